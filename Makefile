@@ -1,0 +1,49 @@
+# `make run` and `make test` need nothing but Python 3.10 to 3.12, make and pip.
+PYTHON ?= $(shell for p in python3.11 python3.12 python3.10 python3; do \
+	$$p -c 'import sys; sys.exit(not (3,10) <= sys.version_info[:2] < (3,13))' 2>/dev/null && echo $$p && break; done)
+VENV := .venv
+BIN := $(VENV)/bin
+OUT ?= out/adas
+RUN_ARGS ?=
+TEST_ARGS ?=
+
+.PHONY: run test check bench refs clean
+
+run: $(VENV)/.installed
+	$(BIN)/skidpad adas --out $(OUT) --resume $(RUN_ARGS)
+
+test: $(VENV)/.tested-with
+	$(BIN)/python -m pytest -n 2 $(TEST_ARGS)
+
+check: $(VENV)/.checked-with
+	$(BIN)/ruff format --check src tests
+	$(BIN)/ruff check src tests
+	$(BIN)/mypy
+	$(BIN)/lint-imports
+
+bench: $(VENV)/.installed
+	$(BIN)/skidpad bench
+
+refs: $(VENV)/.tested-with
+	$(BIN)/python -m pytest tests/references --rewrite-references
+
+$(BIN)/python:
+	@test -n "$(PYTHON)" || { echo "skidpad needs Python 3.10, 3.11 or 3.12 on the PATH"; exit 2; }
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+
+$(VENV)/.installed: $(BIN)/python pyproject.toml
+	$(BIN)/python -m pip install --quiet --prefer-binary -e .
+	touch $@
+
+$(VENV)/.tested-with: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --prefer-binary -e '.[test,server,cluster,ros,learn]'
+	-$(BIN)/python -m pip install --quiet --prefer-binary -e '.[carla]'
+	touch $@
+
+$(VENV)/.checked-with: $(VENV)/.tested-with
+	$(BIN)/python -m pip install --quiet --prefer-binary -e '.[check]'
+	touch $@
+
+clean:
+	rm -rf $(VENV) out build dist

@@ -1,0 +1,16 @@
+"""Skidpad: a proving ground for driving automation in bad weather."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+__version__ = "0.1.0"
+__all__ = ["__version__", "drive"]
+
+
+def __getattr__(name: str) -> Any:
+    # Lazy, so that `skidpad --version` does not pay for numba.
+    if name == "drive":
+        return import_module("skidpad.campaign.drive").drive
+    raise AttributeError(f"module 'skidpad' has no attribute {name!r}")

@@ -1,0 +1,1 @@
+"""Campaign: cells, the one loop, and the pool of workers."""

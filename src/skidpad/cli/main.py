@@ -1,0 +1,35 @@
+"""The command `skidpad`. Each command module is loaded when its command runs, so help is quick."""
+
+from __future__ import annotations
+
+import typer
+
+import skidpad
+
+app = typer.Typer(
+    name="skidpad",
+    help="A proving ground for driving automation in bad weather.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"skidpad {skidpad.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Print the version and exit."
+    ),
+) -> None:
+    """A proving ground for driving automation in bad weather."""
+
+
+def main() -> None:
+    """Run the command line."""
+    app()

@@ -1,0 +1,1 @@
+"""Core: the words that all houses share. It imports no other house."""

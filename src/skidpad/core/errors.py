@@ -1,0 +1,63 @@
+"""Every error that Skidpad raises on purpose.
+
+SkidpadError
+├── InputError        the user gave something that cannot be used; the command exits with 2
+│   ├── ConfigError   a value outside its range, an unknown name or key
+│   ├── FileError     a file that is missing, unreadable, or not what it should be
+│   └── OutputError   an output folder that would be overwritten, a full disk
+├── BackendError      a simulator that does not answer, or answers nonsense
+├── StackError        the stack under test raised, or returned no command
+└── MissingExtra      an optional dependency that is not installed
+"""
+
+from __future__ import annotations
+
+
+class SkidpadError(Exception):
+    """Base of all errors raised on purpose; its text is one sentence for a person."""
+
+
+class InputError(SkidpadError, ValueError):
+    """Input that cannot be used: names the file or field, the value and what is allowed."""
+
+
+class ConfigError(InputError):
+    """A value outside its range, an unknown name or an unknown key."""
+
+
+class FileError(InputError):
+    """A file that is missing, unreadable, or not of the expected kind."""
+
+
+class OutputError(InputError):
+    """A result that cannot be written without losing an earlier one, or at all."""
+
+
+class BackendError(SkidpadError):
+    """A simulator that cannot be reached or breaks its protocol."""
+
+
+class StackError(SkidpadError):
+    """The stack under test failed; this is the outcome of its run."""
+
+
+class MissingExtra(SkidpadError, ImportError):
+    """An optional dependency is needed: says which, and how to install it."""
+
+    def __init__(self, what: str, extra: str) -> None:
+        super().__init__(f"{what} needs an optional part: pip install 'skidpad[{extra}]'")
+        self.extra = extra
+
+
+def require_range(field: str, value: float, low: float, high: float) -> float:
+    """`value` if low <= value <= high; else ConfigError naming field, value and range."""
+    if not low <= value <= high:  # also catches NaN
+        raise ConfigError(f"{field} must be between {low:g} and {high:g}, got {value!r}")
+    return value
+
+
+def require_choice(field: str, value: str, allowed: list[str] | tuple[str, ...]) -> str:
+    """`value` if it is one of `allowed`; else ConfigError that lists them."""
+    if value not in allowed:
+        raise ConfigError(f"unknown {field} {value!r}; choose one of: {', '.join(allowed)}")
+    return value

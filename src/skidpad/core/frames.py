@@ -1,0 +1,86 @@
+"""What a stack receives each tick. A frame is valid until the next step: copy what you keep (X-11)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.states import ContactEvent, EgoEstimate, LaneInvasion
+from skidpad.core.vocabulary import LightState, Supervision
+
+Float32 = NDArray[np.float32]
+
+
+@dataclass(frozen=True, slots=True)
+class CameraImage:
+    """One view; only the field of the camera's modality is there, the others are None.
+
+    Row 0 is the top, column 0 the left.
+    """
+
+    inverse_depth: Float32 | None = None  # (H, W) 1/m, planar; 0 where there is nothing
+    labels: NDArray[np.uint8] | None = None  # (H, W) SemanticClass; may be a strided view
+    instances: NDArray[np.uint16] | None = None  # (H, W) 0 static, else actor index + 1
+    rgb: NDArray[np.uint8] | None = None  # (H, W, 3) red, green, blue
+
+    def depth(self) -> Float32:
+        """(H, W) planar depth in m, +inf where there is nothing; computed at each call."""
+        assert self.inverse_depth is not None, "this camera delivers no depth"
+        with np.errstate(divide="ignore"):
+            metres: Float32 = np.float32(1.0) / self.inverse_depth
+        return metres
+
+
+class RadarPoints(NamedTuple):
+    """n radar returns; azimuth left positive, altitude up positive, velocity negative closing."""
+
+    range: Float32  # m along the ray
+    azimuth: Float32  # rad
+    altitude: Float32  # rad
+    velocity: Float32  # m/s, range rate
+
+    @classmethod
+    def none(cls) -> RadarPoints:
+        """No return."""
+        return cls(*(np.empty(0, dtype=np.float32) for _ in range(4)))
+
+
+class Segments(NamedTuple):
+    """The object level's stand-in for a depth and label image: m vertical runs of equal content.
+
+    Run i covers `width[i]` columns centred on `u[i]` and rows top[i] <= row < bottom[i]; all its
+    pixels carry `label[i]` at planar depth `depth[i]`. Only visible vehicle faces are listed.
+    """
+
+    u: Float32  # px
+    width: Float32  # px
+    top: Float32  # px
+    bottom: Float32  # px
+    depth: Float32  # m
+    label: NDArray[np.uint8]
+
+
+@dataclass(frozen=True, slots=True)
+class SensorFrame:
+    """One tick of all sensors of the ego (decision L-3)."""
+
+    tick: int
+    ego: EgoEstimate
+    images: Mapping[str, CameraImage]  # by sensor id; rendered when first read
+    segments: Mapping[str, Segments]  # by id of the depth camera; object level only, else empty
+    radar: RadarPoints
+    lights: Mapping[int, LightState]  # by signal id: the lights that this stack may see
+    contacts: tuple[ContactEvent, ...] = ()
+    invasions: tuple[LaneInvasion, ...] = ()
+    supervision: Supervision = Supervision.NONE
+    extra: Mapping[str, Any] = field(
+        default_factory=dict
+    )  # readings of sensors the stack asked for
+
+
+# A backend's frame is the ego's sensor frame.
+Frame = SensorFrame

@@ -1,0 +1,97 @@
+"""What a backend is told at reset, and what a scenario player tells actors while driving."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from skidpad.core.geometry import Pose
+from skidpad.core.specs import SensorSpec
+from skidpad.core.states import VehicleCommand
+from skidpad.core.vocabulary import GripModel, RangeModel, SensorLevel
+from skidpad.core.weather import Weather
+
+DT = 0.05  # s, the fixed step of the published runs (A-001); time is a count of these
+
+
+@dataclass(frozen=True, slots=True)
+class LanePosition:
+    """A place on a lane in OpenDRIVE terms, `s` along the road reference line in m."""
+
+    road: int
+    lane: int
+    s: float
+    offset: float = 0.0  # m, left of the lane centre seen in driving direction
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ActorSetup:
+    """One actor at the start. `driver` is "autopilot", or "scripted" for actors moved by commands."""
+
+    name: str
+    type: str  # vehicle type id, "pedestrian", "bicycle" or a prop id
+    place: Pose | LanePosition
+    speed: float = 0.0  # m/s
+    driver: str = "autopilot"
+    rgb: tuple[int, int, int] | None = None  # None: by index from the type's palette
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class TrafficSetup:
+    """Background traffic placed by the backend. `mode` is "fixed" (A-202) or "random" (A-209)."""
+
+    mode: str = "fixed"
+    vehicles: int = 20
+    allow_fewer: bool = False  # A-208
+    variant: str = "listing"  # or "table": which published positions (D-085, D-086)
+    initial_limit_kmh: float | None = None  # None: the map's limit at the place (decision M-6)
+    slow_in_weather: bool = False  # the switch `drivers` (decision M-1)
+    put_wrecks_back: bool = True  # decision M-7
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class FrictionPatch:
+    """A stretch of lane or an area with its own friction ratio, felt wheel by wheel."""
+
+    mu_ratio: float  # of the friction that the surface would have without it
+    polygon: tuple[tuple[float, float], ...] = ()  # world x, y in m; or:
+    road: int | None = None
+    lane: int | None = None
+    s_from: float = 0.0
+    s_to: float = 0.0
+    side: str = "both"  # "left" or "right" half of the lane for split-mu
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Setup:
+    """Everything that a backend needs to begin a run."""
+
+    map: str | Path  # name of a bundled map, or a file
+    weather: Weather
+    specs: tuple[SensorSpec, ...]
+    ego: ActorSetup
+    actors: tuple[ActorSetup, ...] = ()
+    traffic: TrafficSetup | None = None
+    grip: GripModel = GripModel.PHYSICAL
+    range_model: RangeModel = RangeModel.PHYSICAL
+    camera_effect: bool = True  # weather acts on RGB images
+    mu_ref: float = 0.9  # friction at CARLA's tire_friction 3.5 on a dry road
+    level: SensorLevel = SensorLevel.PIXELS
+    render_all: bool = False  # every image every tick, read or not
+    patches: tuple[FrictionPatch, ...] = ()
+    dt: float = DT
+
+
+@dataclass(frozen=True, slots=True)
+class ActorCommand:
+    """A scenario player's word to one actor for the coming step; one of the three forms.
+
+    `place` moves it there with `speed` (ideal actors); `command` drives it through the physics;
+    `present` lets it appear or vanish.
+    """
+
+    actor: str
+    place: Pose | None = None
+    speed: float | None = None
+    command: VehicleCommand | None = None
+    present: bool | None = None

@@ -1,0 +1,164 @@
+"""States of vehicles, commands to them, what a stack says about itself, and the truth."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.geometry import Pose
+from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Tier
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleCommand:
+    """What a driver does: pedals in [0, 1], steer in [-1, 1] with left positive (ISO 8855)."""
+
+    throttle: float = 0.0
+    brake: float = 0.0
+    steer: float = 0.0
+    handbrake: bool = False
+    reverse: bool = False
+
+
+class ActorStates(NamedTuple):
+    """States of n actors as arrays of shape (n,), world frame, SI. Index 0 is the ego.
+
+    The position is the centre of the box's footprint at road height; the velocity is that point's.
+    A named tuple of arrays, so that kernels take it as it is.
+    """
+
+    x: Floats
+    y: Floats
+    z: Floats
+    yaw: Floats
+    pitch: Floats  # body attitude relative to the horizontal
+    roll: Floats
+    vx: Floats
+    vy: Floats
+    yaw_rate: Floats
+    ax: Floats  # body frame, forward
+    ay: Floats  # body frame, left
+    present: NDArray[np.bool_]  # False: not (or no longer) in the world
+
+    @classmethod
+    def empty(cls, n: int) -> ActorStates:
+        """n actors at the origin, at rest, not present."""
+        x, y, z, yaw, pitch, roll, vx, vy, yaw_rate, ax, ay = np.zeros((11, n))
+        present = np.zeros(n, dtype=np.bool_)
+        return cls(x, y, z, yaw, pitch, roll, vx, vy, yaw_rate, ax, ay, present)
+
+    def copy(self) -> ActorStates:
+        """Independent arrays (a frame is valid until the next step, decision X-11)."""
+        return ActorStates._make(a.copy() for a in self)
+
+    def pose(self, i: int) -> Pose:
+        """Pose of actor i."""
+        return Pose(
+            float(self.x[i]),
+            float(self.y[i]),
+            float(self.z[i]),
+            float(self.roll[i]),
+            float(self.pitch[i]),
+            float(self.yaw[i]),
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ActorTable:
+    """What does not change about n actors during a run; row 0 is the ego. Arrays of shape (n,)."""
+
+    names: tuple[str, ...]
+    types: tuple[str, ...]  # vehicle type ids of physics, or "pedestrian", "bicycle", prop ids
+    kind: NDArray[np.uint8]  # ActorKind
+    length: Floats
+    width: Floats
+    height: Floats
+    rgb: NDArray[np.uint8]  # (n, 3) paint
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+
+@dataclass(frozen=True, slots=True)
+class EgoEstimate:
+    """What localisation and the ego's own sensors say."""
+
+    pose: Pose
+    speed: float  # m/s along the body, negative in reverse
+    yaw_rate: float  # rad/s, left positive
+    ax: float  # m/s^2
+    ay: float
+    wheel_speeds: tuple[float, float, float, float]  # m/s at the rim: FL, FR, RL, RR
+    gear: int  # -1 reverse, 0 neutral, 1.. forward
+
+
+@dataclass(frozen=True, slots=True)
+class ContactEvent:
+    """A contact that began in a tick (A-029)."""
+
+    tick: int
+    actor: int  # index of the actor that was touched by the sensor's owner; -1: static
+    static: str  # "" for a vehicle, else "guardrail", "wall", "pole", ...
+    impulse: float  # N s
+    v_closing: float  # m/s, positive when closing
+    x: float
+    y: float
+
+
+@dataclass(frozen=True, slots=True)
+class LaneInvasion:
+    """The ego's outline crossed a lane marking (A-030)."""
+
+    tick: int
+    marking: str  # "solid", "broken", "none", ...
+    road: int
+
+
+@dataclass(frozen=True, slots=True)
+class StackReport:
+    """What a stack says about one tick, for the recording; every field may be absent.
+
+    Distances in m from the sensor, None: no target. Nothing here feeds back into control.
+    """
+
+    status: DetectionStatus | None = None
+    tier: Tier | None = None
+    detected: bool | None = None
+    distance: float | None = None  # measured, as used by the tiers
+    time_gap: float | None = None  # s
+    bumper: float | None = None
+    roof: float | None = None
+    fused: float | None = None  # before the median
+    radar_pre: float | None = None  # nearest point after the pre-filter
+    radar_lane: float | None = None  # nearest point that passed the lane check
+    radar_velocity: float | None = None  # m/s, negative closing
+    radar_points: int | None = None
+    v_target: float | None = None  # m/s, cruise target
+    light_distance: float | None = None
+    light_state: LightState | None = None
+    light_source: LightSource | None = None
+    light_stop: bool | None = None  # a stop is requested
+    hsv: LightState | None = None  # None: not evaluated
+    lane_offset: float | None = None  # m, left positive
+    yaw_error: float | None = None  # rad
+    curvature: float | None = None  # 1/m at the reference point
+    resume_timer: float | None = None  # s
+
+
+@dataclass(frozen=True, slots=True)
+class WorldTruth:
+    """The simulator's truth after a step: for recording, supervision and evaluation only (A-014)."""
+
+    tick: int
+    table: ActorTable
+    states: ActorStates
+    mu: Floats  # (n, 4) friction at the tyres FL, FR, RL, RR; NaN where there is no tyre
+    commands: Floats  # (n, 5) throttle, brake, steer, handbrake, reverse as applied
+    lights: dict[int, LightState]  # by signal id of the map
+    contacts: tuple[ContactEvent, ...]  # of the ego, that began in this tick
+    invasions: tuple[LaneInvasion, ...]

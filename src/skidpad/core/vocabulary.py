@@ -1,0 +1,161 @@
+"""The words that appear in recordings. Decisions compare these, never text for people."""
+
+from __future__ import annotations
+
+from enum import Enum, IntEnum
+
+
+class DetectionStatus(IntEnum):
+    """Where the measured distance of a tick comes from (A-085)."""
+
+    NO_TARGET = 0
+    FUSION_DETECT = 1
+    FUSION_PERSIST = 2
+    RADAR_ACTIVE = 3
+    SAFETY_PERSIST = 4  # compatibility profiles only (A-095)
+
+
+class Tier(IntEnum):
+    """The mode of the tick: which rule of the seven-tier hierarchy acted (A-111, A-139)."""
+
+    NONE = 0
+    HARD_STOP = 1  # tier 1
+    STOPPED_TOO_CLOSE = 2  # tier 2
+    EMERGENCY = 3  # tier 3
+    STOPPED_BEHIND_CAR = 4  # tier 4, holding at a red light
+    APPROACH = 5  # tier 4, approaching a red light behind a lead
+    ACC_HOLD = 6  # tier 5, zone A
+    ACC_OPEN = 7  # tier 5, zone B
+    ACC_CLOSE = 8  # tier 5, zone C
+    LIGHT_STOP = 9  # tier 6, approaching
+    HOLDING_AT_LINE = 10  # tier 6, standing
+    COAST = 11  # tier 7
+    CRUISE = 12  # tier 7
+
+
+class LightState(IntEnum):
+    """State of a traffic light; numbers as in CARLA's protocol."""
+
+    RED = 0
+    YELLOW = 1
+    GREEN = 2
+    OFF = 3
+    UNKNOWN = 4
+
+
+class LightSource(IntEnum):
+    """How the light assist found a light (A-161)."""
+
+    NO_LIGHT = 0
+    IMMEDIATE_TRIGGER = 1
+    MAP_SCAN = 2
+    NO_WAYPOINT = 3
+
+
+class Supervision(IntEnum):
+    """Phase of the recovery supervisor; it pre-empts the stack unless it is NONE (A-179, A-186)."""
+
+    NONE = 0
+    BRAKE = 1
+    REVERSE = 2
+    REALIGN = 3
+    WARM_UP = 4
+
+
+class RelocationReason(IntEnum):
+    """Why the supervisor put the ego somewhere else (A-194)."""
+
+    COLLISION = 1
+    WRONG_WAY = 2
+    STUCK = 3
+
+
+class Outcome(str, Enum):
+    """How a run ended; the last three leave every denominator, counted (decision L-7)."""
+
+    COMPLETED = "completed"
+    COLLISION = "collision"
+    NOT_TRIGGERED = "not_triggered"
+    AGENT_ERROR = "agent_error"
+    CRASHED = "crashed"
+    TIMEOUT = "timeout"
+
+
+class HazardType(str, Enum):
+    """Hazards and candidate hazards of the channels monitor (C-120, C-127 to C-129)."""
+
+    INCONSISTENT_LOCALISATION = "inconsistent_localisation"
+    EGO_TAILGATING = "ego_tailgating"
+    EGO_TAILGATED = "ego_tailgated"
+    CROSSING_OBJECT = "crossing_object"
+    CONFLICTING_PATHS = "conflicting_paths"
+    STUCK_VEHICLE = "stuck_vehicle"
+
+
+class ActorKind(IntEnum):
+    """What an actor is. Vehicles come first: `kind <= MOTORCYCLE`."""
+
+    CAR = 0
+    VAN = 1
+    TRUCK = 2
+    BUS = 3
+    MOTORCYCLE = 4
+    BICYCLE = 5
+    PEDESTRIAN = 6
+    PROP = 7
+
+
+class SemanticClass(IntEnum):
+    """CityScapes class ids as CARLA 0.9.15 numbers them."""
+
+    NONE = 0
+    ROAD = 1
+    SIDEWALK = 2
+    BUILDING = 3
+    WALL = 4
+    FENCE = 5
+    POLE = 6
+    TRAFFIC_LIGHT = 7
+    TRAFFIC_SIGN = 8
+    VEGETATION = 9
+    TERRAIN = 10
+    SKY = 11
+    PEDESTRIAN = 12
+    RIDER = 13
+    CAR = 14
+    TRUCK = 15
+    BUS = 16
+    TRAIN = 17
+    MOTORCYCLE = 18
+    BICYCLE = 19
+    STATIC = 20
+    DYNAMIC = 21
+    OTHER = 22
+    WATER = 23
+    ROAD_LINE = 24
+    GROUND = 25
+    BRIDGE = 26
+    RAIL_TRACK = 27
+    GUARD_RAIL = 28
+
+
+class GripModel(str, Enum):
+    """How weather acts on tyres."""
+
+    NONE = "none"
+    STATISTICAL = "statistical"
+    PHYSICAL = "physical"
+
+
+class RangeModel(str, Enum):
+    """How weather acts on depth, labels and radar; `none` as in CARLA."""
+
+    NONE = "none"
+    PHYSICAL = "physical"
+
+
+class SensorLevel(str, Enum):
+    """Real images and radar points, or geometric detection from boxes (decision M-3)."""
+
+    PIXELS = "pixels"
+    OBJECTS = "objects"

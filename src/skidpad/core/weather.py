@@ -1,0 +1,78 @@
+"""Weather: one record with CARLA's fields plus ice, snow and temperatures (decision M-10)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+from skidpad.core.errors import require_range
+
+PERCENT = (0.0, 100.0)
+RANGES: dict[str, tuple[float, float]] = {
+    "cloudiness": PERCENT,
+    "precipitation": PERCENT,
+    "precipitation_deposits": PERCENT,
+    "wind_intensity": PERCENT,
+    "sun_azimuth_deg": (0.0, 360.0),
+    "sun_altitude_deg": (-90.0, 90.0),
+    "fog_density": PERCENT,
+    "fog_distance": (0.0, 1.0e6),
+    "wetness": PERCENT,
+    "fog_falloff": (0.0, 1.0e3),
+    "scattering_intensity": (0.0, 1.0e3),
+    "mie_scattering_scale": (0.0, 1.0e3),
+    "rayleigh_scattering_scale": (0.0, 1.0e3),
+    "ice_thickness": PERCENT,
+    "snow_depth_mm": (0.0, 2000.0),
+    "air_temperature_c": (-60.0, 60.0),
+    "road_temperature_c": (-60.0, 80.0),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Weather:
+    """The state of sky, air and road. Percentages are CARLA's; `ice_thickness` 100 is 2 cm (B-017)."""
+
+    name: str = ""  # slug
+    title: str = ""  # as published
+    cloudiness: float = 0.0  # percent
+    precipitation: float = 0.0  # percent
+    precipitation_deposits: float = 0.0  # percent of the road under water
+    wind_intensity: float = 0.0  # percent
+    sun_azimuth_deg: float = 0.0
+    sun_altitude_deg: float = 75.0
+    fog_density: float = 0.0  # percent
+    fog_distance: float = 0.0  # m, where fog begins
+    wetness: float = 0.0  # percent
+    fog_falloff: float = 0.0
+    scattering_intensity: float = 0.0
+    mie_scattering_scale: float = 0.0
+    rayleigh_scattering_scale: float = 0.0331
+    ice_thickness: float = 0.0  # percent of 20 mm
+    snow_depth_mm: float = 0.0
+    air_temperature_c: float = 15.0
+    road_temperature_c: float = 15.0
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in RANGES.items():
+            require_range(f"weather.{name}", getattr(self, name), low, high)
+
+    @property
+    def is_night(self) -> bool:
+        """The sun is below the horizon: headlights on (A-218)."""
+        return self.sun_altitude_deg < 0.0
+
+    @property
+    def precipitation_kind(self) -> str:
+        """`rain` or `clear`, the column of M-8."""
+        return "rain" if self.precipitation > 0.0 else "clear"
+
+    @property
+    def rain_with_ice(self) -> bool:
+        """Ice together with falling or standing water; refused where the models cannot say (B-002)."""
+        return self.ice_thickness > 0.0 and (
+            self.precipitation > 0.0 or self.precipitation_deposits > 0.0
+        )
+
+    def values(self) -> dict[str, float]:
+        """The numeric fields by name, in declaration order."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name in RANGES}

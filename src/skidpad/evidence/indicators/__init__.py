@@ -1,0 +1,1 @@
+"""Safety performance indicators over channel frames."""

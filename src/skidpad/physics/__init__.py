@@ -1,0 +1,1 @@
+"""Physics: weather to grip and optics; tyres, vehicles and contacts."""

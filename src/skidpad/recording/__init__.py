@@ -1,0 +1,1 @@
+"""Recording: schemas, writers and readers of everything that a run leaves behind."""

@@ -1,0 +1,1 @@
+"""Report: tables, figures, verdicts and the page."""

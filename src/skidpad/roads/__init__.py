@@ -1,0 +1,1 @@
+"""Roads: OpenDRIVE to baked lane arrays and roadside objects; queries and routing."""

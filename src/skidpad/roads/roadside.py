@@ -1,0 +1,65 @@
+"""What stands beside the road: read by sensors (scene) and by the engine (collision segments)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from numpy.typing import NDArray
+
+
+class BarrierKind(IntEnum):
+    """Linear obstacles."""
+
+    GUARDRAIL = 0
+    WALL = 1
+    KERB = 2
+    FENCE = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Barrier:
+    """A linear obstacle along a polyline."""
+
+    kind: BarrierKind
+    points: NDArray[np.float64]  # (k, 3) foot line
+    height: float  # m
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """A building, a gantry leg or beam, a pole, a sign plate: an upright box."""
+
+    label: int  # SemanticClass
+    x: float
+    y: float
+    z: float  # foot
+    yaw: float
+    length: float
+    width: float
+    height: float
+    solid: bool = True  # hit by vehicles
+    rgb: tuple[int, int, int] = (128, 128, 128)
+
+
+@dataclass(frozen=True, slots=True)
+class SignalHead:
+    """A traffic light's head with three lamps, top down red, yellow, green."""
+
+    signal: int  # OpenDRIVE signal id
+    x: float
+    y: float
+    z: float  # centre of the middle lamp
+    heading: float  # of the traffic that looks at it
+    lamp_diameter: float = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class Roadside:
+    """All of it for one map."""
+
+    barriers: tuple[Barrier, ...] = ()
+    boxes: tuple[Box, ...] = ()
+    heads: tuple[SignalHead, ...] = ()
+    crosswalks: tuple[NDArray[np.float64], ...] = ()  # (k, 3) polygons

@@ -1,0 +1,1 @@
+"""Scenarios: OpenSCENARIO files, their player and writer."""

@@ -1,0 +1,1 @@
+"""Sensors: the scene and what cameras, radar and the object level make of it."""

@@ -1,0 +1,1 @@
+"""Simulation: the backend protocol, the supervisor, and the backends."""

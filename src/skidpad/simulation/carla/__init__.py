@@ -1,0 +1,1 @@
+"""The backend protocol on a real CARLA server."""

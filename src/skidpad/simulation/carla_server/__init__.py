@@ -1,0 +1,1 @@
+"""A server that speaks CARLA's network protocol to the real client."""

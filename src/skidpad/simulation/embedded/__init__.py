@@ -1,0 +1,1 @@
+"""The embedded simulator: no GPU, no download, deterministic."""

@@ -1,0 +1,1 @@
+"""Driving channels and their arbiter."""

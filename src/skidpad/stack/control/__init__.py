@@ -1,0 +1,1 @@
+"""From a measured distance to pedals and steering."""

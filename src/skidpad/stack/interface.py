@@ -1,0 +1,33 @@
+"""What any stack under test looks like (decision L-3). Yours too: `--stack module:Class`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+from skidpad.core.frames import SensorFrame
+from skidpad.core.specs import SensorSpec
+from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.roads.queries import RoadMap
+
+
+class Stack(Protocol):
+    """Constructed as `Class(specs, map, settings)`, then called once per tick.
+
+    Optional: `sensors()` names more sensors, whose readings arrive in `frame.extra` by id;
+    `report` says what it thought, for the recording.
+    """
+
+    def __init__(
+        self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
+    ) -> None: ...
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        """The command for the coming step."""
+        ...
+
+
+class ReportingStack(Stack, Protocol):
+    """A stack that also explains itself."""
+
+    report: StackReport

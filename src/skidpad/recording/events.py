@@ -1,0 +1,86 @@
+"""What happens now and then during a run, one JSON line each in events.jsonl."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, is_dataclass
+from enum import Enum
+from typing import Any
+
+import msgspec
+
+from skidpad.core.errors import FileError
+from skidpad.core.geometry import Pose
+from skidpad.core.states import ContactEvent, LaneInvasion
+from skidpad.core.vocabulary import LightState, RelocationReason
+
+
+@dataclass(frozen=True, slots=True)
+class Relocation:
+    """The supervisor put the ego somewhere else (A-194)."""
+
+    tick: int
+    reason: RelocationReason
+    shift: float  # m moved back along the lane to find clearance
+    old: Pose
+    new: Pose
+
+
+@dataclass(frozen=True, slots=True)
+class LightChange:
+    """A traffic light of the map changed; the first tick lists every light."""
+
+    tick: int
+    signal: int  # OpenDRIVE signal id
+    state: LightState
+
+
+class NoticeSource(str, Enum):
+    """Who has something to say."""
+
+    STACK = "stack"
+    SUPERVISOR = "supervisor"
+    TRAFFIC = "traffic"
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """An error of the stack, a retry of the supervisor (A-192), a wreck put back (M-7)."""
+
+    tick: int
+    source: NoticeSource
+    text: str
+
+
+Event = ContactEvent | LaneInvasion | Relocation | LightChange | Notice
+KINDS: dict[str, type[Event]] = {
+    "contact": ContactEvent,
+    "lane_invasion": LaneInvasion,
+    "relocation": Relocation,
+    "light": LightChange,
+    "notice": Notice,
+}
+NAMES = {kind: name for name, kind in KINDS.items()}
+
+
+def encode_events(events: Iterable[Event]) -> bytes:
+    """One line per event, in the order given."""
+    lines = [msgspec.json.encode({"event": NAMES[type(e)], **_plain(e)}) for e in events]
+    return b"".join(line + b"\n" for line in lines)
+
+
+def decode_events(text: bytes, name: str = "events.jsonl") -> tuple[Event, ...]:
+    """The inverse; FileError names the line that cannot be read."""
+    events: list[Event] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        try:
+            fields = msgspec.json.decode(line)
+            events.append(msgspec.convert(fields, KINDS[fields.pop("event")]))
+        except (msgspec.MsgspecError, KeyError, TypeError, AttributeError) as error:
+            raise FileError(f"{name}, line {number} is not an event: {error}") from error
+    return tuple(events)
+
+
+def _plain(event: Event) -> dict[str, Any]:
+    assert is_dataclass(event)
+    return asdict(event)

@@ -1,0 +1,164 @@
+"""A run's log on disk: ticks.parquet (one row per tick) and events.jsonl, and its content hash."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any, TypeVar
+
+import msgspec
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from skidpad.core.errors import FileError
+from skidpad.core.states import ActorTable
+from skidpad.recording.events import decode_events, encode_events
+from skidpad.recording.files import content_hash, read_parquet, write_bytes, write_parquet
+from skidpad.recording.runlog import (
+    ActorSeries,
+    CommandSeries,
+    EgoSeries,
+    LogHeader,
+    ReportSeries,
+    RunLog,
+)
+
+TICKS, EVENTS = "ticks.parquet", "events.jsonl"
+SCHEMA_VERSION = "1"
+KEY = "skidpad"
+BOOLEANS = {
+    "applied_handbrake",
+    "applied_reverse",
+    "requested_handbrake",
+    "requested_reverse",
+    "stack_detected",
+    "stack_light_stop",
+}
+INTEGERS = {
+    "ego_gear",
+    "stack_status",
+    "stack_tier",
+    "stack_radar_points",
+    "stack_light_state",
+    "stack_light_source",
+    "stack_hsv",
+}
+GROUPS = (
+    ("ego_", EgoSeries._fields),
+    ("applied_", CommandSeries._fields),
+    ("requested_", CommandSeries._fields),
+    ("stack_", ReportSeries._fields),
+)
+S = TypeVar("S", EgoSeries, CommandSeries, ReportSeries)
+
+
+def tick_table(log: RunLog) -> pl.DataFrame:
+    """One row per tick: scalars typed and null where absent, actors as arrays of n numbers."""
+    columns: dict[str, Any] = {
+        "tick": log.tick,
+        "supervision": log.supervision.astype(np.uint8),
+        "weather": log.weather.astype(np.uint8),
+    }
+    groups = (log.ego, log.applied, log.requested, log.report)
+    for (prefix, names), series in zip(GROUPS, groups, strict=True):
+        for field, values in zip(names, series, strict=True):
+            columns[prefix + field] = _typed(prefix + field, values)
+    columns.update(zip(ActorSeries._fields, log.actors, strict=True))
+    columns["present"] = log.present.astype(np.uint8)
+    columns["mu"] = log.mu.reshape(len(log), -1)
+    return pl.DataFrame(columns)
+
+
+def _typed(name: str, values: NDArray[np.float64]) -> pl.Series:
+    column = pl.Series(name, np.ascontiguousarray(values), nan_to_null=True)
+    kind = pl.Boolean if name in BOOLEANS else pl.Int32 if name in INTEGERS else pl.Float64
+    return pl.Series(name, column.cast(kind))
+
+
+def log_hash(log: RunLog) -> str:
+    """Content hash of a log (decision X-1): equal for equal runs, wherever they were driven."""
+    text = msgspec.json.encode(_head(log), order="deterministic") + encode_events(log.events)
+    return content_hash([tick_table(log)], text)
+
+
+def write_log(folder: Path, log: RunLog) -> str:
+    """Write ticks.parquet and events.jsonl into `folder`, each atomically; returns the hash."""
+    head = msgspec.json.encode(_head(log), order="deterministic")
+    table, events = tick_table(log), encode_events(log.events)
+    write_bytes(folder / EVENTS, events)
+    write_parquet(folder / TICKS, table, {KEY: head.decode()})
+    return content_hash([table], head + events)
+
+
+def read_log(folder: Path) -> RunLog:
+    """The log in `folder`; FileError names what is missing or not a log."""
+    table, metadata = read_parquet(folder / TICKS)
+    if KEY not in metadata:
+        raise FileError(f"{folder / TICKS} is a Parquet file, but not a tick log")
+    head = msgspec.json.decode(metadata[KEY])
+    if head["schema"] != SCHEMA_VERSION:
+        raise FileError(
+            f"{folder / TICKS} has schema {head['schema']}, this version reads {SCHEMA_VERSION}"
+        )
+    try:
+        text = (folder / EVENTS).read_bytes()
+    except OSError as error:
+        raise FileError(f"cannot read {folder / EVENTS}: {error.strerror}") from error
+    actors = _table_from(head["actors"])
+    n = len(actors)
+    return RunLog(
+        header=msgspec.convert(head["header"], LogHeader),
+        table=actors,
+        tick=table["tick"].to_numpy(),
+        actors=ActorSeries(*(_matrix(table, f, n) for f in ActorSeries._fields)),
+        present=_matrix(table, "present", n).astype(np.bool_),
+        mu=_matrix(table, "mu", 4 * n).reshape(-1, n, 4),
+        ego=_series(table, "ego_", EgoSeries),
+        applied=_series(table, "applied_", CommandSeries),
+        requested=_series(table, "requested_", CommandSeries),
+        report=_series(table, "stack_", ReportSeries),
+        supervision=table["supervision"].to_numpy().astype(np.int64),
+        weather=table["weather"].to_numpy().astype(np.int64),
+        weathers=tuple(head["weathers"]),
+        events=decode_events(text, str(folder / EVENTS)),
+    )
+
+
+def _matrix(table: pl.DataFrame, name: str, width: int) -> NDArray[Any]:
+    values: NDArray[Any] = table[name].to_numpy().reshape(len(table), width)
+    return values
+
+
+def _series(table: pl.DataFrame, prefix: str, kind: type[S]) -> S:
+    columns = (table[prefix + name].cast(pl.Float64) for name in kind._fields)
+    return kind(*(c.fill_null(float("nan")).to_numpy() for c in columns))
+
+
+def _head(log: RunLog) -> dict[str, Any]:
+    t = log.table
+    return {
+        "schema": SCHEMA_VERSION,
+        "header": log.header,
+        "weathers": log.weathers,
+        "actors": {
+            "names": t.names,
+            "types": t.types,
+            "kind": t.kind.tolist(),
+            "length": t.length.tolist(),
+            "width": t.width.tolist(),
+            "height": t.height.tolist(),
+            "rgb": t.rgb.tolist(),
+        },
+    }
+
+
+def _table_from(head: dict[str, Any]) -> ActorTable:
+    return ActorTable(
+        names=tuple(head["names"]),
+        types=tuple(head["types"]),
+        kind=np.array(head["kind"], dtype=np.uint8),
+        length=np.array(head["length"], dtype=np.float64),
+        width=np.array(head["width"], dtype=np.float64),
+        height=np.array(head["height"], dtype=np.float64),
+        rgb=np.array(head["rgb"], dtype=np.uint8).reshape(-1, 3),
+    )

@@ -1,0 +1,153 @@
+"""The log of one run as a value: everything a metric may look at (A-260, decision L-6).
+
+Row k is one moment: the world at `tick[k]`, what the ego's sensors said of it, and what the stack
+answered. World frame, ISO 8855, SI. In the arrays here NaN means absent; in the file it is null.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.states import ActorTable, ContactEvent, LaneInvasion
+from skidpad.recording.events import Event, LightChange, Notice, Relocation
+
+Floats = NDArray[np.float64]
+Float32 = NDArray[np.float32]
+Ints = NDArray[np.int64]
+
+
+class ActorSeries(NamedTuple):
+    """Motion of n actors over T ticks, arrays (T, n); column 0 is the ego."""
+
+    x: Float32
+    y: Float32
+    z: Float32
+    yaw: Float32
+    vx: Float32
+    vy: Float32
+    yaw_rate: Float32
+    ax: Float32  # body frame
+    ay: Float32
+
+
+class EgoSeries(NamedTuple):
+    """What localisation and the ego's own sensors said, arrays (T,)."""
+
+    x: Floats
+    y: Floats
+    yaw: Floats
+    speed: Floats
+    yaw_rate: Floats
+    ax: Floats
+    ay: Floats
+    gear: Floats
+
+
+class CommandSeries(NamedTuple):
+    """Commands, arrays (T,); booleans as 0 and 1."""
+
+    throttle: Floats
+    brake: Floats
+    steer: Floats
+    handbrake: Floats
+    reverse: Floats
+
+
+class ReportSeries(NamedTuple):
+    """The stack's report, arrays (T,), NaN where it said nothing; fields of `core.StackReport`."""
+
+    status: Floats
+    tier: Floats
+    detected: Floats
+    distance: Floats
+    time_gap: Floats
+    bumper: Floats
+    roof: Floats
+    fused: Floats
+    radar_pre: Floats
+    radar_lane: Floats
+    radar_velocity: Floats
+    radar_points: Floats
+    v_target: Floats
+    light_distance: Floats
+    light_state: Floats
+    light_source: Floats
+    light_stop: Floats
+    hsv: Floats
+    lane_offset: Floats
+    yaw_error: Floats
+    curvature: Floats
+    resume_timer: Floats
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class LogHeader:
+    """What holds for the whole run. `about` says which run it is: config, seed, profile, ..."""
+
+    map: str
+    map_hash: str
+    dt: float  # s
+    about: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class RunLog:
+    """One run, T ticks and n actors."""
+
+    header: LogHeader
+    table: ActorTable
+    tick: Ints  # (T,)
+    actors: ActorSeries
+    present: NDArray[np.bool_]  # (T, n)
+    mu: Float32  # (T, n, 4) at the tyres FL, FR, RL, RR; NaN where there is none
+    ego: EgoSeries
+    applied: CommandSeries  # what drove the ego into this moment
+    requested: CommandSeries  # what the stack asked for in answer to it
+    report: ReportSeries
+    supervision: Ints  # (T,) core.Supervision
+    weather: Ints  # (T,) index into `weathers`
+    weathers: tuple[str, ...]  # slugs
+    events: tuple[Event, ...]  # in order of ticks
+
+    def __len__(self) -> int:
+        return len(self.tick)
+
+    @property
+    def t(self) -> Floats:
+        """(T,) s of simulated time."""
+        return np.asarray(self.tick * self.header.dt, dtype=np.float64)
+
+    @property
+    def v_ego(self) -> Floats:
+        """(T,) m/s, true speed of the ego over ground."""
+        v: Floats = np.hypot(self.actors.vx[:, 0], self.actors.vy[:, 0]).astype(np.float64)
+        return v
+
+    @property
+    def contacts(self) -> tuple[ContactEvent, ...]:
+        """Contacts of the ego."""
+        return tuple(e for e in self.events if isinstance(e, ContactEvent))
+
+    @property
+    def invasions(self) -> tuple[LaneInvasion, ...]:
+        """Markings that the ego's outline crossed."""
+        return tuple(e for e in self.events if isinstance(e, LaneInvasion))
+
+    @property
+    def relocations(self) -> tuple[Relocation, ...]:
+        """Moves of the ego by the supervisor."""
+        return tuple(e for e in self.events if isinstance(e, Relocation))
+
+    @property
+    def lights(self) -> tuple[LightChange, ...]:
+        """Changes of traffic lights."""
+        return tuple(e for e in self.events if isinstance(e, LightChange))
+
+    @property
+    def notices(self) -> tuple[Notice, ...]:
+        """What stack, supervisor and traffic had to say."""
+        return tuple(e for e in self.events if isinstance(e, Notice))

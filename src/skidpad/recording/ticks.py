@@ -1,0 +1,140 @@
+"""The recorder of one run: copies each moment into arrays, and nothing more."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from operator import attrgetter
+
+import numpy as np
+
+from skidpad.core.frames import SensorFrame
+from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
+from skidpad.core.vocabulary import LightState, Supervision
+from skidpad.recording.events import Event, LightChange, Notice, NoticeSource, Relocation
+from skidpad.recording.runlog import (
+    ActorSeries,
+    CommandSeries,
+    EgoSeries,
+    LogHeader,
+    ReportSeries,
+    RunLog,
+)
+
+REPORT_FIELDS = tuple(f.name for f in fields(StackReport))
+read_report = attrgetter(*REPORT_FIELDS)
+read_states = attrgetter(*ActorSeries._fields)
+NO_REPORT = (None,) * len(REPORT_FIELDS)
+N_EGO, N_COMMAND, N_REPORT = len(EgoSeries._fields), len(CommandSeries._fields), len(REPORT_FIELDS)
+N_ROW = N_EGO + 2 * N_COMMAND + N_REPORT
+GROWTH = 2
+
+
+class TickLog:
+    """Collects the ticks of one run; `finish` gives the log as a value."""
+
+    def __init__(
+        self, table: ActorTable, header: LogHeader, weather: str = "", capacity: int = 10_000
+    ) -> None:
+        """capacity: expected number of ticks; more are welcome and cost a copy."""
+        self.table, self.header = table, header
+        self._n = 0
+        n = len(table)
+        self._tick = np.zeros((capacity, 3), dtype=np.int64)  # tick, supervision, weather
+        self._row = np.full((capacity, N_ROW), np.nan)
+        self._actors = np.zeros((len(ActorSeries._fields), capacity, n), dtype=np.float32)
+        self._present = np.zeros((capacity, n), dtype=np.bool_)
+        self._mu = np.full((capacity, n, 4), np.nan, dtype=np.float32)
+        self._events: list[Event] = []
+        self._lights: dict[int, LightState] = {}
+        self._weathers = [weather]
+        self._weather = 0
+
+    def __len__(self) -> int:
+        return self._n
+
+    def append(
+        self,
+        truth: WorldTruth,
+        frame: SensorFrame,
+        command: VehicleCommand,
+        report: StackReport | None,
+        supervision: Supervision = Supervision.NONE,
+    ) -> None:
+        """Record one moment: `truth` and `frame` of the same tick, and the stack's answer to it."""
+        assert truth.tick == frame.tick, "truth and frame must be of one moment"
+        k = self._n
+        if k == len(self._tick):
+            self._grow()
+        self._tick[k] = (truth.tick, supervision, self._weather)
+        ego = frame.ego
+        self._row[k] = (
+            *(ego.pose.x, ego.pose.y, ego.pose.yaw),
+            *(ego.speed, ego.yaw_rate, ego.ax, ego.ay, ego.gear),
+            *truth.commands[0].tolist(),
+            *(command.throttle, command.brake, command.steer),
+            *(command.handbrake, command.reverse),
+            *(NO_REPORT if report is None else read_report(report)),
+        )
+        for buffer, values in zip(self._actors, read_states(truth.states), strict=True):
+            buffer[k] = values
+        self._present[k] = truth.states.present
+        self._mu[k] = truth.mu
+        if truth.contacts or truth.invasions:
+            self._events += [*truth.contacts, *truth.invasions]
+        if truth.lights != self._lights:
+            self._note_lights(truth)
+        self._n = k + 1
+
+    def set_weather(self, slug: str) -> None:
+        """The weather from the next moment on (A-217, A-231)."""
+        if slug not in self._weathers:
+            self._weathers.append(slug)
+        self._weather = self._weathers.index(slug)
+
+    def relocated(self, relocation: Relocation) -> None:
+        """The supervisor moved the ego (A-194)."""
+        self._events.append(relocation)
+
+    def notice(self, tick: int, source: NoticeSource, text: str) -> None:
+        """Something that a reader of the log should know."""
+        self._events.append(Notice(tick, source, text))
+
+    def finish(self) -> RunLog:
+        """The log so far; arrays are views of the recorder's own until it grows."""
+        k = self._n
+        columns = self._row[:k].T
+        ego, applied, requested, report = np.split(
+            columns, np.cumsum([N_EGO, N_COMMAND, N_COMMAND])
+        )
+        return RunLog(
+            header=self.header,
+            table=self.table,
+            tick=self._tick[:k, 0],
+            actors=ActorSeries(*self._actors[:, :k]),
+            present=self._present[:k],
+            mu=self._mu[:k],
+            ego=EgoSeries(*ego),
+            applied=CommandSeries(*applied),
+            requested=CommandSeries(*requested),
+            report=ReportSeries(*report),
+            supervision=self._tick[:k, 1],
+            weather=self._tick[:k, 2],
+            weathers=tuple(self._weathers),
+            events=tuple(sorted(self._events, key=lambda e: e.tick)),
+        )
+
+    def _note_lights(self, truth: WorldTruth) -> None:
+        for signal, state in truth.lights.items():
+            if self._lights.get(signal) != state:
+                self._events.append(LightChange(truth.tick, signal, state))
+        self._lights = dict(truth.lights)
+
+    def _grow(self) -> None:
+        more = max(64, (GROWTH - 1) * len(self._tick))
+        self._tick = np.concatenate([self._tick, np.zeros((more, 3), np.int64)])
+        self._row = np.concatenate([self._row, np.full((more, N_ROW), np.nan)])
+        n = len(self.table)
+        empty = np.zeros((len(self._actors), more, n), np.float32)
+        self._actors = np.concatenate([self._actors, empty], axis=1)
+        self._present = np.concatenate([self._present, np.zeros((more, n), np.bool_)])
+        self._mu = np.concatenate([self._mu, np.full((more, n, 4), np.nan, np.float32)])

@@ -1,0 +1,136 @@
+"""Upright boxes, walls and mounted sensors as arrays for kernels: the geometry of the object level."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.geometry import Pose
+from skidpad.core.jit import kernel
+from skidpad.core.states import ActorStates
+from skidpad.roads.roadside import Roadside
+
+Floats = NDArray[np.float64]
+
+
+class Boxes(NamedTuple):
+    """n upright boxes standing at z; arrays (n,)."""
+
+    x: Floats
+    y: Floats
+    z: Floats
+    yaw: Floats
+    length: Floats
+    width: Floats
+    height: Floats
+
+
+class Walls(NamedTuple):
+    """n vertical rectangles over ground segments; arrays (n,)."""
+
+    x0: Floats
+    y0: Floats
+    z0: Floats
+    x1: Floats
+    y1: Floats
+    z1: Floats
+    height: Floats
+
+
+class Mount(NamedTuple):
+    """A sensor on the ego: origin (3,) and rotation (3, 3) in the ego's frame."""
+
+    origin: Floats
+    rotation: Floats
+
+
+def mount_of(pose: Pose) -> Mount:
+    """A mounting pose as arrays for kernels."""
+    return Mount(np.array([pose.x, pose.y, pose.z]), np.ascontiguousarray(pose.rotation()))
+
+
+@kernel
+def placed(mount: Mount, states: ActorStates) -> Mount:
+    """The ego's sensor seen from the world, body pitch and roll included (`Pose.rotation`)."""
+    cr, sr = np.cos(states.roll[0]), np.sin(states.roll[0])
+    cp, sp = np.cos(states.pitch[0]), np.sin(states.pitch[0])
+    cy, sy = np.cos(states.yaw[0]), np.sin(states.yaw[0])
+    body = np.array(
+        [
+            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+            [-sp, cp * sr, cp * cr],
+        ]
+    )
+    origin = np.empty(3)
+    rotation = np.empty((3, 3))
+    centre = (states.x[0], states.y[0], states.z[0])
+    for i in range(3):
+        origin[i] = centre[i]
+        for k in range(3):
+            origin[i] += body[i, k] * mount.origin[k]
+            rotation[i, k] = 0.0
+            for m in range(3):
+                rotation[i, k] += body[i, m] * mount.rotation[m, k]
+    return Mount(origin, rotation)
+
+
+def walls_of(roadside: Roadside) -> Walls:
+    """Every stretch of barrier as a vertical rectangle."""
+    rows = [
+        (*a, *b, barrier.height)
+        for barrier in roadside.barriers
+        for a, b in zip(barrier.points[:-1], barrier.points[1:], strict=True)
+    ]
+    return Walls(*np.array(rows, dtype=np.float64).reshape(-1, 7).T.copy())
+
+
+def posts_of(roadside: Roadside) -> Boxes:
+    """Every roadside box."""
+    rows = [(b.x, b.y, b.z, b.yaw, b.length, b.width, b.height) for b in roadside.boxes]
+    return Boxes(*np.array(rows, dtype=np.float64).reshape(-1, 7).T.copy())
+
+
+@kernel
+def walls_in_view(
+    origin: Floats, yaw: float, slope: float, walls: Walls, reach: float
+) -> NDArray[np.int64]:
+    """Walls of which a part may lie within `reach` and |left| <= slope * forward."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    keep = np.empty(walls.x0.size, np.int64)
+    n = 0
+    for w in range(walls.x0.size):
+        ax, ay = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
+        bx, by = walls.x1[w] - origin[0], walls.y1[w] - origin[1]
+        if abs(ax) + abs(ay) > 1.5 * reach + abs(bx - ax) + abs(by - ay):
+            continue
+        af, al = c * ax + s * ay, -s * ax + c * ay
+        bf, bl = c * bx + s * by, -s * bx + c * by
+        behind = af < 0.0 and bf < 0.0
+        left = al > slope * af and bl > slope * bf
+        right = -al > slope * af and -bl > slope * bf
+        if not (behind or left or right):
+            keep[n] = w
+            n += 1
+    return keep[:n]
+
+
+@kernel
+def boxes_in_view(
+    origin: Floats, yaw: float, slope: float, boxes: Boxes, reach: float
+) -> NDArray[np.int64]:
+    """Boxes of which a part may lie within `reach` and |left| <= slope * forward."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    stretch = np.hypot(1.0, slope)
+    keep = np.empty(boxes.x.size, np.int64)
+    n = 0
+    for b in range(boxes.x.size):
+        half = 0.5 * np.hypot(boxes.length[b], boxes.width[b])
+        dx, dy = boxes.x[b] - origin[0], boxes.y[b] - origin[1]
+        forward, left = c * dx + s * dy, -s * dx + c * dy
+        if -half < forward < reach + half and abs(left) - slope * forward < half * stretch:
+            keep[n] = b
+            n += 1
+    return keep[:n]

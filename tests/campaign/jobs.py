@@ -1,0 +1,42 @@
+"""Jobs that the tests of the pool send to worker processes."""
+
+import os
+import signal
+import time
+from pathlib import Path
+
+
+def square(n):
+    return n * n
+
+
+def odd_only(n):
+    if n % 2 == 0:
+        raise ValueError(f"{n} is even")
+    return n
+
+
+def suicide(path):
+    with open(path, "a") as f:
+        f.write("x")
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def sleep(seconds):
+    time.sleep(seconds)
+
+
+def die_first(path):
+    if not Path(path).exists():
+        Path(path).touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return "second"
+
+
+def write_pid_and_sleep(path):
+    Path(path).write_text(str(os.getpid()))
+    time.sleep(60)
+
+
+def environment(name):
+    return os.environ.get(name)

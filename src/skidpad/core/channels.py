@@ -28,3 +28,47 @@ class ChannelFrame(NamedTuple):
     prediction_t: Floats  # (p,) relative to `t`
     ids: NDArray[np.int64]  # (n,) -1: this channel gives no identity
     classes: NDArray[np.int64]  # (n,) SemanticClass, -1: unknown
+
+
+class TruthFrame(NamedTuple):
+    """The true world at one cycle, for evaluation only: no indicator or rule may read it (C-021).
+
+    Same conventions as `ChannelFrame`; `mu` is the friction available at an actor's tyres.
+    """
+
+    t: float  # s
+    ego: Floats  # (5,) x, y, heading, vx, vy
+    ego_polygon: Floats  # (k, 2)
+    ego_mu: float
+    actors: Floats  # (n, 5) x, y, heading, vx, vy
+    polygons: Floats  # (n, k, 2), rows beyond polygon_size are NaN
+    polygon_size: NDArray[np.int64]  # (n,)
+    ids: NDArray[np.int64]  # (n,)
+    classes: NDArray[np.int64]  # (n,) SemanticClass
+    mu: Floats  # (n,)
+
+
+class Decision(NamedTuple):
+    """Which channel drives from `t` on, and why."""
+
+    t: float  # s
+    driving: str
+    reason: str
+    scores: tuple[float, ...]  # safety score per channel, NaN: not evaluated
+
+
+class Context(NamedTuple):
+    """Words about the drive from `t` on: route, weather, map, versions."""
+
+    t: float  # s
+    entries: dict[str, str]
+
+
+class Cycle(NamedTuple):
+    """One step of the evaluation grid: what each channel last said, in the recording's order."""
+
+    k: int
+    t: float  # s, time of the grid
+    frames: tuple[ChannelFrame | None, ...]  # None: nothing fresh enough
+    driving: int | None = None  # index of the driving channel, None: not recorded
+    truth: TruthFrame | None = None

@@ -1,0 +1,287 @@
+"""Channel recordings: MCAP with the schema of channels.proto embedded, one topic per channel.
+
+A file cut short or damaged in places is read as far as it goes; `Losses` says what was lost.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Protocol
+
+import mcap.records
+from google.protobuf.message import DecodeError
+from mcap.stream_reader import StreamReader, breakup_chunk
+from mcap.writer import Writer
+
+from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
+from skidpad.core.errors import ConfigError, FileError, OutputError
+from skidpad.recording import channel_codec as codec
+from skidpad.recording import channels_pb2 as pb
+
+CHANNEL_TOPIC = "/channels/"
+TRUTH_TOPIC = "/truth"
+DECISION_TOPIC = "/arbiter"
+CONTEXT_TOPIC = "/context"
+CHUNK_SIZE = 256 * 1024  # bytes; what a power cut can cost
+RECORD_LIMIT = 64 * 1024 * 1024  # bytes; a longer record is damage
+FLUSH_EVERY = 1.0  # s of recorded time
+NS = 1_000_000_000
+
+Item = ChannelFrame | TruthFrame | Decision | Context
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One item of a recording; `channel` is the index of the driving channel that said it."""
+
+    channel: int | None  # None: truth, decision or context
+    t: float  # s
+    item: Item
+
+
+@dataclass(slots=True)
+class Losses:
+    """What a recording should hold and did not give; words for people come from `report`."""
+
+    cut: bool = False  # the file ends before its footer
+    chunks: int = 0  # damaged chunks that were skipped
+    malformed: int = 0  # messages whose content does not fit together
+    foreign: int = 0  # messages of topics or types that are not read
+    out_of_order: int = 0  # messages older than their channel's newest
+    jumps: int = 0  # single messages with a time far ahead of all others
+    truth_missing: int = 0
+    stale: dict[str, int] = field(
+        default_factory=dict
+    )  # cycles without a fresh message, by channel
+
+    def any(self) -> bool:
+        """Whether anything at all was lost."""
+        return self.cut or bool(
+            self.chunks or self.malformed or self.out_of_order or self.jumps or self.stale
+        )
+
+
+class ChannelSource(Protocol):
+    """Anything that replays what channels said: an MCAP file, a ROS bag, a list in memory."""
+
+    channels: tuple[str, ...]
+    losses: Losses
+
+    def messages(self) -> Iterator[Message]:
+        """All messages, oldest first as far as the recording is in order."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class TopicInfo:
+    """What `skidpad channels info` says about a topic."""
+
+    topic: str
+    schema: str
+    messages: int
+    t_first: float  # s
+    t_last: float
+
+
+class ChannelWriter:
+    """Writes a channel recording; times must not run backwards by the caller's own clock."""
+
+    def __init__(self, path: Path, channels: Sequence[str]) -> None:
+        if not channels or len(set(channels)) != len(channels):
+            raise ConfigError(f"channels must be different names, got {list(channels)}")
+        self.channels = tuple(channels)
+        try:
+            self._file = path.open("wb")
+        except OSError as error:
+            raise OutputError(f"{path}: cannot be written ({error.strerror})") from error
+        self._writer = Writer(self._file, chunk_size=CHUNK_SIZE)
+        self._writer.start(profile="skidpad", library="skidpad")
+        self._writer.add_metadata("skidpad", {"channels": json.dumps(list(channels))})
+        schemas = {m: self._schema(m) for m in ("Channel", "Truth", "Decision", "Context")}
+        self._topics = {
+            name: self._topic(CHANNEL_TOPIC + name, schemas["Channel"]) for name in channels
+        }
+        self._truth = self._topic(TRUTH_TOPIC, schemas["Truth"])
+        self._decision = self._topic(DECISION_TOPIC, schemas["Decision"])
+        self._context = self._topic(CONTEXT_TOPIC, schemas["Context"])
+        self._flushed_at = -float("inf")
+
+    def _schema(self, message: str) -> int:
+        descriptors = pb.DESCRIPTOR.serialized_pb
+        # a FileDescriptorSet with one file: field 1, length-delimited
+        data = b"\x0a" + _varint(len(descriptors)) + descriptors
+        return int(self._writer.register_schema(f"skidpad.{message}", "protobuf", data))
+
+    def _topic(self, topic: str, schema: int) -> int:
+        return int(self._writer.register_channel(topic, "protobuf", schema))
+
+    def write(self, channel: str, frame: ChannelFrame) -> None:
+        """Append what `channel` said."""
+        self._add(self._topics[channel], frame.t, codec.message_from_frame(frame))
+
+    def write_truth(self, truth: TruthFrame) -> None:
+        """Append the true world."""
+        self._add(self._truth, truth.t, codec.message_from_truth(truth))
+
+    def write_decision(self, decision: Decision) -> None:
+        """Append the arbiter's word."""
+        self._add(self._decision, decision.t, codec.message_from_decision(decision))
+
+    def write_context(self, context: Context) -> None:
+        """Append words about the drive."""
+        self._add(self._context, context.t, codec.message_from_context(context))
+
+    def _add(self, topic: int, t: float, message: Any) -> None:
+        if not 0.0 <= t < 1.8e10:  # MCAP stores unsigned nanoseconds
+            raise ConfigError(f"time of a channel message must be in [0, 1.8e10) s, got {t!r}")
+        stamp = round(t * NS)
+        self._writer.add_message(topic, stamp, message.SerializeToString(), stamp)
+        if t - self._flushed_at >= FLUSH_EVERY:
+            self._file.flush()
+            self._flushed_at = t
+
+    def close(self) -> None:
+        """Finish the file; safe to call twice."""
+        if not self._file.closed:
+            self._writer.finish()  # type: ignore[no-untyped-call]
+            self._file.close()
+
+    def __enter__(self) -> ChannelWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+_READERS: dict[str, Callable[[Any], Item]] = {
+    "skidpad.Channel": codec.frame_from_message,
+    "skidpad.Truth": codec.truth_from_message,
+    "skidpad.Decision": codec.decision_from_message,
+    "skidpad.Context": codec.context_from_message,
+}
+
+
+class McapRecording:
+    """A channel recording on disk. Reads front to back, so that a cut file still reads."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.losses = Losses()
+        self.topics = self._scan()
+        names = [t.topic for t in self.topics if t.schema == "skidpad.Channel"]
+        if not names:
+            raise FileError(f"{path}: holds no channel topics of type skidpad.Channel")
+        self.channels = tuple(name.removeprefix(CHANNEL_TOPIC) for name in names)
+
+    def messages(self) -> Iterator[Message]:
+        """All messages; `losses` is complete once they have been read."""
+        self.losses = Losses()
+        index = {CHANNEL_TOPIC + name: i for i, name in enumerate(self.channels)}
+        for topic, schema, record in self._records(self.losses):
+            item = self._item(schema, record.data)
+            if item is None:
+                continue
+            channel = index.get(topic) if isinstance(item, ChannelFrame) else None
+            yield Message(channel, item.t, item)
+
+    def _item(self, schema: str, data: bytes) -> Item | None:
+        reader = _READERS.get(schema)
+        if reader is None:
+            self.losses.foreign += 1
+            return None
+        try:
+            return reader(getattr(pb, schema.removeprefix("skidpad.")).FromString(data))
+        except (FileError, ValueError, OverflowError, DecodeError):
+            self.losses.malformed += 1
+            return None
+
+    def _scan(self) -> tuple[TopicInfo, ...]:
+        seen: dict[str, tuple[str, int, float, float]] = {}
+        for topic, schema, record in self._records(self.losses):
+            t = record.log_time / NS
+            _, count, first, last = seen.get(topic, (schema, 0, t, t))
+            seen[topic] = (schema, count + 1, min(first, t), max(last, t))
+        return tuple(TopicInfo(topic, *seen[topic]) for topic in self._ordered(list(seen)))
+
+    def _ordered(self, topics: list[str]) -> list[str]:
+        """Channels in the order of the writer's metadata where it survives, then by name."""
+        rank = {CHANNEL_TOPIC + name: i for i, name in enumerate(self._declared)}
+        return sorted(topics, key=lambda topic: (rank.get(topic, len(rank)), topic))
+
+    def _records(self, losses: Losses) -> Iterator[tuple[str, str, mcap.records.Message]]:
+        self._declared: list[str] = []
+        schemas: dict[int, str] = {}
+        channels: dict[int, tuple[str, str]] = {}
+        for record in self._top_level(losses):
+            for inner in _opened(record, losses):
+                if isinstance(inner, mcap.records.Schema):
+                    schemas[inner.id] = inner.name
+                elif isinstance(inner, mcap.records.Channel):
+                    channels[inner.id] = (inner.topic, schemas.get(inner.schema_id, ""))
+                elif isinstance(inner, mcap.records.Metadata) and inner.name == "skidpad":
+                    self._declared = _names(inner.metadata.get("channels", "[]"))
+                elif isinstance(inner, mcap.records.Message):
+                    if inner.channel_id not in channels:
+                        losses.malformed += 1
+                        continue
+                    yield (*channels[inner.channel_id], inner)
+
+    def _top_level(self, losses: Losses) -> Iterator[Any]:
+        try:
+            stream = self.path.open("rb")
+        except OSError as error:
+            raise FileError(f"{self.path}: cannot be read ({error.strerror})") from error
+        with stream:
+            if stream.read(8) != b"\x89MCAP0\r\n":
+                raise FileError(f"{self.path}: is not an MCAP file")
+            stream.seek(0)
+            reader = StreamReader(stream, emit_chunks=True, record_size_limit=RECORD_LIMIT)
+            records = reader.records
+            while True:
+                try:
+                    record = next(records)
+                except StopIteration:
+                    return
+                except Exception:  # whatever the bytes provoke: the file ends here
+                    losses.cut = True
+                    return
+                yield record
+
+
+def _opened(record: Any, losses: Losses) -> Sequence[Any]:
+    """The records inside a chunk, or the record itself; a damaged chunk is counted and empty."""
+    if not isinstance(record, mcap.records.Chunk):
+        return (record,)
+    try:
+        if record.uncompressed_size > RECORD_LIMIT:
+            raise FileError("a chunk longer than any record may be")
+        return breakup_chunk(record, validate_crc=True)
+    except Exception:  # zstandard, lz4, struct and mcap each have their own errors
+        losses.chunks += 1
+        return ()
+
+
+def _names(text: str) -> list[str]:
+    try:
+        names = json.loads(text)
+    except ValueError:
+        return []
+    return [str(name) for name in names] if isinstance(names, list) else []
+
+
+def _varint(value: int) -> bytes:
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    out.append(value)
+    return bytes(out)

@@ -1,0 +1,125 @@
+"""Channels on one clock: a grid of 0.1 s with the newest message of each channel (C-022, C-10)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import floor, isfinite
+
+from skidpad.core.channels import ChannelFrame, Cycle, Decision, TruthFrame
+from skidpad.recording.channels import ChannelSource, Message
+
+STEP = 0.1  # s, the cycle of the published stacks (C-022)
+MAX_AGE = 0.15  # s, older messages count as absent (decision C-10)
+MAX_GAP = 10.0  # s, a message further ahead must be confirmed by the next of its channel
+SAME_TIME = 1e-6  # s, rounding of stamps
+
+
+@dataclass(slots=True)
+class _Newest:
+    """The newest message of one sender, and one that claims a time far ahead."""
+
+    message: Message | None = None
+    doubtful: Message | None = None
+
+
+class _Clock:
+    """Decides per sender which messages move time forward."""
+
+    def __init__(self, source: ChannelSource) -> None:
+        self.losses = source.losses
+        self.newest: dict[object, _Newest] = {}
+        self.t: float | None = None  # newest accepted time over all senders
+
+    def accept(self, message: Message) -> bool:
+        """Whether `message` counts; counts it as a loss if not."""
+        if not isfinite(message.t):
+            self.losses.malformed += 1
+            return False
+        sender = message.channel if message.channel is not None else type(message.item)
+        state = self.newest.setdefault(sender, _Newest())
+        if state.message is not None and message.t <= state.message.t - SAME_TIME:
+            self.losses.out_of_order += 1
+            return False
+        if (
+            self.t is not None
+            and message.t > self.t + MAX_GAP
+            and not self._confirmed(state, message)
+        ):
+            state.doubtful = message
+            self.losses.jumps += 1
+            return False
+        state.message = message
+        state.doubtful = None
+        self.t = message.t if self.t is None else max(self.t, message.t)
+        return True
+
+    @staticmethod
+    def _confirmed(state: _Newest, message: Message) -> bool:
+        return state.doubtful is not None and 0.0 <= message.t - state.doubtful.t <= MAX_GAP
+
+
+def cycles(source: ChannelSource) -> Iterator[Cycle]:
+    """The cycles of a recording: grid times from its first message to its last.
+
+    A stretch of more than MAX_GAP without any message is left out; k keeps counting the grid.
+    """
+    clock = _Clock(source)
+    state = _State(source)
+    t_first: float | None = None
+    k = 0
+    for message in source.messages():
+        state.losses = clock.losses = source.losses
+        if not clock.accept(message):
+            continue
+        if t_first is None:
+            t_first = message.t
+        # a message moves the grid to just before it: everything older is now known
+        due = _last_before(message.t, t_first)
+        k = max(k, due - round(MAX_GAP / STEP))
+        while k <= due:
+            yield state.cycle(k, t_first + k * STEP)
+            k += 1
+        state.take(message)
+    if t_first is not None and clock.t is not None:
+        while t_first + k * STEP <= clock.t + SAME_TIME:
+            yield state.cycle(k, t_first + k * STEP)
+            k += 1
+
+
+def _last_before(t: float, t_first: float) -> int:
+    """Number of the last grid time before `t`; -1 when there is none."""
+    return floor((t - t_first - SAME_TIME) / STEP)
+
+
+class _State:
+    """The newest frame per channel, the driving channel and the truth."""
+
+    def __init__(self, source: ChannelSource) -> None:
+        self.channels = source.channels
+        self.losses = source.losses
+        self.frames: list[ChannelFrame | None] = [None] * len(source.channels)
+        self.driving: int | None = None
+        self.truth: TruthFrame | None = None
+
+    def take(self, message: Message) -> None:
+        item = message.item
+        if isinstance(item, ChannelFrame) and message.channel is not None:
+            self.frames[message.channel] = item
+        elif isinstance(item, TruthFrame):
+            self.truth = item
+        elif isinstance(item, Decision) and item.driving in self.channels:
+            self.driving = self.channels.index(item.driving)
+
+    def cycle(self, k: int, t: float) -> Cycle:
+        fresh = []
+        for name, frame in zip(self.channels, self.frames, strict=True):
+            if frame is not None and t - frame.t > MAX_AGE + SAME_TIME:
+                frame = None
+            if frame is None:
+                self.losses.stale[name] = self.losses.stale.get(name, 0) + 1
+            fresh.append(frame)
+        truth = self.truth
+        if truth is not None and t - truth.t > MAX_AGE + SAME_TIME:
+            truth = None
+        return Cycle(k, t, tuple(fresh), self.driving, truth)

@@ -1,0 +1,185 @@
+"""The ledger of a campaign: one line per finished run, appended and synced, so that nothing that
+was done is done again, whatever is killed. It, and not any scheduler, is the truth.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
+from enum import Enum
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import msgspec
+
+from skidpad.core.errors import FileError, OutputError
+from skidpad.core.vocabulary import Outcome
+from skidpad.recording.files import output_error, write_bytes
+from skidpad.recording.results import Metrics, RunKey, Timing
+
+LEDGER, CAMPAIGN = "ledger.jsonl", "campaign.json"
+RETRIED = frozenset({Outcome.CRASHED, Outcome.TIMEOUT})  # by resume (decision L-7)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry:
+    """One finished run. `run` names it within the campaign: cell and seed."""
+
+    run: str
+    key: RunKey
+    metrics: Metrics
+    timing: Timing
+    fingerprint: str
+    attempts: int = 1
+    error: str = ""  # one sentence, for agent_error, crashed, timeout
+
+
+class Ledger:
+    """The open ledger of the one process that writes a campaign; use it as a context."""
+
+    def __init__(self, folder: Path, identity: dict[str, Any], resume: bool = False) -> None:
+        """identity: the resolved configuration, without workers and paths (decision M-18).
+
+        OutputError when the folder holds another campaign, or this one and `resume` is false, or
+        another process is writing it.
+        """
+        self.folder = folder
+        self.path = folder / LEDGER
+        self._check(identity, resume)
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o644)
+        except OSError as error:
+            raise output_error(self.path, error) from error
+        try:
+            _lock(self._file, folder)
+            if not (folder / CAMPAIGN).exists():
+                write_bytes(folder / CAMPAIGN, encode_identity(identity))
+            self.entries = read_ledger(folder)
+            self._heal()
+        except BaseException:
+            self.close()
+            raise
+
+    def _check(self, identity: dict[str, Any], resume: bool) -> None:
+        state = folder_state(self.folder, identity)
+        if state is FolderState.OTHER:
+            raise OutputError(
+                f"{self.folder} holds something else than this campaign; choose another --out"
+            )
+        if state is FolderState.SAME and not resume:
+            raise OutputError(
+                f"{self.folder} holds this campaign already; pass --resume to finish it"
+            )
+
+    def _heal(self) -> None:
+        """Cut off what a kill left of a line, so that the next line stands alone."""
+        whole = self.path.read_bytes().rfind(b"\n") + 1
+        if whole != self.path.stat().st_size:
+            os.truncate(self._file, whole)
+
+    def append(self, entry: Entry) -> None:
+        """Record a finished run; when this returns, the line is on the disk."""
+        line = msgspec.json.encode(asdict(entry)) + b"\n"
+        size = os.fstat(self._file).st_size
+        try:
+            written = os.write(self._file, line)
+            if written != len(line):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+            os.fsync(self._file)
+        except OSError as error:
+            os.truncate(self._file, size)
+            raise output_error(self.path, error) from error
+        self.entries.append(entry)
+
+    def done(self) -> frozenset[str]:
+        """Runs that need not be driven again: all but those that crashed or timed out."""
+        last = latest(self.entries)
+        return frozenset(e.run for e in last if Outcome(e.key.outcome) not in RETRIED)
+
+    def close(self) -> None:
+        """Release the lock; safe to call twice."""
+        if self._file >= 0:
+            os.close(self._file)
+            self._file = -1
+
+    def __enter__(self) -> Ledger:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def read_ledger(folder: Path) -> list[Entry]:
+    """All entries, oldest first. A torn last line is passed over; any other damage is a FileError."""
+    path = folder / LEDGER
+    try:
+        lines = path.read_bytes().split(b"\n")
+    except FileNotFoundError:
+        return []
+    entries = []
+    for number, line in enumerate(lines[:-1], start=1):  # what follows the last newline is torn
+        try:
+            entries.append(msgspec.json.decode(line, type=Entry))
+        except msgspec.MsgspecError as error:
+            raise FileError(f"{path}, line {number} is damaged: {error}") from error
+    return entries
+
+
+def latest(entries: Iterable[Entry]) -> list[Entry]:
+    """The last word on each run, in the order of their names."""
+    by_run = {e.run: e for e in entries}
+    return [by_run[run] for run in sorted(by_run)]
+
+
+def fingerprints(entries: Sequence[Entry]) -> frozenset[str]:
+    """More than one: byte equality is not promised across this campaign (decision X-2)."""
+    return frozenset(e.fingerprint for e in entries)
+
+
+class FolderState(Enum):
+    """What an output folder holds."""
+
+    EMPTY = 0
+    SAME = 1  # this campaign, finished or not
+    OTHER = 2
+
+
+def folder_state(folder: Path, identity: dict[str, Any]) -> FolderState:
+    """What `folder` holds, seen from the campaign with this resolved configuration."""
+    if not folder.exists():
+        return FolderState.EMPTY
+    if not folder.is_dir():
+        return FolderState.OTHER
+    if not any(f for f in folder.iterdir() if f.name != LEDGER or f.stat().st_size > 0):
+        return FolderState.EMPTY  # a kill between the first two files leaves an empty ledger
+    campaign = folder / CAMPAIGN
+    same = campaign.is_file() and campaign.read_bytes() == encode_identity(identity)
+    return FolderState.SAME if same else FolderState.OTHER
+
+
+def encode_identity(identity: dict[str, Any]) -> bytes:
+    """Canonical text of a resolved configuration."""
+    return msgspec.json.encode(identity, order="deterministic")
+
+
+def _lock(file: int, folder: Path) -> None:
+    try:
+        if os.name == "nt":
+            import msvcrt
+
+            msvcrt.locking(file, msvcrt.LK_NBLCK, 1)  # type: ignore[attr-defined, unused-ignore]
+        else:
+            import fcntl
+
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        raise OutputError(f"another process is writing {folder}") from error

@@ -1,0 +1,195 @@
+"""The self-contained HTML page: blocks in, one file out. It knows no metric and no campaign."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import msgspec
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """A table cell: what is shown, what it sorts by, how it is marked and explained."""
+
+    text: str
+    sort: float | str | None = None
+    note: str = ""  # small second line, such as an interval
+    heat: float | None = None  # 0..1, shade of the background
+    kind: str = ""  # "good", "bad", "muted", "published"
+    href: str = ""
+    hint: str = ""  # shown on hover and read by screen readers
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """A sortable table. Columns are (heading, hint)."""
+
+    columns: Sequence[tuple[str, str]]
+    rows: Sequence[Sequence[Cell]]
+    caption: str = ""
+    note: str = ""
+    sortable: bool = True
+    kind: str = "table"
+
+
+@dataclass(frozen=True, slots=True)
+class Figure:
+    """An inline SVG with its caption."""
+
+    svg: str
+    caption: str
+    kind: str = "figure"
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """Paragraphs of plain text; blank lines part them."""
+
+    text: str
+    tone: str = ""  # "lead", "warning", "note"
+    kind: str = "text"
+
+
+@dataclass(frozen=True, slots=True)
+class Number:
+    """A headline number with its meaning."""
+
+    value: str
+    label: str
+    note: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Numbers:
+    """A row of headline numbers."""
+
+    items: Sequence[Number]
+    kind: str = "numbers"
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """A claim and what the data say of it."""
+
+    id: str
+    claim: str
+    verdict: str
+    text: str
+    detail: str = ""
+    kind: str = "verdict"
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """A picture as a data URI."""
+
+    uri: str
+    caption: str
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """One crash: title, facts, cause chain, pictures, replay."""
+
+    title: str
+    subtitle: str = ""
+    tags: Sequence[str] = ()
+    facts: Sequence[tuple[str, str]] = ()
+    chain: Sequence[str] = ()
+    images: Sequence[Image] = ()
+    replay: Any = None  # see assets/replay.js for its shape
+    href: str = ""
+    kind: str = "card"
+
+    def replay_json(self) -> str:
+        """The replay as JSON that is safe inside a script element."""
+        return msgspec.json.encode(self.replay).decode().replace("</", "<\\/")
+
+
+@dataclass(frozen=True, slots=True)
+class Cards:
+    """Several cards under one heading, folded away until asked for."""
+
+    title: str
+    cards: Sequence[Card]
+    open: bool = False
+    note: str = ""
+    kind: str = "cards"
+
+
+@dataclass(frozen=True, slots=True)
+class Definitions:
+    """Terms and what they mean."""
+
+    items: Sequence[tuple[str, str, str]]  # name, unit, definition
+    kind: str = "definitions"
+
+
+@dataclass(frozen=True, slots=True)
+class Code:
+    """Text as it stands in a file."""
+
+    title: str
+    text: str
+    kind: str = "code"
+
+
+Block = Table | Figure | Text | Numbers | Verdict | Cards | Card | Definitions | Code
+
+
+@dataclass(frozen=True, slots=True)
+class Section:
+    """A part of the page with an entry in its table of contents."""
+
+    title: str
+    blocks: Sequence[Block]
+    id: str = ""
+
+    @property
+    def anchor(self) -> str:
+        """Identifier for links."""
+        return self.id or "".join(c if c.isalnum() else "-" for c in self.title.lower()).strip("-")
+
+
+@dataclass(frozen=True, slots=True)
+class Page:
+    """A report."""
+
+    title: str
+    subtitle: str
+    sections: Sequence[Section]
+    facts: Sequence[tuple[str, str]] = field(default=())  # seeds, versions, hashes
+
+
+def render(page: Page) -> str:
+    """The page as one HTML document without any reference to the network."""
+    return _template().render(
+        page=page,
+        css=_asset("page.css"),
+        script=_asset("page.js") + _asset("replay.js"),
+    )
+
+
+def write_page(page: Page, path: Path) -> None:
+    """Render to `path`; an earlier report is replaced only by a complete one."""
+    partial = path.with_suffix(".partial")
+    partial.write_text(render(page), encoding="utf-8")
+    partial.replace(path)
+
+
+def _asset(name: str) -> str:
+    return files("skidpad.report").joinpath("assets", name).read_text(encoding="utf-8")
+
+
+@cache
+def _template() -> jinja2.Template:
+    environment = jinja2.Environment(
+        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
+    )
+    return environment.from_string(_asset("page.html.j2"))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 import skidpad
+from skidpad.core.errors import InputError, SkidpadError
 
 app = typer.Typer(
     name="skidpad",
@@ -30,6 +31,21 @@ def _root(
     """A proving ground for driving automation in bad weather."""
 
 
+@app.command()
+def doctor() -> None:
+    """Say what is installed, and what each missing part would give."""
+    from skidpad.cli.doctor import doctor as show
+
+    show()
+
+
 def main() -> None:
-    """Run the command line."""
-    app()
+    """Run the command line; input that cannot be used ends with one sentence and exit code 2."""
+    try:
+        app()
+    except InputError as error:
+        typer.echo(f"skidpad: {error}", err=True)
+        raise SystemExit(2) from None
+    except SkidpadError as error:
+        typer.echo(f"skidpad: {error}", err=True)
+        raise SystemExit(1) from None

@@ -184,7 +184,7 @@ def write_page(page: Page, path: Path) -> None:
 
 
 def _asset(name: str) -> str:
-    return files("skidpad.report").joinpath("assets", name).read_text(encoding="utf-8")
+    return files("skidpad.report").joinpath("assets").joinpath(name).read_text(encoding="utf-8")
 
 
 @cache

@@ -1,0 +1,55 @@
+"""`skidpad doctor`: what is installed, and what each missing part would give."""
+
+from __future__ import annotations
+
+import os
+import platform
+from dataclasses import dataclass
+from importlib import metadata
+from importlib.util import find_spec
+
+from rich.console import Console
+from rich.table import Table
+
+import skidpad
+from skidpad.core.jit import kernel_source_hash
+
+
+@dataclass(frozen=True, slots=True)
+class Extra:
+    """An optional part: the module that shows it is there, its distribution, what it gives."""
+
+    name: str
+    module: str
+    distribution: str
+    gives: str
+
+
+EXTRAS = (
+    Extra("server", "msgpack", "msgpack", "skidpad carla-server: CARLA's protocol without a GPU"),
+    Extra("carla", "carla", "carla", "--backend carla, and the pytest fixture for CARLA clients"),
+    Extra("cluster", "distributed", "distributed", "--cluster: campaigns on many machines"),
+    Extra("ros", "rosbags", "rosbags", "skidpad monitor on ROS 2 bags"),
+    Extra("learn", "sklearn", "scikit-learn", "--identifier learned"),
+    Extra("view", "rerun", "rerun-sdk", "skidpad view: recordings in Rerun"),
+)
+CORE = ("numpy", "numba", "scipy", "polars", "opencv-python-headless", "scenariogeneration")
+
+
+def doctor() -> None:
+    """Print what is installed and what each missing part would give."""
+    console = Console()
+    console.print(
+        f"skidpad {skidpad.__version__} on Python {platform.python_version()}, "
+        f"{platform.system()} {platform.machine()}, {os.cpu_count()} cores"
+    )
+    for name in CORE:
+        console.print(f"  {name} {metadata.version(name)}")
+    console.print(f"  compiled kernels: set {kernel_source_hash()}")
+    table = Table("extra", "installed", "gives", "install", box=None, pad_edge=False)
+    for extra in EXTRAS:
+        there = find_spec(extra.module) is not None
+        version = metadata.version(extra.distribution) if there else "-"
+        install = "" if there else f"pip install 'skidpad\\[{extra.name}]'"
+        table.add_row(extra.name, version, extra.gives, install)
+    console.print(table)

@@ -1,0 +1,78 @@
+import re
+
+import pytest
+
+from skidpad.report.page import (
+    Card,
+    Cards,
+    Cell,
+    Definitions,
+    Number,
+    Numbers,
+    Page,
+    Section,
+    Table,
+    Text,
+    Verdict,
+    render,
+    write_page,
+)
+
+REPLAY = {
+    "dt": 0.1,
+    "unit": 0.01,
+    "t0": 3.0,
+    "mark": 1,
+    "ego": 0,
+    "lanes": [[0, 0, 1000, 0]],
+    "size": [[4.5, 1.8]],
+    "frames": [[0, 0, 0], [100, 0, 0]],
+}
+
+
+def page():
+    return Page(
+        title="A <title> & more",
+        subtitle="what it is",
+        facts=[("seed", "1")],
+        sections=[
+            Section("First", [Text("one\n\ntwo"), Numbers([Number("3", "runs", "of 3")])]),
+            Section(
+                "Tables",
+                [
+                    Table(
+                        [("row", ""), ("count", "how many")],
+                        [[Cell("a"), Cell("10", sort=10, note="[4, 18]", heat=0.5)]],
+                        caption="A table",
+                    ),
+                    Verdict("F-01", "claim", "supported", "because"),
+                    Cards("crashes", [Card("one", replay=REPLAY, chain=["</script><b>"])]),
+                    Definitions([("min_ttc_s", "s", "least time to collision")]),
+                ],
+            ),
+        ],
+    )
+
+
+def test_the_page_is_self_contained_and_escapes_what_it_shows():
+    html = render(page())
+    assert "A &lt;title&gt; &amp; more" in html
+    assert "&lt;/script&gt;&lt;b&gt;" in html
+    assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
+    assert 'href="#tables"' in html
+    assert 'id="tables"' in html
+    assert html.count("<script") == html.count("</script>")
+
+
+def test_a_report_is_replaced_only_by_a_complete_one(tmp_path, monkeypatch):
+    path = tmp_path / "report.html"
+    write_page(page(), path)
+    before = path.read_text()
+
+    def broken(_):
+        raise OSError("disk full")
+
+    monkeypatch.setattr("skidpad.report.page.render", broken)
+    with pytest.raises(OSError, match="disk full"):
+        write_page(page(), path)
+    assert path.read_text() == before

@@ -1,0 +1,151 @@
+"""Charts as inline SVG. Each function takes plain numbers and draws one kind of chart."""
+
+from __future__ import annotations
+
+import io
+import re
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+import matplotlib as mpl
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure as Canvas
+
+PALETTE = ("#2b6cb0", "#d9541e", "#1f7a4d", "#8a5fb0", "#b8860b", "#5b6875", "#c2458a", "#2a9d8f")
+STYLE: dict[Any, Any] = {
+    "svg.hashsalt": "skidpad",  # the same data give the same bytes
+    "svg.fonttype": "none",
+    "font.family": "sans-serif",
+    "font.sans-serif": ["system-ui", "Segoe UI", "Roboto", "DejaVu Sans"],
+    "font.size": 9.5,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "grid.color": "#e3e8ed",
+    "grid.linewidth": 0.7,
+    "axes.edgecolor": "#8996a3",
+    "legend.frameon": False,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """One colour of a chart: values with optional interval ends; None where there is no value."""
+
+    name: str
+    values: Sequence[float | None]
+    low: Sequence[float | None] = ()
+    high: Sequence[float | None] = ()
+    published: Sequence[float | None] = ()  # drawn as hollow diamonds
+
+
+@contextmanager
+def canvas(
+    width: float = 8.4, height: float = 3.4, columns: int = 1
+) -> Iterator[tuple[Canvas, list[Axes]]]:
+    """A figure with axes in the house style, in inches."""
+    with mpl.rc_context(STYLE):
+        figure = Canvas(figsize=(width, height), layout="constrained")
+        yield figure, [figure.add_subplot(1, columns, k + 1) for k in range(columns)]
+
+
+def svg_of(figure: Canvas) -> str:
+    """The figure as an SVG element that scales with the page."""
+    with mpl.rc_context(STYLE):
+        buffer = io.StringIO()
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
+    text = buffer.getvalue()
+    text = text[text.index("<svg") :]
+    return re.sub(
+        r'(<svg[^>]*?) width="[^"]*"',
+        r"\1",
+        re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1),
+        count=1,
+    )
+
+
+def grouped_bars(groups: Sequence[str], series: Sequence[Series], y_label: str) -> str:
+    """Bars side by side per group, with intervals and published values."""
+    with canvas() as (figure, (axes,)):
+        draw_bars(axes, groups, series, y_label)
+        if len(series) > 1 or any(s.published for s in series):
+            figure.legend(loc="outside upper center", ncols=min(len(series) + 1, 6))
+        return svg_of(figure)
+
+
+def draw_bars(axes: Axes, groups: Sequence[str], series: Sequence[Series], y_label: str) -> None:
+    """Bars into existing axes."""
+    width = 0.8 / len(series)
+    named = False
+    for k, one in enumerate(series):
+        x = [g + (k - (len(series) - 1) / 2) * width for g in range(len(groups))]
+        heights = [v if v is not None else float("nan") for v in one.values]
+        axes.bar(x, heights, 0.9 * width, color=PALETTE[k % len(PALETTE)], label=one.name)
+        if one.low:
+            for xi, v, lo, hi in zip(x, one.values, one.low, one.high, strict=True):
+                if v is not None and lo is not None and hi is not None:
+                    axes.plot([xi, xi], [lo, hi], color="#1c2530", linewidth=1.0)
+        known = [(xi, v) for xi, v in zip(x, one.published, strict=False) if v is not None]
+        if known:
+            axes.plot(
+                *zip(*known, strict=True),
+                "D",
+                markersize=4.5,
+                markerfacecolor="white",
+                markeredgecolor="#1c2530",
+                linestyle="none",
+                label=None if named else "published",
+            )
+            named = True
+    axes.set_xticks(range(len(groups)), groups)
+    axes.set_ylabel(y_label)
+    axes.set_ylim(bottom=0.0)
+    axes.grid(axis="x", visible=False)
+
+
+def scatter(
+    points: Sequence[tuple[str, Sequence[float], Sequence[float]]], x_label: str, y_label: str
+) -> str:
+    """Clouds of points: (name, x, y) each."""
+    with canvas(height=3.6) as (figure, (axes,)):
+        for k, (name, x, y) in enumerate(points):
+            axes.plot(
+                x,
+                y,
+                "o",
+                color=PALETTE[k % len(PALETTE)],
+                alpha=0.75,
+                markersize=5,
+                label=name,
+                linestyle="none",
+            )
+        axes.set_xlabel(x_label)
+        axes.set_ylabel(y_label)
+        figure.legend(loc="outside upper center", ncols=6)
+        return svg_of(figure)
+
+
+def panel(groups: Sequence[str], charts: Sequence[tuple[str, Series]]) -> str:
+    """Small bar charts beside each other, one quantity each."""
+    with canvas(width=10.5, height=2.9, columns=len(charts)) as (figure, all_axes):
+        for axes, (label, series) in zip(all_axes, charts, strict=True):
+            draw_bars(axes, groups, [series], label)
+            axes.tick_params(axis="x", labelrotation=60, labelsize=8)
+        return svg_of(figure)
+
+
+def lines(
+    series: Sequence[tuple[str, Sequence[float], Sequence[float]]], x_label: str, y_label: str
+) -> str:
+    """Curves: (name, x, y) each."""
+    with canvas() as (figure, (axes,)):
+        for k, (name, x, y) in enumerate(series):
+            axes.plot(x, y, color=PALETTE[k % len(PALETTE)], linewidth=1.6, label=name)
+        axes.set_xlabel(x_label)
+        axes.set_ylabel(y_label)
+        if len(series) > 1:
+            figure.legend(loc="outside upper center", ncols=6)
+        return svg_of(figure)

@@ -1,0 +1,153 @@
+"""A fleet: the vehicles of a run with their wheels, stepped together, one tick at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import ConfigError
+from skidpad.core.geometry import Pose, wrap_angle
+from skidpad.core.states import ActorStates
+from skidpad.physics.types import TIRE_FRICTION_REFERENCE, VehicleType
+from skidpad.physics.vehicle import WheelStates, step_vehicles, vehicle_params
+
+Floats = NDArray[np.float64]
+
+SUBSTEP = 0.01  # s; stopping distances and yaw rates within 3 % of 1 ms (docs/physics.md)
+GEAR_UP_V = np.array([4.0, 8.5, 14.0, 20.0, 27.0])  # m/s, full-load shift points of a compact car
+
+
+class Fleet:
+    """n vehicles. `states` is the one truth about their motion; whoever writes it, moves them.
+
+    Height `z` belongs to the caller: it follows from the road.
+    """
+
+    def __init__(
+        self,
+        types: Sequence[VehicleType],
+        dt: float,
+        *,
+        states: ActorStates | None = None,
+        anti_lock: bool | None = None,
+        substep: float = SUBSTEP,
+    ) -> None:
+        """A fleet at rest at the origin.
+
+        states: arrays to work on whose first rows are these vehicles; None: own ones.
+        anti_lock: None leaves it to each type. substep: longest inner step, s.
+        """
+        n = len(types)
+        self.types = tuple(types)
+        self.dt = dt
+        self.steps = max(1, round(dt / substep))
+        if self.steps * substep < dt - 1e-9:
+            self.steps += 1
+        rows = ActorStates.empty(n) if states is None else states
+        self.states = ActorStates._make(column[:n] for column in rows)
+        self.params = vehicle_params(self.types)
+        if anti_lock is not None:
+            self.params.anti_lock[:] = anti_lock
+        self.wheels = WheelStates(
+            omega=np.zeros((n, 4)),
+            steer=np.zeros(n),
+            a_load=np.zeros((n, 2)),
+            slide=np.zeros((n, 4)),
+            load=np.zeros((n, 4)),
+        )
+        self.tire_friction = np.array(
+            [[t.tire_friction] * 4 for t in types], dtype=np.float64
+        ).reshape(n, 4)
+        self.mu = np.zeros((n, 4))  # what the tyres felt in the last step (decision L-6)
+        self._flat = np.zeros(n)
+
+    def __len__(self) -> int:
+        return len(self.types)
+
+    def place(self, i: int, pose: Pose, v: float = 0.0) -> None:
+        """Put vehicle i at `pose` with speed v along its heading, wheels straight and rolling."""
+        s = self.states
+        s.x[i], s.y[i], s.z[i] = pose.x, pose.y, pose.z
+        s.roll[i], s.pitch[i], s.yaw[i] = pose.roll, pose.pitch, wrap_angle(pose.yaw)
+        s.vx[i], s.vy[i] = v * cos(pose.yaw), v * sin(pose.yaw)
+        s.yaw_rate[i] = s.ax[i] = s.ay[i] = 0.0
+        s.present[i] = True
+        self.wheels.omega[i] = v / self.params.wheel_radius[i]
+        self.wheels.steer[i] = 0.0
+        self.wheels.a_load[i] = 0.0
+        self.wheels.slide[i] = 0.0
+
+    def step(
+        self,
+        commands: Floats,
+        mu: Floats,
+        grade: Floats | None = None,
+        bank: Floats | None = None,
+        active: NDArray[np.bool_] | None = None,
+    ) -> None:
+        """Advance the active vehicles by dt.
+
+        commands (n, 5): throttle, brake, steer (left positive), handbrake, reverse. mu (n, 4) of a
+        tyre with tire_friction 3.5 at FL, FR, RL, RR; each wheel's own scale is applied here, once.
+        grade, bank (n,): rad, uphill and left side up positive. active: None means all present.
+        """
+        if commands.shape != (len(self), 5) or mu.shape != (len(self), 4):
+            raise ConfigError(
+                f"fleet of {len(self)}: commands must be (n, 5) and mu (n, 4), "
+                f"got {commands.shape} and {mu.shape}"
+            )
+        np.multiply(mu, self.tire_friction, out=self.mu)
+        self.mu /= TIRE_FRICTION_REFERENCE
+        step_vehicles(
+            self.states,
+            self.wheels,
+            self.params,
+            commands,
+            self.mu,
+            self._flat if grade is None else grade,
+            self._flat if bank is None else bank,
+            self.states.present if active is None else active,
+            self.dt / self.steps,
+            self.steps,
+        )
+
+    def apply_impulse(
+        self, i: int, impulse: tuple[float, float], point: tuple[float, float]
+    ) -> None:
+        """Impulse (N s) at a point (m), both in world axes, on vehicle i."""
+        s, p = self.states, self.params
+        c, sn = cos(s.yaw[i]), sin(s.yaw[i])
+        x_cog = s.x[i] + p.x_cog[i] * c
+        y_cog = s.y[i] + p.x_cog[i] * sn
+        d_r = (point[0] - x_cog) * impulse[1] - (point[1] - y_cog) * impulse[0]
+        d_r /= p.yaw_inertia[i]
+        s.vx[i] += impulse[0] / p.mass[i] + d_r * p.x_cog[i] * sn
+        s.vy[i] += impulse[1] / p.mass[i] - d_r * p.x_cog[i] * c
+        s.yaw_rate[i] += d_r
+
+    def wheel_speeds(self, i: int) -> tuple[float, float, float, float]:
+        """Rim speeds of vehicle i in m/s: FL, FR, RL, RR."""
+        fl, fr, rl, rr = (self.wheels.omega[i] * self.params.wheel_radius[i]).tolist()
+        return fl, fr, rl, rr
+
+    def speed(self, i: int) -> float:
+        """Speed of vehicle i along its body in m/s, negative in reverse."""
+        s = self.states
+        return float(s.vx[i] * cos(s.yaw[i]) + s.vy[i] * sin(s.yaw[i]))
+
+    def slip_angles(self) -> Floats:
+        """(n,) side slip of the centres of gravity in rad, left positive; 0 below 1 m/s."""
+        s, x_cog = self.states, self.params.x_cog
+        c, sn = np.cos(s.yaw), np.sin(s.yaw)
+        u = s.vx * c + s.vy * sn
+        v = s.vy * c - s.vx * sn + s.yaw_rate * x_cog
+        return np.where(np.hypot(u, v) > 1.0, np.arctan2(v, u), 0.0)
+
+    def gear(self, i: int, reverse: bool = False) -> int:
+        """Gear that an automatic box shows: -1 in reverse, else 1 to 6 by speed."""
+        if reverse:
+            return -1
+        return 1 + int(np.searchsorted(GEAR_UP_V, abs(self.speed(i))))

@@ -1,0 +1,128 @@
+"""Vehicle types: sizes, masses, wheels, drive and brakes as data with sources (`vehicles.yaml`)."""
+
+from __future__ import annotations
+
+from enum import Enum
+from functools import lru_cache
+from importlib import resources
+from math import radians
+
+import msgspec
+
+from skidpad.core.errors import ConfigError, require_choice, require_range
+from skidpad.core.vocabulary import ActorKind
+
+TIRE_FRICTION_REFERENCE = 3.5  # the blueprints' own tire_friction, at which mu is mu_ref (B-033)
+
+
+class Drive(str, Enum):
+    """Driven wheels; all-wheel drive splits evenly."""
+
+    FRONT = "front"
+    REAR = "rear"
+    ALL = "all"
+
+
+class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One type of four-wheeled vehicle. Positions are along x from the footprint's centre."""
+
+    title: str
+    kind: str  # a vehicle of ActorKind, in lower case
+    length: float  # m
+    width: float  # m, without mirrors
+    height: float  # m
+    mass: float  # kg, with driver
+    wheelbase: float  # m
+    front_overhang: float  # m, bumper to front axle
+    track: float  # m, mean of both axles
+    cog_height: float  # m
+    front_share: float  # of the weight at rest
+    wheel_radius: float  # m, rolling
+    wheel_inertia: float  # kg m^2, one wheel with its share of the drive line
+    drive: Drive
+    power: float  # W at the wheels
+    force_max: float  # N at the wheels, lowest gear
+    engine_drag: float = 0.5  # m/s^2 at closed throttle
+    brake_torque_front: float  # N m per wheel at full pedal
+    brake_torque_rear: float
+    handbrake_torque: float = 3000.0  # N m per rear wheel; carla.WheelPhysicsControl
+    steer_max_deg: float = 70.0  # road wheel; carla.WheelPhysicsControl
+    steer_rate_deg: float = 70.0  # road wheel per s; 1000 deg/s at the wheel over ratio 14.5
+    drag_area: float  # m^2, cw * A
+    rolling_resistance: float = 0.011  # of the load; ISO 28580 class C
+    stiffness_front: float = 20.0  # tyre force per unit slip over load
+    stiffness_rear: float = 21.0
+    roll_share_front: float = 0.55  # of the lateral load transfer
+    pitch_gradient: float = 0.0035  # rad per m/s^2
+    roll_gradient: float = 0.0075  # rad per m/s^2
+    tire_friction: float = TIRE_FRICTION_REFERENCE  # CARLA's scale
+    abs: bool = True
+    source: str
+
+    def __post_init__(self) -> None:
+        require_choice("vehicle kind", self.kind, [k.name.lower() for k in ActorKind][:4])
+        for name in ("length", "width", "height", "mass", "wheelbase", "track", "wheel_radius"):
+            require_range(f"vehicle {self.title}: {name}", getattr(self, name), 0.1, 1.0e5)
+        require_range(f"vehicle {self.title}: front_share", self.front_share, 0.2, 0.8)
+        if self.front_overhang + self.wheelbase > self.length:
+            raise ConfigError(f"vehicle {self.title}: the rear axle lies behind the rear bumper")
+
+    @property
+    def actor_kind(self) -> ActorKind:
+        """What the actor is."""
+        return ActorKind[self.kind.upper()]
+
+    @property
+    def x_front_axle(self) -> float:
+        """Front axle ahead of the footprint's centre, m."""
+        return 0.5 * self.length - self.front_overhang
+
+    @property
+    def x_rear_axle(self) -> float:
+        """Rear axle, m; negative."""
+        return self.x_front_axle - self.wheelbase
+
+    @property
+    def x_cog(self) -> float:
+        """Centre of gravity ahead of the footprint's centre, m."""
+        return self.x_rear_axle + self.front_share * self.wheelbase
+
+    @property
+    def yaw_inertia(self) -> float:
+        """kg m^2 about the centre of gravity, dynamic index 1: m * a * b.
+
+        Source: Heydinger et al., SAE 1999-01-1336 (measured dynamic indices 0.9 to 1.1).
+        """
+        return self.mass * self.front_share * (1.0 - self.front_share) * self.wheelbase**2
+
+    @property
+    def steer_max(self) -> float:
+        """Largest road-wheel angle, rad."""
+        return radians(self.steer_max_deg)
+
+    @property
+    def drive_share_front(self) -> float:
+        """Share of the drive force at the front axle."""
+        return {Drive.FRONT: 1.0, Drive.REAR: 0.0, Drive.ALL: 0.5}[self.drive]
+
+
+EGO_TYPE = "mini_cooper_s"
+
+
+@lru_cache(maxsize=1)
+def vehicle_types() -> dict[str, VehicleType]:
+    """All types by id, sorted, so that lists made from them are reproducible (A-206)."""
+    text = resources.files("skidpad.physics").joinpath("vehicles.yaml").read_bytes()
+    types = msgspec.yaml.decode(text, type=dict[str, VehicleType])
+    return dict(sorted(types.items()))
+
+
+def vehicle_type(name: str) -> VehicleType:
+    """The type with this id; ConfigError lists the known ones."""
+    types = vehicle_types()
+    return types[require_choice("vehicle type", name, list(types))]
+
+
+def traffic_types() -> tuple[str, ...]:
+    """Ids of passenger cars for background traffic, sorted (A-206); the ego's type is among them."""
+    return tuple(k for k, t in vehicle_types().items() if t.actor_kind is ActorKind.CAR)

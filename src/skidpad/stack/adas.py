@@ -1,0 +1,241 @@
+"""The published driver: dual-range vision, radar, seven tiers, lane centring (A-010)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from skidpad.core.errors import require_choice, require_range
+from skidpad.core.frames import SensorFrame
+from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.setup import DT
+from skidpad.core.specs import SensorSpec
+from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.core.vocabulary import DetectionStatus, LightState, Supervision, Tier
+from skidpad.roads.queries import RoadMap
+from skidpad.stack.configurations import (
+    V_CRUISE_KMH,
+    V_LIMITER_KMH,
+    Function,
+    Functions,
+    functions_of,
+    parse_functions,
+)
+from skidpad.stack.control.resume import ResumeProtocol, SpeedCaps
+from skidpad.stack.control.steering import NoSmoothing, Smoothing, steering_of
+from skidpad.stack.control.tiers import (
+    Hierarchy,
+    Lead,
+    Request,
+    Situation,
+    needs_verification,
+    time_gap,
+)
+from skidpad.stack.perception.front import Front, Sight
+from skidpad.stack.perception.hsv import detect_lamp
+from skidpad.stack.perception.lane_view import (
+    FirstBranchRoute,
+    HighwayRoute,
+    LaneTracker,
+    LaneView,
+)
+from skidpad.stack.perception.lights import NO_LIGHT, LightReading, LightScan, StopLock
+from skidpad.stack.settings import Route, Settings, load_profile
+
+FRONT_CAMERA = "rgb_front"
+HELD = VehicleCommand(brake=1.0)  # while the supervisor drives; it overrides this anyway
+KEYS = ("configuration", "functions", "profile", "set", "cruise_kmh", "limiter_kmh", "dt")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class AdasConfig:
+    """What this stack drives with; speeds in km/h as at a cruise control's lever."""
+
+    functions: Functions
+    settings: Settings
+    cruise_kmh: float = V_CRUISE_KMH
+    limiter_kmh: float = V_LIMITER_KMH
+    dt: float = DT
+
+    def __post_init__(self) -> None:
+        require_range("cruise_kmh", self.cruise_kmh, 1.0, 400.0)
+        require_range("limiter_kmh", self.limiter_kmh, 1.0, 400.0)
+        require_range("dt", self.dt, 1e-3, 1.0)
+
+    @classmethod
+    def from_mapping(cls, plain: Mapping[str, Any]) -> AdasConfig:
+        """From plain data; every key is optional, see KEYS.
+
+        `functions` (names) takes the place of `configuration` (0 to 4, default 4); `set` holds
+        single settings on top of `profile`.
+        """
+        for key in plain:
+            require_choice("stack option", key, KEYS)
+        settings = load_profile(plain.get("profile", "recommended"), plain.get("set"))
+        if "functions" in plain:
+            functions = parse_functions(",".join(plain["functions"]))
+        else:
+            functions = functions_of(plain.get("configuration", 4))
+        if settings.aeb_without_acc and not functions & {Function.ACC}:
+            functions |= {Function.AEB}
+        numbers = {k: float(plain[k]) for k in ("cruise_kmh", "limiter_kmh", "dt") if k in plain}
+        return cls(functions=functions, settings=settings, **numbers)
+
+
+class AdasStack:
+    """One vehicle's driver. Deterministic: its commands depend on the frames alone."""
+
+    report: StackReport
+
+    def __init__(
+        self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
+    ) -> None:
+        self.config = AdasConfig.from_mapping(settings)
+        options = self.config.settings
+        route = HighwayRoute() if options.route is Route.HIGHWAY else FirstBranchRoute()
+        self.tracker = LaneTracker(map, route)
+        self.front = Front(specs, map, self.config.functions, options, self.config.dt)
+        self.scan = LightScan(map)
+        self.lock = StopLock(self.config.dt, options.hsv_required)
+        self.resume = ResumeProtocol(self.config.dt, options.resume_end)
+        self.smoothing: Smoothing | NoSmoothing = (
+            Smoothing(self.config.dt) if options.steer_smoothing else NoSmoothing()
+        )
+        self.supervision = Supervision.NONE
+        self.verified_by = ""
+        self.report = StackReport()
+        self.switch(self.config.functions)
+
+    def switch(self, functions: Functions) -> None:
+        """Turn functions on and off while driving (A-011); the controllers start afresh."""
+        c = self.config
+        self.functions = functions
+        self.hierarchy = Hierarchy(functions, c.settings, c.dt)
+        self.steering = steering_of(functions, c.settings)
+        self.caps = SpeedCaps(functions, c.cruise_kmh, c.limiter_kmh, c.settings.cap_scope)
+        self.front.switch(functions)
+
+    def relocated(self) -> None:
+        """The ego stands elsewhere: what was seen and summed before no longer counts (A-109)."""
+        self.front.reset()
+        self.hierarchy.reset()
+        self.lock.reset()
+        self.smoothing.reset()
+        self.tracker.hint = -1
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        """Sense, decide, actuate (A-010)."""
+        self._follow_supervision(frame.supervision)
+        v = frame.ego.speed
+        view = self.tracker.update(frame.ego.pose)
+        sight = self.front.look(frame, v, view)
+        light, hsv = self._light(frame, v, view)
+        stop = self.lock.update(light, v, frame.lights, hsv) if self._assists() else None
+        stop_distance = stop.distance if stop is not None else None
+        lane_curvature = view.ego.curvature if view.ego is not None else 0.0
+        self.resume.update(stop is not None, kmh_from_mps(v), lane_curvature)
+        situation, sight = self._situation(frame, v, view, sight, stop_distance)
+        supervised = frame.supervision is not Supervision.NONE
+        request = Request(Tier.NONE) if supervised else self.hierarchy.decide(situation)
+        self.front.conclude(sight, stop is not None)
+        self.report = self._report(view, sight, situation, request.tier, light, hsv)
+        if supervised:
+            return HELD
+        return VehicleCommand(request.throttle, request.brake, self._steer(frame, v, view),
+                              request.handbrake)  # fmt: skip
+
+    def _follow_supervision(self, phase: Supervision) -> None:
+        """The warm-up begins where the ego was put (A-185)."""
+        if phase is Supervision.WARM_UP and self.supervision is not Supervision.WARM_UP:
+            self.relocated()
+        self.supervision = phase
+
+    def _assists(self) -> bool:
+        return Function.TLA in self.functions
+
+    def _light(
+        self, frame: SensorFrame, v: float, view: LaneView
+    ) -> tuple[LightReading, LightState | None]:
+        """The light ahead by map, and what the camera sees while the map reports one (M-4)."""
+        if not self._assists():
+            return NO_LIGHT, None
+        light = self.scan.look(frame.ego.pose, v, view, frame.lights)
+        if light.signal is None:
+            return light, None
+        image = frame.images.get(FRONT_CAMERA)
+        return light, detect_lamp(image.rgb if image is not None else None)
+
+    def _situation(
+        self,
+        frame: SensorFrame,
+        v: float,
+        view: LaneView,
+        sight: Sight,
+        stop_distance: float | None,
+    ) -> tuple[Situation, Sight]:
+        """What the tiers see; a target that the cameras do not confirm at standstill is dropped
+        before them, so that all tiers go on without it (A-116, D-043)."""
+        active = self.resume.active
+        s = Situation(
+            v=v,
+            v_kmh=kmh_from_mps(v),
+            lead=_lead(sight, v),
+            stop_distance=stop_distance,
+            cruise_kmh=self.caps.cruise_kmh(active),
+            follow_cap_kmh=self.caps.following_kmh(active),
+        )
+        if not needs_verification(s) or sight.distance is None:
+            return s, sight
+        confirmed, self.verified_by = self.front.verify(frame, sight.distance, view)
+        if confirmed:
+            return s, sight
+        return s._replace(lead=None), sight._replace(distance=None)
+
+    def _steer(self, frame: SensorFrame, v: float, view: LaneView) -> float:
+        command = self.steering.steer(
+            frame.ego.pose, v, lambda d, heading: self.tracker.ahead(view, d, heading)
+        )
+        return self.smoothing.update(command)
+
+    def _report(
+        self,
+        view: LaneView,
+        sight: Sight,
+        s: Situation,
+        tier: Tier,
+        light: LightReading,
+        hsv: LightState | None,
+    ) -> StackReport:
+        radar = sight.radar
+        return StackReport(
+            status=sight.status,
+            tier=tier,
+            detected=sight.distance is not None,
+            distance=sight.distance,
+            time_gap=s.lead.gap if s.lead is not None else None,
+            bumper=sight.bumper,
+            roof=sight.roof,
+            fused=sight.fused,
+            radar_pre=radar.pre,
+            radar_lane=radar.lane,
+            radar_velocity=radar.velocity,
+            radar_points=radar.points,
+            v_target=s.cruise_kmh / 3.6,
+            light_distance=light.distance,
+            light_state=light.state,
+            light_source=light.source if self._assists() else None,
+            light_stop=s.stop_distance is not None,
+            hsv=hsv,
+            lane_offset=view.ego.offset if view.ego is not None else None,
+            yaw_error=view.yaw_error if view.ego is not None else None,
+            curvature=view.curvature if view.ego is not None else None,
+            resume_timer=self.resume.timer,
+        )
+
+
+def _lead(sight: Sight, v: float) -> Lead | None:
+    if sight.distance is None:
+        return None
+    confirmed = sight.confirmed or sight.status is DetectionStatus.RADAR_ACTIVE
+    return Lead(sight.distance, time_gap(sight.distance, v), confirmed)

@@ -1,0 +1,57 @@
+"""Which functions drive: the five published configurations, or any set of functions (A-008)."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+from skidpad.core.errors import ConfigError, require_choice
+
+V_CRUISE_KMH = 150.0  # cruise target without a limiter (A-009)
+V_LIMITER_KMH = 80.0  # limiter of configuration 4 (A-178)
+
+
+class Function(str, Enum):
+    """One function of driving automation; each can be switched by itself (A-011)."""
+
+    AEB = "aeb"  # emergency braking without following: tiers 1 to 3 alone (D-038)
+    ACC = "acc"  # following, which includes tiers 1 to 3
+    LCA = "lca"  # lane centring; without it the lazy driver steers
+    TLA = "tla"  # traffic-light assist
+    RESUME = "resume"  # post-stop resume protocol
+    LIMITER = "limiter"
+
+
+Functions = frozenset[Function]
+
+CONFIGURATIONS: dict[int, Functions] = {
+    0: frozenset(),
+    1: frozenset({Function.ACC}),
+    2: frozenset({Function.ACC, Function.LCA}),
+    3: frozenset({Function.ACC, Function.LCA, Function.TLA, Function.RESUME}),
+    4: frozenset({Function.ACC, Function.LCA, Function.TLA, Function.RESUME, Function.LIMITER}),
+}
+
+TITLES: dict[int, str] = {
+    0: "baseline, no ADAS",
+    1: "ACC only",
+    2: "ACC + LCA",
+    3: "ACC + LCA + light assist",
+    4: "full package, 80 km/h limiter",
+}
+
+
+def functions_of(configuration: int) -> Functions:
+    """The functions of a published configuration."""
+    if configuration not in CONFIGURATIONS:
+        raise ConfigError(
+            f"unknown configuration {configuration!r}; choose one of: "
+            + ", ".join(map(str, CONFIGURATIONS))
+        )
+    return CONFIGURATIONS[configuration]
+
+
+def parse_functions(text: str) -> Functions:
+    """`acc,lca` to functions; an empty text is none of them."""
+    names = [name.strip() for name in text.split(",") if name.strip()]
+    allowed = [function.value for function in Function]
+    return frozenset(Function(require_choice("function", name, allowed)) for name in names)

@@ -1,0 +1,120 @@
+"""Anybody's stack: found by `module:Class` or `file.py:Class`, and kept to its word."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from importlib import import_module
+from importlib.util import module_from_spec, spec_from_file_location
+from math import isfinite
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from skidpad.core.errors import ConfigError, FileError, StackError
+from skidpad.core.frames import SensorFrame
+from skidpad.core.specs import SensorSpec
+from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.roads.queries import RoadMap
+from skidpad.stack.interface import Stack
+
+NO_REPORT = StackReport()
+
+
+def load_stack(where: str) -> type[Stack]:
+    """The class named by `module:Class` or `path/to/file.py:Class`."""
+    place, colon, name = where.rpartition(":")
+    if not colon or not place or not name.isidentifier():
+        raise ConfigError(f"a stack is given as module:Class or file.py:Class, got {where!r}")
+    module = _from_file(Path(place)) if place.endswith(".py") else _from_module(place)
+    found = getattr(module, name, None)
+    if not isinstance(found, type):
+        raise ConfigError(f"stack {where!r}: {place} has no class {name}")
+    if not callable(getattr(found, "tick", None)):
+        raise ConfigError(f"stack {where!r}: class {name} has no method tick(frame)")
+    return found
+
+
+def _from_file(path: Path) -> ModuleType:
+    if not path.is_file():
+        raise FileError(f"stack file {str(path)!r} does not exist")
+    name = f"skidpad_user_stack_{path.stem}"
+    spec = spec_from_file_location(name, path)
+    assert spec is not None, "a .py file has a loader"
+    assert spec.loader is not None
+    module = module_from_spec(spec)
+    sys.modules[name] = module  # dataclasses and pickling look a class up by its module
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:
+        raise ConfigError(f"stack file {str(path)!r} cannot be imported: {error!r}") from error
+    return module
+
+
+def _from_module(name: str) -> ModuleType:
+    try:
+        return import_module(name)
+    except Exception as error:  # an import runs foreign code: anything can happen
+        raise ConfigError(f"stack module {name!r} cannot be imported: {error!r}") from error
+
+
+class GuardedStack:
+    """Runs a stack; whatever it does wrong becomes a StackError, the outcome of its run."""
+
+    def __init__(
+        self,
+        kind: type[Stack],
+        specs: Sequence[SensorSpec],
+        map: RoadMap,
+        settings: Mapping[str, Any],
+    ) -> None:
+        self.name = kind.__name__
+        try:
+            self.stack = kind(specs, map, settings)
+        except (StackError, ConfigError):
+            raise
+        except Exception as error:
+            raise StackError(f"{self.name} could not be built: {error!r}") from error
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        """The stack's command, checked."""
+        try:
+            command = self.stack.tick(frame)
+        except Exception as error:
+            raise StackError(f"{self.name} raised in tick {frame.tick}: {error!r}") from error
+        if not isinstance(command, VehicleCommand):
+            raise StackError(
+                f"{self.name} must return a VehicleCommand, got {type(command).__name__} "
+                f"in tick {frame.tick}"
+            )
+        _check(self.name, command, frame.tick)
+        return command
+
+    @property
+    def report(self) -> StackReport:
+        """What the stack says about its last tick; empty for a stack that says nothing."""
+        report = getattr(self.stack, "report", NO_REPORT)
+        return report if isinstance(report, StackReport) else NO_REPORT
+
+    def sensors(self) -> tuple[SensorSpec, ...]:
+        """The further sensors that the stack asks for."""
+        ask = getattr(self.stack, "sensors", None)
+        if ask is None:
+            return ()
+        try:
+            return tuple(ask())
+        except Exception as error:
+            raise StackError(f"{self.name}.sensors() raised: {error!r}") from error
+
+
+def _check(name: str, command: VehicleCommand, tick: int) -> None:
+    ranges = (
+        ("throttle", command.throttle, 0.0),
+        ("brake", command.brake, 0.0),
+        ("steer", command.steer, -1.0),
+    )
+    for what, value, low in ranges:
+        if not isfinite(value) or not low <= value <= 1.0:
+            raise StackError(
+                f"{name}: {what} must be between {low:g} and 1, got {value!r} in tick {tick}"
+            )

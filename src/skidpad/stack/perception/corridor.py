@@ -1,0 +1,225 @@
+"""Kernels that read one distance from the pixels of a depth and label image pair.
+
+Image rows run down, columns right; a pixel left of the principal column lies left of the ego.
+Depth arrives as inverse depth, 0 where there is nothing.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import kernel
+
+# Car, truck and bus stand side by side in SemanticClass, so one comparison finds them (D-011).
+FIRST_VEHICLE = np.uint8(14)
+VEHICLE_CLASSES = np.uint8(3)
+
+
+class Corridor(NamedTuple):
+    """What a tier keeps: |d| < min(half_width + widening * Z, half_width_max), near < Z < far."""
+
+    focal: float  # px
+    cx: float  # px
+    row_first: int  # rows row_first <= row < row_end are read
+    row_end: int
+    half_width: float  # m at Z = 0
+    widening: float  # m per m
+    half_width_max: float  # m
+    near: float  # m
+    far: float  # m
+    min_vehicle: float  # px in the rows read, fewer: no target
+    min_kept: float  # px in the corridor, fewer: no target
+
+
+@kernel
+def lateral_offset(z: float, u: float, c: Corridor, sin_yaw: float, kappa: float) -> float:
+    """Offset of column u at depth z from the lane's path, left positive (eq. 5, 7; A-041, A-042).
+
+    sin_yaw: of the heading error to the lane, left positive; kappa: half the lane's curvature.
+    """
+    return (c.cx - u) * z / c.focal + z * sin_yaw - kappa * z * z
+
+
+@kernel
+def half_width(z: float, c: Corridor) -> float:
+    """Half-width of the corridor at depth z in m (eq. 8)."""
+    return min(c.half_width + c.widening * z, c.half_width_max)
+
+
+@kernel
+def in_corridor(z: float, u: float, c: Corridor, sin_yaw: float, kappa: float) -> bool:
+    """Strictly inside in depth and width (A-054)."""
+    if not (c.near < z < c.far):
+        return False
+    return bool(abs(lateral_offset(z, u, c, sin_yaw, kappa)) < half_width(z, c))
+
+
+@kernel
+def _is_vehicle(label: np.uint8) -> bool:
+    return np.uint8(label - FIRST_VEHICLE) < VEHICLE_CLASSES
+
+
+@kernel
+def reachable_columns(c: Corridor, sin_yaw: float, kappa: float, width: int) -> tuple[int, int]:
+    """Columns first <= u < end outside which no depth lies in the corridor.
+
+    |d| < w means (cx - u) / f within kappa Z - sin_yaw +- w / Z. The first term is linear in Z
+    and w / Z falls with Z, so the extremes over [near, far] bound both.
+    """
+    spread = half_width(c.near, c) / c.near
+    low = min(kappa * c.near, kappa * c.far) - sin_yaw - spread
+    high = max(kappa * c.near, kappa * c.far) - sin_yaw + spread
+    first = int(max(0.0, np.floor(c.cx - high * c.focal)))
+    end = int(min(float(width), np.ceil(c.cx - low * c.focal) + 1.0))
+    return min(first, width), max(end, 0)
+
+
+@kernel
+def _count_vehicle(
+    labels: NDArray[np.uint8], row_first: int, row_end: int, col_first: int, col_end: int
+) -> int:
+    count = 0
+    for row in range(row_first, row_end):
+        for u in range(col_first, col_end):
+            if _is_vehicle(labels[row, u]):
+                count += 1
+    return count
+
+
+@kernel
+def select(values: NDArray[np.float32], n: int, k: int) -> float:
+    """The k-th smallest (from 0) of values[:n]; reorders them so that smaller ones come first."""
+    left, right = 0, n - 1
+    while left < right:
+        pivot = values[(left + right) // 2]
+        i, j = left, right
+        while i <= j:
+            while values[i] < pivot:
+                i += 1
+            while values[j] > pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if k <= j:
+            right = j
+        elif k >= i:
+            left = i
+        else:
+            break
+    return float(values[k])
+
+
+@kernel
+def percentile(values: NDArray[np.float32], n: int, fraction: float) -> float:
+    """Percentile of values[:n] with linear interpolation between neighbours; reorders them."""
+    position = fraction * (n - 1)
+    k = int(np.floor(position))
+    low = select(values, n, k)
+    if k + 1 >= n:
+        return low
+    high = values[k + 1]
+    for i in range(k + 2, n):
+        high = min(high, values[i])
+    return low + (position - k) * (float(high) - low)
+
+
+@kernel
+def read_pixels(
+    inverse_depth: NDArray[np.float32],
+    labels: NDArray[np.uint8],
+    c: Corridor,
+    fraction: float,
+    sin_yaw: float,
+    kappa: float,
+    scratch: NDArray[np.float32],
+) -> float:
+    """The tier's distance in m, NaN for no target (A-044 to A-054).
+
+    inverse_depth (H, W) 1/m, labels (H, W) of the same view; scratch: room for every pixel read.
+    """
+    width = labels.shape[1]
+    first, end = reachable_columns(c, sin_yaw, kappa, width)
+    vehicle = 0
+    kept = 0
+    for row in range(c.row_first, c.row_end):
+        for u in range(first, end):
+            if _is_vehicle(labels[row, u]):
+                vehicle += 1
+                inverse = inverse_depth[row, u]
+                if inverse > 0.0:
+                    z = 1.0 / float(inverse)
+                    if in_corridor(z, float(u), c, sin_yaw, kappa):
+                        scratch[kept] = z
+                        kept += 1
+    if kept < c.min_kept or kept == 0:
+        return np.nan
+    if vehicle < c.min_vehicle:  # the rest of the image decides
+        vehicle += _count_vehicle(labels, c.row_first, c.row_end, 0, first)
+        vehicle += _count_vehicle(labels, c.row_first, c.row_end, end, width)
+        if vehicle < c.min_vehicle:
+            return np.nan
+    return percentile(scratch, kept, fraction)
+
+
+@kernel
+def read_segments(
+    u: NDArray[np.float32],
+    width: NDArray[np.float32],
+    top: NDArray[np.float32],
+    bottom: NDArray[np.float32],
+    depth: NDArray[np.float32],
+    label: NDArray[np.uint8],
+    c: Corridor,
+    fraction: float,
+    sin_yaw: float,
+    kappa: float,
+) -> float:
+    """The same distance from runs of pixels, each weighing as many pixels as it covers (M-3)."""
+    n = len(u)
+    z = np.empty(n, dtype=np.float64)
+    weight = np.empty(n, dtype=np.float64)
+    vehicle = 0.0
+    kept = 0
+    total = 0.0
+    for i in range(n):
+        rows = min(float(bottom[i]), float(c.row_end)) - max(float(top[i]), float(c.row_first))
+        if rows <= 0.0 or not _is_vehicle(label[i]):
+            continue
+        pixels = rows * float(width[i])
+        vehicle += pixels
+        if in_corridor(float(depth[i]), float(u[i]), c, sin_yaw, kappa):
+            z[kept] = depth[i]
+            weight[kept] = pixels
+            total += pixels
+            kept += 1
+    if vehicle < c.min_vehicle or total < c.min_kept or kept == 0:
+        return np.nan
+    return weighted_percentile(z[:kept], weight[:kept], fraction)
+
+
+@kernel
+def weighted_percentile(
+    values: NDArray[np.float64], weight: NDArray[np.float64], fraction: float
+) -> float:
+    """Percentile of values that each stand `weight` times, interpolated as in `percentile`."""
+    order = np.argsort(values, kind="mergesort")
+    position = fraction * max(np.sum(weight) - 1.0, 0.0)
+    k = np.floor(position)
+    passed = 0.0
+    low = values[order[-1]]
+    high = low
+    found = False
+    for i in order:
+        passed += weight[i]
+        if not found and passed > k:
+            low = values[i]
+            found = True
+        if passed > k + 1.0:
+            high = values[i]
+            break
+    return float(low + (position - k) * (high - low))

@@ -1,0 +1,132 @@
+"""Everything that looks ahead, joined: fusion, radar, persistence, verification."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from skidpad.core.frames import SensorFrame
+from skidpad.core.specs import SensorSpec
+from skidpad.core.vocabulary import DetectionStatus
+from skidpad.roads.queries import RoadMap
+from skidpad.stack.configurations import Function, Functions
+from skidpad.stack.perception.fusion import (
+    CameraPair,
+    MedianFilter,
+    RateFilter,
+    Verification,
+    bumper_corridor,
+    camera_pair,
+    fuse,
+    roof_corridor,
+)
+from skidpad.stack.perception.lane_view import LaneView
+from skidpad.stack.perception.persistence import Persistence
+from skidpad.stack.perception.radar import (
+    HALF_WIDTH,
+    NO_RADAR,
+    PARABOLA_HALF_WIDTH,
+    AnyPoint,
+    LaneMatch,
+    Radar,
+    RadarReading,
+)
+from skidpad.stack.settings import RadarCandidates, RadarCorridor, RoofCorridor, Settings
+
+ROOF = ("depth_roof", "semantic_roof")
+BUMPER = ("depth_bumper", "semantic_bumper")
+
+
+class Sight(NamedTuple):
+    """What lies ahead in one tick; distances in m, None: no target."""
+
+    status: DetectionStatus
+    distance: float | None  # the measured distance that counts
+    confirmed: bool  # by vision, for long enough
+    bumper: float | None
+    roof: float | None
+    fused: float | None  # before the median
+    radar: RadarReading
+
+
+class Front:
+    """The forward perception of one vehicle."""
+
+    def __init__(
+        self,
+        specs: Sequence[SensorSpec],
+        map: RoadMap,
+        functions: Functions,
+        settings: Settings,
+        dt: float,
+    ) -> None:
+        self.settings = settings
+        bumper_depth, bumper_semantic = camera_pair(specs, *BUMPER)
+        self.roof_depth, self.roof_semantic = camera_pair(specs, *ROOF)
+        self.bumper = CameraPair(bumper_depth, bumper_semantic, bumper_corridor(bumper_semantic))
+        self.median = MedianFilter()
+        self.rate = RateFilter(dt) if settings.rate_filter else None
+        self.radar = _radar(map, settings) if settings.radar else None
+        self.persistence = Persistence(
+            dt,
+            settings.detection_gate,
+            settings.radar_close_check,
+            settings.safety_persist,
+            settings.rejected_stays_active,
+        )
+        self.switch(functions)
+
+    def switch(self, functions: Functions) -> None:
+        """Functions that perception depends on."""
+        self.follows = Function.ACC in functions
+        narrow = self.settings.roof_corridor is RoofCorridor.FLAT_WITHOUT_LCA
+        flat = narrow and Function.LCA not in functions
+        self.roof = CameraPair(
+            self.roof_depth, self.roof_semantic, roof_corridor(self.roof_semantic, flat)
+        )
+        self.verification = Verification(self.bumper, self.roof)
+
+    def reset(self) -> None:
+        """The ego stands elsewhere."""
+        self.median.reset()
+        self.persistence.reset()
+        for part in (self.rate, self.radar):
+            if part is not None:
+                part.reset()
+
+    def look(self, frame: SensorFrame, v: float, view: LaneView) -> Sight:
+        """What this frame shows; v in m/s."""
+        s = self.settings
+        bumper = self.bumper.read(frame, view.yaw_error, view.kappa)
+        roof = self.roof.read(frame, view.yaw_error, view.kappa)
+        fused = fuse(bumper, roof, s.bumper_alone, s.consistency_guard)
+        steady = fused if self.rate is None else self.rate.update(fused)
+        radar = NO_RADAR
+        if self.radar is not None:
+            tracking = self.persistence.confirmed
+            radar = self.radar.update(frame.radar, frame.ego.pose, v, view, tracking)
+        detection = self.persistence.update(self.median.update(steady), bumper, radar)
+        return Sight(
+            detection.status,
+            detection.distance,
+            self.persistence.confirmed,
+            bumper,
+            roof,
+            fused,
+            radar,
+        )
+
+    def conclude(self, sight: Sight, stopping: bool) -> None:
+        """What the tick came to."""
+        self.persistence.conclude(sight.distance is not None, self.follows, stopping)
+
+    def verify(self, frame: SensorFrame, distance: float, view: LaneView) -> tuple[bool, str]:
+        """Whether vehicle pixels near `distance` bear the target out, and who says so."""
+        return self.verification.confirm(frame, distance, view.yaw_error, view.kappa)
+
+
+def _radar(map: RoadMap, settings: Settings) -> Radar:
+    nearest_only = settings.radar_candidates is RadarCandidates.NEAREST
+    if settings.radar_corridor is RadarCorridor.PARABOLA:
+        return Radar(AnyPoint(), PARABOLA_HALF_WIDTH, nearest_only)
+    return Radar(LaneMatch(map), HALF_WIDTH, nearest_only)

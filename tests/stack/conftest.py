@@ -1,0 +1,1 @@
+"""Makes `stackfakes` importable for the tests below this folder."""

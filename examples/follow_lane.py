@@ -1,21 +1,28 @@
-"""Your own stack in 20 lines: steer along the lane, keep two seconds to what the radar sees."""
+"""Your own stack: drive it with `skidpad adas --stack examples/follow_lane.py:FollowLane`."""
 
 from math import atan2
 
-from skidpad import VehicleCommand
+import numpy as np
+
+from skidpad.core.geometry import wrap_angle
+from skidpad.core.states import VehicleCommand
 
 
 class FollowLane:
+    """Steers towards the lane ahead and keeps two seconds to what the radar sees."""
+
     def __init__(self, specs, map, settings):
         self.map, self.v_cruise = map, settings.get("cruise_kmh", 80.0) / 3.6
 
     def tick(self, frame):
-        ego = frame.ego
-        here = self.map.project(ego.pose.x, ego.pose.y, ego.pose.z)
-        aim = here and self.map.ahead(here, 10.0 + ego.speed)
-        bearing = atan2(aim.y - ego.pose.y, aim.x - ego.pose.x) - ego.pose.yaw if aim else 0.0
-        steer = max(-1.0, min(1.0, 0.8 * atan2(*_sin_cos(bearing))))
-        ahead = abs(frame.radar.azimuth) * frame.radar.range < 1.5
-        gap = min(frame.radar.range[ahead & (frame.radar.altitude > -0.03)], default=1e3)
-        error = min(self.v_cruise, gap / 2.0) - ego.speed
-        return VehicleCommand(max(0.0, min(1.0, error)), max(0.0, min(1.0, -error / 4.0)), steer)
+        """The command for the next 0.05 s."""
+        pose, v, radar = frame.ego.pose, frame.ego.speed, frame.radar
+        here = self.map.project(pose.x, pose.y, pose.z)
+        aim = self.map.ahead(here, 10.0 + v) if here else None
+        if aim is None:
+            return VehicleCommand(brake=1.0)
+        steer = wrap_angle(atan2(aim.y - pose.y, aim.x - pose.x) - pose.yaw)
+        in_path = (np.abs(radar.range * radar.azimuth) < 1.5) & (radar.altitude > -0.01)
+        gap = min(radar.range[in_path], default=200.0)
+        pedal = min(max(min(self.v_cruise, gap / 2.0) - v, -1.0), 1.0)
+        return VehicleCommand(max(pedal, 0.0), max(-pedal, 0.0), min(max(steer, -1.0), 1.0))

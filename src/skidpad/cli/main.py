@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 import skidpad
+from skidpad.cli.profiles import profiles
 from skidpad.core.errors import InputError, SkidpadError
 
 app = typer.Typer(
@@ -29,6 +30,9 @@ def _root(
     ),
 ) -> None:
     """A proving ground for driving automation in bad weather."""
+
+
+app.add_typer(profiles)
 
 
 @app.command()

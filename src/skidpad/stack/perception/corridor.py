@@ -59,7 +59,7 @@ def in_corridor(z: float, u: float, c: Corridor, sin_yaw: float, kappa: float) -
 
 @kernel
 def _is_vehicle(label: np.uint8) -> bool:
-    return np.uint8(label - FIRST_VEHICLE) < VEHICLE_CLASSES
+    return bool(np.uint8(label - FIRST_VEHICLE) < VEHICLE_CLASSES)
 
 
 @kernel

@@ -1,0 +1,70 @@
+"""`skidpad profiles`: the settings files and how they differ."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import typer
+
+profiles = typer.Typer(
+    name="profiles",
+    help="Settings profiles: list them, show one, compare two.",
+    invoke_without_command=True,
+)
+
+
+@profiles.callback()
+def _default(context: typer.Context) -> None:
+    """Settings profiles: list them, show one, compare two."""
+    if context.invoked_subcommand is None:
+        list_profiles()
+
+
+@profiles.command("list")
+def list_profiles() -> None:
+    """Name the profiles, with the number of settings that differ from `recommended`."""
+    from skidpad.stack.settings import PROFILES, differences, load_profile
+
+    recommended = load_profile("recommended")
+    for name in PROFILES:
+        n = len(differences(recommended, load_profile(name)))
+        typer.echo(f"{name:<16}{n} settings differ from recommended" if n else name)
+
+
+@profiles.command()
+def show(name: str) -> None:
+    """Show every setting of a profile with its source."""
+    from dataclasses import fields
+
+    from skidpad.stack.settings import Settings, load_profile
+
+    plain = load_profile(name).as_plain()
+    for f in fields(Settings):
+        about = f.metadata
+        typer.echo(
+            f"{f.name + ': ' + _text(plain[f.name]):<42}"
+            f"# {about['source']}, {about['house']}: {about['text']}"
+        )
+
+
+@profiles.command()
+def diff(a: str, b: str) -> None:
+    """List the settings in which two profiles differ."""
+    from skidpad.stack.settings import differences, load_profile
+
+    rows = differences(load_profile(a), load_profile(b))
+    if not rows:
+        typer.echo(f"{a} and {b} are equal")
+        return
+    typer.echo(f"{'setting':<24}{a:<20}{b}")
+    for name, left, right in rows:
+        typer.echo(f"{name:<24}{_text(left):<20}{_text(right)}")
+
+
+def _text(value: Any) -> str:
+    """As `--set` takes it."""
+    if value is None:
+        return "none"
+    if isinstance(value, bool):
+        return "on" if value else "off"
+    return f"{value:g}" if isinstance(value, float) else str(value)

@@ -1,0 +1,71 @@
+import pytest
+
+from skidpad.campaign.cells import Cell, Driver, cross, identity, published_drivers, sweep
+from skidpad.core.errors import ConfigError
+from skidpad.core.weather import Weather
+from skidpad.stack.settings import Settings
+
+RAIN = Weather(name="rain-noon", title="Heavy Rain - Noon", precipitation=100, wetness=100)
+CLEAR = Weather(name="clear-noon", title="Clear Sky - Noon")
+
+
+def template():
+    return Cell(
+        driver=Driver(label="0"), weather=CLEAR, seed=0, profile="recommended", settings=Settings()
+    )
+
+
+@pytest.mark.req("A-006", "A-007", "A-008")
+def test_the_matrix_is_every_driver_in_every_weather_with_common_seeds():
+    cells = cross(published_drivers("all"), [CLEAR, RAIN], 3, template())
+    assert len(cells) == 5 * 2 * 3
+    assert len({c.name for c in cells}) == 30
+    seeds = {(c.driver.label, c.weather.name): set() for c in cells}
+    for c in cells:
+        seeds[c.driver.label, c.weather.name].add(c.seed)
+    assert set(map(tuple, seeds.values())) == {(1, 2, 3)}
+    assert all(c.duration == 500.0 for c in cells)
+
+
+@pytest.mark.req("A-005")
+def test_a_run_lasts_500_simulated_seconds():
+    assert template().duration == 500.0
+
+
+def test_a_sweep_varies_one_field_and_names_each_value():
+    swept = sweep([CLEAR], "wetness=0:100:25")
+    assert [w.wetness for w in swept] == [0, 25, 50, 75, 100]
+    assert len({w.name for w in swept}) == 5
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("colour=0:1:1", "weather field"),
+        ("wetness=0:1", "three numbers"),
+        ("wetness=5:1:1", "A <= B"),
+        ("wetness=0:200:100", "between 0 and 100, got 200"),
+    ],
+)
+def test_a_wrong_sweep_says_what_is_wrong(text, message):
+    with pytest.raises(ConfigError, match=message):
+        sweep([CLEAR], text)
+
+
+def test_unknown_configurations_are_refused_with_the_choice():
+    with pytest.raises(ConfigError, match="choose"):
+        published_drivers("0,7")
+    with pytest.raises(ConfigError, match="'x'"):
+        published_drivers("x")
+
+
+def test_a_weather_given_twice_is_refused():
+    with pytest.raises(ConfigError, match="twice"):
+        cross(published_drivers("1"), [CLEAR, CLEAR], 1, template())
+
+
+def test_the_identity_changes_with_anything_that_decides_a_run():
+    base = cross(published_drivers("1"), [CLEAR], 1, template())
+    other = cross(published_drivers("1"), [CLEAR], 2, template())
+    assert identity(base) != identity(other)
+    assert identity(base) == identity(cross(published_drivers("1"), [CLEAR], 1, template()))

@@ -1,12 +1,17 @@
 """The readable face of a baked map. Kernels do the work; see `roads.kernels`."""
-# Interface for the roads author and all users of it (signatures are settled, bodies are not).
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from math import ceil, nan
 
+from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.roads.lanes import LaneSamples, LaneTable, SignalTable
+from skidpad.core.setup import LanePosition
+from skidpad.roads import kernels
+from skidpad.roads.baked import BakedMap
+from skidpad.roads.lanes import LaneSamples, LaneTable, SignalKind, SignalTable
+from skidpad.roads.roadside import Roadside
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,10 +36,21 @@ class LanePoint:
         return Pose(self.x, self.y, self.z, yaw=self.heading)
 
 
+@dataclass(frozen=True, slots=True)
+class SignalAhead:
+    """A signal on the path: its row in the signal table and the way to its stop line."""
+
+    row: int
+    signal: int  # OpenDRIVE id
+    distance: float  # m along the lanes
+
+
 class RoadMap:
     """One map: `samples`, `lanes`, `signals`, `roadside`, and questions about them.
 
-    name: str; content_hash: str (SHA-256 over all baked arrays, decision L-6).
+    name: str; content_hash: str (SHA-256 over all baked arrays, decision L-6); arrays: what kernels
+    of other houses take; ego_start: where the ego starts unless told otherwise, or None;
+    geo_reference: the file's projection text.
     """
 
     name: str
@@ -42,6 +58,18 @@ class RoadMap:
     samples: LaneSamples
     lanes: LaneTable
     signals: SignalTable
+    roadside: Roadside
+    arrays: kernels.LaneArrays
+    geo_reference: str
+    ego_start: LanePosition | None
+
+    def __init__(self, baked: BakedMap) -> None:
+        self.name = baked.name
+        self.samples, self.lanes, self.signals = baked.samples, baked.lanes, baked.signals
+        self.roadside = baked.roadside
+        self.geo_reference, self.ego_start = baked.geo_reference, baked.ego_start
+        self.content_hash = baked.content_hash()
+        self.arrays = kernels.lane_arrays(baked)
 
     def project(
         self, x: float, y: float, z: float, hint: int = -1, driving: bool = True
@@ -50,7 +78,20 @@ class RoadMap:
 
         hint: a lane index near which to search first; the answer does not depend on it.
         """
-        raise NotImplementedError
+        lane, s, offset = kernels.project_kernel(
+            self.arrays, float(x), float(y), float(z), hint, driving
+        )
+        return None if lane < 0 else self.at(lane, s, offset)
+
+    def at(self, lane: int, s: float, offset: float = 0.0) -> LanePoint:
+        """The place `s` m along a lane, given by its index."""
+        x, y, z, heading, curvature, width, _, _, _ = kernels.sample_kernel(
+            self.arrays, int(lane), float(s)
+        )
+        road, lane_id = int(self.lanes.road[lane]), int(self.lanes.lane_id[lane])
+        return LanePoint(
+            int(lane), float(s), x, y, z, heading, curvature, width, road, lane_id, float(offset)
+        )
 
     def ahead(
         self, point: LanePoint, distance: float, heading: float | None = None
@@ -59,30 +100,113 @@ class RoadMap:
 
         heading: what "straight" is measured against; None: the lane's own. None where the road ends.
         """
-        raise NotImplementedError
+        lane, s = kernels.advance_kernel(
+            self.arrays, point.lane, point.s, float(distance), nan if heading is None else heading
+        )
+        return None if lane < 0 else self.at(lane, s)
 
     def behind(self, point: LanePoint, distance: float) -> LanePoint | None:
         """The place `distance` m back along the straightest predecessor."""
-        raise NotImplementedError
+        return self.ahead(point, -distance)
 
     def all_ahead(self, point: LanePoint, distance: float) -> list[LanePoint]:
         """Every place that lies `distance` m further, one per branch."""
-        raise NotImplementedError
+        found: dict[int, LanePoint] = {}
+        seen = set()
+        frontier = [(point.lane, point.s + distance)]
+        while frontier:
+            lane, s = frontier.pop()
+            length = float(self.lanes.length[lane])
+            if s <= length:
+                found.setdefault(lane, self.at(lane, s))
+                continue
+            for following in self.successors(lane):
+                step = (following, s - length)
+                drives_on = self.arrays.drivable[following] or not self.arrays.drivable[lane]
+                if drives_on and step not in seen:
+                    seen.add(step)
+                    frontier.append(step)
+        return [found[lane] for lane in sorted(found)]
+
+    def successors(self, lane: int) -> list[int]:
+        """Indices of the lanes that follow."""
+        start = self.lanes.next_start
+        return [int(i) for i in self.lanes.next_lane[start[lane] : start[lane + 1]]]
+
+    def predecessors(self, lane: int) -> list[int]:
+        """Indices of the lanes that lead here."""
+        start = self.lanes.prev_start
+        return [int(i) for i in self.lanes.prev_lane[start[lane] : start[lane + 1]]]
 
     def left(self, point: LanePoint) -> LanePoint | None:
         """The neighbouring driving lane on the left, same direction."""
-        raise NotImplementedError
+        return self._beside(point, int(self.lanes.left[point.lane]))
 
     def right(self, point: LanePoint) -> LanePoint | None:
         """The neighbouring driving lane on the right, same direction."""
-        raise NotImplementedError
+        return self._beside(point, int(self.lanes.right[point.lane]))
+
+    def _beside(self, point: LanePoint, lane: int) -> LanePoint | None:
+        if lane < 0:
+            return None
+        return self.at(lane, kernels.neighbour_s(self.arrays, point.lane, lane, point.s))
+
+    def shifted(self, point: LanePoint, lanes_left: int) -> LanePoint | None:
+        """The place `lanes_left` lanes to the left (negative: right) of it; None when one is missing."""
+        place: LanePoint | None = point
+        for _ in range(abs(lanes_left)):
+            if place is None:
+                return None
+            place = self.left(place) if lanes_left > 0 else self.right(place)
+        return place
+
+    def s_road(self, point: LanePoint) -> float:
+        """OpenDRIVE s of a place."""
+        return float(kernels.s_road_kernel(self.arrays, point.lane, point.s))
+
+    def limit(self, point: LanePoint) -> float | None:
+        """Speed limit in m/s; None where the map gives none."""
+        value = float(kernels.sample_kernel(self.arrays, point.lane, point.s)[8])
+        return None if value != value else value
 
     def on_lane(self, road: int, lane_id: int, s_road: float) -> LanePoint:
         """OpenDRIVE coordinates to a place; ConfigError when there is no such lane."""
-        raise NotImplementedError
+        lanes = ((self.lanes.road == road) & (self.lanes.lane_id == lane_id)).nonzero()[0]
+        spans = []
+        for lane in lanes:
+            first = self.lanes.first[lane]
+            ends = self.samples.s_road[[first, first + self.lanes.size[lane] - 1]]
+            if ends.min() - 1e-3 <= s_road <= ends.max() + 1e-3:
+                return self.at(lane, kernels.lane_s_kernel(self.arrays, int(lane), float(s_road)))
+            spans.append(f"{ends.min():.1f} to {ends.max():.1f}")
+        has = f"s from {', '.join(spans)}" if spans else "no such lane"
+        raise ConfigError(
+            f"map {self.name}: road {road} lane {lane_id} at s = {s_road:g} is not there ({has})"
+        )
+
+    def place(self, position: LanePosition) -> LanePoint:
+        """The place of a lane position; its lateral offset is kept in `offset`."""
+        point = self.on_lane(position.road, position.lane, position.s)
+        return self.at(point.lane, point.s, position.offset)
+
+    def signal_ahead(
+        self, point: LanePoint, distance: float, kind: SignalKind = SignalKind.LIGHT
+    ) -> SignalAhead | None:
+        """The first signal of a kind on the straightest path, with the way to its stop line."""
+        row, gap = kernels.signal_ahead(
+            self.arrays, point.lane, point.s, float(distance), int(kind)
+        )
+        return None if row < 0 else SignalAhead(int(row), int(self.signals.id[row]), float(gap))
 
     def traced_roads(
         self, start: LanePoint, distance: float = 5000.0, step: float = 5.0
     ) -> frozenset[int]:
         """Road ids met when driving on from `start` (highway tracing, A-212)."""
-        raise NotImplementedError
+        roads = {start.road}
+        lane, s = start.lane, start.s
+        for _ in range(ceil(distance / step)):
+            lane, s = kernels.advance_kernel(self.arrays, lane, s, step)
+            if lane < 0:
+                break
+            roads.add(int(self.lanes.road[lane]))
+        return frozenset(roads)

@@ -1,0 +1,147 @@
+"""A baked map as plain data: hashing, saving, loading."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from dataclasses import dataclass, field
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import FileError
+from skidpad.core.setup import LanePosition
+from skidpad.roads.lanes import LaneSamples, LaneTable, SignalTable
+from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside, SignalHead
+
+FORMAT = 1  # of the baked file; raise it when columns change
+
+
+@dataclass(frozen=True, slots=True)
+class BakedMap:
+    """Everything that the importer makes of one file."""
+
+    name: str
+    samples: LaneSamples
+    lanes: LaneTable
+    signals: SignalTable
+    roadside: Roadside = field(default_factory=Roadside)
+    geo_reference: str = ""
+    ego_start: LanePosition | None = None
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """All content as named arrays, in a fixed order."""
+        out: dict[str, Any] = {}
+        for prefix, table in (
+            ("samples", self.samples),
+            ("lanes", self.lanes),
+            ("signals", self.signals),
+        ):
+            for column, values in zip(table._fields, table, strict=True):
+                out[f"{prefix}.{column}"] = values
+        return out | _roadside_arrays(self.roadside)
+
+    def content_hash(self) -> str:
+        """SHA-256 over names, types, shapes and values of all arrays (decisions X-1, L-6)."""
+        digest = hashlib.sha256()
+        for name, values in self.arrays().items():
+            kind = values.dtype.newbyteorder("<")
+            digest.update(f"{name} {kind.str} {values.shape};".encode())
+            canonical = values.astype(kind) + 0 if values.dtype.kind == "f" else values.astype(kind)
+            digest.update(
+                np.where(canonical != canonical, np.nan, canonical).astype(kind).tobytes()
+            )
+        return digest.hexdigest()
+
+    def save(self, path: Path) -> None:
+        """Write as compressed npz."""
+        start = self.ego_start
+        about = {
+            "format": FORMAT,
+            "name": self.name,
+            "geo_reference": self.geo_reference,
+            "ego_start": None if start is None else [start.road, start.lane, start.s],
+        }
+        buffer = BytesIO()
+        content: dict[str, Any] = {"about": np.array(json.dumps(about)), **self.arrays()}
+        np.savez_compressed(buffer, **content)
+        path.write_bytes(buffer.getvalue())
+
+
+def load_baked(path: Path) -> BakedMap:
+    """Read what `BakedMap.save` wrote; FileError for anything else."""
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = dict(stored)
+        about = json.loads(str(arrays.pop("about")))
+        if about["format"] != FORMAT:
+            raise FileError(f"{path}: baked in format {about['format']}, need {FORMAT}")
+        start = about["ego_start"]
+        return BakedMap(
+            name=about["name"],
+            samples=LaneSamples(*(arrays[f"samples.{c}"] for c in LaneSamples._fields)),
+            lanes=LaneTable(*(arrays[f"lanes.{c}"] for c in LaneTable._fields)),
+            signals=SignalTable(*(arrays[f"signals.{c}"] for c in SignalTable._fields)),
+            roadside=_roadside(arrays),
+            geo_reference=about["geo_reference"],
+            ego_start=None if start is None else LanePosition(*start),
+        )
+    except (OSError, ValueError, KeyError, EOFError) as error:
+        if isinstance(error, FileError):
+            raise
+        raise FileError(f"{path}: not a baked map: {error}") from None
+
+
+def _roadside_arrays(roadside: Roadside) -> dict[str, NDArray[Any]]:
+    barriers, boxes = roadside.barriers, roadside.boxes
+    lines = [b.points for b in barriers]
+    areas = list(roadside.crosswalks)
+    return {
+        "barriers.about": np.array([[b.kind, b.height] for b in barriers]).reshape(-1, 2),
+        "barriers.points": np.concatenate([np.empty((0, 3)), *lines]),
+        "barriers.sizes": np.array([len(p) for p in lines], dtype=np.int32),
+        "boxes": np.array(
+            [
+                [b.label, b.x, b.y, b.z, b.yaw, b.length, b.width, b.height, b.solid, *b.rgb]
+                for b in boxes
+            ],
+            dtype=np.float64,
+        ).reshape(-1, 12),
+        "heads": np.array(
+            [[h.signal, h.x, h.y, h.z, h.heading, h.lamp_diameter] for h in roadside.heads],
+            dtype=np.float64,
+        ).reshape(-1, 6),
+        "crosswalks.points": np.concatenate([np.empty((0, 3)), *areas]),
+        "crosswalks.sizes": np.array([len(p) for p in areas], dtype=np.int32),
+    }
+
+
+def _split(arrays: dict[str, NDArray[Any]], name: str) -> list[NDArray[np.float64]]:
+    sizes = arrays[f"{name}.sizes"]
+    return np.split(arrays[f"{name}.points"], np.cumsum(sizes)[:-1]) if len(sizes) else []
+
+
+def _roadside(arrays: dict[str, NDArray[Any]]) -> Roadside:
+    return Roadside(
+        barriers=tuple(
+            Barrier(BarrierKind(int(kind)), points, float(height))
+            for (kind, height), points in zip(
+                arrays["barriers.about"], _split(arrays, "barriers"), strict=True
+            )
+        ),
+        boxes=tuple(_box(*row) for row in arrays["boxes"].tolist()),
+        heads=tuple(
+            SignalHead(int(signal), x, y, z, heading, diameter)
+            for signal, x, y, z, heading, diameter in arrays["heads"].tolist()
+        ),
+        crosswalks=tuple(_split(arrays, "crosswalks")),
+    )
+
+
+def _box(label: float, x: float, y: float, z: float, yaw: float, *rest: float) -> Box:
+    length, width, height, solid, r, g, b = rest
+    rgb = (int(r), int(g), int(b))
+    return Box(int(label), x, y, z, yaw, length, width, height, bool(solid), rgb)

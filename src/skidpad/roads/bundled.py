@@ -1,0 +1,59 @@
+"""Maps by name or file: those that come with Skidpad are stored baked, others are baked when read."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from pathlib import Path
+
+from skidpad.core.errors import ConfigError, FileError
+from skidpad.roads.baked import BakedMap, load_baked
+from skidpad.roads.queries import RoadMap
+
+FOLDER = Path(__file__).parent / "maps"
+
+
+def bundled_maps() -> list[str]:
+    """Names of the maps that come with Skidpad."""
+    return sorted(p.stem for p in FOLDER.glob("*.xodr"))
+
+
+def map_file(map: str | Path) -> Path:
+    """The OpenDRIVE file of a bundled map's name, or of a path."""
+    name = str(map)
+    if name in bundled_maps():
+        return FOLDER / f"{name}.xodr"
+    path = Path(map)
+    if path.is_file():
+        return path
+    if path.suffix or len(path.parts) > 1:
+        raise FileError(f"map {name}: there is no such file")
+    raise ConfigError(
+        f"unknown map {name!r}; choose one of: {', '.join(bundled_maps())}, or a file"
+    )
+
+
+def bake_file(path: Path) -> BakedMap:
+    """The baked map of an OpenDRIVE file; the name is the file's."""
+    from skidpad.roads.opendrive.bake import bake  # lxml and scipy are needed for baking only
+
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise FileError(f"map {path}: cannot be read: {error.strerror}") from None
+    return bake(text, path.stem, str(path))
+
+
+def load_map(map: str | Path) -> RoadMap:
+    """A bundled map by name, or any OpenDRIVE or baked file. The same file gives the same object."""
+    path = map_file(map)
+    return _load(path, path.stat().st_mtime_ns)
+
+
+@lru_cache(maxsize=8)
+def _load(path: Path, changed: int) -> RoadMap:  # noqa: ARG001  part of the key
+    if path.suffix == ".npz":
+        return RoadMap(load_baked(path))
+    stored = path.with_suffix(".npz")
+    if path.parent == FOLDER and stored.is_file():
+        return RoadMap(load_baked(stored))
+    return RoadMap(bake_file(path))

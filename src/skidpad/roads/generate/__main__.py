@@ -1,0 +1,23 @@
+"""Write the bundled maps: `python -m skidpad.roads.generate [FOLDER]`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from skidpad.roads.bundled import FOLDER, bake_file
+from skidpad.roads.generate import figure8, straight
+
+MAPS = {"figure8": figure8.network, "straight": straight.network}
+
+
+def write(folder: Path) -> None:
+    """Every map as .xodr and baked beside it."""
+    for name, network in MAPS.items():
+        path = folder / f"{name}.xodr"
+        path.write_bytes(network().text())
+        bake_file(path).save(path.with_suffix(".npz"))
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]) if len(sys.argv) > 1 else FOLDER)

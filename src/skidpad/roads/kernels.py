@@ -1,0 +1,403 @@
+"""Compiled questions about lanes, for the facade in `queries` and for kernels of other houses.
+
+All take `LaneArrays` first. Lane -1 means none. World frame, ISO 8855, SI.
+"""
+
+from __future__ import annotations
+
+from math import atan2, ceil, cos, floor, inf, nan, pi, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+
+from skidpad.core.jit import kernel
+from skidpad.roads.baked import BakedMap
+from skidpad.roads.lanes import Floats, Ints, LaneKind
+
+CELL = 4.0  # m, edge of a cell of the search grid
+REACH = 20.0  # m, beyond this there is no lane
+Z_WEIGHT = 2.0  # heights count double, so that a road 8 m above is 16 m away
+HALF_STEP_SQ = 0.3  # m^2, more than the squared half distance of samples
+SAME = 1e-6  # m^2, squared distances closer than this are equal: the lower lane index wins
+RETRY = 64  # junction-free steps that one walk may take per 64 m, against cycles of tiny lanes
+
+# Columns of LaneArrays.sample
+X, Y, Z, HEADING, S, CURVATURE, GRADE, BANK, WIDTH, LIMIT, S_ROAD = range(11)
+
+
+class LaneArrays(NamedTuple):
+    """A baked map in the form that kernels read; N samples, L lanes, K signals."""
+
+    sample: Floats  # (N, 11) columns X to S_ROAD; heading continuous within a lane
+    lane_of: Ints  # (N,)
+    first: Ints  # (L,) first sample
+    size: Ints  # (L,)
+    length: Floats  # (L,) m
+    road: Ints  # (L,)
+    lane_id: Ints  # (L,)
+    junction: Ints  # (L,) or -1
+    drivable: Ints  # (L,) 1 for driving lanes and ramps
+    left: Ints  # (L,)
+    right: Ints  # (L,)
+    opposite: Ints  # (L,)
+    next_start: Ints  # (L + 1,)
+    next_lane: Ints
+    prev_start: Ints  # (L + 1,)
+    prev_lane: Ints
+    signal_start: Ints  # (L + 1,) signals of lane i, by s: rows signal_row[start[i]:start[i + 1]]
+    signal_row: Ints  # (K,) row of SignalTable
+    signal_s: Floats  # (K,) m along the lane, in the order of signal_row
+    signal_kind: Ints  # (K,) SignalKind, in the order of signal_row
+    cell_origin: Floats  # (2,)
+    cell_start: Ints  # (rows + 1, columns) samples of a cell: cell_sample[start:next start]
+    cell_sample: Ints  # (N,)
+
+
+def lane_arrays(baked: BakedMap) -> LaneArrays:
+    """Pack a baked map for kernels and build its search grid."""
+    p, t = baked.samples, baked.lanes
+    turns = np.diff(p.heading, prepend=p.heading[:1])
+    jumps = -2.0 * np.pi * np.round(turns / (2.0 * np.pi))
+    heading = p.heading + np.cumsum(jumps)
+    heading -= np.repeat((heading - p.heading)[t.first], t.size)
+    columns = (
+        p.x, p.y, p.z, heading, p.s, p.curvature, p.grade, p.bank, p.width, p.limit, p.s_road,
+    )  # fmt: skip
+    order = np.lexsort((baked.signals.s, baked.signals.lane)).astype(np.int32)
+    origin, start, cell_sample = _grid(p.x, p.y)
+    return LaneArrays(
+        sample=np.ascontiguousarray(np.column_stack(columns)),
+        lane_of=p.lane,
+        first=t.first,
+        size=t.size,
+        length=t.length,
+        road=t.road,
+        lane_id=t.lane_id,
+        junction=t.junction,
+        drivable=((t.kind == LaneKind.DRIVING) | (t.kind == LaneKind.RAMP)).astype(np.int32),
+        left=t.left,
+        right=t.right,
+        opposite=t.opposite,
+        next_start=t.next_start,
+        next_lane=t.next_lane,
+        prev_start=t.prev_start,
+        prev_lane=t.prev_lane,
+        signal_start=np.searchsorted(baked.signals.lane[order], np.arange(len(t.road) + 1)).astype(
+            np.int32
+        ),
+        signal_row=order,
+        signal_s=baked.signals.s[order],
+        signal_kind=baked.signals.kind[order].astype(np.int32),
+        cell_origin=origin,
+        cell_start=start,
+        cell_sample=cell_sample,
+    )
+
+
+def _grid(x: Floats, y: Floats) -> tuple[Floats, Ints, Ints]:
+    origin = np.array([x.min(), y.min()])
+    column = np.floor((x - origin[0]) / CELL).astype(np.int64)
+    row = np.floor((y - origin[1]) / CELL).astype(np.int64)
+    columns, rows = int(column.max()) + 1, int(row.max()) + 1
+    cell = row * columns + column
+    order = np.argsort(cell, kind="stable").astype(np.int32)
+    start = np.searchsorted(cell[order], np.arange(rows * columns + columns))
+    return origin, start.astype(np.int32).reshape(rows + 1, columns), order
+
+
+@kernel
+def wrapped(angle: float) -> float:
+    """`angle` wrapped to (-pi, pi]."""
+    return pi - (pi - angle) % (2.0 * pi)
+
+
+@kernel
+def closest_on_segment(a: LaneArrays, i: int, x: float, y: float) -> tuple[float, float, float]:
+    """Closest point of the curve between samples i and i + 1.
+
+    Returns (share in [0, 1], left offset, squared plane distance). The curve is an arc in first
+    order: the share is found on the chord and corrected by the headings at both ends.
+    """
+    p, q = a.sample[i], a.sample[i + 1]
+    ds = q[S] - p[S]
+    dx, dy = x - p[X], y - p[Y]
+    share = 0.0
+    cx, cy = q[X] - p[X], q[Y] - p[Y]
+    chord_sq = cx * cx + cy * cy
+    if chord_sq > 0.0:
+        share = (dx * cx + dy * cy) / chord_sq
+    inside = 0.0 <= share <= 1.0
+    px, py, h = 0.0, 0.0, 0.0
+    for _ in range(3):
+        share = min(max(share, 0.0), 1.0)
+        px, py, h = _hermite(a, i, share)
+        along = (x - px) * cos(h) + (y - py) * sin(h)
+        across = (y - py) * cos(h) - (x - px) * sin(h)
+        # Near the centre of a bend one metre of lane is a shorter way around the query point.
+        bend = 1.0 - p[CURVATURE] * across
+        step = along / (ds * max(bend, 0.3))
+        if abs(step) < 1e-5 or (not inside and (share + step) * (share + step - 1.0) > 0.0):
+            break
+        share += step
+    share = min(max(share, 0.0), 1.0)
+    px, py, h = _hermite(a, i, share)
+    across = (y - py) * cos(h) - (x - px) * sin(h)
+    return share, across, (x - px) ** 2 + (y - py) ** 2
+
+
+@kernel
+def _hermite(a: LaneArrays, i: int, u: float) -> tuple[float, float, float]:
+    """Position and heading on the cubic through samples i and i + 1 with their headings."""
+    p, q = a.sample[i], a.sample[i + 1]
+    ds = q[S] - p[S]
+    h0, h1 = p[HEADING], q[HEADING]
+    w = 1.0 - u
+    b0, b1 = w * w * (1.0 + 2.0 * u), u * u * (3.0 - 2.0 * u)
+    g0, g1 = w * w * u * ds, -u * u * w * ds
+    x = b0 * p[X] + b1 * q[X] + g0 * cos(h0) + g1 * cos(h1)
+    y = b0 * p[Y] + b1 * q[Y] + g0 * sin(h0) + g1 * sin(h1)
+    return x, y, h0 + u * (h1 - h0)
+
+
+@kernel
+def project_kernel(
+    a: LaneArrays,
+    x: float,
+    y: float,
+    z: float,
+    hint: int = -1,  # noqa: ARG001  the grid finds the lane at once
+    driving: bool = True,
+) -> tuple[int, float, float]:
+    """Nearest lane centre to a point: (lane, s, left offset); lane -1 beyond 20 m.
+
+    Nearest in space with heights counted double (decision M-12). hint: a lane; the answer does not
+    depend on it. driving: only driving lanes and ramps.
+    """
+    if not (abs(x) < inf and abs(y) < inf and abs(z) < inf):
+        return -1, nan, nan
+    best, lane, s, offset = REACH * REACH, -1, nan, nan
+    rows, columns = a.cell_start.shape[0] - 1, a.cell_start.shape[1]
+    u, v = (x - a.cell_origin[0]) / CELL, (y - a.cell_origin[1]) / CELL
+    # From far outside the grid no ring could reach it, and the cell numbers would overflow.
+    margin = REACH / CELL + 2.0
+    if not (-margin < u < columns + margin and -margin < v < rows + margin):
+        return -1, nan, nan
+    column, row = floor(u), floor(v)
+    edge = min(u - column, column + 1 - u, v - row, row + 1 - v) * CELL
+    for ring in range(ceil(REACH / CELL) + 2):
+        # No sample of this ring or a later one is nearer than `near`.
+        near = (ring - 1) * CELL + edge if ring > 0 else 0.0
+        if near * near - HALF_STEP_SQ > best:
+            break
+        for r in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):
+            whole = r == row - ring or r == row + ring
+            step = 1 if whole or ring == 0 else 2 * ring
+            for c in range(column - ring, column + ring + 1, step):
+                if not 0 <= c < columns:
+                    continue
+                begin = a.cell_start[r, c]
+                end = a.cell_start[r, c + 1] if c + 1 < columns else a.cell_start[r + 1, 0]
+                for k in range(begin, end):
+                    i = a.cell_sample[k]
+                    dx, dy, dz = x - a.sample[i, X], y - a.sample[i, Y], z - a.sample[i, Z]
+                    dz = max(abs(dz) - 0.1, 0.0) * Z_WEIGHT  # it may change between samples
+                    if dx * dx + dy * dy + dz * dz - HALF_STEP_SQ > best:
+                        continue
+                    j = a.lane_of[i]
+                    if driving and a.drivable[j] == 0:
+                        continue
+                    h = a.sample[i, HEADING]
+                    ahead = dx * cos(h) + dy * sin(h) >= 0.0
+                    if ahead and i == a.first[j] + a.size[j] - 1:
+                        ahead = False
+                    elif not ahead and i == a.first[j]:
+                        ahead = True
+                    segment = i if ahead else i - 1
+                    share, across, d_sq = closest_on_segment(a, segment, x, y)
+                    z_lane = a.sample[segment, Z] + share * (
+                        a.sample[segment + 1, Z] - a.sample[segment, Z]
+                    )
+                    d_sq += (Z_WEIGHT * (z - z_lane)) ** 2
+                    if d_sq < best - SAME or (d_sq < best + SAME and lane >= 0 and j < lane):
+                        best, lane, offset = d_sq, j, across
+                        s = a.sample[segment, S] + share * (
+                            a.sample[segment + 1, S] - a.sample[segment, S]
+                        )
+    return lane, s, offset
+
+
+@kernel
+def segment_kernel(a: LaneArrays, lane: int, s: float) -> tuple[int, float]:
+    """(sample, share): s lies between that sample of the lane and the next; s is clamped."""
+    first = a.first[lane]
+    low, high = first, first + a.size[lane] - 1
+    guess = first + int(max(s, 0.0) / a.length[lane] * (a.size[lane] - 1))
+    guess = min(max(guess, low), high - 1)
+    if a.sample[guess, S] <= s <= a.sample[guess + 1, S]:  # samples are nearly evenly spaced
+        low, high = guess, guess + 1
+    while high - low > 1:
+        middle = (low + high) // 2
+        if a.sample[middle, S] <= s:
+            low = middle
+        else:
+            high = middle
+    share = (s - a.sample[low, S]) / (a.sample[low + 1, S] - a.sample[low, S])
+    return low, min(max(share, 0.0), 1.0)
+
+
+@kernel
+def sample_kernel(
+    a: LaneArrays, lane: int, s: float
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """(x, y, z, heading, curvature, width, grade, bank, limit) of the lane centre at s.
+
+    heading is wrapped; limit is NaN where the map gives none.
+    """
+    i, u = segment_kernel(a, lane, s)
+    x, y, heading = _hermite(a, i, u)
+    p, q = a.sample[i], a.sample[i + 1]
+    w = 1.0 - u
+    return (
+        x,
+        y,
+        w * p[Z] + u * q[Z],
+        wrapped(heading),
+        w * p[CURVATURE] + u * q[CURVATURE],
+        w * p[WIDTH] + u * q[WIDTH],
+        w * p[GRADE] + u * q[GRADE],
+        w * p[BANK] + u * q[BANK],
+        p[LIMIT],
+    )
+
+
+@kernel
+def s_road_kernel(a: LaneArrays, lane: int, s: float) -> float:
+    """OpenDRIVE s of a place on a lane."""
+    i, u = segment_kernel(a, lane, s)
+    p, q = a.sample[i], a.sample[i + 1]
+    return float((1.0 - u) * p[S_ROAD] + u * q[S_ROAD])
+
+
+@kernel
+def lane_s_kernel(a: LaneArrays, lane: int, s_road: float) -> float:
+    """m along the lane of a place given by OpenDRIVE s, clamped to the lane."""
+    low = a.first[lane]
+    high = low + a.size[lane] - 1
+    rising = a.sample[high, S_ROAD] > a.sample[low, S_ROAD]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if (a.sample[middle, S_ROAD] <= s_road) == rising:
+            low = middle
+        else:
+            high = middle
+    from_, to = a.sample[low, S_ROAD], a.sample[high, S_ROAD]
+    share = min(max((s_road - from_) / (to - from_), 0.0), 1.0)
+    return float(a.sample[low, S] + share * (a.sample[high, S] - a.sample[low, S]))
+
+
+@kernel
+def turn_of(a: LaneArrays, lane: int, heading: float, distance: float) -> float:
+    """Absolute angle between `heading` and the direction to the place `distance` m into the lane."""
+    s = min(distance, a.length[lane])
+    x0, y0 = a.sample[a.first[lane], X], a.sample[a.first[lane], Y]
+    x, y, _, h, _, _, _, _, _ = sample_kernel(a, lane, s)
+    return abs(wrapped(h - heading)) + 1e-3 * abs(wrapped(atan2(y - y0, x - x0) - heading))
+
+
+@kernel
+def straightest_next(a: LaneArrays, lane: int, heading: float) -> int:
+    """The drivable successor whose end points closest to `heading` (A-148), or -1."""
+    best, chosen = inf, -1
+    for k in range(a.next_start[lane], a.next_start[lane + 1]):
+        candidate = a.next_lane[k]
+        if a.drivable[candidate] == 0 and a.drivable[lane] == 1:
+            continue
+        turn = turn_of(a, candidate, heading, inf)
+        if turn < best:
+            best, chosen = turn, candidate
+    return chosen
+
+
+@kernel
+def straightest_previous(a: LaneArrays, lane: int, heading: float) -> int:
+    """The drivable predecessor whose start points closest to `heading`, or -1."""
+    best, chosen = inf, -1
+    for k in range(a.prev_start[lane], a.prev_start[lane + 1]):
+        candidate = a.prev_lane[k]
+        if a.drivable[candidate] == 0 and a.drivable[lane] == 1:
+            continue
+        turn = abs(wrapped(a.sample[a.first[candidate], HEADING] - heading))
+        if turn < best:
+            best, chosen = turn, candidate
+    return chosen
+
+
+@kernel
+def advance_kernel(
+    a: LaneArrays, lane: int, s: float, distance: float, heading: float = nan
+) -> tuple[int, float]:
+    """(lane, s) `distance` m further, at forks along the straightest successor; -1 at a dead end.
+
+    heading: what "straight" is measured against at every fork; NaN: the lane's own at its end.
+    A negative distance goes back along straightest predecessors.
+    """
+    s += distance
+    for _ in range(RETRY + int(abs(distance))):
+        if s > a.length[lane]:
+            ahead = heading
+            if not abs(ahead) < inf:
+                ahead = a.sample[a.first[lane] + a.size[lane] - 1, HEADING]
+            following = straightest_next(a, lane, ahead)
+            if following < 0:
+                return -1, nan
+            s -= a.length[lane]
+            lane = following
+        elif s < 0.0:
+            previous = straightest_previous(a, lane, a.sample[a.first[lane], HEADING])
+            if previous < 0:
+                return -1, nan
+            s += a.length[previous]
+            lane = previous
+        else:
+            return lane, s
+    return -1, nan
+
+
+@kernel
+def neighbour_s(a: LaneArrays, lane: int, other: int, s: float) -> float:
+    """m along a neighbouring lane of the same section abreast of s on `lane`."""
+    return lane_s_kernel(a, other, s_road_kernel(a, lane, s))
+
+
+@kernel
+def signal_ahead(
+    a: LaneArrays, lane: int, s: float, distance: float, kind: int, heading: float = nan
+) -> tuple[int, float]:
+    """First signal of `kind` on the straightest path from s on: (row of SignalTable, m to it).
+
+    Row -1 when there is none within `distance`. The distance runs along the lanes to the stop line
+    (A-158, A-163); no junction is needed (decision M-5).
+    """
+    walked = -s
+    for _ in range(RETRY + int(distance)):
+        for k in range(a.signal_start[lane], a.signal_start[lane + 1]):
+            gap = walked + a.signal_s[k]
+            if a.signal_kind[k] == kind and 0.0 <= gap <= distance:
+                return a.signal_row[k], gap
+        walked += a.length[lane]
+        if walked > distance:
+            return -1, inf
+        ahead = heading
+        if not abs(ahead) < inf:
+            ahead = a.sample[a.first[lane] + a.size[lane] - 1, HEADING]
+        lane = straightest_next(a, lane, ahead)
+        if lane < 0:
+            return -1, inf
+    return -1, inf
+
+
+@kernel
+def distance_kernel(a: LaneArrays, lane: int, s: float, x: float, y: float) -> float:
+    """Plane distance from a point to a place on a lane."""
+    px, py, _, _, _, _, _, _, _ = sample_kernel(a, lane, s)
+    return sqrt((x - px) ** 2 + (y - py) ** 2)

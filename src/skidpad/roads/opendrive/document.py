@@ -1,0 +1,320 @@
+"""OpenDRIVE text to plain records. Every problem is a FileError that names file and element."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Any
+
+import numpy as np
+from lxml import etree
+
+from skidpad.core.errors import FileError
+from skidpad.roads.opendrive.reference_line import (
+    Clothoid,
+    Cubics,
+    Element,
+    Parametric,
+    ReferenceLine,
+)
+
+SIZE_MAX = 64 * 2**20  # bytes; the largest town that we know has 3.4 MB
+Node = Any  # lxml's element
+
+
+@dataclass(frozen=True, slots=True)
+class LaneRecord:
+    """One lane of one section."""
+
+    id: int
+    type: str
+    width: Cubics | None  # by s from the section's start
+    border: Cubics | None  # instead of widths
+    predecessor: int | None
+    successor: int | None
+    marks: tuple[tuple[float, str], ...]  # (s from the section's start, road mark type)
+    speeds: tuple[tuple[float, float], ...]  # (s from the section's start, m/s)
+
+
+@dataclass(frozen=True, slots=True)
+class SectionRecord:
+    """A lane section from s_start to s_end."""
+
+    s_start: float
+    s_end: float
+    lanes: tuple[LaneRecord, ...]  # left to right, the centre lane with id 0 included
+
+
+@dataclass(frozen=True, slots=True)
+class Link:
+    """Where a road goes on."""
+
+    target: int
+    junction: bool
+    at_start: bool  # contact point on the target road
+
+
+@dataclass(frozen=True, slots=True)
+class RoadRecord:
+    """One road."""
+
+    id: int
+    junction: int  # -1: none
+    length: float
+    left_hand: bool  # left-hand traffic
+    line: ReferenceLine
+    elevation: Cubics
+    superelevation: Cubics
+    lane_offset: Cubics
+    sections: tuple[SectionRecord, ...]
+    predecessor: Link | None
+    successor: Link | None
+    speeds: tuple[tuple[float, float], ...]  # (s, m/s) of the road's type records
+    signals: tuple[Node, ...]  # <signal>
+    references: tuple[Node, ...]  # <signalReference>
+    objects: tuple[Node, ...]  # <object>
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectionRecord:
+    """A way through a junction."""
+
+    incoming: int
+    connecting: int
+    at_start: bool
+    lanes: tuple[tuple[int, int], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Document:
+    """A whole file."""
+
+    file: str
+    roads: dict[int, RoadRecord]
+    junctions: dict[int, tuple[ConnectionRecord, ...]]
+    controllers: dict[int, int]  # controller by signal
+    geo_reference: str = ""
+    user_data: dict[str, str] = field(default_factory=dict)  # of the header
+
+
+class Reader:
+    """Attribute access with errors that say where."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+
+    def fail(self, node: Node, problem: str) -> FileError:
+        """The error to raise about `node`."""
+        named = f" id={node.get('id')}" if node.get("id") is not None else ""
+        return FileError(f"{self.file}, line {node.sourceline}: <{node.tag}{named}> {problem}")
+
+    def number(self, node: Node, name: str, default: float | None = None) -> float:
+        """A finite number; FileError when it is missing (without default) or is none."""
+        text = node.get(name)
+        if text is None and default is not None:
+            return default
+        try:
+            value = float(text)
+        except (TypeError, ValueError):
+            raise self.fail(node, f"needs a number {name}, got {text!r}") from None
+        if not isfinite(value):
+            raise self.fail(node, f"needs a finite {name}, got {text!r}")
+        return value
+
+    def integer(self, node: Node, name: str, default: int | None = None) -> int:
+        """A whole number that fits 32 bits."""
+        text = node.get(name)
+        if text is None and default is not None:
+            return default
+        try:
+            value = int(text)
+        except (TypeError, ValueError):
+            raise self.fail(node, f"needs a whole number {name}, got {text!r}") from None
+        if abs(value) >= 2**31:
+            raise self.fail(node, f"needs {name} below 2^31, got {text!r}")
+        return value
+
+    def cubics(self, nodes: list[Node], start: str = "s") -> Cubics:
+        """Records with attributes a, b, c, d as one function; zero when there are none."""
+        if not nodes:
+            return Cubics.none()
+        rows = sorted(
+            [self.number(n, start), *(self.number(n, k, 0.0) for k in "abcd")] for n in nodes
+        )
+        table = np.array(rows)
+        return Cubics(table[:, 0], table[:, 1:])
+
+    def speed(self, node: Node) -> float | None:
+        """m/s of a <speed>; None for "no limit" and "undefined"."""
+        if node.get("max") in ("no limit", "undefined"):
+            return None
+        factor = {"km/h": 1 / 3.6, "mph": 0.44704, "m/s": 1.0, None: 1.0}
+        unit = node.get("unit")
+        if unit not in factor:
+            raise self.fail(node, f"has unknown unit {unit!r}; allowed: km/h, mph, m/s")
+        return self.number(node, "max") * factor[unit]
+
+
+def parse(text: bytes, file: str) -> Document:
+    """Records of an OpenDRIVE file; without entities, networks or huge trees."""
+    if len(text) > SIZE_MAX:
+        raise FileError(f"{file}: {len(text)} bytes are more than the allowed {SIZE_MAX}")
+    parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False)
+    try:
+        root = etree.fromstring(text, parser)
+    except etree.XMLSyntaxError as error:
+        raise FileError(f"{file}: not XML: {error}") from None
+    if root.tag != "OpenDRIVE":
+        raise FileError(f"{file}: not OpenDRIVE, its root element is <{root.tag}>")
+    if root.getroottree().docinfo.internalDTD is not None:
+        raise FileError(f"{file}: a document type declaration is not allowed")
+    read = Reader(file)
+    roads: dict[int, RoadRecord] = {}
+    for node in root.findall("road"):
+        road = _road(read, node)
+        if road.id in roads:
+            raise read.fail(node, "occurs twice")
+        roads[road.id] = road
+    return Document(
+        file=file,
+        roads=roads,
+        junctions={read.integer(n, "id"): _connections(read, n) for n in root.findall("junction")},
+        controllers={
+            read.integer(c, "signalId"): read.integer(n, "id")
+            for n in root.findall("controller")
+            for c in n.findall("control")
+        },
+        geo_reference=(root.findtext("header/geoReference") or "").strip(),
+        user_data={n.get("code", ""): n.get("value", "") for n in root.findall("header/userData")},
+    )
+
+
+def _road(read: Reader, node: Node) -> RoadRecord:
+    length = read.number(node, "length")
+    if length <= 0.0:
+        raise read.fail(node, f"needs a positive length, got {length}")
+    elements = [_element(read, n) for n in node.findall("planView/geometry")]
+    elements = [e for e in elements if e.length > 0.0]
+    if not elements:
+        raise read.fail(node, "has no geometry")
+    speeds = [
+        (read.number(t, "s"), v)
+        for t in node.findall("type")
+        for n in t.findall("speed")
+        if (v := read.speed(n)) is not None
+    ]
+    return RoadRecord(
+        id=read.integer(node, "id"),
+        junction=read.integer(node, "junction", -1),
+        length=length,
+        left_hand=node.get("rule", "RHT") == "LHT",
+        line=ReferenceLine(sorted(elements, key=lambda e: e.s)),
+        elevation=read.cubics(node.findall("elevationProfile/elevation")),
+        superelevation=read.cubics(node.findall("lateralProfile/superelevation")),
+        lane_offset=read.cubics(node.findall("lanes/laneOffset")),
+        sections=_sections(read, node, length),
+        predecessor=_link(read, node.find("link/predecessor")),
+        successor=_link(read, node.find("link/successor")),
+        speeds=tuple(sorted(speeds)),
+        signals=tuple(node.findall("signals/signal")),
+        references=tuple(node.findall("signals/signalReference")),
+        objects=tuple(node.findall("objects/object")),
+    )
+
+
+def _element(read: Reader, node: Node) -> Element:
+    length = read.number(node, "length")
+    shape: Clothoid | Parametric
+    child = next((c for c in node if isinstance(c.tag, str) and c.tag != "userData"), None)
+    match None if child is None else child.tag:
+        case "line":
+            shape = Clothoid(0.0, 0.0)
+        case "arc":
+            curvature = read.number(child, "curvature")
+            shape = Clothoid(curvature, curvature)
+        case "spiral":
+            shape = Clothoid(read.number(child, "curvStart"), read.number(child, "curvEnd"))
+        case "poly3":
+            a, b, c, d = (read.number(child, k) for k in "abcd")
+            shape = Parametric((0.0, 1.0, 0.0, 0.0), (a, b, c, d), length)
+        case "paramPoly3":
+            u = tuple(read.number(child, f"{k}U") for k in "abcd")
+            v = tuple(read.number(child, f"{k}V") for k in "abcd")
+            p_end = length if node.xpath("string(paramPoly3/@pRange)") == "arcLength" else 1.0
+            shape = Parametric(u, v, p_end)  # type: ignore[arg-type]
+        case tag:
+            raise read.fail(
+                node, f"needs line, arc, spiral, poly3 or paramPoly3, got {tag or 'nothing'}"
+            )
+    s, x, y, heading = (read.number(node, k) for k in ("s", "x", "y", "hdg"))
+    return Element(s, x, y, heading, length, shape)
+
+
+def _sections(read: Reader, road: Node, length: float) -> tuple[SectionRecord, ...]:
+    nodes = sorted(road.findall("lanes/laneSection"), key=lambda n: read.number(n, "s"))
+    if not nodes:
+        raise read.fail(road, "has no lane section")
+    starts = [*(read.number(n, "s") for n in nodes), length]
+    return tuple(
+        SectionRecord(s0, s1, _lanes(read, node))
+        for node, s0, s1 in zip(nodes, starts[:-1], starts[1:], strict=True)
+    )
+
+
+def _lanes(read: Reader, section: Node) -> tuple[LaneRecord, ...]:
+    lanes = [
+        _lane(read, node)
+        for side in ("left", "center", "right")
+        for node in section.findall(f"{side}/lane")
+    ]
+    return tuple(sorted(lanes, key=lambda lane: -lane.id))
+
+
+def _lane(read: Reader, node: Node) -> LaneRecord:
+    widths, borders = node.findall("width"), node.findall("border")
+    ends = [node.find(f"link/{end}") for end in ("predecessor", "successor")]
+    speeds = [
+        (read.number(n, "sOffset"), v)
+        for n in node.findall("speed")
+        if (v := read.speed(n)) is not None
+    ]
+    return LaneRecord(
+        id=read.integer(node, "id"),
+        type=node.get("type", "none"),
+        width=read.cubics(widths, "sOffset") if widths else None,
+        border=read.cubics(borders, "sOffset") if borders else None,
+        predecessor=None if ends[0] is None else read.integer(ends[0], "id"),
+        successor=None if ends[1] is None else read.integer(ends[1], "id"),
+        marks=tuple(
+            sorted(
+                (read.number(n, "sOffset", 0.0), n.get("type", "none"))
+                for n in node.findall("roadMark")
+            )
+        ),
+        speeds=tuple(sorted(speeds)),
+    )
+
+
+def _link(read: Reader, node: Node | None) -> Link | None:
+    if node is None:
+        return None
+    return Link(
+        target=read.integer(node, "elementId"),
+        junction=node.get("elementType") == "junction",
+        at_start=node.get("contactPoint", "start") == "start",
+    )
+
+
+def _connections(read: Reader, junction: Node) -> tuple[ConnectionRecord, ...]:
+    return tuple(
+        ConnectionRecord(
+            incoming=read.integer(node, "incomingRoad"),
+            connecting=read.integer(node, "connectingRoad"),
+            at_start=node.get("contactPoint", "start") == "start",
+            lanes=tuple(
+                (read.integer(n, "from"), read.integer(n, "to")) for n in node.findall("laneLink")
+            ),
+        )
+        for node in junction.findall("connection")
+        if node.get("incomingRoad") is not None and node.get("connectingRoad") is not None
+    )

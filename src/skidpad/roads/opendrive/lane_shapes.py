@@ -1,0 +1,250 @@
+"""Lanes of a road as samples: centre line, heading, curvature, width, height, limits, markings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+from math import ceil
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import FileError
+from skidpad.roads.lanes import LaneKind, Marking
+from skidpad.roads.opendrive.document import Document, LaneRecord, RoadRecord, SectionRecord
+from skidpad.roads.opendrive.reference_line import Cubics
+
+Floats = NDArray[np.float64]
+
+STEP = 0.98  # m, longest distance of samples along any lane of a section
+JOINT = 1e-6  # m inside a section: where records are chosen at its ends
+JOINT_GAP = 0.02  # m, closer joints get no sample of their own
+SHORTEST = 1e-4  # m, shorter sections are joints written twice
+LONGEST = 1e6  # m, a longer road is a mistake or an attack
+SAMPLES_MAX = 20_000_000
+
+KINDS = {
+    "driving": LaneKind.DRIVING,
+    "bidirectional": LaneKind.DRIVING,
+    "shoulder": LaneKind.SHOULDER,
+    "stop": LaneKind.SHOULDER,
+    "sidewalk": LaneKind.SIDEWALK,
+    "walking": LaneKind.SIDEWALK,
+    "biking": LaneKind.BIKING,
+    "parking": LaneKind.PARKING,
+    "border": LaneKind.BORDER,
+    "curb": LaneKind.BORDER,
+    "median": LaneKind.MEDIAN,
+    "entry": LaneKind.RAMP,
+    "exit": LaneKind.RAMP,
+    "onRamp": LaneKind.RAMP,
+    "offRamp": LaneKind.RAMP,
+    "connectingRamp": LaneKind.RAMP,
+    "slipLane": LaneKind.RAMP,
+    "mwyEntry": LaneKind.RAMP,
+    "mwyExit": LaneKind.RAMP,
+}
+
+MARKINGS = {
+    "none": Marking.NONE,
+    "broken": Marking.BROKEN,
+    "solid": Marking.SOLID,
+    "solid solid": Marking.SOLID_SOLID,
+    "solid broken": Marking.SOLID_BROKEN,
+    "broken solid": Marking.BROKEN_SOLID,
+}
+
+
+class LaneKey(NamedTuple):
+    """A lane in OpenDRIVE terms."""
+
+    road: int
+    section: int
+    lane: int
+
+
+class LaneShape(NamedTuple):
+    """One lane's samples in driving direction, arrays (n,)."""
+
+    key: LaneKey
+    kind: LaneKind
+    along: bool  # traffic runs with increasing road s
+    x: Floats
+    y: Floats
+    z: Floats
+    heading: Floats  # rad, continuous
+    s: Floats
+    s_road: Floats
+    curvature: Floats
+    grade: Floats
+    bank: Floats
+    width: Floats
+    limit: Floats
+    marking_left: NDArray[np.uint8]
+    marking_right: NDArray[np.uint8]
+
+
+class _Band(NamedTuple):
+    """Centre and width of one lane across the road, arrays (n,), with derivatives by road s."""
+
+    lane: LaneRecord
+    inner_mark: LaneRecord
+    t: Floats
+    dt: Floats
+    ddt: Floats
+    width: Floats
+
+
+def lane_shapes(document: Document) -> Iterator[LaneShape]:
+    """All lanes but the centre ones, roads in file order, each section from left to right."""
+    samples = 0
+    for road in document.roads.values():
+        if road.length > LONGEST:
+            raise FileError(
+                f"{document.file}: road {road.id} is {road.length:g} m long; at most {LONGEST:g} m"
+            )
+        for index, section in enumerate(road.sections):
+            if section.s_end - section.s_start < SHORTEST:
+                continue
+            for shape in _section_shapes(road, index, section):
+                samples += len(shape.s)
+                if samples > SAMPLES_MAX:
+                    raise FileError(f"{document.file}: more than {SAMPLES_MAX} lane samples")
+                yield shape
+
+
+def _section_shapes(road: RoadRecord, index: int, section: SectionRecord) -> list[LaneShape]:
+    shapes = _sampled(road, index, section, _grid(road, section, STEP))
+    longest = max((float(np.max(np.diff(shape.s))) for shape in shapes), default=0.0)
+    if longest > STEP:  # outer lanes of a bend are longer than the reference line
+        shapes = _sampled(road, index, section, _grid(road, section, STEP * STEP / longest))
+    return shapes
+
+
+def _grid(road: RoadRecord, section: SectionRecord, step: float) -> Floats:
+    """Road s of the samples: evenly spaced between the joints, where curvature may jump."""
+    joints = [section.s_start]
+    for s in road.line.starts:
+        if joints[-1] + JOINT_GAP < s < section.s_end - JOINT_GAP:
+            joints.append(float(s))
+    joints.append(section.s_end)
+    pieces = [
+        np.linspace(s0, s1, max(ceil((s1 - s0) / step), 1), endpoint=False)
+        for s0, s1 in pairwise(joints)
+    ]
+    return np.concatenate([*pieces, [section.s_end]])
+
+
+def _sampled(road: RoadRecord, index: int, section: SectionRecord, s: Floats) -> list[LaneShape]:
+    select = np.clip(s, section.s_start + JOINT, section.s_end - JOINT)
+    line = road.line.at(s)
+    z_line, grade_line, _ = road.elevation.at(s, select)
+    roll, d_roll, _ = road.superelevation.at(s, select)
+    shapes = []
+    for band in _bands(road, section, s, select):
+        along = (band.lane.id < 0) != road.left_hand
+        stretch = 1.0 - line.curvature * band.t  # length of a parallel line per length of the line
+        turn = np.arctan2(band.dt, stretch)
+        d_stretch = -line.d_curvature * band.t - line.curvature * band.dt
+        speed = np.maximum(np.hypot(stretch, band.dt), 1e-6)
+        d_turn = (band.ddt * stretch - band.dt * d_stretch) / speed**2
+        heading = np.unwrap(line.heading + turn)
+        x = line.x - band.t * np.sin(line.heading)
+        y = line.y + band.t * np.cos(line.heading)
+        d_z = grade_line + band.dt * np.sin(roll) + band.t * np.cos(roll) * d_roll
+        sign = 1.0 if along else -1.0
+        order = slice(None) if along else slice(None, None, -1)
+        left, right = _markings(band, section, select)
+        if not along:
+            left, right = right, left
+        shapes.append(
+            LaneShape(
+                key=LaneKey(road.id, index, band.lane.id),
+                kind=KINDS.get(band.lane.type, LaneKind.OTHER),
+                along=along,
+                x=x[order],
+                y=y[order],
+                z=(z_line + band.t * np.sin(roll))[order],
+                heading=(heading + (0.0 if along else np.pi))[order],
+                s=_lengths(x[order], y[order], heading[order]),
+                s_road=s[order],
+                curvature=(sign * (line.curvature + d_turn) / speed)[order],
+                grade=(sign * d_z / speed)[order],
+                bank=(sign * roll)[order],
+                width=band.width[order],
+                limit=_limits(road, section, band.lane, select)[order],
+                marking_left=left[order],
+                marking_right=right[order],
+            )
+        )
+    return shapes
+
+
+def _lengths(x: Floats, y: Floats, heading: Floats) -> Floats:
+    """Arc length from the first sample: each chord is that of an arc through its headings."""
+    chord = np.hypot(np.diff(x), np.diff(y))
+    half = 0.5 * np.diff(heading)
+    return np.concatenate(([0.0], np.cumsum(chord / np.sinc(half / np.pi))))
+
+
+def _bands(road: RoadRecord, section: SectionRecord, s: Floats, select: Floats) -> Iterator[_Band]:
+    """Lanes of both sides from the centre outwards; lanes without any width are left out."""
+    offset = np.array(road.lane_offset.at(s, select))  # value and derivatives: (3, n)
+    centre = next((lane for lane in section.lanes if lane.id == 0), None)
+    for side in (1.0, -1.0):
+        lanes = sorted((r for r in section.lanes if r.id * side > 0), key=lambda r: abs(r.id))
+        inner, inner_mark = offset, centre
+        for lane in lanes:
+            outer = _outer_border(lane, side, inner, offset, section.s_start, s, select)
+            middle, width = 0.5 * (inner + outer), side * (outer - inner)[0]
+            if np.any(width > 0.0):
+                t, dt, ddt = middle
+                yield _Band(lane, inner_mark or lane, t, dt, ddt, np.maximum(width, 0.0))
+            inner, inner_mark = outer, lane
+
+
+def _outer_border(
+    lane: LaneRecord,
+    side: float,
+    inner: Floats,
+    offset: Floats,
+    s_start: float,
+    s: Floats,
+    select: Floats,
+) -> Floats:
+    def cubic(record: Cubics) -> Floats:
+        return np.array(record.at(s - s_start, select - s_start))
+
+    if lane.width is not None:
+        return inner + side * cubic(lane.width)
+    if lane.border is not None:
+        return offset + cubic(lane.border)
+    return inner
+
+
+def _markings(
+    band: _Band, section: SectionRecord, select: Floats
+) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    """Markings left and right of a lane as seen along increasing s."""
+    inner, outer = (
+        _steps(
+            [(s, float(MARKINGS.get(kind, Marking.OTHER))) for s, kind in lane.marks],
+            select - section.s_start,
+            float(Marking.NONE),
+        ).astype(np.uint8)
+        for lane in (band.inner_mark, band.lane)
+    )
+    return (outer, inner) if band.lane.id > 0 else (inner, outer)
+
+
+def _limits(road: RoadRecord, section: SectionRecord, lane: LaneRecord, select: Floats) -> Floats:
+    """Speed limit: the lane's own record, else the road type's; NaN where there is none."""
+    by_lane = _steps(list(lane.speeds), select - section.s_start, np.nan)
+    return np.where(np.isnan(by_lane), _steps(list(road.speeds), select, np.nan), by_lane)
+
+
+def _steps(records: list[tuple[float, float]], s: Floats, before: float) -> Floats:
+    """The value of the last record at or before `s`."""
+    values = np.array([before, *(value for _, value in records)])
+    return values[np.searchsorted([start for start, _ in records], s, side="right")]

@@ -1,0 +1,200 @@
+"""Barriers, boxes, signal heads and crosswalks from the objects and signals of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import cos, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.vocabulary import SemanticClass
+from skidpad.roads.lanes import SignalTable
+from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
+from skidpad.roads.opendrive.signals import road_place, signal_heads
+from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside
+
+Floats = NDArray[np.float64]
+
+BARRIER_STEP = 2.0  # m between the points of a barrier; 7 mm of chord at R 70
+REPEATS_MAX = 10_000
+THICKNESS = 0.3  # m, of an object for which the file gives no size
+
+BARRIERS = {
+    "guardrail": BarrierKind.GUARDRAIL,
+    "barrier": BarrierKind.GUARDRAIL,
+    "railing": BarrierKind.FENCE,
+    "fence": BarrierKind.FENCE,
+    "wall": BarrierKind.WALL,
+    "soundbarrier": BarrierKind.WALL,
+    "kerb": BarrierKind.KERB,
+    "curb": BarrierKind.KERB,
+}
+BARRIER_HEIGHTS = {
+    BarrierKind.GUARDRAIL: 0.75,
+    BarrierKind.WALL: 2.0,
+    BarrierKind.KERB: 0.12,
+    BarrierKind.FENCE: 1.2,
+}
+LABELS = {
+    "building": (SemanticClass.BUILDING, (150, 140, 130)),
+    "pole": (SemanticClass.POLE, (120, 120, 125)),
+    "streetLamp": (SemanticClass.POLE, (120, 120, 125)),
+    "gantry": (SemanticClass.STATIC, (110, 112, 118)),
+    "bridge": (SemanticClass.BRIDGE, (140, 140, 140)),
+    "tree": (SemanticClass.VEGETATION, (60, 95, 45)),
+    "vegetation": (SemanticClass.VEGETATION, (60, 95, 45)),
+    "sign": (SemanticClass.TRAFFIC_SIGN, (200, 200, 205)),
+    "obstacle": (SemanticClass.STATIC, (130, 130, 130)),
+}
+
+
+def roadside(document: Document, signals: SignalTable) -> Roadside:
+    """Only what the file says; nothing is made up for files without objects."""
+    read = Reader(document.file)
+    barriers: list[Barrier] = []
+    boxes: list[Box] = []
+    crosswalks: list[Floats] = []
+    for road in document.roads.values():
+        for node in road.objects:
+            type_ = node.get("type", "none")
+            barrier = _barrier_kind(node)
+            if barrier is not None:
+                barriers += _barriers(read, road, node, barrier)
+            elif type_ == "crosswalk":
+                crosswalks += [np.round(p, 5) for p in _outlines(read, road, node)]
+            elif type_ in LABELS:
+                boxes += _boxes(read, road, node, type_)
+    return Roadside(
+        tuple(barriers), tuple(boxes), signal_heads(document, signals), tuple(crosswalks)
+    )
+
+
+def _barrier_kind(node: Node) -> BarrierKind | None:
+    """By subtype or name (which say guardRail or wall), else by type."""
+    type_ = node.get("type", "").lower()
+    if type_ not in BARRIERS:
+        return None
+    for text in (node.get("subtype"), node.get("name")):
+        if text and text.lower() in BARRIERS:
+            return BARRIERS[text.lower()]
+    return BARRIERS[type_]
+
+
+def _barriers(read: Reader, road: RoadRecord, node: Node, kind: BarrierKind) -> list[Barrier]:
+    height = read.number(node, "height", 0.0) or BARRIER_HEIGHTS[kind]
+    lines = [_repeated_line(read, road, r) for r in node.findall("repeat")]
+    if not lines:
+        lines = [*_outlines(read, road, node)] or [_straight_line(read, road, node)]
+    return [Barrier(kind, np.round(line, 5), height) for line in lines if len(line) >= 2]
+
+
+def _repeated_line(read: Reader, road: RoadRecord, repeat: Node) -> Floats:
+    """A continuous object (repeat distance 0) along the road."""
+    s = read.number(repeat, "s")
+    length = min(read.number(repeat, "length"), road.length - s)
+    n = max(int(np.ceil(length / BARRIER_STEP)), 1) + 1
+    t = np.linspace(read.number(repeat, "tStart"), read.number(repeat, "tEnd"), n)
+    up = np.linspace(
+        read.number(repeat, "zOffsetStart", 0.0), read.number(repeat, "zOffsetEnd", 0.0), n
+    )
+    return _points(road, np.linspace(s, s + length, n), t, up)
+
+
+def _points(road: RoadRecord, s: Floats, t: Floats, up: Floats) -> Floats:
+    line = road.line.at(s)
+    roll = road.superelevation.at(s)[0]
+    return np.column_stack(
+        [
+            line.x - t * np.sin(line.heading),
+            line.y + t * np.cos(line.heading),
+            road.elevation.at(s)[0] + t * np.sin(roll) + up,
+        ]
+    )
+
+
+def _straight_line(read: Reader, road: RoadRecord, node: Node) -> Floats:
+    """An object with a length only, centred on its place."""
+    place = road_place(
+        road, read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
+    )
+    yaw = place.heading + read.number(node, "hdg", 0.0)
+    half = 0.5 * read.number(node, "length", 0.0)
+    if half <= 0.0:
+        return np.empty((0, 3))
+    step = np.array([cos(yaw), sin(yaw), 0.0]) * half
+    line: Floats = np.array(place[:3]) + np.array([-step, step])
+    return line
+
+
+def _outlines(read: Reader, road: RoadRecord, node: Node) -> Iterator[Floats]:
+    """Corner polygons in world coordinates; a box when only a size is given."""
+    place = road_place(
+        road, read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
+    )
+    yaw = place.heading + read.number(node, "hdg", 0.0)
+    outlines = [*node.findall("outline"), *node.findall("outlines/outline")]
+    for outline in outlines:
+        local = [
+            [read.number(c, "u"), read.number(c, "v"), read.number(c, "z", 0.0)]
+            for c in outline.findall("cornerLocal")
+        ]
+        on_road = [
+            [read.number(c, "s"), read.number(c, "t"), read.number(c, "dz", 0.0)]
+            for c in outline.findall("cornerRoad")
+        ]
+        if local:
+            yield _turned(np.array(local), place[:3], yaw)
+        elif on_road:
+            s, t, up = np.array(on_road).T
+            yield _points(road, s, t, up)
+    length, width = read.number(node, "length", 0.0), read.number(node, "width", 0.0)
+    if not outlines and length > 0.0 and width > 0.0:
+        corners = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], dtype=np.float64)
+        yield _turned(corners * (length / 2, width / 2, 1.0), place[:3], yaw)
+
+
+def _turned(points: Floats, origin: tuple[float, ...], yaw: float) -> Floats:
+    c, s = cos(yaw), sin(yaw)
+    out: Floats = points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + np.array(origin)
+    return out
+
+
+def _boxes(read: Reader, road: RoadRecord, node: Node, type_: str) -> list[Box]:
+    label, rgb = LABELS[type_]
+    if "sign" in (node.get("subtype"), node.get("name")):
+        label, rgb = LABELS["sign"]
+    radius = read.number(node, "radius", 0.0)
+    length = read.number(node, "length", 0.0) or 2.0 * radius or THICKNESS
+    width = read.number(node, "width", 0.0) or 2.0 * radius or THICKNESS
+    height = read.number(node, "height", 0.0) or 1.0
+    boxes = []
+    for s, t, up in _places(read, node):
+        place = road_place(road, s, t, up)
+        yaw = place.heading + read.number(node, "hdg", 0.0)
+        x, y, z, yaw = (round(v, 5) for v in (place.x, place.y, place.z, yaw))
+        boxes.append(Box(int(label), x, y, z, yaw, length, width, height, rgb=rgb))
+    return boxes
+
+
+def _places(read: Reader, node: Node) -> Iterator[tuple[float, float, float]]:
+    """(s, t, height) of the object or of its repetitions."""
+    repeats = node.findall("repeat")
+    if not repeats:
+        yield read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
+    for repeat in repeats:
+        step, length = read.number(repeat, "distance"), read.number(repeat, "length")
+        if step <= 0.0 or length / step > REPEATS_MAX:
+            raise read.fail(
+                node, f"needs a repeat distance that gives at most {REPEATS_MAX} objects"
+            )
+        for k in range(int(length / step) + 1):
+            share = k * step / length if length > 0.0 else 0.0
+            t0, t1 = read.number(repeat, "tStart"), read.number(repeat, "tEnd")
+            z0 = read.number(repeat, "zOffsetStart", 0.0)
+            z1 = read.number(repeat, "zOffsetEnd", 0.0)
+            yield (
+                read.number(repeat, "s") + k * step,
+                t0 + share * (t1 - t0),
+                z0 + share * (z1 - z0),
+            )

@@ -1,0 +1,220 @@
+"""Signals of a file as they act on lanes, and the heads of its traffic lights."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from skidpad.roads.lanes import SignalKind, SignalTable
+from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
+from skidpad.roads.opendrive.lane_shapes import LaneKey, LaneShape
+from skidpad.roads.opendrive.links import DRIVABLE
+from skidpad.roads.roadside import SignalHead
+
+LIGHTS = {"1000001", "1000007", "1000008", "1000009", "1000010", "1000011"}  # vehicle lights
+KINDS = {
+    "206": SignalKind.STOP,
+    "205": SignalKind.YIELD,
+    "274": SignalKind.SPEED_LIMIT,
+    "293": SignalKind.CROSSWALK,
+}
+STOP_LINE = "294"  # German catalogue, as all numbers here
+STOP_LINE_REACH = 40.0  # m between a head beyond a crossing and its stop line
+HEAD_SIZE = 1.0  # m, height of a head whose file gives none
+
+
+class Place(NamedTuple):
+    """World position of a point given in road coordinates."""
+
+    x: float
+    y: float
+    z: float
+    heading: float  # of the reference line
+
+
+class _Row(NamedTuple):
+    id: int
+    kind: SignalKind
+    place: Place
+    lane: int
+    s: float
+    value: float
+    group: int
+
+
+def road_place(road: RoadRecord, s: float, t: float, z_offset: float = 0.0) -> Place:
+    """The point at (s, t) of a road, `z_offset` above its surface."""
+    at = np.array([s])
+    line = road.line.at(at)
+    heading = float(line.heading[0])
+    roll = float(road.superelevation.at(at)[0][0])
+    return Place(
+        float(line.x[0]) - t * np.sin(heading),
+        float(line.y[0]) + t * np.cos(heading),
+        float(road.elevation.at(at)[0][0]) + t * np.sin(roll) + z_offset,
+        heading,
+    )
+
+
+def signal_kind(node: Node) -> SignalKind:
+    """What a <signal> demands; its type is a number of the German catalogue or OpenDRIVE's own."""
+    if node.get("type") in LIGHTS:
+        return SignalKind.LIGHT
+    return KINDS.get(node.get("type", ""), SignalKind.OTHER)
+
+
+def signal_table(
+    document: Document, shapes: Sequence[LaneShape], index: Mapping[LaneKey, int]
+) -> SignalTable:
+    """One row per signal and lane; a stop line moves `s` of the light or stop sign it belongs to."""
+    read = Reader(document.file)
+    rows: dict[tuple[int, int], _Row] = {}
+    for row in _rows(read, document, shapes, index):
+        rows.setdefault((row.id, row.lane), row)
+    lines = list(_stop_lines(read, document, shapes, index))
+    ordered = [
+        row._replace(s=_nearest_line(row, lines)) for row in sorted(rows.values(), key=_order)
+    ]
+    return SignalTable(
+        id=np.array([r.id for r in ordered], dtype=np.int32),
+        kind=np.array([r.kind for r in ordered], dtype=np.uint8),
+        x=np.array([r.place.x for r in ordered], dtype=np.float64),
+        y=np.array([r.place.y for r in ordered], dtype=np.float64),
+        z=np.array([r.place.z for r in ordered], dtype=np.float64),
+        heading=np.array([_heading(shapes[r.lane], r.s) for r in ordered], dtype=np.float64),
+        lane=np.array([r.lane for r in ordered], dtype=np.int32),
+        s=np.array([r.s for r in ordered], dtype=np.float64),
+        value=np.array([r.value for r in ordered], dtype=np.float64),
+        group=np.array([r.group for r in ordered], dtype=np.int32),
+    )
+
+
+def signal_heads(document: Document, table: SignalTable) -> tuple[SignalHead, ...]:
+    """A head for every light that governs some lane."""
+    read = Reader(document.file)
+    heads = {}
+    for _road, node in _signals(document):
+        signal = read.integer(node, "id")
+        governed = np.flatnonzero((table.id == signal) & (table.kind == SignalKind.LIGHT))
+        if len(governed):
+            i = governed[0]
+            middle = 0.5 * read.number(node, "height", HEAD_SIZE)
+            heads[signal] = SignalHead(
+                signal,
+                float(table.x[i]),
+                float(table.y[i]),
+                float(table.z[i]) + middle,
+                float(table.heading[i]),
+            )
+    return tuple(heads[k] for k in sorted(heads))
+
+
+def _order(row: _Row) -> tuple[int, float, int]:
+    return (row.lane, row.s, row.id)
+
+
+def _signals(document: Document) -> Iterator[tuple[RoadRecord, Node]]:
+    for road in document.roads.values():
+        for node in road.signals:
+            yield road, node
+
+
+def _rows(
+    read: Reader,
+    document: Document,
+    shapes: Sequence[LaneShape],
+    index: Mapping[LaneKey, int],
+) -> Iterator[_Row]:
+    signals = {read.integer(node, "id"): (road, node) for road, node in _signals(document)}
+    places = [(id, road, node) for id, (road, node) in signals.items()]
+    for road in document.roads.values():
+        places += [(read.integer(node, "id"), road, node) for node in road.references]
+    for id, road, node in places:
+        if id not in signals or signals[id][1].get("type") == STOP_LINE:
+            continue
+        home, signal = signals[id]
+        head = road_place(
+            home,
+            read.number(signal, "s"),
+            read.number(signal, "t"),
+            read.number(signal, "zOffset", 0.0),
+        )
+        kind = signal_kind(signal)
+        value = _limit(read, signal) if kind is SignalKind.SPEED_LIMIT else np.nan
+        group = document.controllers.get(id, road.junction)
+        for lane in _governed(read, node, road, shapes, index):
+            s = _along(shapes[lane], read.number(node, "s"))
+            if road.junction >= 0 and kind is not SignalKind.SPEED_LIMIT:
+                s = 0.0  # one waits before the crossing, wherever the file puts the reference
+            yield _Row(id, kind, head, lane, s, value, group)
+
+
+def _governed(
+    read: Reader,
+    node: Node,
+    road: RoadRecord,
+    shapes: Sequence[LaneShape],
+    index: Mapping[LaneKey, int],
+) -> list[int]:
+    """Drivable lanes on which a signal is valid: its validity, else all of its orientation."""
+    s = read.number(node, "s")
+    section = max((i for i, sec in enumerate(road.sections) if sec.s_start <= s + 1e-6), default=0)
+    ranges = [
+        sorted((read.integer(v, "fromLane"), read.integer(v, "toLane")))
+        for v in node.findall("validity")
+    ]
+    orientation = node.get("orientation", "none")
+    lanes = []
+    for record in road.sections[section].lanes:
+        i = index.get(LaneKey(road.id, section, record.id))
+        if i is None or shapes[i].kind not in DRIVABLE:
+            continue
+        if ranges:
+            valid = any(low <= record.id <= high for low, high in ranges)
+        else:
+            valid = orientation == "none" or shapes[i].along == (orientation == "+")
+        if valid:
+            lanes.append(i)
+    return lanes
+
+
+def _limit(read: Reader, signal: Node) -> float:
+    """m/s; the value is in km/h unless the file says otherwise."""
+    factor = (
+        0.44704 if signal.get("unit") == "mph" else 1.0 if signal.get("unit") == "m/s" else 1 / 3.6
+    )
+    value = read.number(signal, "value", -1.0)
+    if value < 0.0:
+        value = read.number(signal, "subtype", np.nan) if signal.get("subtype") != "-1" else np.nan
+    return value * factor
+
+
+def _along(shape: LaneShape, s_road: float) -> float:
+    order = slice(None) if shape.along else slice(None, None, -1)
+    return float(np.interp(s_road, shape.s_road[order], shape.s[order]))
+
+
+def _heading(shape: LaneShape, s: float) -> float:
+    return float(np.interp(s, shape.s, shape.heading))
+
+
+def _stop_lines(
+    read: Reader,
+    document: Document,
+    shapes: Sequence[LaneShape],
+    index: Mapping[LaneKey, int],
+) -> Iterator[tuple[int, float]]:
+    """(lane, s) of every stop line."""
+    for road, node in _signals(document):
+        if node.get("type") == STOP_LINE:
+            for lane in _governed(read, node, road, shapes, index):
+                yield lane, _along(shapes[lane], read.number(node, "s"))
+
+
+def _nearest_line(row: _Row, lines: list[tuple[int, float]]) -> float:
+    if row.kind not in (SignalKind.LIGHT, SignalKind.STOP):
+        return row.s
+    near = [s for lane, s in lines if lane == row.lane and abs(s - row.s) <= STOP_LINE_REACH]
+    return min(near, key=lambda s: abs(s - row.s), default=row.s)

@@ -257,8 +257,8 @@ def _advance(
             f_y = k * s_y
             square = f_x * f_x + f_y * f_y
             if square > grip * grip:
-                share = grip / sqrt(square)
-                f_x, f_y = f_x * share, f_y * share
+                cut = grip / sqrt(square)
+                f_x, f_y = f_x * cut, f_y * cut
             if front:
                 f_x, f_y = f_x * cd - f_y * sd, f_x * sd + f_y * cd
             force_x += f_x

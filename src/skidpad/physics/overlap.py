@@ -1,0 +1,154 @@
+"""Where two oriented boxes, or a box and a line, overlap in the plane, and along which normal."""
+
+from __future__ import annotations
+
+from math import cos, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import kernel
+
+Floats = NDArray[np.float64]
+Overlap = tuple[bool, float, float, float, float, float]  # touching, x, y, nx, ny, depth
+
+
+class Boxes(NamedTuple):
+    """Oriented boxes on the ground, arrays of shape (n,)."""
+
+    x: Floats
+    y: Floats
+    yaw: Floats
+    half_length: Floats
+    half_width: Floats
+
+
+@kernel
+def _clip(polygon: Floats, count: int, axis: int, limit: float, sign: float, out: Floats) -> int:
+    """Part of the polygon (count, 2) with sign * coordinate <= limit, into `out`."""
+    kept = 0
+    for k in range(count):
+        p, q = polygon[k], polygon[(k + 1) % count]
+        inside_p, inside_q = sign * p[axis] <= limit, sign * q[axis] <= limit
+        if inside_p:
+            out[kept, 0], out[kept, 1] = p[0], p[1]
+            kept += 1
+        if inside_p != inside_q:
+            t = (limit - sign * p[axis]) / (sign * (q[axis] - p[axis]))
+            out[kept, 0] = p[0] + t * (q[0] - p[0])
+            out[kept, 1] = p[1] + t * (q[1] - p[1])
+            kept += 1
+    return kept
+
+
+@kernel
+def _middle(boxes: Boxes, i: int, j: int) -> tuple[float, float]:
+    """Mean corner of the overlap of boxes i and j, in the world."""
+    c, s = cos(boxes.yaw[j]), sin(boxes.yaw[j])
+    ci, si = cos(boxes.yaw[i]), sin(boxes.yaw[i])
+    here, there = np.empty((12, 2)), np.empty((12, 2))
+    for k in range(4):
+        along = boxes.half_length[i] if k in (0, 3) else -boxes.half_length[i]
+        across = boxes.half_width[i] if k < 2 else -boxes.half_width[i]
+        dx = boxes.x[i] + along * ci - across * si - boxes.x[j]
+        dy = boxes.y[i] + along * si + across * ci - boxes.y[j]
+        here[k, 0], here[k, 1] = dx * c + dy * s, dy * c - dx * s
+    count = _clip(here, 4, 0, boxes.half_length[j], 1.0, there)
+    count = _clip(there, count, 0, boxes.half_length[j], -1.0, here)
+    count = _clip(here, count, 1, boxes.half_width[j], 1.0, there)
+    count = _clip(there, count, 1, boxes.half_width[j], -1.0, here)
+    if count == 0:
+        return 0.5 * (boxes.x[i] + boxes.x[j]), 0.5 * (boxes.y[i] + boxes.y[j])
+    u, v = 0.0, 0.0
+    for k in range(count):
+        u += here[k, 0] / count
+        v += here[k, 1] / count
+    return boxes.x[j] + u * c - v * s, boxes.y[j] + u * s + v * c
+
+
+@kernel
+def _radius(boxes: Boxes, i: int, nx: float, ny: float) -> float:
+    """Half the extent of box i along a unit direction."""
+    c, s = cos(boxes.yaw[i]), sin(boxes.yaw[i])
+    along, across = abs(nx * c + ny * s), abs(ny * c - nx * s)
+    return float(boxes.half_length[i] * along + boxes.half_width[i] * across)
+
+
+@kernel
+def box_box(boxes: Boxes, i: int, j: int) -> Overlap:
+    """Overlap of boxes i and j by separating axes; the normal pushes i away from j."""
+    dx, dy = boxes.x[i] - boxes.x[j], boxes.y[i] - boxes.y[j]
+    depth, nx, ny = np.inf, 0.0, 0.0
+    for k in range(4):
+        yaw = boxes.yaw[i] if k < 2 else boxes.yaw[j]
+        ux, uy = (cos(yaw), sin(yaw)) if k % 2 == 0 else (-sin(yaw), cos(yaw))
+        gap = dx * ux + dy * uy
+        inside = _radius(boxes, i, ux, uy) + _radius(boxes, j, ux, uy) - abs(gap)
+        if inside <= 0.0:
+            return False, 0.0, 0.0, 0.0, 0.0, 0.0
+        if inside < depth - 1e-9:
+            depth = inside
+            nx, ny = (ux, uy) if gap >= 0.0 else (-ux, -uy)
+    x, y = _middle(boxes, i, j)
+    return True, x, y, nx, ny, depth
+
+
+@kernel
+def _clipped_line(boxes: Boxes, i: int, line: tuple[float, float, float, float]) -> Floats:
+    """Shares of the line's length where it enters and leaves box i; enter > leave: it misses."""
+    c, s = cos(boxes.yaw[i]), sin(boxes.yaw[i])
+    ax, ay = line[0] - boxes.x[i], line[1] - boxes.y[i]
+    dx, dy = line[2] - line[0], line[3] - line[1]
+    start = (ax * c + ay * s, ay * c - ax * s)
+    along = (dx * c + dy * s, dy * c - dx * s)
+    half = (boxes.half_length[i], boxes.half_width[i])
+    span = np.array([0.0, 1.0])
+    for axis in range(2):
+        if abs(along[axis]) < 1e-12:
+            if abs(start[axis]) > half[axis]:
+                span[0], span[1] = 1.0, 0.0
+            continue
+        t0 = (-half[axis] - start[axis]) / along[axis]
+        t1 = (half[axis] - start[axis]) / along[axis]
+        span[0] = max(span[0], min(t0, t1))
+        span[1] = min(span[1], max(t0, t1))
+    return span
+
+
+@kernel
+def box_segment(
+    boxes: Boxes, i: int, line: tuple[float, float, float, float], back: tuple[float, float]
+) -> Overlap:
+    """Overlap of box i with a line from (x0, y0) to (x1, y1); the normal pushes the box away.
+
+    back: where the box's centre was before the step. It tells the side of the line that the box
+    came from, so that a fast car is thrown back and not drawn through a guardrail.
+    """
+    span = _clipped_line(boxes, i, line)
+    if span[0] > span[1]:
+        return False, 0.0, 0.0, 0.0, 0.0, 0.0
+    dx, dy = line[2] - line[0], line[3] - line[1]
+    middle = 0.5 * (span[0] + span[1])
+    x, y = line[0] + middle * dx, line[1] + middle * dy
+    length = sqrt(dx * dx + dy * dy)
+    nx, ny = -dy / length, dx / length
+    before = (back[0] - line[0]) * nx + (back[1] - line[1]) * ny
+    if before < 0.0:
+        nx, ny, before = -nx, -ny, -before
+    now = (boxes.x[i] - line[0]) * nx + (boxes.y[i] - line[1]) * ny
+    depth = _radius(boxes, i, nx, ny) - now
+    if now < 0.0:  # crossed within the step
+        return True, x, y, nx, ny, depth
+    for axis in range(2):  # the line's end may stick into the box's front or flank
+        yaw = boxes.yaw[i]
+        ux, uy = (cos(yaw), sin(yaw)) if axis == 0 else (-sin(yaw), cos(yaw))
+        half = boxes.half_length[i] if axis == 0 else boxes.half_width[i]
+        p0 = (line[0] - boxes.x[i]) * ux + (line[1] - boxes.y[i]) * uy
+        p1 = (line[2] - boxes.x[i]) * ux + (line[3] - boxes.y[i]) * uy
+        ahead, behind = half - min(p0, p1), half + max(p0, p1)
+        if ahead < depth:
+            depth, nx, ny = ahead, -ux, -uy
+        if behind < depth:
+            depth, nx, ny = behind, ux, uy
+    return True, x, y, nx, ny, depth

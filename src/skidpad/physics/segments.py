@@ -1,0 +1,102 @@
+"""Static segments (guardrails, walls, outlines) and the grid that finds those near a place."""
+
+from __future__ import annotations
+
+from math import floor
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import kernel
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+
+CELL = 20.0  # m, a few car lengths
+CELLS_MAX = 250_000  # larger maps get larger cells
+
+
+class Segments(NamedTuple):
+    """m segments with their heights, and a grid over them in compressed rows."""
+
+    x0: Floats  # (m,)
+    y0: Floats
+    x1: Floats
+    y1: Floats
+    z_low: Floats
+    z_high: Floats
+    origin: Floats  # (2,) corner of the grid
+    shape: Ints  # (2,) cells along x and y
+    cell: float  # m
+    first: Ints  # (cells + 1,) where a cell's list begins in `member`
+    member: Ints  # segment indices
+
+
+def _cell_size(low: Floats, high: Floats) -> float:
+    extent = np.maximum(high - low, 1.0)
+    return float(max(CELL, np.sqrt(extent[0] * extent[1] / CELLS_MAX), extent.max() / 1.0e5))
+
+
+def _cells_of(i: Floats, origin: Floats, cell: float, shape: Ints) -> list[int]:
+    """Cells touched by the bounding box of one segment, x0 y0 x1 y1."""
+    low = np.floor((np.minimum(i[:2], i[2:]) - origin) / cell).astype(int)
+    high = np.floor((np.maximum(i[:2], i[2:]) - origin) / cell).astype(int)
+    nx = int(shape[0])
+    return [
+        int(v) * nx + int(u) for v in range(low[1], high[1] + 1) for u in range(low[0], high[0] + 1)
+    ]
+
+
+def static_segments(lines: Floats, z_low: Floats, z_high: Floats) -> Segments:
+    """Segments from lines (m, 4) as x0 y0 x1 y1, each between two heights (m,).
+
+    Segments shorter than a millimetre have no direction and keep their index, but are never found.
+    """
+    lines = np.asarray(lines, dtype=np.float64).reshape(-1, 4)
+    ends = lines.reshape(-1, 2)
+    low = ends.min(axis=0) if len(ends) else np.zeros(2)
+    high = ends.max(axis=0) if len(ends) else np.zeros(2)
+    cell = _cell_size(low, high)
+    shape = np.floor((high - low) / cell).astype(np.int64) + 1
+    lists: list[list[int]] = [[] for _ in range(int(shape[0] * shape[1]))]
+    lengths = np.hypot(lines[:, 2] - lines[:, 0], lines[:, 3] - lines[:, 1])
+    for m in np.flatnonzero(lengths > 1e-3):
+        for place in _cells_of(lines[m], low, cell, shape):
+            lists[place].append(int(m))
+    first = np.concatenate([[0], np.cumsum([len(entry) for entry in lists])]).astype(np.int64)
+    member = np.array([m for entry in lists for m in entry], dtype=np.int64)
+    x0, y0, x1, y1 = np.ascontiguousarray(lines.T)
+    heights = np.array(z_low, dtype=np.float64), np.array(z_high, dtype=np.float64)
+    return Segments(x0, y0, x1, y1, *heights, low, shape, cell, first, member)
+
+
+@kernel
+def candidates(s: Segments, x: float, y: float, reach: float, out: Ints) -> int:
+    """Indices of segments whose bounding boxes come within `reach` of a place, ascending.
+
+    Fills `out` as far as it goes and returns how many.
+    """
+    count = 0
+    u_low = max(floor((x - reach - s.origin[0]) / s.cell), 0)
+    u_high = min(floor((x + reach - s.origin[0]) / s.cell), s.shape[0] - 1)
+    v_low = max(floor((y - reach - s.origin[1]) / s.cell), 0)
+    v_high = min(floor((y + reach - s.origin[1]) / s.cell), s.shape[1] - 1)
+    for v in range(v_low, v_high + 1):
+        for u in range(u_low, u_high + 1):
+            cell = v * s.shape[0] + u
+            for k in range(s.first[cell], s.first[cell + 1]):
+                m = s.member[k]
+                if min(s.x0[m], s.x1[m]) > x + reach or max(s.x0[m], s.x1[m]) < x - reach:
+                    continue
+                if min(s.y0[m], s.y1[m]) > y + reach or max(s.y0[m], s.y1[m]) < y - reach:
+                    continue
+                known = False
+                for q in range(count):
+                    known = known or out[q] == m
+                if known or count >= out.shape[0]:
+                    continue
+                out[count] = m
+                count += 1
+    out[:count].sort()
+    return count

@@ -1,0 +1,15 @@
+from traceability import marks, states, summaries
+
+
+def test_every_mark_names_a_requirement():
+    assert set(marks()) <= set(summaries())
+
+
+def test_states_name_requirements_and_exclude_each_other():
+    state = states()
+    assert set(state["differs"]) | set(state["not_yet"]) <= set(summaries())
+    assert not set(state["differs"]) & set(state["not_yet"])
+
+
+def test_what_is_not_yet_there_has_no_test_that_claims_it():
+    assert not set(states()["not_yet"]) & set(marks())

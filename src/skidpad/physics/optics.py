@@ -1,0 +1,170 @@
+"""Weather to light and radio waves: extinction, sight, daylight, rain on radar.
+
+With `grip`, the only module that turns `Weather` into physical quantities (decision L-1). Sensors
+use these under `RangeModel.PHYSICAL`.
+"""
+
+from __future__ import annotations
+
+from math import exp, inf, log, log10, radians, sin, sqrt
+
+from skidpad.core.weather import Weather
+from skidpad.physics.grip import rain_rate
+
+CONTRAST_SEEN = 0.05  # least contrast of the meteorological optical range, WMO-No. 8, 9.1
+CONTRAST_CAR = 0.5  # of a car against the road at no distance; our assumption
+V_CLEAR = 20_000.0  # m, sight at fog density 0; "clear" in the international visibility code
+V_FOG = 50.0  # m, at fog density 100; density 50 then gives 1 km, where fog begins (WMO-No. 8)
+RAIN_SIGHT_KM, RAIN_SIGHT_EXPONENT = (
+    11.6,
+    -0.63,
+)  # sight in rain of R mm/h; Atlas, J. Met. 10 (1953)
+RAIN_SIGHT_CONTRAST = 0.02  # the contrast of that formula (Koschmieder, 1924)
+
+RADAR_GHZ = 77.0
+
+HEADLIGHT_CANDELA = 10_000.0  # low beam towards a car ahead, UN R112 order of magnitude
+E_SEEN_LUX = 1.0  # illuminance at which a dark object is noticed; Schmidt-Clausen (1982), 1 to 3
+NIGHT_LUX = 0.05  # moonless sky with skyglow beside a road
+
+
+def fog_extinction(weather: Weather) -> float:
+    """Extinction of fog and clear air in 1/m; sight falls geometrically with fog density.
+
+    Koschmieder: sight = ln(1 / contrast) / beta.
+    """
+    share = weather.fog_density / 100.0
+    sight = V_CLEAR * (V_FOG / V_CLEAR) ** share
+    return float(-log(CONTRAST_SEEN) / sight)
+
+
+def rain_extinction(rain_mm_h: float) -> float:
+    """Extinction of rain in 1/m; 0 without rain. Source: Atlas (1953), see RAIN_SIGHT_KM."""
+    if rain_mm_h <= 0.0:
+        return 0.0
+    sight = 1000.0 * RAIN_SIGHT_KM * rain_mm_h**RAIN_SIGHT_EXPONENT
+    return float(-log(RAIN_SIGHT_CONTRAST) / sight)
+
+
+def extinction(weather: Weather) -> float:
+    """Extinction of visible light in 1/m by fog, clear air and rain together."""
+    return fog_extinction(weather) + rain_extinction(rain_rate(weather))
+
+
+def sight(weather: Weather) -> float:
+    """Meteorological optical range in m (5 % contrast of a black target by day)."""
+    return -log(CONTRAST_SEEN) / extinction(weather)
+
+
+def transmission(weather: Weather, distance: float) -> float:
+    """Share of light left after `distance` m; fog begins at the weather's fog_distance."""
+    fog = fog_extinction(weather) * max(distance - weather.fog_distance, 0.0)
+    return exp(-fog - rain_extinction(rain_rate(weather)) * distance)
+
+
+def daylight(weather: Weather) -> float:
+    """Horizontal illuminance in lux of sun and sky.
+
+    Source: IES RP-21-84, clear (0.8 + 15.5 sqrt(sin h), c 0.21) and overcast sky (0.3 + 21 sin h),
+    mixed by cloudiness. Between sun altitudes 0 and -12 degrees it fades by decades to night.
+    """
+    h = weather.sun_altitude_deg
+    rise = sin(radians(max(h, 0.0)))
+    beam = 133_100.0 * exp(-0.21 / rise) * rise if rise > 1e-6 else 0.0
+    clear = beam + 800.0 + 15_500.0 * sqrt(rise)
+    overcast = 300.0 + 21_000.0 * rise
+    cloud = weather.cloudiness / 100.0
+    lux = (1.0 - cloud) * clear + cloud * overcast
+    if h >= 0.0:
+        return lux
+    dusk = min(-h / 12.0, 1.0)
+    return float(lux ** (1.0 - dusk) * NIGHT_LUX**dusk)
+
+
+def _reach(beta: float, start: float, budget: float) -> float:
+    """Distance in m at which beta * (r - start) has used up `budget` nepers."""
+    return start + budget / beta if beta > 0.0 else inf
+
+
+def depth_range(weather: Weather) -> float:
+    """Distance in m to which a camera still measures depth and tells classes by day.
+
+    A car's contrast falls to the least seen one (Koschmieder); fog begins at fog_distance, rain at
+    the lens.
+    """
+    budget = log(CONTRAST_CAR / CONTRAST_SEEN)
+    rain, fog = rain_extinction(rain_rate(weather)), fog_extinction(weather)
+    near = _reach(rain, 0.0, budget)
+    if near <= weather.fog_distance:
+        return near
+    spent = rain * weather.fog_distance
+    return _reach(rain + fog, weather.fog_distance, budget - spent)
+
+
+def label_range(weather: Weather, headlights: bool = True) -> float:
+    """Distance in m to which an unlit object is recognised: by contrast, and at night by light.
+
+    At night a low beam must throw E_SEEN_LUX through the air onto it: I exp(-beta r) / r^2.
+    """
+    by_contrast = depth_range(weather)
+    if daylight(weather) >= 10.0 * E_SEEN_LUX:
+        return by_contrast
+    if not headlights:
+        return 0.0
+    low, high = 0.1, 1000.0
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        lux = HEADLIGHT_CANDELA / middle**2 * transmission(weather, middle)
+        low, high = (middle, high) if lux > E_SEEN_LUX else (low, middle)
+    return min(by_contrast, low)
+
+
+# ITU-R P.838-3, tables 1 and 3 (horizontal polarisation): a, b, c of each term, then m and c.
+_K_TERMS = (
+    (-5.33980, -0.10008, 1.13098),
+    (-0.35351, 1.26970, 0.45400),
+    (-0.23789, 0.86036, 0.15354),
+    (-0.94158, 0.64552, 0.16817),
+)
+_K_LINE = (-0.18961, 0.71147)
+_ALPHA_TERMS = (
+    (-0.14318, 1.82442, -0.55187),
+    (0.29591, 0.77564, 0.19822),
+    (0.32177, 0.63773, 0.13164),
+    (-5.37610, -0.96230, 1.47828),
+    (16.1721, -3.29980, 3.43990),
+)
+_ALPHA_LINE = (0.67849, -1.95537)
+
+
+def _itu_curve(
+    terms: tuple[tuple[float, float, float], ...], line: tuple[float, float], x: float
+) -> float:
+    return sum(a * exp(-(((x - b) / c) ** 2)) for a, b, c in terms) + line[0] * x + line[1]
+
+
+def rain_attenuation_db_km(rain_mm_h: float, frequency_ghz: float = RADAR_GHZ) -> float:
+    """Attenuation of a radio wave by rain in dB/km, one way, 1 to 1000 GHz (ITU-R P.838-3)."""
+    if rain_mm_h <= 0.0:
+        return 0.0
+    x = log10(frequency_ghz)
+    k = 10.0 ** _itu_curve(_K_TERMS, _K_LINE, x)
+    return float(k * rain_mm_h ** _itu_curve(_ALPHA_TERMS, _ALPHA_LINE, x))
+
+
+def radar_loss_db(weather: Weather, distance: float) -> float:
+    """Two-way loss in dB of a 77 GHz radar on a target at `distance` m; a few dB at 80 m (M-9)."""
+    return 2.0 * rain_attenuation_db_km(rain_rate(weather)) * distance / 1000.0
+
+
+def radar_range(weather: Weather, nominal: float) -> float:
+    """Range in m at which a target returns what it returns at `nominal` m in dry air.
+
+    Received power falls with the fourth power of distance and by the rain: solved by bisection.
+    """
+    low, high = 0.0, nominal
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        loss = 40.0 * log10(max(middle, 1e-9) / nominal) + radar_loss_db(weather, middle)
+        low, high = (middle, high) if loss < 0.0 else (low, middle)
+    return high

@@ -1,0 +1,114 @@
+"""Weather by name or from a user's file."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import lru_cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.weather import Weather
+
+MATRIX, GRIP = "matrix", "grip"
+SNOW = "snow"  # the one preset that only the physical grip model knows
+
+
+def _weather(fields: Any, where: str) -> Weather:
+    """A Weather from a mapping; an unknown key is an error."""
+    if not isinstance(fields, dict):
+        raise ConfigError(f"{where} must be a mapping of weather fields, got {fields!r}")
+    known = Weather.__dataclass_fields__
+    unknown = sorted(str(key) for key in fields if key not in known)
+    if unknown:
+        raise ConfigError(f"{where}: unknown field {unknown[0]!r}; known are {', '.join(known)}")
+    try:
+        return msgspec.convert(fields, Weather)
+    except msgspec.ValidationError as error:
+        raise ConfigError(f"{where}: {error}") from error
+
+
+@lru_cache(maxsize=1)
+def preset_groups() -> dict[str, dict[str, Weather]]:
+    """Presets by group (`matrix`, `grip`) and name, in the published order."""
+    text = resources.files("skidpad.physics").joinpath("presets.yaml").read_bytes()
+    groups = msgspec.yaml.decode(text, type=dict[str, dict[str, dict[str, Any]]])
+    return {
+        group: {
+            name: _weather({"name": name, **fields}, f"preset {name}")
+            for name, fields in members.items()
+        }
+        for group, members in groups.items()
+    }
+
+
+def all_presets() -> dict[str, Weather]:
+    """Every preset by its name."""
+    return {name: w for members in preset_groups().values() for name, w in members.items()}
+
+
+def preset_name(text: str) -> str | None:
+    """The preset's own spelling of `text`, where `-` and `_` are one; None: no such preset."""
+    wanted = text.strip().lower().replace("_", "-")
+    return next((name for name in all_presets() if name.replace("_", "-") == wanted), None)
+
+
+def preset(name: str) -> Weather:
+    """The preset with this name; ConfigError lists all names."""
+    known = preset_name(name)
+    if known is None:
+        raise ConfigError(f"unknown weather {name!r}; choose one of: {', '.join(all_presets())}")
+    return all_presets()[known]
+
+
+def load_weather(path: Path) -> Weather:
+    """Weather from a YAML file of fields; its name is the file's unless it gives one."""
+    try:
+        fields = msgspec.yaml.decode(path.read_bytes())
+    except OSError as error:
+        raise FileError(f"cannot read weather file {path}: {error.strerror}") from error
+    except msgspec.DecodeError as error:
+        raise FileError(f"weather file {path} is not YAML: {error}") from error
+    weather = _weather(fields, f"weather file {path}")
+    return weather if weather.name else replace(weather, name=path.stem)
+
+
+def find_weather(text: str) -> Weather:
+    """What a user may write for a weather: a preset's name, or a .yaml file."""
+    path = Path(text)
+    if path.suffix in (".yaml", ".yml"):
+        return load_weather(path)
+    return preset(text)
+
+
+class WeatherManager:
+    """The weather of a session: apply by name, or go to the next preset (A-217)."""
+
+    def __init__(self, weathers: tuple[Weather, ...] | None = None) -> None:
+        """Presets to cycle through, at least one; None: the six of the matrix."""
+        self.weathers = tuple(preset_groups()[MATRIX].values()) if weathers is None else weathers
+        if not self.weathers:
+            raise ConfigError("a weather manager needs at least one weather")
+        self.index = 0
+
+    @property
+    def current(self) -> Weather:
+        """The weather in force; its name and parameters."""
+        return self.weathers[self.index]
+
+    def apply(self, name: str) -> bool:
+        """Switch to the weather with this name or title; False, and no change, if unknown."""
+        wanted = name.replace("_", "-")
+        for index, weather in enumerate(self.weathers):
+            if wanted in (weather.name.replace("_", "-"), weather.title):
+                self.index = index
+                return True
+        return False
+
+    def cycle(self) -> Weather:
+        """Switch to the next weather, after the last to the first."""
+        self.index = (self.index + 1) % len(self.weathers)
+        return self.current

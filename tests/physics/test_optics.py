@@ -1,0 +1,86 @@
+from dataclasses import replace
+from math import exp
+
+import pytest
+from hypothesis import given
+from hypothesis.strategies import floats
+
+from skidpad.core.weather import Weather
+from skidpad.physics.optics import (
+    daylight,
+    depth_range,
+    extinction,
+    label_range,
+    radar_loss_db,
+    radar_range,
+    rain_attenuation_db_km,
+    sight,
+    transmission,
+)
+from skidpad.physics.presets import preset
+
+percent = floats(0.0, 100.0)
+
+
+def test_sight_in_named_conditions():
+    assert sight(Weather()) == pytest.approx(20_000)
+    assert sight(Weather(fog_density=50)) == pytest.approx(1000)
+    assert sight(Weather(fog_density=100)) == pytest.approx(50)
+    # Atlas: 25 mm/h leaves 1.5 km at 2 % contrast, so 1.17 km at 5 %.
+    rain = Weather(precipitation=50)
+    assert 1100 < sight(rain) < 1200
+
+
+@given(percent, percent, floats(0.1, 20.0), floats(1.0, 300.0))
+def test_more_fog_or_rain_never_clears_the_air(fog, rain, step, distance):
+    w = Weather(fog_density=fog, precipitation=rain)
+    for field in ("fog_density", "precipitation"):
+        worse = replace(w, **{field: min(getattr(w, field) + step, 100.0)})
+        assert extinction(worse) >= extinction(w)
+        assert depth_range(worse) <= depth_range(w)
+        assert label_range(worse) <= label_range(w)
+        assert radar_range(worse, 80.0) <= radar_range(w, 80.0) <= 80.0
+        assert 0.0 < transmission(worse, distance) <= transmission(w, distance) <= 1.0
+
+
+@given(percent, percent, floats(0.0, 200.0))
+def test_depth_range_is_where_the_contrast_is_used_up(fog, rain, start):
+    w = Weather(fog_density=fog, precipitation=rain, fog_distance=start)
+    assert 0.5 * transmission(w, depth_range(w)) == pytest.approx(0.05, rel=1e-9)
+
+
+def test_transmission_is_exponential():
+    w = Weather(fog_density=60)
+    assert transmission(w, 100.0) == pytest.approx(exp(-extinction(w) * 100.0))
+
+
+def test_itu_rain_attenuation_against_its_printed_table():
+    # P.838-3 table 5, horizontal: 10 GHz k 0.01217 alpha 1.2571; 80 GHz k 1.1704 alpha 0.7115.
+    assert rain_attenuation_db_km(1.0, 10.0) == pytest.approx(0.01217, rel=2e-3)
+    assert rain_attenuation_db_km(50.0, 10.0) == pytest.approx(0.01217 * 50**1.2571, rel=3e-3)
+    assert rain_attenuation_db_km(50.0, 80.0) == pytest.approx(1.1704 * 50**0.7115, rel=3e-3)
+
+
+def test_heavy_rain_costs_radar_a_few_decibels():
+    rain = preset("rain-noon")
+    assert 2.0 < radar_loss_db(rain, 80.0) < 5.0
+    assert 65.0 < radar_range(rain, 80.0) < 75.0
+    assert radar_range(Weather(), 80.0) == 80.0
+
+
+def test_daylight():
+    assert 80_000 < daylight(preset("clear-noon")) < 130_000
+    assert 5_000 < daylight(preset("rain-noon")) < 25_000
+    assert daylight(preset("clear-night")) < 0.1
+    altitudes = [75, 45, 15, 5, 1, 0, -1, -3, -6, -9, -12]
+    lux = [daylight(Weather(sun_altitude_deg=h)) for h in altitudes]
+    assert lux == sorted(lux, reverse=True)
+
+
+@pytest.mark.req("A-218")
+def test_night_sight_needs_headlights():
+    night = preset("clear-night")
+    assert label_range(night, headlights=False) == 0.0
+    assert 70 < label_range(night) < 110
+    assert label_range(preset("rain-night")) < label_range(night)
+    assert label_range(preset("clear-noon"), headlights=False) > 1000

@@ -1,0 +1,69 @@
+"""How other programs write the same images: views for compatibility, never for our own stack."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.vocabulary import SemanticClass
+
+DEPTH_RANGE = 1000.0  # m, A-033
+DEPTH_STEPS = 256**3 - 1
+Bytes = NDArray[np.uint8]
+
+# CityScapes colours as documented for CARLA 0.9.15.
+CITYSCAPES: dict[SemanticClass, tuple[int, int, int]] = {
+    SemanticClass.NONE: (0, 0, 0),
+    SemanticClass.ROAD: (128, 64, 128),
+    SemanticClass.SIDEWALK: (244, 35, 232),
+    SemanticClass.BUILDING: (70, 70, 70),
+    SemanticClass.WALL: (102, 102, 156),
+    SemanticClass.FENCE: (190, 153, 153),
+    SemanticClass.POLE: (153, 153, 153),
+    SemanticClass.TRAFFIC_LIGHT: (250, 170, 30),
+    SemanticClass.TRAFFIC_SIGN: (220, 220, 0),
+    SemanticClass.VEGETATION: (107, 142, 35),
+    SemanticClass.TERRAIN: (152, 251, 152),
+    SemanticClass.SKY: (70, 130, 180),
+    SemanticClass.PEDESTRIAN: (220, 20, 60),
+    SemanticClass.RIDER: (255, 0, 0),
+    SemanticClass.CAR: (0, 0, 142),
+    SemanticClass.TRUCK: (0, 0, 70),
+    SemanticClass.BUS: (0, 60, 100),
+    SemanticClass.TRAIN: (0, 80, 100),
+    SemanticClass.MOTORCYCLE: (0, 0, 230),
+    SemanticClass.BICYCLE: (119, 11, 32),
+    SemanticClass.STATIC: (110, 190, 160),
+    SemanticClass.DYNAMIC: (170, 120, 50),
+    SemanticClass.OTHER: (55, 90, 80),
+    SemanticClass.WATER: (45, 60, 150),
+    SemanticClass.ROAD_LINE: (157, 234, 50),
+    SemanticClass.GROUND: (81, 0, 81),
+    SemanticClass.BRIDGE: (150, 100, 100),
+    SemanticClass.RAIL_TRACK: (230, 150, 140),
+    SemanticClass.GUARD_RAIL: (180, 165, 180),
+}
+_COLOURS: Bytes = np.zeros((256, 3), dtype=np.uint8)
+for _label, _rgb in CITYSCAPES.items():
+    _COLOURS[_label] = _rgb
+
+
+def encode_carla_depth(inverse_depth: NDArray[np.float32]) -> Bytes:
+    """(H, W) 1/m to (H, W, 3) red, green, blue of the 24-bit code (A-033); beyond 1000 m is full."""
+    with np.errstate(divide="ignore"):
+        share = np.minimum(1.0 / inverse_depth.astype(np.float64) / DEPTH_RANGE, 1.0)
+    code = np.rint(share * DEPTH_STEPS).astype(np.uint32)
+    parts = [(code >> shift) & 0xFF for shift in (0, 8, 16)]
+    return np.stack(parts, axis=-1).astype(np.uint8)
+
+
+def decode_carla_depth(rgb: Bytes) -> NDArray[np.float64]:
+    """(H, W, 3) red, green, blue to metres (A-033)."""
+    r, g, b = (rgb[..., i].astype(np.float64) for i in range(3))
+    metres: NDArray[np.float64] = (r + 256.0 * g + 65536.0 * b) / DEPTH_STEPS * DEPTH_RANGE
+    return metres
+
+
+def cityscapes_colours(labels: NDArray[np.uint8]) -> Bytes:
+    """(H, W) class ids to (H, W, 3) red, green, blue (A-034)."""
+    return _COLOURS[labels]

@@ -1,0 +1,92 @@
+"""What the light is like: sun, sky, air and lamps as functions of the weather.
+
+Light is linear, 1 = a horizontal white surface at clear noon after exposure. The camera exposes
+for the scene as the published histogram exposure does, so a sunrise is not half as bright as noon.
+Colours and strengths are chosen by eye for legible pictures; the air's extinction is physics.
+"""
+
+from __future__ import annotations
+
+from math import cos, radians, sin
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.lefthanded import mirrored
+from skidpad.core.weather import Weather
+
+Colour = NDArray[np.float32]
+
+NIGHT_BELOW, DAY_ABOVE = -8.0, 12.0  # deg of sun altitude between which dusk happens
+
+
+class Lighting(NamedTuple):
+    """Light of one weather; colours (3,) float32 linear, directions world frame."""
+
+    sun_direction: NDArray[np.float64]  # (3,) unit, towards the sun
+    sun: Colour  # on a surface that faces it
+    sky: Colour  # diffuse, on a surface that faces up
+    bounce: Colour  # diffuse, on a surface that faces down
+    zenith: Colour  # colour of the sky overhead
+    horizon: Colour  # and at the horizon; also the colour of haze
+    disc: float  # brightness of the sun's disc and glow
+    extinction: float  # 1/m along the line of sight
+    haze_begins: float  # m
+    wet: float  # 0 dry .. 1 water on the road
+    snow: float  # 0 .. 1 share of white ground
+    headlights: float  # strength of the ego's low beam, 0 off
+    lamps: float  # strength of other vehicles' lamps, 0 by day
+
+
+def lighting(weather: Weather, extinction: float) -> Lighting:
+    """The light of a weather. extinction: 1/m, from the weather's rain and fog."""
+    altitude = radians(weather.sun_altitude_deg)
+    azimuth = radians(mirrored(weather.sun_azimuth_deg))
+    direction = np.array(
+        [cos(altitude) * cos(azimuth), cos(altitude) * sin(azimuth), sin(altitude)]
+    )
+    day = _smooth((weather.sun_altitude_deg - NIGHT_BELOW) / (DAY_ABOVE - NIGHT_BELOW))
+    high = _smooth(weather.sun_altitude_deg / 45.0)
+    cloud = weather.cloudiness / 100.0
+    clear = 1.0 - 0.94 * cloud
+    low_sun, noon_sun = np.array([1.05, 0.66, 0.36]), np.array([0.76, 0.73, 0.68])
+    sun = day * clear * (low_sun + high * (noon_sun - low_sun))
+    blue, grey = np.array([0.24, 0.29, 0.37]), np.array([0.48, 0.49, 0.50])
+    diffuse = blue + cloud * (grey - blue)
+    dusk = np.array([0.36, 0.31, 0.31]) + cloud * (np.array([0.34, 0.35, 0.37]) - 0.33)
+    sky = day * (dusk + high * (diffuse - dusk)) + (1.0 - day) * NIGHT_SKY_LIGHT
+    zenith = day * _mix(_mix(DAWN_ZENITH, DAY_ZENITH, high), OVERCAST, cloud)
+    horizon = day * _mix(_mix(DAWN_HORIZON, DAY_HORIZON, high), OVERCAST * 1.12, cloud)
+    night = 1.0 - day
+    return Lighting(
+        direction,
+        sun.astype(np.float32),
+        sky.astype(np.float32),
+        (0.45 * sky).astype(np.float32),
+        (zenith + night * NIGHT_ZENITH).astype(np.float32),
+        (horizon + night * NIGHT_HORIZON).astype(np.float32),
+        float(day * clear * (0.35 if cloud > 0.5 else 1.0)),
+        extinction,
+        weather.fog_distance if weather.fog_density > 0.0 else 0.0,
+        max(weather.wetness, weather.precipitation_deposits) / 100.0,
+        _smooth(weather.snow_depth_mm / 20.0),
+        1.0 if weather.is_night else 0.0,
+        night,
+    )
+
+
+DAY_ZENITH, DAY_HORIZON = np.array([0.10, 0.26, 0.60]), np.array([0.48, 0.64, 0.82])
+DAWN_ZENITH, DAWN_HORIZON = np.array([0.16, 0.24, 0.46]), np.array([0.92, 0.60, 0.36])
+OVERCAST = np.array([0.40, 0.42, 0.45])
+NIGHT_SKY_LIGHT = np.array([0.010, 0.012, 0.018])
+NIGHT_ZENITH, NIGHT_HORIZON = np.array([0.002, 0.003, 0.008]), np.array([0.010, 0.012, 0.022])
+
+
+def _mix(a: NDArray[np.float64], b: NDArray[np.float64], share: float) -> NDArray[np.float64]:
+    return a + share * (b - a)
+
+
+def _smooth(t: float) -> float:
+    t = min(max(t, 0.0), 1.0)
+    return t * t * (3.0 - 2.0 * t)

@@ -1,0 +1,150 @@
+"""A radar as exact ray samples: new random directions every tick, range rate from true motion."""
+
+from __future__ import annotations
+
+from math import ceil, log10, pi, radians, tan
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.frames import RadarPoints
+from skidpad.core.geometry import Pose
+from skidpad.core.jit import kernel
+from skidpad.core.randomness import stream_key
+from skidpad.core.specs import RadarSpec
+from skidpad.sensors.noise import uniform
+from skidpad.sensors.rasteriser import Actors, Floats, Ints, Scratch
+from skidpad.sensors.rays import Hits, Rays, cast, make_hits, make_rays
+from skidpad.sensors.scene import Chunks
+from skidpad.sensors.view import View, world_to_camera
+
+CELLS = 16  # columns of cells over the horizontal field of view
+
+
+class Radar:
+    """One radar with its own random stream; `measure` once per tick."""
+
+    def __init__(self, spec: RadarSpec, seed: int, dt: float, range_limit: float) -> None:
+        """range_limit: m, what the weather leaves of the spec's range."""
+        self.spec = spec
+        self.range = min(spec.range, range_limit)
+        self.rays_per_tick = max(1, round(spec.points_per_second * dt))
+        self._key = np.uint64(stream_key(seed, "radar", spec.id))
+        half = (tan(radians(spec.horizontal_fov_deg) / 2), tan(radians(spec.vertical_fov_deg) / 2))
+        self._half = half
+        self._focal = CELLS / (2.0 * half[0])
+        self._rows = max(1, ceil(2.0 * half[1] * self._focal))
+        self._rays: Rays = make_rays(self.rays_per_tick, CELLS, self._rows)
+        self._hits: Hits = make_hits(self.rays_per_tick)
+        self._points = np.empty((4, self.rays_per_tick), dtype=np.float32)
+
+    def view(self, pose_world_ego: Pose) -> View:
+        """The pyramid that holds every ray."""
+        pose = pose_world_ego @ self.spec.mount
+        return View(
+            CELLS,
+            self._rows,
+            self._focal,
+            CELLS / 2.0,
+            self._rows / 2.0,
+            world_to_camera(pose),
+            np.array([pose.x, pose.y, pose.z]),
+        )
+
+    def measure(
+        self,
+        tick: int,
+        pose_world_ego: Pose,
+        motion: Floats,
+        chunks: Chunks,
+        static_key: Ints,
+        actors: Actors,
+        scratch: Scratch,
+    ) -> RadarPoints:
+        """The returns of one tick. motion: (n, 4) vx, vy, vz in m/s and yaw rate of the actors.
+
+        The arrays stay valid until the next call.
+        """
+        view = self.view(pose_world_ego)
+        aim(self._key, tick, self._half[0], self._half[1], view, self._rays)
+        cast(chunks, static_key, actors, 0, view, self.range, scratch, self._rays, self._hits)
+        count = _returns(view, self._rays, self._hits, self.range, motion, actors, self._points)
+        return RadarPoints(*(row[:count] for row in self._points))
+
+
+def range_in_rain(free_range: float, attenuation_db_per_m: float) -> float:
+    """Range in m at which the echo falls to what it is at `free_range` in clear air.
+
+    Radar equation: echo power falls with r^4 and with the two-way attenuation, so
+    40 log10(r / r0) + 2 gamma r = 0; solved by bisection.
+    """
+    low, high = 0.0, free_range
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        loss = 2.0 * attenuation_db_per_m * middle
+        if middle > 0.0 and 40.0 * log10(middle / free_range) + loss > 0.0:
+            high = middle
+        else:
+            low = middle
+    return high
+
+
+@kernel
+def aim(
+    key: np.uint64, tick: int, half_width: float, half_height: float, view: View, rays: Rays
+) -> None:
+    """Draw this tick's directions: uniform angle and uniform radius within the elliptic cone.
+
+    The radius is uniform, so directions crowd at the axis, as CARLA documents for its radar.
+    half_width, half_height: tangents of half the fields of view.
+    """
+    n = rays.column.size
+    for i in range(n):
+        angle = 2.0 * pi * uniform(key, tick, 2 * i)
+        radius = uniform(key, tick, 2 * i + 1)
+        rays.column[i] = view.cx + view.focal * half_width * radius * np.cos(angle)
+        rays.row[i] = view.cy + view.focal * half_height * radius * np.sin(angle)
+
+
+@kernel
+def _returns(
+    view: View,
+    rays: Rays,
+    hits: Hits,
+    max_range: float,
+    motion: Floats,
+    actors: Actors,
+    out: NDArray[np.float32],
+) -> int:
+    """Write range, azimuth, altitude and range rate of all returns; say how many."""
+    r = view.rotation
+    count = 0
+    arm = view.centre - actors.position[0]
+    antenna_x = motion[0, 0] - motion[0, 3] * arm[1]
+    antenna_y = motion[0, 1] + motion[0, 3] * arm[0]
+    for i in range(rays.column.size):
+        if hits.inverse[i] <= 0.0:
+            continue
+        u = (rays.column[i] - view.cx) / view.focal
+        v = (rays.row[i] - view.cy) / view.focal
+        stretch = np.sqrt(u * u + v * v + 1.0)
+        distance = stretch / hits.inverse[i]
+        if distance > max_range:
+            continue
+        dx = (r[0, 0] * u + r[1, 0] * v + r[2, 0]) / stretch
+        dy = (r[0, 1] * u + r[1, 1] * v + r[2, 1]) / stretch
+        dz = (r[0, 2] * u + r[1, 2] * v + r[2, 2]) / stretch
+        vx, vy, vz = -antenna_x, -antenna_y, -motion[0, 2]
+        n = (hits.key[i] >> 16) - 1
+        if n >= 0:
+            px = view.centre[0] + distance * dx - actors.position[n, 0]
+            py = view.centre[1] + distance * dy - actors.position[n, 1]
+            vx += motion[n, 0] - motion[n, 3] * py
+            vy += motion[n, 1] + motion[n, 3] * px
+            vz += motion[n, 2]
+        out[0, count] = distance
+        out[1, count] = np.arctan2(-u, 1.0)
+        out[2, count] = np.arctan2(-v, np.sqrt(u * u + 1.0))
+        out[3, count] = vx * dx + vy * dy + vz * dz
+        count += 1
+    return count

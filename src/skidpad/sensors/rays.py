@@ -1,0 +1,214 @@
+"""Exact samples of the scene along given rays, in the same triangle loop as the images.
+
+The rays of one sensor lie in the pyramid of a `View` whose pixels are cells: each triangle is
+tested against the rays of the cells that its bounding box touches. Full detail, no tolerance.
+"""
+
+from __future__ import annotations
+
+from math import floor
+from typing import NamedTuple
+
+import numpy as np
+
+from skidpad.core.jit import kernel
+from skidpad.sensors.rasteriser import (
+    Actors,
+    Floats,
+    Ints,
+    Scratch,
+    clip_near,
+    composed,
+    frustum_sides,
+    project_block,
+    rotated,
+    sphere_visible,
+)
+from skidpad.sensors.scene import Chunks
+from skidpad.sensors.view import View
+
+_BEHIND = 16
+
+
+class Rays(NamedTuple):
+    """n rays through a view, sorted into its cells."""
+
+    column: Floats  # (n,) on screen
+    row: Floats  # (n,)
+    start: Ints  # (width * height + 1,) rays of cell i are order[start[i]:start[i + 1]]
+    order: Ints  # (n,)
+
+
+class Hits(NamedTuple):
+    """What n rays met."""
+
+    inverse: Floats  # (n,) 1/m, planar; 0 where nothing was met
+    key: Ints  # (n,) as in the images
+    cosine: Floats  # (n,) of the angle of incidence, in [0, 1]
+
+
+def make_rays(n: int, width: int, height: int) -> Rays:
+    """Room for n rays in width x height cells."""
+    return Rays(
+        np.zeros(n),
+        np.zeros(n),
+        np.zeros(width * height + 1, dtype=np.int32),
+        np.zeros(n, dtype=np.int32),
+    )
+
+
+def make_hits(n: int) -> Hits:
+    """Room for n hits."""
+    return Hits(np.zeros(n), np.zeros(n, dtype=np.int32), np.zeros(n))
+
+
+@kernel
+def sort_into_cells(view: View, rays: Rays) -> None:
+    """Fill `start` and `order` from the rays' columns and rows (a counting sort)."""
+    rays.start[:] = 0
+    for i in range(rays.column.size):
+        x = min(max(floor(rays.column[i]), 0), view.width - 1)
+        y = min(max(floor(rays.row[i]), 0), view.height - 1)
+        rays.start[y * view.width + x + 1] += 1
+    for cell in range(rays.start.size - 1):
+        rays.start[cell + 1] += rays.start[cell]
+    for i in range(rays.column.size - 1, -1, -1):
+        x = min(max(floor(rays.column[i]), 0), view.width - 1)
+        y = min(max(floor(rays.row[i]), 0), view.height - 1)
+        cell = y * view.width + x + 1
+        rays.start[cell] -= 1
+        rays.order[rays.start[cell]] = i
+    for cell in range(rays.start.size - 1):
+        rays.start[cell] = rays.start[cell + 1]
+    rays.start[rays.start.size - 1] = rays.order.size
+
+
+@kernel
+def _meet(corners: Floats, value: int, view: View, rays: Rays, hits: Hits) -> None:
+    """Test one projected triangle (3, 3) against the rays of the cells that it touches."""
+    x0, y0, w0 = corners[0, 0], corners[0, 1], corners[0, 2]
+    x1, y1, w1 = corners[1, 0], corners[1, 1], corners[1, 2]
+    x2, y2, w2 = corners[2, 0], corners[2, 1], corners[2, 2]
+    det = (x1 - x0) * (y2 - y0) - (x2 - x0) * (y1 - y0)
+    if det == 0.0:
+        return
+    left = floor(max(min(x0, x1, x2), 0.0))
+    right = floor(min(max(x0, x1, x2), view.width - 1.0))
+    top = floor(max(min(y0, y1, y2), 0.0))
+    bottom = floor(min(max(y0, y1, y2), view.height - 1.0))
+    if left > right or top > bottom:
+        return
+    a = ((w1 - w0) * (y2 - y0) - (w2 - w0) * (y1 - y0)) / det
+    b = ((x1 - x0) * (w2 - w0) - (x2 - x0) * (w1 - w0)) / det
+    for y in range(top, bottom + 1):
+        base = y * view.width
+        for k in range(rays.start[base + left], rays.start[base + right + 1]):
+            i = rays.order[k]
+            px, py = rays.column[i], rays.row[i]
+            e0 = (x1 - x0) * (py - y0) - (y1 - y0) * (px - x0)
+            e1 = (x2 - x1) * (py - y1) - (y2 - y1) * (px - x1)
+            e2 = (x0 - x2) * (py - y2) - (y0 - y2) * (px - x2)
+            inside = (e0 >= 0.0 and e1 >= 0.0 and e2 >= 0.0) or (
+                e0 <= 0.0 and e1 <= 0.0 and e2 <= 0.0
+            )
+            if not inside:
+                continue
+            w = w0 + a * (px - x0) + b * (py - y0)
+            if w > hits.inverse[i]:
+                hits.inverse[i] = w
+                hits.key[i] = value
+                hits.cosine[i] = _incidence(a, b, w, px, py, view)
+
+
+@kernel
+def _incidence(a: float, b: float, w: float, px: float, py: float, view: View) -> float:
+    """Cosine between the ray and the normal of the plane whose inverse depth has slopes a, b."""
+    u, v = (px - view.cx) / view.focal, (py - view.cy) / view.focal
+    nx, ny = a * view.focal, b * view.focal
+    nz = w - nx * u - ny * v
+    return float(w / np.sqrt((nx * nx + ny * ny + nz * nz) * (u * u + v * v + 1.0)))
+
+
+@kernel
+def _meet_block(
+    triangles: Ints,
+    keys: Ints,
+    first: int,
+    count: int,
+    instance: int,
+    view: View,
+    scratch: Scratch,
+    work: Floats,
+    rays: Rays,
+    hits: Hits,
+) -> None:
+    screen, code = scratch.screen, scratch.code
+    corners = np.empty((3, 3))
+    for t in range(first, first + count):
+        a, b, c = triangles[t, 0], triangles[t, 1], triangles[t, 2]
+        if code[a] & code[b] & code[c]:
+            continue
+        value = keys[t] | instance
+        if (code[a] | code[b] | code[c]) & _BEHIND:
+            k = clip_near(a, b, c, view, scratch, work)
+            for i in range(1, k - 1):
+                corners[0] = work[0]
+                corners[1] = work[i]
+                corners[2] = work[i + 1]
+                _meet(corners, value, view, rays, hits)
+        else:
+            corners[0] = screen[a]
+            corners[1] = screen[b]
+            corners[2] = screen[c]
+            _meet(corners, value, view, rays, hits)
+
+
+@kernel
+def cast(
+    chunks: Chunks,
+    static_key: Ints,
+    actors: Actors,
+    hidden: int,
+    view: View,
+    reach: float,
+    scratch: Scratch,
+    rays: Rays,
+    hits: Hits,
+) -> None:
+    """The nearest surface along every ray into `hits`.
+
+    hidden: the actor that carries the sensor, or -1. reach: chunks and actors wholly beyond it
+    (m) are skipped; a hit beyond it may still be reported.
+    """
+    hits.inverse[:] = 0.0
+    hits.key[:] = 0
+    hits.cosine[:] = 0.0
+    sort_into_cells(view, rays)
+    sides = frustum_sides(view)
+    work = np.empty((4, 3))
+    shift = -rotated(view.rotation, view.centre)
+    for c in range(chunks.radius.size):
+        offset = chunks.centre[c] - view.centre
+        limit = reach + chunks.radius[c]
+        if offset[0] ** 2 + offset[1] ** 2 + offset[2] ** 2 > limit * limit:
+            continue
+        if not sphere_visible(chunks.centre[c], chunks.radius[c], view, sides, shift):
+            continue
+        first, count = chunks.vertex_start[c, 0], chunks.vertex_count[c, 0]
+        project_block(chunks.vertices, first, count, view.rotation, shift, view, scratch)
+        first, count = chunks.triangle_start[c, 0], chunks.triangle_count[c, 0]
+        _meet_block(chunks.triangles, static_key, first, count, 0, view, scratch, work, rays, hits)
+    for n in range(actors.radius.size):
+        if n == hidden or not actors.present[n]:
+            continue
+        if not sphere_visible(actors.position[n], actors.radius[n], view, sides, shift):
+            continue
+        turn = composed(view.rotation, actors.rotation[n])
+        place = rotated(view.rotation, actors.position[n]) + shift
+        first, count = actors.vertex_start[n], actors.vertex_count[n]
+        project_block(actors.vertices, first, count, turn, place, view, scratch)
+        first, count = actors.triangle_start[n], actors.triangle_count[n]
+        instance = (n + 1) << 16
+        _meet_block(
+            actors.triangles, actors.key, first, count, instance, view, scratch, work, rays, hits
+        )

@@ -1,0 +1,170 @@
+"""Road surface, markings and embankments from baked lane samples, at four levels of detail.
+
+Lanes are cut every `CHUNK` metres of OpenDRIVE s, and every level keeps the cut's own samples: so
+neighbouring pieces of different levels meet in the same points, and lanes of one road change level
+together.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.vocabulary import SemanticClass
+from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, Marking
+from skidpad.sensors.materials import Material
+from skidpad.sensors.mesh import Mesh, Points, merge, patches, ribbon
+
+CHUNK = 48.0  # m
+CHORDS = (2.0, 4.0, 8.0, 24.0)  # m between cross-sections, by level
+LEVELS = len(CHORDS)
+MARKING_WIDTH = 0.15  # m, RMS part 1 (Germany), narrow line on motorways
+DASH, DASH_PERIOD = 6.0, 18.0  # m, RMS part 1: 6 m line, 12 m gap
+MARKING_LIFT = 0.015  # m above the asphalt, so that depth decides which is in front
+SKIRT_WIDTH, SKIRT_DROP = 4.0, 2.0  # m, the embankment beside the outermost lane
+
+SURFACE: dict[LaneKind, tuple[SemanticClass, Material]] = {
+    LaneKind.DRIVING: (SemanticClass.ROAD, Material.ASPHALT),
+    LaneKind.RAMP: (SemanticClass.ROAD, Material.ASPHALT),
+    LaneKind.PARKING: (SemanticClass.ROAD, Material.ASPHALT),
+    LaneKind.BIKING: (SemanticClass.ROAD, Material.ASPHALT),
+    LaneKind.SHOULDER: (SemanticClass.ROAD, Material.SHOULDER),
+    LaneKind.BORDER: (SemanticClass.ROAD, Material.SHOULDER),
+    LaneKind.SIDEWALK: (SemanticClass.SIDEWALK, Material.SIDEWALK),
+    LaneKind.MEDIAN: (SemanticClass.TERRAIN, Material.MEDIAN),
+    LaneKind.OTHER: (SemanticClass.ROAD, Material.SHOULDER),
+}
+DRIVABLE = (LaneKind.DRIVING, LaneKind.RAMP)
+MIN_WIDTH = 0.02  # m; a lane narrower than this over a whole piece is not drawn
+
+ChunkKey = tuple[str, int, int, int]
+
+
+class Edges(NamedTuple):
+    """The two borders of a run of samples, in increasing OpenDRIVE s."""
+
+    left: Points  # (k, 3) seen in driving direction
+    right: Points
+    normal: Points  # (k, 3) unit, to the left
+    s: NDArray[np.float64]  # OpenDRIVE s
+    marking_left: NDArray[np.uint8]
+    marking_right: NDArray[np.uint8]
+
+
+def road_pieces(samples: LaneSamples, lanes: LaneTable) -> Iterator[tuple[ChunkKey, list[Mesh]]]:
+    """Every lane's pieces: chunk key and one mesh per level."""
+    outer = _outermost(lanes)
+    for lane in range(len(lanes.road)):
+        edges = _edges(samples, lanes, lane)
+        if edges is None:
+            continue
+        index = np.floor(edges.s / CHUNK).astype(int)
+        starts = np.concatenate([[0], np.flatnonzero(np.diff(index)) + 1, [len(index) - 1]])
+        for a, b in itertools.pairwise(starts):
+            if b > a:
+                key = ("road", int(lanes.road[lane]), int(lanes.section[lane]), int(index[a]))
+                piece = _cut(edges, slice(a, b + 1))
+                yield key, _levels(piece, lanes, lane, outer[lane])
+
+
+def _edges(samples: LaneSamples, lanes: LaneTable, lane: int) -> Edges | None:
+    first, size = int(lanes.first[lane]), int(lanes.size[lane])
+    part = slice(first, first + size)
+    if samples.width[part].max() < MIN_WIDTH:
+        return None
+    step = 1 if samples.s_road[first + size - 1] >= samples.s_road[first] else -1
+    heading, bank = samples.heading[part], samples.bank[part]
+    normal = np.stack(
+        [-np.sin(heading) * np.cos(bank), np.cos(heading) * np.cos(bank), np.sin(bank)], axis=1
+    )
+    centre = np.stack([samples.x[part], samples.y[part], samples.z[part]], axis=1)
+    half = normal * samples.width[part, None] / 2.0
+    edges = Edges(
+        centre + half,
+        centre - half,
+        normal,
+        samples.s_road[part],
+        samples.marking_left[part],
+        samples.marking_right[part],
+    )
+    return _cut(edges, slice(None, None, step))
+
+
+def _cut(edges: Edges, part: slice) -> Edges:
+    return Edges._make(field[part] for field in edges)
+
+
+def _outermost(lanes: LaneTable) -> NDArray[np.bool_]:
+    """(L, 2): no lane of the road's section lies further to the left, to the right."""
+    result = np.zeros((len(lanes.road), 2), dtype=np.bool_)
+    groups: dict[tuple[int, int], list[int]] = {}
+    for i, key in enumerate(zip(lanes.road.tolist(), lanes.section.tolist(), strict=True)):
+        groups.setdefault(key, []).append(i)
+    for members in groups.values():
+        for pick, along_is_left in ((max, True), (min, False)):
+            i = pick(members, key=lambda m: int(lanes.lane_id[m]))
+            with_s = lanes.lane_id[i] < 0  # driven along increasing s
+            result[i, 0 if along_is_left == with_s else 1] = True
+    return result
+
+
+def _stations(s: NDArray[np.float64], chord: float) -> NDArray[np.intp]:
+    """Indices of the samples that a level keeps: both ends, and one per chord."""
+    bins = np.floor(s / chord + 1e-9)
+    inner = np.flatnonzero(np.diff(bins)) + 1
+    return np.unique(np.concatenate([[0], inner, [len(s) - 1]]))
+
+
+def _levels(piece: Edges, lanes: LaneTable, lane: int, outer: NDArray[np.bool_]) -> list[Mesh]:
+    kind = LaneKind(int(lanes.kind[lane]))
+    label, material = SURFACE[kind]
+    meshes = []
+    for level, chord in enumerate(CHORDS):
+        at = _stations(piece.s, chord)
+        parts = [ribbon(piece.left[at], piece.right[at], label, material)]
+        for side, is_outer in enumerate(outer):
+            if is_outer:
+                parts.append(_skirt(piece, at, side))
+        if level < LEVELS - 1:  # beyond that a line is a quarter of a pixel wide
+            parts.append(_marking(piece, at, level, 1))
+            if kind in DRIVABLE and lanes.left[lane] < 0:
+                parts.append(_marking(piece, at, level, 0))
+        meshes.append(merge(parts))
+    return meshes
+
+
+def _skirt(piece: Edges, at: NDArray[np.intp], side: int) -> Mesh:
+    edge = (piece.left, piece.right)[side][at]
+    out = edge + piece.normal[at] * (SKIRT_WIDTH if side == 0 else -SKIRT_WIDTH)
+    out[:, 2] = edge[:, 2] - SKIRT_DROP
+    return ribbon(edge, out, SemanticClass.TERRAIN, Material.EMBANKMENT)
+
+
+def _marking(piece: Edges, at: NDArray[np.intp], level: int, side: int) -> Mesh:
+    edge = (piece.left, piece.right)[side] + (0.0, 0.0, MARKING_LIFT)
+    half = piece.normal * (MARKING_WIDTH / 2.0)
+    style = (piece.marking_left, piece.marking_right)[side]
+    pairs = _painted(piece.s, at, style, level)
+    return patches(edge + half, edge - half, pairs, SemanticClass.ROAD_LINE, Material.MARKING)
+
+
+def _painted(
+    s: NDArray[np.float64], at: NDArray[np.intp], style: NDArray[np.uint8], level: int
+) -> NDArray[np.intp]:
+    """(q, 2) index pairs of the painted stretches; dashes keep their length at every level."""
+    solid = np.stack([at[:-1], at[1:]], axis=1)
+    lines = (Marking.SOLID, Marking.SOLID_SOLID, Marking.SOLID_BROKEN, Marking.BROKEN_SOLID)
+    solid = solid[np.isin(style[at[:-1]], [int(m) for m in lines])]
+    on = (style == Marking.BROKEN) & (np.mod(s, DASH_PERIOD) < DASH)
+    bounds = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(np.int8)))
+    runs = bounds.reshape(-1, 2)
+    runs[:, 1] = np.minimum(runs[:, 1], len(s) - 1)
+    if level == 0:
+        runs = np.array(
+            [(i, min(i + 2, b)) for a, b in runs for i in range(a, b, 2)], dtype=np.intp
+        ).reshape(-1, 2)
+    return np.concatenate([solid, runs[runs[:, 1] > runs[:, 0]]])

@@ -1,0 +1,179 @@
+"""The static world as triangles in chunks with bounding spheres and levels of detail."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from itertools import chain
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.vocabulary import LightState
+from skidpad.roads.lanes import LaneSamples, LaneTable
+from skidpad.roads.roadside import Roadside
+from skidpad.sensors.furniture import cell, furniture_pieces, lamp_mesh
+from skidpad.sensors.ground import ground_pieces
+from skidpad.sensors.materials import MATERIALS, Material, base_palette
+from skidpad.sensors.mesh import Mesh, merge
+from skidpad.sensors.roadmesh import LEVELS, ChunkKey, road_pieces
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+# A lamp lights up in its own colour; everything else is dark.
+LIT: dict[LightState, tuple[int, Material]] = {
+    LightState.RED: (0, Material.LAMP_RED),
+    LightState.YELLOW: (1, Material.LAMP_YELLOW),
+    LightState.GREEN: (2, Material.LAMP_GREEN),
+}
+
+
+class Chunks(NamedTuple):
+    """C chunks of V vertices and T triangles in all; level l of chunk c is a block of both."""
+
+    vertices: Floats  # (V, 3) world, m
+    triangles: Ints  # (T, 3) indices relative to the block's first vertex
+    key: Ints  # (T,) class << 8 | material
+    centre: Floats  # (C, 3)
+    radius: Floats  # (C,)
+    vertex_start: Ints  # (C, LEVELS)
+    vertex_count: Ints  # (C, LEVELS)
+    triangle_start: Ints  # (C, LEVELS)
+    triangle_count: Ints  # (C, LEVELS)
+
+
+class Lamps(NamedTuple):
+    """Where in `Chunks.key` the triangles of the signal lamps are."""
+
+    signal: Ints  # (n,) signal id
+    place: Ints  # (n,) 0 red, 1 yellow, 2 green
+    triangle: Ints  # (n,) row of Chunks.key
+
+
+@dataclass(frozen=True, slots=True)
+class StaticScene:
+    """A map's geometry; read only, so that suites can share it."""
+
+    chunks: Chunks
+    lamps: Lamps
+    palette: NDArray[np.float32]  # (256, 3) sRGB grey levels by material
+
+    def lamp_keys(self, lights: Mapping[int, LightState]) -> NDArray[np.int32]:
+        """(n,) keys of the lamp triangles while the lights show these states."""
+        keys = (self.chunks.key[self.lamps.triangle] & ~0xFF) | int(Material.LAMP_DARK)
+        for signal, state in lights.items():
+            if state in LIT:
+                place, material = LIT[state]
+                lit = (self.lamps.signal == signal) & (self.lamps.place == place)
+                keys[lit] = (keys[lit] & ~0xFF) | int(material)
+        result: NDArray[np.int32] = keys.astype(np.int32)
+        return result
+
+
+def build_scene(samples: LaneSamples, lanes: LaneTable, roadside: Roadside) -> StaticScene:
+    """Triangulate a map: about 2000 triangles per 48 m of a four-lane road at full detail."""
+    palette = base_palette()
+    box_material = _box_materials({b.rgb for b in roadside.boxes}, palette)
+    pieces = chain(
+        road_pieces(samples, lanes),
+        ground_pieces(samples),
+        furniture_pieces(roadside, box_material),
+    )
+    grouped: dict[ChunkKey, list[list[Mesh]]] = {}
+    for key, levels in pieces:
+        grouped.setdefault(key, []).append(levels)
+    lamps = [(head, place, lamp_mesh(head, place)) for head in roadside.heads for place in range(3)]
+    for head, _, mesh in lamps:
+        grouped.setdefault(cell(head.x, head.y), []).append([mesh] * LEVELS)
+    blocks = {
+        key: [merge([p[level] for p in parts]) for level in range(LEVELS)]
+        for key, parts in grouped.items()
+    }
+    chunks = pack(blocks.values())
+    return StaticScene(chunks, _find_lamps(chunks, roadside, blocks, grouped), palette)
+
+
+def pack(blocks: Iterable[list[Mesh]]) -> Chunks:
+    """Meshes per chunk and level to flat arrays."""
+    blocks = list(blocks)
+    flat = [mesh for levels in blocks for mesh in levels]
+    shape = (len(blocks), LEVELS)
+    vertex_count = np.array([len(m.vertices) for m in flat], dtype=np.int32)
+    triangle_count = np.array([len(m.triangles) for m in flat], dtype=np.int32)
+    everything = merge([m._replace(triangles=m.triangles) for m in flat])
+    vertex_start = (np.cumsum(vertex_count) - vertex_count).astype(np.int32)
+    triangles = everything.triangles - np.repeat(vertex_start, triangle_count)[:, None]
+    centre, radius = _spheres(blocks)
+    return Chunks(
+        everything.vertices,
+        np.ascontiguousarray(triangles, dtype=np.int32),
+        pixel_key(everything),
+        centre,
+        radius,
+        vertex_start.reshape(shape),
+        vertex_count.reshape(shape),
+        (np.cumsum(triangle_count) - triangle_count).astype(np.int32).reshape(shape),
+        triangle_count.reshape(shape),
+    )
+
+
+def pixel_key(mesh: Mesh) -> Ints:
+    """(m,) class << 8 | material; the instance is added when drawn."""
+    return mesh.label.astype(np.int32) << 8 | mesh.material.astype(np.int32)
+
+
+def _spheres(blocks: list[list[Mesh]]) -> tuple[Floats, Floats]:
+    centre = np.empty((len(blocks), 3))
+    radius = np.empty(len(blocks))
+    for i, levels in enumerate(blocks):
+        points = np.concatenate([m.vertices for m in levels])
+        centre[i] = (points.min(axis=0) + points.max(axis=0)) / 2.0
+        radius[i] = np.sqrt(((points - centre[i]) ** 2).sum(axis=1).max())
+    return centre, radius
+
+
+def _box_materials(
+    colours: set[tuple[int, int, int]], palette: NDArray[np.float32]
+) -> dict[tuple[int, int, int], int]:
+    """Give every box colour a free material; beyond those, the nearest one already given."""
+    given: dict[tuple[int, int, int], int] = {}
+    for rgb in sorted(colours):
+        number = int(Material.FIRST_FREE) + len(given)
+        if number < MATERIALS:
+            palette[number] = rgb
+        else:
+            taken = palette[int(Material.FIRST_FREE) :]
+            distance = ((taken - np.asarray(rgb)) ** 2).sum(axis=1)
+            number = int(Material.FIRST_FREE) + int(distance.argmin())
+        given[rgb] = number
+    return given
+
+
+def _find_lamps(
+    chunks: Chunks,
+    roadside: Roadside,
+    blocks: Mapping[ChunkKey, list[Mesh]],
+    grouped: Mapping[ChunkKey, list[list[Mesh]]],
+) -> Lamps:
+    """Rows of the lamp triangles: they stand last in their chunk, in the order of the heads."""
+    order = {key: i for i, key in enumerate(blocks)}
+    signal: list[int] = []
+    place: list[int] = []
+    rows: list[int] = []
+    behind: dict[ChunkKey, int] = dict.fromkeys(grouped, 0)
+    for head in reversed(roadside.heads):
+        key = cell(head.x, head.y)
+        for lamp in (2, 1, 0):
+            size = len(lamp_mesh(head, lamp).triangles)
+            behind[key] += size
+            for level in range(LEVELS):
+                chunk = order[key]
+                end = chunks.triangle_start[chunk, level] + chunks.triangle_count[chunk, level]
+                first = end - behind[key]
+                rows += range(first, first + size)
+                signal += [head.signal] * size
+                place += [lamp] * size
+    as_ints = (np.array(a, dtype=np.int32) for a in (signal, place, rows))
+    return Lamps(*as_ints)

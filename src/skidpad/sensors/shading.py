@@ -1,0 +1,301 @@
+"""RGB from key and depth: no second raster pass, no textures, no shadows beyond contact.
+
+The normal of a surface is read off its inverse depth: on a plane, inverse depth is linear in the
+pixel, and its two slopes are the normal. Light is linear inside and leaves by a square root.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.geometry import Pose
+from skidpad.core.jit import kernel
+from skidpad.core.states import ActorTable
+from skidpad.sensors.lighting import Lighting
+from skidpad.sensors.materials import ACTOR_PAINTED, EMISSIVE, MATERIALS, Material
+from skidpad.sensors.view import View
+
+Image = NDArray[np.uint8]
+Float32 = NDArray[np.float32]
+
+# Columns of the look-up table, one row per (instance, material).
+_RED, _GREEN, _BLUE, _GLOW, _WETTABLE, _GLOSS = range(6)
+COLUMNS = 6
+# The kernel works on blocks of a row. All its intermediate values lie in lanes of one array at
+# constant distances: only then can the compiler prove that they do not overlap, and vectorise.
+BLOCK = 512
+(_R, _G, _B, _L, _T, _S, _U, _W, _GX, _GY) = (np.intp(lane * BLOCK) for lane in range(10))
+LANES = 10
+ROADLIKE = (Material.ASPHALT, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
+SNOWY = (Material.GRASS, Material.EMBANKMENT, Material.SHOULDER, Material.SIDEWALK, Material.MEDIAN)
+GLOSSY = (Material.PAINT, Material.GLASS)
+WET_DARKENING = 0.52  # of asphalt's albedo; Lekner and Dorf (1988) give 0.4 to 0.7
+SNOW = np.array([0.80, 0.83, 0.88], dtype=np.float32)
+BRAKE_GLOW = 1.5  # tail lamp when braking, against its plain colour
+HEADLAMP_X, HEADLAMP_Z = 1.75, 0.65  # m, in the ego's frame
+
+
+class Shading:
+    """Colours of all actors and materials in one weather; `paint` makes a picture."""
+
+    def __init__(self, palette: Float32, table: ActorTable, light: Lighting) -> None:
+        self.light = light
+        self._table = _look_up(palette, table, light)
+        self._plain_tail = self._table.reshape(-1, MATERIALS, COLUMNS)[0, Material.TAIL_LAMP].copy()
+        self._work = np.zeros(LANES * BLOCK, dtype=np.float32)
+        self._braking = np.zeros(len(table), dtype=np.bool_)
+
+    def set_braking(self, braking: NDArray[np.bool_]) -> None:
+        """Light the brake lamps of these actors (n,)."""
+        if np.array_equal(braking, self._braking):
+            return
+        self._braking[:] = braking
+        tails = self._table.reshape(-1, MATERIALS, COLUMNS)[1:, Material.TAIL_LAMP]
+        tails[:] = self._plain_tail
+        tails[braking, :3] = np.array([BRAKE_GLOW, 0.03, 0.03], dtype=np.float32)
+        tails[braking, _GLOW] = 1.0
+
+    def paint(
+        self, view: View, ego: Pose, inverse: Float32, key: NDArray[np.int32], out: Image
+    ) -> None:
+        """Write the picture (H, W, 3) of a view; ego: the pose that carries the headlights."""
+        light = self.light
+        r = view.rotation
+        body = ego.rotation()
+        shade(
+            view,
+            light,
+            (r @ light.sun_direction).astype(np.float32),
+            np.ascontiguousarray(r[:, 2], dtype=np.float32),
+            np.ascontiguousarray(body.T @ r.T, dtype=np.float32),
+            (body.T @ (view.centre - (ego.x, ego.y, ego.z))).astype(np.float32),
+            self._table,
+            self._work,
+            inverse,
+            key,
+            out,
+        )
+
+
+def _look_up(palette: Float32, table: ActorTable, light: Lighting) -> Float32:
+    """((n + 1) * 256, COLUMNS): colour and behaviour of each material on each actor."""
+    n = len(table)
+    out = np.zeros((n + 1, MATERIALS, COLUMNS), dtype=np.float32)
+    out[:, :, :3] = np.square(palette / np.float32(255.0))
+    for material in ACTOR_PAINTED:
+        out[1:, material, :3] = np.square(table.rgb.astype(np.float32) / 255.0)[:, None].squeeze(1)
+    for material in EMISSIVE:
+        out[:, material, _GLOW] = 1.0
+    out[:, list(ROADLIKE), _WETTABLE] = 1.0
+    out[:, list(GLOSSY), _GLOSS] = 1.0
+    for material in SNOWY:
+        out[:, material, :3] += light.snow * (SNOW - out[:, material, :3])
+    out[:, Material.HEADLAMP, _GLOW] = 0.9 * light.lamps
+    out[:, Material.TAIL_LAMP, _GLOW] = 0.8 * light.lamps
+    return out.reshape(-1, COLUMNS)
+
+
+_ZERO, _HALF, _ONE, _TWO = (np.float32(v) for v in (0.0, 0.5, 1.0, 2.0))
+_TINY = np.float32(1e-12)
+_SIXTEENTH = np.float32(0.0625)
+_WHITE = np.float32(255.0)
+_GLOSS_SHARE = np.float32(0.35)
+_F0 = np.float32(0.03)  # reflectance of water and glass at normal incidence, about
+_BEAM_WIDTH = np.float32(2.6)  # 1 / tangent squared: half the light at 22 deg to the side
+_BEAM_RANGE = np.float32(1.0 / 380.0)  # 1/m^2: a low beam lights some 40 m of road
+_CUT_SLOPE = np.float32(42.0)  # the cut-off: half the light 1.4 deg above the lamp
+_LAMP_X, _LAMP_Z = np.float32(HEADLAMP_X), np.float32(HEADLAMP_Z)
+_BEAM_BLUE = np.float32(0.82)
+_BEAM_POWER = np.float32(1.7)
+_DARK = np.float32(1.0 - WET_DARKENING)
+_FILM_SHARE = np.float32(0.8)
+_RETRO = np.float32(0.35)  # rough asphalt sends back much of a grazing beam
+_GLOW_SHARE, _DISC_SHARE = np.float32(0.25), np.float32(3.0)
+_FARTHEST = np.float32(1e-6)
+_NEAR_LAMP, _LAMP_APART = np.float32(0.3), np.float32(1.2)  # m
+
+
+@kernel
+def _gather(
+    key: NDArray[np.int32], y: int, first: int, count: int, table: Float32, work: Float32
+) -> None:
+    """Colour and behaviour of a block's pixels from the table: the only indexed reads."""
+    for x in range(count):
+        k = key[y, first + x]
+        i = (k >> 16) * MATERIALS + (k & 255)
+        work[_R + x] = table[i, 0]
+        work[_G + x] = table[i, 1]
+        work[_B + x] = table[i, 2]
+        work[_L + x] = table[i, 3]
+        work[_T + x] = table[i, 4]
+        work[_S + x] = table[i, 5]
+
+
+@kernel
+def _slopes(inverse: Float32, y: int, first: int, count: int, view: View, work: Float32) -> None:
+    """Viewing direction, inverse depth and its two slopes, of a block's pixels.
+
+    Of the two differences on either side the gentler one counts: the other may cross an edge.
+    """
+    height, width = inverse.shape
+    focal = np.float32(view.focal)
+    per_pixel = np.float32(1.0 / view.focal)
+    start = np.float32((first + 0.5 - view.cx) / view.focal)
+    here = inverse[y, first : first + count]
+    above = inverse[max(y - 1, 0), first : first + count]
+    below = inverse[min(y + 1, height - 1), first : first + count]
+    for x in range(count):
+        w = here[x]
+        a = below[x] - w
+        b = w - above[x]
+        work[_W + x] = w
+        work[_GY + x] = (a if abs(a) < abs(b) else b) * focal
+        work[_U + x] = start + np.float32(x) * per_pixel
+    for x in range(1, count - 1):
+        a = here[x + 1] - here[x]
+        b = here[x] - here[x - 1]
+        work[_GX + x] = (a if abs(a) < abs(b) else b) * focal
+    for x in (0, count - 1):
+        behind = inverse[y, max(first + x - 1, 0)]
+        ahead = inverse[y, min(first + x + 1, width - 1)]
+        a = ahead - here[x]
+        b = here[x] - behind
+        work[_GX + x] = (a if abs(a) < abs(b) else b) * focal
+
+
+@kernel
+def _light_block(
+    v: float,
+    count: int,
+    light: Lighting,
+    sun: Float32,
+    up: Float32,
+    to_body: Float32,
+    offset: Float32,
+    work: Float32,
+) -> None:
+    """Sky, sun, lamps, wet mirror and haze of a block, in place; leaves grey levels."""
+    beta, begins = np.float32(light.extinction), np.float32(light.haze_begins)
+    wet, beam = np.float32(light.wet), np.float32(light.headlights) * _BEAM_POWER
+    disc = np.float32(light.disc)
+    sun_r, sun_g, sun_b = light.sun[0], light.sun[1], light.sun[2]
+    low_r, low_g, low_b = light.bounce[0], light.bounce[1], light.bounce[2]
+    span_r, span_g, span_b = light.sky[0] - low_r, light.sky[1] - low_g, light.sky[2] - low_b
+    hor_r, hor_g, hor_b = light.horizon[0], light.horizon[1], light.horizon[2]
+    zen_r, zen_g, zen_b = light.zenith[0] - hor_r, light.zenith[1] - hor_g, light.zenith[2] - hor_b
+    up0, up1, up2 = up[0], up[1], up[2]
+    sun0, sun1, sun2 = sun[0], sun[1], sun[2]
+    b00, b01, b02 = to_body[0, 0], to_body[0, 1], to_body[0, 2]
+    b10, b11, b12 = to_body[1, 0], to_body[1, 1], to_body[1, 2]
+    b20, b21, b22 = to_body[2, 0], to_body[2, 1], to_body[2, 2]
+    o0, o1, o2 = offset[0] - _LAMP_X, offset[1], offset[2] - _LAMP_Z
+    for x in range(count):
+        u, w = work[_U + x], work[_W + x]
+        gx, gy = work[_GX + x], work[_GY + x]
+        glow, gloss = work[_L + x], work[_S + x]
+        gz = w - u * gx - v * gy
+        size = _ONE / np.sqrt(gx * gx + gy * gy + gz * gz + _TINY)
+        per_ray = _ONE / np.sqrt(u * u + v * v + _ONE)
+        n_up = -(gx * up0 + gy * up1 + gz * up2) * size
+        n_sun = -(gx * sun0 + gy * sun1 + gz * sun2) * size
+        n_sun = n_sun if n_sun > _ZERO else _ZERO
+        facing = w * size * per_ray
+        tilt = _HALF + _HALF * n_up
+
+        climb = (u * up0 + v * up1 + up2) * per_ray
+        climb = climb if climb > _ZERO else _ZERO
+        climb = climb * (_TWO - climb)
+        halo = (u * sun0 + v * sun1 + sun2) * per_ray
+        halo = halo if halo > _ZERO else _ZERO
+        halo = halo * halo
+        halo = halo * halo
+        halo = halo * halo
+        halo = halo * halo
+        wide = halo
+        halo = halo * halo
+        halo = halo * halo
+        halo = halo * halo
+        halo = halo * halo
+        halo = halo * halo
+        shine = disc * (wide * _GLOW_SHARE + halo * _DISC_SHARE)
+
+        z = _ONE / (w if w > _FARTHEST else _FARTHEST)
+        distance = z / per_ray
+        px = z * (b00 * u + b01 * v + b02) + o0
+        py = z * (b10 * u + b11 * v + b12) + o1
+        pz = z * (b20 * u + b21 * v + b22) + o2
+        lead = px if px > _NEAR_LAMP else _NEAR_LAMP
+        side = py / (lead + _LAMP_APART)
+        rise = pz / lead * _CUT_SLOPE
+        rise = rise if rise > _ZERO else _ZERO
+        spread = _ONE / (_ONE + _BEAM_WIDTH * side * side)
+        fall = _ONE / (_ONE + (px * px + py * py) * _BEAM_RANGE)
+        lit = beam * spread * spread * fall * fall * (_RETRO + (_ONE - _RETRO) * facing)
+        lit = lit / (_ONE + rise * rise)
+        lit = lit if px > _ZERO else _ZERO
+
+        grazing = _ONE - (facing if facing < _ONE else _ONE)
+        square = grazing * grazing
+        fresnel = _F0 + (_ONE - _F0) * square * square * grazing
+        film = wet * work[_T + x] * (n_up if n_up > _ZERO else _ZERO)
+        mirror = fresnel * (film * _FILM_SHARE + gloss * _GLOSS_SHARE)
+        shown = _ONE - glow
+        dull = shown * (_ONE - film * _DARK) * (_ONE - mirror)
+        mirror = mirror * shown
+        depth = distance - begins
+        depth = (depth if depth > _ZERO else _ZERO) * beta * _SIXTEENTH
+        through = _ONE / (_ONE + depth)
+        through = through * through
+        through = through * through
+        through = through * through
+        through = through * through
+        veil = _ONE - through
+        empty = w <= _ZERO
+
+        r = work[_R + x] * (glow + dull * (low_r + tilt * span_r + sun_r * n_sun + lit))
+        g = work[_G + x] * (glow + dull * (low_g + tilt * span_g + sun_g * n_sun + lit))
+        b = work[_B + x] * (
+            glow + dull * (low_b + tilt * span_b + sun_b * n_sun + lit * _BEAM_BLUE)
+        )
+        r = (r + mirror * hor_r) * through + veil * hor_r
+        g = (g + mirror * hor_g) * through + veil * hor_g
+        b = (b + mirror * hor_b) * through + veil * hor_b
+        r = hor_r + climb * zen_r + shine * sun_r if empty else r
+        g = hor_g + climb * zen_g + shine * sun_g if empty else g
+        b = hor_b + climb * zen_b + shine * sun_b if empty else b
+        r = np.sqrt(r if r < _ONE else _ONE) * _WHITE
+        g = np.sqrt(g if g < _ONE else _ONE) * _WHITE
+        b = np.sqrt(b if b < _ONE else _ONE) * _WHITE
+        work[_R + x] = r
+        work[_G + x] = g
+        work[_B + x] = b
+
+
+@kernel
+def shade(
+    view: View,
+    light: Lighting,
+    sun: Float32,
+    up: Float32,
+    to_body: Float32,
+    offset: Float32,
+    table: Float32,
+    work: Float32,
+    inverse: Float32,
+    key: NDArray[np.int32],
+    out: Image,
+) -> None:
+    """The deferred pass. sun, up: (3,) camera axes; to_body, offset: camera to ego frame."""
+    height, width = inverse.shape
+    for y in range(height):
+        v = np.float32((y + 0.5 - view.cy) / view.focal)
+        for first in range(0, width, BLOCK):
+            count = min(BLOCK, width - first)
+            _gather(key, y, first, count, table, work)
+            _slopes(inverse, y, first, count, view, work)
+            _light_block(v, count, light, sun, up, to_body, offset, work)
+            for x in range(count):
+                out[y, first + x, 0] = np.uint8(work[_R + x])
+                out[y, first + x, 1] = np.uint8(work[_G + x])
+                out[y, first + x, 2] = np.uint8(work[_B + x])

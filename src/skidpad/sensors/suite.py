@@ -1,0 +1,226 @@
+"""All pixel-level sensors of one ego: give it the state of the world, read its frames."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from math import inf
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import BackendError
+from skidpad.core.frames import CameraImage, RadarPoints
+from skidpad.core.geometry import Pose
+from skidpad.core.setup import DT
+from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
+from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.vocabulary import LightState, RangeModel
+from skidpad.core.weather import Weather
+from skidpad.roads.lanes import LaneSamples, LaneTable
+from skidpad.roads.roadside import Roadside
+from skidpad.sensors.atmosphere import atmosphere, sensing_range
+from skidpad.sensors.crowd import make_actors, place_actors
+from skidpad.sensors.lighting import lighting
+from skidpad.sensors.passes import Pass, PassKey, poison
+from skidpad.sensors.radar import Radar, range_in_rain
+from skidpad.sensors.rasteriser import AUTO_LEVEL, make_scratch, raster
+from skidpad.sensors.scene import StaticScene, build_scene
+from skidpad.sensors.shading import Shading
+from skidpad.sensors.view import camera_view
+
+MAX_CLIMB = 8.0  # m/s; a faster change of height is a relocation, not motion
+
+
+class SceneMap(Protocol):
+    """What the sensors read of a road map."""
+
+    content_hash: str
+    samples: LaneSamples
+    lanes: LaneTable
+    roadside: Roadside
+
+
+class Observation(NamedTuple):
+    """One tick of cameras and radar."""
+
+    images: Mapping[str, CameraImage]  # by sensor id, rendered when first read
+    radar: RadarPoints
+
+
+_SCENES: dict[str, StaticScene] = {}
+KEPT_SCENES = 4
+
+
+def scene_of(map: SceneMap) -> StaticScene:
+    """The triangulated map; the last few maps of a process are kept."""
+    scene = _SCENES.pop(map.content_hash, None)
+    if scene is None:
+        scene = build_scene(map.samples, map.lanes, map.roadside)
+        while len(_SCENES) >= KEPT_SCENES:
+            _SCENES.pop(next(iter(_SCENES)))
+    _SCENES[map.content_hash] = scene
+    return scene
+
+
+class PixelSuite:
+    """Cameras and radar at pixel level (A-018 to A-028).
+
+    Buffers belong to the suite: an observation is valid until the next one (X-11); reading an
+    image later is an error. Cameras of equal `view` share one raster pass, unless weather limits
+    the sight of one of them only.
+    """
+
+    def __init__(
+        self,
+        map: SceneMap,
+        table: ActorTable,
+        specs: Sequence[SensorSpec],
+        weather: Weather,
+        *,
+        range_model: RangeModel = RangeModel.NONE,
+        seed: int = 0,
+        dt: float = DT,
+        render_all: bool = False,
+        level: int = AUTO_LEVEL,
+        poison_old: bool = False,
+    ) -> None:
+        """level: one level of detail for all (tests); poison_old: spoil buffers that went stale."""
+        self.scene = scene_of(map)
+        self.cameras = {s.id: s for s in specs if isinstance(s, CameraSpec)}
+        self._render_all, self._level, self._poison_old = render_all, level, poison_old
+        self._dt = dt
+        air = sensing_range(weather, range_model)
+        self._actors = make_actors(table)
+        self._static_key = self.scene.chunks.key.copy()
+        largest = max(
+            int(self.scene.chunks.vertex_count.max()), int(self._actors.vertex_count.max())
+        )
+        widest = max((c.width for c in self.cameras.values()), default=1)
+        self._scratch = make_scratch(largest, widest)
+        self.shading = Shading(
+            self.scene.palette, table, lighting(weather, atmosphere(weather).extinction)
+        )
+        self._passes: dict[PassKey, Pass] = {}
+        self._pass_of: dict[str, Pass] = {}
+        for camera in self.cameras.values():
+            sight = inf if camera.modality is Modality.RGB else air.visual_range()
+            key = (*camera.view, sight)
+            self._pass_of[camera.id] = self._passes.setdefault(key, Pass(camera, sight))
+        self._rgb = {
+            c.id: np.zeros((c.height, c.width, 3), dtype=np.uint8)
+            for c in self.cameras.values()
+            if c.modality is Modality.RGB
+        }
+        self.radars = [
+            Radar(s, seed, dt, range_in_rain(s.range, air.radar_attenuation_db_per_m))
+            for s in specs
+            if isinstance(s, RadarSpec)
+        ]
+        self._motion = np.zeros((len(table), 4))
+        self._height = np.full(len(table), np.nan)
+        self._ego = Pose(0.0, 0.0)
+        self.tick = -1
+
+    def observe(
+        self,
+        tick: int,
+        states: ActorStates,
+        lights: Mapping[int, LightState],
+        braking: NDArray[np.bool_] | None = None,
+    ) -> Observation:
+        """What the sensors see of this state. braking: (n,) whose brake lamps are lit."""
+        self.tick = tick
+        place_actors(states, self._actors)
+        self._ego = states.pose(0)
+        self._move(states)
+        self._static_key[self.scene.lamps.triangle] = self.scene.lamp_keys(lights)
+        if braking is not None:
+            self.shading.set_braking(braking)
+        for one in self._passes.values():
+            one.stale = True
+            if self._poison_old:
+                poison(one.inverse, one.key)
+        if self._poison_old:
+            poison(*self._rgb.values())
+        images = LazyImages(self, tick)
+        if self._render_all:
+            images = LazyImages(self, tick, {id: self.render(id) for id in self.cameras})
+        return Observation(images, self._measure(tick))
+
+    def render(self, id: str) -> CameraImage:
+        """The image of one camera in the current state."""
+        camera, one = self.cameras[id], self._pass_of[id]
+        view = camera_view(camera, self._ego)
+        if one.stale:
+            raster(
+                self.scene.chunks,
+                self._static_key,
+                self._actors,
+                -1 if camera.shows_own_body else 0,
+                view,
+                self._level,
+                self._scratch,
+                one.inverse,
+                one.key,
+            )
+            one.limit_sight(view)
+            one.stale = False
+        if camera.modality is Modality.DEPTH:
+            return CameraImage(inverse_depth=one.inverse)
+        if camera.modality is Modality.SEMANTIC:
+            return CameraImage(labels=one.labels)
+        if camera.modality is Modality.INSTANCE:
+            return CameraImage(instances=one.instances)
+        rgb = self._rgb[id]
+        self.shading.paint(view, self._ego, one.inverse, one.key, rgb)
+        return CameraImage(rgb=rgb)
+
+    def _move(self, states: ActorStates) -> None:
+        """Velocities and yaw rates; the vertical one from the change of height in a tick."""
+        climb = (states.z - self._height) / self._dt
+        self._height[:] = states.z
+        self._motion[:, 0], self._motion[:, 1] = states.vx, states.vy
+        self._motion[:, 2] = np.where(np.abs(climb) < MAX_CLIMB, climb, 0.0)
+        self._motion[:, 3] = states.yaw_rate
+
+    def _measure(self, tick: int) -> RadarPoints:
+        if not self.radars:
+            return RadarPoints.none()
+        return self.radars[0].measure(
+            tick,
+            self._ego,
+            self._motion,
+            self.scene.chunks,
+            self._static_key,
+            self._actors,
+            self._scratch,
+        )
+
+
+class LazyImages(Mapping[str, CameraImage]):
+    """Images by sensor id, each rendered when it is first read."""
+
+    def __init__(
+        self, suite: PixelSuite, tick: int, ready: dict[str, CameraImage] | None = None
+    ) -> None:
+        self._suite, self._tick = suite, tick
+        self._ready = ready if ready is not None else {}
+
+    def __getitem__(self, id: str) -> CameraImage:
+        if id not in self._ready:
+            if id not in self._suite.cameras:
+                raise KeyError(id)
+            if self._suite.tick != self._tick:
+                raise BackendError(
+                    f"image {id} of tick {self._tick} was first read after tick {self._suite.tick}; "
+                    "a frame is valid until the next step"
+                )
+            self._ready[id] = self._suite.render(id)
+        return self._ready[id]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._suite.cameras)
+
+    def __len__(self) -> int:
+        return len(self._suite.cameras)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import typer
 
 import skidpad
+from skidpad.cli.friction import friction
 from skidpad.cli.profiles import profiles
 from skidpad.core.errors import InputError, SkidpadError
 
@@ -33,6 +34,7 @@ def _root(
 
 
 app.add_typer(profiles)
+app.command()(friction)
 
 
 @app.command()

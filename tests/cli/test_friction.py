@@ -1,0 +1,69 @@
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+from skidpad.cli.main import app, main
+
+runner = CliRunner(env={"COLUMNS": "100"})
+
+
+def row(output, name):
+    """Cells of the printed row of one weather."""
+    line = next(line for line in output.splitlines() if line.startswith(f"│{name}"))
+    return line.strip("│").replace("│", " ").split()[-10:]
+
+
+def test_both_models_stand_beside_each_other():
+    result = runner.invoke(app, ["friction", "--wetness", "40", "--deposits", "40"])
+    assert result.exit_code == 0
+    cells = row(result.output, "as given")
+    assert cells[0] == "0.450"
+    assert float(cells[5]) > 0.7
+    assert "packed snow 0.34" in result.output.replace("\n", " ").replace("  ", " ")
+
+
+@pytest.mark.req("B-031")
+def test_ice_and_presets():
+    by_hand = runner.invoke(app, ["friction", "--ice", "30"]).output
+    by_name = runner.invoke(app, ["friction", "--preset", "icy-30"]).output
+    assert row(by_hand, "as given") == row(by_name, "icy_30")
+    assert row(by_name, "icy_30")[0] == "0.315"
+
+
+def test_table_has_every_preset():
+    output = runner.invoke(app, ["friction", "--table"]).output
+    assert row(output, "rain_100")[0] == "0.300"
+    assert row(output, "snow")[:5] == ["-"] * 5
+    assert "snow: the statistical model is not defined" in output
+
+
+@pytest.mark.req("B-041")
+def test_figure(tmp_path):
+    path = tmp_path / "grip.png"
+    assert runner.invoke(app, ["friction", "--plot", str(path)]).exit_code == 0
+    assert Image.open(path).size[0] > 800
+
+
+@pytest.mark.req("B-002", "B-010")
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["--ice", "30", "--deposits", "10"], "ice_thickness 30"),
+        (["--preset", "hail"], "unknown weather 'hail'"),
+        (["--plot", "/nowhere/at/all.png"], "cannot write"),
+    ],
+)
+def test_bad_input_is_one_sentence_and_exit_two(arguments, text, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["skidpad", "friction", *arguments])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    assert stop.value.code == 2
+    message = capsys.readouterr().err.strip()
+    assert text in message
+    assert "\n" not in message
+
+
+@pytest.mark.req("B-010")
+@pytest.mark.parametrize("value", ["-1", "101", "nan"])
+def test_percent_outside_its_range(value):
+    assert runner.invoke(app, ["friction", "--wetness", value]).exit_code != 0

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from makelog import actor_table, drive, frame, pose, world
@@ -135,6 +135,7 @@ def test_the_recorder_keeps_copies_because_frames_are_reused() -> None:
     assert np.all(log.finish().mu == np.float32(0.9))
 
 
+@settings(max_examples=20)
 @given(st.floats(-1e3, 1e3).filter(lambda v: abs(v) > 1e-3))
 def test_hash_sees_any_change_of_a_value(change: float) -> None:
     log = some_log()
@@ -153,6 +154,13 @@ def test_hash_sees_events_and_header() -> None:
         ),
     }
     assert len(hashes) == 3
+
+
+def test_hash_is_of_the_drive_and_not_of_its_labels() -> None:
+    log = some_log()
+    header = dataclasses.replace(log.header, about={"config": "4", "weather": "snow"})
+    same = dataclasses.replace(log, header=header, weathers=("snow", "rain"))
+    assert log_hash(same) == log_hash(log)
 
 
 def test_hash_does_not_see_how_absence_or_zero_is_stored() -> None:

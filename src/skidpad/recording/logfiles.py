@@ -76,18 +76,29 @@ def _typed(name: str, values: NDArray[np.float64]) -> pl.Series:
 
 
 def log_hash(log: RunLog) -> str:
-    """Content hash of a log (decision X-1): equal for equal runs, wherever they were driven."""
-    text = msgspec.json.encode(_head(log), order="deterministic") + encode_events(log.events)
-    return content_hash([tick_table(log)], text)
+    """Content hash of a drive (decision X-1): equal for equal drives, wherever they were driven.
+
+    Labels (`about`, weather slugs) are left out, so that cells which weather cannot touch are
+    recognised by equal hashes (decision M-1).
+    """
+    return _hash(log, tick_table(log))
+
+
+def _hash(log: RunLog, table: pl.DataFrame) -> str:
+    head = _head(log)
+    header = head.pop("header")
+    drive = {**head, "weathers": len(log.weathers), "map": header.map_hash, "dt": header.dt}
+    text = msgspec.json.encode(drive, order="deterministic")
+    return content_hash([table], text + encode_events(log.events))
 
 
 def write_log(folder: Path, log: RunLog) -> str:
     """Write ticks.parquet and events.jsonl into `folder`, each atomically; returns the hash."""
     head = msgspec.json.encode(_head(log), order="deterministic")
-    table, events = tick_table(log), encode_events(log.events)
-    write_bytes(folder / EVENTS, events)
+    table = tick_table(log)
+    write_bytes(folder / EVENTS, encode_events(log.events))
     write_parquet(folder / TICKS, table, {KEY: head.decode()})
-    return content_hash([table], head + events)
+    return _hash(log, table)
 
 
 def read_log(folder: Path) -> RunLog:

@@ -1,0 +1,196 @@
+"""Findings as data: a claim, what would show it, and a verdict computed from results (X-7).
+
+A finding is written before results are seen. It consists of contrasts: differences that the claim
+says are positive. It is supported when all of them are shown, contradicted when one is shown to be
+reversed or smaller than its margin, and otherwise undecided, with the seeds that it would take.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from math import ceil
+
+import polars as pl
+from numpy.typing import ArrayLike
+from scipy import stats
+
+from skidpad.evidence.statistics import (
+    Interval,
+    compare_pairs,
+    holm,
+    interval_text,
+    p_text,
+    pairs_needed,
+    poisson_interval,
+)
+
+ALPHA = 0.05
+RUNS_WITHOUT_EVENT = 3.7  # / limit: runs without an event that bound a rate, -ln(0.025)
+
+
+class Verdict(str, Enum):
+    """What the results say about a claim."""
+
+    SUPPORTED = "supported"
+    CONTRADICTED = "contradicted"
+    UNDECIDED = "undecided"
+    BY_CONSTRUCTION = "by construction"  # the two sides are the same drive: nothing to measure
+    NOT_TESTABLE = "not testable"  # the runs that it needs are not there
+
+
+@dataclass(frozen=True, slots=True)
+class Contrast:
+    """A difference that the claim says is positive."""
+
+    label: str
+    mean: float
+    interval: Interval
+    p_claimed: float  # of this or more if the difference were <= 0
+    p_reversed: float  # of this or less if it were >= 0
+    margin: float  # a smaller difference does not matter
+    units: int  # pairs or runs behind it
+    units_needed: int | None  # None: cannot be said
+    identical: bool = False  # all pairs are the same drive
+
+    @property
+    def negligible(self) -> bool:
+        """The whole interval lies below the margin: the claimed difference is not there."""
+        return self.margin > 0.0 and self.interval.high < self.margin
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Finding:
+    """One claim of the sources and how it is judged."""
+
+    id: str
+    claim: str
+    estimand: str
+    needs: str  # which runs
+    test: str
+    margin: str
+    contrasts: Callable[[pl.DataFrame], list[Contrast]]  # empty: the runs are not there
+    study: bool = False  # needs runs of its own (`skidpad study ID`)
+
+
+@dataclass(frozen=True, slots=True)
+class Judgement:
+    """A finding, judged."""
+
+    finding: Finding
+    verdict: Verdict
+    p: float | None  # Holm-adjusted within the report
+    contrasts: tuple[Contrast, ...]
+    seeds_needed: int | None
+    text: str
+
+
+def judge(findings: Sequence[Finding], results: Sequence[pl.DataFrame | None]) -> list[Judgement]:
+    """Judge a report's findings, each on its table (None: never run), Holm-adjusted together."""
+    evidence = [
+        [] if table is None else finding.contrasts(table)
+        for finding, table in zip(findings, results, strict=True)
+    ]
+    tested = [k for k, c in enumerate(evidence) if c and not all(x.identical for x in c)]
+    adjusted = dict(zip(tested, holm([_p(evidence[k]) for k in tested]), strict=True))
+    seeds = [0 if t is None or "seed" not in t.columns else t["seed"].n_unique() for t in results]
+    return [
+        _judgement(finding, evidence[k], adjusted.get(k), seeds[k])
+        for k, finding in enumerate(findings)
+    ]
+
+
+def _p(contrasts: list[Contrast]) -> float:
+    """Two-sided p of a finding: all contrasts must show the claim, one suffices against it."""
+    claimed, reversed_ = _sides(contrasts)
+    return min(1.0, 2.0 * min(claimed, reversed_))
+
+
+def _sides(contrasts: list[Contrast]) -> tuple[float, float]:
+    claimed = max(c.p_claimed for c in contrasts)
+    reversed_ = min(1.0, len(contrasts) * min(c.p_reversed for c in contrasts))
+    return claimed, reversed_
+
+
+def _judgement(
+    finding: Finding, contrasts: list[Contrast], p: float | None, seeds: int
+) -> Judgement:
+    verdict = _verdict(contrasts, p)
+    needed = _seeds_needed(contrasts, seeds) if verdict is Verdict.UNDECIDED else None
+    text = _text(finding, verdict, contrasts, p, needed)
+    return Judgement(finding, verdict, p, tuple(contrasts), needed, text)
+
+
+def _verdict(contrasts: list[Contrast], p: float | None) -> Verdict:
+    if not contrasts:
+        return Verdict.NOT_TESTABLE
+    if p is None:
+        return Verdict.BY_CONSTRUCTION
+    claimed, reversed_ = _sides(contrasts)
+    if p < ALPHA:
+        return Verdict.SUPPORTED if claimed < reversed_ else Verdict.CONTRADICTED
+    if any(c.negligible and not c.identical for c in contrasts):
+        return Verdict.CONTRADICTED
+    return Verdict.UNDECIDED
+
+
+def _seeds_needed(contrasts: list[Contrast], seeds: int) -> int | None:
+    ratios = [c.units_needed / c.units if c.units_needed else None for c in contrasts]
+    if not seeds or None in ratios:
+        return None
+    return max(seeds + 1, ceil(seeds * max(r for r in ratios if r is not None)))
+
+
+def _text(
+    finding: Finding,
+    verdict: Verdict,
+    contrasts: list[Contrast],
+    p: float | None,
+    needed: int | None,
+) -> str:
+    if verdict is Verdict.NOT_TESTABLE:
+        return f"Not testable: it needs {finding.needs}."
+    if verdict is Verdict.BY_CONSTRUCTION:
+        return "By construction: both sides are the same drive, so there is nothing to measure."
+    parts = [f"{c.label} {c.mean:+.3g} ({interval_text(c.interval)})" for c in contrasts]
+    text = f"{verdict.value.capitalize()}: {'; '.join(parts)}."
+    if p is not None:
+        text += f" {p_text(p)} after correction for all findings of this report."
+    if verdict is Verdict.CONTRADICTED:
+        small = [c.label for c in contrasts if c.negligible]
+        text += f" Smaller than the margin: {', '.join(small)}." if small else ""
+    if verdict is Verdict.UNDECIDED:
+        text += f" It needs about {needed} seeds." if needed else " More seeds are needed."
+    return text
+
+
+def paired(label: str, differences: ArrayLike, margin: float, identical: bool = False) -> Contrast:
+    """A contrast from differences of runs that share a seed; claimed positive."""
+    c = compare_pairs(differences)
+    return Contrast(
+        label=label,
+        mean=c.mean,
+        interval=c.interval,
+        p_claimed=c.p_greater,
+        p_reversed=c.p_less,
+        margin=margin,
+        units=c.n,
+        units_needed=pairs_needed(c, margin),
+        identical=identical,
+    )
+
+
+def rate_below(label: str, events: int, runs: int, limit: float) -> Contrast:
+    """The claim that a rate per run lies below `limit`, by exact Poisson tests."""
+    low, high = poisson_interval(events, runs)
+    return Contrast(
+        label=label,
+        mean=limit - events / runs,
+        interval=Interval(limit - high, limit - low),
+        p_claimed=float(stats.poisson.cdf(events, limit * runs)),
+        p_reversed=float(stats.poisson.sf(events - 1, limit * runs)),
+        margin=0.0,
+        units=runs,
+        units_needed=ceil(RUNS_WITHOUT_EVENT / limit),
+    )

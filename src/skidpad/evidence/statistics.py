@@ -1,0 +1,300 @@
+"""Intervals, comparisons and corrections (decision X-9). Every number in a report passes here.
+
+Counts of crashes are small: exact methods where they exist, resampling over seeds where runs are
+more alike or more different than Poisson, and the words "too few" where nothing helps.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+from itertools import product
+from math import ceil, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy import stats
+
+from skidpad.core.errors import require_range
+from skidpad.core.randomness import stream
+
+Floats = NDArray[np.float64]
+
+CONFIDENCE = 0.95
+DISPERSION_MAX = 1.2  # above, counts vary more than Poisson: bootstrap (X-9)
+SEEDS_FOR_BOOTSTRAP = 10
+FEW_EVENTS = 100  # below, say so
+RESAMPLES = 4000
+EVER_SIGNIFICANT = 6  # fewer pairs cannot give p < 0.05: 2 / 2^5 > 0.05
+EXACT_PAIRS = 12  # up to here all 2^n sign changes are tried
+
+
+class Interval(NamedTuple):
+    """Confidence limits."""
+
+    low: float
+    high: float
+
+
+class Side(str, Enum):
+    """Alternative hypothesis about the first quantity."""
+
+    TWO = "two-sided"
+    GREATER = "greater"
+    LESS = "less"
+
+
+class Method(str, Enum):
+    """How an interval was made."""
+
+    POISSON = "exact Poisson"
+    BOOTSTRAP = "bootstrap over runs"
+
+
+@dataclass(frozen=True, slots=True)
+class Rate:
+    """Events per unit of exposure, with its interval."""
+
+    events: int
+    runs: int
+    exposure: float  # runs, km, hours
+    rate: float
+    interval: Interval
+    method: Method
+    dispersion: float | None  # variance / mean of the counts, None: not defined
+
+    @property
+    def too_few(self) -> bool:
+        """Too few events to say more than the interval does."""
+        return self.events < FEW_EVENTS
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """Mean of paired differences, its interval and one-sided p values."""
+
+    n: int
+    mean: float
+    interval: Interval
+    p_greater: float  # against "the mean difference is <= 0"
+    p_less: float
+    spread: float  # standard deviation of the differences, 0 for one pair
+
+    @property
+    def effect(self) -> float | None:
+        """Mean over standard deviation (Cohen's d_z); None where the pairs do not vary."""
+        return self.mean / self.spread if self.spread > 0.0 else None
+
+    @property
+    def p(self) -> float:
+        """Two-sided."""
+        return min(1.0, 2.0 * min(self.p_greater, self.p_less))
+
+
+def poisson_interval(count: int, exposure: float = 1.0, confidence: float = CONFIDENCE) -> Interval:
+    """Exact limits of a Poisson rate. Source: Garwood (1936), Biometrika 28."""
+    tail = (1.0 - confidence) / 2.0
+    low = stats.chi2.ppf(tail, 2 * count) / 2.0 if count else 0.0
+    high = stats.chi2.ppf(1.0 - tail, 2 * count + 2) / 2.0
+    return Interval(float(low) / exposure, float(high) / exposure)
+
+
+def dispersion_index(counts: ArrayLike) -> float | None:
+    """Variance over mean of counts, 1 for Poisson; None below two runs or without events."""
+    c = np.asarray(counts, dtype=np.float64)
+    if c.size < 2 or c.mean() == 0.0:
+        return None
+    return float(c.var(ddof=1) / c.mean())
+
+
+def bootstrap_interval(
+    values: ArrayLike, weights: ArrayLike | None = None, confidence: float = CONFIDENCE
+) -> Interval:
+    """Percentile limits of sum(values) / sum(weights) over resampled runs or drive segments (n,).
+
+    weights: exposure of each, 1 by default. The resamples are the same at every call.
+    """
+    v = np.asarray(values, dtype=np.float64)
+    w = np.ones_like(v) if weights is None else np.asarray(weights, dtype=np.float64)
+    picks = stream(0, "bootstrap", v.size).integers(0, v.size, (RESAMPLES, v.size))
+    means = v[picks].sum(axis=1) / w[picks].sum(axis=1)
+    tail = 100.0 * (1.0 - confidence) / 2.0
+    low, high = np.percentile(means, [tail, 100.0 - tail])
+    return Interval(float(low), float(high))
+
+
+def event_rate(counts: Sequence[int], exposures: Sequence[float] | None = None) -> Rate:
+    """Rate of events over runs: exact Poisson, or bootstrap when X-9 asks for it.
+
+    Without any event the bootstrap knows nothing, so the exact limit stands.
+    """
+    c = np.asarray(counts, dtype=np.int64)
+    e = np.ones(c.size) if exposures is None else np.asarray(exposures, dtype=np.float64)
+    if c.size == 0 or e.sum() <= 0.0:
+        raise ValueError("a rate needs at least one run with exposure > 0")
+    total, exposure, dispersion = int(c.sum()), float(e.sum()), dispersion_index(c)
+    spread = c.size >= SEEDS_FOR_BOOTSTRAP or (dispersion or 0.0) > DISPERSION_MAX
+    if spread and total:
+        interval, method = bootstrap_interval(c, e), Method.BOOTSTRAP
+    else:
+        interval, method = poisson_interval(total, exposure), Method.POISSON
+    return Rate(total, c.size, exposure, total / exposure, interval, method, dispersion)
+
+
+def compare_counts(
+    a: int, b: int, exposure_a: float = 1.0, exposure_b: float = 1.0, side: Side = Side.TWO
+) -> float:
+    """p value of equal Poisson rates, given the sum of both counts; `side` is about a.
+
+    Source: Przyborowski and Wilenski (1940), Biometrika 31.
+    """
+    if a + b == 0:
+        return 1.0
+    share = exposure_a / (exposure_a + exposure_b)
+    return float(stats.binomtest(a, a + b, share, alternative=side.value).pvalue)
+
+
+def rate_ratio_interval(
+    a: int, b: int, exposure_a: float = 1.0, exposure_b: float = 1.0
+) -> Interval | None:
+    """Exact limits of rate a over rate b, given the sum; None without events."""
+    if a + b == 0:
+        return None
+    low, high = clopper_pearson(a, a + b)
+    scale = exposure_b / exposure_a
+    return Interval(
+        scale * low / (1.0 - low) if low < 1.0 else float("inf"),
+        scale * high / (1.0 - high) if high < 1.0 else float("inf"),
+    )
+
+
+def runs_to_tell_apart(
+    rate_a: float, rate_b: float, power: float = 0.8, alpha: float = 0.05
+) -> int | None:
+    """Runs per side until the exact two-sided comparison of counts finds the difference with
+    this power; None beyond 10 000."""
+    low, high = 1, 1
+    while _power(rate_a, rate_b, high, alpha) < power:
+        low, high = high + 1, 2 * high
+        if high > 10_000:
+            return None
+    while low < high:
+        middle = (low + high) // 2
+        if _power(rate_a, rate_b, middle, alpha) < power:
+            low = middle + 1
+        else:
+            high = middle
+    return high
+
+
+def _power(rate_a: float, rate_b: float, runs: int, alpha: float) -> float:
+    total = runs * (rate_a + rate_b)
+    sums = np.arange(1, ceil(total + 8.0 * sqrt(total) + 10.0))
+    share = rate_a / (rate_a + rate_b)
+    edge = stats.binom.ppf(alpha / 2.0, sums, 0.5)
+    edge = np.where(stats.binom.cdf(edge, sums, 0.5) > alpha / 2.0, edge - 1, edge)
+    low, high = stats.binom.cdf(edge, sums, share), stats.binom.sf(sums - edge - 1, sums, share)
+    return float(np.sum(stats.poisson.pmf(sums, total) * (low + high)))
+
+
+def compare_pairs(differences: ArrayLike) -> Comparison:
+    """Test and interval of the mean of differences of runs with equal seeds (n,), n >= 1.
+
+    p values by changing signs: all of them up to 12 pairs, else 4000 drawn ones, the same at every
+    call. Source: Fisher (1935), The design of experiments, section 21.
+    """
+    d = np.asarray(differences, dtype=np.float64)
+    if d.size == 0:
+        raise ValueError("a paired comparison needs at least one pair")
+    if d.size <= EXACT_PAIRS:
+        signs = np.array(list(product((1.0, -1.0), repeat=d.size)))
+    else:
+        drawn = stream(0, "sign changes", d.size).integers(0, 2, (RESAMPLES - 1, d.size))
+        signs = np.concatenate([np.ones((1, d.size)), 1.0 - 2.0 * drawn])
+    sums, seen = signs @ d, d.sum()
+    near = 1e-9 * max(1.0, float(np.abs(d).sum()))
+    return Comparison(
+        n=d.size,
+        mean=float(d.mean()),
+        interval=bootstrap_interval(d),
+        p_greater=float(np.mean(sums >= seen - near)),
+        p_less=float(np.mean(sums <= seen + near)),
+        spread=float(d.std(ddof=1)) if d.size > 1 else 0.0,
+    )
+
+
+def pairs_needed(comparison: Comparison, smallest: float, power: float = 0.8) -> int | None:
+    """Pairs until a mean difference like the one seen, at least `smallest`, would be found.
+
+    By the normal approximation at 5 %, two-sided; None when the pairs do not vary or beyond 10 000.
+    """
+    z = stats.norm.ppf(1.0 - (1.0 - CONFIDENCE) / 2.0) + stats.norm.ppf(power)
+    difference = max(abs(comparison.mean), smallest)
+    if comparison.spread == 0.0 or difference == 0.0:
+        return None
+    needed = ceil((z * comparison.spread / difference) ** 2)
+    return None if needed > 10_000 else max(needed, EVER_SIGNIFICANT)
+
+
+def mcnemar(only_a: int, only_b: int) -> float:
+    """Exact two-sided p of paired yes/no outcomes from the pairs that differ (completion, X-9).
+
+    Source: McNemar (1947), Psychometrika 12.
+    """
+    if only_a + only_b == 0:
+        return 1.0
+    return float(stats.binomtest(only_a, only_a + only_b).pvalue)
+
+
+def clopper_pearson(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:
+    """Exact limits of a share k of n. Source: Clopper and Pearson (1934), Biometrika 26."""
+    return _share(k, n, confidence, "exact")
+
+
+def wilson(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:
+    """Score limits of a share k of n. Source: Wilson (1927), JASA 22."""
+    return _share(k, n, confidence, "wilson")
+
+
+def _share(k: int, n: int, confidence: float, method: str) -> Interval:
+    require_range("successes", k, 0, n)
+    if n == 0:
+        return Interval(0.0, 1.0)
+    limits = stats.binomtest(k, n).proportion_ci(confidence, method=method)
+    return Interval(float(limits.low), float(limits.high))
+
+
+def holm(p_values: Sequence[float]) -> list[float]:
+    """Adjusted p values of a family. Source: Holm (1979), Scandinavian Journal of Statistics 6."""
+    p = np.asarray(p_values, dtype=np.float64)
+    order = np.argsort(p, kind="stable")
+    steps = (p.size - np.arange(p.size)) * p[order]
+    adjusted = np.empty_like(p)
+    adjusted[order] = np.minimum(np.maximum.accumulate(steps), 1.0)
+    return [float(v) for v in adjusted]
+
+
+def rate_text(rate: Rate, unit: str = "run", stopped: bool = False) -> str:
+    """`3 in 6 runs: 0.5 per run (95 % 0.1 to 1.46), too few events to say more`."""
+    runs = "run" if rate.runs == 1 else "runs"
+    text = (
+        f"{rate.events} in {rate.runs} {runs}: {rate.rate:.3g} per {unit} "
+        f"({interval_text(rate.interval)})"
+    )
+    if rate.too_few:
+        text += ", too few events to say more"
+    if stopped:
+        text += "; the number of runs followed from the results, so the interval is approximate"
+    return text
+
+
+def interval_text(interval: Interval) -> str:
+    """`95 % 0.1 to 1.46`."""
+    return f"95 % {interval.low:.3g} to {interval.high:.3g}"
+
+
+def p_text(p: float) -> str:
+    """`p = 0.25`, `p < 0.001`."""
+    return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"

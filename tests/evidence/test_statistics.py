@@ -1,0 +1,208 @@
+from __future__ import annotations
+
+from itertools import pairwise
+from math import comb, exp, factorial, isclose
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from scipy import stats
+
+from skidpad.evidence.statistics import (
+    Method,
+    Side,
+    bootstrap_interval,
+    clopper_pearson,
+    compare_counts,
+    compare_pairs,
+    dispersion_index,
+    event_rate,
+    holm,
+    mcnemar,
+    p_text,
+    pairs_needed,
+    poisson_interval,
+    rate_ratio_interval,
+    rate_text,
+    runs_to_tell_apart,
+    wilson,
+)
+
+
+def poisson_cdf(k: int, mean: float) -> float:
+    return sum(exp(-mean) * mean**i / factorial(i) for i in range(k + 1))
+
+
+@pytest.mark.req("A-279")
+@given(st.integers(0, 60))
+def test_poisson_limits_are_where_the_tails_hold_two_and_a_half_percent(k: int) -> None:
+    low, high = poisson_interval(k)
+    assert poisson_cdf(k, high) == pytest.approx(0.025, abs=1e-9)
+    if k:
+        assert 1.0 - poisson_cdf(k - 1, low) == pytest.approx(0.025, abs=1e-9)
+    else:
+        assert low == 0.0
+
+
+def binomial_tail(a: int, n: int) -> float:
+    return sum(comb(n, i) for i in range(a, n + 1)) / 2**n
+
+
+@pytest.mark.req("A-279")
+@pytest.mark.parametrize(
+    ("a", "b", "printed", "digits"),
+    [(28, 3, 2e-6, 6), (6, 3, 0.25, 2), (10, 6, 0.23, 2), (10, 0, 0.001, 3), (6, 0, 0.016, 3)],
+)
+def test_one_sided_p_values_of_the_published_counts(
+    a: int, b: int, printed: float, digits: int
+) -> None:
+    p = compare_counts(a, b, side=Side.GREATER)
+    assert round(p, digits) == pytest.approx(printed)
+    assert p == pytest.approx(binomial_tail(a, a + b))
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "printed", "digits"),
+    [
+        (3, 6, 0.51, 2),
+        (6, 10, 0.45, 2),
+        (3, 10, 0.09, 2),
+        (2, 8, 0.11, 2),
+        (0, 3, 0.25, 2),
+        (6, 0, 0.03, 2),
+        (10, 0, 0.002, 3),
+    ],
+)
+def test_two_sided_p_values_of_the_published_counts(
+    a: int, b: int, printed: float, digits: int
+) -> None:
+    p = compare_counts(a, b)
+    assert round(p, digits) == printed
+    assert p == pytest.approx(min(1.0, 2.0 * binomial_tail(max(a, b), a + b)))
+
+
+def test_comparison_counts_exposure() -> None:
+    assert compare_counts(6, 3, 2.0, 1.0) == 1.0
+    assert compare_counts(0, 0) == 1.0
+
+
+@given(st.integers(0, 40), st.integers(0, 40))
+def test_ratio_interval_excludes_one_exactly_when_the_counts_differ(a: int, b: int) -> None:
+    interval = rate_ratio_interval(a, b)
+    if a + b == 0:
+        assert interval is None
+        return
+    assert interval is not None
+    tail = binomial_tail(max(a, b), a + b)
+    if not isclose(tail, 0.025):
+        assert (not interval.low <= 1.0 <= interval.high) == (tail < 0.025)
+
+
+def test_runs_to_tell_apart_has_the_power_it_promises() -> None:
+    """F-01 gives about 49 runs per configuration at 0.5 and 1.0 collisions per run."""
+    n = runs_to_tell_apart(0.5, 1.0)
+    assert n is not None
+    assert 45 <= n <= 53
+    rng = np.random.default_rng(1)
+    a, b = rng.poisson(0.5 * n, 4000), rng.poisson(1.0 * n, 4000)
+    power = np.mean([compare_counts(int(x), int(y)) <= 0.05 for x, y in zip(a, b, strict=True)])
+    assert power == pytest.approx(0.8, abs=0.03)
+    assert runs_to_tell_apart(1.0, 1.0001) is None
+
+
+def test_dispersion_is_one_for_poisson_counts_and_none_without_events() -> None:
+    counts = np.random.default_rng(2).poisson(3.0, 20_000)
+    assert dispersion_index(counts) == pytest.approx(1.0, abs=0.05)
+    assert dispersion_index([0, 0, 0]) is None
+    assert dispersion_index([4]) is None
+    assert dispersion_index([0, 8]) == 8.0
+
+
+def test_rates_are_exact_unless_counts_spread_or_seeds_are_many() -> None:
+    assert event_rate([1, 0, 1]).method is Method.POISSON
+    assert event_rate([0, 0, 9]).method is Method.BOOTSTRAP
+    assert event_rate([1, 2] * 5).method is Method.BOOTSTRAP
+    none = event_rate([0] * 40)
+    assert none.method is Method.POISSON
+    assert none.interval.high == pytest.approx(-np.log(0.025) / 40)
+    with pytest.raises(ValueError, match="at least one run"):
+        event_rate([])
+
+
+def test_bootstrap_agrees_with_the_normal_limit_and_is_repeatable() -> None:
+    x = np.random.default_rng(3).normal(5.0, 2.0, 400)
+    low, high = bootstrap_interval(x)
+    half = 1.96 * x.std() / 20.0
+    assert low == pytest.approx(x.mean() - half, abs=0.03)
+    assert high == pytest.approx(x.mean() + half, abs=0.03)
+    assert bootstrap_interval(x) == (low, high)
+    assert bootstrap_interval([2.0, 4.0], [1.0, 2.0]) == (2.0, 2.0)
+
+
+@given(st.lists(st.floats(-10.0, 10.0), min_size=2, max_size=9))
+def test_sign_changes_agree_with_scipy(d: list[float]) -> None:
+    d = [round(v, 2) for v in d]
+    c = compare_pairs(d)
+    expected = stats.permutation_test(
+        (d, np.zeros(len(d))),
+        lambda x, y, axis: np.mean(x - y, axis=axis),
+        permutation_type="samples",
+        vectorized=True,
+        n_resamples=10_000,
+        alternative="greater",
+    )
+    assert c.p_greater == pytest.approx(expected.pvalue, abs=1e-9)
+    mirrored = compare_pairs([-v for v in d])
+    assert (mirrored.p_less, mirrored.mean) == (c.p_greater, pytest.approx(-c.mean))
+
+
+def test_many_pairs_find_a_shift_and_say_how_many_were_needed() -> None:
+    d = np.random.default_rng(4).normal(1.0, 2.0, 60)
+    c = compare_pairs(d)
+    assert c.p < 0.01
+    assert c.effect == pytest.approx(d.mean() / d.std(ddof=1))
+    exact = (stats.norm.ppf(0.975) + stats.norm.ppf(0.8)) ** 2 * d.var(ddof=1) / d.mean() ** 2
+    assert pairs_needed(c, 0.1) == pytest.approx(exact, abs=1.0)
+    assert compare_pairs([1.0, 1.0]).effect is None
+
+
+@pytest.mark.parametrize(("b", "c"), [(0, 0), (5, 0), (7, 2), (3, 3)])
+def test_mcnemar_is_a_coin_toss_over_the_pairs_that_differ(b: int, c: int) -> None:
+    n, k = b + c, max(b, c)
+    assert mcnemar(b, c) == pytest.approx(min(1.0, 2.0 * binomial_tail(k, n)) if n else 1.0)
+
+
+@given(st.integers(1, 60), st.data())
+def test_share_limits(n: int, data: st.DataObject) -> None:
+    k = data.draw(st.integers(0, n))
+    low, high = clopper_pearson(k, n)
+    if k:
+        assert stats.binom.sf(k - 1, n, low) == pytest.approx(0.025, abs=1e-6)
+    if k < n:
+        assert stats.binom.cdf(k, n, high) == pytest.approx(0.025, abs=1e-6)
+    for edge in wilson(k, n):
+        if 1e-9 < edge < 1.0 - 1e-9:
+            assert abs(k / n - edge) == pytest.approx(1.959964 * (edge * (1 - edge) / n) ** 0.5)
+
+
+@given(st.lists(st.floats(0.0, 1.0), min_size=1, max_size=12))
+def test_holm_rejects_what_the_step_down_rule_rejects(p: list[float]) -> None:
+    adjusted = holm(p)
+    order = np.argsort(p, kind="stable")
+    rejecting = True
+    for rank, k in enumerate(order):
+        bound = 0.05 / (len(p) - rank)
+        rejecting = rejecting and p[k] <= bound
+        if not isclose(p[k], bound):
+            assert (adjusted[k] <= 0.05) == rejecting
+    assert all(adjusted[a] <= adjusted[b] for a, b in pairwise(order))
+
+
+def test_words() -> None:
+    text = rate_text(event_rate([1, 0, 2, 0, 0, 0]), stopped=True)
+    assert text.startswith("3 in 6 runs: 0.5 per run (95 % ")
+    assert "too few events" in text
+    assert "approximate" in text
+    assert "too few" not in rate_text(event_rate([60, 61]))
+    assert (p_text(0.2539), p_text(2e-6)) == ("p = 0.25", "p < 0.001")

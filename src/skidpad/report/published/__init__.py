@@ -1,0 +1,61 @@
+"""The published numbers, to stand beside ours in a report, marked as published (decision X-6).
+
+They are copied from the three theses' tables and nothing else in Skidpad may read them: a simulator
+that knew the answer would prove nothing. Each cell of the matrix was one run of 500 s.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from importlib.resources import files
+
+import polars as pl
+
+
+class Source(str, Enum):
+    """One table each; the value is the name of its file here."""
+
+    MATRIX = "adas_results_by_config_weather"  # tables 5 to 9 of the ADAS thesis
+    SPEEDS = "adas_average_speeds"  # table 15 and sections 6.1, 7.2
+    PRELIMINARY = "adas_preliminary_vs_final_matching_runs"  # table 14
+    SAMPLES = "adas_sample_counts"  # table 14 and section 6.1
+    REAL_TIME = "adas_rtf_figures"  # sections 4.1, 5.5, 6.3
+    COMPLETION = "grip_completion_and_score"  # tables of the friction thesis
+    WARPING = "grip_dtw_reduced_vs_original"
+    CUTIN_COMPLETION = "grip_cutin_fix_completion_score"
+    CUTIN_WARPING = "grip_cutin_fix_dtw"
+    HAZARDS = "channels_hsi_summary"  # tables of the channels thesis
+    HAZARDS_BY_TOWN = "channels_hsi_results_by_town"
+    VIOLATIONS = "channels_spi_violations_summary"
+    VIOLATIONS_BY_TOWN = "channels_spi_violations_by_town"
+    TIMING = "channels_timing_statistics"
+
+
+KINDS = {"Clear Sky": "clear", "Heavy Rain": "rain"}
+COLUMNS = {"collisions": "fatal_collisions", "speed_kmh": "mean_speed_kmh"}
+
+
+def published(source: Source) -> pl.DataFrame:
+    """A table as copied."""
+    text = (files(__name__) / f"{source.value}.csv").read_bytes()
+    return pl.read_csv(text, infer_schema_length=None)
+
+
+def published_matrix() -> pl.DataFrame:
+    """The 30 cells with the column names of results.parquet; null where nothing was published."""
+    cells = _cells(published(Source.MATRIX)).drop("config_features", "source")
+    speeds = published(Source.SPEEDS).filter(pl.col("source").is_in(["Table 15", "section 6.1.1"]))
+    speeds = _cells(speeds).select("config", "weather", "mean_speed_kmh")
+    return cells.join(speeds, on=["config", "weather"], how="left").sort("config", "weather")
+
+
+def _cells(table: pl.DataFrame) -> pl.DataFrame:
+    kind = pl.col("weather").replace_strict(KINDS)
+    time = pl.col("time_of_day").str.to_lowercase()
+    return table.select(
+        pl.col("config_id").cast(pl.String).alias("config"),
+        (kind + "-" + time).alias("weather"),
+        kind.alias("precipitation_kind"),
+        time.alias("time_of_day"),
+        pl.exclude("config_id", "weather", "time_of_day").name.map(lambda c: COLUMNS.get(c, c)),
+    )

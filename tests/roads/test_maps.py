@@ -14,11 +14,6 @@ from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import LanePoint, RoadMap
 
 
-@pytest.fixture(scope="module")
-def figure8() -> RoadMap:
-    return load_map("figure8")
-
-
 def start(map: RoadMap) -> LanePoint:
     assert map.ego_start is not None
     return map.place(map.ego_start)

@@ -5,7 +5,7 @@ All take `LaneArrays` first. Lane -1 means none. World frame, ISO 8855, SI.
 
 from __future__ import annotations
 
-from math import atan2, ceil, cos, floor, inf, nan, pi, sin, sqrt
+from math import atan2, ceil, floor, inf, nan, pi, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -19,16 +19,17 @@ REACH = 20.0  # m, beyond this there is no lane
 Z_WEIGHT = 2.0  # heights count double, so that a road 8 m above is 16 m away
 HALF_STEP_SQ = 0.3  # m^2, more than the squared half distance of samples
 SAME = 1e-6  # m^2, squared distances closer than this are equal: the lower lane index wins
+FOOT = 1e-3  # m along a lane by which the foot of a perpendicular may lie outside its segment
 RETRY = 64  # junction-free steps that one walk may take per 64 m, against cycles of tiny lanes
 
 # Columns of LaneArrays.sample
-X, Y, Z, HEADING, S, CURVATURE, GRADE, BANK, WIDTH, LIMIT, S_ROAD = range(11)
+X, Y, Z, HEADING, S, CURVATURE, GRADE, BANK, WIDTH, LIMIT, S_ROAD, COS, SIN = range(13)
 
 
 class LaneArrays(NamedTuple):
     """A baked map in the form that kernels read; N samples, L lanes, K signals."""
 
-    sample: Floats  # (N, 11) columns X to S_ROAD; heading continuous within a lane
+    sample: Floats  # (N, 13) columns X to SIN (of the heading); heading continuous within a lane
     lane_of: Ints  # (N,)
     first: Ints  # (L,) first sample
     size: Ints  # (L,)
@@ -51,6 +52,7 @@ class LaneArrays(NamedTuple):
     cell_origin: Floats  # (2,)
     cell_start: Ints  # (rows + 1, columns) samples of a cell: cell_sample[start:next start]
     cell_sample: Ints  # (N,)
+    cell_point: Floats  # (N, 3) x, y, z in the order of cell_sample: read one after the other
 
 
 def lane_arrays(baked: BakedMap) -> LaneArrays:
@@ -61,8 +63,9 @@ def lane_arrays(baked: BakedMap) -> LaneArrays:
     heading = p.heading + np.cumsum(jumps)
     heading -= np.repeat((heading - p.heading)[t.first], t.size)
     columns = (
-        p.x, p.y, p.z, heading, p.s, p.curvature, p.grade, p.bank, p.width, p.limit, p.s_road,
-    )  # fmt: skip
+        *(p.x, p.y, p.z, heading, p.s, p.curvature, p.grade, p.bank, p.width, p.limit, p.s_road),
+        *(np.cos(heading), np.sin(heading)),
+    )
     order = np.lexsort((baked.signals.s, baked.signals.lane)).astype(np.int32)
     origin, start, cell_sample = _grid(p.x, p.y)
     return LaneArrays(
@@ -91,6 +94,7 @@ def lane_arrays(baked: BakedMap) -> LaneArrays:
         cell_origin=origin,
         cell_start=start,
         cell_sample=cell_sample,
+        cell_point=np.column_stack((p.x, p.y, p.z))[cell_sample],
     )
 
 
@@ -112,51 +116,51 @@ def wrapped(angle: float) -> float:
 
 
 @kernel
-def closest_on_segment(a: LaneArrays, i: int, x: float, y: float) -> tuple[float, float, float]:
+def closest_on_segment(
+    a: LaneArrays, i: int, x: float, y: float
+) -> tuple[float, float, float, float]:
     """Closest point of the curve between samples i and i + 1.
 
-    Returns (share in [0, 1], left offset, squared plane distance). The curve is an arc in first
-    order: the share is found on the chord and corrected by the headings at both ends.
+    Returns (share in [0, 1], left offset, squared plane distance, distance by which the point lies
+    before or beyond the ends); Newton steps from the chord.
     """
     p, q = a.sample[i], a.sample[i + 1]
-    ds = q[S] - p[S]
-    dx, dy = x - p[X], y - p[Y]
-    share = 0.0
     cx, cy = q[X] - p[X], q[Y] - p[Y]
-    chord_sq = cx * cx + cy * cy
-    if chord_sq > 0.0:
-        share = (dx * cx + dy * cy) / chord_sq
-    inside = 0.0 <= share <= 1.0
-    px, py, h = 0.0, 0.0, 0.0
-    for _ in range(3):
-        share = min(max(share, 0.0), 1.0)
-        px, py, h = _hermite(a, i, share)
-        along = (x - px) * cos(h) + (y - py) * sin(h)
-        across = (y - py) * cos(h) - (x - px) * sin(h)
-        # Near the centre of a bend one metre of lane is a shorter way around the query point.
-        bend = 1.0 - p[CURVATURE] * across
-        step = along / (ds * max(bend, 0.3))
-        if abs(step) < 1e-5 or (not inside and (share + step) * (share + step - 1.0) > 0.0):
+    u = ((x - p[X]) * cx + (y - p[Y]) * cy) / (cx * cx + cy * cy)
+    u = min(max(u, 0.0), 1.0)
+    px, py, tx, ty = hermite(a, i, u)
+    for _ in range(2):
+        ds = sqrt(tx * tx + ty * ty)
+        along = ((x - px) * tx + (y - py) * ty) / ds
+        across = ((y - py) * tx - (x - px) * ty) / ds
+        # On the inner side of a bend a metre along the lane is a longer way around the point.
+        step = along / (ds * max(1.0 - p[CURVATURE] * across, 0.3))
+        moved = min(max(u + step, 0.0), 1.0)
+        if abs(moved - u) < 1e-6:
             break
-        share += step
-    share = min(max(share, 0.0), 1.0)
-    px, py, h = _hermite(a, i, share)
-    across = (y - py) * cos(h) - (x - px) * sin(h)
-    return share, across, (x - px) ** 2 + (y - py) ** 2
+        u = moved
+        px, py, tx, ty = hermite(a, i, u)
+    ds = sqrt(tx * tx + ty * ty)
+    across = ((y - py) * tx - (x - px) * ty) / ds
+    missed = ((x - px) * tx + (y - py) * ty) / ds if u <= 0.0 or u >= 1.0 else 0.0
+    return u, across, (x - px) ** 2 + (y - py) ** 2, missed
 
 
 @kernel
-def _hermite(a: LaneArrays, i: int, u: float) -> tuple[float, float, float]:
-    """Position and heading on the cubic through samples i and i + 1 with their headings."""
+def hermite(a: LaneArrays, i: int, u: float) -> tuple[float, float, float, float]:
+    """Position and its derivative by u on the cubic through samples i and i + 1."""
     p, q = a.sample[i], a.sample[i + 1]
     ds = q[S] - p[S]
-    h0, h1 = p[HEADING], q[HEADING]
     w = 1.0 - u
-    b0, b1 = w * w * (1.0 + 2.0 * u), u * u * (3.0 - 2.0 * u)
+    b, db = u * u * (3.0 - 2.0 * u), 6.0 * u * w
     g0, g1 = w * w * u * ds, -u * u * w * ds
-    x = b0 * p[X] + b1 * q[X] + g0 * cos(h0) + g1 * cos(h1)
-    y = b0 * p[Y] + b1 * q[Y] + g0 * sin(h0) + g1 * sin(h1)
-    return x, y, h0 + u * (h1 - h0)
+    d0, d1 = w * (1.0 - 3.0 * u) * ds, u * (3.0 * u - 2.0) * ds
+    cx, cy = q[X] - p[X], q[Y] - p[Y]
+    x = p[X] + b * cx + g0 * p[COS] + g1 * q[COS]
+    y = p[Y] + b * cy + g0 * p[SIN] + g1 * q[SIN]
+    tx = db * cx + d0 * p[COS] + d1 * q[COS]
+    ty = db * cy + d0 * p[SIN] + d1 * q[SIN]
+    return x, y, tx, ty
 
 
 @kernel
@@ -198,22 +202,28 @@ def project_kernel(
                 begin = a.cell_start[r, c]
                 end = a.cell_start[r, c + 1] if c + 1 < columns else a.cell_start[r + 1, 0]
                 for k in range(begin, end):
-                    i = a.cell_sample[k]
-                    dx, dy, dz = x - a.sample[i, X], y - a.sample[i, Y], z - a.sample[i, Z]
+                    dx, dy, dz = (
+                        x - a.cell_point[k, 0],
+                        y - a.cell_point[k, 1],
+                        z - a.cell_point[k, 2],
+                    )
                     dz = max(abs(dz) - 0.1, 0.0) * Z_WEIGHT  # it may change between samples
                     if dx * dx + dy * dy + dz * dz - HALF_STEP_SQ > best:
                         continue
+                    i = a.cell_sample[k]
                     j = a.lane_of[i]
                     if driving and a.drivable[j] == 0:
                         continue
-                    h = a.sample[i, HEADING]
-                    ahead = dx * cos(h) + dy * sin(h) >= 0.0
+                    ahead = dx * a.sample[i, COS] + dy * a.sample[i, SIN] >= 0.0
                     if ahead and i == a.first[j] + a.size[j] - 1:
                         ahead = False
                     elif not ahead and i == a.first[j]:
                         ahead = True
                     segment = i if ahead else i - 1
-                    share, across, d_sq = closest_on_segment(a, segment, x, y)
+                    share, across, d_sq, missed = closest_on_segment(a, segment, x, y)
+                    at_end = segment == a.first[j] or segment == a.first[j] + a.size[j] - 2
+                    if abs(missed) > FOOT and not at_end:
+                        continue  # the next segment has the foot; here height alone could win
                     z_lane = a.sample[segment, Z] + share * (
                         a.sample[segment + 1, Z] - a.sample[segment, Z]
                     )
@@ -254,20 +264,44 @@ def sample_kernel(
     heading is wrapped; limit is NaN where the map gives none.
     """
     i, u = segment_kernel(a, lane, s)
-    x, y, heading = _hermite(a, i, u)
+    x, y, _, _ = hermite(a, i, u)
     p, q = a.sample[i], a.sample[i + 1]
     w = 1.0 - u
     return (
         x,
         y,
         w * p[Z] + u * q[Z],
-        wrapped(heading),
+        wrapped(w * p[HEADING] + u * q[HEADING]),
         w * p[CURVATURE] + u * q[CURVATURE],
         w * p[WIDTH] + u * q[WIDTH],
         w * p[GRADE] + u * q[GRADE],
         w * p[BANK] + u * q[BANK],
         p[LIMIT],
     )
+
+
+@kernel
+def project_point(
+    a: LaneArrays, x: float, y: float, z: float, hint: int, driving: bool
+) -> tuple[int, float, float, float, float, float, float, float, float]:
+    """`project_kernel` and what the facade tells about the place: one call from Python."""
+    lane, s, offset = project_kernel(a, x, y, z, hint, driving)
+    if lane < 0:
+        return -1, nan, nan, nan, nan, nan, nan, nan, nan
+    px, py, pz, heading, curvature, width, _, _, _ = sample_kernel(a, lane, s)
+    return lane, s, offset, px, py, pz, heading, curvature, width
+
+
+@kernel
+def advance_point(
+    a: LaneArrays, lane: int, s: float, distance: float, heading: float
+) -> tuple[int, float, float, float, float, float, float, float, float]:
+    """`advance_kernel` likewise; the offset is 0."""
+    lane, s = advance_kernel(a, lane, s, distance, heading)
+    if lane < 0:
+        return -1, nan, nan, nan, nan, nan, nan, nan, nan
+    px, py, pz, heading, curvature, width, _, _, _ = sample_kernel(a, lane, s)
+    return lane, s, 0.0, px, py, pz, heading, curvature, width
 
 
 @kernel

@@ -70,6 +70,7 @@ class RoadMap:
         self.geo_reference, self.ego_start = baked.geo_reference, baked.ego_start
         self.content_hash = baked.content_hash()
         self.arrays = kernels.lane_arrays(baked)
+        self._names = list(zip(self.lanes.road.tolist(), self.lanes.lane_id.tolist(), strict=True))
 
     def project(
         self, x: float, y: float, z: float, hint: int = -1, driving: bool = True
@@ -78,17 +79,23 @@ class RoadMap:
 
         hint: a lane index near which to search first; the answer does not depend on it.
         """
-        lane, s, offset = kernels.project_kernel(
-            self.arrays, float(x), float(y), float(z), hint, driving
+        return self._point(
+            *kernels.project_point(self.arrays, float(x), float(y), float(z), hint, driving)
         )
-        return None if lane < 0 else self.at(lane, s, offset)
+
+    def _point(self, lane: int, s: float, offset: float, *place: float) -> LanePoint | None:
+        if lane < 0:
+            return None
+        x, y, z, heading, curvature, width = place
+        road, lane_id = self._names[lane]
+        return LanePoint(lane, s, x, y, z, heading, curvature, width, road, lane_id, offset)
 
     def at(self, lane: int, s: float, offset: float = 0.0) -> LanePoint:
         """The place `s` m along a lane, given by its index."""
         x, y, z, heading, curvature, width, _, _, _ = kernels.sample_kernel(
             self.arrays, int(lane), float(s)
         )
-        road, lane_id = int(self.lanes.road[lane]), int(self.lanes.lane_id[lane])
+        road, lane_id = self._names[lane]
         return LanePoint(
             int(lane), float(s), x, y, z, heading, curvature, width, road, lane_id, float(offset)
         )
@@ -100,10 +107,10 @@ class RoadMap:
 
         heading: what "straight" is measured against; None: the lane's own. None where the road ends.
         """
-        lane, s = kernels.advance_kernel(
-            self.arrays, point.lane, point.s, float(distance), nan if heading is None else heading
+        measured = nan if heading is None else heading
+        return self._point(
+            *kernels.advance_point(self.arrays, point.lane, point.s, float(distance), measured)
         )
-        return None if lane < 0 else self.at(lane, s)
 
     def behind(self, point: LanePoint, distance: float) -> LanePoint | None:
         """The place `distance` m back along the straightest predecessor."""

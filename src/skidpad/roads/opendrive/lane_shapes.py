@@ -19,6 +19,7 @@ Floats = NDArray[np.float64]
 
 STEP = 0.98  # m, longest distance of samples along any lane of a section
 JOINT = 1e-6  # m inside a section: where records are chosen at its ends
+STRETCH_MAX = 3.0  # more is a jump in the file, which no sampling makes smooth
 JOINT_GAP = 0.02  # m, closer joints get no sample of their own
 SHORTEST = 1e-4  # m, shorter sections are joints written twice
 LONGEST = 1e6  # m, a longer road is a mistake or an attack
@@ -116,18 +117,29 @@ def lane_shapes(document: Document) -> Iterator[LaneShape]:
 
 def _section_shapes(road: RoadRecord, index: int, section: SectionRecord) -> list[LaneShape]:
     shapes = _sampled(road, index, section, _grid(road, section, STEP))
-    longest = max((float(np.max(np.diff(shape.s))) for shape in shapes), default=0.0)
-    if longest > STEP:  # outer lanes of a bend are longer than the reference line
-        shapes = _sampled(road, index, section, _grid(road, section, STEP * STEP / longest))
+    stretch = max(
+        (float(np.max(np.diff(shape.s) / abs(np.diff(shape.s_road)))) for shape in shapes),
+        default=1.0,
+    )
+    if stretch > 1.0:  # outer lanes of a bend are longer than the reference line
+        step = STEP / min(stretch, STRETCH_MAX)
+        shapes = _sampled(road, index, section, _grid(road, section, step))
     return shapes
 
 
 def _grid(road: RoadRecord, section: SectionRecord, step: float) -> Floats:
     """Road s of the samples: evenly spaced between the joints, where curvature may jump."""
+    widths = [
+        section.s_start + cubic.start
+        for lane in section.lanes
+        for cubic in (lane.width, lane.border)
+        if cubic is not None
+    ]
+    starts = np.unique(np.concatenate([road.line.starts, road.lane_offset.start, *widths]))
     joints = [section.s_start]
-    for s in road.line.starts:
+    for s in starts.tolist():
         if joints[-1] + JOINT_GAP < s < section.s_end - JOINT_GAP:
-            joints.append(float(s))
+            joints.append(s)
     joints.append(section.s_end)
     pieces = [
         np.linspace(s0, s1, max(ceil((s1 - s0) / step), 1), endpoint=False)

@@ -227,6 +227,9 @@ def project_kernel(
                     z_lane = a.sample[segment, Z] + share * (
                         a.sample[segment + 1, Z] - a.sample[segment, Z]
                     )
+                    # Beyond the end of a lane the next one has the foot; without its slope the end
+                    # of a lane that comes down could seem nearer in height.
+                    z_lane += missed * a.sample[segment, GRADE]
                     d_sq += (Z_WEIGHT * (z - z_lane)) ** 2
                     if d_sq < best - SAME or (d_sq < best + SAME and lane >= 0 and j < lane):
                         best, lane, offset = d_sq, j, across

@@ -206,6 +206,32 @@ def test_random_inputs_stay_finite_and_bounded(seed):
     assert (f.wheels.load >= 0.0).all()
 
 
+def cog_velocity(f):
+    s, d = f.states, f.params.x_cog * f.states.yaw_rate
+    return np.array([s.vx - d * np.sin(s.yaw), s.vy + d * np.cos(s.yaw)])
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.5, 1.0])
+def test_acceleration_stays_inside_the_friction_circle(mu):
+    rng = np.random.default_rng(7)
+    f = fleet(30.0, tuple(vehicle_types().values()) * 3)
+    n = len(f)
+    largest = np.zeros(n)
+    for _ in range(200):
+        inputs = np.column_stack(
+            [rng.random(n), rng.random(n), rng.uniform(-1, 1, n), np.zeros((n, 2))]
+        )
+        before = cog_velocity(f)
+        f.step(inputs, np.full((n, 4), mu))
+        v = np.hypot(*before)
+        a = np.hypot(*(cog_velocity(f) - before)) / DT
+        drag = f.params.drag * v**2 / f.params.mass
+        rolling = v > 1.0  # coming to rest is no matter of friction
+        assert (a[rolling] <= (mu * 9.80665 + drag)[rolling] * (1 + 1e-9)).all()
+        largest = np.maximum(largest, np.where(rolling, a, 0.0))
+    assert (largest > 0.6 * min(mu, 0.7) * 9.80665).all()
+
+
 @pytest.mark.req("B-032", "B-033", "B-064", "B-067")
 def test_each_wheel_scales_mu_by_its_own_friction_once():
     f = fleet(10.0)

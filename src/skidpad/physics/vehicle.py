@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from skidpad.core.jit import kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.types import VehicleType
-from skidpad.physics.tyre import V_SLIP_MIN, force_per_slip
+from skidpad.physics.tyre import V_SLIP_MIN, brush_secant
 
 Floats = NDArray[np.float64]
 
@@ -34,6 +34,8 @@ V_REVERSE_MAX = 2.0  # m/s, forward speed above which reverse finds no drive
 V_ABS_MIN = 1.5  # m/s, below which anti-lock brakes let wheels lock; ISO 21994 leaves it free
 ABS_UTILISATION = 0.99  # of the grip that the idealised slip control keeps
 ABS_RELEASE = 0.6  # of the grip, while a wheel is past its peak
+DRAG_CONTROL = 0.5  # of the grip, most that engine drag takes with anti-lock brakes; our assumption
+MU_MIN = 1e-6  # keeps slip over grip finite
 V_HOLD = 0.1  # m/s and rad/s, below which a braked vehicle comes to rest
 
 THROTTLE, BRAKE, STEER, HANDBRAKE, REVERSE = range(5)  # columns of commands
@@ -231,29 +233,32 @@ def _advance(
             if front:
                 vx_w, vy_w = vx_w * cd + vy_w * sd, vy_w * cd - vx_w * sd
             rim = omega[i, w] * radius
-            reference = max(sqrt(vx_w * vx_w + vy_w * vy_w), abs(rim), V_SLIP_MIN)
-            s_x = (rim - vx_w) / reference
-            s_y = -vy_w / reference
-            slip = sqrt(s_x * s_x + s_y * s_y)
+            per_speed = 1.0 / max(sqrt(vx_w * vx_w + vy_w * vy_w), abs(rim), V_SLIP_MIN)
+            s_x = (rim - vx_w) * per_speed
+            s_y = -vy_w * per_speed
             grip = mu[w] * load[i, w]
-            stiffness = p.stiffness[i, axle] * load[i, w]
-            k = force_per_slip(slip, stiffness, grip)
-            slide[i, w] = stiffness * slip / (3.0 * grip) if grip > 0.0 else 0.0
-            drag = radius * (p.rolling[i] * load[i, w] + share * engine_drag)
+            sigma = p.stiffness[i, axle] * sqrt(s_x * s_x + s_y * s_y) / (3.0 * max(mu[w], MU_MIN))
+            slide[i, w] = sigma
+            k = p.stiffness[i, axle] * load[i, w] * brush_secant(sigma)
+
+            engine = share * engine_drag
+            if p.anti_lock[i]:
+                engine = min(engine, DRAG_CONTROL * grip)
+            drag = radius * (p.rolling[i] * load[i, w] + engine)
             braking = brake * p.brake_torque[i, axle]
             if p.anti_lock[i] and speed > V_ABS_MIN:
-                limit = radius * _brake_limit(grip, slide[i, w], s_x, vx_w)
+                limit = radius * _brake_limit(grip, sigma, s_x, vx_w)
                 own = p.wheel_inertia[i] * abs(a_x) / radius  # to slow the wheel itself
                 braking = min(braking, max(limit + own - drag, 0.0))
             if handbrake and not front:
                 braking += p.handbrake_torque[i]
             holding += min(braking / radius, grip)
             omega[i, w] = _spin(
-                omega[i, w], share * drive * radius, braking + drag, k / reference, vx_w, radius,
+                omega[i, w], share * drive * radius, braking + drag, k * per_speed, vx_w, radius,
                 p.wheel_inertia[i], h,
             )  # fmt: skip
             # Body and wheel feel the same force, that of the new spin; the secant may overshoot.
-            f_x = k * (omega[i, w] * radius - vx_w) / reference
+            f_x = k * (omega[i, w] * radius - vx_w) * per_speed
             f_y = k * s_y
             square = f_x * f_x + f_y * f_y
             if square > grip * grip:

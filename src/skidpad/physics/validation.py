@@ -1,0 +1,211 @@
+"""Manoeuvres that show how far the vehicle can be trusted; `python -m skidpad.physics.validation DIR`
+draws the figures of docs/physics.md. The comparison needs commonroad-vehicle-models (extra `test`).
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import MissingExtra
+from skidpad.core.geometry import Pose, kmh_from_mps, mps_from_kmh
+from skidpad.physics.fleet import Fleet
+from skidpad.physics.grip import GripParams
+from skidpad.physics.stopping import stops
+from skidpad.physics.types import EGO_TYPE, Drive, VehicleType, vehicle_type
+from skidpad.physics.vehicle import G, steer_share
+
+Floats = NDArray[np.float64]
+
+TICK = 0.01  # s
+# Parameters of vehicle 2 (BMW 320i) of commonroad-vehicle-models 3.0.2, in our terms. Brakes are
+# strong enough for the deceleration to be demanded, split as there (66 % front).
+ORACLE = VehicleType(
+    title="BMW 320i of commonroad-vehicle-models",
+    kind="car",
+    length=4.508,
+    width=1.61,
+    height=1.45,
+    mass=1093.3,
+    wheelbase=2.579,
+    front_overhang=0.9,
+    track=1.387,
+    cog_height=0.614,
+    front_share=1.4227 / 2.579,
+    wheel_radius=0.344,
+    wheel_inertia=1.7,
+    drive=Drive.REAR,
+    power=150_000.0,
+    force_max=8000.0,
+    brake_torque_front=1500.0,
+    brake_torque_rear=773.0,
+    drag_area=0.0,
+    rolling_resistance=0.0,
+    engine_drag=0.0,
+    stiffness_front=21.92,
+    stiffness_rear=21.92,
+    source="commonroad-vehicle-models 3.0.2, parameters_vehicle2",
+)
+ORACLE_MU = 1.05  # its peak lateral friction
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """One manoeuvre over time, arrays (k,)."""
+
+    t: Floats
+    x: Floats
+    y: Floats
+    yaw: Floats
+    v: Floats
+    yaw_rate: Floats
+
+
+def drive(fleet: Fleet, duration: float, mu: float, commands: Any) -> Trace:
+    """Drive vehicle 0; commands(t, fleet) gives throttle, brake, steer, handbrake, reverse."""
+    rows = []
+    for k in range(round(duration / fleet.dt)):
+        inputs = np.array([commands(k * fleet.dt, fleet)], dtype=np.float64)
+        fleet.step(inputs, np.full((1, 4), mu))
+        s = fleet.states
+        rows.append((k * fleet.dt, s.x[0], s.y[0], s.yaw[0], fleet.speed(0), s.yaw_rate[0]))
+    return Trace(*np.array(rows).T)
+
+
+def placed(kind: VehicleType, v: float, **options: Any) -> Fleet:
+    """One vehicle at the origin, heading along x at speed v."""
+    fleet = Fleet([kind], TICK, **options)
+    fleet.place(0, Pose(0.0, 0.0), v)
+    return fleet
+
+
+def step_steer(v: float, delta: float, duration: float = 2.5) -> Trace:
+    """Our model of ORACLE: road-wheel angle delta at once, speed held."""
+
+    def commands(_: float, fleet: Fleet) -> tuple[float, ...]:
+        speed = fleet.speed(0)
+        steer = delta / (ORACLE.steer_max * steer_share(speed))
+        return max(0.5 * (v - speed), 0.0), 0.0, steer, 0.0, 0.0
+
+    return drive(placed(ORACLE, v), duration, ORACLE_MU, commands)
+
+
+def brake(v: float, deceleration: float, duration: float = 6.0) -> Trace:
+    """Our model of ORACLE: a pedal that asks for this deceleration."""
+    full = 2.0 * (ORACLE.brake_torque_front + ORACLE.brake_torque_rear)
+    pedal = deceleration * ORACLE.mass * ORACLE.wheel_radius / full
+    return drive(placed(ORACLE, v), duration, ORACLE_MU, lambda *_: (0, pedal, 0, 0, 0))
+
+
+def oracle(v: float, delta: float, deceleration: float, duration: float) -> Trace:
+    """The single-track drift model of commonroad-vehicle-models under the same demand."""
+    try:
+        from vehiclemodels.init_std import init_std
+        from vehiclemodels.parameters_vehicle2 import parameters_vehicle2
+        from vehiclemodels.vehicle_dynamics_std import vehicle_dynamics_std
+    except ImportError as error:
+        raise MissingExtra("the comparison of vehicle models", "test") from error
+    dt = 0.001
+    p = parameters_vehicle2()
+    state = np.array(init_std([0.0, 0.0, 0.0, v, 0.0, 0.0, 0.0], p))
+    rows = []
+    for k in range(round(duration / dt)):
+        if state[3] < 0.3:
+            break
+        rate = float(np.clip((delta - state[2]) / dt, -0.4, 0.4))
+        state = state + dt * np.array(vehicle_dynamics_std(list(state), [rate, -deceleration], p))
+        rows.append((k * dt, state[0], state[1], state[4], state[3], state[5]))
+    return Trace(*np.array(rows).T)
+
+
+def handbrake_turn(mu: float, v: float, steer: float = 0.02) -> Trace:
+    """The ego under handbrake with a little steer until it stands."""
+    fleet = placed(vehicle_type(EGO_TYPE), v)
+    return drive(fleet, 30.0, mu, lambda t, _: (0, 0, steer, float(t > 0.5), 0))
+
+
+def _stopping_figure(axes: Any) -> None:
+    mus = np.geomspace(0.08, 1.05, 25)
+    for kmh, colour in ((50.0, "tab:blue"), (80.0, "tab:orange"), (100.0, "tab:green")):
+        v = mps_from_kmh(kmh)
+        for anti_lock, style in ((True, "-"), (False, "--")):
+            params = [GripParams(float(mu), 1.0, 0.0, 0.0) for mu in mus]
+            found = stops(params, [v] * len(mus), anti_lock=anti_lock)
+            label = f"{kmh:g} km/h, {'anti-lock' if anti_lock else 'locked'}"
+            axes.loglog(mus, [s.distance for s in found], style, color=colour, label=label)
+        axes.loglog(mus, v * v / (2 * G * mus), ":", color="black", linewidth=0.8)
+    axes.plot([], [], ":", color="black", label="v² / (2 mu g)")
+    axes.set(xlabel="friction coefficient", ylabel="stopping distance, m")
+    axes.grid(which="both", alpha=0.25)
+    axes.legend(fontsize=8)
+
+
+def _step_figure(axes: Any) -> None:
+    for delta in (0.015, 0.03):
+        ours, theirs = step_steer(20.0, delta), oracle(20.0, delta, 0.0, 2.5)
+        axes.plot(ours.t, ours.yaw_rate, label=f"ours, {delta:g} rad")
+        axes.plot(theirs.t, theirs.yaw_rate, "--", label=f"drift model, {delta:g} rad")
+        axes.axhline(20.0 * np.tan(delta) / ORACLE.wheelbase, color="black", lw=0.6, ls=":")
+    axes.set(xlabel="time, s", ylabel="yaw rate, rad/s", title="step steer at 20 m/s")
+    axes.grid(alpha=0.25)
+    axes.legend(fontsize=8)
+
+
+def _brake_figure(axes: Any) -> None:
+    for a in (4.0, 8.0):
+        ours, theirs = brake(mps_from_kmh(100.0), a, 9.0), oracle(mps_from_kmh(100.0), 0.0, a, 10.0)
+        axes.plot(ours.x, kmh_from_mps(1.0) * ours.v, label=f"ours, {a:g} m/s²")
+        axes.plot(theirs.x, kmh_from_mps(1.0) * theirs.v, "--", label=f"drift model, {a:g} m/s²")
+    axes.set(xlabel="distance, m", ylabel="speed, km/h", title="braking from 100 km/h")
+    axes.grid(alpha=0.25)
+    axes.legend(fontsize=8)
+
+
+def _spin_figure(axes: Any) -> None:
+    for mu, colour in ((0.9, "tab:blue"), (0.4, "tab:orange"), (0.15, "tab:green")):
+        trace = handbrake_turn(mu, mps_from_kmh(50.0))
+        turned = np.degrees(np.unwrap(trace.yaw)[-1])
+        axes.plot(trace.x, trace.y, color=colour, label=f"mu {mu:g}: turned by {turned:.0f}°")
+        every = slice(None, None, 40)
+        axes.quiver(
+            trace.x[every],
+            trace.y[every],
+            np.cos(trace.yaw[every]),
+            np.sin(trace.yaw[every]),
+            color=colour,
+            scale=40,
+            width=0.003,
+        )
+    axes.set(xlabel="x, m", ylabel="y, m", title="handbrake at 50 km/h, steer 0.02")
+    axes.grid(alpha=0.25)
+    axes.legend(fontsize=8)
+
+
+def main(folder: Path) -> None:
+    """Write the figures into `folder`."""
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    pages = {
+        "stopping": (_stopping_figure,),
+        "handling": (_step_figure, _brake_figure, _spin_figure),
+    }
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, panels in pages.items():
+        width = 7.0 if len(panels) == 1 else 4.8 * len(panels)
+        figure, axes = plt.subplots(1, len(panels), figsize=(width, 4.2), layout="constrained")
+        for panel, place in zip(panels, np.atleast_1d(axes), strict=True):
+            panel(place)
+        figure.savefig(folder / f"physics_{name}.png", dpi=75)
+        plt.close(figure)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("docs/img"))

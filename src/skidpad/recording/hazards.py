@@ -1,0 +1,222 @@
+"""Hazard records: what was found, and the worlds around it as the channels saw them (C-150).
+
+`hazards.txt` is the record, `hazards.jsonl` its index; one writer makes both (decision C-13).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+from skidpad.core.channels import Cycle
+from skidpad.core.errors import FileError, OutputError
+from skidpad.core.vocabulary import HazardType
+from skidpad.recording.hazard_text import HEADER, encode_worlds
+from skidpad.recording.hazard_text_reader import decode_worlds
+
+TEXT_FILE = "hazards.txt"
+INDEX_FILE = "hazards.jsonl"
+RECORD_LIMIT = 32 * 1024 * 1024  # bytes of one record
+FILE_LIMIT = 1024 * 1024 * 1024
+
+
+@dataclass(frozen=True, slots=True)
+class InvolvedObject:
+    """An object that a channel reported and that the hazard is about."""
+
+    channel: str
+    id: int | None  # the channel's own identity of it
+    x: float  # m, world, when the hazard was worst
+    y: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class HazardRecord:
+    """One hazardous scene."""
+
+    id: str
+    type: HazardType
+    profile: str
+    forms: str
+    t_start: float  # s, first cycle in which the rule fired
+    t_end: float  # s, last one
+    t_worst: float
+    count: int  # cycles in which it fired
+    extremes: dict[str, float]  # signals when the hazard was worst
+    channels: tuple[str, ...]  # all channels, in the order of the worlds
+    driving: str | None
+    involved: tuple[str, ...]
+    objects: tuple[InvolvedObject, ...] = ()
+    flags: tuple[str, ...] = ()  # "assumed": OLSS without a pair; "cut": the world ends early
+    context: dict[str, str]
+    worlds: tuple[Cycle, ...] = ()  # from 5 s before to 5 s after
+
+
+class HazardWriter:
+    """Writes records as they close, text and index together."""
+
+    def __init__(self, folder: Path) -> None:
+        try:
+            folder.mkdir(parents=True, exist_ok=True)
+            self._text = (folder / TEXT_FILE).open("w", encoding="ascii", newline="\n")
+            self._index = (folder / INDEX_FILE).open("w", encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise OutputError(f"{folder}: cannot be written ({error.strerror})") from error
+        self._text.write(HEADER + "\n")
+
+    def write(self, record: HazardRecord) -> None:
+        """Append one record."""
+        text = encode_record(record)
+        offset = self._text.tell()
+        self._text.write(text)
+        self._text.flush()
+        row = index_row(record) | {"offset": offset, "bytes": len(text)}
+        self._index.write(json.dumps(row, allow_nan=False) + "\n")
+        self._index.flush()
+
+    def close(self) -> None:
+        """Finish both files; safe to call twice."""
+        self._text.close()
+        self._index.close()
+
+    def __enter__(self) -> HazardWriter:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+
+def index_row(record: HazardRecord) -> dict[str, Any]:
+    """The record without its worlds, for JSON."""
+    return {
+        "id": record.id,
+        "type": record.type.value,
+        "profile": record.profile,
+        "forms": record.forms,
+        "t_start": record.t_start,
+        "t_end": record.t_end,
+        "t_worst": record.t_worst,
+        "count": record.count,
+        "extremes": record.extremes,
+        "channels": list(record.channels),
+        "driving": record.driving,
+        "involved": list(record.involved),
+        "objects": [{"channel": o.channel, "id": o.id, "x": o.x, "y": o.y} for o in record.objects],
+        "flags": list(record.flags),
+        "context": record.context,
+        "cycles": len(record.worlds),
+    }
+
+
+def encode_record(record: HazardRecord) -> str:
+    """The record as lines of text: its index, its worlds, and an end mark."""
+    head = json.dumps(index_row(record), allow_nan=False)
+    lines = ["H " + head, *encode_worlds(record.worlds, len(record.channels)), "Z"]
+    return "\n".join(lines) + "\n"
+
+
+def decode_record(text: str) -> HazardRecord:
+    """Inverse of `encode_record`, in its resolution of 1 cm, 1 mrad and 1 ms."""
+    lines = text.split("\n")
+    if len(lines) < 3 or not lines[0].startswith("H ") or lines[-2:] != ["Z", ""]:
+        raise FileError("a hazard record must run from a line H to a line Z")
+    try:
+        row = json.loads(lines[0][2:])
+        record = _record(row)
+    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise FileError(f"a hazard record has an unreadable head ({error})") from error
+    worlds = decode_worlds(lines[1:-2], len(record.channels))
+    if len(worlds) != row["cycles"]:
+        raise FileError(f"hazard {record.id}: {len(worlds)} cycles, its head says {row['cycles']}")
+    return HazardRecord(**{n: getattr(record, n) for n in _FIELDS if n != "worlds"}, worlds=worlds)
+
+
+def _record(row: dict[str, Any]) -> HazardRecord:
+    objects = tuple(
+        InvolvedObject(str(o["channel"]), _optional_int(o["id"]), float(o["x"]), float(o["y"]))
+        for o in row["objects"]
+    )
+    return HazardRecord(
+        id=str(row["id"]),
+        type=HazardType(row["type"]),
+        profile=str(row["profile"]),
+        forms=str(row["forms"]),
+        t_start=float(row["t_start"]),
+        t_end=float(row["t_end"]),
+        t_worst=float(row["t_worst"]),
+        count=int(row["count"]),
+        extremes={str(k): float(v) for k, v in row["extremes"].items()},
+        channels=tuple(map(str, row["channels"])),
+        driving=None if row["driving"] is None else str(row["driving"]),
+        involved=tuple(map(str, row["involved"])),
+        objects=objects,
+        flags=tuple(map(str, row["flags"])),
+        context={str(k): str(v) for k, v in row["context"].items()},
+    )
+
+
+_FIELDS = tuple(HazardRecord.__dataclass_fields__)
+
+
+def _optional_int(value: Any) -> int | None:
+    return None if value is None else int(value)
+
+
+def read_hazards(folder: Path) -> Iterator[HazardRecord]:
+    """The records of a monitor's output folder; a record cut off at the end is left out.
+
+    FileError when there is no record file, or when it is damaged before its end.
+    """
+    path = folder / TEXT_FILE
+    try:
+        if path.stat().st_size > FILE_LIMIT:
+            raise FileError(f"{path}: is larger than {FILE_LIMIT} bytes")
+        stream = path.open(encoding="ascii", errors="strict", newline="\n")
+    except OSError as error:
+        raise FileError(
+            f"{path}: cannot be read ({error.strerror}); `skidpad monitor` writes it"
+        ) from error
+    with stream:
+        try:
+            yield from _records(stream)
+        except UnicodeDecodeError as error:
+            raise FileError(f"{path}: is not a text of hazards ({error.reason})") from error
+        except FileError as error:
+            raise FileError(f"{path}: {error}") from error
+
+
+def _records(stream: Iterator[str]) -> Iterator[HazardRecord]:
+    if next(stream, "").rstrip("\n") != HEADER:
+        raise FileError(f"its first line must be {HEADER!r}")
+    lines: list[str] = []
+    size = 0
+    for line in stream:
+        size += len(line)
+        if size > RECORD_LIMIT:
+            raise FileError(f"a record is longer than {RECORD_LIMIT} bytes")
+        lines.append(line)
+        if line == "Z\n":
+            yield decode_record("".join(lines))
+            lines, size = [], 0
+
+
+def read_index(folder: Path) -> list[dict[str, Any]]:
+    """The rows of the index file."""
+    path = folder / INDEX_FILE
+    try:
+        return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
+    except OSError as error:
+        raise FileError(
+            f"{path}: cannot be read ({error.strerror}); `skidpad monitor` writes it"
+        ) from error
+    except ValueError as error:
+        raise FileError(f"{path}: holds a line that is not JSON ({error})") from error

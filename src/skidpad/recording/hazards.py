@@ -131,12 +131,19 @@ def decode_record(text: str) -> HazardRecord:
         raise FileError("a hazard record must run from a line H to a line Z")
     try:
         row = json.loads(lines[0][2:])
-        record = _record(row)
-    except (ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        record, expected = _record(row), int(row["cycles"])
+    except (
+        ValueError,
+        KeyError,
+        TypeError,
+        AttributeError,
+        OverflowError,
+        RecursionError,
+    ) as error:
         raise FileError(f"a hazard record has an unreadable head ({error})") from error
     worlds = decode_worlds(lines[1:-2], len(record.channels))
-    if len(worlds) != row["cycles"]:
-        raise FileError(f"hazard {record.id}: {len(worlds)} cycles, its head says {row['cycles']}")
+    if len(worlds) != expected:
+        raise FileError(f"hazard {record.id}: {len(worlds)} cycles, its head says {expected}")
     return HazardRecord(**{n: getattr(record, n) for n in _FIELDS if n != "worlds"}, worlds=worlds)
 
 

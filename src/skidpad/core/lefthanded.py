@@ -9,7 +9,12 @@ from __future__ import annotations
 
 from math import degrees, radians
 
+import numpy as np
+from numpy.typing import NDArray
+
 from skidpad.core.geometry import Pose
+
+Floats = NDArray[np.float64]
 
 
 def pose_from_carla(
@@ -29,6 +34,33 @@ def pose_to_carla(pose: Pose) -> tuple[float, float, float, float, float, float]
         -degrees(pose.pitch),
         -degrees(pose.yaw),
     )
+
+
+def vector_from_carla(x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A place, velocity or force; its own inverse."""
+    return (x, -y, z)
+
+
+def turn_from_carla(x: float, y: float, z: float) -> tuple[float, float, float]:
+    """A rate of rotation about x, y, z, or a torque: an axial vector; its own inverse, no unit."""
+    return (x, -y, -z)
+
+
+def poses_to_carla(
+    x: Floats, y: Floats, z: Floats, roll: Floats, pitch: Floats, yaw: Floats
+) -> Floats:
+    """(n, 6) x, y, z in m, pitch, yaw, roll in deg, as CARLA's snapshots order them."""
+    return np.column_stack((x, -y, z, np.degrees(-pitch), np.degrees(-yaw), np.degrees(roll)))
+
+
+def vectors_to_carla(x: Floats, y: Floats, z: Floats) -> Floats:
+    """(n, 3) places, velocities or forces from ISO columns."""
+    return np.column_stack((x, -y, z))
+
+
+def turns_to_carla(x: Floats, y: Floats, z: Floats) -> Floats:
+    """(n, 3) rates of rotation from ISO columns, no unit changed."""
+    return np.column_stack((x, -y, -z))
 
 
 def mirrored(value: float) -> float:

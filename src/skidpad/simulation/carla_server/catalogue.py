@@ -1,0 +1,243 @@
+"""Blueprints: what can be spawned, with attributes, sizes and the physics type that stands for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from skidpad.core.vocabulary import ActorKind, SemanticClass
+from skidpad.simulation.carla_server import wire
+
+DATA = Path(__file__).with_name("data") / "blueprints.yaml"
+GRIP_BLUEPRINT = "skidpad.weather"  # decision K-2
+
+
+class AttributeType(int, Enum):
+    """How a client parses an attribute's text."""
+
+    BOOL = 1
+    INT = 2
+    FLOAT = 3
+    STRING = 4
+    COLOUR = 5
+
+
+class Family(str, Enum):
+    """What a blueprint makes; the first part of its id for most."""
+
+    VEHICLE = "vehicle"
+    WALKER = "walker"
+    SENSOR = "sensor"
+    PROP = "static.prop"
+    TRIGGER = "static.trigger"
+    CONTROLLER = "controller"
+    GRIP = "skidpad"
+    TRAFFIC_LIGHT = "traffic.traffic_light"
+    TRAFFIC_SIGN = "traffic"
+    SPECTATOR = "spectator"
+
+
+@dataclass(frozen=True, slots=True)
+class Attribute:
+    """One attribute of a blueprint; the first recommended value is its default."""
+
+    id: str
+    type: AttributeType
+    recommended: tuple[str, ...]
+    modifiable: bool = True
+    restricted: bool = False
+
+    def packed(self) -> list[Any]:
+        """ActorAttribute of an ActorDefinition."""
+        values = list(self.recommended)
+        return [self.id, int(self.type), values[0], values, self.modifiable, self.restricted]
+
+
+@dataclass(frozen=True, slots=True)
+class Blueprint:
+    """One thing that clients may spawn."""
+
+    id: str
+    family: Family
+    attributes: dict[str, Attribute]
+    size: tuple[float, float, float] = (0.0, 0.0, 0.0)  # m: length, width, height
+    kind: ActorKind = ActorKind.PROP
+    label: SemanticClass = SemanticClass.NONE
+
+    def packed(self, uid: int) -> list[Any]:
+        """ActorDefinition."""
+        tags = ",".join(self.id.split("."))
+        return [uid, self.id, tags, [a.packed() for a in self.attributes.values()]]
+
+
+_TYPES = {
+    "bool": AttributeType.BOOL,
+    "int": AttributeType.INT,
+    "float": AttributeType.FLOAT,
+    "string": AttributeType.STRING,
+}
+_KINDS = {
+    "car": ActorKind.CAR,
+    "van": ActorKind.VAN,
+    "truck": ActorKind.TRUCK,
+    "bus": ActorKind.BUS,
+    "motorcycle": ActorKind.MOTORCYCLE,
+    "bicycle": ActorKind.BICYCLE,
+}
+LABELS = {
+    ActorKind.CAR: SemanticClass.CAR,
+    ActorKind.VAN: SemanticClass.TRUCK,
+    ActorKind.TRUCK: SemanticClass.TRUCK,
+    ActorKind.BUS: SemanticClass.BUS,
+    ActorKind.MOTORCYCLE: SemanticClass.MOTORCYCLE,
+    ActorKind.BICYCLE: SemanticClass.BICYCLE,
+    ActorKind.PEDESTRIAN: SemanticClass.PEDESTRIAN,
+    ActorKind.PROP: SemanticClass.DYNAMIC,
+}
+
+
+def _attributes(entry: dict[str, Any]) -> dict[str, Attribute]:
+    made = {}
+    for name, spec in entry.items():
+        values = spec[1] if isinstance(spec[1], list) else [spec[1]]
+        made[name] = Attribute(
+            name, _TYPES[spec[0]], tuple(str(v) for v in values), restricted=len(spec) > 2
+        )
+    return made
+
+
+def _fixed(name: str, kind: AttributeType, value: object) -> Attribute:
+    written = str(value).lower() if isinstance(value, bool) else str(value)
+    return Attribute(name, kind, (written,), modifiable=False)
+
+
+def _roles(actor: dict[str, Attribute], *names: str) -> dict[str, Attribute]:
+    role = Attribute("role_name", AttributeType.STRING, names)
+    return {**actor, "role_name": role}
+
+
+def _vehicle(id: str, row: list[Any], actor: dict[str, Attribute], colours: list[str]) -> Blueprint:
+    length, width, height, base, special, generation, lights, doors = row
+    wheels = 2 if base in ("motorcycle", "bicycle") else 4
+    attributes = _roles(actor, "autopilot", "scenario", "ego_vehicle", "hero")
+    for attribute in (
+        Attribute("color", AttributeType.COLOUR, tuple(colours)),
+        Attribute("driver_id", AttributeType.INT, ("0", "1"), restricted=True),
+        Attribute("sticky_control", AttributeType.BOOL, ("true",)),
+        Attribute("terramechanics", AttributeType.BOOL, ("false",)),
+        _fixed("object_type", AttributeType.STRING, ""),
+        _fixed("base_type", AttributeType.STRING, base),
+        _fixed("special_type", AttributeType.STRING, special),
+        _fixed("number_of_wheels", AttributeType.INT, wheels),
+        _fixed("generation", AttributeType.INT, generation),
+        _fixed("has_dynamic_doors", AttributeType.BOOL, doors),
+        _fixed("has_lights", AttributeType.BOOL, lights),
+    ):
+        attributes[attribute.id] = attribute
+    kind = _KINDS[base]
+    return Blueprint(
+        id, Family.VEHICLE, attributes, (length, width, height), kind, label=LABELS[kind]
+    )
+
+
+def _walker(id: str, row: list[Any], actor: dict[str, Attribute]) -> Blueprint:
+    length, width, height, age, gender, generation = row
+    attributes = _roles(actor, "pedestrian")
+    for attribute in (
+        _fixed("gender", AttributeType.STRING, gender),
+        _fixed("generation", AttributeType.INT, generation),
+        _fixed("age", AttributeType.STRING, age),
+        _fixed("can_use_wheelchair", AttributeType.BOOL, False),
+        Attribute("speed", AttributeType.FLOAT, ("0.0", "1.4", "2.4")),
+        Attribute("is_invincible", AttributeType.BOOL, ("true",)),
+        Attribute("use_wheelchair", AttributeType.BOOL, ("false",), restricted=True),
+    ):
+        attributes[attribute.id] = attribute
+    size = (length, width, height)
+    label = SemanticClass.PEDESTRIAN
+    return Blueprint(id, Family.WALKER, attributes, size, ActorKind.PEDESTRIAN, label)
+
+
+def _size_word(length: float, width: float, height: float) -> str:
+    longest = max(length, width, height)
+    words = ((0.3, "tiny"), (1.0, "small"), (2.5, "medium"), (5.0, "big"))
+    return next((word for limit, word in words if longest < limit), "huge")
+
+
+def _prop(id: str, size: list[float], actor: dict[str, Attribute]) -> Blueprint:
+    attributes = _roles(actor, "prop")
+    attributes["size"] = _fixed("size", AttributeType.STRING, _size_word(*size))
+    if id == "static.prop.mesh":
+        for name, kind, value in (
+            ("mesh_path", AttributeType.STRING, ""),
+            ("scale", AttributeType.FLOAT, "1.0"),
+            ("mass", AttributeType.FLOAT, "0.0"),
+        ):
+            attributes[name] = Attribute(name, kind, (value,))
+    length, width, height = (float(v) for v in size)
+    return Blueprint(
+        id, Family.PROP, attributes, (length, width, height), label=SemanticClass.DYNAMIC
+    )
+
+
+def _grip(actor: dict[str, Attribute]) -> Blueprint:
+    """Our own: its presence says that weather acts on grip here, its attribute sets ice (K-2)."""
+    ice = Attribute("ice_thickness", AttributeType.FLOAT, ("0.0",))
+    return Blueprint(GRIP_BLUEPRINT, Family.GRIP, {**actor, ice.id: ice})
+
+
+@cache
+def load_catalogue() -> dict[str, Blueprint]:
+    """All blueprints by id."""
+    data = yaml.load(DATA.read_text(encoding="utf-8"), Loader=getattr(yaml, "CSafeLoader"))
+    actor = _attributes(data["attributes"]["actor"])
+    made: list[Blueprint] = []
+    for group, family in (
+        ("sensors", Family.SENSOR),
+        ("triggers", Family.TRIGGER),
+        ("controllers", Family.CONTROLLER),
+    ):
+        made += [Blueprint(id, family, _attributes(e)) for id, e in data[group].items()]
+    made += [_vehicle(id, row, actor, data["colours"]) for id, row in data["vehicles"].items()]
+    made += [_walker(id, row, actor) for id, row in data["walkers"].items()]
+    for group in ("props", "estimated"):
+        made += [_prop(id, size, actor) for id, size in data[group].items()]
+    made.append(_grip(actor))
+    return {b.id: b for b in sorted(made, key=lambda b: b.id)}
+
+
+def chosen(blueprint: Blueprint, given: dict[str, str]) -> dict[str, str]:
+    """The attributes of a new actor: the client's where it gave some, else the defaults."""
+    values = {a.id: a.recommended[0] for a in blueprint.attributes.values()}
+    for name, value in given.items():
+        attribute = blueprint.attributes.get(name)
+        if attribute is None or not attribute.modifiable:
+            continue
+        if attribute.restricted and value not in attribute.recommended:
+            raise wire.WireError(
+                f"{blueprint.id}: {name} must be one of {', '.join(attribute.recommended)}"
+            )
+        _check_text(blueprint.id, attribute, value)
+        values[name] = value
+    return values
+
+
+def _check_text(id: str, attribute: Attribute, value: str) -> None:
+    try:
+        if attribute.type is AttributeType.FLOAT:
+            wire.number(float(value.rstrip("f")), f"{id}: {attribute.id}")
+        elif attribute.type is AttributeType.INT:
+            wire.integer(int(value), f"{id}: {attribute.id}", -(2**31), 2**31 - 1)
+        elif attribute.type is AttributeType.COLOUR:
+            parts = [int(v) for v in value.split(",")]
+            if len(parts) != 3 or not all(0 <= v <= 255 for v in parts):
+                raise ValueError
+    except ValueError as error:
+        raise wire.WireError(
+            f"{id}: {attribute.id} must be a {attribute.type.name.lower()}, got {value[:40]!r}"
+        ) from error

@@ -1,0 +1,101 @@
+"""The RPC channel's bytes: msgpack-rpc with no framing but msgpack's own, and its limits.
+
+A request is `[0, msgid, method, params]`, an answer `[1, msgid, error, result]`. params[0] is the
+client's metadata `[bool]`: true when it will ignore the result.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import msgpack
+
+from skidpad.core.errors import BackendError
+
+MAX_MESSAGE = 32 * 1024 * 1024  # bytes; the largest real one is an OpenDRIVE text
+MAX_ITEMS = 100_000  # in one array; the largest real one is a batch of commands
+REQUEST = 0
+ANSWER = 1
+NOTIFICATION = 2
+
+
+class ProtocolError(BackendError):
+    """Bytes that are not a request; the client that sent them is closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    """One call of a client."""
+
+    msgid: int
+    method: str
+    arguments: list[Any]
+    waits: bool  # False: the client ignores the answer
+
+
+class Decoder:
+    """Bytes in, requests out, for one connection."""
+
+    def __init__(self) -> None:
+        self._unpacker = msgpack.Unpacker(
+            raw=False,
+            unicode_errors="replace",
+            use_list=True,
+            strict_map_key=True,
+            max_buffer_size=MAX_MESSAGE,
+            max_str_len=MAX_MESSAGE,
+            max_bin_len=MAX_MESSAGE,
+            max_array_len=MAX_ITEMS,
+            max_map_len=64,
+            max_ext_len=0,
+        )
+
+    def feed(self, data: bytes) -> Iterator[Request]:
+        """The requests that `data` completes; ProtocolError ends the connection."""
+        try:
+            self._unpacker.feed(data)
+            for message in self._unpacker:
+                yield parse_request(message)
+        except (msgpack.exceptions.UnpackException, ValueError, TypeError, RecursionError) as error:
+            raise ProtocolError(f"not a msgpack-rpc request: {error}") from error
+
+
+def parse_request(message: Any) -> Request:
+    """A decoded message as a request; ProtocolError when it is none."""
+    if not isinstance(message, list) or len(message) not in (3, 4):
+        raise ProtocolError("a request is an array of four")
+    if len(message) == 3:
+        kind, method, params = message
+        msgid = 0
+    else:
+        kind, msgid, method, params = message
+    if kind != (NOTIFICATION if len(message) == 3 else REQUEST) or isinstance(kind, bool):
+        raise ProtocolError(f"unknown message type {kind!r:.40}")
+    if not isinstance(msgid, int) or not 0 <= msgid < 2**32:
+        raise ProtocolError("msgid must be an unsigned 32-bit integer")
+    if not isinstance(method, str) or not isinstance(params, list):
+        raise ProtocolError("method must be a text and params an array")
+    waits = kind == REQUEST
+    if params and isinstance(params[0], list) and len(params[0]) == 1:
+        if isinstance(params[0][0], bool):
+            waits = waits and not params[0][0]
+            params = params[1:]
+    return Request(msgid, method, params, waits)
+
+
+def pack(value: Any) -> bytes:
+    """msgpack bytes of an answer or a stream message."""
+    packed: bytes = msgpack.packb(value, use_bin_type=True)
+    return packed
+
+
+def answer(msgid: int, result: Any) -> bytes:
+    """The bytes of a successful answer."""
+    return pack([ANSWER, msgid, None, result])
+
+
+def failure(msgid: int, message: str) -> bytes:
+    """The bytes of an answer that the client raises as rpc_error."""
+    return pack([ANSWER, msgid, message, None])

@@ -1,0 +1,119 @@
+"""The maps that are served: bundled ones, a folder of the user's, and OpenDRIVE text from clients."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from skidpad.core.errors import ConfigError, SkidpadError
+from skidpad.core.geometry import Pose
+from skidpad.roads.bundled import bundled_maps, load_map, map_file
+from skidpad.roads.lanes import LaneKind
+from skidpad.roads.queries import RoadMap
+from skidpad.simulation.carla_server.rpc import CallError
+
+PREFIX = "Carla/Maps/"
+OPENDRIVE_MAP = "OpenDriveMap"  # the name under which a client's own text is loaded
+MAX_XODR = 24 * 1024 * 1024  # characters
+SPACING = 25.0  # m between recommended spawn points along a lane
+MARGIN = 6.0  # m from a lane's ends
+LIFT = 0.3  # m above the road, so that nobody spawns inside it
+
+
+@dataclass(frozen=True, slots=True)
+class ServedMap:
+    """A map in use."""
+
+    name: str
+    roads: RoadMap
+    xodr: str
+    spawn_points: tuple[Pose, ...]
+
+    @property
+    def origin(self) -> tuple[float, float]:
+        """Latitude and longitude in deg of the map's origin."""
+        text = self.roads.geo_reference
+        return _projection(text, "lat_0"), _projection(text, "lon_0")
+
+    @property
+    def full_name(self) -> str:
+        """As clients see it."""
+        return PREFIX + self.name
+
+
+class MapStore:
+    """Maps by name."""
+
+    def __init__(self, folder: Path | None = None) -> None:
+        self.folder = folder
+        self._text: str | None = None  # from copy_opendrive_to_file
+
+    def names(self) -> list[str]:
+        """All that can be loaded, bundled ones first."""
+        own = sorted(p.stem for p in self.folder.glob("*.xodr")) if self.folder else []
+        return [*bundled_maps(), *(n for n in own if n not in bundled_maps())]
+
+    def keep_text(self, xodr: str) -> None:
+        """OpenDRIVE text that a client wants to drive on."""
+        if len(xodr) > MAX_XODR:
+            raise CallError(f"OpenDRIVE text must be shorter than {MAX_XODR} characters")
+        self._text = xodr
+
+    def load(self, name: str) -> ServedMap:
+        """The map of that name; CallError `map not found` as CARLA says it."""
+        short = name.rsplit("/", 1)[-1]
+        if short == OPENDRIVE_MAP:
+            if self._text is None:
+                raise CallError("no OpenDRIVE text was sent")
+            return _served(short, roads_from_text(self._text, short), self._text)
+        path = self._path(short)
+        if path is None:
+            raise CallError(f"map not found: {name}")
+        return _served(short, load_map(path), path.read_text(encoding="utf-8", errors="replace"))
+
+    def _path(self, name: str) -> Path | None:
+        if self.folder is not None and name in self.names():
+            own = self.folder / f"{name}.xodr"
+            if own.is_file():
+                return own
+        return map_file(name) if name in bundled_maps() else None
+
+
+def _projection(text: str, key: str) -> float:
+    """A number of a projection text like `+lat_0=49 +lon_0=8`; 0 when it is not there."""
+    found = re.search(rf"\+{key}=(-?[0-9.]+(?:[eE][-+]?[0-9]+)?)", text)
+    return float(found[1]) if found else 0.0
+
+
+def roads_from_text(xodr: str, name: str) -> RoadMap:
+    """Bake OpenDRIVE text; CallError when it is none."""
+    from skidpad.roads.opendrive.bake import bake
+
+    try:
+        return RoadMap(bake(xodr.encode(), name, name))
+    except SkidpadError as error:
+        raise CallError(str(error)) from error
+
+
+def _served(name: str, roads: RoadMap, xodr: str) -> ServedMap:
+    points = tuple(spawn_points(roads))
+    if not points:
+        raise ConfigError(f"map {name}: no lane is long enough for a spawn point")
+    return ServedMap(name, roads, xodr, points)
+
+
+def spawn_points(roads: RoadMap) -> list[Pose]:
+    """Poses on driving lanes outside junctions, every 25 m, a little above the road."""
+    found = []
+    table = roads.lanes
+    for lane in range(len(table.road)):
+        if table.kind[lane] != LaneKind.DRIVING or table.junction[lane] >= 0:
+            continue
+        s, end = MARGIN, float(table.length[lane]) - MARGIN
+        while s <= end:
+            place = roads.at(lane, s)
+            found.append(place.pose.moved(up=LIFT))
+            s += SPACING
+    return found
+

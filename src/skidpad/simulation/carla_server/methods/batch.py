@@ -1,0 +1,110 @@
+"""Batches: many commands in one call, each with its own outcome."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from skidpad.core.errors import SkidpadError
+from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.methods import lights, motion, vehicles, walkers
+from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
+from skidpad.simulation.carla_server.spawning import spawn, spawn_attached
+from skidpad.simulation.carla_server.world import World
+
+TABLE = Table("batch")
+MAX_DEPTH = 4  # of spawn commands inside `do_after`
+Command = Callable[..., Any]
+
+
+def _destroy(world: World, id: Any) -> None:
+    world.destroy(world.actors.get(id).id)
+
+
+def _nothing(_: World, *__: Any) -> None:
+    """Accepted without effect: the Traffic Manager lives in the client, nothing is drawn."""
+
+
+# Variant index of the command, and what it does with the command's members; 0, spawning, is apart.
+COMMANDS: dict[int, Command] = {
+    1: _destroy,
+    2: vehicles.apply_control_to_vehicle,
+    3: vehicles.apply_ackermann_control_to_vehicle,
+    4: walkers.apply_control_to_walker,
+    5: vehicles.apply_physics_control,
+    6: motion.set_actor_transform,
+    7: motion.set_walker_state,
+    8: motion.set_actor_target_velocity,
+    9: motion.set_actor_target_angular_velocity,
+    10: motion.add_actor_impulse,
+    11: motion.add_actor_force,
+    12: motion.add_actor_angular_impulse,
+    13: motion.add_actor_torque,
+    14: motion.set_actor_simulate_physics,
+    15: motion.set_actor_enable_gravity,
+    16: _nothing,  # SetAutopilot
+    17: _nothing,  # ShowDebugTelemetry
+    18: vehicles.set_vehicle_light_state,
+    19: motion.set_actor_location,
+    20: _nothing,  # ConsoleCommand
+    21: lights.set_traffic_light_state,
+}
+SPAWN = 0
+
+
+@TABLE.method("apply_batch", Shape.PLAIN)
+def apply_batch(world: World, commands: Any, do_tick: Any) -> list[Any]:
+    """Each command's actor id, or its error."""
+    outcomes = [_outcome(world, c) for c in wire.items(commands, "commands")]
+    if wire.flag(do_tick, "do_tick") and world.episode.settings.synchronous:
+        world.tick()
+    return outcomes
+
+
+def _outcome(world: World, command: Any) -> list[Any]:
+    try:
+        (variant,) = wire.items(command, "command", 1)
+        return [[1, run(world, variant)]]
+    except SkidpadError as error:
+        return [[0, [str(error)]]]
+
+
+def run(world: World, variant: Any, depth: int = 0) -> int:
+    """One command; the actor id that it is about, 0 when there is none."""
+    index, body = wire.items(variant, "command", 2)
+    number = wire.integer(index, "command", 0, max(COMMANDS))
+    members = wire.items(body, "command body")
+    if number == SPAWN:
+        return _spawn(world, members, depth)
+    try:
+        COMMANDS[number](world, *members)
+    except TypeError as error:
+        raise wire.WireError(f"command {number} has a wrong number of members") from error
+    id = members[0] if members else 0
+    return id if isinstance(id, int) else 0
+
+
+def _spawn(world: World, members: list[Any], depth: int) -> int:
+    if len(members) != 6 or depth > MAX_DEPTH:
+        raise wire.WireError("a spawn command has six members and is nested at most four deep")
+    description, transform, parent, kind, socket, after = members
+    pose = wire.pose(transform, "transform")
+    parent_id = wire.optional(parent, "parent")
+    if parent_id is None:
+        actor = spawn(world, description, pose)
+    else:
+        name = wire.text(socket, "socket")
+        actor = spawn_attached(world, description, pose, parent_id, kind, name)
+    for command in wire.items(after, "do_after"):
+        (variant,) = wire.items(command, "command", 1)
+        index, body = wire.items(variant, "command", 2)
+        own = wire.items(body, "command body")
+        if index == SPAWN and len(own) == 6:
+            own = [*own[:2], wire.some(actor.id), *own[3:]]
+        elif own:
+            own = [actor.id, *own[1:]]
+        try:
+            run(world, [index, own], depth + 1)
+        except CallError:
+            continue
+    return actor.id

@@ -1,0 +1,193 @@
+"""Vehicles: control, physics settings, lamps, telemetry, doors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.ackermann import (
+    AckermannDriver,
+    AckermannSettings,
+    parse_target,
+)
+from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.physics_control import applied, parse_physics
+from skidpad.simulation.carla_server.rpc import Shape, Table
+from skidpad.simulation.carla_server.vehicles import Control, Vehicle
+from skidpad.simulation.carla_server.world import World
+
+TABLE = Table("vehicles")
+
+
+def vehicle_of(world: World, id: Any) -> Vehicle:
+    """The living vehicle with this id."""
+    return world.vehicles.of(world.actors.get(id, Family.VEHICLE).id)
+
+
+def parse_control(value: Any) -> Control:
+    """VehicleControl with ISO steer, clamped to its ranges."""
+    v = wire.items(value, "control", 7)
+    throttle, steer, brake = wire.numbers(v[:3], "control", 3)
+    return Control(
+        throttle=min(max(throttle, 0.0), 1.0),
+        steer=wire.iso_steer(min(max(steer, -1.0), 1.0)),
+        brake=min(max(brake, 0.0), 1.0),
+        hand_brake=wire.flag(v[3], "control.hand_brake"),
+        reverse=wire.flag(v[4], "control.reverse"),
+        manual=wire.flag(v[5], "control.manual_gear_shift"),
+        gear=wire.integer(v[6], "control.gear", -(2**31), 2**31 - 1),
+    )
+
+
+@TABLE.method("apply_control_to_vehicle", Shape.VOID)
+def apply_control_to_vehicle(world: World, id: Any, control: Any) -> None:
+    """Held until the next one."""
+    vehicle = vehicle_of(world, id)
+    vehicle.control = parse_control(control)
+    vehicle.driver = None
+
+
+@TABLE.method("apply_ackermann_control_to_vehicle", Shape.VOID)
+def apply_ackermann_control_to_vehicle(world: World, id: Any, control: Any) -> None:
+    """Two controllers drive it from now on."""
+    vehicle = vehicle_of(world, id)
+    target = parse_target(control)
+    if vehicle.driver is None:
+        vehicle.driver = AckermannDriver(vehicle.ackermann)
+    vehicle.driver.target = target
+
+
+@TABLE.method("get_ackermann_controller_settings")
+def get_ackermann_controller_settings(world: World, id: Any) -> list[float]:
+    """Gains."""
+    return vehicle_of(world, id).ackermann.packed()
+
+
+@TABLE.method("apply_ackermann_controller_settings", Shape.VOID)
+def apply_ackermann_controller_settings(world: World, id: Any, settings: Any) -> None:
+    """Other gains."""
+    vehicle = vehicle_of(world, id)
+    vehicle.ackermann = AckermannSettings(*wire.numbers(settings, "ackermann settings", 6))
+    if vehicle.driver is not None:
+        vehicle.driver.settings = vehicle.ackermann
+
+
+@TABLE.method("get_physics_control")
+def get_physics_control(world: World, id: Any) -> list[Any]:
+    """As last set, with the wheels' present places."""
+    actor = world.actors.get(id, Family.VEHICLE)
+    vehicle = world.vehicles.of(actor.id)
+    pose = world.pose(actor)
+    places = []
+    for x, y in wheel_centres(vehicle):
+        place = pose.moved(forward=x, left=y, up=vehicle.type.wheel_radius)
+        px, py, pz = wire.iso_to_wire((place.x, place.y, place.z))
+        places.append([100.0 * px, 100.0 * py, 100.0 * pz])
+    return vehicle.physics.packed(places)
+
+
+def wheel_centres(vehicle: Vehicle) -> list[tuple[float, float]]:
+    """x forward and y left of FL, FR, RL, RR from the footprint's centre, m."""
+    t = vehicle.type
+    half = t.track / 2.0
+    return [
+        (t.x_front_axle, half),
+        (t.x_front_axle, -half),
+        (t.x_rear_axle, half),
+        (t.x_rear_axle, -half),
+    ]
+
+
+@TABLE.method("apply_physics_control", Shape.VOID)
+def apply_physics_control(world: World, id: Any, control: Any) -> None:
+    """What acts: mass, drag, wheels' friction, radius, brakes and steering angle."""
+    vehicle = vehicle_of(world, id)
+    new = parse_physics(control)
+    model = applied(vehicle.type, vehicle.physics, new)
+    vehicle.physics = new
+    if model is not vehicle.type:
+        world.vehicles.replace_type(vehicle.actor, model)
+    world.vehicles.fleet.tire_friction[world.vehicles.slots[vehicle.actor]] = new.tire_friction
+
+
+@TABLE.method("get_vehicle_light_state")
+def get_vehicle_light_state(world: World, id: Any) -> list[int]:
+    """Lamp flags."""
+    return [vehicle_of(world, id).lights]
+
+
+@TABLE.method("get_vehicle_light_states")
+def get_vehicle_light_states(world: World) -> list[list[int]]:
+    """Lamp flags of all vehicles."""
+    return [[v.actor, v.lights] for v in world.vehicles.members]
+
+
+@TABLE.method("set_vehicle_light_state", Shape.VOID)
+def set_vehicle_light_state(world: World, id: Any, state: Any) -> None:
+    """Lamp flags; the lamps are kept, not drawn."""
+    flags = state[0] if isinstance(state, list) and len(state) == 1 else state
+    vehicle_of(world, id).lights = wire.integer(flags, "light state", 0, 2**32 - 1)
+
+
+@TABLE.method("get_telemetry_data")
+def get_telemetry_data(world: World, id: Any) -> list[Any]:
+    """Speed, pedals and per wheel: friction, spin, load."""
+    vehicle = vehicle_of(world, id)
+    i = world.vehicles.slots[vehicle.actor]
+    fleet, c = world.vehicles.fleet, vehicle.control
+    wheels = []
+    for w in range(4):
+        load, mu = float(fleet.wheels.load[i, w]), float(fleet.mu[i, w])
+        rest = vehicle.type.mass * 9.80665 / 4.0
+        omega = float(fleet.wheels.omega[i, w])
+        friction = float(fleet.tire_friction[i, w])
+        wheels.append(
+            [friction, 0.0, 0.0, omega, load, load / rest, 0.0, mu * load, mu * load, mu, mu]
+        )
+    gear = c.gear if c.manual else fleet.gear(i, c.reverse)
+    speed = fleet.speed(i)
+    return [speed, wire.iso_steer(c.steer), c.throttle, c.brake, 0.0, gear, 0.0, wheels]
+
+
+@TABLE.method("get_wheel_steer_angle")
+def get_wheel_steer_angle(world: World, id: Any, wheel: Any) -> float:
+    """deg; rear wheels do not steer."""
+    vehicle = vehicle_of(world, id)
+    if wire.integer(wheel, "wheel", 0, 8) > 1:
+        return 0.0
+    angle = float(world.vehicles.fleet.wheels.steer[world.vehicles.slots[vehicle.actor]])
+    return wire.yaw_to_wire(angle)
+
+
+@TABLE.method("get_wheel_pitch_angle")
+def get_wheel_pitch_angle(world: World, id: Any, wheel: Any) -> float:
+    """deg turned; not tracked."""
+    vehicle_of(world, id)
+    wire.integer(wheel, "wheel", 0, 8)
+    return 0.0
+
+
+def _accepted(name: str, reason: str) -> None:
+    @TABLE.method(name, Shape.VOID, without_effect=reason)
+    def accepted(world: World, id: Any, a: Any = None, b: Any = None, c: Any = None, d: Any = None,
+                 e: Any = None, f: Any = None) -> None:  # fmt: skip
+        """Checked for a living actor, else without effect."""
+        del a, b, c, d, e, f
+        world.actors.get(id)
+
+
+for _name, _reason in {
+    "set_wheel_steer_direction": "wheels are drawn by the physics alone",
+    "set_wheel_pitch_angle": "wheels are drawn by the physics alone",
+    "open_vehicle_door": "doors do not open",
+    "close_vehicle_door": "doors do not open",
+    "set_actor_autopilot": "the Traffic Manager lives in the client",
+    "show_vehicle_debug_telemetry": "nothing is drawn on a screen",
+    "set_ignored_vehicles": "vehicles collide with all others",
+    "enable_carsim": "there is no CarSim",
+    "use_carsim_road": "there is no CarSim",
+    "enable_chrono_physics": "there is no Chrono",
+    "restore_physx_physics": "there is one physics",
+}.items():
+    _accepted(_name, _reason)
+

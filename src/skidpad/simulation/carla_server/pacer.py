@@ -1,0 +1,48 @@
+"""The only wall clock of the server (decision K-7): it decides when to tick, never by how much."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable
+
+log = logging.getLogger("skidpad.carla_server")
+BEHIND = 0.5  # s; a pacer that is later than this gives up catching up
+IDLE = 0.05  # s between looks while clients tick
+
+
+class Pacer:
+    """Ticks in real time while no client does."""
+
+    def __init__(
+        self, tick: Callable[[], object], step: Callable[[], float | None], idle: Callable[[], bool]
+    ) -> None:
+        """step: s of simulated time per tick, None while clients tick; idle: nobody is there."""
+        self._tick, self._step, self._idle = tick, step, idle
+        self._begin = time.monotonic()
+
+    def elapsed(self) -> float:
+        """s of wall time since the start, for the snapshots' platform time."""
+        return time.monotonic() - self._begin
+
+    async def run(self, idle_exit: float | None = None) -> None:
+        """Until cancelled, or until nobody was there for `idle_exit` s."""
+        due = time.monotonic()
+        seen = due
+        while True:
+            now = time.monotonic()
+            if not self._idle():
+                seen = now
+            elif idle_exit is not None and now - seen > idle_exit:
+                log.info("no client for %g s", idle_exit)
+                return
+            step = self._step()
+            if step is None:
+                due = now
+                await asyncio.sleep(IDLE)
+                continue
+            if now >= due:
+                self._tick()
+                due = due + step if now - due < BEHIND else now + step
+            await asyncio.sleep(max(due - time.monotonic(), 0.0))

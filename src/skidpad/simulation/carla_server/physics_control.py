@@ -1,0 +1,148 @@
+"""VehiclePhysicsControl: what a client reads and writes, and which of it acts.
+
+Acting members: mass, drag, every wheel's tire_friction, radius, brake and handbrake torque and
+steering angle. Engine and gear box are kept and given back, without effect.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from math import isclose
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from skidpad.physics.types import VehicleType
+from skidpad.simulation.carla_server import wire
+
+WHEELS = 4
+CM = 100.0  # a wheel's radius and position travel in cm
+
+ENGINE: tuple[Any, ...] = (  # defaults of the client's own class
+    [[0.0, 500.0], [5000.0, 500.0]],  # torque curve, rpm and N m
+    5000.0,  # max rpm
+    1.0,  # moment of inertia
+    0.15,
+    2.0,
+    0.35,  # damping
+    True,  # automatic gears
+    0.5,  # s, gear switch
+    10.0,  # clutch strength
+    4.0,  # final ratio
+    [[4.0, 0.5, 0.65], [2.0, 0.5, 0.65], [1.5, 0.5, 0.65], [1.1, 0.5, 0.65], [1.0, 0.5, 0.65]],
+)
+STEERING_CURVE = [[0.0, 1.0], [20.0, 0.9], [60.0, 0.8], [120.0, 0.7]]
+MEMBERS = 17
+DRAG_PER_AREA = 0.3 / 0.7  # CARLA's coefficient for a car of 0.7 m^2 drag area; estimated
+
+
+@dataclass(frozen=True, slots=True)
+class PhysicsControl:
+    """As last set, in the wire's order and units; wheels FL, FR, RL, RR."""
+
+    engine: tuple[Any, ...]
+    mass: float
+    drag: float
+    com: list[float]
+    steering_curve: list[list[float]]
+    wheels: tuple[tuple[Any, ...], ...]
+    sweep: bool = False
+    tire_friction: np.ndarray[Any, Any] = field(default_factory=lambda: np.full(WHEELS, 3.5))
+
+    @classmethod
+    def of(cls, model: VehicleType) -> PhysicsControl:
+        """What a fresh vehicle of this type reports."""
+        wheels = tuple(
+            (
+                model.tire_friction,
+                0.25,
+                model.steer_max_deg if w < 2 else 0.0,
+                model.wheel_radius * CM,
+                model.brake_torque_front if w < 2 else model.brake_torque_rear,
+                0.0 if w < 2 else model.handbrake_torque,
+                2.0,
+                model.stiffness_front if w < 2 else model.stiffness_rear,
+                1000.0,
+                [0.0, 0.0, 0.0],
+            )
+            for w in range(WHEELS)
+        )
+        return cls(
+            ENGINE,
+            model.mass,
+            model.drag_area * DRAG_PER_AREA,
+            [0.0, 0.0, 0.0],
+            STEERING_CURVE,
+            wheels,
+            tire_friction=np.full(WHEELS, model.tire_friction),
+        )
+
+    def packed(self, positions: list[list[float]]) -> list[Any]:
+        """As it travels; positions: wheel centres in the world, cm, CARLA's axes."""
+        wheels = [[*w[:9], p] for w, p in zip(self.wheels, positions, strict=True)]
+        return [
+            *self.engine,
+            self.mass,
+            self.drag,
+            self.com,
+            self.steering_curve,
+            wheels,
+            self.sweep,
+        ]
+
+
+def parse_physics(value: Any) -> PhysicsControl:
+    """From a call; two wheels of a two-wheeler count for both sides."""
+    v = wire.items(value, "physics control", MEMBERS)
+    wheels = [wire.items(w, "wheel", 10) for w in wire.items(v[15], "wheels")]
+    if len(wheels) == 2:
+        wheels = [wheels[0], wheels[0], wheels[1], wheels[1]]
+    if len(wheels) != WHEELS:
+        raise wire.WireError(f"physics control: needs {WHEELS} wheels, got {len(wheels)}")
+    packed = []
+    for w in wheels:
+        numbers = wire.numbers(w[:9], "wheel", 9)
+        if min(numbers[0], *numbers[3:6]) < 0.0:
+            raise wire.WireError("wheel: friction, radius and torques must not be negative")
+        packed.append((*numbers, wire.vector(w[9], "wheel.position")))
+    mass = wire.number(v[11], "physics control.mass")
+    if not 1.0 <= mass <= 1.0e6:
+        raise wire.WireError(f"physics control.mass must be between 1 and 1e6 kg, got {mass:g}")
+    return PhysicsControl(
+        engine=tuple(v[:11]),
+        mass=mass,
+        drag=max(wire.number(v[12], "physics control.drag_coefficient"), 0.0),
+        com=list(wire.vector(v[13], "physics control.center_of_mass")),
+        steering_curve=[wire.numbers(p, "steering curve", 2) for p in wire.items(v[14], "curve")],
+        wheels=tuple(packed),
+        sweep=wire.flag(v[16], "physics control.use_sweep"),
+        tire_friction=np.array([w[0] for w in packed]),
+    )
+
+
+def applied(model: VehicleType, old: PhysicsControl, new: PhysicsControl) -> VehicleType:
+    """The physics type after a client changed members that act; unchanged ones stay exact."""
+    front, rear = new.wheels[0], new.wheels[2]
+    changes: dict[str, Any] = {}
+    if not isclose(new.mass, old.mass, rel_tol=1e-6):
+        changes["mass"] = new.mass
+    if not isclose(new.drag, old.drag, rel_tol=1e-6, abs_tol=1e-9):
+        changes["drag_area"] = new.drag / DRAG_PER_AREA
+    for name, wheel, was, member, scale in (
+        ("wheel_radius", front, old.wheels[0], 3, 1.0 / CM),
+        ("steer_max_deg", front, old.wheels[0], 2, 1.0),
+        ("brake_torque_front", front, old.wheels[0], 4, 1.0),
+        ("brake_torque_rear", rear, old.wheels[2], 4, 1.0),
+        ("handbrake_torque", rear, old.wheels[2], 5, 1.0),
+    ):
+        if not isclose(wheel[member], was[member], rel_tol=1e-6):
+            changes[name] = wheel[member] * scale
+    if changes.get("wheel_radius", 1.0) < 0.1 or changes.get("steer_max_deg", 1.0) <= 0.0:
+        raise wire.WireError("wheel: radius must be >= 10 cm and max_steer_angle > 0")
+    return msgspec.structs.replace(model, **changes) if changes else model
+
+
+def with_friction(control: PhysicsControl, friction: np.ndarray[Any, Any]) -> PhysicsControl:
+    """The same with other tire_friction, for friction triggers."""
+    return replace(control, tire_friction=friction)

@@ -1,0 +1,105 @@
+"""The recorder's calls: a plain log of poses in --data-dir, one line per tick, and its summaries.
+
+The format is ours (JSON lines), not CARLA's binary one: files of the two are not exchangeable.
+"""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import IO, TYPE_CHECKING
+
+from skidpad.core.errors import FileError
+from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.rpc import CallError
+
+if TYPE_CHECKING:
+    from skidpad.simulation.carla_server.world import World
+
+MAX_BYTES = 2 * 1024**3
+
+
+def safe_path(folder: Path | None, name: str) -> Path:
+    """A client's file name inside the data folder; only its base name counts (decision K-8)."""
+    if folder is None:
+        raise CallError("this server has no --data-dir, so it neither writes nor reads files")
+    base = name.replace("\\", "/").rsplit("/", 1)[-1]
+    if not base or base in (".", "..") or "\x00" in base or len(base) > 200:
+        raise CallError(f"not a file name: {name!r:.80}")
+    return folder / base
+
+
+class Recorder:
+    """Writes while started."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self.folder = folder
+        self._file: IO[str] | None = None
+        self._left = 0
+
+    def start(self, name: str, world: World) -> str:
+        """Begin a recording; the text that the client prints."""
+        path = safe_path(self.folder, name)
+        self.stop()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            self._file = path.open("w", encoding="utf-8")
+        except OSError as error:
+            raise FileError(f"recording {path.name}: {error.strerror}") from error
+        self._left = MAX_BYTES
+        head = {"map": world.map.name, "episode": world.episode.id, "format": 1}
+        self._write(json.dumps(head))
+        return f"Recording to file: {path.name}"
+
+    def stop(self) -> None:
+        """End the recording, if any."""
+        if self._file is not None:
+            self._file.close()
+            self._file = None
+
+    def tick(self, world: World) -> None:
+        """One line: frame, time, and [id, x, y, z, yaw] in CARLA's axes of what moves."""
+        if self._file is None:
+            return
+        poses = []
+        for actor in world.actors:
+            if actor.family in (Family.VEHICLE, Family.WALKER):
+                (x, y, z), (_, yaw, _) = wire.transform(world.pose(actor))
+                poses.append([actor.id, round(x, 3), round(y, 3), round(z, 3), round(yaw, 3)])
+        contacts = [[c.actor, c.other] for c in world.contacts.events]
+        self._write(json.dumps([world.episode.frame, world.episode.elapsed, poses, contacts]))
+
+    def _write(self, line: str) -> None:
+        assert self._file is not None
+        self._left -= len(line) + 1
+        if self._left < 0:
+            self.stop()
+            return
+        self._file.write(line + "\n")
+
+    def summary(self, name: str) -> str:
+        """What `show_recorder_file_info` prints."""
+        head, ticks = self._read(name)
+        seconds = ticks[-1][1] if ticks else 0.0
+        return (
+            f"Map: {head.get('map')}\nFrames: {len(ticks)}\nDuration: {seconds:.3f} seconds\n"
+            "Format: Skidpad JSON lines\n"
+        )
+
+    def collisions(self, name: str) -> str:
+        """What `show_recorder_collisions` prints."""
+        _, ticks = self._read(name)
+        lines = [f"{t[1]:10.3f} {a:6d} {b:6d}" for t in ticks for a, b in t[3]]
+        return "\n".join(["      Time  actor  other", *lines]) + "\n"
+
+    def _read(self, name: str) -> tuple[dict[str, object], list[list[object]]]:  # type: ignore[return]
+        path = safe_path(self.folder, name)
+        if self._file is not None:
+            self._file.flush()
+        try:
+            lines = path.read_text(encoding="utf-8").splitlines()
+            head, ticks = json.loads(lines[0]), [json.loads(line) for line in lines[1:]]
+        except (OSError, ValueError, IndexError) as error:
+            raise CallError(f"File {path.name} not found on server, or no recording") from error
+        return head, ticks

@@ -1,0 +1,176 @@
+"""The server: two ports, connections, and what happens to clients that misbehave."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import logging
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import IO, Any
+
+from skidpad.core.errors import ConfigError
+from skidpad.simulation.carla_server.codec import Decoder, ProtocolError, Request
+from skidpad.simulation.carla_server.methods import TABLES
+from skidpad.simulation.carla_server.pacer import Pacer
+from skidpad.simulation.carla_server.rpc import Dispatcher
+from skidpad.simulation.carla_server.streams import StreamHub
+from skidpad.simulation.carla_server.world import ServerOptions, World
+
+log = logging.getLogger("skidpad.carla_server")
+MAX_CLIENTS = 512
+MAX_UNREAD = 64 * 1024 * 1024  # bytes of answers that a client may leave unread
+PORT_TRIES = 50
+
+
+class RpcConnection(asyncio.Protocol):
+    """One client."""
+
+    def __init__(self, server: CarlaServer) -> None:
+        self._server = server
+        self._decoder = Decoder()
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """A client connected."""
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+        if not self._server.admit(self):
+            transport.close()
+
+    def data_received(self, data: bytes) -> None:
+        """Answer every request that is complete; close on anything else."""
+        transport = self._transport
+        assert transport is not None
+        try:
+            for request in self._decoder.feed(data):
+                transport.write(self._server.answer(request))
+        except ProtocolError as error:
+            log.warning("closing a client: %s", error)
+            transport.close()
+            return
+        if transport.get_write_buffer_size() > MAX_UNREAD:
+            log.warning("closing a client that does not read its answers")
+            transport.abort()
+
+    def pause_writing(self) -> None:
+        """The client reads slowly: take no more requests from it."""
+        if self._transport is not None:
+            self._transport.pause_reading()
+
+    def resume_writing(self) -> None:
+        """It has caught up."""
+        if self._transport is not None and not self._transport.is_closing():
+            self._transport.resume_reading()
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  asyncio's name
+        """The client went away."""
+        self._server.release(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Ports:
+    """Where the server listens."""
+
+    rpc: int
+    streaming: int
+
+
+class CarlaServer:
+    """A world behind CARLA's protocol."""
+
+    def __init__(self, options: ServerOptions) -> None:
+        self.options = options
+        self.hub = StreamHub()
+        self.world = World(options, self.hub)
+        self.dispatcher = Dispatcher(self.world, TABLES)
+        self.pacer = Pacer(self.world.tick, self._own_step, lambda: not self._clients)
+        self.world.platform_time = self.pacer.elapsed
+        self._clients: set[RpcConnection] = set()
+        self._calls: IO[str] | None = None
+        self._servers: list[asyncio.Server] = []
+
+    def _own_step(self) -> float | None:
+        settings = self.world.episode.settings
+        return None if settings.synchronous else settings.step
+
+    def admit(self, client: RpcConnection) -> bool:
+        """Count a client in; False when there are too many."""
+        if len(self._clients) >= MAX_CLIENTS:
+            return False
+        self._clients.add(client)
+        return True
+
+    def release(self, client: RpcConnection) -> None:
+        """Count it out."""
+        self._clients.discard(client)
+
+    def answer(self, request: Request) -> bytes:
+        """The answer to a request, which is written down when calls are recorded."""
+        if self._calls is not None:
+            line = [self.world.episode.frame, request.method, request.arguments]
+            self._calls.write(json.dumps(line, default=repr) + "\n")
+        return self.dispatcher.answer(request)
+
+    async def open(self) -> Ports:
+        """Listen on the port pair; the streaming port is the next one."""
+        host = self.options.host
+        loop = asyncio.get_running_loop()
+        for rpc_socket, stream_socket in _socket_pair(host, self.options.port):
+            self._servers = [
+                await loop.create_server(lambda: RpcConnection(self), sock=rpc_socket),
+                await loop.create_server(self.hub.protocol, sock=stream_socket),
+            ]
+            ports = Ports(rpc_socket.getsockname()[1], stream_socket.getsockname()[1])
+            self.hub.port = ports.streaming
+            return ports
+        raise ConfigError(f"no free port pair on {host} at {self.options.port}")
+
+    async def run(self, ready: Callable[[Ports], Any]) -> None:
+        """Serve until cancelled or idle for too long."""
+        if self.options.record_calls is not None:
+            self._calls = self.options.record_calls.open("w", encoding="utf-8")
+        try:
+            ready(await self.open())
+            await self.pacer.run(self.options.idle_exit)
+        finally:
+            self.close()
+
+    def close(self) -> None:
+        """Stop listening."""
+        for server in self._servers:
+            server.close()
+        self.world.recorder.stop()
+        if self._calls is not None:
+            self._calls.close()
+            self._calls = None
+
+    def complaints(self) -> list[str]:
+        """Unknown calls and how often they came, for --strict."""
+        return [f"unknown call {n} ({k} times)" for n, k in self.dispatcher.unknown.items()]
+
+
+def _bound(host: str, port: int) -> socket.socket:
+    made = socket.socket(socket.AF_INET, socket.SOCK_STREAM)
+    made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        made.bind((host, port))
+    except OSError:
+        made.close()
+        raise
+    return made
+
+
+def _socket_pair(host: str, port: int) -> list[tuple[socket.socket, socket.socket]]:
+    """Two bound sockets on neighbouring ports; empty when they cannot be had."""
+    for _ in range(PORT_TRIES if port == 0 else 1):
+        try:
+            first = _bound(host, port)
+        except OSError:
+            return []
+        try:
+            return [(first, _bound(host, first.getsockname()[1] + 1))]
+        except (OSError, OverflowError):
+            first.close()
+    return []

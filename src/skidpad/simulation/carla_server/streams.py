@@ -1,0 +1,132 @@
+"""The streaming channel: one connection per stream, which first names it by four bytes.
+
+A message is its length in four bytes, little-endian, and the payload. Only streams that somebody
+listens to are produced; what a slow client has not fetched is bounded, and then dropped.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+from collections.abc import Callable
+
+EPISODE_STREAM = 1  # the world snapshots
+MAX_PENDING = 64 * 1024 * 1024  # bytes that one client may leave unfetched
+MAX_CONNECTIONS = 4096
+TCP = 1
+ADDRESS_NOT_SET = 0  # the client then uses the host it was given
+TOKEN = struct.Struct("<IHBB16s")
+
+
+class StreamHub:
+    """Who listens to what."""
+
+    def __init__(self) -> None:
+        self.port = 0
+        self.dropped = 0  # messages not sent because a client did not fetch
+        self._next = EPISODE_STREAM + 1
+        self._open: set[int] = {EPISODE_STREAM}
+        self._listeners: dict[int, list[asyncio.Transport]] = {}
+        self._connections = 0
+        self.on_subscribe: Callable[[int], bytes | None] = lambda _: None
+
+    def create(self) -> int:
+        """A new stream id."""
+        stream = self._next
+        self._next += 1
+        self._open.add(stream)
+        return stream
+
+    def token(self, stream: int) -> bytes:
+        """The 24 bytes with which a client finds a stream."""
+        return TOKEN.pack(stream, self.port, TCP, ADDRESS_NOT_SET, b"")
+
+    def exists(self, stream: int) -> bool:
+        """Whether `stream` may be subscribed."""
+        return stream in self._open
+
+    def wanted(self, stream: int) -> bool:
+        """Whether anybody listens."""
+        return bool(self._listeners.get(stream))
+
+    def publish(self, stream: int, *parts: bytes | memoryview) -> None:
+        """Send one message to all listeners."""
+        listeners = self._listeners.get(stream)
+        if not listeners:
+            return
+        size = sum(len(p) for p in parts)
+        head = size.to_bytes(4, "little")
+        for transport in listeners:
+            if transport.get_write_buffer_size() + size > MAX_PENDING:
+                self.dropped += 1
+                continue
+            if size < 65536:
+                transport.write(b"".join((head, *parts)))
+            else:
+                transport.write(head)
+                for part in parts:
+                    transport.write(part)
+
+    def close(self, stream: int) -> None:
+        """Forget a stream and hang up on its listeners."""
+        self._open.discard(stream)
+        for transport in self._listeners.pop(stream, []):
+            transport.close()
+
+    def protocol(self) -> StreamConnection:
+        """A connection's protocol, for asyncio's server."""
+        return StreamConnection(self)
+
+    def admit(self) -> bool:
+        """Count a new connection; False when there are too many."""
+        self._connections += 1
+        return self._connections <= MAX_CONNECTIONS
+
+    def release(self, stream: int | None, transport: asyncio.Transport) -> None:
+        """A connection ended."""
+        self._connections -= 1
+        listeners = self._listeners.get(stream) if stream is not None else None
+        if listeners and transport in listeners:
+            listeners.remove(transport)
+
+    def subscribe(self, stream: int, transport: asyncio.Transport) -> None:
+        """Attach a listener; the newest message of a steady stream is sent at once."""
+        if not self.exists(stream):
+            transport.close()
+            return
+        self._listeners.setdefault(stream, []).append(transport)
+        latest = self.on_subscribe(stream)
+        if latest is not None:
+            transport.write(len(latest).to_bytes(4, "little") + latest)
+
+
+class StreamConnection(asyncio.Protocol):
+    """One client's connection for one stream."""
+
+    def __init__(self, hub: StreamHub) -> None:
+        self._hub = hub
+        self._asked = b""
+        self._stream: int | None = None
+        self._transport: asyncio.Transport | None = None
+
+    def connection_made(self, transport: asyncio.BaseTransport) -> None:
+        """A client connected."""
+        assert isinstance(transport, asyncio.Transport)
+        self._transport = transport
+        if not self._hub.admit():
+            transport.close()
+
+    def data_received(self, data: bytes) -> None:
+        """The four bytes of the stream id; anything after them is ignored."""
+        assert self._transport is not None
+        if self._stream is not None:
+            return
+        self._asked += data[:4]
+        if len(self._asked) >= 4:
+            self._stream = int.from_bytes(self._asked[:4], "little")
+            self._hub.subscribe(self._stream, self._transport)
+
+    def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  asyncio's name
+        """The client went away."""
+        if self._transport is not None:
+            self._hub.release(self._stream, self._transport)

@@ -1,0 +1,72 @@
+"""CARLA's weather parameters and ours; ice comes from the blueprint `skidpad.weather` (K-2)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from skidpad.core.weather import RANGES, Weather
+from skidpad.simulation.carla_server import wire
+
+PACKED = (  # order of the wire
+    "cloudiness",
+    "precipitation",
+    "precipitation_deposits",
+    "wind_intensity",
+    "sun_azimuth_deg",
+    "sun_altitude_deg",
+    "fog_density",
+    "fog_distance",
+    "fog_falloff",
+    "wetness",
+    "scattering_intensity",
+    "mie_scattering_scale",
+    "rayleigh_scattering_scale",
+)
+COLD_C = -5.0  # air and road when there is ice (decision M-10)
+
+
+class Sky:
+    """The weather as it acts, and as the client wrote it (which is what it reads back)."""
+
+    def __init__(self, ice_thickness: float = 0.0) -> None:
+        self.server_ice = ice_thickness
+        self.client_ice: float | None = None
+        self.values = dict.fromkeys(PACKED, 0.0) | {"sun_altitude_deg": 75.0}
+        self.values["rayleigh_scattering_scale"] = 0.0331
+        self.dust_storm = 0.0  # accepted without effect
+        self.weather = Weather()
+        self._derive()
+
+    def packed(self) -> list[float]:
+        """WeatherParameters as last set."""
+        return [*(self.values[name] for name in PACKED), self.dust_storm]
+
+    def apply(self, value: Any) -> None:
+        """Set from a call; values beyond their range act as the nearest one inside."""
+        numbers = wire.numbers(value, "weather", len(PACKED) + 1)
+        self.values = dict(zip(PACKED, numbers[:-1], strict=True))
+        self.dust_storm = numbers[-1]
+        self._derive()
+
+    def set_ice(self, thickness: float | None) -> None:
+        """Ice in percent of 20 mm, None: as the server was started."""
+        self.client_ice = thickness
+        self._derive()
+
+    def _derive(self) -> None:
+        clamped = {
+            name: min(max(value, RANGES[name][0]), RANGES[name][1])
+            for name, value in self.values.items()
+            if name != "sun_azimuth_deg"
+        }
+        ice = self.server_ice if self.client_ice is None else self.client_ice
+        low, high = RANGES["ice_thickness"]
+        weather = Weather(
+            **clamped,
+            sun_azimuth_deg=self.values["sun_azimuth_deg"] % 360.0,
+            ice_thickness=min(max(ice, low), high),
+        )
+        if weather.ice_thickness > 0.0:
+            weather = replace(weather, air_temperature_c=COLD_C, road_temperature_c=COLD_C)
+        self.weather = weather

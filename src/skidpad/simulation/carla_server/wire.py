@@ -1,0 +1,139 @@
+"""The shapes that travel in calls: readers that refuse wrong ones, and writers.
+
+Structs are positional arrays; poses cross here from CARLA's axes to ISO 8855 and back, by
+`core.lefthanded` alone.
+"""
+
+from __future__ import annotations
+
+from math import degrees, isfinite, radians
+from typing import Any
+
+from skidpad.core.errors import BackendError
+from skidpad.core.geometry import Pose
+from skidpad.core.lefthanded import (
+    mirrored,
+    pose_from_carla,
+    pose_to_carla,
+    turn_from_carla,
+    vector_from_carla,
+)
+
+Vector = tuple[float, float, float]
+FLOAT_MAX = 1.0e12  # beyond this a client's number is a mistake, not a place or a force
+
+
+class WireError(BackendError):
+    """A call whose arguments cannot be used; its text is the client's error."""
+
+
+def number(value: Any, field: str) -> float:
+    """A finite number."""
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise WireError(f"{field} must be a number")
+    if not isfinite(value) or abs(value) > FLOAT_MAX:
+        raise WireError(f"{field} must be finite and below {FLOAT_MAX:g}")
+    return float(value)
+
+
+def integer(value: Any, field: str, low: int = 0, high: int = 2**64 - 1) -> int:
+    """An integer in [low, high]."""
+    if isinstance(value, bool) or not isinstance(value, int) or not low <= value <= high:
+        raise WireError(f"{field} must be an integer between {low} and {high}")
+    return value
+
+
+def flag(value: Any, field: str) -> bool:
+    """A truth value; 0 and 1 are accepted."""
+    if value not in (0, 1):
+        raise WireError(f"{field} must be true or false")
+    return bool(value)
+
+
+def text(value: Any, field: str, longest: int = 4096) -> str:
+    """A text of bounded length."""
+    if not isinstance(value, str) or len(value) > longest:
+        raise WireError(f"{field} must be a text of at most {longest} characters")
+    return value
+
+
+def items(value: Any, field: str, size: int | None = None) -> list[Any]:
+    """An array, of `size` members when given."""
+    if not isinstance(value, list) or (size is not None and len(value) != size):
+        raise WireError(f"{field} must be an array" + (f" of {size}" if size is not None else ""))
+    return value
+
+
+def numbers(value: Any, field: str, size: int | None = None) -> list[float]:
+    """An array of numbers."""
+    return [number(v, field) for v in items(value, field, size)]
+
+
+def vector(value: Any, field: str) -> Vector:
+    """A Vec3 as it came: CARLA's axes, the client's unit."""
+    x, y, z = numbers(value, field, 3)
+    return (x, y, z)
+
+
+def iso_vector(value: Any, field: str) -> Vector:
+    """A Vec3 of positions, velocities or forces, in ISO axes."""
+    return vector_from_carla(*vector(value, field))
+
+
+def iso_turn(value: Any, field: str) -> Vector:
+    """An angular velocity in deg/s, or any axial vector in degrees, as ISO rad."""
+    x, y, z = turn_from_carla(*vector(value, field))
+    return (radians(x), radians(y), radians(z))
+
+
+def iso_torque(value: Any, field: str) -> Vector:
+    """A torque or angular impulse in ISO axes, its unit unchanged."""
+    return turn_from_carla(*vector(value, field))
+
+
+def iso_steer(steer: float) -> float:
+    """A steer command or angle, right positive, as ISO; and back."""
+    return mirrored(steer)
+
+
+def iso_to_wire(v: Vector) -> Vector:
+    """A vector in CARLA's axes."""
+    return vector_from_carla(*v)
+
+
+def yaw_to_wire(yaw: float) -> float:
+    """A yaw in rad as CARLA's degrees."""
+    return mirrored(degrees(yaw))
+
+
+def pose(value: Any, field: str) -> Pose:
+    """A Transform as an ISO pose."""
+    location, rotation = items(value, field, 2)
+    x, y, z = numbers(location, f"{field}.location", 3)
+    pitch, yaw, roll = numbers(rotation, f"{field}.rotation", 3)
+    return pose_from_carla(x, y, z, roll=roll, pitch=pitch, yaw=yaw)
+
+
+def transform(place: Pose) -> list[list[float]]:
+    """An ISO pose as a Transform."""
+    x, y, z, roll, pitch, yaw = pose_to_carla(place)
+    return [[x, y, z], [pitch, yaw, roll]]
+
+
+def optional(value: Any, field: str) -> Any | None:
+    """The content of an optional, None when empty."""
+    if isinstance(value, list) and len(value) == 1 and value[0] is False:
+        return None
+    if isinstance(value, list) and len(value) == 2 and value[0] is True:
+        return value[1]
+    raise WireError(f"{field} must be an optional")
+
+
+def some(value: Any | None) -> list[Any]:
+    """An optional as it travels."""
+    return [False] if value is None else [True, value]
+
+
+def box(centre: Vector, half: Vector, yaw_deg: float = 0.0) -> list[list[float]]:
+    """A BoundingBox in CARLA's axes: centre, half extents, rotation."""
+    return [list(centre), list(half), [0.0, yaw_deg, 0.0]]

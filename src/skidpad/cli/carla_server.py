@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from contextlib import suppress
 from pathlib import Path
 from typing import Annotated
 
@@ -15,7 +16,9 @@ from skidpad.core.vocabulary import GripModel
 
 def carla_server(
     host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="RPC port; 0: any free one. Streams use the next.")] = 2000,
+    port: Annotated[
+        int, typer.Option(help="RPC port; 0: any free one. Streams use the next.")
+    ] = 2000,
     map: Annotated[str, typer.Option(help="Map to begin with.")] = "figure8",
     maps: Annotated[Path | None, typer.Option(help="Folder of your own .xodr files.")] = None,
     weather_grip: Annotated[
@@ -28,7 +31,9 @@ def carla_server(
     seed: Annotated[int, typer.Option(help="Seed of sensor noise.")] = 0,
     strict: Annotated[bool, typer.Option(help="Report unknown calls; exit with 1.")] = False,
     record_calls: Annotated[Path | None, typer.Option(help="Write every call here.")] = None,
-    data_dir: Annotated[Path | None, typer.Option(help="Folder for files named by clients.")] = None,
+    data_dir: Annotated[
+        Path | None, typer.Option(help="Folder for files named by clients.")
+    ] = None,
     idle_exit: Annotated[
         float | None, typer.Option(min=0.0, help="Stop after so many seconds without a client.")
     ] = None,
@@ -67,10 +72,15 @@ def carla_server(
             f"streams on {ports.streaming}, map {server.world.map.name}"
         )
 
-    try:
+    with suppress(KeyboardInterrupt):
         asyncio.run(server.run(ready))
-    except KeyboardInterrupt:
-        pass
     if strict and server.complaints():
         typer.echo("\n".join(server.complaints()), err=True)
         raise typer.Exit(1)
+
+
+def command(arguments: list[str]) -> None:
+    """Run it with these arguments; help lists its options."""
+    app = typer.Typer(add_completion=False, pretty_exceptions_enable=False)
+    app.command()(carla_server)
+    app(arguments, prog_name="skidpad carla-server", standalone_mode=False)

@@ -45,6 +45,18 @@ def doctor() -> None:
     show()
 
 
+@app.command(
+    "carla-server",
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+    add_help_option=False,
+)
+def carla_server(context: typer.Context) -> None:
+    """Serve unmodified CARLA 0.9.16 clients: no GPU, no download."""
+    from skidpad.cli.carla_server import command
+
+    command(context.args)
+
+
 def main() -> None:
     """Run the command line; input that cannot be used ends with one sentence and exit code 2."""
     try:

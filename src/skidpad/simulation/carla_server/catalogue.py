@@ -194,7 +194,7 @@ def _grip(actor: dict[str, Attribute]) -> Blueprint:
 @cache
 def load_catalogue() -> dict[str, Blueprint]:
     """All blueprints by id."""
-    data = yaml.load(DATA.read_text(encoding="utf-8"), Loader=getattr(yaml, "CSafeLoader"))
+    data = yaml.load(DATA.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader)
     actor = _attributes(data["attributes"]["actor"])
     made: list[Blueprint] = []
     for group, family in (

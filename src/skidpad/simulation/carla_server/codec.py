@@ -78,10 +78,9 @@ def parse_request(message: Any) -> Request:
     if not isinstance(method, str) or not isinstance(params, list):
         raise ProtocolError("method must be a text and params an array")
     waits = kind == REQUEST
-    if params and isinstance(params[0], list) and len(params[0]) == 1:
-        if isinstance(params[0][0], bool):
-            waits = waits and not params[0][0]
-            params = params[1:]
+    if params and params[0] in ([False], [True]):
+        waits = waits and not params[0][0]
+        params = params[1:]
     return Request(msgid, method, params, waits)
 
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
 from skidpad.core.states import ActorStates
-from skidpad.roads.kernels import project_kernel, sample_kernel, signal_ahead
+from skidpad.roads.kernels import LaneArrays, project_kernel, sample_kernel, signal_ahead
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap
 
@@ -41,7 +41,7 @@ class Ground(NamedTuple):
 
 
 @kernel
-def _feel(arrays, states, half_lengths, ground):  # type: ignore[no-untyped-def]
+def _feel(arrays: LaneArrays, states: ActorStates, half_lengths: Floats, ground: Ground) -> None:
     for i in range(states.x.shape[0]):
         lane, s, offset = project_kernel(
             arrays, states.x[i], states.y[i], states.z[i], ground.lane[i], False

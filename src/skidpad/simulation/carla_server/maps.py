@@ -116,4 +116,3 @@ def spawn_points(roads: RoadMap) -> list[Pose]:
             found.append(place.pose.moved(up=LIFT))
             s += SPACING
     return found
-

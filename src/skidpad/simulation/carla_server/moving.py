@@ -75,9 +75,7 @@ def _vehicles(world: World) -> None:
     table["velocity"][rows] = vectors_to_carla(s.vx, s.vy, climb)
     flat = np.zeros(len(members))
     table["turn"][rows] = np.degrees(turns_to_carla(flat, flat, s.yaw_rate))
-    table["acceleration"][rows] = vectors_to_carla(
-        s.ax * c - s.ay * sn, s.ax * sn + s.ay * c, flat
-    )
+    table["acceleration"][rows] = vectors_to_carla(s.ax * c - s.ay * sn, s.ax * sn + s.ay * c, flat)
     _controls(world, rows)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import IO, TYPE_CHECKING
+from typing import IO, TYPE_CHECKING, Any
 
 from skidpad.core.errors import FileError
 from skidpad.simulation.carla_server import wire
@@ -93,7 +93,7 @@ class Recorder:
         lines = [f"{t[1]:10.3f} {a:6d} {b:6d}" for t in ticks for a, b in t[3]]
         return "\n".join(["      Time  actor  other", *lines]) + "\n"
 
-    def _read(self, name: str) -> tuple[dict[str, object], list[list[object]]]:  # type: ignore[return]
+    def _read(self, name: str) -> tuple[dict[str, Any], list[list[Any]]]:
         path = safe_path(self.folder, name)
         if self._file is not None:
             self._file.flush()

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 from skidpad.core.errors import ConfigError
+from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.codec import Decoder, ProtocolError, Request
 from skidpad.simulation.carla_server.methods import TABLES
 from skidpad.simulation.carla_server.pacer import Pacer
 from skidpad.simulation.carla_server.rpc import Dispatcher
+from skidpad.simulation.carla_server.spawning import spawn
 from skidpad.simulation.carla_server.streams import StreamHub
 from skidpad.simulation.carla_server.world import ServerOptions, World
 
@@ -131,6 +133,7 @@ class CarlaServer:
         """Serve until cancelled or idle for too long."""
         if self.options.record_calls is not None:
             self._calls = self.options.record_calls.open("w", encoding="utf-8")
+        warm_up(self.options)
         try:
             ready(await self.open())
             await self.pacer.run(self.options.idle_exit)
@@ -149,6 +152,14 @@ class CarlaServer:
     def complaints(self) -> list[str]:
         """Unknown calls and how often they came, for --strict."""
         return [f"unknown call {n} ({k} times)" for n, k in self.dispatcher.unknown.items()]
+
+
+def warm_up(options: ServerOptions) -> None:
+    """Compile or load all kernels before clients wait, by a tick of a world that is thrown away."""
+    world = World(options, StreamHub())
+    names = [id for id, b in world.catalogue.items() if b.family is Family.VEHICLE]
+    spawn(world, [0, names[0], []], world.map.spawn_points[0])
+    world.tick()
 
 
 def _bound(host: str, port: int) -> socket.socket:

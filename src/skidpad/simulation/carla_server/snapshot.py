@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import struct
 from enum import IntEnum
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,15 +75,16 @@ _WALKER = [("direction", "<f4", 65, (3,)), ("speed", "<f4", 77), ("jump", "u1", 
 ROW_BYTES = 119
 
 
-def _layout(fields: list[tuple[object, ...]]) -> np.dtype[np.void]:
-    return np.dtype(
+def _layout(fields: list[Any]) -> np.dtype[Any]:
+    layout: np.dtype[Any] = np.dtype(
         {
             "names": [f[0] for f in fields],
             "formats": [(f[1], f[3]) if len(f) > 3 else f[1] for f in fields],
             "offsets": [f[2] for f in fields],
             "itemsize": ROW_BYTES,
-        }  # type: ignore[call-overload]
+        }
     )
+    return layout
 
 
 BYTES = np.dtype((np.void, ROW_BYTES))
@@ -103,9 +105,9 @@ class Rows:
         self._views()
 
     def _views(self) -> None:
-        self.vehicles: NDArray[np.void] = self._buffer.view(VEHICLE_ROW)
-        self.lights: NDArray[np.void] = self._buffer.view(LIGHT_ROW)
-        self.walkers: NDArray[np.void] = self._buffer.view(WALKER_ROW)
+        self.vehicles: NDArray[Any] = self._buffer.view(VEHICLE_ROW)
+        self.lights: NDArray[Any] = self._buffer.view(LIGHT_ROW)
+        self.walkers: NDArray[Any] = self._buffer.view(WALKER_ROW)
 
     def add(self, actor: int) -> int:
         """A new row at the end; its index holds until another row is removed."""

@@ -114,9 +114,9 @@ def blocked(world: World, actor: Actor) -> bool:
             continue
         box = world_box(world, other)
         far = reach + box[1][0] + box[1][1]
-        if abs(box[0].x - own[0].x) < far and abs(box[0].y - own[0].y) < far:
-            if not overlap.apart(own, box):
-                return True
+        near = abs(box[0].x - own[0].x) < far and abs(box[0].y - own[0].y) < far
+        if near and not overlap.apart(own, box):
+            return True
     return False
 
 

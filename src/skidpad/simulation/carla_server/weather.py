@@ -62,8 +62,9 @@ class Sky:
         }
         ice = self.server_ice if self.client_ice is None else self.client_ice
         low, high = RANGES["ice_thickness"]
-        weather = Weather(
-            **clamped,
+        weather = replace(
+            Weather(),
+            **clamped,  # type: ignore[arg-type]
             sun_azimuth_deg=self.values["sun_azimuth_deg"] % 360.0,
             ice_thickness=min(max(ice, low), high),
         )

@@ -194,7 +194,7 @@ class World:
             self.refresh_ground()
         mu = self.grip.per_wheel(self)
         vehicles.step(mu, self.ground.grade, self.ground.bank)
-        self.contacts.resolve(self)
+        self.contacts.resolve(self, self.episode.settings.step)
         self.refresh_ground()
         simulated = np.array([v.simulated for v in vehicles.members], dtype=np.bool_)
         np.copyto(vehicles.fleet.states.z, self.ground.z, where=simulated)
@@ -216,9 +216,7 @@ class World:
         if self.lights_changed:
             bits |= snapshot.LIGHTS_CHANGED
         moving.fill_rows(self)
-        self.last_snapshot = snapshot.message(
-            self.episode, self.rows, self.platform_time(), bits
-        )
+        self.last_snapshot = snapshot.message(self.episode, self.rows, self.platform_time(), bits)
         if self.hub.wanted(EPISODE_STREAM):
             self.hub.publish(EPISODE_STREAM, self.last_snapshot)
             self.episode.map_changed = False

@@ -40,5 +40,3 @@ def add_traffic_manager_running(world: World, address: Any) -> bool:
 def destroy_traffic_manager(world: World, port: Any) -> bool:
     """Forget one."""
     return isinstance(port, int) and world.managers.by_port.pop(port, None) is not None
-
-

@@ -190,4 +190,3 @@ for _name, _reason in {
     "restore_physx_physics": "there is one physics",
 }.items():
     _accepted(_name, _reason)
-

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from skidpad.simulation.carla_server.sensing.sensors import Sensor
     from skidpad.simulation.carla_server.world import World
 
-Messages = list[tuple[bytes, ...]]
+Messages = list[tuple[bytes | memoryview, ...]]
 MAP_THINGS = {
     SemanticClass.GUARD_RAIL: "static.guardrail",
     SemanticClass.WALL: "static.wall",
@@ -71,9 +71,10 @@ def obstacle(world: World, sensor: Sensor) -> Messages:
         along = half[0] * abs(cos(turn)) + half[1] * abs(sin(turn))
         across = half[0] * abs(sin(turn)) + half[1] * abs(cos(turn))
         gap = ahead - along
-        if ahead > 0.0 and gap <= reach and aside <= across + radius:
-            if abs(centre.z - pose.z) <= half[2] + radius and (best is None or gap < best[0]):
-                best = (max(gap, 0.0), other)
+        met = ahead > 0.0 and gap <= reach and aside <= across + radius
+        level = abs(centre.z - pose.z) <= half[2] + radius
+        if met and level and (best is None or gap < best[0]):
+            best = (max(gap, 0.0), other)
     if best is None:
         return []
     return [(codec.pack([carrier.packed(), best[1].packed(), best[0]]),)]

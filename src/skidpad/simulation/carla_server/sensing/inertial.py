@@ -38,12 +38,12 @@ def motion_of_carrier(world: World, sensor: Sensor) -> Motion:
     return np.array([ax * c - ay * sn, ax * sn + ay * c, 0.0]), np.array([0.0, 0.0, rate])
 
 
-def imu(world: World, sensor: Sensor) -> list[tuple[bytes, ...]]:
+def imu(world: World, sensor: Sensor) -> list[tuple[bytes | memoryview, ...]]:
     """Specific force, rate of turn and compass in the sensor's axes."""
     acceleration, turn = motion_of_carrier(world, sensor)
     pose = world.pose(sensor.actor)
     to_sensor = pose.rotation().T
-    force = to_sensor @ (acceleration + (0.0, 0.0, world.sensors.gravity))
+    force = to_sensor @ (acceleration + np.array([0.0, 0.0, world.sensors.gravity]))
     rate = to_sensor @ turn
     noise, n = sensor.rng.standard_normal(6), sensor.number
     out_force = [
@@ -62,7 +62,7 @@ def compass(pose: Pose) -> float:
     return (pi / 2.0 - pose.yaw) % (2.0 * pi)
 
 
-def gnss(world: World, sensor: Sensor) -> list[tuple[bytes, ...]]:
+def gnss(world: World, sensor: Sensor) -> list[tuple[bytes | memoryview, ...]]:
     """Latitude and longitude in deg, altitude in m."""
     pose = world.pose(sensor.actor)
     latitude, longitude = geolocation(pose.x, pose.y, *world.map.origin)

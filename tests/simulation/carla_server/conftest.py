@@ -1,0 +1,98 @@
+"""A server in a process of its own, and clients in others: the wheel can abort its process."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import textwrap
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from skidpad.simulation.carla_server.streams import StreamHub
+from skidpad.simulation.carla_server.world import ServerOptions, World
+
+READY = re.compile(r"ready: CARLA \S+ on \S+:(\d+)")
+CLIENT_LIMIT = 120.0  # s
+PREFACE = """
+import carla, math, sys, time
+client = carla.Client("127.0.0.1", int(sys.argv[1]))
+client.set_timeout(20.0)
+world = client.get_world()
+
+def synchronous(step=0.05):
+    settings = world.get_settings()
+    settings.synchronous_mode, settings.fixed_delta_seconds = True, step
+    world.apply_settings(settings)
+
+def finish():
+    for actor in world.get_actors():
+        if actor.type_id.startswith("sensor") and actor.is_listening:
+            actor.stop()
+    print("DONE", flush=True)
+    import os
+    os._exit(0)
+"""
+
+
+class Server:
+    """A running `skidpad carla-server`."""
+
+    def __init__(self, *options: str) -> None:
+        command = [sys.executable, "-m", "skidpad", "carla-server", "--port", "0", *options]
+        self.process = subprocess.Popen(
+            command,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+            env=dict(os.environ),
+        )
+        assert self.process.stdout is not None
+        line = self.process.stdout.readline()
+        found = READY.search(line)
+        assert found, f"no ready line: {line!r}"
+        self.port = int(found[1])
+
+    def client(self, script: str) -> str:
+        """Run a client script to its DONE; what it printed."""
+        code = PREFACE + textwrap.dedent(script) + "\nfinish()\n"
+        done = subprocess.run(
+            [sys.executable, "-c", code, str(self.port)],
+            capture_output=True,
+            text=True,
+            timeout=CLIENT_LIMIT,
+            check=False,
+        )
+        assert "DONE" in done.stdout, f"{done.stdout}\n{done.stderr}"
+        return done.stdout
+
+    def stop(self) -> None:
+        """End it."""
+        self.process.terminate()
+        self.process.wait(10.0)
+        assert self.process.stdout is not None
+        self.process.stdout.close()
+
+
+@pytest.fixture
+def serve() -> Iterator[Callable[..., Server]]:
+    """Start servers with options; all are stopped at the end."""
+    pytest.importorskip("carla")
+    started: list[Server] = []
+
+    def start(*options: str) -> Server:
+        started.append(Server("--idle-exit", "120", *options))
+        return started[-1]
+
+    yield start
+    for server in started:
+        server.stop()
+
+
+@pytest.fixture
+def world(tmp_path: Path) -> World:
+    """A world without a network."""
+    return World(ServerOptions(data_dir=tmp_path), StreamHub())

@@ -1,0 +1,73 @@
+from __future__ import annotations
+
+import pytest
+
+from skidpad.core.vocabulary import ActorKind
+from skidpad.simulation.carla_server.catalogue import (
+    AttributeType,
+    Family,
+    chosen,
+    load_catalogue,
+)
+from skidpad.simulation.carla_server.vehicles import model_of
+from skidpad.simulation.carla_server.wire import WireError
+
+
+def test_the_catalogue_has_what_a_0_9_16_server_was_seen_to_offer() -> None:
+    by_family: dict[Family, int] = {}
+    for blueprint in load_catalogue().values():
+        by_family[blueprint.family] = by_family.get(blueprint.family, 0) + 1
+    assert by_family[Family.VEHICLE] == 41
+    assert by_family[Family.WALKER] == 52
+    assert by_family[Family.PROP] >= 98
+    assert by_family[Family.SENSOR] == 19
+
+
+@pytest.mark.parametrize(
+    ("id", "attribute", "default"),
+    [
+        ("static.trigger.friction", "friction", "3.5"),
+        ("sensor.lidar.ray_cast", "range", "10.0"),
+        ("sensor.camera.rgb", "chromatic_aberration_intensity", "0.0"),
+        ("vehicle.dodge.charger_2020", "number_of_wheels", "4"),
+        ("vehicle.bh.crossbike", "number_of_wheels", "2"),
+        ("walker.pedestrian.0001", "is_invincible", "true"),
+        ("sensor.other.radar", "points_per_second", "1500"),
+    ],
+)
+def test_attributes_that_scripts_rely_on(id: str, attribute: str, default: str) -> None:
+    assert load_catalogue()[id].attributes[attribute].recommended[0] == default
+
+
+def test_every_default_parses_as_its_type() -> None:
+    for blueprint in load_catalogue().values():
+        defaults = {a.id: a.recommended[0] for a in blueprint.attributes.values() if a.modifiable}
+        assert chosen(blueprint, defaults) == chosen(blueprint, {})
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("color", "300,0,0"), ("color", "red"), ("driver_id", "7"), ("ros_publish_tf", "true")],
+)
+def test_values_are_checked(name: str, value: str) -> None:
+    blueprint = load_catalogue()["vehicle.audi.tt"]
+    if name == "ros_publish_tf":
+        assert chosen(blueprint, {name: value})[name] == value
+        return
+    with pytest.raises(WireError):
+        chosen(blueprint, {name: value})
+
+
+def test_every_vehicle_has_physics_of_its_size() -> None:
+    for blueprint in load_catalogue().values():
+        if blueprint.family is Family.VEHICLE:
+            model = model_of(blueprint)
+            assert (model.length, model.width, model.height) == blueprint.size
+            assert blueprint.kind <= ActorKind.BICYCLE
+            assert 10.0 < model.mass < 40_000.0
+
+
+def test_fixed_attributes_cannot_be_set() -> None:
+    blueprint = load_catalogue()["vehicle.audi.tt"]
+    assert chosen(blueprint, {"number_of_wheels": "9"})["number_of_wheels"] == "4"
+    assert blueprint.attributes["color"].type is AttributeType.COLOUR

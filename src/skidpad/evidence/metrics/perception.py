@@ -8,11 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.vocabulary import DetectionStatus, Tier
-from skidpad.evidence.metrics.drive import Drive, Mask
+from skidpad.evidence.metrics.drive import LEAD_RANGE, Drive, Mask
 
 Floats = NDArray[np.float64]
 
-PRESENT = (2.0, 80.0)  # m, exclusive
+PRESENT = (2.0, LEAD_RANGE)  # m, exclusive
 MEASURED = (0.1, 99.0)  # m, exclusive
 LOST = (DetectionStatus.NO_TARGET, DetectionStatus.FUSION_PERSIST)
 FOLLOWING = (Tier.ACC_HOLD, Tier.ACC_OPEN, Tier.ACC_CLOSE)

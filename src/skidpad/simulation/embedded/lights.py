@@ -1,0 +1,69 @@
+"""Traffic lights: a fixed cycle whose phase is part of the seed (decision M-2)."""
+
+from __future__ import annotations
+
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.randomness import stream
+from skidpad.core.vocabulary import LightState
+from skidpad.roads.lanes import SignalKind, SignalTable
+
+GREEN_S = 10.0  # CARLA's defaults for green and yellow; red as measured in the published set-up
+YELLOW_S = 3.0
+RED_S = 32.0
+CYCLE_S = GREEN_S + YELLOW_S + RED_S
+
+
+class Lights:
+    """States of all lights of a map as a function of the tick.
+
+    Lights of one group (a junction) take turns: approaches along one axis share their green, the
+    axes follow each other evenly within the cycle, so crossing streams never have green together.
+    """
+
+    def __init__(self, signals: SignalTable, seed: int, dt: float) -> None:
+        self.rows = np.flatnonzero(signals.kind == SignalKind.LIGHT)
+        self.ids = signals.id[self.rows]
+        self.dt = dt
+        offset = _offsets(signals, self.rows, seed)
+        self._offset_ticks = np.round(offset / dt).astype(np.int64)
+        self._durations = np.round(np.array([GREEN_S, YELLOW_S, RED_S]) / dt).astype(np.int64)
+        self.by_row = np.full(len(signals.id), LightState.OFF, dtype=np.uint8)  # (K,) LightState
+        self.by_id: dict[int, LightState] = {}
+        self.update(0)
+
+    def update(self, tick: int) -> None:
+        """Set `by_row` and `by_id` to the states of `tick`."""
+        green, yellow, red = self._durations
+        phase = (tick + self._offset_ticks) % (green + yellow + red)
+        state = np.where(
+            phase < green,
+            LightState.GREEN,
+            np.where(phase < green + yellow, LightState.YELLOW, LightState.RED),
+        ).astype(np.uint8)
+        if self.by_id and np.array_equal(state, self.by_row[self.rows]):
+            return
+        self.by_row[self.rows] = state
+        self.by_id = {
+            int(i): LightState(int(s)) for i, s in zip(self.ids, state, strict=True)
+        }
+
+
+def _offsets(
+    signals: SignalTable, rows: NDArray[np.intp], seed: int
+) -> NDArray[np.float64]:
+    """Phase of each light row in s: one draw per group, axes of a group spread over the cycle."""
+    offset = np.zeros(len(rows))
+    axis = np.round((signals.heading[rows] % pi) / (pi / 4.0)).astype(np.int64) % 4
+    for i, row in enumerate(rows):
+        group = int(signals.group[row])
+        alone = group < 0
+        name = f"signal {int(signals.id[row])}" if alone else f"group {group}"
+        offset[i] = stream(seed, "lights", name).uniform(0.0, CYCLE_S)
+        if not alone:
+            axes = np.unique(axis[signals.group[rows] == group])
+            offset[i] += CYCLE_S * np.searchsorted(axes, axis[i]) / len(axes)
+    return offset

@@ -1,0 +1,1 @@
+"""Background traffic: drivers who see the road and each other, and drive through the physics."""

@@ -1,0 +1,225 @@
+"""All drivers in one kernel: each follows its path, chooses lane and acceleration, then pedals."""
+
+from __future__ import annotations
+
+from math import cos
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import kernel
+from skidpad.simulation.embedded.traffic import occupancy as occ_
+from skidpad.simulation.embedded.traffic.idm import idm
+from skidpad.simulation.embedded.traffic.mobil import (
+    A_THRESHOLD,
+    RANDOM_RATE,
+    incentive,
+    is_safe,
+)
+from skidpad.simulation.embedded.traffic.occupancy import NOBODY
+from skidpad.simulation.embedded.traffic.outlook import (
+    desired_speed,
+    end_gap,
+    merge_gap,
+    stop_gap,
+)
+from skidpad.simulation.embedded.traffic.path import (
+    along,
+    begin,
+    extend,
+    offset_from,
+    straight_path,
+    uniform,
+)
+from skidpad.simulation.embedded.traffic.state import CHANGE_TIME, Drivers, View
+from skidpad.simulation.embedded.traffic.tracking import pedals, steer
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+REACH_AHEAD = 150.0  # m
+REACH_BEHIND = 120.0  # m
+CHANGE_COOLDOWN = 10.0  # s between two changes
+CHANGE_MIN_SPEED = 5.0  # m/s
+CHANGE_MAX_CURVE = 1.0 / 120.0  # 1/m: nobody changes lane in a tight bend
+CHANGE_PERIOD = 10  # ticks between two looks at the neighbour lanes
+END_MARGIN = 200.0  # m before a lane's end from which a driver must leave it
+LEFT_BEHIND = 0.6  # of a change, after which the leader on the old lane no longer counts
+HEADWAY_STOP = 0.5  # s kept to a stop line
+STUCK_SPEED = 0.5  # m/s
+CAUSE_GAP = 12.0  # m: a leader or stop line this near explains standing
+STRAYED = 1.0  # m beyond the lane's edge
+WRONG_WAY = -0.5  # cosine of 120 deg
+
+
+@kernel
+def follow_path(view: View, d: Drivers, i: int) -> None:
+    """Update where driver i is along its path; enter the next lane when it is reached."""
+    net, path, me, body = view.net, d.path[i], d.state[i], view.placed[i]
+    start = me.at + 1
+    at, t = along(net, path[0], me.at, body.x, body.y)
+    while t > 1.0 and path[1] >= 0:
+        path[:-1] = path[1:]
+        path[-1] = -1
+        me.turns += 1
+        start = net.lane[path[0]].first
+        at, t = along(net, path[0], start, body.x, body.y)
+    for k in range(start, at + 1):
+        if net.point[k].sign:
+            me.cap = np.inf
+    me.at = at
+    me.s = net.point[at].s + t * (net.point[at + 1].s - net.point[at].s)
+    me.offset, me.heading = offset_from(net, at, t, body.x, body.y)
+    extend(net, path, me.s, me.key, me.turns, view.free_choice)
+
+
+@kernel
+def turn_to(view: View, d: Drivers, i: int, lane: int, s: float) -> None:
+    """Follow `lane` from about s on, sliding over from the present lateral offset."""
+    me, target = d.state[i], view.net.lane[lane]
+    cap = me.cap
+    begin(d.path[i], lane)
+    me.at = target.first + int((target.size - 1) * s / target.length)
+    follow_path(view, d, i)
+    me.cap = cap  # no sign was passed
+    me.shift = me.offset
+    me.change = 0.0
+    occ_.add(view.occ, i, lane, me.s)
+
+
+@kernel
+def acceleration_along(
+    view: View, d: Drivers, i: int, path: Ints, s: float, v_desired: float
+) -> tuple[float, float]:
+    """IDM acceleration of i on `path` at `s`, and the gap to its leader there."""
+    leader, gap = occ_.find_ahead(view.net, view.occ, view.placed, path, s, i, REACH_AHEAD)
+    v_lead = view.placed[leader].v if leader != NOBODY else 0.0
+    v, trait = view.placed[i].speed, d.trait[i]
+    return idm(v, v_desired, gap, v_lead, trait.headway, trait.a_max), gap
+
+
+@kernel
+def follower_acceleration(view: View, d: Drivers, j: int, gap: float, v_lead: float) -> float:
+    """What follower j would do behind a vehicle at `gap`; it is taken to want its own speed."""
+    if j == NOBODY:
+        return 0.0
+    v, trait = max(view.placed[j].v, 0.0), d.trait[j]
+    return idm(v, max(v, 1.0), gap, v_lead, trait.headway, trait.a_max)
+
+
+@kernel
+def change_gain(
+    view: View, d: Drivers, i: int, lane: int, a_now: float, v_desired: float
+) -> float:
+    """MOBIL's advantage of moving to `lane` in m/s^2; -inf when it is not safe."""
+    me, v = d.state[i], view.placed[i].speed
+    s = occ_.beside(view.net, d.path[i, 0], me.s, lane)
+    scratch = np.empty(4, dtype=np.int32)
+    straight_path(view.net, lane, scratch)
+    a_new, gap_ahead = acceleration_along(view, d, i, scratch, s, v_desired)
+    behind, gap_behind = occ_.find_behind(
+        view.net, view.occ, view.placed, lane, s, i, REACH_BEHIND
+    )
+    a_behind = follower_acceleration(view, d, behind, gap_behind, v)
+    if not is_safe(a_new, a_behind, gap_ahead, gap_behind):
+        return -np.inf
+    old, gap_old = occ_.find_behind(
+        view.net, view.occ, view.placed, d.path[i, 0], me.s, i, REACH_BEHIND
+    )
+    a_old = follower_acceleration(view, d, old, gap_old, v)
+    return incentive(a_new - a_now, min(a_behind, 0.0), max(-a_old, 0.0))
+
+
+@kernel
+def may_enter(view: View, d: Drivers, i: int, lane: int, left: bool) -> bool:
+    """There is such a driving lane, it goes on, and the marking may be crossed: broken or none."""
+    if lane < 0 or view.net.lane[lane].kind != 0 or view.net.lane[lane].ahead < 0:
+        return False  # LaneKind.DRIVING only: ramps are entered at forks
+    here = view.net.point[d.state[i].at]
+    return (here.marking_left if left else here.marking_right) <= 1  # Marking.NONE, BROKEN
+
+
+@kernel
+def consider_change(view: View, d: Drivers, i: int, a_now: float, v_desired: float) -> None:
+    """Begin a lane change when MOBIL, a draw or the lane's end says so."""
+    me = d.state[i]
+    if me.change < CHANGE_TIME + CHANGE_COOLDOWN or view.placed[i].speed < CHANGE_MIN_SPEED:
+        return
+    bend = abs(view.net.point[me.at].curvature)
+    if (view.tick + 3 * i) % CHANGE_PERIOD != 0 or bend > CHANGE_MAX_CURVE:
+        return
+    must = end_gap(view, d, i) < END_MARGIN
+    drawn = uniform(me.key, view.tick, 2) < RANDOM_RATE * CHANGE_PERIOD * view.dt
+    drawn_left = uniform(me.key, view.tick, 3) < 0.5
+    lane_now = view.net.lane[d.path[i, 0]]
+    best, best_gain = -1, A_THRESHOLD
+    for left in (True, False):
+        lane = lane_now.left if left else lane_now.right
+        if not may_enter(view, d, i, lane, left):
+            continue
+        gain = change_gain(view, d, i, lane, a_now, v_desired)
+        if gain > -np.inf and (must or (drawn and left == drawn_left)):
+            gain = np.inf
+        if gain > best_gain:
+            best, best_gain = lane, gain
+    if best >= 0:
+        turn_to(view, d, i, best, occ_.beside(view.net, d.path[i, 0], me.s, best))
+
+
+@kernel
+def plan(view: View, d: Drivers, i: int) -> None:
+    """Choose lane and acceleration of driver i; note how long it has been out of order."""
+    me, trait, body = d.state[i], d.trait[i], view.placed[i]
+    v, v_desired = body.speed, desired_speed(view, d, i)
+    a, gap = acceleration_along(view, d, i, d.path[i], me.s, v_desired)
+    if body.lane >= 0 and body.lane != d.path[i, 0] and me.change < LEFT_BEHIND * CHANGE_TIME:
+        scratch = np.empty(4, dtype=np.int32)
+        straight_path(view.net, body.lane, scratch)
+        a_old, gap_old = acceleration_along(view, d, i, scratch, body.s, v_desired)
+        a, gap = min(a, a_old), min(gap, gap_old)
+    merging, gap_merge = merge_gap(view, d, i)
+    if merging != NOBODY:
+        v_merging = view.placed[merging].v
+        a = min(a, idm(v, v_desired, gap_merge, v_merging, trait.headway, trait.a_max))
+    gap_stop = min(stop_gap(view, d, i), end_gap(view, d, i))
+    if gap_stop < np.inf:
+        a = min(a, idm(v, v_desired, gap_stop, 0.0, HEADWAY_STOP, trait.a_max))
+    me.target = a
+    consider_change(view, d, i, a, v_desired)
+    strayed = abs(me.offset) > view.net.point[me.at].half_width + STRAYED
+    standing = v < STUCK_SPEED and min(gap, gap_stop, gap_merge) > CAUSE_GAP
+    wrong_way = cos(body.yaw - me.heading) < WRONG_WAY
+    if standing or (strayed and me.change > CHANGE_TIME) or wrong_way:
+        me.stuck += view.dt
+    else:
+        me.stuck = 0.0
+
+
+@kernel
+def keep_lane_if_pushed(view: View, d: Drivers, i: int) -> None:
+    """A vehicle that finds itself on another lane without having changed stays on that one."""
+    me, body = d.state[i], view.placed[i]
+    if me.change <= CHANGE_TIME or body.lane < 0 or body.lane == d.path[i, 0]:
+        return
+    kind = view.net.lane[body.lane].kind
+    if abs(me.offset) > 1.5 * view.net.point[me.at].half_width and (kind == 0 or kind == 7):
+        turn_to(view, d, i, body.lane, body.s)
+
+
+@kernel
+def drive_all(view: View, d: Drivers, commands: Floats) -> None:
+    """One tick of all active drivers; writes throttle, brake, steer, ... into commands (n, 5)."""
+    occ_.fill(view.net, view.placed, view.occ)
+    for i in range(len(d.state)):
+        if d.state[i].active and view.placed[i].present:
+            d.state[i].change += view.dt
+            follow_path(view, d, i)
+            keep_lane_if_pushed(view, d, i)
+            occ_.add(view.occ, i, d.path[i, 0], d.state[i].s)
+    for i in range(len(d.state)):
+        if d.state[i].active and view.placed[i].present:
+            plan(view, d, i)
+            throttle, brake = pedals(view, d, i)
+            commands[i, 0], commands[i, 1] = throttle, brake
+            commands[i, 2] = steer(view, d, i)
+            commands[i, 3] = commands[i, 4] = 0.0

@@ -1,0 +1,37 @@
+"""Intelligent Driver Model: longitudinal acceleration behind a leader or alone.
+
+Source: Treiber and Kesting (2013), Traffic Flow Dynamics, eqs. 11.14, 11.15 (IDM) and 11.23
+(deceleration above the desired speed stays comfortable); parameters from table 11.2, highway.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from skidpad.core.jit import kernel
+
+T_HEADWAY = 1.0  # s
+GAP_MIN = 2.0  # m
+A_MAX = 1.0  # m/s^2
+B_COMFORT = 1.5  # m/s^2
+A_EMERGENCY = -8.0  # m/s^2, the hardest braking that is asked of a car
+CURVE_G = 0.6 * 9.81  # m/s^2, lateral limit of CARLA's Traffic Manager (FRICTION x GRAVITY)
+
+
+@kernel
+def idm(
+    v: float, v_desired: float, gap: float, v_lead: float, headway: float, a_max: float
+) -> float:
+    """Acceleration in m/s^2 in [A_EMERGENCY, a_max]; gap inf: no leader."""
+    if v <= v_desired:
+        free = a_max * (1.0 - (v / max(v_desired, 0.1)) ** 4)
+    else:
+        free = -B_COMFORT * (1.0 - (v_desired / v) ** (4.0 * a_max / B_COMFORT))
+    if gap == np.inf:
+        return free
+    wanted = GAP_MIN + max(0.0, v * headway + v * (v - v_lead) / (2.0 * sqrt(a_max * B_COMFORT)))
+    interaction = a_max * (wanted / max(gap, 0.1)) ** 2
+    return max(A_EMERGENCY, free - interaction)
+

@@ -1,0 +1,167 @@
+"""All background drivers of a run: set up once, decided in one kernel call per tick."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import ConfigError
+from skidpad.core.geometry import Pose, mps_from_kmh
+from skidpad.core.randomness import stream, stream_key
+from skidpad.core.setup import TrafficSetup
+from skidpad.core.states import ActorStates
+from skidpad.physics.types import VehicleType
+from skidpad.roads.queries import RoadMap
+from skidpad.simulation.embedded.traffic.driver import drive_all
+from skidpad.simulation.embedded.traffic.idm import A_MAX, CURVE_G, T_HEADWAY
+from skidpad.simulation.embedded.traffic.network import Network
+from skidpad.simulation.embedded.traffic.occupancy import Places, occupancy
+from skidpad.simulation.embedded.traffic.path import begin
+from skidpad.simulation.embedded.traffic.places import FreePlaces
+from skidpad.simulation.embedded.traffic.state import TRAIT, View, drivers
+
+G = 9.80665  # m/s^2
+AIR_DENSITY = 1.204  # kg/m^3 at 20 C
+STUCK_TIME = 10.0  # s, decision M-7
+PUT_BACK_NEAREST = 100.0  # m from the ego, decision M-7
+PUT_BACK_SPEED = 0.8  # of the desired speed there
+BUBBLE = 500.0  # m, random traffic lives within this distance of the ego (A-209)
+BUBBLE_NEAREST = 150.0  # m, respawns stay out of the ego's sight
+CHECK_PERIOD = 20  # ticks between two looks at wrecks and the bubble
+
+
+@dataclass(frozen=True, slots=True)
+class Move:
+    """A vehicle that is to be put somewhere: entering, respawned, or a wreck put back."""
+
+    actor: int
+    pose: Pose
+    v: float
+    wreck: bool
+
+
+class Traffic:
+    """Drivers of those actors that have one."""
+
+    def __init__(
+        self,
+        map: RoadMap,
+        net: Network,
+        types: list[VehicleType | None],
+        setup: TrafficSetup,
+        seed: int,
+        dt: float,
+        grip: float,
+    ) -> None:
+        """types: per actor, None where it is no vehicle. grip: friction over dry, in (0, 1]."""
+        n = len(types)
+        self.net, self.setup, self.dt = net, setup, dt
+        self.drivers = drivers(n)
+        self.drivers.state["key"] = [stream_key(seed, "traffic", "driver", i) for i in range(n)]
+        self.drivers.trait[:] = _traits(types, grip if setup.slow_in_weather else 1.0)
+        self.occupancy = occupancy(len(net.lane), n)
+        self.places = FreePlaces(map, net, stream(seed, "traffic", "places"))
+        self.waiting: list[int] = []
+
+    def engage(self, i: int, lane: int, s: float, factor: float = 1.0) -> None:
+        """Actor i drives itself from here on, along `lane`."""
+        me, row = self.drivers.state[i], self.net.lane[lane]
+        begin(self.drivers.path[i], lane)
+        me["active"] = True
+        me["at"] = row["first"] + int((row["size"] - 1) * s / row["length"])
+        me["s"] = s
+        self.drivers.trait["factor"][i] *= factor
+        limit = self.setup.initial_limit_kmh
+        me["cap"] = np.inf if limit is None else mps_from_kmh(limit)
+
+    def release(self, i: int) -> None:
+        """Actor i is moved by commands from here on."""
+        self.drivers.state["active"][i] = False
+
+    def decide(
+        self, placed: Places, lights: NDArray[np.uint8], tick: int, commands: NDArray[np.float64]
+    ) -> None:
+        """Write the commands of all driven actors for the coming step."""
+        free_choice = self.setup.mode == "random"
+        view = View(self.net, self.occupancy, placed, lights, tick, self.dt, free_choice)
+        drive_all(view, self.drivers, commands)
+
+    def moves(self, states: ActorStates, tick: int) -> Iterator[Move]:
+        """Vehicles to put somewhere in this tick; apply each before asking for the next."""
+        if tick % CHECK_PERIOD:
+            return
+        driver = self.drivers.state
+        if self.setup.put_wrecks_back:
+            for i in np.flatnonzero(driver["active"] & (driver["stuck"] > STUCK_TIME)):
+                yield from self._put(int(i), states, PUT_BACK_NEAREST, np.inf, True)
+        if self.setup.mode == "random":
+            yield from self._keep_bubble(states)
+
+    def _keep_bubble(self, states: ActorStates) -> Iterator[Move]:
+        for i in list(self.waiting):
+            for move in self._put(i, states, BUBBLE_NEAREST, BUBBLE, False):
+                self.waiting.remove(i)
+                self.drivers.state["active"][i] = True
+                yield move
+        x, y = float(states.x[0]), float(states.y[0])
+        for i in np.flatnonzero(self.drivers.state["active"] & states.present):
+            if hypot(states.x[i] - x, states.y[i] - y) > 1.2 * BUBBLE:
+                yield from self._put(int(i), states, BUBBLE_NEAREST, BUBBLE, False)
+
+    def _put(
+        self, i: int, states: ActorStates, nearest: float, farthest: float, wreck: bool
+    ) -> Iterator[Move]:
+        at = self.places.draw(states, nearest, farthest)
+        if at is None:
+            return
+        point, me = self.net.point[at], self.drivers.state[i]
+        begin(self.drivers.path[i], self.places.lane[at])
+        me["at"], me["s"] = at, point["s"]
+        me["change"] = me["cap"] = np.inf
+        me["trim"] = me["stuck"] = 0.0
+        pose = Pose(
+            float(point["x"]),
+            float(point["y"]),
+            float(self.places.z[at]),
+            yaw=float(point["heading"]),
+        )
+        v = PUT_BACK_SPEED * float(point["limit"] * self.drivers.trait["factor"][i])
+        yield Move(i, pose, v, wreck)
+
+
+def _traits(types: list[VehicleType | None], caution: float) -> NDArray[np.void]:
+    """Drivers know their vehicles; `caution` in (0, 1] slows those who mind the weather."""
+    known = [t for t in types if t is not None]
+    if not known:
+        raise ConfigError("a world needs at least one vehicle")
+    traits = np.zeros(len(types), dtype=TRAIT)
+    for trait, known_type in zip(traits, types, strict=True):
+        t = known[0] if known_type is None else known_type
+        torque = 2.0 * (t.brake_torque_front + t.brake_torque_rear)
+        trait["factor"] = _speed_choice(caution)
+        trait["headway"] = T_HEADWAY / caution
+        trait["a_max"] = A_MAX
+        trait["a_curve"] = CURVE_G * caution
+        trait["wheelbase"] = t.wheelbase
+        trait["steer_angle"] = t.steer_max
+        trait["understeer"] = (1.0 / t.stiffness_front - 1.0 / t.stiffness_rear) / G
+        trait["a_drive"] = t.force_max / t.mass
+        trait["p_drive"] = t.power / t.mass
+        trait["a_brake"] = torque / (t.wheel_radius * t.mass)
+        trait["drag"] = 0.5 * AIR_DENSITY * t.drag_area / t.mass
+        trait["rolling"] = t.rolling_resistance * G + t.engine_drag
+    return traits
+
+
+def _speed_choice(grip: float) -> float:
+    """Desired speed on a road with this friction over that on a dry one.
+
+    Source: SUMO's friction-dependent speed factor, vehicle class car.
+    """
+    if grip >= 1.0:
+        return 1.0
+    return -0.3491 * grip * grip + 0.8922 * grip + 0.4493

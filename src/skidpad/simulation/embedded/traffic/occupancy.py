@@ -1,0 +1,157 @@
+"""Who is on which lane: linked lists per lane, and the neighbours ahead and behind."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import kernel
+from skidpad.simulation.embedded.traffic.network import Network
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int32]
+
+SLOTS = 4  # lanes on which one actor can stand at once
+NOBODY = -1
+
+
+PLACE = np.dtype(
+    [
+        ("x", "f8"),
+        ("y", "f8"),
+        ("yaw", "f8"),
+        ("vx", "f8"),
+        ("vy", "f8"),
+        ("speed", "f8"),  # m/s along the body
+        ("ax", "f8"),  # m/s^2 along the body
+        ("s", "f8"),  # m along the lane
+        ("offset", "f8"),  # m left of its centre
+        ("heading", "f8"),  # rad, of the lane there
+        ("v", "f8"),  # m/s along the lane
+        ("half_length", "f8"),
+        ("half_width", "f8"),
+        ("lane", "i4"),  # -1: on none
+        ("present", "?"),
+    ],
+    align=True,
+)
+Places = NDArray[np.void]  # (n,) PLACE: where the actors are, as drivers see it
+
+
+class Occupancy(NamedTuple):
+    """Linked lists: lane l holds the slots head[l], next[head[l]], ... until -1."""
+
+    head: Ints  # (L,)
+    next: Ints  # (n * SLOTS,)
+    s: Floats  # (n * SLOTS,) m along that lane
+    used: Ints  # (n,) slots in use
+
+
+def occupancy(lanes: int, actors: int) -> Occupancy:
+    """Empty lists."""
+    slots = actors * SLOTS
+    return Occupancy(
+        head=np.full(lanes, NOBODY, dtype=np.int32),
+        next=np.full(slots, NOBODY, dtype=np.int32),
+        s=np.zeros(slots),
+        used=np.zeros(actors, dtype=np.int32),
+    )
+
+
+@kernel
+def add(occ: Occupancy, actor: int, lane: int, s: float) -> None:
+    """Enter `actor` into a lane's list, unless it is there already or has no slot left."""
+    if lane < 0 or occ.used[actor] == SLOTS:
+        return
+    entry = occ.head[lane]
+    while entry != NOBODY:
+        if entry // SLOTS == actor:
+            return
+        entry = occ.next[entry]
+    slot = actor * SLOTS + occ.used[actor]
+    occ.used[actor] += 1
+    occ.s[slot] = s
+    occ.next[slot] = occ.head[lane]
+    occ.head[lane] = slot
+
+
+@kernel
+def beside(net: Network, lane: int, s: float, other: int) -> float:
+    """`s` on a neighbour lane of the same section: lanes of a section scale with their length."""
+    return s * net.lane[other].length / net.lane[lane].length
+
+
+@kernel
+def fill(net: Network, placed: Places, occ: Occupancy) -> None:
+    """Enter every present actor into each lane that its body overlaps."""
+    occ.head[:] = NOBODY
+    occ.used[:] = 0
+    for i in range(len(placed)):
+        lane = placed[i].lane
+        if not placed[i].present or lane < 0:
+            continue
+        s = placed[i].s
+        add(occ, i, lane, s)
+        half_lane = net.point[net.lane[lane].first].half_width
+        if placed[i].offset + placed[i].half_width > half_lane and net.lane[lane].left >= 0:
+            add(occ, i, net.lane[lane].left, beside(net, lane, s, net.lane[lane].left))
+        if placed[i].offset - placed[i].half_width < -half_lane and net.lane[lane].right >= 0:
+            add(occ, i, net.lane[lane].right, beside(net, lane, s, net.lane[lane].right))
+
+
+@kernel
+def find_ahead(
+    net: Network, occ: Occupancy, placed: Places, path: Ints, s: float, me: int, reach: float
+) -> tuple[int, float]:
+    """Nearest actor ahead along `path` (lanes, -1 ends it): index or NOBODY, gap in m or inf.
+
+    The gap is bumper to bumper along the road; negative while bodies overlap lengthwise.
+    """
+    start = -s
+    for k in range(len(path)):
+        lane = path[k]
+        if lane < 0 or start > reach:
+            break
+        nearest, distance = NOBODY, np.inf
+        entry = occ.head[lane]
+        while entry != NOBODY:
+            other = entry // SLOTS
+            d = start + occ.s[entry]
+            if other != me and 0.0 <= d < distance:
+                nearest, distance = other, d
+            entry = occ.next[entry]
+        if nearest != NOBODY:
+            if distance > reach:
+                break
+            return nearest, distance - placed[me].half_length - placed[nearest].half_length
+        start += net.lane[lane].length
+    return NOBODY, np.inf
+
+
+@kernel
+def find_behind(
+    net: Network, occ: Occupancy, placed: Places, lane: int, s: float, me: int, reach: float
+) -> tuple[int, float]:
+    """Nearest actor behind along the straightest predecessors; as `find_ahead`."""
+    start = s
+    for _ in range(8):
+        if lane < 0 or start - net.lane[lane].length > reach:
+            break
+        nearest, distance = NOBODY, np.inf
+        entry = occ.head[lane]
+        while entry != NOBODY:
+            other = entry // SLOTS
+            d = start - occ.s[entry]
+            if other != me and 0.0 < d < distance:
+                nearest, distance = other, d
+            entry = occ.next[entry]
+        if nearest != NOBODY:
+            if distance > reach:
+                break
+            return nearest, distance - placed[me].half_length - placed[nearest].half_length
+        lane = net.lane[lane].behind
+        if lane >= 0:
+            start += net.lane[lane].length
+    return NOBODY, np.inf

@@ -1,0 +1,106 @@
+"""What a driver sees ahead along its path: limits, bends, lights, the road's end, merging traffic."""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from skidpad.core.jit import kernel
+from skidpad.simulation.embedded.traffic.idm import B_COMFORT
+from skidpad.simulation.embedded.traffic.occupancy import NOBODY, SLOTS
+from skidpad.simulation.embedded.traffic.path import PATH
+from skidpad.simulation.embedded.traffic.state import Drivers, View
+
+REACH_LIGHT = 150.0  # m
+MERGE_REACH = 60.0  # m before a merge within which the streams watch each other
+YELLOW_BRAKE = 3.0  # m/s^2, drivers stop at yellow if this is enough
+STOP_MARGIN = 1.0  # m kept to a stop line, beside the IDM's standstill gap
+PREVIEW_STEP = 5.0  # m between two looks at limit and bend
+V_PREVIEW = 10.0  # m/s, look at least this far beyond the comfortable braking distance, in m
+
+
+@kernel
+def desired_speed(view: View, d: Drivers, i: int) -> float:
+    """Speed in m/s that limits and bends ahead allow, each reached by comfortable braking."""
+    net, me, trait = view.net, d.state[i], d.trait[i]
+    v = view.placed[i].speed
+    reach = v * v / (2.0 * B_COMFORT) + V_PREVIEW
+    best_sq = (min(net.point[me.at].limit, me.cap) * trait.factor) ** 2
+    start = -me.s
+    for k in range(PATH):
+        if d.path[i, k] < 0 or start > reach:
+            break
+        lane = net.lane[d.path[i, k]]
+        spacing = lane.length / (lane.size - 1)
+        step = max(1, int(PREVIEW_STEP / spacing))
+        for j in range(me.at - lane.first if k == 0 else 0, lane.size, step):
+            distance = start + j * spacing
+            if distance > reach:
+                break
+            point = net.point[lane.first + j]
+            cap_sq = (min(point.limit, me.cap) * trait.factor) ** 2
+            if abs(point.curvature) * cap_sq > trait.a_curve:
+                cap_sq = trait.a_curve / abs(point.curvature)
+            best_sq = min(best_sq, cap_sq + 2.0 * B_COMFORT * max(distance, 0.0))
+        start += lane.length
+    return sqrt(best_sq)
+
+
+@kernel
+def stop_gap(view: View, d: Drivers, i: int) -> float:
+    """Metres from the front bumper to the next line at which driver i has to stop; inf: none."""
+    net, v = view.net, view.placed[i].speed
+    start = -d.state[i].s - view.placed[i].half_length
+    for k in range(PATH):
+        if d.path[i, k] < 0 or start > REACH_LIGHT:
+            break
+        lane = net.lane[d.path[i, k]]
+        for row in range(lane.stop_first, lane.stop_first + lane.stops):
+            gap = start + net.stop[row].s - STOP_MARGIN
+            light = view.lights[net.stop[row].row]
+            if gap < -STOP_MARGIN or gap > REACH_LIGHT or light > 1:
+                continue  # passed, too far, or neither LightState.RED nor YELLOW
+            if light == 0 or v * v <= 2.0 * YELLOW_BRAKE * max(gap, 0.0):
+                return max(gap, 0.1)
+        start += lane.length
+    return np.inf
+
+
+@kernel
+def end_gap(view: View, d: Drivers, i: int) -> float:
+    """Metres to the end of the road along the path; inf: not within what the driver knows."""
+    known = -d.state[i].s
+    for k in range(PATH):
+        if d.path[i, k] < 0:
+            last = view.net.lane[d.path[i, k - 1]]
+            return max(known, 0.1) if last.ahead < 0 else np.inf
+        known += view.net.lane[d.path[i, k]].length
+    return np.inf
+
+
+@kernel
+def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
+    """Who arrives at a merge ahead just before driver i on another branch, and the gap to it."""
+    net, occ = view.net, view.occ
+    start = net.lane[d.path[i, 0]].length - d.state[i].s
+    best, best_gap = NOBODY, np.inf
+    for k in range(1, PATH):
+        if d.path[i, k] < 0 or start > MERGE_REACH:
+            break
+        lane = net.lane[d.path[i, k]]
+        for p in range(lane.prev_first, lane.prev_first + lane.prevs):
+            other_lane = net.prev_lane[p]
+            if other_lane == d.path[i, k - 1]:
+                continue
+            entry = occ.head[other_lane]
+            while entry != NOBODY:
+                distance = net.lane[other_lane].length - occ.s[entry]
+                gap = start - distance
+                if entry // SLOTS != i and distance < MERGE_REACH and 0.0 < gap < best_gap:
+                    best, best_gap = entry // SLOTS, gap
+                entry = occ.next[entry]
+        start += lane.length
+    if best == NOBODY:
+        return NOBODY, np.inf
+    return best, best_gap - view.placed[i].half_length - view.placed[best].half_length

@@ -1,0 +1,106 @@
+"""The lanes that a driver follows, and where the vehicle is along them."""
+
+from __future__ import annotations
+
+from math import cos, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import kernel
+from skidpad.simulation.embedded.traffic.network import Network
+
+Ints = NDArray[np.int32]
+
+PATH = 12  # lanes remembered ahead, the present one first
+LOOKAHEAD = 250.0  # m of path that a driver knows
+UNIT = 1.0 / 2**53
+
+
+@kernel
+def uniform(key: np.uint64, tick: int, salt: int) -> float:
+    """A number in [0, 1) from (key, tick, salt): splitmix64 (Steele, Lea, Flood 2014)."""
+    z = np.uint64(key) + np.uint64(0x9E3779B97F4A7C15) * np.uint64(2 * tick + 1)
+    z += np.uint64(0xD1B54A32D192ED03) * np.uint64(salt)
+    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    z = z ^ (z >> np.uint64(31))
+    return float(z >> np.uint64(11)) * UNIT
+
+
+@kernel
+def wrapped(angle: float) -> float:
+    """`angle` in [-pi, pi)."""
+    return (angle + pi) % (2.0 * pi) - pi
+
+
+@kernel
+def choose_branch(net: Network, lane: int, key: np.uint64, turn: int, free_choice: bool) -> int:
+    """The lane to take after `lane`: the straightest, or one drawn per driver and turn."""
+    here = net.lane[lane]
+    if not free_choice or here.nexts < 2:
+        return here.ahead
+    choice = net.next_lane[here.next_first + int(uniform(key, turn, 1) * here.nexts)]
+    kind = net.lane[choice].kind
+    return choice if kind == 0 or kind == 7 else here.ahead  # LaneKind.DRIVING, RAMP
+
+
+@kernel
+def extend(net: Network, path: Ints, s: float, key: np.uint64, turn: int, free: bool) -> None:
+    """Append lanes to `path` until it reaches LOOKAHEAD, is full, or the road ends."""
+    known = -s
+    for k in range(PATH - 1):
+        if path[k] < 0:
+            return
+        known += net.lane[path[k]].length
+        if path[k + 1] < 0 and known < LOOKAHEAD:
+            path[k + 1] = choose_branch(net, path[k], key, turn + k, free)
+
+
+@kernel
+def begin(path: Ints, lane: int) -> None:
+    """Restart `path` on `lane`."""
+    path[:] = -1
+    path[0] = lane
+
+
+@kernel
+def straight_path(net: Network, lane: int, out: Ints) -> None:
+    """Fill `out` with `lane` and its straightest successors."""
+    for k in range(len(out)):
+        out[k] = lane
+        if lane >= 0:
+            lane = net.lane[lane].ahead
+
+
+@kernel
+def along(net: Network, lane: int, at: int, x: float, y: float) -> tuple[int, float]:
+    """Segment of `lane` beside (x, y), searched from sample `at`, and the fraction along it.
+
+    A fraction below 0 or above 1 means before the first or behind the last sample.
+    """
+    first = net.lane[lane].first
+    last = first + net.lane[lane].size - 2
+    at = min(max(at, first), last)
+    forward = False
+    while True:
+        p, q = net.point[at], net.point[at + 1]
+        dx, dy = q.x - p.x, q.y - p.y
+        t = ((x - p.x) * dx + (y - p.y) * dy) / (dx * dx + dy * dy)
+        if t > 1.0 and at < last:
+            at += 1
+            forward = True
+        elif t < 0.0 and at > first and not forward:  # never back again: joints can open outwards
+            at -= 1
+        else:
+            return at, t
+
+
+@kernel
+def offset_from(net: Network, at: int, t: float, x: float, y: float) -> tuple[float, float]:
+    """Metres by which (x, y) lies left of the lane, and the lane's heading there."""
+    p, q = net.point[at], net.point[at + 1]
+    u = min(max(t, 0.0), 1.0)
+    heading = p.heading + u * wrapped(q.heading - p.heading)
+    x_ref, y_ref = p.x + u * (q.x - p.x), p.y + u * (q.y - p.y)
+    return -(x - x_ref) * sin(heading) + (y - y_ref) * cos(heading), heading

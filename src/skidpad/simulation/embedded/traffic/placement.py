@@ -1,0 +1,116 @@
+"""Where background vehicles begin: the published positions, or drawn around the ego."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.lefthanded import lanes_left_from_carla
+from skidpad.core.randomness import stream
+from skidpad.core.setup import TrafficSetup
+from skidpad.roads.queries import LanePoint, RoadMap
+
+VARIANTS = ("listing", "table")
+MAX_AHEAD, MAX_BEHIND = 15, 5  # A-203
+SHARE_AHEAD = 0.75
+FACTOR_AHEAD, FACTOR_BEHIND = 0.90, 1.05  # of the limit: Traffic Manager's +10 % and -5 % (A-207)
+GAP_SPREAD = 3.0  # m, uniform (decision M-2)
+SPEED_SPREAD = 0.03  # standard deviation of desired speeds (decision M-2)
+RANDOM_SPEED_SPREAD = 0.10  # random mode (A-209); the size is not published
+RANDOM_MAX = 80  # A-209
+
+
+@dataclass(frozen=True, slots=True)
+class Spawn:
+    """One background vehicle at the start; place None: it enters later."""
+
+    place: LanePoint | None
+    factor: float  # desired speed over the limit
+
+
+@dataclass(frozen=True, slots=True)
+class Position:
+    """A row of the published table: metres ahead of the ego, and lanes to its left."""
+
+    group: str
+    index: int
+    distance: float
+    lanes_left: int
+
+
+def published_positions(variant: str) -> tuple[Position, ...]:
+    """The twenty positions as in the listing or in the tables (D-085, D-086)."""
+    require_choice("traffic variant", variant, VARIANTS)
+    text = resources.files(__package__).joinpath("positions.csv").read_text()
+    return tuple(
+        Position(
+            row["group"],
+            int(row["index"]),
+            float(row[f"{variant}_distance_m"]),
+            lanes_left_from_carla(int(row[f"{variant}_lane_offset"])),
+        )
+        for row in csv.DictReader(text.splitlines())
+    )
+
+
+def chosen_positions(vehicles: int, variant: str) -> list[Position]:
+    """The first of each group: floor(0.75 n) ahead up to 15, the rest behind up to 5 (A-203)."""
+    rows = published_positions(variant)
+    ahead = min(int(SHARE_AHEAD * vehicles), MAX_AHEAD)
+    behind = min(vehicles - ahead, MAX_BEHIND)
+    return [r for r in rows if r.group == "ahead"][:ahead] + [
+        r for r in rows if r.group == "behind"
+    ][:behind]
+
+
+def fixed_spawns(map: RoadMap, ego: LanePoint, setup: TrafficSetup, seed: int) -> list[Spawn]:
+    """Vehicles at the published distances from the ego (A-202 to A-205), gaps and speeds varied."""
+    spawns = []
+    missing = []
+    for position in chosen_positions(setup.vehicles, setup.variant):
+        name = f"{position.group} {position.index}"
+        gap = position.distance + stream(seed, "traffic", "gap", name).uniform(
+            -GAP_SPREAD, GAP_SPREAD
+        )
+        place = _place(map, ego, gap, position.lanes_left)
+        if place is None:
+            missing.append(f"{name} ({position.distance:g} m)")
+            continue
+        mean = FACTOR_AHEAD if position.group == "ahead" else FACTOR_BEHIND
+        spread = stream(seed, "traffic", "speed", name).normal(0.0, SPEED_SPREAD)
+        spawns.append(Spawn(place, mean * (1.0 + spread)))
+    if len(spawns) < setup.vehicles and not setup.allow_fewer:
+        raise ConfigError(
+            f"traffic: map {map.name} holds {len(spawns)} of {setup.vehicles} vehicles around the "
+            f"ego (no lane for: {', '.join(missing) or 'more than twenty'}); "
+            "choose fewer vehicles or allow fewer"
+        )
+    return spawns
+
+
+def _place(map: RoadMap, ego: LanePoint, distance: float, lanes_left: int) -> LanePoint | None:
+    """`distance` m along the road from the ego, then so many lanes to the left; None: no lane."""
+    place = map.ahead(ego, distance) if distance >= 0.0 else map.behind(ego, -distance)
+    step = map.left if lanes_left > 0 else map.right
+    for _ in range(abs(lanes_left)):
+        place = None if place is None else step(place)
+    return place
+
+
+def random_factors(vehicles: int, seed: int) -> NDArray[np.float64]:
+    """Desired speeds over the limit, Gaussian, one stream per vehicle (A-209)."""
+    if not 0 <= vehicles <= RANDOM_MAX:
+        raise ConfigError(f"traffic.vehicles must be between 0 and {RANDOM_MAX}, got {vehicles}")
+    draws = [stream(seed, "traffic", "speed", i).normal(0.0, 1.0) for i in range(vehicles)]
+    return np.clip(1.0 + RANDOM_SPEED_SPREAD * np.array(draws), 0.6, 1.3)
+
+
+def type_of(index: int, types: Sequence[str]) -> str:
+    """Types in turn, the rear group continuing after the front (A-205)."""
+    return types[index % len(types)]

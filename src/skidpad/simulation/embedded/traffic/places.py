@@ -1,0 +1,48 @@
+"""Free places on the road for vehicles that enter or are put back while driving."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.states import ActorStates
+from skidpad.roads.lanes import LaneKind
+from skidpad.roads.queries import RoadMap
+from skidpad.simulation.embedded.traffic.network import Network
+
+CLEARANCE = 45.0  # m to any other vehicle
+EDGE = 15.0  # m kept to both ends of a lane
+MAX_CURVE = 1.0 / 150.0  # 1/m: nobody is put into a tight bend
+TRIES = 60
+
+
+class FreePlaces:
+    """Draws samples of driving lanes at which a vehicle can be put."""
+
+    def __init__(self, map: RoadMap, net: Network, rng: np.random.Generator) -> None:
+        self.lane, self.z = map.samples.lane, map.samples.z
+        row = net.lane[self.lane]
+        fits = (
+            (row["kind"] == LaneKind.DRIVING)
+            & (map.lanes.junction[self.lane] < 0)
+            & (row["ahead"] >= 0)
+            & (net.point["s"] > EDGE)
+            & (net.point["s"] < row["length"] - EDGE)
+            & (np.abs(net.point["curvature"]) < MAX_CURVE)
+        )
+        self.candidates: NDArray[np.intp] = np.flatnonzero(fits)
+        self.net = net
+        self.rng = rng
+
+    def draw(self, states: ActorStates, nearest: float, farthest: float) -> int | None:
+        """A sample between `nearest` and `farthest` m from the ego, clear of all; None: not found."""
+        point = self.net.point
+        if not len(self.candidates):
+            return None
+        for index in self.rng.integers(0, len(self.candidates), TRIES):
+            at = int(self.candidates[index])
+            d = np.hypot(states.x - point["x"][at], states.y - point["y"][at])
+            near = states.present & (d < CLEARANCE)
+            if nearest <= d[0] <= farthest and not near.any():
+                return at
+        return None

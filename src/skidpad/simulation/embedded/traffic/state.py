@@ -1,0 +1,79 @@
+"""What drivers are, do and see: arrays of records, so that few arrays cross each kernel call."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.simulation.embedded.traffic.network import Network
+from skidpad.simulation.embedded.traffic.occupancy import Occupancy, Places
+from skidpad.simulation.embedded.traffic.path import PATH
+
+Ints = NDArray[np.int32]
+
+CHANGE_TIME = 5.0  # s for one lane; naturalistic mean 4 to 6 s (Toledo and Zohar 2007)
+
+DRIVER = np.dtype(
+    [
+        ("active", "?"),
+        ("at", "i4"),  # point of the path's first lane beside the vehicle
+        ("turns", "i4"),  # lanes entered so far
+        ("key", "u8"),  # of the driver's own draws
+        ("s", "f8"),  # m along the path's first lane
+        ("offset", "f8"),  # m left of it
+        ("heading", "f8"),  # rad, of the lane there
+        ("shift", "f8"),  # m, offset at which the present lane change began
+        ("change", "f8"),  # s since it began
+        ("cap", "f8"),  # m/s, limit that holds until the first sign; inf behind it
+        ("target", "f8"),  # m/s^2, acceleration asked for
+        ("trim", "f8"),  # m/s^2, integral of the pedal control
+        ("stuck", "f8"),  # s stopped, off the lane or wrong-way without a cause ahead
+    ],
+    align=True,
+)
+TRAIT = np.dtype(
+    [
+        ("factor", "f8"),  # desired speed over the limit
+        ("headway", "f8"),  # s
+        ("a_max", "f8"),  # m/s^2
+        ("a_curve", "f8"),  # m/s^2, lateral acceleration accepted in bends
+        ("wheelbase", "f8"),  # m
+        ("steer_angle", "f8"),  # rad at the road wheels for steer 1
+        ("understeer", "f8"),  # s^2/m, extra wheel angle per lateral acceleration
+        ("a_drive", "f8"),  # m/s^2 at full throttle, low speed
+        ("p_drive", "f8"),  # W/kg
+        ("a_brake", "f8"),  # m/s^2 at full brake
+        ("drag", "f8"),  # 1/m, air drag over mass
+        ("rolling", "f8"),  # m/s^2, rolling and engine drag
+    ],
+    align=True,
+)
+
+
+class Drivers(NamedTuple):
+    """n drivers: what they do, what they are like, and where they go. Row 0 is the ego."""
+
+    state: NDArray[np.void]  # (n,) DRIVER
+    trait: NDArray[np.void]  # (n,) TRAIT
+    path: Ints  # (n, PATH) lanes to follow, the present one first
+
+
+class View(NamedTuple):
+    """Everything that drivers see in one tick."""
+
+    net: Network
+    occ: Occupancy
+    placed: Places
+    lights: NDArray[np.uint8]  # (K,) LightState by signal row
+    tick: int
+    dt: float
+    free_choice: bool  # branches are drawn instead of taking the straightest
+
+
+def drivers(n: int) -> Drivers:
+    """n inactive drivers."""
+    state = np.zeros(n, dtype=DRIVER)
+    state["change"] = state["cap"] = np.inf
+    return Drivers(state, np.zeros(n, dtype=TRAIT), np.full((n, PATH), -1, dtype=np.int32))

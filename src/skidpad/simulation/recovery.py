@@ -1,0 +1,288 @@
+"""The recovery supervisor: gets the ego going again after a crash, on every backend (A-179 to A-201).
+
+It stands between stack and backend. Each tick `observe` reads the truth and says in which phase the
+tick is; `act` turns the stack's command into what is applied, and may relocate the ego. It knows
+nothing of how the backend works, and the stack knows nothing of the truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
+from math import cos, hypot, sin
+
+import numpy as np
+
+from skidpad.core.errors import require_range
+from skidpad.core.geometry import Pose, mps_from_kmh
+from skidpad.core.states import ActorStates, StackReport, VehicleCommand, WorldTruth
+from skidpad.core.vocabulary import ActorKind, LightState, RelocationReason, Supervision, Tier
+from skidpad.roads.lanes import SignalKind
+from skidpad.roads.queries import LanePoint, RoadMap
+
+BRAKE_TIME = 0.5  # s, A-181
+REVERSE_TIME = 2.0  # s, A-182
+REVERSE_THROTTLE = 0.4
+REVERSE_STEER_GAIN = 0.5
+REVERSE_STEER_MAX = 0.3
+LIFT = 0.5  # m above the road, so that no wheel begins inside it (A-183)
+CLEAR_AHEAD = 15.0  # m, A-184
+CLEAR_ASIDE = 2.5  # m
+SHIFT_BACK = 8.0  # m
+SHIFTS = 4
+COOL_DOWN = 3.0  # s, A-185
+GRACE = 8.0  # s without the stuck detector after a relocation, A-188
+WRONG_WAY_DOT = -0.5  # cosine of 120 deg, A-196
+LEVEL = 4.0  # m: whatever is farther above or below is on another road (decision M-12)
+LIGHT_REACH = 30.0  # m to a stop line that explains standing
+MARGIN = 0.3  # m around the ego's own box where it is put
+
+FULL_STOP = VehicleCommand(brake=1.0, handbrake=True)
+HELD = VehicleCommand(brake=1.0)
+ROLLING = VehicleCommand()
+HOLDING = frozenset(
+    {Tier.STOPPED_BEHIND_CAR, Tier.APPROACH, Tier.ACC_HOLD, Tier.LIGHT_STOP, Tier.HOLDING_AT_LINE}
+)
+
+
+class Clearance(Enum):
+    """How a place is searched (D-080)."""
+
+    CHECKED = "checked"  # the ego does not obstruct itself, and the last place is checked too
+    LISTING = "listing"  # as printed: the ego counts, and after four shifts the place is taken
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RecoverySettings:
+    """What the sources leave open about recovery."""
+
+    warm_up: float = 0.5  # s with brakes held; 1.5 as listed (D-076)
+    release_speed: float = 5.5  # m/s given at its end; 0 as listed (D-077)
+    clearance: Clearance = Clearance.CHECKED  # D-080
+    stuck_time: float = 10.0  # s, A-200
+    stuck_speed: float = mps_from_kmh(1.0)  # m/s, A-200
+
+    def __post_init__(self) -> None:
+        require_range("recovery.warm_up", self.warm_up, 0.05, 10.0)
+        require_range("recovery.release_speed", self.release_speed, 0.0, 30.0)
+        require_range("recovery.stuck_time", self.stuck_time, 1.0, 3600.0)
+        require_range("recovery.stuck_speed", self.stuck_speed, 0.0, 5.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """A relocation as it is recorded (A-194)."""
+
+    reason: RelocationReason
+    shift: float  # m moved back along the lane
+    old: Pose
+    new: Pose
+    clear: bool  # False: no free place was found, the last one was taken
+
+
+@dataclass(frozen=True, slots=True)
+class Relocate:
+    """A request to the backend; `moved` is None when only the speed changes (A-187)."""
+
+    pose: Pose
+    v: float
+    moved: Moved | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """What is done in a tick: the command that is applied, after a relocation if there is one."""
+
+    command: VehicleCommand
+    relocate: Relocate | None = None
+    notice: str = ""
+
+
+class Supervisor:
+    """State: phase, its age, cool-down and grace, time near standstill, counters."""
+
+    def __init__(self, map: RoadMap, settings: RecoverySettings, dt: float) -> None:
+        self.map, self.settings, self.dt = map, settings, dt
+        self.reset()
+
+    def reset(self) -> None:
+        """Begin a run."""
+        self.phase = Supervision.NONE
+        self.left = 0  # ticks of the present phase still to come
+        self.cool_down = 0  # ticks
+        self.grace = 0  # ticks
+        self.standing = 0  # ticks
+        self.recoveries = 0
+        self.contacts_seen = 0  # index into the collision history (A-193)
+        self.reason = RelocationReason.COLLISION
+        self.lane = -1
+        self.truth: WorldTruth | None = None
+
+    def observe(self, truth: WorldTruth) -> Supervision:
+        """The phase of the tick that `truth` begins."""
+        self.truth = truth
+        self.contacts_seen += len(truth.contacts)
+        if self.phase is not Supervision.NONE:
+            if self.left == 0:
+                self._next_phase()
+        elif truth.contacts and self.cool_down == 0:
+            self.recoveries += 1
+            self._begin(Supervision.BRAKE, BRAKE_TIME, RelocationReason.COLLISION)
+        elif self._is_wrong_way(truth.states):
+            self._begin(Supervision.REALIGN, 0.0, RelocationReason.WRONG_WAY)
+        return self.phase
+
+    def act(self, command: VehicleCommand, report: StackReport | None = None) -> Action:
+        """What is applied in this tick, given the stack's own command and report."""
+        assert self.truth is not None, "observe() comes first"
+        self.cool_down, self.grace = max(self.cool_down - 1, 0), max(self.grace - 1, 0)
+        self.left = max(self.left - 1, 0)
+        states = self.truth.states
+        if self.phase is Supervision.BRAKE:
+            return Action(FULL_STOP)
+        if self.phase is Supervision.REVERSE:
+            return Action(self._reverse(states))
+        if self.phase is Supervision.REALIGN:
+            return self._realign(states)
+        if self.phase is Supervision.WARM_UP:
+            return self._warm_up(states)
+        if self._is_stuck(self.truth, report):
+            self._begin(Supervision.REALIGN, 0.0, RelocationReason.STUCK)
+            return self._realign(states)
+        return Action(command)
+
+    def _begin(self, phase: Supervision, duration: float, reason: RelocationReason) -> None:
+        self.phase, self.left = phase, round(duration / self.dt)
+        self.reason, self.standing = reason, 0
+
+    def _next_phase(self) -> None:
+        if self.phase is Supervision.BRAKE:
+            self._begin(Supervision.REVERSE, REVERSE_TIME, self.reason)
+        elif self.phase is Supervision.REVERSE:
+            self._begin(Supervision.REALIGN, 0.0, self.reason)
+        elif self.phase is Supervision.WARM_UP:
+            self._begin(Supervision.NONE, 0.0, self.reason)
+
+    def _place(self, states: ActorStates) -> LanePoint | None:
+        x, y, z = float(states.x[0]), float(states.y[0]), float(states.z[0])
+        place = self.map.project(x, y, z, self.lane)
+        if place is not None:
+            self.lane = place.lane
+        return place
+
+    def _reverse(self, states: ActorStates) -> VehicleCommand:
+        """Backwards towards the lane (A-182). The published cross product is CARLA-handed: in
+        ISO 8855 both it and the steer change sign, so the formula keeps its form."""
+        place = self._place(states)
+        steer = 0.0
+        if place is not None:
+            dx, dy = place.x - float(states.x[0]), place.y - float(states.y[0])
+            distance = hypot(dx, dy)
+            if distance > 0.0:
+                yaw = float(states.yaw[0])
+                cross = (cos(yaw) * dy - sin(yaw) * dx) / distance
+                steer = min(max(-REVERSE_STEER_GAIN * cross, -REVERSE_STEER_MAX), REVERSE_STEER_MAX)
+        return VehicleCommand(throttle=REVERSE_THROTTLE, steer=steer, reverse=True)
+
+    def _realign(self, states: ActorStates) -> Action:
+        """Put the ego on the lane (A-183 to A-186, A-198); without a lane, wait (A-192)."""
+        assert self.truth is not None
+        nearest = self._place(states)
+        if nearest is None:
+            return Action(FULL_STOP, notice="no driving lane near the ego, relocation is retried")
+        place, shift, clear = self._clear_place(nearest)
+        new = replace(place.pose, z=place.z + LIFT)
+        moved = Moved(self.reason, shift, states.pose(0), new, clear)
+        self.cool_down = round(COOL_DOWN / self.dt)
+        self.grace = round(GRACE / self.dt)
+        self._begin(Supervision.WARM_UP, self.settings.warm_up, self.reason)
+        notice = "" if clear else "no free place found, the ego was put near another vehicle"
+        return Action(HELD, Relocate(new, 0.0, moved), notice)
+
+    def _warm_up(self, states: ActorStates) -> Action:
+        if self.left > 0:
+            return Action(HELD)
+        place = self._place(states)
+        yaw = float(states.yaw[0]) if place is None else place.heading
+        pose = replace(states.pose(0), yaw=yaw)
+        return Action(ROLLING, Relocate(pose, self.settings.release_speed))
+
+    def _clear_place(self, nearest: LanePoint) -> tuple[LanePoint, float, bool]:
+        """The place, the distance moved back to it, and whether it is clear (A-184, D-080)."""
+        place, shift = nearest, 0.0
+        for candidate in self._candidates(nearest):
+            place, shift = candidate
+            if self._is_clear(place):
+                return place, shift, True
+        return place, shift, False
+
+    def _candidates(self, nearest: LanePoint) -> Iterator[tuple[LanePoint, float]]:
+        yield nearest, 0.0
+        place = nearest
+        for k in range(1, SHIFTS + 1):
+            behind = self.map.behind(place, SHIFT_BACK)
+            if behind is None:
+                return
+            place = behind
+            yield place, k * SHIFT_BACK
+
+    def _is_clear(self, place: LanePoint) -> bool:
+        """No other vehicle in the box ahead of the place, nor where the ego's own box would be."""
+        assert self.truth is not None
+        states, table = self.truth.states, self.truth.table
+        vehicle = states.present & (table.kind <= ActorKind.MOTORCYCLE)
+        vehicle &= np.abs(states.z - place.z) < LEVEL
+        dx, dy = states.x - place.x, states.y - place.y
+        forward = dx * cos(place.heading) + dy * sin(place.heading)
+        aside = np.abs(dy * cos(place.heading) - dx * sin(place.heading))
+        blocking = vehicle & (forward > 0.0) & (forward < CLEAR_AHEAD) & (aside < CLEAR_ASIDE)
+        if self.settings.clearance is Clearance.LISTING:
+            return not bool(blocking.any())
+        touching = vehicle & (np.abs(forward) < 0.5 * (table.length + table.length[0]) + MARGIN)
+        touching &= aside < 0.5 * (table.width + table.width[0]) + MARGIN
+        return not bool((blocking | touching)[1:].any())
+
+    def _is_wrong_way(self, states: ActorStates) -> bool:
+        """More than 120 deg off the lane's heading (A-196, A-197)."""
+        place = self._place(states)
+        return place is not None and cos(place.heading - float(states.yaw[0])) < WRONG_WAY_DOT
+
+    def _is_stuck(self, truth: WorldTruth, report: StackReport | None) -> bool:
+        """Near standstill for too long without a reason to stand (A-200)."""
+        states = truth.states
+        slow = hypot(float(states.vx[0]), float(states.vy[0])) < self.settings.stuck_speed
+        if not slow or self.grace > 0 or self._has_reason(truth, report):
+            self.standing = 0
+            return False
+        self.standing += 1
+        return self.standing * self.dt >= self.settings.stuck_time
+
+    def _has_reason(self, truth: WorldTruth, report: StackReport | None) -> bool:
+        """The stack says that it holds; one that says nothing is judged by what stands ahead."""
+        if report is not None and report.tier is not None:
+            return report.tier in HOLDING
+        ego = self._place(truth.states)
+        if ego is None:
+            return False
+        here = replace(
+            ego, x=float(truth.states.x[0]), y=float(truth.states.y[0]), z=float(truth.states.z[0])
+        )
+        return not self._is_clear_of_others(here) or self._light_ahead(ego, truth)
+
+    def _is_clear_of_others(self, here: LanePoint) -> bool:
+        assert self.truth is not None
+        states = self.truth.states
+        dx, dy = states.x - here.x, states.y - here.y
+        forward = dx * cos(here.heading) + dy * sin(here.heading)
+        aside = np.abs(dy * cos(here.heading) - dx * sin(here.heading))
+        ahead = states.present & (forward > 0.0) & (forward < CLEAR_AHEAD) & (aside < CLEAR_ASIDE)
+        return not bool((ahead & (np.abs(states.z - here.z) < LEVEL))[1:].any())
+
+    def _light_ahead(self, ego: LanePoint, truth: WorldTruth) -> bool:
+        signals = self.map.signals
+        distance = signals.s - ego.s
+        near = (signals.kind == SignalKind.LIGHT) & (signals.lane == ego.lane)
+        near &= (distance > 0.0) & (distance < LIGHT_REACH)
+        stop = (LightState.RED, LightState.YELLOW)
+        return any(truth.lights.get(int(i)) in stop for i in signals.id[near])

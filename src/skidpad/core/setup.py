@@ -79,6 +79,7 @@ class Setup:
     level: SensorLevel = SensorLevel.PIXELS
     render_all: bool = False  # every image every tick, read or not
     patches: tuple[FrictionPatch, ...] = ()
+    localisation_noise: float = 0.0  # m, standard deviation of the ego's x and y; 0: exact (L-3)
     dt: float = DT
 
 

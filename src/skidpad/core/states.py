@@ -162,3 +162,4 @@ class WorldTruth:
     lights: dict[int, LightState]  # by signal id of the map
     contacts: tuple[ContactEvent, ...]  # of the ego, that began in this tick
     invasions: tuple[LaneInvasion, ...]
+    notices: tuple[str, ...] = ()  # what else happened in this tick: a wreck was put back, ...

@@ -65,7 +65,7 @@ class Traffic:
         self.drivers.trait[:] = _traits(types, grip if setup.slow_in_weather else 1.0)
         self.occupancy = occupancy(len(net.lane), n)
         self.places = FreePlaces(map, net, stream(seed, "traffic", "places"))
-        self.waiting: list[int] = []
+        self.waiting: list[int] = []  # enter when there is room
 
     def engage(self, i: int, lane: int, s: float, factor: float = 1.0) -> None:
         """Actor i drives itself from here on, along `lane`."""
@@ -77,6 +77,11 @@ class Traffic:
         self.drivers.trait["factor"][i] *= factor
         limit = self.setup.initial_limit_kmh
         me["cap"] = np.inf if limit is None else mps_from_kmh(limit)
+
+    def await_room(self, i: int, factor: float) -> None:
+        """Actor i enters as soon as there is a free place near the ego (A-209)."""
+        self.drivers.trait["factor"][i] *= factor
+        self.waiting.append(i)
 
     def release(self, i: int) -> None:
         """Actor i is moved by commands from here on."""

@@ -1,0 +1,108 @@
+"""The embedded simulator as a backend: the moving world, seen through the ego's sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from types import MappingProxyType
+
+from skidpad.core.errors import BackendError
+from skidpad.core.frames import Frame, SensorFrame
+from skidpad.core.geometry import Pose
+from skidpad.core.randomness import stream
+from skidpad.core.setup import ActorCommand, Setup
+from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
+from skidpad.roads.queries import RoadMap
+from skidpad.simulation.embedded.sensing import sensing_of
+from skidpad.simulation.embedded.world import EGO, World
+
+REVERSE = 4  # column of the commands
+
+
+class EmbeddedBackend:
+    """A world that advances one fixed step at a time (decision L-4).
+
+    poison: spoil the buffers of earlier frames, to find readers that keep them (decision X-11).
+    """
+
+    def __init__(self, poison: bool = False) -> None:
+        self.poison = poison
+        self._world: World | None = None
+
+    @property
+    def world(self) -> World:
+        """The run's world; BackendError before the first reset."""
+        if self._world is None:
+            raise BackendError("the embedded simulator was not reset, or was closed")
+        return self._world
+
+    @property
+    def map(self) -> RoadMap:
+        """The map of the run."""
+        return self.world.map
+
+    def reset(self, setup: Setup, seed: int) -> Frame:
+        """Begin a run: everything is built anew (decision X-12)."""
+        self._world = World(setup, seed)
+        self._localisation = stream(seed, "ego", "localisation")
+        self._sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
+        return self._frame()
+
+    def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
+        """Apply the commands for one step."""
+        self.world.step(command, actor_commands)
+        return self._frame()
+
+    def truth(self) -> WorldTruth:
+        """Ground truth of the moment."""
+        w = self.world
+        return WorldTruth(
+            tick=w.tick,
+            table=w.table,
+            states=w.states,
+            mu=w.mu,
+            commands=w.commands,
+            lights=w.lights.by_id,
+            contacts=w.contacts,
+            invasions=w.invasions,
+            notices=w.notices,
+        )
+
+    def relocate(self, pose: Pose, v: float) -> None:
+        """Put the ego at `pose` with speed v along it; its height follows from the road."""
+        self.world.relocate(pose, v)
+
+    def close(self) -> None:
+        """Forget the run."""
+        self._world = None
+
+    def _frame(self) -> SensorFrame:
+        w = self.world
+        seen = self._sensing.read(w.tick, w.states, w.lights.by_id, w.braking())
+        return SensorFrame(
+            tick=w.tick,
+            ego=self._estimate(),
+            images=seen.images,
+            segments=seen.segments,
+            radar=seen.radar,
+            lights=MappingProxyType(w.lights.by_id),
+            contacts=w.contacts,
+            invasions=w.invasions,
+        )
+
+    def _estimate(self) -> EgoEstimate:
+        w, s = self.world, self.world.states
+        pose = s.pose(EGO)
+        sigma = w.setup.localisation_noise
+        if sigma > 0.0:
+            dx, dy = self._localisation.normal(0.0, sigma, 2).tolist()
+            pose = replace(pose, x=pose.x + dx, y=pose.y + dy)
+        return EgoEstimate(
+            pose=pose,
+            speed=w.fleet.speed(EGO),
+            yaw_rate=float(s.yaw_rate[EGO]),
+            ax=float(s.ax[EGO]),
+            ay=float(s.ay[EGO]),
+            wheel_speeds=w.fleet.wheel_speeds(EGO),
+            gear=w.fleet.gear(EGO, bool(w.commands[EGO, REVERSE])),
+        )

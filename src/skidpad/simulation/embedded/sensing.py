@@ -1,0 +1,103 @@
+"""The ego's sensors at either level behind one call: the state of the world in, readings out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.frames import CameraImage, RadarPoints, Segments
+from skidpad.core.setup import Setup
+from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.vocabulary import LightState, SensorLevel
+from skidpad.roads.queries import RoadMap
+from skidpad.sensors.atmosphere import sensing_range
+from skidpad.sensors.objects import ObjectSuite
+from skidpad.sensors.suite import PixelSuite
+
+NO_IMAGES: Mapping[str, CameraImage] = {}
+NO_SEGMENTS: Mapping[str, Segments] = {}
+
+
+class Readings(NamedTuple):
+    """One tick of cameras and radar at either level."""
+
+    images: Mapping[str, CameraImage]
+    segments: Mapping[str, Segments]
+    radar: RadarPoints
+
+
+class Sensing(Protocol):
+    """What the engine asks of a suite."""
+
+    def read(
+        self,
+        tick: int,
+        states: ActorStates,
+        lights: Mapping[int, LightState],
+        braking: NDArray[np.bool_],
+    ) -> Readings:
+        """Readings of this state; valid until the next call (decision X-11)."""
+        ...
+
+
+class Pixels:
+    """Real images and radar points."""
+
+    def __init__(
+        self, map: RoadMap, table: ActorTable, setup: Setup, seed: int, poison: bool
+    ) -> None:
+        self.suite = PixelSuite(
+            map,
+            table,
+            setup.specs,
+            setup.weather,
+            range_model=setup.range_model,
+            seed=seed,
+            dt=setup.dt,
+            render_all=setup.render_all,
+            poison_old=poison,
+        )
+
+    def read(
+        self,
+        tick: int,
+        states: ActorStates,
+        lights: Mapping[int, LightState],
+        braking: NDArray[np.bool_],
+    ) -> Readings:
+        """Images are rendered when first read."""
+        seen = self.suite.observe(tick, states, lights, braking)
+        return Readings(seen.images, NO_SEGMENTS, seen.radar)
+
+
+class Objects:
+    """Geometric detection from boxes (decision M-3)."""
+
+    def __init__(self, map: RoadMap, table: ActorTable, setup: Setup, seed: int) -> None:
+        air = sensing_range(setup.weather, setup.range_model)
+        self.suite = ObjectSuite(
+            map.roadside, table, setup.specs, seed, setup.dt, limit=air.visual_range()
+        )
+
+    def read(
+        self,
+        tick: int,
+        states: ActorStates,
+        lights: Mapping[int, LightState],
+        braking: NDArray[np.bool_],
+    ) -> Readings:
+        """Segments of the depth cameras; lights and lamps play no part at this level."""
+        del lights, braking
+        return Readings(NO_IMAGES, self.suite.segments(states), self.suite.radar(tick, states))
+
+
+def sensing_of(
+    map: RoadMap, table: ActorTable, setup: Setup, seed: int, poison: bool = False
+) -> Sensing:
+    """The suite at the level of the set-up."""
+    if setup.level is SensorLevel.OBJECTS:
+        return Objects(map, table, setup, seed)
+    return Pixels(map, table, setup, seed, poison)

@@ -259,9 +259,9 @@ class Supervisor:
         return self.standing * self.dt >= self.settings.stuck_time
 
     def _has_reason(self, truth: WorldTruth, report: StackReport | None) -> bool:
-        """The stack says that it holds; one that says nothing is judged by what stands ahead."""
-        if report is not None and report.tier is not None:
-            return report.tier in HOLDING
+        """The stack says that it holds, or a vehicle or a red light stands ahead."""
+        if report is not None and report.tier in HOLDING:
+            return True
         ego = self._place(truth.states)
         if ego is None:
             return False

@@ -113,7 +113,7 @@ def _table(
     actors: Sequence[ActorSetup], vehicles: Sequence[VehicleType], shapes: Sequence[Shape]
 ) -> ActorTable:
     kinds = [t.actor_kind for t in vehicles] + [s.kind for s in shapes]
-    bodies = [*vehicles, *shapes]
+    bodies: list[VehicleType | Shape] = [*vehicles, *shapes]
     paint = [a.rgb or PALETTE[i % len(PALETTE)] for i, a in enumerate(actors)]
     return ActorTable(
         names=tuple(a.name for a in actors),

@@ -47,14 +47,10 @@ class Lights:
         if self.by_id and np.array_equal(state, self.by_row[self.rows]):
             return
         self.by_row[self.rows] = state
-        self.by_id = {
-            int(i): LightState(int(s)) for i, s in zip(self.ids, state, strict=True)
-        }
+        self.by_id = {int(i): LightState(int(s)) for i, s in zip(self.ids, state, strict=True)}
 
 
-def _offsets(
-    signals: SignalTable, rows: NDArray[np.intp], seed: int
-) -> NDArray[np.float64]:
+def _offsets(signals: SignalTable, rows: NDArray[np.intp], seed: int) -> NDArray[np.float64]:
     """Phase of each light row in s: one draw per group, axes of a group spread over the cycle."""
     offset = np.zeros(len(rows))
     axis = np.round((signals.heading[rows] % pi) / (pi / 4.0)).astype(np.int64) % 4

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from math import cos, sin
 
-import numpy as np
-
 from skidpad.core.states import ActorTable, ContactEvent, LaneInvasion
 from skidpad.physics.contact import Contacts
 from skidpad.roads.lanes import Marking
@@ -28,15 +26,18 @@ class ContactBook:
     def update(self, tick: int, contacts: Contacts, count: int) -> tuple[ContactEvent, ...]:
         """Contacts of the ego that began in this tick; the largest impulse speaks for each."""
         events: dict[tuple[int, int | str], ContactEvent] = {}
+        touched: set[tuple[int, int | str]] = set()
         for k in range(count):
+            if contacts.impulse[k] <= 0.0:
+                continue  # side by side, or parting already
             i, j = int(contacts.i[k]), int(contacts.j[k])
             static = self.names[int(contacts.segment[k])] if j < 0 else ""
             pair: tuple[int, int | str] = (i, static if j < 0 else j)
             began = tick - self.last.get(pair, -self.hold - 1) > self.hold
             if i != EGO:
-                self.background += int(began)
-            elif began or pair in events:
-                event = ContactEvent(
+                self.background += int(began and pair not in touched)
+            elif began and (pair not in events or contacts.impulse[k] > events[pair].impulse):
+                events[pair] = ContactEvent(
                     tick,
                     j,
                     static,
@@ -45,11 +46,8 @@ class ContactBook:
                     float(contacts.x[k]),
                     float(contacts.y[k]),
                 )
-                if pair not in events or event.impulse > events[pair].impulse:
-                    events[pair] = event
-            if pair not in events or i != EGO:
-                self.last[pair] = tick
-        for pair in events:
+            touched.add(pair)
+        for pair in touched:
             self.last[pair] = tick
         return tuple(events.values())
 
@@ -107,8 +105,3 @@ class MarkingWatch:
         if lane == int(self.map.lanes.right[self.lane]):
             return (right, False)
         return self.across  # the next lane of the same strip
-
-
-def no_contacts(contacts: Contacts, count: int) -> bool:
-    """None of the first `count` contacts concerns the ego."""
-    return not bool(np.any(contacts.i[:count] == EGO))

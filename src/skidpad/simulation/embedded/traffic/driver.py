@@ -108,18 +108,14 @@ def follower_acceleration(view: View, d: Drivers, j: int, gap: float, v_lead: fl
 
 
 @kernel
-def change_gain(
-    view: View, d: Drivers, i: int, lane: int, a_now: float, v_desired: float
-) -> float:
+def change_gain(view: View, d: Drivers, i: int, lane: int, a_now: float, v_desired: float) -> float:
     """MOBIL's advantage of moving to `lane` in m/s^2; -inf when it is not safe."""
     me, v = d.state[i], view.placed[i].speed
     s = occ_.beside(view.net, d.path[i, 0], me.s, lane)
     scratch = np.empty(4, dtype=np.int32)
     straight_path(view.net, lane, scratch)
     a_new, gap_ahead = acceleration_along(view, d, i, scratch, s, v_desired)
-    behind, gap_behind = occ_.find_behind(
-        view.net, view.occ, view.placed, lane, s, i, REACH_BEHIND
-    )
+    behind, gap_behind = occ_.find_behind(view.net, view.occ, view.placed, lane, s, i, REACH_BEHIND)
     a_behind = follower_acceleration(view, d, behind, gap_behind, v)
     if not is_safe(a_new, a_behind, gap_ahead, gap_behind):
         return -np.inf
@@ -136,7 +132,7 @@ def may_enter(view: View, d: Drivers, i: int, lane: int, left: bool) -> bool:
     if lane < 0 or view.net.lane[lane].kind != 0 or view.net.lane[lane].ahead < 0:
         return False  # LaneKind.DRIVING only: ramps are entered at forks
     here = view.net.point[d.state[i].at]
-    return (here.marking_left if left else here.marking_right) <= 1  # Marking.NONE, BROKEN
+    return bool((here.marking_left if left else here.marking_right) <= 1)  # Marking.NONE, BROKEN
 
 
 @kernel

@@ -1,7 +1,8 @@
 """Intelligent Driver Model: longitudinal acceleration behind a leader or alone.
 
 Source: Treiber and Kesting (2013), Traffic Flow Dynamics, eqs. 11.14, 11.15 (IDM) and 11.23
-(deceleration above the desired speed stays comfortable); parameters from table 11.2, highway.
+(deceleration above the desired speed stays comfortable); parameters of Kesting, Treiber, Helbing
+(2010), Enhanced intelligent driver model, table 1.
 """
 
 from __future__ import annotations
@@ -12,10 +13,10 @@ import numpy as np
 
 from skidpad.core.jit import kernel
 
-T_HEADWAY = 1.0  # s
+T_HEADWAY = 1.5  # s
 GAP_MIN = 2.0  # m
-A_MAX = 1.0  # m/s^2
-B_COMFORT = 1.5  # m/s^2
+A_MAX = 1.4  # m/s^2
+B_COMFORT = 2.0  # m/s^2
 A_EMERGENCY = -8.0  # m/s^2, the hardest braking that is asked of a car
 CURVE_G = 0.6 * 9.81  # m/s^2, lateral limit of CARLA's Traffic Manager (FRICTION x GRAVITY)
 
@@ -34,4 +35,3 @@ def idm(
     wanted = GAP_MIN + max(0.0, v * headway + v * (v - v_lead) / (2.0 * sqrt(a_max * B_COMFORT)))
     interaction = a_max * (wanted / max(gap, 0.1)) ** 2
     return max(A_EMERGENCY, free - interaction)
-

@@ -101,8 +101,9 @@ class Traffic:
             return
         driver = self.drivers.state
         if self.setup.put_wrecks_back:
-            for i in np.flatnonzero(driver["active"] & (driver["stuck"] > STUCK_TIME)):
-                yield from self._put(int(i), states, PUT_BACK_NEAREST, np.inf, True)
+            wrecks = np.flatnonzero(driver["active"] & (driver["stuck"] > STUCK_TIME))
+            for i in wrecks.tolist():
+                yield from self._put(i, states, PUT_BACK_NEAREST, np.inf, True)
         if self.setup.mode == "random":
             yield from self._keep_bubble(states)
 
@@ -113,9 +114,10 @@ class Traffic:
                 self.drivers.state["active"][i] = True
                 yield move
         x, y = float(states.x[0]), float(states.y[0])
-        for i in np.flatnonzero(self.drivers.state["active"] & states.present):
+        driving = self.drivers.state["active"] & states.present
+        for i in np.flatnonzero(driving).tolist():
             if hypot(states.x[i] - x, states.y[i] - y) > 1.2 * BUBBLE:
-                yield from self._put(int(i), states, BUBBLE_NEAREST, BUBBLE, False)
+                yield from self._put(i, states, BUBBLE_NEAREST, BUBBLE, False)
 
     def _put(
         self, i: int, states: ActorStates, nearest: float, farthest: float, wreck: bool

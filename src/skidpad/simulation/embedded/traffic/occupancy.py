@@ -80,7 +80,7 @@ def add(occ: Occupancy, actor: int, lane: int, s: float) -> None:
 @kernel
 def beside(net: Network, lane: int, s: float, other: int) -> float:
     """`s` on a neighbour lane of the same section: lanes of a section scale with their length."""
-    return s * net.lane[other].length / net.lane[lane].length
+    return float(s * net.lane[other].length / net.lane[lane].length)
 
 
 @kernel

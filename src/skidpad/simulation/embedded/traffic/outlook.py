@@ -62,7 +62,7 @@ def stop_gap(view: View, d: Drivers, i: int) -> float:
             if gap < -STOP_MARGIN or gap > REACH_LIGHT or light > 1:
                 continue  # passed, too far, or neither LightState.RED nor YELLOW
             if light == 0 or v * v <= 2.0 * YELLOW_BRAKE * max(gap, 0.0):
-                return max(gap, 0.1)
+                return float(max(gap, 0.1))
         start += lane.length
     return np.inf
 

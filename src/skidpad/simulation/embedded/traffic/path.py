@@ -39,10 +39,10 @@ def choose_branch(net: Network, lane: int, key: np.uint64, turn: int, free_choic
     """The lane to take after `lane`: the straightest, or one drawn per driver and turn."""
     here = net.lane[lane]
     if not free_choice or here.nexts < 2:
-        return here.ahead
+        return int(here.ahead)
     choice = net.next_lane[here.next_first + int(uniform(key, turn, 1) * here.nexts)]
     kind = net.lane[choice].kind
-    return choice if kind == 0 or kind == 7 else here.ahead  # LaneKind.DRIVING, RAMP
+    return int(choice if kind == 0 or kind == 7 else here.ahead)  # LaneKind.DRIVING, RAMP
 
 
 @kernel

@@ -43,7 +43,7 @@ def steer(view: View, d: Drivers, i: int) -> float:
     most = A_LATERAL_MAX / (v * v)
     kappa = min(max(kappa, -most), most)
     angle = atan(trait.wheelbase * kappa) + trait.understeer * v * v * kappa
-    return min(max(angle / (trait.steer_angle * steer_share(v)), -1.0), 1.0)
+    return float(min(max(angle / (trait.steer_angle * steer_share(v)), -1.0), 1.0))
 
 
 @kernel
@@ -56,7 +56,7 @@ def curvature_ahead(view: View, d: Drivers, i: int, distance: float) -> float:
         lane = view.net.lane[d.path[i, k]]
         if s <= lane.length:
             j = int(s / lane.length * (lane.size - 1))
-            return view.net.point[lane.first + max(j, 0)].curvature
+            return float(view.net.point[lane.first + max(j, 0)].curvature)
         s -= lane.length
     return 0.0
 

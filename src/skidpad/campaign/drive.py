@@ -1,0 +1,242 @@
+"""The one loop: world, supervisor, stack, log. Everything that Skidpad finds out begins here.
+
+    frame = backend.reset(setup, seed)
+    each tick:  phase   = supervisor.observe(truth)       who drives now: the stack, or recovery
+                command = stack.tick(frame)               it sees sensors only, never the truth
+                action  = supervisor.act(command)
+                log the moment, then step the world
+
+The log is the only result. Whatever is said about a drive later is computed from it.
+"""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from skidpad.campaign.cells import Cell, Driver
+from skidpad.campaign.snapshots import Snapshots
+from skidpad.core.errors import ConfigError, StackError
+from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
+from skidpad.core.states import WorldTruth
+from skidpad.core.vocabulary import Outcome, SensorLevel, Supervision
+from skidpad.core.weather import Weather
+from skidpad.physics.presets import find_weather
+from skidpad.physics.types import EGO_TYPE
+from skidpad.recording.events import NoticeSource, Relocation
+from skidpad.recording.runlog import LogHeader, RunLog
+from skidpad.recording.ticks import TickLog
+from skidpad.roads.bundled import load_map
+from skidpad.roads.queries import RoadMap
+from skidpad.sensors.twelve import twelve_sensors
+from skidpad.simulation.backend import Backend
+from skidpad.simulation.embedded.engine import EmbeddedBackend
+from skidpad.simulation.recovery import Action, Clearance, RecoverySettings, Supervisor
+from skidpad.stack import settings as options
+from skidpad.stack.adas import AdasStack
+from skidpad.stack.configurations import functions_of
+from skidpad.stack.interface import Stack
+from skidpad.stack.loading import GuardedStack, load_stack
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a drive leaves behind."""
+
+    log: RunLog
+    outcome: Outcome
+    error: str = ""  # traceback of a stack that failed
+    snapshots: tuple[Path, ...] = ()
+
+
+def drive(
+    stack: type[Stack] | str | int,
+    *,
+    map: str | Path = "figure8",
+    weather: str | Weather = "clear-noon",
+    seed: int = 0,
+    duration: float = 500.0,
+    traffic: str = "fixed",
+    vehicles: int = 20,
+    sensors: str = "pixels",
+    profile: str = "recommended",
+    settings: Mapping[str, Any] | None = None,
+    options: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+) -> Run:
+    """Drive a stack and return the log.
+
+    stack: a class with the stack interface, "module:Class", or 0 to 4 for a published
+    configuration. settings: single settings over the profile. options: what the class is given as
+    its settings. out: a folder for snapshots of collisions.
+    """
+    label, kind, functions = _named(stack)
+    cell = Cell(
+        driver=Driver(label=label, functions=functions, stack=label, options=dict(options or {})),
+        weather=find_weather(weather) if isinstance(weather, str) else weather,
+        seed=seed,
+        profile=profile,
+        settings=_load_settings(profile, settings),
+        map=str(map),
+        duration=duration,
+        traffic=traffic,
+        vehicles=vehicles,
+        level=SensorLevel(sensors),
+    )
+    return run_cell(cell, kind, folder=None if out is None else Path(out))
+
+
+def _named(stack: type[Stack] | str | int) -> tuple[str, type[Stack] | None, Any]:
+    if isinstance(stack, int):
+        return str(stack), None, functions_of(stack)
+    if isinstance(stack, str):
+        return stack, load_stack(stack), frozenset()
+    return f"{stack.__module__}:{stack.__qualname__}", stack, frozenset()
+
+
+def _load_settings(profile: str, settings: Mapping[str, Any] | None) -> options.Settings:
+    return options.load_profile(profile, settings)
+
+
+def run_cell(
+    cell: Cell,
+    kind: type[Stack] | None = None,
+    *,
+    backend: Backend | None = None,
+    folder: Path | None = None,
+) -> Run:
+    """Drive one cell of a campaign on `backend`, by default a fresh embedded simulator."""
+    backend = EmbeddedBackend() if backend is None else backend
+    map = load_map(cell.map)
+    setup = setup_of(cell, map)
+    header = LogHeader(map=map.name, map_hash=map.content_hash, dt=setup.dt, about=_about(cell))
+    try:
+        stack = stack_of(cell, kind, setup, map)
+        setup = replace(setup, specs=(*setup.specs, *stack.sensors()))
+    except StackError as error:
+        backend.reset(setup, cell.seed)
+        log = TickLog(backend.truth().table, header, cell.weather.name, 1)
+        return Run(log.finish(), Outcome.AGENT_ERROR, _story(error))
+    supervisor = Supervisor(map, recovery_settings(cell.settings), setup.dt)
+    snapshots = Snapshots(folder, cell.driver.label, cell.weather.name, setup.dt)
+    ticks = round(cell.duration / setup.dt)
+    try:
+        return _loop(backend, setup, cell, stack, supervisor, snapshots, header, ticks)
+    finally:
+        backend.close()
+
+
+def _loop(
+    backend: Backend,
+    setup: Setup,
+    cell: Cell,
+    stack: GuardedStack,
+    supervisor: Supervisor,
+    snapshots: Snapshots,
+    header: LogHeader,
+    ticks: int,
+) -> Run:
+    frame = backend.reset(setup, cell.seed)
+    truth = backend.truth()
+    log = TickLog(truth.table, header, cell.weather.name, ticks)
+    outcome, error = Outcome.COMPLETED, ""
+    for _ in range(ticks):
+        phase = supervisor.observe(truth)
+        if phase is not Supervision.NONE:
+            frame = replace(frame, supervision=phase)
+        try:
+            command = stack.tick(frame)
+        except StackError as failure:
+            outcome, error = Outcome.AGENT_ERROR, _story(failure)
+            log.notice(truth.tick, NoticeSource.STACK, str(failure))
+            break
+        action = supervisor.act(command, stack.report)
+        log.append(truth, frame, command, stack.report, phase)
+        if truth.contacts:
+            snapshots.take(frame)
+        _note(log, truth, action)
+        if action.relocate is not None:
+            backend.relocate(action.relocate.pose, action.relocate.v)
+        frame = backend.step(action.command)
+        truth = backend.truth()
+    return Run(log.finish(), outcome, error, tuple(snapshots.paths))
+
+
+def _note(log: TickLog, truth: WorldTruth, action: Action) -> None:
+    """Write down what supervisor and world did besides driving (A-194)."""
+    for text in truth.notices:
+        log.notice(truth.tick, NoticeSource.TRAFFIC, text)
+    if action.notice:
+        log.notice(truth.tick, NoticeSource.SUPERVISOR, action.notice)
+    if action.relocate is not None and action.relocate.moved is not None:
+        moved = action.relocate.moved
+        log.relocated(Relocation(truth.tick, moved.reason, moved.shift, moved.old, moved.new))
+
+
+def stack_of(cell: Cell, kind: type[Stack] | None, setup: Setup, map: RoadMap) -> GuardedStack:
+    """The cell's driver, built: ours with its functions and settings, or anybody's."""
+    driver = cell.driver
+    if kind is None and driver.stack is not None and ":" in driver.stack:
+        kind = load_stack(driver.stack)
+    if kind is not None:
+        return GuardedStack(kind, setup.specs, map, driver.options)
+    plain = {
+        "functions": sorted(f.value for f in driver.functions),
+        "profile": cell.profile,
+        "set": cell.settings.as_plain(),
+    }
+    return GuardedStack(AdasStack, setup.specs, map, plain)
+
+
+def setup_of(cell: Cell, map: RoadMap) -> Setup:
+    """The world of a cell."""
+    if map.ego_start is None:
+        raise ConfigError(f"map {map.name} names no place for the ego to start")
+    s = cell.settings
+    return Setup(
+        map=cell.map,
+        weather=cell.weather,
+        specs=twelve_sensors(bumper_depth_fov_deg=s.bumper_depth_fov_deg),
+        ego=ActorSetup(name="ego", type=EGO_TYPE, place=map.ego_start, driver="scripted"),
+        traffic=TrafficSetup(
+            mode=cell.traffic,
+            vehicles=cell.vehicles,
+            allow_fewer=cell.allow_fewer,
+            variant=s.traffic_positions.value,
+            initial_limit_kmh=s.initial_limit_kmh,
+            slow_in_weather=s.drivers,
+        ),
+        grip=s.grip,
+        range_model=s.range,
+        camera_effect=s.camera,
+        mu_ref=s.mu_ref,
+        level=cell.level,
+        render_all=cell.render_all,
+    )
+
+
+def recovery_settings(s: options.Settings) -> RecoverySettings:
+    """The supervisor's part of the settings (D-076, D-077, D-080)."""
+    listing = s.clearance is options.Clearance.LISTING
+    clearance = Clearance.LISTING if listing else Clearance.CHECKED
+    if s.relocation is options.Relocation.STANDING:
+        return RecoverySettings(warm_up=1.5, release_speed=0.0, clearance=clearance)
+    return RecoverySettings(clearance=clearance)
+
+
+def _about(cell: Cell) -> dict[str, str]:
+    return {
+        "config": cell.driver.label,
+        "weather": cell.weather.name,
+        "seed": str(cell.seed),
+        "profile": cell.profile,
+        "sensors": cell.level.value,
+    }
+
+
+def _story(error: StackError) -> str:
+    cause = error.__cause__ or error
+    return "".join(traceback.format_exception(cause)) + f"\n{error}"

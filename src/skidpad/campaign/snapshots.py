@@ -1,0 +1,50 @@
+"""One picture per collision: the view ahead, with the top view in its corner (A-257)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from skidpad.core.frames import SensorFrame
+from skidpad.recording.files import output_error
+
+FRONT, TOP = "rgb_front", "rgb_top"
+MARGIN = 12  # px
+FOLDER = "snapshots"
+
+
+class Snapshots:
+    """Writes PNG files named by configuration, weather and time; without a folder it does nothing."""
+
+    def __init__(self, folder: Path | None, driver: str, weather: str, dt: float) -> None:
+        self.folder = None if folder is None else folder / FOLDER
+        name = "".join(c if c.isalnum() else "-" for c in driver)
+        self.stem, self.dt = f"{name}_{weather}", dt
+        self.paths: list[Path] = []
+
+    def take(self, frame: SensorFrame) -> None:
+        """A picture of this moment, if there are cameras."""
+        if self.folder is None or FRONT not in frame.images:
+            return
+        front = frame.images[FRONT].rgb
+        if front is None:
+            return
+        picture = front.copy()
+        if TOP in frame.images and (top := frame.images[TOP].rgb) is not None:
+            _inset(picture, top)
+        path = self.folder / f"{self.stem}_{frame.tick * self.dt:07.2f}s.png"
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            Image.fromarray(picture).save(path, optimize=False, compress_level=3)
+        except OSError as error:
+            raise output_error(path, error) from error
+        self.paths.append(path)
+
+
+def _inset(picture: np.ndarray, small: np.ndarray) -> None:
+    """Put `small` into the upper right corner of `picture`, in place."""
+    h, w = small.shape[:2]
+    if h + MARGIN <= picture.shape[0] and w + MARGIN <= picture.shape[1]:
+        picture[MARGIN : MARGIN + h, -MARGIN - w : -MARGIN] = small

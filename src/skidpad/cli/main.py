@@ -6,6 +6,7 @@ import typer
 
 import skidpad
 from skidpad.cli.friction import friction
+from skidpad.cli.map import maps
 from skidpad.cli.profiles import profiles
 from skidpad.core.errors import InputError, SkidpadError
 
@@ -34,6 +35,7 @@ def _root(
 
 
 app.add_typer(profiles)
+app.add_typer(maps)
 app.command()(friction)
 
 

@@ -7,7 +7,7 @@ bridge, then the right loop. All bends have spirals; heights have level tangents
 from __future__ import annotations
 
 from itertools import pairwise
-from math import pi
+from math import pi, sin
 
 from scenariogeneration import xodr
 
@@ -28,9 +28,11 @@ from skidpad.roads.generate.paths import (
     Start,
     Straight,
     elements,
+    end,
     fitted,
     length,
 )
+from skidpad.roads.opendrive.reference_line import Element
 
 LANE = 3.5
 LANES = 4
@@ -39,6 +41,7 @@ MEDIAN = 1.0
 RIGHT_EDGE = -LANES * LANE - SHOULDER
 RAIL_LEFT, RAIL_RIGHT = MEDIAN + 0.3, RIGHT_EDGE - 0.3
 QUARTER = pi / 2
+ORIGIN = Start(0.0, 0.0, 0.0)
 
 EXIT_FROM, EXIT_TO = 60.0, 150.0  # m along the axis
 ENTRY_LENGTH = 90.0
@@ -80,7 +83,7 @@ def axis_pieces() -> list[Piece]:
         Straight(60.0),
         Bend(-QUARTER, 84.0, 50.0),  # innermost driving lane at R 71.75
     ]
-    return fitted(Start(0.0, 0.0, 0.0), pieces, (0, 6), (0.0, 0.0))
+    return fitted(ORIGIN, pieces, (0, 6), (0.0, 0.0))
 
 
 def knots(starts: list[float], total: float) -> Heights:
@@ -111,10 +114,10 @@ def network() -> Network:
     pieces = axis_pieces()
     starts = [length(pieces[:i]) for i in range(len(pieces) + 1)]
     total = starts[-1]
-    axis = elements(Start(0.0, 0.0, 0.0), pieces)
+    axis = elements(ORIGIN, pieces)
     heights = knots(starts, total)
     ramp = _ramp_pieces()
-    entry_from = EXIT_FROM + _shadow(ramp) - ENTRY_LENGTH
+    entry_from = EXIT_FROM + end(ORIGIN, ramp).x - ENTRY_LENGTH
     entry_to = entry_from + ENTRY_LENGTH
     cuts = [0.0, EXIT_FROM, EXIT_TO, entry_from, entry_to, *starts[2:7], *starts[8:11], total]
     lines = [starts[1] - LIGHT_BEFORE_BEND, starts[9] - 25.0]
@@ -144,7 +147,7 @@ def network() -> Network:
 
 
 def _main_roads(
-    axis: tuple[object, ...],
+    axis: tuple[Element, ...],
     heights: Heights,
     cuts: list[float],
     slow: list[tuple[float, float]],
@@ -155,7 +158,7 @@ def _main_roads(
     for i, (a, b) in enumerate(spans):
         road = stretch(
             ids[i],
-            axis,  # type: ignore[arg-type]
+            axis,
             heights,
             a,
             b,
@@ -185,28 +188,9 @@ def _limits(a: float, b: float, slow: list[tuple[float, float]]) -> list[tuple[f
 def _ramp_pieces() -> list[Piece]:
     """Away from the main road, parallel to it, and back."""
     away, back = Bend(-RAMP_ANGLE, *RAMP_BEND), Bend(RAMP_ANGLE, *RAMP_BEND)
-    shift = _end_y([away, Straight(1e-3), back])
-    slope = Straight((RAMP_OFFSET + shift) / _sine(RAMP_ANGLE))
+    shift = end(ORIGIN, [away, back]).y
+    slope = Straight((RAMP_OFFSET + shift) / sin(RAMP_ANGLE))
     return [away, slope, back, Straight(RAMP_STRAIGHT), back, slope, away]
-
-
-def _end_y(pieces: list[Piece]) -> float:
-    from skidpad.roads.generate.paths import end
-
-    return end(Start(0.0, 0.0, 0.0), pieces).y
-
-
-def _sine(angle: float) -> float:
-    from math import sin
-
-    return sin(angle)
-
-
-def _shadow(pieces: list[Piece]) -> float:
-    """Length of the ramp projected on the straight beside it."""
-    from skidpad.roads.generate.paths import end
-
-    return end(Start(0.0, 0.0, 0.0), pieces).x
 
 
 def _ramps(pieces: list[Piece], main: list[RoadSpec]) -> list[RoadSpec]:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
+from xml.etree.ElementTree import tostring
 
 from lxml import etree
 from scenariogeneration import xodr
 
-from skidpad.roads.generate.paths import Heights
+from skidpad.roads.generate.paths import Heights, cut
 from skidpad.roads.opendrive.reference_line import Clothoid, Element
 
 GEO_REFERENCE = (
@@ -83,7 +84,7 @@ class Network:
         for id, connections in self.junctions.items():
             document.add_junction(_junction(id, connections))
         # The writer uses the standard library's elements; lxml keeps the order of attributes too.
-        root = etree.fromstring(_serialised(document.get_element()))
+        root = etree.fromstring(tostring(document.get_element()))
         header = root.find("header")
         assert header is not None
         header.set("date", DATE)
@@ -97,13 +98,6 @@ class Network:
             root.insert(1 + len(self.roads) + position, node)
         etree.indent(root)
         return etree.tostring(root, xml_declaration=True, encoding="UTF-8") + b"\n"
-
-
-def _serialised(element: Any) -> bytes:
-    from xml.etree.ElementTree import tostring
-
-    text: bytes = tostring(element)
-    return text
 
 
 def _road(spec: RoadSpec, junctions: dict[int, list[Connection]]) -> xodr.Road:
@@ -177,6 +171,4 @@ def stretch(
     id: int, axis: tuple[Element, ...], heights: Heights, s_from: float, s_to: float, **rest: Any
 ) -> RoadSpec:
     """The road between two places of a long axis."""
-    from skidpad.roads.generate.paths import cut
-
     return RoadSpec(id, cut(axis, s_from, s_to), heights=heights.records(s_from, s_to), **rest)

@@ -8,6 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicHermiteSpline
 from scipy.special import fresnel
 
 Floats = NDArray[np.float64]
@@ -144,7 +145,8 @@ def _parametric(e: Element, shape: Parametric, ds: Floats) -> LinePoints:
     simpson = (speed[:-1] + 4.0 * speed_middle + speed[1:]) / 6.0 * np.diff(p_table)
     length_table = np.concatenate(([0.0], np.cumsum(simpson)))
     # The file's length decides, so that the element ends where the next one begins.
-    p = np.interp(ds * (length_table[-1] / e.length), length_table, p_table)
+    inverse = CubicHermiteSpline(length_table, p_table, 1.0 / np.maximum(speed, 1e-9))
+    p = inverse(ds * (length_table[-1] / e.length))
     u, v, du, dv, ddu, ddv, dddu, dddv = _derivatives(shape, p)
     v_norm = np.maximum(np.hypot(du, dv), 1e-9)
     cross = du * ddv - dv * ddu

@@ -1,0 +1,113 @@
+"""`skidpad map`: what maps there are, what is on them, and baking."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from skidpad.roads.queries import RoadMap
+    from skidpad.roads.summary import MapSummary
+
+maps = typer.Typer(name="map", help="Bundled and own maps.", no_args_is_help=True)
+
+SPEEDS_KMH = (80.0, 150.0)  # the matrix drives at 80, its limiter ends at 150
+BENDS_SHOWN = 20
+MAP = typer.Argument(help="Name of a bundled map, or an OpenDRIVE file.")
+FILE = typer.Argument(help="An OpenDRIVE file.")
+PNG = typer.Option(None, help="Also write a picture from above.")
+OUT = typer.Option(None, help="Where to write; default: beside it, as .npz.")
+
+
+@maps.command("list")
+def list_() -> None:
+    """Name the maps that come with Skidpad."""
+    from skidpad.roads.bundled import bundled_maps, load_map
+
+    for name in bundled_maps():
+        map = load_map(name)
+        driving = map.arrays.drivable == 1
+        typer.echo(f"{name}: {map.lanes.length[driving].sum() / 1000.0:.1f} km of driving lanes")
+
+
+@maps.command()
+def info(
+    map: str = MAP,
+    png: Path | None = PNG,
+) -> None:
+    """Print roads, lanes, signals, limits, and the grip that bends ask for."""
+    from skidpad.roads.bundled import load_map
+    from skidpad.roads.summary import summarise
+
+    loaded = load_map(map)
+    summary = summarise(loaded)
+    for line in _facts(loaded, summary):
+        typer.echo(line)
+    for line in _bends(summary):
+        typer.echo(line)
+    if summary.dead_ends:
+        ends = ", ".join(f"road {road} lane {lane}" for road, lane in summary.dead_ends[:10])
+        typer.echo(f"warning: {len(summary.dead_ends)} driving lanes lead nowhere: {ends}")
+    if png is not None:
+        from skidpad.roads.plan_view import draw
+
+        draw(loaded, png)
+        typer.echo(f"picture: {png}")
+
+
+@maps.command()
+def bake(
+    file: Path = FILE,
+    out: Path | None = OUT,
+) -> None:
+    """Turn an OpenDRIVE file into a baked map, which loads in milliseconds."""
+    from skidpad.roads.bundled import bake_file
+
+    baked = bake_file(file)
+    target = out or file.with_suffix(".npz")
+    baked.save(target)
+    typer.echo(f"{target}: {len(baked.samples.x)} samples, content hash {baked.content_hash()}")
+
+
+def _facts(map: RoadMap, summary: MapSummary) -> list[str]:
+    lengths = ", ".join(
+        f"{kind.name.lower()} {length / 1000.0:.2f} km"
+        for kind, length in summary.lane_length.items()
+    )
+    signals = ", ".join(
+        f"{count} {kind.name.lower().replace('_', ' ')}" for kind, count in summary.signals.items()
+    )
+    limits = ", ".join(f"{limit * 3.6:.0f}" for limit in summary.limits)
+    side = map.roadside
+    return [
+        f"map {map.name}, content hash {map.content_hash}",
+        f"{summary.roads} roads, {summary.lanes} lanes, {summary.junctions} junctions",
+        f"lanes: {lengths}",
+        f"signals: {signals or 'none'}",
+        f"limits in km/h: {limits or 'none given'}",
+        f"steepest grade: {100.0 * summary.steepest:.1f} %",
+        (
+            f"roadside: {len(side.barriers)} barriers, {len(side.boxes)} boxes, "
+            f"{len(side.heads)} light heads, {len(side.crosswalks)} crosswalks"
+        ),
+    ]
+
+
+def _bends(summary: MapSummary) -> list[str]:
+    if not summary.bends:
+        return ["no bend tighter than R 300 outside junctions"]
+    grips = "".join(f"  grip at {v:.0f} km/h" for v in SPEEDS_KMH)
+    lines = [f"{'road':>6} {'s from':>8} {'s to':>8} {'R':>7} {'limit':>6}{grips}"]
+    for bend in summary.bends[:BENDS_SHOWN]:
+        limit = "-" if bend.limit is None else f"{bend.limit * 3.6:.0f}"
+        needs = "".join(
+            f"{bend.grip(v / 3.6):>{len(f'  grip at {v:.0f} km/h')}.2f}" for v in SPEEDS_KMH
+        )
+        lines.append(
+            f"{bend.road:>6} {bend.s_from:>8.1f} {bend.s_to:>8.1f} {bend.radius:>7.1f} {limit:>6}{needs}"
+        )
+    if len(summary.bends) > BENDS_SHOWN:
+        lines.append(f"and {len(summary.bends) - BENDS_SHOWN} wider bends")
+    return lines

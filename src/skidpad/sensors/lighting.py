@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.lefthanded import mirrored
 from skidpad.core.weather import Weather
+from skidpad.physics.optics import extinction
 
 Colour = NDArray[np.float32]
 
@@ -39,8 +40,8 @@ class Lighting(NamedTuple):
     lamps: float  # strength of other vehicles' lamps, 0 by day
 
 
-def lighting(weather: Weather, extinction: float) -> Lighting:
-    """The light of a weather. extinction: 1/m, from the weather's rain and fog."""
+def lighting(weather: Weather) -> Lighting:
+    """The light of a weather."""
     altitude = radians(weather.sun_altitude_deg)
     azimuth = radians(mirrored(weather.sun_azimuth_deg))
     direction = np.array(
@@ -50,24 +51,25 @@ def lighting(weather: Weather, extinction: float) -> Lighting:
     high = _smooth(weather.sun_altitude_deg / 45.0)
     cloud = weather.cloudiness / 100.0
     clear = 1.0 - 0.94 * cloud
-    low_sun, noon_sun = np.array([1.05, 0.66, 0.36]), np.array([0.76, 0.73, 0.68])
+    low_sun, noon_sun = np.array([1.55, 0.98, 0.52]), np.array([0.76, 0.73, 0.68])
     sun = day * clear * (low_sun + high * (noon_sun - low_sun))
     blue, grey = np.array([0.24, 0.29, 0.37]), np.array([0.48, 0.49, 0.50])
     diffuse = blue + cloud * (grey - blue)
-    dusk = np.array([0.36, 0.31, 0.31]) + cloud * (np.array([0.34, 0.35, 0.37]) - 0.33)
+    dusk = _mix(np.array([0.48, 0.42, 0.44]), np.array([0.40, 0.36, 0.34]), cloud)
     sky = day * (dusk + high * (diffuse - dusk)) + (1.0 - day) * NIGHT_SKY_LIGHT
-    zenith = day * _mix(_mix(DAWN_ZENITH, DAY_ZENITH, high), OVERCAST, cloud)
-    horizon = day * _mix(_mix(DAWN_HORIZON, DAY_HORIZON, high), OVERCAST * 1.12, cloud)
+    grey_sky = _mix(DAWN_OVERCAST, OVERCAST, high)
+    zenith = day * _mix(_mix(DAWN_ZENITH, DAY_ZENITH, high), grey_sky, cloud)
+    horizon = day * _mix(_mix(DAWN_HORIZON, DAY_HORIZON, high), grey_sky * 1.12, cloud)
     night = 1.0 - day
     return Lighting(
         direction,
         sun.astype(np.float32),
         sky.astype(np.float32),
-        (0.45 * sky).astype(np.float32),
+        (0.62 * sky).astype(np.float32),
         (zenith + night * NIGHT_ZENITH).astype(np.float32),
         (horizon + night * NIGHT_HORIZON).astype(np.float32),
         float(day * clear * (0.35 if cloud > 0.5 else 1.0)),
-        extinction,
+        extinction(weather),
         weather.fog_distance if weather.fog_density > 0.0 else 0.0,
         max(weather.wetness, weather.precipitation_deposits) / 100.0,
         _smooth(weather.snow_depth_mm / 20.0),
@@ -78,7 +80,7 @@ def lighting(weather: Weather, extinction: float) -> Lighting:
 
 DAY_ZENITH, DAY_HORIZON = np.array([0.10, 0.26, 0.60]), np.array([0.48, 0.64, 0.82])
 DAWN_ZENITH, DAWN_HORIZON = np.array([0.16, 0.24, 0.46]), np.array([0.92, 0.60, 0.36])
-OVERCAST = np.array([0.40, 0.42, 0.45])
+OVERCAST, DAWN_OVERCAST = np.array([0.40, 0.42, 0.45]), np.array([0.36, 0.30, 0.27])
 NIGHT_SKY_LIGHT = np.array([0.010, 0.012, 0.018])
 NIGHT_ZENITH, NIGHT_HORIZON = np.array([0.002, 0.003, 0.008]), np.array([0.010, 0.012, 0.022])
 

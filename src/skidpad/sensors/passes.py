@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 from math import inf
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
 from skidpad.core.specs import CameraSpec
 from skidpad.sensors.rasteriser import BACKGROUND
 from skidpad.sensors.view import View
 
-PassKey = tuple[Pose, int, int, float, bool, float]
+
+class Sight(NamedTuple):
+    """How far along a ray the weather lets a camera see, in m."""
+
+    depth: float
+    labels: float
+
+
+UNLIMITED = Sight(inf, inf)
+LAND = 5000.0  # m; nothing is drawn further away, so a longer sight hides nothing
 
 
 class Pass:
     """Inverse depth and key of one view; `labels` and `instances` are views of the key."""
 
-    def __init__(self, camera: CameraSpec, sight: float = inf) -> None:
-        """sight: m along the ray beyond which nothing is seen."""
+    def __init__(self, camera: CameraSpec, sight: Sight = UNLIMITED) -> None:
         shape = (camera.height, camera.width)
         self.sight = sight
         self.stale = True
@@ -32,23 +39,35 @@ class Pass:
 
     def limit_sight(self, view: View) -> None:
         """Remove what the weather hides."""
-        if self.sight < inf:
-            hide_beyond(self.sight, view, self.inverse, self.key)
+        if min(self.sight) < LAND:
+            depth, labels = (np.float32(min(s, 10.0 * LAND)) for s in self.sight)
+            hide_beyond(depth, labels, view, self.inverse, self.key)
 
 
 @kernel
 def hide_beyond(
-    sight: float, view: View, inverse: NDArray[np.float32], key: NDArray[np.int32]
+    depth_sight: np.float32,
+    label_sight: np.float32,
+    view: View,
+    inverse: NDArray[np.float32],
+    key: NDArray[np.int32],
 ) -> None:
-    """Turn every pixel whose ray is longer than `sight` m into sky without depth."""
+    """Clear the depth, and turn the class to sky, of pixels whose ray is longer than the sight."""
     height, width = inverse.shape
+    start = np.float32((0.5 - view.cx) / view.focal)
+    step = np.float32(1.0 / view.focal)
+    none, one = np.float32(0.0), np.float32(1.0)
     for y in range(height):
-        v = (y + 0.5 - view.cy) / view.focal
+        v = np.float32((y + 0.5 - view.cy) / view.focal)
+        depths, keys = inverse[y], key[y]
         for x in range(width):
-            u = (x + 0.5 - view.cx) / view.focal
-            if inverse[y, x] * sight < np.sqrt(u * u + v * v + 1.0):
-                inverse[y, x] = np.float32(0.0)
-                key[y, x] = BACKGROUND
+            u = start + np.float32(x) * step
+            square = u * u + v * v + one
+            w = depths[x]
+            near = w * depth_sight
+            known = w * label_sight
+            depths[x] = w if near * near >= square else none
+            keys[x] = keys[x] if known * known >= square else BACKGROUND
 
 
 def poison(*buffers: NDArray[Any]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, log10, pi, radians, tan
+from math import ceil, pi, radians, tan
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ class Radar:
     """One radar with its own random stream; `measure` once per tick."""
 
     def __init__(self, spec: RadarSpec, seed: int, dt: float, range_limit: float) -> None:
-        """range_limit: m, what the weather leaves of the spec's range."""
+        """range_limit: m, what the weather leaves of the nominal range."""
         self.spec = spec
         self.range = min(spec.range, range_limit)
         self.rays_per_tick = max(1, round(spec.points_per_second * dt))
@@ -70,23 +70,6 @@ class Radar:
         cast(chunks, static_key, actors, 0, view, self.range, scratch, self._rays, self._hits)
         count = _returns(view, self._rays, self._hits, self.range, motion, actors, self._points)
         return RadarPoints(*(row[:count] for row in self._points))
-
-
-def range_in_rain(free_range: float, attenuation_db_per_m: float) -> float:
-    """Range in m at which the echo falls to what it is at `free_range` in clear air.
-
-    Radar equation: echo power falls with r^4 and with the two-way attenuation, so
-    40 log10(r / r0) + 2 gamma r = 0; solved by bisection.
-    """
-    low, high = 0.0, free_range
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        loss = 2.0 * attenuation_db_per_m * middle
-        if middle > 0.0 and 40.0 * log10(middle / free_range) + loss > 0.0:
-            high = middle
-        else:
-            low = middle
-    return high
 
 
 @kernel

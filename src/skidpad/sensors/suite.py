@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import inf
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -17,18 +16,21 @@ from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, RangeModel
 from skidpad.core.weather import Weather
+from skidpad.physics.optics import depth_range, label_range, radar_range
 from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.roadside import Roadside
-from skidpad.sensors.atmosphere import atmosphere, sensing_range
 from skidpad.sensors.crowd import make_actors, place_actors
+from skidpad.sensors.degradation import CameraNoise, degradation
 from skidpad.sensors.lighting import lighting
-from skidpad.sensors.passes import Pass, PassKey, poison
-from skidpad.sensors.radar import Radar, range_in_rain
+from skidpad.sensors.passes import UNLIMITED, Pass, Sight, poison
+from skidpad.sensors.perception_noise import PerceptionNoise
+from skidpad.sensors.radar import Radar
 from skidpad.sensors.rasteriser import AUTO_LEVEL, make_scratch, raster
 from skidpad.sensors.scene import StaticScene, build_scene
 from skidpad.sensors.shading import Shading
 from skidpad.sensors.view import camera_view
 
+NO_NOISE = PerceptionNoise()
 MAX_CLIMB = 8.0  # m/s; a faster change of height is a relocation, not motion
 
 
@@ -79,18 +81,27 @@ class PixelSuite:
         weather: Weather,
         *,
         range_model: RangeModel = RangeModel.NONE,
+        camera_effect: bool = True,
+        exclusive_stages: bool = False,
+        perception_noise: PerceptionNoise = NO_NOISE,
         seed: int = 0,
         dt: float = DT,
         render_all: bool = False,
         level: int = AUTO_LEVEL,
         poison_old: bool = False,
     ) -> None:
-        """level: one level of detail for all (tests); poison_old: spoil buffers that went stale."""
+        """Specs that are neither camera nor radar are somebody else's.
+
+        camera_effect: degrade RGB images (A-222, A-223). exclusive_stages: rain switches the night
+        stage off (D-094). level: one level of detail for all (tests). poison_old: spoil buffers
+        that went stale (tests).
+        """
         self.scene = scene_of(map)
         self.cameras = {s.id: s for s in specs if isinstance(s, CameraSpec)}
         self._render_all, self._level, self._poison_old = render_all, level, poison_old
-        self._dt = dt
-        air = sensing_range(weather, range_model)
+        self._dt, self._seed, self._noise = dt, seed, perception_noise
+        limited = range_model is RangeModel.PHYSICAL
+        sight = Sight(depth_range(weather), label_range(weather)) if limited else UNLIMITED
         self._actors = make_actors(table)
         self._static_key = self.scene.chunks.key.copy()
         largest = max(
@@ -98,22 +109,24 @@ class PixelSuite:
         )
         widest = max((c.width for c in self.cameras.values()), default=1)
         self._scratch = make_scratch(largest, widest)
-        self.shading = Shading(
-            self.scene.palette, table, lighting(weather, atmosphere(weather).extinction)
-        )
-        self._passes: dict[PassKey, Pass] = {}
+        self.shading = Shading(self.scene.palette, table, lighting(weather))
+        self._passes: dict[tuple[object, Sight], Pass] = {}
         self._pass_of: dict[str, Pass] = {}
         for camera in self.cameras.values():
-            sight = inf if camera.modality is Modality.RGB else air.visual_range()
-            key = (*camera.view, sight)
-            self._pass_of[camera.id] = self._passes.setdefault(key, Pass(camera, sight))
+            eye = UNLIMITED if camera.modality is Modality.RGB else sight
+            key = (camera.view, eye)
+            self._pass_of[camera.id] = self._passes.setdefault(key, Pass(camera, eye))
         self._rgb = {
             c.id: np.zeros((c.height, c.width, 3), dtype=np.uint8)
             for c in self.cameras.values()
             if c.modality is Modality.RGB
         }
+        effect = degradation(weather, exclusive=exclusive_stages)
+        self._degraded = (
+            {id: CameraNoise(id, seed, effect) for id in self._rgb} if camera_effect else {}
+        )
         self.radars = [
-            Radar(s, seed, dt, range_in_rain(s.range, air.radar_attenuation_db_per_m))
+            Radar(s, seed, dt, radar_range(weather, s.range) if limited else s.range)
             for s in specs
             if isinstance(s, RadarSpec)
         ]
@@ -167,13 +180,17 @@ class PixelSuite:
             one.limit_sight(view)
             one.stale = False
         if camera.modality is Modality.DEPTH:
-            return CameraImage(inverse_depth=one.inverse)
+            noisy = self._noise.on_depth(one.inverse, self._seed, id, self.tick)
+            return CameraImage(inverse_depth=noisy)
         if camera.modality is Modality.SEMANTIC:
-            return CameraImage(labels=one.labels)
+            labels = self._noise.on_labels(one.labels, self._seed, id, self.tick)
+            return CameraImage(labels=labels)
         if camera.modality is Modality.INSTANCE:
             return CameraImage(instances=one.instances)
         rgb = self._rgb[id]
         self.shading.paint(view, self._ego, one.inverse, one.key, rgb)
+        if id in self._degraded:
+            self._degraded[id].apply(self.tick, rgb)
         return CameraImage(rgb=rgb)
 
     def _move(self, states: ActorStates) -> None:

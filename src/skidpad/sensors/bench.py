@@ -1,0 +1,106 @@
+"""CPU time of each sensor stage on figure8 with 20 vehicles: for `skidpad bench sensors`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from statistics import median
+from time import process_time_ns
+
+import numpy as np
+
+from skidpad.core.specs import Modality
+from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.vocabulary import ActorKind, LightState, RangeModel
+from skidpad.physics.presets import preset
+from skidpad.roads.bundled import load_map
+from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.sensors.suite import PixelSuite
+from skidpad.sensors.twelve import twelve_sensors
+
+TICKS = 200
+STEP = 1.5  # m per tick: 30 m/s at 20 Hz
+SPEED = 30.0  # m/s
+# Distance from the ego in m, and lanes to its right: close to the published placement (A-202).
+PLACES = (
+    (25, 0), (40, 1), (55, -1), (70, 0), (90, 1), (110, -1), (130, 0), (150, 1), (175, -1),
+    (200, 0), (230, 1), (260, -1), (300, 0), (350, 1), (400, -1),
+    (-20, 1), (-35, 0), (-50, -1), (-70, 0), (-90, 1),
+)  # fmt: skip
+KINDS = (ActorKind.CAR, ActorKind.CAR, ActorKind.VAN, ActorKind.CAR, ActorKind.TRUCK)
+SIZES = {
+    ActorKind.CAR: (4.5, 1.85, 1.48),
+    ActorKind.VAN: (5.9, 2.0, 2.5),
+    ActorKind.TRUCK: (9.0, 2.5, 3.6),
+}
+EGO_SIZE = (3.876, 1.973, 1.475)  # m, the published ego's class of car
+PAINTS = ((196, 34, 38), (30, 70, 160), (232, 232, 230), (44, 46, 50), (180, 184, 188))
+
+
+def convoy(map: RoadMap, travelled: float = 0.0) -> tuple[ActorTable, ActorStates]:
+    """The ego and 20 vehicles around it, `travelled` m after the map's start."""
+    assert map.ego_start is not None, f"map {map.name} has no start for the ego"
+    at = map.ego_start
+    start = map.on_lane(at.road, at.lane, at.s)
+    ego = map.ahead(start, travelled + 1.0) or start
+    points = [ego, *(_place(map, ego, *place) for place in PLACES)]
+    kinds = [ActorKind.CAR, *(KINDS[i % len(KINDS)] for i in range(len(PLACES)))]
+    sizes = np.array([EGO_SIZE, *(SIZES[kind] for kind in kinds[1:])])
+    paint = np.array([PAINTS[i % len(PAINTS)] for i in range(len(points))], dtype=np.uint8)
+    table = ActorTable(
+        tuple(f"vehicle-{i}" for i in range(len(points))),
+        tuple(kind.name.lower() for kind in kinds),
+        np.array(kinds, dtype=np.uint8),
+        sizes[:, 0].copy(),
+        sizes[:, 1].copy(),
+        sizes[:, 2].copy(),
+        paint,
+    )
+    states = ActorStates.empty(len(points))
+    for i, point in enumerate(points):
+        states.x[i], states.y[i], states.z[i] = point.x, point.y, point.z
+        states.yaw[i] = point.heading
+        states.vx[i] = SPEED * np.cos(point.heading)
+        states.vy[i] = SPEED * np.sin(point.heading)
+    states.present[:] = True
+    return table, states
+
+
+def _place(map: RoadMap, ego: LanePoint, distance: float, lanes_right: int) -> LanePoint:
+    point = map.ahead(ego, distance) if distance >= 0 else map.behind(ego, -distance)
+    point = point or ego
+    side = map.right if lanes_right > 0 else map.left
+    return (side(point) or point) if lanes_right else point
+
+
+def run(ticks: int = TICKS, weather: str = "rain-night") -> dict[str, float]:
+    """Median CPU time in ms of each stage over single-shot ticks, kernels warm."""
+    map = load_map("figure8")
+    table, _ = convoy(map)
+    specs = twelve_sensors()
+    suite = PixelSuite(map, table, specs, preset(weather), range_model=RangeModel.PHYSICAL, seed=1)
+    frames = [convoy(map, STEP * 10 * k)[1] for k in range(ticks // 10)]
+    lights = dict.fromkeys({int(head.signal) for head in map.roadside.heads}, LightState.RED)
+    shared = {"semantic_roof", "semantic_bumper"}
+    stages = [s.id for s in specs if s.id in suite.cameras and s.id not in shared]
+    times: dict[str, list[float]] = {"observe_and_radar": [], **{id: [] for id in stages}}
+    for k in range(-2, ticks):
+        state = frames[max(k, 0) % len(frames)]
+        spent = {"observe_and_radar": _cpu_ms(partial(suite.observe, k, state, lights))}
+        for id in stages:
+            spent[id] = _cpu_ms(partial(suite.render, id))
+        if k >= 0:
+            for name, value in spent.items():
+                times[name].append(value)
+    result = {name: median(values) for name, values in times.items()}
+    core = ("observe_and_radar", "depth_roof", "depth_bumper")
+    rgb = [id for id in stages if suite.cameras[id].modality is Modality.RGB]
+    result["core"] = sum(result[name] for name in core)
+    result["all_images"] = result["core"] + sum(result[id] for id in rgb)
+    return result
+
+
+def _cpu_ms(work: Callable[[], object]) -> float:
+    begin = process_time_ns()
+    work()
+    return (process_time_ns() - begin) / 1e6

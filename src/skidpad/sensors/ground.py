@@ -7,6 +7,7 @@ elsewhere it is a smooth continuation. Decoration only: nothing drives on it.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import ceil, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,7 +20,8 @@ from skidpad.sensors.mesh import Mesh, quads
 from skidpad.sensors.roadmesh import CHUNK, LEVELS, ChunkKey
 
 CELL = 8.0  # m, resolution at which road heights are gathered
-FINE, COARSE = 2, 6  # cells per quad near and far: 16 m and 48 m
+FINE, COARSE = 2, 6  # cells per quad: 16 m, and 48 m where that is flat enough
+BULGE = (0.002, 0.002, 0.005, 0.03)  # m, what counts as flat at each level
 MARGIN = 4 * CHUNK  # m of terrain around the map
 APRON = 4000.0  # m, flat land beyond it, out to the horizon
 CLEARANCE = 0.3  # m below the lowest road in reach
@@ -29,16 +31,15 @@ Heights = NDArray[np.float64]
 def ground_pieces(samples: LaneSamples) -> Iterator[tuple[ChunkKey, list[Mesh]]]:
     """Terrain chunks on a grid of `CHUNK` m, and the apron around them."""
     x0, y0, nx, ny = _grid(samples)
-    lowest = _lowest_road(samples, x0, y0, nx, ny)
-    fine = _terrain(lowest, FINE)
-    coarse = _terrain(lowest, COARSE)
+    height = _terrain(_lowest_road(samples, x0, y0, nx, ny))
     for i in range(0, nx - 1, COARSE):
         for j in range(0, ny - 1, COARSE):
-            near = _tile(fine, x0, y0, i, j, FINE)
-            far = _tile(coarse, x0, y0, i, j, COARSE)
-            yield ("ground", i, j, 0), [near, near] + [far] * (LEVELS - 2)
+            bulge = _bulge(height[i : i + COARSE + 1, j : j + COARSE + 1])
+            strides = [COARSE if bulge < limit else FINE for limit in BULGE]
+            tiles = {stride: _tile(height, x0, y0, i, j, stride) for stride in set(strides)}
+            yield ("ground", i, j, 0), [tiles[stride] for stride in strides]
     x1, y1 = x0 + (nx - 1) * CELL, y0 + (ny - 1) * CELL
-    apron = _apron(x0, y0, x1, y1, float(coarse.min()))
+    apron = _apron(x0, y0, x1, y1, float(height.min()))
     yield ("apron", 0, 0, 0), [apron] * LEVELS
 
 
@@ -61,9 +62,9 @@ def _lowest_road(samples: LaneSamples, x0: float, y0: float, nx: int, ny: int) -
     return low
 
 
-def _terrain(lowest: Heights, stride: int) -> Heights:
-    """(nx, ny) heights such that quads of `stride` cells stay below every road."""
-    reach = int(np.ceil(stride * np.sqrt(2.0))) + 1  # a quad's diagonal, and the rounding
+def _terrain(lowest: Heights) -> Heights:
+    """(nx, ny) heights such that quads of `FINE` cells stay below every road."""
+    reach = ceil(FINE * sqrt(2.0)) + 1  # a quad's diagonal, and the rounding to nodes
     span = np.arange(-reach, reach + 1)
     disc = span[:, None] ** 2 + span[None, :] ** 2 <= reach**2
     near = ndimage.minimum_filter(lowest, footprint=disc, mode="nearest") - CLEARANCE
@@ -73,6 +74,17 @@ def _terrain(lowest: Heights, stride: int) -> Heights:
     smooth = ndimage.gaussian_filter(filled, 4.0, mode="nearest")
     terrain: Heights = np.where(bound, near, smooth)
     return terrain
+
+
+def _bulge(tile: Heights) -> float:
+    """Largest height in m by which a tile differs from the surface through its four corners."""
+    t = np.linspace(0.0, 1.0, len(tile))
+    a, b = t[:, None], t[None, :]
+    flat = (1 - a) * ((1 - b) * tile[0, 0] + b * tile[0, -1]) + a * (
+        (1 - b) * tile[-1, 0] + b * tile[-1, -1]
+    )
+    twist = abs(tile[0, 0] + tile[-1, -1] - tile[0, -1] - tile[-1, 0]) / 4.0
+    return float(np.abs(tile - flat).max() + twist)
 
 
 def _tile(height: Heights, x0: float, y0: float, i: int, j: int, stride: int) -> Mesh:

@@ -22,6 +22,7 @@ from skidpad.sensors.mesh import Mesh, Points, merge, patches, ribbon
 CHUNK = 48.0  # m
 CHORDS = (2.0, 4.0, 8.0, 24.0)  # m between cross-sections, by level
 LEVELS = len(CHORDS)
+DASHED_LEVELS = 2  # a dash beyond them is 0.4 px wide and a tenth of a pixel high
 MARKING_WIDTH = 0.15  # m, RMS part 1 (Germany), narrow line on motorways
 DASH, DASH_PERIOD = 6.0, 18.0  # m, RMS part 1: 6 m line, 12 m gap
 MARKING_LIFT = 0.015  # m above the asphalt, so that depth decides which is in front
@@ -163,6 +164,8 @@ def _painted(
     bounds = np.flatnonzero(np.diff(np.concatenate([[False], on, [False]]).astype(np.int8)))
     runs = bounds.reshape(-1, 2)
     runs[:, 1] = np.minimum(runs[:, 1], len(s) - 1)
+    if level >= DASHED_LEVELS:
+        return solid
     if level == 0:
         runs = np.array(
             [(i, min(i + 2, b)) for a, b in runs for i in range(a, b, 2)], dtype=np.intp

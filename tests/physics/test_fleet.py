@@ -274,3 +274,12 @@ def test_same_inputs_same_bytes():
         drive(f, 5.0, mu=0.3, steer=0.2, throttle=0.5)
         runs.append(b"".join(column.tobytes() for column in f.states))
     assert runs[0] == runs[1]
+
+
+def test_a_gentle_turn_hardly_depends_on_the_step():
+    ends = []
+    for substep in (0.001, 0.01):
+        f = fleet(20.0, substep=substep)
+        drive(f, 2.0, steer=0.05, throttle=0.2)
+        ends.append((f.states.y[0], f.states.yaw[0], f.states.yaw_rate[0]))
+    assert ends[1] == pytest.approx(ends[0], rel=0.03)

@@ -91,12 +91,13 @@ def candidates(s: Segments, x: float, y: float, reach: float, out: Ints) -> int:
                     continue
                 if min(s.y0[m], s.y1[m]) > y + reach or max(s.y0[m], s.y1[m]) < y - reach:
                     continue
-                known = False
-                for q in range(count):
-                    known = known or out[q] == m
-                if known or count >= out.shape[0]:
+                place = count
+                while place > 0 and out[place - 1] > m:
+                    place -= 1
+                if count >= out.shape[0] or (place > 0 and out[place - 1] == m):
                     continue
-                out[count] = m
+                for q in range(count, place, -1):
+                    out[q] = out[q - 1]
+                out[place] = m
                 count += 1
-    out[:count].sort()
     return count

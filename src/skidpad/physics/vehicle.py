@@ -11,7 +11,7 @@ and Vehicle Dynamics (2012), chapter 1.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, pi, sin, sqrt
+from math import cos, exp, pi, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -192,6 +192,7 @@ def _advance(
     weight = mass * G * cos(grade) * cos(bank)
     g_x, g_y = -G * sin(grade), -G * sin(bank)
     g_plane = mass * sqrt(g_x * g_x + g_y * g_y)
+    steer_lag, load_lag = 1.0 - exp(-h / STEER_TIME), 1.0 - exp(-h / LOAD_TIME)
     omega, slide, load = wheels.omega, wheels.slide, wheels.load
 
     yaw, r = states.yaw[i], states.yaw_rate[i]
@@ -207,7 +208,7 @@ def _advance(
         v = vy * c - vx * s
         speed = sqrt(u * u + v * v)
         target = steer_command * steer_share(speed)
-        turn = (target - wheels.steer[i]) * min(1.0, h / STEER_TIME)
+        turn = (target - wheels.steer[i]) * steer_lag
         turn_max = p.steer_rate[i] * h
         wheels.steer[i] += min(max(turn, -turn_max), turn_max)
         cd, sd = cos(wheels.steer[i]), sin(wheels.steer[i])
@@ -272,9 +273,8 @@ def _advance(
 
         a_x = (force_x - p.drag[i] * speed * u) / mass
         a_y = (force_y - p.drag[i] * speed * v) / mass
-        lag = h / (LOAD_TIME + h)
-        wheels.a_load[i, 0] += lag * (force_x / mass - wheels.a_load[i, 0])
-        wheels.a_load[i, 1] += lag * (force_y / mass - wheels.a_load[i, 1])
+        wheels.a_load[i, 0] += load_lag * (force_x / mass - wheels.a_load[i, 0])
+        wheels.a_load[i, 1] += load_lag * (force_y / mass - wheels.a_load[i, 1])
         a_x += g_x
         a_y += g_y
         vx += h * (a_x * c - a_y * s)

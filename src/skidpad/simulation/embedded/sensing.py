@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from skidpad.core.frames import CameraImage, RadarPoints, Segments
 from skidpad.core.setup import Setup
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import LightState, SensorLevel
+from skidpad.core.vocabulary import LightState, RangeModel, SensorLevel
+from skidpad.physics.optics import label_range
 from skidpad.roads.queries import RoadMap
-from skidpad.sensors.atmosphere import sensing_range
 from skidpad.sensors.objects import ObjectSuite
 from skidpad.sensors.suite import PixelSuite
 
@@ -77,9 +77,14 @@ class Objects:
     """Geometric detection from boxes (decision M-3)."""
 
     def __init__(self, map: RoadMap, table: ActorTable, setup: Setup, seed: int) -> None:
-        air = sensing_range(setup.weather, setup.range_model)
+        physical = setup.range_model is RangeModel.PHYSICAL
         self.suite = ObjectSuite(
-            map.roadside, table, setup.specs, seed, setup.dt, limit=air.visual_range()
+            map.roadside,
+            table,
+            setup.specs,
+            seed,
+            setup.dt,
+            limit=label_range(setup.weather) if physical else None,
         )
 
     def read(

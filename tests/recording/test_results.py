@@ -99,6 +99,7 @@ def test_rows_come_back_sorted_and_null_stays_null(tmp_path: Path) -> None:
     assert pl.read_csv(tmp_path / "results.csv")["fatal_collisions"].to_list() == [None, 3]
 
 
+@pytest.mark.req("A-261")
 def test_wall_times_do_not_touch_the_hash(tmp_path: Path) -> None:
     rows = [(key(), Metrics(fatal_collisions=3))]
     slow = Timing(config="1", weather="rain-noon", seed=0, wall_s=506.22, cpu_s=8.0, rtf=0.99)

@@ -10,7 +10,7 @@ TEST_ARGS ?=
 .PHONY: run test check bench refs clean
 
 run: $(VENV)/.installed
-	$(BIN)/skidpad adas --out $(OUT) --resume $(RUN_ARGS)
+	$(BIN)/skidpad adas --out $(OUT) --resume --or-next $(RUN_ARGS)
 
 test: $(VENV)/.tested-with
 	$(BIN)/python -m pytest -n 2 $(TEST_ARGS)

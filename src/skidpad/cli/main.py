@@ -5,6 +5,8 @@ from __future__ import annotations
 import typer
 
 import skidpad
+from skidpad.cli.adas import adas, report, show
+from skidpad.cli.compare import compare
 from skidpad.cli.friction import friction
 from skidpad.cli.map import maps
 from skidpad.cli.profiles import profiles
@@ -34,6 +36,10 @@ def _root(
     """A proving ground for driving automation in bad weather."""
 
 
+app.command()(adas)
+app.command()(report)
+app.command()(compare)
+app.command()(show)
 app.add_typer(profiles)
 app.add_typer(maps)
 app.command()(friction)

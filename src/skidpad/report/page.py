@@ -19,7 +19,7 @@ class Cell:
 
     text: str
     sort: float | str | None = None
-    note: str = ""  # small second line, such as an interval
+    note: str = ""  # small lines below, such as an interval
     heat: float | None = None  # 0..1, shade of the background
     kind: str = ""  # "good", "bad", "muted", "published"
     href: str = ""
@@ -119,6 +119,7 @@ class Cards:
     title: str
     cards: Sequence[Card]
     open: bool = False
+    link: str = ""  # where there is more, called `note`
     note: str = ""
     kind: str = "cards"
 

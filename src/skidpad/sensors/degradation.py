@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,13 +64,14 @@ def glass_mask(height: int, width: int, pillar: bool) -> NDArray[np.int32]:
 
     The pillar keeps pixels with y > (h_p / w_p) x + (0.85 H - h_p), x < w_p and y < 0.85 H.
     """
-    y, x = np.mgrid[0:height, 0:width]
+    first = np.zeros(height, dtype=np.int32)
     bottom = GLASS_ROWS * height
-    w, h = PILLAR_WIDTH * width, PILLAR_HEIGHT * height
-    clean = y >= bottom
+    first[ceil(bottom) :] = width
     if pillar:
-        clean |= (y > (h / w) * x + (bottom - h)) & (x < w)
-    first: NDArray[np.int32] = clean.sum(axis=1).astype(np.int32)
+        w, h = PILLAR_WIDTH * width, PILLAR_HEIGHT * height
+        for y in range(ceil(bottom)):
+            edge = (y - (bottom - h)) * w / h  # columns left of it are pillar
+            first[y] = max(0, ceil(min(edge, w)))
     first.setflags(write=False)
     return first
 

@@ -1,0 +1,103 @@
+"""`skidpad adas`: drive the ADAS-in-weather matrix and write its report."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def adas(
+    out: Annotated[Path, typer.Option(help="Folder for results and report.")],
+    configs: Annotated[
+        str | None, typer.Option(help="Published configurations, e.g. 0,1,4; default all five.")
+    ] = None,
+    functions: Annotated[
+        str | None, typer.Option(help="Any set of aeb,acc,lca,tla,resume,limiter.")
+    ] = None,
+    stack: Annotated[
+        str | None, typer.Option(help="Your own stack: module:Class or file.py:Class.")
+    ] = None,
+    weather: Annotated[
+        str, typer.Option(help="all, or presets and YAML files parted by commas.")
+    ] = "all",
+    sweep: Annotated[
+        str | None, typer.Option(help="Vary one weather field: FIELD=A:B:STEP.")
+    ] = None,
+    grip: Annotated[
+        str | None, typer.Option(help="none, statistical or physical; default: the profile's.")
+    ] = None,
+    range: Annotated[
+        str | None, typer.Option(help="none or physical; default: the profile's.")
+    ] = None,
+    seeds: Annotated[int, typer.Option(help="Runs per cell.")] = 1,
+    duration: Annotated[float, typer.Option(help="Simulated seconds per run.")] = 500.0,
+    profile: Annotated[
+        str, typer.Option(help="recommended, thesis_text, thesis_listing or preliminary.")
+    ] = "recommended",
+    set: Annotated[
+        list[str] | None, typer.Option(help="Single settings over the profile: name=value.")
+    ] = None,
+    map: Annotated[
+        str, typer.Option(help="A bundled map's name, or an OpenDRIVE file.")
+    ] = "figure8",
+    traffic: Annotated[str, typer.Option(help="fixed or random.")] = "fixed",
+    vehicles: Annotated[int, typer.Option(help="Background vehicles, 0 to 80.")] = 20,
+    sensors: Annotated[
+        str, typer.Option(help="pixels: real images; objects: from boxes, much faster.")
+    ] = "pixels",
+    render: Annotated[
+        str, typer.Option(help="needed: images that something reads; all: every image.")
+    ] = "needed",
+    workers: Annotated[
+        int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
+    ] = os.cpu_count() or 1,
+    resume: Annotated[bool, typer.Option("--resume", help="Finish a campaign.")] = False,
+    or_next: Annotated[
+        bool, typer.Option("--or-next", help="If OUT holds another campaign, use OUT-2, OUT-3, ...")
+    ] = False,
+    csv: Annotated[bool, typer.Option("--csv", help="Write CSV beside Parquet.")] = False,
+) -> None:
+    """Drive configurations x weathers x seeds; prints the path of the report."""
+    from skidpad.cli.adas_plan import Wish, drive_with_progress, next_folder, plan, warn
+    from skidpad.report.matrix import write_report
+
+    cells = plan(
+        Wish(
+            configs=configs,
+            functions=functions,
+            stack=stack,
+            weather=weather,
+            sweep=sweep,
+            grip=grip,
+            range=range,
+            seeds=seeds,
+            duration=duration,
+            profile=profile,
+            assignments=set or [],
+            map=map,
+            traffic=traffic,
+            vehicles=vehicles,
+            sensors=sensors,
+            render=render,
+        )
+    )
+    folder = next_folder(out, cells) if or_next else out
+    warn(drive_with_progress(cells, folder, workers=workers, resume=resume, csv=csv))
+    typer.echo(write_report(folder))
+
+
+def report(folder: Annotated[Path, typer.Argument(help="A campaign's folder.")]) -> None:
+    """Write the report of a campaign again, from what it left behind."""
+    from skidpad.report.matrix import write_report
+
+    typer.echo(write_report(folder))
+
+
+def show(run: Annotated[Path, typer.Argument(help="A run's folder.")]) -> None:
+    """Print one run: what it was, what it came to, and its crashes."""
+    from skidpad.cli.show import show as print_run
+
+    print_run(run)

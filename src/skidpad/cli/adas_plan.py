@@ -1,0 +1,151 @@
+"""From the options of `skidpad adas` to cells, and driving them under a progress bar."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from skidpad.campaign.cells import (
+    DURATION,
+    Cell,
+    Driver,
+    cross,
+    identity,
+    published_drivers,
+    sweep,
+)
+from skidpad.campaign.matrix import Summary, run_matrix
+from skidpad.core.errors import ConfigError, require_choice, require_range
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.weather import Weather
+from skidpad.physics.presets import MATRIX, find_weather, preset_groups
+from skidpad.recording.ledger import Entry, FolderState, folder_state
+from skidpad.roads.bundled import load_map
+from skidpad.stack.configurations import parse_functions
+from skidpad.stack.loading import load_stack
+from skidpad.stack.settings import load_profile, parse_assignments
+
+console = Console(stderr=True)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Wish:
+    """What the user asked for, as text and numbers from the command line."""
+
+    configs: str | None = None
+    functions: str | None = None
+    stack: str | None = None
+    weather: str = "all"
+    sweep: str | None = None
+    grip: str | None = None
+    range: str | None = None
+    seeds: int = 1
+    duration: float = DURATION
+    profile: str = "recommended"
+    assignments: Sequence[str] = ()
+    map: str = "figure8"
+    traffic: str = "fixed"
+    vehicles: int = 20
+    sensors: str = "pixels"
+    render: str = "needed"
+
+
+def plan(wish: Wish) -> list[Cell]:
+    """The cells of a campaign; ConfigError or FileError for what cannot be driven."""
+    values = parse_assignments(wish.assignments)
+    for name, value in (("grip", wish.grip), ("range", wish.range)):
+        if value is not None:
+            values |= parse_assignments([f"{name}={value}"])
+    climate = weathers(wish.weather)
+    if wish.sweep is not None:
+        climate = sweep(climate, wish.sweep)
+    drivers = _drivers(wish)
+    require_range("--duration", wish.duration, 1.0, 100_000.0)
+    require_range("--vehicles", wish.vehicles, 0, 80)
+    load_map(wish.map)
+    template = Cell(
+        driver=drivers[0],
+        weather=climate[0],
+        seed=0,
+        profile=wish.profile,
+        settings=load_profile(wish.profile, values),
+        map=wish.map,
+        duration=wish.duration,
+        traffic=require_choice("--traffic", wish.traffic, ("fixed", "random")),
+        vehicles=wish.vehicles,
+        level=SensorLevel(require_choice("--sensors", wish.sensors, ("pixels", "objects"))),
+        render_all=require_choice("--render", wish.render, ("needed", "all")) == "all",
+    )
+    return cross(drivers, climate, wish.seeds, template)
+
+
+def warn(summary: Summary) -> None:
+    """Say what a reader of the report should know first."""
+    if summary.mixed_machines:
+        console.print("[yellow]runs of different machines or versions: bytes may differ[/]")
+    if summary.failed:
+        console.print(f"[yellow]{summary.failed} runs crashed or timed out; see the report[/]")
+
+
+def drive_with_progress(
+    cells: list[Cell], folder: Path, *, workers: int, resume: bool, csv: bool
+) -> Summary:
+    """Run the campaign under a progress bar with the time left."""
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=console) as progress:
+        task = progress.add_task("driving", total=len(cells))
+
+        def on_run(entry: Entry) -> None:
+            fatal = entry.metrics.fatal_collisions
+            told = entry.key.outcome if fatal is None else f"{fatal} collisions"
+            progress.update(task, advance=1, description=f"{entry.run}: {told}")
+
+        try:
+            summary = run_matrix(
+                cells, folder, workers=workers, resume=resume, csv=csv, on_run=on_run
+            )
+        except KeyboardInterrupt:
+            console.print(f"interrupted; what is done is kept: --out {folder} --resume finishes it")
+            raise SystemExit(130) from None
+        progress.update(task, completed=len(cells), description=f"{summary.runs} runs")
+    return summary
+
+
+def next_folder(out: Path, cells: list[Cell]) -> Path:
+    """`out`, or the first of out-2, out-3, ... that is empty or holds this campaign (M-18)."""
+    wanted = identity(cells)
+    folder, n = out, 1
+    while folder_state(folder, wanted) is FolderState.OTHER:
+        n += 1
+        folder = out.with_name(f"{out.name}-{n}")
+    return folder
+
+
+def weathers(text: str) -> list[Weather]:
+    """`all` is the six published presets; else names or YAML files, parted by commas."""
+    if text == "all":
+        return list(preset_groups()[MATRIX].values())
+    return [find_weather(part.strip()) for part in text.split(",")]
+
+
+def _drivers(wish: Wish) -> list[Driver]:
+    given = [v for v in (wish.configs, wish.functions, wish.stack) if v is not None]
+    if len(given) > 1:
+        raise ConfigError("give one of --configs, --functions and --stack, not several")
+    if wish.functions is not None:
+        chosen = parse_functions(wish.functions)
+        label = "+".join(sorted(f.value for f in chosen)) or "none"
+        return [Driver(label=label, functions=chosen)]
+    if wish.stack is not None:
+        load_stack(wish.stack)  # a stack that is not there is wrong input, not a run's outcome
+        return [Driver(label=wish.stack, stack=wish.stack)]
+    return published_drivers(wish.configs or "all")

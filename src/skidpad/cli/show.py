@@ -1,0 +1,45 @@
+"""`skidpad show RUN_DIR`: one run in the terminal: what it was, what it came to, and its crashes."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+from rich.console import Console
+from rich.table import Table
+
+from skidpad.evidence.metrics.collisions import find_crashes
+from skidpad.evidence.metrics.drive import prepare
+from skidpad.evidence.metrics.run import run_metrics
+from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.results import definitions
+from skidpad.report.cards import chain, headline
+from skidpad.roads.bundled import load_map
+
+
+def show(run: Path) -> None:
+    """Print it."""
+    log = read_log(run)
+    road_map = load_map(log.header.map)
+    console = Console()
+    console.print(f"[bold]{run.name}[/] on {log.header.map}, {len(log) * log.header.dt:g} s")
+    for name, value in log.header.about.items():
+        console.print(f"  {name}: {value}")
+    console.print(f"  content hash: {log_hash(log)}")
+    if road_map.content_hash != log.header.map_hash:
+        console.print("[yellow]the map has changed since this run: lanes may not match[/]")
+    meanings = {name: meaning for name, meaning, _ in definitions()}
+    table = Table("metric", "value", "meaning", box=None, pad_edge=False)
+    for name, value in asdict(run_metrics(log, road_map)).items():
+        table.add_row(name, _text(value), meanings[name])
+    console.print(table)
+    for crash in find_crashes(prepare(log, road_map)):
+        console.print(f"\n[bold]{crash.t:.2f} s: {headline(crash)}[/]")
+        for line in chain(crash):
+            console.print(f"  {line}")
+
+
+def _text(value: float | None) -> str:
+    if value is None:
+        return "-"
+    return f"{value:g}" if isinstance(value, int) else f"{value:.3f}"

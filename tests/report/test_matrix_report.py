@@ -1,0 +1,113 @@
+import re
+
+import numpy as np
+import pytest
+
+from skidpad.recording.results import Metrics, RunKey, Timing, write_results
+from skidpad.report.matrix import build_page, write_report
+from skidpad.report.matrix_data import WEATHERS, load_matrix
+
+RATES = {"0": 3.0, "1": 0.5, "2": 1.0, "3": 1.5, "4": 0.0}
+
+
+def key(config, weather, seed, outcome="completed", log_hash=None):
+    kind, time = weather.split("-")
+    return RunKey(
+        config=config,
+        weather=weather,
+        precipitation_kind=kind,
+        time_of_day=time,
+        seed=seed,
+        profile="recommended",
+        map="figure8",
+        sensors="objects",
+        grip="physical",
+        range="physical",
+        outcome=outcome,
+        version="0",
+        log_hash=log_hash or f"{config}{weather}{seed}",
+    )
+
+
+def campaign(folder, seeds=3, **changes):
+    rng = np.random.default_rng(1)
+    rows, timing = [], []
+    for config, rate in RATES.items():
+        for weather in WEATHERS:
+            for seed in range(1, seeds + 1):
+                n = int(rng.poisson(rate))
+                values = {
+                    "fatal_collisions": n,
+                    "collisions_vehicle": n,
+                    "collisions_static": 0,
+                    "wrong_way": 0,
+                    "contacts": n,
+                    "rear_ended": 0,
+                    "bend_exits": 0,
+                    "stuck_relocations": 0,
+                    "lane_invasions": int(rng.poisson(1)),
+                    "dropout_pct": float(rng.uniform(5, 12)),
+                    "mean_error_m": float(rng.uniform(1, 4)),
+                    "headway_variance_m2": float(rng.uniform(10, 90)),
+                    "radar_fpr_pct": 50.0,
+                    "mean_speed_kmh": float(rng.normal(50, 3)),
+                    "p95_speed_kmh": 90.0,
+                    "bend_speed_kmh": 70.0,
+                    "ttc_below_1_5_s": 3.0,
+                    "distance_km": 7.0,
+                    "duration_s": 500.0,
+                }
+                rows.append((key(config, weather, seed, **changes), Metrics(**values)))
+                timing.append(
+                    Timing(config=config, weather=weather, seed=seed, wall_s=9, cpu_s=8, rtf=55)
+                )
+    write_results(folder, rows, timing)
+    return rows
+
+
+@pytest.mark.req("A-258", "A-259")
+def test_the_report_has_every_section_and_no_link_to_the_network(tmp_path):
+    campaign(tmp_path)
+    html = write_report(tmp_path).read_text()
+    for title in ("Collisions", "Findings of the sources, judged", "All metrics", "Definitions"):
+        assert f">{title}</h2>" in html
+    assert html.count("<svg") >= 6
+    assert "published 6" in html  # configuration 0, clear sunrise
+    assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
+    assert len(html) < 15e6
+
+
+def test_counts_in_the_matrix_are_those_of_the_results(tmp_path):
+    rows = campaign(tmp_path)
+    matrix = load_matrix(tmp_path)
+    for config in RATES:
+        for weather in WEATHERS:
+            counts = [
+                m.fatal_collisions for k, m in rows if (k.config, k.weather) == (config, weather)
+            ]
+            assert matrix.rate("fatal_collisions", config, weather).events == sum(counts)
+
+
+def test_equal_drives_are_named_and_count_once(tmp_path):
+    rows = [
+        (key("1", weather, 1, log_hash="same"), Metrics(fatal_collisions=2, distance_km=7.0))
+        for weather in ("clear-noon", "rain-noon")
+    ]
+    write_results(tmp_path, rows)
+    matrix = load_matrix(tmp_path)
+    assert matrix.same_weather == [("1", ["clear-noon", "rain-noon"])]
+    assert matrix.rate("fatal_collisions", "1").events == 2
+
+
+def test_runs_that_did_not_finish_are_said_and_left_out(tmp_path):
+    rows = [
+        (key("1", "clear-noon", 1), Metrics(fatal_collisions=2, distance_km=7.0, duration_s=500)),
+        (key("1", "clear-noon", 2, outcome="crashed"), Metrics()),
+    ]
+    write_results(tmp_path, rows)
+    matrix = load_matrix(tmp_path)
+    assert matrix.rate("fatal_collisions", "1", "clear-noon").runs == 1
+    page = build_page(matrix, tmp_path)
+    assert any(
+        "1 of 2 runs did not finish" in getattr(b, "text", "") for b in page.sections[0].blocks
+    )

@@ -3,6 +3,7 @@ from __future__ import annotations
 import dataclasses
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +23,7 @@ from skidpad.evidence.metrics.lanematch import LaneIndex
 from skidpad.evidence.metrics.lateral import count_invasions
 from skidpad.evidence.metrics.run import run_metrics, weather_metrics
 from skidpad.recording.events import Relocation
+from skidpad.recording.logfiles import read_log, write_log
 from skidpad.recording.results import Metrics
 from skidpad.recording.runlog import RunLog
 from skidpad.recording.ticks import TickLog
@@ -481,6 +483,16 @@ def test_metrics_per_weather_add_up_to_those_of_the_run() -> None:
 @pytest.mark.req("A-251")
 def test_an_empty_log_has_complete_metrics() -> None:
     assert metrics(drive(0, lambda _k: [{}])).samples == 0
+
+
+@pytest.mark.req("A-260")
+def test_a_stored_run_has_the_metrics_of_the_drive(tmp_path: Path) -> None:
+    log = crash(hit(), seen_from=5)
+    write_log(tmp_path, log)
+    assert metrics(read_log(tmp_path)) == metrics(log)
+    assert find_crashes(prepare(read_log(tmp_path), straight_map())) == find_crashes(
+        prepare(log, straight_map())
+    )
 
 
 @settings(max_examples=20)

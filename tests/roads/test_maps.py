@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from math import hypot, pi
+from math import cos, hypot, pi, sin
 
 import numpy as np
 import pytest
 
-from skidpad.core.geometry import wrap_angle
+from skidpad.core.geometry import footprint, wrap_angle
 from skidpad.roads.bundled import FOLDER, bake_file, load_map
 from skidpad.roads.generate.__main__ import MAPS
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.roads.routing import shortest_route
 
 
 def start(map: RoadMap) -> LanePoint:
@@ -111,3 +112,98 @@ def test_straight_has_three_lanes_per_direction() -> None:
     assert east.heading == pytest.approx(0.0)
     assert abs(west.heading) == pytest.approx(pi)
     assert map.ahead(east, 900.0) is None
+
+
+@pytest.fixture(scope="module", params=sorted(MAPS))
+def map(request: pytest.FixtureRequest) -> RoadMap:
+    return load_map(request.param)
+
+
+def test_every_lane_begins_where_its_predecessors_end(map: RoadMap) -> None:
+    for lane in range(len(map.lanes.road)):
+        end = map.at(lane, float(map.lanes.length[lane]))
+        for following in map.successors(lane):
+            begin = map.at(following, 0.0)
+            assert hypot(begin.x - end.x, begin.y - end.y, begin.z - end.z) < 1e-3
+            assert abs(wrap_angle(begin.heading - end.heading)) < 1e-4
+            assert begin.width == pytest.approx(end.width)
+
+
+def test_nothing_solid_stands_on_a_lane(map: RoadMap) -> None:
+    points = [tuple(p) for barrier in map.roadside.barriers for p in barrier.points.tolist()]
+    for box in map.roadside.boxes:
+        if box.z < 5.0 or abs(box.z - 9.6) < 1.0:  # not the beams above the road
+            corners = footprint(box.x, box.y, box.yaw, box.length, box.width)
+            points += [(x, y, box.z) for x, y in corners.tolist()]
+    assert points
+    for x, y, z in points:
+        place = map.project(x, y, z)
+        if place is not None and abs(place.z - z) < 4.0:
+            along = (x - place.x) * cos(place.heading) + (y - place.y) * sin(place.heading)
+            beyond_the_end = abs(along) > 0.5
+            assert beyond_the_end or abs(place.offset) > 0.5 * place.width + 0.1
+
+
+def test_samples_are_at_most_a_metre_apart_and_end_exactly(map: RoadMap) -> None:
+    same = np.diff(map.samples.lane) == 0
+    steps = np.diff(map.samples.s)[same]
+    assert steps.max() <= 1.0
+    assert steps.min() > 0.0
+    last = map.lanes.first + map.lanes.size - 1
+    assert np.array_equal(map.samples.s[last], map.lanes.length)
+    assert not map.samples.s[map.lanes.first].any()
+
+
+def test_town_has_what_the_decision_lists() -> None:
+    map = load_map("town")
+    kinds = {k: len(set(map.signals.id[map.signals.kind == k].tolist())) for k in SignalKind}
+    assert kinds[SignalKind.LIGHT] == 4
+    assert kinds[SignalKind.STOP] == 4
+    assert kinds[SignalKind.YIELD] == 3
+    groups = map.signals.group[map.signals.kind == SignalKind.LIGHT]
+    assert sorted(groups.tolist()) == [5001, 5001, 5002, 5002]
+    assert len(map.roadside.crosswalks) == 4
+    assert len(map.roadside.parking) == 20
+    assert len(np.unique(map.lanes.junction[map.lanes.junction >= 0])) == 5 + 4 + 2
+    ring = [i for i in range(len(map.lanes.road)) if map.lanes.road[i] in (20, 201, 22, 203, 24)]
+    lengths = [map.lanes.length[i] for i in ring if map.lanes.lane_id[i] == -1]
+    assert sum(lengths) == pytest.approx(2000.0, abs=60.0)
+    assert {round(3.6 * float(map.limit(map.at(i, 1.0)) or 0.0)) for i in ring[:2]} == {80}
+
+
+def test_in_town_every_street_can_be_reached_from_every_other() -> None:
+    map = load_map("town")
+    driving = np.flatnonzero(map.arrays.drivable).tolist()
+    streets = [i for i in driving if map.lanes.junction[i] < 0]
+    hub = map.at(streets[0], 5.0)
+    for lane in streets[::3]:
+        there = map.at(lane, 1.0)
+        out, back = shortest_route(map, hub, there), shortest_route(map, there, hub)
+        assert out is not None
+        assert back is not None
+        assert out.lanes[-1] == lane
+        assert back.lanes[-1] == hub.lane
+
+
+def test_at_the_signalled_crossing_the_line_comes_before_zebra_and_light() -> None:
+    map = load_map("town")
+    for row in np.flatnonzero(map.signals.kind == SignalKind.LIGHT).tolist():
+        lane, s = int(map.signals.lane[row]), float(map.signals.s[row])
+        line = map.at(lane, s)
+        zebra = min(
+            np.hypot(*(walk[:, :2].mean(axis=0) - (line.x, line.y)))
+            for walk in map.roadside.crosswalks
+        )
+        to_head = (map.signals.x[row] - line.x) * cos(line.heading) + (
+            map.signals.y[row] - line.y
+        ) * sin(line.heading)
+        assert 2.0 < zebra < to_head < float(map.lanes.length[lane]) - s
+        assert abs(wrap_angle(map.signals.heading[row] - line.heading)) < 1e-6
+
+
+def test_in_the_roundabout_traffic_turns_left() -> None:
+    map = load_map("town")
+    for lane in np.flatnonzero(map.arrays.drivable).tolist():
+        if map.lanes.junction[lane] < 0 and map.lanes.length[lane] < 20.0:
+            place = map.at(lane, 1.0)
+            assert place.curvature == pytest.approx(1.0 / 18.0, rel=1e-3)

@@ -15,9 +15,16 @@ from numpy.typing import NDArray
 from skidpad.core.errors import FileError
 from skidpad.core.setup import LanePosition
 from skidpad.roads.lanes import LaneSamples, LaneTable, SignalTable
-from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside, SignalHead
+from skidpad.roads.roadside import (
+    Barrier,
+    BarrierKind,
+    Box,
+    ParkingSpace,
+    Roadside,
+    SignalHead,
+)
 
-FORMAT = 1  # of the baked file; raise it when columns change
+FORMAT = 2  # of the baked file; raise it when columns change
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +123,9 @@ def _roadside_arrays(roadside: Roadside) -> dict[str, NDArray[Any]]:
         ).reshape(-1, 6),
         "crosswalks.points": np.concatenate([np.empty((0, 3)), *areas]),
         "crosswalks.sizes": np.array([len(p) for p in areas], dtype=np.int32),
+        "parking": np.array(
+            [[p.x, p.y, p.z, p.yaw, p.length, p.width] for p in roadside.parking], dtype=np.float64
+        ).reshape(-1, 6),
     }
 
 
@@ -138,6 +148,7 @@ def _roadside(arrays: dict[str, NDArray[Any]]) -> Roadside:
             for signal, x, y, z, heading, diameter in arrays["heads"].tolist()
         ),
         crosswalks=tuple(_split(arrays, "crosswalks")),
+        parking=tuple(ParkingSpace(*row) for row in arrays["parking"].tolist()),
     )
 
 

@@ -39,6 +39,9 @@ def draw(map: RoadMap, path: Path) -> None:
         axes.fill(corners[:, 0], corners[:, 1], color=tuple(c / 255 for c in box.rgb))
     for walk in map.roadside.crosswalks:
         axes.fill(walk[:, 0], walk[:, 1], color="white", alpha=0.8)
+    for space in map.roadside.parking:
+        corners = footprint(space.x, space.y, space.yaw, space.length, space.width)
+        axes.fill(corners[:, 0], corners[:, 1], fill=False, ec="white", lw=0.5)
     _signals(axes, map)
     if map.ego_start is not None:
         ego = map.place(map.ego_start)

@@ -56,6 +56,18 @@ class SignalHead:
 
 
 @dataclass(frozen=True, slots=True)
+class ParkingSpace:
+    """A place for one parked car."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+    length: float
+    width: float
+
+
+@dataclass(frozen=True, slots=True)
 class Roadside:
     """All of it for one map."""
 
@@ -63,3 +75,4 @@ class Roadside:
     boxes: tuple[Box, ...] = ()
     heads: tuple[SignalHead, ...] = ()
     crosswalks: tuple[NDArray[np.float64], ...] = ()  # (k, 3) polygons
+    parking: tuple[ParkingSpace, ...] = ()

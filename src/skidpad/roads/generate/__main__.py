@@ -6,9 +6,9 @@ import sys
 from pathlib import Path
 
 from skidpad.roads.bundled import FOLDER, bake_file
-from skidpad.roads.generate import figure8, straight
+from skidpad.roads.generate import figure8, straight, town
 
-MAPS = {"figure8": figure8.network, "straight": straight.network}
+MAPS = {"figure8": figure8.network, "straight": straight.network, "town": town.network}
 
 
 def write(folder: Path) -> None:

@@ -248,7 +248,10 @@ def _furnish(
     for from_, to in slow:
         for s, value in ((from_, SLOW), (to % cuts[-1], FAST)):
             road, s_road = _on(main, cuts, s)
-            for t in (RAIL_LEFT + 0.5, RAIL_RIGHT - 0.5):
+            sides = [RAIL_LEFT + 0.5]
+            if road.junction < 0:  # there the ramp runs where the right sign would stand
+                sides.append(RAIL_RIGHT - 0.5)
+            for t in sides:
                 sign(road, ids, s_road, t, type_="274", lanes=ALL, value=value)
     for s in (EXIT_FROM - 40.0, cuts[5] + 150.0, cuts[8] + 20.0):
         road, s_road = _on(main, cuts, s)

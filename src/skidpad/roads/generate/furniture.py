@@ -134,3 +134,38 @@ def light(
     )  # fmt: skip
     signal.add_validity(*lanes)
     road.signals.append(signal)
+
+
+def _outlined(
+    road: RoadSpec,
+    ids: Numbers,
+    type_: xodr.ObjectType,
+    s: float,
+    t: float,
+    size: tuple[float, float],
+) -> None:
+    """A flat rectangle; size is along and across the road."""
+    length, width = size
+    thing = xodr.Object(
+        s, t, Type=type_, id=ids.take(), name=type_.name, length=length, width=width, height=0.0
+    )
+    outline = xodr.Outline(closed=True)
+    for number, (u, v) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
+        corner = xodr.CornerLocal(u * length / 2, v * width / 2, 0.0, 0.0, id=number)
+        outline.add_corner(corner)
+    thing.add_outline(outline)
+    road.objects.append(thing)
+
+
+def crosswalk(
+    road: RoadSpec, ids: Numbers, s: float, t: float, length: float, width: float
+) -> None:
+    """A zebra across the road, `length` m along it."""
+    _outlined(road, ids, xodr.ObjectType.crosswalk, s, t, (length, width))
+
+
+def parking_space(
+    road: RoadSpec, ids: Numbers, s: float, t: float, length: float, width: float
+) -> None:
+    """A place for one parked car, parallel to the road."""
+    _outlined(road, ids, xodr.ObjectType.parkingSpace, s, t, (length, width))

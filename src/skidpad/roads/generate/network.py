@@ -41,6 +41,7 @@ class RoadSpec:
     right: Sequence[LaneSpec] = ()
     heights: Sequence[tuple[float, ...]] = ()
     centre_mark: xodr.RoadMarkType = Mark.solid
+    lane_offset: float = 0.0  # m, shifts all lanes; half a lane's width puts the axis in its centre
     limits_kmh: Sequence[tuple[float, float]] = ()  # (s, limit) as road type records
     junction: int = -1
     predecessor: tuple[int, str] | None = None  # (road, "start" or "end"), or (junction, "")
@@ -151,6 +152,8 @@ def _lanes(spec: RoadSpec) -> xodr.Lanes:
                     written.add_link(kind, linked or side * i)
             add(written)
     lanes_ = xodr.Lanes()
+    if spec.lane_offset:
+        lanes_.add_laneoffset(xodr.LaneOffset(0.0, spec.lane_offset, 0.0, 0.0, 0.0))
     lanes_.add_lanesection(section)
     return lanes_
 

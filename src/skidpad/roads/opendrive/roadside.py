@@ -12,7 +12,7 @@ from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import SignalTable
 from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
 from skidpad.roads.opendrive.signals import road_place, signal_heads
-from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside
+from skidpad.roads.roadside import Barrier, BarrierKind, Box, ParkingSpace, Roadside
 
 Floats = NDArray[np.float64]
 
@@ -55,6 +55,7 @@ def roadside(document: Document, signals: SignalTable) -> Roadside:
     barriers: list[Barrier] = []
     boxes: list[Box] = []
     crosswalks: list[Floats] = []
+    parking: list[ParkingSpace] = []
     for road in document.roads.values():
         for node in road.objects:
             type_ = node.get("type", "none")
@@ -63,10 +64,16 @@ def roadside(document: Document, signals: SignalTable) -> Roadside:
                 barriers += _barriers(read, road, node, barrier)
             elif type_ == "crosswalk":
                 crosswalks += [np.round(p, 5) for p in _outlines(read, road, node)]
+            elif type_ == "parkingSpace":
+                parking.append(_parking(read, road, node))
             elif type_ in LABELS:
                 boxes += _boxes(read, road, node, type_)
     return Roadside(
-        tuple(barriers), tuple(boxes), signal_heads(document, signals), tuple(crosswalks)
+        tuple(barriers),
+        tuple(boxes),
+        signal_heads(document, signals),
+        tuple(crosswalks),
+        tuple(parking),
     )
 
 
@@ -175,6 +182,18 @@ def _boxes(read: Reader, road: RoadRecord, node: Node, type_: str) -> list[Box]:
         x, y, z, yaw = (round(v, 5) for v in (place.x, place.y, place.z, yaw))
         boxes.append(Box(int(label), x, y, z, yaw, length, width, height, rgb=rgb))
     return boxes
+
+
+def _parking(read: Reader, road: RoadRecord, node: Node) -> ParkingSpace:
+    place = road_place(
+        road, read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
+    )
+    yaw = place.heading + read.number(node, "hdg", 0.0)
+    numbers = (place.x, place.y, place.z, yaw)
+    x, y, z, yaw = (round(v, 5) for v in numbers)
+    return ParkingSpace(
+        x, y, z, yaw, read.number(node, "length", 5.0), read.number(node, "width", 2.0)
+    )
 
 
 def _places(read: Reader, node: Node) -> Iterator[tuple[float, float, float]]:

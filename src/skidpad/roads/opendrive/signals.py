@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from skidpad.core.geometry import wrap_angle
 from skidpad.roads.lanes import SignalKind, SignalTable
 from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
 from skidpad.roads.opendrive.lane_shapes import LaneKey, LaneShape
@@ -197,7 +198,7 @@ def _along(shape: LaneShape, s_road: float) -> float:
 
 
 def _heading(shape: LaneShape, s: float) -> float:
-    return float(np.interp(s, shape.s, shape.heading))
+    return wrap_angle(float(np.interp(s, shape.s, shape.heading)))
 
 
 def _stop_lines(

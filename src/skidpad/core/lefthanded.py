@@ -63,6 +63,11 @@ def turns_to_carla(x: Floats, y: Floats, z: Floats) -> Floats:
     return np.column_stack((x, -y, -z))
 
 
+def angles_to_carla(angle: Floats) -> Floats:
+    """(n,) azimuths in rad."""
+    return -angle
+
+
 def mirrored(value: float) -> float:
     """A steer, azimuth, yaw rate, lateral offset, curvature or y, in either direction."""
     return -value

@@ -121,9 +121,11 @@ def blocked(world: World, actor: Actor) -> bool:
 
 
 def _enlist(world: World, actor: Actor) -> None:
-    """Enter it in the tables of its family."""
-    world.add(actor)
+    """Enter it in the tables of its family; a sensor that cannot work is refused first."""
     family = actor.family
+    if family is Family.SENSOR:
+        world.sensors.add(actor)
+    world.add(actor)
     if family is Family.VEHICLE:
         world.vehicles.add(actor.id, actor.blueprint, actor.pose)
         world.refresh_for_new_vehicle()
@@ -132,7 +134,6 @@ def _enlist(world: World, actor: Actor) -> None:
     elif family is Family.SENSOR:
         if actor.blueprint.id not in NO_STREAM:
             actor.stream = world.hub.create()
-        world.sensors.add(actor)
     elif family is Family.GRIP:
         world.sky.set_ice(float(actor.attributes["ice_thickness"]))
 

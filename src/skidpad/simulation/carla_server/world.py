@@ -112,7 +112,6 @@ class World:
         self.lights = LightControl(served.roads)
         self.ground = Ground.of(0)
         self.contacts.begin(served.roads)
-        self.sensors.begin(served.roads)
         place_map_actors(self)
         self.spectator = spectator(self)
         self.vehicles.set_step(self.episode.settings.step)

@@ -32,7 +32,7 @@ def collision(world: World, sensor: Sensor) -> Messages:
         return []
     messages: Messages = []
     for touch in world.contacts.events:
-        if touch.actor == carrier.id:
+        if touch.actor == carrier.id and any(touch.impulse):
             other = _touched(world, touch.other, touch.label)
             impulse = list(wire.iso_to_wire(touch.impulse))
             messages.append((codec.pack([carrier.packed(), other.packed(), impulse]),))

@@ -65,7 +65,8 @@ def compass(pose: Pose) -> float:
 def gnss(world: World, sensor: Sensor) -> list[tuple[bytes | memoryview, ...]]:
     """Latitude and longitude in deg, altitude in m."""
     pose = world.pose(sensor.actor)
-    latitude, longitude = geolocation(pose.x, pose.y, *world.map.origin)
+    x, y, _ = vector_from_carla(pose.x, pose.y, pose.z)
+    latitude, longitude = geolocation(x, y, *world.map.origin)
     noise, n = sensor.rng.standard_normal(3), sensor.number
     values = [
         v + n(f"noise_{name}_bias") + noise[k] * n(f"noise_{name}_stddev")
@@ -75,9 +76,10 @@ def gnss(world: World, sensor: Sensor) -> list[tuple[bytes | memoryview, ...]]:
 
 
 def geolocation(x: float, y: float, latitude: float, longitude: float) -> tuple[float, float]:
-    """(latitude, longitude) in deg of a place east x and north y of a map's origin, m.
+    """(latitude, longitude) in deg of a place x, y in CARLA's axes from a map's origin, m.
 
-    Mercator scaled at the origin, which is what the client's own map computes.
+    Mercator scaled at the origin, as the client's own map computes it: latitude grows with
+    CARLA's y, although the IMU's north is its -y.
     """
     scale = EARTH_RADIUS * cos(radians(latitude))
     east = scale * radians(longitude) + x

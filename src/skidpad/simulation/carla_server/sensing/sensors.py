@@ -10,10 +10,10 @@ import numpy as np
 
 from skidpad.core.randomness import stream
 from skidpad.physics.vehicle import G
-from skidpad.roads.queries import RoadMap
 from skidpad.simulation.carla_server import snapshot, wire
 from skidpad.simulation.carla_server.actors import Actor
-from skidpad.simulation.carla_server.sensing import events, inertial
+from skidpad.simulation.carla_server.sensing import events, images, inertial, points
+from skidpad.simulation.carla_server.sensing.scene import Scene, visible
 from skidpad.simulation.carla_server.snapshot import SensorType
 
 if TYPE_CHECKING:
@@ -42,6 +42,13 @@ class Sensor:
 
 
 PRODUCERS: dict[str, tuple[SensorType, Produce]] = {
+    "sensor.camera.rgb": (SensorType.RGB, images.image),
+    "sensor.camera.depth": (SensorType.DEPTH, images.image),
+    "sensor.camera.semantic_segmentation": (SensorType.SEMANTIC, images.image),
+    "sensor.camera.instance_segmentation": (SensorType.INSTANCE, images.image),
+    "sensor.other.radar": (SensorType.RADAR, points.radar),
+    "sensor.lidar.ray_cast": (SensorType.LIDAR, points.lidar),
+    "sensor.lidar.ray_cast_semantic": (SensorType.SEMANTIC_LIDAR, points.lidar),
     "sensor.other.imu": (SensorType.IMU, inertial.imu),
     "sensor.other.gnss": (SensorType.GNSS, inertial.gnss),
     "sensor.other.collision": (SensorType.COLLISION, events.collision),
@@ -56,11 +63,14 @@ class SensorSet:
         self._seed = seed
         self._sensors: dict[int, Sensor] = {}
         self.gravity = G  # m/s^2, as set by clients
-        self.roads: RoadMap | None = None
+        self._scene: Scene | None = None
 
-    def begin(self, roads: RoadMap) -> None:
-        """Another map."""
-        self.roads = roads
+    def scene(self, world: World) -> Scene:
+        """What sensors see in the world's frame."""
+        if self._scene is None or self._scene.members != visible(world):
+            self._scene = Scene(world)
+        self._scene.update(world)
+        return self._scene
 
     def add(self, actor: Actor) -> None:
         """A new sensor; kinds that we cannot produce stay silent (listed in the coverage table)."""
@@ -70,15 +80,27 @@ class SensorSet:
         noise_seed = actor.attributes.get("noise_seed", "0")
         rng = stream(self._seed, "carla_server", actor.blueprint.id, actor.id, noise_seed)
         period = float(actor.attributes.get("sensor_tick", "0"))
-        self._sensors[actor.id] = Sensor(actor, entry[0], entry[1], period, rng)
+        state = self._equip(actor)
+        self._sensors[actor.id] = Sensor(actor, entry[0], entry[1], period, rng, state=state)
+
+    def _equip(self, actor: Actor) -> Any:
+        """What a producer needs, from the attributes; an error when they cannot be used."""
+        if actor.blueprint.id in images.MODALITIES:
+            return images.make_camera(actor)
+        if actor.blueprint.id == "sensor.other.radar":
+            return points.make_radar(actor, self._seed)
+        if actor.blueprint.id.startswith("sensor.lidar"):
+            return points.make_lidar(actor)
+        return None
 
     def forget(self, id: int) -> None:
         """It is gone."""
         self._sensors.pop(id, None)
 
     def clear(self) -> None:
-        """All are gone."""
+        """All are gone, and the map with them."""
         self._sensors.clear()
+        self._scene = None
 
     def produce(self, world: World) -> None:
         """One tick of every sensor that is due and listened to."""
@@ -87,7 +109,8 @@ class SensorSet:
             number = sensor.actor.stream
             if number is None or not world.hub.wanted(number) or time < sensor.due - EARLY:
                 continue
-            sensor.due = max(sensor.due + sensor.period, time)
+            later = sensor.due + sensor.period
+            sensor.due = later if later > time + EARLY else time + sensor.period
             for message in sensor.produce(world, sensor):
                 world.hub.publish(number, head(world, sensor), *message)
 

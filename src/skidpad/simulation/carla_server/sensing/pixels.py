@@ -1,0 +1,58 @@
+"""Images as CARLA's clients decode them: BGRA, depth in 24 bits, tags in red."""
+
+from __future__ import annotations
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import kernel
+
+Bytes = NDArray[np.uint8]
+DEPTH_RANGE = 1000.0  # m
+DEPTH_STEPS = 256.0**3 - 1.0
+
+
+def bgra_from_rgb(rgb: Bytes, out: Bytes) -> None:
+    """(H, W, 3) red, green, blue into (H, W, 4)."""
+    cv2.cvtColor(rgb, cv2.COLOR_RGB2BGRA, dst=out)
+
+
+@kernel
+def bgra_from_depth(inverse: NDArray[np.float32], out: Bytes) -> None:
+    """(H, W) 1/m into the 24-bit code, low byte in red; nothing is 1000 m."""
+    for y in range(inverse.shape[0]):
+        for x in range(inverse.shape[1]):
+            share = 1.0
+            if inverse[y, x] * DEPTH_RANGE > 1.0:
+                share = 1.0 / (float(inverse[y, x]) * DEPTH_RANGE)
+            code = int(share * DEPTH_STEPS + 0.5)
+            out[y, x, 2] = code & 255
+            out[y, x, 1] = (code >> 8) & 255
+            out[y, x, 0] = (code >> 16) & 255
+            out[y, x, 3] = 255
+
+
+@kernel
+def bgra_from_labels(labels: Bytes, out: Bytes) -> None:
+    """(H, W) tags into red."""
+    for y in range(labels.shape[0]):
+        for x in range(labels.shape[1]):
+            out[y, x, 0] = 0
+            out[y, x, 1] = 0
+            out[y, x, 2] = labels[y, x]
+            out[y, x, 3] = 255
+
+
+@kernel
+def bgra_from_instances(
+    labels: Bytes, rows: NDArray[np.uint16], ids: NDArray[np.int64], out: Bytes
+) -> None:
+    """(H, W) tags into red and actor ids into green (low byte) and blue; rows: 0 static."""
+    for y in range(labels.shape[0]):
+        for x in range(labels.shape[1]):
+            id = ids[rows[y, x]]
+            out[y, x, 0] = (id >> 8) & 255
+            out[y, x, 1] = id & 255
+            out[y, x, 2] = labels[y, x]
+            out[y, x, 3] = 255

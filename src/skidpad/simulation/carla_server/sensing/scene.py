@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from skidpad.core.geometry import Pose
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.weather import Weather
-from skidpad.physics.optics import extinction
 from skidpad.sensors.crowd import make_actors, place_actors
 from skidpad.sensors.lighting import lighting
 from skidpad.sensors.rasteriser import make_scratch
@@ -62,8 +61,7 @@ class Scene:
         self.keys[self.static.lamps.triangle] = self.static.lamp_keys(lights)
         if self.weather is not world.sky.weather:
             self.weather = world.sky.weather
-            light = lighting(self.weather, extinction(self.weather))
-            self.shading = Shading(self.static.palette, self._table, light)
+            self.shading = Shading(self.static.palette, self._table, lighting(self.weather))
         if self.members:
             self.shading.set_braking(np.array([_brakes(world, a) for a in self.members]))
 

@@ -483,6 +483,7 @@ def test_metrics_per_weather_add_up_to_those_of_the_run() -> None:
 @pytest.mark.req("A-251")
 def test_an_empty_log_has_complete_metrics() -> None:
     assert metrics(drive(0, lambda _k: [{}])).samples == 0
+    assert weather_metrics(drive(0, lambda _k: [{}]), straight_map()) == {}
 
 
 @pytest.mark.req("A-260")

@@ -145,7 +145,6 @@ def _event(
     history = slice(_since(drive, at, LOOK_BACK), at + 1)
     unseen = vehicle_present(drive) & (log.report.detected != 1.0) & drive.sample
     since, first = (None, None) if actor is None else _as_lead(drive, at, actor)
-    mu = log.mu[at, 0]
     return Crash(
         tick=int(log.tick[at]),
         t=float(log.t[at]),
@@ -163,7 +162,7 @@ def _event(
         y=float(a.y[at, 0]) if contact is None else contact.y,
         lane_offset=number(float(drive.place.offset[at])),
         bend_radius=_bend_radius(drive, at),
-        mu=None if np.all(np.isnan(mu)) else float(np.nanmean(mu)),
+        mu=_grip(log, at),
         brake_max=float(np.nanmax(log.applied.brake[recent])),
         unseen=float(np.count_nonzero(unseen[history]) * log.header.dt),
         lead_since=since,
@@ -193,6 +192,12 @@ def _who(log: RunLog, at: int, other: int) -> tuple[bool, Striker]:
     ego = a.vx[k, 0] * to[0] + a.vy[k, 0] * to[1]
     them = -(a.vx[k, other] * to[0] + a.vy[k, other] * to[1])
     return bool(ahead < BEHIND), Striker.OTHER if them > ego else Striker.EGO
+
+
+def _grip(log: RunLog, row: int) -> float | None:
+    """Mean friction at the ego's tyres."""
+    mu = log.mu[row, 0]
+    return None if np.all(np.isnan(mu)) else float(np.nanmean(mu))
 
 
 def _speed(log: RunLog, row: int, actor: int) -> float:

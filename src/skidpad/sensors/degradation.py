@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
-from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +27,7 @@ TILE_UNIT = 32.0  # steps per standard deviation; +-127 steps cut the tails at 3
 STREAKS = 420.0  # of rain per 800x600 image at precipitation 100, by eye
 STREAK_LENGTH = 26.0  # px in an image of 600 rows
 
-Image = NDArray[np.uint8]
+Packed = NDArray[np.uint32]  # (H, W) bytes red, green, blue, 255
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,14 +63,13 @@ def glass_mask(height: int, width: int, pillar: bool) -> NDArray[np.int32]:
 
     The pillar keeps pixels with y > (h_p / w_p) x + (0.85 H - h_p), x < w_p and y < 0.85 H.
     """
-    first = np.zeros(height, dtype=np.int32)
+    y, x = np.mgrid[0:height, 0:width]
     bottom = GLASS_ROWS * height
-    first[ceil(bottom) :] = width
+    w, h = PILLAR_WIDTH * width, PILLAR_HEIGHT * height
+    clean = y >= bottom
     if pillar:
-        w, h = PILLAR_WIDTH * width, PILLAR_HEIGHT * height
-        for y in range(ceil(bottom)):
-            edge = (y - (bottom - h)) * w / h  # columns left of it are pillar
-            first[y] = max(0, ceil(min(edge, w)))
+        clean |= (y > (h / w) * x + (bottom - h)) & (x < w)
+    first: NDArray[np.int32] = clean.sum(axis=1).astype(np.int32)
     first.setflags(write=False)
     return first
 
@@ -96,18 +94,28 @@ class CameraNoise:
         else:
             self._tile = np.zeros(1, dtype=np.int8)
 
-    def apply(self, tick: int, image: Image) -> None:
-        """Degrade an image (H, W, 3) in place."""
+    def apply(self, tick: int, image: Packed) -> None:
+        """Degrade an image (H, W) of packed bytes in place."""
         s = self.strength
         if not s.any:
             return
-        height, width, _ = image.shape
+        height, width = image.shape
         mask = glass_mask(height, width, s.pillar)
         if s.streaks > 0.0:
             count = int(STREAKS * s.streaks * height * width / 480_000.0)
             draw_streaks(self._keys[2], tick, count, s.night, mask, image)
         if s.rain_sigma > 0.0 or s.night:
             degrade(self._keys, tick, s.rain_sigma, s.grey, s.night, self._tile, mask, image)
+
+
+@kernel
+def _byte(value: float) -> int:
+    """Rounded and clipped to 0..255."""
+    low, high, half = np.float32(0.0), np.float32(255.0), np.float32(0.5)
+    v = value + half
+    v = v if v > low else low
+    whole: int = np.int32(v if v < high else high)
+    return whole
 
 
 @kernel
@@ -119,46 +127,44 @@ def degrade(
     night: bool,
     tile: NDArray[np.int8],
     first: NDArray[np.int32],
-    image: Image,
+    image: Packed,
 ) -> None:
     """Rain: noise, then mix with grey. Night: gain, lift, noise. Clip once at the end (A-228)."""
-    height, width, _ = image.shape
+    height, width = image.shape
     room = np.uint64(tile.size - 3 * width)
     rain_unit = np.float32(rain_sigma / TILE_UNIT)
-    night_unit = np.float32(NIGHT_SIGMA / TILE_UNIT)
-    gain, lift = np.float32(NIGHT_GAIN), np.float32(NIGHT_LIFT)
-    share = np.float32(grey)
-    kept = np.float32(1.0 - grey)
-    low, high, half = np.float32(0.0), np.float32(255.0), np.float32(0.5)
+    night_unit = np.float32(NIGHT_SIGMA / TILE_UNIT if night else 0.0)
+    gain = np.float32(NIGHT_GAIN if night else 1.0)
+    lift = np.float32(NIGHT_LIFT if night else 0.0)
+    share, kept = np.float32(grey), np.float32(1.0 - grey)
     wr, wg, wb = np.float32(0.299), np.float32(0.587), np.float32(0.114)
     for y in range(height):
-        if first[y] >= width:
+        count = width - first[y]
+        if count <= 0:
             continue
         at = np.intp(mixed(keys[0], tick, y) % room)
-        rain = tile[at : at + 3 * width]
+        rain = tile[at : at + 3 * count]
         at = np.intp(mixed(keys[1], tick, y) % room)
-        dark = tile[at : at + 3 * width]
-        for x in range(first[y], width):
-            r = np.float32(image[y, x, 0]) + rain_unit * np.float32(rain[3 * x])
-            g = np.float32(image[y, x, 1]) + rain_unit * np.float32(rain[3 * x + 1])
-            b = np.float32(image[y, x, 2]) + rain_unit * np.float32(rain[3 * x + 2])
+        dark = tile[at : at + 3 * count]
+        row = image[y, first[y] :]
+        for x in range(count):
+            pixel = np.int32(row[x] & np.uint32(0xFFFFFF))
+            r = np.float32(pixel & 255) + rain_unit * np.float32(rain[x])
+            g = np.float32((pixel >> 8) & 255) + rain_unit * np.float32(rain[x + count])
+            b = np.float32(pixel >> 16) + rain_unit * np.float32(rain[x + 2 * count])
             luma = share * (wr * r + wg * g + wb * b)
-            r, g, b = kept * r + luma, kept * g + luma, kept * b + luma
-            if night:
-                r = gain * r + lift + night_unit * np.float32(dark[3 * x])
-                g = gain * g + lift + night_unit * np.float32(dark[3 * x + 1])
-                b = gain * b + lift + night_unit * np.float32(dark[3 * x + 2])
-            image[y, x, 0] = np.uint8(min(max(r + half, low), high))
-            image[y, x, 1] = np.uint8(min(max(g + half, low), high))
-            image[y, x, 2] = np.uint8(min(max(b + half, low), high))
+            r = gain * (kept * r + luma) + lift + night_unit * np.float32(dark[x])
+            g = gain * (kept * g + luma) + lift + night_unit * np.float32(dark[x + count])
+            b = gain * (kept * b + luma) + lift + night_unit * np.float32(dark[x + 2 * count])
+            row[x] = np.uint32(_byte(r) | _byte(g) << 8 | _byte(b) << 16 | 0xFF000000)
 
 
 @kernel
 def draw_streaks(
-    key: np.uint64, tick: int, count: int, night: bool, first: NDArray[np.int32], image: Image
+    key: np.uint64, tick: int, count: int, night: bool, first: NDArray[np.int32], image: Packed
 ) -> None:
     """Short slanted strokes of falling rain, brighter than what is behind them."""
-    height, width, _ = image.shape
+    height, width = image.shape
     light = 120.0 if night else 215.0
     for i in range(count):
         x = uniform(key, tick, 4 * i) * width
@@ -169,6 +175,9 @@ def draw_streaks(
         for step in range(length):
             row, column = int(y) + step, int(x + slant * step)
             if 0 <= row < height and first[row] <= column and 0 <= column < width:
-                for c in range(3):
-                    old = float(image[row, column, c])
-                    image[row, column, c] = np.uint8(old + strength * max(light - old, 0.0))
+                pixel = np.int64(image[row, column])
+                brighter = 0xFF000000
+                for shift in (0, 8, 16):
+                    old = float((pixel >> shift) & 255)
+                    brighter |= int(old + strength * max(light - old, 0.0)) << shift
+                image[row, column] = np.uint32(brighter)

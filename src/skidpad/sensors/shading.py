@@ -16,7 +16,6 @@ from skidpad.sensors.lighting import Lighting
 from skidpad.sensors.materials import ACTOR_PAINTED, EMISSIVE, MATERIALS, Material
 from skidpad.sensors.view import View
 
-Image = NDArray[np.uint8]
 Float32 = NDArray[np.float32]
 
 # Columns of the look-up table, one row per (instance, material).
@@ -24,9 +23,9 @@ _RED, _GREEN, _BLUE, _GLOW, _WETTABLE, _GLOSS = range(6)
 COLUMNS = 6
 # The kernel works on blocks of a row. All its intermediate values lie in lanes of one array at
 # constant distances: only then can the compiler prove that they do not overlap, and vectorise.
-BLOCK = 512
-(_R, _G, _B, _L, _T, _S, _U, _W, _GX, _GY) = (np.intp(lane * BLOCK) for lane in range(10))
-LANES = 10
+BLOCK = 256
+LANES = 11
+(_R, _G, _B, _L, _T, _S, _U, _W, _GX, _GY, _H) = (np.intp(n * BLOCK) for n in range(LANES))
 ROADLIKE = (Material.ASPHALT, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
 SNOWY = (Material.GRASS, Material.EMBANKMENT, Material.SHOULDER, Material.SIDEWALK, Material.MEDIAN)
 GLOSSY = (Material.PAINT, Material.GLASS)
@@ -57,9 +56,17 @@ class Shading:
         tails[braking, _GLOW] = 1.0
 
     def paint(
-        self, view: View, ego: Pose, inverse: Float32, key: NDArray[np.int32], out: Image
+        self,
+        view: View,
+        ego: Pose,
+        inverse: Float32,
+        key: NDArray[np.int32],
+        out: NDArray[np.uint32],
     ) -> None:
-        """Write the picture (H, W, 3) of a view; ego: the pose that carries the headlights."""
+        """Write the picture of a view, (H, W) of packed bytes red, green, blue, 255.
+
+        ego: the pose that carries the headlights.
+        """
         light = self.light
         r = view.rotation
         body = ego.rotation()
@@ -107,7 +114,7 @@ _BEAM_RANGE = np.float32(1.0 / 380.0)  # 1/m^2: a low beam lights some 40 m of r
 _CUT_SLOPE = np.float32(42.0)  # the cut-off: half the light 1.4 deg above the lamp
 _LAMP_X, _LAMP_Z = np.float32(HEADLAMP_X), np.float32(HEADLAMP_Z)
 _BEAM_BLUE = np.float32(0.82)
-_BEAM_POWER = np.float32(1.7)
+_BEAM_POWER = np.float32(2.6)
 _DARK = np.float32(1.0 - WET_DARKENING)
 _FILM_SHARE = np.float32(0.8)
 _RETRO = np.float32(0.35)  # rough asphalt sends back much of a grazing beam
@@ -133,10 +140,13 @@ def _gather(
 
 
 @kernel
-def _slopes(inverse: Float32, y: int, first: int, count: int, view: View, work: Float32) -> None:
+def _slopes(
+    inverse: Float32, y: int, first: int, count: int, view: View, work: Float32
+) -> tuple[bool, bool]:
     """Viewing direction, inverse depth and its two slopes, of a block's pixels.
 
     Of the two differences on either side the gentler one counts: the other may cross an edge.
+    Says whether any pixel shows a surface, and whether any shows sky.
     """
     height, width = inverse.shape
     focal = np.float32(view.focal)
@@ -145,6 +155,7 @@ def _slopes(inverse: Float32, y: int, first: int, count: int, view: View, work: 
     here = inverse[y, first : first + count]
     above = inverse[max(y - 1, 0), first : first + count]
     below = inverse[min(y + 1, height - 1), first : first + count]
+    solid = 0
     for x in range(count):
         w = here[x]
         a = below[x] - w
@@ -152,6 +163,7 @@ def _slopes(inverse: Float32, y: int, first: int, count: int, view: View, work: 
         work[_W + x] = w
         work[_GY + x] = (a if abs(a) < abs(b) else b) * focal
         work[_U + x] = start + np.float32(x) * per_pixel
+        solid += 1 if w > _ZERO else 0
     for x in range(1, count - 1):
         a = here[x + 1] - here[x]
         b = here[x] - here[x - 1]
@@ -162,47 +174,99 @@ def _slopes(inverse: Float32, y: int, first: int, count: int, view: View, work: 
         a = ahead - here[x]
         b = here[x] - behind
         work[_GX + x] = (a if abs(a) < abs(b) else b) * focal
+    return solid > 0, solid < count
 
 
 @kernel
-def _light_block(
-    v: float,
-    count: int,
-    light: Lighting,
-    sun: Float32,
-    up: Float32,
-    to_body: Float32,
-    offset: Float32,
-    work: Float32,
+def _headlights(
+    v: np.float32, count: int, beam: np.float32, to_body: Float32, offset: Float32, work: Float32
 ) -> None:
-    """Sky, sun, lamps, wet mirror and haze of a block, in place; leaves grey levels."""
-    beta, begins = np.float32(light.extinction), np.float32(light.haze_begins)
-    wet, beam = np.float32(light.wet), np.float32(light.headlights) * _BEAM_POWER
-    disc = np.float32(light.disc)
-    sun_r, sun_g, sun_b = light.sun[0], light.sun[1], light.sun[2]
-    low_r, low_g, low_b = light.bounce[0], light.bounce[1], light.bounce[2]
-    span_r, span_g, span_b = light.sky[0] - low_r, light.sky[1] - low_g, light.sky[2] - low_b
-    hor_r, hor_g, hor_b = light.horizon[0], light.horizon[1], light.horizon[2]
-    zen_r, zen_g, zen_b = light.zenith[0] - hor_r, light.zenith[1] - hor_g, light.zenith[2] - hor_b
-    up0, up1, up2 = up[0], up[1], up[2]
-    sun0, sun1, sun2 = sun[0], sun[1], sun[2]
+    """Light of the ego's low beam on a block: a soft cone, cut off above the lamps."""
     b00, b01, b02 = to_body[0, 0], to_body[0, 1], to_body[0, 2]
     b10, b11, b12 = to_body[1, 0], to_body[1, 1], to_body[1, 2]
     b20, b21, b22 = to_body[2, 0], to_body[2, 1], to_body[2, 2]
     o0, o1, o2 = offset[0] - _LAMP_X, offset[1], offset[2] - _LAMP_Z
     for x in range(count):
         u, w = work[_U + x], work[_W + x]
+        z = _ONE / (w if w > _FARTHEST else _FARTHEST)
+        px = z * (b00 * u + b01 * v + b02) + o0
+        py = z * (b10 * u + b11 * v + b12) + o1
+        pz = z * (b20 * u + b21 * v + b22) + o2
+        lead = px if px > _NEAR_LAMP else _NEAR_LAMP
+        side = py / (lead + _LAMP_APART)
+        rise = pz / lead * _CUT_SLOPE
+        rise = rise if rise > _ZERO else _ZERO
+        spread = _ONE + _BEAM_WIDTH * side * side
+        fall = _ONE + (px * px + py * py) * _BEAM_RANGE
+        lit = beam / (spread * spread * fall * fall * (_ONE + rise * rise))
+        work[_H + x] = lit if px > _ZERO else _ZERO
+
+
+@kernel
+def _surfaces(
+    v: np.float32, count: int, light: Lighting, sun: Float32, up: Float32, work: Float32
+) -> None:
+    """Sun, diffuse light, lamps, wet mirror and haze of a block's surfaces, in place."""
+    beta, begins = np.float32(light.extinction), np.float32(light.haze_begins)
+    wet = np.float32(light.wet)
+    sun_r, sun_g, sun_b = light.sun[0], light.sun[1], light.sun[2]
+    low_r, low_g, low_b = light.bounce[0], light.bounce[1], light.bounce[2]
+    span_r, span_g, span_b = light.sky[0] - low_r, light.sky[1] - low_g, light.sky[2] - low_b
+    hor_r, hor_g, hor_b = light.horizon[0], light.horizon[1], light.horizon[2]
+    up0, up1, up2 = up[0], up[1], up[2]
+    sun0, sun1, sun2 = sun[0], sun[1], sun[2]
+    for x in range(count):
+        u, w = work[_U + x], work[_W + x]
         gx, gy = work[_GX + x], work[_GY + x]
         glow, gloss = work[_L + x], work[_S + x]
         gz = w - u * gx - v * gy
         size = _ONE / np.sqrt(gx * gx + gy * gy + gz * gz + _TINY)
-        per_ray = _ONE / np.sqrt(u * u + v * v + _ONE)
+        ray = np.sqrt(u * u + v * v + _ONE)
         n_up = -(gx * up0 + gy * up1 + gz * up2) * size
         n_sun = -(gx * sun0 + gy * sun1 + gz * sun2) * size
         n_sun = n_sun if n_sun > _ZERO else _ZERO
-        facing = w * size * per_ray
+        facing = w * size / ray
         tilt = _HALF + _HALF * n_up
+        lit = work[_H + x] * (_RETRO + (_ONE - _RETRO) * facing)
 
+        grazing = _ONE - (facing if facing < _ONE else _ONE)
+        square = grazing * grazing
+        fresnel = _F0 + (_ONE - _F0) * square * square * grazing
+        film = wet * work[_T + x] * (n_up if n_up > _ZERO else _ZERO)
+        mirror = fresnel * (film * _FILM_SHARE + gloss * _GLOSS_SHARE)
+        shown = _ONE - glow
+        dull = shown * (_ONE - film * _DARK) * (_ONE - mirror)
+        depth = ray / (w if w > _FARTHEST else _FARTHEST) - begins
+        depth = (depth if depth > _ZERO else _ZERO) * beta * _SIXTEENTH
+        through = _ONE / (_ONE + depth)
+        through = through * through
+        through = through * through
+        through = through * through
+        through = through * through
+        veil = mirror * shown * through + (_ONE - through)
+
+        r = glow + dull * (low_r + tilt * span_r + sun_r * n_sun + lit)
+        g = glow + dull * (low_g + tilt * span_g + sun_g * n_sun + lit)
+        b = glow + dull * (low_b + tilt * span_b + sun_b * n_sun + lit * _BEAM_BLUE)
+        work[_R + x] = work[_R + x] * r * through + veil * hor_r
+        work[_G + x] = work[_G + x] * g * through + veil * hor_g
+        work[_B + x] = work[_B + x] * b * through + veil * hor_b
+
+
+@kernel
+def _sky(
+    v: np.float32, count: int, light: Lighting, sun: Float32, up: Float32, work: Float32
+) -> None:
+    """Sky and sun where a block shows nothing else."""
+    disc = np.float32(light.disc)
+    sun_r, sun_g, sun_b = light.sun[0], light.sun[1], light.sun[2]
+    hor_r, hor_g, hor_b = light.horizon[0], light.horizon[1], light.horizon[2]
+    zen_r, zen_g, zen_b = light.zenith[0] - hor_r, light.zenith[1] - hor_g, light.zenith[2] - hor_b
+    up0, up1, up2 = up[0], up[1], up[2]
+    sun0, sun1, sun2 = sun[0], sun[1], sun[2]
+    for x in range(count):
+        u = work[_U + x]
+        per_ray = _ONE / np.sqrt(u * u + v * v + _ONE)
         climb = (u * up0 + v * up1 + up2) * per_ray
         climb = climb if climb > _ZERO else _ZERO
         climb = climb * (_TWO - climb)
@@ -219,57 +283,22 @@ def _light_block(
         halo = halo * halo
         halo = halo * halo
         shine = disc * (wide * _GLOW_SHARE + halo * _DISC_SHARE)
+        empty = work[_W + x] <= _ZERO
+        work[_R + x] = hor_r + climb * zen_r + shine * sun_r if empty else work[_R + x]
+        work[_G + x] = hor_g + climb * zen_g + shine * sun_g if empty else work[_G + x]
+        work[_B + x] = hor_b + climb * zen_b + shine * sun_b if empty else work[_B + x]
 
-        z = _ONE / (w if w > _FARTHEST else _FARTHEST)
-        distance = z / per_ray
-        px = z * (b00 * u + b01 * v + b02) + o0
-        py = z * (b10 * u + b11 * v + b12) + o1
-        pz = z * (b20 * u + b21 * v + b22) + o2
-        lead = px if px > _NEAR_LAMP else _NEAR_LAMP
-        side = py / (lead + _LAMP_APART)
-        rise = pz / lead * _CUT_SLOPE
-        rise = rise if rise > _ZERO else _ZERO
-        spread = _ONE / (_ONE + _BEAM_WIDTH * side * side)
-        fall = _ONE / (_ONE + (px * px + py * py) * _BEAM_RANGE)
-        lit = beam * spread * spread * fall * fall * (_RETRO + (_ONE - _RETRO) * facing)
-        lit = lit / (_ONE + rise * rise)
-        lit = lit if px > _ZERO else _ZERO
 
-        grazing = _ONE - (facing if facing < _ONE else _ONE)
-        square = grazing * grazing
-        fresnel = _F0 + (_ONE - _F0) * square * square * grazing
-        film = wet * work[_T + x] * (n_up if n_up > _ZERO else _ZERO)
-        mirror = fresnel * (film * _FILM_SHARE + gloss * _GLOSS_SHARE)
-        shown = _ONE - glow
-        dull = shown * (_ONE - film * _DARK) * (_ONE - mirror)
-        mirror = mirror * shown
-        depth = distance - begins
-        depth = (depth if depth > _ZERO else _ZERO) * beta * _SIXTEENTH
-        through = _ONE / (_ONE + depth)
-        through = through * through
-        through = through * through
-        through = through * through
-        through = through * through
-        veil = _ONE - through
-        empty = w <= _ZERO
-
-        r = work[_R + x] * (glow + dull * (low_r + tilt * span_r + sun_r * n_sun + lit))
-        g = work[_G + x] * (glow + dull * (low_g + tilt * span_g + sun_g * n_sun + lit))
-        b = work[_B + x] * (
-            glow + dull * (low_b + tilt * span_b + sun_b * n_sun + lit * _BEAM_BLUE)
-        )
-        r = (r + mirror * hor_r) * through + veil * hor_r
-        g = (g + mirror * hor_g) * through + veil * hor_g
-        b = (b + mirror * hor_b) * through + veil * hor_b
-        r = hor_r + climb * zen_r + shine * sun_r if empty else r
-        g = hor_g + climb * zen_g + shine * sun_g if empty else g
-        b = hor_b + climb * zen_b + shine * sun_b if empty else b
+@kernel
+def _develop(count: int, work: Float32, out: NDArray[np.uint32]) -> None:
+    """Linear light to bytes: gamma 2, clipped, packed as red, green, blue, 255."""
+    for x in range(count):
+        r, g, b = work[_R + x], work[_G + x], work[_B + x]
         r = np.sqrt(r if r < _ONE else _ONE) * _WHITE
         g = np.sqrt(g if g < _ONE else _ONE) * _WHITE
         b = np.sqrt(b if b < _ONE else _ONE) * _WHITE
-        work[_R + x] = r
-        work[_G + x] = g
-        work[_B + x] = b
+        packed = np.int32(r) | np.int32(g) << 8 | np.int32(b) << 16
+        out[x] = np.uint32(packed | 0xFF000000)
 
 
 @kernel
@@ -284,18 +313,22 @@ def shade(
     work: Float32,
     inverse: Float32,
     key: NDArray[np.int32],
-    out: Image,
+    out: NDArray[np.uint32],
 ) -> None:
     """The deferred pass. sun, up: (3,) camera axes; to_body, offset: camera to ego frame."""
     height, width = inverse.shape
+    beam = np.float32(light.headlights) * _BEAM_POWER
+    work[_H : _H + BLOCK] = _ZERO
     for y in range(height):
         v = np.float32((y + 0.5 - view.cy) / view.focal)
         for first in range(0, width, BLOCK):
             count = min(BLOCK, width - first)
-            _gather(key, y, first, count, table, work)
-            _slopes(inverse, y, first, count, view, work)
-            _light_block(v, count, light, sun, up, to_body, offset, work)
-            for x in range(count):
-                out[y, first + x, 0] = np.uint8(work[_R + x])
-                out[y, first + x, 1] = np.uint8(work[_G + x])
-                out[y, first + x, 2] = np.uint8(work[_B + x])
+            solid, empty = _slopes(inverse, y, first, count, view, work)
+            if solid:
+                _gather(key, y, first, count, table, work)
+                if beam > _ZERO:
+                    _headlights(v, count, beam, to_body, offset, work)
+                _surfaces(v, count, light, sun, up, work)
+            if empty:
+                _sky(v, count, light, sun, up, work)
+            _develop(count, work, out[y, first : first + count])

@@ -117,7 +117,7 @@ class PixelSuite:
             key = (camera.view, eye)
             self._pass_of[camera.id] = self._passes.setdefault(key, Pass(camera, eye))
         self._rgb = {
-            c.id: np.zeros((c.height, c.width, 3), dtype=np.uint8)
+            c.id: np.zeros((c.height, c.width), dtype=np.dtype("<u4"))
             for c in self.cameras.values()
             if c.modality is Modality.RGB
         }
@@ -187,11 +187,11 @@ class PixelSuite:
             return CameraImage(labels=labels)
         if camera.modality is Modality.INSTANCE:
             return CameraImage(instances=one.instances)
-        rgb = self._rgb[id]
-        self.shading.paint(view, self._ego, one.inverse, one.key, rgb)
+        packed = self._rgb[id]
+        self.shading.paint(view, self._ego, one.inverse, one.key, packed)
         if id in self._degraded:
-            self._degraded[id].apply(self.tick, rgb)
-        return CameraImage(rgb=rgb)
+            self._degraded[id].apply(self.tick, packed)
+        return CameraImage(rgb=packed.view(np.uint8).reshape(*packed.shape, 4)[..., :3])
 
     def _move(self, states: ActorStates) -> None:
         """Velocities and yaw rates; the vertical one from the change of height in a tick."""

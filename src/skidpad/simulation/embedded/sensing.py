@@ -55,6 +55,7 @@ class Pixels:
             setup.specs,
             setup.weather,
             range_model=setup.range_model,
+            camera_effect=setup.camera_effect,
             seed=seed,
             dt=setup.dt,
             render_all=setup.render_all,

@@ -39,7 +39,7 @@ class Camera:
 
     spec: CameraSpec
     drawn: Pass
-    rgb: NDArray[np.uint8]
+    rgb: NDArray[np.uint32]  # packed red, green, blue, 255
     bgra: NDArray[np.uint8]
     head: bytes
 
@@ -56,7 +56,7 @@ def make_camera(actor: Actor) -> Camera:
     return Camera(
         spec,
         Pass(spec),
-        np.zeros((height, width, 3), dtype=np.uint8),
+        np.zeros((height, width), dtype=np.dtype("<u4")),
         np.zeros((height, width, 4), dtype=np.uint8),
         IMAGE_HEAD.pack(width, height, fov),
     )

@@ -13,9 +13,10 @@ DEPTH_RANGE = 1000.0  # m
 DEPTH_STEPS = 256.0**3 - 1.0
 
 
-def bgra_from_rgb(rgb: Bytes, out: Bytes) -> None:
-    """(H, W, 3) red, green, blue into (H, W, 4)."""
-    cv2.cvtColor(rgb, cv2.COLOR_RGB2BGRA, dst=out)
+def bgra_from_rgb(packed: NDArray[np.uint32], out: Bytes) -> None:
+    """(H, W) packed red, green, blue, 255 into (H, W, 4)."""
+    rgba = packed.view(np.uint8).reshape(*packed.shape, 4)
+    cv2.cvtColor(rgba, cv2.COLOR_RGBA2BGRA, dst=out)
 
 
 @kernel

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import re
 import subprocess
 import sys
 import textwrap
@@ -12,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
+from skidpad.simulation.carla_server.process import ServerProcess
 from skidpad.simulation.carla_server.streams import StreamHub
 from skidpad.simulation.carla_server.world import ServerOptions, World
 
-READY = re.compile(r"ready: CARLA \S+ on \S+:(\d+)")
 CLIENT_LIMIT = 120.0  # s
 PREFACE = """
 import carla, math, sys, time
@@ -38,23 +36,8 @@ def finish():
 """
 
 
-class Server:
-    """A running `skidpad carla-server`."""
-
-    def __init__(self, *options: str) -> None:
-        command = [sys.executable, "-m", "skidpad", "carla-server", "--port", "0", *options]
-        self.process = subprocess.Popen(
-            command,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-            env=dict(os.environ),
-        )
-        assert self.process.stdout is not None
-        line = self.process.stdout.readline()
-        found = READY.search(line)
-        assert found, f"no ready line: {line!r}"
-        self.port = int(found[1])
+class Server(ServerProcess):
+    """A running server, and clients for it."""
 
     def client(self, script: str) -> str:
         """Run a client script to its DONE; what it printed."""
@@ -67,14 +50,8 @@ class Server:
             check=False,
         )
         assert "DONE" in done.stdout, f"{done.stdout}\n{done.stderr}"
+        assert self.alive
         return done.stdout
-
-    def stop(self) -> None:
-        """End it."""
-        self.process.terminate()
-        self.process.wait(10.0)
-        assert self.process.stdout is not None
-        self.process.stdout.close()
 
 
 @pytest.fixture
@@ -84,7 +61,7 @@ def serve() -> Iterator[Callable[..., Server]]:
     started: list[Server] = []
 
     def start(*options: str) -> Server:
-        started.append(Server("--idle-exit", "120", *options))
+        started.append(Server(["--idle-exit", "120", *options]))
         return started[-1]
 
     yield start

@@ -34,7 +34,9 @@ def spawn(world: World, description: Any, pose: Pose) -> Actor:
     """A new actor where a client wants it; CallError when something stands there."""
     _, id, given = wire.items(description, "description", 3)
     blueprint = world.blueprint(wire.text(id, "description.id"))
-    attributes = chosen(blueprint, parse_attributes(given))
+    wanted = parse_attributes(given)
+    attributes = chosen(blueprint, wanted)
+    world.remarks.remark(blueprint, wanted)
     actor = Actor(world.actors.new_id(), blueprint, attributes, pose)
     _shape(actor)
     if blueprint.family in SOLID:
@@ -53,7 +55,9 @@ def spawn_attached(
     parent = world.actors.get(parent_id)
     _, id, given = wire.items(description, "description", 3)
     blueprint = world.blueprint(wire.text(id, "description.id"))
-    attributes = chosen(blueprint, parse_attributes(given))
+    wanted = parse_attributes(given)
+    attributes = chosen(blueprint, wanted)
+    world.remarks.remark(blueprint, wanted)
     if blueprint.family is Family.VEHICLE:
         raise CallError("a vehicle cannot be attached")
     attachment = Attachment(wire.integer(kind, "attachment type", 0, 2))

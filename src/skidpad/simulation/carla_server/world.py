@@ -17,6 +17,7 @@ from skidpad.simulation.carla_server import moving, snapshot, wire
 from skidpad.simulation.carla_server.actors import Actor, ActorTable, Attachment
 from skidpad.simulation.carla_server.catalogue import Blueprint, Family, load_catalogue
 from skidpad.simulation.carla_server.debug import DebugShapes
+from skidpad.simulation.carla_server.effects import Remarks
 from skidpad.simulation.carla_server.episode import Episode
 from skidpad.simulation.carla_server.ground import Ground, feel
 from skidpad.simulation.carla_server.lights import LightControl
@@ -79,6 +80,7 @@ class World:
         self.managers = TrafficManagers()
         self.sensors = SensorSet(options.seed)
         self.contacts = Contacts()
+        self.remarks = Remarks()
         self.ground = Ground.of(0)
         self.last_snapshot: bytes | None = None
         self.platform_time: Callable[[], float] = lambda: 0.0

@@ -1,0 +1,36 @@
+from __future__ import annotations
+
+from pathlib import Path
+
+from skidpad.simulation.carla_server.catalogue import Family, load_catalogue
+from skidpad.simulation.carla_server.coverage import rewritten
+from skidpad.simulation.carla_server.effects import BY_FAMILY, BY_SENSOR, Remarks
+from skidpad.simulation.carla_server.sensing.sensors import PRODUCERS
+
+PAGE = Path(__file__).parents[3] / "docs" / "carla.md"
+
+
+def test_the_page_shows_what_is_registered() -> None:
+    text = PAGE.read_text(encoding="utf-8")
+    assert rewritten(text) == text, "run python -m skidpad.simulation.carla_server.coverage FILE"
+
+
+def test_every_acting_attribute_exists() -> None:
+    catalogue = load_catalogue()
+    for sensor, names in BY_SENSOR.items():
+        assert names <= set(catalogue[sensor].attributes), sensor
+    for family, names in BY_FAMILY.items():
+        for blueprint in catalogue.values():
+            if blueprint.family is family:
+                assert names <= set(blueprint.attributes)
+    assert set(PRODUCERS) <= {b.id for b in catalogue.values() if b.family is Family.SENSOR}
+
+
+def test_vain_attributes_are_remarked_once() -> None:
+    remarks = Remarks()
+    blueprint = load_catalogue()["sensor.camera.rgb"]
+    remarks.remark(blueprint, {"gamma": "2.2", "fov": "60"})
+    assert not remarks.made
+    for _ in range(3):
+        remarks.remark(blueprint, {"gamma": "1.0"})
+    assert remarks.made == {("sensor.camera.rgb", "attribute gamma")}

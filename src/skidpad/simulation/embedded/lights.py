@@ -14,6 +14,8 @@ from skidpad.roads.lanes import SignalKind, SignalTable
 GREEN_S = 10.0  # CARLA's defaults for green and yellow; red as measured in the published set-up
 YELLOW_S = 3.0
 RED_S = 32.0
+NEVER = 2**62  # ticks
+STAGES = np.array([LightState.GREEN, LightState.YELLOW, LightState.RED], dtype=np.uint8)
 CYCLE_S = GREEN_S + YELLOW_S + RED_S
 
 
@@ -27,27 +29,27 @@ class Lights:
     def __init__(self, signals: SignalTable, seed: int, dt: float) -> None:
         self.rows = np.flatnonzero(signals.kind == SignalKind.LIGHT)
         self.ids = signals.id[self.rows]
-        self.dt = dt
-        offset = _offsets(signals, self.rows, seed)
-        self._offset_ticks = np.round(offset / dt).astype(np.int64)
-        self._durations = np.round(np.array([GREEN_S, YELLOW_S, RED_S]) / dt).astype(np.int64)
+        self._shift = np.round(_offsets(signals, self.rows, seed) / dt).astype(np.int64)
+        durations = [round(GREEN_S / dt), round(YELLOW_S / dt), round(RED_S / dt)]
+        self._ends = np.cumsum(durations)  # ticks from the start of green
         self.by_row = np.full(len(signals.id), LightState.OFF, dtype=np.uint8)  # (K,) LightState
         self.by_id: dict[int, LightState] = {}
+        self._changes = 0  # tick of the next change
         self.update(0)
 
     def update(self, tick: int) -> None:
-        """Set `by_row` and `by_id` to the states of `tick`."""
-        green, yellow, red = self._durations
-        phase = (tick + self._offset_ticks) % (green + yellow + red)
-        state = np.where(
-            phase < green,
-            LightState.GREEN,
-            np.where(phase < green + yellow, LightState.YELLOW, LightState.RED),
-        ).astype(np.uint8)
-        if self.by_id and np.array_equal(state, self.by_row[self.rows]):
+        """Set `by_row` and `by_id` to the states of `tick`; ticks must not run backwards."""
+        if tick < self._changes:
             return
-        self.by_row[self.rows] = state
-        self.by_id = {int(i): LightState(int(s)) for i, s in zip(self.ids, state, strict=True)}
+        phase = (tick + self._shift) % self._ends[-1]
+        stage = np.searchsorted(self._ends, phase, side="right")
+        self.by_row[self.rows] = STAGES[stage]
+        self.by_id = {
+            int(i): LightState(int(s))
+            for i, s in zip(self.ids, self.by_row[self.rows], strict=True)
+        }
+        left = self._ends[stage] - phase
+        self._changes = tick + int(left.min(initial=NEVER))
 
 
 def _offsets(signals: SignalTable, rows: NDArray[np.intp], seed: int) -> NDArray[np.float64]:

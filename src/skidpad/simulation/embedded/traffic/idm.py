@@ -18,7 +18,9 @@ GAP_MIN = 2.0  # m
 A_MAX = 1.4  # m/s^2
 B_COMFORT = 2.0  # m/s^2
 A_EMERGENCY = -8.0  # m/s^2, the hardest braking that is asked of a car
-CURVE_G = 0.6 * 9.81  # m/s^2, lateral limit of CARLA's Traffic Manager (FRICTION x GRAVITY)
+# m/s^2, lateral acceleration that drivers accept at road speeds: Reymond et al. (2001), Human
+# Factors 43(3). CARLA's Traffic Manager has 0.6 g, which leaves no grip for anything else.
+A_CURVE = 3.5
 
 
 @kernel

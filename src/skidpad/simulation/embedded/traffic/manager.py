@@ -17,7 +17,7 @@ from skidpad.core.states import ActorStates
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.embedded.traffic.driver import drive_all
-from skidpad.simulation.embedded.traffic.idm import A_MAX, CURVE_G, T_HEADWAY
+from skidpad.simulation.embedded.traffic.idm import A_MAX, A_CURVE, T_HEADWAY
 from skidpad.simulation.embedded.traffic.network import Network
 from skidpad.simulation.embedded.traffic.occupancy import Places, occupancy
 from skidpad.simulation.embedded.traffic.path import begin
@@ -152,7 +152,7 @@ def _traits(types: list[VehicleType | None], caution: float) -> NDArray[np.void]
         trait["factor"] = _speed_choice(caution)
         trait["headway"] = T_HEADWAY / caution
         trait["a_max"] = A_MAX
-        trait["a_curve"] = CURVE_G * caution
+        trait["a_curve"] = A_CURVE * caution
         trait["wheelbase"] = t.wheelbase
         trait["steer_angle"] = t.steer_max
         trait["understeer"] = (1.0 / t.stiffness_front - 1.0 / t.stiffness_rear) / G

@@ -19,7 +19,7 @@ from typing import Any
 
 from skidpad.campaign.cells import Cell, Driver
 from skidpad.campaign.snapshots import Snapshots
-from skidpad.core.errors import ConfigError, StackError
+from skidpad.core.errors import ConfigError, StackError, require_choice
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Outcome, SensorLevel, Supervision
@@ -84,7 +84,7 @@ def drive(
         duration=duration,
         traffic=traffic,
         vehicles=vehicles,
-        level=SensorLevel(sensors),
+        level=SensorLevel(require_choice("sensors", sensors, [v.value for v in SensorLevel])),
     )
     return run_cell(cell, kind, folder=None if out is None else Path(out))
 

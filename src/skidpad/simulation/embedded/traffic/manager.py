@@ -17,7 +17,7 @@ from skidpad.core.states import ActorStates
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.embedded.traffic.driver import drive_all
-from skidpad.simulation.embedded.traffic.idm import A_MAX, A_CURVE, T_HEADWAY
+from skidpad.simulation.embedded.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
 from skidpad.simulation.embedded.traffic.network import Network
 from skidpad.simulation.embedded.traffic.occupancy import Places, occupancy
 from skidpad.simulation.embedded.traffic.path import begin

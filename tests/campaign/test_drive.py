@@ -1,0 +1,240 @@
+"""The one loop: anybody's stack, failures as outcomes, equal bytes, supervision, snapshots."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from skidpad.campaign.cells import Cell, Driver
+from skidpad.campaign.drive import Run, drive, run_cell
+from skidpad.core.errors import ConfigError
+from skidpad.core.frames import Frame, Segments, SensorFrame
+from skidpad.core.geometry import Pose
+from skidpad.core.setup import ActorCommand
+from skidpad.core.specs import SensorSpec
+from skidpad.core.states import ContactEvent, VehicleCommand, WorldTruth
+from skidpad.core.vocabulary import Outcome, RelocationReason, SensorLevel, Supervision, Tier
+from skidpad.physics.presets import find_weather
+from skidpad.recording.logfiles import log_hash
+from skidpad.roads.queries import RoadMap
+from skidpad.simulation.embedded.engine import EmbeddedBackend
+from skidpad.stack.configurations import functions_of
+from skidpad.stack.settings import load_profile
+
+
+class Gentle:
+    """A stack of somebody else: a little throttle, straight on."""
+
+    def __init__(
+        self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
+    ) -> None:
+        self.throttle = float(settings.get("throttle", 0.3))
+        self.fail_at = settings.get("fail_at")
+        self.answer = settings.get("answer")
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        if frame.tick == self.fail_at:
+            raise RuntimeError("out of ideas")
+        if self.answer is not None:
+            return self.answer  # type: ignore[no-any-return]
+        return VehicleCommand(throttle=self.throttle)
+
+
+class Blind(Gentle):
+    """Steers into the guardrail."""
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        return VehicleCommand(throttle=1.0, steer=0.05)
+
+
+def short(stack: type[Gentle] = Gentle, seconds: float = 3.0, **options: Any) -> Run:
+    return drive(stack, duration=seconds, sensors="objects", seed=2, options=options)
+
+
+def cell(number: int = 4, seconds: float = 8.0, level: SensorLevel = SensorLevel.OBJECTS) -> Cell:
+    return Cell(
+        driver=Driver(label=str(number), functions=functions_of(number)),
+        weather=find_weather("clear-noon"),
+        seed=5,
+        profile="recommended",
+        settings=load_profile("recommended"),
+        duration=seconds,
+        level=level,
+    )
+
+
+def test_any_class_with_the_stack_interface_drives() -> None:
+    from skidpad import drive as public
+
+    assert public is drive
+    run = short(seconds=2.0)
+    assert (run.outcome, len(run.log), run.error) == (Outcome.COMPLETED, 40, "")
+    assert run.log.requested.throttle == pytest.approx(0.3)
+    assert short(throttle=0.6).log.v_ego[-1] > run.log.v_ego[-1] > 0.0
+    named = drive(f"{__name__}:Gentle", duration=0.5, sensors="objects")
+    assert len(named.log) == 10
+
+
+@pytest.mark.parametrize(
+    ("options", "said", "ticks"),
+    [
+        ({"fail_at": 20}, "out of ideas", 20),
+        ({"answer": "full speed"}, "must return a VehicleCommand", 0),
+        ({"answer": VehicleCommand(throttle=float("nan"))}, "throttle must be between", 0),
+        ({"throttle": "a lot"}, "could not be built", 0),
+    ],
+)
+def test_a_stack_that_fails_is_an_outcome_with_its_traceback(
+    options: dict[str, Any], said: str, ticks: int
+) -> None:
+    run = short(**options)
+    assert run.outcome is Outcome.AGENT_ERROR
+    assert said in run.error
+    assert len(run.log) == ticks
+
+
+@pytest.mark.req("X-1", "X-8", "X-12")
+def test_same_seed_same_content_whatever_ran_before() -> None:
+    backend = EmbeddedBackend()
+    first = run_cell(cell(), backend=backend)
+    run_cell(replace(cell(1), seed=9, duration=2.0), backend=backend)
+    again = run_cell(cell(), backend=backend)
+    assert log_hash(first.log) == log_hash(again.log)
+    assert log_hash(run_cell(replace(cell(), seed=6)).log) != log_hash(first.log)
+
+
+@pytest.mark.req("X-11")
+def test_nobody_keeps_a_buffer_beyond_its_tick() -> None:
+    wanted = cell(3, 2.0, SensorLevel.PIXELS)
+    clean = run_cell(wanted)
+    poisoned = run_cell(wanted, backend=EmbeddedBackend(poison=True))
+    assert log_hash(clean.log) == log_hash(poisoned.log)
+
+
+class Wrapped:
+    """The embedded simulator with something changed on the way."""
+
+    def __init__(self) -> None:
+        self.inner = EmbeddedBackend()
+
+    def reset(self, setup: Any, seed: int) -> Frame:
+        return self.inner.reset(setup, seed)
+
+    def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
+        return self.inner.step(command, actor_commands)
+
+    def truth(self) -> WorldTruth:
+        return self.inner.truth()
+
+    def relocate(self, pose: Pose, v: float) -> None:
+        self.inner.relocate(pose, v)
+
+    def close(self) -> None:
+        self.inner.close()
+
+
+class TruthGone(Wrapped):
+    """Truth about the others is NaN."""
+
+    def truth(self) -> WorldTruth:
+        true = self.inner.truth()
+        states = true.states.copy()
+        for column in states[:-1]:
+            column[1:] = np.nan
+        return replace(true, states=states)
+
+
+@pytest.mark.req("A-014", "L-3")
+def test_the_stack_never_sees_the_truth() -> None:
+    with_truth = run_cell(cell())
+    without = run_cell(cell(), backend=TruthGone())
+    for a, b in zip(with_truth.log.requested, without.log.requested, strict=True):
+        assert np.array_equal(a, b)
+    assert np.isnan(without.log.actors.x[:, 1]).all()
+
+
+@pytest.mark.req("A-179", "A-191", "A-194")
+def test_a_crash_is_recovered_recorded_and_hidden_from_no_one() -> None:
+    run = short(Blind, seconds=20.0)
+    phases = run.log.supervision
+    assert {int(p) for p in Supervision} == set(phases.tolist())
+    assert run.log.contacts[0].static == "guardrail"
+    moved = run.log.relocations[0]
+    assert moved.reason is RelocationReason.COLLISION
+    k = int(np.flatnonzero(run.log.tick == moved.tick)[0])
+    assert phases[k] == Supervision.REALIGN
+    assert run.log.actors.x[k + 1, 0] == pytest.approx(moved.new.x, abs=0.5)
+    braking = phases == Supervision.BRAKE
+    assert (run.log.applied.brake[1:][braking[:-1]] == 1.0).all()
+    assert (run.log.requested.brake[braking] == 0.0).all()
+
+
+class StaleView(Wrapped):
+    """A false contact in one tick; the cameras show the old scene for two frames after the move."""
+
+    CONTACT_TICK, STALE = 60, 2
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.left = 0
+
+    def truth(self) -> WorldTruth:
+        true = self.inner.truth()
+        if true.tick != self.CONTACT_TICK:
+            return true
+        return replace(true, contacts=(ContactEvent(true.tick, -1, "wall", 1.0, 1.0, 0.0, 0.0),))
+
+    def relocate(self, pose: Pose, v: float) -> None:
+        super().relocate(pose, v)
+        self.left = self.STALE if v == 0.0 else self.left
+
+    def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
+        frame = super().step(command, actor_commands)
+        if self.left == 0:
+            return frame
+        self.left -= 1
+        near = Segments(
+            np.array([200.0], np.float32),
+            np.array([300.0], np.float32),
+            np.array([100.0], np.float32),
+            np.array([250.0], np.float32),
+            np.array([1.5], np.float32),
+            np.array([14], np.uint8),
+        )
+        return replace(frame, segments=dict.fromkeys(frame.segments, near))
+
+
+@pytest.mark.req("A-195")
+def test_stale_images_after_a_relocation_cause_no_emergency_braking() -> None:
+    backend = StaleView()
+    run = run_cell(replace(cell(1), vehicles=0, seed=1), backend=backend)
+    phases, tier = run.log.supervision, run.log.report.tier
+    warm = np.flatnonzero(phases == Supervision.WARM_UP)
+    assert len(warm) == 10
+    after = tier[warm[-1] + 1 :]
+    assert len(after) > 20
+    assert not np.isin(after, [Tier.HARD_STOP, Tier.STOPPED_TOO_CLOSE, Tier.EMERGENCY]).any()
+
+
+@pytest.mark.req("A-257")
+def test_each_collision_leaves_a_picture(tmp_path: Path) -> None:
+    run = drive(Blind, duration=6.0, vehicles=0, out=tmp_path)
+    assert len(run.snapshots) == len({c.tick for c in run.log.contacts}) > 0
+    with Image.open(run.snapshots[0]) as picture:
+        assert picture.size == (800, 600)
+        assert np.asarray(picture).std() > 10.0
+    time = run.log.contacts[0].tick * 0.05
+    assert run.snapshots[0].name.endswith(f"clear-noon_{time:07.2f}s.png")
+
+
+def test_a_wrong_level_or_weather_is_one_sentence() -> None:
+    with pytest.raises(ConfigError, match="sensors"):
+        drive(Gentle, sensors="lasers")
+    with pytest.raises(ConfigError, match="weather"):
+        drive(Gentle, weather="locusts")

@@ -291,7 +291,7 @@ def test_frechet_is_its_recursive_definition(a, b):
 @pytest.mark.req("C-077")
 @pytest.mark.parametrize("seed", range(20))
 def test_frechet_agrees_with_shapely_on_paths_that_go_somewhere(seed):
-    # GEOS 3.13 is wrong for some lines that return to one point, so paths wander without return
+    # GEOS 3.14 is wrong for some lines that return to one point, so paths wander without return
     rng = np.random.default_rng(seed)
     a, b = (np.cumsum(rng.uniform(0, 1, (n, 2)), axis=0) for n in rng.integers(2, 40, 2))
     expected = shapely.frechet_distance(shapely.LineString(a), shapely.LineString(b))

@@ -1,0 +1,165 @@
+"""Detected against true hazards: one-to-one matching and what follows from it (C-214, decision C-5)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Decimal
+
+import numpy as np
+from scipy.sparse import csr_matrix
+from scipy.sparse.csgraph import maximum_bipartite_matching
+
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.statistics import Interval, bootstrap_interval, clopper_pearson
+
+TOLERANCES = (1.0, 0.5, 2.0)  # s by which intervals are dilated; the first is the headline
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """A hazard from t_start to t_end, in s; `about` names objects where they are known."""
+
+    hazard: HazardType
+    t_start: float
+    t_end: float
+    about: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True, slots=True)
+class Matching:
+    """Indices of matched detections and truths, and of what was left."""
+
+    pairs: tuple[tuple[int, int], ...]  # detection, truth
+    false_alarms: tuple[int, ...]
+    missed: tuple[int, ...]
+
+
+def match(detected: Sequence[Span], true: Sequence[Span], tolerance: float = 1.0) -> Matching:
+    """As many pairs as possible of the same hazard and object that overlap within `tolerance` s.
+
+    Every detection and every truth is in at most one pair; the surplus is false or missed.
+    """
+    if not detected or not true:
+        return Matching((), tuple(range(len(detected))), tuple(range(len(true))))
+    edges = np.array([[_compatible(d, h, tolerance) for h in true] for d in detected])
+    partner = maximum_bipartite_matching(csr_matrix(edges), perm_type="column")
+    pairs = tuple((d, int(h)) for d, h in enumerate(partner) if h >= 0)
+    hit_d, hit_h = {d for d, _ in pairs}, {h for _, h in pairs}
+    return Matching(
+        pairs,
+        tuple(d for d in range(len(detected)) if d not in hit_d),
+        tuple(h for h in range(len(true)) if h not in hit_h),
+    )
+
+
+def _compatible(d: Span, h: Span, tolerance: float) -> bool:
+    if d.hazard is not h.hazard:
+        return False
+    apart = d.t_start > h.t_end + tolerance or h.t_start > d.t_end + tolerance
+    return not apart and (not d.about or not h.about or bool(d.about & h.about))
+
+
+@dataclass(frozen=True, slots=True)
+class Tally:
+    """Counts of one hazard in one segment of driving."""
+
+    tp: int = 0
+    fp: int = 0
+    fn: int = 0
+    hours: float = 0.0
+    lead_times: tuple[float, ...] = ()  # s, positive: detected before it was true
+
+    def __add__(self, other: Tally) -> Tally:
+        return Tally(
+            self.tp + other.tp,
+            self.fp + other.fp,
+            self.fn + other.fn,
+            self.hours + other.hours,
+            self.lead_times + other.lead_times,
+        )
+
+    @property
+    def precision(self) -> float | None:
+        """TP / (TP + FP); None without a detection."""
+        return self.tp / (self.tp + self.fp) if self.tp + self.fp else None
+
+    @property
+    def recall(self) -> float | None:
+        """TP / (TP + FN); None without a true hazard."""
+        return self.tp / (self.tp + self.fn) if self.tp + self.fn else None
+
+    @property
+    def false_alarms_per_hour(self) -> float | None:
+        """False alarms per hour of evaluated driving."""
+        return self.fp / self.hours if self.hours > 0.0 else None
+
+
+def tally(
+    detected: Sequence[Span], true: Sequence[Span], hours: float, tolerance: float = 1.0
+) -> dict[HazardType, Tally]:
+    """Counts per hazard of one segment."""
+    out = {}
+    for hazard in HazardType:
+        d = [s for s in detected if s.hazard is hazard]
+        h = [s for s in true if s.hazard is hazard]
+        m = match(d, h, tolerance)
+        leads = tuple(h[j].t_start - d[i].t_start for i, j in m.pairs)
+        out[hazard] = Tally(len(m.pairs), len(m.false_alarms), len(m.missed), hours, leads)
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Precision and recall of one hazard over segments, with intervals over segments."""
+
+    total: Tally
+    precision: Interval | None
+    recall: Interval | None
+
+
+def score(segments: Sequence[Tally]) -> Score:
+    """Sum of segments; events within a drive are dependent, so resampling is over segments (X-9).
+
+    With events in one segment only, the interval is that of a single binomial count.
+    """
+    return Score(
+        sum(segments, Tally()),
+        _interval([(t.tp, t.tp + t.fp) for t in segments]),
+        _interval([(t.tp, t.tp + t.fn) for t in segments]),
+    )
+
+
+def _interval(counts: Sequence[tuple[int, int]]) -> Interval | None:
+    """Limits of the ratio of sums over segments of (hits, cases)."""
+    known = [(k, n) for k, n in counts if n]
+    if not known:
+        return None
+    if len(known) == 1:
+        return clopper_pearson(*known[0])
+    return bootstrap_interval([k for k, _ in known], [n for _, n in known])
+
+
+def macro(scores: Mapping[HazardType, Score]) -> tuple[float | None, float | None]:
+    """Means of the hazards' precisions and recalls, over those that have one (C-216)."""
+    return (
+        _mean([s.total.precision for s in scores.values()]),
+        _mean([s.total.recall for s in scores.values()]),
+    )
+
+
+def micro(scores: Mapping[HazardType, Score]) -> tuple[float | None, float | None]:
+    """Precision and recall of all hazards' counts together (C-216)."""
+    total = sum((s.total for s in scores.values()), Tally())
+    return total.precision, total.recall
+
+
+def percent(ratio: float) -> str:
+    """Percent with two decimals, rounded half up (C-214)."""
+    value = (Decimal(str(ratio)) * 100).quantize(Decimal("0.01"), ROUND_HALF_UP)
+    return f"{value}"
+
+
+def _mean(values: Sequence[float | None]) -> float | None:
+    known = [v for v in values if v is not None]
+    return sum(known) / len(known) if known else None

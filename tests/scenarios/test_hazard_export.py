@@ -1,0 +1,165 @@
+"""Exported hazards: positions, roads, profiles, and the verdict of the ASAM checkers."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from channel_worlds import Eyes, World, drive, traffic
+from skidpad.core.errors import ConfigError, InputError
+from skidpad.core.vocabulary import HazardType
+from skidpad.recording.cycles import cycles
+from skidpad.recording.hazards import HazardRecord, decode_record, encode_record
+from skidpad.scenarios.hazard_export import OscVersion, export_hazard
+
+CHECKER = Path(__file__).with_name("asam_check.py")
+JUNCTION_RULE = 1  # of two junction rules that exclude each other, one is always skipped
+
+
+def a_record(n=4, seconds=11.0, late=False, noise=0.05) -> HazardRecord:
+    eyes = (Eyes("lav", noise), Eyes("tfuse", noise, blind=(1,)))
+    worlds = [
+        c._replace(truth=None) for c in cycles(drive(World(objects=traffic(n)), eyes, seconds))
+    ]
+    if late:  # object 0 of the first channel is there from 3 s to 6 s only
+        for k, cycle in enumerate(worlds):
+            f = cycle.frames[0]
+            if 3.0 <= cycle.t <= 6.0:
+                continue
+            rest = f._replace(
+                objects=f.objects[1:], polygons=f.polygons[1:], polygon_size=f.polygon_size[1:],
+                predictions=f.predictions[1:], ids=f.ids[1:], classes=f.classes[1:],
+            )  # fmt: skip
+            worlds[k] = cycle._replace(frames=(rest, cycle.frames[1]))
+    record = HazardRecord(
+        id="h0001", type=HazardType.EGO_TAILGATED, profile="practical", forms="corrected",
+        t_start=5.0, t_end=6.0, t_worst=5.5, count=11, extremes={}, channels=("lav", "tfuse"),
+        driving="tfuse", involved=("lav",), context={}, worlds=tuple(worlds),
+    )  # fmt: skip
+    return decode_record(encode_record(record))
+
+
+def vertices(path):
+    """Entity -> rows of t, x, y, h, read with lxml and nothing of ours."""
+    root = etree.parse(str(path)).getroot()
+    out = {}
+    for group in root.iter("ManeuverGroup"):
+        (name,) = {e.get("entityRef") for e in group.iter("EntityRef")} - {None}
+        out[name] = np.array(
+            [
+                [float(v.get("time")), *(float(v.find(".//WorldPosition").get(k)) for k in "xyh")]
+                for v in group.iter("Vertex")
+            ]
+        )
+    return root, out
+
+
+@pytest.mark.req("C-152", "C-154", "C-155", "C-156")
+def test_the_file_holds_every_ego_and_object_where_the_record_has_them(tmp_path):
+    record = a_record()
+    scenario, road = export_hazard(record, tmp_path)
+    root, moved = vertices(scenario)
+    assert root.find("FileHeader").get("revMinor") == "2"
+    assert root.find("RoadNetwork/LogicFile").get("filepath") == road.name
+    names = {e.get("name") for e in root.iter("ScenarioObject")}
+    assert names == {"Ego_lav", "Ego_tfuse", *(f"lav_{k}" for k in range(1, 5)),
+                     *(f"tfuse_{k}" for k in range(1, 4))}  # fmt: skip
+    for c, channel in enumerate(record.channels):
+        for k, cycle in enumerate(record.worlds):
+            frame = cycle.frames[c]
+            assert moved[f"Ego_{channel}"][k, 1:3] == pytest.approx(frame.ego[:2], abs=0.01)
+            for i in range(len(frame.objects)):
+                row = moved[f"{channel}_{i + 1}"][k]
+                assert row[0] == pytest.approx(cycle.t - record.worlds[0].t, abs=1e-3)
+                assert row[1:3] == pytest.approx(frame.objects[i, :2], abs=0.01)
+    colours = {
+        o.get("name"): o.find(".//Property[@name='color']").get("value")
+        for o in root.iter("ScenarioObject")
+    }
+    assert (colours["Ego_lav"], colours["lav_1"]) == ("1,0,0", "1,1,1")
+    assert (colours["Ego_tfuse"], colours["tfuse_1"]) == ("0,0,1", "1,1,0")
+
+
+@pytest.mark.req("C-155", "C-156")
+def test_the_road_covers_every_position(tmp_path):
+    scenario, road = export_hazard(a_record(12), tmp_path)
+    _, moved = vertices(scenario)
+    line = etree.parse(str(road)).getroot().find(".//geometry")
+    x, y, h, length = (float(line.get(k)) for k in ("x", "y", "hdg", "length"))
+    lanes = etree.parse(str(road)).getroot().findall(".//left/lane")
+    half = sum(float(lane.find("width").get("a")) for lane in lanes)
+    points = np.vstack([rows[:, 1:3] for rows in moved.values()]) - (x, y)
+    along = points @ [np.cos(h), np.sin(h)]
+    left = points @ [-np.sin(h), np.cos(h)]
+    assert along.min() >= 0 <= length - along.max()
+    assert np.abs(left).max() <= half
+
+
+@pytest.mark.req("C-156")
+def test_late_objects_appear_and_vanish_in_1_2_and_wait_beside_the_road_in_1_0(tmp_path):
+    record = a_record(late=True)
+    new, _ = export_hazard(record, tmp_path)
+    root, moved = vertices(new)
+    (name,) = {e.get("entityRef") for e in root.iter("EntityAction")}
+    assert moved[name][0, 0] == pytest.approx(3.0)
+    kinds = [e[0].tag for e in root.iter("EntityAction")]
+    assert kinds == ["DeleteEntityAction", "AddEntityAction", "DeleteEntityAction"]
+    old, _ = export_hazard(record, tmp_path / "old", OscVersion.V1_0, "lav")
+    root, parked = vertices(old)
+    assert not list(root.iter("EntityAction"))
+    assert root.find("FileHeader").get("revMinor") == "0"
+    t, x = parked[name][:, 0], parked[name][:, 1:3]
+    there = (t >= 3.0) & (t <= 6.0)
+    assert np.hypot(*(x[~there][0] - x[there][0])) > 30.0
+    assert not any(n.startswith("tfuse") for n in parked)
+
+
+def test_a_1_0_file_takes_the_driving_channel_and_names_wrong_ones(tmp_path):
+    _, moved = vertices(export_hazard(a_record(2), tmp_path, OscVersion.V1_0)[0])
+    assert "Ego_tfuse" in moved
+    assert "Ego_lav" not in moved
+    with pytest.raises(ConfigError, match="lav, tfuse"):
+        export_hazard(a_record(2), tmp_path, world="third")
+
+
+def test_a_record_without_worlds_is_refused(tmp_path):
+    record = a_record(1, 0.2)
+    empty = HazardRecord(
+        **{n: getattr(record, n) for n in HazardRecord.__dataclass_fields__ if n != "worlds"}
+    )
+    with pytest.raises(InputError, match="no world"):
+        export_hazard(empty, tmp_path)
+
+
+def test_export_is_repeatable(tmp_path):
+    record = a_record(2)
+    one = [p.read_bytes() for p in export_hazard(record, tmp_path / "1")]
+    export_hazard(record, tmp_path / "2", OscVersion.V1_0)
+    assert [p.read_bytes() for p in export_hazard(record, tmp_path / "3")] == one
+
+
+@pytest.mark.req("C-154", "C-156")
+def test_the_asam_checkers_find_nothing(tmp_path):
+    python = os.environ.get("SKIDPAD_ASAM_PYTHON")
+    if not python or not Path(python).exists():
+        pytest.skip("SKIDPAD_ASAM_PYTHON names no environment with the ASAM checkers")
+    record = a_record(late=True)
+    files = [str(p) for p in export_hazard(record, tmp_path)]
+    old, _ = export_hazard(record, tmp_path / "old", OscVersion.V1_0)
+    done = subprocess.run(
+        [python, str(CHECKER), *files, str(old)], capture_output=True, text=True, check=True
+    )
+    verdict = json.loads(next(r for r in done.stdout.splitlines() if r.startswith("ASAM "))[5:])
+    new_xosc, xodr = (verdict[f] for f in files)
+    assert new_xosc["issues"] == [] == new_xosc["skipped"]
+    assert any("valid_schema" in c for c in new_xosc["completed"])
+    assert xodr["issues"] == []
+    assert len(xodr["skipped"]) == JUNCTION_RULE
+    assert verdict[str(old)]["issues"] == []  # its schema is checked, the rules begin with 1.2
+    assert any("valid_schema" in c for c in verdict[str(old)]["completed"])

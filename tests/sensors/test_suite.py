@@ -118,3 +118,22 @@ def test_rendering_needed_images_only_changes_no_value_that_is_read():
         )
         assert np.array_equal(a.images["rgb_top"].rgb, b.images["rgb_top"].rgb)
         assert all(np.array_equal(p, q) for p, q in zip(a.radar, b.radar, strict=True))
+
+
+@pytest.mark.req("A-257")
+def test_a_snapshot_is_a_copy_of_the_moments_pictures():
+    world = straight()
+    table, states = traffic(world)
+    eyes = PixelSuite(world, table, twelve_sensors(), Weather())
+    seen = eyes.observe(0, states, {})
+    kept = eyes.snapshot("rgb_front", "rgb_top")
+    assert {k: v.shape for k, v in kept.items()} == {
+        "rgb_front": (600, 800, 3),
+        "rgb_top": (160, 160, 3),
+    }
+    assert np.array_equal(kept["rgb_front"], seen.images["rgb_front"].rgb)
+    before = kept["rgb_front"].copy()
+    states.x[0] += 20.0
+    eyes.observe(1, states, {})
+    eyes.render("rgb_front")
+    assert np.array_equal(before, kept["rgb_front"])

@@ -67,3 +67,17 @@ def decode_carla_depth(rgb: Bytes) -> NDArray[np.float64]:
 def cityscapes_colours(labels: NDArray[np.uint8]) -> Bytes:
     """(H, W) class ids to (H, W, 3) red, green, blue (A-034)."""
     return _COLOURS[labels]
+
+
+def vehicle_mask(rgb: Bytes) -> NDArray[np.bool_]:
+    """(H, W, 3) class colours to the published tolerance boxes of car, truck and bus (A-035).
+
+    For images whose colours have been through lossy coding; labels need no mask.
+    """
+    r, g, b = (rgb[..., i].astype(np.int16) for i in range(3))
+    dark = (g < 50) & (r < 50)
+    car = (b > 100) & (b < 160) & dark
+    truck = (b > 50) & (b < 90) & dark
+    bus = (b > 80) & (b < 120) & (g > 40) & (g < 80) & (r < 50)
+    mask: NDArray[np.bool_] = car | truck | bus
+    return mask

@@ -193,6 +193,14 @@ class PixelSuite:
             self._degraded[id].apply(self.tick, packed)
         return CameraImage(rgb=packed.view(np.uint8).reshape(*packed.shape, 4)[..., :3])
 
+    def snapshot(self, *ids: str) -> dict[str, NDArray[np.uint8]]:
+        """Copies (H, W, 3) of RGB views as they are now, for a file (A-257); none given: all."""
+        return {
+            id: np.ascontiguousarray(rgb)
+            for id in (ids or tuple(self._rgb))
+            if (rgb := self.render(id).rgb) is not None
+        }
+
     def _move(self, states: ActorStates) -> None:
         """Velocities and yaw rates; the vertical one from the change of height in a tick."""
         climb = (states.z - self._height) / self._dt

@@ -7,8 +7,11 @@ import typer
 import skidpad
 from skidpad.cli.adas import adas, report, show
 from skidpad.cli.compare import compare
+from skidpad.cli.channels import channels
 from skidpad.cli.friction import friction
+from skidpad.cli.hazards import hazards
 from skidpad.cli.map import maps
+from skidpad.cli.monitor import monitor, safety_case
 from skidpad.cli.profiles import profiles
 from skidpad.core.errors import InputError, SkidpadError
 
@@ -42,7 +45,11 @@ app.command()(compare)
 app.command()(show)
 app.add_typer(profiles)
 app.add_typer(maps)
+app.add_typer(channels)
+app.add_typer(hazards)
 app.command()(friction)
+app.command()(monitor)
+app.command("safety-case")(safety_case)
 
 
 @app.command()

@@ -5,7 +5,7 @@ It reads what channels report and nothing else; truth and words about the drive 
 
 from __future__ import annotations
 
-from collections import Counter, deque
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
@@ -14,13 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.channels import ChannelFrame, Cycle
+from skidpad.core.channels import Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.frames import Usable, usable
 from skidpad.evidence.hazards import (
     Profile,
     Rule,
-    Signal,
     SignalReader,
     SignalReadings,
     load_rules,
@@ -40,14 +39,12 @@ from skidpad.evidence.indicators.panel import (
     IndicatorSettings,
     Readings,
 )
+from skidpad.evidence.recorder import CycleEvidence, Recorder
 from skidpad.evidence.risk import RiskMatrix, risk_matrix
 from skidpad.evidence.timefilter import Event, TimeFilter
-from skidpad.recording.hazards import HazardRecord, InvolvedObject
+from skidpad.recording.hazards import HazardRecord
 
 Floats = NDArray[np.float64]
-BEFORE = 5.0  # s of world kept before a hazard (C-13)
-AFTER = 5.0  # s after it
-WORLD_LIMIT = 600  # cycles of world in one record; a longer hazard is flagged cut
 Lap = Callable[[str], None]
 
 
@@ -62,6 +59,11 @@ class Unusable:
     objects_beyond_limit: Counter[str] = field(default_factory=Counter)
     shapes: Counter[str] = field(default_factory=Counter)  # objects without an area
 
+    def as_dict(self) -> dict[str, dict[str, int]]:
+        """Counts above zero by kind and channel."""
+        kinds = ("absent", "poses", "plans", "objects", "objects_beyond_limit", "shapes")
+        return {kind: dict(+getattr(self, kind)) for kind in kinds}
+
 
 class _Counts(NamedTuple):
     """Cycles per indicator and subject."""
@@ -72,18 +74,6 @@ class _Counts(NamedTuple):
     @classmethod
     def of(cls, indicators: int, subjects: int) -> _Counts:
         return cls(*np.zeros((2, indicators, subjects), dtype=np.int64))
-
-
-@dataclass(slots=True)
-class CycleEvidence:
-    """Everything found in one cycle."""
-
-    cycle: Cycle
-    readings: Readings
-    risk: RiskMatrix
-    signals: SignalReadings
-    fired: tuple[HazardType, ...]
-    undecided: tuple[HazardType, ...]
 
 
 class Monitor:
@@ -111,8 +101,17 @@ class Monitor:
         self.violations: TimeFilter[tuple[Indicator, str]] = TimeFilter()
         self.unusable = Unusable()
         self.undecided: Counter[HazardType] = Counter()
-        self.context: dict[str, str] = {}
-        self._recorder = _Recorder(self) if keep_worlds else None
+        self._recorder = (
+            Recorder(
+                self.channels,
+                self.rules,
+                profile.value,
+                self.settings.form.value,
+                self.hazards.pause,
+            )
+            if keep_worlds
+            else None
+        )
         scopes = ((CHANNEL_INDICATORS, self.channels), (PAIR_INDICATORS, self.pairs))
         self._bounds = [_bounds(self.thresholds, indicators) for indicators, _ in scopes]
         self._counts = [_Counts.of(len(indicators), len(names)) for indicators, names in scopes]
@@ -169,6 +168,11 @@ class Monitor:
                 undecided.append(rule.hazard)
                 self.undecided[rule.hazard] += 1
         return CycleEvidence(cycle, readings, risk, signals, tuple(fired), tuple(undecided))
+
+    def note(self, entries: dict[str, str]) -> None:
+        """Words about the drive, copied into records; nothing is judged by them."""
+        if self._recorder:
+            self._recorder.context.update(entries)
 
     def records(self) -> list[HazardRecord]:
         """Records that have closed since the last call."""
@@ -253,152 +257,6 @@ def _bounds(
         if entry.threshold is not None:
             (low if entry.bound is Bound.LOWER else high)[row] = entry.threshold
     return low, high
-
-
-@dataclass(slots=True)
-class _Open:
-    """A hazard whose record is being gathered."""
-
-    rule: Rule
-    t_start: float
-    t_end: float
-    t_worst: float
-    count: int
-    worst: float
-    signals: SignalReadings
-    risk: RiskMatrix
-    frames: tuple[ChannelFrame | None, ...]
-    worlds: list[Cycle]
-    assumed: bool
-    cut: bool = False
-
-
-class _Recorder:
-    """Gathers the worlds around hazards from 5 s before to 5 s after."""
-
-    def __init__(self, monitor: Monitor) -> None:
-        self.monitor = monitor
-        self.rules = {rule.hazard: rule for rule in monitor.rules}
-        self.past: deque[Cycle] = deque()
-        self.open: dict[HazardType, _Open] = {}
-        self.closed: list[HazardRecord] = []
-        self.number = 0
-
-    def update(self, cycle: Cycle, evidence: CycleEvidence) -> None:
-        """Add the cycle to the past and to all open hazards."""
-        cycle = cycle._replace(truth=None)  # a record holds what channels said
-        t = cycle.t
-        for hazard, one in list(self.open.items()):
-            if hazard not in evidence.fired and t - one.t_end > AFTER + 1e-6:
-                self._close(hazard)
-        while self.past and t - self.past[0].t > BEFORE + 1e-6:
-            self.past.popleft()
-        for hazard in evidence.fired:
-            self._fired(hazard, cycle, evidence)
-        for one in self.open.values():
-            if len(one.worlds) < WORLD_LIMIT:
-                one.worlds.append(cycle)
-            else:
-                one.cut = True
-        self.past.append(cycle)
-
-    def _fired(self, hazard: HazardType, cycle: Cycle, evidence: CycleEvidence) -> None:
-        rule = self.rules[hazard]
-        value = evidence.signals.values[rule.extreme.signal]
-        one = self.open.get(hazard)
-        pause = self.monitor.hazards.pause
-        if one is not None and cycle.t - one.t_end >= pause:
-            # a new event begins within the 5 s after the last: that record ends here
-            self._close(hazard)
-            one = None
-        if one is None:
-            self.open[hazard] = _Open(
-                rule, cycle.t, cycle.t, cycle.t, 1, value, evidence.signals, evidence.risk,
-                cycle.frames, list(self.past), evidence.signals.assumed,
-            )  # fmt: skip
-            return
-        one.t_end = cycle.t
-        one.count += 1
-        one.assumed |= evidence.signals.assumed
-        harder = value < one.worst if rule.extreme.of == "least" else value > one.worst
-        if harder:
-            one.worst, one.t_worst = value, cycle.t
-            one.signals, one.risk, one.frames = evidence.signals, evidence.risk, cycle.frames
-
-    def _close(self, hazard: HazardType) -> None:
-        one = self.open.pop(hazard)
-        self.number += 1
-        monitor = self.monitor
-        involved, objects = _involved(hazard, one, monitor.channels)
-        driving = one.signals.driving
-        assumed = one.assumed and any(
-            c.signal in (Signal.GAP, Signal.GAP_SIGNED) for a in one.rule.alternatives for c in a
-        )
-        flags = [name for name, set_ in (("assumed", assumed), ("cut", one.cut)) if set_]
-        self.closed.append(
-            HazardRecord(
-                id=f"h{self.number:04d}",
-                type=hazard,
-                profile=monitor.profile.value,
-                forms=monitor.settings.form.value,
-                t_start=round(one.t_start, 3),
-                t_end=round(one.t_end, 3),
-                t_worst=round(one.t_worst, 3),
-                count=one.count,
-                extremes={
-                    s.value: round(v, 6) for s, v in one.signals.values.items() if np.isfinite(v)
-                },
-                channels=monitor.channels,
-                driving=None if driving is None else monitor.channels[driving],
-                involved=involved,
-                objects=objects,
-                flags=tuple(flags),
-                context=dict(monitor.context),
-                worlds=tuple(one.worlds),
-            )
-        )
-
-    def take(self) -> list[HazardRecord]:
-        """Closed records, each once."""
-        done, self.closed = self.closed, []
-        return done
-
-    def finish(self) -> list[HazardRecord]:
-        """Close everything; what has not had its 5 s after is cut."""
-        for hazard in list(self.open):
-            one = self.open[hazard]
-            one.cut |= not one.worlds or one.worlds[-1].t - one.t_end < AFTER - 1e-6
-            self._close(hazard)
-        return self.take()
-
-
-def _involved(
-    hazard: HazardType, one: _Open, channels: tuple[str, ...]
-) -> tuple[tuple[str, ...], tuple[InvolvedObject, ...]]:
-    """Channels and objects that a record names."""
-    if hazard is HazardType.INCONSISTENT_LOCALISATION or not np.isfinite(one.risk.risk).any():
-        pair = one.signals.gap_pair
-        names = channels if pair is None else _pair(channels, pair)
-        return tuple(names), ()
-    behind = hazard is HazardType.EGO_TAILGATED
-    risk = one.risk.risk_behind if behind else one.risk.risk_ahead
-    worst = one.risk.worst_behind if behind else one.risk.worst_ahead
-    a, b = np.unravel_index(int(np.argmax(np.nan_to_num(risk, nan=-1.0))), risk.shape)
-    names = tuple(dict.fromkeys((channels[int(a)], channels[int(b)])))
-    frame, row = one.frames[int(b)], int(worst[a, b])
-    if frame is None or row < 0:
-        return names, ()
-    identity = int(frame.ids[row])
-    x, y = frame.objects[row, :2].tolist()
-    return names, (
-        InvolvedObject(
-            channels[int(b)], identity if identity >= 0 else None, round(x, 3), round(y, 3)
-        ),
-    )
-
-
-def _pair(channels: tuple[str, ...], pair: int) -> tuple[str, ...]:
-    return tuple(combinations(channels, 2))[pair]
 
 
 def drive_events(

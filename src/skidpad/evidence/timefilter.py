@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 PAUSE = 2.0  # s (C-140)
+SAME_TIME = 1e-6  # s, rounding of cycle times
 Key = TypeVar("Key", bound=Hashable)
 
 
@@ -35,7 +36,7 @@ class TimeFilter(Generic[Key]):
         The event keeps the least or the greatest value; NaN is a value that was not there.
         """
         event = self.open.get(key)
-        if event is None or t - event.t_end >= self.pause:
+        if event is None or t - event.t_end >= self.pause - SAME_TIME:
             if event is not None:
                 self.closed.append(event)
             self.open[key] = Event(key, t, t, 1, value)
@@ -49,7 +50,9 @@ class TimeFilter(Generic[Key]):
 
     def advance(self, t: float) -> list[Event[Key]]:
         """Events that no detection at `t` or later can extend; each is handed out once."""
-        for key in [k for k, event in self.open.items() if t - event.t_end >= self.pause]:
+        for key in [
+            k for k, event in self.open.items() if t - event.t_end >= self.pause - SAME_TIME
+        ]:
             self.closed.append(self.open.pop(key))
         done, self.closed = self.closed, []
         return done

@@ -327,7 +327,7 @@ def _merged(marks: list[_Mark], world: World) -> list[TrueHazard]:
     for hazard in HazardType:
         group: list[_Mark] = []
         for mark in sorted((m for m in marks if m.hazard is hazard), key=lambda m: m.t):
-            if group and mark.t - group[-1].t >= PAUSE:
+            if group and mark.t - group[-1].t >= PAUSE - 1e-6:
                 out.append(_hazard(group, world))
                 group = []
             group.append(mark)

@@ -68,8 +68,15 @@ class Losses:
 class ChannelSource(Protocol):
     """Anything that replays what channels said: an MCAP file, a ROS bag, a list in memory."""
 
-    channels: tuple[str, ...]
-    losses: Losses
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the driving channels."""
+        ...
+
+    @property
+    def losses(self) -> Losses:
+        """What could not be read; complete once all messages have been."""
+        ...
 
     def messages(self) -> Iterator[Message]:
         """All messages, oldest first as far as the recording is in order."""

@@ -1,0 +1,83 @@
+"""`skidpad hazards`: the scenes that a monitor found, and their export."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import TypeVar
+
+import typer
+
+hazards = typer.Typer(
+    name="hazards", help="Hazardous scenes that a monitor found.", no_args_is_help=True
+)
+DIR = typer.Argument(help="Output folder of `skidpad monitor`.")
+ID = typer.Option(None, "--id", help="Only this hazard; may be repeated.")
+
+
+class Osc(str, Enum):
+    """Choices of --osc."""
+
+    v1_2 = "1.2"
+    v1_0 = "1.0"
+
+
+OSC = typer.Option(Osc.v1_2, help="1.2 for all channels; 1.0 for CARLA ScenarioRunner.")
+T = TypeVar("T")
+WORLD = typer.Option(None, help="Only this channel's world; 1.0: the driving one by default.")
+
+
+@hazards.command("list")
+def list_(folder: Path = DIR) -> None:
+    """One line per hazard."""
+    from skidpad.recording.hazards import read_index
+
+    rows = read_index(folder)
+    for row in rows:
+        flags = f" [{', '.join(row['flags'])}]" if row["flags"] else ""
+        typer.echo(
+            f"{row['id']}  {row['type']:<26} {row['t_start']:.1f} to {row['t_end']:.1f} s  "
+            f"{row['count']} cycles  {', '.join(row['involved'])}{flags}"
+        )
+    if not rows:
+        typer.echo("no hazard was found")
+
+
+@hazards.command()
+def show(folder: Path = DIR, id: list[str] = ID) -> None:
+    """Everything that a record says, without its worlds."""
+    import json
+
+    from skidpad.recording.hazards import read_index
+
+    rows = read_index(folder)
+    for row in _chosen({row["id"]: row for row in rows}, id):
+        typer.echo(json.dumps(row, indent=2))
+
+
+@hazards.command()
+def export(
+    folder: Path = DIR,
+    id: list[str] = ID,
+    osc: Osc = OSC,
+    world: str | None = WORLD,
+) -> None:
+    """Write each hazard as .xosc and .xodr into DIR/scenarios."""
+    from skidpad.recording.hazards import read_hazards
+    from skidpad.scenarios.hazard_export import OscVersion, export_hazard
+
+    records = {record.id: record for record in read_hazards(folder)}
+    for record in _chosen(records, id):
+        scenario, road = export_hazard(record, folder / "scenarios", OscVersion(osc.value), world)
+        typer.echo(f"{scenario} with {road.name}")
+
+
+def _chosen(table: dict[str, T], ids: list[str] | None) -> list[T]:
+    from skidpad.core.errors import ConfigError
+
+    unknown = [i for i in ids or [] if i not in table]
+    if unknown:
+        raise ConfigError(
+            f"no hazard {', '.join(unknown)}; there are: {', '.join(table) or 'none'}"
+        )
+    return [table[i] for i in (ids or table)]

@@ -1,0 +1,181 @@
+"""`skidpad monitor`, `skidpad safety-case`: what channels say, judged."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from skidpad.core.vocabulary import HazardType
+    from skidpad.evidence.indicators.catalogue import Indicator
+    from skidpad.evidence.watch import Watched
+
+
+class Rules(str, Enum):
+    """Choices of --rules."""
+
+    practical = "practical"
+    as_printed = "as_printed"
+
+
+class Forms(str, Enum):
+    """Choices of --forms."""
+
+    corrected = "corrected"
+    completed = "completed"
+    printed = "printed"
+
+
+FILE = typer.Argument(help="A channel recording (.mcap), or a ROS 2 bag with --mapping.")
+OUT = typer.Option(..., help="Folder for indicators, hazards and the summary.")
+MAPPING = typer.Option(None, help="YAML that says which topics of a ROS 2 bag are what.")
+RULES = typer.Option(Rules.practical, help="Hazard rules: corrected, or as published.")
+FORMS = typer.Option(
+    None, help="Formulas of the indicators; default: corrected, with as_printed rules completed."
+)
+RULES_FILE = typer.Option(None, help="Own hazard rules (YAML).")
+THRESHOLDS = typer.Option(None, help="Own thresholds (YAML).")
+TIMING = typer.Option(False, "--timing", help="Measure each module and print the table.")
+FAIL_IF = typer.Option(
+    None, help="Exit with 1 when this hazard or indicator violation occurs; may be repeated."
+)
+JUNIT = typer.Option(None, help="Also write the verdicts of --fail-if as JUnit XML.")
+DIR = typer.Argument(help="Output folder of `skidpad monitor`.")
+
+
+def monitor(
+    file: Path = FILE,
+    out: Path = OUT,
+    mapping: Path | None = MAPPING,
+    rules: Rules = RULES,
+    forms: Forms | None = FORMS,
+    rules_file: Path | None = RULES_FILE,
+    thresholds: Path | None = THRESHOLDS,
+    timing: bool = TIMING,
+    fail_if: list[str] = FAIL_IF,
+    junit: Path | None = JUNIT,
+) -> None:
+    """Watch what driving channels say: indicators, violations, hazardous scenes."""
+    import time
+
+    from skidpad.core.errors import ConfigError
+    from skidpad.evidence.hazards import Profile
+    from skidpad.evidence.indicators.catalogue import load_thresholds
+    from skidpad.evidence.indicators.comfort import Form
+    from skidpad.evidence.indicators.panel import IndicatorSettings
+    from skidpad.evidence.watch import timing_statistics, watch
+    from skidpad.recording.sources import open_channels
+
+    wanted = {name: _rule(name) for name in fail_if or []}
+    if junit is not None and not wanted:
+        raise ConfigError("--junit writes the verdicts of --fail-if, and none is given")
+    default = Form.COMPLETED if rules is Rules.as_printed else Form.CORRECTED
+    source = open_channels(file, mapping)
+    found = watch(
+        source,
+        out,
+        settings=IndicatorSettings(form=Form(forms.value) if forms else default),
+        profile=Profile(rules.value),
+        thresholds=load_thresholds(thresholds),
+        rules_file=rules_file,
+        clock=time.thread_time_ns if timing else None,
+    )
+    _print(found, out)
+    if found.timing is not None:
+        _print_table(timing_statistics(found.timing))
+    if wanted:
+        _gate({name: _events(found, rule) for name, rule in wanted.items()}, junit)
+
+
+def _rule(name: str) -> HazardType | Indicator:
+    from skidpad.core.errors import ConfigError
+    from skidpad.core.vocabulary import HazardType
+    from skidpad.evidence.indicators.catalogue import Indicator, load_thresholds
+
+    by_label = {entry.label: i for i, entry in load_thresholds().items() if entry.threshold}
+    known: dict[str, HazardType | Indicator] = {h.value: h for h in HazardType}
+    known |= {i.value: i for i in by_label.values()} | dict(by_label)
+    if name not in known:
+        raise ConfigError(
+            f"--fail-if {name!r} is neither a hazard nor an indicator with a threshold; choose of: "
+            + ", ".join(n for n in known if n not in {i.value for i in Indicator})
+        )
+    return known[name]
+
+
+def _events(found: Watched, rule: HazardType | Indicator) -> int:
+    from skidpad.core.vocabulary import HazardType
+
+    if isinstance(rule, HazardType):
+        return found.hazards.get(rule, 0)
+    return sum(n for (indicator, _), n in found.violations.items() if indicator is rule)
+
+
+def _print(found: Watched, out: Path) -> None:
+    summary = found.summary
+    typer.echo(
+        f"{', '.join(found.channels)}: {found.cycles} cycles, {found.hours * 60:.1f} min; "
+        f"rules {summary['rules']}, forms {summary['forms']}"
+    )
+    for hazard, n in found.hazards.items():
+        typer.echo(f"  hazard {hazard.value}: {n}")
+    if not found.hazards:
+        typer.echo("  no hazard found")
+    for (indicator, subject), n in sorted(found.violations.items()):
+        typer.echo(f"  violation {indicator.value} ({subject}): {n}")
+    lost = {k: v for k, v in summary["losses"].items() if v}
+    unusable = {k: v for k, v in summary["unusable"].items() if any(v.values())}
+    for what, table in (("lost while reading", lost), ("not usable", unusable)):
+        if table:
+            typer.echo(f"  {what}: " + ", ".join(f"{k} {v}" for k, v in table.items()))
+    typer.echo(f"written to {out}")
+
+
+def _print_table(table: object) -> None:
+    import polars as pl
+
+    with pl.Config(
+        tbl_rows=50, tbl_cols=20, tbl_hide_dataframe_shape=True, tbl_width_chars=140,
+        tbl_hide_column_data_types=True, float_precision=3,
+    ):  # fmt: skip
+        typer.echo(str(table))
+
+
+def _gate(counts: dict[str, int], junit: Path | None) -> None:
+    """Exit with 1 when anything that must not occur did."""
+    if junit is not None:
+        from skidpad.recording.files import write_bytes
+
+        write_bytes(junit, _junit(counts))
+    failed = [f"{name} occurred {n} times" for name, n in counts.items() if n]
+    if failed:
+        typer.echo("failed: " + "; ".join(failed), err=True)
+        raise typer.Exit(1)
+
+
+def _junit(counts: dict[str, int]) -> bytes:
+    from lxml import etree
+
+    suite = etree.Element(
+        "testsuite",
+        name="skidpad monitor",
+        tests=str(len(counts)),
+        failures=str(sum(n > 0 for n in counts.values())),
+    )
+    for name, n in counts.items():
+        case = etree.SubElement(suite, "testcase", classname="skidpad.monitor", name=name)
+        if n:
+            etree.SubElement(case, "failure", message=f"{name} occurred {n} times")
+    return etree.tostring(suite, xml_declaration=True, encoding="utf-8", pretty_print=True)
+
+
+def safety_case(folder: Path = DIR) -> None:
+    """Print the safety case with what the drive says for and against each claim."""
+    from skidpad.evidence.case import evidence_lines
+    from skidpad.recording.indicators import read_indicators
+
+    for line in evidence_lines(read_indicators(folder)):
+        typer.echo(line)

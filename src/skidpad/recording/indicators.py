@@ -1,0 +1,86 @@
+"""Indicator values of a drive as Parquet: one row per cycle, subject and indicator (C-17)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from skidpad.recording.files import read_parquet, write_parquet
+
+Floats = NDArray[np.float64]
+FILE = "indicators.parquet"
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One indicator of one channel or pair, with its bound and claim."""
+
+    indicator: str
+    subject: str  # channel, or pair "a+b"
+    threshold: float | None
+    upper: bool  # the threshold is an upper bound
+    claim: str | None
+
+
+class IndicatorLog:
+    """Gathers one row of values per cycle; NaN is written as null, not evaluated."""
+
+    def __init__(self, columns: Sequence[Column]) -> None:
+        self.columns = tuple(columns)
+        self._k: list[int] = []
+        self._t: list[float] = []
+        self._rows: list[Floats] = []
+
+    def add(self, k: int, t: float, values: Floats) -> None:
+        """Values (len(columns),) of cycle k at `t` s."""
+        self._k.append(k)
+        self._t.append(t)
+        self._rows.append(values)
+
+    def table(self) -> pl.DataFrame:
+        """Long form, by cycle and then in the order of the columns."""
+        n, m = len(self._k), len(self.columns)
+        values = np.array(self._rows, dtype=np.float64).reshape(n, m)
+        low = np.array([_bound(c, upper=False) for c in self.columns])
+        high = np.array([_bound(c, upper=True) for c in self.columns])
+        violated = (values < low) | (values > high)
+        return pl.DataFrame(
+            {
+                "cycle": np.repeat(np.array(self._k, dtype=np.int64), m),
+                "t": np.repeat(np.array(self._t, dtype=np.float64), m),
+                "subject": _tiled([c.subject for c in self.columns], n),
+                "indicator": _tiled([c.indicator for c in self.columns], n),
+                "value": pl.Series(values.ravel(), nan_to_null=True),
+                "evaluated": np.isfinite(values).ravel(),
+                "threshold": _tiled([c.threshold for c in self.columns], n, pl.Float64()),
+                "violated": violated.ravel(),
+                "claim": _tiled([c.claim for c in self.columns], n),
+            }
+        )
+
+    def write(self, folder: Path) -> None:
+        """Write the table into `folder`."""
+        write_parquet(folder / FILE, self.table())
+
+
+def read_indicators(folder: Path) -> pl.DataFrame:
+    """The table in a monitor's output folder."""
+    return read_parquet(folder / FILE)[0]
+
+
+def _bound(column: Column, upper: bool) -> float:
+    if column.threshold is None or column.upper is not upper:
+        return np.inf if upper else -np.inf
+    return column.threshold
+
+
+def _tiled(
+    values: Sequence[str | float | None], n: int, dtype: pl.DataType | None = None
+) -> pl.Series:
+    base = pl.Series(list(values), dtype=dtype or pl.String())
+    return base.gather(np.tile(np.arange(len(values), dtype=np.uint32), n))

@@ -1,0 +1,29 @@
+"""Opens whatever holds channels: our MCAP files, or ROS 2 bags with a mapping file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from skidpad.core.errors import FileError
+from skidpad.recording.channels import ChannelSource, McapRecording
+
+
+def open_channels(path: Path, mapping: Path | None = None) -> ChannelSource:
+    """The recording at `path`; with `mapping` it is read as a ROS 2 bag."""
+    if mapping is not None:
+        from skidpad.recording.rosbag import RosRecording
+
+        return RosRecording(path, mapping)
+    if path.is_dir():
+        raise FileError(f"{path}: a folder is read as a ROS 2 bag, which needs --mapping FILE")
+    if not path.exists():
+        raise FileError(f"{path}: no such file")
+    return McapRecording(path)
+
+
+def recordings_below(folder: Path) -> list[Path]:
+    """All .mcap files below `folder`, by name; FileError when there is none."""
+    found = sorted(folder.rglob("*.mcap")) if folder.is_dir() else []
+    if not found:
+        raise FileError(f"{folder}: holds no .mcap recording")
+    return found

@@ -1,0 +1,182 @@
+"""The commands that read channel recordings: what they write, print, and how they fail."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+
+import numpy as np
+import polars as pl
+import pytest
+from lxml import etree
+from typer.testing import CliRunner
+
+from channel_worlds import Eyes, World, drive
+from skidpad.cli.main import app, main
+from skidpad.core.channels import Context
+from skidpad.evidence.indicators.catalogue import Indicator
+from skidpad.recording.channels import ChannelWriter
+from skidpad.recording.hazards import read_hazards
+
+runner = CliRunner(env={"COLUMNS": "200"})
+WORLD = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-11.0, 0, 0, 15.5, 0), (50.0, 3.5, 0, 15, 0)]))
+EYES = (Eyes("lav", 0.03), Eyes("tfuse", 0.03, blind=(0,)))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("drives")
+    source = drive(WORLD, EYES, 12.0)
+    with ChannelWriter(folder / "one.mcap", source.channels) as writer:
+        writer.write_context(Context(0.0, {"route": "ring"}))
+        for channel, item in source.rows:
+            if channel is None:
+                writer.write_truth(item)
+            else:
+                writer.write(source.channels[channel], item)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def monitored(folder):
+    done = runner.invoke(app, ["monitor", str(folder / "one.mcap"), "--out", str(folder / "out")])
+    assert done.exit_code == 0, done.output
+    return folder / "out"
+
+
+def invoke(*args):
+    return runner.invoke(app, [str(a) for a in args], catch_exceptions=False)
+
+
+def failing(monkeypatch, capsys, *args):
+    monkeypatch.setattr(sys, "argv", ["skidpad", *map(str, args)])
+    with pytest.raises(SystemExit) as stop:
+        main()
+    return stop.value.code, capsys.readouterr().err
+
+
+@pytest.mark.req("C-032", "C-213")
+def test_monitor_writes_every_indicator_of_every_cycle(monitored):
+    table = pl.read_parquet(monitored / "indicators.parquet")
+    assert table.columns == [
+        "cycle", "t", "subject", "indicator", "value", "evaluated", "threshold", "violated", "claim"
+    ]  # fmt: skip
+    assert set(table["indicator"]) == {i.value for i in Indicator}
+    assert table["cycle"].n_unique() == 121
+    assert table.filter(pl.col("evaluated") == pl.col("value").is_null()).is_empty()
+    low = table.filter(pl.col("threshold").is_not_null() & pl.col("evaluated"))
+    variance = Indicator.EGO_LOCATION_VARIANCE.value
+    expected = (
+        pl.when(pl.col("indicator") == variance)
+        .then(pl.col("value") > pl.col("threshold"))
+        .otherwise(pl.col("value") < pl.col("threshold"))
+    )
+    assert low.filter(expected != pl.col("violated")).is_empty()
+    scores = table.filter(pl.col("claim").is_not_null() & pl.col("evaluated"))
+    scores = scores.filter(~pl.col("indicator").str.contains("variance|shift|left"))
+    assert scores["value"].is_between(0.0, 1.0).all()
+    summary = json.loads((monitored / "monitor.json").read_text())
+    assert [h["name"] for h in summary["hazards"]] == ["ego_tailgated"]
+
+
+def test_hazards_are_listed_shown_and_exported(monitored):
+    assert "ego_tailgated" in invoke("hazards", "list", monitored).output
+    shown = json.loads(invoke("hazards", "show", monitored, "--id", "h0001").output)
+    assert shown["context"] == {"route": "ring"}
+    done = invoke("hazards", "export", monitored, "--osc", "1.0", "--world", "lav")
+    assert done.exit_code == 0
+    scenario = next((monitored / "scenarios").glob("*.xosc"))
+    assert etree.parse(str(scenario)).getroot().find("FileHeader").get("revMinor") == "0"
+    assert len(list(read_hazards(monitored))) == 1
+
+
+@pytest.mark.req("C-033", "C-034")
+def test_the_safety_case_prints_evidence_for_every_statement(monitored):
+    output = invoke("safety-case", monitored).output
+    assert re.findall(r"\b(S\d+) ", output) == [f"S{k}" for k in range(1, 11)]
+    assert "challenged" in output or "supported" in output
+    assert "not evaluated in" in output
+
+
+@pytest.mark.req("C-105", "C-214")
+def test_evaluate_and_compare(folder, monitored):
+    done = invoke("channels", "evaluate", folder)
+    assert done.exit_code == 0
+    table = json.loads((folder / "evaluation.json").read_text())
+    (row,) = [
+        r for r in table["results"]
+        if (r["rules"], r["truth"], r["tolerance_s"]) == ("practical", "sim", 1.0)
+    ]  # fmt: skip
+    assert row["hazards"]["ego_tailgated"]["recall"] == 1.0
+    assert list(table["by_route"]["practical/sim"]) == ["ring"]
+    done = invoke("channels", "compare", monitored, monitored)
+    assert "ego_location_similarity (lav+tfuse): +0.0000" in done.output
+
+
+def test_info_says_what_a_recording_holds_and_what_it_lost(folder, tmp_path):
+    output = invoke("channels", "info", folder / "one.mcap").output
+    assert "/channels/lav (skidpad.Channel): 121 messages" in output
+    cut = tmp_path / "cut.mcap"
+    whole = (folder / "one.mcap").read_bytes()
+    cut.write_bytes(whole[: int(0.6 * len(whole))])
+    done = invoke("channels", "info", cut)
+    assert done.exit_code == 0
+    assert "cut short" in done.output
+
+
+@pytest.mark.req("C-230", "C-232", "C-233", "C-234")
+def test_timing_gives_the_table_and_the_total_is_the_sum_of_its_parts(folder, tmp_path):
+    done = invoke("monitor", folder / "one.mcap", "--out", tmp_path, "--timing")
+    assert "motion_prediction" in done.output
+    t = pl.read_parquet(tmp_path / "timing.parquet")
+    parts = ["prepare", "comfort", "similarity", "motion_prediction", "risk", "hazards"]
+    assert t["total"].to_list() == pytest.approx(t.select(pl.sum_horizontal(parts)).to_series())
+    assert t["objects"].to_list() == [3] * 121
+
+
+def test_gates_exit_with_1_and_write_junit(folder, tmp_path):
+    junit = tmp_path / "verdict.xml"
+    args = ["monitor", folder / "one.mcap", "--out", tmp_path, "--junit", junit]
+    done = invoke(*args, "--fail-if", "ego_tailgated", "--fail-if", "ELSS")
+    assert done.exit_code == 1
+    suite = etree.parse(str(junit)).getroot()
+    assert (suite.get("tests"), suite.get("failures")) == ("2", "1")
+    assert [c.get("name") for c in suite if c.find("failure") is not None] == ["ego_tailgated"]
+    assert invoke(*args, "--fail-if", "ELSS").exit_code == 0
+
+
+@pytest.mark.parametrize(
+    ("args", "words"),
+    [
+        (("monitor", "missing.mcap", "--out", "o"), "missing.mcap: no such file"),
+        (("monitor", ".", "--out", "o"), "--mapping"),
+        (("hazards", "list", "nowhere"), "skidpad monitor"),
+        (("safety-case", "nowhere"), "no file nowhere"),
+        (("channels", "evaluate", "nowhere"), "holds no .mcap"),
+        (("channels", "info", "text.mcap"), "is not an MCAP file"),
+    ],
+)
+def test_unusable_input_is_one_sentence_and_exit_code_2(monkeypatch, capsys, tmp_path, args, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "text.mcap").write_text("hello, this is no recording")
+    code, error = failing(monkeypatch, capsys, *args)
+    assert code == 2
+    assert words in error
+    assert error.count("\n") == 1
+
+
+def test_a_gate_on_an_unknown_name_lists_the_known_ones(monkeypatch, capsys, folder, tmp_path):
+    code, error = failing(
+        monkeypatch, capsys, "monitor", folder / "one.mcap", "--out", tmp_path, "--fail-if", "speed"
+    )
+    assert code == 2
+    assert "ego_tailgated" in error
+    assert "ELSS" in error
+
+
+def test_help_does_not_load_numba():
+    text = "import sys; from skidpad.cli.main import app; print('numba' in sys.modules)"
+    done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "False"

@@ -6,8 +6,8 @@ import typer
 
 import skidpad
 from skidpad.cli.adas import adas, report, show
-from skidpad.cli.compare import compare
 from skidpad.cli.channels import channels
+from skidpad.cli.compare import compare
 from skidpad.cli.friction import friction
 from skidpad.cli.hazards import hazards
 from skidpad.cli.map import maps

@@ -15,6 +15,7 @@ from skidpad.roads.baked import BakedMap
 from skidpad.roads.lanes import Floats, Ints, LaneKind
 
 CELL = 4.0  # m, edge of a cell of the search grid
+CELLS_MAX = 8_000_000  # a map that is larger gets larger cells
 REACH = 20.0  # m, beyond this there is no lane
 Z_WEIGHT = 2.0  # heights count double, so that a road 8 m above is 16 m away
 HALF_STEP_SQ = 0.3  # m^2, more than the squared half distance of samples
@@ -49,6 +50,7 @@ class LaneArrays(NamedTuple):
     signal_row: Ints  # (K,) row of SignalTable
     signal_s: Floats  # (K,) m along the lane, in the order of signal_row
     signal_kind: Ints  # (K,) SignalKind, in the order of signal_row
+    cell_size: float  # m, edge of a cell of the search grid
     cell_origin: Floats  # (2,)
     cell_start: Ints  # (rows + 1, columns) samples of a cell: cell_sample[start:next start]
     cell_sample: Ints  # (N,)
@@ -67,7 +69,7 @@ def lane_arrays(baked: BakedMap) -> LaneArrays:
         *(np.cos(heading), np.sin(heading)),
     )
     order = np.lexsort((baked.signals.s, baked.signals.lane)).astype(np.int32)
-    origin, start, cell_sample = _grid(p.x, p.y)
+    cell, origin, start, cell_sample = _grid(p.x, p.y)
     return LaneArrays(
         sample=np.ascontiguousarray(np.column_stack(columns)),
         lane_of=p.lane,
@@ -91,6 +93,7 @@ def lane_arrays(baked: BakedMap) -> LaneArrays:
         signal_row=order,
         signal_s=baked.signals.s[order],
         signal_kind=baked.signals.kind[order].astype(np.int32),
+        cell_size=cell,
         cell_origin=origin,
         cell_start=start,
         cell_sample=cell_sample,
@@ -98,15 +101,17 @@ def lane_arrays(baked: BakedMap) -> LaneArrays:
     )
 
 
-def _grid(x: Floats, y: Floats) -> tuple[Floats, Ints, Ints]:
+def _grid(x: Floats, y: Floats) -> tuple[float, Floats, Ints, Ints]:
     origin = np.array([x.min(), y.min()])
-    column = np.floor((x - origin[0]) / CELL).astype(np.int64)
-    row = np.floor((y - origin[1]) / CELL).astype(np.int64)
+    size = max(CELL, float(np.sqrt(np.ptp(x) / CELLS_MAX * np.ptp(y))))
+    size = max(size, float(np.ptp(x) + np.ptp(y)) / CELLS_MAX)  # a thin map
+    column = np.floor((x - origin[0]) / size).astype(np.int64)
+    row = np.floor((y - origin[1]) / size).astype(np.int64)
     columns, rows = int(column.max()) + 1, int(row.max()) + 1
     cell = row * columns + column
     order = np.argsort(cell, kind="stable").astype(np.int32)
     start = np.searchsorted(cell[order], np.arange(rows * columns + columns))
-    return origin, start.astype(np.int32).reshape(rows + 1, columns), order
+    return size, origin, start.astype(np.int32).reshape(rows + 1, columns), order
 
 
 @kernel
@@ -180,17 +185,18 @@ def project_kernel(
     if not (abs(x) < inf and abs(y) < inf and abs(z) < inf):
         return -1, nan, nan
     best, lane, s, offset = REACH * REACH, -1, nan, nan
+    size = a.cell_size
     rows, columns = a.cell_start.shape[0] - 1, a.cell_start.shape[1]
-    u, v = (x - a.cell_origin[0]) / CELL, (y - a.cell_origin[1]) / CELL
+    u, v = (x - a.cell_origin[0]) / size, (y - a.cell_origin[1]) / size
     # From far outside the grid no ring could reach it, and the cell numbers would overflow.
-    margin = REACH / CELL + 2.0
+    margin = REACH / size + 2.0
     if not (-margin < u < columns + margin and -margin < v < rows + margin):
         return -1, nan, nan
     column, row = floor(u), floor(v)
-    edge = min(u - column, column + 1 - u, v - row, row + 1 - v) * CELL
-    for ring in range(ceil(REACH / CELL) + 2):
+    edge = min(u - column, column + 1 - u, v - row, row + 1 - v) * size
+    for ring in range(ceil(REACH / size) + 2):
         # No sample of this ring or a later one is nearer than `near`.
-        near = (ring - 1) * CELL + edge if ring > 0 else 0.0
+        near = (ring - 1) * size + edge if ring > 0 else 0.0
         if near * near - HALF_STEP_SQ > best:
             break
         for r in range(max(row - ring, 0), min(row + ring, rows - 1) + 1):

@@ -23,6 +23,7 @@ STRETCH_MAX = 3.0  # more is a jump in the file, which no sampling makes smooth
 JOINT_GAP = 0.02  # m, closer joints get no sample of their own
 SHORTEST = 1e-4  # m, shorter sections are joints written twice
 LONGEST = 1e6  # m, a longer road is a mistake or an attack
+FARTHEST = 1e7  # m from the origin; northings of map projections reach 1e7
 SAMPLES_MAX = 20_000_000
 
 KINDS = {
@@ -109,10 +110,21 @@ def lane_shapes(document: Document) -> Iterator[LaneShape]:
             if section.s_end - section.s_start < SHORTEST:
                 continue
             for shape in _section_shapes(road, index, section):
+                _require_sane(document, shape)
                 samples += len(shape.s)
                 if samples > SAMPLES_MAX:
                     raise FileError(f"{document.file}: more than {SAMPLES_MAX} lane samples")
                 yield shape
+
+
+def _require_sane(document: Document, shape: LaneShape) -> None:
+    for name in ("x", "y", "z", "s", "width", "curvature", "grade", "bank"):
+        values = getattr(shape, name)
+        if not np.all(np.abs(values) <= FARTHEST):  # also catches NaN
+            raise FileError(
+                f"{document.file}: road {shape.key.road} lane {shape.key.lane}: {name} must be "
+                f"within {FARTHEST:g}, got {values[np.argmax(np.abs(values))]:g}"
+            )
 
 
 def _section_shapes(road: RoadRecord, index: int, section: SectionRecord) -> list[LaneShape]:

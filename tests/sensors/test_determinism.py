@@ -1,6 +1,8 @@
 """Same seed, same bytes: in one process, in another, whatever was read; and old frames spoil."""
 
 import hashlib
+import os
+import platform
 import subprocess
 import sys
 from pathlib import Path
@@ -50,16 +52,35 @@ def test_same_seed_same_bytes_and_another_seed_other_bytes():
     assert drive_hash() != drive_hash(seed=4)
 
 
-def test_same_bytes_in_another_process():
+def hash_elsewhere(**environment: str) -> str:
+    """The drive's hash from a process of its own."""
     here = Path(__file__).parent
     code = (
         f"import sys; sys.path.insert(0, {str(here)!r});"
         "import test_determinism as t; print(t.drive_hash())"
     )
     other = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=300
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        timeout=300,
+        env={**os.environ, **environment},
     )
-    assert other.stdout.strip() == drive_hash()
+    return other.stdout.strip()
+
+
+def test_same_bytes_in_another_process():
+    assert hash_elsewhere() == drive_hash()
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="compares x86-64 targets")
+def test_same_bytes_for_an_older_processor(tmp_path):
+    older = hash_elsewhere(
+        NUMBA_CPU_NAME="x86-64", NUMBA_CPU_FEATURES="", NUMBA_CACHE_DIR=str(tmp_path)
+    )
+    assert older == drive_hash()
 
 
 def test_stale_buffers_are_spoilt_in_test_mode():

@@ -201,7 +201,7 @@ class LeadAtLight:
 
 def zones(gap: float) -> Request:
     """Actuation of following by the error of the time gap in s (A-124 to A-128)."""
-    error = gap - TARGET_GAP
+    error = round(gap - TARGET_GAP, 9)  # 2.8 - 2.5 falls just short of 0.3 (A-128)
     if error >= DEAD_BAND:
         more = OPEN_THROTTLE_MORE * min(error / OPEN_SPAN, 1.0)
         return Request(Tier.ACC_OPEN, throttle=OPEN_THROTTLE + more)

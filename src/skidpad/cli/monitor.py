@@ -73,7 +73,7 @@ def monitor(
     if junit is not None and not wanted:
         raise ConfigError("--junit writes the verdicts of --fail-if, and none is given")
     default = Form.COMPLETED if rules is Rules.as_printed else Form.CORRECTED
-    source = open_channels(file, mapping)
+    source = open_channels(file, mapping, truth=False)
     found = watch(
         source,
         out,

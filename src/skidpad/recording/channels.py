@@ -53,7 +53,6 @@ class Losses:
     foreign: int = 0  # messages of topics or types that are not read
     out_of_order: int = 0  # messages older than their channel's newest
     jumps: int = 0  # single messages with a time far ahead of all others
-    truth_missing: int = 0
     stale: dict[str, int] = field(
         default_factory=dict
     )  # cycles without a fresh message, by channel
@@ -178,10 +177,14 @@ _READERS: dict[str, Callable[[Any], Item]] = {
 
 
 class McapRecording:
-    """A channel recording on disk. Reads front to back, so that a cut file still reads."""
+    """A channel recording on disk. Reads front to back, so that a cut file still reads.
 
-    def __init__(self, path: Path) -> None:
+    Without `truth` the true world is not even decoded.
+    """
+
+    def __init__(self, path: Path, truth: bool = True) -> None:
         self.path = path
+        self.truth = truth
         self.losses = Losses()
         self.topics = self._scan()
         names = [t.topic for t in self.topics if t.schema == "skidpad.Channel"]
@@ -194,6 +197,8 @@ class McapRecording:
         self.losses = Losses()
         index = {CHANNEL_TOPIC + name: i for i, name in enumerate(self.channels)}
         for topic, schema, record in self._records(self.losses):
+            if schema == "skidpad.Truth" and not self.truth:
+                continue
             item = self._item(schema, record.data)
             if item is None:
                 continue

@@ -30,6 +30,7 @@ PATHS_EVERY_MS = 500
 SHAPE_TOLERANCE = 5  # cm
 NUMBER_LIMIT = 10**15  # a greater size is written as not a number
 Floats = NDArray[np.float64]
+_POSE_SCALE = np.array([100.0, 100.0, 1000.0, 100.0, 100.0])  # cm, cm, mrad, cm/s, cm/s
 Pose = list["int | None"]  # x, y in cm, heading in mrad, vx, vy in cm/s
 Numbers = list["int | None"]
 
@@ -79,7 +80,7 @@ def _encode_frame(c: int, channel: Channel, frame: ChannelFrame, now: int) -> li
         channel.ego_shape = shape
         lines.append(_line("E", c, shape))
     dt = now - channel.seen_at
-    ego = _pose(frame.ego)
+    (ego,) = _poses(frame.ego[None])
     age = now - (_scaled(frame.t, 1000) or 0)
     lines.append(_line("F", c, [age, *_differences(ego, moved_on(channel.ego, dt))]))
     channel.ego, channel.seen_at = ego, now
@@ -96,15 +97,16 @@ def _encode_objects(
 ) -> list[str]:
     lines = []
     row: Numbers = []
+    poses, shapes = _poses(frame.objects), _shapes(frame)
     for i, slot in enumerate(slots):
-        shape = _flat(frame.polygons[i, : frame.polygon_size[i]], 100)
+        shape = shapes[i]
         id_, label = int(frame.ids[i]), int(frame.classes[i])
         known = channel.slots.get(slot)
         if known is None or known.id != id_ or known.label != label or _moved(shape, known.shape):
             pose: Pose = known.pose if known else [0] * 5
             known = channel.slots[slot] = Object(id_, label, shape, pose)
             lines.append(_line("S", c, [slot, id_, label, *shape]))
-        pose = _pose(frame.objects[i])
+        pose = poses[i]
         row += [slot, *_differences(pose, moved_on(known.pose, dt))]
         known.pose = pose
     lines.append(_line("O", c, row))
@@ -113,13 +115,13 @@ def _encode_objects(
 
 def _encode_paths(c: int, channel: Channel, frame: ChannelFrame, slots: list[int]) -> list[str]:
     plan: Numbers = []
-    t = _curvature([_scaled(v, 1000) for v in frame.plan[:, 2].tolist()])
-    x = _curvature([_scaled(v, 100) for v in frame.plan[:, 0].tolist()])
-    y = _curvature([_scaled(v, 100) for v in frame.plan[:, 1].tolist()])
+    t = _curvature(_flat(frame.plan[:, 2], 1000))
+    x = _curvature(_flat(frame.plan[:, 0], 100))
+    y = _curvature(_flat(frame.plan[:, 1], 100))
     for triple in zip(t, x, y, strict=True):
         plan += triple
     lines = [_line("L", c, plan)]
-    times = [_scaled(v, 1000) for v in frame.prediction_t.tolist()]
+    times = _flat(frame.prediction_t, 1000)
     if times != channel.times:
         channel.times = times
         lines.append(_line("T", c, times))
@@ -128,7 +130,7 @@ def _encode_paths(c: int, channel: Channel, frame: ChannelFrame, slots: list[int
     for i, slot in enumerate(slots):
         pose = channel.slots[slot].pose
         path: Numbers = []
-        steps = [_scaled(v, 100) for v in frame.predictions[i].ravel().tolist()]
+        steps = _flat(frame.predictions[i], 100)
         xs, ys = _curvature(steps[0::2], pose[0]), _curvature(steps[1::2], pose[1])
         for pair in zip(xs, ys, strict=True):
             path += pair
@@ -142,7 +144,7 @@ def _assign_slots(channel: Channel, frame: ChannelFrame) -> list[int]:
     """A slot per object: its identity's, else the nearest free known one within 3 m, else new."""
     free = dict(channel.slots)
     slots = []
-    poses = [_pose(row) for row in frame.objects]
+    poses = _poses(frame.objects)
     by_id = {known.id: slot for slot, known in channel.slots.items() if known.id >= 0}
     for i, pose in enumerate(poses):
         slot = by_id.get(int(frame.ids[i])) if frame.ids[i] >= 0 else _nearest_slot(free, pose)
@@ -176,18 +178,33 @@ def _scaled(value: float, scale: int) -> int | None:
     return round(number) if abs(number) < NUMBER_LIMIT else None  # also NaN
 
 
-def _pose(row: Floats) -> Pose:
-    x, y, heading, vx, vy = row.tolist()
-    return [
-        _scaled(x, 100), _scaled(y, 100), _scaled(heading, 1000), _scaled(vx, 100), _scaled(vy, 100)
-    ]  # fmt: skip
+def _poses(rows: Floats) -> list[Pose]:
+    """States (n, 5) as whole numbers."""
+    flat = _flat(rows * _POSE_SCALE, 1)
+    return [flat[i : i + 5] for i in range(0, len(flat), 5)]
 
 
 def _flat(table: Floats, scale: int) -> Numbers:
+    """All numbers of a table as whole numbers, row by row."""
+    scaled = table.ravel() * scale
+    if np.all(np.abs(scaled) < NUMBER_LIMIT):  # also false for NaN
+        whole: Numbers = np.rint(scaled).astype(np.int64).tolist()
+        return whole
     return [_scaled(v, scale) for v in table.ravel().tolist()]
 
 
+def _shapes(frame: ChannelFrame) -> list[Numbers]:
+    """The vertices of each object's shape as whole numbers of cm."""
+    n, k, _ = frame.polygons.shape
+    if np.all(frame.polygon_size == k):  # the common case: nothing is padded
+        flat = _flat(frame.polygons, 100)
+        return [flat[2 * k * i : 2 * k * (i + 1)] for i in range(n)]
+    return [_flat(frame.polygons[i, : frame.polygon_size[i]], 100) for i in range(n)]
+
+
 def _moved(shape: Numbers, known: Numbers) -> bool:
+    if shape == known:
+        return False
     if len(shape) != len(known):
         return True
     return any(

@@ -8,7 +8,7 @@ from skidpad.core.errors import FileError
 from skidpad.recording.channels import ChannelSource, McapRecording
 
 
-def open_channels(path: Path, mapping: Path | None = None) -> ChannelSource:
+def open_channels(path: Path, mapping: Path | None = None, truth: bool = True) -> ChannelSource:
     """The recording at `path`; with `mapping` it is read as a ROS 2 bag."""
     if mapping is not None:
         from skidpad.recording.rosbag import RosRecording
@@ -18,7 +18,7 @@ def open_channels(path: Path, mapping: Path | None = None) -> ChannelSource:
         raise FileError(f"{path}: a folder is read as a ROS 2 bag, which needs --mapping FILE")
     if not path.exists():
         raise FileError(f"{path}: no such file")
-    return McapRecording(path)
+    return McapRecording(path, truth)
 
 
 def recordings_below(folder: Path) -> list[Path]:

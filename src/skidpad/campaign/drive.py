@@ -101,6 +101,33 @@ def _load_settings(profile: str, settings: Mapping[str, Any] | None) -> options.
     return options.load_profile(profile, settings)
 
 
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """A cell made ready: what drives, what supervises, in which world."""
+
+    cell: Cell
+    map: RoadMap
+    setup: Setup
+    stack: GuardedStack
+    supervisor: Supervisor
+
+    @property
+    def header(self) -> LogHeader:
+        """What the log says about the whole run."""
+        return header_of(self.cell, self.map, self.setup.dt)
+
+
+def prepare(cell: Cell, kind: type[Stack] | None = None) -> Drive:
+    """Build the stack and all that surrounds it; StackError when it cannot be built."""
+    map = load_map(cell.map)
+    setup = setup_of(cell, map)
+    stack = stack_of(cell, kind, setup, map)
+    setup = replace(setup, specs=(*setup.specs, *stack.sensors()))
+    return Drive(
+        cell, map, setup, stack, Supervisor(map, recovery_settings(cell.settings), setup.dt)
+    )
+
+
 def run_cell(
     cell: Cell,
     kind: type[Stack] | None = None,
@@ -110,38 +137,27 @@ def run_cell(
 ) -> Run:
     """Drive one cell of a campaign on `backend`, by default a fresh embedded simulator."""
     backend = EmbeddedBackend() if backend is None else backend
-    map = load_map(cell.map)
-    setup = setup_of(cell, map)
-    header = LogHeader(map=map.name, map_hash=map.content_hash, dt=setup.dt, about=_about(cell))
     try:
-        stack = stack_of(cell, kind, setup, map)
-        setup = replace(setup, specs=(*setup.specs, *stack.sensors()))
-    except StackError as error:
+        ready = prepare(cell, kind)
+        snapshots = Snapshots(folder, cell.driver.label, cell.weather.name, ready.setup.dt)
+        return loop(backend, ready, snapshots)
+    except StackError as error:  # it could not even be built
+        map = load_map(cell.map)
+        setup = setup_of(cell, map)
         backend.reset(setup, cell.seed)
-        log = TickLog(backend.truth().table, header, cell.weather.name, 1)
+        log = TickLog(backend.truth().table, header_of(cell, map, setup.dt), cell.weather.name, 1)
         return Run(log.finish(), Outcome.AGENT_ERROR, _story(error))
-    supervisor = Supervisor(map, recovery_settings(cell.settings), setup.dt)
-    snapshots = Snapshots(folder, cell.driver.label, cell.weather.name, setup.dt)
-    ticks = round(cell.duration / setup.dt)
-    try:
-        return _loop(backend, setup, cell, stack, supervisor, snapshots, header, ticks)
     finally:
         backend.close()
 
 
-def _loop(
-    backend: Backend,
-    setup: Setup,
-    cell: Cell,
-    stack: GuardedStack,
-    supervisor: Supervisor,
-    snapshots: Snapshots,
-    header: LogHeader,
-    ticks: int,
-) -> Run:
-    frame = backend.reset(setup, cell.seed)
+def loop(backend: Backend, ready: Drive, snapshots: Snapshots) -> Run:
+    """The loop itself; it ends with the duration, or when the stack fails."""
+    cell, stack, supervisor = ready.cell, ready.stack, ready.supervisor
+    ticks = round(cell.duration / ready.setup.dt)
+    frame = backend.reset(ready.setup, cell.seed)
     truth = backend.truth()
-    log = TickLog(truth.table, header, cell.weather.name, ticks)
+    log = TickLog(truth.table, ready.header, cell.weather.name, ticks)
     outcome, error = Outcome.COMPLETED, ""
     for _ in range(ticks):
         phase = supervisor.observe(truth)
@@ -227,14 +243,16 @@ def recovery_settings(s: options.Settings) -> RecoverySettings:
     return RecoverySettings(clearance=clearance)
 
 
-def _about(cell: Cell) -> dict[str, str]:
-    return {
+def header_of(cell: Cell, map: RoadMap, dt: float) -> LogHeader:
+    """What holds for the whole run, for its log."""
+    about = {
         "config": cell.driver.label,
         "weather": cell.weather.name,
         "seed": str(cell.seed),
         "profile": cell.profile,
         "sensors": cell.level.value,
     }
+    return LogHeader(map=map.name, map_hash=map.content_hash, dt=dt, about=about)
 
 
 def _story(error: StackError) -> str:

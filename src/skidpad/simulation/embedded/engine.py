@@ -45,7 +45,7 @@ class EmbeddedBackend:
         """Begin a run: everything is built anew (decision X-12)."""
         self._world = World(setup, seed)
         self._localisation = stream(seed, "ego", "localisation")
-        self._sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
+        self.sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
         return self._frame()
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
@@ -78,7 +78,7 @@ class EmbeddedBackend:
 
     def _frame(self) -> SensorFrame:
         w = self.world
-        seen = self._sensing.read(w.tick, w.states, w.lights.by_id, w.braking())
+        seen = self.sensing.read(w.tick, w.states, w.lights.by_id, w.braking())
         return SensorFrame(
             tick=w.tick,
             ego=self._estimate(),

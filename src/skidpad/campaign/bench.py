@@ -1,0 +1,107 @@
+"""What a tick costs, part by part, in CPU time (decision M-16): the loop with a clock in between."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import wraps
+from time import process_time_ns
+from typing import Any, TypeVar
+
+import numpy as np
+
+from skidpad.campaign.cells import Cell
+from skidpad.campaign.drive import prepare
+from skidpad.core.vocabulary import Supervision
+from skidpad.recording.ticks import TickLog
+from skidpad.simulation.embedded.engine import EmbeddedBackend
+from skidpad.simulation.embedded.sensing import Pixels
+
+F = TypeVar("F", bound=Callable[..., Any])
+WARM_UP = 2.0  # s simulated before the clock counts: kernels load, caches fill
+MS = 1.0e-6  # per ns
+
+
+@dataclass(frozen=True, slots=True)
+class TickCost:
+    """CPU milliseconds per tick of one drive."""
+
+    mean: float
+    median: float
+    p99: float
+    parts: dict[str, float]  # means: world, sensors, rendering, stack, supervisor, log
+
+
+class Meter:
+    """Adds up the CPU time of named parts."""
+
+    def __init__(self) -> None:
+        self.total: dict[str, int] = {}
+
+    def timed(self, name: str, function: F) -> F:
+        """`function`, its time added to `name`."""
+
+        @wraps(function)
+        def wrapper(*args: Any, **kwargs: Any) -> Any:
+            begin = process_time_ns()
+            try:
+                return function(*args, **kwargs)
+            finally:
+                self.total[name] = self.total.get(name, 0) + process_time_ns() - begin
+
+        return wrapper  # type: ignore[return-value]
+
+
+def tick_cost(cell: Cell, seconds: float = 60.0) -> TickCost:
+    """Drive `cell` for some simulated seconds on the embedded simulator and measure."""
+    meter = Meter()
+    ready = prepare(replace(cell, duration=WARM_UP + seconds))
+    backend = EmbeddedBackend()
+    frame = backend.reset(ready.setup, cell.seed)
+    _instrument(backend, meter)
+    tick = meter.timed("stack", ready.stack.tick)
+    observe = meter.timed("supervisor", ready.supervisor.observe)
+    act = meter.timed("supervisor", ready.supervisor.act)
+    warm, count = round(WARM_UP / ready.setup.dt), round(seconds / ready.setup.dt)
+    log = TickLog(backend.truth().table, ready.header, cell.weather.name, warm + count)
+    append = meter.timed("log", log.append)
+    spans = np.zeros(warm + count)
+    for k in range(warm + count):
+        if k == warm:
+            meter.total.clear()
+        begin = process_time_ns()
+        truth = backend.truth()
+        phase = observe(truth)
+        if phase is not Supervision.NONE:
+            frame = replace(frame, supervision=phase)
+        command = tick(frame)
+        action = act(command, ready.stack.report)
+        append(truth, frame, command, ready.stack.report, phase)
+        if action.relocate is not None:
+            backend.relocate(action.relocate.pose, action.relocate.v)
+        frame = backend.step(action.command)
+        spans[k] = process_time_ns() - begin
+    backend.close()
+    return _summary(spans[warm:], meter.total)
+
+
+def _instrument(backend: EmbeddedBackend, meter: Meter) -> None:
+    """Clocks around the world's step, the sensors, and images that the stack asks for."""
+    world: Any = backend.world
+    world.step = meter.timed("world", world.step)
+    sensing: Any = backend.sensing
+    sensing.read = meter.timed("sensors", sensing.read)
+    if isinstance(sensing, Pixels):
+        suite: Any = sensing.suite
+        suite.render = meter.timed("rendering", suite.render)
+
+
+def _summary(spans: np.ndarray[Any, Any], total: dict[str, int]) -> TickCost:
+    parts = {name: ns * MS / len(spans) for name, ns in total.items()}
+    parts["stack"] -= parts.get("rendering", 0.0)  # images are rendered when the stack reads them
+    return TickCost(
+        mean=float(spans.mean()) * MS,
+        median=float(np.median(spans)) * MS,
+        p99=float(np.percentile(spans, 99)) * MS,
+        parts=parts,
+    )

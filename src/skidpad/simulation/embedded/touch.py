@@ -8,10 +8,11 @@ from skidpad.core.states import ActorTable, ContactEvent, LaneInvasion
 from skidpad.physics.contact import Contacts
 from skidpad.roads.lanes import Marking
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.embedded.traffic.occupancy import Places
+from skidpad.simulation.embedded.traffic.occupancy import PLACE, Places
 
 HOLD = 0.5  # s: bodies that bounce apart and touch again within this are one contact
 EGO = 0
+FIELDS = PLACE.names or ()
 
 
 class ContactBook:
@@ -68,18 +69,16 @@ class MarkingWatch:
 
     def update(self, tick: int, placed: Places) -> tuple[LaneInvasion, ...]:
         """Markings that the outline began to cross in this tick."""
-        place = placed[EGO]
-        lane = int(place["lane"])
+        place = dict(zip(FIELDS, placed[EGO].item(), strict=True))
+        lane = place["lane"]
         if lane < 0:
             self.lane = -1
             return ()
-        turn = float(place["yaw"] - place["heading"])
+        turn = place["yaw"] - place["heading"]
         reach = self.half_width * abs(cos(turn)) + self.half_length * abs(sin(turn))
         lanes = self.map.lanes
-        share = float(place["s"]) / float(lanes.length[lane])
-        at = int(lanes.first[lane]) + int(share * (int(lanes.size[lane]) - 1))
+        at, offset = place["sample"], place["offset"]
         half = float(self.map.samples.width[at]) / 2.0
-        offset = float(place["offset"])
         across = (offset + reach > half, offset - reach < -half)
         before = self._before(lane)
         self.lane, self.across = lane, across

@@ -42,6 +42,7 @@ REACH_BEHIND = 120.0  # m
 CHANGE_COOLDOWN = 10.0  # s between two changes
 CHANGE_MIN_SPEED = 5.0  # m/s
 CHANGE_MAX_CURVE = 1.0 / 250.0  # 1/m: nobody changes lane in a tight bend
+LOOK_PERIOD = 4  # ticks between two looks at limits and bends ahead: 0.2 s
 CHANGE_PERIOD = 10  # ticks between two looks at the neighbour lanes
 END_MARGIN = 200.0  # m before a lane's end from which a driver must leave it
 LEFT_BEHIND = 0.6  # of a change, after which the leader on the old lane no longer counts
@@ -166,7 +167,9 @@ def consider_change(view: View, d: Drivers, i: int, a_now: float, v_desired: flo
 def plan(view: View, d: Drivers, i: int) -> None:
     """Choose lane and acceleration of driver i; note how long it has been out of order."""
     me, trait, body = d.state[i], d.trait[i], view.placed[i]
-    v, v_desired = body.speed, desired_speed(view, d, i)
+    if (view.tick + i) % LOOK_PERIOD == 0 or me.v_desired == 0.0:
+        me.v_desired = desired_speed(view, d, i)
+    v, v_desired = body.speed, me.v_desired
     a, gap = acceleration_along(view, d, i, d.path[i], me.s, v_desired)
     if body.lane >= 0 and body.lane != d.path[i, 0] and me.change < LEFT_BEHIND * CHANGE_TIME:
         scratch = np.empty(4, dtype=np.int32)

@@ -129,7 +129,7 @@ class Traffic:
         begin(self.drivers.path[i], self.places.lane[at])
         me["at"], me["s"] = at, point["s"]
         me["change"] = me["cap"] = np.inf
-        me["trim"] = me["stuck"] = 0.0
+        me["trim"] = me["stuck"] = me["v_desired"] = 0.0
         pose = Pose(
             float(point["x"]),
             float(point["y"]),

@@ -33,6 +33,7 @@ PLACE = np.dtype(
         ("half_length", "f8"),
         ("half_width", "f8"),
         ("lane", "i4"),  # -1: on none
+        ("sample", "i4"),  # of the lane, at or before the actor
         ("present", "?"),
     ],
     align=True,

@@ -27,6 +27,7 @@ DRIVER = np.dtype(
         ("shift", "f8"),  # m, offset at which the present lane change began
         ("change", "f8"),  # s since it began
         ("cap", "f8"),  # m/s, limit that holds until the first sign; inf behind it
+        ("v_desired", "f8"),  # m/s, that limits and bends ahead allow
         ("target", "f8"),  # m/s^2, acceleration asked for
         ("trim", "f8"),  # m/s^2, integral of the pedal control
         ("stuck", "f8"),  # s stopped, off the lane or wrong-way without a cause ahead

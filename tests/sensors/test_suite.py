@@ -137,3 +137,13 @@ def test_a_snapshot_is_a_copy_of_the_moments_pictures():
     eyes.observe(1, states, {})
     eyes.render("rgb_front")
     assert np.array_equal(before, kept["rgb_front"])
+
+
+@pytest.mark.req("A-060")
+def test_where_the_roof_pair_begins_to_see_the_ground():
+    world = straight(300, rails=False)
+    eyes = PixelSuite(world, table_of([]), twelve_sensors(), Weather())
+    images = eyes.observe(0, states_at([(100.0, -8.75, 0.0, 0.0)]), {}).images
+    nearest = images["depth_roof"].depth()[:, 400]
+    assert nearest[449] == pytest.approx(6.4, abs=0.05)  # lowest row of the 25-75 % band
+    assert nearest[599] == pytest.approx(3.2, abs=0.05)  # lowest row of all

@@ -281,3 +281,11 @@ def test_a_mirrored_scene_gives_mirrored_images():
     assert (a["semantic"].labels == b["semantic"].labels[:, ::-1]).mean() > 0.999
     different = np.abs(a["rgb"].rgb.astype(int) - b["rgb"].rgb[:, ::-1]).max(axis=2) > 3
     assert different.mean() < 0.004
+
+
+def test_an_even_road_is_evenly_lit_up_to_the_borders_of_the_image():
+    rgb, _ = picture(straight(300, rails=False), "clear-noon")
+    column = rgb[520:, 400].astype(int)
+    row = rgb[590, [0, 1, 400, 798, 799]].astype(int)
+    assert np.ptp(column, axis=0).max() <= 2
+    assert np.ptp(row, axis=0).max() <= 2

@@ -28,7 +28,7 @@ class Lighting(NamedTuple):
     sun_direction: NDArray[np.float64]  # (3,) unit, towards the sun
     sun: Colour  # on a surface that faces it
     sky: Colour  # diffuse, on a surface that faces up
-    bounce: Colour  # diffuse, on a surface that faces down
+    bounce: Colour  # diffuse, on a surface that faces down: light from the ground
     zenith: Colour  # colour of the sky overhead
     horizon: Colour  # and at the horizon; also the colour of haze
     disc: float  # brightness of the sun's disc and glow
@@ -65,7 +65,7 @@ def lighting(weather: Weather) -> Lighting:
         direction,
         sun.astype(np.float32),
         sky.astype(np.float32),
-        (0.62 * sky).astype(np.float32),
+        (0.95 * sky).astype(np.float32),
         (zenith + night * NIGHT_ZENITH).astype(np.float32),
         (horizon + night * NIGHT_HORIZON).astype(np.float32),
         float(day * clear * (0.35 if cloud > 0.5 else 1.0)),

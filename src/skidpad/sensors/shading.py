@@ -155,13 +155,14 @@ def _slopes(
     here = inverse[y, first : first + count]
     above = inverse[max(y - 1, 0), first : first + count]
     below = inverse[min(y + 1, height - 1), first : first + count]
+    top, bottom = y == 0, y == height - 1
     solid = 0
     for x in range(count):
         w = here[x]
         a = below[x] - w
         b = w - above[x]
         work[_W + x] = w
-        work[_GY + x] = (a if abs(a) < abs(b) else b) * focal
+        work[_GY + x] = (a if (abs(a) < abs(b) or top) and not bottom else b) * focal
         work[_U + x] = start + np.float32(x) * per_pixel
         solid += 1 if w > _ZERO else 0
     for x in range(1, count - 1):
@@ -169,11 +170,12 @@ def _slopes(
         b = here[x] - here[x - 1]
         work[_GX + x] = (a if abs(a) < abs(b) else b) * focal
     for x in (0, count - 1):
+        left, right = first + x == 0, first + x == width - 1
         behind = inverse[y, max(first + x - 1, 0)]
         ahead = inverse[y, min(first + x + 1, width - 1)]
         a = ahead - here[x]
         b = here[x] - behind
-        work[_GX + x] = (a if abs(a) < abs(b) else b) * focal
+        work[_GX + x] = (a if (abs(a) < abs(b) or left) and not right else b) * focal
     return solid > 0, solid < count
 
 

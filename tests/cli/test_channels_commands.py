@@ -17,6 +17,7 @@ from channel_worlds import Eyes, World, drive
 from skidpad.cli.main import app, main
 from skidpad.core.channels import Context
 from skidpad.evidence.indicators.catalogue import Indicator
+from skidpad.evidence.watch import time_by_objects, timing_statistics
 from skidpad.recording.channels import ChannelWriter
 from skidpad.recording.hazards import read_hazards
 
@@ -126,7 +127,7 @@ def test_info_says_what_a_recording_holds_and_what_it_lost(folder, tmp_path):
     assert "cut short" in done.output
 
 
-@pytest.mark.req("C-230", "C-232", "C-233", "C-234")
+@pytest.mark.req("C-232", "C-233", "C-234", "C-237", "C-238")
 def test_timing_gives_the_table_and_the_total_is_the_sum_of_its_parts(folder, tmp_path):
     done = invoke("monitor", folder / "one.mcap", "--out", tmp_path, "--timing")
     assert "motion_prediction" in done.output
@@ -134,6 +135,22 @@ def test_timing_gives_the_table_and_the_total_is_the_sum_of_its_parts(folder, tm
     parts = ["prepare", "comfort", "similarity", "motion_prediction", "risk", "hazards"]
     assert t["total"].to_list() == pytest.approx(t.select(pl.sum_horizontal(parts)).to_series())
     assert t["objects"].to_list() == [3] * 121
+    table = timing_statistics(t)
+    means = dict(zip(table["module"], table["mean_ms"], strict=True))
+    assert means["total"] == pytest.approx(sum(means[p] for p in parts))
+    by_objects = time_by_objects(t)
+    assert by_objects["cycles"].to_list() == [121]
+    assert by_objects["total"][0] == pytest.approx(means["total"])
+
+
+@pytest.mark.req("C-233", "C-234")
+def test_shares_of_the_timing_table_by_hand():
+    total = [1.0, 12.4, 12.5, 22.5, 25.0, 26.0, 2.0, 3.0, 4.0, 5.0]
+    names = ["prepare", "comfort", "similarity", "motion_prediction", "risk", "hazards", "writing"]
+    row = timing_statistics(pl.DataFrame({"total": total} | dict.fromkeys(names, total)))
+    first, second = row.row(0, named=True), row.row(1, named=True)
+    assert (first["breaches_pct"], first["within_90_pct"], first["under_50_pct"]) == (10, 20, 60)
+    assert (second["breaches_pct"], second["within_90_pct"]) == (0.0, 20.0)  # of its own maximum
 
 
 def test_gates_exit_with_1_and_write_junit(folder, tmp_path):

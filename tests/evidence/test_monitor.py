@@ -311,3 +311,29 @@ def test_violations_of_a_drive_are_counted_as_cycles_and_as_events():
     assert (event.count, event.extreme) == (30, pytest.approx(0.5))
     now = monitor.violations_now(evidence[40].readings)
     assert key in [(v.indicator, v.subject) for v in now]
+
+
+@pytest.mark.req("C-130")
+def test_an_object_of_one_channel_for_a_moment_is_a_cue_for_a_ghost():
+    lead, ghost = (30.0, 0, 0, 15.0, 0), (15.0, 6.0, 0, 15.0, 0)
+    monitor = Monitor(["a", "b"])
+    for k in range(30):
+        t = 0.1 * k
+        real = np.array([lead]) + np.array([15.0 * t, 0, 0, 0, 0])
+        more = np.vstack([real, [np.add(ghost, (15.0 * t, 0, 0, 0, 0))]])
+        seen_by_a = (
+            frame(t, EGO, more, ids=[1, 2]) if 10 <= k < 13 else frame(t, EGO, real, ids=[1])
+        )
+        # the follower of b stays for long, the lead is known to both
+        lasting = np.vstack([real, [(-20.0 + 15.0 * t, 0, 0, 15.0, 0)]])
+        seen_by_b = frame(t, EGO, lasting, ids=[8, 9]) if k < 20 else frame(t, EGO, real, ids=[8])
+        monitor.update(Cycle(k, t, (seen_by_a, seen_by_b)))
+    assert dict(monitor.ghosts.brief) == {"a": 1}
+
+
+@pytest.mark.req("C-090", "C-104")
+def test_safety_scores_have_no_threshold_and_every_violation_has_a_meaning():
+    table = Monitor(["a", "b"]).thresholds
+    assert table[Indicator.SAFETY_SCORE].threshold is None
+    assert table[Indicator.SAFETY_SCORE].claim is None
+    assert all(entry.meaning for entry in table.values())

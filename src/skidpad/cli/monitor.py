@@ -66,7 +66,7 @@ def monitor(
     from skidpad.evidence.indicators.catalogue import load_thresholds
     from skidpad.evidence.indicators.comfort import Form
     from skidpad.evidence.indicators.panel import IndicatorSettings
-    from skidpad.evidence.watch import timing_statistics, watch
+    from skidpad.evidence.watch import time_by_objects, timing_statistics, watch
     from skidpad.recording.sources import open_channels
 
     wanted = {name: _rule(name) for name in fail_if or []}
@@ -86,6 +86,7 @@ def monitor(
     _print(found, out)
     if found.timing is not None:
         _print_table(timing_statistics(found.timing))
+        _print_table(time_by_objects(found.timing))
     if wanted:
         _gate({name: _events(found, rule) for name, rule in wanted.items()}, junit)
 

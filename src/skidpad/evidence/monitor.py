@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from skidpad.core.channels import Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.frames import Usable, usable
+from skidpad.evidence.ghosts import GhostCue
 from skidpad.evidence.hazards import (
     Profile,
     Rule,
@@ -100,6 +101,7 @@ class Monitor:
         self.hazards: TimeFilter[HazardType] = TimeFilter()
         self.violations: TimeFilter[tuple[Indicator, str]] = TimeFilter()
         self.unusable = Unusable()
+        self.ghosts = GhostCue(self.channels)
         self.undecided: Counter[HazardType] = Counter()
         self._recorder = (
             Recorder(
@@ -135,6 +137,7 @@ class Monitor:
         done("comfort")
         self.panel.similarity(frames, readings)
         self.panel.counts([None if u is None else u.reported for u in kept], readings)
+        self.ghosts.update(frames, self.panel.paired_rows())
         done("similarity")
         self.panel.prediction(frames, readings)
         done("motion_prediction")

@@ -156,6 +156,7 @@ def _finished(
         "losses": asdict(source.losses),
         "unusable": monitor.unusable.as_dict(),
         "hazards": [_event(e, e.key.value) for e in hazards],
+        "brief_objects": dict(monitor.ghosts.brief),  # a cue for ghosts (C-130)
         "undecided_cycles": {h.value: c for h, c in monitor.undecided.items()},
         "indicators": _audit(monitor, found),
         "violations": [_event(e, e.key[0].value, e.key[1]) for e in violations],

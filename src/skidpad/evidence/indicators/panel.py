@@ -203,6 +203,15 @@ class IndicatorPanel:
                 frame_a.classes, frame_b.classes, pairs
             )
 
+    def paired_rows(self) -> list[set[int]]:
+        """Per channel the rows of its objects that some other channel also reports now."""
+        rows: list[set[int]] = [set() for _ in range(self.n)]
+        for (a, b), pairs in zip(self.pairs, self.object_pairs, strict=True):
+            if pairs is not None:
+                rows[a].update(pairs[:, 0].tolist())
+                rows[b].update(pairs[:, 1].tolist())
+        return rows
+
     def _ego_similarity(self, p: int, a: ChannelFrame, b: ChannelFrame, row: Floats) -> None:
         score = similarity.location_similarity(a.ego, b.ego)
         scores = self.location_scores[p]

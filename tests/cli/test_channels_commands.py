@@ -103,7 +103,7 @@ def test_the_safety_case_prints_evidence_for_every_statement(monitored):
 
 @pytest.mark.req("C-105", "C-214")
 def test_evaluate_and_compare(folder, monitored):
-    done = invoke("channels", "evaluate", folder)
+    done = invoke("channels", "evaluate", folder, "--curve", "gap_signed")
     assert done.exit_code == 0
     table = json.loads((folder / "evaluation.json").read_text())
     (row,) = [
@@ -112,6 +112,9 @@ def test_evaluate_and_compare(folder, monitored):
     ]  # fmt: skip
     assert row["hazards"]["ego_tailgated"]["recall"] == 1.0
     assert list(table["by_route"]["practical/sim"]) == ["ring"]
+    curve = table["curve"]["sim"]
+    assert curve["1.0"]["ego_tailgated"] == [1, 0, 0]
+    assert curve["2.0"]["ego_tailgated"] == [0, 0, 1]  # one unseen vehicle gives at most 0.5
     done = invoke("channels", "compare", monitored, monitored)
     assert "ego_location_similarity (lav+tfuse): +0.0000" in done.output
 

@@ -25,6 +25,9 @@ MAPPING = typer.Option(None, help="YAML that says which topics of a ROS 2 bag ar
 DIR = typer.Argument(help="Folder with .mcap recordings, at any depth.")
 LABELS = typer.Option(None, help="Human labels (CSV).")
 TRUTH = typer.Option(Truth.both, help="Which truth to judge by.")
+CURVE = typer.Option(
+    None, help="Also vary the thresholds on this signal, such as gap, from half to double."
+)
 A = typer.Argument(help="Output folder of `skidpad monitor`, or one of many.")
 B = typer.Argument(help="The other one.")
 
@@ -67,11 +70,18 @@ def info(file: Path = FILE, mapping: Path | None = MAPPING) -> None:
 
 
 @channels.command()
-def evaluate(folder: Path = DIR, labels: Path | None = LABELS, truth: Truth = TRUTH) -> None:
+def evaluate(
+    folder: Path = DIR,
+    labels: Path | None = LABELS,
+    truth: Truth = TRUTH,
+    curve: str | None = CURVE,
+) -> None:
     """Judge the hazard rules by precision and recall; writes DIR/evaluation.json."""
     import json
 
+    from skidpad.core.errors import require_choice
     from skidpad.evidence.evaluation import Evaluation, judge, read_labels
+    from skidpad.evidence.hazards import Signal
     from skidpad.recording.channels import McapRecording
     from skidpad.recording.context import route_of
     from skidpad.recording.cycles import cycles
@@ -87,6 +97,7 @@ def evaluate(folder: Path = DIR, labels: Path | None = LABELS, truth: Truth = TR
             f"{labels}: needs a column `recording`, since {folder} holds {len(paths)} recordings"
         )
     wanted = ("sim", "world") if truth is Truth.both else (truth.value,)
+    varied = None if curve is None else Signal(require_choice("signal", curve, [*Signal]))
     evaluation = Evaluation()
     for path in paths:
         source = McapRecording(path)
@@ -94,7 +105,15 @@ def evaluate(folder: Path = DIR, labels: Path | None = LABELS, truth: Truth = TR
         mine = [*marked.get("", []), *marked.get(path.stem, [])]
         name = str(path.relative_to(folder))
         evaluation.segments.append(
-            judge(name, route_of(source) or path.parent.name, source.channels, rows, mine, wanted)
+            judge(
+                name,
+                route_of(source) or path.parent.name,
+                source.channels,
+                rows,
+                mine,
+                wanted,
+                varied,
+            )
         )
         typer.echo(f"{name}: {len(rows)} cycles")
     table = evaluation.as_dict()

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.hazards import SCORED_HAZARDS, Profile
+from skidpad.evidence.hazards import SCORED_HAZARDS, Profile, Signal, load_rules
 from skidpad.evidence.indicators.comfort import Form
 from skidpad.evidence.indicators.panel import IndicatorSettings
 from skidpad.evidence.matching import TOLERANCES, Score, Span, Tally, macro, micro, score, tally
 from skidpad.evidence.monitor import Monitor
+from skidpad.evidence.timefilter import TimeFilter
 from skidpad.evidence.truth import TrueHazard, simulator_truth, world_model_truth
 
 FORMS = {Profile.PRACTICAL: Form.CORRECTED, Profile.AS_PRINTED: Form.COMPLETED}  # decision C-16
+CURVE_FACTORS = (0.5, 0.67, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
 WARM_UP = 2.0  # s at the start of a segment that are not evaluated (decision C-12)
 LABEL_COLUMNS = ("hazard", "start_s", "end_s", "world", "annotator", "note")
 
@@ -34,6 +36,7 @@ class Segment:
     truths: Mapping[str, tuple[Span, ...]]  # "sim", "world", and "labels" where there are any
     candidates: Mapping[HazardType, int]  # candidate hazards, listed and counted (decision C-4)
     unseen: int  # true hazards with an object that no channel reported
+    curve: Mapping[float, tuple[Span, ...]]  # practical rules with one threshold scaled
 
 
 def judge(
@@ -43,20 +46,25 @@ def judge(
     cycles: Sequence[Cycle],
     labels: Iterable[Span] = (),
     truths: Sequence[str] = ("sim", "world"),
+    curve: Signal | None = None,
 ) -> Segment:
-    """Run both rule profiles and the truths over a recording's cycles."""
+    """Run both rule profiles and the truths over a recording's cycles.
+
+    With `curve` the practical rules are applied again with each clause on that signal scaled by
+    CURVE_FACTORS (C-105).
+    """
     detected: dict[Profile, tuple[Span, ...]] = {}
     candidates: dict[HazardType, int] = {}
+    scaled: dict[float, tuple[Span, ...]] = {}
     begin = cycles[0].t + WARM_UP if cycles else 0.0
     for profile in Profile:
         settings = IndicatorSettings(form=FORMS[profile])
         monitor = Monitor(channels, settings=settings, profile=profile, keep_worlds=False)
-        for cycle in cycles:
-            monitor.update(cycle)
-        spans = [Span(e.key, e.t_start, e.t_end) for e in monitor.hazards.finish()]
-        spans = sorted((s for s in spans if s.t_end >= begin), key=lambda s: s.t_start)
+        signals = [(c.t, monitor.update(c).signals.values) for c in cycles]
+        spans = _found(monitor.hazards, begin)
         detected[profile] = tuple(s for s in spans if s.hazard in SCORED_HAZARDS)
         if profile is Profile.PRACTICAL:
+            scaled = {f: _reapplied(signals, curve, f, begin) for f in CURVE_FACTORS if curve}
             others = [s.hazard for s in spans if s.hazard not in SCORED_HAZARDS]
             candidates = {hazard: others.count(hazard) for hazard in dict.fromkeys(others)}
     found: dict[str, tuple[Span, ...]] = {}
@@ -70,7 +78,37 @@ def judge(
     if marked := tuple(labels):
         found["labels"] = tuple(merged(marked))
     duration = cycles[-1].t - begin if cycles else 0.0
-    return Segment(name, route, max(duration, 0.0) / 3600.0, detected, found, candidates, unseen)
+    return Segment(
+        name, route, max(duration, 0.0) / 3600.0, detected, found, candidates, unseen, scaled
+    )
+
+
+def _found(events: TimeFilter[HazardType], begin: float) -> list[Span]:
+    """The events of a finished drive that reach into its evaluated part."""
+    spans = [Span(e.key, e.t_start, e.t_end) for e in events.finish()]
+    return sorted((s for s in spans if s.t_end >= begin), key=lambda s: s.t_start)
+
+
+def _reapplied(
+    signals: Sequence[tuple[float, dict[Signal, float]]],
+    signal: Signal | None,
+    factor: float,
+    begin: float,
+) -> tuple[Span, ...]:
+    """What the practical rules find with every threshold on `signal` times `factor`."""
+    events: TimeFilter[HazardType] = TimeFilter()
+    for rule in load_rules(Profile.PRACTICAL):
+        if rule.hazard not in SCORED_HAZARDS:
+            continue
+        alternatives = tuple(
+            tuple(replace(c, value=c.value * factor) if c.signal is signal else c for c in clauses)
+            for clauses in rule.alternatives
+        )
+        changed = replace(rule, alternatives=alternatives)
+        for t, values in signals:
+            if changed.fires(values):
+                events.add(rule.hazard, t, 0.0, least=True)
+    return tuple(_found(events, begin))
 
 
 def _spans(hazards: Iterable[TrueHazard]) -> tuple[Span, ...]:
@@ -119,6 +157,17 @@ class Evaluation:
         ]
         return {h: score([row[h] for row in rows]) for h in SCORED_HAZARDS}
 
+    def curve(self, truth: str) -> dict[float, dict[HazardType, Tally]]:
+        """Counts by factor on the threshold, over the segments that have this truth (C-105)."""
+        out: dict[float, dict[HazardType, Tally]] = {}
+        for segment in (s for s in self.segments if truth in s.truths):
+            for factor, spans in segment.curve.items():
+                row = tally(spans, segment.truths[truth], segment.hours)
+                total = out.setdefault(factor, dict.fromkeys(SCORED_HAZARDS, Tally()))
+                for hazard in SCORED_HAZARDS:
+                    total[hazard] = total[hazard] + row[hazard]
+        return out
+
     def as_dict(self) -> dict[str, Any]:
         """Everything, for JSON."""
         truths = sorted({name for s in self.segments for name in s.truths})
@@ -143,6 +192,13 @@ class Evaluation:
                     for route, row in self.by_route(profile, truth).items()
                 }
                 for profile in Profile
+                for truth in truths
+            },
+            "curve": {
+                truth: {
+                    str(factor): {h.value: [t.tp, t.fp, t.fn] for h, t in row.items()}
+                    for factor, row in self.curve(truth).items()
+                }
                 for truth in truths
             },
             "truths_agree": {h.value: _row(s) for h, s in self.truths_agree().items()},

@@ -55,6 +55,19 @@ class Server(ServerProcess):
 
 
 @pytest.fixture
+def without_hang() -> Callable[[Callable[[], str]], str]:
+    """Try a client with a Traffic Manager again when the wheel hangs (see MANAGER_REST)."""
+
+    def tried(attempt: Callable[[], str]) -> str:
+        try:
+            return attempt()
+        except subprocess.TimeoutExpired:
+            return attempt()
+
+    return tried
+
+
+@pytest.fixture
 def serve() -> Iterator[Callable[..., Server]]:
     """Start servers with options; all are stopped at the end."""
     pytest.importorskip("carla")

@@ -222,22 +222,24 @@ def chosen(blueprint: Blueprint, given: dict[str, str]) -> dict[str, str]:
             raise wire.WireError(
                 f"{blueprint.id}: {name} must be one of {', '.join(attribute.recommended)}"
             )
-        _check_text(blueprint.id, attribute, value)
-        values[name] = value
+        values[name] = _checked(blueprint.id, attribute, value)
     return values
 
 
-def _check_text(id: str, attribute: Attribute, value: str) -> None:
+def _checked(id: str, attribute: Attribute, value: str) -> str:
+    """The text of a value that its type can be read from; `64.0` is an int to clients."""
     try:
         if attribute.type is AttributeType.FLOAT:
             wire.number(float(value.rstrip("f")), f"{id}: {attribute.id}")
         elif attribute.type is AttributeType.INT:
-            wire.integer(int(value), f"{id}: {attribute.id}", -(2**31), 2**31 - 1)
+            number = int(float(value))
+            return str(wire.integer(number, f"{id}: {attribute.id}", -(2**31), 2**31 - 1))
         elif attribute.type is AttributeType.COLOUR:
             parts = [int(v) for v in value.split(",")]
             if len(parts) != 3 or not all(0 <= v <= 255 for v in parts):
                 raise ValueError
-    except ValueError as error:
+    except (ValueError, OverflowError) as error:
         raise wire.WireError(
             f"{id}: {attribute.id} must be a {attribute.type.name.lower()}, got {value[:40]!r}"
         ) from error
+    return value

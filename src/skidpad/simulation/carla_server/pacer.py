@@ -10,6 +10,10 @@ from collections.abc import Callable
 log = logging.getLogger("skidpad.carla_server")
 BEHIND = 0.5  # s; a pacer that is later than this gives up catching up
 IDLE = 0.05  # s between looks while clients tick
+MANAGER_REST = 0.002  # s before a tick's answer
+"""The 0.9.16 client's Traffic Manager thread misses its wake-up, and the client then hangs for good,
+when a tick returns before that thread has gone to sleep. Simulators that render never are so quick;
+without this rest we met it about once in 2000 ticks on two busy cores."""
 
 
 class Pacer:

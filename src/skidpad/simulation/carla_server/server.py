@@ -11,12 +11,14 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 from skidpad.core.errors import ConfigError
+from skidpad.core.geometry import Pose
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.codec import Decoder, ProtocolError, Request
 from skidpad.simulation.carla_server.methods import TABLES
-from skidpad.simulation.carla_server.pacer import Pacer
+from skidpad.simulation.carla_server.pacer import MANAGER_REST, Pacer
 from skidpad.simulation.carla_server.rpc import Dispatcher
-from skidpad.simulation.carla_server.spawning import spawn
+from skidpad.simulation.carla_server.sensing.sensors import PRODUCERS
+from skidpad.simulation.carla_server.spawning import spawn, spawn_attached
 from skidpad.simulation.carla_server.streams import StreamHub
 from skidpad.simulation.carla_server.world import ServerOptions, World
 
@@ -47,14 +49,19 @@ class RpcConnection(asyncio.Protocol):
         assert transport is not None
         try:
             for request in self._decoder.feed(data):
-                transport.write(self._server.answer(request))
+                answer = self._server.answer(request)
+                rest = self._server.rest_before(request)
+                if rest > 0.0:
+                    asyncio.get_running_loop().call_later(rest, transport.write, answer)
+                else:
+                    transport.write(answer)
+                if transport.get_write_buffer_size() > MAX_UNREAD:
+                    log.warning("closing a client that does not read its answers")
+                    transport.abort()
+                    return
         except ProtocolError as error:
             log.warning("closing a client: %s", error)
             transport.close()
-            return
-        if transport.get_write_buffer_size() > MAX_UNREAD:
-            log.warning("closing a client that does not read its answers")
-            transport.abort()
 
     def pause_writing(self) -> None:
         """The client reads slowly: take no more requests from it."""
@@ -115,6 +122,11 @@ class CarlaServer:
             self._calls.write(json.dumps(line, default=repr) + "\n")
         return self.dispatcher.answer(request)
 
+    def rest_before(self, request: Request) -> float:
+        """s by which the answer to a tick is held back while a Traffic Manager listens."""
+        ticks = request.method == "tick_cue" and self.world.managers.by_port
+        return MANAGER_REST if ticks else 0.0
+
     async def open(self) -> Ports:
         """Listen on the port pair; the streaming port is the next one."""
         host = self.options.host
@@ -154,11 +166,22 @@ class CarlaServer:
         return [f"unknown call {n} ({k} times)" for n, k in self.dispatcher.unknown.items()]
 
 
+class EverybodyListens(StreamHub):
+    """Streams to nobody that are all produced."""
+
+    def wanted(self, stream: int) -> bool:
+        """Always."""
+        return self.exists(stream)
+
+
 def warm_up(options: ServerOptions) -> None:
     """Compile or load all kernels before clients wait, by a tick of a world that is thrown away."""
-    world = World(options, StreamHub())
+    world = World(options, EverybodyListens())
     names = [id for id, b in world.catalogue.items() if b.family is Family.VEHICLE]
-    spawn(world, [0, names[0], []], world.map.spawn_points[0])
+    car = spawn(world, [0, names[0], []], world.map.spawn_points[0])
+    for kind in PRODUCERS:
+        small = [["image_size_x", 2, "64"], ["image_size_y", 2, "48"]]
+        spawn_attached(world, [0, kind, small], Pose(0.0, 0.0, 2.0), car.id, 0, "")
     world.tick()
 
 

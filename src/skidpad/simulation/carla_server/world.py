@@ -13,6 +13,7 @@ import numpy as np
 
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import GripModel
+from skidpad.sensors.suite import scene_of
 from skidpad.simulation.carla_server import moving, snapshot, wire
 from skidpad.simulation.carla_server.actors import Actor, ActorTable, Attachment
 from skidpad.simulation.carla_server.catalogue import Blueprint, Family, load_catalogue
@@ -95,6 +96,7 @@ class World:
     def load(self, name: str, reset_settings: bool) -> None:
         """Another map, or with "" the same one anew."""
         served = self.map if name == "" else self.maps.load(name)
+        scene_of(served.roads)  # triangles now, not in the first picture's tick
         for actor in list(self.actors):
             if actor.stream is not None:
                 self.hub.close(actor.stream)

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from channel_worlds import Eyes, World, drive, frame, truth
+from channel_worlds import CAR, Eyes, World, drive, frame, truth
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.evaluation import Evaluation, judge, merged, read_labels
 from skidpad.evidence.hazards import Profile
 from skidpad.evidence.matching import Span, Tally, macro, match, micro, percent, score, tally
-from skidpad.evidence.truth import G, simulator_truth, world_model_truth, would_hit
+from skidpad.evidence.truth import G, footprint, simulator_truth, world_model_truth, would_hit
 from skidpad.recording.cycles import cycles
 
 TAILGATED, TAILGATING = HazardType.EGO_TAILGATED, HazardType.EGO_TAILGATING
@@ -107,6 +107,37 @@ def test_world_model_truth_believes_ghosts_and_tells_ahead_from_behind():
     beside = [(-12.0, 3.5, 0, 16.0, 0)]
     rows = [Cycle(0, 0.0, (frame(0.0, ego), frame(0.0, ego, beside)))]
     assert world_model_truth(rows, ["a", "b"]) == []
+
+
+@given(st.data())
+@settings(max_examples=60, deadline=None)
+def test_world_model_truth_agrees_with_footprints_moved_in_small_steps(data):
+    ego = (0.0, 0.0, 0.0, 10.0, 0.0)
+    x, y = data.draw(st.floats(-35, 35)), data.draw(st.floats(-25, 25))
+    heading, v = data.draw(st.floats(-3.1, 3.1)), data.draw(st.floats(1.0, 15.0))
+    other = np.array([x, y, heading, v * np.cos(heading), v * np.sin(heading)])
+    f = frame(0.0, ego, [other])
+    distance = min(
+        footprint(CAR, np.array([10 * t, 0, 0, 0, 0])).distance(
+            footprint(CAR, np.array([*(other[:2] + other[3:] * t), heading, 0, 0]))
+        )
+        for t in np.arange(0, 3.001, 0.01)
+    )
+    found = world_model_truth([Cycle(0, 0.0, (f,))], ["a"])
+    if distance == 0.0:
+        assert len(found) == 1
+    elif distance > 1.5:  # hulls of a step of 0.25 s are a little larger than the footprints
+        assert found == []
+
+
+def test_a_prediction_that_ends_early_is_believed_to_its_end():
+    ego = (0.0, 0.0, 0.0, 10.0, 0.0)
+    f = frame(0.0, ego, [(20.0, 0, 0, 0, 0)])
+    predictions = f.predictions.copy()
+    predictions[:, 3:] = np.nan
+    early = f._replace(predictions=predictions)
+    assert world_model_truth([Cycle(0, 0.0, (early,))], ["a"]) == []
+    assert len(world_model_truth([Cycle(0, 0.0, (f,))], ["a"])) == 1
 
 
 def test_truth_survives_strange_frames():

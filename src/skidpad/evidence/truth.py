@@ -225,20 +225,26 @@ def _sweeps(cycle: Cycle, ego: ChannelFrame, channels: Sequence[str]) -> list[_M
     for b, frame in enumerate(cycle.frames):
         if frame is None or len(frame.objects) == 0:
             continue
-        p_t = np.concatenate([[0.0], frame.prediction_t])
-        until = min(SWEEP_TIME, plan_t[-1], p_t[-1])
-        times = np.arange(0.0, until + 1e-9, SWEEP_STEP)
-        mine = _along(times, plan_t, plan_xy)
-        reach = _radius(ego.ego_polygon) + SWEEP_STEP * 40.0  # m between steps at most
+        times = np.arange(0.0, min(SWEEP_TIME, plan_t[-1]) + 1e-9, SWEEP_STEP)
+        whole = _along(times, plan_t, plan_xy)
+        ego_reach = _radius(ego.ego_polygon) + _stride(whole)
         for i, state in enumerate(frame.objects):
             if not np.isfinite(state).all():
                 continue
-            theirs = _along(times, p_t, np.vstack([state[:2], frame.predictions[i]]))
+            said = np.isfinite(frame.predictions[i]).all(
+                axis=1
+            )  # an object's own end may be earlier
+            p_t = np.concatenate([[0.0], frame.prediction_t[said]])
+            n = int(np.searchsorted(times, p_t[-1] + 1e-9, side="right"))
+            theirs = _along(times[:n], p_t, np.vstack([state[:2], frame.predictions[i, said]]))
+            mine = whole[:n]
             shape = frame.polygons[i, : frame.polygon_size[i]]
-            near = np.hypot(*(mine - theirs).T) < reach + _radius(shape)
-            if not near.any():
+            reach = ego_reach + _radius(shape) + _stride(theirs)
+            near = np.flatnonzero(np.hypot(*(mine - theirs).T) < reach)
+            if near.size == 0:
                 continue
-            if _meet(ego.ego_polygon, ego.ego, mine, shape, state, theirs, near):
+            swept = _swept(ego.ego_polygon, ego.ego, mine, near)
+            if shapely.intersects(swept, _swept(shape, state, theirs, near)).any():
                 offset = state[:2] - ego.ego[:2]
                 behind = offset @ [np.cos(ego.ego[2]), np.sin(ego.ego[2])] < 0.0
                 hazard = HazardType.EGO_TAILGATED if behind else HazardType.EGO_TAILGATING
@@ -254,31 +260,37 @@ def _along(times: Floats, path_t: Floats, path: Floats) -> Floats:
     return np.column_stack([np.interp(times, path_t, path[:, k]) for k in (0, 1)])
 
 
-def _meet(
-    shape_a: Floats, state_a: Floats, path_a: Floats,
-    shape_b: Floats, state_b: Floats, path_b: Floats, near: NDArray[np.bool_],
-) -> bool:  # fmt: skip
-    for k in np.flatnonzero(near).tolist():
-        pieces = []
-        for shape, state, path in ((shape_a, state_a, path_a), (shape_b, state_b, path_b)):
-            j = min(k + 1, len(path) - 1)
-            here, there = (_carried(shape, state, path, m) for m in (k, j))
-            pieces.append(here if j == k else shapely.union(here, there).convex_hull)
-        if pieces[0].intersects(pieces[1]):
-            return True
-    return False
+def _stride(path: Floats) -> float:
+    """Longest step of a path, m."""
+    return float(np.hypot(*(path[1:] - path[:-1]).T).max(initial=0.0))
 
 
-def _carried(shape: Floats, state: Floats, path: Floats, k: int) -> shapely.Polygon:
-    """The footprint at step k of a path, turned into the direction of motion there."""
-    j = k if k < len(path) - 1 else k - 1
-    step = path[j + 1] - path[j] if len(path) > 1 else np.zeros(2)
-    heading = state[2]
-    if np.hypot(*step) > 0.1:
-        heading = np.arctan2(step[1], step[0])
-        if np.cos(heading - state[2]) < 0.0:  # moves backwards
-            heading += np.pi
-    return footprint(shape, np.array([*path[k], heading, 0.0, 0.0]))
+def _swept(
+    shape: Floats, state: Floats, path: Floats, steps: NDArray[np.int64]
+) -> NDArray[np.object_]:
+    """Hulls of the footprint at each of `steps` of a path together with the step after it.
+
+    The footprint turns into the direction of motion; where it hardly moves it keeps its heading.
+    """
+    points = shape[np.isfinite(shape).all(axis=1)]
+    if len(points) == 0:
+        points = np.zeros((1, 2))
+    moves = np.diff(path, axis=0, append=path[-1:])
+    if len(path) > 1:
+        moves[-1] = moves[-2]
+    heading = np.where(np.hypot(*moves.T) > 0.1, np.arctan2(moves[:, 1], moves[:, 0]), state[2])
+    heading = np.where(np.cos(heading - state[2]) < 0.0, heading + np.pi, heading)  # in reverse
+    c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
+    x = path[:, :1] + c * points[:, 0] - s * points[:, 1]
+    y = path[:, 1:] + s * points[:, 0] + c * points[:, 1]
+    corners = np.stack([x, y], axis=2)  # (steps of the path, vertices, 2)
+    after = np.minimum(steps + 1, len(path) - 1)
+    both = np.concatenate([corners[steps], corners[after]], axis=1)
+    owner = np.repeat(np.arange(len(steps)), both.shape[1])
+    hulls: NDArray[np.object_] = shapely.convex_hull(
+        shapely.multipoints(both.reshape(-1, 2), indices=owner)
+    )
+    return hulls
 
 
 def footprint(shape: Floats, state: Floats) -> shapely.Geometry:

@@ -8,6 +8,7 @@ from functools import wraps
 from time import process_time_ns
 from typing import Any, TypeVar
 
+import cv2
 import numpy as np
 
 from skidpad.campaign.cells import Cell
@@ -54,6 +55,7 @@ class Meter:
 
 def tick_cost(cell: Cell, seconds: float = 60.0) -> TickCost:
     """Drive `cell` for some simulated seconds on the embedded simulator and measure."""
+    cv2.setNumThreads(1)  # as in the workers (decision X-10): helpers that wait would count, too
     meter = Meter()
     ready = prepare(replace(cell, duration=WARM_UP + seconds))
     backend = EmbeddedBackend()

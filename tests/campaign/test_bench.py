@@ -1,0 +1,26 @@
+"""The tick benchmark adds up: parts are positive and not more than the whole."""
+
+from __future__ import annotations
+
+from skidpad.campaign.bench import tick_cost
+from skidpad.campaign.cells import Cell, Driver
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.physics.presets import find_weather
+from skidpad.stack.configurations import functions_of
+from skidpad.stack.settings import load_profile
+
+
+def test_parts_add_up_to_the_tick() -> None:
+    cell = Cell(
+        driver=Driver(label="2", functions=functions_of(2)),
+        weather=find_weather("clear-noon"),
+        seed=1,
+        profile="recommended",
+        settings=load_profile("recommended"),
+        level=SensorLevel.PIXELS,
+    )
+    cost = tick_cost(cell, seconds=1.0)
+    assert set(cost.parts) == {"world", "sensors", "rendering", "stack", "supervisor", "log"}
+    assert all(ms > 0.0 for ms in cost.parts.values())
+    assert sum(cost.parts.values()) <= cost.mean
+    assert cost.median <= cost.p99

@@ -7,6 +7,7 @@ import typer
 import skidpad
 from skidpad.cli.adas import adas, report, show
 from skidpad.cli.channels import channels
+from skidpad.cli.channels_drive import drive
 from skidpad.cli.compare import compare
 from skidpad.cli.friction import friction
 from skidpad.cli.hazards import hazards
@@ -45,6 +46,7 @@ app.command()(compare)
 app.command()(show)
 app.add_typer(profiles)
 app.add_typer(maps)
+channels.command()(drive)
 app.add_typer(channels)
 app.add_typer(hazards)
 app.command()(friction)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+
+from skidpad.core.vocabulary import LightState
 
 Floats = NDArray[np.float64]
 
@@ -72,3 +75,17 @@ class Cycle(NamedTuple):
     frames: tuple[ChannelFrame | None, ...]  # None: nothing fresh enough
     driving: int | None = None  # index of the driving channel, None: not recorded
     truth: TruthFrame | None = None
+
+
+class ChannelView(NamedTuple):
+    """What a channel's own sensors deliver in a cycle: all that its stack receives (decision C-1).
+
+    Objects were measured at `t_seen` and are given in the ego's frame of that moment.
+    """
+
+    t: float  # s
+    ego: Floats  # (5,) x, y, heading by localisation; speed, yaw rate by odometry
+    t_seen: float  # s, <= t
+    objects: Floats  # (n, 5) x, y, heading, length, width
+    classes: NDArray[np.int64]  # (n,) SemanticClass
+    lights: Mapping[int, LightState]  # by signal id: those whose head is in sight

@@ -47,6 +47,7 @@ class TrafficSetup:
     initial_limit_kmh: float | None = None  # None: the map's limit at the place (decision M-6)
     slow_in_weather: bool = False  # the switch `drivers` (decision M-1)
     put_wrecks_back: bool = True  # decision M-7
+    variety: bool = False  # drivers differ in speed, headway and acceleration (decision C-11)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

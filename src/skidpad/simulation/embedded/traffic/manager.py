@@ -23,6 +23,7 @@ from skidpad.simulation.embedded.traffic.occupancy import Places, occupancy
 from skidpad.simulation.embedded.traffic.path import begin
 from skidpad.simulation.embedded.traffic.places import FreePlaces
 from skidpad.simulation.embedded.traffic.state import TRAIT, View, drivers
+from skidpad.simulation.embedded.traffic.variety import vary
 
 G = 9.80665  # m/s^2
 AIR_DENSITY = 1.204  # kg/m^3 at 20 C
@@ -63,6 +64,8 @@ class Traffic:
         self.drivers = drivers(n)
         self.drivers.state["key"] = [stream_key(seed, "traffic", "driver", i) for i in range(n)]
         self.drivers.trait[:] = _traits(types, grip if setup.slow_in_weather else 1.0)
+        if setup.variety:
+            vary(self.drivers.trait, seed)
         self.occupancy = occupancy(len(net.lane), n)
         self.places = FreePlaces(map, net, stream(seed, "traffic", "places"))
         self.waiting: list[int] = []  # enter when there is room

@@ -1,0 +1,139 @@
+"""What became of a drive: collisions, red lights run, stalls, and how the arbiter acted (C-9)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, hypot, sin
+
+import msgspec
+
+from skidpad.core.channels import Decision
+from skidpad.core.states import ContactEvent, WorldTruth
+from skidpad.core.vocabulary import LightState
+from skidpad.roads.lanes import SignalKind
+from skidpad.stack.channels.route import SEARCH, STEP, RoutePath, locate
+from skidpad.stack.channels.settings import CarModel
+
+V_STANDING = 0.3  # m/s
+STALL_TIME = 60.0  # s standing without a red light ahead
+STUCK_TIME = 180.0  # s standing for any reason: a red phase lasts 32 s
+RED_REACH = 60.0  # m to a red light that explains standing
+LOST = 8.0  # m beside the route
+AGAIN = 3.0  # s within which a contact with the same actor is the same collision
+
+
+class DriveOutcome(msgspec.Struct, frozen=True, kw_only=True):
+    """One row per segment; counts unless said otherwise."""
+
+    route: str
+    seed: int
+    drive_by: str
+    driven_s: float
+    distance_m: float
+    collisions: int
+    collisions_struck: int  # of these: the ego hit, seen by who closed in with its front
+    red_lights_run: int
+    stalls: int
+    ended: str  # "time", "stalled" or "off the route"
+    switches: int
+    minimal_risk_s: float
+    driving_s: dict[str, float]
+    content_hash: str = ""
+    cpu_s: float = 0.0  # outside every hash
+
+
+class Referee:
+    """Watches the true world; says nothing to anybody until the end."""
+
+    def __init__(self, route: RoutePath, car: CarModel, dt: float) -> None:
+        self.route, self.car, self.dt = route, car, dt
+        self.over = False
+        self.ended = "time"
+        self.cycles = self.switches = self.reds = self.stalls = self.at = 0
+        self.distance = self.stood = self.minimal_risk = 0.0
+        self.driving: dict[str, float] = {}
+        self.hits: list[bool] = []
+        self._last: dict[tuple[int, str], float] = {}
+        self._place: tuple[float, float] | None = None
+        self._driver: str | None = None
+        self._front = 0.0
+
+    def observe(self, t: float, truth: WorldTruth, decision: Decision) -> None:
+        """One cycle."""
+        s = truth.states
+        x, y, v = float(s.x[0]), float(s.y[0]), hypot(float(s.vx[0]), float(s.vy[0]))
+        if self._place is not None:
+            self.distance += hypot(x - self._place[0], y - self._place[1])
+        self._place = (x, y)
+        self.cycles += 1
+        if self._driver is not None and decision.driving != self._driver:
+            self.switches += 1
+        self._driver = decision.driving
+        if decision.driving:
+            self.driving[decision.driving] = self.driving.get(decision.driving, 0.0) + self.dt
+        else:
+            self.minimal_risk += self.dt
+        self.at, offset = locate(self.route.points, x, y, self.at, SEARCH)
+        self._lines(truth)
+        self._standing(v, truth)
+        if abs(offset) > LOST or self.at * STEP > self.route.length - 30.0:
+            self.over, self.ended = True, "off the route"
+
+    def touched(self, t: float, truth: WorldTruth, contacts: Sequence[ContactEvent]) -> None:
+        """Contacts of one tick."""
+        s = truth.states
+        for contact in contacts:
+            key = (contact.actor, contact.static)
+            if t - self._last.get(key, -AGAIN) >= AGAIN:
+                yaw = float(s.yaw[0])
+                dx, dy = contact.x - float(s.x[0]), contact.y - float(s.y[0])
+                ahead = cos(yaw) * dx + sin(yaw) * dy
+                self.hits.append(ahead > 0.3 * self.car.length)
+            self._last[key] = t
+
+    def _lines(self, truth: WorldTruth) -> None:
+        """Count a red light when the front passes its line."""
+        front = self.at * STEP + 0.5 * self.car.length
+        for line in self.route.lines:
+            if line.kind is not SignalKind.LIGHT or not self._front < line.s <= front:
+                continue
+            if truth.lights.get(line.signal) is LightState.RED:
+                self.reds += 1
+        self._front = max(front, self._front)
+
+    def _standing(self, v: float, truth: WorldTruth) -> None:
+        if v >= V_STANDING:
+            self.stood = 0.0
+            return
+        self.stood += self.dt
+        limit = STUCK_TIME if self._red_ahead(truth) else STALL_TIME
+        if self.stood > limit:
+            self.stalls += 1
+            self.over, self.ended = True, "stalled"
+
+    def _red_ahead(self, truth: WorldTruth) -> bool:
+        here = self.at * STEP
+        return any(
+            line.kind is SignalKind.LIGHT
+            and -5.0 < line.s - here < RED_REACH
+            and truth.lights.get(line.signal) is not LightState.GREEN
+            for line in self.route.lines
+        )
+
+    def outcome(self, route: str, seed: int, drive_by: str) -> DriveOutcome:
+        """The row."""
+        return DriveOutcome(
+            route=route,
+            seed=seed,
+            drive_by=drive_by,
+            driven_s=self.cycles * self.dt,
+            distance_m=self.distance,
+            collisions=len(self.hits),
+            collisions_struck=sum(self.hits),
+            red_lights_run=self.reds,
+            stalls=self.stalls,
+            ended=self.ended,
+            switches=self.switches,
+            minimal_risk_s=self.minimal_risk,
+            driving_s=dict(sorted(self.driving.items())),
+        )

@@ -1,0 +1,120 @@
+"""The world of one segment of a route: ego, traffic, parked cars, people; all from the seed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import hypot
+
+import numpy as np
+
+from skidpad.campaign.channel_routes import DrivenRoute
+from skidpad.core.errors import ConfigError
+from skidpad.core.geometry import Pose
+from skidpad.core.randomness import stream
+from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.physics.types import EGO_TYPE, traffic_types, vehicle_type
+from skidpad.roads.lanes import LaneKind
+from skidpad.roads.queries import RoadMap
+from skidpad.simulation.crowd import Crowd
+from skidpad.stack.channels.route import RoutePath, draw_route, route_path
+from skidpad.stack.channels.settings import CarModel
+
+CLEARANCE = 25.0  # m between vehicles at the start
+FIRST_S = 25.0  # m from the beginning of its lane where the ego starts
+V_MEAN_MAX = 25.0  # m/s, so that no route ends before its segment
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """Everything that a segment begins with."""
+
+    setup: Setup
+    crowd: Crowd
+    route: RoutePath
+    car: CarModel
+
+
+def segment_of(route: DrivenRoute, map: RoadMap, seed: int, duration: float) -> Segment:
+    """The world of a route with this seed; `duration` in s decides how long the way is."""
+    rng = stream(seed, "channels", "route")
+    lane = _first_lane(map, rng)
+    lanes = draw_route(map, lane, duration * V_MEAN_MAX, rng)
+    path = route_path(map, lanes, FIRST_S)
+    start = map.at(lane, FIRST_S)
+    crowd = Crowd(map, route.pedestrians, route.cyclists, seed)
+    places = _places(map, route.vehicles, start.pose, stream(seed, "channels", "places"))
+    types = traffic_types()
+    traffic = [
+        ActorSetup(name=f"traffic_{i + 1:02d}", type=types[i % len(types)], place=p)
+        for i, p in enumerate(places)
+    ]
+    spaces = map.roadside.parking[: route.parked]
+    parked = [
+        ActorSetup(
+            name=f"parked_{i + 1:02d}",
+            type=types[(i + 1) % len(types)],
+            place=Pose(p.x, p.y, p.z, yaw=p.yaw),
+            driver="scripted",
+        )
+        for i, p in enumerate(spaces)
+    ]
+    setup = Setup(
+        map=route.map,
+        weather=route.weather,
+        specs=(),
+        ego=ActorSetup(name="ego", type=EGO_TYPE, place=start.pose, driver="scripted"),
+        actors=(*traffic, *parked, *crowd.actors()),
+        traffic=TrafficSetup(mode="random", vehicles=0, variety=True),
+        level=SensorLevel.OBJECTS,
+    )
+    return Segment(setup, crowd, path, car_model())
+
+
+def car_model() -> CarModel:
+    """What channels know about the ego."""
+    t = vehicle_type(EGO_TYPE)
+    brake = 2.0 * (t.brake_torque_front + t.brake_torque_rear)
+    return CarModel(
+        length=t.length,
+        width=t.width,
+        wheelbase=t.wheelbase,
+        steer_max=t.steer_max,
+        a_drive=t.force_max / t.mass,
+        a_brake=brake / (t.wheel_radius * t.mass),
+    )
+
+
+def _first_lane(map: RoadMap, rng: np.random.Generator) -> int:
+    """A lane to start on: any long one outside junctions, the map's own start on foreign roads."""
+    fits = np.flatnonzero(
+        (map.lanes.kind == LaneKind.DRIVING)
+        & (map.lanes.junction < 0)
+        & (map.lanes.length > 2.0 * FIRST_S)
+        & (np.diff(map.lanes.next_start) > 0)
+    )
+    if not len(fits):
+        raise ConfigError(f"map {map.name} has no driving lane of {2.0 * FIRST_S:g} m that goes on")
+    return int(fits[int(rng.integers(len(fits)))])
+
+
+def _places(map: RoadMap, count: int, ego: Pose, rng: np.random.Generator) -> list[Pose]:
+    """Places of background vehicles, clear of the ego and each other; fewer if the map is full."""
+    first, size = map.lanes.first[map.samples.lane], map.lanes.size[map.samples.lane]
+    at = np.arange(len(map.samples.x))
+    fits = np.flatnonzero(
+        (map.lanes.kind[map.samples.lane] == LaneKind.DRIVING)
+        & (map.lanes.junction[map.samples.lane] < 0)
+        & (at - first > 15)
+        & (first + size - at > 15)
+    )
+    found: list[Pose] = []
+    for sample in rng.choice(fits, size=min(40 * count, len(fits)), replace=False).tolist():
+        x, y = float(map.samples.x[sample]), float(map.samples.y[sample])
+        if any(hypot(p.x - x, p.y - y) < CLEARANCE for p in (ego, *found)):
+            continue
+        z, yaw = float(map.samples.z[sample]), float(map.samples.heading[sample])
+        found.append(Pose(x, y, z, yaw=yaw))
+        if len(found) == count:
+            break
+    return found

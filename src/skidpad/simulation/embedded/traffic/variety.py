@@ -1,0 +1,27 @@
+"""Drivers differ: desired speed, headway and acceleration, one stream per driver (C-11)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.randomness import stream
+
+# Following headways are log-normal; medians of 1.1 to 1.5 s are reported for free choice (Taieb-Ari
+# and Shinar 2001: mean 0.98 s "comfortable"; Ayres et al. 2001: 1 to 2 s).
+HEADWAY_MEDIAN, HEADWAY_SIGMA = 1.2, 0.35  # s, of the logarithm
+HEADWAY_RANGE = (0.5, 3.0)  # s
+# Free speeds are normal with a coefficient of variation near 0.1 (Highway Capacity Manual 2010).
+SPEED_SIGMA, SPEED_RANGE = 0.10, (0.75, 1.25)
+# Kesting, Treiber and Helbing (2010) vary the IDM's acceleration by 20 to 30 %.
+ACCELERATION_SIGMA, ACCELERATION_RANGE = 0.25, (0.5, 1.6)
+
+
+def vary(traits: NDArray[np.void], seed: int) -> None:
+    """Give every driver (row of TRAIT) a character of its own."""
+    for i, trait in enumerate(traits):
+        draw = stream(seed, "traffic", "character", i).standard_normal(3).tolist()
+        headway = HEADWAY_MEDIAN * np.exp(HEADWAY_SIGMA * draw[0])
+        trait["headway"] = np.clip(headway, *HEADWAY_RANGE)
+        trait["factor"] *= np.clip(1.0 + SPEED_SIGMA * draw[1], *SPEED_RANGE)
+        trait["a_max"] *= np.clip(1.0 + ACCELERATION_SIGMA * draw[2], *ACCELERATION_RANGE)

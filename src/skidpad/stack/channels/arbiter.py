@@ -1,0 +1,114 @@
+"""Which channel drives (C-093, C-096, decision C-9): scores, preference, dwell, failover."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from skidpad.core.channels import ChannelFrame
+from skidpad.core.errors import require_range
+
+
+class Reason(str, Enum):
+    """Why this channel drives now; recorded."""
+
+    START = "start"
+    KEPT = "kept"
+    PREFERRED = "preferred channel is safe again"
+    SAFER = "higher safety score"
+    PROGRESS = "most progressing of the safe channels"
+    FAILOVER = "the driving channel is silent"
+    MINIMAL_RISK = "no channel is safe: minimal-risk stop"
+    ALL_SILENT = "all channels are silent: minimal-risk stop"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ArbiterSettings:
+    """Decision C-9."""
+
+    preferred: str | None = None  # channel; None: the most progressing
+    safe: float = 0.8
+    unsafe: float = 0.2  # below this for all: minimal-risk stop
+    dwell: float = 1.0  # s between two changes
+    dead_after: float = 0.3  # s without a message
+
+    def __post_init__(self) -> None:
+        require_range("arbiter.unsafe", self.unsafe, 0.0, self.safe)
+        require_range("arbiter.safe", self.safe, 0.0, 1.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """The channel that drives, None for a minimal-risk stop, and why."""
+
+    driving: int | None
+    reason: Reason
+
+
+class Arbiter:
+    """Call `update` each cycle; it never looks at indicators."""
+
+    def __init__(self, channels: Sequence[str], settings: ArbiterSettings) -> None:
+        self.channels, self.settings = tuple(channels), settings
+        self.reset()
+
+    def reset(self) -> None:
+        """Nobody drives yet."""
+        self.driving: int | None = None
+        self.changed_at = -np.inf
+        self.heard_at = [-np.inf] * len(self.channels)
+        self.started = False
+
+    def update(
+        self,
+        t: float,
+        frames: Sequence[ChannelFrame | None],
+        scores: Sequence[float],
+        progress: Sequence[float],
+    ) -> Choice:
+        """frames: this cycle's messages, None: nothing came; scores NaN: not evaluated;
+        progress: m/s at the end of each plan."""
+        for i, frame in enumerate(frames):
+            if frame is not None:
+                self.heard_at[i] = t
+        dead_after = self.settings.dead_after - 1e-9
+        alive = [i for i, heard in enumerate(self.heard_at) if t - heard < dead_after]
+        wanted = self._wanted(alive, scores, progress)
+        if wanted.driving == self.driving and self.started:
+            return Choice(self.driving, wanted.reason if self.driving is None else Reason.KEPT)
+        urgent = wanted.driving is None or self.driving not in alive
+        if self.started and not urgent and t - self.changed_at < self.settings.dwell - 1e-9:
+            return Choice(self.driving, Reason.KEPT)
+        lost = self.driving is not None and self.driving not in alive
+        reason = Reason.START if not self.started else wanted.reason
+        if lost and wanted.driving is not None:
+            reason = Reason.FAILOVER
+        self.driving, self.changed_at, self.started = wanted.driving, t, True
+        return Choice(self.driving, reason)
+
+    def _wanted(
+        self, alive: Sequence[int], scores: Sequence[float], progress: Sequence[float]
+    ) -> Choice:
+        s = self.settings
+        if not alive:
+            return Choice(None, Reason.ALL_SILENT)
+        known = {i: float(scores[i]) for i in alive if scores[i] == scores[i]}
+        if not known:
+            return Choice(self.driving if self.driving in alive else alive[0], Reason.KEPT)
+        safe = [i for i, score in known.items() if score >= s.safe]
+        if safe:
+            return self._among_safe(safe, progress)
+        best = max(known, key=lambda i: (known[i], i == self.driving, -i))
+        if known[best] < s.unsafe:
+            return Choice(None, Reason.MINIMAL_RISK)
+        return Choice(best, Reason.SAFER)
+
+    def _among_safe(self, safe: Sequence[int], progress: Sequence[float]) -> Choice:
+        s = self.settings
+        if s.preferred is not None and self.channels.index(s.preferred) in safe:
+            return Choice(self.channels.index(s.preferred), Reason.PREFERRED)
+        best = max(safe, key=lambda i: (progress[i], i == self.driving, -i))
+        return Choice(best, Reason.PROGRESS)

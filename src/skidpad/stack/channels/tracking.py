@@ -1,0 +1,233 @@
+"""Tracks of objects from one channel's detections: association, Kalman filter, birth and death.
+
+Tracks live in the odometry frame, the path that the car's own wheels and gyroscope tell; so an
+error of localisation moves the whole world at once and no object by itself.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from math import cos, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.channels import ChannelView
+from skidpad.core.jit import kernel
+from skidpad.stack.channels.settings import ChannelSettings
+
+Floats = NDArray[np.float64]
+
+GATE = 2.5  # m: a car at 40 m/s may accelerate by 6 m/s^2 for 0.5 s unseen, and errs by 3 sigma
+SIGMA_MEASURED = 0.2  # m per axis
+SIGMA_ACCELERATION = 2.5  # m/s^2, what road users do within a second
+SIGMA_SPEED_FIRST = 6.0  # m/s of an object that was never seen before
+HEADING_SHARE = 0.3  # of a new measurement in the smoothed heading
+SIZE_SHARE = 0.1
+V_TURNING = 2.0  # m/s, from which the motion tells the heading better than a detector
+MAX_TRACKS = 128
+VOTES = 10
+
+TRACK = np.dtype(
+    [
+        ("id", "i8"),
+        ("x", "f8"),
+        ("y", "f8"),
+        ("vx", "f8"),
+        ("vy", "f8"),
+        ("p_xx", "f8"),  # covariance of one axis, the same for both
+        ("p_xv", "f8"),
+        ("p_vv", "f8"),
+        ("heading", "f8"),
+        ("length", "f8"),
+        ("width", "f8"),
+        ("label", "i8"),
+        ("votes", "i8"),
+        ("hits", "i8"),
+        ("unseen", "f8"),  # s
+    ],
+    align=True,
+)
+
+
+class Tracker:
+    """All tracks of one channel."""
+
+    def __init__(self, settings: ChannelSettings) -> None:
+        self.settings = settings
+        self.reset()
+
+    def reset(self) -> None:
+        """Nothing seen yet; odometry at its origin."""
+        self._all = np.zeros(MAX_TRACKS, dtype=TRACK)
+        self.count = 0
+        self.next_id = 0
+        self.pose = np.zeros(3)  # x, y, heading by odometry
+        self.t: float | None = None
+        self._poses: deque[tuple[float, Floats]] = deque(maxlen=16)
+
+    def update(self, view: ChannelView) -> None:
+        """Take in one view."""
+        dt = 0.0 if self.t is None else view.t - self.t
+        self.t = view.t
+        speed, rate = float(view.ego[3]), float(view.ego[4])
+        middle = self.pose[2] + 0.5 * dt * rate
+        self.pose = self.pose + dt * np.array([speed * cos(middle), speed * sin(middle), rate])
+        self._poses.append((view.t, self.pose))
+        at = next((p for t, p in self._poses if t >= view.t_seen - 1e-6), self.pose)
+        self.count, self.next_id = _update(
+            self._all,
+            self.count,
+            self.next_id,
+            dt,
+            view.t_seen - view.t,
+            at,
+            view.objects,
+            view.classes,
+            self.settings.confirm,
+            self.settings.coast,
+        )
+
+    @property
+    def confirmed(self) -> NDArray[np.void]:
+        """Rows of TRACK that count as objects, in the odometry frame."""
+        rows = self._all[: self.count]
+        chosen: NDArray[np.void] = rows[rows["hits"] >= self.settings.confirm]
+        return chosen
+
+    def objects(self, ego: Floats) -> Floats:
+        """(n, 5) x, y, heading, vx, vy of confirmed tracks in the world in which the ego is at
+        `ego` (x, y, heading, ...)."""
+        rows = self.confirmed
+        turn = float(ego[2]) - float(self.pose[2])
+        c, s = cos(turn), sin(turn)
+        dx, dy = rows["x"] - self.pose[0], rows["y"] - self.pose[1]
+        return np.column_stack(
+            [
+                ego[0] + c * dx - s * dy,
+                ego[1] + s * dx + c * dy,
+                (rows["heading"] + turn + pi) % (2.0 * pi) - pi,
+                c * rows["vx"] - s * rows["vy"],
+                s * rows["vx"] + c * rows["vy"],
+            ]
+        )
+
+
+@kernel
+def _predict(tracks: NDArray[np.void], count: int, dt: float) -> None:
+    """Constant velocity with white acceleration (Bar-Shalom et al. 2001, 6.2)."""
+    q = SIGMA_ACCELERATION**2
+    for i in range(count):
+        t = tracks[i]
+        t.x += dt * t.vx
+        t.y += dt * t.vy
+        t.p_xx += dt * (2.0 * t.p_xv + dt * t.p_vv) + 0.25 * q * dt**4
+        t.p_xv += dt * t.p_vv + 0.5 * q * dt**3
+        t.p_vv += q * dt * dt
+        t.unseen += dt
+
+
+@kernel
+def _correct(t: np.void, x: float, y: float, age: float) -> None:
+    """Kalman update with a position measured `age` (<= 0) s from now."""
+    r = SIGMA_MEASURED**2
+    h = age
+    variance = t.p_xx + 2.0 * h * t.p_xv + h * h * t.p_vv + r
+    k_x = (t.p_xx + h * t.p_xv) / variance
+    k_v = (t.p_xv + h * t.p_vv) / variance
+    e_x, e_y = x - t.x - h * t.vx, y - t.y - h * t.vy
+    t.x += k_x * e_x
+    t.y += k_x * e_y
+    t.vx += k_v * e_x
+    t.vy += k_v * e_y
+    p_xx, p_xv, p_vv = t.p_xx, t.p_xv, t.p_vv
+    t.p_xx = p_xx - k_x * (p_xx + h * p_xv)
+    t.p_xv = p_xv - k_x * (p_xv + h * p_vv)
+    t.p_vv = p_vv - k_v * (p_xv + h * p_vv)
+
+
+@kernel
+def _shape(t: np.void, heading: float, length: float, width: float, label: int) -> None:
+    """Smooth heading and size, vote on the class."""
+    v = np.hypot(t.vx, t.vy)
+    if v > V_TURNING:
+        travel = np.arctan2(t.vy, t.vx)
+        if np.cos(travel - heading) > 0.7:
+            heading = travel
+    turn = (heading - t.heading + np.pi) % (2.0 * np.pi) - np.pi
+    t.heading += HEADING_SHARE * turn
+    t.length += SIZE_SHARE * (length - t.length)
+    t.width += SIZE_SHARE * (width - t.width)
+    if label == t.label:
+        t.votes = min(t.votes + 1, VOTES)
+    elif t.votes > 0:
+        t.votes -= 1
+    else:
+        t.label = label
+
+
+@kernel
+def _update(
+    tracks: NDArray[np.void],
+    count: int,
+    next_id: int,
+    dt: float,
+    age: float,
+    pose: Floats,
+    objects: Floats,
+    classes: NDArray[np.int64],
+    confirm: int,
+    coast: float,
+) -> tuple[int, int]:
+    """One cycle: predict, associate nearest first, correct, bear and bury. New count and id."""
+    _predict(tracks, count, dt)
+    m = objects.shape[0]
+    c, s = np.cos(pose[2]), np.sin(pose[2])
+    x, y = np.empty(m), np.empty(m)
+    distance = np.full((m, count), np.inf)
+    for j in range(m):
+        x[j] = pose[0] + c * objects[j, 0] - s * objects[j, 1]
+        y[j] = pose[1] + s * objects[j, 0] + c * objects[j, 1]
+        for i in range(count):
+            t = tracks[i]
+            d = np.hypot(x[j] - t.x - age * t.vx, y[j] - t.y - age * t.vy)
+            if d < GATE:
+                distance[j, i] = d
+    taken = np.zeros(m, np.bool_)
+    for _ in range(min(m, count)):
+        best, best_j, best_i = np.inf, -1, -1
+        for j in range(m):
+            for i in range(count):
+                if distance[j, i] < best:
+                    best, best_j, best_i = distance[j, i], j, i
+        if best_j < 0:
+            break
+        taken[best_j] = True
+        distance[best_j, :] = np.inf
+        distance[:, best_i] = np.inf
+        t = tracks[best_i]
+        _correct(t, x[best_j], y[best_j], age)
+        row = objects[best_j]
+        _shape(t, pose[2] + row[2], row[3], row[4], classes[best_j])
+        t.hits += 1
+        t.unseen = 0.0
+    kept = 0
+    for i in range(count):
+        t = tracks[i]
+        patience = coast if t.hits >= confirm else 0.5 * dt
+        if t.unseen <= patience + 1e-9:
+            if kept != i:
+                tracks[kept] = tracks[i]
+            kept += 1
+    for j in range(m):
+        if taken[j] or kept == tracks.shape[0]:
+            continue
+        t = tracks[kept]
+        t.id, next_id = next_id, next_id + 1
+        t.x, t.y, t.vx, t.vy = x[j], y[j], 0.0, 0.0
+        t.p_xx, t.p_xv, t.p_vv = SIGMA_MEASURED**2, 0.0, SIGMA_SPEED_FIRST**2
+        t.heading = pose[2] + objects[j, 2]
+        t.length, t.width = objects[j, 3], objects[j, 4]
+        t.label, t.votes, t.hits, t.unseen = classes[j], 1, 1, 0.0
+        kept += 1
+    return kept, next_id

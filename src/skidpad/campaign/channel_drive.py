@@ -145,7 +145,7 @@ def _loop(
         frames, decision = crew.cycle(t, truth)
         words = segment.crowd.commands(t, truth)
         if k >= 0:
-            referee.observe(t, truth, decision)
+            referee.observe(truth, decision)
             for name, frame in zip(plan.channels, frames, strict=True):
                 writer.write(name, frame)
             writer.write_decision(decision)

@@ -58,7 +58,7 @@ class Referee:
         self._driver: str | None = None
         self._front = 0.0
 
-    def observe(self, t: float, truth: WorldTruth, decision: Decision) -> None:
+    def observe(self, truth: WorldTruth, decision: Decision) -> None:
         """One cycle."""
         s = truth.states
         x, y, v = float(s.x[0]), float(s.y[0]), hypot(float(s.vx[0]), float(s.vy[0]))

@@ -49,20 +49,18 @@ def segment_plans(
     require_range("hours", hours, 1.0 / 3600.0, 10_000.0)
     require_range("noise", noise, 0.0, 10.0)
     seconds = hours * 3600.0 / len(routes)
-    plans = []
-    for i in range(ceil(seconds / SEGMENT - 1e-9)):
-        for route in routes:
-            plans.append(
-                SegmentPlan(
-                    route=route,
-                    channels=channels,
-                    seed=seed * SEEDS_PER_ROUTE + i,
-                    duration=min(SEGMENT, seconds - i * SEGMENT),
-                    drive_by=drive_by,
-                    noise=noise,
-                )
-            )
-    return plans
+    return [
+        SegmentPlan(
+            route=route,
+            channels=channels,
+            seed=seed * SEEDS_PER_ROUTE + i,
+            duration=min(SEGMENT, seconds - i * SEGMENT),
+            drive_by=drive_by,
+            noise=noise,
+        )
+        for i in range(ceil(seconds / SEGMENT - 1e-9))
+        for route in routes
+    ]
 
 
 def run_drives(

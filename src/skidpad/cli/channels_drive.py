@@ -40,9 +40,7 @@ def drive(
     routes = chosen_routes(route, map)
     for chosen in routes:
         load_map(chosen.map)
-    plans = segment_plans(
-        routes, hours, channels=names, seed=seed, drive_by=drive_by, noise=noise
-    )
+    plans = segment_plans(routes, hours, channels=names, seed=seed, drive_by=drive_by, noise=noise)
     summary = run_drives(
         plans,
         out,

@@ -130,5 +130,5 @@ SENSES = {
 
 def senses_of(channel: str) -> ChannelSensing:
     """The senses of a shipped channel."""
-    require_choice("channel", channel, SENSES)
+    require_choice("channel", channel, tuple(SENSES))
     return SENSES[channel]

@@ -23,7 +23,7 @@ from skidpad.core.weather import Weather
 from skidpad.physics.optics import daylight, label_range
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.boxes import Boxes, posts_of
-from skidpad.sensors.ghosts import GhostSettings, Ghosts
+from skidpad.sensors.ghosts import Ghosts, GhostSettings
 from skidpad.sensors.localisation import Localisation, LocalisationError, gauss_markov
 from skidpad.sensors.objects import LABELS
 from skidpad.sensors.sight import empty_sight, look, sees_point
@@ -33,6 +33,8 @@ Floats = NDArray[np.float64]
 CYCLE = 0.1  # s (C-022)
 DARK_LUX = 10.0  # civil twilight ends near 3 lux; street lights are switched on at 10 to 40
 EYE_HEIGHT = 1.6  # m, roof-mounted cameras of small cars
+ODOMETRY_RATIO = 0.005  # of the speed, wheel speed sensors (assumed)
+GYRO_SIGMA = 0.0017  # rad/s, 0.1 deg/s of a MEMS gyroscope (assumed)
 OCCLUDER_AREA = 4.0  # m^2 of ground; poles and signs hide nothing in 2-D
 LIGHT_HALF_ANGLE = pi / 3.0  # rad, a head is read from in front of it
 CONFUSIONS = {  # what a class is taken for
@@ -164,9 +166,7 @@ class ChannelSuite:
             ]
         )
         seen = self._queue[0]
-        return ChannelView(
-            t, ego, seen.t, seen.objects, seen.classes, self._lights(pose, float(s.z[0]), lights)
-        )
+        return ChannelView(t, ego, seen.t, seen.objects, seen.classes, self._lights(pose, lights))
 
     @property
     def visible(self) -> NDArray[np.bool_]:
@@ -196,17 +196,14 @@ class ChannelSuite:
         self._bias = gauss_markov(
             self._bias, rng["bias"].standard_normal((n, 2)), CYCLE / cfg.bias_time
         )
-        self._miss = gauss_markov(
-            self._miss, rng["miss"].standard_normal(n), CYCLE / cfg.miss_time
-        )
+        self._miss = gauss_markov(self._miss, rng["miss"].standard_normal(n), CYCLE / cfg.miss_time)
         white = rng["position"].standard_normal((n, 2))
         turn = cfg.heading_sigma * rng["heading"].standard_normal(n)
         rows = np.flatnonzero(self._sight.share >= max(cfg.share_seen, 1e-9))
+        rows = rows[~self._missed(rows, np.hypot(s.x[rows] - pose[0], s.y[rows] - pose[1]))]
         dx, dy = s.x[rows] - pose[0], s.y[rows] - pose[1]
         c, sn = cos(pose[2]), sin(pose[2])
         distance = np.hypot(dx, dy)
-        rows_missed = self._missed(rows, distance)
-        rows, dx, dy, distance = (a[~rows_missed] for a in (rows, dx, dy, distance))
         grow = (1.0 + cfg.range_growth * distance / 100.0)[:, None]
         error = grow * (cfg.position_sigma * white[rows] + cfg.bias_sigma * self._bias[rows])
         objects = np.column_stack(
@@ -234,7 +231,7 @@ class ChannelSuite:
         return missed
 
     def _lights(
-        self, pose: tuple[float, float, float], z: float, lights: Mapping[int, LightState]
+        self, pose: tuple[float, float, float], lights: Mapping[int, LightState]
     ) -> dict[int, LightState]:
         """States of the heads in sight, by signal id; none unless this channel reads lights."""
         seen: dict[int, LightState] = {}
@@ -251,11 +248,6 @@ class ChannelSuite:
             if sees_point(self._eye, EYE_HEIGHT, point, self._heights, self._sight):
                 seen[head.signal] = lights[head.signal]
         return seen
-
-
-# Wheel speed sensors: 0.5 % (assumed); yaw rate noise of a MEMS gyroscope, 0.1 deg/s (assumed).
-ODOMETRY_RATIO = 0.005
-GYRO_SIGMA = 0.0017
 
 
 def _reach(cfg: ChannelSensing, table: ActorTable, weather: Weather) -> Floats:

@@ -7,9 +7,8 @@ ahead, for red lights and at minor lines. Nobody is sent against the ego.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from math import atan2, cos, hypot, pi, sin
+from math import atan2, cos, hypot, sin
 
 import numpy as np
 from numpy.typing import NDArray
@@ -252,7 +251,9 @@ def _riders(map: RoadMap, count: int, rng: np.random.Generator) -> list[_Rider]:
         s = float(map.lanes.length[lane]) * float(rng.uniform(0.2, 0.7))
         speed = float(np.clip(rng.normal(RIDE_MEAN, RIDE_SIGMA), 3.0, 6.5))
         onward = [lane, _onward(map, lane, rng)]
-        found.append(_Rider(f"cyclist_{i + 1:02d}", [*onward, _onward(map, onward[1], rng)], s, speed))
+        found.append(
+            _Rider(f"cyclist_{i + 1:02d}", [*onward, _onward(map, onward[1], rng)], s, speed)
+        )
     return found
 
 

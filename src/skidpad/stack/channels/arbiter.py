@@ -79,10 +79,10 @@ class Arbiter:
         wanted = self._wanted(alive, scores, progress)
         if wanted.driving == self.driving and self.started:
             return Choice(self.driving, wanted.reason if self.driving is None else Reason.KEPT)
-        urgent = wanted.driving is None or self.driving not in alive
+        lost = self.driving is not None and self.driving not in alive
+        urgent = wanted.driving is None or lost
         if self.started and not urgent and t - self.changed_at < self.settings.dwell - 1e-9:
             return Choice(self.driving, Reason.KEPT)
-        lost = self.driving is not None and self.driving not in alive
         reason = Reason.START if not self.started else wanted.reason
         if lost and wanted.driving is not None:
             reason = Reason.FAILOVER

@@ -150,9 +150,7 @@ class Channel:
             return False
         return not self._may_pass(line, gap, objects, v, view.ego[:2])
 
-    def _may_pass(
-        self, line: Line, gap: float, objects: Floats, v: float, ego: Floats
-    ) -> bool:
+    def _may_pass(self, line: Line, gap: float, objects: Floats, v: float, ego: Floats) -> bool:
         """At a stop line after a stop, at a yield line when slow, and when nobody is coming."""
         if self.halted == line.s and gap > HALT_REACH:
             self.halted = None

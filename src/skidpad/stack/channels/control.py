@@ -71,7 +71,5 @@ class Controller:
         self.v_before, self.a_wanted = v, a
         force = a + RESISTANCE + self.trim
         if force >= 0.0:
-            return VehicleCommand(
-                throttle=min(force / self.car.a_drive, THROTTLE_MAX), steer=steer
-            )
+            return VehicleCommand(throttle=min(force / self.car.a_drive, THROTTLE_MAX), steer=steer)
         return VehicleCommand(brake=min(-force / self.car.a_brake, 1.0), steer=steer)

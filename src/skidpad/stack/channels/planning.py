@@ -95,7 +95,9 @@ def find_blocks(
     for i in range(n):
         for k in range(times.size):
             x, y = predictions[i, k, 0], predictions[i, k, 1]
-            j, offset = locate(path, x, y, at + (SEARCH_AHEAD - BACK) // 2, SEARCH_AHEAD // 2 + BACK)
+            j, offset = locate(
+                path, x, y, at + (SEARCH_AHEAD - BACK) // 2, SEARCH_AHEAD // 2 + BACK
+            )
             h = path.heading[j]
             dx = (x - path.x[j]) * np.cos(h) + (y - path.y[j]) * np.sin(h)
             if abs(dx) > 2.0:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from math import cos, pi, sin
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -128,7 +129,7 @@ def _predict(tracks: NDArray[np.void], count: int, dt: float) -> None:
 
 
 @kernel
-def _correct(t: np.void, x: float, y: float, age: float) -> None:
+def _correct(t: Any, x: float, y: float, age: float) -> None:
     """Kalman update with a position measured `age` (<= 0) s from now."""
     r = SIGMA_MEASURED**2
     h = age
@@ -147,7 +148,7 @@ def _correct(t: np.void, x: float, y: float, age: float) -> None:
 
 
 @kernel
-def _shape(t: np.void, heading: float, length: float, width: float, label: int) -> None:
+def _shape(t: Any, heading: float, length: float, width: float, label: int) -> None:
     """Smooth heading and size, vote on the class."""
     v = np.hypot(t.vx, t.vy)
     if v > V_TURNING:

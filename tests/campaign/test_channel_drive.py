@@ -1,0 +1,81 @@
+"""A driven segment: recorded, repeatable, and blind to the truth topic."""
+
+from dataclasses import replace
+
+import pytest
+
+from skidpad.campaign.channel_drive import SegmentPlan, drive_segment
+from skidpad.campaign.channel_routes import chosen_routes, driven_routes
+from skidpad.campaign.channels import run_drives, segment_plans
+from skidpad.core.channels import ChannelFrame, Decision, TruthFrame
+from skidpad.core.errors import ConfigError, OutputError
+from skidpad.recording.channel_hash import recording_hash
+from skidpad.recording.channels import McapRecording
+
+BOTH = ("lav_like", "tfuse_like")
+
+
+def plan(**changes) -> SegmentPlan:
+    base = {"route": driven_routes()["route-4"], "channels": BOTH, "seed": 1, "duration": 4.0}
+    return SegmentPlan(**{**base, **changes})
+
+
+@pytest.mark.req("C-020", "C-022", "C-023", "C-210")
+def test_a_segment_gives_every_topic_each_cycle_and_the_same_bytes_again(tmp_path):
+    outcome = drive_segment(plan(), tmp_path / "a.mcap")
+    drive_segment(plan(), tmp_path / "b.mcap")
+    assert recording_hash(tmp_path / "a.mcap") == recording_hash(tmp_path / "b.mcap")
+    drive_segment(plan(seed=2), tmp_path / "c.mcap")
+    assert recording_hash(tmp_path / "a.mcap") != recording_hash(tmp_path / "c.mcap")
+    recording = McapRecording(tmp_path / "a.mcap")
+    items = [m.item for m in recording.messages()]
+    assert recording.channels == BOTH
+    for kind, count in ((ChannelFrame, 80), (TruthFrame, 40), (Decision, 40)):
+        assert sum(isinstance(i, kind) for i in items) == count
+    assert outcome.driven_s == pytest.approx(4.0)
+    assert outcome.distance_m > 5.0
+    assert sum(outcome.driving_s.values()) + outcome.minimal_risk_s == pytest.approx(4.0)
+
+
+@pytest.mark.req("C-023")
+def test_three_channels_in_town(tmp_path):
+    names = (*BOTH, "reference_like")
+    three = plan(route=driven_routes()["route-5"], channels=names, drive_by="reference_like")
+    outcome = drive_segment(three, tmp_path / "a.mcap")
+    assert list(outcome.driving_s) == ["reference_like"]
+    frames = [m for m in McapRecording(tmp_path / "a.mcap").messages() if m.channel == 2]
+    assert any(len(m.item.objects) for m in frames)
+
+
+@pytest.mark.req("C-210")
+def test_routes_are_the_six_and_hours_are_split():
+    routes = chosen_routes("all")
+    assert len(routes) == 6
+    assert {r.map for r in routes} == {"town", "figure8"}
+    night = driven_routes()["route-4"].weather
+    assert night.is_night
+    plans = segment_plans(routes, 2.5, channels=BOTH, seed=2)
+    assert sum(p.duration for p in plans) == pytest.approx(9000.0)
+    assert max(p.duration for p in plans) == 600.0
+    assert len({p.name for p in plans}) == len(plans)
+    other = segment_plans(routes, 2.5, channels=BOTH, seed=3)
+    assert not {p.seed for p in plans} & {p.seed for p in other}
+
+
+def test_wrong_words_are_refused():
+    with pytest.raises(ConfigError, match="unknown route"):
+        chosen_routes("route-9")
+    with pytest.raises(ConfigError, match="drive-by"):
+        plan(drive_by="nobody")
+
+
+def test_a_campaign_resumes_and_refuses_other_settings(tmp_path):
+    plans = [plan(duration=1.0)]
+    first = run_drives(plans, tmp_path, workers=1)
+    assert first.driven == 1
+    assert not first.failed
+    again = run_drives(plans, tmp_path, workers=1)
+    assert again.driven == 0
+    assert again.outcomes == first.outcomes
+    with pytest.raises(OutputError, match="other settings"):
+        run_drives([replace(plans[0], noise=2.0)], tmp_path, workers=1)

@@ -1,7 +1,7 @@
 """Traffic lights: states, groups and timing as CARLA's clients read and set them.
 
 A group is a junction. Its lights that look along one axis share a phase; phases take turns, each
-green, then yellow, then red for all, with the times of the phase's first light.
+green, then yellow, then red for all.
 """
 
 from __future__ import annotations
@@ -114,6 +114,11 @@ class LightControl:
         for i, phase in enumerate(group.phases):
             if light in phase and state is not LightState.RED:
                 group.turn = i
+
+    def phase_of(self, light: Light) -> list[Light]:
+        """The lights that change together with this one; they share their times."""
+        phases = self.groups[light.group].phases
+        return next(phase for phase in phases if light in phase)
 
     def frozen(self, light: Light) -> bool:
         """Whether its time stands still."""

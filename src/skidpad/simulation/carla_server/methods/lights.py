@@ -39,20 +39,23 @@ def set_traffic_light_state(world: World, id: Any, state: Any) -> None:
 
 @TABLE.method("set_traffic_light_green_time", Shape.VOID)
 def set_traffic_light_green_time(world: World, id: Any, seconds: Any) -> None:
-    """s."""
-    light_of(world, id).green = _seconds(seconds)
+    """s, of all lights that change together with it."""
+    for light in world.lights.phase_of(light_of(world, id)):
+        light.green = _seconds(seconds)
 
 
 @TABLE.method("set_traffic_light_yellow_time", Shape.VOID)
 def set_traffic_light_yellow_time(world: World, id: Any, seconds: Any) -> None:
-    """s."""
-    light_of(world, id).yellow = _seconds(seconds)
+    """s, of all lights that change together with it."""
+    for light in world.lights.phase_of(light_of(world, id)):
+        light.yellow = _seconds(seconds)
 
 
 @TABLE.method("set_traffic_light_red_time", Shape.VOID)
 def set_traffic_light_red_time(world: World, id: Any, seconds: Any) -> None:
-    """s."""
-    light_of(world, id).red = _seconds(seconds)
+    """s, of all lights that change together with it."""
+    for light in world.lights.phase_of(light_of(world, id)):
+        light.red = _seconds(seconds)
 
 
 @TABLE.method("freeze_traffic_light", Shape.VOID)

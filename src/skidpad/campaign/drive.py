@@ -12,16 +12,17 @@ The log is the only result. Whatever is said about a drive later is computed fro
 from __future__ import annotations
 
 import traceback
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Protocol
 
 from skidpad.campaign.cells import Cell, Driver
 from skidpad.campaign.snapshots import Snapshots
 from skidpad.core.errors import ConfigError, StackError, require_choice
+from skidpad.core.frames import SensorFrame
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
-from skidpad.core.states import WorldTruth
+from skidpad.core.states import StackReport, WorldTruth
 from skidpad.core.vocabulary import Outcome, SensorLevel, Supervision
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
@@ -40,6 +41,14 @@ from skidpad.stack.adas import AdasStack
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.interface import Stack
 from skidpad.stack.loading import GuardedStack, load_stack
+
+
+class Watcher(Protocol):
+    """Looks on while a run is driven: snapshots, clocks, films."""
+
+    def see(self, frame: SensorFrame, truth: WorldTruth, report: StackReport | None) -> None:
+        """One moment, after the stack has answered it."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,13 +143,18 @@ def run_cell(
     *,
     backend: Backend | None = None,
     folder: Path | None = None,
+    watchers: Sequence[Watcher] = (),
 ) -> Run:
-    """Drive one cell of a campaign on `backend`, by default a fresh embedded simulator."""
+    """Drive one cell of a campaign on `backend`, by default a fresh embedded simulator.
+
+    folder: where snapshots of collisions go. watchers: who else looks on; they change nothing.
+    """
     backend = EmbeddedBackend() if backend is None else backend
     try:
         ready = prepare(cell, kind)
         snapshots = Snapshots(folder, cell.driver.label, cell.weather.name, ready.setup.dt)
-        return loop(backend, ready, snapshots)
+        run = loop(backend, ready, (snapshots, *watchers))
+        return replace(run, snapshots=tuple(snapshots.paths))
     except StackError as error:  # it could not even be built
         map = load_map(cell.map)
         setup = setup_of(cell, map)
@@ -151,7 +165,7 @@ def run_cell(
         backend.close()
 
 
-def loop(backend: Backend, ready: Drive, snapshots: Snapshots) -> Run:
+def loop(backend: Backend, ready: Drive, watchers: Sequence[Watcher] = ()) -> Run:
     """The loop itself; it ends with the duration, or when the stack fails."""
     cell, stack, supervisor = ready.cell, ready.stack, ready.supervisor
     ticks = round(cell.duration / ready.setup.dt)
@@ -171,14 +185,14 @@ def loop(backend: Backend, ready: Drive, snapshots: Snapshots) -> Run:
             break
         action = supervisor.act(command, stack.report)
         log.append(truth, frame, command, stack.report, phase)
-        if truth.contacts:
-            snapshots.take(frame)
+        for watcher in watchers:
+            watcher.see(frame, truth, stack.report)
         _note(log, truth, action)
         if action.relocate is not None:
             backend.relocate(action.relocate.pose, action.relocate.v)
         frame = backend.step(action.command)
         truth = backend.truth()
-    return Run(log.finish(), outcome, error, tuple(snapshots.paths))
+    return Run(log.finish(), outcome, error)
 
 
 def _note(log: TickLog, truth: WorldTruth, action: Action) -> None:

@@ -12,7 +12,9 @@ import yaml
 
 from skidpad import __version__
 from skidpad.campaign.cells import Cell, identity
+from skidpad.campaign.pace import Pace
 from skidpad.campaign.pool import Finished, Job, run_jobs
+from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.metrics.drive import LeadDefinition, MetricSettings
@@ -100,7 +102,8 @@ def drive_one(argument: tuple[Cell, Path]) -> tuple[RunKey, Metrics, Timing, str
     folder.mkdir(parents=True)
     write_bytes(folder / CONFIG, yaml.safe_dump(cell.resolved(), sort_keys=False).encode())
     wall, cpu = time.perf_counter(), time.process_time()
-    run = run_cell(cell, folder=folder)
+    pace = Pace(DT)
+    run = run_cell(cell, folder=folder, watchers=(pace,))
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     digest = write_log(folder, run.log)
     if run.error:
@@ -112,6 +115,7 @@ def drive_one(argument: tuple[Cell, Path]) -> tuple[RunKey, Metrics, Timing, str
         wall_s=wall,
         cpu_s=cpu,
         rtf=len(run.log) * run.log.header.dt / wall,
+        rtf_below_0_9_pct=pace.slow_pct,
     )
     metrics = run_metrics(run.log, load_map(cell.map), metric_settings(cell))
     return run_key(cell, run.outcome, digest), metrics, timing, run.error.strip().split("\n")[-1]

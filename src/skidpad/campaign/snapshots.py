@@ -8,6 +8,7 @@ import numpy as np
 from PIL import Image
 
 from skidpad.core.frames import SensorFrame
+from skidpad.core.states import StackReport, WorldTruth
 from skidpad.recording.files import output_error
 
 FRONT, TOP = "rgb_front", "rgb_top"
@@ -23,6 +24,12 @@ class Snapshots:
         name = "".join(c if c.isalnum() else "-" for c in driver)
         self.stem, self.dt = f"{name}_{weather}", dt
         self.paths: list[Path] = []
+
+    def see(self, frame: SensorFrame, truth: WorldTruth, report: StackReport | None) -> None:
+        """Take a picture when the ego touches something."""
+        del report
+        if truth.contacts:
+            self.take(frame)
 
     def take(self, frame: SensorFrame) -> None:
         """A picture of this moment, if there are cameras."""

@@ -14,6 +14,7 @@ from skidpad.cli.hazards import hazards
 from skidpad.cli.map import maps
 from skidpad.cli.monitor import monitor, safety_case
 from skidpad.cli.profiles import profiles
+from skidpad.cli.rerun import rerun, study
 from skidpad.core.errors import InputError, SkidpadError
 
 app = typer.Typer(
@@ -43,6 +44,8 @@ def _root(
 app.command()(adas)
 app.command()(report)
 app.command()(compare)
+app.command()(rerun)
+app.command()(study)
 app.command()(show)
 app.add_typer(profiles)
 app.add_typer(maps)

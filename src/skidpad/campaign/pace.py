@@ -1,0 +1,44 @@
+"""How fast a run went on the wall. It looks on; no clock is read inside the loop (A-246, X-1)."""
+
+from __future__ import annotations
+
+from time import perf_counter, sleep
+
+from skidpad.core.frames import SensorFrame
+from skidpad.core.states import StackReport, WorldTruth
+
+SLOW = 0.9  # real-time factor below which a tick counts as slow (A-246)
+
+
+class Pace:
+    """Wall time of every tick."""
+
+    def __init__(self, dt: float) -> None:
+        self.dt = dt
+        self.slow = self.ticks = 0
+        self.last = perf_counter()
+
+    def see(self, frame: SensorFrame, truth: WorldTruth, report: StackReport | None) -> None:
+        """One tick is over."""
+        del frame, truth, report
+        now = perf_counter()
+        self.slow += self.dt < SLOW * (now - self.last)
+        self.ticks += 1
+        self.last = now
+
+    @property
+    def slow_pct(self) -> float:
+        """Percentage of ticks with a real-time factor below 0.9."""
+        return 100.0 * self.slow / max(self.ticks, 1)
+
+
+class Brake:
+    """Makes every tick take `seconds` longer: for showing that pace changes nothing (F-25)."""
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+
+    def see(self, frame: SensorFrame, truth: WorldTruth, report: StackReport | None) -> None:
+        """Wait."""
+        del frame, truth, report
+        sleep(self.seconds)

@@ -1,0 +1,203 @@
+"""Small experiments of their own for findings that the matrix cannot decide (decision X-7)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import polars as pl
+
+from skidpad.campaign.cells import Cell, Driver, seeds
+from skidpad.campaign.drive import run_cell
+from skidpad.campaign.pace import Brake
+from skidpad.campaign.pool import Job, run_jobs
+from skidpad.core.errors import SkidpadError, require_choice
+from skidpad.core.frames import RadarPoints, SensorFrame
+from skidpad.core.randomness import stream
+from skidpad.core.specs import SensorSpec
+from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.core.vocabulary import SensorLevel, Tier
+from skidpad.evidence.findings import Judgement, judge
+from skidpad.evidence.matrix_findings import FINDINGS
+from skidpad.evidence.metrics.run import run_metrics
+from skidpad.physics.presets import find_weather
+from skidpad.recording.logfiles import log_hash
+from skidpad.recording.runlog import RunLog
+from skidpad.roads.bundled import load_map
+from skidpad.roads.queries import RoadMap
+from skidpad.stack.adas import AdasStack
+from skidpad.stack.configurations import functions_of
+from skidpad.stack.settings import load_profile
+
+BRAKING = (Tier.HARD_STOP, Tier.EMERGENCY)
+TARGETS_KMH = (60.0, 90.0, 120.0, 150.0)
+DROPOUT_SHARES = (0.0, 0.1, 0.2)  # of time in which nothing is sensed
+DROPOUT_S = 1.0  # length of one
+
+
+@dataclass(frozen=True, slots=True)
+class Variant:
+    """One arm of a study: a cell, columns that name it, and what is special about it."""
+
+    cell: Cell
+    labels: Mapping[str, Any]
+    dropout: float = 0.0
+    slow_s: float = 0.0
+
+
+class Blinking:
+    """Our stack, which for stretches of a second receives empty sensor frames (F-08)."""
+
+    report: StackReport
+
+    def __init__(
+        self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
+    ) -> None:
+        plain = dict(settings)
+        share, seed = plain.pop("dropout"), plain.pop("seed")
+        self.stack = AdasStack(specs, map, plain)
+        length = round(DROPOUT_S / self.stack.config.dt)
+        begins = stream(seed, "study", "dropout").random(200_000) < share / length
+        reach = np.convolve(begins, np.ones(length))[: begins.size]
+        self.blind = reach > 0
+        self.report = self.stack.report
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        """Drive, blind or not."""
+        if self.blind[frame.tick % self.blind.size]:
+            frame = replace(frame, images={}, segments={}, radar=RadarPoints.none())
+        command = self.stack.tick(frame)
+        self.report = self.stack.report
+        return command
+
+
+def base_cell(
+    configuration: int, weather: str = "clear-noon", settings: Mapping[str, Any] | None = None
+) -> Cell:
+    """An object-level cell of the profile `recommended`."""
+    return Cell(
+        driver=Driver(label=str(configuration), functions=functions_of(configuration)),
+        weather=find_weather(weather),
+        seed=0,
+        profile="recommended",
+        settings=load_profile("recommended", settings),
+        level=SensorLevel.OBJECTS,
+    )
+
+
+def speed_and_dropout(n: int) -> list[Variant]:
+    """F-08: cruise target x share of time without any sensing, configuration 2."""
+    cell = base_cell(2)
+    variants = []
+    for seed in seeds(n):
+        for target in TARGETS_KMH:
+            for share in DROPOUT_SHARES:
+                options = {
+                    "configuration": 2,
+                    "profile": cell.profile,
+                    "cruise_kmh": target,
+                    "dropout": share,
+                    "seed": seed,
+                }
+                driver = Driver(label="2", stack="skidpad.campaign.study:Blinking", options=options)
+                labels = {"target_kmh": target, "dropout_injected": share}
+                variants.append(Variant(replace(cell, driver=driver, seed=seed), labels))
+    return variants
+
+
+def persistence(n: int) -> list[Variant]:
+    """F-17: holding a lost lead for 5 s, against the radar cascade."""
+    arms: dict[str, dict[str, Any]] = {"cascade": {}, "safety_persist": {"safety_persist": True}}
+    return [
+        Variant(replace(base_cell(2, settings=values), seed=seed), {"variant": name})
+        for seed in seeds(n)
+        for name, values in arms.items()
+    ]
+
+
+def radar_filters(n: int) -> list[Variant]:
+    """F-21: map-matched radar, against the 1.6 m corridor."""
+    arms: dict[str, dict[str, Any]] = {
+        "map_matched": {},
+        "corridor": {"radar_corridor": "parabola"},
+    }
+    return [
+        Variant(replace(base_cell(2, settings=values), seed=seed), {"variant": name})
+        for seed in seeds(n)
+        for name, values in arms.items()
+    ]
+
+
+def pace(n: int) -> list[Variant]:
+    """F-25: the same runs, each tick 1 ms slower."""
+    cell = replace(base_cell(4, "rain-night"), duration=100.0)
+    return [
+        Variant(replace(cell, seed=seed), {"variant": name}, slow_s=slow)
+        for seed in seeds(n)
+        for name, slow in (("paced", 0.0), ("slowed", 1e-3))
+    ]
+
+
+STUDIES: dict[str, Callable[[int], list[Variant]]] = {
+    "F-08": speed_and_dropout,
+    "F-17": persistence,
+    "F-21": radar_filters,
+    "F-25": pace,
+}
+
+
+def drive_variant(variant: Variant) -> dict[str, Any]:
+    """In a worker: drive one arm and return its row."""
+    watchers = [Brake(variant.slow_s)] if variant.slow_s else []
+    run = run_cell(variant.cell, watchers=watchers)
+    metrics = run_metrics(run.log, load_map(variant.cell.map))
+    return {
+        **variant.labels,
+        "config": variant.cell.driver.label,
+        "weather": variant.cell.weather.name,
+        "seed": variant.cell.seed,
+        "outcome": run.outcome.value,
+        "log_hash": log_hash(run.log),
+        "fatal_collisions": metrics.fatal_collisions,
+        "radar_fpr_pct": metrics.radar_fpr_pct,
+        "radar_fnr_pct": metrics.radar_fnr_pct,
+        "dropout_pct": metrics.dropout_pct,
+        "phantom_brakings": phantom_brakings(run.log),
+    }
+
+
+def phantom_brakings(log: RunLog) -> int:
+    """Times that emergency braking began although nothing was within 40 m of the ego.
+
+    Whatever stands or drives there, in any lane: a strict reading of "for nothing".
+    """
+    a = log.actors
+    distance = np.hypot(a.x - a.x[:, :1], a.y - a.y[:, :1])
+    distance[:, 0] = np.inf
+    empty = np.where(log.present, distance, np.inf).min(axis=1) > 40.0
+    braking = np.isin(log.report.tier, BRAKING) & (log.supervision == 0)
+    begins = braking & ~np.concatenate([[False], braking[:-1]])
+    return int(np.sum(begins & empty))
+
+
+def run_study(
+    id: str, n: int, workers: int, on_run: Callable[[int, int], None] = lambda *_: None
+) -> tuple[Judgement, pl.DataFrame]:
+    """Drive a study with n seeds and judge its finding."""
+    require_choice("study", id, tuple(STUDIES))
+    variants = STUDIES[id](n)
+    jobs = [
+        Job(f"{id}-{k}", "skidpad.campaign.study:drive_variant", v, v.cell.deadline_s)
+        for k, v in enumerate(variants)
+    ]
+    rows: dict[str, dict[str, Any]] = {}
+    for finished in run_jobs(jobs, workers, warm="skidpad.campaign.matrix:warm_up"):
+        if finished.failure is not None:
+            raise SkidpadError(f"study {id}: a run {finished.failure}: {finished.detail.strip()}")
+        rows[finished.job.key] = finished.value
+        on_run(len(rows), len(jobs))
+    table = pl.DataFrame([rows[j.key] for j in jobs])
+    finding = next(f for f in FINDINGS if f.id == id)
+    return judge([finding], [table])[0], table

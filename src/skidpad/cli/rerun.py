@@ -1,0 +1,59 @@
+"""`skidpad rerun` and `skidpad study`: look closely, and decide what the matrix cannot."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def rerun(
+    run: Annotated[Path, typer.Argument(help="A run's folder.")],
+    begin: Annotated[float, typer.Option("--from", help="s of simulated time.")] = 0.0,
+    end: Annotated[float, typer.Option("--to", help="s of simulated time.")] = 10.0,
+    video: Annotated[Path | None, typer.Option(help="Write a film to this .mp4 file.")] = None,
+) -> None:
+    """Drive a stored run again: all twelve views and the tier trace of a stretch, hash-checked."""
+    from skidpad.campaign.rerun import rerun as drive_again
+
+    result = drive_again(run, begin, end, run / "rerun", video)
+    for line in result.trace:
+        typer.echo(line)
+    if result.film is not None:
+        typer.echo(f"film: {result.film}")
+    elif result.pictures:
+        typer.echo(f"{len(result.pictures)} pictures: {result.pictures[0].parent}")
+    if not result.same:
+        typer.echo(
+            "this is another drive than the stored one: machine, libraries or code have changed",
+            err=True,
+        )
+        raise typer.Exit(1)
+    typer.echo("the same drive as the stored one, by content hash")
+
+
+def study(
+    id: Annotated[str, typer.Argument(help="F-08, F-17, F-21 or F-25.")],
+    seeds: Annotated[int, typer.Option(min=1, help="Seeds per arm.")] = 6,
+    workers: Annotated[
+        int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
+    ] = os.cpu_count() or 1,
+    out: Annotated[Path | None, typer.Option(help="Write the rows to this .csv file.")] = None,
+) -> None:
+    """Drive the experiment that a finding of the sources needs, and judge it."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    from skidpad.campaign.study import run_study
+
+    with Progress(console=Console(stderr=True)) as progress:
+        task = progress.add_task(id)
+        verdict, table = run_study(
+            id, seeds, workers, lambda done, n: progress.update(task, completed=done, total=n)
+        )
+    typer.echo(f"{verdict.finding.id}: {verdict.finding.claim}\n{verdict.text}")
+    if out is not None:
+        table.write_csv(out)
+        typer.echo(str(out))

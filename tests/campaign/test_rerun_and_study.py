@@ -1,0 +1,150 @@
+from dataclasses import replace
+
+import numpy as np
+import polars as pl
+import pytest
+from typer.testing import CliRunner
+
+from skidpad.campaign import study
+from skidpad.campaign.cells import Cell, Driver
+from skidpad.campaign.drive import run_cell
+from skidpad.campaign.matrix import run_matrix
+from skidpad.campaign.pace import Pace
+from skidpad.campaign.rerun import read_cell
+from skidpad.campaign.views import SIZE, twelve_views
+from skidpad.cli.main import app
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.evidence.findings import judge
+from skidpad.evidence.matrix_findings import FINDINGS
+from skidpad.physics.presets import find_weather
+from skidpad.recording.logfiles import log_hash
+from skidpad.recording.results import read_results
+from skidpad.sensors.twelve import twelve_sensors
+from skidpad.stack.configurations import functions_of
+from skidpad.stack.settings import load_profile
+
+
+def cell(level=SensorLevel.OBJECTS, duration=6.0, **changes):
+    base = Cell(
+        driver=Driver(label="2", functions=functions_of(2)),
+        weather=find_weather("rain-noon"),
+        seed=3,
+        profile="thesis_text",
+        settings=load_profile("thesis_text", {"mu_ref": 0.8}),
+        duration=duration,
+        level=level,
+    )
+    return replace(base, **changes)
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("campaign")
+    run_matrix([cell(), cell(SensorLevel.PIXELS, 2.0, seed=4)], folder, workers=1)
+    return folder
+
+
+@pytest.mark.req("A-260", "A-261")
+def test_a_run_can_be_driven_again_from_what_it_left_behind(campaign):
+    run = campaign / "runs" / "2_rain-noon-003"
+    assert read_cell(run) == cell()
+    done = CliRunner().invoke(app, ["rerun", str(run), "--from", "1", "--to", "3"])
+    assert done.exit_code == 0, done.output
+    assert "the same drive" in done.output
+    assert len(list((run / "rerun").glob("*.png"))) == 40
+
+
+def test_a_changed_log_is_noticed(campaign, tmp_path):
+    import shutil
+
+    run = tmp_path / "run"
+    shutil.copytree(campaign / "runs" / "2_rain-noon-003", run)
+    text = (run / "config.yaml").read_text()
+    (run / "config.yaml").write_text(text.replace("seed: 3", "seed: 5"))
+    done = CliRunner().invoke(app, ["rerun", str(run), "--from", "1", "--to", "2"])
+    assert done.exit_code == 1
+
+
+@pytest.mark.parametrize("stretch", [("3", "2"), ("100", "101")])
+def test_a_stretch_outside_the_run_is_refused(campaign, stretch):
+    run = campaign / "runs" / "2_rain-noon-003"
+    done = CliRunner().invoke(app, ["rerun", str(run), "--from", stretch[0], "--to", stretch[1]])
+    assert done.exit_code != 0
+    assert "--from" in str(done.exception)
+
+
+def test_a_film_shows_every_tick(campaign, tmp_path):
+    import cv2
+
+    run, film = campaign / "runs" / "2_rain-noon-004", tmp_path / "film.mp4"
+    call = ["rerun", str(run), "--from", "0.5", "--to", "1.0", "--video", str(film)]
+    assert CliRunner().invoke(app, call).exit_code == 0
+    assert int(cv2.VideoCapture(str(film)).get(cv2.CAP_PROP_FRAME_COUNT)) == 10
+
+
+@pytest.mark.req("A-246")
+def test_wall_times_stand_apart_from_results(campaign):
+    timing = pl.read_parquet(campaign / "timing.parquet")
+    assert (timing["rtf"] > 0.0).all()
+    assert timing["rtf_below_0_9_pct"].is_between(0.0, 100.0).all()
+    assert not {"rtf", "wall_s"} & set(read_results(campaign).columns)
+
+
+@pytest.mark.req("A-246")
+def test_slow_ticks_are_those_below_0_9_of_real_time(monkeypatch):
+    clock = iter([0.0, 0.05, 0.105, 0.165])
+    monkeypatch.setattr("skidpad.campaign.pace.perf_counter", lambda: next(clock))
+    pace = Pace(0.05)
+    for _ in range(3):
+        pace.see(None, None, None)
+    assert pace.slow_pct == pytest.approx(100.0 / 3.0)  # factors 1.0, 0.91, 0.83
+
+
+def test_the_picture_of_a_moment_has_all_views():
+    seen = []
+
+    class Eye:
+        def see(self, frame, truth, report):
+            if frame.tick == 3:
+                seen.append(twelve_views(frame, truth, report, 0.05))
+
+    run_cell(cell(SensorLevel.PIXELS, 0.4), watchers=(Eye(),))
+    (picture,) = seen
+    assert picture.shape == (*SIZE, 3)
+    assert picture[300:560, 20:780].std() > 10.0  # the front camera
+    assert picture[200:440, 1220:1580].std() > 10.0  # classes
+
+
+@pytest.mark.req("A-002", "A-099")
+def test_pace_changes_no_byte():
+    plain = study.pace(1)
+    short = [replace(v, cell=replace(v.cell, duration=5.0)) for v in plain]
+    rows = [study.drive_variant(v) for v in short]
+    assert rows[0]["log_hash"] == rows[1]["log_hash"]
+    finding = next(f for f in FINDINGS if f.id == "F-25")
+    assert judge([finding], [pl.DataFrame(rows)])[0].verdict.value != "contradicted"
+
+
+def test_injected_dropout_blinds_about_its_share_of_time():
+    options = {"configuration": 2, "dropout": 0.2, "seed": 1}
+    driver = Driver(label="2", stack="skidpad.campaign.study:Blinking", options=options)
+    run = run_cell(cell(driver=driver, duration=30.0))
+    assert np.isfinite(run.log.report.tier).all()
+    blind = study.Blinking(twelve_sensors(), study.load_map("figure8"), options).blind
+    assert blind.mean() == pytest.approx(0.2, abs=0.03)
+    sighted = replace(driver, options={**options, "dropout": 0.0})
+    assert log_hash(run.log) != log_hash(run_cell(cell(driver=sighted, duration=30.0)).log)
+
+
+def test_every_arm_of_every_study_has_common_seeds():
+    for make in study.STUDIES.values():
+        arms = {}
+        for v in make(3):
+            arms.setdefault(tuple(v.labels.values()), set()).add(v.cell.seed)
+        assert len(set(map(frozenset, arms.values()))) == 1
+        assert len(arms) >= 2
+
+
+def test_an_unknown_study_is_refused():
+    done = CliRunner().invoke(app, ["study", "F-99"])
+    assert "F-08" in str(done.exception)

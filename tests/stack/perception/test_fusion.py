@@ -1,0 +1,158 @@
+"""Both camera tiers joined, filtered, and asked to verify."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from stackfakes import BUMPER_DEPTH, BUMPER_SEMANTIC, ROOF_DEPTH, ROOF_SEMANTIC, SPECS, Car, frame
+
+from skidpad.core.errors import ConfigError
+from skidpad.core.frames import CameraImage
+from skidpad.core.specs import CameraSpec
+from skidpad.stack.perception.fusion import (
+    CameraPair,
+    MedianFilter,
+    RateFilter,
+    Verification,
+    bumper_corridor,
+    camera_pair,
+    fuse,
+    roof_corridor,
+)
+
+approx = pytest.approx
+BUMPER = CameraPair(BUMPER_DEPTH, BUMPER_SEMANTIC, bumper_corridor(BUMPER_SEMANTIC))
+ROOF = CameraPair(ROOF_DEPTH, ROOF_SEMANTIC, roof_corridor(ROOF_SEMANTIC))
+
+
+@pytest.mark.req("A-055", "A-056", "A-057", "A-058")
+@pytest.mark.parametrize(
+    ("bumper", "roof", "fused", "listed"),
+    [
+        (4.0, 60.0, 4.0, 4.0),
+        (15.0, 60.0, 15.0, 15.0),
+        (16.0, 26.0, 17.0, 17.0),
+        (20.0, 30.0, 25.0, 25.0),
+        (20.0, 79.0, 49.5, 49.5),  # what the consistency guard is for (A-059)
+        (24.0, 34.0, 33.0, 33.0),
+        (25.0, 34.0, 34.0, 34.0),
+        (28.0, 34.0, 34.0, 34.0),
+        (None, 34.0, 34.0, 34.0),
+        (None, None, None, None),
+        (15.1, None, 15.1, None),
+        (29.9, None, 29.9, None),
+        (14.9, None, 14.9, 14.9),
+    ],
+)
+def test_fused_distance(bumper, roof, fused, listed):
+    assert fuse(bumper, roof) == (None if fused is None else approx(fused))
+    found = fuse(bumper, roof, bumper_alone=False)
+    assert found == (None if listed is None else approx(listed))
+
+
+@given(st.floats(0.2, 29.9), st.floats(10.1, 79.9))
+def test_fused_distance_lies_between_the_tiers_and_never_jumps(bumper, roof):
+    fused = fuse(bumper, roof)
+    assert min(bumper, roof) - 1e-9 <= fused <= max(bumper, roof) + 1e-9
+    step = abs(fuse(min(bumper + 1e-6, 29.9), roof) - fused)
+    assert step < 1e-6 * (2.0 + abs(roof - bumper))
+
+
+@pytest.mark.req("A-059")
+def test_guard_takes_the_nearer_of_two_that_disagree():
+    assert fuse(20.0, 79.0, guard=10.0) == 20.0
+    assert fuse(20.0, 16.0, guard=3.0) == 16.0
+    assert fuse(20.0, 26.0, guard=10.0) == fuse(20.0, 26.0) == 23.0
+
+
+@pytest.mark.req("A-061")
+def test_median_of_five_samples():
+    m = MedianFilter()
+    assert [m.update(d) for d in (30.0, 29.0, 28.0)] == [None, None, 30.0]
+    assert [m.update(d) for d in (27.0, 80.0, 26.0)] == [29.0, 29.0, 28.0]
+    m.reset()
+    assert m.update(20.0) is None
+
+
+@pytest.mark.req("A-062")
+def test_rate_filter_starts_at_100_m_and_moves_12_m_per_tick():
+    f = RateFilter(0.05)
+    smoothed = []
+    answers = []
+    for _ in range(9):
+        answers.append(f.update(20.0))
+        smoothed.append(f.smoothed)
+    assert smoothed == approx([88.0, 76.0, 64.0, 52.0, 40.0, 28.0, 20.0, 20.0, 20.0])
+    # the median over 0.17 s, which is three ticks, lags one tick behind
+    assert answers[0] is None
+    assert answers[1:] == approx([88.0, 76.0, 64.0, 52.0, 40.0, 28.0, 20.0, 20.0])
+    assert f.update(None) == approx(20.0)
+    assert f.smoothed == approx(32.0)
+
+
+@pytest.mark.req("A-037")
+def test_no_image_yet_is_no_target():
+    empty = frame()
+    for images in (
+        {},
+        {"depth_roof": CameraImage(), "semantic_roof": CameraImage()},
+        {"depth_roof": CameraImage()},
+    ):
+        assert ROOF.read(replace(empty, segments={}, images=images), 0.0, 0.0) is None
+    one_is_late = frame(cars=[Car(20.0)], level="pixels")
+    images = {k: v for k, v in one_is_late.images.items() if k != "semantic_bumper"}
+    assert BUMPER.read(replace(one_is_late, images=images), 0.0, 0.0) is None
+    assert BUMPER.read(one_is_late, 0.0, 0.0) == approx(20.0, rel=1e-6)
+
+
+def test_cameras_of_a_pair_must_fit():
+    small = replace(ROOF_SEMANTIC, width=400)
+    with pytest.raises(ConfigError, match=r"depth_roof and semantic_roof.*800x600 and 400x600"):
+        CameraPair(ROOF_DEPTH, small, roof_corridor(ROOF_SEMANTIC))
+    cameras = [spec for spec in SPECS if isinstance(spec, CameraSpec)]
+    with pytest.raises(ConfigError, match=r"semantic camera 'semantic_roof'; the vehicle has: dep"):
+        camera_pair(cameras[:1], "depth_roof", "semantic_roof")
+
+
+@pytest.mark.req("A-065")
+@pytest.mark.parametrize("level", ["pixels", "objects"])
+@pytest.mark.parametrize(
+    ("cars", "reported", "answer"),
+    [
+        ([Car(3.0)], 3.5, (True, "bumper")),
+        ([Car(3.0)], 4.9, (True, "bumper")),
+        ([Car(3.0)], 5.1, (False, "none")),  # more than 2 m off
+        ([Car(3.0)], 1.05, (True, "bumper")),
+        ([Car(3.0)], 0.9, (False, "none")),
+        ([Car(3.0, left=4.0)], 3.0, (False, "none")),  # beside the corridor
+        ([], 3.0, (False, "none")),
+    ],
+)
+def test_verification_asks_for_vehicle_pixels_near_the_distance(level, cars, reported, answer):
+    found = Verification(BUMPER, ROOF).confirm(frame(cars=cars, level=level), reported, 0.0, 0.0)
+    assert found == answer
+
+
+@pytest.mark.req("A-065")
+def test_roof_verifies_without_its_minimum_depth_when_the_bumper_is_blind():
+    seen = frame(cars=[Car(4.0)], level="pixels")
+    roof_only = {k: v for k, v in seen.images.items() if "roof" in k}
+    blind = replace(seen, images=roof_only)
+    assert Verification(BUMPER, ROOF).confirm(blind, 4.0, 0.0, 0.0) == (True, "roof")
+    assert ROOF.read(blind, 0.0, 0.0) is None  # as a tier it starts at 10 m
+
+
+@pytest.mark.req("A-055", "A-057")
+@pytest.mark.parametrize("gap", [3.0, 8.0, 12.0, 14.0, 26.0, 29.0, 45.0, 70.0, 79.0])
+@pytest.mark.parametrize("left", [-0.8, 0.0, 0.8])
+def test_segments_read_as_the_pixels_that_they_stand_for(gap, left):
+    cars = [Car(gap, left), Car(gap + 20.0, -left, label=15)]
+    for pair in (BUMPER, ROOF):
+        pixels = pair.read(frame(cars=cars, level="pixels"), 0.0, 0.0)
+        segments = pair.read(frame(cars=cars), 0.0, 0.0)
+        assert (pixels is None) is (segments is None)
+        if pixels is not None:
+            assert segments == approx(pixels, rel=1e-5)

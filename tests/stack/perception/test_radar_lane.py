@@ -1,0 +1,291 @@
+"""Which radar points may be the lead, and which of them drive in the ego's lane."""
+
+from __future__ import annotations
+
+from math import radians, sin
+
+import numpy as np
+import pytest
+from stackfakes import LANE_WIDTH, SPECS, ArcMap, Car, ego_at, frame, radar_points
+
+from skidpad.core.geometry import Pose
+from skidpad.core.vocabulary import DetectionStatus
+from skidpad.stack.adas import AdasStack
+from skidpad.stack.perception.lane_view import HighwayRoute, LaneTracker, LaneView
+from skidpad.stack.perception.radar import (
+    FIRST_VELOCITY_LIMIT,
+    HALF_WIDTH,
+    MOUNT,
+    NO_RADAR,
+    PARABOLA_HALF_WIDTH,
+    AnyPoint,
+    LaneMatch,
+    Radar,
+    velocity_limit,
+)
+
+approx = pytest.approx
+STRAIGHT = LaneView(None, None, 0.0, 0.0)
+
+
+def prefilter(*points, v=20.0, view=STRAIGHT, tracking=False, half_width=HALF_WIDTH):
+    """Nearest point that passes, with its number of companions; no lane check."""
+    radar = Radar(AnyPoint(), half_width, nearest_only=False)
+    return radar.update(radar_points(*points), Pose(0.0, 0.0), v, view, tracking)
+
+
+def passes(*point, **options):
+    return prefilter(point, **options).pre is not None
+
+
+@pytest.mark.req("A-068")
+def test_keeps_4_m_about_the_path():
+    for r in (10.0, 40.0, 70.0):
+        for side in (1.0, -1.0):
+            at = side * np.arcsin(3.95 / r)
+            assert passes(r, at, 0.0, -5.0)
+            assert not passes(r, side * np.arcsin(4.05 / r), 0.0, -5.0)
+
+
+@pytest.mark.req("A-068", "A-067")
+def test_path_follows_yaw_error_and_curvature():
+    """A car in the lane of a bend, seen by an ego turned against it, in closed form."""
+    for curvature, yaw in ((1 / 200, 0.05), (-1 / 200, 0.05), (1 / 300, -0.1)):
+        map = ArcMap(curvature)
+        ego = Pose(0.0, 0.0, yaw=yaw)
+        view = LaneTracker(map, HighwayRoute()).update(ego)
+        x, y, _ = map._point(50.0, 0.0)
+        r, azimuth = float(np.hypot(x, y)), float(np.arctan2(y, x)) - yaw
+        assert passes(r, azimuth, 0.0, -5.0, view=view)
+        assert passes(r, azimuth + 0.06, 0.0, -5.0, view=view)
+        assert not passes(r, azimuth + 0.1, 0.0, -5.0, view=view)
+        assert not passes(r, azimuth - 0.1, 0.0, -5.0, view=view)
+
+
+@pytest.mark.req("A-069")
+@pytest.mark.parametrize(
+    ("r", "kept"), [(0.09, False), (0.11, True), (79.9, True), (80.0, False), (85.0, False)]
+)
+def test_keeps_0_1_to_80_m(r, kept):
+    assert passes(r, 0.0, 0.0, -5.0) is kept
+
+
+@pytest.mark.req("A-070")
+@pytest.mark.parametrize(
+    ("altitude", "kept"), [(-0.051, False), (-0.049, True), (0.079, True), (0.081, False)]
+)
+def test_keeps_altitudes_in_radians(altitude, kept):
+    assert passes(30.0, 0.0, altitude, -5.0) is kept
+
+
+@pytest.mark.req("A-071", "A-074")
+def test_velocity_limit_is_that_of_standing_objects():
+    assert FIRST_VELOCITY_LIMIT == Radar(AnyPoint(), 4.0, False).velocity_limit == -15.6
+    assert [velocity_limit(v) for v in (0.0, 20.0, 35.0)] == approx([0.5, -19.5, -34.5])
+    v = 150 / 3.6  # the floor also rejects slow vehicles here (D-033)
+    assert velocity_limit(v) == -35.0
+    assert not passes(60.0, 0.0, 0.0, -35.1, v=v)
+    assert passes(60.0, 0.0, 0.0, -34.9, v=v)
+
+
+@pytest.mark.req("A-072")
+@pytest.mark.parametrize(
+    ("r", "velocity", "tracking", "kept"),
+    [
+        (19.9, -30.0, False, True),
+        (20.1, -30.0, False, False),
+        (20.1, -19.6, False, False),
+        (20.1, -19.4, False, True),
+        (39.9, -30.0, True, True),
+        (40.1, -30.0, True, False),
+        (79.0, -19.4, False, True),
+    ],
+)
+def test_standing_objects_stay_only_when_near(r, velocity, tracking, kept):
+    assert passes(r, 0.0, 0.0, velocity, v=20.0, tracking=tracking) is kept
+
+
+@pytest.mark.req("A-073")
+def test_tracking_begins_the_tick_after_vision_confirmed():
+    """A standing car at 35 m: only a radar that tracks keeps it."""
+    stack = AdasStack(SPECS, ArcMap(), {"configuration": 2})
+    seen = []
+    for k in range(7):
+        stack.tick(frame(k, [Car(35.0)], ego_at(v=20.0), radar=[(33.0, 0.0, 0.0, -20.0)]))
+        seen.append((stack.report.status is DetectionStatus.FUSION_DETECT, stack.report.radar_pre))
+    assert [confirmed for confirmed, _ in seen] == [False] * 3 + [True] * 4
+    assert [r is not None for _, r in seen] == [False] * 4 + [True] * 3
+
+
+@pytest.mark.req("A-066", "A-075")
+def test_each_measurement_stands_alone():
+    radar = Radar(AnyPoint(), HALF_WIDTH, nearest_only=False)
+    far, near, side = (50.0, 0.0, 0.0, -4.0), (30.0, 0.01, 0.0, -6.0), (30.0, 0.5, 0.0, 0.0)
+
+    def measure(*points):
+        return radar.update(radar_points(*points), Pose(0.0, 0.0), 20.0, STRAIGHT, False)
+
+    two = measure(far, side, near)
+    assert (two.pre, two.lane, two.velocity, two.points) == (30.0, 30.0, -6.0, 2)
+    assert measure() is NO_RADAR
+    assert measure(side) is NO_RADAR
+    assert measure(far).pre == 50.0
+    many = [(20.0 + 0.1 * i, 0.0, 0.0, -1.0) for i in range(400)]
+    assert measure(*many[::-1]).points == 400
+    assert measure(*many[::-1]).pre == 20.0
+
+
+def lane_match(map, pose, r, azimuth=0.0):
+    view = LaneTracker(map, HighwayRoute()).update(pose)
+    return LaneMatch(map)(pose, view, r, azimuth)
+
+
+@pytest.mark.req("A-076")
+def test_lane_is_that_of_the_point_on_the_map():
+    map = ArcMap(curvature=1 / 250)
+    for x, y, yaw in ((0.0, 0.0, 0.0), (0.0, 0.5, 0.03)):
+        pose = Pose(x, y, yaw=yaw)
+        for r in (20.0, 60.0):
+            for lanes in (0, 1):
+                px, py, _ = map._point(r, lanes * LANE_WIDTH)
+                # as the radar sees it, MOUNT ahead of the ego's origin
+                dx = px - x - MOUNT * np.cos(yaw)
+                dy = py - y - MOUNT * np.sin(yaw)
+                seen = np.hypot(dx, dy), np.arctan2(dy, dx) - yaw
+                assert lane_match(map, pose, *seen) is (lanes == 0)
+
+
+@pytest.mark.req("A-076")
+def test_mount_is_2_m_ahead_of_the_origin():
+    """Read off where the point crosses from one road into the next that nobody reaches."""
+
+    class Split(ArcMap):
+        def all_ahead(self, point, distance):
+            return []
+
+    map = Split(piece=100.0)
+    assert lane_match(map, Pose(50.0, 0.0), 47.9)
+    assert not lane_match(map, Pose(50.0, 0.0), 48.1)
+
+
+@pytest.mark.req("A-077")
+def test_places_off_the_highway_count_as_the_lane_on_their_left():
+    """Lane 0 is a slip road with an id of its own; its left neighbour is on the highway."""
+    map = ArcMap()
+    map.lanes = map.lanes._replace(
+        road=np.where(np.arange(24) % 3 == 0, map.lanes.road + 50, map.lanes.road)
+    )
+    map.off_highway = frozenset(range(51, 59))
+    left = np.arcsin(LANE_WIDTH / 40.0)
+    for y in (0.0, LANE_WIDTH):
+        assert lane_match(map, Pose(0.0, y), 40.0), "both on one lane"
+    assert lane_match(map, Pose(0.0, 0.0), 40.0, left), "target on the highway, ego beside it"
+    assert lane_match(map, Pose(0.0, LANE_WIDTH), 40.0, -left), "and the other way round"
+    assert not lane_match(map, Pose(0.0, 0.0), 40.0, np.arcsin(2 * LANE_WIDTH / 40.0))
+    map.lanes = map.lanes._replace(left=np.full(24, -1, np.int32))
+    assert not lane_match(map, Pose(0.0, 0.0), 40.0, left), "no lane on the left: it stays"
+
+
+@pytest.mark.req("A-078")
+@pytest.mark.parametrize(
+    ("piece", "x", "r", "same"),
+    [
+        (90.0, 0.0, 35.0, True),  # target and ego on one road
+        (36.0, 0.0, 35.0, True),  # target on the next road, on which the look ahead ends too
+        (25.0, 19.5, 20.0, True),  # target at 41.5 m, look ahead ends at 49.5 m: both on road 2
+        (25.0, 20.5, 20.0, False),  # it ends at 50.5 m, on road 3: missed, as written
+        (8.0, 0.0, 20.0, False),
+    ],
+)
+def test_lane_reached_after_range_plus_10_m_is_the_same(piece, x, r, same):
+    assert lane_match(ArcMap(piece=piece), Pose(x, 0.0), r) is same
+
+
+@pytest.mark.req("A-083", "A-037")
+def test_off_the_map_is_not_in_the_lane():
+    map = ArcMap()
+    assert not lane_match(map, Pose(0.0, 500.0), 30.0)
+    assert not lane_match(map, Pose(0.0, 0.0), 60.0, radians(80.0))
+    assert lane_match(map, Pose(0.0, 0.0), 60.0)
+
+
+LEFT = float(np.arcsin(LANE_WIDTH / 30.0))
+
+
+@pytest.mark.req("A-082", "A-029")
+def test_all_points_are_matched_and_the_nearest_in_the_lane_counts():
+    map, points = ArcMap(), radar_points((30.0, LEFT, 0.0, -3.0), (50.0, 0.0, 0.0, -5.0))
+    view = LaneTracker(map, HighwayRoute()).update(Pose(0.0, 0.0))
+    both = Radar(LaneMatch(map), HALF_WIDTH, nearest_only=False)
+    reading = both.update(points, Pose(0.0, 0.0), 20.0, view, False)
+    assert (reading.pre, reading.lane, reading.velocity) == approx((30.0, 50.0, -5.0))
+    nearest = Radar(LaneMatch(map), HALF_WIDTH, nearest_only=True)
+    reading = nearest.update(points, Pose(0.0, 0.0), 20.0, view, False)
+    assert (reading.pre, reading.lane, reading.velocity) == approx((30.0, None, -3.0))
+
+
+def status_of(settings, radar, cars=()):
+    stack = AdasStack(SPECS, ArcMap(), {"configuration": 2, "set": settings})
+    for k in range(6):
+        stack.tick(frame(k, cars, ego_at(v=20.0), radar=radar))
+    return stack.report
+
+
+@pytest.mark.req("A-079")
+def test_vision_is_not_asked_for_its_lane():
+    beside = [(30.0, LEFT, 0.0, -3.0)]
+    seen = status_of({}, beside, [Car(30.0)])
+    assert (seen.status, seen.distance) == (DetectionStatus.FUSION_DETECT, approx(30.0))
+    assert seen.radar_lane is None
+
+
+@pytest.mark.req("A-081")
+def test_a_point_off_the_lane_is_no_target():
+    beside = [(30.0, LEFT, 0.0, -3.0)]
+    clear = status_of({}, beside)
+    assert (clear.status, clear.detected) == (DetectionStatus.NO_TARGET, False)
+    assert (clear.distance, clear.time_gap) == (None, None)
+    listed = status_of({"rejected_stays_active": True}, beside)
+    assert (listed.status, listed.detected) == (DetectionStatus.RADAR_ACTIVE, False)
+    assert listed.time_gap is None
+
+
+@pytest.mark.req("A-084")
+def test_compatibility_corridor_is_1_6_m_and_asks_no_map():
+    inside, outside = np.arcsin(1.55 / 30.0), np.arcsin(1.65 / 30.0)
+    assert passes(30.0, inside, 0.0, -3.0, half_width=PARABOLA_HALF_WIDTH)
+    assert not passes(30.0, outside, 0.0, -3.0, half_width=PARABOLA_HALF_WIDTH)
+    parabola = status_of({"radar_corridor": "parabola"}, [(30.0, float(inside), 0.0, -3.0)])
+    assert parabola.status is DetectionStatus.RADAR_ACTIVE
+    # 3.5 m is a lane to the left, but 1.9 m beside the path is the same lane
+    wide = float(np.arcsin(1.7 / 30.0))
+    assert status_of({"radar_corridor": "parabola"}, [(30.0, wide, 0.0, -3.0)]).radar_pre is None
+    assert status_of({}, [(30.0, wide, 0.0, -3.0)]).radar_lane == approx(30.0)
+
+
+@pytest.mark.req("A-038")
+def test_suite_without_radar_drives_by_cameras_alone():
+    ahead = [(30.0, 0.0, 0.0, -3.0)]
+    assert status_of({}, ahead).status is DetectionStatus.RADAR_ACTIVE
+    reduced = status_of({"radar": False}, ahead)
+    assert (reduced.status, reduced.radar_pre) == (DetectionStatus.NO_TARGET, None)
+    assert status_of({"radar": False}, ahead, [Car(30.0)]).distance == approx(30.0)
+    without = AdasStack(SPECS[:4], ArcMap(), {"set": {"radar": False}})
+    assert without.tick(frame()).brake >= 0.0
+
+
+@pytest.mark.req("A-080")
+def test_both_filter_levels_are_reported_whatever_the_functions():
+    beside = [(30.0, LEFT, 0.0, -3.0)]
+    for configuration in range(5):
+        stack = AdasStack(SPECS, ArcMap(), {"configuration": configuration})
+        stack.tick(frame(0, (), ego_at(v=20.0), radar=beside))
+        assert (stack.report.radar_pre, stack.report.radar_lane) == (30.0, None)
+        assert stack.report.radar_points == 1
+
+
+def test_azimuth_is_left_positive():
+    view = STRAIGHT._replace(yaw_error=0.1)
+    assert 40.0 * sin(0.1) < 4.0 < 40.0 * sin(0.2)
+    assert passes(40.0, -0.1, 0.0, -5.0, view=view)
+    assert not passes(40.0, 0.1, 0.0, -5.0, view=view)

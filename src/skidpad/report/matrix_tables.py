@@ -33,6 +33,7 @@ def collisions(matrix: Matrix) -> list[Block]:
         count_table(
             matrix, "fatal_collisions", "Fatal collisions per run", "published count of one run"
         ),
+        count_table(matrix, "collisions_vehicle", "Of these with vehicles, per run", ""),
         kinds_table(matrix),
     ]
     return blocks

@@ -68,6 +68,7 @@ def monitor(
     from skidpad.evidence.indicators.panel import IndicatorSettings
     from skidpad.evidence.watch import time_by_objects, timing_statistics, watch
     from skidpad.recording.sources import open_channels
+    from skidpad.report.channels import write_drive_report
 
     wanted = {name: _rule(name) for name in fail_if or []}
     if junit is not None and not wanted:
@@ -83,6 +84,7 @@ def monitor(
         rules_file=rules_file,
         clock=time.thread_time_ns if timing else None,
     )
+    write_drive_report(out)
     _print(found, out)
     if found.timing is not None:
         _print_table(timing_statistics(found.timing))

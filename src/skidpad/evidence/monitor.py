@@ -177,6 +177,11 @@ class Monitor:
         if self._recorder:
             self._recorder.context.update(entries)
 
+    @property
+    def context(self) -> dict[str, str]:
+        """Words about the drive so far."""
+        return dict(self._recorder.context) if self._recorder else {}
+
     def records(self) -> list[HazardRecord]:
         """Records that have closed since the last call."""
         return self._recorder.take() if self._recorder else []

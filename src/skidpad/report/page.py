@@ -104,12 +104,17 @@ class Card:
     chain: Sequence[str] = ()
     images: Sequence[Image] = ()
     replay: Any = None  # see assets/replay.js for its shape
+    worlds: Any = None  # see assets/worlds.js
     href: str = ""
     kind: str = "card"
 
     def replay_json(self) -> str:
         """The replay as JSON that is safe inside a script element."""
-        return msgspec.json.encode(self.replay).decode().replace("</", "<\\/")
+        return _script_json(self.replay)
+
+    def worlds_json(self) -> str:
+        """The same for worlds of channels."""
+        return _script_json(self.worlds)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,6 +138,26 @@ class Definitions:
 
 
 @dataclass(frozen=True, slots=True)
+class Node:
+    """A claim in a tree, with what stands for and against it."""
+
+    title: str
+    state: str = ""  # "supported", "challenged", "no evidence", or empty
+    text: str = ""
+    lines: Sequence[str] = ()
+    children: Sequence[Node] = ()
+    open: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Tree:
+    """Claims that rest on claims."""
+
+    root: Node
+    kind: str = "tree"
+
+
+@dataclass(frozen=True, slots=True)
 class Code:
     """Text as it stands in a file."""
 
@@ -141,7 +166,7 @@ class Code:
     kind: str = "code"
 
 
-Block = Table | Figure | Text | Numbers | Verdict | Cards | Card | Definitions | Code
+Block = Table | Figure | Text | Numbers | Verdict | Cards | Card | Definitions | Code | Tree
 
 
 @dataclass(frozen=True, slots=True)
@@ -173,7 +198,7 @@ def render(page: Page) -> str:
     return _template().render(
         page=page,
         css=_asset("page.css"),
-        script=_asset("page.js") + _asset("replay.js"),
+        script="".join(_asset(name) for name in ("page.js", "replay.js", "worlds.js")),
     )
 
 
@@ -182,6 +207,10 @@ def write_page(page: Page, path: Path) -> None:
     partial = path.with_suffix(".partial")
     partial.write_text(render(page), encoding="utf-8")
     partial.replace(path)
+
+
+def _script_json(value: Any) -> str:
+    return msgspec.json.encode(value).decode().replace("</", "<\\/")
 
 
 def _asset(name: str) -> str:

@@ -1,0 +1,204 @@
+"""The report of a monitored drive: from a monitor's output folder to one page (C-17, C-106)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from skidpad import __version__
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.indicators.catalogue import Indicator
+from skidpad.recording.hazards import HazardRecord
+from skidpad.report import channels_figures as figures
+from skidpad.report import channels_tables as tables
+from skidpad.report.channels_data import MonitoredDrive, load_drive
+from skidpad.report.page import (
+    Block,
+    Card,
+    Cards,
+    Figure,
+    Number,
+    Numbers,
+    Page,
+    Section,
+    Text,
+    write_page,
+)
+from skidpad.report.worlds import worlds_replay
+
+REPORT = "report.html"
+REPLAYS = 12  # worlds of the worst hazards are drawn; the others are listed
+LEAD = """Indicators compare what the channels of one car report, ten times a second, and nothing else: no \
+map, no raw sensor and no ground truth. One means full support for the claim, zero a concern. \
+Grey stretches could not be evaluated, which is never counted as good.
+
+Hazards come from rules over these indicators and the risk of each channel's plan in every channel's world."""
+NAMES = {
+    HazardType.INCONSISTENT_LOCALISATION: "Inconsistent localisation",
+    HazardType.EGO_TAILGATING: "Ego tailgating",
+    HazardType.EGO_TAILGATED: "Ego tailgated",
+    HazardType.CROSSING_OBJECT: "Crossing object (candidate)",
+    HazardType.CONFLICTING_PATHS: "Conflicting paths (candidate)",
+    HazardType.STUCK_VEHICLE: "Stuck vehicle (candidate)",
+}
+MEANING = {
+    HazardType.INCONSISTENT_LOCALISATION: "the channels' ego positions jump or drift apart",
+    HazardType.EGO_TAILGATING: "a channel's plan risks running into the vehicle ahead",
+    HazardType.EGO_TAILGATED: "a channel predicts the vehicle behind to run into the ego",
+    HazardType.CROSSING_OBJECT: "plans change at once while a conflict is predicted",
+    HazardType.CONFLICTING_PATHS: "the channels want to drive different ways",
+    HazardType.STUCK_VEHICLE: "hardly anything changes for long",
+}
+
+
+def write_drive_report(folder: Path) -> Path:
+    """Write report.html into a monitor's output folder; returns its path."""
+    path = folder / REPORT
+    write_page(drive_page(load_drive(folder)), path)
+    return path
+
+
+def drive_page(drive: MonitoredDrive) -> Page:
+    """All sections in the order in which a reader asks."""
+    sections = [
+        Section("What happened", [*_warnings(drive), _headline(drive), Text(LEAD)]),
+        Section("Timeline", _timeline(drive)),
+        Section("Hazards", _hazards(drive)),
+        Section("Safety case", [tables.safety_case_tree(drive)]),
+        Section("Indicators", tables.indicators(drive)),
+        Section("Risk", figures.risk(drive)),
+        Section("Computing time", [*tables.timing(drive), *figures.timing(drive)]),
+        Section("What could not be used", tables.losses(drive)),
+    ]
+    return Page(
+        title="Channels under watch",
+        subtitle=_subtitle(drive),
+        facts=_facts(drive),
+        sections=[s for s in sections if s.blocks],
+    )
+
+
+def _subtitle(drive: MonitoredDrive) -> str:
+    words = drive.context
+    where = words.get("title") or words.get("route") or drive.name
+    return f"{where}: {', '.join(drive.channels)}"
+
+
+def _facts(drive: MonitoredDrive) -> list[tuple[str, str]]:
+    s = drive.summary
+    facts = [
+        ("rules", s["rules"]),
+        ("forms", s["forms"]),
+        ("identifier", s.get("identifier", "rules")),
+        ("cycles", f"{s['cycles']}"),
+        ("Skidpad", __version__),
+    ]
+    return facts + [(k, v) for k, v in sorted(drive.context.items()) if len(v) < 60][:8]
+
+
+def _warnings(drive: MonitoredDrive) -> list[Block]:
+    lost = {k: v for k, v in drive.summary["losses"].items() if v}
+    if not lost:
+        return []
+    words = ", ".join(f"{k.replace('_', ' ')}: {v}" for k, v in lost.items())
+    return [Text(f"The recording was not read in full ({words}).", tone="warning")]
+
+
+def _headline(drive: MonitoredDrive) -> Numbers:
+    s = drive.summary
+    scored = sum(not _candidate(e["name"]) for e in s["hazards"])
+    minutes = s["seconds"] / 60.0
+    items = [
+        Number(f"{minutes:.1f} min", "watched", f"{s['cycles']} cycles of 0.1 s"),
+        Number(f"{scored}", "hazards", f"{len(s['hazards']) - scored} candidates beside them"),
+        Number(f"{len(s['violations'])}", "violations", "repeats within 2 s count once"),
+    ]
+    agreement = drive.traces(Indicator.AGREEMENT)
+    if agreement:
+        values = np.concatenate([trace.value for trace in agreement])
+        if np.isfinite(values).any():
+            items.append(
+                Number(
+                    f"{np.nanmean(values):.2f}",
+                    "agreement of the channels",
+                    f"least {np.nanmin(values):.2f}; 1 is full",
+                )
+            )
+    return Numbers(items)
+
+
+def _candidate(name: str) -> bool:
+    return HazardType(name) not in tuple(HazardType)[:3]
+
+
+def _timeline(drive: MonitoredDrive) -> list[Block]:
+    return [
+        Figure(
+            figures.drive_timeline(drive),
+            "Indicators with a threshold, the worst of all channels or pairs, and the safety score. "
+            "Blue: values (least to greatest within a stretch); dashed: threshold; orange below: "
+            "violated; grey: not evaluated; orange bands: hazards.",
+        )
+    ]
+
+
+def _hazards(drive: MonitoredDrive) -> list[Block]:
+    if not drive.records:
+        return [Text("The rules found no hazard in this drive.")]
+    order = sorted(drive.records, key=_severity)
+    drawn = {r.id for r in order[:REPLAYS]}
+    blocks: list[Block] = [tables.hazard_list(drive.records, NAMES)]
+    for hazard in HazardType:
+        records = [r for r in drive.records if r.type is hazard]
+        if records:
+            cards = [hazard_card(r, r.id in drawn) for r in records]
+            blocks.append(Cards(NAMES[hazard], cards, open=not _candidate(hazard.value)))
+    if len(drive.records) > REPLAYS:
+        blocks.append(
+            Text(
+                f"Worlds are drawn for the {REPLAYS} worst hazards; `skidpad hazards export` writes "
+                "any of them as a scenario.",
+                tone="note",
+            )
+        )
+    return blocks
+
+
+def _severity(record: HazardRecord) -> tuple[bool, float]:
+    """Scored hazards first, then by the safety score when it was worst."""
+    return _candidate(record.type.value), record.extremes.get("safety_score", 1.0)
+
+
+def hazard_card(record: HazardRecord, drawn: bool) -> Card:
+    """What was found, who is involved, and the worlds as the channels saw them."""
+    duration = record.t_end - record.t_start
+    facts = [
+        ("rule fired", f"{record.count} cycles in {duration:.1f} s"),
+        ("channels", ", ".join(record.involved) or "all"),
+        ("driving", record.driving or "not recorded"),
+    ]
+    facts += [(k.replace("_", " "), f"{v:.2f}") for k, v in record.extremes.items() if k in SHOWN]
+    chain = [MEANING[record.type].capitalize() + "."]
+    chain += [
+        f"Object {'' if o.id is None else o.id} of {o.channel} at ({o.x:.1f}, {o.y:.1f}) m."
+        for o in record.objects
+    ]
+    if "assumed" in record.flags:
+        chain.append("No objects were paired between the channels, so their agreement is assumed.")
+    if "cut" in record.flags:
+        chain.append("The record is cut: the drive or the record's limit ended it.")
+    return Card(
+        title=f"{NAMES[record.type]} at {record.t_start:.1f} s",
+        subtitle=f"{record.id}, rules {record.profile}",
+        tags=record.flags,
+        facts=facts,
+        chain=chain,
+        worlds=worlds_replay(record) if drawn else None,
+    )
+
+
+SHOWN = (
+    "safety_score", "gap_signed", "comfort_least", "comfort_driving", "location_variance",
+    "shift_short", "shift_long", "cross_path", "ego_trajectory",
+)  # fmt: skip

@@ -1,0 +1,93 @@
+"""What a monitored drive left in its folder, ready to be drawn."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from skidpad.core.errors import FileError
+from skidpad.evidence.indicators.catalogue import Indicator, Threshold, load_thresholds
+from skidpad.evidence.watch import SUMMARY, TIMING
+from skidpad.recording.files import read_parquet
+from skidpad.recording.hazards import HazardRecord, read_hazards
+from skidpad.recording.indicators import read_indicators
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Trace:
+    """One indicator of one channel or pair over the drive."""
+
+    indicator: Indicator
+    subject: str
+    t: Floats  # (k,) s
+    value: Floats  # (k,), NaN: not evaluated
+    violated: NDArray[np.bool_]  # (k,)
+
+
+@dataclass(frozen=True, slots=True)
+class MonitoredDrive:
+    """One recording and what the monitor said of it."""
+
+    name: str
+    summary: dict[str, Any]  # monitor.json
+    table: pl.DataFrame  # indicators.parquet
+    records: tuple[HazardRecord, ...]
+    timing: pl.DataFrame | None
+    thresholds: dict[Indicator, Threshold]
+
+    @property
+    def channels(self) -> Sequence[str]:
+        """In the order of the recording."""
+        names: list[str] = self.summary["channels"]
+        return names
+
+    @property
+    def context(self) -> dict[str, str]:
+        """Words about the drive."""
+        words: dict[str, str] = self.summary.get("context", {})
+        return words
+
+    def traces(self, indicator: Indicator) -> list[Trace]:
+        """The indicator's course, one per channel or pair."""
+        rows = self.table.filter(pl.col("indicator") == indicator.value)
+        return [
+            Trace(
+                indicator,
+                str(subject),
+                group["t"].to_numpy(),
+                group["value"].fill_null(float("nan")).to_numpy(),
+                group["violated"].to_numpy(),
+            )
+            for (subject,), group in rows.group_by("subject", maintain_order=True)
+        ]
+
+
+def load_drive(folder: Path) -> MonitoredDrive:
+    """Read the output folder of `skidpad monitor`."""
+    path = folder / SUMMARY
+    try:
+        summary = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FileError(
+            f"{path}: cannot be read ({error.strerror}); `skidpad monitor` writes it"
+        ) from error
+    except ValueError as error:
+        raise FileError(f"{path}: is not JSON ({error})") from error
+    timing = read_parquet(folder / TIMING)[0] if (folder / TIMING).exists() else None
+    return MonitoredDrive(
+        name=folder.name,
+        summary=summary,
+        table=read_indicators(folder),
+        records=tuple(read_hazards(folder)),
+        timing=timing,
+        thresholds=load_thresholds(),
+    )

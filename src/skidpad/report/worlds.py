@@ -1,0 +1,83 @@
+"""Replays of a hazard record from above, in the world of every channel, for assets/worlds.js."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.channels import ChannelFrame, Cycle
+from skidpad.recording.hazards import HazardRecord
+
+UNIT = 0.05  # m
+STRIDE = 2  # cycles between pictures
+REACH = 70.0  # m around the ego
+PREDICTION_POINTS = 5
+PLAN_POINTS = 12
+SPAN = 76.0  # m across a panel
+
+
+def worlds_replay(record: HazardRecord) -> dict[str, Any] | None:
+    """The record's worlds as whole numbers; None when it holds none."""
+    cycles = record.worlds[::STRIDE]
+    origin = next((_ego(c) for c in cycles if _ego(c) is not None), None)
+    if origin is None:
+        return None
+    times = np.array([c.t for c in cycles])
+    return {
+        "dt": 0.1 * STRIDE,
+        "unit": UNIT,
+        "span": SPAN,
+        "t0": round(float(times[0]), 2),
+        "mark": int(np.searchsorted(times, record.t_worst)),
+        "hazard": [
+            int(np.searchsorted(times, record.t_start)),
+            int(np.searchsorted(times, record.t_end)),
+        ],
+        "names": list(record.channels),
+        "driving": None if record.driving is None else record.channels.index(record.driving),
+        "involved": [_point(np.array([o.x, o.y]) - origin) for o in record.objects],
+        "cycles": [[_world(frame, origin) for frame in c.frames] for c in cycles],
+    }
+
+
+def _ego(cycle: Cycle) -> NDArray[np.float64] | None:
+    frame = next((f for f in cycle.frames if f is not None and np.isfinite(f.ego[:2]).all()), None)
+    return None if frame is None else frame.ego[:2]
+
+
+def _world(frame: ChannelFrame | None, origin: NDArray[np.float64]) -> list[Any] | None:
+    """[ego box, plan, objects, predictions]; a box is x, y, heading in mrad, length, width."""
+    if frame is None or not np.isfinite(frame.ego).all():
+        return None
+    offset = frame.objects[:, :2] - frame.ego[:2]
+    near = np.flatnonzero(np.hypot(offset[:, 0], offset[:, 1]) < REACH)
+    step = max(1, len(frame.plan) // PLAN_POINTS)
+    far = max(1, frame.predictions.shape[1] // PREDICTION_POINTS)
+    return [
+        _box(frame.ego, frame.ego_polygon, origin),
+        _points(frame.plan[::step, :2] - origin),
+        [_box(frame.objects[i], frame.polygons[i, : frame.polygon_size[i]], origin) for i in near],
+        [_points(frame.predictions[i, ::far] - origin) for i in near],
+    ]
+
+
+def _box(
+    state: NDArray[np.float64], polygon: NDArray[np.float64], origin: NDArray[np.float64]
+) -> list[int]:
+    low, high = (polygon.min(axis=0), polygon.max(axis=0)) if len(polygon) else (np.zeros(2),) * 2
+    c, s = np.cos(state[2]), np.sin(state[2])
+    x, y = 0.5 * (low + high)
+    centre = state[:2] - origin + np.array([c * x - s * y, s * x + c * y])
+    return [*_point(centre), round(float(state[2]) * 1000), *_point(high - low)]
+
+
+def _point(p: NDArray[np.float64]) -> list[int]:
+    return [round(float(v) / UNIT) for v in p]
+
+
+def _points(points: NDArray[np.float64]) -> list[int]:
+    finite = points[np.isfinite(points).all(axis=1)]
+    whole: list[int] = np.round(finite.ravel() / UNIT).astype(int).tolist()
+    return whole

@@ -1,0 +1,97 @@
+import json
+import re
+
+import numpy as np
+import pytest
+
+from channel_worlds import Eyes, World, drive
+from skidpad.evidence.hazards import Profile
+from skidpad.evidence.indicators.catalogue import load_thresholds
+from skidpad.evidence.indicators.panel import IndicatorSettings
+from skidpad.evidence.watch import watch
+from skidpad.recording.hazards import read_hazards
+from skidpad.report.channels import drive_page, write_drive_report
+from skidpad.report.channels_data import load_drive
+from skidpad.report.timeline import Mark, Strip, timelines
+from skidpad.report.worlds import UNIT, worlds_replay
+
+WORLD = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-11.0, 0, 0, 15.5, 0), (50.0, 3.5, 0, 15, 0)]))
+EYES = (Eyes("lav", 0.03), Eyes("tfuse", 0.03, blind=(0,)))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("watched")
+    ticks = iter(range(0, 10**12, 1_000_000))
+    watch(
+        drive(WORLD, EYES, 12.0),
+        folder,
+        settings=IndicatorSettings(),
+        profile=Profile.PRACTICAL,
+        thresholds=load_thresholds(),
+        clock=lambda: next(ticks),
+    )
+    return folder
+
+
+@pytest.mark.req("C-034", "C-106", "C-211", "C-233", "C-236", "C-238", "C-17")
+def test_the_page_holds_every_part_and_needs_no_network(folder):
+    text = write_drive_report(folder).read_text()
+    for title in ("Timeline", "Hazards", "Safety case", "Indicators", "Risk", "Computing time"):
+        assert f"<h2>{title}</h2>" in text
+    assert not re.search(r'(src|href)="(?!#|data:)|url\(', text.replace("url(#", ""))
+    assert 'class="worlds"' in text
+    assert "Ego tailgated at" in text
+
+
+@pytest.mark.req("C-033", "C-104")
+def test_indicator_table_agrees_with_the_summary(folder):
+    page = drive_page(load_drive(folder))
+    table = next(s for s in page.sections if s.title == "Indicators").blocks[0]
+    audit = json.loads((folder / "monitor.json").read_text())["indicators"]
+    assert [int(row[6].text) for row in table.rows] == [a["violation_events"] for a in audit]
+    assert [int(row[8].text) for row in table.rows] == [a["not_evaluated_cycles"] for a in audit]
+    assert all(row[2].text == (a["claim"] or "") for row, a in zip(table.rows, audit, strict=True))
+
+
+@pytest.mark.req("C-030", "C-033")
+def test_a_tree_node_is_challenged_exactly_when_an_indicator_below_it_was_violated(folder):
+    drive_ = load_drive(folder)
+    root = next(s for s in drive_page(drive_).sections if s.title == "Safety case").blocks[0].root
+    statements = [s for argument in root.children for s in argument.children]
+    against = {a["claim"] for a in drive_.summary["indicators"] if a["violation_cycles"]}
+    challenged = {s.title.split()[0] for s in statements if s.state == "challenged"}
+    assert against == challenged
+    assert len(statements) == 10
+
+
+@pytest.mark.req("C-211", "C-212")
+def test_the_replay_shows_each_channel_its_own_objects_in_place(folder):
+    record = next(r for r in read_hazards(folder) if r.type.value == "ego_tailgated")
+    data = worlds_replay(record)
+    lav, tfuse = data["cycles"][data["mark"]]
+    assert (len(lav[2]), len(tfuse[2])) == (2, 1)
+    follower = min(lav[2], key=lambda box: box[0])
+    gap = (lav[0][0] - follower[0]) * UNIT
+    t = data["t0"] + data["mark"] * data["dt"]
+    assert gap == pytest.approx(11.0 - 0.5 * t, abs=0.2)  # it starts 11 m behind, closes at 0.5 m/s
+    assert data["names"] == ["lav", "tfuse"]
+
+
+def test_a_timeline_marks_alarms_and_what_was_not_evaluated():
+    t = np.arange(0.0, 60.0, 0.1)
+    value = np.where(t < 20.0, np.nan, 0.9)
+    value[t > 50.0] = 0.1
+    strip = Strip("score", t, value, value < 0.5, threshold=0.5)
+    svg = timelines([strip], [Mark(50.0, 55.0, "a < b")], 0.0, 60.0)
+    (missing,) = re.findall(
+        r'x="([\d.]+)" y="\d+" width="([\d.]+)" height="[\d.]+" class="missing"', svg
+    )
+    assert float(missing[1]) == pytest.approx(840.0 / 3.0, abs=4.0)
+    assert "a &lt; b" in svg
+    alarms = re.findall(r'width="([\d.]+)" height="3"', svg)
+    assert sum(map(float, alarms)) == pytest.approx(840.0 / 6.0, abs=6.0)
+
+
+def test_reports_of_the_same_drive_are_the_same_bytes(folder):
+    assert write_drive_report(folder).read_bytes() == write_drive_report(folder).read_bytes()

@@ -26,6 +26,7 @@ class CameraImage:
     labels: NDArray[np.uint8] | None = None  # (H, W) SemanticClass; may be a strided view
     instances: NDArray[np.uint16] | None = None  # (H, W) 0 static, else actor index + 1
     rgb: NDArray[np.uint8] | None = None  # (H, W, 3) red, green, blue
+    packed: NDArray[np.uint32] | None = None  # (H, W) rgb as 4-byte pixels, where it is kept so
 
     def depth(self) -> Float32:
         """(H, W) planar depth in m, +inf where there is nothing; computed at each call."""
@@ -33,6 +34,13 @@ class CameraImage:
         with np.errstate(divide="ignore"):
             metres: Float32 = np.float32(1.0) / self.inverse_depth
         return metres
+
+
+def pack(rgb: NDArray[np.uint8]) -> NDArray[np.uint32]:
+    """(H, W) pixels of bytes red, green, blue, 255 of an (H, W, 3) image."""
+    padded = np.full((*rgb.shape[:2], 4), 255, dtype=np.uint8)
+    padded[..., :3] = rgb
+    return padded.view(np.dtype("<u4"))[..., 0]
 
 
 class RadarPoints(NamedTuple):

@@ -191,7 +191,9 @@ class PixelSuite:
         self.shading.paint(view, self._ego, one.inverse, one.key, packed)
         if id in self._degraded:
             self._degraded[id].apply(self.tick, packed)
-        return CameraImage(rgb=packed.view(np.uint8).reshape(*packed.shape, 4)[..., :3])
+        return CameraImage(
+            rgb=packed.view(np.uint8).reshape(*packed.shape, 4)[..., :3], packed=packed
+        )
 
     def snapshot(self, *ids: str) -> dict[str, NDArray[np.uint8]]:
         """Copies (H, W, 3) of RGB views as they are now, for a file (A-257); none given: all."""

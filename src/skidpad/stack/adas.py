@@ -164,7 +164,7 @@ class AdasStack:
         if light.signal is None:
             return light, None
         image = frame.images.get(FRONT_CAMERA)
-        return light, detect_lamp(image.rgb if image is not None else None)
+        return light, detect_lamp(image)
 
     def _situation(
         self,

@@ -1,4 +1,8 @@
-"""A traffic light's colour from the front image (A-164 to A-167, A-171)."""
+"""A traffic light's colour from the front image (A-164 to A-167, A-171).
+
+OpenCV decides on colours and shapes. It is asked only about pixels that can be in a hue range and
+about patches that can be large enough: noise in rain at night makes thousands of tiny ones.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +12,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.frames import CameraImage, pack
+from skidpad.core.jit import kernel
 from skidpad.core.vocabulary import LightState
 
 UPPER_ROWS = 0.60  # share of the image height (A-164)
@@ -19,25 +25,46 @@ YELLOW_HUES = ((20, 35),)
 AREAS = (3.0, 1000.0)  # px (A-166); the upper limit alone rejects a low sun (D-068)
 ASPECTS = (0.3, 2.0)  # width / height of the bounding box (A-166)
 
+# Necessary for any of the ranges, with a margin of one hue and one saturation step each.
+_BRIGHT = np.int32(MIN_VALUE)
+_SATURATED = np.int32(158)  # of 512
+_REDDISH, _ORANGE, _YELLOW = (np.int32(n) for n in (11, 19, 24))  # of 30, share of the chroma
 
-def detect_lamp(rgb: NDArray[np.uint8] | None) -> LightState | None:
-    """RED, YELLOW, or None for neither, from an (H, W, 3) red-green-blue image."""
-    if rgb is None:
+
+def rows_needed(height: int) -> int:
+    """How many of the upper rows of an image are looked at (A-164)."""
+    return round(height * UPPER_ROWS)
+
+
+def detect_lamp(image: CameraImage | None) -> LightState | None:
+    """RED, YELLOW, or None for neither, from a colour image."""
+    if image is None or image.rgb is None:
         return None
-    upper = rgb[: round(rgb.shape[0] * UPPER_ROWS)]
-    hsv = cv2.cvtColor(np.ascontiguousarray(upper), cv2.COLOR_RGB2HSV)
-    if _has_lamp(hsv, RED_HUES):
+    rows = rows_needed(image.rgb.shape[0])
+    upper = pack(image.rgb[:rows]) if image.packed is None else image.packed[:rows]
+    places, colours = colourful(upper)
+    if not len(places):
+        return None
+    hsv = cv2.cvtColor(colours[None], cv2.COLOR_RGB2HSV)
+    shape: tuple[int, int] = upper.shape
+    if _has_lamp(hsv, places, shape, RED_HUES):
         return LightState.RED
-    if _has_lamp(hsv, YELLOW_HUES):
+    if _has_lamp(hsv, places, shape, YELLOW_HUES):
         return LightState.YELLOW
     return None
 
 
-def _has_lamp(hsv: Any, hues: tuple[tuple[int, int], ...]) -> bool:
-    mask: Any = np.zeros(hsv.shape[:2], dtype=np.uint8)
+def _has_lamp(
+    hsv: Any,
+    places: NDArray[np.int32],
+    shape: tuple[int, int],
+    hues: tuple[tuple[int, int], ...],
+) -> bool:
+    chosen: Any = np.zeros(len(places), dtype=np.uint8)
     for low, high in hues:
-        mask |= cv2.inRange(hsv, (low, MIN_SATURATION, MIN_VALUE), (high, 255, 255))
-    if not mask.any():
+        chosen |= cv2.inRange(hsv, (low, MIN_SATURATION, MIN_VALUE), (high, 255, 255))[0]
+    mask: Any = np.zeros(shape, dtype=np.uint8)
+    if not keep_large(places[chosen != 0], mask):
         return False
     contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     return any(_is_lamp(contour) for contour in contours)
@@ -47,3 +74,85 @@ def _is_lamp(contour: Any) -> bool:
     _, _, width, height = cv2.boundingRect(contour)
     area = cv2.contourArea(contour)
     return AREAS[0] <= area <= AREAS[1] and ASPECTS[0] <= width / height <= ASPECTS[1]
+
+
+@kernel
+def _may_be_lamp(pixel: np.uint32) -> bool:
+    """Whether a packed pixel can be in one of the hue ranges."""
+    word = np.int32(pixel & np.uint32(0xFFFFFF))
+    r, g, b = word & 255, (word >> 8) & 255, word >> 16
+    value = max(r, g, b)
+    chroma = value - min(r, g, b)
+    hue = np.int32(30) * (g - b)
+    red = (r == value) & ((abs(hue) <= _REDDISH * chroma) | (hue >= _ORANGE * chroma))
+    yellow = (g == value) & (np.int32(30) * (r - b) >= _YELLOW * chroma)
+    lively = (value >= _BRIGHT) & (np.int32(512) * chroma >= _SATURATED * value)
+    return bool(lively & (red | yellow))
+
+
+@kernel
+def _candidates(packed: NDArray[np.uint32], places: NDArray[np.int32]) -> int:
+    """Write the flat indices of all pixels that may belong to a lamp; says how many."""
+    height, width = packed.shape
+    flags = np.empty(width, dtype=np.bool_)
+    n = 0
+    for y in range(height):
+        row = packed[y]
+        found = 0
+        for x in range(width):
+            flag = _may_be_lamp(row[x])
+            flags[x] = flag
+            found += flag
+        if found == 0:
+            continue
+        for x in range(width):
+            if flags[x]:
+                places[n] = y * width + x
+                n += 1
+    return n
+
+
+def colourful(packed: NDArray[np.uint32]) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    """Flat indices (n,) and colours (n, 3) of all pixels that may be in a hue range (A-165)."""
+    places = np.empty(packed.size, dtype=np.int32)
+    places = places[: _candidates(packed, places)]
+    chosen = packed.ravel()[places]
+    return places, np.ascontiguousarray(chosen.view(np.uint8).reshape(-1, 4)[:, :3])
+
+
+@kernel
+def keep_large(places: NDArray[np.int32], mask: NDArray[np.uint8]) -> int:
+    """Set in the cleared `mask` (H, W) all 8-connected patches whose contour can have the least
+    area (A-166); says how many.
+
+    A contour runs through pixel centres, so its area is at most (w - 1)(h - 1) of its box. Patches
+    that enclose others are larger than that, so no inner one becomes an outer one.
+    """
+    height, width = mask.shape
+    for i in range(places.size):
+        mask[places[i] // width, places[i] % width] = 1
+    stack = np.empty(places.size, dtype=np.int32)
+    kept = 0
+    for i in range(places.size):
+        if mask[places[i] // width, places[i] % width] != 1:
+            continue
+        stack[0] = places[i]
+        mask[places[i] // width, places[i] % width] = 2
+        size, done = 1, 0
+        top, bottom, left, right = height, -1, width, -1
+        while done < size:
+            y, x = stack[done] // width, stack[done] % width
+            done += 1
+            top, bottom = min(top, y), max(bottom, y)
+            left, right = min(left, x), max(right, x)
+            for v in range(max(y - 1, 0), min(y + 2, height)):
+                for u in range(max(x - 1, 0), min(x + 2, width)):
+                    if mask[v, u] == 1:
+                        mask[v, u] = 2
+                        stack[size] = v * width + u
+                        size += 1
+        large = (bottom - top) * (right - left) >= AREAS[0]
+        kept += np.int32(large)
+        for k in range(size):
+            mask[stack[k] // width, stack[k] % width] = 255 if large else 0
+    return kept

@@ -4,6 +4,7 @@
     each tick:  phase   = supervisor.observe(truth)       who drives now: the stack, or recovery
                 command = stack.tick(frame)               it sees sensors only, never the truth
                 action  = supervisor.act(command)
+                words   = script.step(truth)              what other actors are told, in scenarios
                 log the moment, then step the world
 
 The log is the only result. Whatever is said about a drive later is computed from it.
@@ -21,8 +22,8 @@ from skidpad.campaign.cells import Cell, Driver
 from skidpad.campaign.snapshots import Snapshots
 from skidpad.core.errors import ConfigError, StackError, require_choice
 from skidpad.core.frames import SensorFrame
-from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
-from skidpad.core.states import StackReport, WorldTruth
+from skidpad.core.setup import ActorCommand, ActorSetup, Setup, TrafficSetup
+from skidpad.core.states import StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Outcome, SensorLevel, Supervision
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
@@ -110,15 +111,63 @@ def _load_settings(profile: str, settings: Mapping[str, Any] | None) -> options.
     return options.load_profile(profile, settings)
 
 
+class Supervising(Protocol):
+    """What stands between stack and world."""
+
+    def observe(self, truth: WorldTruth) -> Supervision:
+        """The phase of the tick that `truth` begins."""
+        ...
+
+    def act(self, command: VehicleCommand, report: StackReport | None = None) -> Action:
+        """What is applied in this tick."""
+        ...
+
+
+class Unsupervised:
+    """Nobody helps: the stack's command is what happens, to the end of the run."""
+
+    def observe(self, truth: WorldTruth) -> Supervision:
+        """The stack drives."""
+        del truth
+        return Supervision.NONE
+
+    def act(self, command: VehicleCommand, report: StackReport | None = None) -> Action:
+        """The command as it is."""
+        del report
+        return Action(command)
+
+
+class Script(Protocol):
+    """What moves other actors and says when it is over, such as a scenario player."""
+
+    ended: bool
+
+    def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
+        """Words to actors for the coming step."""
+        ...
+
+
+class NoScript:
+    """Actors are left to the backend; only the duration ends the run."""
+
+    ended = False
+
+    def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
+        """Nothing to say."""
+        del truth
+        return ()
+
+
 @dataclass(frozen=True, slots=True)
 class Drive:
-    """A cell made ready: what drives, what supervises, in which world."""
+    """A cell made ready: what drives, what supervises, in which world, after which script."""
 
     cell: Cell
     map: RoadMap
     setup: Setup
     stack: GuardedStack
-    supervisor: Supervisor
+    supervisor: Supervising
+    script: Script = NoScript()
 
     @property
     def header(self) -> LogHeader:
@@ -160,14 +209,15 @@ def run_cell(
         setup = setup_of(cell, map)
         backend.reset(setup, cell.seed)
         log = TickLog(backend.truth().table, header_of(cell, map, setup.dt), cell.weather.name, 1)
-        return Run(log.finish(), Outcome.AGENT_ERROR, _story(error))
+        return Run(log.finish(), Outcome.AGENT_ERROR, story(error))
     finally:
         backend.close()
 
 
 def loop(backend: Backend, ready: Drive, watchers: Sequence[Watcher] = ()) -> Run:
-    """The loop itself; it ends with the duration, or when the stack fails."""
+    """The loop itself; it ends with duration or script, or when the stack fails."""
     cell, stack, supervisor = ready.cell, ready.stack, ready.supervisor
+    script = ready.script
     ticks = round(cell.duration / ready.setup.dt)
     frame = backend.reset(ready.setup, cell.seed)
     truth = backend.truth()
@@ -180,7 +230,7 @@ def loop(backend: Backend, ready: Drive, watchers: Sequence[Watcher] = ()) -> Ru
         try:
             command = stack.tick(frame)
         except StackError as failure:
-            outcome, error = Outcome.AGENT_ERROR, _story(failure)
+            outcome, error = Outcome.AGENT_ERROR, story(failure)
             log.notice(truth.tick, NoticeSource.STACK, str(failure))
             break
         action = supervisor.act(command, stack.report)
@@ -188,9 +238,12 @@ def loop(backend: Backend, ready: Drive, watchers: Sequence[Watcher] = ()) -> Ru
         for watcher in watchers:
             watcher.see(frame, truth, stack.report)
         _note(log, truth, action)
+        words = script.step(truth)
+        if script.ended:
+            break
         if action.relocate is not None:
             backend.relocate(action.relocate.pose, action.relocate.v)
-        frame = backend.step(action.command)
+        frame = backend.step(action.command, words)
         truth = backend.truth()
     return Run(log.finish(), outcome, error)
 
@@ -269,6 +322,7 @@ def header_of(cell: Cell, map: RoadMap, dt: float) -> LogHeader:
     return LogHeader(map=map.name, map_hash=map.content_hash, dt=dt, about=about)
 
 
-def _story(error: StackError) -> str:
+def story(error: StackError) -> str:
+    """The traceback of a stack that failed."""
     cause = error.__cause__ or error
     return "".join(traceback.format_exception(cause)) + f"\n{error}"

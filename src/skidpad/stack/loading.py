@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from math import isfinite
@@ -23,22 +24,28 @@ NO_REPORT = StackReport()
 
 def load_stack(where: str) -> type[Stack]:
     """The class named by `module:Class` or `path/to/file.py:Class`."""
-    place, colon, name = where.rpartition(":")
-    if not colon or not place or not name.isidentifier():
-        raise ConfigError(f"a stack is given as module:Class or file.py:Class, got {where!r}")
-    module = _from_file(Path(place)) if place.endswith(".py") else _from_module(place)
-    found = getattr(module, name, None)
-    if not isinstance(found, type):
-        raise ConfigError(f"stack {where!r}: {place} has no class {name}")
+    found = import_class(where, "stack")
     if not callable(getattr(found, "tick", None)):
-        raise ConfigError(f"stack {where!r}: class {name} has no method tick(frame)")
+        raise ConfigError(f"stack {where!r}: class {found.__name__} has no method tick(frame)")
     return found
 
 
-def _from_file(path: Path) -> ModuleType:
+def import_class(where: str, what: str) -> type[Any]:
+    """The class named by `module:Class` or `path/to/file.py:Class`; `what` it is, for messages."""
+    place, colon, name = where.rpartition(":")
+    if not colon or not place or not name.isidentifier():
+        raise ConfigError(f"a {what} is given as module:Class or file.py:Class, got {where!r}")
+    module = _from_file(Path(place), what) if place.endswith(".py") else _from_module(place, what)
+    found = getattr(module, name, None)
+    if not isinstance(found, type):
+        raise ConfigError(f"{what} {where!r}: {place} has no class {name}")
+    return found
+
+
+def _from_file(path: Path, what: str) -> ModuleType:
     if not path.is_file():
-        raise FileError(f"stack file {str(path)!r} does not exist")
-    name = f"skidpad_user_stack_{path.stem}"
+        raise FileError(f"{what} file {str(path)!r} does not exist")
+    name = f"skidpad_user_{what}_{path.stem}"
     spec = spec_from_file_location(name, path)
     assert spec is not None, "a .py file has a loader"
     assert spec.loader is not None
@@ -47,15 +54,15 @@ def _from_file(path: Path) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except Exception as error:
-        raise ConfigError(f"stack file {str(path)!r} cannot be imported: {error!r}") from error
+        raise ConfigError(f"{what} file {str(path)!r} cannot be imported: {error!r}") from error
     return module
 
 
-def _from_module(name: str) -> ModuleType:
+def _from_module(name: str, what: str) -> ModuleType:
     try:
         return import_module(name)
     except Exception as error:  # an import runs foreign code: anything can happen
-        raise ConfigError(f"stack module {name!r} cannot be imported: {error!r}") from error
+        raise ConfigError(f"{what} module {name!r} cannot be imported: {error!r}") from error
 
 
 class GuardedStack:
@@ -89,6 +96,13 @@ class GuardedStack:
             )
         _check(self.name, command, frame.tick)
         return command
+
+    def close(self) -> None:
+        """The run is over; what a stack does wrong here no longer matters to it."""
+        close = getattr(self.stack, "close", None)
+        if callable(close):
+            with suppress(Exception):
+                close()
 
     @property
     def report(self) -> StackReport:

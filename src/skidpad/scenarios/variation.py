@@ -1,0 +1,113 @@
+"""The scenarios that come with Skidpad: their files, what a seed varies, variants of the cut-in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from functools import cache
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from skidpad.core.errors import require_choice
+from skidpad.core.randomness import stream
+from skidpad.core.setup import DT
+from skidpad.scenarios.generate import FOLDER, SCENARIOS
+
+CUT = 2.5  # deviations
+SKILL_SPREAD = 0.15  # of the gains of scripted drivers
+EGO_SPEED, CRUISE_SPEED = "EgoSpeed", "CruiseSpeed"
+CUT_IN = "ghost_cut_in"
+SPAWN_DELAY = 40  # ticks by which the slower spawning holds the ghost back (B-070)
+
+
+class CutIn(str, Enum):
+    """Variants of the cut-in (B-070 to B-079, decision G-3)."""
+
+    ROLLING = "rolling"  # the repaired distance, everyone rolls from the start
+    ORIGINAL = "original"  # from rest, no delay, the first distance
+    UNFIXED = "unfixed"  # from rest, the ghost comes later, the first distance
+    FIXED = "fixed"  # from rest, the ghost comes later, the repaired distance
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Distribution of one parameter around its value in the file."""
+
+    gap: float = 0.0  # uniform, +-, in the parameter's unit
+    spread: float = 0.0  # normal, share of the value
+
+    def draw(self, value: float, rng: np.random.Generator) -> float:
+        """One value."""
+        noise = float(np.clip(rng.standard_normal(), -CUT, CUT))
+        return value * (1.0 + self.spread * noise) + self.gap * float(rng.uniform(-1.0, 1.0))
+
+
+# Start from rest towards 50 km/h; the ghost comes from 15 m behind at 79 km/h. Held back by the spawn
+# delay it comes from as far as it drives in that time: the ego is faster when they meet (BD-51).
+FROM_REST = {"EgoSpeed": 0.0, "CruiseSpeed": 13.9, "GhostSpeed": 22.0, "GhostEndSpeed": 4.0}
+GHOST_S = 85.0  # m
+FIRST_DISTANCE, REPAIRED_DISTANCE = 8.0, 2.0  # m; the sources give no value (B-074)
+
+
+def variant_parameters(variant: CutIn) -> dict[str, float]:
+    """Values of the file's parameters that make the variant."""
+    if variant is CutIn.ROLLING:
+        return {}
+    late = 0.0 if variant is CutIn.ORIGINAL else SPAWN_DELAY * DT
+    repaired = variant is CutIn.FIXED
+    return FROM_REST | {
+        "GhostS": GHOST_S - late * FROM_REST["GhostSpeed"],
+        "MergeDistance": REPAIRED_DISTANCE if repaired else FIRST_DISTANCE,
+    }
+
+
+@cache
+def names() -> tuple[str, ...]:
+    """Scenarios of the catalogue."""
+    return tuple(s.name for s in SCENARIOS)
+
+
+def scenario_file(name: str) -> Path:
+    """The 1.2 file of a scenario of the catalogue."""
+    return FOLDER / f"{require_choice('scenario', name, names())}.xosc"
+
+
+@cache
+def variations() -> dict[str, dict[str, Spread]]:
+    """What a seed varies, by scenario and parameter."""
+    text = (files("skidpad.scenarios") / "variation.yaml").read_bytes()
+    return msgspec.yaml.decode(text, type=dict[str, dict[str, Spread]])
+
+
+def drawn_parameters(name: str, seed: int, variant: CutIn = CutIn.ROLLING) -> dict[str, float]:
+    """Parameters of a scenario for a seed; the same for every weather and friction (X-8)."""
+    scenario = next(s for s in SCENARIOS if s.name == name)
+    values = dict(scenario.parameters)
+    if name == CUT_IN:
+        values |= variant_parameters(variant)
+    drawn = {
+        parameter: spread.draw(values[parameter], stream(seed, "scenario", name, parameter))
+        for parameter, spread in variations()[name].items()
+    }
+    if variant is CutIn.ROLLING or name != CUT_IN:
+        drawn[CRUISE_SPEED] = drawn[EGO_SPEED]
+    return values | drawn
+
+
+def drawn_skill(name: str, seed: int) -> dict[str, float]:
+    """Gains of the scripted drivers, by actor."""
+    scenario = next(s for s in SCENARIOS if s.name == name)
+    spread = Spread(spread=SKILL_SPREAD)
+    return {
+        actor: spread.draw(1.0, stream(seed, "scenario", name, "driver", actor))
+        for actor in scenario.actors
+    }
+
+
+def described() -> dict[str, Any]:
+    """Nominal parameters by scenario, for reports."""
+    return {s.name: dict(s.parameters) for s in SCENARIOS}

@@ -1,0 +1,104 @@
+"""Drivers of scripted actors: from a demanded speed and path to pedals and steer, through the tyres.
+
+A scenario player says where an actor should be; this driver tries, and the road decides how well it
+succeeds. On every backend, as it only sees poses and velocities.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import atan, cos, hypot, sin
+
+from skidpad.core.errors import ConfigError
+from skidpad.core.states import VehicleCommand
+from skidpad.core.vocabulary import ActorKind
+from skidpad.physics.types import VehicleType, vehicle_type, vehicle_types
+from skidpad.physics.vehicle import AIR_DENSITY, G, steer_share
+
+OMEGA, ZETA = 1.2, 0.9  # rad/s and damping of the lateral control, half the yaw response's
+V_LATERAL_MIN = 4.0  # m/s, keeps gains finite at walking speed
+A_LATERAL_MAX = 7.0  # m/s^2, the most that a driver steers for
+SPEED_GAIN = 1.2  # 1/s
+V_STANDING = 0.3  # m/s
+HOLD_BRAKE = 0.6
+
+
+@dataclass(frozen=True, slots=True)
+class Demand:
+    """What a scenario asks of an actor in a tick, relative to a point of its path."""
+
+    v: float  # m/s
+    a: float  # m/s^2, rate of v
+    curvature: float  # 1/m of the path
+    error: float  # m, the actor lies left of where it should be
+    error_rate: float  # m/s
+    a_lateral: float  # m/s^2 of the demanded sideways motion
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """State of an actor as its driver knows it."""
+
+    x: float
+    y: float
+    yaw: float
+    vx: float
+    vy: float
+
+    @property
+    def speed(self) -> float:
+        """Along the body, m/s."""
+        return self.vx * cos(self.yaw) + self.vy * sin(self.yaw)
+
+
+class ActorDriver:
+    """Feedforward through the vehicle's own dynamics plus feedback; no state between ticks.
+
+    skill: scales both gains, 1 is nominal; repeats of a scenario vary it.
+    """
+
+    def __init__(self, kind: str, skill: float = 1.0) -> None:
+        t = vehicle_type(kind)
+        self.type = t
+        self.speed_gain, self.omega = SPEED_GAIN * skill, OMEGA * skill
+        torque = 2.0 * (t.brake_torque_front + t.brake_torque_rear)
+        self.a_brake = torque / (t.wheel_radius * t.mass)
+        self.a_drive, self.p_drive = t.force_max / t.mass, t.power / t.mass
+        self.drag = 0.5 * AIR_DENSITY * t.drag_area / t.mass
+        self.rolling = t.rolling_resistance * G
+        self.understeer = (1.0 / t.stiffness_front - 1.0 / t.stiffness_rear) / G
+
+    def command(self, motion: Motion, demand: Demand) -> VehicleCommand:
+        """Pedals and steer for the coming step."""
+        throttle, brake = self._pedals(motion.speed, demand)
+        return VehicleCommand(throttle=throttle, brake=brake, steer=self._steer(motion, demand))
+
+    def _steer(self, motion: Motion, d: Demand) -> float:
+        v = max(motion.speed, V_LATERAL_MIN)
+        w = self.omega
+        a = d.a_lateral - w * w * d.error - 2.0 * ZETA * w * d.error_rate
+        most = A_LATERAL_MAX / (v * v)
+        kappa = min(max(d.curvature + a / (v * v), -most), most)
+        angle = atan(self.type.wheelbase * kappa) + self.understeer * v * v * kappa
+        return float(min(max(angle / (self.type.steer_max * steer_share(v)), -1.0), 1.0))
+
+    def _pedals(self, v: float, d: Demand) -> tuple[float, float]:
+        if d.v < V_STANDING and v < V_STANDING:
+            return 0.0, HOLD_BRAKE
+        a = d.a + self.speed_gain * (d.v - v)
+        wanted = a + self.drag * v * v + self.rolling
+        if wanted >= 0.0:
+            return min(wanted / min(self.a_drive, self.p_drive / max(v, 1.0)), 1.0), 0.0
+        return 0.0, min(-wanted / self.a_brake, 1.0)
+
+
+def nearest_type(kind: ActorKind, length: float, width: float, height: float) -> str:
+    """Id of the vehicle type of this kind whose body is nearest in size."""
+    of_kind = {k: t for k, t in vehicle_types().items() if t.actor_kind is kind}
+    if not of_kind:
+        raise ConfigError(f"there is no vehicle type of kind {kind.name.lower()}")
+
+    def distance(t: VehicleType) -> float:
+        return hypot(t.length - length, t.width - width, t.height - height)
+
+    return min(of_kind, key=lambda k: distance(of_kind[k]))

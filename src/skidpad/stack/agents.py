@@ -1,0 +1,225 @@
+"""Agents written for CARLA's leaderboard as stacks (decision G-6): `--controller agent:PATH:CLASS`.
+
+An agent has `setup`, `sensors`, `set_global_plan`, `run_step(input_data, timestamp)` and `destroy`.
+It lives in CARLA's axes, so everything that goes in or out passes `core.lefthanded`. Its control is
+read by attribute; nothing here imports carla.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+from math import cos, degrees, pi, tau
+from typing import Any, ClassVar
+
+import numpy as np
+
+from skidpad.core.errors import ConfigError, StackError
+from skidpad.core.frames import SensorFrame
+from skidpad.core.geometry import Pose
+from skidpad.core.lefthanded import (
+    mirrored,
+    pose_from_carla,
+    pose_to_carla,
+    turn_from_carla,
+    vector_from_carla,
+)
+from skidpad.core.setup import DT
+from skidpad.core.specs import CameraSpec, Modality, SensorSpec
+from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.stack.interface import Stack
+from skidpad.stack.loading import import_class
+
+METHODS = ("setup", "sensors", "run_step")
+CAMERAS = {
+    "sensor.camera.rgb": Modality.RGB,
+    "sensor.camera.depth": Modality.DEPTH,
+    "sensor.camera.semantic_segmentation": Modality.SEMANTIC,
+}
+GNSS, IMU, SPEEDOMETER = "sensor.other.gnss", "sensor.other.imu", "sensor.speedometer"
+POINT_SENSORS = (GNSS, IMU, SPEEDOMETER, "sensor.other.speedometer")
+G = 9.81  # m/s^2, what CARLA's accelerometer feels at rest
+EARTH_RADIUS = 6_378_137.0  # m, as in CARLA's projection
+DEPTH_FAR = 1000.0  # m, full scale of CARLA's depth images
+DEPTH_STEPS = 256**3 - 1
+ROUTE_LENGTH, ROUTE_STEP = 500.0, 5.0  # m
+
+
+class RoadOption(IntEnum):
+    """What a point of the plan asks for; numbers as in CARLA's agents."""
+
+    LANEFOLLOW = 4
+
+
+@dataclass(frozen=True, slots=True)
+class Vector:
+    """x, y, z."""
+
+    x: float
+    y: float
+    z: float
+
+
+@dataclass(frozen=True, slots=True)
+class Rotation:
+    """Degrees."""
+
+    pitch: float
+    yaw: float
+    roll: float
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """A pose as agents read it: `location` and `rotation`."""
+
+    location: Vector
+    rotation: Rotation
+
+
+def load_agent(where: str) -> type[Stack]:
+    """The agent class named by `path.py:Class` (or module:Class), as a stack."""
+    kind = import_class(where, "agent")
+    for method in METHODS:
+        if not callable(getattr(kind, method, None)):
+            raise ConfigError(f"agent {where!r}: class {kind.__name__} has no method {method}")
+    return type(kind.__name__, (AgentStack,), {"agent_class": kind})
+
+
+class AgentStack:
+    """One agent at the wheel."""
+
+    agent_class: ClassVar[type[Any]]
+    report: StackReport = StackReport()
+
+    def __init__(
+        self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
+    ) -> None:
+        del specs
+        self.map = map
+        self.agent = _instance(self.agent_class)
+        self.agent.setup(str(settings.get("config", "")))
+        self.wanted: list[dict[str, Any]] = [dict(s) for s in self.agent.sensors()]
+        self.specs = tuple(_camera(s) for s in self.wanted if _kind(s) in CAMERAS)
+        self.planned = False
+
+    def sensors(self) -> tuple[SensorSpec, ...]:
+        """The cameras that it asked for; the rest is read from the ego's own motion."""
+        return self.specs
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        """One `run_step`."""
+        if not self.planned:
+            self._plan(frame.ego.pose)
+            self.planned = True
+        data = {str(s["id"]): (frame.tick, self._reading(s, frame)) for s in self.wanted}
+        control = self.agent.run_step(data, frame.tick * DT)
+        if control is None:
+            raise StackError("run_step returned no control")
+        return VehicleCommand(
+            throttle=float(control.throttle),
+            brake=float(control.brake),
+            steer=mirrored(float(control.steer)),
+            handbrake=bool(getattr(control, "hand_brake", False)),
+            reverse=bool(getattr(control, "reverse", False)),
+        )
+
+    def close(self) -> None:
+        """The run is over."""
+        destroy = getattr(self.agent, "destroy", None)
+        if callable(destroy):
+            destroy()
+
+    def _plan(self, start: Pose) -> None:
+        """The way along the ego's lane, as GPS and as world coordinates."""
+        give = getattr(self.agent, "set_global_plan", None)
+        place: LanePoint | None = self.map.project(start.x, start.y, start.z)
+        if not callable(give):
+            return
+        gps, world = [], []
+        for _ in range(int(ROUTE_LENGTH / ROUTE_STEP)):
+            if place is None:
+                break
+            gps.append((_gps(place.pose), RoadOption.LANEFOLLOW))
+            world.append((transform(place.pose), RoadOption.LANEFOLLOW))
+            place = self.map.ahead(place, ROUTE_STEP)
+        give(gps, world)
+
+    def _reading(self, wanted: Mapping[str, Any], frame: SensorFrame) -> Any:
+        kind, ego = _kind(wanted), frame.ego
+        if kind == GNSS:
+            place = _gps(ego.pose)
+            return np.array([place["lat"], place["lon"], place["z"]])
+        if kind == IMU:
+            ax, ay, az = vector_from_carla(ego.ax, ego.ay, G)
+            wx, wy, wz = turn_from_carla(0.0, 0.0, ego.yaw_rate)
+            return np.array([ax, ay, az, wx, wy, wz, (pi / 2.0 - ego.pose.yaw) % tau])
+        if kind in CAMERAS:
+            return _image(str(wanted["id"]), CAMERAS[kind], frame)
+        return {"speed": ego.speed}
+
+
+def _instance(kind: type[Any]) -> Any:
+    """Newer agents take no argument or a host, older ones the path of their configuration."""
+    try:
+        return kind()
+    except TypeError:
+        return kind("")
+
+
+def _kind(wanted: Mapping[str, Any]) -> str:
+    kind = str(wanted.get("type", ""))
+    if kind not in CAMERAS and kind not in POINT_SENSORS:
+        known = ", ".join((*CAMERAS, *POINT_SENSORS))
+        raise StackError(f"the agent asks for a sensor {kind!r}; there are: {known}")
+    return kind
+
+
+def _camera(wanted: Mapping[str, Any]) -> CameraSpec:
+    """A camera as the agent describes it, in CARLA's axes."""
+    mount = pose_from_carla(
+        *(float(wanted.get(k, 0.0)) for k in ("x", "y", "z", "roll", "pitch", "yaw"))
+    )
+    return CameraSpec(
+        str(wanted["id"]),
+        CAMERAS[_kind(wanted)],
+        int(wanted.get("width", 800)),
+        int(wanted.get("height", 600)),
+        float(wanted.get("fov", 90.0)),
+        mount,
+    )
+
+
+def _image(id: str, modality: Modality, frame: SensorFrame) -> np.ndarray[Any, Any]:
+    """(H, W, 4) BGRA bytes, as CARLA's sensors deliver them."""
+    if id not in frame.images:
+        raise StackError(f"camera {id!r} delivers no image: run with --sensors pixels")
+    image = frame.images[id]
+    if modality is Modality.RGB:
+        assert image.rgb is not None
+        bgr = image.rgb[:, :, ::-1]
+    elif modality is Modality.SEMANTIC:
+        assert image.labels is not None
+        zero = np.zeros_like(image.labels)
+        bgr = np.stack([zero, zero, image.labels], axis=2)
+    else:
+        share = np.clip(image.depth() / DEPTH_FAR, 0.0, 1.0)
+        steps = (share * DEPTH_STEPS).astype(np.uint32)
+        bgr = np.stack([steps >> 16 & 255, steps >> 8 & 255, steps & 255], axis=2).astype(np.uint8)
+    alpha = np.full((*bgr.shape[:2], 1), 255, dtype=np.uint8)
+    return np.concatenate([bgr, alpha], axis=2)
+
+
+def _gps(pose: Pose) -> dict[str, float]:
+    """Latitude, longitude in deg and height, around 0 N 0 E; north is left of the x axis."""
+    lat = degrees(pose.y / EARTH_RADIUS)
+    lon = degrees(pose.x / (EARTH_RADIUS * cos(pose.y / EARTH_RADIUS)))
+    return {"lat": lat, "lon": lon, "z": pose.z}
+
+
+def transform(pose: Pose) -> Transform:
+    """A pose in CARLA's axes."""
+    x, y, z, roll, pitch, yaw = pose_to_carla(pose)
+    return Transform(Vector(x, y, z), Rotation(pitch, yaw, roll))

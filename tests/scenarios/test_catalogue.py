@@ -1,0 +1,103 @@
+"""The shipped scenarios: they are what their source says, and the ASAM checkers accept them."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+
+from skidpad.scenarios.generate import FOLDER, SCENARIOS, file_name, write
+from skidpad.scenarios.hazard_export import OscVersion
+from skidpad.scenarios.player import load, problems
+from skidpad.scenarios.variation import (
+    CutIn,
+    drawn_parameters,
+    drawn_skill,
+    names,
+    variant_parameters,
+    variations,
+)
+
+CHECKER = Path(__file__).with_name("asam_check.py")
+FILES = [FOLDER / file_name(s.name, v) for s in SCENARIOS for v in OscVersion]
+
+
+@pytest.fixture(scope="module")
+def asam_python() -> str:
+    """Python of the environment with the ASAM checkers."""
+    python = os.environ.get("SKIDPAD_ASAM_PYTHON")
+    if not python or not Path(python).exists():
+        pytest.skip("SKIDPAD_ASAM_PYTHON names no environment with the ASAM checkers")
+    return python
+
+
+@pytest.mark.req("B-090", "B-091", "B-092")
+def test_the_files_are_what_their_source_writes(tmp_path):
+    for path in write(tmp_path):
+        assert path.read_bytes() == (FOLDER / path.name).read_bytes(), path.name
+
+
+@pytest.mark.req("B-090", "B-091", "B-092")
+def test_the_asam_checkers_accept_every_file(asam_python):
+    done = subprocess.run(
+        [asam_python, str(CHECKER), *map(str, FILES)], capture_output=True, text=True, check=True
+    )
+    verdicts = json.loads(next(r for r in done.stdout.splitlines() if r.startswith("ASAM "))[5:])
+    for path in FILES:
+        verdict = verdicts[str(path)]
+        assert verdict["issues"] == [], path.name
+        assert any("valid_schema" in c for c in verdict["completed"]), path.name
+        if "_1.0" not in path.name:
+            assert verdict["skipped"] == [], path.name
+
+
+def test_the_1_0_files_are_valid_by_the_schema_of_1_0(asam_python):
+    ask = "import qc_openscenario, pathlib; print(pathlib.Path(qc_openscenario.__file__).parent)"
+    done = subprocess.run([asam_python, "-c", ask], capture_output=True, text=True, check=True)
+    folder = Path(done.stdout.strip()) / "schema" / "1.0.0"
+    schema = etree.XMLSchema(etree.parse(str(next(folder.glob("*.xsd")))))
+    for path in FILES:
+        assert schema.validate(etree.parse(str(path))) == ("_1.0" in path.name), path.name
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda p: p.name)
+def test_the_player_supports_everything_in_them(path):
+    assert problems(path) == []
+    assert load(path).ego == "ego"
+
+
+@pytest.mark.req("B-092", "B-093")
+def test_one_other_vehicle_in_two_scenarios_and_two_in_the_third():
+    others = {s.name: len(s.actors) - 1 for s in SCENARIOS}
+    assert others == {"ghost_cut_in": 1, "lead_slowdown": 1, "front_accident": 2}
+
+
+@pytest.mark.req("X-8")
+@pytest.mark.parametrize("name", names())
+def test_a_seed_draws_every_varied_parameter_from_its_own_stream(name):
+    nominal = next(s for s in SCENARIOS if s.name == name).parameters
+    draws = [drawn_parameters(name, seed) for seed in range(40)]
+    assert draws[3] == drawn_parameters(name, 3)
+    for parameter, spread in variations()[name].items():
+        values = np.array([d[parameter] for d in draws])
+        reach = spread.gap + 2.5 * spread.spread * nominal[parameter]
+        assert values.std() > 0.0
+        assert np.abs(values - nominal[parameter]).max() <= reach + 1e-9
+    assert all(d["CruiseSpeed"] == d["EgoSpeed"] for d in draws)
+    skills = [drawn_skill(name, seed)["ego"] for seed in range(40)]
+    assert 0.5 < min(skills) < 1.0 < max(skills) < 1.5
+
+
+@pytest.mark.req("B-074", "B-075")
+def test_variants_differ_in_delay_and_distance_only():
+    original, unfixed, fixed = map(variant_parameters, (CutIn.ORIGINAL, CutIn.UNFIXED, CutIn.FIXED))
+    assert {k for k in original if original[k] != unfixed[k]} == {"GhostS"}
+    assert {k for k in fixed if fixed[k] != unfixed[k]} == {"MergeDistance"}
+    assert fixed["MergeDistance"] < unfixed["MergeDistance"]
+    assert unfixed["GhostS"] == pytest.approx(original["GhostS"] - 40 * 0.05 * 22.0)
+    assert original["EgoSpeed"] == 0.0

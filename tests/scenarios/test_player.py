@@ -1,0 +1,266 @@
+"""The player: trajectories to the centimetre, triggers, refusals with element and line."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import hypot
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from skidpad.campaign.play import Play, play
+from skidpad.core.errors import FileError
+from skidpad.core.vocabulary import GripModel, Outcome
+from skidpad.core.weather import Weather
+from skidpad.physics.presets import preset
+from skidpad.scenarios.generate import FOLDER
+from skidpad.scenarios.motion import Shape, Transition
+from skidpad.scenarios.player import load, problems
+from skidpad.scenarios.reader import Unsupported
+from skidpad.scenarios.scene import Mode
+
+HEAD = """<?xml version='1.0'?>
+<OpenSCENARIO>
+  <FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="x" author="x"/>
+  <ParameterDeclarations>
+    <ParameterDeclaration name="V" parameterType="double" value="10"/>
+  </ParameterDeclarations>
+  <CatalogLocations/>
+  <RoadNetwork><LogicFile filepath="straight.xodr"/></RoadNetwork>
+  <Entities>{entities}</Entities>
+  <Storyboard><Init><Actions>{init}</Actions></Init>
+    <Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutionCount="1">
+      <Actors selectTriggeringEntities="false"><EntityRef entityRef="other"/></Actors>
+      <Maneuver name="m">{events}</Maneuver></ManeuverGroup>
+      <StartTrigger/></Act></Story>
+    <StopTrigger><ConditionGroup><Condition name="end" delay="0" conditionEdge="none">
+      <ByValueCondition><SimulationTimeCondition value="{end}" rule="greaterOrEqual"/>
+      </ByValueCondition></Condition></ConditionGroup></StopTrigger>
+  </Storyboard>
+</OpenSCENARIO>
+"""
+ENTITY = """<ScenarioObject name="{}"><Vehicle name="v" vehicleCategory="car">
+<BoundingBox><Center x="0" y="0" z="0.7"/><Dimensions width="1.8" length="4.2" height="1.5"/>
+</BoundingBox></Vehicle></ScenarioObject>"""
+PLACED = """<Private entityRef="{0}"><PrivateAction><TeleportAction><Position>
+<LanePosition roadId="1" laneId="{1}" s="{2}"/></Position></TeleportAction></PrivateAction>
+<PrivateAction><LongitudinalAction><SpeedAction>
+<SpeedActionDynamics dynamicsShape="step" value="0" dynamicsDimension="time"/>
+<SpeedActionTarget><AbsoluteTargetSpeed value="{3}"/></SpeedActionTarget></SpeedAction>
+</LongitudinalAction></PrivateAction></Private>"""
+EVENT = """<Event name="{}" priority="parallel"><Action name="x">{}</Action>
+<StartTrigger><ConditionGroup><Condition name="c" delay="{}" conditionEdge="none">{}
+</Condition></ConditionGroup></StartTrigger></Event>"""
+AT_2_S = """<ByValueCondition><SimulationTimeCondition value="2" rule="greaterOrEqual"/>
+</ByValueCondition>"""
+VANISH = """<GlobalAction><EntityAction entityRef="other"><DeleteEntityAction/></EntityAction>
+</GlobalAction>"""
+APPEAR = """<GlobalAction><EntityAction entityRef="other"><AddEntityAction><Position>
+<WorldPosition x="60" y="-1.75" h="0"/></Position></AddEntityAction></EntityAction></GlobalAction>"""
+
+
+def slow_down(v=0.0, rate=2.0, shape="linear", dimension="rate"):
+    return f"""<PrivateAction><LongitudinalAction><SpeedAction>
+<SpeedActionDynamics dynamicsShape="{shape}" value="{rate}" dynamicsDimension="{dimension}"/>
+<SpeedActionTarget><AbsoluteTargetSpeed value="{v}"/></SpeedActionTarget></SpeedAction>
+</LongitudinalAction></PrivateAction>"""
+
+
+def trajectory(rows, timing='<Timing domainAbsoluteRelative="absolute" scale="1" offset="0"/>'):
+    vertices = "".join(
+        f'<Vertex time="{t}"><Position><WorldPosition x="{x}" y="{y}" h="{h}"/></Position></Vertex>'
+        for t, x, y, h in rows
+    )
+    return f"""<PrivateAction><RoutingAction><FollowTrajectoryAction>
+<Trajectory name="t" closed="false"><Shape><Polyline>{vertices}</Polyline></Shape></Trajectory>
+<TimeReference>{timing}</TimeReference><TrajectoryFollowingMode followingMode="position"/>
+</FollowTrajectoryAction></RoutingAction></PrivateAction>"""
+
+
+def scenario(folder: Path, *events: str, end=6.0, init_more="", other_lane=-1, name="x") -> Path:
+    text = HEAD.format(
+        entities=ENTITY.format("ego") + ENTITY.format("other"),
+        init=PLACED.format("ego", -3, 100, 10) + PLACED.format("other", other_lane, 120, "$V")
+        + init_more,
+        events="".join(events),
+        end=end,
+    )  # fmt: skip
+    path = folder / f"{name}.xosc"
+    path.write_text(text, encoding="utf-8")
+    return path
+
+
+def played(path: Path, **more):
+    wish = Play(file=path, label="test", weather=Weather(), controller="ideal", actors=Mode.IDEAL)
+    return play(replace(wish, **more))
+
+
+def test_a_trajectory_is_followed_to_the_centimetre(tmp_path):
+    rows = [
+        (t, 120 + 8 * t + 0.4 * t * t, -1.75 + 0.8 * np.sin(t), 0.05 * t)
+        for t in np.arange(0.0, 5.01, 0.1)
+    ]
+    path = scenario(tmp_path, EVENT.format("e", trajectory(rows), 0, AT_2_S.replace("2", "0")))
+    log = played(path).run.log
+    source = np.array(rows)
+    for k in range(1, 100):
+        t = log.t[k]
+        x, y = (np.interp(t, source[:, 0], source[:, c]) for c in (1, 2))
+        assert hypot(log.actors.x[k, 1] - x, log.actors.y[k, 1] - y) < 0.01, t
+        assert log.actors.yaw[k, 1] == pytest.approx(0.05 * t, abs=1e-3)
+
+
+def test_a_relative_trajectory_counts_from_its_own_begin(tmp_path):
+    timing = '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/>'
+    rows = [(0.0, 150.0, -1.75, 0.0), (2.0, 170.0, -1.75, 0.0)]
+    path = scenario(tmp_path, EVENT.format("e", trajectory(rows, timing), 0, AT_2_S))
+    log = played(path).run.log
+    assert log.actors.x[60, 1] == pytest.approx(160.0, abs=0.01)  # 1 s after 2 s
+    assert log.actors.x[-1, 1] == pytest.approx(170.0, abs=0.01)  # stands at the end
+
+
+def test_entities_vanish_and_appear(tmp_path):
+    late = AT_2_S.replace('"2"', '"4"')
+    path = scenario(
+        tmp_path, EVENT.format("gone", VANISH, 0, AT_2_S), EVENT.format("back", APPEAR, 0, late)
+    )
+    log = played(path).run.log
+    there = log.present[:, 1]
+    assert there[:40].all()
+    assert not there[42:80].any()
+    assert there[82:].all()
+    assert log.actors.x[81, 1] == pytest.approx(60.0, abs=1.1)
+
+
+@pytest.mark.parametrize("mode", [Mode.IDEAL, Mode.PHYSICAL])
+def test_a_speed_action_starts_when_its_trigger_fires_and_keeps_its_rate(tmp_path, mode):
+    path = scenario(tmp_path, EVENT.format("slow", slow_down(4.0, 2.0), 0, AT_2_S))
+    log = played(path, actors=mode).run.log
+    v = np.hypot(log.actors.vx[:, 1], log.actors.vy[:, 1])
+    loose = 0.01 if mode is Mode.IDEAL else 0.4
+    assert v[40] == pytest.approx(10.0, abs=loose)
+    assert v[70] == pytest.approx(10.0 - 2.0 * 1.5, abs=0.11 + loose)
+    assert v[-1] == pytest.approx(4.0, abs=loose)
+
+
+def test_a_delay_puts_a_trigger_off(tmp_path):
+    path = scenario(tmp_path, EVENT.format("slow", slow_down(0.0, 5.0), 1.5, AT_2_S))
+    v = np.hypot(*(column[:, 1] for column in played(path).run.log.actors[4:6]))
+    assert v[70] == pytest.approx(10.0, abs=0.01)
+    assert v[75] < 9.0
+
+
+@pytest.mark.parametrize("mode", [Mode.IDEAL, Mode.PHYSICAL])
+def test_a_lane_change_ends_on_the_other_lane(tmp_path, mode):
+    change = """<PrivateAction><LateralAction><LaneChangeAction>
+<LaneChangeActionDynamics dynamicsShape="sinusoidal" value="2" dynamicsDimension="time"/>
+<LaneChangeTarget><RelativeTargetLane value="-1" entityRef="other"/></LaneChangeTarget>
+</LaneChangeAction></LateralAction></PrivateAction>"""
+    path = scenario(tmp_path, EVENT.format("change", change, 0, AT_2_S), end=8.0)
+    y = played(path, actors=mode).run.log.actors.y[:, 1]
+    assert y[40] == pytest.approx(-1.75, abs=0.02)
+    assert y[60] == pytest.approx(-3.5, abs=0.05 if mode is Mode.IDEAL else 0.8)
+    assert y[-1] == pytest.approx(-5.25, abs=0.05 if mode is Mode.IDEAL else 0.2)
+
+
+@pytest.mark.parametrize("shape", list(Shape))
+def test_transitions_end_where_they_should_and_their_rates_are_derivatives(shape):
+    change = Transition(2.0, 7.0, 3.0, shape)
+    assert change.at(3.0)[0] == change.at(9.0)[0] == 7.0
+    if shape is Shape.STEP:
+        return
+    for t in np.linspace(0.2, 2.8, 14):
+        h = 1e-5
+        before, now, after = (change.at(float(t + d)) for d in (-h, 0.0, h))
+        assert now[1] == pytest.approx((after[0] - before[0]) / (2 * h), abs=1e-5)
+        assert now[2] == pytest.approx((after[1] - before[1]) / (2 * h), abs=1e-4)
+
+
+def test_what_is_unknown_is_refused_by_element_and_line(tmp_path):
+    odd = "<PrivateAction><VisibilityAction graphics='true'/></PrivateAction>"
+    weird = "<ByValueCondition><TrafficSignalCondition name='x' state='y'/></ByValueCondition>"
+    path = scenario(
+        tmp_path,
+        EVENT.format("one", odd, 0, AT_2_S),
+        EVENT.format("two", slow_down(shape="ramp"), 0, weird),
+    )
+    with pytest.raises(Unsupported, match=r"x\.xosc, line \d+, <VisibilityAction>"):
+        load(path)
+    found = problems(path)
+    assert [p.element for p in found] == [
+        "VisibilityAction",
+        "SpeedActionDynamics",
+        "TrafficSignalCondition",
+    ]
+    lines = path.read_text(encoding="utf-8").splitlines()
+    for problem in found:
+        assert f"<{problem.element}" in lines[problem.line - 1]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ('value="$V"', 'value="$W"', "parameter '\\$W' is not declared"),
+        ('value="$V"', 'value="nan"', "must be finite"),
+        ('s="120"', 's="far"', "must be a number"),
+        ('s="120"', 's="9120"', "is not there"),
+        ('entityRef="other"', 'entityRef="nobody"', "no entity 'nobody'"),
+        ("<OpenSCENARIO>", "<OpenDRIVE>", "not XML"),
+        ("straight.xodr", "nowhere.xodr", "no road file"),
+        ('revMinor="2"', 'revMinor="9"', "revMinor"),
+    ],
+)
+def test_what_is_wrong_is_named(tmp_path, old, new, message):
+    path = scenario(tmp_path, EVENT.format("slow", slow_down(), 0, AT_2_S))
+    path.write_text(path.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(FileError, match=message):
+        load(path)
+
+
+def test_entities_of_xml_are_not_expanded(tmp_path):
+    path = scenario(tmp_path, EVENT.format("slow", slow_down(), 0, AT_2_S))
+    text = path.read_text(encoding="utf-8").replace(
+        "<OpenSCENARIO>", '<!DOCTYPE a [<!ENTITY b SYSTEM "/etc/passwd">]><OpenSCENARIO>', 1
+    )
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(FileError, match="document type"):
+        load(path)
+
+
+def test_a_parameter_can_be_given(tmp_path):
+    path = scenario(tmp_path, EVENT.format("slow", slow_down(), 0, AT_2_S))
+    assert load(path, {"V": 7.5}).entities["other"].speed == 7.5
+    with pytest.raises(FileError, match="declares no parameter 'U'"):
+        load(path, {"U": 1.0})
+
+
+@pytest.mark.req("B-073")
+def test_the_ghost_merges_at_its_distance_whatever_the_ego_does():
+    wish = Play(file=FOLDER / "ghost_cut_in.xosc", label="t", weather=Weather())
+    a = play(wish).run.log.actors
+    begin = int(np.argmax(np.abs(a.y[:, 1] + 1.75) > 0.05))
+    assert abs(a.x[begin, 1] - a.x[begin, 0]) < 2.0 + 0.5 * 8.0  # half a second of closing speed
+
+
+@pytest.mark.req("B-094", "B-104")
+def test_a_collision_ends_the_run():
+    # without a driver's brakes: the ego rolls on into the wreck
+    wish = Play(
+        file=FOLDER / "front_accident.xosc", label="t", weather=Weather(),
+        controller="tests.scenarios.blind:Blind",
+    )  # fmt: skip
+    result = play(wish)
+    assert result.outcome is Outcome.COLLISION
+    assert len(result.run.log.contacts) == 1
+    assert result.run.log.contacts[0].tick == result.run.log.tick[-1]
+
+
+@pytest.mark.req("B-062", "B-065")
+def test_reduced_friction_reaches_ego_and_others_alike():
+    wish = Play(
+        file=FOLDER / "lead_slowdown.xosc", label="t", weather=preset("icy_70"),
+        grip=GripModel.STATISTICAL, duration=2.0,
+    )  # fmt: skip
+    mu = play(wish).run.log.mu
+    assert mu[-1] == pytest.approx(np.full((2, 4), 0.9 * 0.156082), abs=1e-4)

@@ -55,7 +55,7 @@ def run_matrix(
     OutputError when `out` holds something else, or this campaign and `resume` is false.
     """
     here = fingerprint().short
-    with Ledger(out, identity(cells), resume=resume) as ledger:
+    with Ledger(out, identity(cells), resume, Entry) as ledger:
         done = ledger.done()
         jobs = [
             Job(c.name, "skidpad.campaign.matrix:drive_one", (c, out), c.deadline_s)

@@ -87,7 +87,7 @@ def run_jobs(jobs: Iterable[Job], workers: int, warm: str | None = None) -> Iter
     if not queue.waiting:
         return
     context = multiprocessing.get_context("spawn")
-    with _single_threaded():
+    with single_threaded():
         if warm is not None:
             process = context.Process(target=_warm, args=(warm,))
             process.start()
@@ -175,7 +175,7 @@ def _work(pipe: Connection) -> None:
         except (EOFError, OSError):
             return
         try:
-            answer: tuple[Any, str] = (_resolve(job.target)(job.argument), "")
+            answer: tuple[Any, str] = (resolve(job.target)(job.argument), "")
         except Exception:
             answer = (None, traceback.format_exc())
         pipe.send(answer)
@@ -193,7 +193,8 @@ def _die_with_parent() -> None:
     threading.Thread(target=watch, daemon=True).start()
 
 
-def _resolve(target: str) -> Callable[[Any], Any]:
+def resolve(target: str) -> Callable[[Any], Any]:
+    """The function that `module:function` names."""
     module, _, name = target.partition(":")
     function: Callable[[Any], Any] = getattr(importlib.import_module(module), name)
     return function
@@ -206,7 +207,7 @@ def _warm(target: str) -> None:
 
 
 @contextmanager
-def _single_threaded() -> Iterator[None]:
+def single_threaded() -> Iterator[None]:
     """Children inherit one thread for each library; the parent's own settings come back after."""
     before = {name: os.environ.get(name) for name in SINGLE_THREADED}
     os.environ.update(dict.fromkeys(SINGLE_THREADED, "1"))

@@ -10,9 +10,11 @@ from skidpad.cli.channels import channels
 from skidpad.cli.channels_drive import drive
 from skidpad.cli.compare import compare
 from skidpad.cli.friction import friction
+from skidpad.cli.grip import campaign, grip
 from skidpad.cli.hazards import hazards
 from skidpad.cli.map import maps
 from skidpad.cli.monitor import monitor, safety_case
+from skidpad.cli.play import play
 from skidpad.cli.profiles import profiles
 from skidpad.cli.rerun import rerun, study
 from skidpad.core.errors import InputError, SkidpadError
@@ -53,6 +55,9 @@ channels.command()(drive)
 app.add_typer(channels)
 app.add_typer(hazards)
 app.command()(friction)
+app.command()(grip)
+app.command()(play)
+app.add_typer(campaign)
 app.command()(monitor)
 app.command("safety-case")(safety_case)
 

@@ -7,11 +7,11 @@ from __future__ import annotations
 import errno
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, Generic, Protocol, TypeVar
 
 import msgspec
 
@@ -37,11 +37,49 @@ class Entry:
     error: str = ""  # one sentence, for agent_error, crashed, timeout
 
 
-class Ledger:
+class HasOutcome(Protocol):
+    """Identifying columns of a row."""
+
+    @property
+    def outcome(self) -> str:
+        """core.Outcome."""
+        ...
+
+
+class Line(Protocol):
+    """A line of any campaign's ledger: a dataclass like `Entry`."""
+
+    @property
+    def run(self) -> str:
+        """Name of the run within the campaign."""
+        ...
+
+    @property
+    def key(self) -> HasOutcome:
+        """Which run, and how it ended."""
+        ...
+
+    @property
+    def fingerprint(self) -> str:
+        """Where it was driven."""
+        ...
+
+
+E = TypeVar("E", bound=Line)
+
+
+class Ledger(Generic[E]):
     """The open ledger of the one process that writes a campaign; use it as a context."""
 
-    def __init__(self, folder: Path, identity: dict[str, Any], resume: bool = False) -> None:
+    def __init__(
+        self,
+        folder: Path,
+        identity: dict[str, Any],
+        resume: bool = False,
+        kind: type[E] = Entry,  # type: ignore[assignment]
+    ) -> None:
         """identity: the resolved configuration, without workers and paths (decision M-18).
+        kind: what its lines are.
 
         OutputError when the folder holds another campaign, or this one and `resume` is false, or
         another process is writing it.
@@ -58,7 +96,7 @@ class Ledger:
             _lock(self._file, folder)
             if not (folder / CAMPAIGN).exists():
                 write_bytes(folder / CAMPAIGN, encode_identity(identity))
-            self.entries = read_ledger(folder)
+            self.entries: list[E] = read_ledger(folder, kind)
             self._heal()
         except BaseException:
             self.close()
@@ -81,9 +119,9 @@ class Ledger:
         if whole != self.path.stat().st_size:
             os.truncate(self._file, whole)
 
-    def append(self, entry: Entry) -> None:
+    def append(self, entry: E) -> None:
         """Record a finished run; when this returns, the line is on the disk."""
-        line = msgspec.json.encode(asdict(entry)) + b"\n"
+        line = msgspec.json.encode(entry) + b"\n"
         size = os.fstat(self._file).st_size
         try:
             written = os.write(self._file, line)
@@ -106,7 +144,7 @@ class Ledger:
             os.close(self._file)
             self._file = -1
 
-    def __enter__(self) -> Ledger:
+    def __enter__(self) -> Ledger[E]:
         return self
 
     def __exit__(
@@ -118,7 +156,10 @@ class Ledger:
         self.close()
 
 
-def read_ledger(folder: Path) -> list[Entry]:
+def read_ledger(
+    folder: Path,
+    kind: type[E] = Entry,  # type: ignore[assignment]
+) -> list[E]:
     """All entries, oldest first. A torn last line is passed over; any other damage is a FileError."""
     path = folder / LEDGER
     try:
@@ -128,19 +169,19 @@ def read_ledger(folder: Path) -> list[Entry]:
     entries = []
     for number, line in enumerate(lines[:-1], start=1):  # what follows the last newline is torn
         try:
-            entries.append(msgspec.json.decode(line, type=Entry))
+            entries.append(msgspec.json.decode(line, type=kind))
         except msgspec.MsgspecError as error:
             raise FileError(f"{path}, line {number} is damaged: {error}") from error
     return entries
 
 
-def latest(entries: Iterable[Entry]) -> list[Entry]:
+def latest(entries: Iterable[E]) -> list[E]:
     """The last word on each run, in the order of their names."""
     by_run = {e.run: e for e in entries}
     return [by_run[run] for run in sorted(by_run)]
 
 
-def fingerprints(entries: Sequence[Entry]) -> frozenset[str]:
+def fingerprints(entries: Sequence[Line]) -> frozenset[str]:
     """More than one: byte equality is not promised across this campaign (decision X-2)."""
     return frozenset(e.fingerprint for e in entries)
 

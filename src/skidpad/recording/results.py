@@ -126,7 +126,7 @@ class Timing:
 
 
 SORT = ("config", "weather", "seed", "profile", "sensors")
-TYPES: dict[str, Any] = {"int": pl.Int64, "float": pl.Float64, "str": pl.String}
+TYPES: dict[str, Any] = {"int": pl.Int64, "float": pl.Float64, "str": pl.String, "bool": pl.Boolean}
 
 
 def schema(*rows: type[Any]) -> dict[str, Any]:

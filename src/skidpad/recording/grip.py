@@ -1,0 +1,124 @@
+"""Rows of the friction campaign: one per run, like those of the matrix (B-125, B-126)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from skidpad.recording.files import content_hash, read_parquet, write_atomically, write_parquet
+from skidpad.recording.results import RESULTS, TIMING, metric, schema
+
+SERIES = "series"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GripKey:
+    """Which run a row is about, and how it ended."""
+
+    scenario: str
+    weather: str  # slug
+    friction: str  # original or reduced
+    seed: int
+    cutin: str  # variant of the cut-in
+    controller: str
+    sensors: str  # core.SensorLevel
+    model: str  # core.GripModel of the reduced friction
+    overlay: bool  # rain drops on the cameras
+    outcome: str  # core.Outcome
+    version: str = ""
+    log_hash: str | None = None  # equal hashes are equal drives
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GripMetrics:
+    """What the log of one run says; None where there is nothing to say (decision X-3)."""
+
+    triggered: bool | None = metric("every event of the scenario began", "G-2")
+    completion: bool | None = metric("no accident", "B-104")
+    score: float | None = metric("route completion times penalties, 0 to 100", "B-105")
+    route_completion: float | None = metric("share of the route driven, percent", "BD-07")
+    min_cvip_m: float | None = metric("least distance of box centres, ego to nearest NPC", "B-149")
+    loss_of_control_ego: bool | None = metric("ego slid or spun before any contact", "B-145")
+    loss_of_control_npc: bool | None = metric("an NPC slid or spun before any contact", "B-145")
+    npc_contact: bool | None = metric("two NPCs touched", "B-092")
+    max_slip_ego_deg: float | None = metric("largest side slip of the ego above 3 m/s", "B-145")
+    max_slip_npc_deg: float | None = metric("largest side slip of an NPC above 3 m/s", "B-145")
+    max_yaw_rate_npc_deg_s: float | None = metric("largest yaw rate of an NPC", "B-145")
+    steer_std: float | None = metric("deviation of the steering command", "B-144")
+    steer_corrections: float | None = metric("reversals of steering per second", "B-144")
+    ratio: float | None = metric("friction ratio at standstill", "B-068")
+    mu: float | None = metric("friction at the ego's tyres, mean", "B-068")
+    impact_kmh: float | None = metric("closing speed of the ego's first contact", "B-149")
+    duration_s: float | None = metric("simulated time", "B-094")
+    distance_m: float | None = metric("way of the ego", "B-105")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GripTiming:
+    """How long a run took; outside every hash."""
+
+    scenario: str
+    weather: str
+    friction: str
+    seed: int
+    wall_s: float
+    cpu_s: float
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class GripEntry:
+    """One finished run in the ledger."""
+
+    run: str
+    key: GripKey
+    metrics: GripMetrics
+    timing: GripTiming
+    fingerprint: str
+    attempts: int = 1
+    error: str = ""
+
+
+SORT = ("scenario", "cutin", "weather", "friction", "seed")
+COLUMNS = ("x", "y", "v", "cvip", "steer", "brake", "throttle", "npc_x", "npc_y")
+
+
+def grip_table(entries: Iterable[GripEntry]) -> pl.DataFrame:
+    """One row per run in canonical order."""
+    rows = [{**asdict(e.key), **asdict(e.metrics)} for e in entries]
+    return pl.DataFrame(rows, schema=schema(GripKey, GripMetrics)).sort(SORT)
+
+
+def write_grip_results(folder: Path, entries: list[GripEntry], csv: bool = False) -> str:
+    """Write results.parquet and timing.parquet; returns the content hash of the results."""
+    table = grip_table(entries)
+    timing = pl.DataFrame([asdict(e.timing) for e in entries], schema=schema(GripTiming))
+    for name, content in ((RESULTS, table), (TIMING, timing)):
+        write_parquet(folder / name, content)
+        if csv:
+            write_atomically((folder / name).with_suffix(".csv"), content.write_csv)
+    return grip_hash(table)
+
+
+def grip_hash(table: pl.DataFrame) -> str:
+    """Content hash of a results table (decision X-1)."""
+    return content_hash([table.sort(SORT)])
+
+
+def series_path(folder: Path, cell: str, seed: int) -> Path:
+    """Where the recorded series of a run lie."""
+    return folder / SERIES / cell / f"{seed:06d}.parquet"
+
+
+def write_series(path: Path, series: NDArray[np.float32]) -> None:
+    """Write the series (T, 9) of one run, atomically; columns as in COLUMNS."""
+    write_parquet(path, pl.DataFrame(series, schema=dict.fromkeys(COLUMNS, pl.Float32)))
+
+
+def read_series(path: Path) -> pl.DataFrame:
+    """The series of one run."""
+    return read_parquet(path)[0]

@@ -1,0 +1,206 @@
+"""Whole scenes: mirrored, renumbered, stale, and the same at both sensor levels."""
+
+from __future__ import annotations
+
+import ast
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from stackfakes import LANE_WIDTH, RED, SPECS, ArcMap, Car, draw, ego_at, frame
+
+import skidpad.stack
+from skidpad.core.geometry import Pose
+from skidpad.core.vocabulary import Supervision, Tier
+from skidpad.stack.adas import AdasStack
+
+approx = pytest.approx
+EMERGENCIES = {Tier.HARD_STOP, Tier.STOPPED_TOO_CLOSE, Tier.EMERGENCY}
+
+
+def stack_on(map=None, configuration=4, specs=SPECS, **options):
+    return AdasStack(specs, map or ArcMap(), {"configuration": configuration, **options})
+
+
+def approach(stack, level, v=22.0, v_lead=14.0, gap=70.0, ticks=175, left=0.0, permute=False):
+    """Commands and reports of a drive up to a slower car, with a second one in the next lane."""
+    log = []
+    for k in range(ticks):
+        x = v * 0.05 * k
+        lead = max(gap + v_lead * 0.05 * k - x, 2.5)
+        cars = [Car(lead, left), Car(lead + 12.0, LANE_WIDTH)]
+        points = [(lead - 2.0, left / lead, 0.0, v_lead - v), (40.0, 0.09, 0.0, -v)]
+        seen = frame(k, cars, ego_at(x, 0.0, 0.0, v), radar=points, level=level)
+        if permute:
+            seen = replace(seen, images=renumbered(seen.images, cars, k))
+        log.append((stack.tick(seen), stack.report))
+    return log
+
+
+def renumbered(images, cars, k):
+    """Depth images that also carry instances, whose ids are drawn anew each tick."""
+    ids = np.random.default_rng(k).permutation(len(cars)) + 2
+    named = [replace(car, instance=int(i)) for car, i in zip(cars, ids, strict=True)]
+    cameras = {spec.id: spec for spec in SPECS[:4]}
+    return {
+        name: replace(image, instances=draw(named, cameras[name]).instances)
+        for name, image in images.items()
+    }
+
+
+@pytest.mark.req("A-014")
+def test_instance_ids_change_nothing():
+    plain = approach(stack_on(), "pixels", ticks=40)
+    assert approach(stack_on(), "pixels", ticks=40, permute=True) == plain
+
+
+@pytest.mark.req("A-014", "A-015")
+def test_the_stack_can_import_nothing_that_knows_the_truth():
+    root = Path(skidpad.stack.__file__).parent
+    allowed = ("core", "roads", "stack")
+    found = set()
+    for path in root.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("skidpad"):
+                found.add(node.module)
+            elif isinstance(node, ast.Import):
+                found |= {a.name for a in node.names if a.name.startswith("skidpad")}
+    assert len(found) > 10
+    assert {name for name in found if name.split(".")[1] not in allowed} == set()
+    controllers = {
+        node.module
+        for path in (root / "control").glob("*.py")
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom)
+    }
+    assert not any("perception" in name for name in controllers), "control decides on values alone"
+
+
+@pytest.mark.req("A-036")
+def test_both_levels_drive_alike():
+    """Decision M-3: readings within 0.3 m, 97 % of detections agree, tiers within three ticks."""
+    pixels, objects = approach(stack_on(), "pixels"), approach(stack_on(), "objects")
+    pairs = [(a[1], b[1]) for a, b in zip(pixels, objects, strict=True)]
+    assert np.mean([a.detected == b.detected for a, b in pairs]) >= 0.97
+    for name in ("bumper", "roof", "fused"):
+        both = [(getattr(a, name), getattr(b, name)) for a, b in pairs]
+        errors = [abs(a - b) for a, b in both if a is not None and b is not None]
+        assert np.median(errors) <= 0.3
+        assert len(errors) > 20
+    for tier in (Tier.ACC_CLOSE, Tier.EMERGENCY, Tier.HARD_STOP):
+        first = [[r.tier for _, r in log].index(tier) for log in (pixels, objects)]
+        assert abs(first[0] - first[1]) <= 3, tier
+
+
+def mirrored_views(curvature, y, yaw, left):
+    """What the stack does in a scene and in its mirror image."""
+    rows = []
+    for sign in (1.0, -1.0):
+        map = Centred(sign * curvature)
+        stack = AdasStack(SPECS, map, {"configuration": 2})
+        cars = [Car(30.0, sign * left)]
+        points = [(28.0, sign * left / 30.0, 0.0, -3.0)]
+        ego = ego_at(0.0, sign * y, sign * yaw, 20.0)
+        for k in range(6):
+            command = stack.tick(frame(k, cars, ego, radar=points))
+        rows.append((command, stack.report))
+    return rows
+
+
+class Centred(ArcMap):
+    """Lane 1, the middle one, passes the origin, so that a mirrored map is a map of this kind."""
+
+    def _point(self, s, left):
+        return super()._point(s, left - LANE_WIDTH)
+
+    def project(self, x, y, z, hint=-1, driving=True):
+        k = self.curvature
+        heading = 0.0 if k == 0.0 else float(np.arctan2(k * x, 1.0 - k * y))
+        s = x if k == 0.0 else heading / k
+        left = y if k == 0.0 else (1.0 - float(np.hypot(k * x, 1.0 - k * y))) / k
+        lane = min(max(round(left / LANE_WIDTH) + 1, 0), 2)
+        piece = int(s // self.piece)
+        if not 0 <= piece < self.pieces or abs(left) > 25.0:
+            return None
+        return replace(
+            self._at(piece * 3 + lane, s - piece * self.piece),
+            offset=left - (lane - 1) * LANE_WIDTH,
+        )
+
+    def _at(self, lane, s, offset=0.0):
+        piece, k = divmod(lane, 3)
+        point = ArcMap(self.curvature)._at(k, 0.0)
+        x, y, heading = self._point(piece * self.piece + s, k * LANE_WIDTH)
+        return replace(
+            point, lane=lane, s=s, x=x, y=y, heading=heading, curvature=self.curvature,
+            road=int(self.lanes.road[lane]), offset=offset,
+        )  # fmt: skip
+
+
+@pytest.mark.req("A-016", "A-042", "A-068", "A-142", "X-4")
+@settings(max_examples=60, deadline=None)
+@given(
+    st.sampled_from([-0.004, -0.001, 0.0, 0.002, 0.003]),
+    st.floats(-1.5, 1.5),
+    st.floats(-0.2, 0.2),
+    st.floats(-3.0, 3.0),
+)
+def test_a_mirrored_scene_gives_mirrored_steer_and_equal_pedals(curvature, y, yaw, left):
+    (here, report), (there, mirror) = mirrored_views(curvature, y, yaw, left)
+    assert there.steer == approx(-here.steer, abs=1e-9)
+    assert (there.throttle, there.brake) == approx((here.throttle, here.brake))
+    assert mirror.yaw_error == approx(-report.yaw_error, abs=1e-9)
+    assert mirror.curvature == approx(-report.curvature, abs=1e-9)
+    assert mirror.lane_offset == approx(-report.lane_offset, abs=1e-9)
+    assert (mirror.status, mirror.detected, mirror.tier) == (
+        report.status, report.detected, report.tier,
+    )  # fmt: skip
+    assert mirror.radar_points == report.radar_points
+
+
+@pytest.mark.req("A-195", "A-109")
+@pytest.mark.parametrize("stale", [1, 2, 3])
+@pytest.mark.parametrize("level", ["pixels", "objects"])
+def test_stale_frames_after_a_relocation_brake_nobody(stale, level):
+    """The ego hit a car, was put elsewhere, and its cameras still show the old scene."""
+    stack, tick = stack_on(configuration=2), 0
+    wreck, old, new = [Car(2.0)], Pose(0.0, 0.0), Pose(300.0, 0.0)
+    phases = [Supervision.NONE] * 8 + [Supervision.BRAKE] * 10 + [Supervision.REALIGN]
+    for phase in phases:
+        ego = ego_at(old.x, v=0.0)
+        stack.tick(frame(tick, wreck, ego, supervision=phase, level=level))
+        tick += 1
+    assert stack.report.detected
+    for k in range(10):
+        shown = wreck if k < stale else []
+        ego = ego_at(new.x, v=0.0)
+        command = stack.tick(frame(tick, shown, ego, supervision=Supervision.WARM_UP, level=level))
+        assert command.brake == 1.0
+        tick += 1
+    for k in range(20):
+        command = stack.tick(frame(tick, [], ego_at(new.x + 0.275 * k, v=5.5), level=level))
+        assert stack.report.tier not in EMERGENCIES
+        assert not stack.report.detected
+        assert command.brake == 0.0
+        tick += 1
+
+
+@pytest.mark.req("A-109", "A-195")
+def test_a_relocation_clears_everything_that_was_seen_and_summed():
+    stack = stack_on(ArcMap(lights=((7, 0, 60.0),)))
+    for k in range(8):
+        stack.tick(frame(k, [Car(30.0)], ego_at(20.0, v=15.0), lights={7: RED}))
+    hierarchy = stack.hierarchy
+    hierarchy.speed_pid.update(5.0)
+    hierarchy.distance_pid.update(5.0)
+    assert stack.front.persistence.confirmed
+    assert stack.lock.signal == 7
+    stack.tick(frame(9, [], ego_at(400.0), supervision=Supervision.WARM_UP))
+    for pid in (hierarchy.speed_pid, hierarchy.distance_pid):
+        assert (pid.previous, pid.integral) == (0.0, 0.0)
+    assert not stack.front.persistence.confirmed
+    assert stack.lock.signal is None
+    assert stack.report.tier is Tier.NONE, "the supervisor drives"

@@ -5,6 +5,8 @@ import signal
 import time
 from pathlib import Path
 
+from skidpad.core.states import VehicleCommand
+
 
 def square(n):
     return n * n
@@ -40,3 +42,33 @@ def write_pid_and_sleep(path):
 
 def environment(name):
     return os.environ.get(name)
+
+
+class Suicide:
+    """A stack that takes its process with it."""
+
+    def __init__(self, specs, map, settings):
+        pass
+
+    def tick(self, frame):
+        os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Raising:
+    """A stack with a bug."""
+
+    def __init__(self, specs, map, settings):
+        pass
+
+    def tick(self, frame):
+        return VehicleCommand(throttle=1 / (10 - frame.tick))
+
+
+class Speechless:
+    """A stack that returns no command."""
+
+    def __init__(self, specs, map, settings):
+        pass
+
+    def tick(self, frame):
+        return None

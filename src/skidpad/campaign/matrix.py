@@ -117,7 +117,9 @@ def drive_one(argument: tuple[Cell, Path]) -> tuple[RunKey, Metrics, Timing, str
         rtf=len(run.log) * run.log.header.dt / wall,
         rtf_below_0_9_pct=pace.slow_pct,
     )
-    metrics = run_metrics(run.log, load_map(cell.map), metric_settings(cell))
+    metrics = Metrics()
+    if len(run.log):  # a stack may fail before it has answered once
+        metrics = run_metrics(run.log, load_map(cell.map), metric_settings(cell))
     return run_key(cell, run.outcome, digest), metrics, timing, run.error.strip().split("\n")[-1]
 
 

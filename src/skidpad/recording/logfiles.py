@@ -65,7 +65,7 @@ def tick_table(log: RunLog) -> pl.DataFrame:
             columns[prefix + field] = _typed(prefix + field, values)
     columns.update(zip(ActorSeries._fields, log.actors, strict=True))
     columns["present"] = log.present.astype(np.uint8)
-    columns["mu"] = log.mu.reshape(len(log), -1)
+    columns["mu"] = log.mu.reshape(len(log), 4 * len(log.table))
     return pl.DataFrame(columns)
 
 

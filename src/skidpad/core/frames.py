@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -41,6 +42,26 @@ def pack(rgb: NDArray[np.uint8]) -> NDArray[np.uint32]:
     padded = np.full((*rgb.shape[:2], 4), 255, dtype=np.uint8)
     padded[..., :3] = rgb
     return padded.view(np.dtype("<u4"))[..., 0]
+
+
+class PartialImages(Mapping[str, CameraImage]):
+    """Images by sensor id from a backend that can draw some rows of one alone."""
+
+    @abstractmethod
+    def rows(self, id: str, first: int, end: int) -> CameraImage:
+        """The image with at least the rows first <= row < end; the others may hold anything."""
+
+
+def image_rows(
+    images: Mapping[str, CameraImage], id: str, rows: tuple[int, int]
+) -> CameraImage | None:
+    """The image of a sensor with at least the rows [first, end); None: there is none.
+
+    Arrays have the size of the whole image; rows outside may hold anything.
+    """
+    if id not in images:
+        return None
+    return images.rows(id, *rows) if isinstance(images, PartialImages) else images[id]
 
 
 class RadarPoints(NamedTuple):

@@ -94,18 +94,22 @@ class CameraNoise:
         else:
             self._tile = np.zeros(1, dtype=np.int8)
 
-    def apply(self, tick: int, image: Packed) -> None:
-        """Degrade an image (H, W) of packed bytes in place."""
+    def apply(self, tick: int, image: Packed, rows: range | None = None) -> None:
+        """Degrade an image (H, W) of packed bytes in place, or only some of its rows."""
         s = self.strength
         if not s.any:
             return
         height, width = image.shape
+        rows = range(height) if rows is None else rows
         mask = glass_mask(height, width, s.pillar)
         if s.streaks > 0.0:
             count = int(STREAKS * s.streaks * height * width / 480_000.0)
-            draw_streaks(self._keys[2], tick, count, s.night, mask, image)
+            draw_streaks(self._keys[2], tick, count, s.night, mask, rows.start, rows.stop, image)
         if s.rain_sigma > 0.0 or s.night:
-            degrade(self._keys, tick, s.rain_sigma, s.grey, s.night, self._tile, mask, image)
+            degrade(
+                self._keys, tick, s.rain_sigma, s.grey, s.night, self._tile, mask,
+                rows.start, rows.stop, image,
+            )  # fmt: skip
 
 
 @kernel
@@ -127,10 +131,12 @@ def degrade(
     night: bool,
     tile: NDArray[np.int8],
     first: NDArray[np.int32],
+    first_row: int,
+    end_row: int,
     image: Packed,
 ) -> None:
     """Rain: noise, then mix with grey. Night: gain, lift, noise. Clip once at the end (A-228)."""
-    height, width = image.shape
+    width = image.shape[1]
     room = np.uint64(tile.size - 3 * width)
     rain_unit = np.float32(rain_sigma / TILE_UNIT)
     night_unit = np.float32(NIGHT_SIGMA / TILE_UNIT if night else 0.0)
@@ -138,7 +144,7 @@ def degrade(
     lift = np.float32(NIGHT_LIFT if night else 0.0)
     share, kept = np.float32(grey), np.float32(1.0 - grey)
     wr, wg, wb = np.float32(0.299), np.float32(0.587), np.float32(0.114)
-    for y in range(height):
+    for y in range(first_row, end_row):
         count = width - first[y]
         if count <= 0:
             continue
@@ -161,7 +167,14 @@ def degrade(
 
 @kernel
 def draw_streaks(
-    key: np.uint64, tick: int, count: int, night: bool, first: NDArray[np.int32], image: Packed
+    key: np.uint64,
+    tick: int,
+    count: int,
+    night: bool,
+    first: NDArray[np.int32],
+    first_row: int,
+    end_row: int,
+    image: Packed,
 ) -> None:
     """Short slanted strokes of falling rain, brighter than what is behind them."""
     height, width = image.shape
@@ -174,7 +187,7 @@ def draw_streaks(
         slant = 0.35 * (x / width - 0.5)
         for step in range(length):
             row, column = int(y) + step, int(x + slant * step)
-            if 0 <= row < height and first[row] <= column and 0 <= column < width:
+            if first_row <= row < end_row and first[row] <= column and 0 <= column < width:
                 pixel = np.int64(image[row, column])
                 brighter = 0xFF000000
                 for shift in (0, 8, 16):

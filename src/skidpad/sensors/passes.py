@@ -22,23 +22,36 @@ class Sight(NamedTuple):
 
 
 UNLIMITED = Sight(inf, inf)
+NOTHING = range(0)
 LAND = 5000.0  # m; nothing is drawn further away, so a longer sight hides nothing
 
 
 class Pass:
-    """Inverse depth and key of one view; `labels` and `instances` are views of the key."""
+    """Inverse depth and key of one view; `labels` and `instances` are views of the key.
+
+    drawn: the rows that show the present.
+    """
 
     def __init__(self, camera: CameraSpec, sight: Sight = UNLIMITED) -> None:
         shape = (camera.height, camera.width)
         self.sight = sight
-        self.stale = True
+        self.drawn = NOTHING
         self.inverse = np.zeros(shape, dtype=np.float32)
         self.key = np.zeros(shape, dtype=np.dtype("<i4"))
         self.labels = self.key.view(np.uint8).reshape(*shape, 4)[..., 1]
         self.instances = self.key.view(np.uint16).reshape(*shape, 2)[..., 1]
 
+    def missing(self, rows: range) -> range:
+        """What must be drawn before `rows` show the present; nothing if they do."""
+        done = self.drawn
+        if not done:
+            return rows
+        if done.start <= rows.start and rows.stop <= done.stop:
+            return NOTHING
+        return range(min(done.start, rows.start), max(done.stop, rows.stop))
+
     def limit_sight(self, view: View) -> None:
-        """Remove what the weather hides."""
+        """Remove what the weather hides from the rows of the view."""
         if min(self.sight) < LAND:
             depth, labels = (np.float32(min(s, 10.0 * LAND)) for s in self.sight)
             hide_beyond(depth, labels, view, self.inverse, self.key)
@@ -53,11 +66,11 @@ def hide_beyond(
     key: NDArray[np.int32],
 ) -> None:
     """Clear the depth, and turn the class to sky, of pixels whose ray is longer than the sight."""
-    height, width = inverse.shape
+    width = inverse.shape[1]
     start = np.float32((0.5 - view.cx) / view.focal)
     step = np.float32(1.0 / view.focal)
     none, one = np.float32(0.0), np.float32(1.0)
-    for y in range(height):
+    for y in range(view.top, view.height):
         v = np.float32((y + 0.5 - view.cy) / view.focal)
         depths, keys = inverse[y], key[y]
         for x in range(width):

@@ -78,14 +78,16 @@ def _fill(
     y2: float,
     w2: float,
     value: np.int32,
+    first_row: int,
+    end_row: int,
     ramp: NDArray[np.float32],
     inverse: NDArray[np.float32],
     key: Ints,
 ) -> None:
     """Draw one projected triangle: columns x, rows y, inverse depths w at its corners."""
-    height, width = inverse.shape
-    top = max(0, ceil(min(y0, y1, y2) - 0.5))
-    bottom = min(height, ceil(max(y0, y1, y2) - 0.5))
+    width = inverse.shape[1]
+    top = max(first_row, ceil(min(y0, y1, y2) - 0.5))
+    bottom = min(end_row, ceil(max(y0, y1, y2) - 0.5))
     if top >= bottom:
         return
     if max(x0, x1, x2) <= 0.5 or min(x0, x1, x2) > width - 0.5:
@@ -146,7 +148,7 @@ def project_block(
     m20, m21, m22 = turn[2, 0], turn[2, 1], turn[2, 2]
     t0, t1, t2 = shift[0], shift[1], shift[2]
     f, cx, cy = view.focal, view.cx, view.cy
-    right, down = view.width - cx, view.height - cy
+    right, up, down = view.width - cx, cy - view.top, view.height - cy
     for i in range(count):
         vx, vy, vz = vertices[first + i, 0], vertices[first + i, 1], vertices[first + i, 2]
         x = m00 * vx + m01 * vy + m02 * vz + t0
@@ -157,7 +159,7 @@ def project_block(
             code |= _LEFT
         if f * x - right * z > 0.0:
             code |= _RIGHT
-        if f * y + cy * z < 0.0:
+        if f * y + up * z < 0.0:
             code |= _UP
         if f * y - down * z > 0.0:
             code |= _DOWN
@@ -234,6 +236,8 @@ def _draw_block(
                     clipped[i + 1, 1],
                     clipped[i + 1, 2],
                     value,
+                    view.top,
+                    view.height,
                     ramp,
                     inverse,
                     key,
@@ -250,6 +254,8 @@ def _draw_block(
                 screen[c, 1],
                 screen[c, 2],
                 value,
+                view.top,
+                view.height,
                 ramp,
                 inverse,
                 key,
@@ -270,7 +276,7 @@ def sphere_visible(centre: Floats, radius: float, view: View, sides: Floats, shi
         return False
     if f * x - (view.width - view.cx) * z > radius * sides[1]:
         return False
-    if f * y + view.cy * z < -radius * sides[2]:
+    if f * y + (view.cy - view.top) * z < -radius * sides[2]:
         return False
     return bool(f * y - (view.height - view.cy) * z <= radius * sides[3])
 
@@ -281,7 +287,7 @@ def frustum_sides(view: View) -> Floats:
     sides = np.empty(4)
     sides[0] = np.hypot(view.focal, view.cx)
     sides[1] = np.hypot(view.focal, view.width - view.cx)
-    sides[2] = np.hypot(view.focal, view.cy)
+    sides[2] = np.hypot(view.focal, view.cy - view.top)
     sides[3] = np.hypot(view.focal, view.height - view.cy)
     return sides
 
@@ -335,13 +341,13 @@ def raster(
     inverse: NDArray[np.float32],
     key: Ints,
 ) -> None:
-    """Draw the scene into `inverse` (H, W) and `key` (H, W), both cleared first.
+    """Draw the view's rows into `inverse` (H, W) and `key` (H, W), cleared there first.
 
     static_key: `chunks.key` with the lamps as they shine now. hidden: index of the actor that is
     not drawn, or -1. level: a level of detail for all chunks, or AUTO_LEVEL.
     """
-    inverse[:] = np.float32(0.0)
-    key[:] = BACKGROUND
+    inverse[view.top : view.height] = np.float32(0.0)
+    key[view.top : view.height] = BACKGROUND
     sides = frustum_sides(view)
     clipped = np.empty((4, 3))
     shift = -rotated(view.rotation, view.centre)

@@ -63,7 +63,7 @@ class Shading:
         key: NDArray[np.int32],
         out: NDArray[np.uint32],
     ) -> None:
-        """Write the picture of a view, (H, W) of packed bytes red, green, blue, 255.
+        """Write the rows of a view of a picture, (H, W) of packed bytes red, green, blue, 255.
 
         ego: the pose that carries the headlights.
         """
@@ -317,11 +317,14 @@ def shade(
     key: NDArray[np.int32],
     out: NDArray[np.uint32],
 ) -> None:
-    """The deferred pass. sun, up: (3,) camera axes; to_body, offset: camera to ego frame."""
-    height, width = inverse.shape
+    """The deferred pass over the rows of the view.
+
+    sun, up: (3,) camera axes; to_body, offset: camera to ego frame.
+    """
+    width = inverse.shape[1]
     beam = np.float32(light.headlights) * _BEAM_POWER
     work[_H : _H + BLOCK] = _ZERO
-    for y in range(height):
+    for y in range(view.top, view.height):
         v = np.float32((y + 0.5 - view.cy) / view.focal)
         for first in range(0, width, BLOCK):
             count = min(BLOCK, width - first)

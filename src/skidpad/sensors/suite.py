@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import BackendError
-from skidpad.core.frames import CameraImage, RadarPoints
+from skidpad.core.frames import CameraImage, PartialImages, RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import DT
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
@@ -22,13 +22,13 @@ from skidpad.roads.roadside import Roadside
 from skidpad.sensors.crowd import make_actors, place_actors
 from skidpad.sensors.degradation import CameraNoise, degradation
 from skidpad.sensors.lighting import lighting
-from skidpad.sensors.passes import UNLIMITED, Pass, Sight, poison
+from skidpad.sensors.passes import NOTHING, UNLIMITED, Pass, Sight, poison
 from skidpad.sensors.perception_noise import PerceptionNoise
 from skidpad.sensors.radar import Radar
 from skidpad.sensors.rasteriser import AUTO_LEVEL, make_scratch, raster
 from skidpad.sensors.scene import StaticScene, build_scene
 from skidpad.sensors.shading import Shading
-from skidpad.sensors.view import camera_view
+from skidpad.sensors.view import View, camera_view
 
 NO_NOISE = PerceptionNoise()
 MAX_CLIMB = 8.0  # m/s; a faster change of height is a relocation, not motion
@@ -151,7 +151,7 @@ class PixelSuite:
         if braking is not None:
             self.shading.set_braking(braking)
         for one in self._passes.values():
-            one.stale = True
+            one.drawn = NOTHING
             if self._poison_old:
                 poison(one.inverse, one.key)
         if self._poison_old:
@@ -161,39 +161,54 @@ class PixelSuite:
             images = LazyImages(self, tick, {id: self.render(id) for id in self.cameras})
         return Observation(images, self._measure(tick))
 
-    def render(self, id: str) -> CameraImage:
-        """The image of one camera in the current state."""
+    def render(self, id: str, rows: range | None = None) -> CameraImage:
+        """The image of one camera in the current state; with `rows`, at least those of it."""
         camera, one = self.cameras[id], self._pass_of[id]
+        whole = range(camera.height)
+        if rows is None or self._noise != NO_NOISE:  # noise is drawn for whole images
+            rows = whole
         view = camera_view(camera, self._ego)
-        if one.stale:
-            raster(
-                self.scene.chunks,
-                self._static_key,
-                self._actors,
-                -1 if camera.shows_own_body else 0,
-                view,
-                self._level,
-                self._scratch,
-                one.inverse,
-                one.key,
-            )
-            one.limit_sight(view)
-            one.stale = False
+        if camera.modality is Modality.RGB:  # a normal is read off the rows above and below
+            self._draw(camera, view, one, range(max(rows.start - 1, 0), rows.stop + 1))
+            return self._picture(id, view._replace(top=rows.start, height=rows.stop), one)
+        self._draw(camera, view, one, rows)
         if camera.modality is Modality.DEPTH:
             noisy = self._noise.on_depth(one.inverse, self._seed, id, self.tick)
             return CameraImage(inverse_depth=noisy)
         if camera.modality is Modality.SEMANTIC:
             labels = self._noise.on_labels(one.labels, self._seed, id, self.tick)
             return CameraImage(labels=labels)
-        if camera.modality is Modality.INSTANCE:
-            return CameraImage(instances=one.instances)
+        return CameraImage(instances=one.instances)
+
+    def _draw(self, camera: CameraSpec, view: View, one: Pass, rows: range) -> None:
+        """See to it that these rows of a pass show the present."""
+        missing = one.missing(range(rows.start, min(rows.stop, camera.height)))
+        if not missing:
+            return
+        view = view._replace(top=missing.start, height=missing.stop)
+        hidden = -1 if camera.shows_own_body else 0
+        raster(
+            self.scene.chunks,
+            self._static_key,
+            self._actors,
+            hidden,
+            view,
+            self._level,
+            self._scratch,
+            one.inverse,
+            one.key,
+        )
+        one.limit_sight(view)
+        one.drawn = missing
+
+    def _picture(self, id: str, view: View, one: Pass) -> CameraImage:
+        """The rows of a view as a colour image."""
         packed = self._rgb[id]
         self.shading.paint(view, self._ego, one.inverse, one.key, packed)
         if id in self._degraded:
-            self._degraded[id].apply(self.tick, packed)
-        return CameraImage(
-            rgb=packed.view(np.uint8).reshape(*packed.shape, 4)[..., :3], packed=packed
-        )
+            self._degraded[id].apply(self.tick, packed, range(view.top, view.height))
+        rgb = packed.view(np.uint8).reshape(*packed.shape, 4)[..., :3]
+        return CameraImage(rgb=rgb, packed=packed)
 
     def snapshot(self, *ids: str) -> dict[str, NDArray[np.uint8]]:
         """Copies (H, W, 3) of RGB views as they are now, for a file (A-257); none given: all."""
@@ -225,7 +240,7 @@ class PixelSuite:
         )
 
 
-class LazyImages(Mapping[str, CameraImage]):
+class LazyImages(PartialImages):
     """Images by sensor id, each rendered when it is first read."""
 
     def __init__(
@@ -236,15 +251,28 @@ class LazyImages(Mapping[str, CameraImage]):
 
     def __getitem__(self, id: str) -> CameraImage:
         if id not in self._ready:
-            if id not in self._suite.cameras:
-                raise KeyError(id)
-            if self._suite.tick != self._tick:
-                raise BackendError(
-                    f"image {id} of tick {self._tick} was first read after tick {self._suite.tick}; "
-                    "a frame is valid until the next step"
-                )
+            self._check(id)
             self._ready[id] = self._suite.render(id)
         return self._ready[id]
+
+    def rows(self, id: str, first: int, end: int) -> CameraImage:
+        """The image, of which at least these rows are there."""
+        if id in self._ready:
+            return self._ready[id]
+        self._check(id)
+        return self._suite.render(id, range(first, end))
+
+    def _check(self, id: str) -> None:
+        if id not in self._suite.cameras:
+            raise KeyError(id)
+        if self._suite.tick != self._tick:
+            raise BackendError(
+                f"image {id} of tick {self._tick} was first read after tick {self._suite.tick}; "
+                "a frame is valid until the next step"
+            )
+
+    def __contains__(self, id: object) -> bool:
+        return id in self._suite.cameras
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._suite.cameras)

@@ -17,12 +17,13 @@ class View(NamedTuple):
     """Camera axes: x right, y down, z forward along the optical axis."""
 
     width: int  # px
-    height: int  # px
+    height: int  # px, end of the rows that are drawn
     focal: float  # px
     cx: float  # px
     cy: float  # px
     rotation: NDArray[np.float64]  # (3, 3) world to camera: rows are the camera's axes
     centre: NDArray[np.float64]  # (3,) world, m
+    top: int = 0  # px, first row that is drawn; `height` ends the last one
 
 
 def world_to_camera(pose: Pose) -> NDArray[np.float64]:

@@ -33,7 +33,7 @@ from skidpad.stack.control.tiers import (
     time_gap,
 )
 from skidpad.stack.perception.front import Front, Sight
-from skidpad.stack.perception.hsv import detect_lamp
+from skidpad.stack.perception.hsv import LampCamera
 from skidpad.stack.perception.lane_view import (
     FirstBranchRoute,
     HighwayRoute,
@@ -43,7 +43,6 @@ from skidpad.stack.perception.lane_view import (
 from skidpad.stack.perception.lights import NO_LIGHT, LightReading, LightScan, StopLock
 from skidpad.stack.settings import Route, Settings, load_profile
 
-FRONT_CAMERA = "rgb_front"
 HELD = VehicleCommand(brake=1.0)  # while the supervisor drives; it overrides this anyway
 KEYS = ("configuration", "functions", "profile", "set", "cruise_kmh", "limiter_kmh", "dt")
 
@@ -97,6 +96,7 @@ class AdasStack:
         self.tracker = LaneTracker(map, route)
         self.front = Front(specs, map, self.config.functions, options, self.config.dt)
         self.scan = LightScan(map)
+        self.lamps = LampCamera(specs)
         self.lock = StopLock(self.config.dt, options.hsv_required)
         self.resume = ResumeProtocol(self.config.dt, options.resume_end)
         self.smoothing: Smoothing | NoSmoothing = (
@@ -163,8 +163,7 @@ class AdasStack:
         light = self.scan.look(frame.ego.pose, v, view, frame.lights)
         if light.signal is None:
             return light, None
-        image = frame.images.get(FRONT_CAMERA)
-        return light, detect_lamp(image)
+        return light, self.lamps.look(frame.images)
 
     def _situation(
         self,

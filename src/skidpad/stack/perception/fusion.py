@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.frames import CameraImage, SensorFrame
+from skidpad.core.frames import CameraImage, SensorFrame, image_rows
 from skidpad.core.specs import CameraSpec, Modality, SensorSpec
 from skidpad.stack.perception import corridor
 from skidpad.stack.perception.corridor import Corridor
@@ -94,7 +94,7 @@ class CameraPair:
         if segments is not None:
             distance = corridor.read_segments(*segments, keep, PERCENTILE, sin(yaw_error), kappa)
         else:
-            images = _pair(frame.images, self.depth_id, self.semantic_id)
+            images = self._pair(frame.images)
             if images is None:
                 return None
             distance = corridor.read_pixels(
@@ -102,16 +102,17 @@ class CameraPair:
             )
         return None if isnan(distance) else distance
 
-
-def _pair(
-    images: Mapping[str, CameraImage], depth_id: str, semantic_id: str
-) -> tuple[NDArray[np.float32], NDArray[np.uint8]] | None:
-    depth, semantic = images.get(depth_id), images.get(semantic_id)
-    if depth is None or semantic is None:
-        return None
-    if depth.inverse_depth is None or semantic.labels is None:
-        return None
-    return depth.inverse_depth, semantic.labels
+    def _pair(
+        self, images: Mapping[str, CameraImage]
+    ) -> tuple[NDArray[np.float32], NDArray[np.uint8]] | None:
+        rows = self.keep.row_first, self.keep.row_end
+        depth = image_rows(images, self.depth_id, rows)
+        semantic = image_rows(images, self.semantic_id, rows)
+        if depth is None or semantic is None:
+            return None
+        if depth.inverse_depth is None or semantic.labels is None:
+            return None
+        return depth.inverse_depth, semantic.labels
 
 
 def camera_pair(

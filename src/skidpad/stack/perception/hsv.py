@@ -6,16 +6,19 @@ about patches that can be large enough: noise in rain at night makes thousands o
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.frames import CameraImage, pack
+from skidpad.core.frames import CameraImage, image_rows, pack
 from skidpad.core.jit import kernel
+from skidpad.core.specs import CameraSpec, SensorSpec
 from skidpad.core.vocabulary import LightState
 
+FRONT_CAMERA = "rgb_front"
 UPPER_ROWS = 0.60  # share of the image height (A-164)
 # Hue 0 to 180, saturation and value 0 to 255, as in OpenCV (A-165).
 MIN_SATURATION = 80
@@ -34,6 +37,18 @@ _REDDISH, _ORANGE, _YELLOW = (np.int32(n) for n in (11, 19, 24))  # of 30, share
 def rows_needed(height: int) -> int:
     """How many of the upper rows of an image are looked at (A-164)."""
     return round(height * UPPER_ROWS)
+
+
+class LampCamera:
+    """The camera in which lamps are looked for; asks for the rows needed only."""
+
+    def __init__(self, specs: Sequence[SensorSpec]) -> None:
+        heights = [s.height for s in specs if isinstance(s, CameraSpec) and s.id == FRONT_CAMERA]
+        self.rows = (0, rows_needed(heights[0])) if heights else (0, 0)
+
+    def look(self, images: Mapping[str, CameraImage]) -> LightState | None:
+        """RED, YELLOW, or None for neither, also without a camera."""
+        return detect_lamp(image_rows(images, FRONT_CAMERA, self.rows))
 
 
 def detect_lamp(image: CameraImage | None) -> LightState | None:

@@ -1,8 +1,11 @@
 import pytest
 
 from skidpad.campaign.cells import Cell, Driver, cross, identity, published_drivers, sweep
+from skidpad.campaign.drive import prepare
+from skidpad.cli.adas_plan import Wish, plan
 from skidpad.core.errors import ConfigError
 from skidpad.core.weather import Weather
+from skidpad.simulation.recovery import Supervisor
 from skidpad.stack.settings import Settings
 
 RAIN = Weather(name="rain-noon", title="Heavy Rain - Noon", precipitation=100, wetness=100)
@@ -25,6 +28,38 @@ def test_the_matrix_is_every_driver_in_every_weather_with_common_seeds():
         seeds[c.driver.label, c.weather.name].add(c.seed)
     assert set(map(tuple, seeds.values())) == {(1, 2, 3)}
     assert all(c.duration == 500.0 for c in cells)
+
+
+@pytest.mark.req("A-210")
+def test_traffic_stands_at_the_fixed_places_unless_asked():
+    assert template().traffic == "fixed"
+    assert all(c.traffic == "fixed" for c in plan(Wish()))
+
+
+@pytest.mark.req("A-270")
+def test_the_command_line_reaches_the_cells():
+    wish = Wish(
+        configs="3",
+        weather="rain-night",
+        traffic="random",
+        vehicles=40,
+        duration=60.0,
+        seeds=2,
+        grip="none",
+        assignments=["mu_ref=0.7"],
+    )
+    cells = plan(wish)
+    assert [c.seed for c in cells] == [1, 2]
+    (one, _) = cells
+    assert (one.driver.label, one.weather.name) == ("3", "rain-night")
+    assert (one.traffic, one.vehicles, one.duration) == ("random", 40, 60.0)
+    assert (one.settings.grip.value, one.settings.mu_ref) == ("none", 0.7)
+
+
+@pytest.mark.req("A-201")
+def test_recovery_and_wrong_way_watch_over_every_configuration():
+    for cell in plan(Wish(weather="clear-noon", sensors="objects")):
+        assert isinstance(prepare(cell).supervisor, Supervisor)
 
 
 @pytest.mark.req("A-005")

@@ -293,7 +293,7 @@ def test_ticks_that_do_not_count_are_counted_with_their_reason() -> None:
     assert (m.samples, m.skipped_no_report, m.skipped_supervised) == (13, 2, 5)
 
 
-@pytest.mark.req("A-191", "A-245")
+@pytest.mark.req("A-154", "A-191", "A-245")
 def test_lateral_offset_pauses_in_recovery_and_when_slow() -> None:
     offset = [0.5, -1.0, 0.3, 1.5, 1.6]
     speed = [20.0, 20.0, 20.0, 1.0, 20.0]

@@ -19,6 +19,7 @@ from skidpad.core.randomness import stream
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import SensorLevel, Tier
+from skidpad.evidence.acceptance import ACCEPTANCE
 from skidpad.evidence.findings import Judgement, judge
 from skidpad.evidence.matrix_findings import FINDINGS
 from skidpad.evidence.metrics.run import run_metrics
@@ -130,6 +131,19 @@ def radar_filters(n: int) -> list[Variant]:
     ]
 
 
+def preliminary(n: int) -> list[Variant]:
+    """A-278: the preliminary profile, against the recommended one with the same grip and sight."""
+    same = {"grip": "none", "range": "none", "mu_ref": 1.5, "camera": False}
+    return [
+        Variant(
+            replace(base_cell(2), seed=seed, profile=profile, settings=load_profile(profile, same)),
+            {"variant": name},
+        )
+        for seed in seeds(n)
+        for name, profile in (("preliminary", "preliminary"), ("final", "recommended"))
+    ]
+
+
 def pace(n: int) -> list[Variant]:
     """F-25: the same runs, each tick 1 ms slower."""
     cell = replace(base_cell(4, "rain-night"), duration=100.0)
@@ -145,6 +159,7 @@ STUDIES: dict[str, Callable[[int], list[Variant]]] = {
     "F-17": persistence,
     "F-21": radar_filters,
     "F-25": pace,
+    "A-278": preliminary,
 }
 
 
@@ -199,5 +214,5 @@ def run_study(
         rows[finished.job.key] = finished.value
         on_run(len(rows), len(jobs))
     table = pl.DataFrame([rows[j.key] for j in jobs])
-    finding = next(f for f in FINDINGS if f.id == id)
+    finding = next(f for f in (*FINDINGS, *ACCEPTANCE) if f.id == id)
     return judge([finding], [table])[0], table

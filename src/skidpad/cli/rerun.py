@@ -35,7 +35,7 @@ def rerun(
 
 
 def study(
-    id: Annotated[str, typer.Argument(help="F-08, F-17, F-21 or F-25.")],
+    id: Annotated[str, typer.Argument(help="F-08, F-17, F-21, F-25 or A-278.")],
     seeds: Annotated[int, typer.Option(min=1, help="Seeds per arm.")] = 6,
     workers: Annotated[
         int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)

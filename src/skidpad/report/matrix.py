@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 
 from skidpad import __version__
+from skidpad.evidence.acceptance import ACCEPTANCE
 from skidpad.evidence.findings import judge
 from skidpad.evidence.matrix_findings import FINDINGS
 from skidpad.recording.files import read_parquet
@@ -137,7 +138,8 @@ def _headline(matrix: Matrix) -> Numbers:
 
 
 def _verdicts(matrix: Matrix) -> list[Block]:
-    judged = judge(FINDINGS, [None if f.study else matrix.results for f in FINDINGS])
+    claims = (*FINDINGS, *ACCEPTANCE)
+    judged = judge(claims, [None if f.study else matrix.results for f in claims])
     intro = Text(
         "Each claim, its test and its margin were written down before results were seen. "
         "A claim whose two sides are the same drive is marked by construction; one that needs runs "

@@ -1,0 +1,83 @@
+"""A CARLA server as a backend: the same promises as the embedded simulator (decision L-4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import suppress
+
+from skidpad.core.errors import BackendError
+from skidpad.core.frames import Frame
+from skidpad.core.geometry import Pose
+from skidpad.core.setup import ActorCommand, Setup
+from skidpad.core.states import VehicleCommand, WorldTruth
+from skidpad.simulation.carla.connection import connect, speaking
+from skidpad.simulation.carla.options import CarlaOptions
+from skidpad.simulation.carla.pacer import Pacer, Watchdog
+from skidpad.simulation.carla.session import Session
+
+
+class CarlaBackend:
+    """One server, one run at a time. The map is loaded anew at every reset (decision X-12)."""
+
+    def __init__(self, options: CarlaOptions | None = None) -> None:
+        self.options = CarlaOptions() if options is None else options
+        self.watchdog = Watchdog(self.options.watchdog)
+        self._session: Session | None = None
+        self._pacer: Pacer | None = None
+
+    @property
+    def session(self) -> Session:
+        """The run; BackendError before the first reset."""
+        if self._session is None:
+            raise BackendError("the CARLA backend was not reset, or was closed")
+        return self._session
+
+    def reset(self, setup: Setup, seed: int) -> Frame:
+        """Begin a run on a freshly loaded map."""
+        self.close()
+        connection = connect(self.options)
+        self.watchdog.feed()
+        try:
+            with speaking(self.options, "setting up the run"):
+                self._session = session = Session(connection, setup, seed)
+                session.begin()
+                frame = session.frame()
+        except BaseException:
+            self.close()
+            raise
+        self._pacer = Pacer(self.options, setup.dt)
+        self._pacer.begin()
+        self.watchdog.feed()
+        return frame
+
+    def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
+        """Apply the commands for one tick, and wait for all sensors."""
+        session = self.session
+        with speaking(self.options, f"driving tick {session.tick + 1}"):
+            session.step(command, actor_commands)
+            frame = session.frame()
+        assert self._pacer is not None
+        self._pacer.tick()
+        self.watchdog.feed()
+        return frame
+
+    def truth(self) -> WorldTruth:
+        """Ground truth of the moment."""
+        return self.session.truth()
+
+    def relocate(self, pose: Pose, v: float) -> None:
+        """Put the ego at `pose` with speed v along it; its height follows from the road."""
+        with speaking(self.options, "relocating the ego"):
+            self.session.relocate(pose, v)
+
+    def close(self) -> None:
+        """Sensors first, then actors, then the time mode; a dead server does not matter."""
+        if self._pacer is not None:
+            self._pacer.end()
+            self._pacer = None
+        if self._session is not None:
+            session, self._session = self._session, None
+            self.watchdog.feed()
+            with suppress(RuntimeError, BackendError):
+                session.close()
+        self.watchdog.stop()

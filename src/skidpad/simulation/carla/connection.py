@@ -1,0 +1,71 @@
+"""The connection to a server: found or not, of the right version, and what it says when it fails."""
+
+from __future__ import annotations
+
+import re
+import socket
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any
+
+from skidpad.core.errors import BackendError, MissingExtra
+from skidpad.simulation.carla.options import CarlaOptions
+
+PROBE = 5.0  # s to find out whether anybody listens at all
+
+
+@dataclass(frozen=True, slots=True)
+class Connection:
+    """A client that was understood once. `carla` is the wheel's module."""
+
+    carla: Any
+    client: Any
+    options: CarlaOptions
+
+
+def wheel() -> Any:
+    """The module `carla`; MissingExtra when it is not installed."""
+    try:
+        import carla
+    except ModuleNotFoundError as error:
+        raise MissingExtra("--backend carla", "carla") from error
+    return carla
+
+
+def connect(options: CarlaOptions) -> Connection:
+    """A client of the server at that address; BackendError when there is none or another version."""
+    carla = wheel()
+    try:
+        socket.create_connection((options.host, options.port), PROBE).close()
+    except OSError:
+        raise BackendError(
+            f"no CARLA server answers at {options.address}: start one (for example `skidpad "
+            f"carla-server --port {options.port}`) or name another with --host and --port"
+        ) from None
+    with speaking(options, "greeting it"):
+        client = carla.Client(options.host, options.port)
+        client.set_timeout(options.timeout)
+        theirs, ours = client.get_server_version(), client.get_client_version()
+    if release(theirs) != release(ours):
+        raise BackendError(
+            f"the CARLA server at {options.address} has version {theirs}, the installed client "
+            f"{ours}: install carla=={release(theirs)}"
+        )
+    return Connection(carla, client, options)
+
+
+def release(version: str) -> str:
+    """`0.9.16` of `0.9.16-12-gabcdef`."""
+    found = re.match(r"\d+(\.\d+)*", version)
+    return found[0] if found else version
+
+
+@contextmanager
+def speaking(options: CarlaOptions, doing: str) -> Iterator[None]:
+    """What the wheel raises becomes one BackendError that says what was being done."""
+    try:
+        yield
+    except RuntimeError as error:
+        said = " ".join(str(error).split())
+        raise BackendError(f"CARLA at {options.address} failed while {doing}: {said}") from error

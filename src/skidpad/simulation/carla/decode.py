@@ -1,0 +1,94 @@
+"""CARLA's sensor bytes to our units and axes; no wheel needed."""
+
+from __future__ import annotations
+
+from math import inf
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.frames import RadarPoints
+from skidpad.core.jit import kernel
+from skidpad.core.lefthanded import angles_to_carla
+from skidpad.core.specs import CameraSpec
+from skidpad.core.vocabulary import SemanticClass
+
+Bytes = NDArray[np.uint8]
+Float32 = NDArray[np.float32]
+METRES_PER_STEP = 1000.0 / (256.0**3 - 1.0)  # A-033
+FULL = 256**3 - 1  # the code of everything at 1000 m or beyond
+SKY = int(SemanticClass.SKY)
+
+
+@kernel
+def inverse_depth(bgra: Bytes, out: Float32) -> None:
+    """(H, W, 4) of the 24-bit code, low byte in red, to (H, W) 1/m; full scale is nothing."""
+    for y in range(out.shape[0]):
+        for x in range(out.shape[1]):
+            code = (
+                np.int64(bgra[y, x, 2])
+                + 256 * np.int64(bgra[y, x, 1])
+                + 65536 * np.int64(bgra[y, x, 0])
+            )
+            out[y, x] = 0.0 if code >= FULL else 1.0 / (max(code, 1) * METRES_PER_STEP)
+
+
+@kernel
+def instance_rows(bgra: Bytes, rows: NDArray[np.uint16], out: NDArray[np.uint16]) -> None:
+    """(H, W, 4) with actor ids in green (low byte) and blue to our rows + 1, 0 for the map.
+
+    rows: (65536,) row + 1 by the lower 16 bits of an actor id.
+    """
+    for y in range(out.shape[0]):
+        for x in range(out.shape[1]):
+            out[y, x] = rows[np.int64(bgra[y, x, 1]) + 256 * np.int64(bgra[y, x, 0])]
+
+
+def packed_rgb(bgra: Bytes, out: NDArray[np.uint32]) -> None:
+    """(H, W, 4) blue, green, red, alpha to (H, W) packed red, green, blue, alpha."""
+    cv2.cvtColor(bgra, cv2.COLOR_BGRA2RGBA, dst=out.view(np.uint8).reshape(*out.shape, 4))
+
+
+@kernel
+def hide_beyond(
+    sight: float, focal: float, cx: float, cy: float, inverse: Float32, labels: Bytes, sky: int
+) -> None:
+    """Turn the class of pixels whose ray is longer than `sight` to `sky`; inverse: (H, W) 1/m."""
+    for y in range(labels.shape[0]):
+        v = (y + 0.5 - cy) / focal
+        for x in range(labels.shape[1]):
+            u = (x + 0.5 - cx) / focal
+            near = inverse[y, x] * sight
+            if near * near < u * u + v * v + 1.0:
+                labels[y, x] = sky
+
+
+@kernel
+def cut_depth(sight: float, focal: float, cx: float, cy: float, inverse: Float32) -> None:
+    """Nothing is measured along rays longer than `sight`."""
+    for y in range(inverse.shape[0]):
+        v = (y + 0.5 - cy) / focal
+        for x in range(inverse.shape[1]):
+            u = (x + 0.5 - cx) / focal
+            near = inverse[y, x] * sight
+            if near * near < u * u + v * v + 1.0:
+                inverse[y, x] = 0.0
+
+
+def limit_labels(camera: CameraSpec, sight: float, inverse: Float32, labels: Bytes) -> None:
+    """Hide what the weather hides from a camera that classifies (decision M-1)."""
+    hide_beyond(sight, camera.focal, camera.cx, camera.cy, inverse, labels, SKY)
+
+
+def limit_depth(camera: CameraSpec, sight: float, inverse: Float32) -> None:
+    """The same for a camera that measures depth."""
+    cut_depth(sight, camera.focal, camera.cx, camera.cy, inverse)
+
+
+def radar_points(raw: bytes | memoryview, limit: float = inf) -> RadarPoints:
+    """Returns of velocity, azimuth, altitude, depth (float32 each) within `limit` m."""
+    points = np.frombuffer(raw, dtype="<f4").reshape(-1, 4)
+    points = points[points[:, 3] <= limit].astype(np.float32)
+    azimuth = angles_to_carla(points[:, 1]).astype(np.float32)
+    return RadarPoints(points[:, 3].copy(), azimuth, points[:, 2].copy(), points[:, 0].copy())

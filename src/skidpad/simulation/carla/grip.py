@@ -1,0 +1,76 @@
+"""Weather on tyres, once: by the server itself, or by scaling every wheel (K-2, B-060 to B-068)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+from skidpad.core.geometry import mps_from_kmh
+from skidpad.core.setup import Setup
+from skidpad.core.vocabulary import GripModel
+from skidpad.physics.grip import GripParams, friction_ratio, grip_params, mu_at
+from skidpad.physics.types import TIRE_FRICTION_REFERENCE
+
+BLUEPRINT = "skidpad.weather"
+V_RATIO = mps_from_kmh(
+    80.0
+)  # tire_friction knows no speed: the ratio at the published cruise speed
+
+
+@dataclass(slots=True)
+class Grip:
+    """How weather reaches the tyres in one run, and what every vehicle had before it (B-067)."""
+
+    setup: Setup
+    served: bool  # the server does it
+    ratio: float  # by which we scale; 1 where the server does it
+    params: GripParams
+    original: dict[int, tuple[float, ...]] = field(default_factory=dict)  # f0 by actor id
+    emitter: Any = None  # the actor of the blueprint
+    notices: list[str] = field(default_factory=list)
+
+    def apply(self, vehicle: Any) -> None:
+        """Scale the wheels of a vehicle; a second call finds f0 kept and multiplies it once.
+
+        Every other property of every wheel is copied from the spawned vehicle (B-063, B-064).
+        """
+        if self.served or self.setup.grip is GripModel.NONE:
+            return
+        control = vehicle.get_physics_control()
+        wheels = list(control.wheels)
+        before = self.original.setdefault(vehicle.id, tuple(float(w.tire_friction) for w in wheels))
+        for wheel, f0 in zip(wheels, before, strict=True):
+            wheel.tire_friction = f0 * self.ratio
+        control.wheels = wheels
+        vehicle.apply_physics_control(control)
+        self.notices.append(
+            f"grip: {vehicle.type_id} ({vehicle.id}), weather {self.setup.weather.name or 'given'}: "
+            f"tire_friction {', '.join(f'{f:g}' for f in before)} x {self.ratio:.4f} = "
+            f"{', '.join(f'{f * self.ratio:.4g}' for f in before)}"
+        )
+
+    def mu(self, speed: float) -> float:
+        """Nominal friction at a tyre of tire_friction 3.5: what our model says, not a measurement."""
+        if self.served or self.setup.grip is GripModel.NONE:
+            return mu_at(self.params, speed)
+        return self.setup.mu_ref * self.ratio
+
+    def scale(self, actor: int) -> float:
+        """Of a vehicle's own tyres against the reference; 1 where its wheels were never read."""
+        wheels = self.original.get(actor)
+        return sum(wheels) / len(wheels) / TIRE_FRICTION_REFERENCE if wheels else 1.0
+
+
+def prepare_grip(carla: Any, world: Any, setup: Setup) -> Grip:
+    """Look for the server's own model, and give it the ice; else compute the ratio once."""
+    params = grip_params(setup.weather, setup.grip, setup.mu_ref)
+    library = world.get_blueprint_library()
+    found = [b for b in library.filter(BLUEPRINT) if b.id == BLUEPRINT]
+    if not found:
+        ratio = friction_ratio(setup.weather, setup.grip, V_RATIO)
+        return Grip(setup, False, ratio, params)
+    found[0].set_attribute("ice_thickness", f"{setup.weather.ice_thickness:g}")
+    emitter = world.spawn_actor(found[0], carla.Transform())
+    grip = Grip(setup, True, 1.0, params, emitter=emitter)
+    grip.notices.append("grip: the server lets weather act on tyres (skidpad.weather)")
+    return grip

@@ -1,0 +1,146 @@
+"""The ego's sensors on the server: attached, listened to, and waited for in every tick."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Sequence
+from typing import Any
+
+from skidpad.core.errors import BackendError
+from skidpad.core.setup import Setup
+from skidpad.core.specs import CameraSpec, Modality, PointSensorSpec, RadarSpec, SensorSpec
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.simulation.carla.axes import to_transform
+from skidpad.simulation.carla.connection import Connection
+from skidpad.simulation.carla.events import EgoEvents
+
+CAMERAS = {
+    Modality.RGB: "sensor.camera.rgb",
+    Modality.DEPTH: "sensor.camera.depth",
+    Modality.SEMANTIC: "sensor.camera.semantic_segmentation",
+    Modality.INSTANCE: "sensor.camera.instance_segmentation",
+}
+EVENTS = {"collision": "sensor.other.collision", "lane_invasion": "sensor.other.lane_invasion"}
+
+
+class Mailbox:
+    """What one streaming sensor sends; a callback of the wheel's threads only appends."""
+
+    def __init__(self, spec: SensorSpec) -> None:
+        self.spec = spec
+        self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
+
+    def hear(self, data: Any) -> None:
+        """Callback."""
+        self._arrived.put(data)
+
+    def of(self, frame: int, timeout: float) -> Any:
+        """The message of this frame, older ones are dropped; None when it does not come."""
+        while True:
+            try:
+                data = self._arrived.get(timeout=timeout)
+            except queue.Empty:
+                return None
+            if data.frame >= frame:
+                return data
+
+
+class Sensors:
+    """All sensors of the ego. Every one is attached; only those that somebody reads send."""
+
+    def __init__(
+        self, connection: Connection, world: Any, ego: Any, setup: Setup, events: EgoEvents
+    ) -> None:
+        self._connection, self._world, self._ego = connection, world, ego
+        self._setup = setup
+        self.boxes: dict[str, Mailbox] = {}
+        self.actors: list[Any] = []
+        self.silent: list[str] = []
+        pixels = setup.level is SensorLevel.PIXELS
+        display = set() if setup.render_all else display_cameras(setup.specs)
+        for spec in setup.specs:
+            if isinstance(spec, PointSensorSpec):
+                if spec.kind in EVENTS:
+                    hear = (
+                        events.hear_collision if spec.kind == "collision" else events.hear_invasion
+                    )
+                    self._attach(EVENTS[spec.kind], spec, {}).listen(hear)
+            elif pixels and isinstance(spec, (CameraSpec, RadarSpec)):
+                actor = self._attach(*described(spec))
+                if spec.id in display:
+                    self.silent.append(spec.id)
+                    continue
+                box = self.boxes[spec.id] = Mailbox(spec)
+                actor.listen(box.hear)
+
+    def _attach(self, id: str, spec: SensorSpec, attributes: dict[str, str]) -> Any:
+        carla = self._connection.carla
+        blueprint = self._world.get_blueprint_library().find(id)
+        for name, value in attributes.items():
+            if blueprint.has_attribute(name):
+                blueprint.set_attribute(name, value)
+        actor = self._world.spawn_actor(blueprint, to_transform(carla, spec.mount), self._ego)
+        self.actors.append(actor)
+        return actor
+
+    def collect(self, frame: int, timeout: float | None = None) -> dict[str, Any] | None:
+        """The messages of a frame by sensor id; None when one is missing and `timeout` was given.
+
+        BackendError when one is missing after the connection's patience.
+        """
+        patience = self._connection.options.timeout if timeout is None else timeout
+        found = {}
+        for id, box in self.boxes.items():
+            data = box.of(frame, patience)
+            if data is None and timeout is not None:
+                return None
+            if data is None or data.frame != frame:
+                told = "nothing" if data is None else f"frame {data.frame}"
+                raise BackendError(
+                    f"CARLA at {self._connection.options.address}: sensor {id} sent {told} instead "
+                    f"of frame {frame} within {patience:g} s"
+                )
+            found[id] = data
+        return found
+
+    def close(self) -> None:
+        """Stop listening first: a sensor that still sends when the client ends aborts it."""
+        for actor in self.actors:
+            if actor.is_listening:
+                actor.stop()
+        for actor in self.actors:
+            actor.destroy()
+        self.actors.clear()
+
+
+def display_cameras(specs: Sequence[SensorSpec]) -> set[str]:
+    """The RGB cameras that only a display shows: all but the first."""
+    rgb = [s.id for s in specs if isinstance(s, CameraSpec) and s.modality is Modality.RGB]
+    return set(rgb[1:])
+
+
+def described(spec: CameraSpec | RadarSpec) -> tuple[str, SensorSpec, dict[str, str]]:
+    """Blueprint id, spec and attributes (A-018 to A-028)."""
+    if isinstance(spec, RadarSpec):
+        return (
+            "sensor.other.radar",
+            spec,
+            {
+                "horizontal_fov": f"{spec.horizontal_fov_deg:g}",
+                "vertical_fov": f"{spec.vertical_fov_deg:g}",
+                "range": f"{spec.range:g}",
+                "points_per_second": str(spec.points_per_second),
+                "sensor_tick": "0.0",
+            },
+        )
+    return (
+        CAMERAS[spec.modality],
+        spec,
+        {
+            "image_size_x": str(spec.width),
+            "image_size_y": str(spec.height),
+            "fov": f"{spec.fov_deg:g}",
+            "sensor_tick": "0.0",
+            **spec.attributes,
+        },
+    )

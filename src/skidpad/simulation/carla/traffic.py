@@ -1,0 +1,143 @@
+"""Background traffic through CARLA's Traffic Manager (A-202 to A-211)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.geometry import Pose
+from skidpad.core.randomness import stream
+from skidpad.core.setup import TrafficSetup
+from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.simulation.carla import blueprints
+from skidpad.simulation.carla.axes import from_transform
+from skidpad.simulation.carla.cast import Player, awaited, measured, try_spawn
+from skidpad.simulation.carla.connection import Connection
+from skidpad.simulation.embedded.traffic.placement import fixed_spawns, random_factors
+
+MODES = ("fixed", "random")
+TOP_UP_EVERY = 20  # ticks between attempts to let missing vehicles in (A-209)
+NEAR, FAR = 25.0, 250.0  # m from the ego, where random vehicles begin; TM's own respawn bounds
+MANAGER_SEEDS = 2**31 - 1
+
+
+class Traffic:
+    """The Traffic Manager of one run, and the vehicles that it drives."""
+
+    def __init__(self, connection: Connection, port: int, dt: float, seed: int) -> None:
+        self._carla, self._client, self.port = connection.carla, connection.client, port
+        self.dt = dt
+        self.manager = self._client.get_trafficmanager(port)
+        self.manager.set_synchronous_mode(True)  # A-211
+        self.manager.set_random_device_seed(seed % MANAGER_SEEDS)
+        self._waiting: list[Player] = []
+        self._seed = seed
+        self.notices: list[str] = []
+
+    def drive(self, player: Player) -> None:
+        """Hand a vehicle over: desired speed and lamps (A-207)."""
+        player.actor.set_autopilot(True, self.port)
+        percent = 100.0 * (1.0 - player.factor)  # positive is slower
+        self.manager.vehicle_percentage_speed_difference(player.actor, percent)
+        self.manager.update_vehicle_lights(player.actor, True)
+
+    def release(self, player: Player) -> None:
+        """Take a vehicle back."""
+        if player.autopilot and player.actor is not None:
+            player.actor.set_autopilot(False, self.port)
+        player.autopilot = False
+
+    def wait_for(self, players: list[Player]) -> None:
+        """These enter when there is room, and random drivers choose their ways (A-209)."""
+        self._waiting = list(players)
+        self.manager.set_respawn_dormant_vehicles(True)
+        self.manager.set_boundaries_respawn_dormant_vehicles(NEAR, FAR)
+
+    def top_up(self, world: Any, tick: int, ego: Pose) -> list[Player]:
+        """Vehicles that entered now."""
+        if not self._waiting or tick % TOP_UP_EVERY:
+            return []
+        points = places_around(world, ego, stream(self._seed, "traffic", "top up", tick))
+        entered, still = [], []
+        library = world.get_blueprint_library()
+        for player in self._waiting:
+            blueprint = blueprints.find(library, player.type)
+            actor = _first_free(self._carla, world, blueprint, points)
+            if actor is None:
+                still.append(player)
+                continue
+            fresh = measured(player.name, actor)
+            player.actor, player.offset = fresh.actor, fresh.offset
+            player.size, player.kind = fresh.size, fresh.kind
+            player.autopilot = True
+            self.drive(player)
+            entered.append(player)
+        self._waiting = still
+        return entered
+
+    def close(self) -> None:
+        """Let the manager's thread go."""
+        self.manager.set_synchronous_mode(False)
+        self.manager.shut_down()
+
+
+def spawn_fixed(
+    carla: Any, world: Any, map: RoadMap, ego: LanePoint, setup: TrafficSetup, seed: int
+) -> tuple[list[Player], list[str]]:
+    """Vehicles at the published positions, and what could not be placed (A-202 to A-208)."""
+    kinds = blueprints.traffic_blueprints(world.get_blueprint_library())
+    players, refused = [], []
+    for i, spawn in enumerate(fixed_spawns(map, ego, setup, seed)):
+        assert spawn.place is not None
+        blueprint = kinds[i % len(kinds)]
+        blueprints.paint(blueprint, i)
+        actor = try_spawn(carla, world, blueprint, spawn.place.pose)
+        if actor is None:
+            refused.append(f"{blueprint.id} at ({spawn.place.x:.0f}, {spawn.place.y:.0f})")
+            continue
+        player = measured(f"traffic_{i + 1:02d}", actor)
+        player.factor, player.autopilot = spawn.factor, True
+        players.append(player)
+    if refused and not setup.allow_fewer:
+        raise ConfigError(
+            f"traffic: CARLA refused {len(refused)} of {setup.vehicles} vehicles "
+            f"({', '.join(refused)}); choose fewer vehicles or allow fewer"
+        )
+    return players, [f"traffic: CARLA refused {text}" for text in refused]
+
+
+def spawn_random(carla: Any, world: Any, ego: Pose, setup: TrafficSetup, seed: int) -> list[Player]:
+    """Up to 80 vehicles on recommended spawn points around the ego; some may have to wait."""
+    kinds = blueprints.traffic_blueprints(world.get_blueprint_library())
+    points = places_around(world, ego, stream(seed, "traffic", "places"))
+    players = []
+    for i, factor in enumerate(random_factors(setup.vehicles, seed)):
+        blueprint = kinds[i % len(kinds)]
+        blueprints.paint(blueprint, i)
+        actor = _first_free(carla, world, blueprint, points)
+        name = f"traffic_{i + 1:02d}"
+        player = awaited(name, blueprint) if actor is None else measured(name, actor)
+        player.factor, player.autopilot = float(factor), actor is not None
+        players.append(player)
+    return players
+
+
+def check_mode(setup: TrafficSetup) -> str:
+    """`fixed` or `random`."""
+    return require_choice("traffic mode", setup.mode, MODES)
+
+
+def places_around(world: Any, ego: Pose, random: Any) -> list[Pose]:
+    """Recommended spawn points near the ego in a drawn order."""
+    poses = [from_transform(t) for t in world.get_map().get_spawn_points()]
+    near = [p for p in poses if NEAR < ((p.x - ego.x) ** 2 + (p.y - ego.y) ** 2) ** 0.5 < FAR]
+    return [near[i] for i in random.permutation(len(near))]
+
+
+def _first_free(carla: Any, world: Any, blueprint: Any, points: list[Pose]) -> Any:
+    """Spawn at the first point that is free; a point is tried once."""
+    while points:
+        actor = try_spawn(carla, world, blueprint, points.pop())
+        if actor is not None:
+            return actor
+    return None

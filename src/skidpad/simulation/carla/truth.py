@@ -1,0 +1,73 @@
+"""The server's truth as our states, from the client's own snapshot: no call per tick (A-266)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import cos, hypot, radians, sin
+from typing import Any
+
+import numpy as np
+
+from skidpad.core.geometry import Pose, wrap_angle
+from skidpad.core.lefthanded import mirrored, turn_from_carla
+from skidpad.core.states import ActorStates, Floats, VehicleCommand
+from skidpad.simulation.carla.axes import from_transform, from_vector
+from skidpad.simulation.carla.cast import Player
+from skidpad.simulation.carla.grip import Grip
+
+EGO = 0
+
+
+def read_states(players: Sequence[Player], source: Any, out: ActorStates) -> None:
+    """Fill `out` from a carla.WorldSnapshot, or from a carla.ActorList asked of the server."""
+    ask = source.find
+    for i, player in enumerate(players):
+        seen = None if player.actor is None else ask(player.actor.id)
+        out.present[i] = seen is not None
+        if seen is not None:
+            put_row(out, i, player, seen)
+
+
+def put_row(out: ActorStates, i: int, player: Player, seen: Any) -> None:
+    """One actor: the motion of its footprint's centre is taken to be that of its origin."""
+    pose = player.footprint(from_transform(seen.get_transform()))
+    yaw = wrap_angle(pose.yaw)
+    out.x[i], out.y[i], out.z[i], out.yaw[i] = pose.x, pose.y, pose.z, yaw
+    out.pitch[i], out.roll[i] = pose.pitch, pose.roll
+    out.vx[i], out.vy[i], _ = from_vector(seen.get_velocity())
+    rate = seen.get_angular_velocity()  # deg/s
+    out.yaw_rate[i] = radians(turn_from_carla(rate.x, rate.y, rate.z)[2])
+    ax, ay, _ = from_vector(seen.get_acceleration())
+    c, s = cos(yaw), sin(yaw)
+    out.ax[i], out.ay[i] = ax * c + ay * s, ay * c - ax * s
+
+
+def move_row(out: ActorStates, i: int, pose: Pose, v: float) -> None:
+    """What row i shall be after a relocation that the server has not stepped yet."""
+    out.x[i], out.y[i], out.z[i], out.yaw[i] = pose.x, pose.y, pose.z, wrap_angle(pose.yaw)
+    out.pitch[i] = out.roll[i] = out.yaw_rate[i] = out.ax[i] = out.ay[i] = 0.0
+    out.vx[i], out.vy[i] = v * cos(pose.yaw), v * sin(pose.yaw)
+
+
+def read_commands(players: Sequence[Player], ego: VehicleCommand, out: Floats) -> None:
+    """(n, 5) throttle, brake, steer, handbrake, reverse as the snapshot tells them."""
+    for i, player in enumerate(players):
+        if i == EGO or player.actor is None or not player.is_vehicle:
+            continue
+        c = player.actor.get_control()
+        out[i] = (c.throttle, c.brake, mirrored(c.steer), c.hand_brake, c.reverse)
+    out[EGO] = (ego.throttle, ego.brake, ego.steer, ego.handbrake, ego.reverse)
+
+
+def read_mu(players: Sequence[Player], grip: Grip, states: ActorStates, out: Floats) -> None:
+    """(n, 4) nominal friction at the tyres; NaN where there is none."""
+    out.fill(np.nan)
+    for i, player in enumerate(players):
+        if states.present[i] and player.is_vehicle:
+            mu = grip.mu(hypot(states.vx[i], states.vy[i]))
+            out[i] = mu * grip.scale(player.actor.id)
+
+
+def along(states: ActorStates, i: int) -> float:
+    """Speed along the body, m/s, negative backwards."""
+    return float(states.vx[i] * cos(states.yaw[i]) + states.vy[i] * sin(states.yaw[i]))

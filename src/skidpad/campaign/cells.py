@@ -30,6 +30,30 @@ class Driver:
     options: dict[str, Any] = field(default_factory=dict)  # for a stack of somebody else
 
 
+class BackendKind(str, Enum):
+    """Which simulator drives the world."""
+
+    EMBEDDED = "embedded"
+    CARLA = "carla"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class BackendChoice:
+    """A simulator and, for a CARLA server, where it is and how it is used."""
+
+    kind: BackendKind = BackendKind.EMBEDDED
+    host: str = "127.0.0.1"
+    port: int = 2000
+    pace: bool = False  # hold runs at real time (A-262)
+    without: tuple[str, ...] = ()  # optimisations that are switched off (A-268)
+    server: tuple[str, ...] = ()  # command that starts the server; (): it runs already
+    restart_every: int = 0  # runs after which that server is started anew; 0: never
+
+    def resolved(self) -> dict[str, Any]:
+        """What of it decides a run; an address does not."""
+        return {"kind": self.kind.value, "pace": self.pace, "without": sorted(self.without)}
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cell:
     """One run."""
@@ -46,6 +70,7 @@ class Cell:
     allow_fewer: bool = False
     level: SensorLevel = SensorLevel.PIXELS
     render_all: bool = False
+    backend: BackendChoice = field(default_factory=BackendChoice)
 
     @property
     def name(self) -> str:
@@ -76,6 +101,7 @@ class Cell:
             "allow_fewer": self.allow_fewer,
             "sensors": self.level.value,
             "render": "all" if self.render_all else "needed",
+            "backend": self.backend.resolved(),
         }
 
 

@@ -18,9 +18,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
-from skidpad.campaign.cells import Cell, Driver
+from skidpad.campaign.backends import make_backend
+from skidpad.campaign.cells import BackendChoice, BackendKind, Cell, Driver
 from skidpad.campaign.snapshots import Snapshots
-from skidpad.core.errors import ConfigError, StackError, require_choice
+from skidpad.campaign.starts import start_of
+from skidpad.core.errors import StackError, require_choice
 from skidpad.core.frames import SensorFrame
 from skidpad.core.setup import ActorCommand, ActorSetup, Setup, TrafficSetup
 from skidpad.core.states import StackReport, VehicleCommand, WorldTruth
@@ -35,7 +37,6 @@ from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.twelve import twelve_sensors
 from skidpad.simulation.backend import Backend
-from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.recovery import Action, Clearance, RecoverySettings, Supervisor
 from skidpad.stack import settings as options
 from skidpad.stack.adas import AdasStack
@@ -76,12 +77,13 @@ def drive(
     settings: Mapping[str, Any] | None = None,
     options: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
+    backend: BackendChoice | None = None,
 ) -> Run:
     """Drive a stack and return the log.
 
     stack: a class with the stack interface, "module:Class", or 0 to 4 for a published
     configuration. settings: single settings over the profile. options: what the class is given as
-    its settings. out: a folder for snapshots of collisions.
+    its settings. out: a folder for snapshots of collisions. backend: None is the embedded one.
     """
     label, kind, functions = _named(stack)
     cell = Cell(
@@ -95,6 +97,7 @@ def drive(
         traffic=traffic,
         vehicles=vehicles,
         level=SensorLevel(require_choice("sensors", sensors, [v.value for v in SensorLevel])),
+        backend=BackendChoice() if backend is None else backend,
     )
     return run_cell(cell, kind, folder=None if out is None else Path(out))
 
@@ -194,11 +197,11 @@ def run_cell(
     folder: Path | None = None,
     watchers: Sequence[Watcher] = (),
 ) -> Run:
-    """Drive one cell of a campaign on `backend`, by default a fresh embedded simulator.
+    """Drive one cell of a campaign on `backend`, by default a fresh one of its choice.
 
     folder: where snapshots of collisions go. watchers: who else looks on; they change nothing.
     """
-    backend = EmbeddedBackend() if backend is None else backend
+    backend = make_backend(cell.backend) if backend is None else backend
     try:
         ready = prepare(cell, kind)
         snapshots = Snapshots(folder, cell.driver.label, cell.weather.name, ready.setup.dt)
@@ -276,14 +279,12 @@ def stack_of(cell: Cell, kind: type[Stack] | None, setup: Setup, map: RoadMap) -
 
 def setup_of(cell: Cell, map: RoadMap) -> Setup:
     """The world of a cell."""
-    if map.ego_start is None:
-        raise ConfigError(f"map {map.name} names no place for the ego to start")
     s = cell.settings
     return Setup(
         map=cell.map,
         weather=cell.weather,
         specs=twelve_sensors(bumper_depth_fov_deg=s.bumper_depth_fov_deg),
-        ego=ActorSetup(name="ego", type=EGO_TYPE, place=map.ego_start, driver="scripted"),
+        ego=ActorSetup(name="ego", type=EGO_TYPE, place=start_of(map), driver="scripted"),
         traffic=TrafficSetup(
             mode=cell.traffic,
             vehicles=cell.vehicles,
@@ -297,8 +298,13 @@ def setup_of(cell: Cell, map: RoadMap) -> Setup:
         camera_effect=s.camera,
         mu_ref=s.mu_ref,
         level=cell.level,
-        render_all=cell.render_all,
+        render_all=cell.render_all or _foreign_on_carla(cell),
     )
+
+
+def _foreign_on_carla(cell: Cell) -> bool:
+    """Nobody knows which images somebody else's stack reads, and CARLA sends none on demand."""
+    return cell.backend.kind is BackendKind.CARLA and ":" in (cell.driver.stack or "")
 
 
 def recovery_settings(s: options.Settings) -> RecoverySettings:

@@ -26,6 +26,7 @@ from skidpad.stack.settings import LaneTruth
 
 RUNS, CONFIG, ERROR = "runs", "config.yaml", "error.txt"
 FAILURES = {"crashed": Outcome.CRASHED, "timeout": Outcome.TIMEOUT}
+WATCHDOG = 120.0  # s without a tick after which a worker ends itself; a map may take a minute
 TIMES_OF_DAY = ("sunrise", "noon", "night")
 
 
@@ -90,6 +91,7 @@ def warm_up() -> None:
 def drive_one(argument: tuple[Cell, Path]) -> tuple[RunKey, Metrics, Timing, str]:
     """In a worker: drive a cell, write its folder, return its row and the last line of an error."""
     # numba and friends are imported only where they are needed, not in the parent.
+    from skidpad.campaign.backends import keep_server, make_backend
     from skidpad.campaign.drive import run_cell
     from skidpad.evidence.metrics.run import run_metrics
     from skidpad.recording.logfiles import write_log
@@ -103,7 +105,9 @@ def drive_one(argument: tuple[Cell, Path]) -> tuple[RunKey, Metrics, Timing, str
     write_bytes(folder / CONFIG, yaml.safe_dump(cell.resolved(), sort_keys=False).encode())
     wall, cpu = time.perf_counter(), time.process_time()
     pace = Pace(DT)
-    run = run_cell(cell, folder=folder, watchers=(pace,))
+    keep_server(cell.backend)
+    backend = make_backend(cell.backend, WATCHDOG)
+    run = run_cell(cell, backend=backend, folder=folder, watchers=(pace,))
     wall, cpu = time.perf_counter() - wall, time.process_time() - cpu
     digest = write_log(folder, run.log)
     if run.error:

@@ -23,6 +23,8 @@ from multiprocessing.connection import Connection, wait
 from multiprocessing.process import BaseProcess
 from typing import Any
 
+from skidpad.core.errors import SkidpadError
+
 ATTEMPTS = 2  # a run that killed its worker gets one more try
 SINGLE_THREADED = (
     "OMP_NUM_THREADS",
@@ -176,6 +178,8 @@ def _work(pipe: Connection) -> None:
             return
         try:
             answer: tuple[Any, str] = (resolve(job.target)(job.argument), "")
+        except SkidpadError as error:  # one sentence for a person; where it arose says no more
+            answer = (None, str(error))
         except Exception:
             answer = (None, traceback.format_exc())
         pipe.send(answer)

@@ -19,6 +19,7 @@ from skidpad.campaign.cells import (
     sweep,
 )
 from skidpad.campaign.matrix import Summary, run_matrix
+from skidpad.cli.carla_backend import backend_choice, map_of, workers_for
 from skidpad.core.errors import ConfigError, require_choice, require_range
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather
@@ -52,6 +53,13 @@ class Wish:
     vehicles: int = 20
     sensors: str = "pixels"
     render: str = "needed"
+    backend: str = "embedded"
+    host: str = "127.0.0.1"
+    port: int = 2000
+    pace: bool = False
+    without: Sequence[str] = ()
+    server_command: str | None = None
+    restart_every: int = 0
 
 
 def plan(wish: Wish) -> list[Cell]:
@@ -66,19 +74,22 @@ def plan(wish: Wish) -> list[Cell]:
     drivers = _drivers(wish)
     require_range("--duration", wish.duration, 1.0, 100_000.0)
     require_range("--vehicles", wish.vehicles, 0, 80)
-    load_map(wish.map)
+    backend = backend_choice(wish)
+    map = map_of(wish.map, backend)
+    load_map(map)
     template = Cell(
         driver=drivers[0],
         weather=climate[0],
         seed=0,
         profile=wish.profile,
         settings=load_profile(wish.profile, values),
-        map=wish.map,
+        map=map,
         duration=wish.duration,
         traffic=require_choice("--traffic", wish.traffic, ("fixed", "random")),
         vehicles=wish.vehicles,
         level=SensorLevel(require_choice("--sensors", wish.sensors, ("pixels", "objects"))),
         render_all=require_choice("--render", wish.render, ("needed", "all")) == "all",
+        backend=backend,
     )
     return cross(drivers, climate, wish.seeds, template)
 
@@ -111,7 +122,12 @@ def drive_with_progress(
 
         try:
             summary = run_matrix(
-                cells, folder, workers=workers, resume=resume, csv=csv, on_run=on_run
+                cells,
+                folder,
+                workers=workers_for(cells, workers),
+                resume=resume,
+                csv=csv,
+                on_run=on_run,
             )
         except KeyboardInterrupt:
             console.print(f"interrupted; what is done is kept: --out {folder} --resume finishes it")

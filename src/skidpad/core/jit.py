@@ -31,7 +31,8 @@ def kernel_source_hash(root: Path = PACKAGE) -> str:
     return digest.hexdigest()[:16]
 
 
-def _user_cache() -> Path:
+def user_cache() -> Path:
+    """Where files of this user that can be made again are kept."""
     if sys.platform == "win32":
         return Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local")) / "skidpad"
     if sys.platform == "darwin":
@@ -42,7 +43,7 @@ def _user_cache() -> Path:
 def _choose_cache() -> None:
     if "NUMBA_CACHE_DIR" in os.environ:  # numba's own variable: the user's word is final
         return
-    parent = _user_cache() / "kernels"
+    parent = user_cache() / "kernels"
     folder = parent / kernel_source_hash()
     try:
         folder.mkdir(parents=True, exist_ok=True)

@@ -33,9 +33,8 @@ def wheel() -> Any:
     return carla
 
 
-def connect(options: CarlaOptions) -> Connection:
-    """A client of the server at that address; BackendError when there is none or another version."""
-    carla = wheel()
+def require_server(options: CarlaOptions) -> None:
+    """BackendError when nobody listens at that address."""
     try:
         socket.create_connection((options.host, options.port), PROBE).close()
     except OSError:
@@ -43,6 +42,12 @@ def connect(options: CarlaOptions) -> Connection:
             f"no CARLA server answers at {options.address}: start one (for example `skidpad "
             f"carla-server --port {options.port}`) or name another with --host and --port"
         ) from None
+
+
+def connect(options: CarlaOptions) -> Connection:
+    """A client of the server at that address; BackendError when there is none or another version."""
+    carla = wheel()
+    require_server(options)
     with speaking(options, "greeting it"):
         client = carla.Client(options.host, options.port)
         client.set_timeout(options.timeout)

@@ -173,7 +173,7 @@ class Session:
         for player in self.players:
             if player.actor is not None and player.is_vehicle:
                 player.actor.apply_control(self._control(VehicleCommand()))
-        if not any(p.autopilot for p in self.players) and self.setup.traffic is None:
+        if all(p.actor is not None and not p.autopilot for p in self.players):
             return
         self.traffic = Traffic(self.connection, free_port(), self.setup.dt, self.seed)
         for player in self.players:

@@ -1,0 +1,54 @@
+"""From the word in a cell to a simulator that is ready to be reset."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from skidpad.campaign.cells import BackendChoice, BackendKind
+from skidpad.core.errors import require_choice
+from skidpad.simulation.backend import Backend
+from skidpad.simulation.embedded.engine import EmbeddedBackend
+
+if TYPE_CHECKING:
+    from skidpad.simulation.carla.keeper import ServerKeeper
+    from skidpad.simulation.carla.options import CarlaOptions
+
+_KEEPERS: dict[BackendChoice, ServerKeeper] = {}  # of this process; a worker lives for many runs
+
+
+def keep_server(choice: BackendChoice) -> None:
+    """Where the campaign starts its own CARLA server: it is up, and not older than asked for."""
+    if choice.kind is BackendKind.EMBEDDED or not choice.server:
+        return
+    if choice not in _KEEPERS:
+        from skidpad.simulation.carla.keeper import ServerKeeper
+
+        _KEEPERS[choice] = ServerKeeper(
+            choice.server, choice.host, choice.port, choice.restart_every
+        )
+    _KEEPERS[choice].before_run()
+
+
+def carla_options(choice: BackendChoice, watchdog: float | None = None) -> CarlaOptions:
+    """The adapter's options; ConfigError for an unknown optimisation."""
+    from skidpad.simulation.carla.options import CarlaOptions, Optimisation
+
+    names = [o.value for o in Optimisation]
+    off = {Optimisation(require_choice("--without", name, names)) for name in choice.without}
+    return CarlaOptions(
+        host=choice.host,
+        port=choice.port,
+        pace=choice.pace,
+        optimisations=frozenset(Optimisation) - off,
+        watchdog=watchdog,
+    )
+
+
+def make_backend(choice: BackendChoice, watchdog: float | None = None) -> Backend:
+    """A fresh backend. watchdog: s without a tick after which this process ends; None: never."""
+    if choice.kind is BackendKind.EMBEDDED:
+        return EmbeddedBackend()
+    # The wheel and its threads concern only those who drive on it.
+    from skidpad.simulation.carla.backend import CarlaBackend
+
+    return CarlaBackend(carla_options(choice, watchdog))

@@ -1,0 +1,97 @@
+"""What `--backend carla` and its options mean for a campaign."""
+
+from __future__ import annotations
+
+import multiprocessing
+import shlex
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+from skidpad.campaign.cells import BackendChoice, BackendKind, Cell
+from skidpad.core.errors import BackendError, ConfigError, require_choice, require_range
+from skidpad.core.jit import user_cache
+from skidpad.roads.bundled import bundled_maps
+
+
+class BackendWish(Protocol):
+    """The options that name a simulator."""
+
+    @property
+    def backend(self) -> str: ...  # noqa: D102
+    @property
+    def host(self) -> str: ...  # noqa: D102
+    @property
+    def port(self) -> int: ...  # noqa: D102
+    @property
+    def pace(self) -> bool: ...  # noqa: D102
+    @property
+    def without(self) -> Sequence[str]: ...  # noqa: D102
+    @property
+    def server_command(self) -> str | None: ...  # noqa: D102
+    @property
+    def restart_every(self) -> int: ...  # noqa: D102
+
+
+def backend_choice(wish: BackendWish) -> BackendChoice:
+    """The choice, checked; a CARLA server that shall run already must answer now."""
+    names = [k.value for k in BackendKind]
+    kind = BackendKind(require_choice("--backend", wish.backend, names))
+    if kind is BackendKind.EMBEDDED:
+        return BackendChoice()
+    require_range("--port", wish.port, 1, 65535)
+    if wish.restart_every and wish.server_command is None:
+        raise ConfigError("--restart-every needs --server-command: only our own server is ours")
+    choice = BackendChoice(
+        kind=kind,
+        host=wish.host,
+        port=wish.port,
+        pace=wish.pace,
+        without=tuple(wish.without),
+        server=tuple(shlex.split(wish.server_command or "")),
+        restart_every=wish.restart_every,
+    )
+    from skidpad.campaign.backends import carla_options
+    from skidpad.simulation.carla.connection import require_server, wheel
+
+    options = carla_options(choice)
+    wheel()
+    if not choice.server:
+        require_server(options)
+    return choice
+
+
+def map_of(map: str, choice: BackendChoice) -> str:
+    """A bundled map or a file as it is; a CARLA server's own map is fetched and kept as a file."""
+    named = map in bundled_maps() or Path(map).is_file() or Path(map).suffix
+    if choice.kind is BackendKind.EMBEDDED or named:
+        return map
+    folder = user_cache() / "carla-maps"
+    # In a process of its own: the wheel's threads can end their process at its exit.
+    process = multiprocessing.get_context("spawn").Process(
+        target=_fetch, args=(choice, map, folder)
+    )
+    process.start()
+    process.join()
+    path = folder / f"{map}.xodr"
+    if not path.is_file() or process.exitcode == 1:
+        raise BackendError(f"map {map} could not be fetched from the CARLA server")
+    return str(path)
+
+
+def _fetch(choice: BackendChoice, map: str, folder: Path) -> None:
+    from skidpad.campaign.backends import carla_options, keep_server
+    from skidpad.simulation.carla.mapping import fetch_map
+
+    keep_server(choice)
+    try:
+        fetch_map(carla_options(choice), map, folder)
+    except BackendError as error:
+        print(error, file=sys.stderr)
+        raise SystemExit(1) from None
+
+
+def workers_for(cells: Sequence[Cell], workers: int) -> int:
+    """A CARLA server drives one run at a time."""
+    return 1 if any(c.backend.kind is BackendKind.CARLA for c in cells) else workers

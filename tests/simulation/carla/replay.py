@@ -4,29 +4,29 @@ from __future__ import annotations
 
 import json
 import sys
-from dataclasses import replace
+from math import atan2, radians, sin
 from typing import Any
 
 import numpy as np
 
-from skidpad.campaign.cells import Cell, Driver
-from skidpad.campaign.drive import Drive, prepare
-from skidpad.core.setup import Setup
+from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics import types
 from skidpad.physics.presets import find_weather
+from skidpad.roads.bundled import load_map
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.carla.backend import CarlaBackend
 from skidpad.simulation.carla.options import CarlaOptions
 from skidpad.simulation.carla_server.catalogue import load_catalogue
 from skidpad.simulation.carla_server.vehicles import model_of
 from skidpad.simulation.embedded.engine import EmbeddedBackend
-from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import load_profile
 
 EGO = "vehicle.mini.cooper_s"
-SECONDS = 60.0
+SECONDS, SEED = 60.0, 3
+V, LOOK_AHEAD = 15.0, 12.0  # m/s, m
+WHEELBASE, STEER_MAX = 2.47, radians(70.0)
+MAP = load_map("figure8")
 
 
 def same_model() -> None:
@@ -34,41 +34,36 @@ def same_model() -> None:
     types.vehicle_types()[EGO] = model_of(load_catalogue()[EGO])
 
 
-def cell(weather: str, level: SensorLevel = SensorLevel.OBJECTS) -> Cell:
-    return Cell(
-        driver=Driver(label="4", functions=functions_of(4)),
+def setup_for(weather: str) -> Setup:
+    """An empty figure8."""
+    assert MAP.ego_start is not None
+    return Setup(
+        map="figure8",
         weather=find_weather(weather),
-        seed=3,
-        profile="recommended",
-        settings=load_profile("recommended"),
-        vehicles=0,
-        duration=SECONDS,
-        level=level,
+        specs=(),
+        ego=ActorSetup(name="ego", type=EGO, place=MAP.ego_start, driver="scripted"),
+        level=SensorLevel.OBJECTS,
     )
 
 
-def with_ego(setup: Setup) -> Setup:
-    return replace(setup, ego=replace(setup.ego, type=EGO))
-
-
-def ready(weather: str) -> Drive:
-    made = prepare(cell(weather))
-    return replace(made, setup=with_ego(made.setup))
-
-
-def record(weather: str) -> tuple[Setup, list[VehicleCommand]]:
-    """What the stack commands on the embedded simulator."""
-    made = ready(weather)
+def record(setup: Setup) -> list[VehicleCommand]:
+    """What a lane keeper commands on the embedded simulator: pure pursuit at 54 km/h."""
     backend, commands = EmbeddedBackend(), []
-    frame = backend.reset(made.setup, 3)
-    for _ in range(round(SECONDS / made.setup.dt)):
-        commands.append(made.stack.tick(frame))
-        frame = backend.step(commands[-1])
-    return made.setup, commands
+    ego = backend.reset(setup, SEED).ego
+    for _ in range(round(SECONDS / setup.dt)):
+        here = MAP.project(ego.pose.x, ego.pose.y, ego.pose.z)
+        there = None if here is None else MAP.ahead(here, LOOK_AHEAD)
+        assert there is not None
+        bearing = atan2(there.y - ego.pose.y, there.x - ego.pose.x) - ego.pose.yaw
+        steer = 2.0 * WHEELBASE * sin(bearing) / LOOK_AHEAD / STEER_MAX
+        throttle = min(max(0.3 * (V - ego.speed), 0.0), 1.0)
+        commands.append(VehicleCommand(throttle=throttle, steer=steer))
+        ego = backend.step(commands[-1]).ego
+    return commands
 
 
 def poses(backend: Backend, setup: Setup, commands: list[VehicleCommand]) -> list[list[float]]:
-    backend.reset(setup, 3)
+    backend.reset(setup, SEED)
     out = []
     for command in commands:
         backend.step(command)
@@ -80,13 +75,15 @@ def poses(backend: Backend, setup: Setup, commands: list[VehicleCommand]) -> lis
 
 def main(port: int, weather: str) -> dict[str, Any]:
     same_model()
-    setup, commands = record(weather)
+    setup = setup_for(weather)
+    commands = record(setup)
     ours = np.array(poses(EmbeddedBackend(), setup, commands))
     theirs = np.array(poses(CarlaBackend(CarlaOptions(port=port)), setup, commands))
     apart = np.hypot(*(ours - theirs)[:, :2].T)
     way = np.hypot(*np.diff(ours[:, :2], axis=0).T).sum()
-    return {"apart": apart.tolist(), "way": float(way), "turned": float(np.ptp(ours[:, 3]))}
+    turned = np.ptp(np.unwrap(ours[:, 3]))
+    return {"apart": apart.tolist(), "way": float(way), "turned": float(turned)}
 
 
 if __name__ == "__main__":
-    print(json.dumps(main(int(sys.argv[1]), sys.argv[2])), flush=True)
+    print("RESULT", json.dumps(main(int(sys.argv[1]), sys.argv[2])), flush=True)

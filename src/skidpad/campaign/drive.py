@@ -296,6 +296,7 @@ def setup_of(cell: Cell, map: RoadMap) -> Setup:
         grip=s.grip,
         range_model=s.range,
         camera_effect=s.camera,
+        rain_hides_night=s.night_rain is options.NightRain.RAIN_ONLY,
         mu_ref=s.mu_ref,
         level=cell.level,
         render_all=cell.render_all or _foreign_on_carla(cell),

@@ -76,6 +76,7 @@ class Setup:
     grip: GripModel = GripModel.PHYSICAL
     range_model: RangeModel = RangeModel.PHYSICAL
     camera_effect: bool = True  # weather acts on RGB images
+    rain_hides_night: bool = False  # in rain the camera effect of the night is left out (D-094)
     mu_ref: float = 0.9  # friction at CARLA's tire_friction 3.5 on a dry road
     level: SensorLevel = SensorLevel.PIXELS
     render_all: bool = False  # every image every tick, read or not

@@ -56,6 +56,7 @@ class Pixels:
             setup.weather,
             range_model=setup.range_model,
             camera_effect=setup.camera_effect,
+            exclusive_stages=setup.rain_hides_night,
             seed=seed,
             dt=setup.dt,
             render_all=setup.render_all,

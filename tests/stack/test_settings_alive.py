@@ -1,0 +1,232 @@
+"""Each setting has a micro-scenario whose outcome changes when it is toggled (decision M-14)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from math import asin
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from stackfakes import (
+    BUMPER_DEPTH,
+    LANE_WIDTH,
+    RED,
+    ROOF_DEPTH,
+    SPECS,
+    ArcMap,
+    Car,
+    as_segments,
+    ego_at,
+    frame,
+)
+
+import makelog
+from skidpad.campaign.cells import Cell, Driver
+from skidpad.campaign.drive import recovery_settings, run_cell, setup_of
+from skidpad.campaign.matrix import metric_settings
+from skidpad.core.geometry import Pose
+from skidpad.core.setup import DT
+from skidpad.core.states import ContactEvent, VehicleCommand
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.weather import Weather
+from skidpad.evidence.metrics.drive import prepare
+from skidpad.physics.presets import find_weather
+from skidpad.recording.logfiles import log_hash
+from skidpad.roads.bundled import load_map
+from skidpad.simulation.embedded.engine import EmbeddedBackend
+from skidpad.simulation.recovery import Supervisor
+from skidpad.stack.adas import AdasStack
+from skidpad.stack.configurations import functions_of
+from skidpad.stack.settings import NAMES, Settings
+
+Outcome = Callable[[Settings], Any]
+
+
+class Scenario(NamedTuple):
+    """Another value of the setting, and what is seen under given settings."""
+
+    other: Any
+    outcome: Outcome
+
+
+# --- settings of the stack: frames in, commands and reports out
+
+
+def driven(*scene: dict[str, Any], configuration: int = 2, map: ArcMap | None = None, **also: Any):
+    """Commands and reports over hand-drawn frames; `also`: settings that the scene needs."""
+
+    def outcome(settings: Settings) -> Any:
+        plain = settings.with_values(also).as_plain()
+        options = {"configuration": configuration, "set": plain}
+        stack = AdasStack(SPECS, map or ArcMap(), options)
+        log = []
+        for k, fields in enumerate(scene):
+            log.append((stack.tick(seen(k, **fields)), stack.report))
+        return log
+
+    return outcome
+
+
+def seen(k: int, near=None, far=None, v=20.0, x=0.0, y=0.0, **fields: Any):
+    """A frame; near and far: cars that only the bumper or only the roof sees."""
+    picture = frame(k, ego=ego_at(x, y, 0.0, v), **fields)
+    if near is None and far is None:
+        return picture
+    segments = {
+        "depth_bumper": as_segments(near or [], BUMPER_DEPTH),
+        "depth_roof": as_segments(far or [], ROOF_DEPTH),
+    }
+    return replace(picture, segments=segments)
+
+
+def radar(*points: tuple[float, float]):
+    """Points at (range, m to the left), slowly closing."""
+    return [(r, asin(left / r), 0.0, -3.0) for r, left in points]
+
+
+def gone(distance: float, missing: int):
+    """A car for six ticks, then nothing."""
+    return [{"cars": [Car(distance)]}] * 6 + [{}] * missing
+
+
+LIGHT = ArcMap(lights=((7, 0, 100.0),))
+STOP = {"lights": {7: RED}, "x": 99.0, "v": 0.5}
+STACK: dict[str, Scenario] = {
+    "bumper_depth_fov_deg": Scenario(90.0, lambda s: pictures(s, "clear-noon", "depth_bumper")),
+    "roof_corridor": Scenario(
+        "flat_without_lca", driven(*[{"cars": [Car(55.0, 2.9)]}] * 5, configuration=1)
+    ),
+    "bumper_alone": Scenario(False, driven(*[{"near": [Car(20.0)]}] * 5)),
+    "detection_gate": Scenario(70.0, driven(*[{"cars": [Car(65.0)]}] * 5)),
+    "safety_persist": Scenario(True, driven(*gone(25.0, 40))),
+    "radar_close_check": Scenario("nothing", driven({"radar": radar((15.0, 0.0))})),
+    "radar_candidates": Scenario(
+        "nearest", driven({"radar": radar((30.0, LANE_WIDTH), (50.0, 0.0))})
+    ),
+    "rejected_stays_active": Scenario(True, driven({"radar": radar((30.0, LANE_WIDTH))})),
+    "aeb_without_acc": Scenario(True, driven(*[{"cars": [Car(8.0)]}] * 5, configuration=0)),
+    # A target that is not confirmed comes from the safety memory alone.
+    "unconfirmed": Scenario("consume", driven(*gone(8.0, 40), safety_persist=True)),
+    "light_braking": Scenario(
+        "proportional",
+        driven({"lights": {7: RED}, "x": 60.0, "v": 12.0}, configuration=4, map=LIGHT),
+    ),
+    "cap_scope": Scenario(
+        "cruise", driven(*[{"cars": [Car(59.0)], "v": 22.5}] * 5, configuration=4)
+    ),
+    "lookahead": Scenario("fixed", driven({"y": 0.5})),
+    "route": Scenario("first_branch", driven({}, map=ArcMap(first_goes_left=True))),
+    "radar": Scenario(False, driven({"radar": radar((30.0, 0.0))})),
+    "radar_corridor": Scenario("parabola", driven({"radar": radar((30.0, 1.7))})),
+    "consistency_guard": Scenario(10.0, driven(*[{"near": [Car(20.0)], "far": [Car(50.0)]}] * 5)),
+    "rate_filter": Scenario(True, driven(*[{"cars": [Car(30.0)]}] * 8)),
+    "follower": Scenario("distance_pid", driven(*[{"cars": [Car(45.0)]}] * 5)),
+    "hsv_required": Scenario(
+        True, driven({"lights": {7: RED}, "x": 60.0}, configuration=4, map=LIGHT)
+    ),
+    "resume_end": Scenario(
+        "first_curve", driven(STOP, *[{"x": 150.0, "v": 5.0}] * 310, configuration=3, map=LIGHT)
+    ),
+    "lazy_lookahead": Scenario(12.0, driven({"y": 0.9}, configuration=1)),
+    "lazy_dead_band": Scenario(0.4, driven({"y": 0.9}, configuration=1)),
+    "lazy_gain": Scenario(0.9, driven({"y": 0.9}, configuration=1)),
+    "steer_smoothing": Scenario(True, driven({"y": 0.5})),
+}
+
+# --- settings of other houses: their own functions, or a short drive at object level
+
+
+def cell(settings: Settings, weather: str = "clear-noon", level=SensorLevel.OBJECTS) -> Cell:
+    return Cell(
+        driver=Driver(label="2", functions=functions_of(2)),
+        weather=find_weather(weather),
+        seed=3,
+        profile="recommended",
+        settings=settings,
+        duration=2.0,
+        level=level,
+    )
+
+
+def short_drive(weather: str | Weather) -> Outcome:
+    return lambda settings: log_hash(run_cell(cell(settings, weather)).log)
+
+
+def pictures(settings: Settings, weather: str, *ids: str) -> list[bytes]:
+    """What some cameras show at the start."""
+    ready = cell(settings, weather, SensorLevel.PIXELS)
+    backend = EmbeddedBackend()
+    images = backend.reset(setup_of(ready, load_map(ready.map)), ready.seed).images
+    found = []
+    for name in ids:
+        image = images[name]
+        channel = next(c for c in (image.rgb, image.inverse_depth, image.labels) if c is not None)
+        found.append(np.ascontiguousarray(channel).tobytes())
+    backend.close()
+    return found
+
+
+@cache
+def figure8():
+    return load_map("figure8")
+
+
+def recovery(settings: Settings) -> list[Any]:
+    """A contact with a car standing 10 m ahead, until the ego drives again."""
+    start = figure8().ahead(figure8().place(figure8().ego_start), 300.0)
+    supervisor = Supervisor(figure8(), recovery_settings(settings), DT)
+    table = makelog.actor_table(2)
+    poses = [start.pose, start.pose.moved(10.0, 0.0)]
+    rows = [{"x": p.x, "y": p.y, "z": p.z, "yaw": p.yaw} for p in poses]
+    hit = ContactEvent(0, -1, "guardrail", 1000.0, 5.0, 0.0, 0.0)
+    log = []
+    for k in range(90):
+        contacts = (hit,) if k == 0 else ()
+        phase = supervisor.observe(makelog.world(k, rows, table, contacts))
+        log.append((phase, supervisor.act(VehicleCommand())))
+    return log
+
+
+def lead_truth(settings: Settings) -> int:
+    """Which actor is the true lead when the only car is 30 m behind."""
+    start = figure8().ahead(figure8().place(figure8().ego_start), 300.0)
+    behind: Pose = figure8().behind(start, 30.0).pose
+    rows = [{"x": p.x, "y": p.y, "z": p.z, "yaw": p.yaw} for p in (start.pose, behind)]
+    log = makelog.drive(1, lambda _k: rows)
+    return int(prepare(log, figure8(), metric_settings(cell(settings))).lead.actor[0])
+
+
+OTHERS: dict[str, Scenario] = {
+    "grip": Scenario("none", short_drive("rain-noon")),
+    "range": Scenario("none", lambda s: pictures(s, "rain-noon", "depth_roof", "semantic_roof")),
+    "mu_ref": Scenario(0.3, short_drive("clear-noon")),
+    "camera": Scenario(False, lambda s: pictures(s, "rain-noon", "rgb_front")),
+    "night_rain": Scenario("rain_only", lambda s: pictures(s, "rain-night", "rgb_front")),
+    "drivers": Scenario(True, short_drive("rain-noon")),
+    "initial_limit_kmh": Scenario(30.0, short_drive("clear-noon")),
+    "traffic_positions": Scenario("table", short_drive("clear-noon")),
+    "relocation": Scenario("standing", recovery),
+    "clearance": Scenario("listing", recovery),
+    "lane_truth": Scenario("same_road", lead_truth),
+}
+SCENARIOS = STACK | OTHERS
+
+
+@pytest.mark.req("M-14")
+def test_every_setting_has_a_scenario():
+    assert set(SCENARIOS) == set(NAMES)
+
+
+@pytest.mark.req("M-14", "A-051", "A-058", "A-059", "A-062", "A-082", "A-177")
+@pytest.mark.parametrize("name", NAMES)
+def test_the_outcome_changes_with_the_setting_and_only_with_it(name):
+    other, outcome = SCENARIOS[name]
+    default = Settings()
+    toggled = default.with_values({name: other})
+    assert toggled != default
+    first = outcome(default)
+    assert first == outcome(default), "the scenario itself is repeatable"
+    assert first != outcome(toggled)

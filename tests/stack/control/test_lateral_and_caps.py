@@ -77,7 +77,8 @@ def test_steer_is_zero_without_a_place_and_clipped():
     assert steer(driver, ArcMap(), Pose(0.0, 300.0), 10.0) == 0.0
     here = ArcMap()._at(0, 0.05)
     assert steer_towards(Pose(0, 0), 10.0, here) == 0.0
-    assert steer_towards(Pose(0, -0.11), 10.0, here) != 0.0
+    for beside, steers in ((0.095, False), (0.105, True)):
+        assert (steer_towards(Pose(0.05, -beside), 10.0, here) != 0.0) is steers
     assert steer(driver, ArcMap(), Pose(0.0, 0.0, yaw=2.0), 5.0) == -1.0
     assert steer(driver, ArcMap(), Pose(0.0, 0.0, yaw=-2.0), 5.0) == 1.0
 

@@ -20,7 +20,7 @@ from skidpad.stack.configurations import (
 )
 from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, Pid
 from skidpad.stack.control.text import LABELS, mode_text
-from skidpad.stack.control.tiers import Hierarchy, Lead, Request, Situation, time_gap
+from skidpad.stack.control.tiers import Hierarchy, Lead, Request, Situation, time_gap, zones
 from skidpad.stack.settings import Settings
 
 approx = pytest.approx
@@ -361,3 +361,72 @@ def test_functions_are_switched_while_driving():
     assert tick(11)[1] != steer
     stack.switch(functions_of(4))
     assert tick(12)[:2] == (Tier.ACC_CLOSE, approx(steer))
+
+
+@pytest.mark.req("A-117")
+def test_emergency_begins_below_0_75_s():
+    for gap, tier in ((0.74, Tier.EMERGENCY), (0.76, Tier.ACC_CLOSE)):
+        s = Situation(20.0, 72.0, Lead(20.0 * gap, gap, True), None, 150.0, 1e9)
+        assert decide(s).tier is tier
+
+
+@pytest.mark.req("A-121")
+def test_approach_is_never_slower_than_1_5_m_s():
+    """The floor shows where the hold does not: effective 2 m asks for more, so shorten the hold."""
+    alone = Hierarchy(frozenset({Function.TLA}), Settings(), 0.05)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("skidpad.stack.control.tiers.LEAD_HOLD", 0.1)
+        for v, throttle in ((1.45, 0.2), (1.55, 0.0)):
+            r = alone.decide(situation(3.6 * v, 30.0, stop=0.3))
+            assert (r.tier, r.throttle) == (Tier.APPROACH, throttle)
+
+
+@pytest.mark.req("A-123")
+def test_range_of_following():
+    """Below 5 s or below 40 m."""
+    for v, distance, follows in (
+        (10.0, 49.0, True), (10.0, 51.0, False), (2.0, 39.5, True), (2.0, 40.5, False),
+        (20.0, 79.0, True),
+    ):  # fmt: skip
+        tier = decide(situation(3.6 * v, distance)).tier
+        assert (tier is Tier.ACC_OPEN) is follows, (v, distance)
+
+
+@pytest.mark.req("A-124", "A-125", "A-128")
+def test_edges_of_the_zones():
+    for gap, tier in (
+        (2.21, Tier.ACC_HOLD), (2.2, Tier.ACC_CLOSE), (2.79, Tier.ACC_HOLD), (2.8, Tier.ACC_OPEN),
+    ):  # fmt: skip
+        assert zones(gap).tier is tier
+    for gap, throttle, brake in (
+        (2.595, 0.15, 0.0), (2.605, 0.30, 0.0), (2.405, 0.15, 0.0), (2.395, 0.0, 0.10),
+    ):  # fmt: skip
+        assert zones(gap)[1:3] == (throttle, brake)
+
+
+@pytest.mark.req("A-130", "A-131", "A-132")
+def test_edges_before_the_line():
+    assert decide(situation(2.0, stop=0.49)).tier is Tier.HOLDING_AT_LINE
+    assert decide(situation(2.0, stop=0.51)).tier is Tier.LIGHT_STOP
+    assert decide(situation(2.0, stop=4.9)).throttle == 0.15
+    assert decide(situation(2.0, stop=5.1)).throttle == 0.35
+
+
+@pytest.mark.req("A-134")
+def test_coasting_brakes_a_little_above_15_km_h():
+    for v_kmh, coasts in ((15.5, True), (14.5, False)):
+        h = hierarchy()
+        h.decide(situation(36.0, 25.0))
+        r = h.decide(situation(v_kmh))
+        assert (r.tier is Tier.COAST) is coasts
+        if coasts:
+            assert r == (Tier.COAST, 0.0, 0.10, False)
+            assert h.speed_pid.previous == 0.0, "the PID does not run"
+
+
+@pytest.mark.req("A-138", "A-137")
+def test_handbrake_below_3_km_h():
+    for v_kmh, pulled in ((2.8, True), (3.2, False)):
+        assert decide(situation(v_kmh, 30.0, stop=1.0)).handbrake is pulled
+        assert decide(situation(v_kmh, stop=0.4)).handbrake is pulled
+        assert not decide(situation(v_kmh, 4.0, stop=0.4)).handbrake, "tier 2 comes first"

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -45,6 +46,7 @@ ROOF = CameraPair(ROOF_DEPTH, ROOF_SEMANTIC, roof_corridor(ROOF_SEMANTIC))
         (15.1, None, 15.1, None),
         (29.9, None, 29.9, None),
         (14.9, None, 14.9, 14.9),
+        (30.1, None, None, None),
     ],
 )
 def test_fused_distance(bumper, roof, fused, listed):
@@ -73,6 +75,8 @@ def test_median_of_five_samples():
     m = MedianFilter()
     assert [m.update(d) for d in (30.0, 29.0, 28.0)] == [None, None, 30.0]
     assert [m.update(d) for d in (27.0, 80.0, 26.0)] == [29.0, 29.0, 28.0]
+    assert [m.update(20.0) for _ in range(5)][-1] == 20.0
+    assert [m.update(None) for _ in range(3)] == [20.0, 20.0, None]
     m.reset()
     assert m.update(20.0) is None
 
@@ -156,3 +160,31 @@ def test_segments_read_as_the_pixels_that_they_stand_for(gap, left):
         assert (pixels is None) is (segments is None)
         if pixels is not None:
             assert segments == approx(pixels, rel=1e-5)
+
+
+@pytest.mark.req("A-047", "A-053")
+@pytest.mark.parametrize(("pair", "nearest"), [(BUMPER, 6.0), (ROOF, 30.0)])
+def test_a_tier_reads_the_tenth_percentile(pair, nearest):
+    """A wall of vehicle pixels whose depth grows with the row."""
+    keep = pair.keep
+    shape = (300, 400) if pair is BUMPER else (600, 800)
+    labels, depth = np.zeros(shape, np.uint8), np.zeros(shape, np.float32)
+    rows = range(keep.row_first, keep.row_end)
+    middle = shape[1] // 2
+    for row in rows:
+        depth[row, middle] = nearest + 0.05 * (row - keep.row_first)
+        labels[row, middle] = 14
+    inverse = np.divide(1.0, depth, out=np.zeros_like(depth), where=depth > 0.0)
+    images = {
+        pair.depth_id: CameraImage(inverse_depth=inverse),
+        pair.semantic_id: CameraImage(labels=labels),
+    }
+    found = pair.read(replace(frame(), segments={}, images=images), 0.0, 0.0)
+    expected = np.percentile([depth[row, middle] for row in rows], 10)
+    assert found == approx(expected, rel=1e-5)
+
+
+@pytest.mark.req("A-062")
+def test_rate_filter_lasts_0_17_s():
+    f = RateFilter(0.001)
+    assert f.history.maxlen == 170

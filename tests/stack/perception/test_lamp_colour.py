@@ -90,7 +90,7 @@ def test_only_the_upper_60_percent_count():
         (2, 4, True),  # 1 x 3 = 3 px
         (32, 33, True),  # 31 x 32 = 992 px
         (33, 33, False),  # 32 x 32 = 1024 px
-        (20, 10, True), (21, 10, False), (6, 20, True), (5, 20, False),
+        (20, 10, True), (21, 10, False), (6, 20, True), (5, 20, False), (7, 25, False),
     ],
 )  # fmt: skip
 def test_area_and_aspect(w, h, counts):

@@ -68,8 +68,8 @@ def test_a_light_must_be_ahead():
     map = ArcMap(lights=ONE)
     map.signals = map.signals._replace(x=np.array([300.0]), y=np.array([30.0]))
     # cos 78.46 deg = 0.2: ahead while (300 - x) / 30 > 0.2041, that is before x = 293.88
-    assert look(map, 293.0).distance == approx(7.0)
-    assert look(map, 294.6) == NO_LIGHT
+    assert look(map, 293.7).distance == approx(6.3)
+    assert look(map, 294.0) == NO_LIGHT
     assert look(map, 294.6, yaw=0.1).distance == approx(5.4)
 
 
@@ -82,8 +82,8 @@ def test_a_light_must_be_ahead():
         (295.1, YELLOW, LightSource.IMMEDIATE_TRIGGER, 4.9),
         (295.1, LightState.UNKNOWN, LightSource.IMMEDIATE_TRIGGER, 4.9),
         (295.1, GREEN, LightSource.MAP_SCAN, 4.9),
-        (300.5, RED, LightSource.IMMEDIATE_TRIGGER, 0.0),
-        (301.1, RED, LightSource.NO_LIGHT, None),
+        (300.95, RED, LightSource.IMMEDIATE_TRIGGER, 0.0),
+        (301.05, RED, LightSource.NO_LIGHT, None),
         (300.5, GREEN, LightSource.NO_LIGHT, None),
         (100.0, RED, LightSource.NO_LIGHT, None),
     ],

@@ -239,3 +239,20 @@ def test_a_phantom_of_one_or_two_ticks_never_reaches_the_controller(length, leve
         assert stack.report.tier is Tier.CRUISE
         assert not stack.report.detected
     assert stack.front.persistence.seen_ticks == 0
+
+
+@pytest.mark.req("A-088", "A-091", "A-095", "A-097", "A-100")
+def test_durations_in_milliseconds():
+    """With a step of 1 ms no rounding to ticks hides a wrong duration."""
+
+    def rows(seen, missing, safety=False, **options):
+        p = persistence(dt=0.001, safety=safety)
+        return p, statuses(play(p, [25.0] * seen + [None] * missing, **options))
+
+    assert rows(100, 0)[1].index(SEEN) == 66
+    assert rows(100, 400)[1].count(HELD) == 170
+    assert rows(100, 1400, acc=True)[1].count(HELD) == 1000
+    assert rows(100, 1900, stopping=True)[1].count(HELD) == 1500
+    assert rows(100, 5600, safety=True, acc=True)[1].count(SAFE) == 3999
+    for missing, remembered in ((5000, True), (5001, False)):
+        assert rows(100, missing, acc=True)[0].was_following is remembered

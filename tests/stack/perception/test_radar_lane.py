@@ -64,7 +64,7 @@ def test_path_follows_yaw_error_and_curvature():
 
 @pytest.mark.req("A-069")
 @pytest.mark.parametrize(
-    ("r", "kept"), [(0.09, False), (0.11, True), (79.9, True), (80.0, False), (85.0, False)]
+    ("r", "kept"), [(0.095, False), (0.105, True), (79.9, True), (80.0, False), (85.0, False)]
 )
 def test_keeps_0_1_to_80_m(r, kept):
     assert passes(r, 0.0, 0.0, -5.0) is kept
@@ -289,3 +289,10 @@ def test_azimuth_is_left_positive():
     assert 40.0 * sin(0.1) < 4.0 < 40.0 * sin(0.2)
     assert passes(40.0, -0.1, 0.0, -5.0, view=view)
     assert not passes(40.0, 0.1, 0.0, -5.0, view=view)
+
+
+@pytest.mark.req("A-068")
+def test_the_stack_keeps_4_m_about_the_path():
+    for left, kept in ((3.9, True), (4.1, False)):
+        report = status_of({}, [(40.0, float(np.arcsin(left / 40.0)), 0.0, -3.0)])
+        assert (report.radar_pre is not None) is kept

@@ -95,7 +95,11 @@ class LaneMatch:
         self.map = map
 
     def __call__(self, pose: Pose, view: LaneView, range: float, azimuth: float) -> bool:
-        """False where target or ego is on no lane."""
+        """False where target or ego is on no lane.
+
+        The look ahead reads one place per branch, `range` + 10 m on, as A-078 is written: a target
+        whose road ends before that place is missed.
+        """
         if view.ego is None:
             return False
         c, s = cos(pose.yaw), sin(pose.yaw)

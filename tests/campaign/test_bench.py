@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from skidpad.campaign.bench import tick_cost
+from skidpad.campaign import bench, bench_matrix
+from skidpad.campaign.bench import TickCost, tick_cost
 from skidpad.campaign.cells import Cell, Driver
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather
@@ -28,3 +29,19 @@ def test_parts_add_up_to_the_tick() -> None:
     assert sum(cost.parts.values()) <= cost.mean
     assert cost.median <= cost.p99
     assert cost.median < 50.0  # CPU ms with twelve sensors; real time with room to spare
+
+
+def test_rows_cover_both_levels_and_weathers(monkeypatch: pytest.MonkeyPatch) -> None:
+    cost = TickCost(2.0, 2.0, 3.0, {})
+    monkeypatch.setattr(bench, "warm_cost", lambda *_: cost)
+    rows = list(bench.tick_costs())
+    assert {r.sensors for r in rows} == {"pixels", "objects", "all images"}
+    assert {r.weather for r in rows} == {"clear-noon", "rain-night"}
+    assert {r.target for r in rows if r.configuration == 4} == {3.2, 0.35}
+
+
+def test_the_matrix_is_estimated_for_two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    cost = TickCost(3.0, 3.0, 3.0, {})
+    monkeypatch.setattr(bench_matrix, "warm_cost", lambda *_: cost)
+    # 30 runs of 10 000 ticks of 3 ms: 900 s on one core.
+    assert bench_matrix.estimated_minutes() == pytest.approx(7.5)

@@ -86,6 +86,22 @@ def warm_up() -> None:
     for level in SensorLevel:
         run = drive(4, weather="rain-night", duration=1.0, sensors=level.value)
         run_metrics(run.log, load_map("figure8"))
+    see_all()
+
+
+def see_all() -> None:
+    """Draw every image once and look for lamps: a moment's drive meets no light."""
+    from skidpad.physics.presets import preset
+    from skidpad.roads.bundled import load_map
+    from skidpad.sensors.bench import convoy
+    from skidpad.sensors.suite import PixelSuite
+    from skidpad.sensors.twelve import twelve_sensors
+    from skidpad.stack.perception.hsv import LampCamera
+
+    road_map, specs = load_map("figure8"), twelve_sensors()
+    table, states = convoy(road_map)
+    suite = PixelSuite(road_map, table, specs, preset("rain-night"), render_all=True)
+    LampCamera(specs).look(suite.observe(0, states, {}).images)
 
 
 def drive_one(argument: tuple[Cell, Path]) -> tuple[RunKey, Metrics, Timing, str]:

@@ -6,6 +6,7 @@ import typer
 
 import skidpad
 from skidpad.cli.adas import adas, report, show
+from skidpad.cli.bench import bench
 from skidpad.cli.channels import channels
 from skidpad.cli.channels_drive import drive
 from skidpad.cli.compare import compare
@@ -48,6 +49,7 @@ app.command()(report)
 app.command()(compare)
 app.command()(rerun)
 app.command()(study)
+app.command()(bench)
 app.command()(show)
 app.add_typer(profiles)
 app.add_typer(maps)

@@ -1,0 +1,117 @@
+"""`skidpad bench`: what things cost on this machine, in CPU time."""
+
+from __future__ import annotations
+
+import json as plain_json
+import os
+import platform
+from dataclasses import asdict
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from skidpad.campaign.bench import Row
+
+
+class Subject(str, Enum):
+    """What can be measured."""
+
+    TICK = "tick"
+    SENSORS = "sensors"
+    PHYSICS = "physics"
+    MATRIX = "matrix"
+
+
+def bench(
+    subject: Annotated[Subject, typer.Argument(help="What to measure.")] = Subject.TICK,
+    seconds: Annotated[
+        float, typer.Option(min=1.0, help="Simulated seconds per measured drive.")
+    ] = 60.0,
+    json: Annotated[bool, typer.Option("--json", help="Print one JSON object.")] = False,
+    run: Annotated[
+        bool, typer.Option("--run", help="matrix: drive all 30 runs instead of estimating.")
+    ] = False,
+) -> None:
+    """Measure CPU time: per tick against the targets, per sensor, per vehicle, of the matrix."""
+    measure = {
+        Subject.TICK: lambda: _tick(seconds, json),
+        Subject.SENSORS: lambda: _sensors(json),
+        Subject.PHYSICS: lambda: _physics(json),
+        Subject.MATRIX: lambda: _matrix(seconds, run, json),
+    }
+    figures = measure[subject]()
+    about = {"subject": subject.value, "machine": machine(), "cores": os.cpu_count()}
+    if json:
+        typer.echo(plain_json.dumps({**about, **figures}, indent=2))
+    else:
+        typer.echo(f"on {about['machine']}, {about['cores']} cores; other load inflates figures")
+
+
+def machine() -> str:
+    """The processor's name as the system tells it."""
+    try:
+        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    except OSError:  # not Linux
+        pass
+    return platform.processor() or platform.machine()
+
+
+def _tick(seconds: float, quiet: bool) -> dict[str, Any]:
+    from skidpad.campaign.bench import tick_costs
+
+    rows = []
+    if not quiet:
+        typer.echo("config  weather      sensors      mean  median    p99  target  CPU ms per tick")
+    for row in tick_costs(seconds):
+        rows.append(asdict(row))
+        if not quiet:
+            typer.echo(_line(row))
+    return {"unit": "ms per tick", "rows": rows}
+
+
+def _line(row: Row) -> str:
+    c = row.cost
+    parts = ", ".join(f"{name} {ms:.2f}" for name, ms in sorted(c.parts.items()))
+    verdict = "ok  " if c.mean <= row.target else "over"
+    return (
+        f"{row.configuration:<7} {row.weather:<12} {row.sensors:<10} {c.mean:6.2f} {c.median:7.2f} "
+        f"{c.p99:6.2f}  {row.target:4.2f} {verdict} {parts}"
+    )
+
+
+def _sensors(quiet: bool) -> dict[str, Any]:
+    from skidpad.sensors.bench import run
+
+    return _plain(run(), "ms per tick, median", quiet)
+
+
+def _physics(quiet: bool) -> dict[str, Any]:
+    from skidpad.physics.bench import run
+
+    return _plain(run(), "us per vehicle and tick, median", quiet)
+
+
+def _plain(figures: dict[str, float], unit: str, quiet: bool) -> dict[str, Any]:
+    if not quiet:
+        typer.echo(unit)
+        for stage, value in figures.items():
+            typer.echo(f"  {stage:<20} {value:7.3f}")
+    return {"unit": unit, "figures": figures}
+
+
+def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
+    from skidpad.campaign import bench_matrix as matrix
+
+    minutes = matrix.driven_minutes() if run else matrix.estimated_minutes(seconds)
+    how = "wall time, driven" if run else "estimated from tick costs"
+    if not quiet:
+        typer.echo(
+            f"30 runs of 500 s with all sensors: {minutes:.1f} min on {matrix.CORES} cores "
+            f"({how}); target {matrix.TARGET:g} min"
+        )
+    return {"unit": "min", "minutes": minutes, "how": how, "target": matrix.TARGET}

@@ -22,6 +22,7 @@ from skidpad.stack.channels.settings import CarModel
 
 CLEARANCE = 25.0  # m between vehicles at the start
 FIRST_S = 25.0  # m from the beginning of its lane where the ego starts
+PARKED_WIDTH = 1.95  # m, wider vehicles would stand on the lane
 V_MEAN_MAX = 25.0  # m/s, so that no route ends before its segment
 
 
@@ -50,10 +51,11 @@ def segment_of(route: DrivenRoute, map: RoadMap, seed: int, duration: float) -> 
         for i, p in enumerate(places)
     ]
     spaces = map.roadside.parking[: route.parked]
+    cars = [t for t in types if vehicle_type(t).width < PARKED_WIDTH]
     parked = [
         ActorSetup(
             name=f"parked_{i + 1:02d}",
-            type=types[(i + 1) % len(types)],
+            type=cars[i % len(cars)],
             place=Pose(p.x, p.y, p.z, yaw=p.yaw),
             driver="scripted",
         )

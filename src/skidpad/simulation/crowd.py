@@ -29,10 +29,10 @@ RIDE_MEAN, RIDE_SIGMA = 4.5, 0.7  # m/s in town traffic (Parkin and Rotheram 201
 STROLL = 15.0  # m from a zebra to which a pedestrian goes before it comes back
 CROSS_WITHIN = 18.0  # s of red after which nobody begins to cross: red lasts 32 s
 GAP_TIME = 7.0  # s of free road for crossing 7 m at 1.2 m/s and a second to spare
-RIDE_RIGHT = 1.0  # m right of the lane's centre
+RIDE_RIGHT = 0.8  # m right of the lane's centre
 RIDE_STOP = 6.0  # m kept to what stands ahead
 RIDE_BRAKE, RIDE_ACCELERATE = 2.0, 0.8  # m/s^2
-SIDE = 1.1  # m to both sides of the way in which something is ahead
+SIDE = 0.7  # m to both sides of the way in which something is ahead: half a bicycle and a gap
 YIELD_TIME = 8.0  # s after which a cyclist at a minor line goes in any gap
 
 

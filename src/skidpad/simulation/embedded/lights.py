@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.randomness import stream
 from skidpad.core.vocabulary import LightState
-from skidpad.roads.lanes import SignalKind, SignalTable
+from skidpad.roads.lanes import LaneTable, SignalKind, SignalTable
 
 GREEN_S = 10.0  # CARLA's defaults for green and yellow; red as measured in the published set-up
 YELLOW_S = 3.0
@@ -26,7 +26,12 @@ class Lights:
     axes follow each other evenly within the cycle, so crossing streams never have green together.
     """
 
-    def __init__(self, signals: SignalTable, seed: int, dt: float) -> None:
+    def __init__(
+        self, signals: SignalTable, seed: int, dt: float, lanes: LaneTable | None = None
+    ) -> None:
+        """lanes: where controllers of one junction are to take turns as one group."""
+        if lanes is not None:
+            signals = signals._replace(group=_junctions(signals, lanes))
         self.rows = np.flatnonzero(signals.kind == SignalKind.LIGHT)
         self.ids = signals.id[self.rows]
         self._shift = np.round(_offsets(signals, self.rows, seed) / dt).astype(np.int64)
@@ -50,6 +55,18 @@ class Lights:
         }
         left = self._ends[stage] - phase
         self._changes = tick + int(left.min(initial=NEVER))
+
+
+def _junctions(signals: SignalTable, lanes: LaneTable) -> NDArray[np.int32]:
+    """(K,) the junction behind each signal's lane, else the signal's own group."""
+    group = signals.group.copy()
+    for row, lane in enumerate(signals.lane):
+        if lanes.next_start[lane] == lanes.next_start[lane + 1]:
+            continue
+        junction = lanes.junction[lanes.next_lane[lanes.next_start[lane]]]
+        if junction >= 0:
+            group[row] = junction
+    return group
 
 
 def _offsets(signals: SignalTable, rows: NDArray[np.intp], seed: int) -> NDArray[np.float64]:

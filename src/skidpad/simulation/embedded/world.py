@@ -17,6 +17,7 @@ from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.randomness import stream_key
 from skidpad.core.setup import ActorCommand, Setup, TrafficSetup
 from skidpad.core.states import ActorStates, ContactEvent, LaneInvasion, VehicleCommand
+from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.contact import CONTACT_LAW, Bodies, Contacts, bodies, resolve_contacts
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import fill_mu, friction_ratio, grip_params
@@ -61,7 +62,7 @@ class World:
         self.keys = np.array([stream_key(seed, "road noise", i) for i in range(n)], np.uint64)
         self.grip = grip_params(setup.weather, setup.grip, setup.mu_ref)
         self.patches = Patches(self.map, setup.patches, self.cast.vehicles)
-        self.lights = Lights(self.map.signals, seed, self.dt)
+        self.lights = Lights(self.map.signals, seed, self.dt, self.map.lanes)
         self.obstacles = obstacles(self.map)
         self.bodies = _bodies(self.cast)
         self.touching = Contacts.room()
@@ -75,7 +76,8 @@ class World:
         traffic = setup.traffic or TrafficSetup(vehicles=0)
         ratio = friction_ratio(setup.weather, setup.grip)
         net = network_of(self.map)
-        self.traffic = Traffic(self.map, net, types, traffic, seed, self.dt, ratio)
+        walkers = np.flatnonzero(self.table.kind == ActorKind.PEDESTRIAN)
+        self.traffic = Traffic(self.map, net, types, traffic, seed, self.dt, ratio, walkers)
         self._place_all()
 
     def step(self, command: VehicleCommand, actor_commands: Iterable[ActorCommand]) -> None:

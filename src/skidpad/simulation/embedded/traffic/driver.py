@@ -31,6 +31,7 @@ from skidpad.simulation.embedded.traffic.path import (
     straight_path,
     uniform,
 )
+from skidpad.simulation.embedded.traffic.right_of_way import right_of_way_gap, zebra_gap
 from skidpad.simulation.embedded.traffic.state import CHANGE_TIME, Drivers, View
 from skidpad.simulation.embedded.traffic.tracking import pedals, steer
 
@@ -181,6 +182,7 @@ def plan(view: View, d: Drivers, i: int) -> None:
         v_merging = view.placed[merging].v
         a = min(a, idm(v, v_desired, gap_merge, v_merging, trait.headway, trait.a_max))
     gap_stop = min(stop_gap(view, d, i), end_gap(view, d, i))
+    gap_stop = min(gap_stop, right_of_way_gap(view, d, i), zebra_gap(view, d, i))
     if gap_stop < np.inf:
         a = min(a, idm(v, v_desired, gap_stop, 0.0, HEADWAY_STOP, trait.a_max))
     me.target = a

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from math import hypot
 
 import numpy as np
@@ -22,10 +23,12 @@ from skidpad.simulation.embedded.traffic.network import Network
 from skidpad.simulation.embedded.traffic.occupancy import Places, occupancy
 from skidpad.simulation.embedded.traffic.path import begin
 from skidpad.simulation.embedded.traffic.places import FreePlaces
+from skidpad.simulation.embedded.traffic.priority import bake_priority
 from skidpad.simulation.embedded.traffic.state import TRAIT, View, drivers
 from skidpad.simulation.embedded.traffic.variety import vary
 
 G = 9.80665  # m/s^2
+KERB = 0.5  # m beside the road from which a pedestrian in motion counts as on the zebra
 AIR_DENSITY = 1.204  # kg/m^3 at 20 C
 STUCK_TIME = 10.0  # s, decision M-7
 PUT_BACK_NEAREST = 100.0  # m from the ego, decision M-7
@@ -33,6 +36,14 @@ PUT_BACK_SPEED = 0.8  # of the desired speed there
 BUBBLE = 500.0  # m, random traffic lives within this distance of the ego (A-209)
 BUBBLE_NEAREST = 150.0  # m, respawns stay out of the ego's sight
 CHECK_PERIOD = 20  # ticks between two looks at wrecks and the bubble
+
+
+@lru_cache(maxsize=8)
+def priority_of(
+    map: RoadMap,
+) -> tuple[NDArray[np.void], NDArray[np.void], NDArray[np.void], NDArray[np.float64]]:
+    """Right of way on a map, baked once per process."""
+    return bake_priority(map.samples, map.lanes, map.signals, map.roadside)
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,8 +68,12 @@ class Traffic:
         seed: int,
         dt: float,
         grip: float,
+        walkers: NDArray[np.intp] | None = None,
     ) -> None:
-        """types: per actor, None where it is no vehicle. grip: friction over dry, in (0, 1]."""
+        """types: per actor, None where it is no vehicle. grip: friction over dry, in (0, 1].
+
+        walkers: actors to whom drivers yield at zebras.
+        """
         n = len(types)
         self.net, self.setup, self.dt = net, setup, dt
         self.drivers = drivers(n)
@@ -67,6 +82,8 @@ class Traffic:
         if setup.variety:
             vary(self.drivers.trait, seed)
         self.occupancy = occupancy(len(net.lane), n)
+        self.walkers = np.empty(0, dtype=np.intp) if walkers is None else walkers
+        self.entry, self.conflict, self.zebra, self.zebras = priority_of(map)
         self.places = FreePlaces(map, net, stream(seed, "traffic", "places"))
         self.waiting: list[int] = []  # enter when there is room
 
@@ -95,8 +112,24 @@ class Traffic:
     ) -> None:
         """Write the commands of all driven actors for the coming step."""
         free_choice = self.setup.mode == "random"
-        view = View(self.net, self.occupancy, placed, lights, tick, self.dt, free_choice)
+        view = View(
+            self.net, self.occupancy, placed, lights, tick, self.dt, free_choice,
+            self.entry, self.conflict, self.zebra, self._busy(placed),
+        )  # fmt: skip
         drive_all(view, self.drivers, commands)
+
+    def _busy(self, placed: Places) -> NDArray[np.bool_]:
+        """(Z,) zebras on which somebody walks, or steps from the kerb."""
+        who = placed[self.walkers]
+        if not len(who) or not len(self.zebras):
+            return np.zeros(len(self.zebras), dtype=np.bool_)
+        x, y, h, half_l, half_w = self.zebras.T[:, :, None]
+        dx, dy = who["x"] - x, who["y"] - y
+        along, across = np.cos(h) * dx + np.sin(h) * dy, -np.sin(h) * dx + np.cos(h) * dy
+        moving = who["present"] & (np.hypot(who["vx"], who["vy"]) > 0.1)
+        on = (np.abs(along) < half_l + KERB) & (np.abs(across) < half_w) & moving
+        busy: NDArray[np.bool_] = on.any(axis=1)
+        return busy
 
     def moves(self, states: ActorStates, tick: int) -> Iterator[Move]:
         """Vehicles to put somewhere in this tick; apply each before asking for the next."""

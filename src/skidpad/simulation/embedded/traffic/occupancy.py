@@ -94,8 +94,10 @@ def fill(net: Network, placed: Places, occ: Occupancy) -> None:
         if not placed[i].present or lane < 0:
             continue
         s = placed[i].s
-        add(occ, i, lane, s)
         half_lane = net.point[net.lane[lane].first].half_width
+        if abs(placed[i].offset) - placed[i].half_width > half_lane:
+            continue  # parked or walking beside the road
+        add(occ, i, lane, s)
         if placed[i].offset + placed[i].half_width > half_lane and net.lane[lane].left >= 0:
             add(occ, i, net.lane[lane].left, beside(net, lane, s, net.lane[lane].left))
         if placed[i].offset - placed[i].half_width < -half_lane and net.lane[lane].right >= 0:

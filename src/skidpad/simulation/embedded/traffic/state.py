@@ -30,6 +30,8 @@ DRIVER = np.dtype(
         ("v_desired", "f8"),  # m/s, that limits and bends ahead allow
         ("target", "f8"),  # m/s^2, acceleration asked for
         ("trim", "f8"),  # m/s^2, integral of the pedal control
+        ("halted", "i4"),  # junction lane before which it has made its stop, -1: none
+        ("waited", "f8"),  # s for others at a junction
         ("stuck", "f8"),  # s stopped, off the lane or wrong-way without a cause ahead
     ],
     align=True,
@@ -71,10 +73,15 @@ class View(NamedTuple):
     tick: int
     dt: float
     free_choice: bool  # branches are drawn instead of taking the straightest
+    entry: NDArray[np.void]  # (L,) ENTRY of `priority`
+    conflict: NDArray[np.void]  # CONFLICT
+    zebra: NDArray[np.void]  # ZEBRA
+    busy: NDArray[np.bool_]  # (Z,) somebody walks over the zebra
 
 
 def drivers(n: int) -> Drivers:
     """n inactive drivers."""
     state = np.zeros(n, dtype=DRIVER)
     state["change"] = state["cap"] = np.inf
+    state["halted"] = -1
     return Drivers(state, np.zeros(n, dtype=TRAIT), np.full((n, PATH), -1, dtype=np.int32))

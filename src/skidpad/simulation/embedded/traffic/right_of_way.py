@@ -1,0 +1,230 @@
+"""Waiting for others at junctions and zebras: stop lines, gap acceptance, areas that are taken.
+
+A driver decides before the junction: it enters when its way through is free, when nobody to whom
+it yields arrives too soon, and when there is room behind the junction. Once in, it only keeps out
+of areas in which somebody stands.
+"""
+
+from __future__ import annotations
+
+from math import sqrt
+
+import numpy as np
+
+from skidpad.core.jit import kernel
+from skidpad.simulation.embedded.traffic.occupancy import NOBODY, SLOTS, find_ahead
+from skidpad.simulation.embedded.traffic.path import PATH
+from skidpad.simulation.embedded.traffic.priority import LIGHT, STOP, YIELD
+from skidpad.simulation.embedded.traffic.state import Drivers, View
+
+REACH = 60.0  # m before a junction from which a driver looks
+DECIDE = 25.0  # m before it from which gaps are judged; before, a driver is only ready to stop
+V_THROUGH = 8.0  # m/s through a junction
+GAP_MARGIN = 1.0  # s beyond leaving the shared area: critical gaps near 4 to 7 s (HCM 2010)
+JOIN_MARGIN = 2.5  # s, who joins must not be caught up at once
+WATCH = 70.0  # m before the shared area in which others matter
+HALTED = 0.5  # m/s
+HALT_GAP = 4.5  # m to the line within which standing counts as a stop
+PATIENCE = 10.0  # s, then who stands on the other side no longer counts
+EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
+V_QUEUE = 2.0  # m/s, slower leaders make a queue
+V_PREPARE = 5.0  # m/s at a yield line
+FREE, WAIT = 0, 1
+
+
+@kernel
+def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
+    """m from the front bumper to where driver i has to wait for others; inf: nowhere."""
+    body, me = view.placed[i], d.state[i]
+    start = -me.s - body.half_length  # from the front to the beginning of path[k]
+    for k in range(PATH):
+        lane = d.path[i, k]
+        if lane < 0 or start > REACH:
+            break
+        entry = view.entry[lane]
+        if entry.size > 0:
+            before = view.entry[d.path[i, k - 1]] if k > 0 else view.entry[lane]
+            length_before = view.net.lane[d.path[i, k - 1]].length if k > 0 else 0.0
+            line = start - (length_before - before.line) if k > 0 else -1.0
+            if line > -0.5:
+                if _waits(view, d, i, k, start, line, before.control):
+                    me.waited += view.dt
+                    return max(line, 0.1)
+                if line < HALT_GAP:
+                    me.waited = 0.0
+            else:
+                blocked = _taken_ahead(view, d, i, k, start)
+                if blocked < np.inf:
+                    me.waited += view.dt
+                    if me.waited < 2.0 * PATIENCE:
+                        return max(blocked, 0.1)
+        start += view.net.lane[lane].length
+    return np.inf
+
+
+@kernel
+def _waits(
+    view: View, d: Drivers, i: int, k: int, start: float, line: float, control: int
+) -> bool:
+    """Whether driver i, not yet past the line before path[k], must be ready to stop there."""
+    me, body = d.state[i], view.placed[i]
+    lane = d.path[i, k]
+    if control == STOP and me.halted != lane:
+        if line < HALT_GAP and body.speed < HALTED:
+            me.halted = lane
+        else:
+            return True
+    if line > DECIDE:
+        return control == YIELD and body.speed > V_THROUGH
+    if _queue_behind(view, d, i, k, start):
+        return True
+    entry = view.entry[lane]
+    for c in range(entry.first, entry.first + entry.size):
+        conflict = view.conflict[c]
+        if _occupied(view, i, conflict.other, conflict.other_start, conflict.other_end):
+            return True
+        if not conflict.yields:
+            continue
+        margin = JOIN_MARGIN if conflict.joins else GAP_MARGIN
+        way = max(start + conflict.end + 2.0 * body.half_length, 1.0)
+        clear = _travel_time(max(body.speed, 0.0), way, d.trait[i].a_max, V_THROUGH) + margin
+        if _is_coming(view, d, i, conflict.other, conflict.other_start, clear):
+            return True
+    return False
+
+
+@kernel
+def _travel_time(v: float, way: float, a: float, v_max: float) -> float:
+    """s for `way` m from speed v at acceleration a up to v_max."""
+    if v >= v_max:
+        return way / v
+    t = (-v + sqrt(v * v + 2.0 * a * way)) / a
+    t_max = (v_max - v) / a
+    if t <= t_max:
+        return t
+    return t_max + (way - 0.5 * (v + v_max) * t_max) / v_max
+
+
+@kernel
+def _occupied(view: View, i: int, lane: int, start: float, end: float) -> bool:
+    """Whether a body other than i's is on [start, end] of a lane."""
+    entry = view.occ.head[lane]
+    while entry != NOBODY:
+        j = entry // SLOTS
+        half = view.placed[j].half_length
+        if j != i and view.occ.s[entry] + half > start and view.occ.s[entry] - half < end:
+            return True
+        entry = view.occ.next[entry]
+    return False
+
+
+@kernel
+def _taken_ahead(view: View, d: Drivers, i: int, k: int, start: float) -> float:
+    """m to the nearest shared area on path[k] in which somebody is, for who is in the junction."""
+    entry = view.entry[d.path[i, k]]
+    nearest = np.inf
+    for c in range(entry.first, entry.first + entry.size):
+        conflict = view.conflict[c]
+        gap = start + conflict.start
+        if gap < 0.0 or gap > nearest:
+            continue
+        if _occupied(view, i, conflict.other, conflict.other_start, conflict.other_end):
+            nearest = gap
+    return nearest
+
+
+@kernel
+def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> bool:
+    """Whether a queue leaves no room behind the junction lane path[k]."""
+    body, me = view.placed[i], d.state[i]
+    room = start + view.net.lane[d.path[i, k]].length + 2.0 * body.half_length + EXIT_ROOM
+    if d.path[i, k + 1] >= 0 and view.entry[d.path[i, k + 1]].size > 0:
+        room -= EXIT_ROOM + body.half_length  # roundabouts: junctions follow each other
+        return False
+    leader, gap = find_ahead(
+        view.net, view.occ, view.placed, d.path[i], me.s, i, room + body.half_length
+    )
+    return leader != NOBODY and gap < room and view.placed[leader].v < V_QUEUE
+
+
+@kernel
+def _is_coming(
+    view: View, d: Drivers, i: int, lane: int, zone: float, clear: float
+) -> bool:
+    """Whether somebody arrives at `zone` m along `lane` within `clear` s."""
+    if _arrives(view, d, i, lane, lane, zone, clear):
+        return True
+    row = view.net.lane[lane]
+    for p in range(row.prev_first, row.prev_first + row.prevs):
+        first = view.net.prev_lane[p]
+        if _held_by_light(view, first):
+            continue
+        way = zone + view.net.lane[first].length
+        if _arrives(view, d, i, first, lane, way, clear):
+            return True
+        if way > WATCH:
+            continue
+        row_2 = view.net.lane[first]
+        for q in range(row_2.prev_first, row_2.prev_first + row_2.prevs):
+            second = view.net.prev_lane[q]
+            if _arrives(view, d, i, second, lane, way + view.net.lane[second].length, clear):
+                return True
+    return False
+
+
+@kernel
+def _held_by_light(view: View, lane: int) -> bool:
+    """Whether a red light stands at the end of a lane."""
+    entry = view.entry[lane]
+    return entry.control == LIGHT and view.lights[entry.signal] == 0
+
+
+@kernel
+def _arrives(
+    view: View, d: Drivers, i: int, lane: int, target: int, way: float, clear: float
+) -> bool:
+    """Whether somebody on `lane`, `way` m before the area from its beginning, gets there in time."""
+    entry = view.occ.head[lane]
+    while entry != NOBODY:
+        j = entry // SLOTS
+        distance = way - view.occ.s[entry] - view.placed[j].half_length
+        v = max(view.placed[j].v, 0.0)
+        entry_now, entry = entry, view.occ.next[entry]
+        if j == i or distance > WATCH or distance < -2.0 * view.placed[j].half_length:
+            continue
+        if d.state[i].waited > PATIENCE and v < HALTED:
+            continue
+        if d.state[j].active and not _leads_to(d, j, target):
+            continue
+        if view.occ.s[entry_now] > way:
+            continue
+        if _travel_time(v, max(distance, 0.0), 1.0, max(v, V_THROUGH)) < clear:
+            return True
+    return False
+
+
+@kernel
+def _leads_to(d: Drivers, j: int, lane: int) -> bool:
+    """Whether driver j's path goes over a lane: its indicators say so."""
+    for k in range(5):
+        if d.path[j, k] == lane:
+            return True
+    return False
+
+
+@kernel
+def zebra_gap(view: View, d: Drivers, i: int) -> float:
+    """m from the front bumper to a zebra on which somebody walks; inf: none within reach."""
+    body = view.placed[i]
+    start = -d.state[i].s - body.half_length
+    for k in range(PATH):
+        lane = d.path[i, k]
+        if lane < 0 or start > REACH:
+            break
+        entry = view.entry[lane]
+        for row in range(entry.zebra_first, entry.zebra_first + entry.zebras):
+            gap = start + view.zebra[row].s - 1.0
+            if gap > -1.0 and view.busy[view.zebra[row].zebra]:
+                return max(gap, 0.1)
+        start += view.net.lane[lane].length
+    return np.inf

@@ -23,6 +23,7 @@ from skidpad.stack.channels.settings import CarModel
 CLEARANCE = 25.0  # m between vehicles at the start
 FIRST_S = 25.0  # m from the beginning of its lane where the ego starts
 PARKED_WIDTH = 1.95  # m, wider vehicles would stand on the lane
+V_STREET = 14.0  # m/s, limit of town streets
 V_MEAN_MAX = 25.0  # m/s, so that no route ends before its segment
 
 
@@ -88,13 +89,16 @@ def car_model() -> CarModel:
 
 
 def _first_lane(map: RoadMap, rng: np.random.Generator) -> int:
-    """A lane to start on: any long one outside junctions, the map's own start on foreign roads."""
+    """A lane to start on: any long one outside junctions, of town streets where there are any."""
     fits = np.flatnonzero(
         (map.lanes.kind == LaneKind.DRIVING)
         & (map.lanes.junction < 0)
         & (map.lanes.length > 2.0 * FIRST_S)
         & (np.diff(map.lanes.next_start) > 0)
     )
+    limit = map.samples.limit[map.lanes.first[fits]]
+    streets = fits[limit < V_STREET]
+    fits = streets if len(streets) else fits
     if not len(fits):
         raise ConfigError(f"map {map.name} has no driving lane of {2.0 * FIRST_S:g} m that goes on")
     return int(fits[int(rng.integers(len(fits)))])

@@ -49,6 +49,8 @@ END_MARGIN = 200.0  # m before a lane's end from which a driver must leave it
 LEFT_BEHIND = 0.6  # of a change, after which the leader on the old lane no longer counts
 HEADWAY_STOP = 0.5  # s kept to a stop line
 STUCK_SPEED = 0.5  # m/s
+TOO_FAST_TIME = 0.7  # s in which too much speed before a bend or limit is taken off
+TOO_FAST_BRAKE = -4.0  # m/s^2
 CAUSE_GAP = 12.0  # m: a leader or stop line this near explains standing
 STRAYED = 1.0  # m beyond the lane's edge
 WRONG_WAY = -0.5  # cosine of 120 deg
@@ -185,6 +187,8 @@ def plan(view: View, d: Drivers, i: int) -> None:
     gap_stop = min(gap_stop, right_of_way_gap(view, d, i), zebra_gap(view, d, i))
     if gap_stop < np.inf:
         a = min(a, idm(v, v_desired, gap_stop, 0.0, HEADWAY_STOP, trait.a_max))
+    if v > v_desired:  # the profile ahead is comfortable: falling behind it is not an option
+        a = min(a, max((v_desired - v) / TOO_FAST_TIME, TOO_FAST_BRAKE))
     me.target = a
     consider_change(view, d, i, a, v_desired)
     strayed = abs(me.offset) > view.net.point[me.at].half_width + STRAYED

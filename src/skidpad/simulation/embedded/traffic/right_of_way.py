@@ -25,7 +25,9 @@ JOIN_MARGIN = 2.5  # s, who joins must not be caught up at once
 WATCH = 70.0  # m before the shared area in which others matter
 HALTED = 0.5  # m/s
 HALT_GAP = 4.5  # m to the line within which standing counts as a stop
-PATIENCE = 10.0  # s, then who stands on the other side no longer counts
+PATIENCE = 4.0  # s, then who stands on the other side no longer counts
+QUEUE_REACH = 26.0  # m before the area; who stands farther away stands in a queue
+TAKEN_TIME = 20.0  # s after which a driver in a junction creeps on
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
 V_QUEUE = 2.0  # m/s, slower leaders make a queue
 V_PREPARE = 5.0  # m/s at a yield line
@@ -47,25 +49,26 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
             length_before = view.net.lane[d.path[i, k - 1]].length if k > 0 else 0.0
             line = start - (length_before - before.line) if k > 0 else -1.0
             if line > -0.5:
+                if before.control == LIGHT and view.lights[before.signal] <= 1:
+                    me.waited = 0.0  # the light is what it waits for
+                    return np.inf
                 if _waits(view, d, i, k, start, line, before.control):
                     me.waited += view.dt
                     return max(line, 0.1)
-                if line < HALT_GAP:
-                    me.waited = 0.0
             else:
                 blocked = _taken_ahead(view, d, i, k, start)
-                if blocked < np.inf:
+                if blocked == np.inf:
+                    me.waited = 0.0
+                else:
                     me.waited += view.dt
-                    if me.waited < 2.0 * PATIENCE:
+                    if me.waited < TAKEN_TIME:
                         return max(blocked, 0.1)
         start += view.net.lane[lane].length
     return np.inf
 
 
 @kernel
-def _waits(
-    view: View, d: Drivers, i: int, k: int, start: float, line: float, control: int
-) -> bool:
+def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, control: int) -> bool:
     """Whether driver i, not yet past the line before path[k], must be ready to stop there."""
     me, body = d.state[i], view.placed[i]
     lane = d.path[i, k]
@@ -148,9 +151,7 @@ def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> bool:
 
 
 @kernel
-def _is_coming(
-    view: View, d: Drivers, i: int, lane: int, zone: float, clear: float
-) -> bool:
+def _is_coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: float) -> bool:
     """Whether somebody arrives at `zone` m along `lane` within `clear` s."""
     if _arrives(view, d, i, lane, lane, zone, clear):
         return True
@@ -192,7 +193,7 @@ def _arrives(
         entry_now, entry = entry, view.occ.next[entry]
         if j == i or distance > WATCH or distance < -2.0 * view.placed[j].half_length:
             continue
-        if d.state[i].waited > PATIENCE and v < HALTED:
+        if v < HALTED and (distance > QUEUE_REACH or d.state[i].waited > PATIENCE):
             continue
         if d.state[j].active and not _leads_to(d, j, target):
             continue

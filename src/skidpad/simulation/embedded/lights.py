@@ -59,7 +59,7 @@ class Lights:
 
 def _junctions(signals: SignalTable, lanes: LaneTable) -> NDArray[np.int32]:
     """(K,) the junction behind each signal's lane, else the signal's own group."""
-    group = signals.group.copy()
+    group: NDArray[np.int32] = signals.group.copy()
     for row, lane in enumerate(signals.lane):
         if lanes.next_start[lane] == lanes.next_start[lane + 1]:
             continue

@@ -30,8 +30,7 @@ QUEUE_REACH = 26.0  # m before the area; who stands farther away stands in a que
 TAKEN_TIME = 20.0  # s after which a driver in a junction creeps on
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
 V_QUEUE = 2.0  # m/s, slower leaders make a queue
-V_PREPARE = 5.0  # m/s at a yield line
-FREE, WAIT = 0, 1
+INDICATED = 5  # lanes ahead that others can guess
 
 
 @kernel
@@ -142,8 +141,7 @@ def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> bool:
     body, me = view.placed[i], d.state[i]
     room = start + view.net.lane[d.path[i, k]].length + 2.0 * body.half_length + EXIT_ROOM
     if d.path[i, k + 1] >= 0 and view.entry[d.path[i, k + 1]].size > 0:
-        room -= EXIT_ROOM + body.half_length  # roundabouts: junctions follow each other
-        return False
+        return False  # in roundabouts junctions follow each other
     leader, gap = find_ahead(
         view.net, view.occ, view.placed, d.path[i], me.s, i, room + body.half_length
     )
@@ -177,7 +175,7 @@ def _is_coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: fl
 def _held_by_light(view: View, lane: int) -> bool:
     """Whether a red light stands at the end of a lane."""
     entry = view.entry[lane]
-    return entry.control == LIGHT and view.lights[entry.signal] == 0
+    return bool(entry.control == LIGHT and view.lights[entry.signal] == 0)
 
 
 @kernel
@@ -207,10 +205,7 @@ def _arrives(
 @kernel
 def _leads_to(d: Drivers, j: int, lane: int) -> bool:
     """Whether driver j's path goes over a lane: its indicators say so."""
-    for k in range(5):
-        if d.path[j, k] == lane:
-            return True
-    return False
+    return bool(np.any(d.path[j, :INDICATED] == lane))
 
 
 @kernel
@@ -226,6 +221,6 @@ def zebra_gap(view: View, d: Drivers, i: int) -> float:
         for row in range(entry.zebra_first, entry.zebra_first + entry.zebras):
             gap = start + view.zebra[row].s - 1.0
             if gap > -1.0 and view.busy[view.zebra[row].zebra]:
-                return max(gap, 0.1)
+                return float(max(gap, 0.1))
         start += view.net.lane[lane].length
     return np.inf

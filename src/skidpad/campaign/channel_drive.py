@@ -25,6 +25,7 @@ from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
 from skidpad.core.errors import ConfigError
 from skidpad.core.setup import DT
 from skidpad.core.states import VehicleCommand, WorldTruth
+from skidpad.core.vocabulary import ActorKind
 from skidpad.evidence.risk import safety_scores
 from skidpad.recording.channels import ChannelWriter
 from skidpad.roads.bundled import load_map
@@ -42,6 +43,7 @@ WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
 TRUTH_REACH = 120.0  # m around the ego within which the true world is recorded
 MINIMAL_RISK_BRAKE = 0.4  # of full brake, about 4 m/s^2 (UN R157 5.1.6: at most 4 m/s^2)
 ARBITER = "arbiter"
+LABEL_OF = np.array([LABELS[kind] for kind in ActorKind], dtype=np.int64)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,7 +174,6 @@ def truth_frame(t: float, truth: WorldTruth) -> TruthFrame:
     state = np.column_stack([s.x, s.y, s.yaw, s.vx, s.vy])
     half = 0.5 * np.column_stack([table.length, table.width])
     corners = half[:, None, :] * np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]])
-    labels = np.array([LABELS[k] for k in table.kind], dtype=np.int64)
     return TruthFrame(
         t=t,
         ego=state[0].copy(),
@@ -182,7 +183,7 @@ def truth_frame(t: float, truth: WorldTruth) -> TruthFrame:
         polygons=corners[rows],
         polygon_size=np.full(len(rows), 4, dtype=np.int64),
         ids=rows.astype(np.int64),
-        classes=labels[rows],
+        classes=LABEL_OF[table.kind[rows]],
         mu=truth.mu[rows].mean(axis=1),
     )
 

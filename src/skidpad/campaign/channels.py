@@ -122,7 +122,9 @@ def warm_up() -> None:
         drive_segment(plan, Path(folder) / "warm.mcap")
 
 
-class _Record(msgspec.Struct, frozen=True):
+class DriveRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What stands beside a recording: what was asked for, and what became of it."""
+
     plan: dict[str, object]
     outcome: DriveOutcome
 
@@ -133,7 +135,7 @@ def _identity(plan: SegmentPlan) -> dict[str, object]:
 
 
 def _write(path: Path, plan: SegmentPlan, outcome: DriveOutcome) -> None:
-    record = _Record(_identity(plan), outcome)
+    record = DriveRecord(_identity(plan), outcome)
     write_bytes(path, msgspec.json.format(msgspec.json.encode(record), indent=1))
 
 
@@ -143,7 +145,7 @@ def _done(plan: SegmentPlan, out: Path) -> DriveOutcome | None:
     if not (path.is_file() and path.with_suffix(".mcap").is_file()):
         return None
     try:
-        record = msgspec.json.decode(path.read_bytes(), type=_Record)
+        record = msgspec.json.decode(path.read_bytes(), type=DriveRecord)
     except (msgspec.DecodeError, OSError):
         return None
     if record.plan != msgspec.json.decode(msgspec.json.encode(_identity(plan))):

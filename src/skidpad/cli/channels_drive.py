@@ -14,6 +14,7 @@ SEED = typer.Option(0, help="First seed; different numbers give disjoint seeds."
 MAP = typer.Option(None, help="Drive on this map (.xodr) instead of the route's own.")
 NOISE = typer.Option(1.0, help="Factor on all sensor errors: 0.5, 1 or 2 for the sweep.")
 WORKERS = typer.Option(1, help="Worker processes.")
+FOLDERS = typer.Argument(help="Folders of `skidpad channels drive`.")
 DRIVE_BY = typer.Option("arbiter", help="The arbiter, or the channel that drives alone.")
 
 
@@ -61,3 +62,17 @@ def drive(
     if summary.failed:
         typer.echo(f"not driven to an end: {', '.join(summary.failed)}", err=True)
         raise typer.Exit(1)
+
+
+def outcomes(folders: list[Path] = FOLDERS) -> None:
+    """Compare drivers over the seeds that all have driven: does redundancy pay?"""
+    from skidpad.campaign.redundancy import compare_drivers, read_outcomes
+
+    for row in compare_drivers(read_outcomes(folders)):
+        typer.echo(f"{row.drive_by}: {row.segments} segments, {row.hours:.2f} h, {row.km:.1f} km")
+        for event, rate in row.rates.items():
+            few = ", too few for a verdict" if rate.too_few else ""
+            typer.echo(
+                f"  {event}: {rate.events}, {rate.rate:.2f} per h "
+                f"({rate.interval.low:.2f} to {rate.interval.high:.2f}){few}"
+            )

@@ -8,7 +8,7 @@ import skidpad
 from skidpad.cli.adas import adas, report, show
 from skidpad.cli.bench import bench
 from skidpad.cli.channels import channels
-from skidpad.cli.channels_drive import drive
+from skidpad.cli.channels_drive import drive, outcomes
 from skidpad.cli.compare import compare
 from skidpad.cli.friction import friction
 from skidpad.cli.grip import campaign, grip
@@ -54,6 +54,7 @@ app.command()(show)
 app.add_typer(profiles)
 app.add_typer(maps)
 channels.command()(drive)
+channels.command()(outcomes)
 app.add_typer(channels)
 app.add_typer(hazards)
 app.command()(friction)

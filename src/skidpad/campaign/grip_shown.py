@@ -1,4 +1,4 @@
-"""The runs that a report shows, a median and a worst one per cell, driven again with their logs."""
+"""What a report shows besides results: logs of a median and a worst run per cell, and full stops."""
 
 from __future__ import annotations
 
@@ -11,9 +11,14 @@ from skidpad.campaign.grip import TARGET, Runner, Task
 from skidpad.campaign.grip_cells import GripCell
 from skidpad.campaign.matrix import RUNS
 from skidpad.campaign.pool import Job
+from skidpad.core.vocabulary import GripModel
+from skidpad.core.weather import Weather
+from skidpad.physics.stopping import SPEEDS_KMH, grip_rows
+from skidpad.recording.files import write_parquet
 from skidpad.recording.logfiles import TICKS
 from skidpad.recording.results import read_results
 
+STOPPING = "stopping.parquet"
 CELL = ("scenario", "cutin", "weather", "friction")
 
 
@@ -40,3 +45,14 @@ def keep_shown(out: Path, cells: Sequence[GripCell], runner: Runner) -> None:
     ]
     for _ in runner(jobs):
         pass
+
+
+def write_stopping(out: Path, weathers: Sequence[Weather], mu_ref: float) -> None:
+    """Ratio, friction and stopping distances of each weather under both models (decision G-5)."""
+    models = [GripModel.STATISTICAL, GripModel.PHYSICAL]
+    rows = []
+    for row in grip_rows(weathers, models, mu_ref):
+        stops = {f"stop_{v:g}_m": s.distance for v, s in zip(SPEEDS_KMH, row.stops, strict=True)}
+        numbers = {"ratio": row.ratio, "mu_80": row.mu_80, **stops}
+        rows.append({"weather": row.weather, "model": row.model.value, **numbers})
+    write_parquet(out / STOPPING, pl.DataFrame(rows))

@@ -23,7 +23,7 @@ from skidpad.campaign.grip import (
     warm_up,
 )
 from skidpad.campaign.grip_cells import Friction, GripCell, cross, seeds
-from skidpad.campaign.grip_shown import keep_shown
+from skidpad.campaign.grip_shown import keep_shown, write_stopping
 from skidpad.campaign.play import check_controller
 from skidpad.core.errors import ConfigError, require_choice, require_range
 from skidpad.core.vocabulary import GripModel, SensorLevel
@@ -144,6 +144,8 @@ def drive_grip(
     with runner_of(cluster) if cluster else _as_is(local(workers)) as runner:
         summary = _progress(plan, out, runner, resume=resume, csv=csv)
         keep_shown(out, plan.cells, runner)
+    weathers = list({c.weather.name: c.weather for c in plan.cells}.values())
+    write_stopping(out, weathers, plan.cells[0].mu_ref)
     if summary.mixed_machines:
         console.print("[yellow]runs of different machines or versions: bytes may differ[/]")
     if summary.failed:

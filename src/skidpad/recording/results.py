@@ -172,5 +172,10 @@ def results_hash(table: pl.DataFrame) -> str:
 
 
 def definitions() -> list[tuple[str, str, str]]:
-    """(column, meaning, source) of every metric, for the report."""
-    return [(f.name, f.metadata["meaning"], f.metadata["source"]) for f in fields(Metrics)]
+    """(column, meaning, source) of every metric of the matrix, for the report."""
+    return definitions_of(Metrics)
+
+
+def definitions_of(rows: type[Any]) -> list[tuple[str, str, str]]:
+    """(column, meaning, source) of every metric of a class of rows."""
+    return [(f.name, f.metadata["meaning"], f.metadata["source"]) for f in fields(rows)]

@@ -31,7 +31,9 @@ def median_series(runs: Floats) -> Floats:
     alive = np.count_nonzero(~np.isnan(runs), axis=0)
     enough = 2 * alive >= len(runs)
     end = int(np.argmin(enough)) if not enough.all() else runs.shape[1]
-    median: Floats = np.nanmedian(runs[:, :end], axis=0)
+    order, tick = np.sort(runs[:, :end], axis=0), np.arange(end)  # what is absent comes last
+    lower, upper = order[(alive[:end] - 1) // 2, tick], order[alive[:end] // 2, tick]
+    median: Floats = 0.5 * (lower + upper)
     return median
 
 

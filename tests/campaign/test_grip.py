@@ -1,0 +1,228 @@
+"""The friction campaign: pairs, hashes, kills, agents that fail, stopping rule, cluster."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from skidpad.campaign.cluster import runner_of
+from skidpad.campaign.grip import Runner, drive_one, local, run_grip, uncertain_cells
+from skidpad.campaign.grip_cells import Friction, GripCell, cross, seeds
+from skidpad.campaign.grip_shown import keep_shown, shown
+from skidpad.core.errors import OutputError
+from skidpad.core.vocabulary import GripModel
+from skidpad.physics.presets import preset
+from skidpad.recording.grip import GripEntry, read_series, series_path
+from skidpad.recording.ledger import read_ledger
+from skidpad.recording.results import read_results
+from skidpad.scenarios.variation import CutIn
+
+TEMPLATE = GripCell(
+    scenario="lead_slowdown", weather=preset("icy_30"), friction=Friction.ORIGINAL, seed=0
+)
+WEATHERS = [preset("icy_0"), preset("icy_30")]
+
+
+def cells(n=1, scenarios=("lead_slowdown",), **more) -> list[GripCell]:
+    template = replace(TEMPLATE, **more)
+    return cross(template, list(scenarios), WEATHERS, list(Friction), [CutIn.ROLLING], seeds(0, n))
+
+
+def here(jobs):
+    """A runner in this process: quick, and failures show their traceback."""
+    from skidpad.campaign.pool import Finished
+
+    for job in jobs:
+        yield Finished(job, value=drive_one(job.argument))
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("grip") / "out"
+    run_grip([cells(2, ("lead_slowdown", "ghost_cut_in"))], out, here)
+    return out
+
+
+@pytest.mark.req("B-004", "B-055", "B-066")
+def test_ratio_1_changes_nothing_and_less_does(campaign):
+    table = read_results(campaign)
+    sides = (table.filter(pl.col("friction") == f) for f in ("original", "reduced"))
+    both = sides.__next__().join(sides.__next__(), on=["scenario", "weather", "seed"])
+    same = both["log_hash"] == both["log_hash_right"]
+    assert same.filter(both["weather"] == "icy_0").all()
+    assert not same.filter(both["weather"] == "icy_30").any()
+    assert both.filter(pl.col("weather") == "icy_30")["ratio_right"].unique().to_list() == [
+        pytest.approx(0.315022, abs=1e-6)
+    ]
+
+
+@pytest.mark.req("B-068", "B-125", "B-126")
+def test_every_run_leaves_its_row_and_its_series(campaign):
+    table = read_results(campaign)
+    assert len(table) == 2 * 2 * 2 * 2
+    for row in table.to_dicts():
+        name = f"{row['scenario']}_{row['weather']}_{row['friction']}"
+        series = read_series(series_path(campaign, name, row["seed"]))
+        assert len(series) == round(row["duration_s"] / 0.05) + 1
+        assert row["score"] is not None
+        assert row["mu"] == pytest.approx(0.9 * row["ratio"], rel=1e-6)
+
+
+@pytest.mark.req("X-8")
+def test_pairs_begin_alike_and_seeds_differ(campaign):
+    table = read_results(campaign)
+    first = table.filter((pl.col("scenario") == "lead_slowdown") & (pl.col("weather") == "icy_30"))
+    series = {
+        (r["friction"], r["seed"]): read_series(
+            series_path(campaign, f"lead_slowdown_icy_30_{r['friction']}", r["seed"])
+        )
+        for r in first.to_dicts()
+    }
+    assert series["original", 1].row(0) == series["reduced", 1].row(0)
+    assert series["original", 1].row(0) != series["original", 2].row(0)
+
+
+def test_a_campaign_is_not_overwritten_and_resumes_without_driving(campaign):
+    batch = [cells(2, ("lead_slowdown", "ghost_cut_in"))]
+    with pytest.raises(OutputError, match="--resume"):
+        run_grip(batch, campaign, here)
+    again = run_grip(batch, campaign, here, resume=True)
+    assert (again.driven, again.runs) == (0, 16)
+
+
+def test_the_runs_that_a_report_shows_are_kept(campaign):
+    keep_shown(campaign, cells(2, ("lead_slowdown", "ghost_cut_in")), here)
+    roles = shown(read_results(campaign))
+    for row in roles.to_dicts():
+        name = f"{row['scenario']}_{row['weather']}_{row['friction']}-{row['seed']:06d}"
+        assert (campaign / "runs" / name / "ticks.parquet").exists()
+    assert set(roles["role"]) == {"median", "worst"}
+
+
+@pytest.mark.slow
+@pytest.mark.req("X-1", "L-7")
+def test_two_workers_one_worker_and_kills_give_the_same_results(tmp_path):
+    batch = cells(3)
+    one = run_grip([batch], tmp_path / "one", local(1))
+    two = run_grip([batch], tmp_path / "two", _killing(local(2)))
+    assert one.content_hash == two.content_hash
+    assert (two.runs, two.failed) == (len(batch), 0)
+
+
+def _killing(runner: Runner) -> Runner:
+    """Kill one child of this process with SIGKILL while the runs are driven."""
+
+    def run(jobs):
+        begun = threading.Event()
+
+        def kill():
+            begun.wait(120.0)
+            mine = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
+            workers = [p for p in mine if b"spawn_main" in Path(f"/proc/{p}/cmdline").read_bytes()]
+            os.kill(int(workers[-1]), signal.SIGKILL)
+
+        thread = threading.Thread(target=kill)
+        thread.start()
+        for finished in runner(jobs):
+            if not begun.is_set():
+                begun.set()
+                time.sleep(0.05)
+            yield finished
+        thread.join()
+
+    return run
+
+
+@pytest.mark.slow
+@pytest.mark.req("X-1")
+def test_a_dask_cluster_gives_the_same_results(tmp_path):
+    pytest.importorskip("distributed")
+    batch = cells(1)
+    alone = run_grip([batch], tmp_path / "alone", here)
+    with runner_of("local:2") as runner:
+        far = run_grip([batch], tmp_path / "far", runner)
+    assert far.content_hash == alone.content_hash
+
+
+AGENTS = """
+class Good:
+    def setup(self, path): self.n = 0
+    def sensors(self): return [{'type': 'sensor.speedometer', 'id': 'speed'}]
+    def set_global_plan(self, gps, world): self.plan = world
+    def run_step(self, data, timestamp):
+        class Control: throttle, brake, steer, hand_brake, reverse = 0.0, 1.0, 0.0, False, False
+        assert data['speed'][1]['speed'] >= 0.0 and len(self.plan) > 10
+        return Control()
+    def destroy(self): pass
+class Raises(Good):
+    def run_step(self, data, timestamp): raise ZeroDivisionError('on purpose')
+class Silent(Good):
+    def run_step(self, data, timestamp): return None
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "outcome", "told"),
+    [
+        ("Good", "not_triggered", ""),
+        ("Raises", "agent_error", "on purpose"),
+        ("Silent", "agent_error", "no control"),
+    ],
+)
+def test_an_agent_that_fails_is_an_outcome_and_the_campaign_goes_on(tmp_path, name, outcome, told):
+    (tmp_path / "agents.py").write_text(AGENTS, encoding="utf-8")
+    batch = cells(1, controller=f"agent:{tmp_path / 'agents.py'}:{name}")[:2]
+    run_grip([batch], tmp_path / "out", here)
+    entries = read_ledger(tmp_path / "out", GripEntry)
+    if name == "Good":
+        # it brakes at once, so that the lead drives off: the scenario takes place without it
+        assert {e.key.outcome for e in entries} <= {"completed", "not_triggered"}
+        return
+    assert [e.key.outcome for e in entries] == [outcome] * 2
+    for entry in entries:
+        assert told in entry.error
+        trace = (tmp_path / "out" / "runs" / entry.run / "error.txt").read_text(encoding="utf-8")
+        assert "Traceback" in trace
+
+
+@pytest.mark.req("X-9")
+def test_only_cells_that_are_still_uncertain_get_more_runs(campaign):
+    entries = read_ledger(campaign, GripEntry)
+    assert uncertain_cells(entries, 0.001) == {e.run.rsplit("-", 1)[0] for e in entries}
+    assert uncertain_cells(entries * 400, 0.05) == set()
+
+
+def test_batches_stop_when_enough_is_known(tmp_path):
+    batches = [cells(1), [replace(c, seed=2) for c in cells(1)]]
+    only = "lead_slowdown_icy_30_reduced"
+    summary = run_grip(batches, tmp_path / "out", here, wanted=lambda entries: {only})
+    assert summary.runs == 5
+    table = read_results(tmp_path / "out")
+    assert table.filter(pl.col("seed") == 2)["weather"].to_list() == ["icy_30"]
+
+
+@pytest.mark.req("B-070", "B-071", "B-074", "B-075", "B-076", "B-078", "B-079")
+@pytest.mark.parametrize("cutin", [CutIn.ORIGINAL, CutIn.UNFIXED, CutIn.FIXED])
+def test_the_spawn_delay_alone_breaks_the_cut_in_and_the_distance_repairs_it(tmp_path, cutin):
+    template = replace(TEMPLATE, weather=preset("rain_0"))
+    batch = cross(
+        template, ["ghost_cut_in"], [preset("rain_0")], [Friction.ORIGINAL], [cutin], seeds(0, 3)
+    )
+    run_grip([batch], tmp_path / "out", here)
+    outcomes = read_results(tmp_path / "out")["outcome"].to_list()
+    assert outcomes == ["collision" if cutin is CutIn.UNFIXED else "completed"] * 3
+
+
+def test_the_physical_model_reaches_the_tyres(tmp_path):
+    batch = [replace(c, model=GripModel.PHYSICAL) for c in cells(1)[2:]]
+    run_grip([batch], tmp_path / "out", here)
+    mu = dict(read_results(tmp_path / "out").select("friction", "mu").iter_rows())
+    assert mu["original"] == pytest.approx(0.9)
+    assert mu["reduced"] < 0.2  # sheet ice

@@ -294,6 +294,43 @@ def test_a_changed_constant_is_noticed(guard, constant, monkeypatch):
     assert not survivors, f"{constant} = {value!r}: {guard.test} accepts {survivors}"
 
 
+# Functions whose results are scaled, each with a test that reaches them through their users.
+FORMULAS = {
+    "control.tiers.stopping_speed": f"{DETAILS}::test_last_metres_before_the_line",
+    "control.steering.lookahead_distance": f"{CAPS}::test_centring_steers_by_the_chord_of_the_bend",
+    "control.steering.steering_gain": f"{CAPS}::test_centring_steers_by_the_chord_of_the_bend",
+    "control.steering.steer_command": f"{CAPS}::test_centring_steers_by_the_chord_of_the_bend",
+    "control.steering.angle_to": f"{CAPS}::test_fixed_lookahead_is_12_m",
+    "perception.radar.velocity_limit": f"{RADAR}::test_velocity_limit_is_that_of_standing_objects",
+    "perception.lights.scan_distance": f"{SCAN}::test_scan_distance_as_printed",
+    "perception.lane_view.wrap_angle": f"{CORRIDOR}::test_curvature_is_read_at_one_point_30_m_ahead",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.req("M-14")
+@pytest.mark.parametrize("factor", [0.9, 1.1])
+@pytest.mark.parametrize("formula", FORMULAS)
+def test_a_scaled_formula_is_noticed(formula, factor, monkeypatch):
+    place, _, name = formula.rpartition(".")
+    module = import_module(f"skidpad.stack.{place}")
+    exact = getattr(module, name)
+    run(FORMULAS[formula])
+    monkeypatch.setattr(module, name, lambda *args: factor * exact(*args))
+    with pytest.raises(AssertionError):
+        run(FORMULAS[formula])
+
+
+@pytest.mark.slow
+@pytest.mark.req("M-14", "A-042")
+@pytest.mark.parametrize("factor", [0.45, 0.55])
+def test_half_the_curvature_is_neither_more_nor_less(factor, monkeypatch):
+    scaled = property(lambda view: factor * view.curvature)
+    monkeypatch.setattr("skidpad.stack.perception.lane_view.LaneView.kappa", scaled)
+    with pytest.raises(AssertionError):
+        run(f"{CORRIDOR}::test_corrected_offset_is_the_offset_from_the_lane")
+
+
 @pytest.mark.req("M-14")
 def test_guards_are_marked_with_a_requirement():
     for guard in GUARDS:

@@ -79,7 +79,7 @@ def test_the_stack_can_import_nothing_that_knows_the_truth():
     assert not any("perception" in name for name in controllers), "control decides on values alone"
 
 
-@pytest.mark.req("A-036")
+@pytest.mark.req("M-3")
 def test_both_levels_drive_alike():
     """Decision M-3: readings within 0.3 m, 97 % of detections agree, tiers within three ticks."""
     pixels, objects = approach(stack_on(), "pixels"), approach(stack_on(), "objects")
@@ -159,6 +159,23 @@ def test_a_mirrored_scene_gives_mirrored_steer_and_equal_pedals(curvature, y, ya
         report.status, report.detected, report.tier,
     )  # fmt: skip
     assert mirror.radar_points == report.radar_points
+
+
+@pytest.mark.req("A-154")
+def test_the_lateral_offset_is_reported_and_steers_nothing():
+    class Shifted(ArcMap):
+        def project(self, *place, **options):
+            point = super().project(*place, **options)
+            return replace(point, offset=point.offset + 1.3)
+
+    def drive(map):
+        stack = stack_on(map, configuration=2)
+        commands = [stack.tick(frame(k, (), ego_at(0.0, 0.4, 0.02, 15.0))) for k in range(5)]
+        return commands, stack.report.lane_offset
+
+    commands, offset = drive(ArcMap())
+    assert offset == approx(0.4)
+    assert drive(Shifted()) == (commands, approx(1.7))
 
 
 @pytest.mark.req("A-195", "A-109")

@@ -230,3 +230,11 @@ def test_the_outcome_changes_with_the_setting_and_only_with_it(name):
     first = outcome(default)
     assert first == outcome(default), "the scenario itself is repeatable"
     assert first != outcome(toggled)
+
+
+@pytest.mark.req("A-013")
+@pytest.mark.parametrize("configuration", range(5))
+def test_no_configuration_hands_the_ego_to_the_traffic(configuration):
+    functions = functions_of(configuration)
+    ready = replace(cell(Settings()), driver=Driver(label="x", functions=functions))
+    assert setup_of(ready, figure8()).ego.driver == "scripted"

@@ -175,7 +175,7 @@ class AdasStack:
     ) -> tuple[Situation, Sight]:
         """What the tiers see; a target that the cameras do not confirm at standstill is dropped
         before them, so that all tiers go on without it (A-116, D-043)."""
-        active = self.resume.active
+        active, self.verified_by = self.resume.active, ""
         s = Situation(
             v=v,
             v_kmh=kmh_from_mps(v),
@@ -184,7 +184,7 @@ class AdasStack:
             cruise_kmh=self.caps.cruise_kmh(active),
             follow_cap_kmh=self.caps.following_kmh(active),
         )
-        if not needs_verification(s) or sight.distance is None:
+        if sight.distance is None or not (self.hierarchy.brakes and needs_verification(s)):
             return s, sight
         confirmed, self.verified_by = self.front.verify(frame, sight.distance, view)
         if confirmed:

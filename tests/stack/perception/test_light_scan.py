@@ -43,7 +43,7 @@ def test_scan_distance_as_printed():
         assert look(map, 300.0 - reach + 0.5, v=v).distance == approx(reach - 0.5)
 
 
-@pytest.mark.req("A-158", "A-160", "A-163")
+@pytest.mark.req("A-158", "A-160", "A-163", "M-5")
 @pytest.mark.parametrize("curvature", [0.0, 1 / 150, -1 / 150])
 def test_distance_runs_along_the_lane_and_over_road_ends(curvature):
     map = ArcMap(curvature, piece=25.0, lights=((7, 6, 15.0),))  # on the third piece
@@ -123,7 +123,7 @@ def seen(distance, state=RED, signal=7):
     return LightReading(LightSource.MAP_SCAN, signal, distance, state)
 
 
-@pytest.mark.req("A-168", "A-070")
+@pytest.mark.req("A-168")
 def test_red_stops_green_does_not_and_yellow_only_with_room():
     def asked(state, v=20.0, distance=100.0):
         return lock().update(seen(distance, state), v, {7: state}, None)

@@ -201,7 +201,7 @@ def test_lane_reached_after_range_plus_10_m_is_the_same(piece, x, r, same):
     assert lane_match(ArcMap(piece=piece), Pose(x, 0.0), r) is same
 
 
-@pytest.mark.req("A-083", "A-037")
+@pytest.mark.req("A-083")
 def test_off_the_map_is_not_in_the_lane():
     map = ArcMap()
     assert not lane_match(map, Pose(0.0, 500.0), 30.0)
@@ -212,7 +212,7 @@ def test_off_the_map_is_not_in_the_lane():
 LEFT = float(np.arcsin(LANE_WIDTH / 30.0))
 
 
-@pytest.mark.req("A-082", "A-029")
+@pytest.mark.req("A-082")
 def test_all_points_are_matched_and_the_nearest_in_the_lane_counts():
     map, points = ArcMap(), radar_points((30.0, LEFT, 0.0, -3.0), (50.0, 0.0, 0.0, -5.0))
     view = LaneTracker(map, HighwayRoute()).update(Pose(0.0, 0.0))

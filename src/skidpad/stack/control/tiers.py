@@ -298,6 +298,7 @@ class Hierarchy:
         self.lead_at_light = LeadAtLight()
         self.cruise = Cruise(self.speed_pid, dt)
         self.last = Tier.NONE
+        self.brakes = bool(functions & {Function.ACC, Function.AEB})  # tiers 1 to 3
         self.rules = self._rules(functions, settings)
 
     def _rules(self, functions: Functions, settings: Settings) -> tuple[Rule, ...]:
@@ -311,7 +312,7 @@ class Hierarchy:
         )
         light_stop = LightStop(settings.light_braking, self.speed_pid)
         return (
-            *(braking if functions & {Function.ACC, Function.AEB} else ()),
+            *(braking if self.brakes else ()),
             self.lead_at_light,
             *((following,) if Function.ACC in functions else ()),
             light_stop,

@@ -192,6 +192,7 @@ def test_scenery_walkers_and_shapes(serve: Serve) -> None:
     world.tick()
     t = spectator.get_transform()
     assert abs(t.location.y - 2.0) < 1e-4 and abs(t.rotation.yaw - 20.0) < 1e-3, t
+    assert abs(t.rotation.pitch - 10.0) < 1e-3, t
     """)
 
 

@@ -78,6 +78,27 @@ def test_steer_is_to_the_right_in_the_clients_axes(serve: Serve) -> None:
     """)
 
 
+def test_cars_drive_where_their_forward_vector_points(serve: Serve) -> None:
+    """K-4: at headings all around the compass, by the client's own vector algebra."""
+    serve().client("""
+    synchronous()
+    library = world.get_blueprint_library()
+    base = world.get_map().get_spawn_points()[0].location
+    for yaw in (30.0, 115.0, -70.0):
+        place = carla.Transform(base + carla.Location(y=-80.0), carla.Rotation(yaw=yaw))
+        car = world.spawn_actor(library.find("vehicle.audi.tt"), place)
+        car.apply_control(carla.VehicleControl(throttle=0.6))
+        for _ in range(40):
+            world.tick()
+        ahead, moved = place.get_forward_vector(), car.get_location() - place.location
+        along = moved.x * ahead.x + moved.y * ahead.y
+        assert along > 2.0 and abs(moved.x * ahead.y - moved.y * ahead.x) < 0.2 * along, moved
+        assert abs(car.get_transform().rotation.yaw - yaw) < 2.0
+        car.destroy()
+        world.tick()
+    """)
+
+
 def test_spawn_points_lie_on_the_clients_own_map(serve: Serve) -> None:
     serve().client("""
     map = world.get_map()

@@ -61,12 +61,15 @@ def test_images_agree_with_the_public_projection(serve: Serve) -> None:
     serve().client(
         STAGE
         + """
-place = carla.Transform(carla.Location(x=0.5, z=1.8))
+turned = carla.Rotation(pitch=-6.0, yaw=8.0)
+place = carla.Transform(carla.Location(x=0.5, z=1.8), turned)
 size = dict(image_size_x=800, image_size_y=600, fov=90)
 names = ("depth", "semantic_segmentation", "instance_segmentation", "rgb")
 cameras = {n: listen("sensor.camera." + n, place, **size) for n in names}
 time.sleep(0.5)
 frame = tick(2)
+assert abs(cameras["rgb"].get_transform().rotation.pitch - turned.pitch) < 0.1
+assert abs(cameras["rgb"].get_transform().rotation.yaw - first.transform.rotation.yaw - 8.0) < 0.1
 images = {n: at(c, frame) for n, c in cameras.items()}
 pixels = {n: np.frombuffer(i.raw_data, np.uint8).reshape(600, 800, 4).astype(int)
           for n, i in images.items()}

@@ -13,9 +13,20 @@ from channel_worlds import CAR, Eyes, World, drive, frame, truth
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.evaluation import Evaluation, judge, merged, read_labels
+from skidpad.evidence.evaluation import Evaluation, read_labels
 from skidpad.evidence.hazards import Profile
-from skidpad.evidence.matching import Span, Tally, macro, match, micro, percent, score, tally
+from skidpad.evidence.judging import judge
+from skidpad.evidence.matching import (
+    Span,
+    Tally,
+    macro,
+    match,
+    merged,
+    micro,
+    percent,
+    score,
+    tally,
+)
 from skidpad.evidence.truth import G, footprint, simulator_truth, world_model_truth, would_hit
 from skidpad.recording.cycles import cycles
 
@@ -224,10 +235,10 @@ def test_a_drive_is_judged_by_rules_truths_and_labels():
     segment = judge("s", "town", names, rows, [Span(TAILGATED, 3.0, 5.0)])
     evaluation = Evaluation([segment])
     for truth_name in ("sim", "world", "labels"):
-        total = evaluation.scores(Profile.PRACTICAL, truth_name)[TAILGATED].total
+        total = evaluation.scores(Profile.PRACTICAL.value, truth_name)[TAILGATED].total
         assert (total.tp, total.fp, total.fn) == (1, 0, 0), truth_name
     # one unseen vehicle opens the gap to at most 0.5, which the printed rule does not exceed
-    total = evaluation.scores(Profile.AS_PRINTED, "sim")[TAILGATED].total
+    total = evaluation.scores(Profile.AS_PRINTED.value, "sim")[TAILGATED].total
     assert (total.tp, total.fn) == (0, 1)
     table = evaluation.as_dict()
     assert table["by_route"]["practical/sim"] == {

@@ -9,6 +9,7 @@ from skidpad.cli.adas import adas, report, show
 from skidpad.cli.bench import bench
 from skidpad.cli.channels import channels
 from skidpad.cli.channels_drive import drive, outcomes
+from skidpad.cli.channels_evaluate import evaluate, train
 from skidpad.cli.compare import compare
 from skidpad.cli.friction import friction
 from skidpad.cli.grip import campaign, grip
@@ -53,8 +54,8 @@ app.command()(bench)
 app.command()(show)
 app.add_typer(profiles)
 app.add_typer(maps)
-channels.command()(drive)
-channels.command()(outcomes)
+for command in (drive, outcomes, evaluate, train):
+    channels.command()(command)
 app.add_typer(channels)
 app.add_typer(hazards)
 app.command()(friction)

@@ -29,6 +29,14 @@ class Forms(str, Enum):
     printed = "printed"
 
 
+class Identifier(str, Enum):
+    """Choices of --identifier."""
+
+    rules = "rules"
+    learned = "learned"
+    both = "both"
+
+
 FILE = typer.Argument(help="A channel recording (.mcap), or a ROS 2 bag with --mapping.")
 OUT = typer.Option(..., help="Folder for indicators, hazards and the summary.")
 MAPPING = typer.Option(None, help="YAML that says which topics of a ROS 2 bag are what.")
@@ -38,6 +46,10 @@ FORMS = typer.Option(
 )
 RULES_FILE = typer.Option(None, help="Own hazard rules (YAML).")
 THRESHOLDS = typer.Option(None, help="Own thresholds (YAML).")
+IDENTIFIER = typer.Option(
+    Identifier.rules, help="Who finds the three scored hazards: the rules, the trained model, both."
+)
+MODEL = typer.Option(None, help="Trained model (.npz) of `skidpad channels train`.")
 TIMING = typer.Option(False, "--timing", help="Measure each module and print the table.")
 FAIL_IF = typer.Option(
     None, help="Exit with 1 when this hazard or indicator violation occurs; may be repeated."
@@ -54,6 +66,8 @@ def monitor(
     forms: Forms | None = FORMS,
     rules_file: Path | None = RULES_FILE,
     thresholds: Path | None = THRESHOLDS,
+    identifier: Identifier = IDENTIFIER,
+    model: Path | None = MODEL,
     timing: bool = TIMING,
     fail_if: list[str] = FAIL_IF,
     junit: Path | None = JUNIT,
@@ -63,6 +77,7 @@ def monitor(
 
     from skidpad.core.errors import ConfigError
     from skidpad.evidence.hazards import Profile
+    from skidpad.evidence.identifier import Identify, load_model
     from skidpad.evidence.indicators.catalogue import load_thresholds
     from skidpad.evidence.indicators.comfort import Form
     from skidpad.evidence.indicators.panel import IndicatorSettings
@@ -83,6 +98,8 @@ def monitor(
         thresholds=load_thresholds(thresholds),
         rules_file=rules_file,
         clock=time.thread_time_ns if timing else None,
+        identify=Identify(identifier.value),
+        model=load_model(model) if model else None,
     )
     write_drive_report(out)
     _print(found, out)

@@ -3,116 +3,21 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections import Counter
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from skidpad.core.channels import Cycle
+import polars as pl
+
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.hazards import SCORED_HAZARDS, Profile, Signal, load_rules
-from skidpad.evidence.indicators.comfort import Form
-from skidpad.evidence.indicators.panel import IndicatorSettings
+from skidpad.evidence.causes import EXPLAINED
+from skidpad.evidence.hazards import SCORED_HAZARDS, Profile
+from skidpad.evidence.judging import Segment
 from skidpad.evidence.matching import TOLERANCES, Score, Span, Tally, macro, micro, score, tally
-from skidpad.evidence.monitor import Monitor
-from skidpad.evidence.timefilter import TimeFilter
-from skidpad.evidence.truth import TrueHazard, simulator_truth, world_model_truth
 
-FORMS = {Profile.PRACTICAL: Form.CORRECTED, Profile.AS_PRINTED: Form.COMPLETED}  # decision C-16
-CURVE_FACTORS = (0.5, 0.67, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
-WARM_UP = 2.0  # s at the start of a segment that are not evaluated (decision C-12)
 LABEL_COLUMNS = ("hazard", "start_s", "end_s", "world", "annotator", "note")
-
-
-@dataclass(frozen=True, slots=True)
-class Segment:
-    """One recording, judged."""
-
-    name: str
-    route: str
-    hours: float
-    detected: Mapping[Profile, tuple[Span, ...]]
-    truths: Mapping[str, tuple[Span, ...]]  # "sim", "world", and "labels" where there are any
-    candidates: Mapping[HazardType, int]  # candidate hazards, listed and counted (decision C-4)
-    unseen: int  # true hazards with an object that no channel reported
-    curve: Mapping[float, tuple[Span, ...]]  # practical rules with one threshold scaled
-
-
-def judge(
-    name: str,
-    route: str,
-    channels: Sequence[str],
-    cycles: Sequence[Cycle],
-    labels: Iterable[Span] = (),
-    truths: Sequence[str] = ("sim", "world"),
-    curve: Signal | None = None,
-) -> Segment:
-    """Run both rule profiles and the truths over a recording's cycles.
-
-    With `curve` the practical rules are applied again with each clause on that signal scaled by
-    CURVE_FACTORS (C-105).
-    """
-    detected: dict[Profile, tuple[Span, ...]] = {}
-    candidates: dict[HazardType, int] = {}
-    scaled: dict[float, tuple[Span, ...]] = {}
-    begin = cycles[0].t + WARM_UP if cycles else 0.0
-    for profile in Profile:
-        settings = IndicatorSettings(form=FORMS[profile])
-        monitor = Monitor(channels, settings=settings, profile=profile, keep_worlds=False)
-        signals = [(c.t, monitor.update(c).signals.values) for c in cycles]
-        spans = _found(monitor.hazards, begin)
-        detected[profile] = tuple(s for s in spans if s.hazard in SCORED_HAZARDS)
-        if profile is Profile.PRACTICAL:
-            scaled = {f: _reapplied(signals, curve, f, begin) for f in CURVE_FACTORS if curve}
-            others = [s.hazard for s in spans if s.hazard not in SCORED_HAZARDS]
-            candidates = {hazard: others.count(hazard) for hazard in dict.fromkeys(others)}
-    found: dict[str, tuple[Span, ...]] = {}
-    unseen = 0
-    if "sim" in truths and any(c.truth is not None for c in cycles):
-        sim = [h for h in simulator_truth(cycles, channels) if h.t_end >= begin]
-        found["sim"] = _spans(sim)
-        unseen = sum(not h.seen for h in sim)
-    if "world" in truths:
-        found["world"] = _spans(h for h in world_model_truth(cycles, channels) if h.t_end >= begin)
-    if marked := tuple(labels):
-        found["labels"] = tuple(merged(marked))
-    duration = cycles[-1].t - begin if cycles else 0.0
-    return Segment(
-        name, route, max(duration, 0.0) / 3600.0, detected, found, candidates, unseen, scaled
-    )
-
-
-def _found(events: TimeFilter[HazardType], begin: float) -> list[Span]:
-    """The events of a finished drive that reach into its evaluated part."""
-    spans = [Span(e.key, e.t_start, e.t_end) for e in events.finish()]
-    return sorted((s for s in spans if s.t_end >= begin), key=lambda s: s.t_start)
-
-
-def _reapplied(
-    signals: Sequence[tuple[float, dict[Signal, float]]],
-    signal: Signal | None,
-    factor: float,
-    begin: float,
-) -> tuple[Span, ...]:
-    """What the practical rules find with every threshold on `signal` times `factor`."""
-    events: TimeFilter[HazardType] = TimeFilter()
-    for rule in load_rules(Profile.PRACTICAL):
-        if rule.hazard not in SCORED_HAZARDS:
-            continue
-        alternatives = tuple(
-            tuple(replace(c, value=c.value * factor) if c.signal is signal else c for c in clauses)
-            for clauses in rule.alternatives
-        )
-        changed = replace(rule, alternatives=alternatives)
-        for t, values in signals:
-            if changed.fires(values):
-                events.add(rule.hazard, t, 0.0, least=True)
-    return tuple(_found(events, begin))
-
-
-def _spans(hazards: Iterable[TrueHazard]) -> tuple[Span, ...]:
-    return tuple(Span(h.hazard, h.t_start, h.t_end) for h in hazards)
 
 
 @dataclass(slots=True)
@@ -121,28 +26,34 @@ class Evaluation:
 
     segments: list[Segment] = field(default_factory=list)
 
+    @property
+    def identifiers(self) -> list[str]:
+        """Rule profiles and learned identifiers that judged every segment."""
+        names = dict.fromkeys(name for s in self.segments for name in s.detected)
+        return [n for n in names if all(n in s.detected for s in self.segments)]
+
     def tallies(
-        self, profile: Profile, truth: str, tolerance: float = TOLERANCES[0]
+        self, identifier: str, truth: str, tolerance: float = TOLERANCES[0]
     ) -> list[dict[HazardType, Tally]]:
         """Counts per segment, of the segments that have this truth."""
         return [
-            tally(s.detected[profile], s.truths[truth], s.hours, tolerance)
+            tally(s.detected[identifier], s.truths[truth], s.hours, tolerance)
             for s in self.segments
             if truth in s.truths
         ]
 
     def scores(
-        self, profile: Profile, truth: str, tolerance: float = TOLERANCES[0]
+        self, identifier: str, truth: str, tolerance: float = TOLERANCES[0]
     ) -> dict[HazardType, Score]:
         """Scores of the three scored hazards."""
-        rows = self.tallies(profile, truth, tolerance)
+        rows = self.tallies(identifier, truth, tolerance)
         return {h: score([row[h] for row in rows]) for h in SCORED_HAZARDS}
 
-    def by_route(self, profile: Profile, truth: str) -> dict[str, dict[HazardType, Tally]]:
+    def by_route(self, identifier: str, truth: str) -> dict[str, dict[HazardType, Tally]]:
         """Counts per route (C-216)."""
         out: dict[str, dict[HazardType, Tally]] = {}
         with_truth = [s for s in self.segments if truth in s.truths]
-        for segment, row in zip(with_truth, self.tallies(profile, truth), strict=True):
+        for segment, row in zip(with_truth, self.tallies(identifier, truth), strict=True):
             total = out.setdefault(segment.route, dict.fromkeys(SCORED_HAZARDS, Tally()))
             for hazard in SCORED_HAZARDS:
                 total[hazard] = total[hazard] + row[hazard]
@@ -181,17 +92,17 @@ class Evaluation:
                 if h not in SCORED_HAZARDS
             },
             "results": [
-                self._result(profile, truth, tolerance)
-                for profile in Profile
+                self._result(identifier, truth, tolerance)
+                for identifier in self.identifiers
                 for truth in truths
                 for tolerance in TOLERANCES
             ],
             "by_route": {
-                f"{profile.value}/{truth}": {
+                f"{identifier}/{truth}": {
                     route: {h.value: [t.tp, t.fp, t.fn] for h, t in row.items()}
-                    for route, row in self.by_route(profile, truth).items()
+                    for route, row in self.by_route(identifier, truth).items()
                 }
-                for profile in Profile
+                for identifier in self.identifiers
                 for truth in truths
             },
             "curve": {
@@ -201,19 +112,62 @@ class Evaluation:
                 }
                 for truth in truths
             },
+            "causes": self._causes(),
+            "segment_table": self.segment_table().to_dicts(),
             "truths_agree": {h.value: _row(s) for h, s in self.truths_agree().items()},
         }
 
-    def _result(self, profile: Profile, truth: str, tolerance: float) -> dict[str, Any]:
-        scores = self.scores(profile, truth, tolerance)
+    def _causes(self) -> list[dict[str, Any]]:
+        """How often which cause stands behind false alarms and misses (C-215)."""
+        counted = Counter(
+            (m.identifier, m.truth, m.hazard.value, m.missed, m.cause)
+            for s in self.segments
+            for m in s.mistakes
+        )
+        names = ("rules", "truth", "hazard", "missed", "cause")
+        return [
+            dict(zip(names, key, strict=True)) | {"count": n} for key, n in counted.most_common()
+        ]
+
+    def segment_table(self) -> pl.DataFrame:
+        """One row per segment: practical rules against world-model truth, and the drive's facts."""
+        return pl.DataFrame([_facts(s) for s in self.segments], infer_schema_length=None)
+
+    def _result(self, identifier: str, truth: str, tolerance: float) -> dict[str, Any]:
+        scores = self.scores(identifier, truth, tolerance)
         return {
-            "rules": profile.value,
+            "rules": identifier,
             "truth": truth,
             "tolerance_s": tolerance,
             "hazards": {h.value: _row(s) for h, s in scores.items()},
             "macro": macro(scores),
             "micro": micro(scores),
         }
+
+
+def _facts(s: Segment) -> dict[str, Any]:
+    practical, sun = Profile.PRACTICAL.value, s.context.get("sun_altitude_deg")
+    row: dict[str, Any] = {
+        "name": s.name,
+        "route": s.route,
+        "seed": s.context.get("seed", s.name),
+        "hours": s.hours,
+        "night": None if sun is None else float(sun) < 0.0,
+    }
+    if "world" in s.truths:
+        for hazard, t in tally(s.detected[practical], s.truths["world"], s.hours).items():
+            if hazard in SCORED_HAZARDS:
+                row |= {f"{k}_{hazard.value}": getattr(t, k) for k in ("tp", "fp", "fn")}
+    for truth, spans in s.truths.items():
+        row |= {f"{truth}_{h.value}": sum(x.hazard is h for x in spans) for h in SCORED_HAZARDS}
+    false = [
+        m.cause
+        for m in s.mistakes
+        if (m.identifier, m.truth, m.missed, m.hazard)
+        == (practical, "world", False, HazardType.EGO_TAILGATING)
+    ]
+    row["false_tailgating_explained"] = sum(c in {e.value for e in EXPLAINED} for c in false)
+    return row | dict(s.facts)
 
 
 def _row(s: Score) -> dict[str, Any]:
@@ -262,15 +216,3 @@ def _label(where: str, row: dict[str, Any]) -> Span:
     if not start <= end:
         raise ConfigError(f"{where}: end_s must not be before start_s, got {start:g} to {end:g}")
     return Span(hazard, start, end)
-
-
-def merged(spans: Iterable[Span], pause: float = 2.0) -> list[Span]:
-    """Spans of one hazard whose pause is under `pause` s, as one (decision C-5)."""
-    out: list[Span] = []
-    for s in sorted(spans, key=lambda s: (s.hazard.value, s.t_start)):
-        last = out[-1] if out else None
-        if last and last.hazard is s.hazard and s.t_start - last.t_end < pause:
-            out[-1] = Span(s.hazard, last.t_start, max(last.t_end, s.t_end), last.about | s.about)
-        else:
-            out.append(s)
-    return out

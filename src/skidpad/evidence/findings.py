@@ -72,6 +72,7 @@ class Finding:
     margin: str
     contrasts: Callable[[pl.DataFrame], list[Contrast]]  # empty: the runs are not there
     study: bool = False  # needs runs of its own (`skidpad study ID`)
+    built_in: str = ""  # what in the simulation brings the effect about; empty: it emerges
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,8 +182,8 @@ def paired(label: str, differences: ArrayLike, margin: float, identical: bool = 
     )
 
 
-def rate_below(label: str, events: int, runs: int, limit: float) -> Contrast:
-    """The claim that a rate per run lies below `limit`, by exact Poisson tests."""
+def rate_below(label: str, events: int, runs: float, limit: float) -> Contrast:
+    """The claim that a rate per run, or hour, lies below `limit`, by exact Poisson tests."""
     low, high = poisson_interval(events, runs)
     return Contrast(
         label=label,
@@ -191,6 +192,6 @@ def rate_below(label: str, events: int, runs: int, limit: float) -> Contrast:
         p_claimed=float(stats.poisson.cdf(events, limit * runs)),
         p_reversed=float(stats.poisson.sf(events - 1, limit * runs)),
         margin=0.0,
-        units=runs,
+        units=max(1, round(runs)),
         units_needed=ceil(RUNS_WITHOUT_EVENT / limit),
     )

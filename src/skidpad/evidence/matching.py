@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
 
@@ -163,3 +163,15 @@ def percent(ratio: float) -> str:
 def _mean(values: Sequence[float | None]) -> float | None:
     known = [v for v in values if v is not None]
     return sum(known) / len(known) if known else None
+
+
+def merged(spans: Iterable[Span], pause: float = 2.0) -> list[Span]:
+    """Spans of one hazard whose pause is under `pause` s, as one (decision C-5)."""
+    out: list[Span] = []
+    for s in sorted(spans, key=lambda s: (s.hazard.value, s.t_start)):
+        last = out[-1] if out else None
+        if last and last.hazard is s.hazard and s.t_start - last.t_end < pause:
+            out[-1] = Span(s.hazard, last.t_start, max(last.t_end, s.t_end), last.about | s.about)
+        else:
+            out.append(s)
+    return out

@@ -6,7 +6,7 @@ It reads what channels report and nothing else; truth and words about the drive 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations
 from typing import NamedTuple
@@ -19,12 +19,15 @@ from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.frames import Usable, usable
 from skidpad.evidence.ghosts import GhostCue
 from skidpad.evidence.hazards import (
+    SCORED_HAZARDS,
     Profile,
     Rule,
     SignalReader,
     SignalReadings,
     load_rules,
 )
+from skidpad.evidence.identifier import Detector, Identify, LearnedIdentifier
+from skidpad.evidence.identifier_features import feature_row
 from skidpad.evidence.indicators.catalogue import (
     CHANNEL_INDICATORS,
     PAIR_INDICATORS,
@@ -89,6 +92,8 @@ class Monitor:
         rules: Sequence[Rule] | None = None,
         thresholds: dict[Indicator, Threshold] | None = None,
         keep_worlds: bool = True,
+        identify: Identify = Identify.RULES,
+        detectors: Mapping[HazardType, Detector] | None = None,
     ) -> None:
         self.channels = tuple(channels)
         self.pairs = tuple("+".join(p) for p in combinations(self.channels, 2))
@@ -103,6 +108,10 @@ class Monitor:
         self.unusable = Unusable()
         self.ghosts = GhostCue(self.channels)
         self.undecided: Counter[HazardType] = Counter()
+        self.identify = identify
+        self.learned = (
+            LearnedIdentifier(detectors or {}) if identify is not Identify.RULES else None
+        )
         self._recorder = (
             Recorder(
                 self.channels,
@@ -157,8 +166,13 @@ class Monitor:
         self, cycle: Cycle, readings: Readings, risk: RiskMatrix, signals: SignalReadings
     ) -> CycleEvidence:
         fired, undecided = [], []
+        learned = self._learned(cycle.t, readings, risk, signals)
         for rule in self.rules:
             verdict = rule.fires(signals.values)
+            if self.identify is Identify.LEARNED and rule.hazard in SCORED_HAZARDS:
+                verdict = rule.hazard in learned
+            elif rule.hazard in learned:
+                verdict = True
             if verdict:
                 fired.append(rule.hazard)
                 self.hazards.add(
@@ -171,6 +185,13 @@ class Monitor:
                 undecided.append(rule.hazard)
                 self.undecided[rule.hazard] += 1
         return CycleEvidence(cycle, readings, risk, signals, tuple(fired), tuple(undecided))
+
+    def _learned(
+        self, t: float, readings: Readings, risk: RiskMatrix, signals: SignalReadings
+    ) -> list[HazardType]:
+        if self.learned is None:
+            return []
+        return self.learned.update(t, feature_row(readings, risk, signals))
 
     def note(self, entries: dict[str, str]) -> None:
         """Words about the drive, copied into records; nothing is judged by them."""

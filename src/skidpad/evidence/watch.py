@@ -16,6 +16,7 @@ from skidpad.core.channels import Context, Cycle
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.hazards import Profile, load_rules
+from skidpad.evidence.identifier import Identify, Model, load_model
 from skidpad.evidence.indicators.catalogue import (
     CHANNEL_INDICATORS,
     PAIR_INDICATORS,
@@ -62,14 +63,20 @@ def watch(
     thresholds: dict[Indicator, Threshold],
     rules_file: Path | None = None,
     clock: Clock | None = None,
+    identify: Identify = Identify.RULES,
+    model: Model | None = None,
 ) -> Watched:
     """Monitor `source`; writes indicators, hazards, a summary, and timings if given a `clock`."""
+    if identify is not Identify.RULES:
+        model = model or load_model()
     monitor = Monitor(
         source.channels,
         settings=settings,
         profile=profile,
         rules=load_rules(profile, rules_file),
         thresholds=thresholds,
+        identify=identify,
+        detectors=model.identifier() if model else None,
     )
     log = IndicatorLog(_columns(monitor))
     timer = _Timer(clock) if clock else None
@@ -103,7 +110,13 @@ def watch(
 def _warmed_up(stream: Iterator[Cycle], like: Monitor) -> Iterator[Cycle]:
     """The same cycles, after the first ones went through another monitor: times are of warm code."""
     head = list(islice(stream, WARM_CYCLES))
-    spare = Monitor(like.channels, settings=like.settings, profile=like.profile)
+    spare = Monitor(
+        like.channels,
+        settings=like.settings,
+        profile=like.profile,
+        identify=like.identify,
+        detectors=like.learned.detectors if like.learned else None,
+    )
     for cycle in head:
         spare.update(cycle)
     return chain(head, stream)
@@ -167,6 +180,7 @@ def _finished(
         "seconds": round(seconds, 3),
         "rules": monitor.profile.value,
         "forms": monitor.settings.form.value,
+        "identifier": monitor.identify.value,
         "losses": asdict(source.losses),
         "unusable": monitor.unusable.as_dict(),
         "hazards": [_event(e, e.key.value) for e in hazards],

@@ -6,9 +6,10 @@ from skidpad.core.channels import Context
 from skidpad.recording.channels import ChannelSource
 
 
-def route_of(source: ChannelSource) -> str | None:
-    """The route that the recording names first; None when it names none."""
+def context_of(source: ChannelSource) -> dict[str, str]:
+    """All words of the recording; of those said twice the later ones."""
+    words: dict[str, str] = {}
     for message in source.messages():
-        if isinstance(message.item, Context) and "route" in message.item.entries:
-            return message.item.entries["route"]
-    return None
+        if isinstance(message.item, Context):
+            words |= message.item.entries
+    return words

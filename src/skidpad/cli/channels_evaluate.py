@@ -1,0 +1,193 @@
+"""`skidpad channels evaluate` and `train`: identifiers of hazards, judged and learned."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator
+
+    from skidpad.evidence.hazards import Signal
+    from skidpad.evidence.judging import Segment
+    from skidpad.evidence.matching import Span
+
+
+class Truth(str, Enum):
+    """Choices of --truth."""
+
+    both = "both"
+    sim = "sim"
+    world = "world"
+
+
+DIR = typer.Argument(help="Folder with .mcap recordings, at any depth.")
+LABELS = typer.Option(None, help="Human labels (CSV).")
+TRUTH = typer.Option(Truth.both, help="Which truth to judge by.")
+CURVE = typer.Option(
+    None, help="Also vary the thresholds on this signal, such as gap, from half to double."
+)
+MODEL = typer.Option(None, help="Also judge this learned identifier (.npz).")
+OUT = typer.Option(None, help="Folder for the results; default: DIR.")
+MODEL_OUT = typer.Option(..., "--out", help="Model file to write (.npz).")
+WORKERS = typer.Option(0, help="Processes; 0: one per core.")
+
+
+def evaluate(
+    folder: Path = DIR,
+    labels: Path | None = LABELS,
+    truth: Truth = TRUTH,
+    curve: str | None = CURVE,
+    model: Path | None = MODEL,
+    out: Path | None = OUT,
+    workers: int = WORKERS,
+) -> None:
+    """Judge who finds hazards by precision and recall; writes evaluation.json and report.html."""
+    import json
+
+    from skidpad.core.errors import ConfigError, require_choice
+    from skidpad.evidence.evaluation import Evaluation, read_labels
+    from skidpad.evidence.hazards import Signal
+    from skidpad.recording.files import write_bytes
+    from skidpad.recording.sources import recordings_below
+    from skidpad.report.channels_evaluation import write_evaluation_report
+
+    paths = recordings_below(folder)
+    marked = read_labels(labels) if labels else {}
+    if "" in marked and len(paths) > 1:
+        raise ConfigError(
+            f"{labels}: needs a column `recording`, since {folder} holds {len(paths)} recordings"
+        )
+    truths = ("sim", "world") if truth is Truth.both else (truth.value,)
+    varied = None if curve is None else Signal(require_choice("signal", curve, [*Signal]))
+    tasks = [_Task(path, folder, truths, _labels_of(path, marked), varied, model) for path in paths]
+    evaluation = Evaluation(_segments(tasks, workers))
+    if model is not None:
+        _refuse_training_drives(model, evaluation.segments)
+    table = evaluation.as_dict()
+    out = out or folder
+    out.mkdir(parents=True, exist_ok=True)
+    write_bytes(out / "evaluation.json", json.dumps(table, indent=1, allow_nan=False).encode())
+    write_evaluation_report(out)
+    _print_results(table)
+
+
+def train(folder: Path = DIR, out: Path = MODEL_OUT, workers: int = WORKERS) -> None:
+    """Train the learned identifier on recordings with truth; writes the model and its card."""
+    from skidpad.evidence.identifier import save_model
+    from skidpad.evidence.training import TrainingDrive, card_text, require_learning, train_model
+    from skidpad.recording.files import write_bytes
+    from skidpad.recording.sources import recordings_below
+
+    require_learning()
+    tasks = [
+        _Task(path, folder, ("sim", "world"), (), None, None) for path in recordings_below(folder)
+    ]
+    drives = [
+        TrainingDrive(s.route, s.context.get("seed", s.name), s.t, s.rows, s.truths, s.hours)
+        for s in _segments(tasks, workers)
+    ]
+    model = train_model(drives, typer.echo)
+    save_model(out, model)
+    write_bytes(out.with_suffix(".md"), card_text(model).encode())
+    typer.echo(f"{out}: written, with its card {out.with_suffix('.md').name}")
+
+
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """One recording to judge, in a worker."""
+
+    path: Path
+    folder: Path
+    truths: tuple[str, ...]
+    labels: tuple[Span, ...]
+    curve: Signal | None
+    model: Path | None
+
+
+def judge_one(task: _Task) -> Segment:
+    """In a worker: read and judge one recording."""
+    import time
+
+    from skidpad.evidence.identifier import load_model
+    from skidpad.evidence.judging import judge
+    from skidpad.recording.channels import McapRecording
+    from skidpad.recording.context import context_of
+    from skidpad.recording.cycles import cycles
+
+    source = McapRecording(task.path)
+    context = context_of(source)
+    return judge(
+        str(task.path.relative_to(task.folder)),
+        context.get("route") or task.path.parent.name,
+        source.channels,
+        list(cycles(source)),
+        task.labels,
+        task.truths,
+        task.curve,
+        load_model(task.model) if task.model else None,
+        context,
+        time.thread_time_ns,
+    )
+
+
+def _segments(tasks: list[_Task], workers: int) -> list[Segment]:
+    """All recordings judged, in the order of their names; a failure is raised."""
+    import os
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    workers = min(workers or os.cpu_count() or 1, len(tasks))
+    if workers == 1:
+        return list(_told(map(judge_one, tasks)))
+    with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
+        return list(_told(pool.map(judge_one, tasks)))
+
+
+def _told(segments: Iterable[Segment]) -> Iterator[Segment]:
+    for segment in segments:
+        typer.echo(f"{segment.name}: {segment.t.size} cycles")
+        yield segment
+
+
+def _labels_of(path: Path, marked: dict[str, list[Span]]) -> tuple[Span, ...]:
+    return (*marked.get("", []), *marked.get(path.stem, []))
+
+
+def _refuse_training_drives(path: Path, segments: list[Segment]) -> None:
+    """A model may not be judged by drives that it was trained on."""
+    from skidpad.core.errors import ConfigError
+    from skidpad.evidence.identifier import load_model
+
+    seen = load_model(path).trained_on()
+    both = [s.name for s in segments if (s.route, s.context.get("seed", s.name)) in seen]
+    if both:
+        raise ConfigError(
+            f"{path}: was trained on {both[0]} and {len(both) - 1} more of these recordings"
+        )
+
+
+def _print_results(table: dict[str, object]) -> None:
+    from skidpad.evidence.matching import percent
+
+    def ratio(row: dict[str, object], name: str) -> str:
+        value, interval = row[name], row[f"{name}_interval"]
+        if not isinstance(value, float) or not isinstance(interval, tuple):
+            return "not defined"
+        return f"{percent(value)} % ({percent(interval[0])} to {percent(interval[1])})"
+
+    results = table["results"]
+    assert isinstance(results, list)
+    for result in results:
+        if result["tolerance_s"] != 1.0:
+            continue
+        typer.echo(f"{result['rules']} against {result['truth']} truth")
+        for hazard, row in result["hazards"].items():
+            typer.echo(
+                f"  {hazard}: found {row['tp']}, false {row['fp']}, missed {row['fn']}; "
+                f"precision {ratio(row, 'precision')}, recall {ratio(row, 'recall')}"
+            )

@@ -120,6 +120,7 @@ def _calibrated(
 def _fit(drives: Sequence[TrainingDrive], truth: str, hazard: HazardType) -> Forest | None:
     """Trees by scikit-learn, as tables; None when only one class is there."""
     from sklearn.ensemble import HistGradientBoostingClassifier
+    from threadpoolctl import threadpool_limits
 
     xs, ys, weights = [], [], []
     for d in drives:
@@ -138,7 +139,8 @@ def _fit(drives: Sequence[TrainingDrive], truth: str, hazard: HazardType) -> For
         max_iter=TREES, max_leaf_nodes=LEAVES, learning_rate=RATE, min_samples_leaf=LEAF_SAMPLES,
         l2_regularization=SHRINK, early_stopping=False, random_state=0,
     )  # fmt: skip
-    machine.fit(np.concatenate(xs), y, sample_weight=np.concatenate(weights))
+    with threadpool_limits(1):  # the same sums on every machine
+        machine.fit(np.concatenate(xs), y, sample_weight=np.concatenate(weights))
     return forest_of(machine)
 
 

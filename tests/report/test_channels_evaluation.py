@@ -1,0 +1,108 @@
+import json
+
+import numpy as np
+import pytest
+
+from channel_worlds import Eyes, World, drive
+from skidpad.core.errors import FileError
+from skidpad.evidence.evaluation import Evaluation
+from skidpad.evidence.hazards import Signal
+from skidpad.evidence.judging import judge
+from skidpad.recording.cycles import cycles
+from skidpad.report.channels_evaluation import evaluation_page, write_evaluation_report
+from skidpad.report.channels_redundancy import outcomes, redundancy
+
+EYES = (Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,)))
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("evaluated")
+    segments = []
+    for i, gap in enumerate((6.0, 45.0)):
+        world = World(
+            (0, 0, 0, 15.0, 0), np.array([(-gap - 4.5, 0, 0, 15.7, 0), (60, 3.5, 0, 15, 0)])
+        )
+        source = drive(world, EYES, 8.0)
+        segments.append(
+            judge(
+                f"route-{i}.mcap", f"route-{i}", source.channels, list(cycles(source)),
+                curve=Signal.GAP, context={"sun_altitude_deg": "-5", "seed": str(i)},
+            )
+        )  # fmt: skip
+    table = Evaluation(segments).as_dict()
+    (folder / "evaluation.json").write_text(json.dumps(table, allow_nan=False))
+    return folder
+
+
+def tables(page):
+    return {b.caption: b for s in page.sections for b in s.blocks if b.kind == "table"}
+
+
+@pytest.mark.req("C-210", "C-212", "C-214", "C-215", "C-216", "C-105", "X-6")
+def test_the_page_holds_results_causes_verdicts_and_published_numbers(folder):
+    text = write_evaluation_report(folder).read_text()
+    for word in (
+        "simulator truth",
+        "world-model truth",
+        "macro",
+        "micro",
+        "CF-30",
+        "92.00 / 94.52",
+    ):
+        assert word in text
+    assert "factor on the threshold" in text
+
+
+@pytest.mark.req("C-216", "C-217")
+def test_totals_are_the_sums_of_the_routes(folder):
+    page = evaluation_page(json.loads((folder / "evaluation.json").read_text()), folder)
+    found = tables(page)
+    totals = {
+        (row[0].text, row[1].text): [int(c.text) for c in row[2:5]]
+        for row in found["World-model truth: what the channels reported, ghosts included"].rows
+        if "all" not in row[1].text
+    }
+    sums = dict.fromkeys(totals, (0, 0, 0))
+    routes = found["Found / false / missed per route, world-model truth"]
+    hazards = [name for name, _ in routes.columns[2:]]
+    for row in routes.rows:
+        if row[0].kind == "published":
+            continue
+        for hazard, cell in zip(hazards, row[2:], strict=True):
+            key = row[1].text, hazard
+            counts = map(int, cell.text.split(" / "))
+            sums[key] = tuple(a + b for a, b in zip(sums[key], counts, strict=True))
+    assert {k: tuple(v) for k, v in totals.items()} == sums
+    assert totals["practical", "ego tailgated"] == [1, 0, 0]
+
+
+@pytest.mark.req("C-215")
+def test_a_missed_hazard_names_the_clause_that_never_held(folder):
+    causes = json.loads((folder / "evaluation.json").read_text())["causes"]
+    missed = [c["cause"] for c in causes if c["missed"] and c["rules"] == "as_printed"]
+    assert "the channels' objects agreed" in missed  # a gap of 0.5 does not exceed 0.5
+
+
+@pytest.mark.req("C-010")
+def test_redundancy_compares_equal_seeds(tmp_path):
+    for driver, collisions in (("arbiter", 0), ("lav_like", 2)):
+        for seed in range(8):
+            path = tmp_path / driver / f"route-1-{seed}.json"
+            path.parent.mkdir(exist_ok=True)
+            path.with_suffix(".mcap").touch()
+            outcome = {
+                "route": "route-1", "seed": seed, "collisions": collisions + seed % 2,
+                "red_lights_run": 0, "stalls": 0, "distance_m": 1000.0,
+            }  # fmt: skip
+            path.write_text(json.dumps({"plan": {"drive_by": driver}, "outcome": outcome}))
+    table, text = redundancy(tmp_path)
+    assert [row[2].text for row in table.rows] == ["4", "20"]
+    assert "lav_like alone less the arbiter, collisions per segment: +2 " in text.text
+    assert outcomes(tmp_path / "nothing") is None
+    assert redundancy(tmp_path / "arbiter")[0].kind == "text"
+
+
+def test_a_folder_without_an_evaluation_is_named(tmp_path):
+    with pytest.raises(FileError, match="evaluation"):
+        write_evaluation_report(tmp_path)

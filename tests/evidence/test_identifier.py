@@ -128,7 +128,7 @@ def tailgated_drive(seed, gap):
         (0, 0, 0, 15.0, 0), np.array([(-gap - 4.5, 0, 0, 15.2, 0), (60.0, 3.5, 0, 15, 0)])
     )
     eyes = (Eyes("a", 0.02 + 0.001 * seed), Eyes("b", 0.02, blind=(0,)))
-    return drive(world, eyes, 8.0)
+    return drive(world, eyes, 12.0)
 
 
 @pytest.fixture(scope="module")

@@ -139,8 +139,10 @@ def _fit(drives: Sequence[TrainingDrive], truth: str, hazard: HazardType) -> For
         max_iter=TREES, max_leaf_nodes=LEAVES, learning_rate=RATE, min_samples_leaf=LEAF_SAMPLES,
         l2_regularization=SHRINK, early_stopping=False, random_state=0,
     )  # fmt: skip
+    x = np.concatenate(xs)
+    x[:, np.isnan(x).all(axis=0)] = 0.0  # never evaluated: nothing to split by
     with threadpool_limits(1):  # the same sums on every machine
-        machine.fit(np.concatenate(xs), y, sample_weight=np.concatenate(weights))
+        machine.fit(x, y, sample_weight=np.concatenate(weights))
     return forest_of(machine)
 
 

@@ -139,7 +139,9 @@ def trained():
     drives = []
     for i in range(12):
         source = tailgated_drive(i, 6.0 if i % 2 else 45.0)
-        s = judge(f"d{i}", f"route-{i % 3}", source.channels, list(cycles(source)))
+        s = judge(
+            f"d{i}", f"route-{i % 3}", source.channels, list(cycles(source)), truths=("world",)
+        )
         drives.append(TrainingDrive(s.route, str(i), s.t, s.rows, s.truths, s.hours))
     return train_model(drives), drives
 

@@ -19,6 +19,7 @@ from skidpad.cli.monitor import monitor, safety_case
 from skidpad.cli.play import play
 from skidpad.cli.profiles import profiles
 from skidpad.cli.rerun import rerun, study
+from skidpad.cli.view import view
 from skidpad.core.errors import InputError, SkidpadError
 
 app = typer.Typer(
@@ -64,6 +65,7 @@ app.command()(play)
 app.add_typer(campaign)
 app.command()(monitor)
 app.command("safety-case")(safety_case)
+app.command()(view)
 
 
 @app.command()

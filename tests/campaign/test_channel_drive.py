@@ -79,3 +79,17 @@ def test_a_campaign_resumes_and_refuses_other_settings(tmp_path):
     assert again.outcomes == first.outcomes
     with pytest.raises(OutputError, match="other settings"):
         run_drives([replace(plans[0], noise=2.0)], tmp_path, workers=1)
+
+
+@pytest.mark.req("C-026")
+def test_other_maps_by_name_or_file(tmp_path):
+    (route,) = chosen_routes("route-6", "straight")
+    outcome = drive_segment(plan(route=route, duration=3.0), tmp_path / "a.mcap")
+    assert outcome.distance_m > 3.0
+
+
+@pytest.mark.req("C-026")
+def test_one_channel_can_drive_without_any_other(tmp_path):
+    alone = plan(channels=("tfuse_like",), drive_by="tfuse_like", duration=2.0)
+    outcome = drive_segment(alone, tmp_path / "a.mcap")
+    assert outcome.driving_s == {"tfuse_like": pytest.approx(2.0)}

@@ -153,13 +153,11 @@ def _loop(
             writer.write_decision(decision)
             writer.write_truth(truth_frame(t, truth))
         command = crew.command()
-        contacts = truth.contacts
         for tick in range(TICKS):
             backend.step(command, words if tick == 0 else ())
             truth = backend.truth()
-            contacts = truth.contacts
             if k >= 0:
-                referee.touched(t, truth, contacts)
+                referee.touched(t, truth)
         if k >= 0 and referee.over:
             break
     return referee.outcome(plan.route.name, plan.seed, plan.drive_by)

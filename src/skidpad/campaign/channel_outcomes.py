@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from math import cos, hypot, sin
 
 import msgspec
 
 from skidpad.core.channels import Decision
-from skidpad.core.states import ContactEvent, WorldTruth
+from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.lanes import SignalKind
 from skidpad.stack.channels.route import SEARCH, STEP, RoutePath, locate
@@ -79,10 +78,10 @@ class Referee:
         if abs(offset) > LOST or self.at * STEP > self.route.length - 30.0:
             self.over, self.ended = True, "off the route"
 
-    def touched(self, t: float, truth: WorldTruth, contacts: Sequence[ContactEvent]) -> None:
+    def touched(self, t: float, truth: WorldTruth) -> None:
         """Contacts of one tick."""
         s = truth.states
-        for contact in contacts:
+        for contact in truth.contacts:
             key = (contact.actor, contact.static)
             if t - self._last.get(key, -AGAIN) >= AGAIN:
                 yaw = float(s.yaw[0])

@@ -42,7 +42,7 @@ def driven_routes() -> dict[str, DrivenRoute]:
     }
 
 
-def chosen_routes(name: str, map: Path | None = None) -> list[DrivenRoute]:
+def chosen_routes(name: str, map: str | Path | None = None) -> list[DrivenRoute]:
     """The route with this name, or `all`; on another map if one is given."""
     routes = driven_routes()
     require_choice("route", name, ["all", *routes])

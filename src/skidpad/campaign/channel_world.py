@@ -23,6 +23,8 @@ from skidpad.stack.channels.settings import CarModel
 CLEARANCE = 25.0  # m between vehicles at the start
 FIRST_S = 25.0  # m from the beginning of its lane where the ego starts
 PARKED_WIDTH = 1.95  # m, wider vehicles would stand on the lane
+DEAD_END_LENGTH = 300.0  # m that a road without an end's successor must offer
+ROUTE_SPARE = 250.0  # m for the start's offset, the warm-up and the view ahead at the end
 V_STREET = 14.0  # m/s, limit of town streets
 V_MEAN_MAX = 25.0  # m/s, so that no route ends before its segment
 
@@ -41,7 +43,7 @@ def segment_of(route: DrivenRoute, map: RoadMap, seed: int, duration: float) -> 
     """The world of a route with this seed; `duration` in s decides how long the way is."""
     rng = stream(seed, "channels", "route")
     lane = _first_lane(map, rng)
-    lanes = draw_route(map, lane, duration * V_MEAN_MAX, rng)
+    lanes = draw_route(map, lane, duration * V_MEAN_MAX + ROUTE_SPARE, rng)
     path = route_path(map, lanes, FIRST_S)
     start = map.at(lane, FIRST_S)
     crowd = Crowd(map, route.pedestrians, route.cyclists, seed)
@@ -94,7 +96,7 @@ def _first_lane(map: RoadMap, rng: np.random.Generator) -> int:
         (map.lanes.kind == LaneKind.DRIVING)
         & (map.lanes.junction < 0)
         & (map.lanes.length > 2.0 * FIRST_S)
-        & (np.diff(map.lanes.next_start) > 0)
+        & ((np.diff(map.lanes.next_start) > 0) | (map.lanes.length > DEAD_END_LENGTH))
     )
     limit = map.samples.limit[map.lanes.first[fits]]
     streets = fits[limit < V_STREET]

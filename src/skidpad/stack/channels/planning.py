@@ -47,7 +47,6 @@ class Blocks(NamedTuple):
 
     s: Floats  # m from the ego's centre to the near end of what blocks, now
     v: Floats  # m/s along the path
-    start: Floats  # s from which it blocks
 
 
 @kernel
@@ -91,7 +90,7 @@ def find_blocks(
 ) -> Blocks:
     """Leaders and crossers among objects (n, 5) with sizes (n, 2) and predictions (n, q, 2)."""
     n = objects.shape[0]
-    s, speed, start = np.full(n, np.inf), np.zeros(n), np.zeros(n)
+    s, speed = np.full(n, np.inf), np.zeros(n)
     for i in range(n):
         for k in range(times.size):
             x, y = predictions[i, k, 0], predictions[i, k, 1]
@@ -120,12 +119,12 @@ def find_blocks(
                     early = abs(arrival - times[k]) > CROSSING_MARGIN and arrival < times[k]
                 if early:
                     continue
-            s[i], speed[i] = ahead - along * times[k], max(along, 0.0)
-            start[i] = 0.0
             if k > 0 and along < ALONG * np.hypot(objects[i, 3], objects[i, 4]):
-                s[i], speed[i] = ahead, 0.0
+                s[i], speed[i] = ahead, 0.0  # it crosses: keep out of where it will be
+            else:
+                s[i], speed[i] = ahead - along * times[k], max(along, 0.0)
             break
-    return Blocks(s, speed, start)
+    return Blocks(s, speed)
 
 
 @kernel

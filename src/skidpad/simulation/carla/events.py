@@ -15,6 +15,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.simulation.carla.cast import Player
 
 HOLD = 0.5  # s: bodies that bounce apart and touch again within this are one contact
+CROSSING = 2.0  # s: CARLA tells each corner of the outline; those of one crossing are one invasion
 QUIET = 3  # ticks after a relocation in which crossing markings is no invasion
 EGO = 0
 
@@ -28,6 +29,8 @@ class EgoEvents:
         self._collisions: deque[Any] = deque()
         self._invasions: deque[Any] = deque()
         self._last: dict[int | str, int] = {}
+        self._crossing = round(CROSSING / dt)
+        self._crossed: dict[str, int] = {}  # tick in which a marking was last told
         self._quiet_until = 0
 
     def hear_collision(self, event: Any) -> None:
@@ -65,17 +68,18 @@ class EgoEvents:
         return tuple(found.values())
 
     def invasions(self, tick: int, states: ActorStates) -> tuple[LaneInvasion, ...]:
-        """Markings that the ego's outline crossed."""
+        """Markings that the ego's outline began to cross."""
         events = drain(self._invasions)
         if not events or tick <= self._quiet_until:
             return ()
+        names = {marking_name(m.type): None for e in events for m in e.crossed_lane_markings}
+        begun = [
+            n for n in names if tick - self._crossed.get(n, -self._crossing - 1) > self._crossing
+        ]
+        self._crossed.update(dict.fromkeys(names, tick))
         point = self._map.project(states.x[EGO], states.y[EGO], states.z[EGO])
         road = -1 if point is None else point.road
-        return tuple(
-            LaneInvasion(tick, marking_name(marking.type), road)
-            for event in events
-            for marking in event.crossed_lane_markings
-        )
+        return tuple(LaneInvasion(tick, name, road) for name in begun)
 
 
 def marking_name(kind: Any) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import queue
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from skidpad.core.errors import BackendError
@@ -55,6 +55,7 @@ class Sensors:
         self._setup = setup
         self.boxes: dict[str, Mailbox] = {}
         self.actors: list[Any] = []
+        self.listening: list[Any] = []
         self.silent: list[str] = []
         pixels = setup.level is SensorLevel.PIXELS
         display = set() if setup.render_all else display_cameras(setup.specs)
@@ -64,14 +65,18 @@ class Sensors:
                     hear = (
                         events.hear_collision if spec.kind == "collision" else events.hear_invasion
                     )
-                    self._attach(EVENTS[spec.kind], spec, {}).listen(hear)
+                    self._listen(self._attach(EVENTS[spec.kind], spec, {}), hear)
             elif pixels and isinstance(spec, (CameraSpec, RadarSpec)):
                 actor = self._attach(*described(spec))
                 if spec.id in display:
                     self.silent.append(spec.id)
                     continue
                 box = self.boxes[spec.id] = Mailbox(spec)
-                actor.listen(box.hear)
+                self._listen(actor, box.hear)
+
+    def _listen(self, actor: Any, hear: Callable[[Any], None]) -> None:
+        actor.listen(hear)
+        self.listening.append(actor)
 
     def _attach(self, id: str, spec: SensorSpec, attributes: dict[str, str]) -> Any:
         carla = self._connection.carla
@@ -105,11 +110,11 @@ class Sensors:
 
     def close(self) -> None:
         """Stop listening first: a sensor that still sends when the client ends aborts it."""
-        for actor in self.actors:
-            if actor.is_listening:
-                actor.stop()
-        for actor in self.actors:
-            actor.destroy()
+        for actor in self.listening:
+            actor.stop()
+        self.listening.clear()
+        destroy = self._connection.carla.command.DestroyActor  # an actor's own destroy() warns
+        self._connection.client.apply_batch_sync([destroy(a) for a in self.actors], False)
         self.actors.clear()
 
 

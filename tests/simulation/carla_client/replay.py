@@ -21,6 +21,8 @@ from skidpad.simulation.carla.options import CarlaOptions
 from skidpad.simulation.carla_server.catalogue import load_catalogue
 from skidpad.simulation.carla_server.vehicles import model_of
 from skidpad.simulation.embedded.engine import EmbeddedBackend
+from skidpad.simulation.embedded.ground import NOISE_SALT, ROAD_NOISE
+from skidpad.simulation.embedded.traffic.path import uniform
 
 EGO = "vehicle.mini.cooper_s"
 SECONDS, SEED = 60.0, 3
@@ -29,9 +31,16 @@ WHEELBASE, STEER_MAX = 2.47, radians(70.0)
 MAP = load_map("figure8")
 
 
-def same_model() -> None:
-    """Let the embedded simulator know the server's car by its blueprint's name."""
-    types.vehicle_types()[EGO] = model_of(load_catalogue()[EGO])
+def same_model(id: str = EGO) -> None:
+    """Let the embedded simulator know a car of the server by its blueprint's name."""
+    types.vehicle_types()[id] = model_of(load_catalogue()[id])
+
+
+def without_road_noise(backend: EmbeddedBackend) -> None:
+    """The server's road has none; ours has 1e-4 rad of cross slope (decision M-11)."""
+    world = backend.world
+    for i, key in enumerate(world.keys):
+        world.bank[i] -= ROAD_NOISE * (2.0 * uniform(key, world.tick, NOISE_SALT) - 1.0)
 
 
 def setup_for(weather: str) -> Setup:
@@ -66,6 +75,8 @@ def poses(backend: Backend, setup: Setup, commands: list[VehicleCommand]) -> lis
     backend.reset(setup, SEED)
     out = []
     for command in commands:
+        if isinstance(backend, EmbeddedBackend):
+            without_road_noise(backend)
         backend.step(command)
         pose = backend.truth().states.pose(0)
         out.append([pose.x, pose.y, pose.z, pose.yaw])

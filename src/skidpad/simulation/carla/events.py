@@ -9,13 +9,14 @@ from math import hypot
 from typing import Any
 
 from skidpad.core.lefthanded import vector_from_carla
-from skidpad.core.states import ActorStates, ContactEvent, LaneInvasion
+from skidpad.core.states import ActorStates, ContactEvent, Floats, LaneInvasion
 from skidpad.roads.lanes import Marking
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.carla.cast import Player
 
 HOLD = 0.5  # s: bodies that bounce apart and touch again within this are one contact
 CROSSING = 2.0  # s: CARLA tells each corner of the outline; those of one crossing are one invasion
+PAST = 10  # frames that are remembered
 QUIET = 3  # ticks after a relocation in which crossing markings is no invasion
 EGO = 0
 
@@ -28,6 +29,7 @@ class EgoEvents:
         self._hold = round(HOLD / dt)
         self._collisions: deque[Any] = deque()
         self._invasions: deque[Any] = deque()
+        self._past: dict[int, tuple[Floats, Floats]] = {}  # vx, vy by the server's frame
         self._last: dict[int | str, int] = {}
         self._crossing = round(CROSSING / dt)
         self._crossed: dict[str, int] = {}  # tick in which a marking was last told
@@ -45,27 +47,39 @@ class EgoEvents:
         """The ego was put somewhere else: the way there crossed nothing."""
         self._quiet_until = tick + QUIET
 
-    def contacts(self, tick: int, before: ActorStates) -> tuple[ContactEvent, ...]:
-        """Contacts that began. before: states of the previous tick, for the closing speed."""
+    def remember(self, frame: int, states: ActorStates) -> None:
+        """Velocities of a frame; an event that comes late is about an earlier one."""
+        self._past[frame] = (states.vx.copy(), states.vy.copy())
+        self._past.pop(frame - PAST, None)
+
+    def contacts(self, tick: int, frame: int) -> tuple[ContactEvent, ...]:
+        """Contacts that began; frame: the server's number of this tick."""
         rows = {p.actor.id: i for i, p in enumerate(self._players) if p.actor is not None}
         found: dict[int | str, ContactEvent] = {}
-        touched: set[int | str] = set()
+        touched: dict[int | str, int] = {}
         for event in drain(self._collisions):
+            at = tick - max(frame - event.frame, 0)
             other = event.other_actor
             row = -1 if other is None else rows.get(other.id, -1)
             static = "" if row >= 0 else thing(other)
             key = static or row
-            began = tick - self._last.get(key, -self._hold - 1) > self._hold
-            touched.add(key)
-            push = event.normal_impulse
-            impulse = hypot(push.x, push.y, push.z)
+            began = at - self._last.get(key, -self._hold - 1) > self._hold
+            touched[key] = at
+            push = vector_from_carla(*_components(event.normal_impulse))
+            impulse = hypot(*push)
             if began and (key not in found or impulse > found[key].impulse):
-                v_closing = closing(before, row, vector_from_carla(push.x, push.y, push.z))
-                place = event.transform.location
-                x, y, _ = vector_from_carla(place.x, place.y, place.z)
-                found[key] = ContactEvent(tick, row, static, impulse, v_closing, x, y)
-        self._last.update(dict.fromkeys(touched, tick))
+                x, y, _ = vector_from_carla(*_components(event.transform.location))
+                v_closing = self._closing(event.frame, row, push)
+                found[key] = ContactEvent(at, row, static, impulse, v_closing, x, y)
+        self._last.update(touched)
         return tuple(found.values())
+
+    def _closing(self, frame: int, row: int, push: tuple[float, float, float]) -> float:
+        before = [f for f in self._past if f < frame] or list(self._past)
+        if not before:
+            return 0.0
+        vx, vy = self._past[max(before)]
+        return closing(vx, vy, row, push)
 
     def invasions(self, tick: int, states: ActorStates) -> tuple[LaneInvasion, ...]:
         """Markings that the ego's outline began to cross."""
@@ -100,12 +114,19 @@ def thing(other: Any) -> str:
     return name or "static"
 
 
-def closing(before: ActorStates, row: int, push: tuple[float, float, float]) -> float:
-    """Speed along the impulse with which the ego and the other came together, m/s, >= 0."""
+def _components(v: Any) -> tuple[float, float, float]:
+    return (v.x, v.y, v.z)
+
+
+def closing(vx: Floats, vy: Floats, row: int, push: tuple[float, float, float]) -> float:
+    """Speed along the impulse with which the ego and the other came together, m/s, >= 0.
+
+    vx, vy: (n,) before the contact. row: of the other, -1: it stands still.
+    """
     size = hypot(push[0], push[1])
-    vx, vy = before.vx[EGO], before.vy[EGO]
+    x, y = vx[EGO], vy[EGO]
     if row >= 0:
-        vx, vy = vx - before.vx[row], vy - before.vy[row]
+        x, y = x - vx[row], y - vy[row]
     if size == 0.0:
-        return float(hypot(vx, vy))
-    return float(abs(vx * push[0] + vy * push[1]) / size)
+        return float(hypot(x, y))
+    return float(abs(x * push[0] + y * push[1]) / size)

@@ -72,5 +72,9 @@ def prepare_grip(carla: Any, world: Any, setup: Setup) -> Grip:
     found[0].set_attribute("ice_thickness", f"{setup.weather.ice_thickness:g}")
     emitter = world.spawn_actor(found[0], carla.Transform())
     grip = Grip(setup, True, 1.0, params, emitter=emitter)
-    grip.notices.append("grip: the server lets weather act on tyres (skidpad.weather)")
+    grip.notices.append(
+        "grip: the server lets weather act on tyres by its own model and mu_ref (skidpad.weather)"
+    )
+    if setup.grip is GripModel.NONE:
+        grip.notices.append("grip: none was asked for, but the server was started with one")
     return grip

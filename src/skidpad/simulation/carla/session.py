@@ -56,6 +56,7 @@ class Session:
         self.carla, self.options = connection.carla, connection.options
         self.map = load_map(setup.map)
         self.tick = 0
+        self.server_frame = 0
         self.players: list[Player] = []
         self.sensors: Sensors | None = None
         self.traffic: Traffic | None = None
@@ -74,7 +75,7 @@ class Session:
         self._spawn()
         n = len(self.players)
         self.table = table_of(self.players)
-        self.states, self.before = ActorStates.empty(n), ActorStates.empty(n)
+        self.states = ActorStates.empty(n)
         self.commands, self.mu = np.zeros((n, 5)), np.full((n, 4), np.nan)
         self.index = {p.name: i for i, p in enumerate(self.players)}
         self._localisation = stream(self.seed, "ego", "localisation")
@@ -215,7 +216,8 @@ class Session:
         """Tick the world; its frame number. The images of the last tick are no longer needed."""
         if self.pictures is not None:
             self.pictures.finish()
-        return int(self.world.tick(self.options.timeout))
+        self.server_frame = int(self.world.tick(self.options.timeout))
+        return self.server_frame
 
     def _top_up(self) -> None:
         assert self.traffic is not None
@@ -299,8 +301,6 @@ class Session:
 
     def _read(self) -> None:
         """States, commands, lights and events of this tick."""
-        for old, new in zip(self.before, self.states, strict=True):
-            np.copyto(old, new)
         local = self.options.uses(Optimisation.LOCAL_TRUTH)
         source = self.world.get_snapshot() if local else self.world.get_actors()
         truth.read_states(self.players, source, self.states)
@@ -309,7 +309,8 @@ class Session:
         truth.read_commands(self.players, self.command, self.commands)
         truth.read_mu(self.players, self.grip, self.states, self.mu)
         self.light_states = self.lights.read()
-        self.contacts = self.events.contacts(self.tick, self.before)
+        self.contacts = self.events.contacts(self.tick, self.server_frame)
+        self.events.remember(self.server_frame, self.states)
         self.invasions = self.events.invasions(self.tick, self.states)
 
     def truth(self) -> WorldTruth:

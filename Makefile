@@ -25,7 +25,7 @@ bench: $(VENV)/.installed
 	$(BIN)/skidpad bench
 
 refs: $(VENV)/.tested-with
-	$(BIN)/python -m pytest tests/references --rewrite-references
+	$(BIN)/python -m pytest tests/references -s --rewrite-references
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "skidpad needs Python 3.10, 3.11 or 3.12 on the PATH"; exit 2; }

@@ -1,4 +1,5 @@
 import re
+from pathlib import Path
 
 from traceability import marks, states, summaries
 
@@ -18,3 +19,8 @@ def test_states_name_requirements_and_exclude_each_other():
 
 def test_what_is_not_yet_there_has_no_test_that_claims_it():
     assert not set(states()["not_yet"]) & set(marks())
+
+
+def test_files_of_tests_have_names_of_their_own():
+    names = [p.name for p in Path(__file__).parent.rglob("test_*.py")]
+    assert len(names) == len(set(names)), "pytest imports test files by their base name"

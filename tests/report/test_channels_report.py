@@ -73,6 +73,8 @@ def test_the_replay_shows_each_channel_its_own_objects_in_place(folder):
     assert (len(lav[2]), len(tfuse[2])) == (2, 1)
     follower = min(lav[2], key=lambda box: box[0])
     gap = (lav[0][0] - follower[0]) * UNIT
+    assert len(lav[1]) >= 4  # plan and predictions are drawn at every moment
+    assert len(lav[3]) == 2
     t = data["t0"] + data["mark"] * data["dt"]
     assert gap == pytest.approx(11.0 - 0.5 * t, abs=0.2)  # it starts 11 m behind, closes at 0.5 m/s
     assert data["names"] == ["lav", "tfuse"]

@@ -28,6 +28,7 @@ from skidpad.report.page import (
 from skidpad.report.worlds import worlds_replay
 
 REPORT = "report.html"
+CARDS = 20  # of one hazard, the worst ones
 REPLAYS = 12  # worlds of the worst hazards are drawn; the others are listed
 LEAD = """Indicators compare what the channels of one car report, ten times a second, and nothing else: no \
 map, no raw sensor and no ground truth. One means full support for the claim, zero a concern. \
@@ -138,7 +139,7 @@ def _timeline(drive: MonitoredDrive) -> list[Block]:
             figures.drive_timeline(drive),
             "Indicators with a threshold, the worst of all channels or pairs, and the safety score. "
             "Blue: values (least to greatest within a stretch); dashed: threshold; orange below: "
-            "violated; grey: not evaluated; orange bands: hazards.",
+            "violated; grey: not evaluated; orange bands: hazards, without candidates.",
         )
     ]
 
@@ -148,12 +149,17 @@ def _hazards(drive: MonitoredDrive) -> list[Block]:
         return [Text("The rules found no hazard in this drive.")]
     order = sorted(drive.records, key=_severity)
     drawn = {r.id for r in order[:REPLAYS]}
-    blocks: list[Block] = [tables.hazard_list(drive.records, NAMES)]
+    scored = [r for r in drive.records if not _candidate(r.type.value)]
+    blocks: list[Block] = [tables.hazard_list(scored, NAMES)] if scored else []
     for hazard in HazardType:
         records = [r for r in drive.records if r.type is hazard]
         if records:
-            cards = [hazard_card(r, r.id in drawn) for r in records]
-            blocks.append(Cards(NAMES[hazard], cards, open=not _candidate(hazard.value)))
+            records.sort(key=_severity)
+            cards = [hazard_card(r, r.id in drawn) for r in records[:CARDS]]
+            blocks.append(Cards(NAMES[hazard], cards, open=records[0].id in drawn))
+            if len(records) > CARDS:
+                left = len(records) - CARDS
+                blocks.append(Text(f"{left} more, in hazards.jsonl.", tone="note"))
     if len(drive.records) > REPLAYS:
         blocks.append(
             Text(

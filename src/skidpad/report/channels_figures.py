@@ -6,6 +6,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from skidpad.evidence.hazards import SCORED_HAZARDS
 from skidpad.evidence.indicators.catalogue import Bound, Indicator
 from skidpad.evidence.watch import BUDGET_MS, MODULES, time_by_objects
 from skidpad.report.channels_data import MonitoredDrive, Trace
@@ -28,7 +29,12 @@ def drive_timeline(drive: MonitoredDrive) -> str:
         if strip is not None
     ]
     t = drive.table["t"]
-    marks = [Mark(e["t_start"], e["t_end"], e["name"]) for e in drive.summary["hazards"]]
+    scored = {h.value for h in SCORED_HAZARDS}  # candidates would cover everything
+    marks = [
+        Mark(e["t_start"], e["t_end"], e["name"])
+        for e in drive.summary["hazards"]
+        if e["name"] in scored
+    ]
     return timelines(strips, marks, float(t.min()), float(t.max()))  # type: ignore[arg-type]
 
 

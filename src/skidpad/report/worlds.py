@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -15,12 +16,12 @@ STRIDE = 2  # cycles between pictures
 REACH = 70.0  # m around the ego
 PREDICTION_POINTS = 5
 PLAN_POINTS = 12
-SPAN = 76.0  # m across a panel
+SPAN = 92.0  # m across a panel
 
 
 def worlds_replay(record: HazardRecord) -> dict[str, Any] | None:
     """The record's worlds as whole numbers; None when it holds none."""
-    cycles = record.worlds[::STRIDE]
+    cycles = with_intentions(record.worlds)[::STRIDE]
     origin = next((_ego(c) for c in cycles if _ego(c) is not None), None)
     if origin is None:
         return None
@@ -42,6 +43,24 @@ def worlds_replay(record: HazardRecord) -> dict[str, Any] | None:
     }
 
 
+def with_intentions(cycles: Sequence[Cycle]) -> list[Cycle]:
+    """The cycles with each channel's newest plan and predictions, which a record keeps each 0.5 s."""
+    newest: dict[int, ChannelFrame] = {}
+    out = []
+    for cycle in cycles:
+        frames: list[ChannelFrame | None] = []
+        for c, frame in enumerate(cycle.frames):
+            if frame is None:
+                newest.pop(c, None)
+            elif len(frame.plan) or frame.predictions.size:
+                newest[c] = frame
+            elif c in newest:
+                frame = frame._replace(plan=newest[c].plan, predictions=newest[c].predictions)
+            frames.append(frame)
+        out.append(cycle._replace(frames=tuple(frames)))
+    return out
+
+
 def _ego(cycle: Cycle) -> NDArray[np.float64] | None:
     frame = next((f for f in cycle.frames if f is not None and np.isfinite(f.ego[:2]).all()), None)
     return None if frame is None else frame.ego[:2]
@@ -59,8 +78,13 @@ def _world(frame: ChannelFrame | None, origin: NDArray[np.float64]) -> list[Any]
         _box(frame.ego, frame.ego_polygon, origin),
         _points(frame.plan[::step, :2] - origin),
         [_box(frame.objects[i], frame.polygons[i, : frame.polygon_size[i]], origin) for i in near],
-        [_points(frame.predictions[i, ::far] - origin) for i in near],
+        [_points(p[::far] - origin) for p in frame.predictions if _within(p, frame.ego)],
     ]
+
+
+def _within(path: NDArray[np.float64], ego: NDArray[np.float64]) -> bool:
+    offset = path[:1] - ego[:2]
+    return bool((np.hypot(offset[:, 0], offset[:, 1]) < REACH).any())
 
 
 def _box(

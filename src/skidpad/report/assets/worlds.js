@@ -20,9 +20,9 @@ for (const figure of document.querySelectorAll(".worlds")) {
   };
   const place = (b, paint) => { c.save(); c.translate(b[0] * u, b[1] * u); c.rotate(b[2] / 1000); paint(b[3] * u, b[4] * u); c.restore(); };
   const world = (w, colour) => {
-    w[3].forEach(p => line(p, colour + "99", .22, [.5, .5]));
+    w[3].forEach(p => line(p, colour + "bb", .3, [.8, .8]));
     w[2].forEach(b => place(b, (l, v) => {
-      c.strokeStyle = colour; c.lineWidth = .28; c.strokeRect(-l / 2, -v / 2, l, v);
+      c.strokeStyle = colour; c.lineWidth = .4; c.strokeRect(-l / 2, -v / 2, l, v);
       c.fillStyle = colour + "30"; c.fillRect(-l / 2, -v / 2, l, v);
       c.fillStyle = colour; c.fillRect(l / 2 - .5, -v / 2, .5, v);
     }));
@@ -41,9 +41,9 @@ for (const figure of document.querySelectorAll(".worlds")) {
       const focus = (p < n ? worlds[p] : first) ?? first;
       if (focus) {
         const e = focus[0], scale = side / data.span;
-        c.translate(p * side + side / 2, side / 2); c.scale(scale, -scale); c.rotate(-e[2] / 1000); c.translate(-e[0] * u, -e[1] * u);
+        c.translate(p * side + side * .36, side / 2); c.scale(scale, -scale); c.rotate(-e[2] / 1000); c.translate(-e[0] * u, -e[1] * u);
         c.strokeStyle = "#2a343f"; c.lineWidth = .15;
-        for (const r of [10, 20, 30]) { c.beginPath(); c.arc(e[0] * u, e[1] * u, r, 0, 7); c.stroke(); }
+        for (const r of [10, 20, 30, 40, 50]) { c.beginPath(); c.arc(e[0] * u, e[1] * u, r, 0, 7); c.stroke(); }
         worlds.forEach((w, i) => { if (w && (p === n || p === i)) world(w, colours[i % 4]); });
         if (k >= data.hazard[0] && k <= data.hazard[1]) data.involved.forEach(([x, y]) => {
           if (Math.abs(k - data.mark) > 3) return;

@@ -69,6 +69,7 @@ def cast_radar(
     near_posts = boxes_in_view(origin, yaw, slope, posts, reach)
     near_boxes = boxes_in_view(origin, yaw, slope, boxes, reach)
     ox, oy = origin[0] - boxes.x[0], origin[1] - boxes.y[0]
+    turned_posts, turned_boxes = _turned(posts, near_posts), _turned(boxes, near_boxes)
     vx0 = states.vx[0] - states.yaw_rate[0] * oy
     vy0 = states.vy[0] + states.yaw_rate[0] * ox
     out = np.empty((directions.shape[0], 4), np.float32)
@@ -89,13 +90,13 @@ def cast_radar(
             t = _ray_wall(origin, dx, dy, dz, walls, w)
             if t < best:
                 best, hit = t, 0
-        for p in near_posts:
-            t = _ray_box(origin, dx, dy, dz, posts, p)
+        for j, p in enumerate(near_posts):
+            t = _ray_box(origin, dx, dy, dz, posts, p, turned_posts[j])
             if t < best:
                 best, hit = t, 0
-        for i in near_boxes:
+        for j, i in enumerate(near_boxes):
             if i > 0 and states.present[i]:
-                t = _ray_box(origin, dx, dy, dz, boxes, i)
+                t = _ray_box(origin, dx, dy, dz, boxes, i, turned_boxes[j])
                 if t < best:
                     best, hit = t, i
         if hit < 0:
@@ -129,9 +130,23 @@ def _ray_wall(origin: Floats, dx: float, dy: float, dz: float, walls: Walls, w: 
 
 
 @kernel
-def _ray_box(origin: Floats, dx: float, dy: float, dz: float, boxes: Boxes, b: int) -> float:
-    """Distance along the ray to the surface of box b, from outside or inside; inf when it misses."""
-    c, s = np.cos(boxes.yaw[b]), np.sin(boxes.yaw[b])
+def _turned(boxes: Boxes, chosen: NDArray[np.int64]) -> Floats:
+    """(k, 2) cosine and sine of the chosen boxes' yaw: once per tick, not once per ray."""
+    out = np.empty((chosen.size, 2))
+    for j, b in enumerate(chosen):
+        out[j, 0], out[j, 1] = np.cos(boxes.yaw[b]), np.sin(boxes.yaw[b])
+    return out
+
+
+@kernel
+def _ray_box(
+    origin: Floats, dx: float, dy: float, dz: float, boxes: Boxes, b: int, turned: Floats
+) -> float:
+    """Distance along the ray to the surface of box b, from outside or inside; inf when it misses.
+
+    turned: cosine and sine of its yaw.
+    """
+    c, s = turned[0], turned[1]
     px, py = origin[0] - boxes.x[b], origin[1] - boxes.y[b]
     o = (c * px + s * py, -s * px + c * py, origin[2] - boxes.z[b] - boxes.height[b] / 2.0)
     d = (c * dx + s * dy, -s * dx + c * dy, dz)

@@ -127,16 +127,22 @@ _NEAR_LAMP, _LAMP_APART = np.float32(0.3), np.float32(1.2)  # m
 def _gather(
     key: NDArray[np.int32], y: int, first: int, count: int, table: Float32, work: Float32
 ) -> None:
-    """Colour and behaviour of a block's pixels from the table: the only indexed reads."""
-    for x in range(count):
-        k = key[y, first + x]
+    """Colour and behaviour of a block's pixels from the table, one read per run of equal keys."""
+    keys = key[y, first : first + count]
+    x = 0
+    while x < count:
+        k = keys[x]
+        end = x + 1
+        while end < count and keys[end] == k:
+            end += 1
         i = (k >> 16) * MATERIALS + (k & 255)
-        work[_R + x] = table[i, 0]
-        work[_G + x] = table[i, 1]
-        work[_B + x] = table[i, 2]
-        work[_L + x] = table[i, 3]
-        work[_T + x] = table[i, 4]
-        work[_S + x] = table[i, 5]
+        work[_R + x : _R + end] = table[i, 0]
+        work[_G + x : _G + end] = table[i, 1]
+        work[_B + x : _B + end] = table[i, 2]
+        work[_L + x : _L + end] = table[i, 3]
+        work[_T + x : _T + end] = table[i, 4]
+        work[_S + x : _S + end] = table[i, 5]
+        x = end
 
 
 @kernel

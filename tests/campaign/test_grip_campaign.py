@@ -22,6 +22,7 @@ from skidpad.physics.presets import preset
 from skidpad.recording.grip import GripEntry, read_series, series_path
 from skidpad.recording.ledger import read_ledger
 from skidpad.recording.results import read_results
+from skidpad.report.grip_data import load_grip
 from skidpad.scenarios.variation import CutIn
 
 TEMPLATE = GripCell(
@@ -50,7 +51,7 @@ def campaign(tmp_path_factory) -> Path:
     return out
 
 
-@pytest.mark.req("B-004", "B-055", "B-066")
+@pytest.mark.req("B-001", "B-004", "B-055", "B-066")
 def test_ratio_1_changes_nothing_and_less_does(campaign):
     table = read_results(campaign)
     sides = (table.filter(pl.col("friction") == f) for f in ("original", "reduced"))
@@ -208,18 +209,26 @@ def test_batches_stop_when_enough_is_known(tmp_path):
     assert table.filter(pl.col("seed") == 2)["weather"].to_list() == ["icy_30"]
 
 
-@pytest.mark.req("B-070", "B-071", "B-074", "B-075", "B-076", "B-078", "B-079")
-@pytest.mark.parametrize("cutin", [CutIn.ORIGINAL, CutIn.UNFIXED, CutIn.FIXED])
-def test_the_spawn_delay_alone_breaks_the_cut_in_and_the_distance_repairs_it(tmp_path, cutin):
+@pytest.mark.req("B-070", "B-071", "B-074", "B-075", "B-076", "B-077", "B-079")
+def test_the_spawn_delay_alone_breaks_the_cut_in_and_the_distance_repairs_it(tmp_path):
+    variants = [CutIn.ORIGINAL, CutIn.UNFIXED, CutIn.FIXED]
     template = replace(TEMPLATE, weather=preset("rain_0"))
     batch = cross(
-        template, ["ghost_cut_in"], [preset("rain_0")], [Friction.ORIGINAL], [cutin], seeds(0, 3)
+        template, ["ghost_cut_in"], [preset("rain_0")], [Friction.ORIGINAL], variants, seeds(0, 4)
     )
     run_grip([batch], tmp_path / "out", here)
-    outcomes = read_results(tmp_path / "out")["outcome"].to_list()
-    assert outcomes == ["collision" if cutin is CutIn.UNFIXED else "completed"] * 3
+    outcomes = read_results(tmp_path / "out").group_by("cutin").agg(pl.col("outcome").unique())
+    assert dict(outcomes.iter_rows()) == {
+        "original": ["completed"], "unfixed": ["collision"], "fixed": ["completed"]
+    }  # fmt: skip
+    found = load_grip(tmp_path / "out").variant_distances
+    distance = {name: {d.metric: d.value for d in ds} for name, ds in found.items()}
+    assert set(distance["original"].values()) == {0.0}
+    for metric in ("y", "cvip"):
+        assert distance["unfixed"][metric] > distance["fixed"][metric] > 0.0, metric
 
 
+@pytest.mark.req("B-003")
 def test_the_physical_model_reaches_the_tyres(tmp_path):
     batch = [replace(c, model=GripModel.PHYSICAL) for c in cells(1)[2:]]
     run_grip([batch], tmp_path / "out", here)

@@ -46,7 +46,7 @@ def test_end_points_are_exact(weather, expected):
     assert friction_ratio(weather, STATISTICAL) == pytest.approx(expected, abs=1e-12)
 
 
-@pytest.mark.req("B-030")
+@pytest.mark.req("B-016", "B-030")
 def test_rain_ratio_by_hand():
     # w = p = 50: exp(-0.458) = 0.632548; 0.632548 / 8 * 0.6 = 0.0474411; + 0.4 - 0.05
     assert friction_ratio(rain(50, 50), STATISTICAL) == pytest.approx(0.3974411, abs=1e-6)
@@ -179,3 +179,14 @@ def test_mu_at_many_wheels_is_mu_at_one():
     expected = [1.5 * friction_ratio(rain(100, 100), PHYSICAL, v) for v in (0.0, 13.0, 20.0)]
     assert out == pytest.approx(np.repeat(np.array(expected)[:, None], 4, axis=1))
     assert mu_at(params, 13.0) == pytest.approx(expected[1])
+
+
+@pytest.mark.req("B-035", "B-038")
+def test_the_published_coefficients_are_logarithms_of_the_terminal_ratios() -> None:
+    from math import log
+
+    assert log(0.4) == pytest.approx(-0.916, abs=5e-4)
+    assert log(0.15) == pytest.approx(-1.89711, abs=2e-5)
+    assert friction_ratio(Weather(), GripModel.STATISTICAL) == 1.0  # dry is 1, not the measured 0.8
+    # with the cubic factor they do not set the terminal value by themselves
+    assert friction_ratio(Weather(wetness=100.0), GripModel.STATISTICAL) == pytest.approx(0.4)

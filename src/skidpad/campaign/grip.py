@@ -134,6 +134,7 @@ def play_cell(cell: GripCell, folder: Path | None = None):  # type: ignore[no-un
             mu_ref=cell.mu_ref,
             level=cell.level,
             actors=cell.actors,
+            overlay=cell.overlay,
         ),
         folder=folder,
     )

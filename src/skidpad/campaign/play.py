@@ -16,7 +16,6 @@ from skidpad.core.errors import OutputError, StackError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.setup import Setup
-from skidpad.core.specs import SensorSpec
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import GripModel, Outcome, SensorLevel
 from skidpad.core.weather import Weather
@@ -25,6 +24,7 @@ from skidpad.recording.logfiles import write_log
 from skidpad.recording.ticks import TickLog
 from skidpad.scenarios.player import Player, Script, load
 from skidpad.scenarios.scene import Mode
+from skidpad.sensors.overlay import Lens
 from skidpad.sensors.twelve import twelve_sensors
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.embedded.engine import EmbeddedBackend
@@ -62,6 +62,7 @@ class Play:
     level: SensorLevel = SensorLevel.OBJECTS
     actors: Mode = Mode.PHYSICAL
     duration: float = DURATION
+    overlay: bool = False  # rain drops on the cameras
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +85,16 @@ class Passenger:
         """Nothing pressed."""
         del frame
         return VehicleCommand()
+
+
+class BehindGlass(GuardedStack):
+    """A stack whose cameras look through rain drops (B-160)."""
+
+    lens: Lens
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        """The same frame, its images behind drops."""
+        return super().tick(replace(frame, images=self.lens.seen(frame.images)))
 
 
 def play(wish: Play, backend: Backend | None = None, folder: Path | None = None) -> Played:
@@ -193,18 +204,25 @@ def cruise_speed(script: Script) -> float:
 
 
 def _driver(wish: Play, script: Script, cell: Cell, setup: Setup) -> GuardedStack:
-    specs: tuple[SensorSpec, ...] = setup.specs
+    kind, settings = _controller(wish, script, cell)
+    if not wish.overlay:
+        return GuardedStack(kind, setup.specs, script.map, settings)
+    behind = BehindGlass(kind, setup.specs, script.map, settings)
+    behind.lens = Lens(wish.weather, wish.seed)
+    return behind
+
+
+def _controller(wish: Play, script: Script, cell: Cell) -> tuple[type[Stack], dict[str, Any]]:
     if wish.controller == IDEAL:
-        return GuardedStack(Passenger, specs, script.map, {})
-    if wish.controller == STACK:
-        plain: dict[str, Any] = {
-            "functions": sorted(f.value for f in cell.driver.functions),
-            "profile": wish.profile,
-            "set": wish.settings.as_plain(),
-            "cruise_kmh": max(kmh_from_mps(cruise_speed(script)), 1.0),
-        }
-        return GuardedStack(AdasStack, specs, script.map, plain)
-    return GuardedStack(controller_class(wish.controller), specs, script.map, {})
+        return Passenger, {}
+    if wish.controller != STACK:
+        return controller_class(wish.controller), {}
+    return AdasStack, {
+        "functions": sorted(f.value for f in cell.driver.functions),
+        "profile": wish.profile,
+        "set": wish.settings.as_plain(),
+        "cruise_kmh": max(kmh_from_mps(cruise_speed(script)), 1.0),
+    }
 
 
 def controller_class(text: str) -> type[Stack]:

@@ -1,0 +1,103 @@
+"""The commands grip, play and campaign estimate, and wrong input to them."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from typer.testing import CliRunner
+
+from skidpad.cli.grip_plan import GripWish, plan_grip
+from skidpad.cli.main import app
+from skidpad.core.errors import ConfigError, InputError
+from skidpad.report.grip import write_grip_report
+from skidpad.scenarios.generate import FOLDER
+
+SMALL = (
+    "--scenarios", "lead_slowdown", "--weather", "icy_0,icy_30", "--repeats", "2", "--workers", "1",
+)  # fmt: skip
+
+
+@pytest.mark.req("B-122")
+def test_the_default_is_the_published_campaign():
+    cells = plan_grip(GripWish()).cells
+    assert len(cells) == 6600
+    assert len({c.name for c in cells}) == 6600
+    assert len({c.weather.name for c in cells}) == 11
+
+
+@pytest.mark.parametrize(
+    ("wish", "message"),
+    [
+        ({"weather": "rain-20,hail"}, "unknown weather 'hail'"),
+        ({"weather": "snow"}, "physical grip model"),
+        ({"scenarios": "ghost"}, "unknown scenario 'ghost'"),
+        ({"friction": "half"}, "original, reduced"),
+        ({"cutin": "broken"}, "rolling, original"),
+        ({"controller": "agent:nowhere.py:A"}, "does not exist"),
+        ({"controller": "no.such:Thing"}, "cannot be imported"),
+        ({"until_halfwidth": 0.9}, "between 0.001 and 0.5"),
+        ({"overlay": True}, "--sensors pixels"),
+        ({"keep": "some"}, "shown, all"),
+    ],
+)
+def test_wrong_input_is_one_sentence(wish, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        plan_grip(GripWish(**wish))
+
+
+@pytest.mark.req("B-002")
+def test_rain_with_ice_is_refused(tmp_path):
+    (tmp_path / "mix.yaml").write_text("ice_thickness: 20\nprecipitation: 30\n", encoding="utf-8")
+    with pytest.raises(ConfigError, match="ice_thickness 20 together with"):
+        plan_grip(GripWish(weather=str(tmp_path / "mix.yaml")))
+
+
+def test_batches_of_twenty_with_a_stopping_rule():
+    plan = plan_grip(GripWish(repeats=50, until_halfwidth=0.05, weather="rain_0"))
+    assert [len(b) // 6 for b in plan.batches] == [20, 20, 10]
+
+
+@pytest.mark.slow
+@pytest.mark.req("B-005", "B-060", "B-124", "B-140", "B-141", "B-143", "B-144", "B-147", "B-148")
+def test_a_small_campaign_from_command_to_page(tmp_path):
+    out = tmp_path / "out"
+    done = CliRunner().invoke(app, ["grip", "--out", str(out), *SMALL], catch_exceptions=False)
+    assert done.exit_code == 0
+    page = (out / "report.html").read_text(encoding="utf-8")
+    for part in (
+        "Completion and score", "published", "Findings of the source", "BF-02", "Distances between",
+        "Series over time", "Across weathers", "Replays", "Stopping distances", "other outcome",
+        "corrections",
+    ):  # fmt: skip
+        assert part in page, part
+    assert 'src="http' not in page
+    write_grip_report(out)
+    assert (out / "report.html").read_text(encoding="utf-8") == page
+
+
+@pytest.mark.req("B-146")
+def test_play_and_check(tmp_path):
+    file = str(FOLDER / "ghost_cut_in.xosc")
+    run = [
+        "play",
+        file,
+        "--out",
+        str(tmp_path / "run"),
+        "--duration",
+        "2",
+        "--param",
+        "EgoSpeed=15",
+    ]
+    done = CliRunner().invoke(app, run, catch_exceptions=False)
+    assert done.exit_code == 0
+    assert "not_triggered after 2.00 s" in done.stdout
+    checked = CliRunner().invoke(app, ["play", file, "--check"], catch_exceptions=False)
+    assert "everything in it is supported" in checked.stdout
+    odd = tmp_path / "odd.xosc"
+    text = (FOLDER / "ghost_cut_in.xosc").read_text(encoding="utf-8")
+    odd.write_text(text.replace("StandStillCondition", "OffroadCondition"), encoding="utf-8")
+    refused = CliRunner().invoke(app, ["play", str(odd), "--check"], catch_exceptions=False)
+    assert refused.exit_code == 2
+    assert re.search(r"odd\.xosc, line \d+: <OffroadCondition> is not supported", refused.stdout)
+    assert not (tmp_path / "odd").exists()

@@ -19,7 +19,7 @@ from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.forest import Forest, check_forest, probabilities
 from skidpad.evidence.identifier_features import FEATURE_NAMES, FeatureHistory, features_at
-from skidpad.evidence.timefilter import TimeFilter
+from skidpad.evidence.timefilter import PAUSE, SAME_TIME
 from skidpad.recording.files import write_bytes
 
 Floats = NDArray[np.float64]
@@ -105,13 +105,13 @@ def probability_of(forest: Forest, t: Floats, rows: Floats) -> Floats:
 
 def events_of(t: Floats, p: Floats, limit: float, confirm: int) -> list[tuple[float, float]]:
     """(start, end) of each event in probabilities over time, repeats within 2 s merged."""
-    merged: TimeFilter[None] = TimeFilter()
-    n = 0
-    for time, above in zip(t.tolist(), (p >= limit).tolist(), strict=True):
-        n = n + 1 if above else 0
-        if n >= confirm:
-            merged.add(None, time, 0.0, least=True)
-    return [(e.t_start, e.t_end) for e in merged.finish()]
+    so_far = np.concatenate([np.zeros(confirm, dtype=np.int64), np.cumsum(p >= limit)])
+    present = t[so_far[confirm:] - so_far[:-confirm] == confirm]
+    if not present.size:
+        return []
+    breaks = np.flatnonzero(np.diff(present) >= PAUSE - SAME_TIME)
+    first, last = np.append(0, breaks + 1), np.append(breaks, present.size - 1)
+    return list(zip(present[first].tolist(), present[last].tolist(), strict=True))
 
 
 def save_model(path: Path, model: Model) -> None:

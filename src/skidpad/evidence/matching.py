@@ -135,8 +135,9 @@ def _interval(counts: Sequence[tuple[int, int]]) -> Interval | None:
     known = [(k, n) for k, n in counts if n]
     if not known:
         return None
-    if len(known) == 1:
-        return clopper_pearson(*known[0])
+    hits, cases = (sum(column) for column in zip(*known, strict=True))
+    if len(known) == 1 or hits in (0, cases):  # resampling cannot show what was never seen
+        return clopper_pearson(hits, cases)
     return bootstrap_interval([k for k, _ in known], [n for _, n in known])
 
 

@@ -133,3 +133,18 @@ def test_radar_rays_change_every_tick_and_repeat_with_the_seed():
     first, again, later = (suite(table).radar(k, states) for k in (5, 5, 6))
     assert np.array_equal(first.azimuth, again.azimuth)
     assert not np.array_equal(first.azimuth[:5], later.azimuth[:5])
+
+
+def test_a_nose_that_dives_brings_the_road_nearer():
+    table, states = world((300.0, 0.0, 0.0, 0.0))
+    level = suite(table).radar(2, states)
+    states.pitch[0] = 0.05
+    dived = suite(table).radar(2, states)
+    for points, pitch in ((level, 0.0), (dived, 0.05)):
+        antenna = 1.0 - 2.0 * np.sin(pitch)
+        down = np.sin(pitch - points.altitude) * 1.0
+        near = np.abs(points.azimuth) < 0.02
+        assert points.range[near] * down[near] == pytest.approx(antenna, rel=0.02)
+    beyond = -0.05
+    assert not np.any(level.range[level.altitude > beyond] < 20.0)
+    assert np.any(dived.range[dived.altitude > beyond] < 20.0)

@@ -11,6 +11,7 @@ from skidpad.core.jit import kernel
 from skidpad.core.randomness import stream
 from skidpad.core.specs import RadarSpec
 from skidpad.core.states import ActorStates
+from skidpad.roads.kernels import LaneArrays, project_kernel, sample_kernel
 from skidpad.sensors.boxes import Boxes, Mount, Walls, boxes_in_view, placed, walls_in_view
 
 Floats = NDArray[np.float64]
@@ -56,19 +57,21 @@ def cast_radar(
     states: ActorStates,
     walls: Walls,
     posts: Boxes,
+    slope: Floats,
 ) -> NDArray[np.float32]:
     """(m, 4) range, azimuth, altitude, range rate of the rays that hit something within `reach`.
 
-    directions: (n, 2) azimuth and altitude in the antenna's frame. The road is a plane through
-    the ego's wheels, inclined as the body is less its own pitch and roll.
+    directions: (n, 2) azimuth and altitude in the antenna's frame. slope: (2,) dz/dx and dz/dy of
+    the road, a plane through the ego's wheels; a nose that dives does not tilt it.
     """
     antenna = placed(mount, states)
     origin, rotation = antenna.origin, antenna.rotation
-    yaw, slope = np.arctan2(rotation[1, 0], rotation[0, 0]), np.tan(half_fov)
-    near_walls = walls_in_view(origin, yaw, slope, walls, reach)
-    near_posts = boxes_in_view(origin, yaw, slope, posts, reach)
-    near_boxes = boxes_in_view(origin, yaw, slope, boxes, reach)
+    yaw, edge = np.arctan2(rotation[1, 0], rotation[0, 0]), np.tan(half_fov)
+    near_walls = walls_in_view(origin, yaw, edge, walls, reach)
+    near_posts = boxes_in_view(origin, yaw, edge, posts, reach)
+    near_boxes = boxes_in_view(origin, yaw, edge, boxes, reach)
     ox, oy = origin[0] - boxes.x[0], origin[1] - boxes.y[0]
+    height = origin[2] - boxes.z[0] - slope[0] * ox - slope[1] * oy
     turned_posts, turned_boxes = _turned(posts, near_posts), _turned(boxes, near_boxes)
     vx0 = states.vx[0] - states.yaw_rate[0] * oy
     vy0 = states.vy[0] + states.yaw_rate[0] * ox
@@ -82,10 +85,9 @@ def cast_radar(
         dy = rotation[1, 0] * fx + rotation[1, 1] * fy + rotation[1, 2] * fz
         dz = rotation[2, 0] * fx + rotation[2, 1] * fy + rotation[2, 2] * fz
         best, hit = reach, -1
-        if fz < 0.0:  # the road, parallel to the ego's own floor
-            t = (origin[2] - boxes.z[0]) / -fz
-            if t < best:
-                best, hit = t, 0
+        fall = dz - slope[0] * dx - slope[1] * dy
+        if fall < 0.0 and -height / fall < best:  # the road
+            best, hit = -height / fall, 0
         for w in near_walls:
             t = _ray_wall(origin, dx, dy, dz, walls, w)
             if t < best:
@@ -111,6 +113,19 @@ def cast_radar(
         n += 1
     returns: NDArray[np.float32] = out[:n].copy()
     return returns
+
+
+@kernel
+def road_slope(lanes: LaneArrays, x: float, y: float, z: float) -> Floats:
+    """(2,) dz/dx and dz/dy of the road at a place; level where there is no lane."""
+    slope = np.zeros(2)
+    lane, s, _ = project_kernel(lanes, x, y, z, -1, True)
+    if lane >= 0:
+        _, _, _, heading, _, _, grade, bank, _ = sample_kernel(lanes, lane, s)
+        tilt = np.tan(bank)
+        slope[0] = grade * np.cos(heading) - tilt * np.sin(heading)
+        slope[1] = grade * np.sin(heading) + tilt * np.cos(heading)
+    return slope
 
 
 @kernel

@@ -22,6 +22,7 @@ from skidpad.core.jit import kernel
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind, SemanticClass
+from skidpad.roads.kernels import LaneArrays
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.boxes import (
     Boxes,
@@ -32,7 +33,7 @@ from skidpad.sensors.boxes import (
     posts_of,
     walls_of,
 )
-from skidpad.sensors.object_radar import RadarDirections, cast_radar
+from skidpad.sensors.object_radar import RadarDirections, cast_radar, road_slope
 
 Floats = NDArray[np.float64]
 
@@ -47,6 +48,7 @@ WIDEN = 1.3  # of the horizontal view before culling: a pitched camera sees wide
 # A vehicle this far above or below the ego's level is on another road (grades are at most 6 %).
 LEVEL_GAP = 1.5  # m
 LEVEL_GRADE = 0.065
+LEVEL = np.zeros(2)
 
 LABELS = {
     ActorKind.CAR: SemanticClass.CAR,
@@ -75,6 +77,7 @@ class ObjectSuite:
     """Segments of every depth camera and points of every radar, tick by tick.
 
     limit: range in m beyond which weather hides objects from cameras, None: it does not.
+    lanes: for the slope of the road that the radar meets; None: level ground.
     """
 
     def __init__(
@@ -85,6 +88,7 @@ class ObjectSuite:
         seed: int,
         dt: float,
         limit: float | None = None,
+        lanes: LaneArrays | None = None,
     ) -> None:
         self.table = table
         self.cameras = [
@@ -96,6 +100,7 @@ class ObjectSuite:
         self.labels = np.array([LABELS[ActorKind(k)] for k in table.kind], dtype=np.uint8)
         self.limit = SIGHT if limit is None else min(limit, SIGHT)
         self.directions = [RadarDirections(s, seed, dt) for s, _ in self.radars]
+        self.lanes = lanes
         self.walls = walls_of(roadside)
         self.posts = posts_of(roadside)
 
@@ -125,8 +130,15 @@ class ObjectSuite:
             states,
             self.walls,
             self.posts,
+            self._slope(states),
         )
         return RadarPoints(raw[:, 0], raw[:, 1], raw[:, 2], raw[:, 3])
+
+    def _slope(self, states: ActorStates) -> Floats:
+        """Slope of the road under the ego; level without a map."""
+        if self.lanes is None:
+            return LEVEL
+        return road_slope(self.lanes, states.x[0], states.y[0], states.z[0])
 
     def _boxes(self, states: ActorStates) -> Boxes:
         t = self.table

@@ -87,6 +87,7 @@ class Objects:
             seed,
             setup.dt,
             limit=label_range(setup.weather) if physical else None,
+            lanes=map.arrays,
         )
 
     def read(

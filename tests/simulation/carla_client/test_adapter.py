@@ -69,7 +69,9 @@ def test_same_scene_same_images_and_radar(serve: Serve, program: Program) -> Non
     assert radar["lead"] > 0.1
 
 
-@pytest.mark.req("B-060", "B-062", "B-063", "B-064", "B-065", "B-066", "B-067", "B-068", "K-2")
+@pytest.mark.req(
+    "B-060", "B-061", "B-062", "B-063", "B-064", "B-065", "B-066", "B-067", "B-068", "K-2"
+)
 def test_friction_is_applied_once_to_every_wheel(serve: Serve, program: Program) -> None:
     """Without the blueprint, wheels are scaled; with it they are not; both stop alike."""
     model = ("--weather-grip", "statistical", "--mu-ref", "0.9")
@@ -95,6 +97,17 @@ def test_friction_is_applied_once_to_every_wheel(serve: Serve, program: Program)
         assert served[name]["once"] == untouched
         assert served[name]["stop"] == pytest.approx(bare[name]["stop"], rel=0.01)
     assert bare["ice"]["stop"] > bare["rain"]["stop"] > 2.0 * bare["dry"]["stop"]
+
+
+@pytest.mark.req("A-263", "A-265", "A-266", "A-267", "A-268")
+def test_optimisations_change_no_reading(serve: Serve, program: Program) -> None:
+    """Five degraded feeds at night in rain, lights and truth; without a cache the world is asked."""
+    runs = program("switches", serve("--mu-ref", "0.9").port)
+    assert len({run["content"] for run in runs.values()}) == 1
+    assert runs["all"]["asked"] == 0
+    assert runs["light-cache"]["asked"] == runs["local-truth"]["asked"] == 12
+    assert runs["all"]["pool"]
+    assert not runs["feed-pool"]["pool"]
 
 
 def test_a_server_that_dies_ends_the_run_with_one_sentence() -> None:

@@ -12,6 +12,7 @@ from typing import Any
 from skidpad.core.errors import BackendError, MissingExtra
 from skidpad.simulation.carla.options import CarlaOptions
 
+_CLIENTS: dict[tuple[str, int], list[Any]] = {}  # of this process, newest last
 PROBE = 5.0  # s to find out whether anybody listens at all
 
 
@@ -49,7 +50,7 @@ def connect(options: CarlaOptions) -> Connection:
     carla = wheel()
     require_server(options)
     with speaking(options, "greeting it"):
-        client = carla.Client(options.host, options.port)
+        client = _client(carla, options)
         client.set_timeout(options.timeout)
         theirs, ours = client.get_server_version(), client.get_client_version()
     if release(theirs) != release(ours):
@@ -58,6 +59,24 @@ def connect(options: CarlaOptions) -> Connection:
             f"{ours}: install carla=={release(theirs)}"
         )
     return Connection(carla, client, options)
+
+
+def _client(carla: Any, options: CarlaOptions) -> Any:
+    """The client of this address that was used before, or a new one if that no longer works.
+
+    None is ever given up: the wheel aborts the process when a client ends on one of its threads.
+    """
+    kept = _CLIENTS.setdefault((options.host, options.port), [])
+    if kept:
+        kept[-1].set_timeout(PROBE)
+        try:
+            kept[-1].get_server_version()
+        except RuntimeError:  # the server was started anew: its connection is gone
+            pass
+        else:
+            return kept[-1]
+    kept.append(carla.Client(options.host, options.port))
+    return kept[-1]
 
 
 def release(version: str) -> str:

@@ -169,3 +169,14 @@ def test_without_its_runs_a_finding_is_not_testable():
 def test_all_headline_findings_are_there():
     numbers = (1, 2, 3, 4, 5, 6, 7, 9, 10, 11, 12, 13, 18)
     assert [f.id for f in FINDINGS] == [f"BF-{n:02d}" for n in numbers]
+
+
+def test_a_difference_too_small_to_matter_does_not_support_however_sure_it_is():
+    def tiny(row: Row, rng: np.random.Generator) -> None:
+        if is_(row, FRONT, "icy_100", "rain_100"):
+            row["steer_std"] = 0.02 + 1e-5
+
+    (judged,) = judge([CLAIMS["BF-11"]], [table(tiny)])
+    assert judged.p is not None
+    assert judged.p < 0.05
+    assert judged.verdict is Verdict.CONTRADICTED

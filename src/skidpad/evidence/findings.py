@@ -128,11 +128,11 @@ def _verdict(contrasts: list[Contrast], p: float | None) -> Verdict:
         return Verdict.NOT_TESTABLE
     if p is None:
         return Verdict.BY_CONSTRUCTION
+    if any(c.negligible and not c.identical for c in contrasts):
+        return Verdict.CONTRADICTED  # also where a difference too small to matter is significant
     claimed, reversed_ = _sides(contrasts)
     if p < ALPHA:
         return Verdict.SUPPORTED if claimed < reversed_ else Verdict.CONTRADICTED
-    if any(c.negligible and not c.identical for c in contrasts):
-        return Verdict.CONTRADICTED
     return Verdict.UNDECIDED
 
 

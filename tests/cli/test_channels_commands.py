@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from channel_worlds import Eyes, World, drive
 from skidpad.cli.main import app, main
 from skidpad.core.channels import Context
+from skidpad.core.errors import ConfigError
 from skidpad.evidence.indicators.catalogue import Indicator
 from skidpad.evidence.watch import time_by_objects, timing_statistics
 from skidpad.recording.channels import ChannelWriter
@@ -200,3 +201,14 @@ def test_help_does_not_load_numba():
     text = "import sys; from skidpad.cli.main import app; print('numba' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", text], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
+
+
+@pytest.mark.req("C-15")
+def test_a_learned_identifier_needs_a_model(folder, tmp_path):
+    out = str(tmp_path / "out")
+    args = ["monitor", str(folder / "one.mcap"), "--out", out, "--identifier", "learned"]
+    done = runner.invoke(app, args)
+    assert isinstance(done.exception, ConfigError)
+    assert "--model" in str(done.exception)
+    done = runner.invoke(app, [*args, "--model", str(tmp_path / "none.npz")])
+    assert "none.npz: cannot be read" in str(done.exception)

@@ -8,7 +8,6 @@ import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -23,7 +22,6 @@ from skidpad.evidence.timefilter import PAUSE, SAME_TIME
 from skidpad.recording.files import write_bytes
 
 Floats = NDArray[np.float64]
-BUILT_IN = "identifier.npz"
 VERSION = 1
 ALL_ROUTES = "all"
 BLOCK = 4096  # cycles judged at once
@@ -145,11 +143,11 @@ def save_model(path: Path, model: Model) -> None:
     write_bytes(path, buffer.getvalue())
 
 
-def load_model(path: Path | None = None) -> Model:
-    """The model at `path`, or the one that comes with Skidpad."""
-    name = str(path) if path else BUILT_IN
+def load_model(path: Path) -> Model:
+    """The model at `path`."""
+    name = str(path)
     try:
-        data = path.read_bytes() if path else (files("skidpad.evidence") / BUILT_IN).read_bytes()
+        data = path.read_bytes()
     except OSError as error:
         raise FileError(
             f"{name}: cannot be read ({error.strerror}); `skidpad channels train` writes a model"

@@ -13,10 +13,10 @@ import numpy as np
 import polars as pl
 
 from skidpad.core.channels import Context, Cycle
-from skidpad.core.errors import FileError
+from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.hazards import Profile, load_rules
-from skidpad.evidence.identifier import Identify, Model, load_model
+from skidpad.evidence.identifier import Identify, Model
 from skidpad.evidence.indicators.catalogue import (
     CHANNEL_INDICATORS,
     PAIR_INDICATORS,
@@ -67,8 +67,8 @@ def watch(
     model: Model | None = None,
 ) -> Watched:
     """Monitor `source`; writes indicators, hazards, a summary, and timings if given a `clock`."""
-    if identify is not Identify.RULES:
-        model = model or load_model()
+    if identify is not Identify.RULES and model is None:
+        raise ConfigError(f"--identifier {identify.value} needs a trained model: --model FILE")
     monitor = Monitor(
         source.channels,
         settings=settings,

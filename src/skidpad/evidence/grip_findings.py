@@ -1,4 +1,4 @@
-"""The headline findings of the friction study as data (decision X-7), written before results.
+"""The headline findings of the friction study as data (decision X-7).
 
 Each takes the results table of a campaign, with the column `delay_s` where series were compared.
 """

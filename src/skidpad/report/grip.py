@@ -153,8 +153,9 @@ def _verdicts(campaign: GripCampaign) -> list[Block]:
     table = campaign.with_delays() if campaign.both else campaign.results
     judged = judge(FINDINGS, [table for _ in FINDINGS])
     intro = Text(
-        "Each claim, its test and its margin were written down before results were seen. The variants "
-        "of the cut-in from rest are runs of their own: --cutin original,unfixed,fixed."
+        "Claims are the source's. Tests and margins were written after a trial of three seeds had been "
+        "seen, and two rules for verdicts were settled after 65; they are not blind. The variants of the "
+        "cut-in from rest are runs of their own: --cutin original,unfixed,fixed."
     )
     verdicts = [
         Verdict(

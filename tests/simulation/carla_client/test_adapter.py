@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -16,11 +17,17 @@ import pytest
 
 from backend_contract import CHECKS
 from carla_programs import HERE, environment
+from skidpad.campaign.cells import BackendChoice, BackendKind, Cell, Driver
+from skidpad.campaign.matrix import run_matrix
+from skidpad.physics.presets import find_weather
+from skidpad.recording.ledger import Entry
 from skidpad.simulation.carla_server.process import ServerProcess
+from skidpad.stack.settings import load_profile
 
 pytest.importorskip("carla")
 Serve = Callable[..., ServerProcess]
 Program = Callable[..., Any]
+HERE_INSTEAD = BackendChoice()
 LIMIT = 170.0  # s
 
 
@@ -138,6 +145,30 @@ def adas(out: Path, *options: str) -> subprocess.CompletedProcess[str]:
         check=False,
         env=environment() | {"COLUMNS": "200", "HOME": os.environ.get("HOME", str(out))},
     )
+
+
+def test_runs_without_a_server_are_recorded_and_the_campaign_goes_on(tmp_path: Path) -> None:
+    """The server is gone when the runs begin: each is crashed with one sentence."""
+    template = Cell(
+        driver=Driver(label="0"),
+        weather=find_weather("clear-noon"),
+        seed=1,
+        profile="recommended",
+        settings=load_profile("recommended"),
+        duration=1.0,
+        backend=BackendChoice(kind=BackendKind.CARLA, port=9),
+    )
+    entries: list[Entry] = []
+    cells = [template, replace(template, seed=2), replace(template, seed=3, backend=HERE_INSTEAD)]
+    summary = run_matrix(cells, tmp_path / "out", workers=1, on_run=entries.append)
+    assert (summary.runs, summary.failed) == (3, 2)
+    told = {e.key.seed: (e.key.outcome, e.error) for e in entries}
+    for seed in (1, 2):
+        outcome, error = told[seed]
+        assert outcome == "crashed"
+        assert error.startswith("no CARLA server answers at 127.0.0.1:9")
+        assert "\n" not in error
+    assert told[3][0] == "completed"
 
 
 @pytest.mark.req("A-001", "A-003", "A-206", "A-207", "A-211")

@@ -1,7 +1,9 @@
 import re
 from pathlib import Path
 
-from traceability import marks, states, summaries
+import pytest
+
+from traceability import DOC, marks, render, states, summaries
 
 DECISION = re.compile(r"[XLMGCK]-[1-9]\d?")  # the project's settled questions; not listed
 
@@ -24,3 +26,8 @@ def test_what_is_not_yet_there_has_no_test_that_claims_it():
 def test_files_of_tests_have_names_of_their_own():
     names = [p.name for p in Path(__file__).parent.rglob("test_*.py")]
     assert len(names) == len(set(names)), "pytest imports test files by their base name"
+
+
+def test_the_page_says_what_the_tests_say():
+    if DOC.read_text(encoding="utf-8") != render():
+        pytest.fail("docs/requirements.md is out of date: run `python tests/traceability.py`")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from importlib.metadata import entry_points
 from pathlib import Path
 
 import pytest
@@ -38,8 +39,10 @@ def test_another_project_gets_client_world_and_port(tmp_path: Path) -> None:
     pytest.importorskip("carla")
     (tmp_path / "test_use.py").write_text(USE)
     (tmp_path / "pytest.ini").write_text("[pytest]\nskidpad_carla_options = --map straight\n")
+    installed = "skidpad" in entry_points(group="pytest11").names
+    plugin = [] if installed else ["-p", "skidpad.pytest_plugin"]
     done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "skidpad.pytest_plugin", str(tmp_path)],
+        [sys.executable, "-m", "pytest", "-q", *plugin, str(tmp_path)],
         capture_output=True,
         text=True,
         timeout=300,

@@ -30,3 +30,14 @@ def test_charts_are_whole_svg_elements_that_scale(svg):
 
 def test_the_same_numbers_give_the_same_bytes():
     assert grouped_bars(["x", "y", "z"], BARS, "c") == grouped_bars(["x", "y", "z"], BARS, "c")
+
+
+def test_ids_are_whole_and_belong_to_one_chart():
+    one = grouped_bars(["x", "y", "z"], BARS, "collisions")
+    two = grouped_bars(["x", "y", "z"], BARS[:1], "collisions")
+    ids = [set(re.findall(r'\bid="([^"]+)"', svg)) for svg in (one, two)]
+    assert not ids[0] & ids[1]
+    for svg, known in zip((one, two), ids, strict=True):
+        used = set(re.findall(r'(?:url\(#|href="#)([^")]+)', svg))
+        assert used
+        assert used <= known

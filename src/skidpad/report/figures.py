@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import io
 import re
 from collections.abc import Iterator, Sequence
@@ -58,13 +59,30 @@ def svg_of(figure: Canvas) -> str:
         buffer = io.StringIO()
         figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     text = buffer.getvalue()
-    text = text[text.index("<svg") :]
+    text = _numbered_ids(text[text.index("<svg") :])
     return re.sub(
         r'(<svg[^>]*?) width="[^"]*"',
         r"\1",
         re.sub(r'(<svg[^>]*?) height="[^"]*"', r"\1", text, count=1),
         count=1,
     )
+
+
+def _numbered_ids(text: str) -> str:
+    """Ids by order of appearance behind a hash of the drawing: the library's own may vary between
+    calls, and two charts in one page must not share any."""
+    order = {
+        old: str(k) for k, old in enumerate(dict.fromkeys(re.findall(r'\bid="([^"]+)"', text)))
+    }
+
+    def renamed(prefix: str) -> str:
+        def swap(match: re.Match[str]) -> str:
+            new = order.get(match[2])
+            return match[0] if new is None else f"{match[1]}{prefix}{new}{match[3]}"
+
+        return re.sub(r'(\bid="|url\(#|href="#)([^")]+)(["\)])', swap, text)
+
+    return renamed("c" + hashlib.sha256(renamed("").encode()).hexdigest()[:8] + "-")
 
 
 def grouped_bars(groups: Sequence[str], series: Sequence[Series], y_label: str) -> str:

@@ -75,6 +75,7 @@ def test_the_report_has_every_section_and_no_link_to_the_network(tmp_path):
     assert "published 6" in html  # configuration 0, clear sunrise
     assert not re.search(r'(?:src|href)="(?:https?:)?//', html)
     assert len(html) < 15e6
+    assert "Per run of 500 s" in html
 
 
 def test_counts_in_the_matrix_are_those_of_the_results(tmp_path):

@@ -94,6 +94,12 @@ class Matrix:
         values = self.cell(config, weather)[column].drop_nulls()
         return float(values.mean()) if len(values) else None  # type: ignore[arg-type]
 
+    @cached_property
+    def duration(self) -> float:
+        """Simulated seconds of the longest run."""
+        seconds = self.finished["duration_s"].drop_nulls().to_list()
+        return max(seconds, default=0.0)
+
     @property
     def subtitle(self) -> str:
         """One sentence: what was driven."""
@@ -101,7 +107,7 @@ class Matrix:
         levels = " and ".join(sorted(r["sensors"].unique().to_list()))
         return (
             f"{len(self.configs)} configurations in {len(self.weathers)} weathers, "
-            f"{r['seed'].n_unique()} seeds each, on {', '.join(sorted(r['map'].unique().to_list()))}, "
+            f"{r['seed'].n_unique()} runs per cell, on {', '.join(sorted(r['map'].unique().to_list()))}, "
             f"sensors as {levels}."
         )
 

@@ -73,7 +73,10 @@ def count_table(matrix: Matrix, column: str, caption: str, published_hint: str) 
         *((weather_title(w), w) for w in matrix.weathers),
         ("all", "every drive once"),
     ]
-    note = "Per run of 500 s; small: 95 % interval, and the published value where there is one."
+    note = (
+        f"Per run of {matrix.duration:g} s; small: 95 % interval, and the published value, "
+        "of one run of 500 s, where there is one."
+    )
     return Table(columns, rows, caption=caption, note=note)
 
 

@@ -17,10 +17,13 @@ from skidpad.core.vocabulary import Outcome
 from skidpad.recording import ledger as ledger_module
 from skidpad.recording.fingerprint import fingerprint
 from skidpad.recording.ledger import (
+    CAMPAIGN,
     LEDGER,
     Entry,
     FolderState,
     Ledger,
+    campaign_command,
+    encode_identity,
     fingerprints,
     folder_state,
     latest,
@@ -218,3 +221,12 @@ def test_fingerprint_is_stable_and_sees_every_part() -> None:
     changed = {dataclasses.replace(here, **{f.name: "?"}).short for f in dataclasses.fields(here)}
     assert len(changed | {here.short}) == 8
     assert fingerprints([entry("a"), entry("b")]) == {"abc"}
+
+
+def test_a_folder_says_which_command_wrote_it(tmp_path):
+    assert campaign_command(tmp_path) == "adas"
+    (tmp_path / CAMPAIGN).write_bytes(encode_identity({"command": "grip"}))
+    assert campaign_command(tmp_path) == "grip"
+    (tmp_path / CAMPAIGN).write_text("{")
+    with pytest.raises(FileError, match="damaged"):
+        campaign_command(tmp_path)

@@ -114,9 +114,16 @@ def adas(
 
 def report(folder: Annotated[Path, typer.Argument(help="A campaign's folder.")]) -> None:
     """Write the report of a campaign again, from what it left behind."""
-    from skidpad.report.matrix import write_report
+    from skidpad.recording.ledger import campaign_command
 
-    typer.echo(write_report(folder))
+    if campaign_command(folder) == "grip":
+        from skidpad.report.grip import write_grip_report
+
+        typer.echo(write_grip_report(folder))
+    else:
+        from skidpad.report.matrix import write_report
+
+        typer.echo(write_report(folder))
 
 
 def show(run: Annotated[Path, typer.Argument(help="A run's folder.")]) -> None:

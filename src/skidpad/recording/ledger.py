@@ -207,6 +207,19 @@ def folder_state(folder: Path, identity: dict[str, Any]) -> FolderState:
     return FolderState.SAME if same else FolderState.OTHER
 
 
+def campaign_command(folder: Path) -> str:
+    """Which command wrote a campaign's folder, "adas" where it does not say."""
+    path = folder / CAMPAIGN
+    if not path.is_file():
+        return "adas"
+    try:
+        return str(
+            msgspec.json.decode(path.read_bytes(), type=dict[str, Any]).get("command", "adas")
+        )
+    except msgspec.MsgspecError as error:
+        raise FileError(f"{path} is damaged: {error}") from error
+
+
 def encode_identity(identity: dict[str, Any]) -> bytes:
     """Canonical text of a resolved configuration."""
     return msgspec.json.encode(identity, order="deterministic")

@@ -30,10 +30,10 @@ from skidpad.report.page import (
     Page,
     Section,
     Text,
-    Verdict,
     write_page,
 )
 from skidpad.report.replay import replay
+from skidpad.report.verdicts import verdict_blocks
 from skidpad.roads.bundled import load_map
 
 REPORT, RUNS, STOPPING = "report.html", "runs", "stopping.parquet"
@@ -157,17 +157,7 @@ def _verdicts(campaign: GripCampaign) -> list[Block]:
         "seen, and two rules for verdicts were settled after 65; they are not blind. The variants of the "
         "cut-in from rest are runs of their own: --cutin original,unfixed,fixed."
     )
-    verdicts = [
-        Verdict(
-            j.finding.id,
-            j.finding.claim,
-            j.verdict.value,
-            j.text,
-            f"{j.finding.estimand}; test: {j.finding.test}; margin: {j.finding.margin}.",
-        )
-        for j in judged
-    ]
-    return [intro, *verdicts]
+    return [intro, *verdict_blocks(judged)]
 
 
 def _replays(campaign: GripCampaign, folder: Path) -> list[Block]:

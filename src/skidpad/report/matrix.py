@@ -27,9 +27,9 @@ from skidpad.report.page import (
     Page,
     Section,
     Text,
-    Verdict,
     write_page,
 )
+from skidpad.report.verdicts import verdict_blocks
 
 REPORT = "report.html"
 LEAD = """Each row below is a set of driving functions, each column a weather. A cell was driven with \
@@ -145,17 +145,7 @@ def _verdicts(matrix: Matrix) -> list[Block]:
         "A claim whose two sides are the same drive is marked by construction; one that needs runs "
         "of its own can be tested with `skidpad study ID`."
     )
-    verdicts = [
-        Verdict(
-            j.finding.id,
-            j.finding.claim,
-            j.verdict.value,
-            j.text,
-            f"{j.finding.estimand}; test: {j.finding.test}; margin: {j.finding.margin}.",
-        )
-        for j in judged
-    ]
-    return [intro, *verdicts]
+    return [intro, *verdict_blocks(judged)]
 
 
 def _definitions() -> Definitions:

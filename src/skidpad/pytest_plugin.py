@@ -9,6 +9,7 @@ Options of the server: `skidpad_carla_options = --map straight` in the pytest co
 
 from __future__ import annotations
 
+import gc
 import shlex
 import socket
 from collections.abc import Iterator
@@ -71,8 +72,12 @@ def free_port() -> int:
 
 
 def stop_sensors(world: Any) -> None:
-    """Sensors that still listen when a client ends abort its process."""
+    """Remove sensors that the test left behind.
+
+    A sensor that a test object still listens to is stopped by that object when it is freed, so
+    freed it is first. Stopping it here, through a second object, would close its socket twice,
+    and the client's process dies of that now and then.
+    """
+    gc.collect()
     for actor in world.get_actors().filter("sensor.*"):
-        if actor.is_listening:
-            actor.stop()
         actor.destroy()

@@ -12,6 +12,10 @@ def square(n):
     return n * n
 
 
+def own_pid(_):
+    return os.getpid()
+
+
 def odd_only(n):
     if n % 2 == 0:
         raise ValueError(f"{n} is even")

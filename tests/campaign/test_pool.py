@@ -63,6 +63,15 @@ def test_a_job_that_fails_once_succeeds_on_the_second_try(tmp_path):
     assert [f.value for f in done] == ["second"]
 
 
+def test_a_worker_that_dies_idle_is_replaced_and_costs_no_attempt(tmp_path):
+    done, finished = [], run_jobs(jobs("own_pid", range(3)), 1)
+    for end in finished:
+        done.append(end.value)
+        os.kill(end.value, signal.SIGKILL)  # between two jobs: the pool is waiting for us
+        time.sleep(0.3)
+    assert len(set(done)) == 3
+
+
 def test_workers_leave_when_their_parent_is_killed(tmp_path):
     pid_file = tmp_path / "pid"
     code = (

@@ -106,10 +106,9 @@ def _supervise(
     context: multiprocessing.context.SpawnContext, crew: list[_Worker], queue: _Queue
 ) -> Iterator[Finished]:
     while queue.waiting or any(w.job for w in crew):
-        for worker in crew:
+        for place, worker in enumerate(crew):
             if worker.job is None and queue.waiting:
-                worker.job, worker.started = queue.waiting.popleft(), time.monotonic()
-                worker.pipe.send(worker.job)
+                crew[place] = _give(context, worker, queue.waiting.popleft())
         busy = [w for w in crew if w.job]
         ready = wait([w.pipe for w in busy], timeout=_patience(busy))
         for worker in busy:
@@ -123,6 +122,18 @@ def _supervise(
                     continue
             worker.job = None
             yield finished
+
+
+def _give(context: multiprocessing.context.SpawnContext, worker: _Worker, job: Job) -> _Worker:
+    """The worker with its job, or a new one when it died idle: no fault of the job."""
+    try:
+        worker.pipe.send(job)
+    except OSError:
+        _dismiss(worker)
+        worker = _hire(context)
+        worker.pipe.send(job)
+    worker.job, worker.started = job, time.monotonic()
+    return worker
 
 
 def _patience(busy: list[_Worker]) -> float:

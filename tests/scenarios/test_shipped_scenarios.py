@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from lxml import etree
 
+from skidpad.roads.bundled import FOLDER as MAPS
 from skidpad.scenarios.generate import FOLDER, SCENARIOS, file_name, write
 from skidpad.scenarios.hazard_export import OscVersion
 from skidpad.scenarios.player import load, problems
@@ -54,6 +55,22 @@ def test_the_asam_checkers_accept_every_file(asam_python):
         assert any("valid_schema" in c for c in verdict["completed"]), path.name
         if "_1.0" not in path.name:
             assert verdict["skipped"] == [], path.name
+
+
+@pytest.mark.req("B-090", "M-15")
+def test_the_asam_checkers_accept_every_map(asam_python):
+    maps = sorted([*MAPS.glob("*.xodr"), *FOLDER.glob("*.xodr")])
+    done = subprocess.run(
+        [asam_python, str(CHECKER), *map(str, maps)], capture_output=True, text=True, check=True
+    )
+    verdicts = json.loads(next(r for r in done.stdout.splitlines() if r.startswith("ASAM "))[5:])
+    for path in maps:
+        verdict = verdicts[str(path)]
+        assert verdict["issues"] == [], path.name
+        assert "check_asam_xodr_xml_valid_schema" in verdict["completed"], path.name
+        # made for OpenDRIVE 1.8 and later
+        later = ["check_asam_xodr_junctions_connection_one_link_to_incoming"]
+        assert verdict["skipped"] == later, path.name
 
 
 def test_the_1_0_files_are_valid_by_the_schema_of_1_0(asam_python):

@@ -149,7 +149,7 @@ def _outlined(
     thing = xodr.Object(
         s, t, Type=type_, id=ids.take(), name=type_.name, length=length, width=width, height=0.0
     )
-    outline = xodr.Outline(closed=True)
+    outline = xodr.Outline(id=0, closed=True)
     for number, (u, v) in enumerate(((1, 1), (-1, 1), (-1, -1), (1, -1))):
         corner = xodr.CornerLocal(u * length / 2, v * width / 2, 0.0, 0.0, id=number)
         outline.add_corner(corner)

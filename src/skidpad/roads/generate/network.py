@@ -79,7 +79,7 @@ class Network:
         """The OpenDRIVE file."""
         xodr.Object._usedIDs.clear()
         xodr.Signal._usedIDs.clear()
-        document = xodr.OpenDrive(self.name, geo_reference=GEO_REFERENCE)
+        document = xodr.OpenDrive(self.name, revMinor="7", geo_reference=GEO_REFERENCE)
         for road in self.roads:
             document.add_road(_road(road, self.junctions))
         for id, connections in self.junctions.items():
@@ -97,6 +97,8 @@ class Network:
             for signal in signals:
                 etree.SubElement(node, "control", signalId=str(signal), type="0")
             root.insert(1 + len(self.roads) + position, node)
+        for sign in root.iterfind(".//signal[@country='OPENDRIVE']"):
+            sign.set("country", "OpenDRIVE")  # the writer raises the case, the schema does not
         etree.indent(root)
         return etree.tostring(root, xml_declaration=True, encoding="UTF-8") + b"\n"
 

@@ -123,12 +123,14 @@ def sweep(weather: Sequence[Weather], text: str) -> list[Weather]:
     name, equals, span = text.partition("=")
     if not equals or name not in RANGES:
         raise ConfigError(
-            f"--sweep takes FIELD=A:B:STEP with a weather field ({', '.join(RANGES)}), got {text!r}"
+            f"--sweep takes FIELD=FROM:TO:STEP with a weather field ({', '.join(RANGES)}), got {text!r}"
         )
     try:
         start, stop, step = (float(part) for part in span.split(":"))
     except ValueError:
-        raise ConfigError(f"--sweep {name} takes three numbers A:B:STEP, got {span!r}") from None
+        raise ConfigError(
+            f"--sweep {name} takes three numbers FROM:TO:STEP, got {span!r}"
+        ) from None
     if step <= 0.0 or stop < start:
         raise ConfigError(f"--sweep {name} needs A <= B and STEP > 0, got {span!r}")
     values = [start + k * step for k in range(int((stop - start) / step + 1e-9) + 1)]

@@ -24,7 +24,7 @@ def adas(
         str, typer.Option(help="all, or presets and YAML files parted by commas.")
     ] = "all",
     sweep: Annotated[
-        str | None, typer.Option(help="Vary one weather field: FIELD=A:B:STEP.")
+        str | None, typer.Option(help="Vary one weather field: FIELD=FROM:TO:STEP.")
     ] = None,
     grip: Annotated[
         str | None, typer.Option(help="none, statistical or physical; default: the profile's.")

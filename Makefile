@@ -7,7 +7,7 @@ OUT ?= out/adas
 RUN_ARGS ?=
 TEST_ARGS ?=
 
-.PHONY: run test check bench refs clean
+.PHONY: run test check wheel-check bench refs clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next $(RUN_ARGS)
@@ -20,6 +20,9 @@ check: $(VENV)/.checked-with
 	$(BIN)/ruff check src tests
 	$(BIN)/mypy
 	$(BIN)/lint-imports
+
+wheel-check: $(BIN)/python
+	PYTHON=$(BIN)/python .ci/wheel
 
 bench: $(VENV)/.installed
 	$(BIN)/skidpad bench

@@ -157,24 +157,28 @@ print(digest.hexdigest())
 
 
 @pytest.mark.slow
-def test_traffic_keeps_its_lane_and_stops_at_red(serve: Serve, without_hang: Serve) -> None:
+@pytest.mark.parametrize("map", ["figure8", "town"])
+def test_traffic_keeps_its_lane_and_stops_at_red(
+    serve: Serve, without_hang: Serve, map: str
+) -> None:
     """The lane is the client's own map's; the stop is its Traffic Manager's decision (K-4)."""
     script = (
         TRAFFIC.replace("COUNT", "50")
         + """
 lights = world.get_actors().filter("traffic.traffic_light")
-lines = {l.id: l.get_stop_waypoints() for l in lights}
+lines = [w.transform for light in lights for w in light.get_stop_waypoints()]
 for light in lights:
     light.set_state(carla.TrafficLightState.Red)
     light.freeze(True)
-held, worst = set(), []
+start = {car.id: car.get_location() for car in cars}
+held, worst = {}, []
 for tick in range(900):
     world.tick()
     for car in cars:
         if car.is_at_traffic_light():
             assert car.get_traffic_light_state() == carla.TrafficLightState.Red
             if car.get_velocity().length() < 0.1:
-                held.add(car.id)
+                held[car.id] = car
     if tick % 100 == 99:
         for car in cars:
             here = car.get_location()
@@ -182,7 +186,13 @@ for tick in range(900):
             worst.append(math.hypot(lane.x - here.x, lane.y - here.y))
 worst.sort()
 assert worst[int(0.95 * len(worst))] < 1.0, worst[-10:]
+assert sum(car.get_location().distance(start[car.id]) > 50.0 for car in cars) >= 25
 assert len(held) >= 4, held
+for car in held.values():
+    here = car.get_location()
+    line = min(lines, key=lambda t: t.location.distance(here))
+    gap, ahead = line.location - here, line.get_forward_vector()
+    assert 0.0 < gap.x * ahead.x + gap.y * ahead.y < 30.0, (here, line)
 """
     )
-    without_hang(lambda: serve().client(script))
+    without_hang(lambda: serve("--map", map).client(script))

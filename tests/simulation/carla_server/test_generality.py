@@ -28,6 +28,7 @@ xodr = f'''<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="4" nam
 world = client.generate_opendrive_world(xodr)
 synchronous(chance.choice((0.02, 0.05, 0.1)))
 roads, library = world.get_map(), world.get_blueprint_library()
+assert world.get_random_location_from_navigation() is None  # no pavement, no shoulder
 points = roads.get_spawn_points()
 assert points
 for point in points:

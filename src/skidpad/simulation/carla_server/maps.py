@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import re
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 from skidpad.core.errors import ConfigError, SkidpadError
@@ -11,8 +13,11 @@ from skidpad.core.geometry import Pose
 from skidpad.roads.bundled import bundled_maps, load_map, map_file
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
+from skidpad.roads.walkable import walk_mesh
+from skidpad.simulation.carla_server import navmesh
 from skidpad.simulation.carla_server.rpc import CallError
 
+log = logging.getLogger("skidpad.carla_server")
 PREFIX = "Carla/Maps/"
 OPENDRIVE_MAP = "OpenDriveMap"  # the name under which a client's own text is loaded
 MAX_XODR = 24 * 1024 * 1024  # characters
@@ -21,7 +26,7 @@ MARGIN = 6.0  # m from a lane's ends
 LIFT = 0.3  # m above the road, so that nobody spawns inside it
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class ServedMap:
     """A map in use."""
 
@@ -40,6 +45,16 @@ class ServedMap:
     def full_name(self) -> str:
         """As clients see it."""
         return PREFIX + self.name
+
+    @cached_property
+    def navigation(self) -> tuple[str, bytes] | None:
+        """Name and content of the navigation mesh; None for maps on which nobody walks (K-9)."""
+        mesh = walk_mesh(self.roads)
+        content = None if mesh is None else navmesh.packed(mesh)
+        if content is None:
+            log.info("map %s has no navigation mesh: AI walkers stay where they are", self.name)
+            return None
+        return navmesh.file_name(self.name, content), content
 
 
 class MapStore:

@@ -12,6 +12,7 @@ from skidpad.simulation.carla_server.world import World
 
 TABLE = Table("maps")
 MAX_FILE = 16 * 1024 * 1024
+NAVIGATION = "Nav"  # folder
 NO_LAYERS = "maps have no layers"
 
 
@@ -48,27 +49,30 @@ def copy_opendrive_to_file(world: World, xodr: Any, parameters: Any) -> None:
 
 
 @TABLE.method("get_required_files")
-def get_required_files(_: World, folder: Any) -> list[str]:
-    """None: clients build their own caches, and there is no navigation mesh."""
-    wire.text(folder, "folder")
-    return []
+def get_required_files(world: World, folder: Any) -> list[str]:
+    """The navigation mesh, in its folder; clients build their other caches themselves."""
+    navigation = world.map.navigation if wire.text(folder, "folder") == NAVIGATION else None
+    return [] if navigation is None else [navigation[0]]
 
 
 @TABLE.method("request_file")
 def request_file(world: World, name: Any) -> bytes:
-    """A file of the data folder (decision K-8)."""
-    path = safe_path(world.options.data_dir, wire.text(name, "file name"))
+    """The navigation mesh, or a file of the data folder (decision K-8)."""
+    asked = wire.text(name, "file name")
+    navigation = world.map.navigation
+    if navigation is not None and navigation[0] == asked:
+        return navigation[1]
+    path = safe_path(world.options.data_dir, asked)
     if not path.is_file() or path.stat().st_size > MAX_FILE:
         raise CallError(f"file {path.name} not found")
     return path.read_bytes()
 
 
-@TABLE.method(
-    "get_navigation_mesh", without_effect="no navigation mesh: AI walkers stay where they are"
-)
-def get_navigation_mesh(_: World) -> bytes:
-    """Empty: the client then says that it has no mesh."""
-    return b""
+@TABLE.method("get_navigation_mesh")
+def get_navigation_mesh(world: World) -> bytes:
+    """Its content; empty where the map has none, and the client then says so."""
+    navigation = world.map.navigation
+    return b"" if navigation is None else navigation[1]
 
 
 @TABLE.method("load_map_layer", Shape.VOID, without_effect=NO_LAYERS)

@@ -53,9 +53,9 @@ def set_actor_location(world: World, id: Any, location: Any) -> None:
 
 @TABLE.method("set_walker_state", Shape.VOID)
 def set_walker_state(world: World, id: Any, transform: Any, speed: Any) -> None:
-    """Place and speed in one."""
+    """Place of its feet, and speed, in one, as the client's pedestrian navigation tells them."""
     actor = world.actors.get(id, Family.WALKER)
-    put(world, actor, wire.pose(transform, "transform"))
+    put(world, actor, wire.pose(transform, "transform").moved(up=actor.half[2]))
     actor.extra.speed = 0.0
     v = wire.number(speed, "speed")
     forward = actor.pose.moved(forward=v)

@@ -1,0 +1,245 @@
+"""Where pedestrians can walk: a map's pavements, crossings, roads and verges as convex polygons.
+
+Two polygons are neighbours where they share an edge, both of its ends. Maps with sidewalks are cut
+as one plane, with heights put back afterwards; on others the shoulders are all there is, each a
+strip of its own, so that a shoulder may pass above another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from skidpad.roads.lanes import LaneKind
+from skidpad.roads.queries import RoadMap
+
+Floats = NDArray[np.float64]
+Ring = tuple[int, ...]
+
+VERGE = 4.0  # m beside the lanes of a junction on which one walks around its corners
+SIMPLIFY = 0.25  # m, root of the area by which an outline may change at a corner left out
+GRID = 0.001  # m, raster of outlines, so that neighbours share their vertices
+SLIVER = 0.01  # m^2 below which a piece is a rounding of two outlines
+WELD = 0.05  # m within which ends of shoulders are the same point
+STRIP = 20.0  # m, longest piece of a shoulder
+STRIP_TURN = 0.05  # rad by which a piece of a shoulder may bend
+NEAR, STOREY = 3.0, 2.5  # m: lanes this near in plan and this far in height lie above each other
+CORNERS = 6  # of a polygon at most (Detour's limit)
+STRAIGHT = 1e-6  # m^2 by which a corner may seem to be reflex by rounding
+
+
+class WalkArea(IntEnum):
+    """What a pedestrian walks on; numbers as CARLA's navigation has them (public source)."""
+
+    SIDEWALK = 1
+    CROSSWALK = 2
+    ROAD = 3
+    GRASS = 4
+
+
+@dataclass(frozen=True, slots=True)
+class WalkMesh:
+    """Convex polygons, counter-clockwise from above, ISO 8855 world frame."""
+
+    vertices: Floats  # (v, 3) m
+    polygons: tuple[Ring, ...]  # vertex indices, three to six each
+    areas: tuple[WalkArea, ...]  # of each polygon
+
+    def neighbours(self) -> list[list[int]]:
+        """Per polygon and edge (corner k to k + 1) the polygon beyond, -1 where there is none.
+
+        Where ways part, several begin at one edge: the first of them goes on.
+        """
+        owners: dict[tuple[int, int], int] = {}
+        for i, ring in enumerate(self.polygons):
+            for edge in _edges(ring):
+                owners.setdefault(edge, i)
+        return [
+            [owners.get((b, a), -1) if owners[a, b] == i else -1 for a, b in _edges(ring)]
+            for i, ring in enumerate(self.polygons)
+        ]
+
+
+def walk_mesh(map: RoadMap) -> WalkMesh | None:
+    """The map's walking surface; None when it has neither sidewalks nor shoulders to walk on.
+
+    None also for maps whose sidewalks or roads lie above each other: a plane cannot hold them.
+    """
+    if np.any(map.lanes.kind == LaneKind.SIDEWALK):
+        return None if _storeys(map) else _town(map)
+    lanes = np.flatnonzero(map.lanes.kind == LaneKind.SHOULDER).tolist()
+    return _strips(map, lanes) if lanes else None
+
+
+def _edges(ring: Ring) -> Iterable[tuple[int, int]]:
+    return zip(ring, (*ring[1:], ring[0]), strict=True)
+
+
+def _borders(map: RoadMap, lane: int) -> tuple[Floats, Floats]:
+    """Left and right border of a lane, (k, 3) each."""
+    first = int(map.lanes.first[lane])
+    rows, samples = slice(first, first + int(map.lanes.size[lane])), map.samples
+    middle = np.column_stack((samples.x[rows], samples.y[rows], samples.z[rows]))
+    heading, half = samples.heading[rows], 0.5 * samples.width[rows]
+    left = np.column_stack((-np.sin(heading), np.cos(heading), np.tan(samples.bank[rows])))
+    return middle + half[:, None] * left, middle - half[:, None] * left
+
+
+# --- shoulders
+
+
+def _strips(map: RoadMap, lanes: list[int]) -> WalkMesh:
+    points: list[Floats] = []
+    rings: list[Ring] = []
+    for lane in lanes:
+        left, right = _borders(map, lane)
+        keep = _stations(map, lane)
+        base = 2 * sum(len(p) // 2 for p in points)
+        points.append(np.stack((left[keep], right[keep]), axis=1).reshape(-1, 3))
+        for k in range(len(keep) - 1):
+            a = base + 2 * k
+            rings.append((a + 1, a + 3, a + 2, a))
+    return _welded(np.concatenate(points), rings, [WalkArea.SIDEWALK] * len(rings))
+
+
+def _stations(map: RoadMap, lane: int) -> list[int]:
+    """Samples of a lane at which its strip is cut."""
+    first, size = int(map.lanes.first[lane]), int(map.lanes.size[lane])
+    heading, s = map.samples.heading[first : first + size], map.samples.s[first : first + size]
+    keep = [0]
+    for k in range(1, size - 1):
+        turn = abs(np.sin(heading[k + 1] - heading[keep[-1]]))
+        if turn > STRIP_TURN or s[k + 1] - s[keep[-1]] > STRIP:
+            keep.append(k)
+    return [*keep, size - 1]
+
+
+def _welded(points: Floats, rings: list[Ring], areas: list[WalkArea]) -> WalkMesh:
+    """Points closer than WELD become one, and pieces that this flattens are left out."""
+    near = cKDTree(points).query_ball_point(points, WELD)
+    used, index = np.unique([min(n) for n in near], return_inverse=True)
+    whole = [(tuple(int(index[i]) for i in r), a) for r, a in zip(rings, areas, strict=True)]
+    whole = [(ring, area) for ring, area in whole if len(set(ring)) == len(ring)]
+    return WalkMesh(points[used], tuple(r for r, _ in whole), tuple(a for _, a in whole))
+
+
+# --- a town
+
+
+def _storeys(map: RoadMap) -> bool:
+    """Whether lanes lie above each other."""
+    s = map.samples
+    plan = cKDTree(np.column_stack((s.x, s.y)))
+    pairs = plan.query_pairs(NEAR, output_type="ndarray")
+    return bool(np.any(np.abs(s.z[pairs[:, 0]] - s.z[pairs[:, 1]]) > STOREY))
+
+
+def _town(map: RoadMap) -> WalkMesh:
+    surfaces = _surfaces(map)
+    lines = shapely.unary_union([g.boundary for g in surfaces.values()], grid_size=GRID)
+    faces = [f for f in shapely.get_parts(shapely.polygonize([lines])) if f.area > SLIVER]
+    kinds = [_kind(surfaces, face) for face in faces]
+    faces = [f for f, kind in zip(faces, kinds, strict=True) if kind is not None]
+    areas = [kind for kind in kinds if kind is not None]
+    cover = shapely.coverage_simplify(np.array(faces), SIMPLIFY)
+    corners: dict[tuple[float, float], int] = {}
+    rings: list[Ring] = []
+    owned: list[WalkArea] = []
+    for face, area in zip(cover, areas, strict=True):
+        for ring in _convex_parts(face, corners):
+            rings.append(ring)
+            owned.append(area)
+    plan = np.array(list(corners), dtype=np.float64)
+    return WalkMesh(np.column_stack((plan, _heights(map, plan))), tuple(rings), tuple(owned))
+
+
+def _surfaces(map: RoadMap) -> dict[WalkArea, shapely.Geometry]:
+    """Outlines by area, without overlaps: a crossing ends at the pavement, a verge at the road."""
+    kinds, junction = map.lanes.kind, map.lanes.junction
+
+    def union(lanes: NDArray[np.bool_]) -> shapely.Geometry:
+        return shapely.unary_union([_outline(map, int(i)) for i in np.flatnonzero(lanes)])
+
+    crossings = shapely.unary_union([shapely.Polygon(c[:, :2]) for c in map.roadside.crosswalks])
+    pavements = union(kinds == LaneKind.SIDEWALK)
+    roads = union(kinds != LaneKind.SIDEWALK)
+    verges = union((junction >= 0) & (kinds != LaneKind.SIDEWALK)).buffer(VERGE)
+    paved = shapely.union(pavements, crossings, grid_size=GRID)
+    firm = shapely.union(paved, roads, grid_size=GRID)
+    return {
+        WalkArea.SIDEWALK: pavements,
+        WalkArea.CROSSWALK: shapely.difference(crossings, pavements, grid_size=GRID),
+        WalkArea.ROAD: shapely.difference(roads, paved, grid_size=GRID),
+        WalkArea.GRASS: shapely.difference(verges, firm, grid_size=GRID),
+    }
+
+
+def _outline(map: RoadMap, lane: int) -> shapely.Geometry:
+    left, right = _borders(map, lane)
+    return shapely.Polygon(np.concatenate((left[:, :2], right[::-1, :2]))).buffer(GRID)
+
+
+def _kind(surfaces: dict[WalkArea, shapely.Geometry], face: shapely.Geometry) -> WalkArea | None:
+    point = face.representative_point()
+    return next((area for area, g in surfaces.items() if g.contains(point)), None)
+
+
+def _heights(map: RoadMap, plan: Floats) -> Floats:
+    """Heights of the nearest lane samples."""
+    s = map.samples
+    _, nearest = cKDTree(np.column_stack((s.x, s.y))).query(plan)
+    return np.asarray(s.z[nearest], dtype=np.float64)
+
+
+def _convex_parts(face: shapely.Geometry, corners: dict[tuple[float, float], int]) -> list[Ring]:
+    """A face cut into convex polygons whose vertices are entered into `corners`."""
+    triangles = []
+    for part in shapely.get_parts(shapely.constrained_delaunay_triangles(face)):
+        points = [(float(x), float(y)) for x, y in part.exterior.coords[:3]]
+        ring = tuple(corners.setdefault(p, len(corners)) for p in points)
+        triangles.append(ring if part.exterior.is_ccw else ring[::-1])
+    return _merged(triangles, list(corners))
+
+
+def _merged(rings: list[Ring], points: list[tuple[float, float]]) -> list[Ring]:
+    """Polygons joined over their longest common edges while they stay convex and small."""
+    alive = dict(enumerate(rings))
+    owner = {edge: i for i, ring in alive.items() for edge in _edges(ring)}
+    inner = [(a, b) for a, b in owner if a < b and (b, a) in owner]
+    inner.sort(key=lambda e: (-_length(points, e), e))
+    for a, b in inner:
+        i, j = owner[a, b], owner[b, a]
+        joined = _joined(alive[i], alive[j], a, b)
+        if i == j or len(joined) > CORNERS or not _convex(joined, points):
+            continue
+        alive[i] = joined
+        del alive[j]
+        owner.update(dict.fromkeys(_edges(joined), i))
+    return list(alive.values())
+
+
+def _joined(one: Ring, two: Ring, a: int, b: int) -> Ring:
+    """The outline of two polygons; `one` has the edge a to b, `two` the edge b to a."""
+    k, m = one.index(b), two.index(a)
+    around = one[k:] + one[:k]  # from b to a
+    return around + (two[m:] + two[:m])[1:-1]  # and from a back to b
+
+
+def _convex(ring: Ring, points: list[tuple[float, float]]) -> bool:
+    if len(set(ring)) != len(ring):
+        return False
+    p = np.array([points[i] for i in ring])
+    d = np.roll(p, -1, axis=0) - p
+    e = np.roll(d, -1, axis=0)
+    return bool(np.all(d[:, 0] * e[:, 1] - d[:, 1] * e[:, 0] > -STRAIGHT))
+
+
+def _length(points: list[tuple[float, float]], edge: tuple[int, int]) -> float:
+    (xa, ya), (xb, yb) = points[edge[0]], points[edge[1]]
+    return float(np.hypot(xb - xa, yb - ya))

@@ -1,0 +1,120 @@
+"""Walking surfaces: whole, convex, without overlaps, and connected as feet are."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from skidpad.roads.bundled import load_map
+from skidpad.roads.lanes import LaneKind
+from skidpad.roads.walkable import WalkArea, WalkMesh, walk_mesh
+
+
+def mesh_of(name: str) -> WalkMesh:
+    mesh = walk_mesh(load_map(name))
+    assert mesh is not None
+    return mesh
+
+
+def plan(mesh: WalkMesh, *areas: WalkArea) -> list[shapely.Polygon]:
+    rings = zip(mesh.polygons, mesh.areas, strict=True)
+    return [shapely.Polygon(mesh.vertices[list(r), :2]) for r, a in rings if a in areas]
+
+
+def lane_area(name: str, kind: LaneKind) -> float:
+    """m^2, by widths along the lanes."""
+    map = load_map(name)
+    total = 0.0
+    for lane in np.flatnonzero(map.lanes.kind == kind).tolist():
+        first = int(map.lanes.first[lane])
+        rows = slice(first, first + int(map.lanes.size[lane]))
+        total += float(np.trapezoid(map.samples.width[rows], map.samples.s[rows]))
+    return total
+
+
+def reached(mesh: WalkMesh, start: int, allowed: set[WalkArea]) -> set[int]:
+    beyond, found, edge = mesh.neighbours(), {start}, [start]
+    while edge:
+        for other in beyond[edge.pop()]:
+            if other >= 0 and other not in found and mesh.areas[other] in allowed:
+                found.add(other)
+                edge.append(other)
+    return found
+
+
+@pytest.mark.parametrize("name", ["town", "figure8", "straight"])
+def test_polygons_are_convex_small_and_counter_clockwise(name: str) -> None:
+    mesh = mesh_of(name)
+    for ring, shape in zip(mesh.polygons, plan(mesh, *WalkArea), strict=True):
+        assert 3 <= len(ring) <= 6
+        assert shape.exterior.is_ccw
+        assert shape.convex_hull.area - shape.area < 1e-3
+
+
+@pytest.mark.parametrize("name", ["town", "figure8", "straight"])
+def test_neighbours_are_mutual_and_share_the_edge(name: str) -> None:
+    mesh = mesh_of(name)
+    beyond = mesh.neighbours()
+    for i, others in enumerate(beyond):
+        for j in others:
+            if j >= 0:
+                assert i in beyond[j]
+                assert len(set(mesh.polygons[i]) & set(mesh.polygons[j])) >= 2
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("town", LaneKind.SIDEWALK), ("figure8", LaneKind.SHOULDER), ("straight", LaneKind.SHOULDER)],
+)
+def test_the_pavement_is_as_large_as_its_lanes(name: str, kind: LaneKind) -> None:
+    total = sum(shape.area for shape in plan(mesh_of(name), WalkArea.SIDEWALK))
+    assert total == pytest.approx(lane_area(name, kind), rel=0.01)
+
+
+def test_nothing_overlaps_in_town() -> None:
+    shapes = plan(mesh_of("town"), *WalkArea)
+    assert sum(s.area for s in shapes) == pytest.approx(shapely.unary_union(shapes).area, rel=1e-6)
+
+
+def test_each_zebra_joins_its_pavements_without_the_road() -> None:
+    mesh, map = mesh_of("town"), load_map("town")
+    middles = [mesh.vertices[list(ring), :2].mean(axis=0) for ring in mesh.polygons]
+    for corners in map.roadside.crosswalks:
+        outline = shapely.Polygon(corners[:, :2])
+        start = next(
+            i
+            for i, area in enumerate(mesh.areas)
+            if area is WalkArea.CROSSWALK and outline.contains(shapely.Point(middles[i]))
+        )
+        joined = reached(mesh, start, {WalkArea.SIDEWALK, WalkArea.CROSSWALK})
+        across = np.ptp(corners[:, :2], axis=0).argmax()  # the axis along which one crosses
+        aside = [
+            middles[i][across] - corners[:, across].mean()
+            for i in joined
+            if mesh.areas[i] is WalkArea.SIDEWALK
+        ]
+        assert min(aside) < 0.0 < max(aside)
+
+
+def test_one_can_walk_around_town_without_stepping_on_a_road() -> None:
+    mesh = mesh_of("town")
+    pavement = {i for i, area in enumerate(mesh.areas) if area is WalkArea.SIDEWALK}
+    everywhere = set(WalkArea) - {WalkArea.ROAD}
+    parts = []
+    while pavement:
+        part = reached(mesh, min(pavement), everywhere)
+        parts.append(part)
+        pavement -= part
+    largest = max(parts, key=len)
+    assert sum(mesh.areas[i] is WalkArea.CROSSWALK for i in largest) >= 1
+    assert len(parts) <= 6  # blocks inside and around the streets, joined by four zebras
+
+
+def test_shoulders_keep_their_heights_where_roads_cross() -> None:
+    mesh, map = mesh_of("figure8"), load_map("figure8")
+    for x, y, z in mesh.vertices[::5].tolist():
+        place = map.project(x, y, z, driving=False)
+        assert place is not None
+        assert z == pytest.approx(place.z, abs=0.3)
+    assert np.ptp(mesh.vertices[:, 2]) > 5.0

@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from skidpad.core.errors import BackendError, ConfigError
+from skidpad.core.frames import Frame
+from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorCommand, ActorSetup, Setup
-from skidpad.core.specs import CameraSpec
+from skidpad.core.specs import CameraSpec, LidarSpec, PointSensorSpec
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.vocabulary import SemanticClass, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
@@ -187,6 +189,80 @@ def keeps_no_frame_beyond_its_tick(make: Make) -> None:
     backend.close()
 
 
+def gives_the_stack_what_it_asked_for(make: Make) -> None:
+    """L-3: by id in `frame.extra`, and right against the truth by a second route."""
+    backend = make()
+    mount = Pose(0.4, 0.2, 1.8, yaw=0.3)
+    specs = (
+        PointSensorSpec("gps", "gnss", mount),
+        PointSensorSpec("imu", "imu"),
+        PointSensorSpec("speed", "speedometer"),
+        LidarSpec("lidar", mount, channels=32, range=60.0, points_per_second=300_000),
+    )
+    ids = [s.id for s in specs]
+    setup = replace(
+        ALONE,
+        specs=(*ALONE.specs, *specs),
+        asked=frozenset(ids),
+        ego=replace(ALONE.ego, speed=15.0),
+        actors=(lead(14.0),),
+    )
+    frame = backend.reset(setup, 0)
+    for _ in range(3):
+        backend.step(VehicleCommand(throttle=0.4, steer=0.02))
+    before = backend.truth().states.copy()
+    frame = backend.step(VehicleCommand(throttle=0.4, steer=0.02))
+    assert list(frame.extra) == ids
+    now = backend.truth().states
+    here = now.pose(0)
+    antenna = here.moved(0.4, 0.2)
+    fix, radius, (lat, lon) = frame.extra["gps"], 6_378_137.0, (48.1, 11.5)  # of figure8's header
+    north = np.radians(fix.latitude - lat) * radius
+    east = np.radians(fix.longitude - lon) * radius * np.cos(np.radians(lat))
+    assert (east, north) == pytest.approx((antenna.x, antenna.y), rel=1e-3, abs=0.05)
+    assert fix.altitude == pytest.approx(here.z + 1.8, abs=0.05)
+    felt, dt = frame.extra["imu"], setup.dt
+    assert felt.rate[2] == pytest.approx((now.yaw[0] - before.yaw[0]) / dt, abs=0.02)
+    change = np.array([now.vx[0] - before.vx[0], now.vy[0] - before.vy[0]]) / dt
+    left = np.array([-np.sin(here.yaw), np.cos(here.yaw)])
+    assert felt.force[1] == pytest.approx(change @ left, abs=0.4)
+    assert np.linalg.norm(felt.force) == pytest.approx(9.81, abs=0.5)
+    assert felt.compass == pytest.approx((np.pi / 2 - here.yaw) % (2 * np.pi))
+    moved = np.hypot(now.x[0] - before.x[0], now.y[0] - before.y[0])
+    assert frame.extra["speed"] == pytest.approx(moved / dt, abs=0.3)
+    met = lidar_in_box(backend, frame, setup, mount, 1)
+    frame = backend.step(VehicleCommand())  # the other half of a turn
+    assert met + lidar_in_box(backend, frame, setup, mount, 1) > 20
+    stale = frame.extra
+    backend.step(VehicleCommand())
+    with pytest.raises(BackendError, match="valid until the next step"):
+        stale["gps"]
+    backend.close()
+
+
+def lidar_in_box(backend: Backend, frame: Frame, setup: Setup, mount: Pose, actor: int) -> int:
+    """How many returns name the actor; all of them lie on its box, and no others do."""
+    points, states = frame.extra["lidar"], backend.truth().states
+    assert len(points.xyz) > 1000
+    assert {len(column) for column in points} == {len(points.xyz)}
+    eye, box = states.pose(0) @ mount, states.pose(actor)
+    world = points.xyz @ eye.rotation().T + (eye.x, eye.y, eye.z)
+    inside = (world - (box.x, box.y, box.z)) @ box.rotation()
+    table = backend.truth().table
+    half = np.array([table.length[actor] / 2.0, table.width[actor] / 2.0])
+    over = (np.abs(inside[:, :2]) - half).max(axis=1)
+    named = points.instance == actor + 1
+    assert over[named].max(initial=0.0) < 0.15
+    assert not (~named & (over < -0.2) & (inside[:, 2] > 0.4) & (inside[:, 2] < 1.2)).any()
+    road = np.isin(points.label, (SemanticClass.ROAD, SemanticClass.ROAD_LINE))
+    ground = world[road][::50]
+    below = [MAP.project(x, y, z, driving=False) for x, y, z in ground.tolist()]
+    apart = [abs(p.z - z) for p, z in zip(below, ground[:, 2], strict=True) if p is not None]
+    assert len(apart) > 5
+    assert max(apart) < 0.15
+    return int(named.sum())
+
+
 CHECKS: tuple[Callable[[Make], None], ...] = (
     must_be_reset_and_closes_twice,
     begins_at_its_place_and_follows_commands,
@@ -197,4 +273,5 @@ CHECKS: tuple[Callable[[Make], None], ...] = (
     drifting_over_a_marking_is_one_invasion,
     delivers_the_twelve_sensors,
     keeps_no_frame_beyond_its_tick,
+    gives_the_stack_what_it_asked_for,
 )

@@ -18,6 +18,12 @@ def test_the_example_stack_is_the_file_in_examples():
     assert len([line for line in block.splitlines() if line.strip()]) <= 30
 
 
+def test_the_example_with_a_lidar_is_the_file_in_examples():
+    text = (ROOT / "docs" / "your-stack.md").read_text(encoding="utf-8")
+    (block,) = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+    assert block in (ROOT / "examples" / "lidar_brake.py").read_text(encoding="utf-8")
+
+
 def commands(group, prefix=""):
     found = set()
     for name, command in group.commands.items():

@@ -17,7 +17,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.frames import Frame, Segments, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorCommand
-from skidpad.core.specs import SensorSpec
+from skidpad.core.specs import CameraSpec, LidarSpec, Modality, PointSensorSpec, SensorSpec
 from skidpad.core.states import ContactEvent, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Outcome, RelocationReason, SensorLevel, Supervision, Tier
 from skidpad.physics.presets import find_weather
@@ -115,6 +115,68 @@ def test_nobody_keeps_a_buffer_beyond_its_tick() -> None:
     clean = run_cell(wanted)
     poisoned = run_cell(wanted, backend=EmbeddedBackend(poison=True))
     assert log_hash(clean.log) == log_hash(poisoned.log)
+
+
+class Curious(Gentle):
+    """Asks for sensors, and looks at them."""
+
+    def sensors(self) -> tuple[SensorSpec, ...]:
+        return (LidarSpec("lidar", Pose(0.0, 0.0, 2.0)), PointSensorSpec("gps", "gnss"))
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        assert set(frame.extra) == {"lidar", "gps"}
+        assert len(frame.extra["lidar"].xyz) > 100
+        assert frame.extra["gps"].latitude == pytest.approx(48.1, abs=0.1)
+        return super().tick(frame)
+
+
+class Silent(Gentle):
+    """Is given nothing that it did not ask for."""
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        assert not frame.extra
+        return super().tick(frame)
+
+
+@pytest.mark.req("L-3")
+@pytest.mark.parametrize("level", ["objects", "pixels"])
+def test_sensors_asked_for_change_nothing_else(level: str) -> None:
+    plain, curious = (
+        drive(kind, duration=1.0, sensors=level, vehicles=3) for kind in (Silent, Curious)
+    )
+    assert plain.outcome is curious.outcome is Outcome.COMPLETED, curious.error
+    for a, b in zip(plain.log.actors, curious.log.actors, strict=True):
+        assert np.array_equal(a, b)
+
+
+class WithCamera(Gentle):
+    """Asks for a camera."""
+
+    def sensors(self) -> tuple[SensorSpec, ...]:
+        return (CameraSpec("mine", Modality.SEMANTIC, 64, 48, 90.0, Pose(1.0, 0.0, 1.5)),)
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        image = frame.extra["mine"]
+        assert image is frame.images["mine"]
+        assert image.labels.shape == (48, 64)
+        return super().tick(frame)
+
+
+@pytest.mark.req("L-3")
+def test_a_camera_asked_for_needs_pixels() -> None:
+    assert drive(WithCamera, duration=0.2, vehicles=0).error == ""
+    run = drive(WithCamera, duration=0.2, vehicles=0, sensors="objects")
+    assert run.outcome is Outcome.AGENT_ERROR
+    assert "run with --sensors pixels" in run.error
+
+
+@pytest.mark.req("L-3")
+def test_the_example_with_a_lidar_follows_and_does_not_hit() -> None:
+    where = Path(__file__).parents[2] / "examples" / "lidar_brake.py"
+    run = drive(f"{where}:LidarBrake", duration=25.0, sensors="objects", seed=1)
+    assert run.outcome is Outcome.COMPLETED, run.error
+    assert run.log.contacts == ()
+    assert 10.0 < run.log.v_ego.max() < 15.0
 
 
 class Wrapped:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import degrees
 
 import numpy as np
 import pytest
 
 from skidpad.core.errors import ConfigError, FileError, StackError
-from skidpad.core.frames import CameraImage, RadarPoints, SensorFrame
+from skidpad.core.frames import CameraImage, LidarPoints, RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.states import EgoEstimate
 from skidpad.roads.bundled import load_map
@@ -32,7 +33,10 @@ class Agent:
         return SimpleNamespace(throttle=0.3, brake=0.0, steer=0.2, hand_brake=False, reverse=False)
     def destroy(self): self.gone = True
 class Lidar(Agent):
-    def sensors(self): return [{'type': 'sensor.lidar.ray_cast', 'id': 'l'}]
+    def sensors(self):
+        return [{'type': 'sensor.lidar.ray_cast', 'id': 'l', 'x': 1.3, 'y': 0.4, 'z': 2.5, 'yaw': -90.0}]
+class Sonar(Agent):
+    def sensors(self): return [{'type': 'sensor.other.sonar', 'id': 's'}]
 class Half:
     def run_step(self, data, timestamp): pass
 """
@@ -57,7 +61,26 @@ def drive(file, pose=HERE):
     stack = load_agent(f"{file}:Agent")((), load_map("straight"), {})
     rgb = np.zeros((48, 64, 3), np.uint8)
     rgb[..., 0] = 200  # red
-    return stack, stack.tick(a_frame(pose, {"left": CameraImage(rgb=rgb)}))
+    return stack, stack.tick(a_frame(pose, {"agent/left": CameraImage(rgb=rgb)}))
+
+
+@pytest.mark.req("G-6", "X-4")
+def test_a_lidar_is_mounted_and_read_in_carla_axes(file):
+    stack = load_agent(f"{file}:Lidar")((), load_map("straight"), {})
+    (spec,) = stack.sensors()
+    assert (spec.channels, spec.range, spec.points_per_second) == (64, 85.0, 600_000)
+    assert (spec.mount.y, degrees(spec.mount.yaw)) == (-0.4, pytest.approx(90.0))
+    points = LidarPoints(
+        np.array([[5.0, 2.0, -1.0], [4.0, -3.0, 0.5]], np.float32),
+        np.array([0.9, 0.8], np.float32),
+        np.ones(2, np.float32),
+        np.zeros(2, np.uint8),
+        np.zeros(2, np.uint16),
+    )
+    stack.tick(replace(a_frame(HERE), extra={spec.id: points}))
+    _, seen = stack.agent.seen[0][0]["l"]
+    assert seen.dtype == np.float32
+    assert seen.tolist() == [[5.0, -2.0, -1.0, np.float32(0.9)], [4.0, 3.0, 0.5, np.float32(0.8)]]
 
 
 @pytest.mark.req("B-121", "X-4", "X-5")
@@ -103,8 +126,8 @@ def test_the_plan_leads_along_the_lane_in_carla_axes(file):
 
 def test_what_cannot_be_given_is_said(file):
     road = load_map("straight")
-    with pytest.raises(StackError, match=r"sensor\.lidar\.ray_cast"):
-        load_agent(f"{file}:Lidar")((), road, {})
+    with pytest.raises(StackError, match=r"sensor\.other\.sonar"):
+        load_agent(f"{file}:Sonar")((), road, {})
     blind = load_agent(f"{file}:Agent")((), road, {})
     with pytest.raises(StackError, match="--sensors pixels"):
         blind.tick(a_frame(Pose(100.0, -5.25)))

@@ -11,6 +11,8 @@ from typer.testing import CliRunner
 
 from skidpad.cli.main import app, main
 from skidpad.core.errors import ConfigError, FileError, StackError
+from skidpad.core.geometry import Pose
+from skidpad.core.specs import LidarSpec, PointSensorSpec, RadarSpec
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import GripModel
 from skidpad.stack.adas import AdasConfig
@@ -212,10 +214,28 @@ def test_optional_parts_of_a_stack_may_be_missing():
     assert plain.sensors() == ()
     plain.stack.report = "fine, thanks"
     assert plain.report == StackReport()
-    plain.stack.sensors = lambda: SPECS[:1]
-    assert plain.sensors() == SPECS[:1]
+    more = (LidarSpec("l", Pose(0.0, 0.0)), PointSensorSpec("g", "gnss"))
+    plain.stack.sensors = lambda: more
+    assert plain.sensors() == more
     plain.stack.sensors = lambda: 1 / 0
     with pytest.raises(StackError, match=r"Simple.sensors\(\) raised: ZeroDivisionError"):
+        plain.sensors()
+
+
+@pytest.mark.parametrize(
+    ("specs", "told"),
+    [
+        (SPECS[:1], "there is a sensor 'depth_roof' already"),
+        ((PointSensorSpec("g", "gnss"),) * 2, "there is a sensor 'g' already"),
+        ((PointSensorSpec("s", "sonar"),), "kind 'sonar'; choose one of: gnss, imu, speedometer"),
+        ((RadarSpec("r", Pose(0.0, 0.0)),), "must name cameras, lidars and point sensors"),
+        (("lidar",), "must name cameras, lidars and point sensors, got 'lidar'"),
+    ],
+)
+def test_sensors_that_cannot_be_had_are_refused_before_the_run(specs, told):
+    plain = guarded()
+    plain.stack.sensors = lambda: specs
+    with pytest.raises(StackError, match=told):
         plain.sensors()
 
 

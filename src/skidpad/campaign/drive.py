@@ -183,7 +183,7 @@ def prepare(cell: Cell, kind: type[Stack] | None = None) -> Drive:
     map = load_map(cell.map)
     setup = setup_of(cell, map)
     stack = stack_of(cell, kind, setup, map)
-    setup = replace(setup, specs=(*setup.specs, *stack.sensors()))
+    setup = with_sensors(setup, stack)
     return Drive(
         cell, map, setup, stack, Supervisor(map, recovery_settings(cell.settings), setup.dt)
     )
@@ -275,6 +275,12 @@ def stack_of(cell: Cell, kind: type[Stack] | None, setup: Setup, map: RoadMap) -
         "set": cell.settings.as_plain(),
     }
     return GuardedStack(AdasStack, setup.specs, map, plain)
+
+
+def with_sensors(setup: Setup, stack: GuardedStack) -> Setup:
+    """The set-up with the further sensors that the stack asks for (L-3)."""
+    more = stack.sensors()
+    return replace(setup, specs=(*setup.specs, *more), asked=frozenset(s.id for s in more))
 
 
 def setup_of(cell: Cell, map: RoadMap) -> Setup:

@@ -10,7 +10,7 @@ from typing import Any
 import yaml
 
 from skidpad.campaign.cells import Cell, Driver
-from skidpad.campaign.drive import Drive, Run, Unsupervised, header_of, loop, story
+from skidpad.campaign.drive import Drive, Run, Unsupervised, header_of, loop, story, with_sensors
 from skidpad.campaign.snapshots import Snapshots
 from skidpad.core.errors import OutputError, StackError
 from skidpad.core.frames import SensorFrame
@@ -94,7 +94,8 @@ class BehindGlass(GuardedStack):
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
         """The same frame, its images behind drops."""
-        return super().tick(replace(frame, images=self.lens.seen(frame.images)))
+        images, extra = self.lens.seen(frame.images), self.lens.seen(frame.extra)
+        return super().tick(replace(frame, images=images, extra=extra))
 
 
 def play(wish: Play, backend: Backend | None = None, folder: Path | None = None) -> Played:
@@ -109,7 +110,7 @@ def play(wish: Play, backend: Backend | None = None, folder: Path | None = None)
     backend = EmbeddedBackend() if backend is None else backend
     try:
         stack = _driver(wish, script, cell, setup)
-        setup = replace(setup, specs=(*setup.specs, *stack.sensors()))
+        setup = with_sensors(setup, stack)
         ready = Drive(cell, script.map, setup, stack, Unsupervised(), player)
         watchers = (Snapshots(folder, "ego", wish.weather.name, setup.dt),)
         run = loop(backend, ready, watchers)

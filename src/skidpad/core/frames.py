@@ -78,6 +78,32 @@ class RadarPoints(NamedTuple):
         return cls(*(np.empty(0, dtype=np.float32) for _ in range(4)))
 
 
+class LidarPoints(NamedTuple):
+    """n returns in the lidar's frame (x forward, y left, z up)."""
+
+    xyz: Float32  # (n, 3) m
+    intensity: Float32  # (n,) 0 .. 1
+    cosine: Float32  # (n,) of the angle of incidence
+    label: NDArray[np.uint8]  # (n,) SemanticClass
+    instance: NDArray[np.uint16]  # (n,) 0 static, else actor index + 1
+
+
+class GnssFix(NamedTuple):
+    """Where the antenna is."""
+
+    latitude: float  # deg, north positive; north is the map's +y
+    longitude: float  # deg, east positive
+    altitude: float  # m
+
+
+class ImuReading(NamedTuple):
+    """What the inertial unit feels, in its own axes: x forward, y left, z up at a level mount."""
+
+    force: tuple[float, float, float]  # m/s^2, specific force: +g upwards at rest
+    rate: tuple[float, float, float]  # rad/s about x, y, z
+    compass: float  # rad clockwise from north, [0, 2 pi)
+
+
 class Segments(NamedTuple):
     """The object level's stand-in for a depth and label image: m vertical runs of equal content.
 
@@ -106,9 +132,9 @@ class SensorFrame:
     contacts: tuple[ContactEvent, ...] = ()
     invasions: tuple[LaneInvasion, ...] = ()
     supervision: Supervision = Supervision.NONE
-    extra: Mapping[str, Any] = field(
-        default_factory=dict
-    )  # readings of sensors the stack asked for
+    # readings of the sensors that the stack asked for, by id: CameraImage, LidarPoints, GnssFix,
+    # ImuReading, or m/s of a speedometer; each is made when it is first read
+    extra: Mapping[str, Any] = field(default_factory=dict)
 
 
 # A backend's frame is the ego's sensor frame.

@@ -79,6 +79,7 @@ class Setup:
     rain_hides_night: bool = False  # in rain the camera effect of the night is left out (D-094)
     mu_ref: float = 0.9  # friction at CARLA's tire_friction 3.5 on a dry road
     level: SensorLevel = SensorLevel.PIXELS
+    asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)
     render_all: bool = False  # every image every tick, read or not
     patches: tuple[FrictionPatch, ...] = ()
     localisation_noise: float = 0.0  # m, standard deviation of the ego's x and y; 0: exact (L-3)

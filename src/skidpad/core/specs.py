@@ -90,12 +90,16 @@ class LidarSpec:
     lower_fov_deg: float = -30.0
 
 
+GNSS, IMU, SPEEDOMETER = "gnss", "imu", "speedometer"
+COLLISION, LANE_INVASION = "collision", "lane_invasion"
+
+
 @dataclass(frozen=True, slots=True)
 class PointSensorSpec:
     """GNSS, IMU, speedometer, collision or lane-invasion sensor."""
 
     id: str
-    kind: str  # "gnss", "imu", "speedometer", "collision", "lane_invasion"
+    kind: str  # one of the five words above
     mount: Pose = Pose(0.0, 0.0, 0.0)
 
 

@@ -7,12 +7,12 @@ degrees are not sent. No noise and no drop-off: intensity falls with the air's e
 from __future__ import annotations
 
 from math import ceil, pi, radians, tan
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
+from skidpad.core.frames import LidarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import LidarSpec
 from skidpad.sensors.rasteriser import Actors, Ints, Scratch
@@ -23,17 +23,6 @@ from skidpad.sensors.view import View, world_to_camera
 CELLS = 32  # columns of cells over a sector
 SECTORS = 4
 STEEPEST_DEG = 80.0
-Float32 = NDArray[np.float32]
-
-
-class LidarPoints(NamedTuple):
-    """n returns in the sensor's frame (x forward, y left, z up), in order of azimuth."""
-
-    xyz: Float32  # (n, 3) m
-    intensity: Float32  # (n,) 0 .. 1
-    cosine: Float32  # (n,) of the angle of incidence
-    label: NDArray[np.uint8]  # (n,) SemanticClass
-    instance: NDArray[np.uint16]  # (n,) 0 static, else actor index + 1
 
 
 class Lidar:

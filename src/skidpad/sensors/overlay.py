@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Any
 
 import cv2
 import numpy as np
@@ -63,8 +64,8 @@ class Lens:
         self.weather, self.seed = weather, seed
         self.layers: dict[str, Layer] = {}
 
-    def seen(self, images: Mapping[str, CameraImage]) -> Mapping[str, CameraImage]:
-        """The same images, each with drops when it is first read."""
+    def seen(self, images: Mapping[str, Any]) -> Mapping[str, Any]:
+        """The same readings, images among them with drops when they are first read."""
         return _Wet(images, self)
 
     def wet(self, id: str, image: CameraImage) -> CameraImage:
@@ -77,14 +78,15 @@ class Lens:
         return replace(image, rgb=overlaid(image.rgb, self.layers[id]))
 
 
-class _Wet(Mapping[str, CameraImage]):
-    """Images by sensor id, behind drops; still rendered only when read."""
+class _Wet(Mapping[str, Any]):
+    """Readings by sensor id, images behind drops; still rendered only when read."""
 
-    def __init__(self, images: Mapping[str, CameraImage], lens: Lens) -> None:
+    def __init__(self, images: Mapping[str, Any], lens: Lens) -> None:
         self.images, self.lens = images, lens
 
-    def __getitem__(self, id: str) -> CameraImage:
-        return self.lens.wet(id, self.images[id])
+    def __getitem__(self, id: str) -> Any:
+        found = self.images[id]
+        return self.lens.wet(id, found) if isinstance(found, CameraImage) else found
 
     def __iter__(self) -> Iterator[str]:
         return iter(self.images)

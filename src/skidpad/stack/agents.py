@@ -16,7 +16,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from skidpad.core.errors import ConfigError, StackError
-from skidpad.core.frames import SensorFrame
+from skidpad.core.frames import LidarPoints, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import (
     mirrored,
@@ -24,9 +24,10 @@ from skidpad.core.lefthanded import (
     pose_to_carla,
     turn_from_carla,
     vector_from_carla,
+    vectors_to_carla,
 )
 from skidpad.core.setup import DT
-from skidpad.core.specs import CameraSpec, Modality, SensorSpec
+from skidpad.core.specs import CameraSpec, LidarSpec, Modality, SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.stack.interface import Stack
@@ -40,6 +41,9 @@ CAMERAS = {
 }
 GNSS, IMU, SPEEDOMETER = "sensor.other.gnss", "sensor.other.imu", "sensor.speedometer"
 POINT_SENSORS = (GNSS, IMU, SPEEDOMETER, "sensor.other.speedometer")
+LIDAR = "sensor.lidar.ray_cast"
+KINDS = (*CAMERAS, LIDAR, *POINT_SENSORS)
+MARK = "agent/"  # before an agent's sensor ids: ours may have the same
 G = 9.81  # m/s^2, what CARLA's accelerometer feels at rest
 EARTH_RADIUS = 6_378_137.0  # m, as in CARLA's projection
 DEPTH_FAR = 1000.0  # m, full scale of CARLA's depth images
@@ -102,11 +106,11 @@ class AgentStack:
         self.agent = _instance(self.agent_class)
         self.agent.setup(str(settings.get("config", "")))
         self.wanted: list[dict[str, Any]] = [dict(s) for s in self.agent.sensors()]
-        self.specs = tuple(_camera(s) for s in self.wanted if _kind(s) in CAMERAS)
+        self.specs = tuple(_spec(s) for s in self.wanted if _kind(s) not in POINT_SENSORS)
         self.planned = False
 
     def sensors(self) -> tuple[SensorSpec, ...]:
-        """The cameras that it asked for; the rest is read from the ego's own motion."""
+        """The cameras and lidars that it asked for; the rest is read from the ego's own motion."""
         return self.specs
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
@@ -157,7 +161,11 @@ class AgentStack:
             wx, wy, wz = turn_from_carla(0.0, 0.0, ego.yaw_rate)
             return np.array([ax, ay, az, wx, wy, wz, (pi / 2.0 - ego.pose.yaw) % tau])
         if kind in CAMERAS:
-            return _image(str(wanted["id"]), CAMERAS[kind], frame)
+            return _image(MARK + str(wanted["id"]), CAMERAS[kind], frame)
+        if kind == LIDAR:
+            seen: LidarPoints = frame.extra[MARK + str(wanted["id"])]
+            places = vectors_to_carla(*seen.xyz.astype(np.float64).T)
+            return np.column_stack((places, seen.intensity)).astype(np.float32)
         return {"speed": ego.speed}
 
 
@@ -171,19 +179,34 @@ def _instance(kind: type[Any]) -> Any:
 
 def _kind(wanted: Mapping[str, Any]) -> str:
     kind = str(wanted.get("type", ""))
-    if kind not in CAMERAS and kind not in POINT_SENSORS:
-        known = ", ".join((*CAMERAS, *POINT_SENSORS))
+    if kind not in KINDS:
+        known = ", ".join(KINDS)
         raise StackError(f"the agent asks for a sensor {kind!r}; there are: {known}")
     return kind
 
 
-def _camera(wanted: Mapping[str, Any]) -> CameraSpec:
-    """A camera as the agent describes it, in CARLA's axes."""
+def _spec(wanted: Mapping[str, Any]) -> SensorSpec:
+    """A camera or lidar as the agent describes it, in CARLA's axes.
+
+    What it leaves out is as in the leaderboard: there lidars have 64 channels and reach 85 m.
+    """
     mount = pose_from_carla(
         *(float(wanted.get(k, 0.0)) for k in ("x", "y", "z", "roll", "pitch", "yaw"))
     )
+    id = MARK + str(wanted["id"])
+    if _kind(wanted) == LIDAR:
+        return LidarSpec(
+            id,
+            mount,
+            channels=int(wanted.get("channels", 64)),
+            range=float(wanted.get("range", 85.0)),
+            points_per_second=int(wanted.get("points_per_second", 600_000)),
+            rotation_hz=float(wanted.get("rotation_frequency", 10.0)),
+            upper_fov_deg=float(wanted.get("upper_fov", 10.0)),
+            lower_fov_deg=float(wanted.get("lower_fov", -30.0)),
+        )
     return CameraSpec(
-        str(wanted["id"]),
+        id,
         CAMERAS[_kind(wanted)],
         int(wanted.get("width", 800)),
         int(wanted.get("height", 600)),
@@ -195,7 +218,9 @@ def _camera(wanted: Mapping[str, Any]) -> CameraSpec:
 def _image(id: str, modality: Modality, frame: SensorFrame) -> np.ndarray[Any, Any]:
     """(H, W, 4) BGRA bytes, as CARLA's sensors deliver them."""
     if id not in frame.images:
-        raise StackError(f"camera {id!r} delivers no image: run with --sensors pixels")
+        raise StackError(
+            f"camera {id.removeprefix(MARK)!r} delivers no image: run with --sensors pixels"
+        )
     image = frame.images[id]
     if modality is Modality.RGB:
         assert image.rgb is not None

@@ -14,8 +14,8 @@ from skidpad.roads.queries import RoadMap
 class Stack(Protocol):
     """Constructed as `Class(specs, map, settings)`, then called once per tick.
 
-    Optional: `sensors()` names more sensors, whose readings arrive in `frame.extra` by id;
-    `report` says what it thought, for the recording.
+    Optional: `sensors()` names more sensors (cameras, lidars, GNSS, IMU, speedometer), whose
+    readings arrive in `frame.extra` by id; `report` says what it thought, for the recording.
     """
 
     def __init__(

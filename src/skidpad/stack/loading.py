@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import suppress
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
@@ -14,12 +14,22 @@ from typing import Any
 
 from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.frames import SensorFrame
-from skidpad.core.specs import SensorSpec
+from skidpad.core.specs import (
+    GNSS,
+    IMU,
+    SPEEDOMETER,
+    CameraSpec,
+    LidarSpec,
+    PointSensorSpec,
+    SensorSpec,
+)
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.interface import Stack
 
 NO_REPORT = StackReport()
+ASKABLE = (CameraSpec, LidarSpec, PointSensorSpec)  # there is one radar, and every stack has it
+ASKABLE_KINDS = (GNSS, IMU, SPEEDOMETER)
 
 
 def load_stack(where: str) -> type[Stack]:
@@ -76,6 +86,7 @@ class GuardedStack:
         settings: Mapping[str, Any],
     ) -> None:
         self.name = kind.__name__
+        self._taken = frozenset(spec.id for spec in specs)
         try:
             self.stack = kind(specs, map, settings)
         except (StackError, ConfigError):
@@ -116,9 +127,11 @@ class GuardedStack:
         if ask is None:
             return ()
         try:
-            return tuple(ask())
+            wanted = tuple(ask())
         except Exception as error:
             raise StackError(f"{self.name}.sensors() raised: {error!r}") from error
+        _check_sensors(self.name, wanted, self._taken)
+        return wanted
 
 
 def _check(name: str, command: VehicleCommand, tick: int) -> None:
@@ -131,4 +144,19 @@ def _check(name: str, command: VehicleCommand, tick: int) -> None:
         if not isfinite(value) or not low <= value <= 1.0:
             raise StackError(
                 f"{name}: {what} must be between {low:g} and 1, got {value!r} in tick {tick}"
+            )
+
+
+def _check_sensors(name: str, wanted: Sequence[SensorSpec], taken: Collection[str]) -> None:
+    for k, spec in enumerate(wanted):
+        if not isinstance(spec, ASKABLE):
+            raise StackError(
+                f"{name}.sensors() must name cameras, lidars and point sensors, got {spec!r}"
+            )
+        if spec.id in taken or spec.id in {other.id for other in wanted[:k]}:
+            raise StackError(f"{name}.sensors(): there is a sensor {spec.id!r} already")
+        if isinstance(spec, PointSensorSpec) and spec.kind not in ASKABLE_KINDS:
+            known = ", ".join(ASKABLE_KINDS)
+            raise StackError(
+                f"{name}.sensors(): sensor {spec.id!r} has kind {spec.kind!r}; choose one of: {known}"
             )

@@ -8,9 +8,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.frames import RadarPoints
+from skidpad.core.frames import LidarPoints, RadarPoints
 from skidpad.core.jit import kernel
-from skidpad.core.lefthanded import angles_to_carla
+from skidpad.core.lefthanded import angles_to_carla, vectors_to_carla
 from skidpad.core.specs import CameraSpec
 from skidpad.core.vocabulary import SemanticClass
 
@@ -92,3 +92,27 @@ def radar_points(raw: bytes | memoryview, limit: float = inf) -> RadarPoints:
     points = points[points[:, 3] <= limit].astype(np.float32)
     azimuth = angles_to_carla(points[:, 1]).astype(np.float32)
     return RadarPoints(points[:, 3].copy(), azimuth, points[:, 2].copy(), points[:, 0].copy())
+
+
+SEMANTIC_POINT = np.dtype(
+    [("place", "<f4", 3), ("cosine", "<f4"), ("actor", "<u4"), ("tag", "<u4")]
+)
+
+
+def lidar_points(
+    raw: bytes | memoryview, rows: NDArray[np.uint16], extinction: float
+) -> LidarPoints:
+    """Returns of a semantic lidar; its class and actor come instead of an intensity.
+
+    rows: row + 1 by the lower bits of an actor id. extinction: of light in the air, 1/m.
+    """
+    points = np.frombuffer(raw, dtype=SEMANTIC_POINT)
+    places = vectors_to_carla(*points["place"].astype(np.float64).T)
+    distance = np.linalg.norm(places, axis=1)
+    return LidarPoints(
+        places.astype(np.float32),
+        np.exp(-extinction * distance).astype(np.float32),
+        points["cosine"].copy(),
+        points["tag"].astype(np.uint8),
+        rows[points["actor"] % len(rows)],
+    )

@@ -8,7 +8,14 @@ from typing import Any
 
 from skidpad.core.errors import BackendError
 from skidpad.core.setup import Setup
-from skidpad.core.specs import CameraSpec, Modality, PointSensorSpec, RadarSpec, SensorSpec
+from skidpad.core.specs import (
+    CameraSpec,
+    LidarSpec,
+    Modality,
+    PointSensorSpec,
+    RadarSpec,
+    SensorSpec,
+)
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.simulation.carla.axes import to_transform
 from skidpad.simulation.carla.connection import Connection
@@ -58,7 +65,7 @@ class Sensors:
         self.listening: list[Any] = []
         self.silent: list[str] = []
         pixels = setup.level is SensorLevel.PIXELS
-        display = set() if setup.render_all else display_cameras(setup.specs)
+        display = set() if setup.render_all else display_cameras(setup.specs) - setup.asked
         for spec in setup.specs:
             if isinstance(spec, PointSensorSpec):
                 if spec.kind in EVENTS:
@@ -71,8 +78,13 @@ class Sensors:
                 if spec.id in display:
                     self.silent.append(spec.id)
                     continue
-                box = self.boxes[spec.id] = Mailbox(spec)
-                self._listen(actor, box.hear)
+                self._read(actor, spec)
+            elif isinstance(spec, LidarSpec):
+                self._read(self._attach(*described(spec)), spec)
+
+    def _read(self, actor: Any, spec: SensorSpec) -> None:
+        box = self.boxes[spec.id] = Mailbox(spec)
+        self._listen(actor, box.hear)
 
     def _listen(self, actor: Any, hear: Callable[[Any], None]) -> None:
         actor.listen(hear)
@@ -124,8 +136,24 @@ def display_cameras(specs: Sequence[SensorSpec]) -> set[str]:
     return set(rgb[1:])
 
 
-def described(spec: CameraSpec | RadarSpec) -> tuple[str, SensorSpec, dict[str, str]]:
+def described(
+    spec: CameraSpec | RadarSpec | LidarSpec,
+) -> tuple[str, SensorSpec, dict[str, str]]:
     """Blueprint id, spec and attributes (A-018 to A-028)."""
+    if isinstance(spec, LidarSpec):
+        return (
+            "sensor.lidar.ray_cast_semantic",
+            spec,
+            {
+                "channels": str(spec.channels),
+                "range": f"{spec.range:g}",
+                "points_per_second": str(spec.points_per_second),
+                "rotation_frequency": f"{spec.rotation_hz:g}",
+                "upper_fov": f"{spec.upper_fov_deg:g}",
+                "lower_fov": f"{spec.lower_fov_deg:g}",
+                "sensor_tick": "0.0",
+            },
+        )
     if isinstance(spec, RadarSpec):
         return (
             "sensor.other.radar",

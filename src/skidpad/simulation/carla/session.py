@@ -11,17 +11,18 @@ from typing import Any
 import numpy as np
 
 from skidpad.core.errors import BackendError, ConfigError
-from skidpad.core.frames import RadarPoints, SensorFrame
+from skidpad.core.frames import LidarPoints, RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import mirrored
 from skidpad.core.randomness import stream
 from skidpad.core.setup import ActorCommand, Setup
-from skidpad.core.specs import RadarSpec
+from skidpad.core.specs import LidarSpec, RadarSpec
 from skidpad.core.states import ActorStates, EgoEstimate, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import RangeModel, SensorLevel
 from skidpad.physics.optics import radar_range
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import LanePoint
+from skidpad.sensors.asked import AskedSensors
 from skidpad.simulation.carla import decode, truth
 from skidpad.simulation.carla.axes import to_transform, to_vector
 from skidpad.simulation.carla.cast import Player, spawn_setup, table_of
@@ -139,6 +140,9 @@ class Session:
         for i, player in enumerate(self.players):
             if player.actor is not None:
                 self.pictures.rows[player.actor.id % len(self.pictures.rows)] = i + 1
+        self.asked = None
+        if setup.asked:
+            self.asked = AskedSensors(self.map, self.table, setup, self._lidar)
         self.radar_id = next((s.id for s in setup.specs if isinstance(s, RadarSpec)), None)
         self.radar_limit = inf
         for spec in setup.specs:
@@ -329,7 +333,7 @@ class Session:
 
     def frame(self) -> SensorFrame:
         """What the ego's sensors say."""
-        seen = self._readings()
+        seen, asked = self._readings(), self.asked
         return SensorFrame(
             tick=self.tick,
             ego=self._estimate(),
@@ -339,7 +343,15 @@ class Session:
             lights=MappingProxyType(self.light_states),
             contacts=self.contacts,
             invasions=self.invasions,
+            extra={} if asked is None else asked.read(self.tick, self.states, seen.images),
         )
+
+    def _lidar(self, spec: LidarSpec) -> LidarPoints:
+        """The server's; GNSS, IMU and speedometer are read off the body, as in our own world."""
+        assert self.pictures is not None
+        assert self.asked is not None
+        raw = self.messages[spec.id].raw_data
+        return decode.lidar_points(raw, self.pictures.rows, self.asked.air)
 
     def _readings(self) -> Readings:
         if self.objects is not None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +13,7 @@ from skidpad.roads.bundled import bundled_maps, load_map, map_file
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.walkable import walk_mesh
+from skidpad.sensors.inertial import map_origin
 from skidpad.simulation.carla_server import navmesh
 from skidpad.simulation.carla_server.rpc import CallError
 
@@ -38,8 +38,7 @@ class ServedMap:
     @property
     def origin(self) -> tuple[float, float]:
         """Latitude and longitude in deg of the map's origin."""
-        text = self.roads.geo_reference
-        return _projection(text, "lat_0"), _projection(text, "lon_0")
+        return map_origin(self.roads.geo_reference)
 
     @property
     def full_name(self) -> str:
@@ -93,12 +92,6 @@ class MapStore:
             if own.is_file():
                 return own
         return map_file(name) if name in bundled_maps() else None
-
-
-def _projection(text: str, key: str) -> float:
-    """A number of a projection text like `+lat_0=49 +lon_0=8`; 0 when it is not there."""
-    found = re.search(rf"\+{key}=(-?[0-9.]+(?:[eE][-+]?[0-9]+)?)", text)
-    return float(found[1]) if found else 0.0
 
 
 def roads_from_text(xodr: str, name: str) -> RoadMap:

@@ -13,6 +13,7 @@ from skidpad.core.randomness import stream
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
 from skidpad.roads.queries import RoadMap
+from skidpad.sensors.asked import AskedSensors
 from skidpad.simulation.embedded.sensing import sensing_of
 from skidpad.simulation.embedded.world import EGO, World
 
@@ -46,6 +47,7 @@ class EmbeddedBackend:
         self._world = World(setup, seed)
         self._localisation = stream(seed, "ego", "localisation")
         self.sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
+        self._asked = AskedSensors(self.map, self.world.table, setup) if setup.asked else None
         return self._frame()
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
@@ -79,6 +81,7 @@ class EmbeddedBackend:
     def _frame(self) -> SensorFrame:
         w = self.world
         seen = self.sensing.read(w.tick, w.states, w.lights.by_id, w.braking())
+        asked = self._asked
         return SensorFrame(
             tick=w.tick,
             ego=self._estimate(),
@@ -88,6 +91,7 @@ class EmbeddedBackend:
             lights=MappingProxyType(w.lights.by_id),
             contacts=w.contacts,
             invasions=w.invasions,
+            extra={} if asked is None else asked.read(w.tick, w.states, seen.images),
         )
 
     def _estimate(self) -> EgoEstimate:

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from math import atan, cos, exp, log, pi, radians, sin, tan
+from math import cos, sin
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import turn_from_carla, vector_from_carla
+from skidpad.sensors.inertial import compass, geolocation
 from skidpad.simulation.carla_server import codec
 from skidpad.simulation.carla_server.catalogue import Family
 
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from skidpad.simulation.carla_server.sensing.sensors import Sensor
     from skidpad.simulation.carla_server.world import World
 
-EARTH_RADIUS = 6_378_137.0  # m, WGS 84 equator, as the client's own transform_to_geolocation
 Floats = NDArray[np.float64]
 Motion = tuple[Floats, Floats]
 
@@ -57,13 +56,11 @@ def imu(world: World, sensor: Sensor) -> list[tuple[bytes | memoryview, ...]]:
     return [(codec.pack([out_force, out_rate, compass(pose)]),)]
 
 
-def compass(pose: Pose) -> float:
-    """rad clockwise from north, [0, 2 pi); north is ISO +y, which is CARLA's -y."""
-    return (pi / 2.0 - pose.yaw) % (2.0 * pi)
-
-
 def gnss(world: World, sensor: Sensor) -> list[tuple[bytes | memoryview, ...]]:
-    """Latitude and longitude in deg, altitude in m."""
+    """Latitude and longitude in deg, altitude in m.
+
+    Latitude grows with CARLA's y, as in the client's own map, although the IMU's north is its -y.
+    """
     pose = world.pose(sensor.actor)
     x, y, _ = vector_from_carla(pose.x, pose.y, pose.z)
     latitude, longitude = geolocation(x, y, *world.map.origin)
@@ -73,18 +70,3 @@ def gnss(world: World, sensor: Sensor) -> list[tuple[bytes | memoryview, ...]]:
         for k, (name, v) in enumerate((("lat", latitude), ("lon", longitude), ("alt", pose.z)))
     ]
     return [(codec.pack(values),)]
-
-
-def geolocation(x: float, y: float, latitude: float, longitude: float) -> tuple[float, float]:
-    """(latitude, longitude) in deg of a place x, y in CARLA's axes from a map's origin, m.
-
-    Mercator scaled at the origin, as the client's own map computes it: latitude grows with
-    CARLA's y, although the IMU's north is its -y.
-    """
-    scale = EARTH_RADIUS * cos(radians(latitude))
-    east = scale * radians(longitude) + x
-    north = scale * log(tan(pi / 4.0 + radians(latitude) / 2.0)) + y
-    return (
-        (2.0 * atan(exp(north / scale)) - pi / 2.0) * 180.0 / pi,
-        east / scale * 180.0 / pi,
-    )

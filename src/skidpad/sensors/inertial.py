@@ -1,0 +1,68 @@
+"""GNSS, inertial unit and speedometer of a body, exact: what they would say without noise."""
+
+from __future__ import annotations
+
+import re
+from math import atan, cos, exp, log, pi, radians, sin, tan
+
+import numpy as np
+
+from skidpad.core.frames import GnssFix, ImuReading
+from skidpad.core.geometry import Pose
+from skidpad.core.states import ActorStates
+
+EARTH_RADIUS = 6_378_137.0  # m, equator of WGS 84, as in CARLA's projection
+G = 9.80665  # m/s^2, standard gravity, 3rd CGPM (1901)
+
+
+def map_origin(geo_reference: str) -> tuple[float, float]:
+    """Latitude and longitude in deg of a map's origin, from its projection text; 0, 0 without."""
+    number = r"-?[0-9.]+(?:[eE][-+]?[0-9]+)?"
+    found = dict(re.findall(rf"\+(lat_0|lon_0)=({number})", geo_reference))
+    return float(found.get("lat_0", 0.0)), float(found.get("lon_0", 0.0))
+
+
+def geolocation(
+    east: float, north: float, latitude: float, longitude: float
+) -> tuple[float, float]:
+    """(latitude, longitude) in deg of a place in m from an origin in deg.
+
+    Mercator on a sphere, scaled at the origin, as CARLA computes it.
+    """
+    scale = EARTH_RADIUS * cos(radians(latitude))
+    y = scale * log(tan(pi / 4.0 + radians(latitude) / 2.0)) + north
+    x = scale * radians(longitude) + east
+    return (2.0 * atan(exp(y / scale)) - pi / 2.0) * 180.0 / pi, x / scale * 180.0 / pi
+
+
+def compass(pose: Pose) -> float:
+    """rad clockwise from north, [0, 2 pi); north is +y."""
+    return (pi / 2.0 - pose.yaw) % (2.0 * pi)
+
+
+def gnss(antenna: Pose, origin: tuple[float, float]) -> GnssFix:
+    """The fix of an antenna in the world; origin: latitude and longitude of the map's, deg."""
+    return GnssFix(*geolocation(antenna.x, antenna.y, *origin), antenna.z)
+
+
+def imu(mount: Pose, states: ActorStates, i: int) -> ImuReading:
+    """What a unit mounted on actor i feels.
+
+    The lever arm adds its centripetal acceleration; what changes of the yaw rate would add is left
+    out. The road's curvature in height is not felt either: bodies have no vertical acceleration.
+    """
+    body = states.pose(i)
+    rate = float(states.yaw_rate[i])
+    ax = float(states.ax[i]) - rate * rate * mount.x
+    ay = float(states.ay[i]) - rate * rate * mount.y
+    c, s = cos(body.yaw), sin(body.yaw)
+    to_sensor = (body @ mount).rotation().T
+    fx, fy, fz = (to_sensor @ np.array([ax * c - ay * s, ax * s + ay * c, G])).tolist()
+    wx, wy, wz = (to_sensor @ np.array([0.0, 0.0, rate])).tolist()
+    return ImuReading((fx, fy, fz), (wx, wy, wz), compass(body @ mount))
+
+
+def speed(states: ActorStates, i: int) -> float:
+    """m/s along the body, negative in reverse."""
+    yaw = float(states.yaw[i])
+    return float(states.vx[i]) * cos(yaw) + float(states.vy[i]) * sin(yaw)

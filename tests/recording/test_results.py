@@ -230,3 +230,9 @@ def test_a_folder_says_which_command_wrote_it(tmp_path):
     (tmp_path / CAMPAIGN).write_text("{")
     with pytest.raises(FileError, match="damaged"):
         campaign_command(tmp_path)
+
+
+def test_an_unfinished_campaign_says_how_to_finish_it(tmp_path):
+    (tmp_path / "ledger.jsonl").touch()
+    with pytest.raises(FileError, match="not finished: finish it with --resume"):
+        read_results(tmp_path)

@@ -13,6 +13,7 @@ from typing import Any
 
 import polars as pl
 
+from skidpad.core.errors import FileError
 from skidpad.recording.files import (
     content_hash,
     read_parquet,
@@ -163,6 +164,8 @@ def write_results(
 
 def read_results(folder: Path) -> pl.DataFrame:
     """results.parquet of a campaign; FileError when there is none."""
+    if (folder / "ledger.jsonl").is_file() and not (folder / RESULTS).is_file():
+        raise FileError(f"{folder} holds a campaign that is not finished: finish it with --resume")
     return read_parquet(folder / RESULTS)[0]
 
 

@@ -1,3 +1,4 @@
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -44,13 +45,14 @@ def campaign(tmp_path_factory):
     return folder
 
 
-@pytest.mark.req("A-260", "A-261")
+@pytest.mark.req("A-139", "A-260", "A-261")
 def test_a_run_can_be_driven_again_from_what_it_left_behind(campaign):
     run = campaign / "runs" / "2_rain-noon-003"
     assert read_cell(run) == cell()
     done = CliRunner().invoke(app, ["rerun", str(run), "--from", "1", "--to", "3"])
     assert done.exit_code == 0, done.output
     assert "the same drive" in done.output
+    assert re.search(r"^ +1\.00 s  CRUISE \[LCA on\] +NO_TARGET$", done.output, re.MULTILINE)
     assert len(list((run / "rerun").glob("*.png"))) == 40
 
 

@@ -15,8 +15,9 @@ import numpy as np
 import yaml
 from PIL import Image
 
+from skidpad.campaign.backends import make_backend
 from skidpad.campaign.cells import Cell, Driver
-from skidpad.campaign.drive import run_cell
+from skidpad.campaign.drive import loop, prepare
 from skidpad.campaign.matrix import CONFIG
 from skidpad.campaign.views import SIZE, twelve_views
 from skidpad.core.errors import ConfigError, FileError, OutputError
@@ -28,6 +29,7 @@ from skidpad.core.weather import Weather
 from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.recording.runlog import RunLog
 from skidpad.stack.configurations import parse_functions
+from skidpad.stack.loading import GuardedStack
 from skidpad.stack.settings import Settings
 
 PICTURES = 40  # at most this many PNG files of a stretch when no film is asked for
@@ -53,9 +55,14 @@ def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None 
     if begin_s > last:
         raise ConfigError(f"--from {begin_s:g} lies after the end of the run at {last:g} s")
     end_s = min(end_s, last + DT)
-    watcher = Closely(begin_s, end_s, out, film)
-    again = run_cell(replace(cell, duration=end_s), watchers=(watcher,))
-    watcher.close()
+    ready = prepare(replace(cell, duration=end_s))
+    watcher = Closely(begin_s, end_s, out, film, ready.stack)
+    backend = make_backend(cell.backend)
+    try:
+        again = loop(backend, ready, (watcher,))
+    finally:
+        backend.close()
+        watcher.close()
     ticks = len(again.log)
     same = log_hash(again.log) == log_hash(first_ticks(stored, ticks))
     return Rerun(same, tuple(watcher.pictures), film, tuple(watcher.trace))
@@ -118,8 +125,11 @@ def read_cell(run: Path) -> Cell:
 class Closely:
     """Watches a stretch: pictures or a film of all views, and the trace of tiers."""
 
-    def __init__(self, begin_s: float, end_s: float, out: Path, film: Path | None) -> None:
-        self.begin, self.out = begin_s, out
+    def __init__(
+        self, begin_s: float, end_s: float, out: Path, film: Path | None, stack: GuardedStack
+    ) -> None:
+        """stack: who drives, asked for its mode in words (A-139)."""
+        self.begin, self.out, self.stack = begin_s, out, stack
         self.every = max(1, round((end_s - begin_s) / DT / PICTURES))
         self.pictures: list[Path] = []
         self.trace: list[str] = []
@@ -133,12 +143,13 @@ class Closely:
             return
         self._trace(t, report)
         if self._film is not None:
-            picture = twelve_views(frame, truth, report, DT)
+            picture = twelve_views(frame, truth, report, DT, self.stack.mode)
             self._film.write(np.ascontiguousarray(picture[..., ::-1]))
         elif frame.tick % self.every == 0:
             self.out.mkdir(parents=True, exist_ok=True)
             path = self.out / f"{t:07.2f}s.png"
-            Image.fromarray(twelve_views(frame, truth, report, DT)).save(path)
+            picture = twelve_views(frame, truth, report, DT, self.stack.mode)
+            Image.fromarray(picture).save(path)
             self.pictures.append(path)
 
     def _trace(self, t: float, report: StackReport | None) -> None:
@@ -148,7 +159,7 @@ class Closely:
         tier = report.tier.name if report.tier is not None else "-"
         status = report.status.name if report.status is not None else "-"
         distance = f", {report.distance:.1f} m" if report.distance is not None else ""
-        self.trace.append(f"{t:7.2f} s  {tier:<20} {status}{distance}")
+        self.trace.append(f"{t:7.2f} s  {self.stack.mode or tier:<36} {status}{distance}")
 
     def close(self) -> None:
         """Finish the film."""

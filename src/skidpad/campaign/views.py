@@ -37,9 +37,16 @@ INK, DIM, ACCENT = (235, 235, 235), (150, 160, 170), (255, 133, 82)
 
 
 def twelve_views(
-    frame: SensorFrame, truth: WorldTruth, report: StackReport | None, dt: float
+    frame: SensorFrame,
+    truth: WorldTruth,
+    report: StackReport | None,
+    dt: float,
+    mode: str = "",
 ) -> Picture:
-    """(720, 1600, 3) RGB: nine cameras, radar from above, contacts and markings, the tier trace."""
+    """(720, 1600, 3) RGB: nine cameras, radar from above, contacts and markings, the tier trace.
+
+    mode: the stack's own words for its tier; without them the tier's name.
+    """
     picture = np.zeros((*SIZE, 3), dtype=np.uint8)
     for id, (left, top, width, height) in LAYOUT.items():
         if id in frame.images:
@@ -49,7 +56,7 @@ def twelve_views(
             picture[top : top + height, left : left + width] = small
         _write(picture, id, left + 6, top + 16, DIM, 0.42)
     _draw_radar(picture, frame.radar)
-    _draw_text(picture, frame, truth, report, dt)
+    _draw_text(picture, frame, truth, report, dt, mode)
     return picture
 
 
@@ -74,7 +81,12 @@ def _draw_radar(picture: Picture, points: RadarPoints) -> None:
 
 
 def _draw_text(
-    picture: Picture, frame: SensorFrame, truth: WorldTruth, report: StackReport | None, dt: float
+    picture: Picture,
+    frame: SensorFrame,
+    truth: WorldTruth,
+    report: StackReport | None,
+    dt: float,
+    mode: str,
 ) -> None:
     left, top, _, _ = TEXT_BOX
     first = f"{frame.tick * dt:7.2f} s   {3.6 * frame.ego.speed:5.1f} km/h"
@@ -84,15 +96,16 @@ def _draw_text(
     first += f"   throttle {throttle:.2f}  brake {brake:.2f}  steer {steer:+.2f}"
     _write(picture, first, left + 12, top + 30, INK, 0.62)
     if report is not None:
-        _write(picture, _said(report), left + 12, top + 62, INK, 0.55)
+        _write(picture, _said(report, mode), left + 12, top + 62, INK, 0.55)
     events = [f"contact with {c.static or truth.table.names[c.actor]}" for c in truth.contacts]
     events += [f"{i.marking} marking crossed" for i in truth.invasions]
     _write(picture, ", ".join(events), left + 12, top + 94, ACCENT, 0.55)
 
 
-def _said(report: StackReport) -> str:
+def _said(report: StackReport, mode: str) -> str:
+    tier = report.tier.name.lower().replace("_", " ") if report.tier is not None else None
     shown: Mapping[str, Any] = {
-        "tier": report.tier.name.lower().replace("_", " ") if report.tier is not None else None,
+        "tier": mode or tier,
         "status": report.status.name.lower().replace("_", " ")
         if report.status is not None
         else None,

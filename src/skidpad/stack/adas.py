@@ -24,6 +24,7 @@ from skidpad.stack.configurations import (
 )
 from skidpad.stack.control.resume import ResumeProtocol, SpeedCaps
 from skidpad.stack.control.steering import NoSmoothing, Smoothing, steering_of
+from skidpad.stack.control.text import mode_text
 from skidpad.stack.control.tiers import (
     Hierarchy,
     Lead,
@@ -106,6 +107,11 @@ class AdasStack:
         self.verified_by = ""
         self.report = StackReport()
         self.switch(self.config.functions)
+
+    @property
+    def mode(self) -> str:
+        """The mode of the last tick as text for people (A-139)."""
+        return mode_text(self.report, Function.LCA in self.functions, self.verified_by)
 
     def switch(self, functions: Functions) -> None:
         """Turn functions on and off while driving (A-011); the controllers start afresh."""

@@ -15,7 +15,8 @@ class Stack(Protocol):
     """Constructed as `Class(specs, map, settings)`, then called once per tick.
 
     Optional: `sensors()` names more sensors (cameras, lidars, GNSS, IMU, speedometer), whose
-    readings arrive in `frame.extra` by id; `report` says what it thought, for the recording.
+    readings arrive in `frame.extra` by id; `report` says what it thought, for the recording;
+    `mode` is a text on its present mode, for `skidpad rerun`.
     """
 
     def __init__(

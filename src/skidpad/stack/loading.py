@@ -121,6 +121,12 @@ class GuardedStack:
         report = getattr(self.stack, "report", NO_REPORT)
         return report if isinstance(report, StackReport) else NO_REPORT
 
+    @property
+    def mode(self) -> str:
+        """The mode of the last tick in the stack's words; empty for one that has none."""
+        mode = getattr(self.stack, "mode", "")
+        return mode if isinstance(mode, str) else ""
+
     def sensors(self) -> tuple[SensorSpec, ...]:
         """The further sensors that the stack asks for."""
         ask = getattr(self.stack, "sensors", None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from math import sqrt
 
 import pytest
@@ -154,6 +155,7 @@ def test_only_tier_2_asks_the_cameras(configuration, detected):
 def test_the_source_of_a_verification_is_that_of_the_tick():
     stack, _ = settled([Car(4.0)], 2.9)
     assert stack.verified_by == "bumper"
+    assert re.fullmatch(r"STOPPED TOO CLOSE \(bumper\) \d\.\d m \[LCA o(n|ff)\]", stack.mode)
     stack.tick(frame(8, [Car(4.0)], ego_at(v=5.0 / 3.6)))
     assert stack.verified_by == ""
 

@@ -78,6 +78,14 @@ def test_the_report_has_every_section_and_no_link_to_the_network(tmp_path):
     assert "Per run of 500 s" in html
 
 
+@pytest.mark.req("X-7")
+def test_the_report_admits_which_rule_was_settled_after_results(tmp_path):
+    campaign(tmp_path)
+    page = " ".join(write_report(tmp_path).read_text(encoding="utf-8").split())
+    assert "One rule is not blind: that a margin comes before significance" in page
+    assert "settled after results of the friction campaign had been seen" in page
+
+
 def test_counts_in_the_matrix_are_those_of_the_results(tmp_path):
     rows = campaign(tmp_path)
     matrix = load_matrix(tmp_path)

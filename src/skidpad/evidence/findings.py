@@ -1,8 +1,10 @@
 """Findings as data: a claim, what would show it, and a verdict computed from results (X-7).
 
-A finding is written before results are seen. It consists of contrasts: differences that the claim
-says are positive. It is supported when all of them are shown, contradicted when one is shown to be
-reversed or smaller than its margin, and otherwise undecided, with the seeds that it would take.
+A finding is written before its results are seen; the rule that margins come before significance was
+settled after those of the friction campaign, and reports say so. A finding consists of contrasts:
+differences that the claim says are positive. It is supported when all of them are shown, contradicted
+when one is shown to be reversed or smaller than its margin, and otherwise undecided, with the seeds
+that it would take.
 """
 
 from __future__ import annotations

@@ -266,8 +266,9 @@ def verdicts(table: Mapping[str, Any]) -> list[Block]:
     blocks: list[Block] = [
         Text(
             "Practical rules against world-model truth. Claims, tests and margins were written before "
-            "results were seen. A finding that the simulated channels bring about by how they are "
-            "made is marked; all others emerge from the drives."
+            "results were seen; that a margin comes before significance is a rule of all reports, "
+            "settled after results of the friction campaign. A finding that the simulated channels "
+            "bring about by how they are made is marked; all others emerge from the drives."
         )
     ]
     for j in judged:

@@ -141,7 +141,10 @@ def _verdicts(matrix: Matrix) -> list[Block]:
     claims = (*FINDINGS, *ACCEPTANCE)
     judged = judge(claims, [None if f.study else matrix.results for f in claims])
     intro = Text(
-        "Each claim, its test and its margin were written down before results were seen. "
+        "Each claim, its test and its margin were written down before results of the matrix were "
+        "seen. One rule is not blind: that a margin comes before significance, so that a difference "
+        "below its margin supports nothing, is shared by all reports and was settled after results "
+        "of the friction campaign had been seen. "
         "A claim whose two sides are the same drive is marked by construction; one that needs runs "
         "of its own can be tested with `skidpad study ID`."
     )

@@ -8,6 +8,7 @@ from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import yaml
 
@@ -28,6 +29,9 @@ from skidpad.recording.grip import (
     write_series,
 )
 from skidpad.recording.ledger import Ledger, fingerprints, latest
+
+if TYPE_CHECKING:
+    from skidpad.campaign.play import Played
 
 TARGET = "skidpad.campaign.grip:drive_one"
 WARM = "skidpad.campaign.grip:warm_up"
@@ -113,7 +117,7 @@ def warm_up() -> None:
             )
 
 
-def play_cell(cell: GripCell, folder: Path | None = None):  # type: ignore[no-untyped-def]
+def play_cell(cell: GripCell, folder: Path | None = None) -> Played:
     """Play the scenario of a cell; returns what is left behind."""
     from skidpad.campaign.play import Play, play
     from skidpad.scenarios.variation import drawn_parameters, drawn_skill, scenario_file

@@ -77,39 +77,34 @@ def adas(
     csv: Annotated[bool, typer.Option("--csv", help="Write CSV beside Parquet.")] = False,
 ) -> None:
     """Drive configurations x weathers x seeds; prints the path of the report."""
-    from skidpad.cli.adas_plan import Wish, drive_with_progress, next_folder, plan, warn
-    from skidpad.report.matrix import write_report
+    from skidpad.cli.adas_plan import Wish, drive_to_report
 
-    cells = plan(
-        Wish(
-            configs=configs,
-            functions=functions,
-            stack=stack,
-            weather=weather,
-            sweep=sweep,
-            grip=grip,
-            range=range,
-            seeds=seeds,
-            duration=duration,
-            profile=profile,
-            assignments=set or [],
-            map=map,
-            traffic=traffic,
-            vehicles=vehicles,
-            sensors=sensors,
-            render=render,
-            backend=backend,
-            host=host,
-            port=port,
-            pace=pace,
-            without=without or [],
-            server_command=server_command,
-            restart_every=restart_every,
-        )
+    wish = Wish(
+        configs=configs,
+        functions=functions,
+        stack=stack,
+        weather=weather,
+        sweep=sweep,
+        grip=grip,
+        range=range,
+        seeds=seeds,
+        duration=duration,
+        profile=profile,
+        assignments=set or [],
+        map=map,
+        traffic=traffic,
+        vehicles=vehicles,
+        sensors=sensors,
+        render=render,
+        backend=backend,
+        host=host,
+        port=port,
+        pace=pace,
+        without=without or [],
+        server_command=server_command,
+        restart_every=restart_every,
     )
-    folder = next_folder(out, cells) if or_next else out
-    warn(drive_with_progress(cells, folder, workers=workers, resume=resume, csv=csv))
-    typer.echo(write_report(folder))
+    typer.echo(drive_to_report(wish, out, or_next, workers=workers, resume=resume, csv=csv))
 
 
 def report(folder: Annotated[Path, typer.Argument(help="A campaign's folder.")]) -> None:

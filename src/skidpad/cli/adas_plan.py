@@ -94,6 +94,18 @@ def plan(wish: Wish) -> list[Cell]:
     return cross(drivers, climate, wish.seeds, template)
 
 
+def drive_to_report(
+    wish: Wish, out: Path, or_next: bool, *, workers: int, resume: bool, csv: bool
+) -> Path:
+    """Drive what is wished for into `out`, or with or_next beside it; the report's path."""
+    from skidpad.report.matrix import write_report
+
+    cells = plan(wish)
+    folder = next_folder(out, cells) if or_next else out
+    warn(drive_with_progress(cells, folder, workers=workers, resume=resume, csv=csv))
+    return write_report(folder)
+
+
 def warn(summary: Summary) -> None:
     """Say what a reader of the report should know first."""
     if summary.mixed_machines:

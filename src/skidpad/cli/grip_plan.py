@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import TypeVar
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
@@ -35,6 +36,7 @@ from skidpad.scenarios.scene import Mode
 from skidpad.scenarios.variation import CutIn, names
 from skidpad.stack.settings import load_profile, parse_assignments
 
+Choice = TypeVar("Choice", Friction, CutIn)
 BATCH = 20  # repeats after which --until-halfwidth looks again (decision G-8)
 KEEP = ("shown", "all")
 console = Console(stderr=True)
@@ -123,7 +125,7 @@ def _parted(text: str) -> list[str]:
     return parts
 
 
-def _choices(option: str, text: str, kind: type[Friction] | type[CutIn]):  # type: ignore[no-untyped-def]
+def _choices(option: str, text: str, kind: type[Choice]) -> list[Choice]:
     allowed = [member.value for member in kind]
     return [kind(require_choice(option, part, allowed)) for part in _parted(text)]
 

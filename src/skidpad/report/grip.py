@@ -11,7 +11,7 @@ import polars as pl
 from skidpad import __version__
 from skidpad.evidence.findings import judge
 from skidpad.evidence.grip_findings import FINDINGS
-from skidpad.evidence.grip_study import completion
+from skidpad.evidence.grip_study import Pair, completion, completion_p
 from skidpad.recording.files import read_parquet
 from skidpad.recording.grip import GripEntry, GripMetrics, grip_hash
 from skidpad.recording.ledger import CAMPAIGN, fingerprints, latest, read_ledger
@@ -143,9 +143,7 @@ def _headline(campaign: GripCampaign) -> Numbers:
     return Numbers(items)
 
 
-def _changed(pair) -> bool:  # type: ignore[no-untyped-def]
-    from skidpad.evidence.grip_study import completion_p
-
+def _changed(pair: Pair) -> bool:
     return completion_p(pair) < 0.05
 
 

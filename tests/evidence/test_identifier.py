@@ -123,9 +123,9 @@ def test_events_need_confirmation_and_merge_within_two_seconds():
 
 
 def tailgated_drive(seed, gap):
-    """A follower at `gap` m that one channel does not see."""
+    """A follower who closes in from `gap` m and whom one channel does not see."""
     world = World(
-        (0, 0, 0, 15.0, 0), np.array([(-gap - 4.5, 0, 0, 15.2, 0), (60.0, 3.5, 0, 15, 0)])
+        (0, 0, 0, 15.0, 0), np.array([(-gap - 4.5, 0, 0, 17.0, 0), (60.0, 3.5, 0, 15, 0)])
     )
     eyes = (Eyes("a", 0.02 + 0.001 * seed), Eyes("b", 0.02, blind=(0,)))
     return drive(world, eyes, 12.0)
@@ -138,7 +138,7 @@ def trained():
 
     drives = []
     for i in range(12):
-        source = tailgated_drive(i, 6.0 if i % 2 else 45.0)
+        source = tailgated_drive(i, 20.0 if i % 2 else 60.0)
         s = judge(
             f"d{i}", f"route-{i % 3}", source.channels, list(cycles(source)), truths=("world",)
         )
@@ -151,7 +151,7 @@ def test_a_trained_model_finds_tailgating_on_a_route_it_never_saw(trained):
     model, _ = trained
     detectors = model.identifier("world", "route-1")
     assert detectors is not model.identifier("world", ALL_ROUTES)
-    for gap, expected in ((6.0, 1), (45.0, 0)):
+    for gap, expected in ((20.0, 1), (60.0, 0)):
         source = tailgated_drive(99, gap)
         s = judge("new", "route-1", source.channels, list(cycles(source)), model=model)
         found = [x for x in s.detected["learned on world truth"] if x.hazard is TAILGATED]
@@ -207,7 +207,7 @@ def test_training_twice_gives_the_same_bytes(trained, tmp_path):
 @pytest.mark.req("C-15")
 def test_the_monitor_uses_rules_the_model_or_both(trained):
     model, _ = trained
-    source = tailgated_drive(7, 6.0)
+    source = tailgated_drive(7, 20.0)
     rows = list(cycles(source))
     fired = {}
     for identify in Identify:

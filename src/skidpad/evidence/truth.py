@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
+from typing import NamedTuple
 
 import numpy as np
 import shapely
@@ -29,7 +30,8 @@ REACH = 80.0  # m of driven path before and after the ego that is looked at
 JUMP, JUMP_TIME = 1.0, 0.5  # m within s: a position that jumps
 DRIFT = 2.0  # m: a position that is off
 SWEEP_TIME = 3.0  # s, decision C-4
-SWEEP_STEP = 0.25  # s; footprints between steps are covered by their common hull
+SWEEP_STEP = 0.25  # s; the hull of two steps tells where to look closer
+SUBSTEPS = 5  # of a step, 0.05 s apart: hulls alone would join cars that follow each other closely
 PAUSE = 2.0  # s, shorter pauses are one hazard (C-140)
 VEHICLES = {
     int(c)
@@ -243,8 +245,9 @@ def _sweeps(cycle: Cycle, ego: ChannelFrame, channels: Sequence[str]) -> list[_M
             near = np.flatnonzero(np.hypot(*(mine - theirs).T) < reach)
             if near.size == 0:
                 continue
-            swept = _swept(ego.ego_polygon, ego.ego, mine, near)
-            if shapely.intersects(swept, _swept(shape, state, theirs, near)).any():
+            if _meet(
+                _Sweep.of(ego.ego_polygon, ego.ego, mine), _Sweep.of(shape, state, theirs), near
+            ):
                 offset = state[:2] - ego.ego[:2]
                 behind = offset @ [np.cos(ego.ego[2]), np.sin(ego.ego[2])] < 0.0
                 hazard = HazardType.EGO_TAILGATED if behind else HazardType.EGO_TAILGATING
@@ -265,32 +268,54 @@ def _stride(path: Floats) -> float:
     return float(np.hypot(*(path[1:] - path[:-1]).T).max(initial=0.0))
 
 
-def _swept(
-    shape: Floats, state: Floats, path: Floats, steps: NDArray[np.int64]
-) -> NDArray[np.object_]:
-    """Hulls of the footprint at each of `steps` of a path together with the step after it.
+class _Sweep(NamedTuple):
+    """A footprint along a path of n steps."""
 
-    The footprint turns into the direction of motion; where it hardly moves it keeps its heading.
-    """
-    points = shape[np.isfinite(shape).all(axis=1)]
-    if len(points) == 0:
-        points = np.zeros((1, 2))
-    moves = np.diff(path, axis=0, append=path[-1:])
-    if len(path) > 1:
-        moves[-1] = moves[-2]
-    heading = np.where(np.hypot(*moves.T) > 0.1, np.arctan2(moves[:, 1], moves[:, 0]), state[2])
-    heading = np.where(np.cos(heading - state[2]) < 0.0, heading + np.pi, heading)  # in reverse
-    c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
-    x = path[:, :1] + c * points[:, 0] - s * points[:, 1]
-    y = path[:, 1:] + s * points[:, 0] + c * points[:, 1]
-    corners = np.stack([x, y], axis=2)  # (steps of the path, vertices, 2)
-    after = np.minimum(steps + 1, len(path) - 1)
-    both = np.concatenate([corners[steps], corners[after]], axis=1)
-    owner = np.repeat(np.arange(len(steps)), both.shape[1])
+    corners: Floats  # (n, vertices, 2)
+    moves: Floats  # (n, 2) m to the next step; none after the last
+
+    @classmethod
+    def of(cls, shape: Floats, state: Floats, path: Floats) -> _Sweep:
+        """It turns into the direction of motion; where it hardly moves it keeps its heading."""
+        points = shape[np.isfinite(shape).all(axis=1)]
+        if len(points) == 0:
+            points = np.zeros((1, 2))
+        moves = np.diff(path, axis=0, append=path[-1:])
+        turns = moves.copy()
+        if len(path) > 1:
+            turns[-1] = turns[-2]
+        heading = np.where(np.hypot(*turns.T) > 0.1, np.arctan2(turns[:, 1], turns[:, 0]), state[2])
+        heading = np.where(np.cos(heading - state[2]) < 0.0, heading + np.pi, heading)  # in reverse
+        c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
+        x = path[:, :1] + c * points[:, 0] - s * points[:, 1]
+        y = path[:, 1:] + s * points[:, 0] + c * points[:, 1]
+        return cls(np.stack([x, y], axis=2), moves)
+
+    def between(self, steps: NDArray[np.int64]) -> NDArray[np.object_]:
+        """(m,) hulls of the footprint at each of `steps` together with the step after it."""
+        after = np.minimum(steps + 1, len(self.corners) - 1)
+        return _hulls(np.concatenate([self.corners[steps], self.corners[after]], axis=1))
+
+    def at(self, steps: NDArray[np.int64], share: float) -> NDArray[np.object_]:
+        """(m,) footprints when a share of the way to the next step is done."""
+        return _hulls(self.corners[steps] + share * self.moves[steps][:, None])
+
+
+def _hulls(corners: Floats) -> NDArray[np.object_]:
+    owner = np.repeat(np.arange(len(corners)), corners.shape[1])
     hulls: NDArray[np.object_] = shapely.convex_hull(
-        shapely.multipoints(both.reshape(-1, 2), indices=owner)
+        shapely.multipoints(corners.reshape(-1, 2), indices=owner)
     )
     return hulls
+
+
+def _meet(mine: _Sweep, theirs: _Sweep, near: NDArray[np.int64]) -> bool:
+    """Whether two footprints overlap at any time within the steps `near`."""
+    steps = near[shapely.intersects(mine.between(near), theirs.between(near))]
+    return steps.size > 0 and any(
+        bool(shapely.intersects(mine.at(steps, share), theirs.at(steps, share)).any())
+        for share in np.linspace(0.0, 1.0, SUBSTEPS + 1)
+    )
 
 
 def footprint(shape: Floats, state: Floats) -> shapely.Geometry:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from math import cos, hypot, sin
 
 import msgspec
+import numpy as np
 
 from skidpad.core.channels import Decision
 from skidpad.core.states import WorldTruth
@@ -14,8 +15,10 @@ from skidpad.stack.channels.route import SEARCH, STEP, RoutePath, locate
 from skidpad.stack.channels.settings import CarModel
 
 V_STANDING = 0.3  # m/s
-STALL_TIME = 60.0  # s standing without a red light ahead
+STALL_TIME = 60.0  # s standing without a red light or a standing vehicle ahead
 STUCK_TIME = 180.0  # s standing for any reason: a red phase lasts 32 s
+QUEUE_REACH = 12.0  # m between centres to the vehicle in front, in a queue
+QUEUE_HALF_WIDTH = 1.5  # m
 RED_REACH = 60.0  # m to a red light that explains standing
 LOST = 8.0  # m beside the route
 AGAIN = 3.0  # s within which a contact with the same actor is the same collision
@@ -105,7 +108,8 @@ class Referee:
             self.stood = 0.0
             return
         self.stood += self.dt
-        limit = STUCK_TIME if self._red_ahead(truth) else STALL_TIME
+        waits = self._red_ahead(truth) or _queues(truth)
+        limit = STUCK_TIME if waits else STALL_TIME
         if self.stood > limit:
             self.stalls += 1
             self.over, self.ended = True, "stalled"
@@ -136,3 +140,14 @@ class Referee:
             minimal_risk_s=self.minimal_risk,
             driving_s=dict(sorted(self.driving.items())),
         )
+
+
+def _queues(truth: WorldTruth) -> bool:
+    """Whether an actor stands right in front of the ego."""
+    s = truth.states
+    dx, dy = s.x[1:] - s.x[0], s.y[1:] - s.y[0]
+    c, sn = cos(float(s.yaw[0])), sin(float(s.yaw[0]))
+    ahead, left = c * dx + sn * dy, c * dy - sn * dx
+    stands = s.present[1:] & (np.hypot(s.vx[1:], s.vy[1:]) < V_STANDING)
+    near = (ahead > 0.0) & (ahead < QUEUE_REACH) & (np.abs(left) < QUEUE_HALF_WIDTH)
+    return bool((stands & near).any())

@@ -166,8 +166,22 @@ class TestArbiter:
         rows += [(0.1 * k, 0.9, 0.9) for k in range(20, 40)]
         chosen = [c.driving for c in self.run(arbiter, rows)]
         assert chosen[:10] == [0] * 10, "dwell 1 s after the start"
-        assert chosen[10:20] == [1] * 10
-        assert chosen[20:] == [0] * 20
+        assert chosen[10:25] == [1] * 15, "wanted again at 2.0 s, for half a second"
+        assert chosen[25:] == [0] * 15
+
+    def test_a_moment_below_the_limit_relieves_nobody(self):
+        rows = [(0.1 * k, 0.5 if k % 10 > 5 else 0.9, 0.9) for k in range(60)]
+        assert {c.driving for c in self.run(self.arbiter(), rows)} == {0}
+
+    def test_a_driver_below_the_lower_limit_is_relieved_without_waiting(self):
+        rows = [(0.1 * k, 0.9, 0.9) for k in range(15)] + [(1.5, 0.1, 0.9)]
+        assert self.run(self.arbiter(), rows)[-1].driving == 1
+
+    def test_when_none_is_safe_a_little_safer_is_not_worth_a_change(self):
+        rows = [(0.1 * k, 0.5, 0.55 if k < 30 else 0.65) for k in range(60)]
+        chosen = [c.driving for c in self.run(self.arbiter(), [(0.0, 0.9, 0.9), *rows[1:]])]
+        assert chosen[:30] == [0] * 30
+        assert chosen[-1] == 1
 
     def test_without_preference_the_most_progressing(self):
         assert self.run(self.arbiter(None), [(0.0, 0.9, 0.85)])[0].driving == 1

@@ -33,6 +33,8 @@ class ArbiterSettings:
     safe: float = 0.8
     unsafe: float = 0.2  # below this for all: minimal-risk stop
     dwell: float = 1.0  # s between two changes
+    settle: float = 0.5  # s for which another channel must be wanted, unless it is urgent
+    margin: float = 0.1  # of the score by which another channel must be safer, none being safe
     dead_after: float = 0.3  # s without a message
 
     def __post_init__(self) -> None:
@@ -59,6 +61,7 @@ class Arbiter:
         """Nobody drives yet."""
         self.driving: int | None = None
         self.changed_at = -np.inf
+        self.wanted_since: tuple[int | None, float] = (None, -np.inf)
         self.heard_at = [-np.inf] * len(self.channels)
         self.started = False
 
@@ -77,17 +80,27 @@ class Arbiter:
         dead_after = self.settings.dead_after - 1e-9
         alive = [i for i, heard in enumerate(self.heard_at) if t - heard < dead_after]
         wanted = self._wanted(alive, scores, progress)
+        if wanted.driving != self.wanted_since[0]:
+            self.wanted_since = (wanted.driving, t)
         if wanted.driving == self.driving and self.started:
             return Choice(self.driving, wanted.reason if self.driving is None else Reason.KEPT)
         lost = self.driving is not None and self.driving not in alive
-        urgent = wanted.driving is None or lost
-        if self.started and not urgent and t - self.changed_at < self.settings.dwell - 1e-9:
+        if self.started and not (wanted.driving is None or lost) and not self._settled(t, scores):
             return Choice(self.driving, Reason.KEPT)
         reason = Reason.START if not self.started else wanted.reason
         if lost and wanted.driving is not None:
             reason = Reason.FAILOVER
         self.driving, self.changed_at, self.started = wanted.driving, t, True
         return Choice(self.driving, reason)
+
+    def _settled(self, t: float, scores: Sequence[float]) -> bool:
+        """Whether the driver may be relieved now: hysteresis in time."""
+        s = self.settings
+        if t - self.changed_at < s.dwell - 1e-9:
+            return False
+        if self.driving is None or scores[self.driving] < s.unsafe:
+            return True
+        return t - self.wanted_since[1] >= s.settle - 1e-9
 
     def _wanted(
         self, alive: Sequence[int], scores: Sequence[float], progress: Sequence[float]
@@ -104,6 +117,9 @@ class Arbiter:
         best = max(known, key=lambda i: (known[i], i == self.driving, -i))
         if known[best] < s.unsafe:
             return Choice(None, Reason.MINIMAL_RISK)
+        mine = known.get(self.driving, -np.inf) if self.driving is not None else -np.inf
+        if mine >= known[best] - s.margin and mine >= s.unsafe:
+            return Choice(self.driving, Reason.KEPT)
         return Choice(best, Reason.SAFER)
 
     def _among_safe(self, safe: Sequence[int], progress: Sequence[float]) -> Choice:

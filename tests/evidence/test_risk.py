@@ -57,6 +57,19 @@ def test_a_follower_is_judged_behind_and_apart_from_what_is_ahead():
     assert matrix.behind_share == pytest.approx([1.0, 1.0])
 
 
+@pytest.mark.req("C-122", "C-123")
+def test_collisions_ahead_and_behind_are_told_apart_and_closeness_is_none():
+    matrix, _ = single(EGO, (24.5, 0, 0, 0, 0))
+    assert matrix.ttc_ahead[0, 0] == pytest.approx(2.0, abs=2e-3)
+    assert np.isinf(matrix.ttc_behind).all()
+    matrix, _ = single(EGO, (-10.0, 0, 0, 14.0, 0))
+    assert matrix.ttc_behind[0, 0] == pytest.approx(5.5 / 4.0, abs=2e-3)
+    assert np.isinf(matrix.ttc_ahead).all()
+    matrix, one = single(EGO, (14.5, 0, 0, 10.0, 0))
+    assert one.pet is not None
+    assert np.isinf(matrix.ttc_ahead).all()
+
+
 @pytest.mark.req("C-091")
 def test_other_lanes_and_the_oncoming_lane_are_no_risk():
     beside = [(0.0, 3.5, 0, 12.0, 0), (15.0, -3.5, 0, 5.0, 0), (60.0, 3.5, np.pi, -15.0, 0)]

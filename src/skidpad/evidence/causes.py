@@ -20,10 +20,13 @@ SIGNALS = {
     Signal.GAP: "the channels' objects agreed",
     Signal.GAP_SIGNED: "the channels' objects agreed",
     Signal.SAFETY_SCORE: "no conflict predicted",
+    Signal.TTC_AHEAD: "no collision predicted",
+    Signal.TTC_BEHIND: "no collision predicted",
     Signal.RISK_AHEAD_LEAD: "the larger risk was on the other side",
     Signal.COMFORT_LEAST: "comfort outside the rule's range",
     Signal.COMFORT_DRIVING: "comfort outside the rule's range",
     Signal.LOCATION_VARIANCE: "positions moved apart too slowly",
+    Signal.EGO_LOCATION: "positions were near each other",
     Signal.SHIFT_SHORT: "positions moved apart too slowly",
     Signal.SHIFT_LONG: "positions moved apart too little",
 }

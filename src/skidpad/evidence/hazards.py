@@ -42,11 +42,14 @@ class Signal(str, Enum):
     """What a clause may name; each is one number per cycle for any number of channels (C-7)."""
 
     LOCATION_VARIANCE = "location_variance"  # greatest over pairs
+    EGO_LOCATION = "ego_location"  # least over pairs
     SHIFT_SHORT = "shift_short"  # m, greatest over pairs
     SHIFT_LONG = "shift_long"  # m
     GAP = "gap"  # |OLSS - OCSS| of the pair where it is largest
     GAP_SIGNED = "gap_signed"  # OLSS - OCSS of that pair
     SAFETY_SCORE = "safety_score"  # least over channels
+    TTC_AHEAD = "ttc_ahead"  # s, least over plans and worlds, of objects ahead; inf: no overlap
+    TTC_BEHIND = "ttc_behind"  # s
     RISK_AHEAD_LEAD = "risk_ahead_lead"  # largest risk ahead less largest risk behind
     COMFORT_DRIVING = "comfort_driving"  # planned-path comfort of the driving channel
     COMFORT_LEAST = "comfort_least"
@@ -202,11 +205,14 @@ class SignalReader:
         pairs = readings.pair
         values = {
             Signal.LOCATION_VARIANCE: _greatest(pairs[PAIR_ROW[Indicator.EGO_LOCATION_VARIANCE]]),
+            Signal.EGO_LOCATION: _least(pairs[PAIR_ROW[Indicator.EGO_LOCATION]]),
             Signal.SHIFT_SHORT: _greatest(pairs[PAIR_ROW[Indicator.EGO_SHIFT_SHORT]]),
             Signal.SHIFT_LONG: _greatest(pairs[PAIR_ROW[Indicator.EGO_SHIFT_LONG]]),
             Signal.GAP: abs(gap),
             Signal.GAP_SIGNED: gap,
             Signal.SAFETY_SCORE: _least(scores),
+            Signal.TTC_AHEAD: _least(risk.ttc_ahead.ravel()),
+            Signal.TTC_BEHIND: _least(risk.ttc_behind.ravel()),
             Signal.RISK_AHEAD_LEAD: _greatest(risk.risk_ahead.ravel())
             - _greatest(risk.risk_behind.ravel()),
             Signal.COMFORT_DRIVING: float(comfort[driving]) if driving is not None else np.nan,

@@ -29,7 +29,10 @@ GREATEST = frozenset(
         Indicator.CROSS_PATH_VARIANCE,
     }
 )  # of these the greatest over pairs counts, of all others the least
-RISKS = ("ahead_greatest", "ahead_least", "behind_greatest", "behind_least", "ttc", "pet")
+RISKS = (
+    "ahead_greatest", "ahead_least", "behind_greatest", "behind_least", "ttc", "pet",
+    "ttc_ahead", "ttc_behind",
+)  # fmt: skip
 OVER_TIME = ("now", "mean_1s", "least_5s", "greatest_5s")
 ROW_NAMES = (
     *(f"{i.value}_least" for i in CHANNEL_INDICATORS),
@@ -47,7 +50,10 @@ def feature_row(readings: Readings, risk: RiskMatrix, signals: SignalReadings) -
     pairs = np.where(_UPPER, _greatest(readings.pair), _least(readings.pair))
     ahead, behind = risk.risk_ahead.reshape(1, -1), risk.risk_behind.reshape(1, -1)
     times = np.minimum(
-        np.concatenate([_least(risk.ttc.reshape(1, -1)), _least(risk.pet.reshape(1, -1))]),
+        [
+            _least(each.reshape(1, -1))[0]
+            for each in (risk.ttc, risk.pet, risk.ttc_ahead, risk.ttc_behind)
+        ],
         NO_CONFLICT,
     )
     return np.concatenate(
@@ -59,7 +65,7 @@ def feature_row(readings: Readings, risk: RiskMatrix, signals: SignalReadings) -
             _least(ahead),
             _greatest(behind),
             _least(behind),
-            np.minimum(times, NO_CONFLICT),
+            times,
             [signals.values[Signal.GAP_SIGNED]],
         ]
     )

@@ -56,6 +56,8 @@ class RiskMatrix:
     risk_behind: Floats  # (n, n)
     ttc: Floats  # (n, n) s, inf: no overlap
     pet: Floats  # (n, n) s, inf: no conflict
+    ttc_ahead: Floats  # (n, n) s, of objects ahead of the ego alone; inf: no overlap
+    ttc_behind: Floats  # (n, n) s
     worst_ahead: NDArray[np.int64]  # (n, n) object index in the world's frame, -1: none
     worst_behind: NDArray[np.int64]
     objects: tuple[tuple[tuple[ObjectRisk, ...], ...], ...] | None = None
@@ -263,20 +265,23 @@ def _judge(ego: Movers, world: Movers, objects: Floats, pose: Floats, out: Float
 
 
 @kernel
-def _worst(judged: Floats) -> tuple[float, float, float, float, int, int]:
-    """Risk ahead and behind, least TTC and PET, and the worst objects ahead and behind."""
+def _worst(judged: Floats) -> tuple[float, float, float, float, float, int, int]:
+    """Risk ahead and behind, TTC ahead and behind, least PET, worst objects ahead and behind."""
     ahead = behind = 0.0
-    ttc = pet = np.inf
+    ttc_ahead = ttc_behind = pet = np.inf
     i_ahead = i_behind = -1
     for i in range(judged.shape[0]):
-        ttc, pet = min(ttc, judged[i, 0]), min(pet, judged[i, 1])
+        pet = min(pet, judged[i, 1])
         risk = judged[i, 3]
         if judged[i, 2] > 0.0:
+            ttc_behind = min(ttc_behind, judged[i, 0])
             if risk > behind:
                 behind, i_behind = risk, i
-        elif risk > ahead:
-            ahead, i_ahead = risk, i
-    return ahead, behind, ttc, pet, i_ahead, i_behind
+        else:
+            ttc_ahead = min(ttc_ahead, judged[i, 0])
+            if risk > ahead:
+                ahead, i_ahead = risk, i
+    return ahead, behind, ttc_ahead, ttc_behind, pet, i_ahead, i_behind
 
 
 def _movers(n: int) -> Movers:
@@ -300,7 +305,7 @@ def risk_matrix(frames: Sequence[ChannelFrame | None], per_object: bool = False)
     be finite (see `frames.usable`). `per_object` keeps each object's times as well.
     """
     n = len(frames)
-    risk, ahead, behind, ttc, pet = np.full((5, n, n), np.nan)
+    risk, ahead, behind, ttc_ahead, ttc_behind, pet = np.full((6, n, n), np.nan)
     worst_ahead, worst_behind = np.full((2, n, n), -1, dtype=np.int64)
     egos = [_ego_movers(frame) for frame in frames]
     worlds = [_world_movers(frame) for frame in frames]
@@ -316,14 +321,17 @@ def risk_matrix(frames: Sequence[ChannelFrame | None], per_object: bool = False)
                 continue
             _judge(ego, world, frame_b.objects, frame_a.ego, judged)
             (
-                ahead[a, b], behind[a, b], ttc[a, b], pet[a, b],
+                ahead[a, b], behind[a, b], ttc_ahead[a, b], ttc_behind[a, b], pet[a, b],
                 worst_ahead[a, b], worst_behind[a, b],
             ) = _worst(judged)  # fmt: skip
             risk[a, b] = max(ahead[a, b], behind[a, b])
             if per_object:
                 details[a][b] = tuple(_object_risk(row) for row in judged)
     objects = tuple(tuple(row) for row in details) if per_object else None
-    return RiskMatrix(risk, ahead, behind, ttc, pet, worst_ahead, worst_behind, objects)
+    ttc = np.minimum(ttc_ahead, ttc_behind)
+    return RiskMatrix(
+        risk, ahead, behind, ttc, pet, ttc_ahead, ttc_behind, worst_ahead, worst_behind, objects
+    )
 
 
 def safety_scores(frames: Sequence[ChannelFrame | None]) -> Floats:

@@ -33,7 +33,7 @@ WEATHERS = [preset("icy_0"), preset("icy_30")]
 
 def cells(n=1, scenarios=("lead_slowdown",), **more) -> list[GripCell]:
     template = replace(TEMPLATE, **more)
-    return cross(template, list(scenarios), WEATHERS, list(Friction), [CutIn.ROLLING], seeds(0, n))
+    return cross(template, list(scenarios), WEATHERS, list(Friction), [CutIn.FIXED], seeds(0, n))
 
 
 def here(jobs):

@@ -33,7 +33,7 @@ def test_the_default_is_the_published_campaign():
         ({"weather": "snow"}, "physical grip model"),
         ({"scenarios": "ghost"}, "unknown scenario 'ghost'"),
         ({"friction": "half"}, "original, reduced"),
-        ({"cutin": "broken"}, "rolling, original"),
+        ({"cutin": "broken"}, "original, unfixed, fixed"),
         ({"controller": "agent:nowhere.py:A"}, "does not exist"),
         ({"controller": "no.such:Thing"}, "cannot be imported"),
         ({"until_halfwidth": 0.9}, "between 0.001 and 0.5"),

@@ -25,14 +25,14 @@ def table(change: Callable[[Row, np.random.Generator], None]) -> pl.DataFrame:
                 for seed in SEEDS:
                     row = {
                         "scenario": scenario, "weather": weather, "friction": friction,
-                        "seed": seed, "cutin": "rolling", "outcome": "completed",
+                        "seed": seed, "cutin": "fixed", "outcome": "completed",
                         "completion": True, "loss_of_control_npc": False, "min_cvip_m": 10.0,
                         "steer_std": 0.02, "delay_s": 0.0,
                         "log_hash": f"{scenario}{weather}{friction}{seed}",
                     }  # fmt: skip
                     change(row, rng)
                     rows.append(row)
-    for cutin in ("original", "unfixed", "fixed"):
+    for cutin in ("original", "unfixed"):
         for seed in SEEDS:
             row = dict(
                 rows[0], scenario=CUT_IN, weather="rain_0", cutin=cutin, seed=seed,
@@ -53,7 +53,7 @@ def is_(row: Row, scenario: str, *weathers: str, friction: str = "reduced") -> b
         row["scenario"] == scenario
         and row["weather"] in weathers
         and row["friction"] == friction
-        and row["cutin"] == "rolling"
+        and row["cutin"] == "fixed"
     )
 
 
@@ -123,7 +123,7 @@ def inverted(world: pl.DataFrame) -> pl.DataFrame:
     levels = dict(zip(("icy_0", *ICE), reversed(("icy_0", *ICE)), strict=True))
     variants = {"original": "unfixed", "unfixed": "original"}
     return world.with_columns(
-        friction=pl.when(pl.col("cutin") == "rolling")
+        friction=pl.when(pl.col("cutin") == "fixed")
         .then(pl.col("friction").replace(swap))
         .otherwise(pl.col("friction")),
         weather=pl.col("weather").replace(levels),
@@ -160,7 +160,7 @@ def test_equal_drives_at_ratio_1_are_so_by_construction():
 
 
 def test_without_its_runs_a_finding_is_not_testable():
-    some = table(bf04).filter(pl.col("scenario") == LEAD, pl.col("cutin") == "rolling")
+    some = table(bf04).filter(pl.col("scenario") == LEAD, pl.col("cutin") == "fixed")
     for name in ("BF-04", "BF-07", "BF-18"):
         (judged,) = judge([CLAIMS[name]], [some])
         assert judged.verdict is Verdict.NOT_TESTABLE

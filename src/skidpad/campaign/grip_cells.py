@@ -33,7 +33,7 @@ class GripCell:
     weather: Weather
     friction: Friction
     seed: int
-    cutin: CutIn = CutIn.ROLLING
+    cutin: CutIn = CutIn.FIXED
     model: GripModel = GripModel.STATISTICAL
     mu_ref: float = 0.9
     controller: str = "stack"
@@ -47,7 +47,7 @@ class GripCell:
     @property
     def cell(self) -> str:
         """Name without the seed."""
-        variant = "" if self.cutin is CutIn.ROLLING else f"-{self.cutin.value}"
+        variant = "" if self.cutin is CutIn.FIXED else f"-{self.cutin.value}"
         return f"{self.scenario}{variant}_{self.weather.name}_{self.friction.value}"
 
     @property
@@ -89,7 +89,7 @@ def cross(
         replace(template, scenario=s, weather=w, friction=f, cutin=c, seed=seed)
         for seed in seeds
         for s in scenarios
-        for c in (cutins if s == CUT_IN else (CutIn.ROLLING,))
+        for c in (cutins if s == CUT_IN else (CutIn.FIXED,))
         for w in weather
         for f in frictions
     ]

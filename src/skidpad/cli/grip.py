@@ -27,10 +27,8 @@ def grip(
     ] = "statistical",
     cutin: Annotated[
         str,
-        typer.Option(
-            help="rolling: repaired distance, all roll; from rest: original, unfixed, fixed."
-        ),
-    ] = "rolling",
+        typer.Option(help="original, unfixed, fixed: spawn delay and merge distance."),
+    ] = "fixed",
     repeats: Annotated[int, typer.Option(min=1, help="Seeds per cell.")] = 100,
     config: Annotated[int, typer.Option(min=0, max=4, help="Configuration of our stack.")] = 2,
     set: Annotated[
@@ -92,7 +90,7 @@ def estimate(
     scenarios: Annotated[str, typer.Option(help="As for grip.")] = "all",
     weather: Annotated[str, typer.Option(help="As for grip.")] = "all",
     friction: Annotated[str, typer.Option(help="As for grip.")] = "original,reduced",
-    cutin: Annotated[str, typer.Option(help="As for grip.")] = "rolling",
+    cutin: Annotated[str, typer.Option(help="As for grip.")] = "fixed",
     repeats: Annotated[int, typer.Option(min=1, help="As for grip.")] = 100,
     controller: Annotated[str, typer.Option(help="As for grip.")] = "stack",
     sensors: Annotated[str, typer.Option(help="As for grip.")] = "objects",

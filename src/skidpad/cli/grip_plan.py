@@ -50,7 +50,7 @@ class GripWish:
     weather: str = "all"
     friction: str = "original,reduced"
     model: str = "statistical"
-    cutin: str = "rolling"
+    cutin: str = "fixed"
     repeats: int = 100
     config: int = 2
     assignments: Sequence[str] = ()

@@ -22,12 +22,12 @@ RAIN = ("rain_20", "rain_40", "rain_60", "rain_80", "rain_100")
 CUT_IN, LEAD, FRONT = "ghost_cut_in", "lead_slowdown", "front_accident"
 BY = ("scenario", "weather", "seed")
 ORIGINAL, REDUCED = pl.col("friction") == "original", pl.col("friction") == "reduced"
-ROLLING = pl.col("cutin") == "rolling"
+PROPER = pl.col("cutin") == "fixed"
 
 
-def rolling(table: pl.DataFrame, scenario: str | None = None, *weathers: str) -> pl.DataFrame:
+def proper(table: pl.DataFrame, scenario: str | None = None, *weathers: str) -> pl.DataFrame:
     """Runs of the campaign proper, of one scenario and some weathers."""
-    rows = table.filter(ROLLING)
+    rows = table.filter(PROPER)
     if scenario is not None:
         rows = rows.filter(pl.col("scenario") == scenario)
     return rows.filter(pl.col("weather").is_in(weathers)) if weathers else rows
@@ -38,7 +38,7 @@ def lost(table: pl.DataFrame, scenario: str, *weathers: str) -> list[Contrast]:
     return complete(
         [
             contrast(
-                rolling(table, scenario, w),
+                proper(table, scenario, w),
                 f"completion in {scenario}, {w}: original minus reduced",
                 "completion", ORIGINAL, REDUCED, BY, SHARE,
             )
@@ -49,7 +49,7 @@ def lost(table: pl.DataFrame, scenario: str, *weathers: str) -> list[Contrast]:
 
 def kept(table: pl.DataFrame, scenario: str, *weathers: str) -> list[Contrast]:
     """Friction takes less completion than the margin."""
-    rows = rolling(table, scenario, *weathers)
+    rows = proper(table, scenario, *weathers)
     values, same = differences(rows, ORIGINAL, REDUCED, BY, "completion")
     label = f"{SHARE:g} minus the completion lost in {scenario}, {', '.join(weathers)}"
     return [paired(label, (SHARE - values).to_numpy(), 0.0, same)] if len(values) else []
@@ -57,7 +57,7 @@ def kept(table: pl.DataFrame, scenario: str, *weathers: str) -> list[Contrast]:
 
 def more_than(table: pl.DataFrame, scenario: str, high: str, low: str) -> list[Contrast]:
     """With reduced friction more runs complete in one weather than in the other."""
-    rows = rolling(table, scenario).filter(REDUCED)
+    rows = proper(table, scenario).filter(REDUCED)
     more, less = pl.col("weather") == high, pl.col("weather") == low
     label = f"completion in {scenario} with reduced friction: {high} minus {low}"
     return contrast(rows, label, "completion", more, less, ("seed",), SHARE)
@@ -65,7 +65,7 @@ def more_than(table: pl.DataFrame, scenario: str, high: str, low: str) -> list[C
 
 def bf01(table: pl.DataFrame) -> list[Contrast]:
     """How often the outcome of a pair changes; and in which direction on the whole."""
-    rows = rolling(table).filter(~pl.col("weather").is_in(BASELINES))
+    rows = proper(table).filter(~pl.col("weather").is_in(BASELINES))
     values, same = differences(rows, ORIGINAL, REDUCED, BY, "completion")
     if not len(values):
         return []
@@ -80,7 +80,7 @@ def bf01(table: pl.DataFrame) -> list[Contrast]:
 
 def bf02(table: pl.DataFrame) -> list[Contrast]:
     """A certain crash: nearly all runs."""
-    rows = rolling(table, LEAD, "icy_70", "icy_100").filter(REDUCED)
+    rows = proper(table, LEAD, "icy_70", "icy_100").filter(REDUCED)
     crashed = (1.0 - rows.sort(*BY)["completion"].drop_nulls().cast(pl.Float64)) - CERTAIN
     certain = (
         [
@@ -100,7 +100,7 @@ def bf02(table: pl.DataFrame) -> list[Contrast]:
 
 def bf03(table: pl.DataFrame) -> list[Contrast]:
     """A step between 30 and 70, none after."""
-    rows = rolling(table, LEAD).filter(REDUCED)
+    rows = proper(table, LEAD).filter(REDUCED)
     thick, thicker = (pl.col("weather") == w for w in ("icy_70", "icy_100"))
     values, _ = differences(rows, thick, thicker, ("seed",), "completion")
     flat = (
@@ -124,7 +124,7 @@ def bf04(table: pl.DataFrame) -> list[Contrast]:
 
 def bf05(table: pl.DataFrame) -> list[Contrast]:
     """Safer on thick ice, because the other vehicle loses control."""
-    rows = rolling(table, CUT_IN, "icy_70", "icy_100")
+    rows = proper(table, CUT_IN, "icy_70", "icy_100")
     gained = contrast(
         rows, "completion on thick ice: reduced minus original",
         "completion", REDUCED, ORIGINAL, BY, SHARE,
@@ -151,7 +151,7 @@ def bf06(table: pl.DataFrame) -> list[Contrast]:
 
 def bf07(table: pl.DataFrame) -> list[Contrast]:
     """Only one of three scenarios."""
-    rows = rolling(table, FRONT, *RAIN)
+    rows = proper(table, FRONT, *RAIN)
     hurt = contrast(
         rows, "completion of the front accident in rain: original minus reduced",
         "completion", ORIGINAL, REDUCED, BY, SHARE,
@@ -163,7 +163,7 @@ def bf09(table: pl.DataFrame) -> list[Contrast]:
     """Column delay_s, of reduced runs; a run that no constant shift explains has none."""
     if "delay_s" not in table.columns:
         return []
-    rows = rolling(table, CUT_IN, "icy_100").filter(REDUCED).sort("seed")
+    rows = proper(table, CUT_IN, "icy_100").filter(REDUCED).sort("seed")
     if not len(rows):
         return []
     delay = rows["delay_s"].fill_null(0.0).to_numpy()
@@ -172,7 +172,7 @@ def bf09(table: pl.DataFrame) -> list[Contrast]:
 
 def bf10(table: pl.DataFrame) -> list[Contrast]:
     """Least distance, step by step."""
-    rows = rolling(table, LEAD).filter(REDUCED)
+    rows = proper(table, LEAD).filter(REDUCED)
     steps = (("icy_0", "icy_10"), ("icy_10", "icy_30"), ("icy_30", "icy_70"))
     return complete(
         [
@@ -187,31 +187,31 @@ def bf10(table: pl.DataFrame) -> list[Contrast]:
 
 def bf11(table: pl.DataFrame) -> list[Contrast]:
     """Spread of the steering command."""
-    rows = rolling(table, FRONT, "icy_100", "rain_100")
+    rows = proper(table, FRONT, "icy_100", "rain_100")
     label = "deviation of steering, front accident: reduced minus original"
     return contrast(rows, label, "steer_std", REDUCED, ORIGINAL, BY, STEER)
 
 
 def bf12(table: pl.DataFrame) -> list[Contrast]:
     """Spins in the cut-in on ice."""
-    return npc_loses(rolling(table, CUT_IN, "icy_30", "icy_70", "icy_100"))
+    return npc_loses(proper(table, CUT_IN, "icy_30", "icy_70", "icy_100"))
 
 
 def bf13(table: pl.DataFrame) -> list[Contrast]:
     """Equal drives at ratio 1."""
-    rows = rolling(table).filter(pl.col("weather").is_in(BASELINES))
+    rows = proper(table).filter(pl.col("weather").is_in(BASELINES))
     values, same = differences(rows, ORIGINAL, REDUCED, BY, "completion")
     label = f"{SHARE:g} minus the change of completion at ratio 1"
     return [paired(label, (SHARE - values.abs()).to_numpy(), 0.0, same)] if len(values) else []
 
 
 def bf18(table: pl.DataFrame) -> list[Contrast]:
-    """Three variants from rest."""
+    """Three variants at the baseline."""
     rows = table.filter((pl.col("scenario") == CUT_IN) & ORIGINAL)
 
     def step(more: str, less: str) -> list[Contrast]:
         high, low = pl.col("cutin") == more, pl.col("cutin") == less
-        label = f"completion of the cut-in from rest: {more} minus {less}"
+        label = f"completion of the cut-in: {more} minus {less}"
         return contrast(rows, label, "completion", high, low, ("weather", "seed"), SHARE)
 
     return complete([step("original", "unfixed"), step("fixed", "unfixed")])
@@ -260,6 +260,6 @@ FINDINGS: Sequence[Finding] = (
     _finding("BF-13", "Nothing changes at ratio 1.",
              "change of completion at rain_0 and icy_0", "rain_0 and icy_0", bf13),
     _finding("BF-18", "A spawn delay alone breaks the cut-in, and a shorter merge distance repairs it.",
-             "completion of the variants from rest, friction untouched",
+             "completion of the variants, friction untouched",
              "--cutin original,unfixed,fixed at rain_0", bf18),
 )  # fmt: skip

@@ -118,7 +118,7 @@ def _warnings(campaign: GripCampaign) -> list[Block]:
 
 
 def _headline(campaign: GripCampaign) -> Numbers:
-    t = campaign.finished.filter(pl.col("cutin") == "rolling")
+    t = campaign.finished.filter(pl.col("cutin") == "fixed")
     items = [
         Number(
             f"{len(campaign.results)}", "runs", f"{campaign.results['seed'].n_unique()} per cell"
@@ -152,8 +152,8 @@ def _verdicts(campaign: GripCampaign) -> list[Block]:
     judged = judge(FINDINGS, [table for _ in FINDINGS])
     intro = Text(
         "Claims are the source's. Tests and margins were written after a trial of three seeds had been "
-        "seen, and two rules for verdicts were settled after 65; they are not blind. The variants of the "
-        "cut-in from rest are runs of their own: --cutin original,unfixed,fixed."
+        "seen, and two rules for verdicts were settled after 65; they are not blind. The other "
+        "variants of the cut-in are runs of their own: --cutin original,unfixed,fixed."
     )
     return [intro, *verdict_blocks(judged)]
 

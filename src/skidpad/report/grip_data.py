@@ -11,6 +11,7 @@ import polars as pl
 
 from skidpad.core.errors import FileError
 from skidpad.evidence.compare import NOT_RUN
+from skidpad.evidence.grip_findings import CUT_IN
 from skidpad.evidence.grip_study import (
     ORIGINAL,
     REDUCED,
@@ -31,7 +32,8 @@ SCENARIOS = {
     "lead_slowdown": "Lead slowdown",
     "front_accident": "Front accident",
 }
-ROLLING = "rolling"
+BASELINE = "rain_0"
+FIXED = "fixed"  # variant of the cut-in in the campaign proper (G-9)
 WEATHERS = (
     *(f"rain_{k}" for k in (0, 20, 40, 60, 80, 100)),
     *(f"icy_{k}" for k in (0, 10, 30, 70, 100)),
@@ -54,13 +56,15 @@ class GripCampaign:
     @cached_property
     def pairs(self) -> dict[Key, Pair]:
         """Cells of the campaign proper, in the published order."""
-        found = {(p.scenario, p.weather): p for p in pairs(self.results) if p.cutin == ROLLING}
+        found = {(p.scenario, p.weather): p for p in pairs(self.results) if p.cutin == FIXED}
         return {k: found[k] for k in sorted(found, key=self._order)}
 
     @cached_property
     def variants(self) -> dict[str, Pair]:
-        """Variants of the cut-in from rest."""
-        return {p.cutin: p for p in pairs(self.results) if p.cutin != ROLLING}
+        """Variants of the cut-in at the baseline; none when only one was driven (B-075)."""
+        cut_ins = [p for p in pairs(self.results) if p.scenario == CUT_IN]
+        found = {p.cutin: p for p in cut_ins if p.weather == BASELINE}
+        return found if len(found) > 1 else {}
 
     def _order(self, key: Key) -> tuple[int, int, str]:
         scenario, weather = key
@@ -92,7 +96,7 @@ class GripCampaign:
             runs = pair.side(friction)
             if not len(runs):
                 return None
-            variant = "" if pair.cutin == ROLLING else f"-{pair.cutin}"
+            variant = "" if pair.cutin == FIXED else f"-{pair.cutin}"
             name = f"{pair.scenario}{variant}_{pair.weather}_{friction}"
             self._series[key] = cell_series(
                 runs, lambda seed: read_series(series_path(self.folder, name, seed))
@@ -144,7 +148,7 @@ class GripCampaign:
                     scenario=pl.lit(key[0]),
                     weather=pl.lit(key[1]),
                     friction=pl.lit(REDUCED),
-                    cutin=pl.lit(ROLLING),
+                    cutin=pl.lit(FIXED),
                     delay_s=pl.col("delay_s").fill_nan(None),
                 )
             )

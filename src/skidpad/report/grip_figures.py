@@ -124,7 +124,7 @@ def trajectories(campaign: GripCampaign) -> list[Block]:
     rest = [(n, p, ORIGINAL) for n, p in campaign.variants.items() if len(p.original)]
     if rest:
         rest.sort(key=lambda item: ("original", "unfixed", "fixed").index(item[0]))
-        caption = "Ghost cut-in from rest: ways in the three variants, friction untouched."
+        caption = "Ghost cut-in: ways in the three variants, friction untouched."
         blocks.append(_ways(campaign, rest, caption))
     return blocks
 

@@ -230,7 +230,7 @@ def _difference_cell(c: Comparison | None, more: str = "") -> Cell:
 
 
 def variant_table(campaign: GripCampaign) -> list[Block]:
-    """Original, unfixed and fixed cut-in from rest, friction untouched (B-075 to B-077)."""
+    """Original, unfixed and fixed cut-in, friction untouched (B-075 to B-077)."""
     rows = []
     for name in ("original", "unfixed", "fixed"):
         pair = campaign.variants.get(name)
@@ -254,7 +254,7 @@ def variant_table(campaign: GripCampaign) -> list[Block]:
         return []
     columns = [("variant", ""), ("completion, %", ""), ("score", "")]
     columns += [(_heading(m), "distance to the original variant") for m in METRICS]
-    caption = "Ghost cut-in from rest: what a spawn delay alone does, and a shorter merge distance"
+    caption = "Ghost cut-in: what a spawn delay alone does, and a shorter merge distance"
     return [Table(columns, rows, caption=caption, sortable=False)]
 
 

@@ -120,7 +120,7 @@ class Scenario:
     actors: Mapping[str, tuple[int, str, str]]  # name to lane, s, speed
     events: Callable[[Writer], Mapping[str, list[Any]]]  # by actor
     last: str  # name of the event after which the scenario is over
-    route_length: float  # m, of which a run that ends early has covered a share (B-105)
+    route_length: float  # m, median way on dry road, of which a collision leaves a share (B-105)
 
 
 def ghost_cut_in(w: Writer) -> Mapping[str, list[Any]]:
@@ -186,7 +186,7 @@ SCENARIOS = (
         actors={EGO: (LANE, "100", "$EgoSpeed"), GHOST: (LANE + 1, "$GhostS", "$GhostSpeed")},
         events=ghost_cut_in,
         last="slow",
-        route_length=450.0,
+        route_length=150.0,
     ),
     Scenario(
         name="lead_slowdown",
@@ -202,7 +202,7 @@ SCENARIOS = (
         actors={EGO: (LANE, "100", "$EgoSpeed"), LEAD: (LANE, "$LeadS", "$LeadSpeed")},
         events=lead_slowdown,
         last="slow",
-        route_length=180.0,
+        route_length=90.0,
     ),
     Scenario(
         name="front_accident",
@@ -226,7 +226,7 @@ SCENARIOS = (
         },
         events=front_accident,
         last="slow",
-        route_length=200.0,
+        route_length=130.0,
     ),
 )
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import msgspec
@@ -27,7 +29,6 @@ SPAWN_DELAY = 40  # ticks by which the slower spawning holds the ghost back (B-0
 class CutIn(str, Enum):
     """Variants of the cut-in (B-070 to B-079, decision G-3)."""
 
-    ROLLING = "rolling"  # the repaired distance, everyone rolls from the start
     ORIGINAL = "original"  # from rest, no delay, the first distance
     UNFIXED = "unfixed"  # from rest, the ghost comes later, the first distance
     FIXED = "fixed"  # from rest, the ghost comes later, the repaired distance
@@ -50,13 +51,11 @@ class Spread:
 # delay it comes from as far as it drives in that time: the ego is faster when they meet (BD-51).
 FROM_REST = {"EgoSpeed": 0.0, "CruiseSpeed": 13.9, "GhostSpeed": 22.0, "GhostEndSpeed": 4.0}
 GHOST_S = 85.0  # m
-FIRST_DISTANCE, REPAIRED_DISTANCE = 8.0, 2.0  # m; the sources give no value (B-074)
+FIRST_DISTANCE, REPAIRED_DISTANCE = 8.0, 2.0  # m, chosen as docs/grip.md says (B-074)
 
 
 def variant_parameters(variant: CutIn) -> dict[str, float]:
     """Values of the file's parameters that make the variant."""
-    if variant is CutIn.ROLLING:
-        return {}
     late = 0.0 if variant is CutIn.ORIGINAL else SPAWN_DELAY * DT
     repaired = variant is CutIn.FIXED
     return FROM_REST | {
@@ -83,17 +82,26 @@ def variations() -> dict[str, dict[str, Spread]]:
     return msgspec.yaml.decode(text, type=dict[str, dict[str, Spread]])
 
 
-def drawn_parameters(name: str, seed: int, variant: CutIn = CutIn.ROLLING) -> dict[str, float]:
-    """Parameters of a scenario for a seed; the same for every weather and friction (X-8)."""
+def drawn_parameters(
+    name: str,
+    seed: int,
+    variant: CutIn = CutIn.FIXED,
+    nominal: Mapping[str, float] = MappingProxyType({}),
+) -> dict[str, float]:
+    """Parameters of a scenario for a seed; the same for every weather and friction (X-8).
+
+    nominal: values drawn around in place of the file's.
+    """
     scenario = next(s for s in SCENARIOS if s.name == name)
     values = dict(scenario.parameters)
     if name == CUT_IN:
         values |= variant_parameters(variant)
+    values |= nominal
     drawn = {
         parameter: spread.draw(values[parameter], stream(seed, "scenario", name, parameter))
         for parameter, spread in variations()[name].items()
     }
-    if variant is CutIn.ROLLING or name != CUT_IN:
+    if name != CUT_IN:  # which starts from rest
         drawn[CRUISE_SPEED] = drawn[EGO_SPEED]
     return values | drawn
 

@@ -25,10 +25,10 @@ from skidpad.recording.runlog import RunLog
 
 Floats = NDArray[np.float64]
 
+# What counts as lost control is our choice, no standard's: 49 CFR 571.126 (FMVSS 126) judges the decay
+# of the yaw rate after a sine-with-dwell steer, which no scenario here performs.
 V_SLIP = 3.0  # m/s, below which side slip says nothing
-SLIP_LOST = (
-    15.0  # deg of side slip that no driver holds: tyres saturate near 8, opposite lock ends there
-)
+SLIP_LOST = 15.0  # deg, about twice the slip angle at which tyres saturate
 YAW_LOST = 60.0  # deg from the road's direction: a spin
 LOST_TIME = 0.3  # s that it must last
 TOUCH = 0.1  # m between bodies that counts as touching

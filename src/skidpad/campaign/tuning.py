@@ -1,0 +1,134 @@
+"""Choose the scenarios' values in the open: candidates, tuning seeds, a criterion (decision X-8).
+
+`python -m skidpad.campaign.tuning [scenario ...]` drives every candidate on dry road with original
+friction and prints one row each. No weather and no reduced friction enters; what the rows were used
+for stands in docs/grip.md.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from skidpad.campaign.cells import TUNING_SEEDS
+from skidpad.campaign.play import Play, Played, play
+from skidpad.core.geometry import mps_from_kmh
+from skidpad.core.setup import DT
+from skidpad.core.vocabulary import Outcome
+from skidpad.core.weather import Weather
+from skidpad.evidence.metrics.grip import npc_contact_row
+from skidpad.physics.presets import preset
+from skidpad.scenarios.variation import (
+    CUT_IN,
+    CutIn,
+    drawn_parameters,
+    drawn_skill,
+    names,
+    scenario_file,
+)
+
+SEEDS = TUNING_SEEDS[:30]
+BASELINE = "rain_0"
+SPEEDS_KMH = (50.0, 80.0, 100.0)
+HEADWAY = 1.26  # s from centre to centre, 1 s between bumpers at 80 km/h
+DECELERATIONS = (4.0, 6.0, 8.0)  # m/s^2: brisk, hard, emergency
+MERGE_DISTANCES = (1.0, 2.0, 4.0, 6.0, 8.0, 10.0)  # m
+SWERVE_TIMES = (1.5, 2.5)  # s
+START = 100.0  # m, where the ego starts
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """Nominal values over those of the file."""
+
+    scenario: str
+    values: Mapping[str, float]
+    cutin: CutIn = CutIn.FIXED
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """What the seeds made of a candidate."""
+
+    completed: float  # share of seeds
+    triggered: float
+    npc_contact: float
+    a_hardest: float  # m/s^2, median of the ego's hardest braking
+    nearest: float  # m, least distance of centres over all seeds
+    way: float  # m, median
+
+
+def candidates(scenario: str) -> Iterator[Candidate]:
+    """What was tried."""
+    if scenario == CUT_IN:
+        for cutin in (CutIn.ORIGINAL, CutIn.FIXED):  # without and with the spawn delay
+            for distance in MERGE_DISTANCES:
+                yield Candidate(scenario, {"MergeDistance": distance}, cutin)
+        return
+    for v_kmh in SPEEDS_KMH:
+        v = mps_from_kmh(v_kmh)
+        same = {"EgoSpeed": v, "LeadSpeed": v, "LeadS": START + HEADWAY * v}
+        if scenario == "lead_slowdown":
+            for a in DECELERATIONS:
+                yield Candidate(scenario, same | {"Deceleration": a})
+            continue
+        for swerve in SWERVE_TIMES:
+            lead_s = START + 1.8 * v  # the second vehicle ends up in the same lane, nearer
+            pair = {"LeadS": lead_s, "SecondS": lead_s + 8.0, "SecondSpeed": v}
+            yield Candidate(scenario, same | pair | {"SwerveTime": swerve})
+
+
+def judge(candidate: Candidate, seeds: range = SEEDS) -> Row:
+    """Drive it once per seed."""
+    played = [_drive(candidate, preset(BASELINE), seed) for seed in seeds]
+    logs = [p.run.log for p in played]
+    way = [float(np.ptp(log.actors.x[:, 0])) for log in logs]
+    return Row(
+        completed=float(np.mean([p.outcome is Outcome.COMPLETED for p in played])),
+        triggered=float(np.mean([p.triggered for p in played])),
+        npc_contact=float(np.mean([npc_contact_row(log) is not None for log in logs])),
+        a_hardest=float(np.median([-np.diff(log.v_ego).min() / DT for log in logs])),
+        nearest=min(_nearest(p) for p in played),
+        way=float(np.median(way)),
+    )
+
+
+def _nearest(played: Played) -> float:
+    a = played.run.log.actors
+    return float(np.hypot(a.x[:, 1:] - a.x[:, :1], a.y[:, 1:] - a.y[:, :1]).min())
+
+
+def _drive(candidate: Candidate, weather: Weather, seed: int) -> Played:
+    name = candidate.scenario
+    return play(
+        Play(
+            file=scenario_file(name),
+            label="tuning",
+            weather=weather,
+            seed=seed,
+            parameters=drawn_parameters(name, seed, candidate.cutin, candidate.values),
+            skill=drawn_skill(name, seed),
+        )
+    )
+
+
+def main(scenarios: list[str]) -> None:
+    """Print the rows of these scenarios, or of all."""
+    for scenario in scenarios or names():
+        for candidate in candidates(scenario):
+            row = judge(candidate)
+            label = candidate.cutin.value if scenario == CUT_IN else ""
+            values = " ".join(f"{k}={v:.4g}" for k, v in candidate.values.items())
+            print(
+                f"{scenario} {label} {values}: completed {row.completed:.0%}, triggered "
+                f"{row.triggered:.0%}, npc contact {row.npc_contact:.0%}, hardest braking "
+                f"{row.a_hardest:.1f} m/s2, nearest {row.nearest:.1f} m, way {row.way:.0f} m",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

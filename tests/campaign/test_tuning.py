@@ -1,0 +1,40 @@
+"""The choice of the scenarios' values can be repeated, with seeds that no report uses (X-8)."""
+
+import pytest
+
+from skidpad.campaign.cells import FIRST_SEED
+from skidpad.campaign.tuning import SEEDS, Candidate, candidates, judge
+from skidpad.scenarios.generate import SCENARIOS
+from skidpad.scenarios.variation import CUT_IN, CutIn, names, variant_parameters
+
+FEW = SEEDS[:3]
+
+
+@pytest.mark.req("X-8")
+def test_no_report_can_reach_a_tuning_seed():
+    assert min(SEEDS) >= 900_000 > FIRST_SEED + 100
+
+
+@pytest.mark.req("X-8", "B-074")
+@pytest.mark.parametrize("name", names())
+def test_what_ships_is_one_of_the_candidates(name):
+    shipped = dict(next(s for s in SCENARIOS if s.name == name).parameters)
+    if name == CUT_IN:
+        shipped |= variant_parameters(CutIn.FIXED)
+    near = [
+        all(shipped[k] == pytest.approx(v, abs=0.05) for k, v in c.values.items())
+        for c in candidates(name)
+    ]
+    assert any(near)
+
+
+@pytest.mark.req("B-070", "B-074", "B-075", "B-076", "B-078")
+def test_the_delay_breaks_the_cut_in_and_the_shorter_distance_repairs_it():
+    shares = {
+        cutin: judge(
+            Candidate(CUT_IN, {"MergeDistance": variant_parameters(cutin)["MergeDistance"]}, cutin),
+            FEW,
+        ).completed
+        for cutin in CutIn
+    }
+    assert shares == {CutIn.ORIGINAL: 1.0, CutIn.UNFIXED: 0.0, CutIn.FIXED: 1.0}

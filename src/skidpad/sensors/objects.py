@@ -2,7 +2,8 @@
 
 For campaigns of thousands of runs. Each vehicle is its box; visible vertical faces are cut into
 strips and the strips into runs of pixels, nearer vehicles hide farther ones column by column. The
-radar casts the same rays as at pixel level, against boxes, barriers and the road's plane.
+radar casts as many rays as at pixel level against boxes, barriers and the road's plane, but evenly
+over its field where those crowd at the axis (docs/limits.md says what that does).
 
 Not modelled here: roofs of vehicles, glass and wheels, crests of hills. A vehicle on another
 level of an overpass counts as hidden by deck and parapet.

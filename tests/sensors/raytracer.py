@@ -13,13 +13,15 @@ from skidpad.sensors.view import NEAR
 def triangles_of(suite, view, hidden=0):
     """(m, 3, 3) full-detail triangles in camera axes, and their keys with the instance."""
     chunks, actors = suite.scene.chunks, suite._actors
+    clusters = chunks.clusters
     corners, keys = [], []
     for c in range(len(chunks.radius)):
-        v0 = chunks.vertex_start[c, 0]
-        t0 = chunks.triangle_start[c, 0]
-        t = slice(t0, t0 + chunks.triangle_count[c, 0])
-        corners.append(chunks.vertices[chunks.triangles[t] + v0])
-        keys.append(suite._static_key[t])
+        first = chunks.cluster_start[c, 0]
+        for k in range(first, first + chunks.cluster_count[c, 0]):
+            t0 = clusters.triangle_start[k]
+            t = slice(t0, t0 + clusters.triangle_count[k])
+            corners.append(clusters.vertices[clusters.triangles[t] + clusters.vertex_start[k]])
+            keys.append(suite._static_key[t])
     for n in range(len(actors.radius)):
         if n == hidden or not actors.present[n]:
             continue

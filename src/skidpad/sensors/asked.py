@@ -24,7 +24,7 @@ from skidpad.physics.optics import extinction
 from skidpad.sensors import inertial
 from skidpad.sensors.crowd import make_actors, place_actors
 from skidpad.sensors.lidar import Lidar
-from skidpad.sensors.rasteriser import make_scratch
+from skidpad.sensors.projection import make_scratch
 from skidpad.sensors.suite import SceneMap, scene_of
 
 EGO = 0
@@ -103,7 +103,9 @@ class _Scene:
     def __init__(self, map: SceneMap, table: ActorTable) -> None:
         static = scene_of(map)
         self.chunks, self.actors = static.chunks, make_actors(table)
-        largest = max(int(static.chunks.vertex_count.max()), int(self.actors.vertex_count.max()))
+        largest = max(
+            int(static.chunks.clusters.vertex_count.max()), int(self.actors.vertex_count.max())
+        )
         self.scratch = make_scratch(largest, 1)
         self.placed = -1
 

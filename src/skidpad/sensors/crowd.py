@@ -8,7 +8,8 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.sensors.bodies import body_mesh
 from skidpad.sensors.mesh import Mesh
-from skidpad.sensors.rasteriser import Actors, Floats
+from skidpad.sensors.projection import Floats
+from skidpad.sensors.rasteriser import Actors
 from skidpad.sensors.scene import pixel_key
 
 MAX_ACTORS = 32_766  # the instance has 15 bits of an int32 key

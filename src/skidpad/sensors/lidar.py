@@ -15,7 +15,8 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.frames import LidarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import LidarSpec
-from skidpad.sensors.rasteriser import Actors, Ints, Scratch
+from skidpad.sensors.projection import Ints, Scratch
+from skidpad.sensors.rasteriser import Actors
 from skidpad.sensors.rays import cast, make_hits, make_rays
 from skidpad.sensors.scene import Chunks
 from skidpad.sensors.view import View, world_to_camera

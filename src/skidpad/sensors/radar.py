@@ -13,7 +13,8 @@ from skidpad.core.jit import kernel
 from skidpad.core.randomness import stream_key
 from skidpad.core.specs import RadarSpec
 from skidpad.sensors.noise import uniform
-from skidpad.sensors.rasteriser import Actors, Floats, Ints, Scratch
+from skidpad.sensors.projection import Floats, Ints, Scratch
+from skidpad.sensors.rasteriser import Actors
 from skidpad.sensors.rays import Hits, Rays, cast, make_hits, make_rays
 from skidpad.sensors.scene import Chunks
 from skidpad.sensors.view import View, world_to_camera

@@ -17,18 +17,25 @@ from numpy.typing import NDArray
 from skidpad.core.jit import kernel
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.sensors.materials import Material
+from skidpad.sensors.projection import (
+    BEHIND,
+    Floats,
+    Ints,
+    Scratch,
+    clip_near,
+    composed,
+    frustum_sides,
+    project_block,
+    rotated,
+    sphere_visible,
+)
 from skidpad.sensors.scene import Chunks
-from skidpad.sensors.view import NEAR, View
+from skidpad.sensors.view import View
 
 LEVEL_DISTANCE = (60.0, 150.0, 400.0)  # m from the camera to the chunk's sphere
 AUTO_LEVEL = -1
 BACKGROUND = int(SemanticClass.SKY) << 8 | int(Material.SKY)
 SLIVER = 1e-7  # px^2, twice the area below which a triangle has no usable slope of depth
-
-_LEFT, _RIGHT, _UP, _DOWN, _BEHIND = 1, 2, 4, 8, 16
-
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int32]
 
 
 class Actors(NamedTuple):
@@ -45,25 +52,6 @@ class Actors(NamedTuple):
     rotation: Floats  # (n, 3, 3) body to world
     position: Floats  # (n, 3)
     present: NDArray[np.bool_]
-
-
-class Scratch(NamedTuple):
-    """Working memory for the vertices of one block."""
-
-    camera: Floats  # (m, 3) camera axes, m
-    screen: Floats  # (m, 3) column, row, inverse depth
-    code: NDArray[np.uint8]  # (m,) which planes of the frustum the vertex lies beyond
-    ramp: NDArray[np.float32]  # (width,) 0, 1, 2, ...
-
-
-def make_scratch(largest_block: int, width: int) -> Scratch:
-    """Room for blocks of so many vertices and images of so many columns."""
-    return Scratch(
-        np.empty((largest_block, 3)),
-        np.empty((largest_block, 3)),
-        np.empty(largest_block, dtype=np.uint8),
-        np.arange(width, dtype=np.float32),
-    )
 
 
 @kernel
@@ -133,76 +121,6 @@ def _fill(
 
 
 @kernel
-def project_block(
-    vertices: Floats,
-    first: int,
-    count: int,
-    turn: Floats,
-    shift: Floats,
-    view: View,
-    scratch: Scratch,
-) -> None:
-    """Vertices to camera axes, screen and frustum codes. turn, shift: their frame to camera."""
-    m00, m01, m02 = turn[0, 0], turn[0, 1], turn[0, 2]
-    m10, m11, m12 = turn[1, 0], turn[1, 1], turn[1, 2]
-    m20, m21, m22 = turn[2, 0], turn[2, 1], turn[2, 2]
-    t0, t1, t2 = shift[0], shift[1], shift[2]
-    f, cx, cy = view.focal, view.cx, view.cy
-    right, up, down = view.width - cx, cy - view.top, view.height - cy
-    for i in range(count):
-        vx, vy, vz = vertices[first + i, 0], vertices[first + i, 1], vertices[first + i, 2]
-        x = m00 * vx + m01 * vy + m02 * vz + t0
-        y = m10 * vx + m11 * vy + m12 * vz + t1
-        z = m20 * vx + m21 * vy + m22 * vz + t2
-        code = 0
-        if f * x + cx * z < 0.0:
-            code |= _LEFT
-        if f * x - right * z > 0.0:
-            code |= _RIGHT
-        if f * y + up * z < 0.0:
-            code |= _UP
-        if f * y - down * z > 0.0:
-            code |= _DOWN
-        if z < NEAR:
-            code |= _BEHIND
-        w = 1.0 / z
-        scratch.camera[i, 0] = x
-        scratch.camera[i, 1] = y
-        scratch.camera[i, 2] = z
-        scratch.screen[i, 0] = cx + f * x * w
-        scratch.screen[i, 1] = cy + f * y * w
-        scratch.screen[i, 2] = w
-        scratch.code[i] = code
-
-
-@kernel
-def clip_near(a: int, b: int, c: int, view: View, scratch: Scratch, out: Floats) -> int:
-    """Corners (k, 3) of the part of a triangle beyond the near plane, on screen; k is 0, 3 or 4."""
-    corners = (a, b, c)
-    k = 0
-    for e in range(3):
-        i, j = corners[e], corners[(e + 1) % 3]
-        zi, zj = scratch.camera[i, 2], scratch.camera[j, 2]
-        if zi >= NEAR:
-            out[k, 0] = scratch.screen[i, 0]
-            out[k, 1] = scratch.screen[i, 1]
-            out[k, 2] = scratch.screen[i, 2]
-            k += 1
-        if (zi >= NEAR) != (zj >= NEAR):
-            if zi < NEAR:  # always from the far end, so that both triangles of an edge agree
-                i, j = j, i
-                zi, zj = zj, zi
-            t = (zi - NEAR) / (zi - zj)
-            x = scratch.camera[i, 0] + t * (scratch.camera[j, 0] - scratch.camera[i, 0])
-            y = scratch.camera[i, 1] + t * (scratch.camera[j, 1] - scratch.camera[i, 1])
-            out[k, 0] = view.cx + view.focal * x / NEAR
-            out[k, 1] = view.cy + view.focal * y / NEAR
-            out[k, 2] = 1.0 / NEAR
-            k += 1
-    return k
-
-
-@kernel
 def _draw_block(
     triangles: Ints,
     keys: Ints,
@@ -222,7 +140,7 @@ def _draw_block(
         if code[a] & code[b] & code[c]:
             continue
         value = np.int32(keys[t] | instance)
-        if (code[a] | code[b] | code[c]) & _BEHIND:
+        if (code[a] | code[b] | code[c]) & BEHIND:
             k = clip_near(a, b, c, view, scratch, clipped)
             for i in range(1, k - 1):
                 _fill(
@@ -260,55 +178,6 @@ def _draw_block(
                 inverse,
                 key,
             )
-
-
-@kernel
-def sphere_visible(centre: Floats, radius: float, view: View, sides: Floats, shift: Floats) -> bool:
-    """Whether any of a sphere may lie in the frustum. sides: (4,) lengths of the side normals."""
-    r = view.rotation
-    x = r[0, 0] * centre[0] + r[0, 1] * centre[1] + r[0, 2] * centre[2] + shift[0]
-    y = r[1, 0] * centre[0] + r[1, 1] * centre[1] + r[1, 2] * centre[2] + shift[1]
-    z = r[2, 0] * centre[0] + r[2, 1] * centre[1] + r[2, 2] * centre[2] + shift[2]
-    f = view.focal
-    if z < NEAR - radius:
-        return False
-    if f * x + view.cx * z < -radius * sides[0]:
-        return False
-    if f * x - (view.width - view.cx) * z > radius * sides[1]:
-        return False
-    if f * y + (view.cy - view.top) * z < -radius * sides[2]:
-        return False
-    return bool(f * y - (view.height - view.cy) * z <= radius * sides[3])
-
-
-@kernel
-def frustum_sides(view: View) -> Floats:
-    """(4,) lengths of the inward normals of the left, right, upper and lower plane."""
-    sides = np.empty(4)
-    sides[0] = np.hypot(view.focal, view.cx)
-    sides[1] = np.hypot(view.focal, view.width - view.cx)
-    sides[2] = np.hypot(view.focal, view.cy - view.top)
-    sides[3] = np.hypot(view.focal, view.height - view.cy)
-    return sides
-
-
-@kernel
-def rotated(m: Floats, v: Floats) -> Floats:
-    """m @ v of a (3, 3) and a (3,), in a fixed order of additions."""
-    out = np.empty(3)
-    for i in range(3):
-        out[i] = m[i, 0] * v[0] + m[i, 1] * v[1] + m[i, 2] * v[2]
-    return out
-
-
-@kernel
-def composed(a: Floats, b: Floats) -> Floats:
-    """a @ b of two (3, 3), in a fixed order of additions."""
-    out = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = a[i, 0] * b[0, j] + a[i, 1] * b[1, j] + a[i, 2] * b[2, j]
-    return out
 
 
 @kernel
@@ -351,31 +220,36 @@ def raster(
     sides = frustum_sides(view)
     clipped = np.empty((4, 3))
     shift = -rotated(view.rotation, view.centre)
+    clusters = chunks.clusters
     for c in range(chunks.radius.size):
         if not sphere_visible(chunks.centre[c], chunks.radius[c], view, sides, shift):
             continue
         k = chunk_level(chunks.centre[c], chunks.radius[c], view, level)
-        project_block(
-            chunks.vertices,
-            chunks.vertex_start[c, k],
-            chunks.vertex_count[c, k],
-            view.rotation,
-            shift,
-            view,
-            scratch,
-        )
-        _draw_block(
-            chunks.triangles,
-            static_key,
-            chunks.triangle_start[c, k],
-            chunks.triangle_count[c, k],
-            0,
-            view,
-            scratch,
-            clipped,
-            inverse,
-            key,
-        )
+        first = chunks.cluster_start[c, k]
+        for j in range(first, first + chunks.cluster_count[c, k]):
+            if not sphere_visible(clusters.centre[j], clusters.radius[j], view, sides, shift):
+                continue
+            project_block(
+                clusters.vertices,
+                clusters.vertex_start[j],
+                clusters.vertex_count[j],
+                view.rotation,
+                shift,
+                view,
+                scratch,
+            )
+            _draw_block(
+                clusters.triangles,
+                static_key,
+                clusters.triangle_start[j],
+                clusters.triangle_count[j],
+                0,
+                view,
+                scratch,
+                clipped,
+                inverse,
+                key,
+            )
     for n in range(actors.radius.size):
         if n == hidden or not actors.present[n]:
             continue

@@ -2,6 +2,7 @@
 
 The rays of one sensor lie in the pyramid of a `View` whose pixels are cells: each triangle is
 tested against the rays of the cells that its bounding box touches. Full detail, no tolerance.
+Clusters and actors whose bounding sphere no ray meets are skipped before any vertex is projected.
 """
 
 from __future__ import annotations
@@ -12,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.jit import kernel
-from skidpad.sensors.rasteriser import (
-    Actors,
+from skidpad.sensors.projection import (
+    BEHIND,
     Floats,
     Ints,
     Scratch,
@@ -24,10 +25,11 @@ from skidpad.sensors.rasteriser import (
     rotated,
     sphere_visible,
 )
+from skidpad.sensors.rasteriser import Actors
 from skidpad.sensors.scene import Chunks
-from skidpad.sensors.view import View
+from skidpad.sensors.view import NEAR, View
 
-_BEHIND = 16
+SPHERE_MARGIN = 1e-3  # m, far more than rounding can move a ray past a bounding sphere
 
 
 class Rays(NamedTuple):
@@ -81,6 +83,51 @@ def sort_into_cells(view: View, rays: Rays) -> None:
     for cell in range(rays.start.size - 1):
         rays.start[cell] = rays.start[cell + 1]
     rays.start[rays.start.size - 1] = rays.order.size
+
+
+@kernel
+def _in_axes(view: View, point: Floats, shift: Floats) -> tuple[float, float, float]:
+    """A point (3,) of the world in camera axes."""
+    r = view.rotation
+    x = r[0, 0] * point[0] + r[0, 1] * point[1] + r[0, 2] * point[2] + shift[0]
+    y = r[1, 0] * point[0] + r[1, 1] * point[1] + r[1, 2] * point[2] + shift[1]
+    z = r[2, 0] * point[0] + r[2, 1] * point[1] + r[2, 2] * point[2] + shift[2]
+    return x, y, z
+
+
+@kernel
+def _touched(
+    centre: Floats, radius: float, view: View, shift: Floats, rays: Rays, hits: Hits
+) -> bool:
+    """Whether any ray comes to within the sphere before its hit so far.
+
+    Only rays of the cells that the sphere's box covers on screen are asked.
+    """
+    x, y, z = _in_axes(view, centre, shift)
+    reach = radius + SPHERE_MARGIN
+    near, far = z - reach, z + reach
+    if near <= NEAR:
+        return True
+    left = view.cx + view.focal * (x - reach) / (near if x < reach else far)
+    right = view.cx + view.focal * (x + reach) / (near if x > -reach else far)
+    top = view.cy + view.focal * (y - reach) / (near if y < reach else far)
+    bottom = view.cy + view.focal * (y + reach) / (near if y > -reach else far)
+    first, last = floor(max(left, 0.0)), floor(min(right, view.width - 1.0))
+    if first > last:
+        return False
+    nearest = 1.0 / near
+    for row in range(floor(max(top, 0.0)), floor(min(bottom, view.height - 1.0)) + 1):
+        base = row * view.width
+        for k in range(rays.start[base + first], rays.start[base + last + 1]):
+            i = rays.order[k]
+            if nearest <= hits.inverse[i]:
+                continue
+            u, v = (rays.column[i] - view.cx) / view.focal, (rays.row[i] - view.cy) / view.focal
+            cross_x, cross_y, cross_z = y - z * v, z * u - x, x * v - y * u
+            apart = cross_x * cross_x + cross_y * cross_y + cross_z * cross_z
+            if apart <= reach * reach * (u * u + v * v + 1.0):
+                return True
+    return False
 
 
 @kernel
@@ -149,7 +196,7 @@ def _meet_block(
         if code[a] & code[b] & code[c]:
             continue
         value = keys[t] | instance
-        if (code[a] | code[b] | code[c]) & _BEHIND:
+        if (code[a] | code[b] | code[c]) & BEHIND:
             k = clip_near(a, b, c, view, scratch, work)
             for i in range(1, k - 1):
                 corners[0] = work[0]
@@ -187,6 +234,7 @@ def cast(
     sides = frustum_sides(view)
     work = np.empty((4, 3))
     shift = -rotated(view.rotation, view.centre)
+    clusters = chunks.clusters
     for c in range(chunks.radius.size):
         offset = chunks.centre[c] - view.centre
         limit = reach + chunks.radius[c]
@@ -194,14 +242,22 @@ def cast(
             continue
         if not sphere_visible(chunks.centre[c], chunks.radius[c], view, sides, shift):
             continue
-        first, count = chunks.vertex_start[c, 0], chunks.vertex_count[c, 0]
-        project_block(chunks.vertices, first, count, view.rotation, shift, view, scratch)
-        first, count = chunks.triangle_start[c, 0], chunks.triangle_count[c, 0]
-        _meet_block(chunks.triangles, static_key, first, count, 0, view, scratch, work, rays, hits)
+        begin = chunks.cluster_start[c, 0]
+        for j in range(begin, begin + chunks.cluster_count[c, 0]):
+            if not _touched(clusters.centre[j], clusters.radius[j], view, shift, rays, hits):
+                continue
+            first, count = clusters.vertex_start[j], clusters.vertex_count[j]
+            project_block(clusters.vertices, first, count, view.rotation, shift, view, scratch)
+            first, count = clusters.triangle_start[j], clusters.triangle_count[j]
+            _meet_block(
+                clusters.triangles, static_key, first, count, 0, view, scratch, work, rays, hits
+            )
     for n in range(actors.radius.size):
         if n == hidden or not actors.present[n]:
             continue
         if not sphere_visible(actors.position[n], actors.radius[n], view, sides, shift):
+            continue
+        if not _touched(actors.position[n], actors.radius[n], view, shift, rays, hits):
             continue
         turn = composed(view.rotation, actors.rotation[n])
         place = rotated(view.rotation, actors.position[n]) + shift

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.roadside import Roadside
+from skidpad.sensors.clusters import Clusters, cluster
 from skidpad.sensors.furniture import cell, furniture_pieces, lamp_mesh
 from skidpad.sensors.ground import ground_pieces
 from skidpad.sensors.materials import MATERIALS, Material, base_palette
@@ -31,17 +32,16 @@ LIT: dict[LightState, tuple[int, Material]] = {
 
 
 class Chunks(NamedTuple):
-    """C chunks of V vertices and T triangles in all; level l of chunk c is a block of both."""
+    """C chunks of T triangles in all; level l of chunk c is a block of them, cut into clusters."""
 
-    vertices: Floats  # (V, 3) world, m
-    triangles: Ints  # (T, 3) indices relative to the block's first vertex
+    clusters: Clusters
     key: Ints  # (T,) class << 8 | material
     centre: Floats  # (C, 3)
     radius: Floats  # (C,)
-    vertex_start: Ints  # (C, LEVELS)
-    vertex_count: Ints  # (C, LEVELS)
     triangle_start: Ints  # (C, LEVELS)
     triangle_count: Ints  # (C, LEVELS)
+    cluster_start: Ints  # (C, LEVELS)
+    cluster_count: Ints  # (C, LEVELS)
 
 
 class Lamps(NamedTuple):
@@ -100,22 +100,19 @@ def pack(blocks: Iterable[list[Mesh]]) -> Chunks:
     blocks = list(blocks)
     flat = [mesh for levels in blocks for mesh in levels]
     shape = (len(blocks), LEVELS)
-    vertex_count = np.array([len(m.vertices) for m in flat], dtype=np.int32)
-    triangle_count = np.array([len(m.triangles) for m in flat], dtype=np.int32)
-    everything = merge([m._replace(triangles=m.triangles) for m in flat])
-    vertex_start = (np.cumsum(vertex_count) - vertex_count).astype(np.int32)
-    triangles = everything.triangles - np.repeat(vertex_start, triangle_count)[:, None]
+    count = np.array([len(m.triangles) for m in flat], dtype=np.int32)
+    everything = merge(flat)
+    clusters, per_block = cluster(everything.vertices, everything.triangles, count)
     centre, radius = _spheres(blocks)
     return Chunks(
-        everything.vertices,
-        np.ascontiguousarray(triangles, dtype=np.int32),
+        clusters,
         pixel_key(everything),
         centre,
         radius,
-        vertex_start.reshape(shape),
-        vertex_count.reshape(shape),
-        (np.cumsum(triangle_count) - triangle_count).astype(np.int32).reshape(shape),
-        triangle_count.reshape(shape),
+        (np.cumsum(count) - count).astype(np.int32).reshape(shape),
+        count.reshape(shape),
+        (np.cumsum(per_block) - per_block).astype(np.int32).reshape(shape),
+        per_block.reshape(shape),
     )
 
 

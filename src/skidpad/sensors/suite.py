@@ -24,8 +24,9 @@ from skidpad.sensors.degradation import CameraNoise, degradation
 from skidpad.sensors.lighting import lighting
 from skidpad.sensors.passes import NOTHING, UNLIMITED, Pass, Sight, poison
 from skidpad.sensors.perception_noise import PerceptionNoise
+from skidpad.sensors.projection import make_scratch
 from skidpad.sensors.radar import Radar
-from skidpad.sensors.rasteriser import AUTO_LEVEL, make_scratch, raster
+from skidpad.sensors.rasteriser import AUTO_LEVEL, raster
 from skidpad.sensors.scene import StaticScene, build_scene
 from skidpad.sensors.shading import Shading
 from skidpad.sensors.view import View, camera_view
@@ -105,7 +106,7 @@ class PixelSuite:
         self._actors = make_actors(table)
         self._static_key = self.scene.chunks.key.copy()
         largest = max(
-            int(self.scene.chunks.vertex_count.max()), int(self._actors.vertex_count.max())
+            int(self.scene.chunks.clusters.vertex_count.max()), int(self._actors.vertex_count.max())
         )
         widest = max((c.width for c in self.cameras.values()), default=1)
         self._scratch = make_scratch(largest, widest)

@@ -15,7 +15,7 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.weather import Weather
 from skidpad.sensors.crowd import make_actors, place_actors
 from skidpad.sensors.lighting import lighting
-from skidpad.sensors.rasteriser import make_scratch
+from skidpad.sensors.projection import make_scratch
 from skidpad.sensors.shading import Shading
 from skidpad.sensors.suite import scene_of
 from skidpad.simulation.carla_server.actors import Actor
@@ -43,7 +43,7 @@ class Scene:
         self.actors = make_actors(table) if self.members else make_actors(_nobody())
         self.motion: NDArray[np.float64] = np.zeros((max(len(self.members), 1), 4))
         largest = max(
-            int(self.static.chunks.vertex_count.max()), int(self.actors.vertex_count.max())
+            int(self.static.chunks.clusters.vertex_count.max()), int(self.actors.vertex_count.max())
         )
         self.scratch = make_scratch(largest, WIDEST)
         self._table = table if self.members else _nobody()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 from typer.testing import CliRunner
@@ -101,3 +102,17 @@ def test_play_and_check(tmp_path):
     assert refused.exit_code == 2
     assert re.search(r"odd\.xosc, line \d+: <OffroadCondition> is not supported", refused.stdout)
     assert not (tmp_path / "odd").exists()
+
+
+@pytest.mark.req("B-161")
+def test_four_cells_cross_drops_with_friction():
+    wish = GripWish(
+        scenarios="lead_slowdown", weather="rain_100", sensors="pixels", four_cells=True, repeats=2
+    )
+    cells = plan_grip(wish).cells
+    seen = {(c.overlay, c.friction.value, c.seed) for c in cells}
+    assert len(cells) == len(seen) == len({c.name for c in cells}) == 8
+    with pytest.raises(ConfigError, match="pixels"):
+        plan_grip(replace(wish, sensors="objects"))
+    with pytest.raises(ConfigError, match="both frictions"):
+        plan_grip(replace(wish, friction="reduced"))

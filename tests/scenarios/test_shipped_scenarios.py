@@ -122,3 +122,10 @@ def test_variants_differ_in_delay_and_distance_only():
     assert fixed["MergeDistance"] < unfixed["MergeDistance"]
     assert unfixed["GhostS"] == pytest.approx(original["GhostS"] - 40 * 0.05 * 22.0)
     assert original["EgoSpeed"] == 0.0
+
+
+@pytest.mark.req("B-074", "B-078")
+def test_the_file_of_the_cut_in_is_the_repaired_variant():
+    shipped = next(s for s in SCENARIOS if s.name == CUT_IN).parameters
+    repaired = variant_parameters(CutIn.FIXED)
+    assert {k: shipped[k] for k in repaired} == pytest.approx(repaired)

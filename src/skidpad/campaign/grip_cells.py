@@ -48,7 +48,8 @@ class GripCell:
     def cell(self) -> str:
         """Name without the seed."""
         variant = "" if self.cutin is CutIn.FIXED else f"-{self.cutin.value}"
-        return f"{self.scenario}{variant}_{self.weather.name}_{self.friction.value}"
+        drops = "-drops" if self.overlay else ""
+        return f"{self.scenario}{variant}{drops}_{self.weather.name}_{self.friction.value}"
 
     @property
     def name(self) -> str:
@@ -81,16 +82,21 @@ def cross(
     frictions: Sequence[Friction],
     cutins: Sequence[CutIn],
     seeds: range,
+    overlays: Sequence[bool] | None = None,
 ) -> list[GripCell]:
-    """Every combination; the rest as in `template`. Seeds vary slowest: pairs come early."""
+    """Every combination; the rest as in `template`. Seeds vary slowest: pairs come early.
+
+    overlays: drops on the cameras or not; None: as in the template.
+    """
     from dataclasses import replace
 
     return [
-        replace(template, scenario=s, weather=w, friction=f, cutin=c, seed=seed)
+        replace(template, scenario=s, weather=w, friction=f, cutin=c, seed=seed, overlay=drops)
         for seed in seeds
         for s in scenarios
         for c in (cutins if s == CUT_IN else (CutIn.FIXED,))
         for w in weather
+        for drops in ((template.overlay,) if overlays is None else overlays)
         for f in frictions
     ]
 
@@ -104,7 +110,7 @@ def identity(cells: Sequence[GripCell]) -> dict[str, Any]:
     """The resolved configuration of a campaign, without workers and paths (decision M-18)."""
     names = sorted({c.cell for c in cells})
     template = cells[0].resolved() if cells else {}
-    for varied in ("scenario", "weather", "friction", "seed", "cutin"):
+    for varied in ("scenario", "weather", "friction", "seed", "cutin", "overlay"):
         template.pop(varied, None)
     weathers = {c.weather.name: asdict(c.weather) for c in cells}
     return {"command": "grip", "cells": names, "weathers": weathers, "template": template}

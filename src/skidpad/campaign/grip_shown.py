@@ -19,7 +19,7 @@ from skidpad.recording.logfiles import TICKS
 from skidpad.recording.results import read_results
 
 STOPPING = "stopping.parquet"
-CELL = ("scenario", "cutin", "weather", "friction")
+CELL = ("scenario", "cutin", "overlay", "weather", "friction")
 
 
 def shown(results: pl.DataFrame) -> pl.DataFrame:
@@ -34,13 +34,13 @@ def shown(results: pl.DataFrame) -> pl.DataFrame:
 def keep_shown(out: Path, cells: Sequence[GripCell], runner: Runner) -> None:
     """Write the logs of these runs; a drive is the same whenever it is driven."""
     wanted = {
-        (row["scenario"], row["cutin"], row["weather"], row["friction"], row["seed"])
-        for row in shown(read_results(out)).to_dicts()
+        tuple(row[name] for name in (*CELL, "seed")) for row in shown(read_results(out)).to_dicts()
     }
     jobs = [
         Job(c.name, TARGET, Task(c, out, keep=True), c.deadline_s)
         for c in cells
-        if (c.scenario, c.cutin.value, c.weather.name, c.friction.value, c.seed) in wanted
+        if (c.scenario, c.cutin.value, c.overlay, c.weather.name, c.friction.value, c.seed)
+        in wanted
         and not (out / RUNS / c.name / TICKS).exists()
     ]
     for _ in runner(jobs):

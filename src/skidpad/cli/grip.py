@@ -45,6 +45,10 @@ def grip(
     overlay: Annotated[
         bool, typer.Option("--overlay", help="Rain drops on the cameras (pixels).")
     ] = False,
+    four_cells: Annotated[
+        bool,
+        typer.Option("--four-cells", help="Each run without and with drops, to part both effects."),
+    ] = False,
     workers: Annotated[
         int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
     ] = os.cpu_count() or 1,
@@ -78,6 +82,7 @@ def grip(
         sensors=sensors,
         actors=actors,
         overlay=overlay,
+        four_cells=four_cells,
         until_halfwidth=until_halfwidth,
         keep=keep,
     )

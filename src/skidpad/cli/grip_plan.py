@@ -59,6 +59,7 @@ class GripWish:
     sensors: str = "objects"
     actors: str = "physical"
     overlay: bool = False
+    four_cells: bool = False  # drops x friction (B-161)
     until_halfwidth: float | None = None
     keep: str = "shown"
 
@@ -100,8 +101,10 @@ def plan_grip(wish: GripWish) -> GripPlan:
         actors=Mode(require_choice("--actors", wish.actors, ("physical", "ideal"))),
         overlay=wish.overlay,
     )
-    if wish.overlay and template.level is not SensorLevel.PIXELS:
-        raise ConfigError("--overlay draws on images: it needs --sensors pixels")
+    if wish.overlay and wish.four_cells:
+        raise ConfigError("--four-cells drives with and without drops: leave --overlay away")
+    if (wish.overlay or wish.four_cells) and template.level is not SensorLevel.PIXELS:
+        raise ConfigError("--overlay and --four-cells draw on images: they need --sensors pixels")
     chosen = list(names()) if wish.scenarios == "all" else _parted(wish.scenarios)
     for name in chosen:
         require_choice("scenario", name, names())
@@ -110,8 +113,19 @@ def plan_grip(wish: GripWish) -> GripPlan:
     if wish.until_halfwidth is not None:
         require_range("--until-halfwidth", wish.until_halfwidth, 0.001, 0.5)
     size = wish.repeats if wish.until_halfwidth is None else BATCH
+    overlays = (False, True) if wish.four_cells else (wish.overlay,)
+    if wish.four_cells and len(frictions) != len(Friction):
+        raise ConfigError("--four-cells needs both frictions")
     batches = [
-        cross(template, chosen, climate, frictions, cutins, seeds(k, min(size, wish.repeats - k)))
+        cross(
+            template,
+            chosen,
+            climate,
+            frictions,
+            cutins,
+            seeds(k, min(size, wish.repeats - k)),
+            overlays,
+        )
         for k in range(0, wish.repeats, size)
     ]
     require_choice("--keep", wish.keep, KEEP)

@@ -83,7 +83,7 @@ class GripEntry:
     error: str = ""
 
 
-SORT = ("scenario", "cutin", "weather", "friction", "seed")
+SORT = ("scenario", "cutin", "overlay", "weather", "friction", "seed")
 COLUMNS = ("x", "y", "v", "cvip", "steer", "brake", "throttle", "npc_x", "npc_y")
 
 

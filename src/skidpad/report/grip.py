@@ -19,6 +19,7 @@ from skidpad.recording.logfiles import TICKS, read_log
 from skidpad.recording.results import TIMING, definitions_of
 from skidpad.report import grip_figures, grip_tables
 from skidpad.report.grip_data import GripCampaign, load_grip, scenario_title
+from skidpad.report.grip_rain import rain_tables
 from skidpad.report.page import (
     Block,
     Card,
@@ -69,6 +70,7 @@ def build_page(campaign: GripCampaign, folder: Path) -> Page:
         Section("Completion and score", grip_tables.completion_tables(campaign)),
         Section("Findings of the source, judged", _verdicts(campaign)),
         Section("What changes besides", grip_tables.change_tables(campaign) if both else []),
+        Section("Rain on the lens and rain on the road", rain_tables(campaign)),
         Section("Series over time", grip_figures.both_modes(campaign) if both else []),
         Section("Across weathers", grip_figures.across_weathers(campaign)),
         Section("Trajectories of the cut-in", grip_figures.trajectories(campaign)),
@@ -181,7 +183,8 @@ def _replays(campaign: GripCampaign, folder: Path) -> list[Block]:
 
 
 def _card(folder: Path, row: dict[str, object], role: str) -> Card | None:
-    name = f"{row['scenario']}_{row['weather']}_{row['friction']}-{row['seed']:06d}"
+    drops = "-drops" if row["overlay"] else ""
+    name = f"{row['scenario']}{drops}_{row['weather']}_{row['friction']}-{row['seed']:06d}"
     run = folder / RUNS / name
     if not (run / TICKS).exists():
         return None
@@ -224,7 +227,7 @@ def _provenance(campaign: GripCampaign, folder: Path) -> list[Block]:
     timing = timing.filter(pl.col("cpu_s") > 0.0)
     prints = fingerprints(latest(read_ledger(folder, GripEntry)))
     lines = [
-        f"Skidpad {__version__}, results hash {grip_hash(campaign.results)}.",
+        f"Skidpad {__version__}, results hash {grip_hash(campaign.all_runs)}.",
         f"Machine fingerprints: {', '.join(sorted(prints)) or 'none'}.",
     ]
     if len(timing):

@@ -47,6 +47,14 @@ class GripCampaign:
 
     folder: Path
     results: pl.DataFrame
+    behind_drops: pl.DataFrame | None = None  # the same runs with drops on the cameras (B-161)
+
+    @cached_property
+    def all_runs(self) -> pl.DataFrame:
+        """With and without drops."""
+        if self.behind_drops is None:
+            return self.results
+        return pl.concat([self.results, self.behind_drops])
 
     @cached_property
     def finished(self) -> pl.DataFrame:
@@ -97,6 +105,7 @@ class GripCampaign:
             if not len(runs):
                 return None
             variant = "" if pair.cutin == FIXED else f"-{pair.cutin}"
+            variant += "-drops" if runs["overlay"][0] else ""
             name = f"{pair.scenario}{variant}_{pair.weather}_{friction}"
             self._series[key] = cell_series(
                 runs, lambda seed: read_series(series_path(self.folder, name, seed))
@@ -165,7 +174,10 @@ def load_grip(folder: Path) -> GripCampaign:
         raise FileError(f"{folder} holds no friction campaign")
     if not len(results):
         raise FileError(f"{folder} holds no finished run yet")
-    return GripCampaign(folder, results)
+    if results["overlay"].n_unique() == 1:
+        return GripCampaign(folder, results)
+    drops = results["overlay"]
+    return GripCampaign(folder, results.filter(~drops), results.filter(drops))
 
 
 def scenario_title(name: str) -> str:

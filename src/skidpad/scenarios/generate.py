@@ -174,13 +174,13 @@ SCENARIOS = (
         name="ghost_cut_in",
         title="Ghost cut-in: a vehicle from behind swerves in front of the ego and slows",
         parameters={
-            "EgoSpeed": 22.2,  # 80 km/h
-            "CruiseSpeed": 22.2,
-            "GhostS": 50.0,
-            "GhostSpeed": 30.0,  # 108 km/h: well above the ego's (B-073)
+            "EgoSpeed": 0.0,  # from rest, as the spawn delay needs (G-3)
+            "CruiseSpeed": 13.9,
+            "GhostS": 41.0,
+            "GhostSpeed": 22.0,  # 79 km/h: well above the ego's (B-073)
             "MergeDistance": 2.0,  # m from centre to centre along the road, the repaired value
             "MergeTime": 2.0,
-            "GhostEndSpeed": 8.0,
+            "GhostEndSpeed": 4.0,
             "Deceleration": 5.0,
         },
         actors={EGO: (LANE, "100", "$EgoSpeed"), GHOST: (LANE + 1, "$GhostS", "$GhostSpeed")},
@@ -192,7 +192,7 @@ SCENARIOS = (
         name="lead_slowdown",
         title="Lead slowdown: the vehicle ahead slows and finally stops",
         parameters={
-            "EgoSpeed": 22.2,
+            "EgoSpeed": 22.2,  # 80 km/h
             "CruiseSpeed": 22.2,
             "LeadS": 128.0,
             "LeadSpeed": 22.2,

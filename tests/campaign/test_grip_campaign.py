@@ -12,7 +12,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from skidpad.campaign.cluster import runner_of
+from skidpad.campaign.cluster import run_on, runner_of
 from skidpad.campaign.grip import Runner, drive_one, local, run_grip, uncertain_cells
 from skidpad.campaign.grip_cells import Friction, GripCell, cross, seeds
 from skidpad.campaign.grip_shown import keep_shown, shown
@@ -150,6 +150,40 @@ def test_a_dask_cluster_gives_the_same_results(tmp_path):
     with runner_of("local:2") as runner:
         far = run_grip([batch], tmp_path / "far", runner)
     assert far.content_hash == alone.content_hash
+
+
+@pytest.mark.slow
+@pytest.mark.req("X-1", "L-7")
+def test_a_dask_worker_killed_during_a_run_loses_nothing(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    batch = cells(3)
+    alone = run_grip([batch], tmp_path / "alone", here)
+
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        begun = threading.Event()
+        pids = set(client.run(os.getpid).values())
+
+        def kill():
+            begun.wait(120.0)
+            os.kill(min(pids), signal.SIGKILL)
+
+        thread = threading.Thread(target=kill)
+        thread.start()
+
+        def killing(jobs):
+            for finished in run_on(client, jobs):
+                begun.set()
+                yield finished
+
+        far = run_grip([batch], tmp_path / "far", killing)
+        thread.join()
+    assert far.content_hash == alone.content_hash
+    assert (far.runs, far.failed) == (len(batch), 0)
 
 
 AGENTS = """

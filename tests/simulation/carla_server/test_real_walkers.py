@@ -25,8 +25,10 @@ walkers = [world.try_spawn_actor(kinds[i], carla.Transform(p)) for i, p in enume
 walkers = [w for w in walkers if w is not None]
 assert len(walkers) >= 15
 kind = library.find("controller.ai.walker")
-leaders = [world.spawn_actor(kind, carla.Transform(), w) for w in walkers]
-world.tick()
+spawn = carla.command.SpawnActor
+results = client.apply_batch_sync([spawn(kind, carla.Transform(), w.id) for w in walkers], True)
+assert not any(r.error for r in results), [r.error for r in results]
+leaders = list(world.get_actors([r.actor_id for r in results]))
 world.set_pedestrians_cross_factor(0.0)
 for leader in leaders:
     leader.start()

@@ -7,6 +7,7 @@ from typing import Any
 
 from skidpad.core.errors import SkidpadError
 from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.actors import Attachment
 from skidpad.simulation.carla_server.methods import lights, motion, vehicles, walkers
 from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
 from skidpad.simulation.carla_server.spawning import spawn, spawn_attached
@@ -84,6 +85,11 @@ def run(world: World, variant: Any, depth: int = 0) -> int:
     return id if isinstance(id, int) else 0
 
 
+def _attachment(kind: Any) -> int:
+    """The client's spawn command leaves this member unset unless told, so chance values arrive."""
+    return int(kind) if kind in tuple(Attachment) else int(Attachment.RIGID)
+
+
 def _spawn(world: World, members: list[Any], depth: int) -> int:
     if len(members) != 6 or depth > MAX_DEPTH:
         raise wire.WireError("a spawn command has six members and is nested at most four deep")
@@ -94,7 +100,7 @@ def _spawn(world: World, members: list[Any], depth: int) -> int:
         actor = spawn(world, description, pose)
     else:
         name = wire.text(socket, "socket")
-        actor = spawn_attached(world, description, pose, parent_id, kind, name)
+        actor = spawn_attached(world, description, pose, parent_id, _attachment(kind), name)
     for command in wire.items(after, "do_after"):
         (variant,) = wire.items(command, "command", 1)
         index, body = wire.items(variant, "command", 2)

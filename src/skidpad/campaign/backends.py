@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from skidpad.simulation.carla.keeper import ServerKeeper
     from skidpad.simulation.carla.options import CarlaOptions
 
+WATCHDOG = 120.0  # s without a tick after which a worker ends itself; a map may take a minute
 _KEEPERS: dict[BackendChoice, ServerKeeper] = {}  # of this process; a worker lives for many runs
 
 

@@ -18,6 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from skidpad import __version__
+from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
+from skidpad.campaign.cells import BackendChoice
 from skidpad.campaign.channel_outcomes import DriveOutcome, Referee
 from skidpad.campaign.channel_routes import DrivenRoute
 from skidpad.campaign.channel_world import Segment, segment_of
@@ -33,7 +35,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.sensors.channel_presets import senses_of
 from skidpad.sensors.channel_suite import CYCLE, ChannelSuite
 from skidpad.sensors.objects import LABELS
-from skidpad.simulation.embedded.engine import EmbeddedBackend
+from skidpad.simulation.backend import Backend
 from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Choice, Reason
 from skidpad.stack.channels.channel import Channel
 from skidpad.stack.channels.settings import settings_of
@@ -56,6 +58,7 @@ class SegmentPlan:
     duration: float = 600.0  # s
     drive_by: str = ARBITER  # or the name of the channel that drives alone
     noise: float = 1.0
+    backend: BackendChoice = BackendChoice()
 
     def __post_init__(self) -> None:
         if len(set(self.channels)) != len(self.channels) or not self.channels:
@@ -76,7 +79,8 @@ def drive_segment(plan: SegmentPlan, path: Path) -> DriveOutcome:
     """Drive a segment and write its recording to `path`, which appears only when complete."""
     map = load_map(plan.route.map)
     segment = segment_of(plan.route, map, plan.seed, plan.duration)
-    backend = EmbeddedBackend()
+    keep_server(plan.backend)
+    backend = make_backend(plan.backend, WATCHDOG)
     part = path.with_suffix(".part")
     try:
         with ChannelWriter(part, plan.channels) as writer:
@@ -132,7 +136,7 @@ def _loop(
     plan: SegmentPlan,
     map: RoadMap,
     segment: Segment,
-    backend: EmbeddedBackend,
+    backend: Backend,
     writer: ChannelWriter,
 ) -> DriveOutcome:
     backend.reset(segment.setup, plan.seed)

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import msgspec
 
+from skidpad.campaign.cells import BackendChoice, BackendKind
 from skidpad.campaign.channel_drive import ARBITER, SegmentPlan, drive_segment
 from skidpad.campaign.channel_outcomes import DriveOutcome
 from skidpad.campaign.channel_routes import DrivenRoute
@@ -44,6 +45,7 @@ def segment_plans(
     seed: int = 0,
     drive_by: str = ARBITER,
     noise: float = 1.0,
+    backend: BackendChoice | None = None,
 ) -> list[SegmentPlan]:
     """Segments of ten minutes, the hours split equally among routes; the last one is the rest."""
     require_range("hours", hours, 1.0 / 3600.0, 10_000.0)
@@ -57,6 +59,7 @@ def segment_plans(
             duration=min(SEGMENT, seconds - i * SEGMENT),
             drive_by=drive_by,
             noise=noise,
+            backend=BackendChoice() if backend is None else backend,
         )
         for i in range(ceil(seconds / SEGMENT - 1e-9))
         for route in routes
@@ -130,7 +133,11 @@ class DriveRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 def _identity(plan: SegmentPlan) -> dict[str, object]:
+    """What decides a segment; where the server is does not."""
     plain: dict[str, object] = msgspec.to_builtins(plan)
+    del plain["backend"]
+    if plan.backend.kind is not BackendKind.EMBEDDED:
+        plain["backend"] = plan.backend.resolved()
     return plain
 
 

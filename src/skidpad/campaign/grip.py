@@ -119,9 +119,11 @@ def warm_up() -> None:
 
 def play_cell(cell: GripCell, folder: Path | None = None) -> Played:
     """Play the scenario of a cell; returns what is left behind."""
+    from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.play import Play, play
     from skidpad.scenarios.variation import drawn_parameters, drawn_skill, scenario_file
 
+    keep_server(cell.backend)
     return play(
         Play(
             file=scenario_file(cell.scenario),
@@ -140,7 +142,8 @@ def play_cell(cell: GripCell, folder: Path | None = None) -> Played:
             actors=cell.actors,
             overlay=cell.overlay,
         ),
-        folder=folder,
+        make_backend(cell.backend, WATCHDOG),
+        folder,
     )
 
 

@@ -26,7 +26,6 @@ from skidpad.stack.settings import LaneTruth
 
 RUNS, CONFIG, ERROR = "runs", "config.yaml", "error.txt"
 FAILURES = {"crashed": Outcome.CRASHED, "timeout": Outcome.TIMEOUT}
-WATCHDOG = 120.0  # s without a tick after which a worker ends itself; a map may take a minute
 TIMES_OF_DAY = ("sunrise", "noon", "night")
 
 
@@ -107,7 +106,7 @@ def see_all() -> None:
 def drive_one(argument: tuple[Cell, Path]) -> tuple[RunKey, Metrics, Timing, str]:
     """In a worker: drive a cell, write its folder, return its row and the last line of an error."""
     # numba and friends are imported only where they are needed, not in the parent.
-    from skidpad.campaign.backends import keep_server, make_backend
+    from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.drive import run_cell
     from skidpad.evidence.metrics.run import run_metrics
     from skidpad.recording.logfiles import write_log

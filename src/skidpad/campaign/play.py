@@ -9,10 +9,10 @@ from typing import Any
 
 import yaml
 
-from skidpad.campaign.cells import Cell, Driver
+from skidpad.campaign.cells import BackendChoice, BackendKind, Cell, Driver
 from skidpad.campaign.drive import Drive, Run, Unsupervised, header_of, loop, story, with_sensors
 from skidpad.campaign.snapshots import Snapshots
-from skidpad.core.errors import OutputError, StackError
+from skidpad.core.errors import BackendError, OutputError, StackError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.setup import Setup
@@ -130,11 +130,42 @@ def play(wish: Play, backend: Backend | None = None, folder: Path | None = None)
     )
 
 
-def play_to(wish: Play, out: Path) -> Played:
-    """Play it and write log, events, set-up and error into a folder."""
+@dataclass(frozen=True, slots=True)
+class PlayTask:
+    """What a worker is given."""
+
+    wish: Play
+    out: Path
+    backend: BackendChoice
+
+
+def play_to(wish: Play, out: Path, choice: BackendChoice | None = None) -> Played:
+    """Play it and write log, events, set-up and error into a folder.
+
+    On a CARLA server a process of its own drives: the wheel's threads can end theirs.
+    """
     if out.exists() and any(out.iterdir()):
         raise OutputError(f"{out} is not empty; choose another --out")
-    played = play(wish, folder=out)
+    task = PlayTask(wish, out, BackendChoice() if choice is None else choice)
+    if task.backend.kind is BackendKind.EMBEDDED:
+        return play_task(task)
+    from skidpad.campaign.pool import Job, run_jobs
+
+    load(wish.file, wish.parameters, wish.ego)  # what is wrong in the file is said here
+    (finished,) = run_jobs([Job(out.name, "skidpad.campaign.play:play_task", task)], 1)
+    if finished.failure is not None:
+        raise BackendError(f"{wish.file.name} on CARLA: {finished.detail.strip()}")
+    played: Played = finished.value
+    return played
+
+
+def play_task(task: PlayTask) -> Played:
+    """Play it here."""
+    from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
+
+    wish, out = task.wish, task.out
+    keep_server(task.backend)
+    played = play(wish, make_backend(task.backend, WATCHDOG), out)
     write_log(out, played.run.log)
     plain = {
         "file": wish.file.name,
@@ -148,6 +179,7 @@ def play_to(wish: Play, out: Path) -> Played:
         "sensors": wish.level.value,
         "actors": wish.actors.value,
         "seed": wish.seed,
+        "backend": task.backend.resolved(),
         "outcome": played.outcome.value,
         "triggered": played.triggered,
     }

@@ -6,6 +6,7 @@ import multiprocessing
 import shlex
 import sys
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Protocol
 
@@ -32,6 +33,19 @@ class BackendWish(Protocol):
     def server_command(self) -> str | None: ...  # noqa: D102
     @property
     def restart_every(self) -> int: ...  # noqa: D102
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class ServerWish:
+    """What commands other than `adas` let one choose."""
+
+    backend: str = "embedded"
+    host: str = "127.0.0.1"
+    port: int = 2000
+    pace: bool = False
+    without: Sequence[str] = ()
+    server_command: str | None = None
+    restart_every: int = 0
 
 
 def backend_choice(wish: BackendWish) -> BackendChoice:

@@ -17,6 +17,12 @@ WORKERS = typer.Option(1, help="Worker processes.")
 FOLDERS = typer.Argument(help="Folders of `skidpad channels drive`.")
 DRIVE_BY = typer.Option("arbiter", help="The arbiter, or the channel that drives alone.")
 
+BACKEND = typer.Option("embedded", help="embedded, or carla: a CARLA server drives the world.")
+HOST = typer.Option("127.0.0.1", help="Of the CARLA server.")
+PORT = typer.Option(2000, help="Of the CARLA server.")
+SERVER_COMMAND = typer.Option(None, help="CARLA: command that starts the server for these drives.")
+RESTART_EVERY = typer.Option(0, min=0, help="CARLA: drives after which it is started anew.")
+
 
 def drive(
     route: str = ROUTE,
@@ -28,10 +34,17 @@ def drive(
     noise: float = NOISE,
     workers: int = WORKERS,
     drive_by: str = DRIVE_BY,
+    backend: str = BACKEND,
+    host: str = HOST,
+    port: int = PORT,
+    server_command: str | None = SERVER_COMMAND,
+    restart_every: int = RESTART_EVERY,
 ) -> None:
-    """Drive channels over routes in the embedded simulator; one recording per ten minutes."""
+    """Drive channels over routes on a simulator; one recording per ten minutes."""
+    from skidpad.campaign.cells import BackendChoice
     from skidpad.campaign.channel_routes import chosen_routes
     from skidpad.campaign.channels import run_drives, segment_plans
+    from skidpad.cli.carla_backend import ServerWish, backend_choice
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.channel_presets import senses_of
 
@@ -41,11 +54,28 @@ def drive(
     routes = chosen_routes(route, map)
     for chosen in routes:
         load_map(chosen.map)
-    plans = segment_plans(routes, hours, channels=names, seed=seed, drive_by=drive_by, noise=noise)
+    choice = backend_choice(
+        ServerWish(
+            backend=backend,
+            host=host,
+            port=port,
+            server_command=server_command,
+            restart_every=restart_every,
+        )
+    )
+    plans = segment_plans(
+        routes,
+        hours,
+        channels=names,
+        seed=seed,
+        drive_by=drive_by,
+        noise=noise,
+        backend=choice,
+    )
     summary = run_drives(
         plans,
         out,
-        workers=workers,
+        workers=workers if choice == BackendChoice() else 1,  # a server drives one run at a time
         on_run=lambda o: typer.echo(
             f"{o.route} seed {o.seed}: {o.driven_s:.0f} s, {o.distance_m:.0f} m, "
             f"{o.collisions} collisions, {o.red_lights_run} red lights run, ended by {o.ended}"

@@ -49,6 +49,17 @@ def grip(
         bool,
         typer.Option("--four-cells", help="Each run without and with drops, to part both effects."),
     ] = False,
+    backend: Annotated[
+        str, typer.Option(help="embedded, or carla: a CARLA server drives the world.")
+    ] = "embedded",
+    host: Annotated[str, typer.Option(help="Of the CARLA server.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Of the CARLA server.")] = 2000,
+    server_command: Annotated[
+        str | None, typer.Option(help="CARLA: command that starts the server for this campaign.")
+    ] = None,
+    restart_every: Annotated[
+        int, typer.Option(min=0, help="CARLA: runs after which that server is started anew.")
+    ] = 0,
     workers: Annotated[
         int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
     ] = os.cpu_count() or 1,
@@ -66,6 +77,7 @@ def grip(
     csv: Annotated[bool, typer.Option("--csv", help="Write CSV beside Parquet.")] = False,
 ) -> None:
     """Drive scenarios x weathers x frictions x seeds; prints the path of the report."""
+    from skidpad.cli.carla_backend import ServerWish
     from skidpad.cli.grip_plan import GripWish, drive_grip, plan_grip
 
     wish = GripWish(
@@ -85,6 +97,13 @@ def grip(
         four_cells=four_cells,
         until_halfwidth=until_halfwidth,
         keep=keep,
+        server=ServerWish(
+            backend=backend,
+            host=host,
+            port=port,
+            server_command=server_command,
+            restart_every=restart_every,
+        ),
     )
     plan = plan_grip(wish)
     typer.echo(drive_grip(plan, out, workers=workers, cluster=cluster, resume=resume, csv=csv))

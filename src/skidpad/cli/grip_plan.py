@@ -12,6 +12,7 @@ from typing import TypeVar
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from skidpad.campaign.cells import BackendKind
 from skidpad.campaign.cluster import runner_of
 from skidpad.campaign.grip import (
     GripSummary,
@@ -26,6 +27,7 @@ from skidpad.campaign.grip import (
 from skidpad.campaign.grip_cells import Friction, GripCell, cross, seeds
 from skidpad.campaign.grip_shown import keep_shown, write_stopping
 from skidpad.campaign.play import check_controller
+from skidpad.cli.carla_backend import ServerWish, backend_choice
 from skidpad.core.errors import ConfigError, require_choice, require_range
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.core.weather import Weather
@@ -62,6 +64,7 @@ class GripWish:
     four_cells: bool = False  # drops x friction (B-161)
     until_halfwidth: float | None = None
     keep: str = "shown"
+    server: ServerWish = ServerWish()
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,6 +103,7 @@ def plan_grip(wish: GripWish) -> GripPlan:
         level=SensorLevel(require_choice("--sensors", wish.sensors, ("objects", "pixels"))),
         actors=Mode(require_choice("--actors", wish.actors, ("physical", "ideal"))),
         overlay=wish.overlay,
+        backend=backend_choice(wish.server),
     )
     if wish.overlay and wish.four_cells:
         raise ConfigError("--four-cells drives with and without drops: leave --overlay away")
@@ -157,6 +161,10 @@ def drive_grip(
     """Run the campaign under a progress bar, keep the runs that the report shows, write it."""
     from skidpad.report.grip import write_grip_report
 
+    if any(c.backend.kind is BackendKind.CARLA for c in plan.cells):
+        workers = 1  # a CARLA server drives one run at a time
+        if cluster:
+            raise ConfigError("--cluster needs --backend embedded: a CARLA server drives one run")
     with runner_of(cluster) if cluster else _as_is(local(workers)) as runner:
         summary = _progress(plan, out, runner, resume=resume, csv=csv)
         keep_shown(out, plan.cells, runner)

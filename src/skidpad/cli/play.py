@@ -26,6 +26,11 @@ def play(
     param: Annotated[
         list[str] | None, typer.Option(help="A parameter of the file: NAME=VALUE.")
     ] = None,
+    backend: Annotated[
+        str, typer.Option(help="embedded, or carla: a CARLA server drives the world.")
+    ] = "embedded",
+    host: Annotated[str, typer.Option(help="Of the CARLA server.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="Of the CARLA server.")] = 2000,
     duration: Annotated[float, typer.Option(help="Longest time, s.")] = 120.0,
     check: Annotated[
         bool, typer.Option("--check", help="List what is not supported; run nothing.")
@@ -40,6 +45,7 @@ def play(
     if out is None:
         raise ConfigError("play needs --out DIR for the run, or --check")
     from skidpad.campaign.play import Play, check_controller, play_to
+    from skidpad.cli.carla_backend import ServerWish, backend_choice
     from skidpad.core.errors import require_choice
     from skidpad.core.vocabulary import GripModel, SensorLevel
     from skidpad.physics.presets import find_weather
@@ -61,7 +67,8 @@ def play(
         actors=Mode(require_choice("--actors", actors, ("physical", "ideal"))),
         duration=duration,
     )
-    played = play_to(wish, out)
+    choice = backend_choice(ServerWish(backend=backend, host=host, port=port))
+    played = play_to(wish, out, choice)
     log = played.run.log
     seconds = float(log.t[-1]) if len(log) else 0.0
     typer.echo(f"{played.outcome.value} after {seconds:.2f} s; log in {out}")

@@ -13,6 +13,9 @@ from collections.abc import Callable
 EPISODE_STREAM = 1  # the world snapshots
 MAX_PENDING = 64 * 1024 * 1024  # bytes that one client may leave unfetched
 MAX_CONNECTIONS = 4096
+# s. The 0.9.16 client hangs up when a sensor is stopped, which commonly happens right before it is
+# destroyed. Its process dies now and then when both sides hang up at once.
+GRACE = 2.0
 TCP = 1
 ADDRESS_NOT_SET = 0  # the client then uses the host it was given
 TOKEN = struct.Struct("<IHBB16s")
@@ -68,10 +71,10 @@ class StreamHub:
                     transport.write(part)
 
     def close(self, stream: int) -> None:
-        """Forget a stream and hang up on its listeners."""
+        """Forget a stream; its listeners have GRACE to hang up themselves."""
         self._open.discard(stream)
         for transport in self._listeners.pop(stream, []):
-            transport.close()
+            asyncio.get_running_loop().call_later(GRACE, transport.close)
 
     def protocol(self) -> StreamConnection:
         """A connection's protocol, for asyncio's server."""

@@ -106,6 +106,36 @@ def test_friction_is_applied_once_to_every_wheel(serve: Serve, program: Program)
     assert bare["ice"]["stop"] > bare["rain"]["stop"] > 2.0 * bare["dry"]["stop"]
 
 
+CLOSED = {
+    "empty 2": (
+        "mean_speed_kmh", "max_speed_kmh", "p95_speed_kmh", "distance_km", "lateral_std_m",
+        "min_ttc_s", "radar_fpr_pct",
+    ),
+    "empty 4": (
+        "mean_speed_kmh", "max_speed_kmh", "p95_speed_kmh", "distance_km", "lateral_std_m",
+        "lateral_max_m", "min_ttc_s",
+    ),
+    "lead": ("distance_m", "duration_s", "route_completion", "min_cvip_m"),
+}  # fmt: skip
+SAME = {
+    "empty 2": ("fatal_collisions", "lane_changes", "samples"),
+    "empty 4": ("fatal_collisions", "lane_changes", "samples"),
+    "lead": ("outcome", "triggered", "completion", "score"),
+}
+
+
+@pytest.mark.slow
+@pytest.mark.req("K-6")
+def test_closed_loop_gives_the_same_metrics(serve: Serve, program: Program) -> None:
+    """An empty road with lights, and a lead that a scenario player moves: within 1 % (K-6 c)."""
+    runs = program("closed_loop", serve("--mu-ref", "0.9").port)
+    for name, (ours, theirs) in runs.items():
+        for metric in CLOSED[name]:
+            assert theirs[metric] == pytest.approx(ours[metric], rel=0.01), (name, metric)
+        for metric in SAME[name]:
+            assert theirs[metric] == ours[metric], (name, metric)
+
+
 @pytest.mark.req("A-263", "A-265", "A-266", "A-267", "A-268")
 def test_optimisations_change_no_reading(serve: Serve, program: Program) -> None:
     """Five degraded feeds at night in rain, lights and truth; without a cache the world is asked."""

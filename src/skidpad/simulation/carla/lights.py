@@ -1,10 +1,12 @@
-"""States of the traffic lights by OpenDRIVE signal id (A-265)."""
+"""Traffic lights by OpenDRIVE signal id: what they show (A-265), and our programme on them."""
 
 from __future__ import annotations
 
 from typing import Any
 
 from skidpad.core.vocabulary import LightState
+from skidpad.roads.queries import RoadMap
+from skidpad.simulation.embedded.lights import Lights
 
 
 class TrafficLights:
@@ -12,17 +14,43 @@ class TrafficLights:
 
     def __init__(self, world: Any, cached: bool) -> None:
         self._world = world
-        self._known = self._find() if cached else None
+        self._known = find_lights(world) if cached else None
 
     def read(self) -> dict[int, LightState]:
         """By signal id, from the client's newest snapshot."""
-        known = self._find() if self._known is None else self._known
+        known = find_lights(self._world) if self._known is None else self._known
         return {id: LightState(int(light.get_state())) for id, light in known}
 
-    def _find(self) -> list[tuple[int, Any]]:
-        found = []
-        for light in self._world.get_actors().filter("traffic.traffic_light*"):
-            text = light.get_opendrive_id()
-            if text.lstrip("-").isdigit():  # a light that the map does not know cannot be named
-                found.append((int(text), light))
-        return sorted(found, key=lambda pair: pair[0])
+
+def find_lights(world: Any) -> list[tuple[int, Any]]:
+    """Lights with their signal ids, in order."""
+    found = []
+    for light in world.get_actors().filter("traffic.traffic_light*"):
+        text = light.get_opendrive_id()
+        if text.lstrip("-").isdigit():  # a light that the map does not know cannot be named
+            found.append((int(text), light))
+    return sorted(found, key=lambda pair: pair[0])
+
+
+class Programme:
+    """The cycle of the embedded simulator, with the seed's phases (decision M-2), on the server.
+
+    The server's own clocks stand still meanwhile.
+    """
+
+    def __init__(self, carla: Any, world: Any, map: RoadMap, seed: int, dt: float) -> None:
+        self._carla = carla
+        self._cycle = Lights(map.signals, seed, dt, map.lanes)
+        self._lights = find_lights(world)
+        self._shown: dict[int, LightState] = {}
+        world.freeze_all_traffic_lights(True)
+        self.show(0)
+
+    def show(self, tick: int) -> None:
+        """Let the lights show what belongs to this tick; the server shows it in the coming one."""
+        self._cycle.update(tick)
+        for id, light in self._lights:
+            state = self._cycle.by_id.get(id)
+            if state is not None and self._shown.get(id) is not state:
+                light.set_state(self._carla.TrafficLightState.values[int(state)])
+                self._shown[id] = state

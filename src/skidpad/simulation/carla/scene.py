@@ -73,6 +73,8 @@ def synchronise(world: Any, setup: Setup) -> None:
 
 def release(world: Any) -> None:
     """Asynchronous again, so that the next client finds a server that ticks by itself."""
+    world.freeze_all_traffic_lights(False)
+    world.reset_all_traffic_lights()
     settings = world.get_settings()
     settings.synchronous_mode = False
     settings.fixed_delta_seconds = None

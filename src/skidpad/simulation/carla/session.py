@@ -29,7 +29,7 @@ from skidpad.simulation.carla.cast import Player, spawn_setup, table_of
 from skidpad.simulation.carla.connection import Connection
 from skidpad.simulation.carla.events import EgoEvents
 from skidpad.simulation.carla.grip import prepare_grip
-from skidpad.simulation.carla.lights import TrafficLights
+from skidpad.simulation.carla.lights import Programme, TrafficLights
 from skidpad.simulation.carla.options import Optimisation
 from skidpad.simulation.carla.pacer import rest
 from skidpad.simulation.carla.pictures import Pictures
@@ -83,6 +83,7 @@ class Session:
         self.grip = prepare_grip(self.carla, self.world, self.setup)
         for player in self.players:
             self._grip_on(player)
+        self.programme = Programme(self.carla, self.world, self.map, self.seed, self.setup.dt)
         self.lights = TrafficLights(self.world, self.options.uses(Optimisation.LIGHT_CACHE))
         self.events = EgoEvents(self.map, self.players, self.setup.dt)
         ego = self.players[EGO].actor
@@ -171,8 +172,7 @@ class Session:
         )
 
     def _engage(self) -> None:
-        """Start: lights from the beginning, initial speeds, drivers on their seats."""
-        self.world.reset_all_traffic_lights()
+        """Start: initial speeds, drivers on their seats."""
         setups = (self.setup.ego, *self.setup.actors)
         self._starting = {i: s.speed for i, s in enumerate(setups) if s.speed != 0.0}
         for player in self.players:
@@ -198,6 +198,7 @@ class Session:
         for i, player in enumerate(self.players[1:], start=1):
             self._push(i, player)
         self._starting.clear()
+        self.programme.show(self.tick + 1)
         frame = self._advance()
         self.tick += 1
         assert self.sensors is not None

@@ -16,9 +16,21 @@ MAX_CONNECTIONS = 4096
 # s. The 0.9.16 client hangs up when a sensor is stopped, which commonly happens right before it is
 # destroyed. Its process dies now and then when both sides hang up at once.
 GRACE = 2.0
+# s. On a new episode the client drops its old one at once, unless one of its threads is busy with a
+# snapshot just then: it then unsubscribes on that thread while another one subscribes, in a table
+# without a lock, and its process dies (seen in a debugger). So it gets no snapshot for that long.
+HOLD = 0.05
+# Subscriptions to snapshots from here on up: each client's episode has an id of its own, because the
+# client's table is by id and holds the old episode and the new one for a moment.
+EPISODE_ALIASES = 2**31
 TCP = 1
 ADDRESS_NOT_SET = 0  # the client then uses the host it was given
 TOKEN = struct.Struct("<IHBB16s")
+
+
+def canonical(stream: int) -> int:
+    """The stream behind an id."""
+    return EPISODE_STREAM if stream >= EPISODE_ALIASES else stream
 
 
 class StreamHub:
@@ -31,6 +43,8 @@ class StreamHub:
         self._open: set[int] = {EPISODE_STREAM}
         self._listeners: dict[int, list[asyncio.Transport]] = {}
         self._connections = 0
+        self._aliases = EPISODE_ALIASES
+        self._held: dict[asyncio.Transport, bytes | None] = {}  # and the newest message withheld
         self.on_subscribe: Callable[[int], bytes | None] = lambda _: None
 
     def create(self) -> int:
@@ -40,13 +54,18 @@ class StreamHub:
         self._open.add(stream)
         return stream
 
+    def episode_token(self) -> bytes:
+        """A token of the snapshots that nobody else has."""
+        self._aliases = EPISODE_ALIASES + (self._aliases + 1) % EPISODE_ALIASES
+        return self.token(self._aliases)
+
     def token(self, stream: int) -> bytes:
         """The 24 bytes with which a client finds a stream."""
         return TOKEN.pack(stream, self.port, TCP, ADDRESS_NOT_SET, b"")
 
     def exists(self, stream: int) -> bool:
         """Whether `stream` may be subscribed."""
-        return stream in self._open
+        return canonical(stream) in self._open
 
     def wanted(self, stream: int) -> bool:
         """Whether anybody listens."""
@@ -60,6 +79,9 @@ class StreamHub:
         size = sum(len(p) for p in parts)
         head = size.to_bytes(4, "little")
         for transport in listeners:
+            if transport in self._held:
+                self._held[transport] = b"".join((head, *parts))
+                continue
             if transport.get_write_buffer_size() + size > MAX_PENDING:
                 self.dropped += 1
                 continue
@@ -69,6 +91,19 @@ class StreamHub:
                 transport.write(head)
                 for part in parts:
                     transport.write(part)
+
+    def hold(self, stream: int) -> None:
+        """Let those who listen now wait for a moment; then they get the newest message."""
+        waiting = [t for t in self._listeners.get(stream, []) if t not in self._held]
+        if waiting:
+            self._held.update(dict.fromkeys(waiting))
+            asyncio.get_running_loop().call_later(HOLD, self._resume, waiting)
+
+    def _resume(self, waiting: list[asyncio.Transport]) -> None:
+        for transport in waiting:
+            message = self._held.pop(transport, None)
+            if message is not None and not transport.is_closing():
+                transport.write(message)
 
     def close(self, stream: int) -> None:
         """Forget a stream; its listeners have GRACE to hang up themselves."""
@@ -88,6 +123,7 @@ class StreamHub:
     def release(self, stream: int | None, transport: asyncio.Transport) -> None:
         """A connection ended."""
         self._connections -= 1
+        self._held.pop(transport, None)
         listeners = self._listeners.get(stream) if stream is not None else None
         if listeners and transport in listeners:
             listeners.remove(transport)
@@ -126,7 +162,7 @@ class StreamConnection(asyncio.Protocol):
             return
         self._asked += data[:4]
         if len(self._asked) >= 4:
-            self._stream = int.from_bytes(self._asked[:4], "little")
+            self._stream = canonical(int.from_bytes(self._asked[:4], "little"))
             self._hub.subscribe(self._stream, self._transport)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  asyncio's name

@@ -96,6 +96,7 @@ class World:
     def load(self, name: str, reset_settings: bool) -> None:
         """Another map, or with "" the same one anew."""
         served = self.map if name == "" else self.maps.load(name)
+        self.hub.hold(EPISODE_STREAM)
         scene_of(served.roads)  # triangles now, not in the first picture's tick
         for actor in list(self.actors):
             if actor.stream is not None:

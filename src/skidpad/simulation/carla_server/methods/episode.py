@@ -7,7 +7,6 @@ from typing import Any
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.episode import parse_settings
 from skidpad.simulation.carla_server.rpc import CallError, Table
-from skidpad.simulation.carla_server.streams import EPISODE_STREAM
 from skidpad.simulation.carla_server.world import World
 
 VERSION = "0.9.16"
@@ -23,7 +22,7 @@ def version(_: World) -> str:
 @TABLE.method("get_episode_info")
 def get_episode_info(world: World) -> list[Any]:
     """Episode id and the token of the snapshots."""
-    return [world.episode.id, [world.hub.token(EPISODE_STREAM)]]
+    return [world.episode.id, [world.hub.episode_token()]]
 
 
 @TABLE.method("get_sensor_token")

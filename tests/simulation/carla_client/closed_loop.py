@@ -1,0 +1,92 @@
+"""A stack in closed loop on both backends: empty road, scripted lead; printed as JSON (K-6 c)."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Sequence
+from dataclasses import asdict
+from typing import Any
+
+from replay import without_road_noise
+
+from skidpad.campaign.cells import Cell, Driver
+from skidpad.campaign.drive import run_cell
+from skidpad.campaign.play import Play, play
+from skidpad.core.frames import Frame
+from skidpad.core.setup import ActorCommand
+from skidpad.core.states import VehicleCommand
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.evidence.metrics.grip import grip_metrics
+from skidpad.evidence.metrics.run import run_metrics
+from skidpad.physics import types
+from skidpad.physics.presets import find_weather
+from skidpad.roads.bundled import load_map
+from skidpad.scenarios.player import load
+from skidpad.scenarios.variation import scenario_file
+from skidpad.simulation.backend import Backend
+from skidpad.simulation.carla.backend import CarlaBackend
+from skidpad.simulation.carla.blueprints import STANDS_FOR
+from skidpad.simulation.carla.options import CarlaOptions
+from skidpad.simulation.carla_server.catalogue import load_catalogue
+from skidpad.simulation.carla_server.vehicles import model_of
+from skidpad.simulation.embedded.engine import EmbeddedBackend
+from skidpad.stack.configurations import functions_of
+from skidpad.stack.settings import load_profile
+
+SECONDS = 90.0
+Numbers = dict[str, Any]
+
+
+class SmoothRoad(EmbeddedBackend):
+    """The server's road has no noise; ours has (decision M-11)."""
+
+    def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
+        without_road_noise(self)
+        return super().step(command, actor_commands)
+
+
+def empty(config: int, backend: Backend) -> Numbers:
+    """Nobody else on figure8."""
+    cell = Cell(
+        driver=Driver(label=str(config), functions=functions_of(config)),
+        weather=find_weather("clear-noon"),
+        seed=1,
+        profile="recommended",
+        settings=load_profile("recommended"),
+        duration=SECONDS,
+        vehicles=0,
+        level=SensorLevel.OBJECTS,
+    )
+    return asdict(run_metrics(run_cell(cell, backend=backend).log, load_map("figure8")))
+
+
+def behind_lead(backend: Backend) -> Numbers:
+    """The lead of the friction study slows down; a scenario player moves it."""
+    wish = Play(file=scenario_file("lead_slowdown"), label="stack", weather=find_weather("rain_0"))
+    played = play(wish, backend)
+    metrics = grip_metrics(
+        played.run.log,
+        played.outcome,
+        triggered=played.triggered,
+        route_length=played.route_length,
+        ratio=1.0,
+    )
+    return {"outcome": played.outcome.value, **asdict(metrics)}
+
+
+def main(port: int) -> Any:
+    script = load(scenario_file("lead_slowdown"), {}, None)
+    ego, actors = script.setups()
+    for setup in (ego, *actors):
+        types.vehicle_types()[setup.type] = model_of(load_catalogue()[STANDS_FOR[setup.type][0]])
+
+    def both(run: Any) -> list[Numbers]:
+        return [run(SmoothRoad()), run(CarlaBackend(CarlaOptions(port=port)))]
+
+    out = {f"empty {config}": both(lambda b, c=config: empty(c, b)) for config in (2, 4)}
+    return out | {"lead": both(behind_lead)}
+
+
+if __name__ == "__main__":
+    print("RESULT", json.dumps(main(int(sys.argv[1])), default=str), flush=True)

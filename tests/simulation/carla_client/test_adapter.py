@@ -115,7 +115,7 @@ CLOSED = {
         "mean_speed_kmh", "max_speed_kmh", "p95_speed_kmh", "distance_km", "lateral_std_m",
         "lateral_max_m", "min_ttc_s",
     ),
-    "lead": ("distance_m", "duration_s", "route_completion", "min_cvip_m"),
+    "lead": ("distance_m", "duration_s", "route_completion"),
 }  # fmt: skip
 SAME = {
     "empty 2": ("fatal_collisions", "lane_changes", "samples"),

@@ -120,7 +120,7 @@ def test_variants_differ_in_delay_and_distance_only():
     assert {k for k in original if original[k] != unfixed[k]} == {"GhostS"}
     assert {k for k in fixed if fixed[k] != unfixed[k]} == {"MergeDistance"}
     assert fixed["MergeDistance"] < unfixed["MergeDistance"]
-    assert unfixed["GhostS"] == pytest.approx(original["GhostS"] - 40 * 0.05 * 22.0)
+    assert unfixed["GhostS"] == pytest.approx(original["GhostS"] - 40 * 0.05 * 24.0)
     assert original["EgoSpeed"] == 0.0
 
 

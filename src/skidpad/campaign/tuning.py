@@ -28,14 +28,17 @@ from skidpad.scenarios.variation import (
     drawn_skill,
     names,
     scenario_file,
+    variant_parameters,
 )
 
 SEEDS = TUNING_SEEDS[:30]
+FRESH_SEEDS = TUNING_SEEDS[80:180]  # no part in the choice
 BASELINE = "rain_0"
 SPEEDS_KMH = (50.0, 80.0, 100.0)
 HEADWAY = 1.26  # s from centre to centre, 1 s between bumpers at 80 km/h
 DECELERATIONS = (4.0, 6.0, 8.0)  # m/s^2: brisk, hard, emergency
-MERGE_DISTANCES = (1.0, 2.0, 4.0, 6.0, 8.0, 10.0)  # m
+MERGE_DISTANCES = (1.0, 2.0, 4.0, 6.0, 8.0, 10.0, 12.0, 14.0)  # m
+GHOST_SPEEDS = (22.0, 24.0, 26.0)  # m/s
 SWERVE_TIMES = (1.5, 2.5)  # s
 START = 100.0  # m, where the ego starts
 
@@ -65,8 +68,11 @@ def candidates(scenario: str) -> Iterator[Candidate]:
     """What was tried."""
     if scenario == CUT_IN:
         for cutin in (CutIn.ORIGINAL, CutIn.FIXED):  # without and with the spawn delay
-            for distance in MERGE_DISTANCES:
-                yield Candidate(scenario, {"MergeDistance": distance}, cutin)
+            for v in GHOST_SPEEDS:
+                start = variant_parameters(cutin, v)["GhostS"]
+                for distance in MERGE_DISTANCES:
+                    values = {"GhostSpeed": v, "GhostS": start, "MergeDistance": distance}
+                    yield Candidate(scenario, values, cutin)
         return
     for v_kmh in SPEEDS_KMH:
         v = mps_from_kmh(v_kmh)
@@ -118,10 +124,11 @@ def _drive(candidate: Candidate, weather: Weather, seed: int) -> Played:
 def main(scenarios: list[str]) -> None:
     """Print the rows of these scenarios, or of all."""
     for scenario in scenarios or names():
-        for candidate in candidates(scenario):
-            row = judge(candidate)
+        shipped = Candidate(scenario, {})
+        for candidate in [*candidates(scenario), shipped]:
+            row = judge(candidate, FRESH_SEEDS if candidate is shipped else SEEDS)
             label = candidate.cutin.value if scenario == CUT_IN else ""
-            values = " ".join(f"{k}={v:.4g}" for k, v in candidate.values.items())
+            values = " ".join(f"{k}={v:.4g}" for k, v in candidate.values.items()) or "as shipped"
             print(
                 f"{scenario} {label} {values}: completed {row.completed:.0%}, triggered "
                 f"{row.triggered:.0%}, npc contact {row.npc_contact:.0%}, hardest braking "

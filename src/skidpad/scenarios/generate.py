@@ -176,8 +176,8 @@ SCENARIOS = (
         parameters={
             "EgoSpeed": 0.0,  # from rest, as the spawn delay needs (G-3)
             "CruiseSpeed": 13.9,
-            "GhostS": 41.0,
-            "GhostSpeed": 22.0,  # 79 km/h: well above the ego's (B-073)
+            "GhostS": 37.0,
+            "GhostSpeed": 24.0,  # 86 km/h: well above the ego's (B-073)
             "MergeDistance": 2.0,  # m from centre to centre along the road, the repaired value
             "MergeTime": 2.0,
             "GhostEndSpeed": 4.0,
@@ -186,7 +186,7 @@ SCENARIOS = (
         actors={EGO: (LANE, "100", "$EgoSpeed"), GHOST: (LANE + 1, "$GhostS", "$GhostSpeed")},
         events=ghost_cut_in,
         last="slow",
-        route_length=150.0,
+        route_length=155.0,
     ),
     Scenario(
         name="lead_slowdown",

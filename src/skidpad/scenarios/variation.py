@@ -47,19 +47,22 @@ class Spread:
         return value * (1.0 + self.spread * noise) + self.gap * float(rng.uniform(-1.0, 1.0))
 
 
-# Start from rest towards 50 km/h; the ghost comes from 15 m behind at 79 km/h. Held back by the spawn
+# Start from rest towards 50 km/h; the ghost comes from 15 m behind at 86 km/h. Held back by the spawn
 # delay it comes from as far as it drives in that time: the ego is faster when they meet (BD-51).
-FROM_REST = {"EgoSpeed": 0.0, "CruiseSpeed": 13.9, "GhostSpeed": 22.0, "GhostEndSpeed": 4.0}
+FROM_REST = {"EgoSpeed": 0.0, "CruiseSpeed": 13.9, "GhostSpeed": 24.0, "GhostEndSpeed": 4.0}
 GHOST_S = 85.0  # m
-FIRST_DISTANCE, REPAIRED_DISTANCE = 8.0, 2.0  # m, chosen as docs/grip.md says (B-074)
+FIRST_DISTANCE, REPAIRED_DISTANCE = 12.0, 2.0  # m, chosen as docs/grip.md says (B-074)
 
 
-def variant_parameters(variant: CutIn) -> dict[str, float]:
-    """Values of the file's parameters that make the variant."""
+def variant_parameters(
+    variant: CutIn, v_ghost: float = FROM_REST["GhostSpeed"]
+) -> dict[str, float]:
+    """Values of the file's parameters that make the variant. v_ghost: m/s."""
     late = 0.0 if variant is CutIn.ORIGINAL else SPAWN_DELAY * DT
     repaired = variant is CutIn.FIXED
     return FROM_REST | {
-        "GhostS": GHOST_S - late * FROM_REST["GhostSpeed"],
+        "GhostSpeed": v_ghost,
+        "GhostS": GHOST_S - late * v_ghost,
         "MergeDistance": REPAIRED_DISTANCE if repaired else FIRST_DISTANCE,
     }
 

@@ -76,3 +76,8 @@ def test_a_report_is_replaced_only_by_a_complete_one(tmp_path, monkeypatch):
     with pytest.raises(OSError, match="disk full"):
         write_page(page(), path)
     assert path.read_text() == before
+
+
+def test_backticks_make_code_and_nothing_else_does():
+    page = Page(title="t", subtitle="", sections=[Section("s", [Text("run `a <b>`, not <i>")])])
+    assert "<p>run <code>a &lt;b&gt;</code>, not &lt;i&gt;</p>" in render(page)

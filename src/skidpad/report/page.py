@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -11,6 +12,7 @@ from typing import Any
 
 import jinja2
 import msgspec
+from markupsafe import Markup, escape
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,9 +219,15 @@ def _asset(name: str) -> str:
     return files("skidpad.report").joinpath("assets").joinpath(name).read_text(encoding="utf-8")
 
 
+def _prose(text: str) -> Markup:
+    """Text of a page; what stands between backticks is code."""
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
 @cache
 def _template() -> jinja2.Template:
     environment = jinja2.Environment(
         autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["prose"] = _prose
     return environment.from_string(_asset("page.html.j2"))

@@ -10,29 +10,12 @@ from pathlib import Path
 
 import pytest
 
+from carla_preface import PREFACE
 from skidpad.simulation.carla_server.process import ServerProcess
 from skidpad.simulation.carla_server.streams import StreamHub
 from skidpad.simulation.carla_server.world import ServerOptions, World
 
 CLIENT_LIMIT = 120.0  # s
-PREFACE = """
-import carla, math, sys, time
-client = carla.Client("127.0.0.1", int(sys.argv[1]))
-client.set_timeout(20.0)
-world = client.get_world()
-
-def synchronous(step=0.05):
-    settings = world.get_settings()
-    settings.synchronous_mode, settings.fixed_delta_seconds = True, step
-    world.apply_settings(settings)
-
-def finish():
-    for sensor in world.get_actors().filter("sensor.*"):
-        sensor.destroy()  # not stop: see skidpad.pytest_plugin.stop_sensors
-    print("DONE", flush=True)
-    import os
-    os._exit(0)
-"""
 
 
 class Server(ServerProcess):

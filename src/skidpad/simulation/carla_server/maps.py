@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
 
 from skidpad.core.errors import ConfigError, SkidpadError
@@ -23,10 +22,12 @@ OPENDRIVE_MAP = "OpenDriveMap"  # the name under which a client's own text is lo
 MAX_XODR = 24 * 1024 * 1024  # characters
 SPACING = 25.0  # m between recommended spawn points along a lane
 MARGIN = 6.0  # m from a lane's ends
+KEPT_MESHES = 16  # navigation meshes, by content of the map: a large town takes seconds
+_NAVIGATION: dict[str, tuple[str, bytes] | None] = {}
 LIFT = 0.3  # m above the road, so that nobody spawns inside it
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class ServedMap:
     """A map in use."""
 
@@ -45,15 +46,28 @@ class ServedMap:
         """As clients see it."""
         return PREFIX + self.name
 
-    @cached_property
+    def prepare(self) -> None:
+        """Make the navigation mesh now: a client's first call does not wait for seconds."""
+        _ = self.navigation
+
+    @property
     def navigation(self) -> tuple[str, bytes] | None:
         """Name and content of the navigation mesh; None for maps on which nobody walks (K-9)."""
-        mesh = walk_mesh(self.roads)
-        content = None if mesh is None else navmesh.packed(mesh)
-        if content is None:
-            log.info("map %s has no navigation mesh: AI walkers stay where they are", self.name)
-            return None
-        return navmesh.file_name(self.name, content), content
+        key = self.roads.content_hash
+        if key not in _NAVIGATION:
+            if len(_NAVIGATION) >= KEPT_MESHES:
+                _NAVIGATION.clear()
+            _NAVIGATION[key] = _navigation(self.name, self.roads)
+        return _NAVIGATION[key]
+
+
+def _navigation(name: str, roads: RoadMap) -> tuple[str, bytes] | None:
+    mesh = walk_mesh(roads)
+    content = None if mesh is None else navmesh.packed(mesh)
+    if content is None:
+        log.info("map %s has no navigation mesh: AI walkers stay where they are", name)
+        return None
+    return navmesh.file_name(name, content), content
 
 
 class MapStore:

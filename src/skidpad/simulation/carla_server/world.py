@@ -114,6 +114,7 @@ class World:
 
     def _begin(self, served: ServedMap) -> None:
         self.map = served
+        served.prepare()
         self.lights = LightControl(served.roads)
         self.ground = Ground.of(0)
         self.contacts.begin(served.roads)

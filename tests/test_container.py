@@ -76,7 +76,7 @@ def test_extras_and_commands_exist():
 def test_the_cluster_recipe_calls_programs_of_the_image():
     pytest.importorskip("distributed")
     text = (ROOT / "docs" / "grip.md").read_text(encoding="utf-8")
-    named = re.findall(r"image: skidpad, args: \[(\w+), (\w+)", text)
+    named = re.findall(r"args: \[(\w+), (\w+)", text)
     assert named == [("dask", "scheduler"), ("dask", "worker")]
     assert "dask" in {e.name for e in metadata.entry_points(group="console_scripts")}
     assert {"scheduler", "worker"} <= {e.name for e in metadata.entry_points(group="dask_cli")}

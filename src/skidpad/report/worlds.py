@@ -26,15 +26,19 @@ def worlds_replay(record: HazardRecord) -> dict[str, Any] | None:
     if origin is None:
         return None
     times = np.array([c.t for c in cycles])
+
+    def shown(t: float) -> int:  # a drive may end between two shown cycles
+        return min(int(np.searchsorted(times, t)), len(times) - 1)
+
     return {
         "dt": 0.1 * STRIDE,
         "unit": UNIT,
         "span": SPAN,
         "t0": round(float(times[0]), 2),
-        "mark": int(np.searchsorted(times, record.t_worst)),
+        "mark": shown(record.t_worst),
         "hazard": [
-            int(np.searchsorted(times, record.t_start)),
-            int(np.searchsorted(times, record.t_end)),
+            shown(record.t_start),
+            shown(record.t_end),
         ],
         "names": list(record.channels),
         "driving": None if record.driving is None else record.channels.index(record.driving),

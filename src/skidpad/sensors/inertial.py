@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import re
-from math import atan, cos, exp, log, pi, radians, sin, tan
+from math import cos, pi, sin
 
 import numpy as np
 
 from skidpad.core.frames import GnssFix, ImuReading
+from skidpad.core.geodesy import geolocation
 from skidpad.core.geometry import Pose
 from skidpad.core.states import ActorStates
 
-EARTH_RADIUS = 6_378_137.0  # m, equator of WGS 84, as in CARLA's projection
 G = 9.80665  # m/s^2, standard gravity, 3rd CGPM (1901)
 
 
@@ -20,19 +20,6 @@ def map_origin(geo_reference: str) -> tuple[float, float]:
     number = r"-?[0-9.]+(?:[eE][-+]?[0-9]+)?"
     found = dict(re.findall(rf"\+(lat_0|lon_0)=({number})", geo_reference))
     return float(found.get("lat_0", 0.0)), float(found.get("lon_0", 0.0))
-
-
-def geolocation(
-    east: float, north: float, latitude: float, longitude: float
-) -> tuple[float, float]:
-    """(latitude, longitude) in deg of a place in m from an origin in deg.
-
-    Mercator on a sphere, scaled at the origin, as CARLA computes it.
-    """
-    scale = EARTH_RADIUS * cos(radians(latitude))
-    y = scale * log(tan(pi / 4.0 + radians(latitude) / 2.0)) + north
-    x = scale * radians(longitude) + east
-    return (2.0 * atan(exp(y / scale)) - pi / 2.0) * 180.0 / pi, x / scale * 180.0 / pi
 
 
 def compass(pose: Pose) -> float:

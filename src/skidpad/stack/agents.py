@@ -10,13 +10,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import IntEnum
-from math import cos, degrees, pi, tau
+from math import pi, tau
 from typing import Any, ClassVar
 
 import numpy as np
 
 from skidpad.core.errors import ConfigError, StackError
 from skidpad.core.frames import LidarPoints, SensorFrame
+from skidpad.core.geodesy import geolocation
 from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import (
     mirrored,
@@ -45,7 +46,6 @@ LIDAR = "sensor.lidar.ray_cast"
 KINDS = (*CAMERAS, LIDAR, *POINT_SENSORS)
 MARK = "agent/"  # before an agent's sensor ids: ours may have the same
 G = 9.81  # m/s^2, what CARLA's accelerometer feels at rest
-EARTH_RADIUS = 6_378_137.0  # m, as in CARLA's projection
 DEPTH_FAR = 1000.0  # m, full scale of CARLA's depth images
 DEPTH_STEPS = 256**3 - 1
 ROUTE_LENGTH, ROUTE_STEP = 500.0, 5.0  # m
@@ -239,8 +239,7 @@ def _image(id: str, modality: Modality, frame: SensorFrame) -> np.ndarray[Any, A
 
 def _gps(pose: Pose) -> dict[str, float]:
     """Latitude, longitude in deg and height, around 0 N 0 E; north is left of the x axis."""
-    lat = degrees(pose.y / EARTH_RADIUS)
-    lon = degrees(pose.x / (EARTH_RADIUS * cos(pose.y / EARTH_RADIUS)))
+    lat, lon = geolocation(pose.x, pose.y, 0.0, 0.0)
     return {"lat": lat, "lon": lon, "z": pose.z}
 
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.geodesy import geolocation
 from skidpad.core.lefthanded import turn_from_carla, vector_from_carla
-from skidpad.sensors.inertial import compass, geolocation
+from skidpad.sensors.inertial import compass
 from skidpad.simulation.carla_server import codec
 from skidpad.simulation.carla_server.catalogue import Family
 

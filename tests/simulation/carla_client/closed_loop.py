@@ -35,6 +35,7 @@ from skidpad.stack.configurations import functions_of
 from skidpad.stack.settings import load_profile
 
 SECONDS = 90.0
+BEFORE_CONTACT = 25.0  # s that configuration 2 drives before it meets the first guardrail
 Numbers = dict[str, Any]
 
 
@@ -46,7 +47,7 @@ class SmoothRoad(EmbeddedBackend):
         return super().step(command, actor_commands)
 
 
-def empty(config: int, backend: Backend) -> Numbers:
+def empty(config: int, seconds: float, backend: Backend) -> Numbers:
     """Nobody else on figure8."""
     cell = Cell(
         driver=Driver(label=str(config), functions=functions_of(config)),
@@ -54,7 +55,7 @@ def empty(config: int, backend: Backend) -> Numbers:
         seed=1,
         profile="recommended",
         settings=load_profile("recommended"),
-        duration=SECONDS,
+        duration=seconds,
         vehicles=0,
         level=SensorLevel.OBJECTS,
     )
@@ -84,8 +85,12 @@ def main(port: int) -> Any:
     def both(run: Any) -> list[Numbers]:
         return [run(SmoothRoad()), run(CarlaBackend(CarlaOptions(port=port)))]
 
-    out = {f"empty {config}": both(lambda b, c=config: empty(c, b)) for config in (2, 4)}
-    return out | {"lead": both(behind_lead)}
+    return {
+        "empty 2": both(lambda b: empty(2, BEFORE_CONTACT, b)),
+        "empty 4": both(lambda b: empty(4, SECONDS, b)),
+        "contacts": both(lambda b: empty(2, SECONDS, b)),
+        "lead": both(behind_lead),
+    }
 
 
 if __name__ == "__main__":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from time import sleep
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,9 @@ from skidpad.simulation.carla_server.snapshot import SensorType
 if TYPE_CHECKING:
     from skidpad.simulation.carla_server.world import World
 
+# s. Every stream has a connection of its own, and the client's threads race: a collision gets ahead
+# of what its tick sends afterwards, so that a client that waits for that has the collision too.
+EVENT_PAUSE = 0.002
 EARLY = 1e-4  # s, so that a period of whole ticks is met in spite of rounding
 Message = tuple[bytes | memoryview, ...]
 Produce = Callable[["World", "Sensor"], list[Message]]
@@ -111,8 +115,11 @@ class SensorSet:
                 continue
             later = sensor.due + sensor.period
             sensor.due = later if later > time + EARLY else time + sensor.period
-            for message in sensor.produce(world, sensor):
+            messages = sensor.produce(world, sensor)
+            for message in messages:
                 world.hub.publish(number, head(world, sensor), *message)
+            if messages and sensor.type is SensorType.COLLISION:
+                sleep(EVENT_PAUSE)
 
 
 def head(world: World, sensor: Sensor) -> bytes:

@@ -1,4 +1,4 @@
-from math import cos, radians, sin
+from math import cos, inf, radians, sin
 
 import numpy as np
 import pytest
@@ -9,8 +9,11 @@ from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind, SemanticClass
+from skidpad.physics.optics import label_range, radar_range
+from skidpad.physics.presets import find_weather
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside
 from skidpad.sensors.objects import ObjectSuite
+from skidpad.sensors.radar import Radar, aim
 
 ROOF = CameraSpec("roof", Modality.DEPTH, 800, 600, 90.0, Pose(1.5, 0.0, 2.4))
 BUMPER = CameraSpec("bumper", Modality.DEPTH, 400, 300, 100.0, Pose(2.3, 0, 0.4, pitch=radians(20)))
@@ -93,9 +96,35 @@ def test_a_car_on_the_overpass_is_hidden_from_below():
 
 
 def test_weather_limits_how_far_objects_are_seen():
-    table, states = world((60.0, 0.0, 0.0, 0.0))
-    assert suite(table, limit=50.0).segments(states)["roof"].u.size == 0
-    assert suite(table, limit=70.0).segments(states)["roof"].u.size > 0
+    night = find_weather("rain-night")
+    for beyond, seen in ((5.0, False), (-5.0, True)):
+        rear = label_range(night) + beyond
+        table, states = world((rear + 2.25, 0.0, 0.0, 0.0))
+        assert bool(suite(table, weather=night).segments(states)["roof"].u.size) is seen
+        assert suite(table).segments(states)["roof"].u.size > 0
+
+
+def test_rain_shortens_the_reach_of_the_radar():
+    rain = find_weather("rain-noon")
+    dry, wet = suite(world()[0]).antennas[0], suite(world()[0], weather=rain).antennas[0]
+    assert dry.reach == RADAR.range
+    assert wet.reach == radar_range(rain, RADAR.range) < dry.reach
+
+
+@pytest.mark.req("M-3")
+def test_both_levels_send_the_same_rays():
+    """A wall of a vehicle across the whole field returns every ray."""
+    pixel = Radar(RADAR, 1, 0.05, inf)
+    view = pixel.view(Pose(0.0, 0.0))
+    aim(pixel.beam, 7, view, pixel._rays)
+    right = (pixel._rays.column - view.cx) / view.focal
+    down = (pixel._rays.row - view.cy) / view.focal
+    table, states = world((30.0, 0.0, 0.0, 0.0))
+    table.length[1], table.width[1], table.height[1] = 1.0, 100.0, 60.0
+    states.z[1] = -30.0
+    points = suite(table).radar(7, states)
+    assert points.azimuth == pytest.approx(np.arctan2(-right, 1.0), abs=1e-6)
+    assert points.altitude == pytest.approx(np.arctan2(-down, np.hypot(1.0, right)), abs=1e-6)
 
 
 def test_a_camera_inside_another_car_sees_its_walls():
@@ -115,7 +144,7 @@ def test_radar_range_rate_is_the_true_closing_speed():
 
 
 def test_radar_sees_road_guardrail_and_post_as_standing():
-    rail = Barrier(BarrierKind.GUARDRAIL, np.array([[0.0, 5, 0], [100, 5, 0]]), 5.0)
+    rail = Barrier(BarrierKind.GUARDRAIL, np.array([[0.0, 3, 0], [100, 3, 0]]), 3.0)
     post = Box(SemanticClass.POLE, 40.0, -2.0, 0.0, 0.0, 0.5, 4.0, 6.0)
     table, states = world((300.0, 0.0, 0.0, 0.0))
     states.vx[0] = 10.0
@@ -123,7 +152,7 @@ def test_radar_sees_road_guardrail_and_post_as_standing():
     doppler = -10.0 * np.cos(points.altitude) * np.cos(points.azimuth)
     assert points.velocity == pytest.approx(doppler, rel=1e-5)
     left = points.range * np.sin(points.azimuth) * np.cos(points.altitude)
-    assert np.any(np.isclose(left, 5.0, atol=1e-3))
+    assert np.any(np.isclose(left, 3.0, atol=1e-3))
     road = points.range * np.sin(points.altitude)
     assert road.min() == pytest.approx(-1.0, abs=1e-4)
 

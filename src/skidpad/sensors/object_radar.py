@@ -2,71 +2,65 @@
 
 from __future__ import annotations
 
-from math import radians
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
-from skidpad.core.randomness import stream
 from skidpad.core.specs import RadarSpec
 from skidpad.core.states import ActorStates
+from skidpad.core.weather import Weather
+from skidpad.physics.optics import radar_range
 from skidpad.roads.kernels import LaneArrays, project_kernel, sample_kernel
-from skidpad.sensors.boxes import Boxes, Mount, Walls, boxes_in_view, placed, walls_in_view
+from skidpad.sensors.beam import Beam, beam_of, direction
+from skidpad.sensors.boxes import (
+    Boxes,
+    Mount,
+    Walls,
+    boxes_in_view,
+    mount_of,
+    placed,
+    walls_in_view,
+)
 
 Floats = NDArray[np.float64]
 
 NEAR = 0.1  # m, near clip
 
 
-class RadarDirections:
-    """Where a radar looks: drawn anew each tick, uniform over the field of view (M-9).
+class Antenna(NamedTuple):
+    """One radar: where it sits, where it looks, and how far it hears in m."""
 
-    A pure function of seed, sensor and tick; drawn in blocks, since making a generator costs more
-    than a tick's rays.
-    """
+    mount: Mount
+    beam: Beam
+    reach: float
 
-    BLOCK = 256  # ticks
 
-    def __init__(self, spec: RadarSpec, seed: int, dt: float) -> None:
-        self.spec, self.seed = spec, seed
-        self.rays = round(spec.points_per_second * dt)
-        self.block = -1
-        self.drawn = np.empty((0, 0, 2))
-
-    def at(self, tick: int) -> Floats:
-        """(n, 2) azimuth (left positive) and altitude (up positive) in rad."""
-        block, k = divmod(tick, self.BLOCK)
-        if block != self.block:
-            fov = radians(self.spec.horizontal_fov_deg), radians(self.spec.vertical_fov_deg)
-            half = np.array(fov) / 2.0
-            draw = stream(self.seed, "radar", self.spec.id, block).uniform
-            self.drawn = draw(-half, half, size=(self.BLOCK, self.rays, 2))
-            self.block = block
-        directions: Floats = self.drawn[k]
-        return directions
+def antenna_of(spec: RadarSpec, seed: int, dt: float, weather: Weather | None) -> Antenna:
+    """A radar in a run; weather: shortens its range, None: it does not."""
+    reach = spec.range if weather is None else radar_range(weather, spec.range)
+    return Antenna(mount_of(spec.mount), beam_of(spec, seed, dt), reach)
 
 
 @kernel
 def cast_radar(
-    mount: Mount,
-    directions: Floats,
-    half_fov: float,
-    reach: float,
+    radar: Antenna,
+    tick: int,
     boxes: Boxes,
     states: ActorStates,
     walls: Walls,
     posts: Boxes,
     slope: Floats,
 ) -> NDArray[np.float32]:
-    """(m, 4) range, azimuth, altitude, range rate of the rays that hit something within `reach`.
+    """(m, 4) range, azimuth, altitude, range rate of the rays that hit something in reach.
 
-    directions: (n, 2) azimuth and altitude in the antenna's frame. slope: (2,) dz/dx and dz/dy of
-    the road, a plane through the ego's wheels; a nose that dives does not tilt it.
+    slope: (2,) dz/dx and dz/dy of the road, a plane through the ego's wheels; a nose that dives does
+    not tilt it.
     """
-    antenna = placed(mount, states)
-    origin, rotation = antenna.origin, antenna.rotation
-    yaw, edge = np.arctan2(rotation[1, 0], rotation[0, 0]), np.tan(half_fov)
+    beam, reach, seat = radar.beam, radar.reach, placed(radar.mount, states)
+    origin, rotation = seat.origin, seat.rotation
+    yaw, edge = np.arctan2(rotation[1, 0], rotation[0, 0]), beam.half_width
     near_walls = walls_in_view(origin, yaw, edge, walls, reach)
     near_posts = boxes_in_view(origin, yaw, edge, posts, reach)
     near_boxes = boxes_in_view(origin, yaw, edge, boxes, reach)
@@ -75,12 +69,12 @@ def cast_radar(
     turned_posts, turned_boxes = _turned(posts, near_posts), _turned(boxes, near_boxes)
     vx0 = states.vx[0] - states.yaw_rate[0] * oy
     vy0 = states.vy[0] + states.yaw_rate[0] * ox
-    out = np.empty((directions.shape[0], 4), np.float32)
+    out = np.empty((beam.rays, 4), np.float32)
     n = 0
-    for k in range(directions.shape[0]):
-        azimuth, altitude = directions[k, 0], directions[k, 1]
-        ca = np.cos(altitude)
-        fx, fy, fz = ca * np.cos(azimuth), ca * np.sin(azimuth), np.sin(altitude)
+    for k in range(beam.rays):
+        right, down = direction(beam, tick, k)
+        fx = 1.0 / np.sqrt(1.0 + right * right + down * down)
+        fy, fz = -right * fx, -down * fx
         dx = rotation[0, 0] * fx + rotation[0, 1] * fy + rotation[0, 2] * fz
         dy = rotation[1, 0] * fx + rotation[1, 1] * fy + rotation[1, 2] * fz
         dz = rotation[2, 0] * fx + rotation[2, 1] * fy + rotation[2, 2] * fz
@@ -109,7 +103,9 @@ def cast_radar(
             hy = origin[1] + best * dy - boxes.y[hit]
             vx += states.vx[hit] - states.yaw_rate[hit] * hy
             vy += states.vy[hit] + states.yaw_rate[hit] * hx
-        out[n, 0], out[n, 1], out[n, 2], out[n, 3] = best, azimuth, altitude, vx * dx + vy * dy
+        out[n, 0], out[n, 1] = best, np.arctan2(-right, 1.0)
+        out[n, 2] = np.arctan2(-down, np.sqrt(1.0 + right * right))
+        out[n, 3] = vx * dx + vy * dy
         n += 1
     returns: NDArray[np.float32] = out[:n].copy()
     return returns

@@ -2,8 +2,7 @@
 
 For campaigns of thousands of runs. Each vehicle is its box; visible vertical faces are cut into
 strips and the strips into runs of pixels, nearer vehicles hide farther ones column by column. The
-radar casts as many rays as at pixel level against boxes, barriers and the road's plane, but evenly
-over its field where those crowd at the axis (docs/limits.md says what that does).
+radar casts the very rays of the pixel level against boxes, barriers and the road's plane.
 
 Not modelled here: roofs of vehicles, glass and wheels, crests of hills. A vehicle on another
 level of an overpass counts as hidden by deck and parapet.
@@ -12,7 +11,6 @@ level of an overpass counts as hidden by deck and parapet.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import radians
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +21,8 @@ from skidpad.core.jit import kernel
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind, SemanticClass
+from skidpad.core.weather import Weather
+from skidpad.physics.optics import label_range
 from skidpad.roads.kernels import LaneArrays
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.boxes import (
@@ -34,7 +34,7 @@ from skidpad.sensors.boxes import (
     posts_of,
     walls_of,
 )
-from skidpad.sensors.object_radar import RadarDirections, cast_radar, road_slope
+from skidpad.sensors.object_radar import antenna_of, cast_radar, road_slope
 
 Floats = NDArray[np.float64]
 
@@ -77,7 +77,7 @@ class Camera(NamedTuple):
 class ObjectSuite:
     """Segments of every depth camera and points of every radar, tick by tick.
 
-    limit: range in m beyond which weather hides objects from cameras, None: it does not.
+    weather: limits the ranges of cameras and radar; None: it does not.
     lanes: for the slope of the road that the radar meets; None: level ground.
     """
 
@@ -88,7 +88,7 @@ class ObjectSuite:
         specs: Sequence[SensorSpec],
         seed: int,
         dt: float,
-        limit: float | None = None,
+        weather: Weather | None = None,
         lanes: LaneArrays | None = None,
     ) -> None:
         self.table = table
@@ -97,10 +97,11 @@ class ObjectSuite:
             for s in specs
             if isinstance(s, CameraSpec) and s.modality is Modality.DEPTH
         ]
-        self.radars = [(s, mount_of(s.mount)) for s in specs if isinstance(s, RadarSpec)]
+        self.antennas = [
+            antenna_of(s, seed, dt, weather) for s in specs if isinstance(s, RadarSpec)
+        ]
         self.labels = np.array([LABELS[ActorKind(k)] for k in table.kind], dtype=np.uint8)
-        self.limit = SIGHT if limit is None else min(limit, SIGHT)
-        self.directions = [RadarDirections(s, seed, dt) for s, _ in self.radars]
+        self.limit = SIGHT if weather is None else min(label_range(weather), SIGHT)
         self.lanes = lanes
         self.walls = walls_of(roadside)
         self.posts = posts_of(roadside)
@@ -119,14 +120,11 @@ class ObjectSuite:
 
     def radar(self, tick: int, states: ActorStates) -> RadarPoints:
         """Returns of the first radar; none when the suite has no radar."""
-        if not self.radars:
+        if not self.antennas:
             return RadarPoints.none()
-        spec, mount = self.radars[0]
         raw = cast_radar(
-            mount,
-            self.directions[0].at(tick),
-            radians(spec.horizontal_fov_deg) / 2.0,
-            spec.range,
+            self.antennas[0],
+            tick,
             self._boxes(states),
             states,
             self.walls,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import ceil, pi, radians, tan
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
-from skidpad.core.randomness import stream_key
 from skidpad.core.specs import RadarSpec
-from skidpad.sensors.noise import uniform
+from skidpad.sensors.beam import Beam, beam_of, direction
 from skidpad.sensors.projection import Floats, Ints, Scratch
 from skidpad.sensors.rasteriser import Actors
 from skidpad.sensors.rays import Hits, Rays, cast, make_hits, make_rays
@@ -29,15 +28,12 @@ class Radar:
         """range_limit: m, what the weather leaves of the nominal range."""
         self.spec = spec
         self.range = min(spec.range, range_limit)
-        self.rays_per_tick = max(1, round(spec.points_per_second * dt))
-        self._key = np.uint64(stream_key(seed, "radar", spec.id))
-        half = (tan(radians(spec.horizontal_fov_deg) / 2), tan(radians(spec.vertical_fov_deg) / 2))
-        self._half = half
-        self._focal = CELLS / (2.0 * half[0])
-        self._rows = max(1, ceil(2.0 * half[1] * self._focal))
-        self._rays: Rays = make_rays(self.rays_per_tick, CELLS, self._rows)
-        self._hits: Hits = make_hits(self.rays_per_tick)
-        self._points = np.empty((4, self.rays_per_tick), dtype=np.float32)
+        self.beam = beam_of(spec, seed, dt)
+        self._focal = CELLS / (2.0 * self.beam.half_width)
+        self._rows = max(1, ceil(2.0 * self.beam.half_height * self._focal))
+        self._rays: Rays = make_rays(self.beam.rays, CELLS, self._rows)
+        self._hits: Hits = make_hits(self.beam.rays)
+        self._points = np.empty((4, self.beam.rays), dtype=np.float32)
 
     def view(self, pose_world_ego: Pose) -> View:
         """The pyramid that holds every ray."""
@@ -67,27 +63,19 @@ class Radar:
         The arrays stay valid until the next call.
         """
         view = self.view(pose_world_ego)
-        aim(self._key, tick, self._half[0], self._half[1], view, self._rays)
+        aim(self.beam, tick, view, self._rays)
         cast(chunks, static_key, actors, 0, view, self.range, scratch, self._rays, self._hits)
         count = _returns(view, self._rays, self._hits, self.range, motion, actors, self._points)
         return RadarPoints(*(row[:count] for row in self._points))
 
 
 @kernel
-def aim(
-    key: np.uint64, tick: int, half_width: float, half_height: float, view: View, rays: Rays
-) -> None:
-    """Draw this tick's directions: uniform angle and uniform radius within the elliptic cone.
-
-    The radius is uniform, so directions crowd at the axis, as CARLA documents for its radar.
-    half_width, half_height: tangents of half the fields of view.
-    """
-    n = rays.column.size
-    for i in range(n):
-        angle = 2.0 * pi * uniform(key, tick, 2 * i)
-        radius = uniform(key, tick, 2 * i + 1)
-        rays.column[i] = view.cx + view.focal * half_width * radius * np.cos(angle)
-        rays.row[i] = view.cy + view.focal * half_height * radius * np.sin(angle)
+def aim(beam: Beam, tick: int, view: View, rays: Rays) -> None:
+    """Point the rays where the beam looks in this tick."""
+    for i in range(rays.column.size):
+        right, down = direction(beam, tick, i)
+        rays.column[i] = view.cx + view.focal * right
+        rays.row[i] = view.cy + view.focal * down
 
 
 @kernel

@@ -219,15 +219,17 @@ def test_two_clients_share_the_world(serve: Serve) -> None:
     synchronous()
     library, points = world.get_blueprint_library(), world.get_map().get_spawn_points()
     car = world.spawn_actor(library.find("vehicle.audi.tt"), points[0])
-    world.tick()
+    frame = world.tick()
     other = carla.Client("127.0.0.1", int(sys.argv[1]))
     other.set_timeout(20.0)
     theirs = other.get_world()
+    def wait_for(frame):  # get_world() of the wheel does not wait for its first snapshot
+        for _ in range(500):
+            if theirs.get_snapshot().frame >= frame:
+                break
+            time.sleep(0.02)
+        assert theirs.get_snapshot().frame == frame
+    wait_for(frame)
     assert [a.id for a in theirs.get_actors().filter("vehicle.*")] == [car.id]
-    frame = world.tick()
-    for _ in range(100):
-        if theirs.get_snapshot().frame >= frame:
-            break
-        time.sleep(0.02)
-    assert theirs.get_snapshot().frame == frame
+    wait_for(world.tick())
     """)

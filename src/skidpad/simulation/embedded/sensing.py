@@ -12,7 +12,6 @@ from skidpad.core.frames import CameraImage, RadarPoints, Segments
 from skidpad.core.setup import Setup
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, RangeModel, SensorLevel
-from skidpad.physics.optics import label_range
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.objects import ObjectSuite
 from skidpad.sensors.suite import PixelSuite
@@ -86,7 +85,7 @@ class Objects:
             setup.specs,
             seed,
             setup.dt,
-            limit=label_range(setup.weather) if physical else None,
+            weather=setup.weather if physical else None,
             lanes=map.arrays,
         )
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import angles_to_carla, vectors_to_carla
 from skidpad.core.randomness import stream_key
+from skidpad.sensors.beam import Beam
 from skidpad.sensors.radar import aim
 from skidpad.sensors.rays import cast, make_hits, make_rays
 from skidpad.sensors.view import View, world_to_camera
@@ -123,7 +124,8 @@ def radar(world: World, sensor: Sensor) -> Messages:
         return [(b"",)]
     view = _pyramid(pose, make.half_width, make.half_height)
     rays = make_rays(n, view.width, view.height)
-    aim(make.key, world.episode.frame, make.half_width, make.half_height, view, rays)
+    beam = Beam(make.key, n, make.half_width, make.half_height)
+    aim(beam, world.episode.frame, view, rays)
     u, v = (rays.column - view.cx) / view.focal, (rays.row - view.cy) / view.focal
     carrier = scene.rows.get(sensor.actor.parent, -1)
     met = _shoot(scene, view, carrier, make.range, u, v)

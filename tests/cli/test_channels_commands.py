@@ -212,3 +212,10 @@ def test_a_learned_identifier_needs_a_model(folder, tmp_path):
     assert "--model" in str(done.exception)
     done = runner.invoke(app, [*args, "--model", str(tmp_path / "none.npz")])
     assert "none.npz: cannot be read" in str(done.exception)
+
+
+def test_outcomes_of_a_folder_without_drives_are_refused(tmp_path, monkeypatch, capsys):
+    (tmp_path / "other.json").write_text("{}")
+    code, said = failing(monkeypatch, capsys, "channels", "outcomes", tmp_path)
+    assert code == 2
+    assert f"no driven segments below {tmp_path}" in " ".join(said.split())

@@ -1,5 +1,6 @@
 import json
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -8,9 +9,10 @@ from skidpad.core.errors import FileError
 from skidpad.evidence.evaluation import Evaluation
 from skidpad.evidence.hazards import Signal
 from skidpad.evidence.judging import judge
+from skidpad.recording.channel_drives import DriveOutcome, DriveRecord
 from skidpad.recording.cycles import cycles
 from skidpad.report.channels_evaluation import evaluation_page, write_evaluation_report
-from skidpad.report.channels_redundancy import outcomes, redundancy
+from skidpad.report.channels_redundancy import redundancy
 
 EYES = (Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,)))
 
@@ -88,19 +90,19 @@ def test_a_missed_hazard_names_the_clause_that_never_held(folder):
 def test_redundancy_compares_equal_seeds(tmp_path):
     for driver, collisions in (("arbiter", 0), ("lav_like", 2)):
         for seed in range(8):
+            outcome = DriveOutcome(
+                route="route-1", seed=seed, drive_by=driver, driven_s=600.0, distance_m=1000.0,
+                collisions=collisions + seed % 2, collisions_struck=0, red_lights_run=0, stalls=0,
+                ended="time", switches=0, minimal_risk_s=0.0, driving_s={},
+            )  # fmt: skip
             path = tmp_path / driver / f"route-1-{seed}.json"
             path.parent.mkdir(exist_ok=True)
-            path.with_suffix(".mcap").touch()
-            outcome = {
-                "route": "route-1", "seed": seed, "collisions": collisions + seed % 2,
-                "red_lights_run": 0, "stalls": 0, "distance_m": 1000.0,
-            }  # fmt: skip
-            path.write_text(json.dumps({"plan": {"drive_by": driver}, "outcome": outcome}))
+            path.write_bytes(msgspec.json.encode(DriveRecord({"drive_by": driver}, outcome)))
     table, text = redundancy(tmp_path)
-    assert [row[2].text for row in table.rows] == ["4", "20"]
+    assert [row[4].text for row in table.rows] == ["4", "20"]
     assert "lav_like alone less the arbiter, collisions per segment: +2 " in text.text
-    assert outcomes(tmp_path / "nothing") is None
     assert redundancy(tmp_path / "arbiter")[0].kind == "text"
+    assert redundancy(tmp_path / "nothing")[0].kind == "text"
 
 
 def test_a_folder_without_an_evaluation_is_named(tmp_path):

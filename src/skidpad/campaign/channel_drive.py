@@ -20,7 +20,7 @@ import numpy as np
 from skidpad import __version__
 from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
 from skidpad.campaign.cells import BackendChoice
-from skidpad.campaign.channel_outcomes import DriveOutcome, Referee
+from skidpad.campaign.channel_outcomes import Referee
 from skidpad.campaign.channel_routes import DrivenRoute
 from skidpad.campaign.channel_world import Segment, segment_of
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
@@ -29,6 +29,7 @@ from skidpad.core.setup import DT
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import ActorKind
 from skidpad.evidence.risk import safety_scores
+from skidpad.recording.channel_drives import DriveOutcome
 from skidpad.recording.channels import ChannelWriter
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from math import cos, hypot, sin
 
-import msgspec
 import numpy as np
 
 from skidpad.core.channels import Decision
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import LightState
+from skidpad.recording.channel_drives import DriveOutcome
 from skidpad.roads.lanes import SignalKind
 from skidpad.stack.channels.route import SEARCH, STEP, RoutePath, locate
 from skidpad.stack.channels.settings import CarModel
@@ -22,26 +22,6 @@ QUEUE_HALF_WIDTH = 1.5  # m
 RED_REACH = 60.0  # m to a red light that explains standing
 LOST = 8.0  # m beside the route
 AGAIN = 3.0  # s within which a contact with the same actor is the same collision
-
-
-class DriveOutcome(msgspec.Struct, frozen=True, kw_only=True):
-    """One row per segment; counts unless said otherwise."""
-
-    route: str
-    seed: int
-    drive_by: str
-    driven_s: float
-    distance_m: float
-    collisions: int
-    collisions_struck: int  # of these: the ego hit, seen by who closed in with its front
-    red_lights_run: int
-    stalls: int
-    ended: str  # "time", "stalled" or "off the route"
-    switches: int
-    minimal_risk_s: float
-    driving_s: dict[str, float]
-    content_hash: str = ""
-    cpu_s: float = 0.0  # outside every hash
 
 
 class Referee:

@@ -16,10 +16,10 @@ import msgspec
 
 from skidpad.campaign.cells import BackendChoice, BackendKind
 from skidpad.campaign.channel_drive import ARBITER, SegmentPlan, drive_segment
-from skidpad.campaign.channel_outcomes import DriveOutcome
 from skidpad.campaign.channel_routes import DrivenRoute
 from skidpad.campaign.pool import Finished, Job, run_jobs
 from skidpad.core.errors import OutputError, require_range
+from skidpad.recording.channel_drives import DriveOutcome, DriveRecord, read_record
 from skidpad.recording.channel_hash import recording_hash
 from skidpad.recording.files import write_bytes
 
@@ -125,13 +125,6 @@ def warm_up() -> None:
         drive_segment(plan, Path(folder) / "warm.mcap")
 
 
-class DriveRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What stands beside a recording: what was asked for, and what became of it."""
-
-    plan: dict[str, object]
-    outcome: DriveOutcome
-
-
 def _identity(plan: SegmentPlan) -> dict[str, object]:
     """What decides a segment; where the server is does not."""
     plain: dict[str, object] = msgspec.to_builtins(plan)
@@ -151,9 +144,8 @@ def _done(plan: SegmentPlan, out: Path) -> DriveOutcome | None:
     path = out / plan.route.name / f"{plan.name}.json"
     if not (path.is_file() and path.with_suffix(".mcap").is_file()):
         return None
-    try:
-        record = msgspec.json.decode(path.read_bytes(), type=DriveRecord)
-    except (msgspec.DecodeError, OSError):
+    record = read_record(path)
+    if record is None:
         return None
     if record.plan != msgspec.json.decode(msgspec.json.encode(_identity(plan))):
         raise OutputError(f"{path}: was driven with other settings; choose another folder")

@@ -96,9 +96,14 @@ def drive(
 
 def outcomes(folders: list[Path] = FOLDERS) -> None:
     """Compare drivers over the seeds that all have driven: does redundancy pay?"""
-    from skidpad.campaign.redundancy import compare_drivers, read_outcomes
+    from skidpad.core.errors import FileError
+    from skidpad.evidence.redundancy import compare_drivers
+    from skidpad.recording.channel_drives import read_outcomes
 
-    for row in compare_drivers(read_outcomes(folders)):
+    driven = read_outcomes(folders)
+    if not driven:
+        raise FileError(f"no driven segments below {', '.join(map(str, folders))}")
+    for row in compare_drivers(driven):
         typer.echo(f"{row.drive_by}: {row.segments} segments, {row.hours:.2f} h, {row.km:.1f} km")
         for event, rate in row.rates.items():
             few = ", too few for a verdict" if rate.too_few else ""

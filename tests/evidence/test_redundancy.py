@@ -2,9 +2,8 @@
 
 import pytest
 
-from skidpad.campaign.channel_outcomes import DriveOutcome
-from skidpad.campaign.redundancy import compare_drivers, read_outcomes
-from skidpad.core.errors import FileError
+from skidpad.evidence.redundancy import compare_drivers, differences
+from skidpad.recording.channel_drives import DriveOutcome
 
 
 def outcome(drive_by: str, seed: int, collisions: int) -> DriveOutcome:
@@ -27,7 +26,11 @@ def test_only_shared_seeds_count():
     assert arbiter.rates["collisions"].interval.high > 0.0
 
 
-def test_an_empty_folder_is_refused(tmp_path):
-    (tmp_path / "other.json").write_text("{}")
-    with pytest.raises(FileError, match="no driven segments"):
-        read_outcomes([tmp_path])
+def test_a_channel_alone_is_compared_on_the_seeds_of_the_arbiter():
+    runs = [outcome("arbiter", s, s % 2) for s in range(8)]
+    runs += [outcome("lav_like", s, 2 + s % 2) for s in range(4, 12)]
+    found = {(d.drive_by, d.event): d.pairs for d in differences(runs)}
+    assert found["lav_like", "collisions"].mean == 2.0
+    assert found["lav_like", "collisions"].n == 4
+    assert found["lav_like", "stalls"].mean == 0.0
+    assert differences(runs[:8]) == []

@@ -11,6 +11,7 @@ from skidpad.core.setup import LanePosition
 from skidpad.roads import kernels
 from skidpad.roads.baked import BakedMap
 from skidpad.roads.lanes import LaneSamples, LaneTable, SignalKind, SignalTable
+from skidpad.roads.packing import lane_arrays
 from skidpad.roads.roadside import Roadside
 
 
@@ -69,7 +70,7 @@ class RoadMap:
         self.roadside = baked.roadside
         self.geo_reference, self.ego_start = baked.geo_reference, baked.ego_start
         self.content_hash = baked.content_hash()
-        self.arrays = kernels.lane_arrays(baked)
+        self.arrays = lane_arrays(baked)
         self._names = list(zip(self.lanes.road.tolist(), self.lanes.lane_id.tolist(), strict=True))
 
     def project(

@@ -16,7 +16,6 @@ from typer.testing import CliRunner
 from channel_worlds import Eyes, World, drive
 from skidpad.cli.main import app, main
 from skidpad.core.channels import Context
-from skidpad.core.errors import ConfigError
 from skidpad.evidence.indicators.catalogue import Indicator
 from skidpad.evidence.watch import time_by_objects, timing_statistics
 from skidpad.recording.channels import ChannelWriter
@@ -204,13 +203,11 @@ def test_help_does_not_load_numba():
 
 
 @pytest.mark.req("C-15")
-def test_a_learned_identifier_needs_a_model(folder, tmp_path):
-    out = str(tmp_path / "out")
-    args = ["monitor", str(folder / "one.mcap"), "--out", out, "--identifier", "learned"]
-    done = runner.invoke(app, args)
-    assert isinstance(done.exception, ConfigError)
-    assert "--model" in str(done.exception)
-    done = runner.invoke(app, [*args, "--model", str(tmp_path / "none.npz")])
+def test_the_bundled_model_judges_a_recording(folder, tmp_path):
+    args = ["monitor", folder / "one.mcap", "--out", tmp_path / "out", "--identifier", "learned"]
+    assert invoke(*args).exit_code == 0
+    assert json.loads((tmp_path / "out" / "monitor.json").read_text())["identifier"] == "learned"
+    done = runner.invoke(app, [str(a) for a in (*args, "--model", tmp_path / "none.npz")])
     assert "none.npz: cannot be read" in str(done.exception)
 
 

@@ -1,9 +1,12 @@
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from channel_worlds import Eyes, World, drive
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
+from skidpad.evidence import identifier
 from skidpad.evidence.forest import Forest, check_forest, probabilities
 from skidpad.evidence.hazards import SCORED_HAZARDS
 from skidpad.evidence.identifier import (
@@ -222,6 +225,17 @@ def test_the_monitor_uses_rules_the_model_or_both(trained):
     d = judge("d", "r", source.channels, rows)
     found = [learned.update(t, row) for t, row in zip(d.t, d.rows, strict=True)]
     assert [set(f) for f in found] == fired[Identify.LEARNED]
+
+
+@pytest.mark.req("C-15")
+def test_the_bundled_model_names_its_training_and_never_saw_the_routes_it_leaves_out():
+    model = load_model(None)
+    routes = {f"route-{k}" for k in range(1, 7)}
+    assert {route for route, _ in model.trained_on()} == routes
+    assert set(model.detectors) == {(t, r) for t in ("world", "sim") for r in routes | {"all"}}
+    assert all(int(seed) // 1000 == 3 for _, seed in model.trained_on())
+    card = (Path(identifier.__file__).parent / "models" / "hazards.md").read_text()
+    assert f"{model.card['hours']:.2f} h" in card
 
 
 @pytest.mark.parametrize("content", [b"", b"PK\x03\x04 not a zip", b"\x93NUMPY\x01\x00v\x00{"])

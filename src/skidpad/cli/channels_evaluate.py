@@ -31,7 +31,7 @@ TRUTH = typer.Option(Truth.both, help="Which truth to judge by.")
 CURVE = typer.Option(
     None, help="Also vary the thresholds on this signal, such as gap, from half to double."
 )
-MODEL = typer.Option(None, help="Also judge this learned identifier (.npz).")
+MODEL = typer.Option(None, help="Also judge this learned identifier (.npz; `bundled`: ours).")
 OUT = typer.Option(None, help="Folder for the results; default: DIR.")
 MODEL_OUT = typer.Option(..., "--out", help="Model file to write (.npz).")
 WORKERS = typer.Option(0, help="Processes; 0: one per core.")

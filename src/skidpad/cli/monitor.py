@@ -49,7 +49,7 @@ THRESHOLDS = typer.Option(None, help="Own thresholds (YAML).")
 IDENTIFIER = typer.Option(
     Identifier.rules, help="Who finds the three scored hazards: the rules, the trained model, both."
 )
-MODEL = typer.Option(None, help="Trained model (.npz) of `skidpad channels train`.")
+MODEL = typer.Option(None, help="Trained model (.npz) of `skidpad channels train`; default: ours.")
 TIMING = typer.Option(False, "--timing", help="Measure each module and print the table.")
 FAIL_IF = typer.Option(
     None, help="Exit with 1 when this hazard or indicator violation occurs; may be repeated."
@@ -99,7 +99,7 @@ def monitor(
         rules_file=rules_file,
         clock=time.thread_time_ns if timing else None,
         identify=Identify(identifier.value),
-        model=load_model(model) if model else None,
+        model=None if identifier is Identifier.rules else load_model(model),
     )
     write_drive_report(out)
     _print(found, out)

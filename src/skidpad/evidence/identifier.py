@@ -26,6 +26,7 @@ VERSION = 1
 ALL_ROUTES = "all"
 BLOCK = 4096  # cycles judged at once
 SIZE_LIMIT = 64 * 1024 * 1024  # bytes of a model file
+BUNDLED = "bundled"  # the model that comes with Skidpad; its card lies beside it
 
 
 class Identify(str, Enum):
@@ -143,11 +144,12 @@ def save_model(path: Path, model: Model) -> None:
     write_bytes(path, buffer.getvalue())
 
 
-def load_model(path: Path) -> Model:
-    """The model at `path`."""
-    name = str(path)
+def load_model(path: Path | None) -> Model:
+    """The model at `path`; None or the word `bundled`: the one that comes with Skidpad."""
+    name = BUNDLED if path is None else str(path)
+    file = Path(__file__).parent / "models" / "hazards.npz" if name == BUNDLED else Path(name)
     try:
-        data = path.read_bytes()
+        data = file.read_bytes()
     except OSError as error:
         raise FileError(
             f"{name}: cannot be read ({error.strerror}); `skidpad channels train` writes a model"

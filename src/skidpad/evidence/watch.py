@@ -68,7 +68,7 @@ def watch(
 ) -> Watched:
     """Monitor `source`; writes indicators, hazards, a summary, and timings if given a `clock`."""
     if identify is not Identify.RULES and model is None:
-        raise ConfigError(f"--identifier {identify.value} needs a trained model: --model FILE")
+        raise ConfigError(f"--identifier {identify.value} needs a trained model")
     monitor = Monitor(
         source.channels,
         settings=settings,

@@ -177,6 +177,16 @@ def test_transitions_end_where_they_should_and_their_rates_are_derivatives(shape
         assert now[2] == pytest.approx((after[1] - before[1]) / (2 * h), abs=1e-4)
 
 
+@pytest.mark.parametrize(("rule", "happens"), [("lessThan", True), ("greaterThan", False)])
+def test_a_parameter_decides_once_for_all(tmp_path, rule, happens):
+    asked = f'<ByValueCondition><ParameterCondition parameterRef="V" value="15" rule="{rule}"/>'
+    path = scenario(tmp_path, EVENT.format("gone", VANISH, 0, f"{asked}</ByValueCondition>"))
+    assert played(path).run.log.present[-1, 1] != happens
+    path.write_text(path.read_text().replace('parameterRef="V"', 'parameterRef="W"'))
+    with pytest.raises(FileError, match="parameter 'W' is not declared"):
+        load(path)
+
+
 def test_what_is_unknown_is_refused_by_element_and_line(tmp_path):
     odd = "<PrivateAction><VisibilityAction graphics='true'/></PrivateAction>"
     weird = "<ByValueCondition><TrafficSignalCondition name='x' state='y'/></ByValueCondition>"

@@ -83,6 +83,25 @@ def test_the_1_0_files_are_valid_by_the_schema_of_1_0(asam_python):
         assert schema.validate(etree.parse(str(path))) == ("_1.0" in path.name), path.name
 
 
+@pytest.mark.parametrize("scenario", SCENARIOS, ids=lambda s: s.name)
+def test_the_1_0_files_hold_what_scenario_runner_can_play(scenario):
+    root = etree.parse(str(FOLDER / file_name(scenario.name, OscVersion.V1_0)))
+    values = {p.get("name"): float(p.get("value")) for p in root.iter("ParameterDeclaration")}
+    for dynamics in root.iter("LaneChangeActionDynamics"):
+        assert dynamics.get("dynamicsDimension") == "distance"
+        length = dynamics.get("value")[1:]
+        v = values["GhostSpeed" if scenario.name == "ghost_cut_in" else "SecondSpeed"]
+        time = scenario.parameters[length.replace("Length", "Time")]
+        assert values[length] == pytest.approx(v * time)
+    last = next(e for e in root.iter("Event") if e.get("name") == "rest")
+    assert [c.get("delay") for c in last.iter("Condition")] == ["0.0"]
+    judged = [c for c in root.iter("Condition") if c.get("name").startswith("criteria_")]
+    assert [c.get("name") for c in judged] == ["criteria_CollisionTest"]
+    for asked in judged[0].iter("ParameterCondition"):  # by the standard it never holds
+        assert asked.get("rule") == "lessThan"
+        assert values[asked.get("parameterRef")] >= float(asked.get("value"))
+
+
 @pytest.mark.parametrize("path", FILES, ids=lambda p: p.name)
 def test_the_player_supports_everything_in_them(path):
     assert problems(path) == []

@@ -62,6 +62,24 @@ class SimulationTime:
         return self.rule(scene.t)
 
 
+class Parameter:
+    """A parameter of the file against a value; it does not change during a run."""
+
+    def __init__(self, node: Node) -> None:
+        name = node.text("parameterRef")
+        if name not in node.values:
+            raise node.error(f"parameterRef: parameter {name!r} is not declared")
+        value, rule = node.text("value"), node.choice("rule", tuple(RULES))
+        try:
+            self.met = RULES[rule](float(node.values[name]), float(value))
+        except ValueError:
+            raise Unsupported(node, f"only numbers can be compared, got {value!r}") from None
+
+    def holds(self, _: Scene) -> bool:
+        """Always or never."""
+        return self.met
+
+
 class StoryboardElementState:
     """An element is in a state, or goes through a transition."""
 
@@ -204,6 +222,7 @@ class AnyEntity:
 
 
 BY_VALUE: dict[str, Callable[[Node], Condition]] = {
+    "ParameterCondition": Parameter,
     "SimulationTimeCondition": SimulationTime,
     "StoryboardElementStateCondition": StoryboardElementState,
 }

@@ -2,12 +2,18 @@
 
 `python -m skidpad.scenarios.generate` writes the files of the catalogue anew: each as 1.2, and as
 1.0 for ScenarioRunner. Everything that repeats vary is a parameter of the file.
+
+What ScenarioRunner 0.9.16 reads otherwise, and what the 1.0 files do about it: it measures lane
+changes by length only, so they have one; it ends with the last event, does not look at the stop
+trigger, and waits a delay before it asks, so a last event waits for the time limit; it judges by
+conditions named `criteria_...`, of which one asks for collisions. By the standard that one never
+holds.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from pathlib import Path
 from shutil import copyfile
@@ -103,11 +109,12 @@ def speed(target: Any, rate: Any) -> Any:
     return xosc.AbsoluteSpeedAction(target, xosc.TransitionDynamics(shape, dimension, rate))
 
 
-def swerve_right(actor: str, duration: Any) -> Any:
-    """Change to the next lane on the right."""
-    shape, dimension = xosc.DynamicsShapes.sinusoidal, xosc.DynamicsDimension.time
-    dynamics = xosc.TransitionDynamics(shape, dimension, duration)
-    return xosc.RelativeLaneChangeAction(-1, actor, dynamics)
+def swerve_right(w: Writer, actor: str, name: str) -> Any:
+    """Change to the next lane on the right; its time, in 1.0 its length, is a parameter."""
+    shape = xosc.DynamicsShapes.sinusoidal
+    dimension = xosc.DynamicsDimension.distance if w.old else xosc.DynamicsDimension.time
+    size = f"${name}Length" if w.old else f"${name}Time"
+    return xosc.RelativeLaneChangeAction(-1, actor, xosc.TransitionDynamics(shape, dimension, size))
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -121,6 +128,12 @@ class Scenario:
     events: Callable[[Writer], Mapping[str, list[Any]]]  # by actor
     last: str  # name of the event after which the scenario is over
     route_length: float  # m, median way on dry road, of which a collision leaves a share (B-105)
+    lengths: Mapping[str, tuple[str, float]] = field(default_factory=dict)  # m, for times in 1.0
+
+    def declared(self, w: Writer) -> dict[str, float]:
+        """The parameters of a file."""
+        renamed = self.lengths if w.old else {}
+        return dict(renamed.get(item[0], item) for item in self.parameters.items())
 
 
 def ghost_cut_in(w: Writer) -> Mapping[str, list[Any]]:
@@ -136,7 +149,7 @@ def ghost_cut_in(w: Writer) -> Mapping[str, list[Any]]:
         xosc.StoryboardElementType.event, "merge", xosc.StoryboardElementState.completeState
     )
     merge = w.event(
-        "merge", when("near_the_ego", near, GHOST), lane=swerve_right(GHOST, "$MergeTime")
+        "merge", when("near_the_ego", near, GHOST), lane=swerve_right(w, GHOST, "Merge")
     )
     slow = w.event("slow", when("merged", merged), speed=speed("$GhostEndSpeed", "$Deceleration"))
     return {GHOST: [merge, slow]}
@@ -160,7 +173,7 @@ def front_accident(w: Writer) -> Mapping[str, list[Any]]:
     swerve = w.event(
         "swerve",
         when("second_has_driven", travelled(), SECOND),
-        lane=swerve_right(SECOND, "$SwerveTime"),
+        lane=swerve_right(w, SECOND, "Swerve"),
         speed=speed(0, "$SecondDeceleration"),
     )
     slow = w.event(
@@ -187,6 +200,7 @@ SCENARIOS = (
         events=ghost_cut_in,
         last="slow",
         route_length=155.0,
+        lengths={"MergeTime": ("MergeLength", 48.0)},
     ),
     Scenario(
         name="lead_slowdown",
@@ -227,6 +241,7 @@ SCENARIOS = (
         events=front_accident,
         last="slow",
         route_length=130.0,
+        lengths={"SwerveTime": ("SwerveLength", 33.3)},
     ),
 )
 
@@ -236,15 +251,16 @@ def build(scenario: Scenario, version: OscVersion) -> ElementTree.Element:
     xosc.VersionBase().setVersion(minor=version.minor)  # a class variable of the whole library
     w = Writer(version)
     parameters, entities, init = xosc.ParameterDeclarations(), xosc.Entities(), xosc.Init()
-    for name, value in scenario.parameters.items():
+    for name, value in scenario.declared(w).items():
         parameters.add_parameter(xosc.Parameter(name, xosc.ParameterType.double, str(value)))
     for name, (lane, s, v) in scenario.actors.items():
         entities.add_scenario_object(name, w.vehicle(*_role(scenario, name)))
-        at_once = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0)
         init.add_init_action(name, xosc.TeleportAction(xosc.LanePosition(s, 0, lane, 1)))
-        init.add_init_action(name, xosc.AbsoluteSpeedAction(v, at_once))
+        init.add_init_action(name, _at_once(v))
     act = xosc.Act("act", when("start", w.at_once))
     for actor, events in scenario.events(w).items():
+        if w.old and scenario.last in [event.name for event in events]:
+            events.append(w.event("rest", when("time_is_up", w.after(T_END)), speed=_at_once(0)))
         manoeuvre = xosc.Maneuver(f"{actor}_manoeuvre")
         for event in events:
             manoeuvre.add_event(event)
@@ -277,6 +293,12 @@ def _role(scenario: Scenario, name: str) -> tuple[Car, dict[str, str]]:
     return COOPER, {"type": "ego_vehicle", **route}
 
 
+def _at_once(v: Any) -> Any:
+    """A speed without transition."""
+    step = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0)
+    return xosc.AbsoluteSpeedAction(v, step)
+
+
 def _stop(scenario: Scenario, w: Writer) -> Any:
     """After the last event and its aftermath, when the ego has come to a stop, or at the limit."""
     over = xosc.StoryboardElementStateCondition(
@@ -290,12 +312,17 @@ def _stop(scenario: Scenario, w: Writer) -> Any:
         EGO,
         triggeringpoint="stop",
     )
-    stop = xosc.Trigger("stop")
-    for trigger in (
-        xosc.ValueTrigger("over", AFTERMATH, xosc.ConditionEdge.none, over, "stop"),
+    none = xosc.ConditionEdge.none
+    triggers = [
+        xosc.ValueTrigger("over", AFTERMATH, none, over, "stop"),
         stands,
-        xosc.ValueTrigger("time_is_up", 0, xosc.ConditionEdge.none, w.after(T_END), "stop"),
-    ):
+        xosc.ValueTrigger("time_is_up", 0, none, w.after(T_END), "stop"),
+    ]
+    if w.old:
+        never = xosc.ParameterCondition("EgoSpeed", 0, xosc.Rule.lessThan)
+        triggers.append(xosc.ValueTrigger("criteria_CollisionTest", 0, none, never, "stop"))
+    stop = xosc.Trigger("stop")
+    for trigger in triggers:
         group = xosc.ConditionGroup("stop")
         group.add_condition(trigger)
         stop.add_conditiongroup(group)

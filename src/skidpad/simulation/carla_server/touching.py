@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from skidpad.simulation.carla_server.world import World
 
 NEAR = 60.0  # m from any vehicle within which standing things are looked at
+ROLLED_OVER = 0.2  # m: lower things pass under bumpers, and wheels roll over them (assumed)
 BARRIERS = {
     BarrierKind.GUARDRAIL: SemanticClass.GUARD_RAIL,
     BarrierKind.WALL: SemanticClass.WALL,
@@ -117,11 +118,13 @@ class Contacts:
 
 
 def _standing(world: World) -> list[Actor]:
-    """Walkers and free props near a vehicle."""
+    """Walkers and free props near a vehicle, except what lies flat on the road."""
     s = world.vehicles.fleet.states
     found = []
     for actor in world.actors:
         if actor.family not in (Family.WALKER, Family.PROP) or actor.parent:
+            continue
+        if actor.family is Family.PROP and 2 * actor.half[2] < ROLLED_OVER:
             continue
         if np.any(np.hypot(s.x - actor.pose.x, s.y - actor.pose.y) < NEAR):
             found.append(actor)

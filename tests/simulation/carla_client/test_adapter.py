@@ -101,6 +101,7 @@ def test_friction_is_applied_once_to_every_wheel(serve: Serve, program: Program)
         assert all(f"{ratio:.4f}" in n and weather in n and "3.5" in n for n in notes)
     assert not any("grip: vehicle" in n for n in bare["dry"]["notices"])
     for name in ("dry", "rain", "ice"):
+        assert any("statistical, mu_ref 0.9" in n for n in served[name]["notices"])
         assert served[name]["once"] == untouched
         assert served[name]["stop"] == pytest.approx(bare[name]["stop"], rel=0.01)
     assert bare["ice"]["stop"] > bare["rain"]["stop"] > 2.0 * bare["dry"]["stop"]

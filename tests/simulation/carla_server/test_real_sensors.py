@@ -238,6 +238,8 @@ def test_weather_changes_grip_once(serve: Serve, grip: str) -> None:
     point = world.get_map().get_spawn_points()[0]
     if offered:
         ice = library.find("skidpad.weather")
+        told = [ice.get_attribute(name) for name in ("weather_grip", "mu_ref")]
+        print("TOLD", told[0].as_str(), round(told[1].as_float(), 6), told[1].is_modifiable)
         ice.set_attribute("ice_thickness", "100")
         world.spawn_actor(ice, carla.Transform())
     car = world.spawn_actor(library.find("vehicle.audi.tt"), point)
@@ -252,4 +254,5 @@ def test_weather_changes_grip_once(serve: Serve, grip: str) -> None:
     """)
     _, offered, metres = next(x for x in out.splitlines() if "BRAKED" in x).split()
     assert offered == str(grip == "physical")
+    assert ("TOLD physical 0.9 False" in out.splitlines()) == (grip == "physical")
     assert (float(metres) > 40.0) == (grip == "physical")

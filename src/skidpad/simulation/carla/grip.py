@@ -61,6 +61,15 @@ class Grip:
         return sum(wheels) / len(wheels) / TIRE_FRICTION_REFERENCE if wheels else 1.0
 
 
+def in_force(blueprint: Any, setup: Setup) -> tuple[GripModel, float]:
+    """Model and mu_ref that the server says it uses; a server that does not say so is believed to
+    use ours."""
+    if not (blueprint.has_attribute("weather_grip") and blueprint.has_attribute("mu_ref")):
+        return setup.grip, setup.mu_ref
+    model = GripModel(blueprint.get_attribute("weather_grip").as_str())
+    return model, float(blueprint.get_attribute("mu_ref").as_float())
+
+
 def prepare_grip(carla: Any, world: Any, setup: Setup) -> Grip:
     """Look for the server's own model, and give it the ice; else compute the ratio once."""
     params = grip_params(setup.weather, setup.grip, setup.mu_ref)
@@ -69,12 +78,19 @@ def prepare_grip(carla: Any, world: Any, setup: Setup) -> Grip:
     if not found:
         ratio = friction_ratio(setup.weather, setup.grip, V_RATIO)
         return Grip(setup, False, ratio, params)
+    model, mu_ref = in_force(found[0], setup)
     found[0].set_attribute("ice_thickness", f"{setup.weather.ice_thickness:g}")
     emitter = world.spawn_actor(found[0], carla.Transform())
+    params = grip_params(setup.weather, model, mu_ref)
     grip = Grip(setup, True, 1.0, params, emitter=emitter)
     grip.notices.append(
-        "grip: the server lets weather act on tyres by its own model and mu_ref (skidpad.weather)"
+        f"grip: the server lets weather act on tyres (skidpad.weather): {model.value}, mu_ref {mu_ref:g}"
     )
+    if setup.grip is not GripModel.NONE and (model, mu_ref) != (setup.grip, setup.mu_ref):
+        grip.notices.append(
+            f"grip: {setup.grip.value} with mu_ref {setup.mu_ref:g} was asked for, "
+            "but the server's holds"
+        )
     if setup.grip is GripModel.NONE:
         grip.notices.append("grip: none was asked for, but the server was started with one")
     return grip

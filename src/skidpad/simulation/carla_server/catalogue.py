@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cache
 from pathlib import Path
@@ -10,11 +10,12 @@ from typing import Any
 
 import yaml
 
-from skidpad.core.vocabulary import ActorKind, SemanticClass
+from skidpad.core.vocabulary import ActorKind, GripModel, SemanticClass
 from skidpad.simulation.carla_server import wire
 
 DATA = Path(__file__).with_name("data") / "blueprints.yaml"
 GRIP_BLUEPRINT = "skidpad.weather"  # decision K-2
+MU_REF = 1.5  # of a tyre with tire_friction 3.5 on a dry road, near CARLA's (decision K-3)
 
 
 class AttributeType(int, Enum):
@@ -186,9 +187,22 @@ def _prop(id: str, size: list[float], actor: dict[str, Attribute]) -> Blueprint:
 
 
 def _grip(actor: dict[str, Attribute]) -> Blueprint:
-    """Our own: its presence says that weather acts on grip here, its attribute sets ice (K-2)."""
     ice = Attribute("ice_thickness", AttributeType.FLOAT, ("0.0",))
-    return Blueprint(GRIP_BLUEPRINT, Family.GRIP, {**actor, ice.id: ice})
+    blueprint = Blueprint(GRIP_BLUEPRINT, Family.GRIP, {**actor, ice.id: ice})
+    return grip_in_force(blueprint, GripModel.PHYSICAL, MU_REF)
+
+
+def grip_in_force(blueprint: Blueprint, model: GripModel, mu_ref: float) -> Blueprint:
+    """Our own: its presence says that weather acts on grip here, and it says how (K-2).
+
+    Attributes: `ice_thickness` sets ice in percent of 20 mm; `weather_grip` and `mu_ref` are those
+    of the server's command line, for clients to read.
+    """
+    told = (
+        _fixed("weather_grip", AttributeType.STRING, model.value),
+        _fixed("mu_ref", AttributeType.FLOAT, mu_ref),
+    )
+    return replace(blueprint, attributes={**blueprint.attributes, **{a.id: a for a in told}})
 
 
 @cache

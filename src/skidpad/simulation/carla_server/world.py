@@ -16,7 +16,14 @@ from skidpad.core.vocabulary import GripModel
 from skidpad.sensors.suite import scene_of
 from skidpad.simulation.carla_server import moving, snapshot, wire
 from skidpad.simulation.carla_server.actors import Actor, ActorTable, Attachment
-from skidpad.simulation.carla_server.catalogue import Blueprint, Family, load_catalogue
+from skidpad.simulation.carla_server.catalogue import (
+    GRIP_BLUEPRINT,
+    MU_REF,
+    Blueprint,
+    Family,
+    grip_in_force,
+    load_catalogue,
+)
 from skidpad.simulation.carla_server.debug import DebugShapes
 from skidpad.simulation.carla_server.effects import Remarks
 from skidpad.simulation.carla_server.episode import Episode
@@ -46,7 +53,7 @@ class ServerOptions:
     maps: Path | None = None
     weather_grip: GripModel = GripModel.PHYSICAL
     ice: float = 0.0  # percent of 20 mm
-    mu_ref: float = 1.5
+    mu_ref: float = MU_REF
     seed: int = 0
     strict: bool = False
     record_calls: Path | None = None
@@ -68,7 +75,7 @@ class World:
         self.options = options
         self.hub = hub
         self.maps = MapStore(options.maps)
-        self.catalogue = _offered(options.weather_grip)
+        self.catalogue = _offered(options.weather_grip, options.mu_ref)
         self.episode = Episode()
         self.sky = Sky(options.ice)
         self.actors = ActorTable()
@@ -235,9 +242,10 @@ class World:
         return blueprint
 
 
-def _offered(grip: GripModel) -> dict[str, Blueprint]:
-    """The catalogue; the blueprint `skidpad.weather` says that weather acts on grip (K-2)."""
+def _offered(grip: GripModel, mu_ref: float) -> dict[str, Blueprint]:
+    """The catalogue; the blueprint `skidpad.weather` says how weather acts on grip (K-2)."""
     everything = load_catalogue()
-    if grip is not GripModel.NONE:
-        return everything
-    return {id: b for id, b in everything.items() if b.family is not Family.GRIP}
+    if grip is GripModel.NONE:
+        return {id: b for id, b in everything.items() if b.family is not Family.GRIP}
+    told = grip_in_force(everything[GRIP_BLUEPRINT], grip, mu_ref)
+    return {**everything, GRIP_BLUEPRINT: told}

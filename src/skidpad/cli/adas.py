@@ -8,6 +8,17 @@ from typing import Annotated
 
 import typer
 
+from skidpad.cli.server_options import (
+    Backend,
+    Host,
+    Pace,
+    Port,
+    RestartEvery,
+    ServerCommand,
+    ServerWish,
+    Without,
+)
+
 
 def adas(
     out: Annotated[Path, typer.Option(help="Folder for results and report.")],
@@ -51,22 +62,13 @@ def adas(
     render: Annotated[
         str, typer.Option(help="needed: images that something reads; all: every image.")
     ] = "needed",
-    backend: Annotated[
-        str, typer.Option(help="embedded, or carla: a CARLA server drives the world.")
-    ] = "embedded",
-    host: Annotated[str, typer.Option(help="Of the CARLA server.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Of the CARLA server.")] = 2000,
-    pace: Annotated[bool, typer.Option("--pace", help="CARLA: hold runs at real time.")] = False,
-    without: Annotated[
-        list[str] | None,
-        typer.Option(help="CARLA: an optimisation to switch off, e.g. light-cache."),
-    ] = None,
-    server_command: Annotated[
-        str | None, typer.Option(help="CARLA: command that starts the server for this campaign.")
-    ] = None,
-    restart_every: Annotated[
-        int, typer.Option(min=0, help="CARLA: runs after which that server is started anew.")
-    ] = 0,
+    backend: Backend = "embedded",
+    host: Host = "127.0.0.1",
+    port: Port = 2000,
+    pace: Pace = False,
+    without: Without = None,
+    server_command: ServerCommand = None,
+    restart_every: RestartEvery = 0,
     workers: Annotated[
         int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
     ] = os.cpu_count() or 1,
@@ -96,13 +98,15 @@ def adas(
         vehicles=vehicles,
         sensors=sensors,
         render=render,
-        backend=backend,
-        host=host,
-        port=port,
-        pace=pace,
-        without=without or [],
-        server_command=server_command,
-        restart_every=restart_every,
+        server=ServerWish(
+            backend=backend,
+            host=host,
+            port=port,
+            pace=pace,
+            without=without or [],
+            server_command=server_command,
+            restart_every=restart_every,
+        ),
     )
     typer.echo(drive_to_report(wish, out, or_next, workers=workers, resume=resume, csv=csv))
 

@@ -20,6 +20,7 @@ from skidpad.campaign.cells import (
 )
 from skidpad.campaign.matrix import Summary, run_matrix
 from skidpad.cli.carla_backend import backend_choice, map_of, workers_for
+from skidpad.cli.server_options import ServerWish
 from skidpad.core.errors import ConfigError, require_choice, require_range
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather
@@ -53,13 +54,7 @@ class Wish:
     vehicles: int = 20
     sensors: str = "pixels"
     render: str = "needed"
-    backend: str = "embedded"
-    host: str = "127.0.0.1"
-    port: int = 2000
-    pace: bool = False
-    without: Sequence[str] = ()
-    server_command: str | None = None
-    restart_every: int = 0
+    server: ServerWish = ServerWish()
 
 
 def plan(wish: Wish) -> list[Cell]:
@@ -74,7 +69,7 @@ def plan(wish: Wish) -> list[Cell]:
     drivers = _drivers(wish)
     require_range("--duration", wish.duration, 1.0, 100_000.0)
     require_range("--vehicles", wish.vehicles, 0, 80)
-    backend = backend_choice(wish)
+    backend = backend_choice(wish.server)
     map = map_of(wish.map, backend)
     load_map(map)
     template = Cell(

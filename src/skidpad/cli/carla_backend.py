@@ -6,49 +6,16 @@ import multiprocessing
 import shlex
 import sys
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Protocol
 
 from skidpad.campaign.cells import BackendChoice, BackendKind, Cell
+from skidpad.cli.server_options import ServerWish
 from skidpad.core.errors import BackendError, ConfigError, require_choice, require_range
 from skidpad.core.jit import user_cache
 from skidpad.roads.bundled import bundled_maps
 
 
-class BackendWish(Protocol):
-    """The options that name a simulator."""
-
-    @property
-    def backend(self) -> str: ...  # noqa: D102
-    @property
-    def host(self) -> str: ...  # noqa: D102
-    @property
-    def port(self) -> int: ...  # noqa: D102
-    @property
-    def pace(self) -> bool: ...  # noqa: D102
-    @property
-    def without(self) -> Sequence[str]: ...  # noqa: D102
-    @property
-    def server_command(self) -> str | None: ...  # noqa: D102
-    @property
-    def restart_every(self) -> int: ...  # noqa: D102
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ServerWish:
-    """What commands other than `adas` let one choose."""
-
-    backend: str = "embedded"
-    host: str = "127.0.0.1"
-    port: int = 2000
-    pace: bool = False
-    without: Sequence[str] = ()
-    server_command: str | None = None
-    restart_every: int = 0
-
-
-def backend_choice(wish: BackendWish) -> BackendChoice:
+def backend_choice(wish: ServerWish) -> BackendChoice:
     """The choice, checked; a CARLA server that shall run already must answer now."""
     names = [k.value for k in BackendKind]
     kind = BackendKind(require_choice("--backend", wish.backend, names))

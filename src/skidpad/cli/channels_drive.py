@@ -6,6 +6,15 @@ from pathlib import Path
 
 import typer
 
+from skidpad.cli.server_options import (
+    Backend,
+    Host,
+    Port,
+    RestartEvery,
+    ServerCommand,
+    ServerWish,
+)
+
 ROUTE = typer.Option("all", help="One of the six routes, or all.")
 OUT = typer.Option(..., help="Folder for recordings; driving again resumes.")
 HOURS = typer.Option(1.0, help="Hours in total, split equally among the routes.")
@@ -16,12 +25,6 @@ NOISE = typer.Option(1.0, help="Factor on all sensor errors: 0.5, 1 or 2 for the
 WORKERS = typer.Option(1, help="Worker processes.")
 FOLDERS = typer.Argument(help="Folders of `skidpad channels drive`.")
 DRIVE_BY = typer.Option("arbiter", help="The arbiter, or the channel that drives alone.")
-
-BACKEND = typer.Option("embedded", help="embedded, or carla: a CARLA server drives the world.")
-HOST = typer.Option("127.0.0.1", help="Of the CARLA server.")
-PORT = typer.Option(2000, help="Of the CARLA server.")
-SERVER_COMMAND = typer.Option(None, help="CARLA: command that starts the server for these drives.")
-RESTART_EVERY = typer.Option(0, min=0, help="CARLA: drives after which it is started anew.")
 
 
 def drive(
@@ -34,17 +37,17 @@ def drive(
     noise: float = NOISE,
     workers: int = WORKERS,
     drive_by: str = DRIVE_BY,
-    backend: str = BACKEND,
-    host: str = HOST,
-    port: int = PORT,
-    server_command: str | None = SERVER_COMMAND,
-    restart_every: int = RESTART_EVERY,
+    backend: Backend = "embedded",
+    host: Host = "127.0.0.1",
+    port: Port = 2000,
+    server_command: ServerCommand = None,
+    restart_every: RestartEvery = 0,
 ) -> None:
     """Drive channels over routes on a simulator; one recording per ten minutes."""
     from skidpad.campaign.cells import BackendChoice
     from skidpad.campaign.channel_routes import chosen_routes
     from skidpad.campaign.channels import run_drives, segment_plans
-    from skidpad.cli.carla_backend import ServerWish, backend_choice
+    from skidpad.cli.carla_backend import backend_choice
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.channel_presets import senses_of
 

@@ -8,6 +8,17 @@ from typing import Annotated
 
 import typer
 
+from skidpad.cli.server_options import (
+    Backend,
+    Host,
+    Pace,
+    Port,
+    RestartEvery,
+    ServerCommand,
+    ServerWish,
+    Without,
+)
+
 campaign = typer.Typer(name="campaign", help="About campaigns.", no_args_is_help=True)
 
 
@@ -49,17 +60,13 @@ def grip(
         bool,
         typer.Option("--four-cells", help="Each run without and with drops, to part both effects."),
     ] = False,
-    backend: Annotated[
-        str, typer.Option(help="embedded, or carla: a CARLA server drives the world.")
-    ] = "embedded",
-    host: Annotated[str, typer.Option(help="Of the CARLA server.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Of the CARLA server.")] = 2000,
-    server_command: Annotated[
-        str | None, typer.Option(help="CARLA: command that starts the server for this campaign.")
-    ] = None,
-    restart_every: Annotated[
-        int, typer.Option(min=0, help="CARLA: runs after which that server is started anew.")
-    ] = 0,
+    backend: Backend = "embedded",
+    host: Host = "127.0.0.1",
+    port: Port = 2000,
+    pace: Pace = False,
+    without: Without = None,
+    server_command: ServerCommand = None,
+    restart_every: RestartEvery = 0,
     workers: Annotated[
         int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
     ] = os.cpu_count() or 1,
@@ -77,7 +84,6 @@ def grip(
     csv: Annotated[bool, typer.Option("--csv", help="Write CSV beside Parquet.")] = False,
 ) -> None:
     """Drive scenarios x weathers x frictions x seeds; prints the path of the report."""
-    from skidpad.cli.carla_backend import ServerWish
     from skidpad.cli.grip_plan import GripWish, drive_grip, plan_grip
 
     wish = GripWish(
@@ -101,6 +107,8 @@ def grip(
             backend=backend,
             host=host,
             port=port,
+            pace=pace,
+            without=without or [],
             server_command=server_command,
             restart_every=restart_every,
         ),

@@ -27,7 +27,8 @@ from skidpad.campaign.grip import (
 from skidpad.campaign.grip_cells import Friction, GripCell, cross, seeds
 from skidpad.campaign.grip_shown import keep_shown, write_stopping
 from skidpad.campaign.play import check_controller
-from skidpad.cli.carla_backend import ServerWish, backend_choice
+from skidpad.cli.carla_backend import backend_choice
+from skidpad.cli.server_options import ServerWish
 from skidpad.core.errors import ConfigError, require_choice, require_range
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.core.weather import Weather

@@ -7,6 +7,8 @@ from typing import Annotated
 
 import typer
 
+from skidpad.cli.server_options import Backend, Host, Port, ServerWish
+
 
 def play(
     file: Annotated[Path, typer.Argument(help="OpenSCENARIO XML 1.0 to 1.3 (.xosc).")],
@@ -26,11 +28,9 @@ def play(
     param: Annotated[
         list[str] | None, typer.Option(help="A parameter of the file: NAME=VALUE.")
     ] = None,
-    backend: Annotated[
-        str, typer.Option(help="embedded, or carla: a CARLA server drives the world.")
-    ] = "embedded",
-    host: Annotated[str, typer.Option(help="Of the CARLA server.")] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Of the CARLA server.")] = 2000,
+    backend: Backend = "embedded",
+    host: Host = "127.0.0.1",
+    port: Port = 2000,
     duration: Annotated[float, typer.Option(help="Longest time, s.")] = 120.0,
     check: Annotated[
         bool, typer.Option("--check", help="List what is not supported; run nothing.")
@@ -45,7 +45,7 @@ def play(
     if out is None:
         raise ConfigError("play needs --out DIR for the run, or --check")
     from skidpad.campaign.play import Play, check_controller, play_to
-    from skidpad.cli.carla_backend import ServerWish, backend_choice
+    from skidpad.cli.carla_backend import backend_choice
     from skidpad.core.errors import require_choice
     from skidpad.core.vocabulary import GripModel, SensorLevel
     from skidpad.physics.presets import find_weather

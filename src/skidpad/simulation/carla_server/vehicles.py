@@ -34,6 +34,9 @@ MODELS = {  # physics type that stands for a blueprint of this kind; sizes are t
 }
 """Two-wheelers are narrow cars to the physics: they do not lean (listed as a difference)."""
 
+STICKY_SPEED = 0.2  # m/s below which a vehicle without throttle comes to rest and stays there
+STICKY_TIME = 1.0  # s for which a push frees it; both as PhysX's sticky tyres
+
 
 @dataclass(slots=True)
 class Control:
@@ -61,6 +64,7 @@ class Vehicle:
     constant_velocity: Vector | None = None  # m/s in the body frame
     simulated: bool = True  # set_simulate_physics
     collides: bool = True
+    pushed: float = 0.0  # s for which a push still frees it
     lights: int = 0  # VehicleLightState flags
     lane: int = -1  # hint for projection
     speed_limit: float = 30.0 / 3.6  # m/s; CARLA's default until the first sign
@@ -173,6 +177,7 @@ class Vehicles:
         s.vx[i], s.vy[i] = velocity[0], velocity[1]
         along = velocity[0] * cos(s.yaw[i]) + velocity[1] * sin(s.yaw[i])
         self.fleet.wheels.omega[i] = along / self.fleet.params.wheel_radius[i]
+        self.members[i].pushed = STICKY_TIME if any(velocity) else 0.0
 
     def push(self, actor: int, impulse: Vector, point: Vector | None = None) -> None:
         """An impulse in N s at a point of the world, the centre of gravity when None."""
@@ -183,11 +188,13 @@ class Vehicles:
         else:
             x, y = point[0], point[1]
         self.fleet.apply_impulse(i, (impulse[0], impulse[1]), (x, y))
+        self.members[i].pushed = STICKY_TIME
 
     def twist(self, actor: int, moment: float) -> None:
         """An angular impulse about the vertical in N m s."""
         i = self.slots[actor]
         self.fleet.states.yaw_rate[i] += moment / self.fleet.params.yaw_inertia[i]
+        self.members[i].pushed = STICKY_TIME
 
     def step(self, mu: Floats, grade: Floats, bank: Floats) -> None:
         """One tick of driving: commands, physics, and those that move by other rules."""
@@ -197,7 +204,8 @@ class Vehicles:
             c = vehicle.control
             reverse = c.reverse or (c.manual and c.gear < 0)
             throttle = 0.0 if c.manual and c.gear == 0 else c.throttle
-            self.commands[i] = (throttle, c.brake, c.steer, c.hand_brake, reverse)
+            brake = 1.0 if throttle == 0.0 and self._sticks(vehicle) else c.brake
+            self.commands[i] = (throttle, brake, c.steer, c.hand_brake, reverse)
         active = np.array([v.simulated for v in self.members], dtype=np.bool_)
         self.fleet.step(self.commands, mu, grade, bank, active)
         for i, vehicle in enumerate(self.members):
@@ -205,6 +213,13 @@ class Vehicles:
                 self._hold_velocity(i, vehicle.constant_velocity)
             elif not vehicle.simulated:
                 _stand(self.fleet.states, i)
+
+    def _sticks(self, vehicle: Vehicle) -> bool:
+        """Whether it stands, so that a slope does not set it rolling."""
+        if vehicle.pushed > 0.0:
+            vehicle.pushed -= self.dt
+            return False
+        return self.speed(vehicle.actor) < STICKY_SPEED
 
     def _hold_velocity(self, i: int, velocity: Vector) -> None:
         s = self.fleet.states

@@ -200,16 +200,28 @@ def test_recorder_writes_into_the_data_folder(serve: Serve, tmp_path: Path) -> N
     synchronous()
     library, points = world.get_blueprint_library(), world.get_map().get_spawn_points()
     print(client.start_recorder("/somewhere/else/run.log"))
-    world.spawn_actor(library.find("vehicle.audi.tt"), points[0])
+    car = world.spawn_actor(library.find("vehicle.audi.tt"), points[0])
+    car.set_target_velocity(points[0].get_forward_vector() * 10.0)
+    way = []
     for _ in range(10):
         world.tick()
+        way.append(car.get_location())
     client.stop_recorder()
     assert "Frames: 10" in client.show_recorder_file_info("run.log", False)
+    car.destroy()
+    world.tick()
+    said = client.replay_file("run.log", 0.0, 0.0, 0)
+    assert "Replaying from 0.000 s - 0.450 s" in said, said
+    for k in range(1, 10):
+        world.tick()
+        (car,) = world.get_actors().filter("vehicle.*")
+        assert car.get_location().distance(way[k]) < 0.01, k
+        assert 8.0 < car.get_velocity().length() < 10.5, car.get_velocity().length()
     try:
-        client.replay_file("run.log", 0, 0, 0)
-        raise SystemExit("a replay was promised")
+        client.replay_file("nothing.log", 0.0, 0.0, 0)
+        raise SystemExit("a replay of nothing")
     except RuntimeError as error:
-        assert "cannot be replayed" in str(error)
+        assert "not found" in str(error)
     """)
     assert [p.name for p in tmp_path.iterdir()] == ["run.log"]
 

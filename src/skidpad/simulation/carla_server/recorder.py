@@ -11,13 +11,14 @@ from typing import IO, TYPE_CHECKING, Any
 
 from skidpad.core.errors import FileError
 from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.replayer import FORMAT, PLAYED, Recording, recording
 from skidpad.simulation.carla_server.rpc import CallError
 
 if TYPE_CHECKING:
     from skidpad.simulation.carla_server.world import World
 
 MAX_BYTES = 2 * 1024**3
+MAX_READ = 256 * 1024**2  # a longer recording is kept, but neither summed up nor replayed
 
 
 def safe_path(folder: Path | None, name: str) -> Path:
@@ -37,6 +38,7 @@ class Recorder:
         self.folder = folder
         self._file: IO[str] | None = None
         self._left = 0
+        self._born: set[int] = set()  # actors that the recording describes
 
     def start(self, name: str, world: World) -> str:
         """Begin a recording; the text that the client prints."""
@@ -47,8 +49,8 @@ class Recorder:
             self._file = path.open("w", encoding="utf-8")
         except OSError as error:
             raise FileError(f"recording {path.name}: {error.strerror}") from error
-        self._left = MAX_BYTES
-        head = {"map": world.map.name, "episode": world.episode.id, "format": 1}
+        self._left, self._born = MAX_BYTES, set()
+        head = {"map": world.map.name, "episode": world.episode.id, "format": FORMAT}
         self._write(json.dumps(head))
         return f"Recording to file: {path.name}"
 
@@ -59,16 +61,21 @@ class Recorder:
             self._file = None
 
     def tick(self, world: World) -> None:
-        """One line: frame, time, and [id, x, y, z, yaw] in CARLA's axes of what moves."""
+        """One line: frame, time, id and Transform of what moves, contacts, and who is new."""
         if self._file is None:
             return
-        poses = []
+        poses, born = [], []
         for actor in world.actors:
-            if actor.family in (Family.VEHICLE, Family.WALKER):
-                (x, y, z), (_, yaw, _) = wire.transform(world.pose(actor))
-                poses.append([actor.id, round(x, 3), round(y, 3), round(z, 3), round(yaw, 3)])
+            if actor.family not in PLAYED:
+                continue
+            place, turn = wire.transform(world.pose(actor))
+            poses.append([actor.id, [round(v, 3) for v in place], [round(v, 3) for v in turn]])
+            if actor.id not in self._born:
+                born.append([actor.id, actor.blueprint.id, actor.attributes])
+                self._born.add(actor.id)
         contacts = [[c.actor, c.other] for c in world.contacts.events]
-        self._write(json.dumps([world.episode.frame, world.episode.elapsed, poses, contacts]))
+        episode = world.episode
+        self._write(json.dumps([episode.frame, episode.elapsed, poses, contacts, born]))
 
     def _write(self, line: str) -> None:
         assert self._file is not None
@@ -93,11 +100,21 @@ class Recorder:
         lines = [f"{t[1]:10.3f} {a:6d} {b:6d}" for t in ticks for a, b in t[3]]
         return "\n".join(["      Time  actor  other", *lines]) + "\n"
 
+    def recording(self, name: str) -> Recording:
+        """What can be replayed of a file."""
+        head, ticks = self._read(name)
+        try:
+            return recording(name, head, ticks)
+        except (AttributeError, TypeError, ValueError, wire.WireError) as error:
+            raise CallError(f"{name:.80} is no recording") from error
+
     def _read(self, name: str) -> tuple[dict[str, Any], list[list[Any]]]:
         path = safe_path(self.folder, name)
         if self._file is not None:
             self._file.flush()
         try:
+            if path.stat().st_size > MAX_READ:
+                raise CallError(f"{path.name} is larger than {MAX_READ} bytes")
             lines = path.read_text(encoding="utf-8").splitlines()
             head, ticks = json.loads(lines[0]), [json.loads(line) for line in lines[1:]]
         except (OSError, ValueError, IndexError) as error:

@@ -31,6 +31,7 @@ from skidpad.simulation.carla_server.ground import Ground, feel
 from skidpad.simulation.carla_server.lights import LightControl
 from skidpad.simulation.carla_server.maps import MapStore, ServedMap
 from skidpad.simulation.carla_server.recorder import Recorder
+from skidpad.simulation.carla_server.replayer import Replayer
 from skidpad.simulation.carla_server.road_grip import RoadGrip
 from skidpad.simulation.carla_server.rpc import CallError
 from skidpad.simulation.carla_server.sensing import SensorSet
@@ -85,6 +86,7 @@ class World:
         self.grip = RoadGrip(options.weather_grip, options.mu_ref)
         self.debug = DebugShapes()
         self.recorder = Recorder(options.data_dir)
+        self.replayer = Replayer()
         self.managers = TrafficManagers()
         self.sensors = SensorSet(options.seed)
         self.contacts = Contacts()
@@ -104,6 +106,7 @@ class World:
         """Another map, or with "" the same one anew."""
         served = self.map if name == "" else self.maps.load(name)
         self.hub.hold(EPISODE_STREAM)
+        self.replayer.release(self)
         scene_of(served.roads)  # triangles now, not in the first picture's tick
         for actor in list(self.actors):
             if actor.stream is not None:
@@ -187,6 +190,7 @@ class World:
         self.lights_changed = self.lights.advance(step) or self.lights_changed
         self._drive()
         self.walkers.step(self, step)
+        self.replayer.tick(self, step)
         moving.follow(self)
         self.debug.age(step)
         self._publish_snapshot()

@@ -1,4 +1,4 @@
-"""The recorder's calls; replaying is not served."""
+"""The recorder's and the replayer's calls."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
 from skidpad.simulation.carla_server.world import World
 
 TABLE = Table("recorder")
-NO_REPLAY = "recordings cannot be replayed yet"
+MAX_FACTOR = 100.0  # times real time
 
 
 @TABLE.method("start_recorder")
@@ -48,19 +48,45 @@ def show_recorder_actors_blocked(world: World, name: Any, seconds: Any, metres: 
 
 
 @TABLE.method("replay_file")
-def replay_file(_: World, name: Any, *__: Any) -> str:
-    """Not served."""
-    raise CallError(f"{wire.text(name, 'file name', 200)}: {NO_REPLAY}")
+def replay_file(
+    world: World, name: Any, start: Any, duration: Any, follow: Any = 0, *without_effect: Any
+) -> str:
+    """Begin; neither recorded sensors nor an offset of the followed view are served."""
+    del without_effect
+    asked = wire.text(name, "file name")
+    begin, length = wire.number(start, "time_start"), wire.number(duration, "duration")
+    followed = wire.integer(follow, "follow_id")
+    source = world.recorder.recording(asked)
+    world.recorder.stop()
+    since, until = world.replayer.start(world, source, begin, length, followed)
+    return (
+        f"Replaying File: {asked:.200}\nTotal time recorded: {source.total:.3f}\n"
+        f"Replaying from {since:.3f} s - {until:.3f} s ({source.total:.3f} s)\n"
+    )
 
 
-for _name in (
-    "stop_replayer",
-    "set_replayer_time_factor",
-    "set_replayer_ignore_hero",
-    "set_replayer_ignore_spectator",
-):
+@TABLE.method("stop_replayer", Shape.VOID)
+def stop_replayer(world: World, keep_actors: Any) -> None:
+    """End; actors that the recording lets vanish do so unless they are kept."""
+    world.replayer.stop(world, wire.flag(keep_actors, "keep_actors"))
 
-    @TABLE.method(_name, Shape.VOID, without_effect=NO_REPLAY)
-    def no_replay(_: World, value: Any) -> None:
-        """Accepted."""
-        del value
+
+@TABLE.method("set_replayer_time_factor", Shape.VOID)
+def set_replayer_time_factor(world: World, factor: Any) -> None:
+    """Faster or slower."""
+    wanted = wire.number(factor, "time_factor")
+    if not 0.0 < wanted <= MAX_FACTOR:
+        raise CallError(f"time_factor must be in (0, {MAX_FACTOR:g}], got {wanted:g}")
+    world.replayer.time_factor = wanted
+
+
+@TABLE.method("set_replayer_ignore_hero", Shape.VOID)
+def set_replayer_ignore_hero(world: World, ignore: Any) -> None:
+    """Leave out who has the role `hero`."""
+    world.replayer.ignore_hero = wire.flag(ignore, "ignore_hero")
+
+
+@TABLE.method("set_replayer_ignore_spectator", Shape.VOID)
+def set_replayer_ignore_spectator(world: World, ignore: Any) -> None:
+    """Leave the spectator where it is."""
+    world.replayer.ignore_spectator = wire.flag(ignore, "ignore_spectator")

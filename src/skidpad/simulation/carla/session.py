@@ -14,10 +14,9 @@ from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.frames import LidarPoints, RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import mirrored
-from skidpad.core.randomness import stream
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.specs import LidarSpec, RadarSpec
-from skidpad.core.states import ActorStates, EgoEstimate, VehicleCommand, WorldTruth
+from skidpad.core.states import ActorStates, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import RangeModel, SensorLevel
 from skidpad.physics.optics import radar_range
 from skidpad.roads.bundled import load_map
@@ -30,6 +29,7 @@ from skidpad.simulation.carla.connection import Connection
 from skidpad.simulation.carla.events import EgoEvents
 from skidpad.simulation.carla.grip import prepare_grip
 from skidpad.simulation.carla.lights import Programme, TrafficLights
+from skidpad.simulation.carla.odometry import Odometry
 from skidpad.simulation.carla.options import Optimisation
 from skidpad.simulation.carla.pacer import rest
 from skidpad.simulation.carla.pictures import Pictures
@@ -79,7 +79,8 @@ class Session:
         self.states = ActorStates.empty(n)
         self.commands, self.mu = np.zeros((n, 5)), np.full((n, 4), np.nan)
         self.index = {p.name: i for i, p in enumerate(self.players)}
-        self._localisation = stream(self.seed, "ego", "localisation")
+        width = self.players[EGO].size[1]
+        self.odometry = Odometry(self.seed, self.setup.localisation_noise, width)
         self.grip = prepare_grip(self.carla, self.world, self.setup)
         for player in self.players:
             self._grip_on(player)
@@ -335,9 +336,10 @@ class Session:
     def frame(self) -> SensorFrame:
         """What the ego's sensors say."""
         seen, asked = self._readings(), self.asked
+        gear = int(self.players[EGO].actor.get_control().gear)
         return SensorFrame(
             tick=self.tick,
-            ego=self._estimate(),
+            ego=self.odometry.read(self.states, gear),
             images=seen.images,
             segments=seen.segments,
             radar=seen.radar,
@@ -364,28 +366,6 @@ class Session:
         if self.radar_id is not None:
             radar = decode.radar_points(self.messages[self.radar_id].raw_data, self.radar_limit)
         return Readings(images, {}, radar)
-
-    def _estimate(self) -> EgoEstimate:
-        """Localisation with its noise; rims turn as the body moves (CARLA tells no wheel speeds)."""
-        s = self.states
-        pose = s.pose(EGO)
-        sigma = self.setup.localisation_noise
-        if sigma > 0.0:
-            dx, dy = self._localisation.normal(0.0, sigma, 2).tolist()
-            pose = replace(pose, x=pose.x + dx, y=pose.y + dy)
-        v = truth.along(s, EGO)
-        half_track = 0.4 * self.players[EGO].size[1]
-        left = v - float(s.yaw_rate[EGO]) * half_track
-        right = v + float(s.yaw_rate[EGO]) * half_track
-        return EgoEstimate(
-            pose=pose,
-            speed=v,
-            yaw_rate=float(s.yaw_rate[EGO]),
-            ax=float(s.ax[EGO]),
-            ay=float(s.ay[EGO]),
-            wheel_speeds=(left, right, left, right),
-            gear=int(self.players[EGO].actor.get_control().gear),
-        )
 
     # --- end
 

@@ -29,7 +29,7 @@ from skidpad.core.setup import DT
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import ActorKind
 from skidpad.evidence.risk import safety_scores
-from skidpad.recording.channel_drives import DriveOutcome
+from skidpad.recording.channel_drives import ARBITER, DriveOutcome
 from skidpad.recording.channels import ChannelWriter
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
@@ -45,7 +45,6 @@ TICKS = round(CYCLE / DT)
 WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
 TRUTH_REACH = 120.0  # m around the ego within which the true world is recorded
 MINIMAL_RISK_BRAKE = 0.4  # of full brake, about 4 m/s^2 (UN R157 5.1.6: at most 4 m/s^2)
-ARBITER = "arbiter"
 LABEL_OF = np.array([LABELS[kind] for kind in ActorKind], dtype=np.int64)
 
 

@@ -15,11 +15,11 @@ from pathlib import Path
 import msgspec
 
 from skidpad.campaign.cells import BackendChoice, BackendKind
-from skidpad.campaign.channel_drive import ARBITER, SegmentPlan, drive_segment
+from skidpad.campaign.channel_drive import SegmentPlan, drive_segment
 from skidpad.campaign.channel_routes import DrivenRoute
 from skidpad.campaign.pool import Finished, Job, run_jobs
 from skidpad.core.errors import OutputError, require_range
-from skidpad.recording.channel_drives import DriveOutcome, DriveRecord, read_record
+from skidpad.recording.channel_drives import ARBITER, DriveOutcome, DriveRecord, read_record
 from skidpad.recording.channel_hash import recording_hash
 from skidpad.recording.files import write_bytes
 

@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from skidpad.evidence.statistics import Comparison, Rate, compare_pairs, event_rate
-from skidpad.recording.channel_drives import DriveOutcome
+from skidpad.recording.channel_drives import ARBITER, DriveOutcome
 
-ARBITER = "arbiter"
 EVENTS = ("collisions", "collisions_struck", "red_lights_run", "stalls")
 Key = tuple[str, int]  # route and seed
 

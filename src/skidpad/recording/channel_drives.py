@@ -7,6 +7,8 @@ from pathlib import Path
 
 import msgspec
 
+ARBITER = "arbiter"  # who drives, when it is not one of the channels
+
 
 class DriveOutcome(msgspec.Struct, frozen=True, kw_only=True):
     """One row per segment; counts unless said otherwise."""

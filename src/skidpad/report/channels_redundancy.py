@@ -54,8 +54,7 @@ def _rate(rate: Rate) -> Cell:
 
 def _sentence(d: Difference) -> str:
     c = d.pairs
-    p = p_text(min(1.0, 2.0 * min(c.p_greater, c.p_less)))
     return (
         f"{d.drive_by} alone less the arbiter, {TITLES[d.event]} per segment: {c.mean:+.3g} "
-        f"({interval_text(c.interval)}, {p}, {c.n} pairs)."
+        f"({interval_text(c.interval)}, {p_text(c.p)}, {c.n} pairs)."
     )

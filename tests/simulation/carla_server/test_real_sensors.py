@@ -10,7 +10,6 @@ import pytest
 Serve = Callable[..., Any]
 
 STAGE = """
-import queue
 import numpy as np
 synchronous()
 library, roads = world.get_blueprint_library(), world.get_map()
@@ -27,16 +26,6 @@ left = foot.get_right_vector() * -1.5
 walker = spawn("walker.pedestrian.0001",
                carla.Transform(foot.location + left + carla.Location(z=1.0), foot.rotation))
 world.tick()
-heard = {}
-
-def listen(name, place=carla.Transform(), **attributes):
-    blueprint = library.find(name)
-    for key, value in attributes.items():
-        blueprint.set_attribute(key, str(value))
-    sensor = world.spawn_actor(blueprint, place, attach_to=ego)
-    heard[sensor.id] = queue.Queue()
-    sensor.listen(heard[sensor.id].put)
-    return sensor
 
 def tick(times=1):
     for _ in range(times):

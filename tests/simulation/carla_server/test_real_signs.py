@@ -19,7 +19,6 @@ LIMIT = 180.0  # s
 
 # A car on a bend, so that no heading is a multiple of 90 deg; a truck ahead of it to the right.
 CHECKS = """
-import queue
 import numpy as np
 synchronous()
 library, roads = world.get_blueprint_library(), world.get_map()
@@ -30,16 +29,6 @@ there = carla.Transform(lane.transform.transform(carla.Location(x=18.0, y=4.0)),
                         lane.transform.rotation)
 ego = world.spawn_actor(library.find("vehicle.tesla.model3"), lane.transform)
 truck = world.spawn_actor(library.find("vehicle.carlamotors.carlacola"), there)
-heard = {}
-
-def listen(name, place, **attributes):
-    blueprint = library.find(name)
-    for key, value in attributes.items():
-        blueprint.set_attribute(key, str(value))
-    sensor = world.spawn_actor(blueprint, place, attach_to=ego)
-    heard[sensor.id] = queue.Queue()
-    sensor.listen(heard[sensor.id].put)
-    return sensor
 
 def at(sensor, frame):
     while True:

@@ -14,7 +14,7 @@ from skidpad.core.frames import SensorFrame
 from skidpad.core.states import StackReport, WorldTruth
 from skidpad.core.vocabulary import DetectionStatus, SensorLevel, Supervision, Tier
 from skidpad.physics.presets import find_weather
-from skidpad.simulation.embedded.sensing import Objects
+from skidpad.simulation.sensing import Objects
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.settings import load_profile

@@ -20,7 +20,7 @@ from skidpad.core.vocabulary import SensorLevel, Supervision
 from skidpad.physics.presets import find_weather
 from skidpad.recording.ticks import TickLog
 from skidpad.simulation.embedded.engine import EmbeddedBackend
-from skidpad.simulation.embedded.sensing import Pixels
+from skidpad.simulation.sensing import Pixels
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.settings import load_profile
 

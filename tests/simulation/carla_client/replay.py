@@ -21,8 +21,8 @@ from skidpad.simulation.carla.options import CarlaOptions
 from skidpad.simulation.carla_server.catalogue import load_catalogue
 from skidpad.simulation.carla_server.vehicles import model_of
 from skidpad.simulation.embedded.engine import EmbeddedBackend
-from skidpad.simulation.embedded.ground import NOISE_SALT, ROAD_NOISE
-from skidpad.simulation.embedded.traffic.path import uniform
+from skidpad.simulation.world.ground import NOISE_SALT, ROAD_NOISE
+from skidpad.simulation.world.traffic.path import uniform
 
 EGO = "vehicle.mini.cooper_s"
 SECONDS, SEED = 60.0, 3

@@ -6,7 +6,7 @@ from typing import Any
 
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.embedded.lights import Lights
+from skidpad.simulation.world.lights import Lights
 
 
 class TrafficLights:

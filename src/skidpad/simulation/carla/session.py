@@ -38,7 +38,7 @@ from skidpad.simulation.carla.scene import load_scene, release, synchronise
 from skidpad.simulation.carla.sensors import Sensors
 from skidpad.simulation.carla.traffic import Traffic, check_mode, spawn_fixed, spawn_random
 from skidpad.simulation.carla.weather import set_weather
-from skidpad.simulation.embedded.sensing import Objects, Readings
+from skidpad.simulation.sensing import Objects, Readings
 
 EGO = 0
 SETTLE = 8  # ticks in which vehicles fall onto the road and sensors begin to send

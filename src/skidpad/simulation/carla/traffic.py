@@ -13,7 +13,7 @@ from skidpad.simulation.carla import blueprints
 from skidpad.simulation.carla.axes import from_transform
 from skidpad.simulation.carla.cast import Player, awaited, measured, try_spawn
 from skidpad.simulation.carla.connection import Connection
-from skidpad.simulation.embedded.traffic.placement import fixed_spawns, random_factors
+from skidpad.simulation.world.traffic.placement import fixed_spawns, random_factors
 
 MODES = ("fixed", "random")
 TOP_UP_EVERY = 20  # ticks between attempts to let missing vehicles in

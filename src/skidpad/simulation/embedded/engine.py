@@ -14,8 +14,8 @@ from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.asked import AskedSensors
-from skidpad.simulation.embedded.sensing import sensing_of
-from skidpad.simulation.embedded.world import EGO, World
+from skidpad.simulation.sensing import sensing_of
+from skidpad.simulation.world.world import EGO, World
 
 REVERSE = 4  # column of the commands
 

@@ -8,22 +8,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
-from skidpad.simulation.embedded.traffic import occupancy as occ_
-from skidpad.simulation.embedded.traffic.idm import idm
-from skidpad.simulation.embedded.traffic.mobil import (
+from skidpad.simulation.world.traffic import occupancy as occ_
+from skidpad.simulation.world.traffic.idm import idm
+from skidpad.simulation.world.traffic.mobil import (
     A_THRESHOLD,
     RANDOM_RATE,
     incentive,
     is_safe,
 )
-from skidpad.simulation.embedded.traffic.occupancy import NOBODY
-from skidpad.simulation.embedded.traffic.outlook import (
+from skidpad.simulation.world.traffic.occupancy import NOBODY
+from skidpad.simulation.world.traffic.outlook import (
     desired_speed,
     end_gap,
     merge_gap,
     stop_gap,
 )
-from skidpad.simulation.embedded.traffic.path import (
+from skidpad.simulation.world.traffic.path import (
     along,
     begin,
     extend,
@@ -31,9 +31,9 @@ from skidpad.simulation.embedded.traffic.path import (
     straight_path,
     uniform,
 )
-from skidpad.simulation.embedded.traffic.right_of_way import right_of_way_gap, zebra_gap
-from skidpad.simulation.embedded.traffic.state import CHANGE_TIME, Drivers, View
-from skidpad.simulation.embedded.traffic.tracking import pedals, steer
+from skidpad.simulation.world.traffic.right_of_way import right_of_way_gap, zebra_gap
+from skidpad.simulation.world.traffic.state import CHANGE_TIME, Drivers, View
+from skidpad.simulation.world.traffic.tracking import pedals, steer
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

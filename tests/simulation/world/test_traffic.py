@@ -21,15 +21,15 @@ from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
-from skidpad.simulation.embedded.lights import CYCLE_S, Lights
-from skidpad.simulation.embedded.traffic.idm import A_EMERGENCY, idm
-from skidpad.simulation.embedded.traffic.mobil import incentive, is_safe
-from skidpad.simulation.embedded.traffic.placement import (
+from skidpad.simulation.world.lights import CYCLE_S, Lights
+from skidpad.simulation.world.traffic.idm import A_EMERGENCY, idm
+from skidpad.simulation.world.traffic.mobil import incentive, is_safe
+from skidpad.simulation.world.traffic.placement import (
     chosen_positions,
     fixed_spawns,
     published_positions,
 )
-from skidpad.simulation.embedded.world import World
+from skidpad.simulation.world.world import World
 
 MAP = load_map("figure8")
 assert MAP.ego_start is not None

@@ -6,8 +6,8 @@ from math import atan, cos, sin
 
 from skidpad.core.jit import kernel
 from skidpad.physics.vehicle import steer_share
-from skidpad.simulation.embedded.traffic.path import PATH
-from skidpad.simulation.embedded.traffic.state import CHANGE_TIME, Drivers, View
+from skidpad.simulation.world.traffic.path import PATH
+from skidpad.simulation.world.traffic.state import CHANGE_TIME, Drivers, View
 
 G = 9.80665  # m/s^2
 OMEGA, ZETA = 1.0, 0.9  # rad/s and damping of the lateral control: half the yaw response's

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from skidpad.core.states import ActorStates
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.embedded.traffic.network import Network
+from skidpad.simulation.world.traffic.network import Network
 
 CLEARANCE = 45.0  # m to any other vehicle
 EDGE = 15.0  # m kept to both ends of a lane

@@ -7,10 +7,10 @@ from math import sqrt
 import numpy as np
 
 from skidpad.core.jit import kernel
-from skidpad.simulation.embedded.traffic.idm import B_COMFORT
-from skidpad.simulation.embedded.traffic.occupancy import NOBODY, SLOTS
-from skidpad.simulation.embedded.traffic.path import PATH
-from skidpad.simulation.embedded.traffic.state import Drivers, View
+from skidpad.simulation.world.traffic.idm import B_COMFORT
+from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS
+from skidpad.simulation.world.traffic.path import PATH
+from skidpad.simulation.world.traffic.state import Drivers, View
 
 REACH_LIGHT = 150.0  # m
 MERGE_REACH = 60.0  # m before a merge within which the streams watch each other

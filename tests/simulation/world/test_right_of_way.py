@@ -11,9 +11,9 @@ from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.embedded.engine import EmbeddedBackend
-from skidpad.simulation.embedded.lights import Lights
-from skidpad.simulation.embedded.traffic.manager import priority_of
-from skidpad.simulation.embedded.traffic.priority import STOP, YIELD
+from skidpad.simulation.world.lights import Lights
+from skidpad.simulation.world.traffic.manager import priority_of
+from skidpad.simulation.world.traffic.priority import STOP, YIELD
 
 TOWN = load_map("town")
 

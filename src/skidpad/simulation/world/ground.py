@@ -21,8 +21,8 @@ from skidpad.roads.kernels import (
     sample_kernel,
     segment_kernel,
 )
-from skidpad.simulation.embedded.traffic.occupancy import PLACE, Places
-from skidpad.simulation.embedded.traffic.path import uniform
+from skidpad.simulation.world.traffic.occupancy import PLACE, Places
+from skidpad.simulation.world.traffic.path import uniform
 
 Floats = NDArray[np.float64]
 

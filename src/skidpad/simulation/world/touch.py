@@ -8,7 +8,7 @@ from skidpad.core.states import ActorTable, ContactEvent, LaneInvasion
 from skidpad.physics.contact import Contacts
 from skidpad.roads.lanes import Marking
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.embedded.traffic.occupancy import PLACE, Places
+from skidpad.simulation.world.traffic.occupancy import PLACE, Places
 
 HOLD = 0.5  # s: bodies that bounce apart and touch again within this are one contact
 EGO = 0

@@ -23,14 +23,14 @@ from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import fill_mu, friction_ratio, grip_params
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.embedded.actors import Cast, cast_of, place_of
-from skidpad.simulation.embedded.ground import places_for, settle
-from skidpad.simulation.embedded.lights import Lights
-from skidpad.simulation.embedded.obstacles import obstacles
-from skidpad.simulation.embedded.patches import Patches
-from skidpad.simulation.embedded.touch import ContactBook, MarkingWatch
-from skidpad.simulation.embedded.traffic.manager import Traffic
-from skidpad.simulation.embedded.traffic.network import Network, network
+from skidpad.simulation.world.actors import Cast, cast_of, place_of
+from skidpad.simulation.world.ground import places_for, settle
+from skidpad.simulation.world.lights import Lights
+from skidpad.simulation.world.obstacles import obstacles
+from skidpad.simulation.world.patches import Patches
+from skidpad.simulation.world.touch import ContactBook, MarkingWatch
+from skidpad.simulation.world.traffic.manager import Traffic
+from skidpad.simulation.world.traffic.network import Network, network
 
 EGO = 0
 BRAKING = 0.05  # pedal at which the brake lamps light up

@@ -12,10 +12,10 @@ from math import sqrt
 import numpy as np
 
 from skidpad.core.jit import kernel
-from skidpad.simulation.embedded.traffic.occupancy import NOBODY, SLOTS, find_ahead
-from skidpad.simulation.embedded.traffic.path import PATH
-from skidpad.simulation.embedded.traffic.priority import LIGHT, STOP, YIELD
-from skidpad.simulation.embedded.traffic.state import Drivers, View
+from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, find_ahead
+from skidpad.simulation.world.traffic.path import PATH
+from skidpad.simulation.world.traffic.priority import LIGHT, STOP, YIELD
+from skidpad.simulation.world.traffic.state import Drivers, View
 
 REACH = 60.0  # m before a junction from which a driver looks
 DECIDE = 25.0  # m before it from which gaps are judged; before, a driver is only ready to stop

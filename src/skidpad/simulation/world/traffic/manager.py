@@ -17,15 +17,15 @@ from skidpad.core.setup import TrafficSetup
 from skidpad.core.states import ActorStates
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.embedded.traffic.driver import drive_all
-from skidpad.simulation.embedded.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
-from skidpad.simulation.embedded.traffic.network import Network
-from skidpad.simulation.embedded.traffic.occupancy import Places, occupancy
-from skidpad.simulation.embedded.traffic.path import begin
-from skidpad.simulation.embedded.traffic.places import FreePlaces
-from skidpad.simulation.embedded.traffic.priority import bake_priority
-from skidpad.simulation.embedded.traffic.state import TRAIT, View, drivers
-from skidpad.simulation.embedded.traffic.variety import vary
+from skidpad.simulation.world.traffic.driver import drive_all
+from skidpad.simulation.world.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
+from skidpad.simulation.world.traffic.network import Network
+from skidpad.simulation.world.traffic.occupancy import Places, occupancy
+from skidpad.simulation.world.traffic.path import begin
+from skidpad.simulation.world.traffic.places import FreePlaces
+from skidpad.simulation.world.traffic.priority import bake_priority
+from skidpad.simulation.world.traffic.state import TRAIT, View, drivers
+from skidpad.simulation.world.traffic.variety import vary
 
 G = 9.80665  # m/s^2
 KERB = 0.5  # m beside the road from which a pedestrian in motion counts as on the zebra

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
-from skidpad.simulation.embedded.traffic.network import Network
+from skidpad.simulation.world.traffic.network import Network
 
 Ints = NDArray[np.int32]
 

@@ -14,7 +14,7 @@ from skidpad.core.states import ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.types import VehicleType, traffic_types, vehicle_type, vehicle_types
 from skidpad.roads.queries import LanePoint, RoadMap
-from skidpad.simulation.embedded.traffic.placement import (
+from skidpad.simulation.world.traffic.placement import (
     RANDOM_MAX,
     Spawn,
     fixed_spawns,

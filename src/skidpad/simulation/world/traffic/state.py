@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.simulation.embedded.traffic.network import Network
-from skidpad.simulation.embedded.traffic.occupancy import Occupancy, Places
-from skidpad.simulation.embedded.traffic.path import PATH
+from skidpad.simulation.world.traffic.network import Network
+from skidpad.simulation.world.traffic.occupancy import Occupancy, Places
+from skidpad.simulation.world.traffic.path import PATH
 
 Ints = NDArray[np.int32]
 

@@ -1,0 +1,1 @@
+"""The moving world of a run, on which every simulator of the house stands."""

@@ -15,8 +15,8 @@ from skidpad.campaign.rerun import read_cell
 from skidpad.campaign.views import SIZE, twelve_views
 from skidpad.cli.main import app
 from skidpad.core.vocabulary import SensorLevel
-from skidpad.evidence.findings import judge
-from skidpad.evidence.matrix_findings import FINDINGS
+from skidpad.evidence.drive.findings import FINDINGS
+from skidpad.evidence.verdicts import judge
 from skidpad.physics.presets import find_weather
 from skidpad.recording.logfiles import log_hash
 from skidpad.recording.results import read_results

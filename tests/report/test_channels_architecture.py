@@ -4,8 +4,8 @@ from pathlib import Path
 import pytest
 
 import skidpad
-from skidpad.evidence.channel_findings import BUDGET_MS as BUDGET_OF_FINDING
-from skidpad.evidence.watch import BUDGET_MS
+from skidpad.evidence.channels.findings import BUDGET_MS as BUDGET_OF_FINDING
+from skidpad.evidence.channels.watch import BUDGET_MS
 
 SOURCE = Path(skidpad.__file__).parent
 PAGE = Path(__file__).parents[2] / "docs" / "architecture.md"

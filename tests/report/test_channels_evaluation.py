@@ -6,9 +6,9 @@ import pytest
 
 from channel_worlds import Eyes, World, drive
 from skidpad.core.errors import FileError
-from skidpad.evidence.evaluation import Evaluation
-from skidpad.evidence.hazards import Signal
-from skidpad.evidence.judging import judge
+from skidpad.evidence.channels.hazards import Signal
+from skidpad.evidence.channels.judging.evaluation import Evaluation
+from skidpad.evidence.channels.judging.segments import judge
 from skidpad.recording.channel_drives import DriveOutcome, DriveRecord
 from skidpad.recording.cycles import cycles
 from skidpad.report.channels_evaluation import evaluation_page, write_evaluation_report

@@ -5,10 +5,10 @@ import numpy as np
 import pytest
 
 from channel_worlds import Eyes, World, drive
-from skidpad.evidence.hazards import Profile
-from skidpad.evidence.indicators.catalogue import load_thresholds
-from skidpad.evidence.indicators.panel import IndicatorSettings
-from skidpad.evidence.watch import watch
+from skidpad.evidence.channels.hazards import Profile
+from skidpad.evidence.channels.indicators.catalogue import load_thresholds
+from skidpad.evidence.channels.indicators.panel import IndicatorSettings
+from skidpad.evidence.channels.watch import watch
 from skidpad.recording.hazards import read_hazards
 from skidpad.report.channels import drive_page, write_drive_report
 from skidpad.report.channels_data import load_drive

@@ -32,7 +32,7 @@ from skidpad.core.setup import DT
 from skidpad.core.states import ContactEvent, VehicleCommand
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather
-from skidpad.evidence.metrics.drive import prepare
+from skidpad.evidence.drive.prepared import prepare
 from skidpad.physics.presets import find_weather
 from skidpad.recording.logfiles import log_hash
 from skidpad.roads.bundled import load_map

@@ -28,7 +28,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.setup import DT
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import ActorKind
-from skidpad.evidence.risk import safety_scores
+from skidpad.evidence.channels.risk import safety_scores
 from skidpad.recording.channel_drives import ARBITER, DriveOutcome
 from skidpad.recording.channels import ChannelWriter
 from skidpad.roads.bundled import load_map

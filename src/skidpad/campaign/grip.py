@@ -149,7 +149,7 @@ def play_cell(cell: GripCell, folder: Path | None = None) -> Played:
 
 def drive_one(task: Task) -> Answer:
     """In a worker: drive a cell, write its series, return its row and the last line of an error."""
-    from skidpad.evidence.metrics.grip import grip_metrics, grip_series
+    from skidpad.evidence.grip.scores import grip_metrics, grip_series
     from skidpad.physics.grip import friction_ratio
     from skidpad.recording.logfiles import log_hash, write_log
 

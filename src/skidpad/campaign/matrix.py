@@ -17,7 +17,7 @@ from skidpad.campaign.pool import Finished, Job, run_jobs
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome, SensorLevel
 from skidpad.core.weather import Weather
-from skidpad.evidence.metrics.drive import LeadDefinition, MetricSettings
+from skidpad.evidence.drive.prepared import LeadDefinition, MetricSettings
 from skidpad.recording.files import write_bytes
 from skidpad.recording.fingerprint import fingerprint
 from skidpad.recording.ledger import Entry, Ledger, fingerprints, latest
@@ -79,7 +79,7 @@ def run_matrix(
 def warm_up() -> None:
     """Compile every kernel that a run may need, by driving a moment of each kind."""
     from skidpad.campaign.drive import drive
-    from skidpad.evidence.metrics.run import run_metrics
+    from skidpad.evidence.drive.metrics import run_metrics
     from skidpad.roads.bundled import load_map
 
     for level in SensorLevel:
@@ -108,7 +108,7 @@ def drive_one(argument: tuple[Cell, Path]) -> tuple[RunKey, Metrics, Timing, str
     # numba and friends are imported only where they are needed, not in the parent.
     from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.drive import run_cell
-    from skidpad.evidence.metrics.run import run_metrics
+    from skidpad.evidence.drive.metrics import run_metrics
     from skidpad.recording.logfiles import write_log
     from skidpad.roads.bundled import load_map
 

@@ -19,10 +19,10 @@ from skidpad.core.randomness import stream
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import SensorLevel, Tier
-from skidpad.evidence.acceptance import ACCEPTANCE
-from skidpad.evidence.findings import Judgement, judge
-from skidpad.evidence.matrix_findings import FINDINGS
-from skidpad.evidence.metrics.run import run_metrics
+from skidpad.evidence.drive.acceptance import ACCEPTANCE
+from skidpad.evidence.drive.findings import FINDINGS
+from skidpad.evidence.drive.metrics import run_metrics
+from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.physics.presets import find_weather
 from skidpad.recording.logfiles import log_hash
 from skidpad.recording.runlog import RunLog

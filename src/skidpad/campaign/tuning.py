@@ -19,7 +19,7 @@ from skidpad.core.geometry import mps_from_kmh
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome
 from skidpad.core.weather import Weather
-from skidpad.evidence.metrics.grip import npc_contact_row
+from skidpad.evidence.grip.scores import npc_contact_row
 from skidpad.physics.presets import preset
 from skidpad.scenarios.variation import (
     CUT_IN,

@@ -57,7 +57,7 @@ def info(file: Path = FILE, mapping: Path | None = MAPPING) -> None:
 @channels.command()
 def compare(a: Path = A, b: Path = B) -> None:
     """Compare two monitored drives cycle by cycle, B less A."""
-    from skidpad.evidence.comparison import compare_drives
+    from skidpad.evidence.channels.comparison import compare_drives
     from skidpad.recording.indicators import read_indicators
 
     for row in compare_drives(read_indicators(a), read_indicators(b)):

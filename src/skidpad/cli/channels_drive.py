@@ -100,7 +100,7 @@ def drive(
 def outcomes(folders: list[Path] = FOLDERS) -> None:
     """Compare drivers over the seeds that all have driven: does redundancy pay?"""
     from skidpad.core.errors import FileError
-    from skidpad.evidence.redundancy import compare_drivers
+    from skidpad.evidence.channels.redundancy import compare_drivers
     from skidpad.recording.channel_drives import read_outcomes
 
     driven = read_outcomes(folders)

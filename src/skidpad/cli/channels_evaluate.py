@@ -12,9 +12,9 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
-    from skidpad.evidence.hazards import Signal
-    from skidpad.evidence.judging import Segment
-    from skidpad.evidence.matching import Span
+    from skidpad.evidence.channels.hazards import Signal
+    from skidpad.evidence.channels.judging.matching import Span
+    from skidpad.evidence.channels.judging.segments import Segment
 
 
 class Truth(str, Enum):
@@ -50,8 +50,8 @@ def evaluate(
     import json
 
     from skidpad.core.errors import ConfigError, require_choice
-    from skidpad.evidence.evaluation import Evaluation, read_labels
-    from skidpad.evidence.hazards import Signal
+    from skidpad.evidence.channels.hazards import Signal
+    from skidpad.evidence.channels.judging.evaluation import Evaluation, read_labels
     from skidpad.recording.files import write_bytes
     from skidpad.recording.sources import recordings_below
     from skidpad.report.channels_evaluation import write_evaluation_report
@@ -78,8 +78,13 @@ def evaluate(
 
 def train(folder: Path = DIR, out: Path = MODEL_OUT, workers: int = WORKERS) -> None:
     """Train the learned identifier on recordings with truth; writes the model and its card."""
-    from skidpad.evidence.identifier import save_model
-    from skidpad.evidence.training import TrainingDrive, card_text, require_learning, train_model
+    from skidpad.evidence.channels.identifier.model import save_model
+    from skidpad.evidence.channels.identifier.training import (
+        TrainingDrive,
+        card_text,
+        require_learning,
+        train_model,
+    )
     from skidpad.recording.files import write_bytes
     from skidpad.recording.sources import recordings_below
 
@@ -113,8 +118,8 @@ def judge_one(task: _Task) -> Segment:
     """In a worker: read and judge one recording."""
     import time
 
-    from skidpad.evidence.identifier import load_model
-    from skidpad.evidence.judging import judge
+    from skidpad.evidence.channels.identifier.model import load_model
+    from skidpad.evidence.channels.judging.segments import judge
     from skidpad.recording.channels import McapRecording
     from skidpad.recording.context import context_of
     from skidpad.recording.cycles import cycles
@@ -161,7 +166,7 @@ def _labels_of(path: Path, marked: dict[str, list[Span]]) -> tuple[Span, ...]:
 def _refuse_training_drives(path: Path, segments: list[Segment]) -> None:
     """A model may not be judged by drives that it was trained on."""
     from skidpad.core.errors import ConfigError
-    from skidpad.evidence.identifier import load_model
+    from skidpad.evidence.channels.identifier.model import load_model
 
     seen = load_model(path).trained_on()
     both = [s.name for s in segments if (s.route, s.context.get("seed", s.name)) in seen]
@@ -172,7 +177,7 @@ def _refuse_training_drives(path: Path, segments: list[Segment]) -> None:
 
 
 def _print_results(table: dict[str, object]) -> None:
-    from skidpad.evidence.matching import percent
+    from skidpad.evidence.channels.judging.matching import percent
 
     def ratio(row: dict[str, object], name: str) -> str:
         value, interval = row[name], row[f"{name}_interval"]

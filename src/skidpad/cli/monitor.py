@@ -10,8 +10,8 @@ import typer
 
 if TYPE_CHECKING:
     from skidpad.core.vocabulary import HazardType
-    from skidpad.evidence.indicators.catalogue import Indicator
-    from skidpad.evidence.watch import Watched
+    from skidpad.evidence.channels.indicators.catalogue import Indicator
+    from skidpad.evidence.channels.watch import Watched
 
 
 class Rules(str, Enum):
@@ -76,12 +76,12 @@ def monitor(
     import time
 
     from skidpad.core.errors import ConfigError
-    from skidpad.evidence.hazards import Profile
-    from skidpad.evidence.identifier import Identify, load_model
-    from skidpad.evidence.indicators.catalogue import load_thresholds
-    from skidpad.evidence.indicators.comfort import Form
-    from skidpad.evidence.indicators.panel import IndicatorSettings
-    from skidpad.evidence.watch import time_by_objects, timing_statistics, watch
+    from skidpad.evidence.channels.hazards import Profile
+    from skidpad.evidence.channels.identifier.model import Identify, load_model
+    from skidpad.evidence.channels.indicators.catalogue import load_thresholds
+    from skidpad.evidence.channels.indicators.comfort import Form
+    from skidpad.evidence.channels.indicators.panel import IndicatorSettings
+    from skidpad.evidence.channels.watch import time_by_objects, timing_statistics, watch
     from skidpad.recording.sources import open_channels
     from skidpad.report.channels import write_drive_report
 
@@ -113,7 +113,7 @@ def monitor(
 def _rule(name: str) -> HazardType | Indicator:
     from skidpad.core.errors import ConfigError
     from skidpad.core.vocabulary import HazardType
-    from skidpad.evidence.indicators.catalogue import Indicator, load_thresholds
+    from skidpad.evidence.channels.indicators.catalogue import Indicator, load_thresholds
 
     by_label = {entry.label: i for i, entry in load_thresholds().items() if entry.threshold}
     known: dict[str, HazardType | Indicator] = {h.value: h for h in HazardType}
@@ -194,7 +194,7 @@ def _junit(counts: dict[str, int]) -> bytes:
 
 def safety_case(folder: Path = DIR) -> None:
     """Print the safety case with what the drive says for and against each claim."""
-    from skidpad.evidence.case import evidence_lines
+    from skidpad.evidence.channels.case import evidence_lines
     from skidpad.recording.indicators import read_indicators
 
     for line in evidence_lines(read_indicators(folder)):

@@ -8,9 +8,9 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from skidpad.evidence.metrics.collisions import find_crashes
-from skidpad.evidence.metrics.drive import prepare
-from skidpad.evidence.metrics.run import run_metrics
+from skidpad.evidence.drive.collisions import find_crashes
+from skidpad.evidence.drive.metrics import run_metrics
+from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.recording.results import definitions
 from skidpad.report.cards import chain, headline

@@ -10,12 +10,11 @@ from dataclasses import dataclass
 import polars as pl
 
 from skidpad.core.errors import ConfigError, require_choice
-from skidpad.core.vocabulary import Outcome
+from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.evidence.statistics import Comparison, compare_pairs
 from skidpad.recording.results import definitions
 
 PAIRED_BY = ("config", "weather", "seed")
-NOT_RUN = [Outcome.AGENT_ERROR.value, Outcome.CRASHED.value, Outcome.TIMEOUT.value]
 OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge,
     "<=": operator.le,

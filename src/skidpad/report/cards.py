@@ -10,8 +10,8 @@ from pathlib import Path
 from PIL import Image as Picture
 
 from skidpad.core.vocabulary import DetectionStatus, Tier
-from skidpad.evidence.metrics.collisions import Crash, CrashKind, Sighting, Striker
-from skidpad.evidence.metrics.drive import Drive
+from skidpad.evidence.drive.collisions import Crash, CrashKind, Sighting, Striker
+from skidpad.evidence.drive.prepared import Drive
 from skidpad.report.page import Card, Image
 from skidpad.report.replay import replay
 from skidpad.roads.queries import RoadMap

@@ -8,7 +8,7 @@ import numpy as np
 
 from skidpad import __version__
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.indicators.catalogue import Indicator
+from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.recording.hazards import HazardRecord
 from skidpad.report import channels_figures as figures
 from skidpad.report import channels_tables as tables

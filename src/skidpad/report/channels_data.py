@@ -13,8 +13,8 @@ import polars as pl
 from numpy.typing import NDArray
 
 from skidpad.core.errors import FileError
-from skidpad.evidence.indicators.catalogue import Indicator, Threshold, load_thresholds
-from skidpad.evidence.watch import SUMMARY, TIMING
+from skidpad.evidence.channels.indicators.catalogue import Indicator, Threshold, load_thresholds
+from skidpad.evidence.channels.watch import SUMMARY, TIMING
 from skidpad.recording.files import read_parquet
 from skidpad.recording.hazards import HazardRecord, read_hazards
 from skidpad.recording.indicators import read_indicators

@@ -6,9 +6,9 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from skidpad.evidence.hazards import SCORED_HAZARDS
-from skidpad.evidence.indicators.catalogue import Bound, Indicator
-from skidpad.evidence.watch import BUDGET_MS, MODULES, time_by_objects
+from skidpad.evidence.channels.hazards import SCORED_HAZARDS
+from skidpad.evidence.channels.indicators.catalogue import Bound, Indicator
+from skidpad.evidence.channels.watch import BUDGET_MS, MODULES, time_by_objects
 from skidpad.report.channels_data import MonitoredDrive, Trace
 from skidpad.report.figures import PALETTE, canvas, lines, svg_of
 from skidpad.report.page import Block, Figure, Text

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from skidpad.evidence.redundancy import EVENTS, Difference, compare_drivers, differences
+from skidpad.evidence.channels.redundancy import EVENTS, Difference, compare_drivers, differences
 from skidpad.evidence.statistics import Rate, interval_text, p_text
 from skidpad.recording.channel_drives import read_outcomes
 from skidpad.report.page import Block, Cell, Table, Text

@@ -7,9 +7,14 @@ from collections.abc import Mapping, Sequence
 import polars as pl
 
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.case import NodeEvidence, node_evidence
-from skidpad.evidence.indicators.catalogue import Argument, Indicator, Statement, safety_case
-from skidpad.evidence.watch import timing_statistics
+from skidpad.evidence.channels.case import NodeEvidence, node_evidence
+from skidpad.evidence.channels.indicators.catalogue import (
+    Argument,
+    Indicator,
+    Statement,
+    safety_case,
+)
+from skidpad.evidence.channels.watch import timing_statistics
 from skidpad.recording.hazards import HazardRecord
 from skidpad.report.channels_data import MonitoredDrive
 from skidpad.report.page import Block, Cell, Node, Table, Text, Tree

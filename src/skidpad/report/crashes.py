@@ -6,8 +6,8 @@ from pathlib import Path
 
 import polars as pl
 
-from skidpad.evidence.metrics.collisions import Crash, find_crashes
-from skidpad.evidence.metrics.drive import Drive, prepare
+from skidpad.evidence.drive.collisions import Crash, find_crashes
+from skidpad.evidence.drive.prepared import Drive, prepare
 from skidpad.recording.logfiles import TICKS, read_log
 from skidpad.report.cards import crash_card, severity
 from skidpad.report.matrix_data import Matrix, config_title, weather_title

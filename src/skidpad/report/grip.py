@@ -9,9 +9,9 @@ import numpy as np
 import polars as pl
 
 from skidpad import __version__
-from skidpad.evidence.findings import judge
-from skidpad.evidence.grip_findings import FINDINGS
-from skidpad.evidence.grip_study import Pair, completion, completion_p
+from skidpad.evidence.grip.findings import FINDINGS
+from skidpad.evidence.grip.study import Pair, completion, completion_p
+from skidpad.evidence.verdicts import judge
 from skidpad.recording.files import read_parquet
 from skidpad.recording.grip import GripEntry, GripMetrics, grip_hash
 from skidpad.recording.ledger import CAMPAIGN, fingerprints, latest, read_ledger

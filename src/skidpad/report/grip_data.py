@@ -10,9 +10,9 @@ import numpy as np
 import polars as pl
 
 from skidpad.core.errors import FileError
-from skidpad.evidence.compare import NOT_RUN
-from skidpad.evidence.grip_findings import CUT_IN
-from skidpad.evidence.grip_study import (
+from skidpad.evidence.contrasts import NOT_RUN
+from skidpad.evidence.grip.findings import CUT_IN
+from skidpad.evidence.grip.study import (
     ORIGINAL,
     REDUCED,
     CellSeries,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.setup import DT
-from skidpad.evidence.grip_study import ORIGINAL, REDUCED, Pair
+from skidpad.evidence.grip.study import ORIGINAL, REDUCED, Pair
 from skidpad.report.figures import PALETTE, canvas, svg_of
 from skidpad.report.grip_data import GripCampaign, scenario_title
 from skidpad.report.page import Block, Figure

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from skidpad.evidence.grip_rain import CELLS, FourCells, four_cells
+from skidpad.evidence.grip.rain import CELLS, FourCells, four_cells
 from skidpad.evidence.statistics import Comparison
 from skidpad.report.grip_data import GripCampaign, scenario_title
 from skidpad.report.page import Block, Cell, Table

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 
-from skidpad.evidence.grip_study import (
+from skidpad.evidence.grip.study import (
     METRICS,
     ORIGINAL,
     REDUCED,

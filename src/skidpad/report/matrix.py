@@ -9,9 +9,9 @@ import numpy as np
 import polars as pl
 
 from skidpad import __version__
-from skidpad.evidence.acceptance import ACCEPTANCE
-from skidpad.evidence.findings import judge
-from skidpad.evidence.matrix_findings import FINDINGS
+from skidpad.evidence.drive.acceptance import ACCEPTANCE
+from skidpad.evidence.drive.findings import FINDINGS
+from skidpad.evidence.verdicts import judge
 from skidpad.recording.files import read_parquet
 from skidpad.recording.ledger import CAMPAIGN, fingerprints, latest, read_ledger
 from skidpad.recording.results import TIMING, definitions, results_hash

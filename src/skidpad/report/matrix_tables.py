@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import polars as pl
 
-from skidpad.evidence.matrix_findings import differences
+from skidpad.evidence.contrasts import differences
 from skidpad.evidence.statistics import Interval, Rate, bootstrap_interval, compare_pairs, p_text
 from skidpad.recording.results import definitions
 from skidpad.report.matrix_data import (

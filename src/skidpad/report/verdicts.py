@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from skidpad.evidence.findings import Judgement
+from skidpad.evidence.verdicts import Judgement
 from skidpad.report.page import Verdict
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.errors import MissingExtra
-from skidpad.evidence.indicators.catalogue import CHANNEL_INDICATORS, PAIR_INDICATORS
-from skidpad.evidence.monitor import Monitor
+from skidpad.evidence.channels.indicators.catalogue import CHANNEL_INDICATORS, PAIR_INDICATORS
+from skidpad.evidence.channels.monitor import Monitor
 
 Floats = NDArray[np.float64]
 APPLICATION = "skidpad channels"

@@ -17,8 +17,8 @@ from skidpad.core.frames import Frame
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import SensorLevel
-from skidpad.evidence.metrics.grip import grip_metrics
-from skidpad.evidence.metrics.run import run_metrics
+from skidpad.evidence.drive.metrics import run_metrics
+from skidpad.evidence.grip.scores import grip_metrics
 from skidpad.physics import types
 from skidpad.physics.presets import find_weather
 from skidpad.roads.bundled import load_map

@@ -1,0 +1,315 @@
+"""Hazard rules as data, read against indicator and safety-score values only (C-120 to C-130)."""
+
+from __future__ import annotations
+
+import operator
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import Enum
+from importlib.resources import files
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.indicators.catalogue import Indicator
+from skidpad.evidence.channels.indicators.panel import CHANNEL_ROW, PAIR_ROW, Readings
+from skidpad.evidence.channels.risk import RiskMatrix
+
+Floats = NDArray[np.float64]
+SCORED_HAZARDS = (
+    HazardType.INCONSISTENT_LOCALISATION,
+    HazardType.EGO_TAILGATING,
+    HazardType.EGO_TAILGATED,
+)
+STEADY_TIME = 20.0  # s over which a stuck vehicle's indicators hardly move (C-129)
+STEADY_RANGE = 0.1
+DIP = 0.2  # a fall of cross-channel path similarity below its recent best that counts as a dip
+
+
+class Profile(str, Enum):
+    """Which published or corrected rules apply (decision C-6)."""
+
+    AS_PRINTED = "as_printed"
+    PRACTICAL = "practical"
+
+
+class Signal(str, Enum):
+    """What a clause may name; each is one number per cycle for any number of channels (C-7)."""
+
+    LOCATION_VARIANCE = "location_variance"  # greatest over pairs
+    EGO_LOCATION = "ego_location"  # least over pairs
+    SHIFT_SHORT = "shift_short"  # m, greatest over pairs
+    SHIFT_LONG = "shift_long"  # m
+    GAP = "gap"  # |OLSS - OCSS| of the pair where it is largest
+    GAP_SIGNED = "gap_signed"  # OLSS - OCSS of that pair
+    SAFETY_SCORE = "safety_score"  # least over channels
+    TTC_AHEAD = "ttc_ahead"  # s, least over plans and worlds, of objects ahead; inf: no overlap
+    TTC_BEHIND = "ttc_behind"  # s
+    RISK_AHEAD_LEAD = "risk_ahead_lead"  # largest risk ahead less largest risk behind
+    COMFORT_DRIVING = "comfort_driving"  # planned-path comfort of the driving channel
+    COMFORT_LEAST = "comfort_least"
+    CROSS_PATH = "cross_path"  # least over pairs
+    CROSS_PATH_VARIANCE = "cross_path_variance"
+    CHANNEL_PATH_VARIANCE = "channel_path_variance"  # greatest over channels
+    EGO_TRAJECTORY = "ego_trajectory"
+    STEADY_SHARE = "steady_share"  # share of the other indicators that hardly moved for 20 s
+    CROSS_PATH_DIPS = "cross_path_dips"  # in those 20 s
+    SCORE_RANGE = "score_range"  # of the safety score, in those 20 s
+    COUNT_RANGE = "count_range"  # of the object count similarity
+
+
+_UNSTEADY_ROWS = (
+    PAIR_ROW[Indicator.CROSS_PATH],
+    PAIR_ROW[Indicator.CROSS_PATH_VARIANCE],
+    PAIR_ROW[Indicator.OBJECT_COUNT],
+    PAIR_ROW[Indicator.EGO_SHIFT_LONG],  # needs 10 s of its own
+    PAIR_ROW[Indicator.AGREEMENT],
+)
+_STEADY_ROWS = np.array([row for row in PAIR_ROW.values() if row not in _UNSTEADY_ROWS])
+
+_OPERATORS: dict[str, Callable[[float, float], bool]] = {
+    ">": operator.gt,
+    ">=": operator.ge,
+    "<": operator.lt,
+    "<=": operator.le,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Clause:
+    """`signal operator value`."""
+
+    signal: Signal
+    operator: str
+    value: float
+
+    @classmethod
+    def parse(cls, text: str) -> Clause:
+        """From text as "gap > 0.3"; ConfigError says what is wrong."""
+        try:
+            signal, symbol, value = text.split()
+            if symbol not in _OPERATORS:
+                raise ValueError
+            return cls(Signal(signal), symbol, float(value))
+        except ValueError:
+            raise ConfigError(
+                f"hazard clause {text!r} must read SIGNAL OPERATOR NUMBER with an operator of "
+                f"{' '.join(_OPERATORS)} and a signal of {', '.join(s.value for s in Signal)}"
+            ) from None
+
+    def holds(self, signals: dict[Signal, float]) -> bool | None:
+        """Whether the clause holds; None while its signal is not evaluated."""
+        value = signals[self.signal]
+        return None if np.isnan(value) else _OPERATORS[self.operator](value, self.value)
+
+
+class Extreme(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """The signal whose extreme an event keeps."""
+
+    signal: Signal
+    of: str  # least or greatest
+
+    def __post_init__(self) -> None:
+        if self.of not in ("least", "greatest"):
+            raise ValueError(f"of must be least or greatest, got {self.of!r}")
+
+
+class _RuleText(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    any: list[list[str]]
+    extreme: Extreme
+
+    def __post_init__(self) -> None:
+        if not self.any or not all(self.any):
+            raise ValueError("any needs alternatives of at least one clause each")
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """When a hazard is present: all clauses of any alternative."""
+
+    hazard: HazardType
+    alternatives: tuple[tuple[Clause, ...], ...]
+    extreme: Extreme
+
+    def fires(self, signals: dict[Signal, float]) -> bool | None:
+        """True, False, or None while it cannot be decided."""
+        verdict: bool | None = False
+        for clauses in self.alternatives:
+            held = [clause.holds(signals) for clause in clauses]
+            if all(held):  # neither False nor None
+                return True
+            if False not in held:
+                verdict = None
+        return verdict
+
+
+def load_rules(profile: Profile, path: Path | None = None) -> tuple[Rule, ...]:
+    """The rules of `profile`: the built-in ones, or those of the file at `path`."""
+    name = str(path) if path else "hazard_rules.yaml"
+    try:
+        data = (
+            path.read_bytes()
+            if path
+            else files("skidpad.evidence.channels").joinpath("hazard_rules.yaml").read_bytes()
+        )
+    except OSError as error:
+        raise FileError(f"{name}: cannot be read ({error.strerror})") from error
+    try:
+        tables = msgspec.yaml.decode(data, type=dict[Profile, dict[HazardType, _RuleText]])
+    except msgspec.MsgspecError as error:
+        raise ConfigError(f"{name}: {error}") from error
+    if profile not in tables:
+        raise ConfigError(f"{name}: holds no profile {profile.value}")
+    return tuple(
+        Rule(
+            hazard,
+            tuple(tuple(Clause.parse(text) for text in clauses) for clauses in rule.any),
+            rule.extreme,
+        )
+        for hazard, rule in tables[profile].items()
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class SignalReadings:
+    """The signals of a cycle, and who stands behind them."""
+
+    values: dict[Signal, float]  # NaN: not evaluated
+    gap_pair: int | None  # pair with the largest gap
+    assumed: bool  # no objects were paired there, so OLSS counts as 1 (decision C-6)
+    driving: int | None  # channel whose comfort was read
+
+
+class SignalReader:
+    """Signals of a cycle from readings and risk; remembers what a stuck vehicle looks like."""
+
+    def __init__(self, n_channels: int) -> None:
+        self.n = n_channels
+        self.steady = _Steadiness()
+
+    def read(
+        self, t: float, readings: Readings, risk: RiskMatrix, driving: int | None
+    ) -> SignalReadings:
+        """The signals at `t`; without a recorded driving channel, that of the highest score."""
+        scores = readings.channel[CHANNEL_ROW[Indicator.SAFETY_SCORE]]
+        comfort = readings.channel[CHANNEL_ROW[Indicator.PLANNED_PATH_COMFORT]]
+        if driving is None:
+            known = [(score, -i) for i, score in enumerate(scores.tolist()) if score == score]
+            driving = -max(known)[1] if known else None
+        gap, pair, assumed = _largest_gap(readings)
+        pairs = readings.pair
+        values = {
+            Signal.LOCATION_VARIANCE: _greatest(pairs[PAIR_ROW[Indicator.EGO_LOCATION_VARIANCE]]),
+            Signal.EGO_LOCATION: _least(pairs[PAIR_ROW[Indicator.EGO_LOCATION]]),
+            Signal.SHIFT_SHORT: _greatest(pairs[PAIR_ROW[Indicator.EGO_SHIFT_SHORT]]),
+            Signal.SHIFT_LONG: _greatest(pairs[PAIR_ROW[Indicator.EGO_SHIFT_LONG]]),
+            Signal.GAP: abs(gap),
+            Signal.GAP_SIGNED: gap,
+            Signal.SAFETY_SCORE: _least(scores),
+            Signal.TTC_AHEAD: _least(risk.ttc_ahead.ravel()),
+            Signal.TTC_BEHIND: _least(risk.ttc_behind.ravel()),
+            Signal.RISK_AHEAD_LEAD: _greatest(risk.risk_ahead.ravel())
+            - _greatest(risk.risk_behind.ravel()),
+            Signal.COMFORT_DRIVING: float(comfort[driving]) if driving is not None else np.nan,
+            Signal.COMFORT_LEAST: _least(comfort),
+            Signal.CROSS_PATH: _least(pairs[PAIR_ROW[Indicator.CROSS_PATH]]),
+            Signal.CROSS_PATH_VARIANCE: _greatest(pairs[PAIR_ROW[Indicator.CROSS_PATH_VARIANCE]]),
+            Signal.CHANNEL_PATH_VARIANCE: _greatest(
+                readings.channel[CHANNEL_ROW[Indicator.CHANNEL_PATH_VARIANCE]]
+            ),
+            Signal.EGO_TRAJECTORY: _least(pairs[PAIR_ROW[Indicator.EGO_TRAJECTORY]]),
+        }
+        values.update(self.steady.update(t, readings, values))
+        return SignalReadings(values, pair, assumed, driving)
+
+
+def _largest_gap(readings: Readings) -> tuple[float, int | None, bool]:
+    """OLSS - OCSS of the pair where it is largest by size, that pair, and whether assumed."""
+    count = readings.pair[PAIR_ROW[Indicator.OBJECT_COUNT]]
+    location = readings.pair[PAIR_ROW[Indicator.OBJECT_LOCATION]]
+    best, best_pair, best_assumed = float("nan"), None, False
+    for p, (n, d) in enumerate(zip(count.tolist(), location.tolist(), strict=True)):
+        if np.isnan(n):
+            continue
+        assumed = bool(np.isnan(d))
+        gap = (1.0 if assumed else d) - n
+        if best_pair is None or abs(gap) > abs(best):
+            best, best_pair, best_assumed = gap, p, assumed
+    return best, best_pair, best_assumed
+
+
+class _Steadiness:
+    """Least and greatest values per second over the last 20 s, and dips of the cross path."""
+
+    def __init__(self) -> None:
+        self.blocks: deque[tuple[float, Floats, Floats]] = deque()  # start, least, greatest
+        self.before: tuple[Floats, Floats] | None = (
+            None  # extremes of all blocks when the last began
+        )
+        self.dips: deque[float] = deque()
+        self.down = False
+
+    def update(
+        self, t: float, readings: Readings, values: dict[Signal, float]
+    ) -> dict[Signal, float]:
+        others = readings.pair[_STEADY_ROWS].ravel()
+        comfort = readings.channel[: CHANNEL_ROW[Indicator.OBJECTS_LEFT]].ravel()
+        count = _least(readings.pair[PAIR_ROW[Indicator.OBJECT_COUNT]])
+        row = np.concatenate([[values[Signal.SAFETY_SCORE], count], others, comfort])
+        if self.blocks and not 0.0 <= t - self.blocks[-1][0] <= 2.0:
+            self.blocks.clear()
+            self.dips.clear()
+        if not self.blocks or t - self.blocks[-1][0] >= 1.0 - 1e-6:
+            self.blocks.append((t, row, row))
+            while self.blocks[0][0] < t - STEADY_TIME:
+                self.blocks.popleft()
+            self.before = (
+                np.fmin.reduce([block[1] for block in self.blocks]),
+                np.fmax.reduce([block[2] for block in self.blocks]),
+            )
+        else:
+            start, low, high = self.blocks[-1]
+            self.blocks[-1] = (start, np.fmin(low, row), np.fmax(high, row))
+        self._count_dips(t, values[Signal.CROSS_PATH])
+        return self._signals(t)
+
+    def _count_dips(self, t: float, cross_path: float) -> None:
+        down = cross_path < 1.0 - DIP
+        if down and not self.down:
+            self.dips.append(t)
+        self.down = down
+        while self.dips and self.dips[0] < t - STEADY_TIME:
+            self.dips.popleft()
+
+    def _signals(self, t: float) -> dict[Signal, float]:
+        if self.before is None or t - self.blocks[0][0] < STEADY_TIME - 1.5:
+            nan = float("nan")
+            return {
+                Signal.STEADY_SHARE: nan,
+                Signal.CROSS_PATH_DIPS: nan,
+                Signal.SCORE_RANGE: nan,
+                Signal.COUNT_RANGE: nan,
+            }
+        _, low, high = self.blocks[-1]
+        span = np.fmax(high, self.before[1]) - np.fmin(low, self.before[0])
+        known = np.isfinite(span[2:])
+        steady = (span[2:][known] < STEADY_RANGE).mean() if known.any() else float("nan")
+        return {
+            Signal.STEADY_SHARE: float(steady),
+            Signal.CROSS_PATH_DIPS: float(len(self.dips)),
+            Signal.SCORE_RANGE: float(span[0]),
+            Signal.COUNT_RANGE: float(span[1]),
+        }
+
+
+def _greatest(values: Floats) -> float:
+    return max((v for v in values.tolist() if v == v), default=float("nan"))  # v == v: not NaN
+
+
+def _least(values: Floats) -> float:
+    return min((v for v in values.tolist() if v == v), default=float("nan"))

@@ -1,0 +1,1 @@
+"""Hazards by trained trees: features, model, training."""

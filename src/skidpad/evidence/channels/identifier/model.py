@@ -1,0 +1,200 @@
+"""A learned identifier of hazards beside the rules: its model as data, and its use (decision C-15)."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.identifier.features import FEATURE_NAMES, FeatureHistory, features_at
+from skidpad.evidence.channels.identifier.forest import Forest, check_forest, probabilities
+from skidpad.evidence.channels.timefilter import PAUSE, SAME_TIME
+from skidpad.recording.files import write_bytes
+
+Floats = NDArray[np.float64]
+VERSION = 1
+ALL_ROUTES = "all"
+BLOCK = 4096  # cycles judged at once
+SIZE_LIMIT = 64 * 1024 * 1024  # bytes of a model file
+BUNDLED = "bundled"  # the model that comes with Skidpad; its card lies beside it
+
+
+class Identify(str, Enum):
+    """Who finds the three scored hazards."""
+
+    RULES = "rules"
+    LEARNED = "learned"
+    BOTH = "both"
+
+
+@dataclass(frozen=True, slots=True)
+class Detector:
+    """Finds one hazard: present when its probability stays at the limit or above."""
+
+    forest: Forest
+    limit: float  # chosen inside the training routes
+    confirm: int  # cycles in a row that it takes
+
+
+@dataclass(frozen=True, slots=True)
+class Model:
+    """Detectors by truth they were trained on and route that they never saw."""
+
+    detectors: Mapping[tuple[str, str], Mapping[HazardType, Detector]]
+    card: dict[str, Any]  # what it was trained on and how
+
+    def identifier(
+        self, truth: str = "world", route: str = ALL_ROUTES
+    ) -> Mapping[HazardType, Detector]:
+        """The detectors that never saw `route`; those of all routes when it was not trained on."""
+        known = {t for t, _ in self.detectors}
+        if truth not in known:
+            raise ConfigError(
+                f"the model was trained on {', '.join(sorted(known))} truth, not {truth}"
+            )
+        return self.detectors.get((truth, route), self.detectors[truth, ALL_ROUTES])
+
+    def trained_on(self) -> set[tuple[str, str]]:
+        """Route and seed of each recording that it was trained on."""
+        return {(str(r["route"]), str(r["seed"])) for r in self.card["recordings"]}
+
+
+@dataclass(slots=True)
+class LearnedIdentifier:
+    """Judges a running drive cycle by cycle."""
+
+    detectors: Mapping[HazardType, Detector]
+    history: FeatureHistory = field(default_factory=FeatureHistory)
+    in_a_row: dict[HazardType, int] = field(default_factory=dict)
+    probability: dict[HazardType, float] = field(default_factory=dict)
+
+    def update(self, t: float, row: Floats) -> list[HazardType]:
+        """Hazards that are present at `t`."""
+        x = self.history.update(t, row)[None]
+        out = np.empty(1)
+        found = []
+        for hazard, detector in self.detectors.items():
+            probabilities(detector.forest, x, out)
+            self.probability[hazard] = float(out[0])
+            n = self.in_a_row.get(hazard, 0) + 1 if out[0] >= detector.limit else 0
+            self.in_a_row[hazard] = n
+            if n >= detector.confirm:
+                found.append(hazard)
+        return found
+
+
+def probability_of(forest: Forest, t: Floats, rows: Floats) -> Floats:
+    """Probability (k,) at every cycle of a drive, as `LearnedIdentifier` would say in its course."""
+    out = np.empty(t.size)
+    for first in range(0, t.size, BLOCK):
+        at = np.arange(first, min(first + BLOCK, t.size))
+        probabilities(forest, features_at(t, rows, at), out[first : first + at.size])
+    return out
+
+
+def events_of(t: Floats, p: Floats, limit: float, confirm: int) -> list[tuple[float, float]]:
+    """(start, end) of each event in probabilities over time, repeats within 2 s merged."""
+    so_far = np.concatenate([np.zeros(confirm, dtype=np.int64), np.cumsum(p >= limit)])
+    present = t[so_far[confirm:] - so_far[:-confirm] == confirm]
+    if not present.size:
+        return []
+    breaks = np.flatnonzero(np.diff(present) >= PAUSE - SAME_TIME)
+    first, last = np.append(0, breaks + 1), np.append(breaks, present.size - 1)
+    return list(zip(present[first].tolist(), present[last].tolist(), strict=True))
+
+
+def save_model(path: Path, model: Model) -> None:
+    """Write as .npz: arrays and a JSON card, nothing that runs."""
+    arrays: dict[str, Any] = {}
+    index: list[dict[str, Any]] = []
+    for (truth, route), detectors in model.detectors.items():
+        for hazard, detector in detectors.items():
+            number = len(index)
+            index.append(
+                {
+                    "truth": truth,
+                    "without_route": route,
+                    "hazard": hazard.value,
+                    "limit": detector.limit,
+                    "confirm": detector.confirm,
+                }
+            )
+            for name, array in detector.forest._asdict().items():
+                arrays[f"{number}_{name}"] = array
+    routes = sorted({f"{t}/{r}" for t, r in model.detectors})
+    card = model.card | {
+        "version": VERSION,
+        "features": list(FEATURE_NAMES),
+        "detectors": index,
+        "models": routes,
+    }
+    arrays["card"] = np.frombuffer(json.dumps(card, allow_nan=False).encode(), dtype=np.uint8)
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, **arrays)
+    write_bytes(path, buffer.getvalue())
+
+
+def load_model(path: Path | None) -> Model:
+    """The model at `path`; None or the word `bundled`: the one that comes with Skidpad."""
+    name = BUNDLED if path is None else str(path)
+    file = Path(__file__).parent / "models" / "hazards.npz" if name == BUNDLED else Path(name)
+    try:
+        data = file.read_bytes()
+    except OSError as error:
+        raise FileError(
+            f"{name}: cannot be read ({error.strerror}); `skidpad channels train` writes a model"
+        ) from error
+    if len(data) > SIZE_LIMIT:
+        raise FileError(f"{name}: is larger than {SIZE_LIMIT} bytes")
+    try:
+        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
+            return _model({key: arrays[key] for key in arrays.files})
+    except FileError as error:
+        raise FileError(f"{name}: {error}") from error
+    except (
+        ValueError,
+        KeyError,
+        TypeError,
+        OSError,
+        EOFError,
+        zipfile.BadZipFile,
+        AttributeError,
+    ) as error:
+        raise FileError(f"{name}: is not a model of the identifier ({error})") from error
+
+
+def _model(arrays: dict[str, Any]) -> Model:
+    card = json.loads(arrays["card"].tobytes())
+    if card["version"] != VERSION or card["features"] != list(FEATURE_NAMES):
+        raise FileError("the model was made by another version; train it again")
+    detectors: dict[tuple[str, str], dict[HazardType, Detector]] = {}
+    for entry in card["models"]:
+        truth, route = str(entry).split("/", 1)
+        detectors[truth, route] = {}
+    for number, entry in enumerate(card["detectors"]):
+        forest = Forest(
+            **{
+                name: arrays[f"{number}_{name}"].astype(np.float64 if kind is Floats else np.int64)
+                for name, kind in zip(Forest._fields, _KINDS, strict=True)
+            }
+        )
+        key = str(entry["truth"]), str(entry["without_route"])
+        detectors[key][HazardType(entry["hazard"])] = Detector(
+            check_forest(forest, len(FEATURE_NAMES)), float(entry["limit"]), int(entry["confirm"])
+        )
+    if any((truth, ALL_ROUTES) not in detectors for truth, _ in detectors) or not detectors:
+        raise FileError("the model lacks the detectors of all routes")
+    return Model(detectors, card)
+
+
+_KINDS = (int, int, Floats, int, int, int, Floats, Floats)

@@ -1,0 +1,1 @@
+"""Hazards found, held against the truth of a drive."""

@@ -1,0 +1,227 @@
+"""The monitor judged: hazards found by rules against both truths and labels (C-210 to C-218)."""
+
+from __future__ import annotations
+
+import csv
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+
+from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile
+from skidpad.evidence.channels.judging.causes import EXPLAINED
+from skidpad.evidence.channels.judging.matching import (
+    TOLERANCES,
+    Score,
+    Span,
+    Tally,
+    macro,
+    micro,
+    score,
+    tally,
+)
+from skidpad.evidence.channels.judging.segments import Segment
+
+LABEL_COLUMNS = ("hazard", "start_s", "end_s", "world", "annotator", "note")
+
+
+@dataclass(slots=True)
+class Evaluation:
+    """All segments together."""
+
+    segments: list[Segment] = field(default_factory=list)
+
+    @property
+    def identifiers(self) -> list[str]:
+        """Rule profiles and learned identifiers that judged every segment."""
+        names = dict.fromkeys(name for s in self.segments for name in s.detected)
+        return [n for n in names if all(n in s.detected for s in self.segments)]
+
+    def tallies(
+        self, identifier: str, truth: str, tolerance: float = TOLERANCES[0]
+    ) -> list[dict[HazardType, Tally]]:
+        """Counts per segment, of the segments that have this truth."""
+        return [
+            tally(s.detected[identifier], s.truths[truth], s.hours, tolerance)
+            for s in self.segments
+            if truth in s.truths
+        ]
+
+    def scores(
+        self, identifier: str, truth: str, tolerance: float = TOLERANCES[0]
+    ) -> dict[HazardType, Score]:
+        """Scores of the three scored hazards."""
+        rows = self.tallies(identifier, truth, tolerance)
+        return {h: score([row[h] for row in rows]) for h in SCORED_HAZARDS}
+
+    def by_route(self, identifier: str, truth: str) -> dict[str, dict[HazardType, Tally]]:
+        """Counts per route (C-216)."""
+        out: dict[str, dict[HazardType, Tally]] = {}
+        with_truth = [s for s in self.segments if truth in s.truths]
+        for segment, row in zip(with_truth, self.tallies(identifier, truth), strict=True):
+            total = out.setdefault(segment.route, dict.fromkeys(SCORED_HAZARDS, Tally()))
+            for hazard in SCORED_HAZARDS:
+                total[hazard] = total[hazard] + row[hazard]
+        return out
+
+    def truths_agree(self) -> dict[HazardType, Score]:
+        """World-model truth held against simulator truth, as if it were a detector (C-212)."""
+        rows = [
+            tally(s.truths["world"], s.truths["sim"], s.hours)
+            for s in self.segments
+            if {"world", "sim"} <= set(s.truths)
+        ]
+        return {h: score([row[h] for row in rows]) for h in SCORED_HAZARDS}
+
+    def curve(self, truth: str) -> dict[float, dict[HazardType, Tally]]:
+        """Counts by factor on the threshold, over the segments that have this truth (C-105)."""
+        out: dict[float, dict[HazardType, Tally]] = {}
+        for segment in (s for s in self.segments if truth in s.truths):
+            for factor, spans in segment.curve.items():
+                row = tally(spans, segment.truths[truth], segment.hours)
+                total = out.setdefault(factor, dict.fromkeys(SCORED_HAZARDS, Tally()))
+                for hazard in SCORED_HAZARDS:
+                    total[hazard] = total[hazard] + row[hazard]
+        return out
+
+    def as_dict(self) -> dict[str, Any]:
+        """Everything, for JSON."""
+        truths = sorted({name for s in self.segments for name in s.truths})
+        return {
+            "segments": len(self.segments),
+            "hours": sum(s.hours for s in self.segments),
+            "unseen_by_all_channels": sum(s.unseen for s in self.segments),
+            "candidates": {
+                h.value: sum(s.candidates.get(h, 0) for s in self.segments)
+                for h in HazardType
+                if h not in SCORED_HAZARDS
+            },
+            "results": [
+                self._result(identifier, truth, tolerance)
+                for identifier in self.identifiers
+                for truth in truths
+                for tolerance in TOLERANCES
+            ],
+            "by_route": {
+                f"{identifier}/{truth}": {
+                    route: {h.value: [t.tp, t.fp, t.fn] for h, t in row.items()}
+                    for route, row in self.by_route(identifier, truth).items()
+                }
+                for identifier in self.identifiers
+                for truth in truths
+            },
+            "curve": {
+                truth: {
+                    str(factor): {h.value: [t.tp, t.fp, t.fn] for h, t in row.items()}
+                    for factor, row in self.curve(truth).items()
+                }
+                for truth in truths
+            },
+            "causes": self._causes(),
+            "segment_table": self.segment_table().to_dicts(),
+            "truths_agree": {h.value: _row(s) for h, s in self.truths_agree().items()},
+        }
+
+    def _causes(self) -> list[dict[str, Any]]:
+        """How often which cause stands behind false alarms and misses (C-215)."""
+        counted = Counter(
+            (m.identifier, m.truth, m.hazard.value, m.missed, m.cause)
+            for s in self.segments
+            for m in s.mistakes
+        )
+        names = ("rules", "truth", "hazard", "missed", "cause")
+        return [
+            dict(zip(names, key, strict=True)) | {"count": n} for key, n in counted.most_common()
+        ]
+
+    def segment_table(self) -> pl.DataFrame:
+        """One row per segment: practical rules against world-model truth, and the drive's facts."""
+        return pl.DataFrame([_facts(s) for s in self.segments], infer_schema_length=None)
+
+    def _result(self, identifier: str, truth: str, tolerance: float) -> dict[str, Any]:
+        scores = self.scores(identifier, truth, tolerance)
+        return {
+            "rules": identifier,
+            "truth": truth,
+            "tolerance_s": tolerance,
+            "hazards": {h.value: _row(s) for h, s in scores.items()},
+            "macro": macro(scores),
+            "micro": micro(scores),
+        }
+
+
+def _facts(s: Segment) -> dict[str, Any]:
+    practical, sun = Profile.PRACTICAL.value, s.context.get("sun_altitude_deg")
+    row: dict[str, Any] = {
+        "name": s.name,
+        "route": s.route,
+        "seed": s.context.get("seed", s.name),
+        "hours": s.hours,
+        "night": None if sun is None else float(sun) < 0.0,
+    }
+    if "world" in s.truths:
+        for hazard, t in tally(s.detected[practical], s.truths["world"], s.hours).items():
+            if hazard in SCORED_HAZARDS:
+                row |= {f"{k}_{hazard.value}": getattr(t, k) for k in ("tp", "fp", "fn")}
+    for truth, spans in s.truths.items():
+        row |= {f"{truth}_{h.value}": sum(x.hazard is h for x in spans) for h in SCORED_HAZARDS}
+    false = [
+        m.cause
+        for m in s.mistakes
+        if (m.identifier, m.truth, m.missed, m.hazard)
+        == (practical, "world", False, HazardType.EGO_TAILGATING)
+    ]
+    row["false_tailgating_explained"] = sum(c in {e.value for e in EXPLAINED} for c in false)
+    return row | dict(s.facts)
+
+
+def _row(s: Score) -> dict[str, Any]:
+    total = s.total
+    leads = sorted(total.lead_times)
+    return {
+        "tp": total.tp,
+        "fp": total.fp,
+        "fn": total.fn,
+        "precision": total.precision,
+        "precision_interval": s.precision,
+        "recall": total.recall,
+        "recall_interval": s.recall,
+        "false_alarms_per_hour": total.false_alarms_per_hour,
+        "lead_time_median_s": leads[len(leads) // 2] if leads else None,
+    }
+
+
+def read_labels(path: Path) -> dict[str, list[Span]]:
+    """Human labels by recording ("" where the file has no column `recording`), both worlds.
+
+    CSV with the columns hazard, start_s, end_s, world (sim or channels), annotator, note.
+    """
+    try:
+        with path.open(encoding="utf-8", newline="") as file:
+            rows = list(csv.DictReader(file))
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise FileError(f"{path}: cannot be read as labels ({error})") from error
+    out: dict[str, list[Span]] = {}
+    for number, row in enumerate(rows, start=2):
+        out.setdefault(row.get("recording") or "", []).append(_label(f"{path}:{number}", row))
+    return out
+
+
+def _label(where: str, row: dict[str, Any]) -> Span:
+    missing = [c for c in LABEL_COLUMNS if row.get(c) is None]
+    if missing:
+        raise ConfigError(f"{where}: lacks the columns {', '.join(missing)}")
+    if row["world"] not in ("sim", "channels"):
+        raise ConfigError(f"{where}: world must be sim or channels, got {row['world']!r}")
+    try:
+        hazard = HazardType(row["hazard"])
+        start, end = float(row["start_s"]), float(row["end_s"])
+    except ValueError as error:
+        raise ConfigError(f"{where}: {error}") from error
+    if not start <= end:
+        raise ConfigError(f"{where}: end_s must not be before start_s, got {start:g} to {end:g}")
+    return Span(hazard, start, end)

@@ -1,0 +1,110 @@
+"""What one drive says for the findings: sums per segment, gathered while the monitor runs (X-7)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.evidence.channels.hazards import Signal
+from skidpad.evidence.channels.indicators.catalogue import Indicator
+from skidpad.evidence.channels.indicators.panel import PAIR_ROW
+from skidpad.evidence.channels.judging.causes import V_STANDING, YAW_RATE_TURN
+from skidpad.evidence.channels.monitor import Monitor
+from skidpad.evidence.channels.recorder import CycleEvidence
+
+Floats = NDArray[np.float64]
+Clock = Callable[[], int]  # ns
+MODULES = ("comfort", "similarity", "motion_prediction")  # those of C-232
+MANY_OBJECTS = 5  # objects of the busiest channel (C-238)
+WARM_CYCLES = 20  # whose times are left out
+CYCLES_MIN = 20  # on either side of a comparison
+SERIES = (
+    ("object_location", Indicator.OBJECT_LOCATION),
+    ("object_trajectory", Indicator.OBJECT_TRAJECTORY),
+    ("cross_path", Indicator.CROSS_PATH),
+)
+
+
+class Observer:
+    """Watches a monitor at work on one drive."""
+
+    def __init__(self, monitor: Monitor, motion: Mapping[str, Floats], clock: Clock | None) -> None:
+        n = motion["t"].size
+        self.monitor, self.motion, self.clock = monitor, motion, clock
+        self.series = {name: np.full(n, np.nan) for name, _ in SERIES}
+        self.steady = np.full(n, np.nan)
+        self.objects = np.zeros(n)
+        self.times = {name: np.zeros(n) for name in (*MODULES, "total")}
+        self.k, self.last, self.first = 0, 0, 0
+
+    def begin(self, k: int) -> None:
+        """Cycle number k of the drive starts."""
+        self.k = k
+        if self.clock:
+            self.first = self.last = self.clock()
+
+    def lap(self, name: str) -> None:
+        """The part `name` of the cycle is done."""
+        assert self.clock is not None
+        now = self.clock()
+        if name in MODULES:
+            self.times[name][self.k] = (now - self.last) / 1e6
+        self.times["total"][self.k] = (now - self.first) / 1e6
+        self.last = self.clock()
+
+    def end(self, evidence: CycleEvidence) -> None:
+        """Keep what this cycle showed."""
+        for name, indicator in SERIES:
+            values = evidence.readings.pair[PAIR_ROW[indicator]]
+            self.series[name][self.k] = np.fmin.reduce(values) if values.size else np.nan
+        self.steady[self.k] = evidence.signals.values[Signal.STEADY_SHARE]
+        counts = [len(f.objects) for f in evidence.cycle.frames if f is not None]
+        self.objects[self.k] = max(counts, default=0)
+
+    def facts(self) -> dict[str, float | None]:
+        """Numbers of the drive; None where there was too little to say."""
+        v, turning = self.motion["v"], np.abs(self.motion["yaw_rate"]) > YAW_RATE_TURN
+        standing = v < V_STANDING
+        few = (self.objects > 0) & (self.objects < MANY_OBJECTS)
+        many = self.objects >= MANY_OBJECTS
+        path = self.series["cross_path"]
+        out: dict[str, float | None] = {
+            "object_location_few_minus_many": _apart(self.series["object_location"], few, many),
+            "object_trajectory_few_minus_many": _apart(self.series["object_trajectory"], few, many),
+            "cross_path_straight_minus_turn": _apart(path, ~turning & ~standing, turning),
+            "cross_path_moving_minus_standing": _apart(path, ~standing & ~turning, standing),
+            "steady_standing_minus_moving": _apart(self.steady, standing, ~standing),
+            "objects_mean": float(self.objects.mean()) if self.objects.size else None,
+        }
+        out |= self._violations()
+        if self.clock and self.objects.size > 2 * WARM_CYCLES:
+            total = self.times["total"][WARM_CYCLES:]
+            means = {m: float(self.times[m][WARM_CYCLES:].mean()) for m in MODULES}
+            out |= {f"{m}_mean_ms": mean for m, mean in means.items()}
+            out["total_mean_ms"] = float(total.mean())
+            out["total_p999_ms"] = float(np.percentile(total, 99.9))
+            out["total_max_ms"] = float(total.max())
+            out["motion_prediction_share"] = means["motion_prediction"] / max(
+                sum(means.values()), 1e-9
+            )
+        return out
+
+    def _violations(self) -> dict[str, float | None]:
+        events = self.monitor.violations.finish()
+        counted = [e.key[0] for e in events]
+        return {
+            f"violations_{i.value}": float(counted.count(i))
+            for i, entry in self.monitor.thresholds.items()
+            if entry.threshold is not None
+        }
+
+
+def _apart(values: Floats, a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float | None:
+    """Mean over cycles a less mean over cycles b."""
+    known = np.isfinite(values)
+    a, b = a & known, b & known
+    if a.sum() < CYCLES_MIN or b.sum() < CYCLES_MIN:
+        return None
+    return float(values[a].mean() - values[b].mean())

@@ -1,0 +1,241 @@
+"""One recording, judged: what rules and learned identifier found, and what was true (C-212 to C-215)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.channels import Cycle
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile, Rule, Signal, load_rules
+from skidpad.evidence.channels.identifier.features import feature_row
+from skidpad.evidence.channels.identifier.model import Model, events_of, probability_of
+from skidpad.evidence.channels.indicators.comfort import Form
+from skidpad.evidence.channels.indicators.panel import IndicatorSettings
+from skidpad.evidence.channels.judging.causes import ego_motion, false_cause, missed_cause
+from skidpad.evidence.channels.judging.facts import Observer
+from skidpad.evidence.channels.judging.matching import Span, match, merged
+from skidpad.evidence.channels.judging.truth import TrueHazard, simulator_truth, world_model_truth
+from skidpad.evidence.channels.monitor import Monitor
+from skidpad.evidence.channels.timefilter import TimeFilter
+
+Floats = NDArray[np.float64]
+Clock = Callable[[], int]  # ns
+Signals = Sequence[tuple[float, dict[Signal, float]]]
+FORMS = {Profile.PRACTICAL: Form.CORRECTED, Profile.AS_PRINTED: Form.COMPLETED}  # decision C-16
+CURVE_FACTORS = (0.5, 0.67, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
+WARM_UP = 2.0  # s at the start of a segment that are not evaluated (decision C-12)
+LEARNED = "learned on {} truth"
+OTHER = {"sim": "world", "world": "sim"}
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """A false alarm or a missed hazard, and why."""
+
+    identifier: str
+    truth: str
+    hazard: HazardType
+    missed: bool  # else false
+    t_start: float
+    t_end: float
+    cause: str
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """One recording, judged."""
+
+    name: str
+    route: str
+    hours: float
+    detected: Mapping[str, tuple[Span, ...]]  # by identifier: a rule profile, or a learned one
+    truths: Mapping[str, tuple[Span, ...]]  # "sim", "world", and "labels" where there are any
+    candidates: Mapping[HazardType, int]  # candidate hazards, listed and counted (decision C-4)
+    unseen: int  # true hazards with an object that no channel reported
+    curve: Mapping[float, tuple[Span, ...]]  # practical rules with one threshold scaled
+    mistakes: tuple[Mistake, ...] = ()
+    facts: Mapping[str, float | None] = field(default_factory=dict)  # see drive_facts
+    context: Mapping[str, str] = field(default_factory=dict)
+    t: Floats = field(default_factory=lambda: np.empty(0))  # (k,) s, and what an identifier sees
+    rows: Floats = field(default_factory=lambda: np.empty((0, 0)))  # (k, f)
+
+
+@dataclass(slots=True)
+class _Pass:
+    """The practical rules once over the drive, with everything that hangs on it."""
+
+    signals: list[tuple[float, dict[Signal, float]]]
+    rows: Floats
+    facts: dict[str, float | None]
+
+
+def judge(
+    name: str,
+    route: str,
+    channels: Sequence[str],
+    cycles: Sequence[Cycle],
+    labels: Iterable[Span] = (),
+    truths: Sequence[str] = ("sim", "world"),
+    curve: Signal | None = None,
+    model: Model | None = None,
+    context: Mapping[str, str] | None = None,
+    clock: Clock | None = None,
+) -> Segment:
+    """Run all identifiers and the truths over a recording's cycles.
+
+    With `curve` the practical rules are applied again with each clause on that signal scaled by
+    CURVE_FACTORS (C-105). A `model` judges by the detectors that never saw this route.
+    """
+    begin = cycles[0].t + WARM_UP if cycles else 0.0
+    t = np.array([c.t for c in cycles])
+    detected: dict[str, tuple[Span, ...]] = {}
+    seen, candidates, detected[Profile.PRACTICAL.value] = _practical(channels, cycles, begin, clock)
+    printed = Monitor(
+        channels,
+        settings=IndicatorSettings(form=FORMS[Profile.AS_PRINTED]),
+        profile=Profile.AS_PRINTED,
+        keep_worlds=False,
+    )
+    for cycle in cycles:
+        printed.update(cycle)
+    detected[Profile.AS_PRINTED.value] = _scored(_found(printed.hazards, begin))
+    found, unseen, unseen_found = _truths(channels, cycles, truths, begin, detected)
+    if model is not None and cycles:
+        for truth in sorted({t_ for t_, _ in model.detectors}):
+            detectors = model.identifier(truth, route)
+            spans = [
+                Span(hazard, a, b)
+                for hazard, d in detectors.items()
+                for a, b in events_of(t, probability_of(d.forest, t, seen.rows), d.limit, d.confirm)
+                if b >= begin
+            ]
+            detected[LEARNED.format(truth)] = tuple(sorted(spans, key=lambda s: s.t_start))
+    if marked := tuple(labels):
+        found["labels"] = tuple(merged(marked))
+    duration = cycles[-1].t - begin if cycles else 0.0
+    return Segment(
+        name=name,
+        route=route,
+        hours=max(duration, 0.0) / 3600.0,
+        detected=detected,
+        truths=found,
+        candidates=candidates,
+        unseen=unseen,
+        curve={f: _reapplied(seen.signals, curve, f, begin) for f in CURVE_FACTORS if curve},
+        mistakes=tuple(_mistakes(detected, found, cycles, seen.signals)),
+        facts=seen.facts | {"unseen": float(unseen), "unseen_found": float(unseen_found)},
+        context=dict(context or {}),
+        t=t,
+        rows=seen.rows,
+    )
+
+
+def _practical(
+    channels: Sequence[str], cycles: Sequence[Cycle], begin: float, clock: Clock | None
+) -> tuple[_Pass, dict[HazardType, int], tuple[Span, ...]]:
+    settings = IndicatorSettings(form=FORMS[Profile.PRACTICAL])
+    monitor = Monitor(channels, settings=settings, keep_worlds=False)
+    observer = Observer(monitor, ego_motion(cycles), clock)
+    signals, rows = [], []
+    for k, cycle in enumerate(cycles):
+        observer.begin(k)
+        evidence = monitor.update(cycle, observer.lap if clock else None)
+        observer.end(evidence)
+        signals.append((cycle.t, evidence.signals.values))
+        rows.append(feature_row(evidence.readings, evidence.risk, evidence.signals))
+    spans = _found(monitor.hazards, begin)
+    others = [s.hazard for s in spans if s.hazard not in SCORED_HAZARDS]
+    return (
+        _Pass(signals, np.array(rows), observer.facts()),
+        {hazard: others.count(hazard) for hazard in dict.fromkeys(others)},
+        _scored(spans),
+    )
+
+
+def _truths(
+    channels: Sequence[str],
+    cycles: Sequence[Cycle],
+    wanted: Sequence[str],
+    begin: float,
+    detected: Mapping[str, tuple[Span, ...]],
+) -> tuple[dict[str, tuple[Span, ...]], int, int]:
+    """True hazards by truth, how many of the simulator's no channel saw, and how many of those
+    the practical rules found all the same."""
+    found: dict[str, tuple[Span, ...]] = {}
+    unseen: list[Span] = []
+    if "sim" in wanted and any(c.truth is not None for c in cycles):
+        sim = [h for h in simulator_truth(cycles, channels) if h.t_end >= begin]
+        found["sim"] = _spans(sim)
+        unseen = [Span(h.hazard, h.t_start, h.t_end) for h in sim if not h.seen]
+    if "world" in wanted:
+        found["world"] = _spans(h for h in world_model_truth(cycles, channels) if h.t_end >= begin)
+    hits = len(match(detected[Profile.PRACTICAL.value], unseen).pairs)
+    return found, len(unseen), hits
+
+
+def _scored(spans: Iterable[Span]) -> tuple[Span, ...]:
+    return tuple(s for s in spans if s.hazard in SCORED_HAZARDS)
+
+
+def _found(events: TimeFilter[HazardType], begin: float) -> list[Span]:
+    """The events of a finished drive that reach into its evaluated part."""
+    spans = [Span(e.key, e.t_start, e.t_end) for e in events.finish()]
+    return sorted((s for s in spans if s.t_end >= begin), key=lambda s: s.t_start)
+
+
+def _reapplied(
+    signals: Signals, signal: Signal | None, factor: float, begin: float
+) -> tuple[Span, ...]:
+    """What the practical rules find with every threshold on `signal` times `factor`."""
+    events: TimeFilter[HazardType] = TimeFilter()
+    for rule in load_rules(Profile.PRACTICAL):
+        if rule.hazard not in SCORED_HAZARDS:
+            continue
+        alternatives = tuple(
+            tuple(replace(c, value=c.value * factor) if c.signal is signal else c for c in clauses)
+            for clauses in rule.alternatives
+        )
+        changed = replace(rule, alternatives=alternatives)
+        for t, values in signals:
+            if changed.fires(values):
+                events.add(rule.hazard, t, 0.0, least=True)
+    return tuple(_found(events, begin))
+
+
+def _spans(hazards: Iterable[TrueHazard]) -> tuple[Span, ...]:
+    return tuple(Span(h.hazard, h.t_start, h.t_end) for h in hazards)
+
+
+def _mistakes(
+    detected: Mapping[str, tuple[Span, ...]],
+    truths: Mapping[str, tuple[Span, ...]],
+    cycles: Sequence[Cycle],
+    signals: Signals,
+) -> Iterable[Mistake]:
+    """Every surplus detection and every missed hazard, with its cause."""
+    motion = ego_motion(cycles)
+    safety = np.array([values[Signal.SAFETY_SCORE] for _, values in signals])
+    for identifier, spans in detected.items():
+        profile = Profile(identifier) if identifier in {p.value for p in Profile} else None
+        rules: dict[HazardType, Rule] = (
+            {r.hazard: r for r in load_rules(profile)} if profile else {}
+        )
+        for truth, true in truths.items():
+            other = truths.get(OTHER.get(truth, ""), ())
+            matching = match(spans, true)
+            for i in matching.false_alarms:
+                s = spans[i]
+                cause = false_cause(s, true, other, motion, safety).value
+                yield Mistake(identifier, truth, s.hazard, False, s.t_start, s.t_end, cause)
+            for i in matching.missed:
+                s = true[i]
+                cause = (
+                    missed_cause(s, rules[s.hazard], signals)
+                    if s.hazard in rules
+                    else "probability below its limit"
+                )
+                yield Mistake(identifier, truth, s.hazard, True, s.t_start, s.t_end, cause)

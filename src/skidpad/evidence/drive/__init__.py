@@ -1,0 +1,1 @@
+"""Judging drives of the matrix: metrics from the tick log, findings, acceptance. May use roads."""

@@ -1,0 +1,245 @@
+"""Collisions, each with its chain of causes: what was hit, what was seen of it, and when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+
+from skidpad.core.states import ContactEvent
+from skidpad.core.vocabulary import DetectionStatus, RelocationReason, Supervision, Tier
+from skidpad.evidence.drive.perception import vehicle_present
+from skidpad.evidence.drive.prepared import Drive
+from skidpad.recording.runlog import RunLog
+
+BEND_RADIUS = 250.0  # m, a lane curved tighter is a bend
+LOOK_BACK = 10.0  # s of history in the chain of causes
+JUST_BEFORE = 2.0  # s, for bend, lead and brake
+RECOVERY_LAG = 0.25  # s within which a contact has started a recovery
+BEHIND = -0.5  # cosine of the direction to the other car: it stands behind
+
+
+class CrashKind(str, Enum):
+    """What a fatal event was (decision M-8)."""
+
+    VEHICLE = "vehicle"
+    STATIC = "static"
+    WRONG_WAY = "wrong_way"
+
+
+class Striker(str, Enum):
+    """Who drove into whom."""
+
+    EGO = "ego"
+    OTHER = "other"
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """What the stack said at one moment before the crash."""
+
+    before: float  # s
+    status: DetectionStatus | None
+    tier: Tier | None
+    distance: float | None  # m, measured
+    gap: float | None  # m, true, to the lead
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Crash:
+    """One fatal event and how it came about. None: does not apply, or was not there."""
+
+    tick: int
+    t: float  # s
+    kind: CrashKind
+    weather: str
+    other: str  # name of the vehicle, or what stood there
+    striker: Striker | None
+    rear_ended: bool
+    bend_exit: bool  # off the road in a bend without a lead (decision M-6)
+    v_ego: float  # m/s just before
+    v_other: float | None
+    v_closing: float | None  # m/s at the contact
+    impulse: float | None  # N s
+    x: float
+    y: float
+    lane_offset: float | None  # m, left positive
+    bend_radius: float | None  # m, tightest of the last two seconds
+    mu: float | None  # mean at the ego's tyres
+    brake_max: float  # of the last two seconds
+    unseen: float  # s of the last ten with a lead in truth that was not reported
+    lead_since: float | None  # s that the other car had been the lead: small for a cut-in
+    first_detection: Sighting | None  # of the car that was hit, in its time as the lead
+    last_detections: tuple[Sighting, ...]  # changes of status and tier, newest last
+
+
+def recovery_rows(log: RunLog) -> list[int]:
+    """Rows on which the supervisor began to brake for a collision (A-179, A-190)."""
+    braking = log.supervision == Supervision.BRAKE
+    begins = braking & ~np.concatenate([[False], braking[:-1]])
+    return [int(k) for k in np.flatnonzero(begins)]
+
+
+def find_crashes(drive: Drive) -> tuple[Crash, ...]:
+    """All fatal events of a drive in order: recoveries and wrong-way corrections (A-247)."""
+    log = drive.log
+    crashes = [_crash(drive, row, _culprit(log, row)) for row in recovery_rows(log)]
+    crashes += [
+        _wrong_way(drive, drive.row(r.tick))
+        for r in log.relocations
+        if r.reason is RelocationReason.WRONG_WAY
+    ]
+    return tuple(sorted(crashes, key=lambda c: c.tick))
+
+
+def _culprit(log: RunLog, row: int) -> ContactEvent | None:
+    """The hardest contact just before a recovery began."""
+    tick, lag = int(log.tick[row]), RECOVERY_LAG / log.header.dt
+    recent = [c for c in log.contacts if 0 <= tick - c.tick <= lag]
+    return max(recent, key=lambda c: c.impulse, default=None)
+
+
+def _crash(drive: Drive, row: int, contact: ContactEvent | None) -> Crash:
+    log = drive.log
+    at = row if contact is None else drive.row(contact.tick)
+    other = contact.actor if contact is not None and contact.actor > 0 else None
+    radius = _bend_radius(drive, at)
+    alone = not np.any(drive.lead.actor[_since(drive, at, JUST_BEFORE) : at + 1] >= 0)
+    behind, struck = (False, None) if other is None else _who(log, at, other)
+    before = max(at - 1, 0)  # the contact itself changes the speeds
+    static = "something" if contact is None else contact.static
+    return _event(
+        drive,
+        at,
+        kind=CrashKind.STATIC if other is None else CrashKind.VEHICLE,
+        other=static if other is None else log.table.names[other],
+        actor=other,
+        striker=struck,
+        rear_ended=behind and struck is Striker.OTHER,
+        bend_exit=other is None and radius is not None and radius < BEND_RADIUS and alone,
+        v_other=None if other is None else _speed(log, before, other),
+        contact=contact,
+    )
+
+
+def _wrong_way(drive: Drive, at: int) -> Crash:
+    return _event(drive, at, kind=CrashKind.WRONG_WAY, other="")
+
+
+def _event(
+    drive: Drive,
+    at: int,
+    *,
+    kind: CrashKind,
+    other: str,
+    actor: int | None = None,
+    striker: Striker | None = None,
+    rear_ended: bool = False,
+    bend_exit: bool = False,
+    v_other: float | None = None,
+    contact: ContactEvent | None = None,
+) -> Crash:
+    log, a = drive.log, drive.log.actors
+    recent = slice(_since(drive, at, JUST_BEFORE), at + 1)
+    history = slice(_since(drive, at, LOOK_BACK), at + 1)
+    unseen = vehicle_present(drive) & (log.report.detected != 1.0) & drive.sample
+    since, first = (None, None) if actor is None else _as_lead(drive, at, actor)
+    return Crash(
+        tick=int(log.tick[at]),
+        t=float(log.t[at]),
+        kind=kind,
+        weather=log.weathers[int(log.weather[at])],
+        other=other,
+        striker=striker,
+        rear_ended=rear_ended,
+        bend_exit=bend_exit,
+        v_ego=float(drive.v[max(at - 1, 0)]),
+        v_other=v_other,
+        v_closing=None if contact is None else contact.v_closing,
+        impulse=None if contact is None else contact.impulse,
+        x=float(a.x[at, 0]) if contact is None else contact.x,
+        y=float(a.y[at, 0]) if contact is None else contact.y,
+        lane_offset=number(float(drive.place.offset[at])),
+        bend_radius=_bend_radius(drive, at),
+        mu=_grip(log, at),
+        brake_max=float(np.nanmax(log.applied.brake[recent])),
+        unseen=float(np.count_nonzero(unseen[history]) * log.header.dt),
+        lead_since=since,
+        first_detection=first,
+        last_detections=_last_detections(drive, history.start, at),
+    )
+
+
+def _since(drive: Drive, at: int, seconds: float) -> int:
+    return max(at - round(seconds / drive.log.header.dt), 0)
+
+
+def _bend_radius(drive: Drive, at: int) -> float | None:
+    """Tightest radius of the ego's lane in the last two seconds; None on a straight."""
+    curvature = np.abs(drive.place.curvature[_since(drive, at, JUST_BEFORE) : at + 1])
+    curvature = curvature[np.isfinite(curvature)]
+    tightest = float(curvature.max()) if curvature.size else 0.0
+    return 1.0 / tightest if tightest > 1e-6 else None
+
+
+def _who(log: RunLog, at: int, other: int) -> tuple[bool, Striker]:
+    """Whether the other car stood behind, and whose approach was the faster one."""
+    a, k = log.actors, max(at - 1, 0)
+    to = np.array([a.x[k, other] - a.x[k, 0], a.y[k, other] - a.y[k, 0]], dtype=np.float64)
+    to /= max(float(np.hypot(*to)), 1e-9)
+    ahead = to[0] * np.cos(a.yaw[k, 0]) + to[1] * np.sin(a.yaw[k, 0])
+    ego = a.vx[k, 0] * to[0] + a.vy[k, 0] * to[1]
+    them = -(a.vx[k, other] * to[0] + a.vy[k, other] * to[1])
+    return bool(ahead < BEHIND), Striker.OTHER if them > ego else Striker.EGO
+
+
+def _grip(log: RunLog, row: int) -> float | None:
+    """Mean friction at the ego's tyres."""
+    mu = log.mu[row, 0]
+    return None if np.all(np.isnan(mu)) else float(np.nanmean(mu))
+
+
+def _speed(log: RunLog, row: int, actor: int) -> float:
+    return float(np.hypot(log.actors.vx[row, actor], log.actors.vy[row, actor]))
+
+
+def _as_lead(drive: Drive, at: int, actor: int) -> tuple[float | None, Sighting | None]:
+    """How long `actor` had been the lead until `at`, and its first detection in that time."""
+    is_lead = drive.lead.actor[: at + 1] == actor
+    last = np.flatnonzero(is_lead[_since(drive, at, JUST_BEFORE) :])
+    if not last.size:
+        return None, None
+    end = _since(drive, at, JUST_BEFORE) + int(last[-1])
+    breaks = np.flatnonzero(~is_lead[: end + 1])
+    begin = int(breaks[-1]) + 1 if breaks.size else 0
+    seen = np.flatnonzero(drive.log.report.detected[begin : end + 1] == 1.0)
+    first = _sighting(drive, begin + int(seen[0]), at) if seen.size else None
+    return (at - begin) * drive.log.header.dt, first
+
+
+def _last_detections(drive: Drive, begin: int, at: int) -> tuple[Sighting, ...]:
+    status, tier = drive.log.report.status, drive.log.report.tier
+    rows = [
+        k
+        for k in range(begin, at + 1)
+        if drive.sample[k] and (k == begin or status[k] != status[k - 1] or tier[k] != tier[k - 1])
+    ]
+    return tuple(_sighting(drive, k, at) for k in rows[-8:])
+
+
+def _sighting(drive: Drive, k: int, at: int) -> Sighting:
+    report = drive.log.report
+    status, tier = number(float(report.status[k])), number(float(report.tier[k]))
+    return Sighting(
+        before=(at - k) * drive.log.header.dt,
+        status=None if status is None else DetectionStatus(int(status)),
+        tier=None if tier is None else Tier(int(tier)),
+        distance=number(float(report.distance[k])),
+        gap=number(float(drive.lead.gap[k])),
+    )
+
+
+def number(value: float) -> float | None:
+    """`value`, None when it is NaN: the way from arrays to interfaces."""
+    return None if np.isnan(value) else value

@@ -1,0 +1,100 @@
+"""Time to collision as the stack saw it, and the conflicts that there truly were."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.evidence.drive.prepared import Drive, Mask
+
+Floats = NDArray[np.float64]
+
+V_EGO_MIN = 1.0  # m/s, below there is no time to collision (A-232)
+V_CLOSING_MIN = 0.5  # m/s (A-232)
+TTC_MAX = 30.0  # s (A-232)
+TTC_CRITICAL = 1.5  # s (A-234)
+V_GATE = 10.0 / 3.6  # m/s, for the gated minimum (A-254)
+GAP_MIN = 0.1  # m, nearer the needed deceleration says nothing more
+
+
+class Conflicts(NamedTuple):
+    """Summary over some ticks; None where no tick had a time to collision (A-235)."""
+
+    min_ttc: float | None  # s
+    min_ttc_gated: float | None  # s, at more than 10 km/h
+    critical_ticks: int
+    critical_time: float  # s
+
+
+class TrueConflicts(NamedTuple):
+    """From the boxes of ego and lead, along the lane (decision M-8)."""
+
+    min_ttc: float | None  # s
+    max_drac: float | None  # m/s^2
+    min_gap: float | None  # m
+
+
+def time_to_collision(gap: Floats, v_closing: Floats) -> Floats:
+    """Time to collision at constant closing speed; inf where the gap is not closing.
+
+    gap, v_closing: (...) broadcastable, gap >= 0. Returns (...).
+    Source: Hayward (1972), Near-miss determination through use of a scale of danger.
+    """
+    out = np.full(np.broadcast(gap, v_closing).shape, np.inf)
+    np.divide(gap, v_closing, out=out, where=np.asarray(v_closing) > 0.0)
+    return out
+
+
+def deceleration_to_avoid_crash(gap: Floats, v_closing: Floats) -> Floats:
+    """Constant deceleration that just avoids contact: v^2 / (2 gap), 0 where nothing closes.
+
+    Source: Cooper and Space (1976), as DRAC in Archer (2005), Indicators for traffic safety.
+    """
+    drac: Floats = np.maximum(v_closing, 0.0) ** 2 / (2.0 * np.maximum(gap, GAP_MIN))
+    return drac
+
+
+def reported_ttc(drive: Drive) -> Floats:
+    """(T,) time to collision from what the stack measured; inf where there is none (A-232, A-233).
+
+    The closing speed is the radar's, or the ego's own speed where the radar has none.
+    """
+    report, v = drive.log.report, drive.v
+    closing = np.where(np.isnan(report.radar_velocity), v, -report.radar_velocity)
+    valid = (report.detected == 1.0) & (v > V_EGO_MIN) & (closing > V_CLOSING_MIN)
+    ttc = time_to_collision(report.distance, np.where(valid, closing, 0.0))
+    inside: Floats = np.where((ttc > 0.0) & (ttc < TTC_MAX), ttc, np.inf)
+    return inside
+
+
+def conflicts(drive: Drive, where: Mask) -> Conflicts:
+    """Least time to collision and time below the critical one, over samples in `where`."""
+    ttc = np.where(where & drive.sample, reported_ttc(drive), np.inf)
+    critical = int(np.count_nonzero(ttc < TTC_CRITICAL))
+    return Conflicts(
+        min_ttc=least(ttc),
+        min_ttc_gated=least(ttc[drive.v > V_GATE]),
+        critical_ticks=critical,
+        critical_time=critical * drive.log.header.dt,
+    )
+
+
+def true_conflicts(drive: Drive, where: Mask) -> TrueConflicts:
+    """Surrogates from truth while the ego drives, for leads whose box is in the ego's way."""
+    lead = drive.lead
+    use = where & drive.free & (drive.v > V_EGO_MIN) & lead.overlap & ~np.isnan(lead.gap)
+    gap, closing = lead.gap[use], lead.v_closing[use]
+    drac = deceleration_to_avoid_crash(gap, closing)
+    return TrueConflicts(
+        min_ttc=least(time_to_collision(gap, closing)),
+        max_drac=float(drac.max()) if drac.size else None,
+        min_gap=least(gap),
+    )
+
+
+def least(values: Floats) -> float | None:
+    """Smallest finite value, None when there is none."""
+    finite = values[np.isfinite(values)]
+    return float(finite.min()) if finite.size else None

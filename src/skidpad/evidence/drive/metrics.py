@@ -1,0 +1,193 @@
+"""All metrics of one run from its log: one row of results, and one per weather (A-231)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import fields
+
+import numpy as np
+
+from skidpad.core.vocabulary import RelocationReason
+from skidpad.evidence.drive.collisions import BEND_RADIUS, Crash, CrashKind, find_crashes
+from skidpad.evidence.drive.conflict import conflicts, true_conflicts
+from skidpad.evidence.drive.lateral import count_invasions, lateral_offset
+from skidpad.evidence.drive.perception import (
+    distance_errors,
+    dropout_pct,
+    gap_variance,
+    radar_levels,
+)
+from skidpad.evidence.drive.prepared import Drive, Floats, Mask, MetricSettings, prepare
+from skidpad.recording.events import Event
+from skidpad.recording.results import Metrics
+from skidpad.recording.runlog import RunLog
+from skidpad.roads.queries import RoadMap
+
+KMH = 3.6
+
+
+def run_metrics(log: RunLog, road_map: RoadMap, settings: MetricSettings | None = None) -> Metrics:
+    """The metrics of a whole run; complete whatever the log lacks (A-251)."""
+    if not len(log):
+        return Metrics(samples=0)
+    drive = prepare(log, road_map, settings)
+    return summarise(drive, find_crashes(drive), highway_roads(drive, road_map))
+
+
+def weather_metrics(
+    log: RunLog, road_map: RoadMap, settings: MetricSettings | None = None
+) -> dict[str, Metrics]:
+    """The same for each weather of the run, by slug (A-231)."""
+    if not len(log):
+        return {}
+    drive = prepare(log, road_map, settings)
+    crashes, highway = find_crashes(drive), highway_roads(drive, road_map)
+    return {
+        slug: summarise(drive, crashes, highway, log.weather == number)
+        for number, slug in enumerate(log.weathers)
+        if np.any(log.weather == number)
+    }
+
+
+def highway_roads(drive: Drive, road_map: RoadMap) -> frozenset[int]:
+    """Roads met when driving on from the start (A-032, A-212)."""
+    a = drive.log.actors
+    start = road_map.project(float(a.x[0, 0]), float(a.y[0, 0]), float(a.z[0, 0]))
+    return frozenset() if start is None else road_map.traced_roads(start)
+
+
+def summarise(
+    drive: Drive, crashes: Sequence[Crash], highway: frozenset[int], where: Mask | None = None
+) -> Metrics:
+    """Metrics over the ticks of `where` (T,), all by default."""
+    if where is None:
+        where = np.ones(len(drive.log), dtype=np.bool_)
+    here = [c for c in crashes if where[drive.row(c.tick)]]
+    return combined(
+        _collisions(drive, here, where),
+        _lanes(drive, highway, where),
+        _conflicts(drive, where),
+        _radar(drive, where),
+        _distances(drive, where),
+        _driving(drive, len(here), where),
+        _ticks(drive, where),
+    )
+
+
+def combined(*parts: Metrics) -> Metrics:
+    """One row from partial ones, each of which sets its own columns."""
+    names = [f.name for f in fields(Metrics)]
+    set_by = {n: getattr(p, n) for p in parts for n in names if getattr(p, n) is not None}
+    return Metrics(**set_by)
+
+
+def _among(drive: Drive, events: Iterable[Event], where: Mask) -> int:
+    return sum(bool(where[drive.row(e.tick)]) for e in events)
+
+
+def _collisions(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
+    log = drive.log
+    kinds = [c.kind for c in here]
+    impacts = [c.v_closing * KMH for c in here if c.v_closing is not None]
+    stuck = [r for r in log.relocations if r.reason is RelocationReason.STUCK]
+    return Metrics(
+        fatal_collisions=len(here),
+        collisions_vehicle=kinds.count(CrashKind.VEHICLE),
+        collisions_static=kinds.count(CrashKind.STATIC),
+        wrong_way=kinds.count(CrashKind.WRONG_WAY),
+        contacts=_among(drive, log.contacts, where),
+        rear_ended=sum(c.rear_ended for c in here),
+        bend_exits=sum(c.bend_exit for c in here),
+        stuck_relocations=_among(drive, stuck, where),
+        max_impact_kmh=max(impacts, default=None),
+    )
+
+
+def _lanes(drive: Drive, highway: frozenset[int], where: Mask) -> Metrics:
+    counted = where & drive.free
+    crossed = [i for i in drive.log.invasions if counted[drive.row(i.tick)]]
+    found = count_invasions(crossed, highway, drive.log.header.dt)
+    offsets = lateral_offset(drive, where)
+    return Metrics(
+        lane_invasions=found.solid,
+        lane_invasions_all=found.any,
+        lane_invasions_highway=found.solid_on_highway,
+        lane_changes=found.lane_changes,
+        lateral_mean_m=offsets.mean,
+        lateral_max_m=offsets.max,
+        lateral_std_m=offsets.std,
+    )
+
+
+def _conflicts(drive: Drive, where: Mask) -> Metrics:
+    seen, true = conflicts(drive, where), true_conflicts(drive, where)
+    return Metrics(
+        min_ttc_s=seen.min_ttc,
+        min_ttc_above_10_kmh_s=seen.min_ttc_gated,
+        ttc_below_1_5_s=seen.critical_time,
+        ttc_critical_count=seen.critical_ticks,
+        min_ttc_true_s=true.min_ttc,
+        max_drac_true=true.max_drac,
+        min_gap_true_m=true.min_gap,
+    )
+
+
+def _radar(drive: Drive, where: Mask) -> Metrics:
+    pre, lane, final = radar_levels(drive, where)
+    return Metrics(
+        radar_fpr_pct=lane.fpr_pct,
+        radar_fnr_pct=lane.fnr_pct,
+        radar_fpr_pct_pre=pre.fpr_pct,
+        radar_fnr_pct_pre=pre.fnr_pct,
+        radar_fpr_pct_final=final.fpr_pct,
+        radar_fnr_pct_final=final.fnr_pct,
+        tp=lane.tp,
+        fp=lane.fp,
+        tn=lane.tn,
+        fn=lane.fn,
+    )
+
+
+def _distances(drive: Drive, where: Mask) -> Metrics:
+    errors = distance_errors(drive, where)
+    dropout, dropout_present = dropout_pct(drive, where)
+    return Metrics(
+        mean_error_m=errors.mean,
+        max_error_m=errors.max,
+        max_error_at_s=errors.max_at,
+        headway_variance_m2=errors.variance,
+        gap_variance_m2=gap_variance(drive, where),
+        dropout_pct=dropout,
+        dropout_present_pct=dropout_present,
+    )
+
+
+def _driving(drive: Drive, fatal: int, where: Mask) -> Metrics:
+    counted = where & drive.free
+    v = drive.v * KMH
+    in_bend = counted & (np.abs(drive.place.curvature) > 1.0 / BEND_RADIUS)
+    dt = drive.log.header.dt
+    distance_km = float(drive.v[where].sum() * dt / 1000.0)
+    return Metrics(
+        mean_speed_kmh=float(v[counted].mean()) if counted.any() else None,
+        max_speed_kmh=_percentile(v[counted], 100.0),
+        p50_speed_kmh=_percentile(v[counted], 50.0),
+        p95_speed_kmh=_percentile(v[counted], 95.0),
+        bend_speed_kmh=_percentile(v[in_bend], 95.0),
+        distance_km=distance_km,
+        duration_s=float(np.count_nonzero(where) * dt),
+        fatal_per_100_km=100.0 * fatal / distance_km if distance_km > 0.0 else None,
+    )
+
+
+def _percentile(values: Floats, percent: float) -> float | None:
+    return float(np.percentile(values, percent)) if values.size else None
+
+
+def _ticks(drive: Drive, where: Mask) -> Metrics:
+    return Metrics(
+        samples=int(np.count_nonzero(where & drive.sample)),
+        skipped_supervised=int(np.count_nonzero(where & ~drive.free)),
+        skipped_no_report=int(np.count_nonzero(where & drive.free & ~drive.sample)),
+        notices=_among(drive, drive.log.notices, where),
+    )

@@ -1,0 +1,145 @@
+"""One drive, seen by its metrics: the log plus what the map adds, computed once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.vocabulary import ActorKind, Supervision
+from skidpad.evidence.drive.lanematch import LaneIndex, LaneMatch
+from skidpad.recording.runlog import RunLog
+from skidpad.roads.queries import RoadMap
+
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+
+LEAD_RANGE = 80.0  # m, A-236
+
+
+class LeadDefinition(str, Enum):
+    """Which vehicle is the lead in truth (D-102 with D-103)."""
+
+    AHEAD_ON_LANE = "ahead_on_lane"  # ahead, following the lane across road boundaries
+    SAME_ROAD_AND_LANE = "same_road_and_lane"  # as printed: equal ids, ahead or behind
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MetricSettings:
+    """Choices that the sources leave open."""
+
+    lead: LeadDefinition = LeadDefinition.AHEAD_ON_LANE
+
+
+class Leads(NamedTuple):
+    """The vehicle in front of the ego in truth, arrays (T,); NaN and -1 where there is none."""
+
+    actor: Ints
+    distance: Floats  # m between positions (A-236)
+    gap: Floats  # m bumper to bumper along the lane, >= 0; NaN also where it is behind
+    v_closing: Floats  # m/s along the lane, positive when closing
+    overlap: Mask  # the two boxes overlap across the lane
+
+
+@dataclass(frozen=True, slots=True)
+class Drive:
+    """A log, the ego on its lanes, and its leads. T ticks."""
+
+    log: RunLog
+    place: LaneMatch
+    lead: Leads
+    v: Floats  # (T,) m/s
+    free: Mask  # (T,) the supervisor does not drive
+    sample: Mask  # (T,) ticks that count for perception (A-250)
+
+    def row(self, tick: int) -> int:
+        """The row of a tick, or of the first one after it."""
+        return min(int(np.searchsorted(self.log.tick, tick)), len(self.log) - 1)
+
+
+def prepare(log: RunLog, road_map: RoadMap, settings: MetricSettings | None = None) -> Drive:
+    """Match a log to its map."""
+    index = LaneIndex(road_map.samples, road_map.lanes)
+    a = log.actors
+    place = index.match(a.x[:, 0], a.y[:, 0], a.z[:, 0])
+    free = log.supervision == Supervision.NONE
+    reported = ~np.isnan(log.report.status)
+    return Drive(
+        log=log,
+        place=place,
+        lead=find_leads(log, index, place, (settings or MetricSettings()).lead),
+        v=log.v_ego,
+        free=free,
+        sample=free & reported,
+    )
+
+
+def find_leads(log: RunLog, index: LaneIndex, place: LaneMatch, rule: LeadDefinition) -> Leads:
+    """The nearest vehicle within 80 m that the definition calls a lead (A-236)."""
+    a, table = log.actors, log.table
+    distance = np.hypot(a.x - a.x[:, :1], a.y - a.y[:, :1]).astype(np.float64)
+    near = log.present & (distance < LEAD_RANGE) & (table.kind <= ActorKind.MOTORCYCLE)
+    near[:, 0] = False
+    k, i = np.nonzero(near)
+    other = index.match(a.x[k, i], a.y[k, i], a.z[k, i])
+    ego = place.at(k)
+    along = index.distance_ahead(ego, other, LEAD_RANGE)
+    if rule is LeadDefinition.AHEAD_ON_LANE:
+        is_lead = np.isfinite(along)
+    else:
+        is_lead = _same_ids(index, ego, other)
+    best = np.full(distance.shape, np.inf)
+    best[k[is_lead], i[is_lead]] = distance[k[is_lead], i[is_lead]]
+    actor = np.argmin(best, axis=1)
+    exists = np.isfinite(best[np.arange(len(log)), actor])
+    chosen = is_lead & (actor[k] == i)
+    return _describe(log, ego, other, along, k, i, chosen, np.where(exists, actor, -1))
+
+
+def _same_ids(index: LaneIndex, a: LaneMatch, b: LaneMatch) -> Mask:
+    road, lane_id = index.lanes.road, index.lanes.lane_id
+    same = (road[a.lane] == road[b.lane]) & (lane_id[a.lane] == lane_id[b.lane])
+    known: Mask = same & (a.lane >= 0) & (b.lane >= 0)
+    return known
+
+
+def _describe(
+    log: RunLog,
+    ego: LaneMatch,
+    other: LaneMatch,
+    along: Floats,
+    k: Ints,
+    i: Ints,
+    chosen: Mask,
+    actor: Ints,
+) -> Leads:
+    a = log.actors
+    distance, gap, closing = (np.full(len(log), np.nan) for _ in range(3))
+    overlap = np.zeros(len(log), dtype=np.bool_)
+    e, o = ego.at(chosen), other.at(chosen)
+    k, i, along = k[chosen], i[chosen], along[chosen]
+    zero = np.zeros_like(i)
+    long_e, wide_e = _extent(log, k, zero, e.heading)
+    long_o, wide_o = _extent(log, k, i, o.heading)
+    distance[k] = np.hypot(a.x[k, i] - a.x[k, 0], a.y[k, i] - a.y[k, 0])
+    gap[k] = np.where(np.isfinite(along), np.maximum(along - long_e - long_o, 0.0), np.nan)
+    closing[k] = _speed_along(log, k, zero, e.heading) - _speed_along(log, k, i, o.heading)
+    overlap[k] = np.abs(o.offset - e.offset) < wide_e + wide_o
+    return Leads(actor.astype(np.int64), distance, gap, closing, overlap)
+
+
+def _extent(log: RunLog, k: Ints, i: Ints, heading: Floats) -> tuple[Floats, Floats]:
+    """Half length and half width of boxes along and across their lanes."""
+    turn = log.actors.yaw[k, i] - heading
+    c, s = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+    length, width = log.table.length[i] / 2.0, log.table.width[i] / 2.0
+    return length * c + width * s, length * s + width * c
+
+
+def _speed_along(log: RunLog, k: Ints, i: Ints, heading: Floats) -> Floats:
+    a = log.actors
+    return np.asarray(a.vx[k, i] * np.cos(heading) + a.vy[k, i] * np.sin(heading), np.float64)

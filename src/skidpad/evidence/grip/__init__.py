@@ -1,0 +1,1 @@
+"""Judging drives of the friction campaign: scores, series, findings."""

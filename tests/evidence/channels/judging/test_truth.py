@@ -1,0 +1,279 @@
+"""Truths by closed forms and scenes whose outcome is plain; matching against brute force."""
+
+from __future__ import annotations
+
+from itertools import permutations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from channel_worlds import CAR, Eyes, World, drive, frame, truth
+from skidpad.core.channels import Cycle
+from skidpad.core.errors import ConfigError
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.hazards import Profile
+from skidpad.evidence.channels.judging.evaluation import Evaluation, read_labels
+from skidpad.evidence.channels.judging.matching import (
+    Span,
+    Tally,
+    macro,
+    match,
+    merged,
+    micro,
+    percent,
+    score,
+    tally,
+)
+from skidpad.evidence.channels.judging.segments import judge
+from skidpad.evidence.channels.judging.truth import (
+    G,
+    footprint,
+    simulator_truth,
+    world_model_truth,
+    would_hit,
+)
+from skidpad.recording.cycles import cycles
+
+TAILGATED, TAILGATING = HazardType.EGO_TAILGATED, HazardType.EGO_TAILGATING
+LOCALISATION = HazardType.INCONSISTENT_LOCALISATION
+
+
+@given(v=st.floats(3.0, 40.0), gap=st.floats(0.5, 100.0), mu=st.floats(0.2, 1.0))
+@settings(max_examples=80, deadline=None)
+def test_equal_speeds_hit_as_their_stopping_distances_say(v, gap, mu):
+    a_lead, a_follow = min(6.0, mu * G), mu * G
+    distance = v * 1.0 + v * v / (2 * a_follow) - v * v / (2 * a_lead)
+    if a_follow > a_lead + 1e-6 and v / a_follow + 1.0 < v / a_lead:
+        return  # the follower may stop first: the nearest moment is then not the end
+    if abs(distance - gap) > 0.05:
+        assert would_hit(gap, v, mu, v, mu) == (distance > gap)
+
+
+@given(st.floats(0, 60), st.floats(0, 40), st.floats(0, 40), st.floats(0.1, 1.0))
+@settings(max_examples=60, deadline=None)
+def test_a_hit_stays_a_hit_when_nearer_faster_or_slicker(gap, v_lead, v_follow, mu):
+    if would_hit(gap, v_lead, 0.9, v_follow, mu):
+        assert would_hit(gap * 0.9, v_lead, 0.9, v_follow, mu)
+        assert would_hit(gap, v_lead, 0.9, v_follow * 1.1, mu)
+        assert would_hit(gap, v_lead, 0.9, v_follow, mu * 0.9)
+
+
+def scene(objects, ego=(0.0, 0.0, 0.0, 15.0, 0.0), duration=8.0, eyes=None):
+    eyes = eyes or (Eyes("a"), Eyes("b"))
+    world = World(ego, np.array(objects, dtype=float))
+    return list(cycles(drive(world, eyes, duration))), [e.name for e in eyes]
+
+
+@pytest.mark.req("C-212")
+@pytest.mark.parametrize(
+    ("obj", "expected"),
+    [
+        ((-12.0, 0, 0, 15.0, 0), {TAILGATED}),  # 7.5 m behind at 54 km/h
+        ((-60.0, 0, 0, 15.0, 0), set()),
+        ((-12.0, 3.5, 0, 15.0, 0), set()),  # the next lane
+        ((12.0, 0, 0, 15.0, 0), {TAILGATING}),
+        ((60.0, 0, 0, 15.0, 0), set()),
+    ],
+)
+def test_simulator_truth_of_plain_scenes(obj, expected):
+    found = simulator_truth(*scene([obj]))
+    assert {h.hazard for h in found} == expected
+    assert all(h.seen and h.about == {"actor 0"} for h in found)
+
+
+def test_ice_makes_a_gap_a_hazard_and_standing_still_none():
+    rows, names = scene([(-25.0, 0, 0, 15.0, 0)])
+    assert simulator_truth(rows, names) == []
+    icy = [c._replace(truth=c.truth._replace(mu=np.array([0.15]))) for c in rows]
+    assert {h.hazard for h in simulator_truth(icy, names)} == {TAILGATED}
+    rows, names = scene([(-6.0, 0, 0, 0.0, 0)], ego=(0, 0, 0, 0.0, 0))
+    assert simulator_truth(rows, names) == []
+
+
+@pytest.mark.req("C-212")
+def test_an_object_that_no_channel_reports_is_marked_unseen():
+    eyes = (Eyes("a", blind=(0,)), Eyes("b", blind=(0,)))
+    (hazard,) = simulator_truth(*scene([(-12.0, 0, 0, 15.0, 0)], eyes=eyes))
+    assert not hazard.seen
+
+
+@pytest.mark.req("C-121")
+@pytest.mark.parametrize(("offset", "kind"), [((1.5, 0.0), "jump"), ((0.0, 2.5), "jump")])
+def test_a_jump_of_one_channel_is_a_localisation_hazard_in_both_truths(offset, kind):
+    rows, names = scene([], eyes=(Eyes("a"), Eyes("b", ego_offset={4.0: offset})))
+    (sim,) = simulator_truth(rows, names)
+    (world,) = world_model_truth(rows, names)
+    assert (sim.hazard, sim.kind, sim.about) == (LOCALISATION, kind, {"b"})
+    assert world.hazard is LOCALISATION
+    assert sim.t_start == pytest.approx(4.0)
+
+
+@pytest.mark.req("C-218", "C-122", "C-123")
+def test_world_model_truth_believes_ghosts_and_tells_ahead_from_behind():
+    ego = (0.0, 0.0, 0.0, 10.0, 0.0)
+    ghost = [(-12.0, 0, 0, 16.0, 0)]  # reported by one channel only
+    rows = [Cycle(0, 0.0, (frame(0.0, ego), frame(0.0, ego, ghost, ids=[7])))]
+    (hazard,) = world_model_truth(rows, ["a", "b"])
+    assert (hazard.hazard, hazard.about) == (TAILGATED, {"b 7"})
+    lead = [(20.0, 0, 0, 2.0, 0)]
+    rows = [Cycle(0, 0.0, (frame(0.0, ego), frame(0.0, ego, lead)))]
+    (hazard,) = world_model_truth(rows, ["a", "b"])
+    assert hazard.hazard is TAILGATING
+    beside = [(-12.0, 3.5, 0, 16.0, 0)]
+    rows = [Cycle(0, 0.0, (frame(0.0, ego), frame(0.0, ego, beside)))]
+    assert world_model_truth(rows, ["a", "b"]) == []
+
+
+@given(st.data())
+@settings(max_examples=60, deadline=None)
+def test_world_model_truth_agrees_with_footprints_moved_in_small_steps(data):
+    ego = (0.0, 0.0, 0.0, 10.0, 0.0)
+    x, y = data.draw(st.floats(-35, 35)), data.draw(st.floats(-25, 25))
+    heading, v = data.draw(st.floats(-3.1, 3.1)), data.draw(st.floats(1.0, 15.0))
+    other = np.array([x, y, heading, v * np.cos(heading), v * np.sin(heading)])
+    f = frame(0.0, ego, [other])
+    distances = [
+        footprint(CAR, np.array([10 * t, 0, 0, 0, 0])).distance(
+            footprint(CAR, np.array([*(other[:2] + other[3:] * t), heading, 0, 0]))
+        )
+        for t in np.arange(0, 3.001, 0.01)
+    ]
+    found = world_model_truth([Cycle(0, 0.0, (f,))], ["a"])
+    if distances.count(0.0) > 6:  # longer than the 0.05 s between two looks
+        assert len(found) == 1
+    elif min(distances) > 0.0:
+        assert found == []
+
+
+def test_world_model_truth_does_not_call_close_following_an_overlap():
+    ego = (0.0, 0.0, 0.0, 20.0, 0.0)
+    close = frame(0.0, ego, [(6.5, 0.0, 0.0, 20.0, 0.0)])  # 2 m apart: 0.1 s, less than a step
+    assert world_model_truth([Cycle(0, 0.0, (close,))], ["a"]) == []
+
+
+def test_a_prediction_that_ends_early_is_believed_to_its_end():
+    ego = (0.0, 0.0, 0.0, 10.0, 0.0)
+    f = frame(0.0, ego, [(20.0, 0, 0, 0, 0)])
+    predictions = f.predictions.copy()
+    predictions[:, 3:] = np.nan
+    early = f._replace(predictions=predictions)
+    assert world_model_truth([Cycle(0, 0.0, (early,))], ["a"]) == []
+    assert len(world_model_truth([Cycle(0, 0.0, (f,))], ["a"])) == 1
+
+
+def test_truth_survives_strange_frames():
+    ego = (np.nan,) * 5
+    strange = frame(0.0, ego, np.full((2, 5), np.nan))
+    rows = [Cycle(0, 0.0, (strange, None), truth=truth(0.0, (0, 0, 0, 0, 0), np.zeros((0, 5))))]
+    assert world_model_truth(rows, ["a", "b"]) == []
+    assert simulator_truth(rows, ["a", "b"]) == []
+
+
+# -- matching
+
+times = st.floats(0, 60).map(lambda t: round(t, 1))
+spans = st.lists(
+    st.tuples(times, st.floats(0, 4)).map(lambda p: Span(TAILGATED, p[0], p[0] + p[1])), max_size=5
+)
+
+
+@pytest.mark.req("C-214")
+@given(spans, spans)
+@settings(max_examples=80, deadline=None)
+def test_matching_is_one_to_one_and_the_largest_possible(detected, true):
+    m = match(detected, true)
+    assert len({d for d, _ in m.pairs}) == len({h for _, h in m.pairs}) == len(m.pairs)
+    assert len(m.pairs) + len(m.false_alarms) == len(detected)
+    assert len(m.pairs) + len(m.missed) == len(true)
+
+    def near(d, h):
+        return d.t_start <= h.t_end + 1.0 and h.t_start <= d.t_end + 1.0
+
+    assert all(near(detected[d], true[h]) for d, h in m.pairs)
+    small, large = sorted((detected, true), key=len)
+    best = max(
+        sum(near(s, c) for s, c in zip(small, chosen, strict=True))
+        for chosen in permutations(large, len(small))
+    )
+    assert len(m.pairs) == best
+
+
+def test_other_hazards_and_other_objects_do_not_match():
+    a = Span(TAILGATED, 0, 1, frozenset({"x"}))
+    assert match([a], [Span(TAILGATING, 0, 1)]).pairs == ()
+    assert match([a], [Span(TAILGATED, 0, 1, frozenset({"y"}))]).pairs == ()
+    assert match([a], [Span(TAILGATED, 0, 1)]).pairs == ((0, 0),)
+    assert match([a], [Span(TAILGATED, 2.5, 3)], tolerance=2.0).pairs == ((0, 0),)
+
+
+@pytest.mark.req("C-214", "C-216", "C-217")
+def test_scores_add_up_and_macro_differs_from_micro():
+    one = Tally(69, 6, 4, 3.0), Tally(17, 0, 4, 3.0), Tally(18, 10, 7, 3.0)
+    scores = {
+        h: score([t]) for h, t in zip((TAILGATED, LOCALISATION, TAILGATING), one, strict=True)
+    }
+    assert percent(macro(scores)[0]) == "85.43"  # the published counts, recomputed
+    assert percent(macro(scores)[1]) == "82.49"
+    assert tuple(map(percent, micro(scores))) == ("86.67", "87.39")
+    assert percent(0.846150001) == "84.62"
+    assert percent(0.00005) == "0.01"  # half up
+    halves = [Tally(30, 3, 1, 1.0, (0.5,)), Tally(39, 3, 3, 2.0, (0.1,))]
+    total = score(halves)
+    assert total.total == Tally(69, 6, 4, 3.0, (0.5, 0.1))
+    assert total.precision.low <= total.total.precision <= total.precision.high
+    assert score([Tally()]).recall is None
+    assert Tally(0, 6, 0, 3.0).false_alarms_per_hour == 2.0
+
+
+def test_lead_time_is_positive_when_the_rule_was_first():
+    row = tally([Span(TAILGATED, 1.0, 4.0)], [Span(TAILGATED, 3.0, 5.0)], 0.1)
+    assert row[TAILGATED].lead_times == (2.0,)
+
+
+@pytest.mark.req("C-140")
+def test_spans_with_short_pauses_are_one():
+    rows = [Span(TAILGATED, 0, 1), Span(TAILGATED, 2.9, 4), Span(TAILGATED, 6.0, 7)]
+    assert [(s.t_start, s.t_end) for s in merged(rows)] == [(0, 4), (6.0, 7)]
+
+
+@pytest.mark.req("C-211", "C-213", "C-215")
+def test_a_drive_is_judged_by_rules_truths_and_labels():
+    rows, names = scene(
+        [(-30.0, 0, 0, 18.0, 0), (50.0, 3.5, 0, 15.0, 0)],
+        eyes=(Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,))),
+    )
+    segment = judge("s", "town", names, rows, [Span(TAILGATED, 3.0, 5.0)])
+    evaluation = Evaluation([segment])
+    for truth_name in ("sim", "world", "labels"):
+        total = evaluation.scores(Profile.PRACTICAL.value, truth_name)[TAILGATED].total
+        assert (total.tp, total.fp, total.fn) == (1, 0, 0), truth_name
+    # one unseen vehicle opens the gap to at most 0.5, which the printed rule does not exceed
+    total = evaluation.scores(Profile.AS_PRINTED.value, "sim")[TAILGATED].total
+    assert (total.tp, total.fn) == (0, 1)
+    table = evaluation.as_dict()
+    assert table["by_route"]["practical/sim"] == {
+        "town": {
+            LOCALISATION.value: [0, 0, 0],
+            TAILGATING.value: [0, 0, 0],
+            TAILGATED.value: [1, 0, 0],
+        }
+    }
+    assert table["truths_agree"][TAILGATED.value]["tp"] == 1
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "hazard,start_s,end_s,world,annotator\nego_tailgated,0,1,sim,me",
+        "hazard,start_s,end_s,world,annotator,note\nspeeding,0,1,sim,me,",
+        "hazard,start_s,end_s,world,annotator,note\nego_tailgated,2,1,sim,me,",
+        "hazard,start_s,end_s,world,annotator,note\nego_tailgated,0,1,moon,me,",
+    ],
+)
+def test_labels_are_checked_line_by_line(tmp_path, text):
+    path = tmp_path / "labels.csv"
+    path.write_text(text)
+    with pytest.raises(ConfigError, match=r"labels\.csv:2"):
+        read_labels(path)

@@ -1,0 +1,184 @@
+"""Risk of plans in worlds, against shapely footprints moved in small steps (C-091 to C-095)."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from shapely import affinity
+
+from channel_worlds import CAR, frame
+from skidpad.evidence.channels.risk import HORIZON, PET_SAFE, risk_matrix, safety_scores
+
+EGO = (0.0, 0.0, 0.0, 10.0, 0.0)
+
+
+def single(ego, obj, **more):
+    f = frame(0.0, ego, [obj], **more)
+    matrix = risk_matrix([f, f], per_object=True)
+    return matrix, matrix.objects[0][1][0]
+
+
+def box_at(state, t):
+    x, y, heading, vx, vy = state
+    shape = shapely.Polygon(CAR)
+    direction = np.arctan2(vy, vx) if np.hypot(vx, vy) > 0.5 else heading
+    moved = affinity.rotate(shape, direction, origin=(0, 0), use_radians=True)
+    return affinity.translate(moved, x + vx * t, y + vy * t)
+
+
+@pytest.mark.req("C-092", "C-094")
+def test_closing_on_a_standing_car_by_hand():
+    matrix, one = single(EGO, (24.5, 0, 0, 0, 0))  # 20 m between the bumpers at 10 m/s
+    assert one.ttc == pytest.approx(2.0, abs=2e-3)
+    assert one.pet is None  # never together with a time to collision
+    assert matrix.safety_scores == pytest.approx([0.5, 0.5], abs=1e-3)
+    assert not one.behind
+
+
+@pytest.mark.req("C-092", "C-094")
+def test_following_at_equal_speed_has_its_time_gap_as_encroachment_time():
+    matrix, one = single(EGO, (14.5, 0, 0, 10.0, 0))  # 10 m gap: 1.0 s
+    assert one.ttc is None
+    assert one.pet == pytest.approx(1.0, abs=2e-3)
+    assert matrix.safety_scores[0] == pytest.approx(0.5, abs=2e-3)
+
+
+@pytest.mark.req("C-091", "C-123")
+def test_a_follower_is_judged_behind_and_apart_from_what_is_ahead():
+    follower, lead = (-10.0, 0, 0, 14.0, 0), (39.0, 0, 0, 10.0, 0)
+    f = frame(0.0, EGO, [follower, lead])
+    matrix = risk_matrix([f, f])
+    assert matrix.worst_behind[0, 1] == 0
+    assert matrix.risk_behind[0, 1] == pytest.approx(1 - (5.5 / 4.0) / 4.0, abs=1e-3)
+    assert matrix.risk_ahead[0, 1] == 0.0
+    assert matrix.behind_share == pytest.approx([1.0, 1.0])
+
+
+@pytest.mark.req("C-122", "C-123")
+def test_collisions_ahead_and_behind_are_told_apart_and_closeness_is_none():
+    matrix, _ = single(EGO, (24.5, 0, 0, 0, 0))
+    assert matrix.ttc_ahead[0, 0] == pytest.approx(2.0, abs=2e-3)
+    assert np.isinf(matrix.ttc_behind).all()
+    matrix, _ = single(EGO, (-10.0, 0, 0, 14.0, 0))
+    assert matrix.ttc_behind[0, 0] == pytest.approx(5.5 / 4.0, abs=2e-3)
+    assert np.isinf(matrix.ttc_ahead).all()
+    matrix, one = single(EGO, (14.5, 0, 0, 10.0, 0))
+    assert one.pet is not None
+    assert np.isinf(matrix.ttc_ahead).all()
+
+
+@pytest.mark.req("C-091")
+def test_other_lanes_and_the_oncoming_lane_are_no_risk():
+    beside = [(0.0, 3.5, 0, 12.0, 0), (15.0, -3.5, 0, 5.0, 0), (60.0, 3.5, np.pi, -15.0, 0)]
+    f = frame(0.0, EGO, beside)
+    assert risk_matrix([f, f]).safety_scores == pytest.approx([1.0, 1.0])
+
+
+@pytest.mark.req("C-091")
+def test_one_channel_that_misses_the_lead_still_meets_it_in_the_others_world():
+    sees, blind = frame(0.0, EGO, [(20.0, 0, 0, 0, 0)]), frame(0.0, EGO)
+    braking = np.column_stack([np.full(16, 0.0), np.zeros(16), np.arange(16) * 0.2])
+    sees = sees._replace(plan=braking)
+    matrix = risk_matrix([sees, blind])
+    assert matrix.risk[0].tolist() == [0.0, 0.0]
+    assert matrix.risk[1, 1] == 0.0
+    assert matrix.risk[1, 0] > 0.5
+    assert matrix.safety_scores[1] < 0.5
+
+
+def test_an_absent_channel_or_one_without_a_plan_is_not_evaluated():
+    f = frame(0.0, EGO, [(30.0, 0, 0, 0, 0)])
+    matrix = risk_matrix([f, None, f._replace(plan=np.zeros((0, 3)))])
+    assert np.isnan(matrix.risk[:, 1]).all()
+    assert np.isfinite(matrix.safety_scores).tolist() == [True, False, False]
+    assert np.isfinite(matrix.risk[0, 2])  # its world still judges the others
+    assert np.isnan(risk_matrix([None, None]).safety_scores).all()
+
+
+@pytest.mark.req("C-095")
+def test_a_collision_only_at_the_end_of_the_plan_leaves_a_high_score():
+    matrix, one = single(EGO, (4.5 + 38.0, 0, 0, 0, 0))
+    assert one.ttc == pytest.approx(3.8, abs=2e-3)
+    assert matrix.safety_scores[0] > 0.9
+
+
+states = st.tuples(
+    st.floats(-40, 40),
+    st.floats(-20, 20),
+    st.floats(-np.pi, np.pi),
+    st.floats(1, 15),
+    st.booleans(),
+)
+
+
+@pytest.mark.req("C-092", "C-095")
+@given(states)
+@settings(max_examples=60, deadline=None)
+def test_times_agree_with_shapely_footprints_in_small_steps(state):
+    x, y, heading, v, stands = state
+    v = 0.0 if stands else v
+    other = (x, y, heading, v * np.cos(heading), v * np.sin(heading))
+    _, one = single(EGO, other, plan_length=4.0, prediction_length=4.0)
+    fine = 0.02
+    times = np.arange(round(HORIZON / fine) + 1) * fine
+    ego = [box_at(EGO, t) for t in times]
+    obj = [box_at(other, t) for t in times]
+    met = [t for t, a, b in zip(times, ego, obj, strict=True) if a.intersects(b)]
+    if met:
+        assert one.pet is None
+        if one.ttc is None:  # a touch shorter than the step of 0.1 s may pass unseen
+            assert met[-1] - met[0] <= 0.1 + fine
+        else:
+            assert met[0] - fine - 2e-3 <= one.ttc <= met[0] + 0.1
+        return
+    assert one.ttc is None
+    tree = shapely.STRtree(obj)
+    pairs = tree.query(ego, predicate="intersects")
+    shift = np.abs(times[pairs[0]] - times[pairs[1]]).min(initial=np.inf)
+    if one.pet is None:
+        assert shift > PET_SAFE - 0.1
+    else:
+        assert one.pet == pytest.approx(shift, abs=0.11)
+
+
+@given(st.floats(-np.pi, np.pi), st.floats(-1e4, 1e4), states)
+@settings(max_examples=30, deadline=None)
+def test_scores_are_bounded_and_do_not_see_the_map(angle, shift, state):
+    x, y, heading, v, _ = state
+    c, s = np.cos(angle), np.sin(angle)
+
+    def placed(row):
+        px, py, h, vx, vy = row
+        return (
+            c * px - s * py + shift, s * px + c * py - shift, h + angle,
+            c * vx - s * vy, s * vx + c * vy,
+        )  # fmt: skip
+
+    other = (x, y, heading, v * np.cos(heading), v * np.sin(heading))
+    one = risk_matrix([frame(0.0, EGO, [other])]).safety_scores
+    two = risk_matrix([frame(0.0, placed(EGO), [placed(other)])]).safety_scores
+    assert 0.0 <= one[0] <= 1.0
+    assert one == pytest.approx(two, abs=2e-3)
+
+
+@pytest.mark.req("C-023", "C-091")
+def test_scores_of_n_channels_do_not_depend_on_their_order():
+    rng = np.random.default_rng(4)
+    frames = [frame(0.0, EGO, rng.normal(0, 12, (6, 5))) for _ in range(4)]
+    scores = safety_scores(frames)
+    order = [2, 0, 3, 1]
+    assert safety_scores([frames[i] for i in order]) == pytest.approx(scores[order])
+
+
+def test_degenerate_shapes_and_numbers_that_are_none_are_survived():
+    f = frame(0.0, EGO, [(20.0, 0, 0, 0, 0), (np.nan, 0, 0, 0, 0), (30.0, 0, 0, 0, 0)])
+    shapes = f.polygons.copy()
+    shapes[0] = 0.0
+    shapes[2] = np.nan
+    f = f._replace(polygons=shapes)
+    assert safety_scores([f, f]) == pytest.approx([(20 - 2.25) / 10 / 4] * 2, abs=1e-3)
+    late = np.array([[0, 0, 0.0], [2, 0, 0.2], [9, 9, 0.1], [4, 0, 0.4]], dtype=float)
+    assert np.isfinite(safety_scores([f._replace(plan=late)])).all()

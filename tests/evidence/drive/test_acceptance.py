@@ -1,0 +1,78 @@
+"""The verdicts of the printed checks follow the data: turned round, they turn."""
+
+import numpy as np
+import polars as pl
+import pytest
+
+from skidpad.evidence.drive.acceptance import ACCEPTANCE
+from skidpad.evidence.verdicts import judge
+
+BY_ID = {f.id: f for f in ACCEPTANCE}
+
+
+def verdict(id, table):
+    return judge([BY_ID[id]], [table])[0].verdict.value
+
+
+def matrix(collisions, invasions, seeds=8):
+    rng = np.random.default_rng(2)
+    return pl.DataFrame(
+        [
+            {
+                "config": c,
+                "weather": w,
+                "seed": s,
+                "outcome": "completed",
+                "log_hash": f"{c}{w}{s}",
+                "fatal_collisions": collisions[c],
+                "lane_invasions": invasions[c] + int(rng.integers(0, 2)),
+            }
+            for c in collisions
+            for w in ("clear-noon", "rain-noon")
+            for s in range(seeds)
+        ]
+    )
+
+
+FEW = {"0": 4, "1": 9, "2": 0, "3": 0, "4": 0}
+MANY = {"0": 9, "1": 0, "2": 8, "3": 8, "4": 8}
+
+
+@pytest.mark.req("A-276")
+def test_one_cell_decides_the_collision_check():
+    published = {"0": 5, "1": 1, "2": 1, "3": 1, "4": 0}
+    assert verdict("A-276", matrix(published, FEW)) == "supported"
+    assert verdict("A-276", matrix({**published, "4": 1}, FEW)) == "contradicted"
+    assert verdict("A-276", matrix({**published, "0": 0}, FEW)) == "contradicted"
+    assert verdict("A-276", matrix({"1": 3}, FEW)) == "not testable"
+
+
+@pytest.mark.req("A-277")
+def test_the_lane_check_follows_the_counts():
+    collisions = dict.fromkeys("01234", 1)
+    assert verdict("A-277", matrix(collisions, FEW)) == "supported"
+    assert verdict("A-277", matrix(collisions, MANY)) == "contradicted"
+
+
+@pytest.mark.req("A-278")
+def test_the_radar_check_follows_the_rates():
+    def study(sign):
+        return pl.DataFrame(
+            [
+                {
+                    "variant": v,
+                    "config": "2",
+                    "weather": "clear-noon",
+                    "seed": s,
+                    "outcome": "completed",
+                    "log_hash": f"{v}{s}",
+                    "radar_fpr_pct": 50.0 + 10.0 * sign * (v == "final") + 0.1 * s,
+                    "radar_fnr_pct": 5.0 - 3.0 * sign * (v == "final") + 0.1 * s,
+                }
+                for v in ("preliminary", "final")
+                for s in range(8)
+            ]
+        )
+
+    assert verdict("A-278", study(1.0)) == "supported"
+    assert verdict("A-278", study(-1.0)) == "contradicted"

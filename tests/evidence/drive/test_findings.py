@@ -1,0 +1,241 @@
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+from typing import Any
+
+import numpy as np
+import polars as pl
+import pytest
+
+from skidpad.evidence.drive.findings import FINDINGS, f08
+from skidpad.evidence.verdicts import Finding, Verdict, judge, paired, rate_below
+
+BY_ID = {f.id: f for f in FINDINGS}
+WEATHERS = [f"{p}-{t}" for p in ("clear", "rain") for t in ("sunrise", "noon", "night")]
+Row = dict[str, Any]
+Effect = Callable[[Row], dict[str, float]]
+
+NEUTRAL = {
+    "fatal_collisions": 3.0,
+    "lane_invasions": 5.0,
+    "bend_speed_kmh": 90.0,
+    "mean_speed_kmh": 50.0,
+    "p95_speed_kmh": 100.0,
+    "dropout_pct": 8.0,
+    "mean_error_m": 3.0,
+    "headway_variance_m2": 60.0,
+    "radar_fpr_pct": 50.0,
+    "radar_fpr_pct_pre": 60.0,
+    "radar_fnr_pct": 5.0,
+    "min_ttc_s": 0.1,
+    "ttc_below_1_5_s": 10.0,
+    "phantom_brakings": 3.0,
+}
+NOISE = {"min_ttc_s": 0.01}
+
+
+def is_config(row: Row, name: str) -> int:
+    return int(row["config"] == name)
+
+
+def order(row: Row) -> dict[str, float]:
+    return {"fatal_collisions": {"0": 14.0, "3": 10.0, "2": 6.0, "1": 3.0}.get(row["config"], 0)}
+
+
+def shifts(**by: Callable[[Row], float]) -> Effect:
+    return lambda row: {column: NEUTRAL[column] + f(row) for column, f in by.items()}
+
+
+def limited(row: Row) -> dict[str, float]:
+    return {"fatal_collisions": 0.0 if row["config"] == "4" else 4.0}
+
+
+def night(row: Row) -> int:
+    return int(row["time_of_day"] == "night")
+
+
+def variant(name: str) -> Callable[[Row], float]:
+    return lambda row: 3.0 * (row["variant"] == name)
+
+
+TRUE: dict[str, Effect] = {
+    "F-01": order,
+    "F-04": shifts(
+        fatal_collisions=lambda r: 4 * is_config(r, "2"),
+        bend_speed_kmh=lambda r: 30 * is_config(r, "2"),
+    ),
+    "F-05": shifts(
+        mean_speed_kmh=lambda r: 9 * is_config(r, "2"),
+        p95_speed_kmh=lambda r: 9 * is_config(r, "2"),
+        bend_speed_kmh=lambda r: 9 * is_config(r, "2"),
+    ),
+    "F-07": limited,
+    "F-10": shifts(lane_invasions=lambda r: 5 * is_config(r, "1")),
+    "F-11": shifts(dropout_pct=lambda r: 4 * (r["weather"] == "clear-noon")),
+    "F-12": shifts(
+        mean_error_m=lambda r: 3 * night(r), headway_variance_m2=lambda r: 30 * night(r)
+    ),
+    "F-13": shifts(fatal_collisions=lambda r: 4 * (r["precipitation_kind"] == "rain")),
+    "F-16": shifts(
+        radar_fpr_pct=lambda r: 30 * is_config(r, "0"),
+        radar_fpr_pct_pre=lambda r: 30 + 30 * is_config(r, "0"),
+    ),
+    "F-17": shifts(phantom_brakings=variant("safety_persist")),
+    "F-21": shifts(
+        radar_fpr_pct=variant("map_matched"),
+        radar_fnr_pct=variant("corridor"),
+        dropout_pct=variant("corridor"),
+    ),
+    "F-26": shifts(ttc_below_1_5_s=lambda r: 9 * is_config(r, "3")),
+}
+VARIANTS = {"F-17": ("cascade", "safety_persist"), "F-21": ("map_matched", "corridor")}
+
+
+def campaign(
+    id: str, effect: Effect, size: float, seeds: int = 8, noise: float = 0.6
+) -> pl.DataFrame:
+    """Results in which `effect` acts `size` times: 1 as claimed, -1 reversed, 0 not at all."""
+    rng = np.random.default_rng(11)
+    rows = []
+    cells = product("01234", WEATHERS, range(seeds), VARIANTS.get(id, ("",)))
+    for config, weather, seed, kind in cells:
+        row: Row = {
+            "config": config,
+            "weather": weather,
+            "precipitation_kind": weather.split("-")[0],
+            "time_of_day": weather.split("-")[1],
+            "seed": seed,
+            "variant": kind,
+            "outcome": "completed",
+            "log_hash": f"{config}{weather}{seed}{kind}",
+        }
+        claimed = effect(row)
+        for column, neutral in NEUTRAL.items():
+            value = neutral + size * (claimed.get(column, neutral) - neutral)
+            value += rng.normal(0.0, NOISE.get(column, noise))
+            is_count = column in ("fatal_collisions", "lane_invasions")
+            row[column] = max(round(value), 0) if is_count else value
+        rows.append(row)
+    return pl.DataFrame(rows)
+
+
+def clear_campaign(id: str, size: float) -> pl.DataFrame:
+    return campaign(id, TRUE[id], size, noise=0.15 if id == "F-07" else 0.6)
+
+
+def verdict(id: str, table: pl.DataFrame | None) -> Verdict:
+    return judge([BY_ID[id]], [table])[0].verdict
+
+
+@pytest.mark.parametrize("id", TRUE)
+def test_data_that_show_the_claim_support_it_and_inverted_data_contradict_it(id: str) -> None:
+    assert verdict(id, clear_campaign(id, 1.0)) is Verdict.SUPPORTED
+    assert verdict(id, clear_campaign(id, -1.0)) is Verdict.CONTRADICTED
+
+
+@pytest.mark.parametrize("id", TRUE)
+def test_no_table_or_no_rows_is_not_testable(id: str) -> None:
+    assert verdict(id, None) is Verdict.NOT_TESTABLE
+    assert verdict(id, campaign(id, TRUE[id], 1.0, seeds=1).clear()) is Verdict.NOT_TESTABLE
+
+
+@pytest.mark.parametrize("id", ["F-05", "F-10", "F-11", "F-13", "F-17"])
+def test_one_noisy_seed_is_undecided_and_says_how_many_it_takes(id: str) -> None:
+    effect = campaign(id, TRUE[id], 0.3, seeds=2, noise=9.0)
+    judged = judge([BY_ID[id]], [effect])[0]
+    assert judged.verdict is Verdict.UNDECIDED
+    assert judged.seeds_needed is not None
+    assert judged.seeds_needed > 2
+    assert f"about {judged.seeds_needed} seeds" in judged.text
+
+
+def test_an_effect_below_the_margin_contradicts() -> None:
+    table = campaign("F-11", TRUE["F-11"], 0.0, noise=0.1)
+    judged = judge([BY_ID["F-11"]], [table])[0]
+    assert judged.verdict is Verdict.CONTRADICTED
+    assert "Smaller than the margin" in judged.text
+
+
+def test_equal_drives_are_by_construction() -> None:
+    table = campaign("F-11", TRUE["F-11"], 0.0, noise=0.0)
+    same = table.with_columns(log_hash=pl.col("config") + pl.col("seed").cast(pl.String))
+    assert verdict("F-11", same) is Verdict.BY_CONSTRUCTION
+
+
+def study(speed: float, dropout: float) -> pl.DataFrame:
+    rng = np.random.default_rng(5)
+    return pl.DataFrame(
+        {
+            "target_kmh": float(v),
+            "dropout_injected": d,
+            "seed": seed,
+            "fatal_collisions": max(
+                round(5 + speed * (v - 100) / 20 + dropout * (d - 0.2) * 10 + rng.normal(0, 0.5)), 0
+            ),
+        }
+        for v, d, seed in product((60, 100, 150), (0.0, 0.2, 0.4), range(12))
+    )
+
+
+def test_speed_against_dropout() -> None:
+    f = [BY_ID["F-08"]]
+    assert judge(f, [study(2.0, 0.1)])[0].verdict is Verdict.SUPPORTED
+    assert judge(f, [study(0.0, 2.0)])[0].verdict is Verdict.CONTRADICTED
+    assert judge(f, [None])[0].verdict is Verdict.NOT_TESTABLE
+    assert len(f08(study(2.0, 0.1))) == 2
+
+
+def test_one_unequal_log_contradicts_independence_of_pace() -> None:
+    rows = [
+        {"variant": v, "seed": s, "log_hash": f"h{s}"}
+        for v in ("paced", "slowed")
+        for s in range(4)
+    ]
+    assert verdict("F-25", pl.DataFrame(rows)) is Verdict.SUPPORTED
+    rows[6]["log_hash"] = "other"
+    assert verdict("F-25", pl.DataFrame(rows)) is Verdict.CONTRADICTED
+    assert verdict("F-25", pl.DataFrame(rows[:4])) is Verdict.NOT_TESTABLE
+
+
+def test_crashed_runs_leave_the_comparison() -> None:
+    table = campaign("F-10", TRUE["F-10"], 1.0)
+    broken = table.with_columns(outcome=pl.lit("crashed"), lane_invasions=pl.lit(0))
+    both = pl.concat([table, broken.cast(table.schema)])
+    honest = judge([BY_ID["F-10"]], [table])[0].contrasts[0].mean
+    assert judge([BY_ID["F-10"]], [both])[0].contrasts[0].mean == honest
+
+
+def test_holm_makes_a_claim_harder_in_a_long_report() -> None:
+    def found(differences: list[float]) -> Finding:
+        return Finding(
+            id="X",
+            claim="",
+            estimand="",
+            needs="",
+            test="",
+            margin="",
+            contrasts=lambda _t: [paired("d", differences, 0.0)],
+        )
+
+    clear, noise = [1.0, 1.1] * 4, [1.0, -1.0, 1.0, -1.0]
+    table = pl.DataFrame({"seed": [1]})
+    assert judge([found(clear)], [table])[0].verdict is Verdict.SUPPORTED
+    family = [found(clear)] + [found(noise)] * 7
+    assert judge(family, [table] * 8)[0].verdict is Verdict.UNDECIDED
+
+
+def test_a_rate_is_bounded_exactly() -> None:
+    none = rate_below("r", 0, 40, 0.1)
+    assert none.p_claimed == pytest.approx(np.exp(-4.0))
+    many = rate_below("r", 20, 40, 0.1)
+    assert many.p_reversed < 1e-6
+    assert many.interval.high < 0.0
+
+
+def test_every_finding_is_written_out_before_results_are_seen() -> None:
+    headline = {1, 4, 5, 7, 8, 10, 11, 12, 13, 16, 17, 21, 25, 26}
+    assert {f.id for f in FINDINGS} == {f"F-{n:02}" for n in headline}
+    for f in FINDINGS:
+        assert all((f.claim, f.estimand, f.needs, f.test, f.margin)), f.id
+    assert {f.id for f in FINDINGS if f.study} == {"F-08", "F-17", "F-21", "F-25"}

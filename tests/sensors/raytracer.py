@@ -12,7 +12,7 @@ from skidpad.sensors.view import NEAR
 
 def triangles_of(suite, view, hidden=0):
     """(m, 3, 3) full-detail triangles in camera axes, and their keys with the instance."""
-    chunks, actors = suite.scene.chunks, suite._actors
+    chunks, actors = suite.scene.static.chunks, suite.scene.actors
     clusters = chunks.clusters
     corners, keys = [], []
     for c in range(len(chunks.radius)):
@@ -21,7 +21,7 @@ def triangles_of(suite, view, hidden=0):
             t0 = clusters.triangle_start[k]
             t = slice(t0, t0 + clusters.triangle_count[k])
             corners.append(clusters.vertices[clusters.triangles[t] + clusters.vertex_start[k]])
-            keys.append(suite._static_key[t])
+            keys.append(suite.scene.key[t])
     for n in range(len(actors.radius)):
         if n == hidden or not actors.present[n]:
             continue

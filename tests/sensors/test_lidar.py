@@ -18,15 +18,7 @@ SPEC = LidarSpec("l", Pose(0.0, 0.0, 2.4), channels=16, range=60.0, rotation_hz=
 def turn(table, states, spec=SPEC, tick=0):
     suite = PixelSuite(straight(400), table, [], Weather())
     suite.observe(tick, states, {})
-    return Lidar(spec, 0.05).measure(
-        tick,
-        states.pose(0),
-        suite.scene.chunks,
-        suite._static_key,
-        suite._actors,
-        0,
-        suite._scratch,
-    )
+    return Lidar(spec, 0.05).measure(tick, states.pose(0), suite.scene, 0)
 
 
 def test_the_road_lies_in_its_plane_all_around():

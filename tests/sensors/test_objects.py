@@ -12,6 +12,7 @@ from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.physics.optics import label_range, radar_range
 from skidpad.physics.presets import find_weather
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside
+from skidpad.sensors.beam import beam_of
 from skidpad.sensors.objects import ObjectSuite
 from skidpad.sensors.radar import Radar, aim
 
@@ -114,7 +115,7 @@ def test_rain_shortens_the_reach_of_the_radar():
 @pytest.mark.req("M-3")
 def test_both_levels_send_the_same_rays():
     """A wall of a vehicle across the whole field returns every ray."""
-    pixel = Radar(RADAR, 1, 0.05, inf)
+    pixel = Radar(RADAR, beam_of(RADAR, 1, 0.05), inf)
     view = pixel.view(Pose(0.0, 0.0))
     aim(pixel.beam, 7, view, pixel._rays)
     right = (pixel._rays.column - view.cx) / view.focal

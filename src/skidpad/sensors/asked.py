@@ -22,10 +22,8 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import RangeModel
 from skidpad.physics.optics import extinction
 from skidpad.sensors import inertial
-from skidpad.sensors.crowd import make_actors, place_actors
 from skidpad.sensors.lidar import Lidar
-from skidpad.sensors.projection import make_scratch
-from skidpad.sensors.suite import SceneMap, scene_of
+from skidpad.sensors.live_scene import LiveScene, SceneMap
 
 EGO = 0
 
@@ -60,7 +58,8 @@ class AskedSensors:
         self._map, self._table, self._dt = map, table, setup.dt
         self._origin = inertial.map_origin(map.geo_reference)
         self._lidar = lidar
-        self._scene: _Scene | None = None
+        self._scene: LiveScene | None = None  # for the first lidar that is read
+        self._placed = -1
         self.readers = {s.id: self._reader(s) for s in setup.specs if s.id in setup.asked}
 
     def read(
@@ -93,29 +92,11 @@ class AskedSensors:
 
     def _points(self, lidar: Lidar) -> LidarPoints:
         if self._scene is None:
-            self._scene = _Scene(self._map, self._table)
-        return self._scene.measure(lidar, self.tick, self.states)
-
-
-class _Scene:
-    """Map and actors for rays; built for the first lidar that is read."""
-
-    def __init__(self, map: SceneMap, table: ActorTable) -> None:
-        static = scene_of(map)
-        self.chunks, self.actors = static.chunks, make_actors(table)
-        largest = max(
-            int(static.chunks.clusters.vertex_count.max()), int(self.actors.vertex_count.max())
-        )
-        self.scratch = make_scratch(largest, 1)
-        self.placed = -1
-
-    def measure(self, lidar: Lidar, tick: int, states: ActorStates) -> LidarPoints:
-        """The returns of one lidar."""
-        if self.placed != tick:
-            place_actors(states, self.actors)
-            self.placed = tick
-        key, pose = self.chunks.key, states.pose(EGO)
-        return lidar.measure(tick, pose, self.chunks, key, self.actors, EGO, self.scratch)
+            self._scene = LiveScene(self._map, self._table)
+        if self._placed != self.tick:
+            self._scene.place(self.states, self._dt)
+            self._placed = self.tick
+        return lidar.measure(self.tick, self.states.pose(EGO), self._scene, EGO)
 
 
 class Readings(Mapping[str, Any]):

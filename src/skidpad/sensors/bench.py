@@ -99,7 +99,7 @@ def run(ticks: int = TICKS, weather: str = "rain-night") -> dict[str, float]:
 def _medians(
     suite: PixelSuite, frames: list[ActorStates], ids: Sequence[str], ticks: int
 ) -> dict[str, float]:
-    lights = dict.fromkeys(suite.scene.lamps.signal.tolist(), LightState.RED)
+    lights = dict.fromkeys(suite.scene.static.lamps.signal.tolist(), LightState.RED)
     times: dict[str, list[float]] = {"observe_and_radar": [], **{id: [] for id in ids}}
     for k in range(-2, ticks):
         state = frames[max(k, 0) % len(frames)]

@@ -11,61 +11,65 @@ from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
 from skidpad.core.specs import RadarSpec
-from skidpad.sensors.beam import Beam, beam_of, direction
-from skidpad.sensors.projection import Floats, Ints, Scratch
+from skidpad.sensors.beam import Beam, direction
+from skidpad.sensors.live_scene import LiveScene
+from skidpad.sensors.projection import Floats
 from skidpad.sensors.rasteriser import Actors
-from skidpad.sensors.rays import Hits, Rays, cast, make_hits, make_rays
-from skidpad.sensors.scene import Chunks
+from skidpad.sensors.rays import Hits, Rays, make_hits, make_rays
 from skidpad.sensors.view import View, world_to_camera
 
 CELLS = 16  # columns of cells over the horizontal field of view
+MOST_ROWS = 8 * CELLS  # of cells; a narrow and tall field of view has fewer columns
 
 
 class Radar:
-    """One radar with its own random stream; `measure` once per tick."""
+    """One radar; `measure` once per tick."""
 
-    def __init__(self, spec: RadarSpec, seed: int, dt: float, range_limit: float) -> None:
-        """range_limit: m, what the weather leaves of the nominal range."""
-        self.spec = spec
+    def __init__(self, spec: RadarSpec, beam: Beam, range_limit: float) -> None:
+        """beam: where its rays go. range_limit: m, what the weather leaves of the range."""
+        self.spec, self.beam = spec, beam
         self.range = min(spec.range, range_limit)
-        self.beam = beam_of(spec, seed, dt)
-        self._focal = CELLS / (2.0 * self.beam.half_width)
-        self._rows = max(1, ceil(2.0 * self.beam.half_height * self._focal))
-        self._rays: Rays = make_rays(self.beam.rays, CELLS, self._rows)
-        self._hits: Hits = make_hits(self.beam.rays)
-        self._points = np.empty((4, self.beam.rays), dtype=np.float32)
+        columns = min(float(CELLS), MOST_ROWS * beam.half_width / beam.half_height)
+        self._focal = columns / (2.0 * beam.half_width)
+        self._columns = max(1, ceil(columns))
+        self._rows = max(1, ceil(2.0 * beam.half_height * self._focal))
+        self._rays: Rays = make_rays(beam.rays, self._columns, self._rows)
+        self._hits: Hits = make_hits(beam.rays)
+        self._points = np.empty((4, beam.rays), dtype=np.float32)
 
-    def view(self, pose_world_ego: Pose) -> View:
+    def view(self, pose_world_carrier: Pose) -> View:
         """The pyramid that holds every ray."""
-        pose = pose_world_ego @ self.spec.mount
+        pose = pose_world_carrier @ self.spec.mount
         return View(
-            CELLS,
+            self._columns,
             self._rows,
             self._focal,
-            CELLS / 2.0,
+            self._columns / 2.0,
             self._rows / 2.0,
             world_to_camera(pose),
             np.array([pose.x, pose.y, pose.z]),
         )
 
     def measure(
-        self,
-        tick: int,
-        pose_world_ego: Pose,
-        motion: Floats,
-        chunks: Chunks,
-        static_key: Ints,
-        actors: Actors,
-        scratch: Scratch,
+        self, tick: int, pose_world_carrier: Pose, scene: LiveScene, carrier: int
     ) -> RadarPoints:
-        """The returns of one tick. motion: (n, 4) vx, vy, vz in m/s and yaw rate of the actors.
+        """The returns of one tick. carrier: row of the actor that carries it unseen, or -1.
 
         The arrays stay valid until the next call.
         """
-        view = self.view(pose_world_ego)
+        view = self.view(pose_world_carrier)
         aim(self.beam, tick, view, self._rays)
-        cast(chunks, static_key, actors, 0, view, self.range, scratch, self._rays, self._hits)
-        count = _returns(view, self._rays, self._hits, self.range, motion, actors, self._points)
+        scene.cast(view, carrier, self.range, self._rays, self._hits)
+        count = _returns(
+            view,
+            self._rays,
+            self._hits,
+            self.range,
+            carrier,
+            scene.motion,
+            scene.actors,
+            self._points,
+        )
         return RadarPoints(*(row[:count] for row in self._points))
 
 
@@ -84,6 +88,7 @@ def _returns(
     rays: Rays,
     hits: Hits,
     max_range: float,
+    carrier: int,
     motion: Floats,
     actors: Actors,
     out: NDArray[np.float32],
@@ -91,9 +96,12 @@ def _returns(
     """Write range, azimuth, altitude and range rate of all returns; say how many."""
     r = view.rotation
     count = 0
-    arm = view.centre - actors.position[0]
-    antenna_x = motion[0, 0] - motion[0, 3] * arm[1]
-    antenna_y = motion[0, 1] + motion[0, 3] * arm[0]
+    antenna_x = antenna_y = antenna_z = 0.0
+    if carrier >= 0:
+        own = motion[carrier]
+        antenna_x = own[0] - own[3] * (view.centre[1] - actors.position[carrier, 1])
+        antenna_y = own[1] + own[3] * (view.centre[0] - actors.position[carrier, 0])
+        antenna_z = own[2]
     for i in range(rays.column.size):
         if hits.inverse[i] <= 0.0:
             continue
@@ -106,7 +114,7 @@ def _returns(
         dx = (r[0, 0] * u + r[1, 0] * v + r[2, 0]) / stretch
         dy = (r[0, 1] * u + r[1, 1] * v + r[2, 1]) / stretch
         dz = (r[0, 2] * u + r[1, 2] * v + r[2, 2]) / stretch
-        vx, vy, vz = -antenna_x, -antenna_y, -motion[0, 2]
+        vx, vy, vz = -antenna_x, -antenna_y, -antenna_z
         n = (hits.key[i] >> 16) - 1
         if n >= 0:
             px = view.centre[0] + distance * dx - actors.position[n, 0]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,31 +17,19 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, RangeModel
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import depth_range, label_range, radar_range
-from skidpad.roads.lanes import LaneSamples, LaneTable
-from skidpad.roads.roadside import Roadside
-from skidpad.sensors.crowd import make_actors, place_actors
+from skidpad.sensors.beam import beam_of
 from skidpad.sensors.degradation import CameraNoise, degradation
 from skidpad.sensors.lighting import lighting
+from skidpad.sensors.live_scene import LiveScene, SceneMap
 from skidpad.sensors.passes import NOTHING, UNLIMITED, Pass, Sight, poison
 from skidpad.sensors.perception_noise import PerceptionNoise
-from skidpad.sensors.projection import make_scratch
 from skidpad.sensors.radar import Radar
-from skidpad.sensors.rasteriser import AUTO_LEVEL, raster
-from skidpad.sensors.scene import StaticScene, build_scene
+from skidpad.sensors.rasteriser import AUTO_LEVEL
 from skidpad.sensors.shading import Shading
 from skidpad.sensors.view import View, camera_view
 
+EGO = 0
 NO_NOISE = PerceptionNoise()
-MAX_CLIMB = 8.0  # m/s; a faster change of height is a relocation, not motion
-
-
-class SceneMap(Protocol):
-    """What the sensors read of a road map."""
-
-    content_hash: str
-    samples: LaneSamples
-    lanes: LaneTable
-    roadside: Roadside
 
 
 class Observation(NamedTuple):
@@ -49,21 +37,6 @@ class Observation(NamedTuple):
 
     images: Mapping[str, CameraImage]  # by sensor id, rendered when first read
     radar: RadarPoints
-
-
-_SCENES: dict[str, StaticScene] = {}
-KEPT_SCENES = 4
-
-
-def scene_of(map: SceneMap) -> StaticScene:
-    """The triangulated map; the last few maps of a process are kept."""
-    scene = _SCENES.pop(map.content_hash, None)
-    if scene is None:
-        scene = build_scene(map.samples, map.lanes, map.roadside)
-        while len(_SCENES) >= KEPT_SCENES:
-            _SCENES.pop(next(iter(_SCENES)))
-    _SCENES[map.content_hash] = scene
-    return scene
 
 
 class PixelSuite:
@@ -97,20 +70,14 @@ class PixelSuite:
         stage off (D-094). level: one level of detail for all (tests). poison_old: spoil buffers
         that went stale (tests).
         """
-        self.scene = scene_of(map)
         self.cameras = {s.id: s for s in specs if isinstance(s, CameraSpec)}
         self._render_all, self._level, self._poison_old = render_all, level, poison_old
         self._dt, self._seed, self._noise = dt, seed, perception_noise
         limited = range_model is RangeModel.PHYSICAL
         sight = Sight(depth_range(weather), label_range(weather)) if limited else UNLIMITED
-        self._actors = make_actors(table)
-        self._static_key = self.scene.chunks.key.copy()
-        largest = max(
-            int(self.scene.chunks.clusters.vertex_count.max()), int(self._actors.vertex_count.max())
-        )
         widest = max((c.width for c in self.cameras.values()), default=1)
-        self._scratch = make_scratch(largest, widest)
-        self.shading = Shading(self.scene.palette, table, lighting(weather))
+        self.scene = LiveScene(map, table, widest)
+        self.shading = Shading(self.scene.static.palette, table, lighting(weather))
         self._passes: dict[tuple[object, Sight], Pass] = {}
         self._pass_of: dict[str, Pass] = {}
         for camera in self.cameras.values():
@@ -127,12 +94,10 @@ class PixelSuite:
             {id: CameraNoise(id, seed, effect) for id in self._rgb} if camera_effect else {}
         )
         self.radars = [
-            Radar(s, seed, dt, radar_range(weather, s.range) if limited else s.range)
+            Radar(s, beam_of(s, seed, dt), radar_range(weather, s.range) if limited else s.range)
             for s in specs
             if isinstance(s, RadarSpec)
         ]
-        self._motion = np.zeros((len(table), 4))
-        self._height = np.full(len(table), np.nan)
         self._ego = Pose(0.0, 0.0)
         self.tick = -1
 
@@ -145,10 +110,9 @@ class PixelSuite:
     ) -> Observation:
         """What the sensors see of this state. braking: (n,) whose brake lamps are lit."""
         self.tick = tick
-        place_actors(states, self._actors)
-        self._ego = states.pose(0)
-        self._move(states)
-        self._static_key[self.scene.lamps.triangle] = self.scene.lamp_keys(lights)
+        self._ego = states.pose(EGO)
+        self.scene.place(states, self._dt)
+        self.scene.show(lights)
         if braking is not None:
             self.shading.set_braking(braking)
         for one in self._passes.values():
@@ -187,18 +151,7 @@ class PixelSuite:
         if not missing:
             return
         view = view._replace(top=missing.start, height=missing.stop)
-        hidden = -1 if camera.shows_own_body else 0
-        raster(
-            self.scene.chunks,
-            self._static_key,
-            self._actors,
-            hidden,
-            view,
-            self._level,
-            self._scratch,
-            one.inverse,
-            one.key,
-        )
+        self.scene.draw(view, -1 if camera.shows_own_body else EGO, self._level, one)
         one.limit_sight(view)
         one.drawn = missing
 
@@ -219,26 +172,10 @@ class PixelSuite:
             if (rgb := self.render(id).rgb) is not None
         }
 
-    def _move(self, states: ActorStates) -> None:
-        """Velocities and yaw rates; the vertical one from the change of height in a tick."""
-        climb = (states.z - self._height) / self._dt
-        self._height[:] = states.z
-        self._motion[:, 0], self._motion[:, 1] = states.vx, states.vy
-        self._motion[:, 2] = np.where(np.abs(climb) < MAX_CLIMB, climb, 0.0)
-        self._motion[:, 3] = states.yaw_rate
-
     def _measure(self, tick: int) -> RadarPoints:
         if not self.radars:
             return RadarPoints.none()
-        return self.radars[0].measure(
-            tick,
-            self._ego,
-            self._motion,
-            self.scene.chunks,
-            self._static_key,
-            self._actors,
-            self._scratch,
-        )
+        return self.radars[0].measure(tick, self._ego, self.scene, EGO)
 
 
 class LazyImages(PartialImages):

@@ -18,7 +18,7 @@ from skidpad.core.lefthanded import pose_from_carla, pose_to_carla
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import SensorLevel
-from skidpad.sensors.rays import cast, make_hits, make_rays
+from skidpad.sensors.rays import make_hits, make_rays
 from skidpad.simulation.carla.backend import CarlaBackend
 from skidpad.simulation.carla.options import CarlaOptions
 from skidpad.simulation.embedded.engine import EmbeddedBackend
@@ -105,10 +105,7 @@ def recast(ours: EmbeddedBackend, points: RadarPoints) -> tuple[np.ndarray, np.n
     v = np.array([-tan(e) for e in points.altitude]) * np.sqrt(u * u + 1.0)
     rays, hits = make_rays(len(u), view.width, view.height), make_hits(len(u))
     rays.column[:], rays.row[:] = view.cx + view.focal * u, view.cy + view.focal * v
-    cast(
-        suite.scene.chunks, suite._static_key, suite._actors, 0, view, 150.0, suite._scratch,
-        rays, hits,
-    )  # fmt: skip
+    suite.scene.cast(view, 0, 150.0, rays, hits)
     stretch = np.sqrt(u * u + v * v + 1.0)
     with np.errstate(divide="ignore"):
         distance = stretch / hits.inverse

@@ -13,7 +13,7 @@ import numpy as np
 
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import GripModel
-from skidpad.sensors.suite import scene_of
+from skidpad.sensors.live_scene import scene_of
 from skidpad.simulation.carla_server import moving, snapshot, wire
 from skidpad.simulation.carla_server.actors import Actor, ActorTable, Attachment
 from skidpad.simulation.carla_server.catalogue import (

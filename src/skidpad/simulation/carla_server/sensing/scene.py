@@ -15,9 +15,9 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.weather import Weather
 from skidpad.sensors.crowd import make_actors, place_actors
 from skidpad.sensors.lighting import lighting
+from skidpad.sensors.live_scene import scene_of
 from skidpad.sensors.projection import make_scratch
 from skidpad.sensors.shading import Shading
-from skidpad.sensors.suite import scene_of
 from skidpad.simulation.carla_server.actors import Actor
 from skidpad.simulation.carla_server.catalogue import Family
 

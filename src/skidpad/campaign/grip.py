@@ -14,9 +14,10 @@ import yaml
 
 from skidpad import __version__
 from skidpad.campaign.grip_cells import GripCell, identity
-from skidpad.campaign.matrix import CONFIG, ERROR, FAILURES, RUNS
+from skidpad.campaign.matrix import CONFIG, ERROR, FAILURES
 from skidpad.campaign.pool import Finished, Job, run_jobs
 from skidpad.core.vocabulary import Outcome
+from skidpad.recording.campaigns import RUNS
 from skidpad.recording.files import write_bytes
 from skidpad.recording.fingerprint import fingerprint
 from skidpad.recording.grip import (

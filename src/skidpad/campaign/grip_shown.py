@@ -9,11 +9,11 @@ import polars as pl
 
 from skidpad.campaign.grip import TARGET, Runner, Task
 from skidpad.campaign.grip_cells import GripCell
-from skidpad.campaign.matrix import RUNS
 from skidpad.campaign.pool import Job
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.stopping import SPEEDS_KMH, grip_rows
+from skidpad.recording.campaigns import RUNS
 from skidpad.recording.files import write_parquet
 from skidpad.recording.logfiles import TICKS
 from skidpad.recording.results import read_results

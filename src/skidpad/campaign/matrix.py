@@ -18,13 +18,14 @@ from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import LeadDefinition, MetricSettings
+from skidpad.recording.campaigns import RUNS
 from skidpad.recording.files import write_bytes
 from skidpad.recording.fingerprint import fingerprint
 from skidpad.recording.ledger import Entry, Ledger, fingerprints, latest
 from skidpad.recording.results import Metrics, RunKey, Timing, write_results
 from skidpad.stack.settings import LaneTruth
 
-RUNS, CONFIG, ERROR = "runs", "config.yaml", "error.txt"
+CONFIG, ERROR = "config.yaml", "error.txt"
 FAILURES = {"crashed": Outcome.CRASHED, "timeout": Outcome.TIMEOUT}
 TIMES_OF_DAY = ("sunrise", "noon", "night")
 

@@ -9,18 +9,18 @@ from PIL import Image
 
 from skidpad.core.frames import SensorFrame
 from skidpad.core.states import StackReport, WorldTruth
+from skidpad.recording.campaigns import SNAPSHOTS
 from skidpad.recording.files import output_error
 
 FRONT, TOP = "rgb_front", "rgb_top"
 MARGIN = 12  # px
-FOLDER = "snapshots"
 
 
 class Snapshots:
     """Writes PNG files named by configuration, weather and time; without a folder it does nothing."""
 
     def __init__(self, folder: Path | None, driver: str, weather: str, dt: float) -> None:
-        self.folder = None if folder is None else folder / FOLDER
+        self.folder = None if folder is None else folder / SNAPSHOTS
         name = "".join(c if c.isalnum() else "-" for c in driver)
         self.stem, self.dt = f"{name}_{weather}", dt
         self.paths: list[Path] = []

@@ -12,6 +12,7 @@ from PIL import Image as Picture
 from skidpad.core.vocabulary import DetectionStatus, Tier
 from skidpad.evidence.drive.collisions import Crash, CrashKind, Sighting, Striker
 from skidpad.evidence.drive.prepared import Drive
+from skidpad.recording.campaigns import snapshot
 from skidpad.report.page import Card, Image
 from skidpad.report.replay import replay
 from skidpad.roads.queries import RoadMap
@@ -19,7 +20,6 @@ from skidpad.roads.queries import RoadMap
 PICTURE_WIDTH = 480  # px
 PICTURE_BYTES = 60_000  # decision M-17
 QUALITIES = (80, 65, 50, 35, 20)
-SNAPSHOTS = "snapshots"
 TIERS = {
     Tier.NONE: "no rule acted",
     Tier.HARD_STOP: "hard stop",
@@ -131,8 +131,10 @@ def _sighting(s: Sighting) -> str:
 
 def pictures(run: Path, t: float) -> list[Image]:
     """The snapshot of that moment, if there is one, small enough to travel inside the page."""
-    found = sorted((run / SNAPSHOTS).glob(f"*_{t:07.2f}s.png"))
-    return [Image(webp_uri(p), "front camera at the contact, top view inset") for p in found[:1]]
+    found = snapshot(run, t)
+    if found is None:
+        return []
+    return [Image(webp_uri(found), "front camera at the contact, top view inset")]
 
 
 def webp_uri(path: Path) -> str:

@@ -5,15 +5,19 @@ from __future__ import annotations
 import hashlib
 import io
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
+from numpy.typing import NDArray
 
+Floats = NDArray[np.float64]
+INK, FRAME = "#1c2530", "#8996a3"
 PALETTE = ("#2b6cb0", "#d9541e", "#1f7a4d", "#8a5fb0", "#b8860b", "#5b6875", "#c2458a", "#2a9d8f")
 STYLE: dict[Any, Any] = {
     "svg.hashsalt": "skidpad",  # the same data give the same bytes
@@ -27,7 +31,7 @@ STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
     "grid.color": "#e3e8ed",
     "grid.linewidth": 0.7,
-    "axes.edgecolor": "#8996a3",
+    "axes.edgecolor": FRAME,
     "legend.frameon": False,
 }
 
@@ -45,12 +49,13 @@ class Series:
 
 @contextmanager
 def canvas(
-    width: float = 8.4, height: float = 3.4, columns: int = 1
+    width: float = 8.4, height: float = 3.4, columns: int = 1, rows: int = 1
 ) -> Iterator[tuple[Canvas, list[Axes]]]:
     """A figure with axes in the house style, in inches."""
     with mpl.rc_context(STYLE):
         figure = Canvas(figsize=(width, height), layout="constrained")
-        yield figure, [figure.add_subplot(1, columns, k + 1) for k in range(columns)]
+        axes = figure.subplots(rows, columns, sharex="col", squeeze=False)
+        yield figure, list(axes.ravel())
 
 
 def svg_of(figure: Canvas) -> str:
@@ -105,7 +110,7 @@ def draw_bars(axes: Axes, groups: Sequence[str], series: Sequence[Series], y_lab
         if one.low:
             for xi, v, lo, hi in zip(x, one.values, one.low, one.high, strict=True):
                 if v is not None and lo is not None and hi is not None:
-                    axes.plot([xi, xi], [lo, hi], color="#1c2530", linewidth=1.0)
+                    axes.plot([xi, xi], [lo, hi], color=INK, linewidth=1.0)
         known = [(xi, v) for xi, v in zip(x, one.published, strict=False) if v is not None]
         if known:
             axes.plot(
@@ -113,7 +118,7 @@ def draw_bars(axes: Axes, groups: Sequence[str], series: Sequence[Series], y_lab
                 "D",
                 markersize=4.5,
                 markerfacecolor="white",
-                markeredgecolor="#1c2530",
+                markeredgecolor=INK,
                 linestyle="none",
                 label=None if named else "published",
             )
@@ -122,28 +127,6 @@ def draw_bars(axes: Axes, groups: Sequence[str], series: Sequence[Series], y_lab
     axes.set_ylabel(y_label)
     axes.set_ylim(bottom=0.0)
     axes.grid(axis="x", visible=False)
-
-
-def scatter(
-    points: Sequence[tuple[str, Sequence[float], Sequence[float]]], x_label: str, y_label: str
-) -> str:
-    """Clouds of points: (name, x, y) each."""
-    with canvas(height=3.6) as (figure, (axes,)):
-        for k, (name, x, y) in enumerate(points):
-            axes.plot(
-                x,
-                y,
-                "o",
-                color=PALETTE[k % len(PALETTE)],
-                alpha=0.75,
-                markersize=5,
-                label=name,
-                linestyle="none",
-            )
-        axes.set_xlabel(x_label)
-        axes.set_ylabel(y_label)
-        figure.legend(loc="outside upper center", ncols=6)
-        return svg_of(figure)
 
 
 def panel(groups: Sequence[str], charts: Sequence[tuple[str, Series]]) -> str:
@@ -155,15 +138,78 @@ def panel(groups: Sequence[str], charts: Sequence[tuple[str, Series]]) -> str:
         return svg_of(figure)
 
 
-def lines(
-    series: Sequence[tuple[str, Sequence[float], Sequence[float]]], x_label: str, y_label: str
+@dataclass(frozen=True, slots=True)
+class Curve:
+    """A line or a cloud of points; curves of one name share their entry in the legend."""
+
+    name: str
+    x: Sequence[float] | Floats
+    y: Sequence[float] | Floats
+    colour: int | None = None  # of the palette; None: by its place in the chart
+    band: tuple[Floats, Floats] | None = None  # shaded, low and high
+    style: Mapping[str, Any] = field(default_factory=dict)  # as for the library
+
+
+@dataclass(frozen=True, slots=True)
+class Chart:
+    """Curves in one pair of axes."""
+
+    curves: Sequence[Curve]
+    x_label: str
+    y_label: str
+    title: str = ""
+    log: bool = False
+    y_range: tuple[float, float] | None = None
+    rules: Sequence[float] = ()  # horizontal dashes at these heights
+
+
+POINTS = {"marker": "o", "linestyle": "none", "alpha": 0.75, "markersize": 5}
+
+
+def curves(
+    charts: Sequence[Chart], width: float = 8.4, height: float = 3.4, stacked: bool = False
 ) -> str:
-    """Curves: (name, x, y) each."""
-    with canvas() as (figure, (axes,)):
-        for k, (name, x, y) in enumerate(series):
-            axes.plot(x, y, color=PALETTE[k % len(PALETTE)], linewidth=1.6, label=name)
-        axes.set_xlabel(x_label)
-        axes.set_ylabel(y_label)
-        if len(series) > 1:
+    """Charts beside or above each other, under one legend where there are several names."""
+    rows, columns = (len(charts), 1) if stacked else (1, len(charts))
+    named: set[str] = set()
+    with canvas(width, height, columns, rows) as (figure, all_axes):
+        for axes, chart in zip(all_axes, charts, strict=True):
+            _draw_curves(axes, chart, named)
+            axes.set_ylabel(chart.y_label)
+            if not stacked or axes is all_axes[-1]:
+                axes.set_xlabel(chart.x_label)
+        if len(named) > 1:
             figure.legend(loc="outside upper center", ncols=6)
         return svg_of(figure)
+
+
+def _draw_curves(axes: Axes, chart: Chart, named: set[str]) -> None:
+    for k, curve in enumerate(chart.curves):
+        colour = PALETTE[(k if curve.colour is None else curve.colour) % len(PALETTE)]
+        if curve.band is not None:
+            axes.fill_between(curve.x, *curve.band, color=colour, alpha=0.15, linewidth=0)
+        style = {"linewidth": 1.5, "color": colour, **curve.style}
+        axes.plot(curve.x, curve.y, label=None if curve.name in named else curve.name, **style)
+        named.add(curve.name)
+    for height in chart.rules:
+        axes.axhline(height, color=FRAME, linewidth=0.6, linestyle=(0, (6, 6)))
+    if chart.title:
+        axes.set_title(chart.title, fontsize=9.5, loc="left")
+    if chart.log:
+        axes.set_yscale("log")
+    if chart.y_range:
+        axes.set_ylim(*chart.y_range)
+
+
+Named = tuple[str, Sequence[float], Sequence[float]]  # name, x, y
+
+
+def scatter(points: Sequence[Named], x_label: str, y_label: str) -> str:
+    """Clouds of points."""
+    clouds = [Curve(*one, style=POINTS) for one in points]
+    return curves([Chart(clouds, x_label, y_label)], height=3.6)
+
+
+def lines(series: Sequence[Named], x_label: str, y_label: str) -> str:
+    """Curves in one chart."""
+    return curves([Chart([Curve(*one) for one in series], x_label, y_label)])

@@ -4,34 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import msgspec
-import numpy as np
-import polars as pl
-
-from skidpad import __version__
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS
 from skidpad.evidence.verdicts import judge
-from skidpad.recording.files import read_parquet
-from skidpad.recording.ledger import CAMPAIGN, fingerprints, latest, read_ledger
-from skidpad.recording.results import TIMING, definitions, results_hash
+from skidpad.recording.results import results_hash
 from skidpad.report import matrix_figures, matrix_tables
 from skidpad.report.crashes import crash_sections
-from skidpad.report.matrix_data import FAILED, Matrix, load_matrix
-from skidpad.report.page import (
-    Block,
-    Code,
-    Definitions,
-    Number,
-    Numbers,
-    Page,
-    Section,
-    Text,
-    write_page,
-)
+from skidpad.report.matrix_data import Matrix, load_matrix
+from skidpad.report.page import Block, Number, Numbers, Page, Section, Text, write_report_page
 from skidpad.report.verdicts import verdict_blocks
 
-REPORT = "report.html"
 LEAD = """Each row below is a set of driving functions, each column a weather. A cell was driven with \
 every seed; seeds are common to all cells, so differences between cells are paired. A fatal collision \
 is a contact that started the recovery supervisor, or a wrong-way correction.
@@ -44,15 +26,11 @@ tuned to meet them."""
 
 def write_report(folder: Path) -> Path:
     """Write report.html into a campaign's folder; returns its path."""
-    matrix = load_matrix(folder)
-    path = folder / REPORT
-    write_page(build_page(matrix, folder), path)
-    return path
+    return write_report_page(build_page(load_matrix(folder)), folder)
 
 
-def build_page(matrix: Matrix, folder: Path) -> Page:
+def build_page(matrix: Matrix) -> Page:
     """All sections in the order in which a reader asks."""
-    crashes = crash_sections(matrix, folder)
     sections = [
         Section("What happened", [*_warnings(matrix), _headline(matrix), Text(LEAD)]),
         Section("Collisions", matrix_tables.collisions(matrix) + matrix_figures.collisions(matrix)),
@@ -62,46 +40,27 @@ def build_page(matrix: Matrix, folder: Path) -> Page:
             matrix_tables.others(matrix) + matrix_figures.others(matrix),
         ),
         Section("One step at a time", matrix_tables.pairs(matrix)),
-        Section("Every crash", crashes),
+        Section("Every crash", crash_sections(matrix)),
         Section("All metrics", matrix_tables.per_weather(matrix)),
-        Section("Definitions", [_definitions()]),
-        Section("Configuration and versions", _provenance(matrix, folder)),
+        Section("Definitions", [matrix.definitions()]),
+        Section("Configuration and versions", _provenance(matrix)),
     ]
     return Page(
         title="Driver assistance in weather",
         subtitle=matrix.subtitle,
         facts=matrix.facts(),
-        sections=[s for s in sections if s.blocks],
+        sections=sections,
     )
 
 
 def _warnings(matrix: Matrix) -> list[Block]:
-    blocks: list[Block] = []
-    failed = matrix.results.filter(pl.col("outcome").is_in(FAILED))
-    if len(failed):
-        names = ", ".join(
-            f"{c} in {w}, seed {s}"
-            for c, w, s in failed.select("config", "weather", "seed").head(5).iter_rows()
-        )
-        blocks.append(
-            Text(
-                f"{len(failed)} of {len(matrix.results)} runs did not finish ({names}); "
-                "they are in no denominator.",
-                tone="warning",
-            )
-        )
-    if matrix.same_weather:
-        pairs = "; ".join(
-            f"configuration {c}: {' = '.join(group)}" for c, group in matrix.same_weather
-        )
-        blocks.append(
-            Text(
-                f"Identical drives, because weather cannot act here ({pairs}). "
-                "They count once in totals.",
-                tone="warning",
-            )
-        )
-    return blocks
+    if not matrix.same_weather:
+        return matrix.missing()
+    pairs = "; ".join(f"configuration {c}: {' = '.join(group)}" for c, group in matrix.same_weather)
+    text = (
+        f"Identical drives, because weather cannot act here ({pairs}). They count once in totals."
+    )
+    return [*matrix.missing(), Text(text, tone="warning")]
 
 
 def _headline(matrix: Matrix) -> Numbers:
@@ -151,39 +110,8 @@ def _verdicts(matrix: Matrix) -> list[Block]:
     return [intro, *verdict_blocks(judged)]
 
 
-def _definitions() -> Definitions:
-    return Definitions(
-        [(name, _unit(name), f"{meaning} ({source})") for name, meaning, source in definitions()]
+def _provenance(matrix: Matrix) -> list[Block]:
+    first = matrix.folder.identity.get("cells", [{}])[0]
+    return matrix.provenance(
+        results_hash(matrix.results), "Resolved configuration of the first cell", first
     )
-
-
-UNITS = {"_m": "m", "_m2": "m²", "_s": "s", "_kmh": "km/h", "_km": "km", "_pct": "%"}
-
-
-def _unit(name: str) -> str:
-    return next((unit for end, unit in UNITS.items() if name.endswith(end)), "")
-
-
-def _provenance(matrix: Matrix, folder: Path) -> list[Block]:
-    timing, _ = read_parquet(folder / TIMING)
-    timing = timing.filter(pl.col("rtf") > 0.0)
-    prints = fingerprints(latest(read_ledger(folder)))
-    lines = [
-        f"Skidpad {__version__}, results hash {results_hash(matrix.results)}.",
-        f"Machine fingerprints: {', '.join(sorted(prints)) or 'none'}.",
-    ]
-    if len(timing):
-        wall, rtf = timing["wall_s"].to_numpy(), timing["rtf"].to_numpy()
-        lines.append(
-            f"Wall time per run: median {np.median(wall):.1f} s; real-time factor: median "
-            f"{np.median(rtf):.1f}, least {rtf.min():.1f}."
-        )
-    campaign = (folder / CAMPAIGN).read_bytes() if (folder / CAMPAIGN).exists() else b"{}"
-    first = msgspec.json.decode(campaign).get("cells", [{}])[0]
-    return [
-        Text(" ".join(lines)),
-        Code(
-            "Resolved configuration of the first cell",
-            msgspec.json.format(msgspec.json.encode(first).decode(), indent=2),
-        ),
-    ]

@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 
 import polars as pl
 
-from skidpad.core.errors import FileError
-from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.statistics import Rate, event_rate
-from skidpad.recording.results import read_results
+from skidpad.recording.campaigns import CampaignFolder
+from skidpad.recording.ledger import Entry
+from skidpad.recording.results import Metrics
+from skidpad.report.campaign import CampaignView
 from skidpad.report.published import Source, published, published_matrix
 
-PublishedCell = dict[str, float | None]
-
-FAILED = [Outcome.AGENT_ERROR.value, Outcome.CRASHED.value, Outcome.TIMEOUT.value]
 CONFIGS = {
     "0": "0 · baseline, no ADAS",
     "1": "1 · ACC",
@@ -36,27 +33,22 @@ WEATHERS = {
 
 
 @dataclass(frozen=True)
-class Matrix:
-    """A campaign's results."""
+class Matrix(CampaignView[Entry]):
+    """A campaign over configurations and weathers."""
 
-    results: pl.DataFrame
-
-    @cached_property
-    def finished(self) -> pl.DataFrame:
-        """Runs that count in denominators (decision L-7)."""
-        return self.results.filter(~pl.col("outcome").is_in(FAILED))
+    metrics = Metrics
+    run_key = ("config", "weather", "seed")
+    common = ("profile", "grip", "range", "version")
 
     @cached_property
     def configs(self) -> list[str]:
         """Drivers, published ones first."""
-        there = self.results["config"].unique().to_list()
-        return [c for c in CONFIGS if c in there] + sorted(c for c in there if c not in CONFIGS)
+        return _known_first(self.results["config"], CONFIGS)
 
     @cached_property
     def weathers(self) -> list[str]:
         """Weathers, published ones first."""
-        there = self.results["weather"].unique().to_list()
-        return [w for w in WEATHERS if w in there] + sorted(w for w in there if w not in WEATHERS)
+        return _known_first(self.results["weather"], WEATHERS)
 
     @cached_property
     def same_weather(self) -> list[tuple[str, list[str]]]:
@@ -97,40 +89,29 @@ class Matrix:
     @cached_property
     def duration(self) -> float:
         """Simulated seconds of the longest run."""
-        seconds = self.finished["duration_s"].drop_nulls().to_list()
-        return max(seconds, default=0.0)
+        return max(self.finished["duration_s"].drop_nulls().to_list(), default=0.0)
 
     @property
     def subtitle(self) -> str:
         """One sentence: what was driven."""
-        r = self.results
-        levels = " and ".join(sorted(r["sensors"].unique().to_list()))
+        levels = " and ".join(sorted(self.results["sensors"].unique().to_list()))
         return (
             f"{len(self.configs)} configurations in {len(self.weathers)} weathers, "
-            f"{r['seed'].n_unique()} runs per cell, on {', '.join(sorted(r['map'].unique().to_list()))}, "
+            f"{self.results['seed'].n_unique()} runs per cell, on {self.values('map')}, "
             f"sensors as {levels}."
         )
 
-    def facts(self) -> list[tuple[str, str]]:
-        """What all runs have in common."""
-        r = self.results
-        return [
-            (name, ", ".join(sorted(map(str, r[column].unique().to_list()))))
-            for name, column in (
-                ("profile", "profile"),
-                ("grip", "grip"),
-                ("range", "range"),
-                ("version", "version"),
-            )
-        ]
-
 
 def load_matrix(folder: Path) -> Matrix:
-    """The results in a campaign's folder; FileError when there are none."""
-    results = read_results(folder)
-    if not len(results):
-        raise FileError(f"{folder} holds no finished run yet")
-    return Matrix(results)
+    """The campaign in a folder; FileError when it holds no results."""
+    found = Matrix(CampaignFolder(folder, Entry))
+    assert len(found.results)
+    return found
+
+
+def _known_first(values: pl.Series, known: dict[str, str]) -> list[str]:
+    there = values.unique().to_list()
+    return [v for v in known if v in there] + sorted(v for v in there if v not in known)
 
 
 def config_title(config: str) -> str:
@@ -143,15 +124,15 @@ def weather_title(weather: str) -> str:
     return WEATHERS.get(weather, weather)
 
 
-def groups_of(names: Sequence[str]) -> list[str]:
-    """Short labels for axes."""
-    return [n.replace("-", "\n", 1) for n in names]
-
-
 @cache
-def published_cells() -> dict[tuple[str, str], PublishedCell]:
+def published_cells() -> dict[tuple[str, str], dict[str, float | None]]:
     """The published value of each column, by configuration and weather."""
     return {(row["config"], row["weather"]): row for row in published_matrix().to_dicts()}
+
+
+def published_value(column: str, config: str, weather: str) -> float | None:
+    """The published value of one cell; None where there is none."""
+    return published_cells().get((config, weather), {}).get(column)
 
 
 PRELIMINARY = (
@@ -165,11 +146,5 @@ PRELIMINARY = (
 
 def published_preliminary() -> list[tuple[str, float, float]]:
     """(quantity, preliminary, final) as means over the runs that both published scripts share."""
-    table = published(Source.PRELIMINARY)
-    return [
-        (label, _mean(table, before), _mean(table, after)) for label, before, after in PRELIMINARY
-    ]
-
-
-def _mean(table: pl.DataFrame, column: str) -> float:
-    return float(table[column].mean())  # type: ignore[arg-type]
+    means = published(Source.PRELIMINARY).select(pl.selectors.numeric().mean()).row(0, named=True)
+    return [(label, means[before], means[after]) for label, before, after in PRELIMINARY]

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from skidpad.evidence.statistics import Rate
 from skidpad.report.figures import Series, grouped_bars, panel, scatter
-from skidpad.report.matrix_data import Matrix, groups_of, published_cells, published_preliminary
+from skidpad.report.matrix_data import WEATHERS, Matrix, published_preliminary, published_value
 from skidpad.report.page import Block, Figure
 
 PANEL = (
@@ -19,38 +20,24 @@ PANEL = (
 
 def collisions(matrix: Matrix) -> list[Block]:
     """By weather and configuration, and by configuration."""
-    said = published_cells()
+    column, label = "fatal_collisions", "fatal collisions per run"
     by_weather = [
-        _rates(
-            matrix,
-            c,
-            [
-                said[c, w].get("fatal_collisions") if (c, w) in said else None
-                for w in matrix.weathers
-            ],
-        )
+        _rates(c, [matrix.rate(column, c, w) for w in matrix.weathers], _said(matrix, c, column))
         for c in matrix.configs
     ]
-    totals = [matrix.rate("fatal_collisions", c) for c in matrix.configs]
-    published = [
-        _mean([p.get("fatal_collisions") for (c, _), p in said.items() if c == config])
-        for config in matrix.configs
-    ]
-    total = Series(
+    total = _rates(
         "all weathers",
-        [r.rate if r else None for r in totals],
-        [r.interval.low if r else None for r in totals],
-        [r.interval.high if r else None for r in totals],
-        published,
+        [matrix.rate(column, c) for c in matrix.configs],
+        [_mean([published_value(column, c, w) for w in WEATHERS]) for c in matrix.configs],
     )
     return [
         Figure(
-            grouped_bars(groups_of(matrix.weathers), by_weather, "fatal collisions per run"),
+            grouped_bars(_groups(matrix), by_weather, label),
             "Fatal collisions per run by weather and configuration; lines are 95 % intervals, "
             "diamonds the published counts.",
         ),
         Figure(
-            grouped_bars(matrix.configs, [total], "fatal collisions per run"),
+            grouped_bars(matrix.configs, [total], label),
             "The same over all weathers, every drive once.",
         ),
     ]
@@ -58,68 +45,44 @@ def collisions(matrix: Matrix) -> list[Block]:
 
 def others(matrix: Matrix) -> list[Block]:
     """Dropout, dropout against collisions, variance, the panel, preliminary against final."""
-    dropout = [
-        Series(
-            c,
-            [matrix.mean("dropout_pct", c, w) for w in matrix.weathers],
-            published=_said(matrix, c, "dropout_pct"),
-        )
-        for c in matrix.configs
-    ]
-    blocks: list[Block] = [
-        Figure(
-            grouped_bars(groups_of(matrix.weathers), dropout, "dropout, %"),
+    dropout = [_means(matrix, c, "dropout_pct", c) for c in matrix.configs]
+    figures = [
+        (
+            grouped_bars(_groups(matrix), dropout, "dropout, %"),
             "Dropout by configuration and weather; diamonds published.",
         ),
-        Figure(
+        (
             _dropout_against_collisions(matrix),
             "Dropout against fatal collisions, one point per run.",
         ),
     ]
     if "4" in matrix.configs:
-        variance = Series(
-            "configuration 4",
-            [matrix.mean("headway_variance_m2", "4", w) for w in matrix.weathers],
-            published=_said(matrix, "4", "headway_variance_m2"),
+        variance = _means(matrix, "4", "headway_variance_m2", "configuration 4")
+        caption = (
+            "Variance of the distance error by weather, configuration 4 (published as headway "
+            "variance)."
         )
-        blocks.append(
-            Figure(
-                grouped_bars(groups_of(matrix.weathers), [variance], "variance, m²"),
-                "Variance of the distance error by weather, configuration 4 (published as headway variance).",
-            )
-        )
+        figures.append((grouped_bars(_groups(matrix), [variance], "variance, m²"), caption))
     if "3" in matrix.configs:
-        charts = [
-            (
-                label,
-                Series(
-                    "3",
-                    [matrix.mean(column, "3", w) for w in matrix.weathers],
-                    published=_said(matrix, "3", column),
-                ),
-            )
-            for column, label in PANEL
-        ]
-        blocks.append(
-            Figure(
-                panel(list(matrix.weathers), charts),
-                "Configuration 3 in every weather, several metrics; diamonds published.",
-            )
-        )
-    blocks.append(
-        Figure(
-            _preliminary(),
-            "Published: preliminary against final script, means over the eleven clear runs that both "
-            "have. Run `skidpad adas --profile preliminary` for ours.",
-        )
+        charts = [(label, _means(matrix, "3", column, "3")) for column, label in PANEL]
+        caption = "Configuration 3 in every weather, several metrics; diamonds published."
+        figures.append((panel(matrix.weathers, charts), caption))
+    caption = (
+        "Published: preliminary against final script, means over the eleven clear runs that both "
+        "have. Run `skidpad adas --profile preliminary` for ours."
     )
-    return blocks
+    figures.append((_preliminary(), caption))
+    return [Figure(svg, caption) for svg, caption in figures]
 
 
-def _rates(matrix: Matrix, config: str, published: Sequence[float | None]) -> Series:
-    rates = [matrix.rate("fatal_collisions", config, w) for w in matrix.weathers]
+def _groups(matrix: Matrix) -> list[str]:
+    """Short labels for axes."""
+    return [w.replace("-", "\n", 1) for w in matrix.weathers]
+
+
+def _rates(name: str, rates: Sequence[Rate | None], published: Sequence[float | None]) -> Series:
     return Series(
-        config,
+        name,
         [r.rate if r else None for r in rates],
         [r.interval.low if r else None for r in rates],
         [r.interval.high if r else None for r in rates],
@@ -127,9 +90,13 @@ def _rates(matrix: Matrix, config: str, published: Sequence[float | None]) -> Se
     )
 
 
+def _means(matrix: Matrix, config: str, column: str, name: str) -> Series:
+    means = [matrix.mean(column, config, w) for w in matrix.weathers]
+    return Series(name, means, published=_said(matrix, config, column))
+
+
 def _said(matrix: Matrix, config: str, column: str) -> list[float | None]:
-    said = published_cells()
-    return [said[config, w].get(column) if (config, w) in said else None for w in matrix.weathers]
+    return [published_value(column, config, w) for w in matrix.weathers]
 
 
 def _mean(values: Sequence[float | None]) -> float | None:

@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import polars as pl
 
 from skidpad.evidence.contrasts import differences
-from skidpad.evidence.statistics import Interval, Rate, bootstrap_interval, compare_pairs, p_text
-from skidpad.recording.results import definitions
-from skidpad.report.matrix_data import (
-    Matrix,
-    PublishedCell,
-    config_title,
-    published_cells,
-    weather_title,
-)
+from skidpad.evidence.statistics import Rate, bootstrap_interval, compare_pairs, p_text
+from skidpad.recording.results import Metrics
+from skidpad.report.campaign import Metric, metrics_of
+from skidpad.report.matrix_data import Matrix, config_title, published_value, weather_title
 from skidpad.report.page import Block, Cell, Table, Text
+from skidpad.report.tables import Column, Format, Quantity, table
 
 STEPS = (("0", "1"), ("1", "2"), ("2", "3"), ("3", "4"), ("2", "4"))
+WORSE_UP = ("fatal_collisions", "lane_invasions", "dropout_pct", "ttc_below_1_5_s")
 STEP_COLUMNS = (
     "fatal_collisions",
     "lane_invasions",
@@ -25,151 +25,133 @@ STEP_COLUMNS = (
     "ttc_below_1_5_s",
 )
 BY_RUN = ("weather", "seed")
+RATE = Format(".2f", absent="no run")
+MEANS = (
+    ("dropout_pct", "Dropout: ticks without a target or persisting, %"),
+    ("headway_variance_m2", "Variance of the distance error, m²"),
+    ("mean_error_m", "Mean distance error, m"),
+    ("radar_fpr_pct", "Radar false positive rate after the lane check, %"),
+    ("radar_fnr_pct", "Radar false negative rate after the lane check, %"),
+    ("mean_speed_kmh", "Mean speed, km/h"),
+)  # fmt: skip
+KINDS = (
+    ("collisions_vehicle", "vehicles", "recoveries after hitting or being hit by a vehicle"),
+    ("rear_ended", "of these struck from behind", "another vehicle drove into the ego"),
+    ("collisions_static", "barriers and posts", "recoveries after hitting anything that stands"),
+    ("bend_exits", "of these in bends without a lead", "speed alone was too much for the bend"),
+    ("wrong_way", "wrong-way corrections", ""),
+    ("stuck_relocations", "stuck, put back", "not fatal"),
+    ("contacts", "contacts in all", "also those within the cool-down of a recovery"),
+)
 
 
 def collisions(matrix: Matrix) -> list[Block]:
     """Fatal collisions, and what they were."""
-    blocks: list[Block] = [
-        count_table(
-            matrix, "fatal_collisions", "Fatal collisions per run", "published count of one run"
-        ),
-        count_table(matrix, "collisions_vehicle", "Of these with vehicles, per run", ""),
+    return [
+        count_table(matrix, "fatal_collisions", "Fatal collisions per run"),
+        count_table(matrix, "collisions_vehicle", "Of these with vehicles, per run"),
         kinds_table(matrix),
     ]
-    return blocks
 
 
 def others(matrix: Matrix) -> list[Block]:
     """Lane invasions, dropouts and radar errors."""
     return [
-        count_table(matrix, "lane_invasions", "Solid markings crossed per run", "published count"),
-        mean_table(matrix, "dropout_pct", "Dropout: ticks without a target or persisting, %"),
-        mean_table(matrix, "headway_variance_m2", "Variance of the distance error, m²"),
-        mean_table(matrix, "mean_error_m", "Mean distance error, m"),
-        mean_table(matrix, "radar_fpr_pct", "Radar false positive rate after the lane check, %"),
-        mean_table(matrix, "radar_fnr_pct", "Radar false negative rate after the lane check, %"),
-        mean_table(matrix, "mean_speed_kmh", "Mean speed, km/h"),
+        count_table(matrix, "lane_invasions", "Solid markings crossed per run"),
+        *(mean_table(matrix, column, caption) for column, caption in MEANS),
     ]
 
 
-def count_table(matrix: Matrix, column: str, caption: str, published_hint: str) -> Table:
-    """Events per run with intervals; the last column adds up each drive once."""
-    said = published_cells()
+def by_weather(
+    matrix: Matrix,
+    of: Callable[[str | None, str], Quantity],
+    format: Format,
+    caption: str,
+    note: str,
+) -> Table:
+    """One row per configuration, one column per weather, and one in which each drive counts once."""
+    columns = [
+        Column[str]("configuration", config_title),
+        *(Column[str](weather_title(w), partial(of, w), w, format=format) for w in matrix.weathers),
+        Column[str]("all", partial(of, None), "every drive once", format=format),
+    ]
+    return table(columns, matrix.configs, caption, note)
+
+
+def count_table(matrix: Matrix, column: str, caption: str) -> Table:
+    """Events per run with intervals."""
     rates = {(c, w): matrix.rate(column, c, w) for c in matrix.configs for w in matrix.weathers}
     top = max((r.rate for r in rates.values() if r), default=0.0) or 1.0
-    rows = [
-        [
-            Cell(config_title(c)),
-            *(
-                _rate_cell(rates[c, w], top, said.get((c, w)), column, published_hint)
-                for w in matrix.weathers
-            ),
-            _rate_cell(matrix.rate(column, c), None, None, column, ""),
-        ]
-        for c in matrix.configs
-    ]
-    columns = [
-        ("configuration", ""),
-        *((weather_title(w), w) for w in matrix.weathers),
-        ("all", "every drive once"),
-    ]
+
+    def of(weather: str | None, config: str) -> Quantity:
+        if weather is None:
+            return rate_quantity(matrix.rate(column, config))
+        said = published_value(column, config, weather)
+        return rate_quantity(rates[config, weather], said, top)
+
     note = (
         f"Per run of {matrix.duration:g} s; small: 95 % interval, and the published value, "
         "of one run of 500 s, where there is one."
     )
-    return Table(columns, rows, caption=caption, note=note)
+    return by_weather(matrix, of, RATE, caption, note)
 
 
-def _rate_cell(
-    rate: Rate | None, top: float | None, said: PublishedCell | None, column: str, hint: str
-) -> Cell:
+def rate_quantity(
+    rate: Rate | None, published: float | None = None, top: float | None = None
+) -> Quantity:
+    """Events per run; shaded against the rate `top`."""
     if rate is None:
-        return Cell("no run", kind="muted")
-    note = interval(rate.interval)
-    published = said.get(column) if said else None
-    if published is not None:
-        note += f"\npublished {published:g}"
-    return Cell(
-        f"{rate.rate:.2f}",
-        sort=rate.rate,
-        note=note,
+        return Quantity(value=None)
+    return Quantity(
+        value=rate.rate,
+        interval=rate.interval,
+        published=published,
         heat=None if top is None else (rate.rate / top) ** 0.5,
-        hint=f"{rate.events} events in {rate.runs} runs, {rate.method.value}"
-        + (f"; {hint}" if published is not None else ""),
+        hint=f"{rate.events} events in {rate.runs} runs, {rate.method.value}",
     )
 
 
 def mean_table(matrix: Matrix, column: str, caption: str) -> Table:
     """Means over seeds with bootstrap intervals."""
-    said = published_cells()
-    rows = []
-    for c in matrix.configs:
-        cells = [
-            _mean_cell(matrix.cell(c, w)[column], said.get((c, w)), column) for w in matrix.weathers
-        ]
-        rows.append(
-            [Cell(config_title(c)), *cells, _mean_cell(matrix.cell(c)[column], None, column)]
-        )
-    columns = [
-        ("configuration", ""),
-        *((weather_title(w), w) for w in matrix.weathers),
-        ("all", "every drive once"),
-    ]
-    return Table(
-        columns,
-        rows,
-        caption=caption,
-        note="Mean over seeds; small: 95 % interval over seeds, and the published value.",
-    )
+
+    def of(weather: str | None, config: str) -> Quantity:
+        said = None if weather is None else published_value(column, config, weather)
+        return mean_quantity(matrix.cell(config, weather)[column], said)
+
+    note = "Mean over seeds; small: 95 % interval over seeds, and the published value."
+    return by_weather(matrix, of, Format(), caption, note)
 
 
-def _mean_cell(values: pl.Series, said: PublishedCell | None, column: str) -> Cell:
-    values = values.drop_nulls()
-    published = said.get(column) if said else None
-    told = f"published {published:g}" if published is not None else ""
-    if not len(values):
-        return Cell("none", note=told, kind="muted")
-    notes = [interval(bootstrap_interval(values.to_numpy()))] if len(values) > 1 else []
-    mean = float(values.mean())  # type: ignore[arg-type]
-    return Cell(
-        _number(mean),
-        sort=mean,
-        note="\n".join([*notes, told]),
-        hint=f"{len(values)} runs",
+def mean_quantity(values: pl.Series, published: float | None = None) -> Quantity:
+    """Mean over runs; one run has no interval."""
+    known = values.drop_nulls().cast(pl.Float64).to_numpy()
+    return Quantity(
+        value=float(known.mean()) if known.size else None,
+        interval=bootstrap_interval(known) if known.size > 1 else None,
+        published=published,
+        hint=f"{known.size} runs" if known.size else "",
     )
 
 
 def kinds_table(matrix: Matrix) -> Table:
     """What the collisions of each configuration were."""
-    kinds = [
-        ("collisions_vehicle", "vehicles", "recoveries after hitting or being hit by a vehicle"),
-        ("rear_ended", "of these struck from behind", "another vehicle drove into the ego"),
-        (
-            "collisions_static",
-            "barriers and posts",
-            "recoveries after hitting anything that stands",
+
+    def name(config: str) -> Cell:
+        runs = matrix.cell(config)
+        note = f"{len(runs)} runs, {runs['distance_km'].sum():,.0f} km"
+        return Cell(config_title(config), note=note)
+
+    def count(kind: str, config: str) -> int:
+        return int(matrix.cell(config)[kind].sum())
+
+    columns = [
+        Column("configuration", name),
+        *(
+            Column[str](title, partial(count, kind), definition)
+            for kind, title, definition in KINDS
         ),
-        ("bend_exits", "of these in bends without a lead", "speed alone was too much for the bend"),
-        ("wrong_way", "wrong-way corrections", ""),
-        ("stuck_relocations", "stuck, put back", "not fatal"),
-        ("contacts", "contacts in all", "also those within the cool-down of a recovery"),
     ]
-    rows = []
-    for c in matrix.configs:
-        runs = matrix.cell(c)
-        rows.append(
-            [
-                Cell(
-                    config_title(c), note=f"{len(runs)} runs, {runs['distance_km'].sum():,.0f} km"
-                ),
-                *(Cell(str(int(runs[k].sum())), sort=int(runs[k].sum())) for k, _, _ in kinds),
-            ]
-        )
-    return Table(
-        [("configuration", ""), *((n, h) for _, n, h in kinds)],
-        rows,
-        caption="What the collisions were: counts over all runs",
-    )
+    return table(columns, matrix.configs, "What the collisions were: counts over all runs")
 
 
 def pairs(matrix: Matrix) -> list[Block]:
@@ -178,55 +160,60 @@ def pairs(matrix: Matrix) -> list[Block]:
         "The difference that each step makes, paired by weather and seed: second minus first "
         "configuration. The step from 2 to 4 adds light assist, resume protocol and limiter at once."
     )
-    rows = []
-    for a, b in STEPS:
-        if a in matrix.configs and b in matrix.configs:
-            cells = [_step_cell(matrix, a, b, column) for column in STEP_COLUMNS]
-            rows.append([Cell(f"{a} to {b}", note=f"{config_title(b)[4:]}"), *cells])
-    meanings = {name: meaning for name, meaning, _ in definitions()}
-    columns = [("step", ""), *((c, meanings[c]) for c in STEP_COLUMNS)]
-    return [intro, Table(columns, rows, caption="Paired differences per run")] if rows else []
+    meanings = {m.name: m.meaning for m in metrics_of(Metrics)}
+    columns = [
+        Column[tuple[str, str]](
+            "step", lambda step: Cell(" to ".join(step), note=config_title(step[1])[4:])
+        ),
+        *(
+            Column[tuple[str, str]](
+                name,
+                partial(step_quantity, matrix, name),
+                meanings[name],
+                format=Format("+.2f", absent="no pairs"),
+            )
+            for name in STEP_COLUMNS
+        ),
+    ]
+    there = [step for step in STEPS if {*step} <= {*matrix.configs}]
+    return [intro, table(columns, there, "Paired differences per run")] if there else []
 
 
-def _step_cell(matrix: Matrix, a: str, b: str, column: str) -> Cell:
-    more, less = pl.col("config") == b, pl.col("config") == a
+def step_quantity(matrix: Matrix, column: str, step: tuple[str, str]) -> Quantity:
+    """The second configuration less the first, paired; a clear sign is marked better or worse."""
+    less, more = (pl.col("config") == config for config in step)
     values, _ = differences(matrix.finished, more, less, BY_RUN, column)
     if not len(values):
-        return Cell("no pairs", kind="muted")
+        return Quantity(value=None)
     c = compare_pairs(values.to_numpy())
-    worse = column in ("fatal_collisions", "lane_invasions", "ttc_below_1_5_s", "dropout_pct")
-    clear = c.interval.low > 0.0 or c.interval.high < 0.0
-    kind = (
-        ("bad" if (c.mean > 0) == worse else "good") if clear and column != "mean_speed_kmh" else ""
-    )
-    return Cell(
-        f"{c.mean:+.2f}",
-        sort=c.mean,
-        note=f"{interval(c.interval)}, {p_text(c.p)}",
-        kind=kind,
+    judged = column in WORSE_UP and (c.interval.low > 0.0 or c.interval.high < 0.0)
+    return Quantity(
+        value=c.mean,
+        interval=c.interval,
+        remark=p_text(c.p),
+        kind=("bad" if c.mean > 0 else "good") if judged else "",
         hint=f"{c.n} pairs",
     )
 
 
 def per_weather(matrix: Matrix) -> list[Block]:
     """Every metric of every cell, one table per configuration (A-256)."""
-    blocks: list[Block] = []
-    for c in matrix.configs:
-        rows = []
-        for name, meaning, source in definitions():
-            cells = [_mean_cell(matrix.cell(c, w)[name], None, name) for w in matrix.weathers]
-            rows.append([Cell(name, hint=f"{meaning} ({source})"), *cells])
-        columns = [("metric", ""), *((weather_title(w), w) for w in matrix.weathers)]
-        blocks.append(Table(columns, rows, caption=config_title(c), sortable=False))
-    return blocks
+    return [_metrics_table(matrix, config) for config in matrix.configs]
 
 
-def interval(limits: Interval) -> str:
-    """`[0.1, 1.46]`."""
-    return f"[{_number(limits.low)}, {_number(limits.high)}]"
+def _metrics_table(matrix: Matrix, config: str) -> Table:
+    def of(weather: str, metric: Metric) -> Quantity:
+        return mean_quantity(matrix.cell(config, weather)[metric.name])
 
-
-def _number(value: float) -> str:
-    if value == int(value) and abs(value) < 1e6:
-        return f"{value:.0f}"
-    return f"{value:.2f}" if abs(value) < 100 else f"{value:.0f}"
+    columns = [
+        Column[Metric]("metric", lambda m: Cell(m.name, hint=m.meaning)),
+        *(
+            Column[Metric](
+                weather_title(w),
+                partial(of, w),
+                w,
+            )
+            for w in matrix.weathers
+        ),
+    ]
+    return table(columns, metrics_of(Metrics), config_title(config), sortable=False)

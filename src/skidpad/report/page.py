@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
+from urllib.parse import quote
 
 import jinja2
 import msgspec
 from markupsafe import Markup, escape
+
+REPORT = "report.html"
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +31,8 @@ class Cell:
     kind: str = ""  # "good", "bad", "muted", "published"
     href: str = ""
     hint: str = ""  # shown on hover and read by screen readers
+    limits: tuple[float, float] | None = None  # of the interval that the note tells
+    published: float | None = None  # value of the source, told in the note too
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +45,35 @@ class Table:
     note: str = ""
     sortable: bool = True
     kind: str = "table"
+
+    def csv(self) -> str:
+        """The table as CSV: beside a column with intervals their limits, beside one with published
+        values those."""
+        columns = [
+            (heading, [row[k] for row in self.rows]) for k, (heading, _) in enumerate(self.columns)
+        ]
+        out = io.StringIO()
+        rows = zip(*(part for column in columns for part in _csv_columns(*column)), strict=True)
+        csv.writer(out).writerows(rows)
+        return out.getvalue()
+
+    def file_name(self) -> str:
+        """Of that CSV."""
+        return (anchor(self.caption) or "table") + ".csv"
+
+    def csv_uri(self) -> str:
+        """The same as the target of a link."""
+        return "data:text/csv;charset=utf-8," + quote(self.csv())
+
+
+def _csv_columns(heading: str, cells: Sequence[Cell]) -> Iterator[list[Any]]:
+    numeric = any(c.sort is not None for c in cells)
+    yield [heading, *(c.sort if numeric else c.text for c in cells)]
+    if any(c.limits for c in cells):
+        for end, name in enumerate(("low", "high")):
+            yield [f"{heading}: {name}", *(c.limits[end] if c.limits else None for c in cells)]
+    if any(c.published is not None for c in cells):
+        yield [f"{heading}: published", *(c.published for c in cells)]
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,7 +218,7 @@ class Section:
     @property
     def anchor(self) -> str:
         """Identifier for links."""
-        return self.id or "".join(c if c.isalnum() else "-" for c in self.title.lower()).strip("-")
+        return self.id or anchor(self.title)
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,9 +235,22 @@ def render(page: Page) -> str:
     """The page as one HTML document without any reference to the network."""
     return _template().render(
         page=page,
+        sections=[s for s in page.sections if s.blocks],
         css=_asset("page.css"),
         script="".join(_asset(name) for name in ("page.js", "replay.js", "worlds.js")),
     )
+
+
+def anchor(text: str) -> str:
+    """Text as the name of a place or file."""
+    return "".join(c if c.isalnum() else "-" for c in text.lower()).strip("-")
+
+
+def write_report_page(page: Page, folder: Path) -> Path:
+    """Write the report of a folder; returns its path."""
+    path = folder / REPORT
+    write_page(page, path)
+    return path
 
 
 def write_page(page: Page, path: Path) -> None:

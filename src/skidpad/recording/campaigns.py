@@ -1,0 +1,75 @@
+"""What a campaign left in its folder, read back: results, timing, ledger, configuration, runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Generic
+
+import msgspec
+import polars as pl
+
+from skidpad.core.errors import FileError
+from skidpad.recording.files import read_parquet
+from skidpad.recording.ledger import CAMPAIGN, E, fingerprints, latest, read_ledger
+from skidpad.recording.logfiles import TICKS
+from skidpad.recording.results import TIMING, read_results
+
+RUNS, SNAPSHOTS = "runs", "snapshots"
+
+
+@dataclass(frozen=True)
+class CampaignFolder(Generic[E]):
+    """A campaign's folder; `entry` is what the lines of its ledger are."""
+
+    path: Path
+    entry: type[E]
+
+    @cached_property
+    def results(self) -> pl.DataFrame:
+        """One row per run; FileError when there are none."""
+        results = read_results(self.path)
+        if not len(results):
+            raise FileError(f"{self.path} holds no finished run yet")
+        return results
+
+    @cached_property
+    def timing(self) -> pl.DataFrame:
+        """Wall and processor time per run."""
+        return read_parquet(self.path / TIMING)[0]
+
+    @cached_property
+    def entries(self) -> list[E]:
+        """The last word of the ledger on each run."""
+        return latest(read_ledger(self.path, self.entry))
+
+    @cached_property
+    def fingerprints(self) -> list[str]:
+        """Machines that drove it."""
+        return sorted(fingerprints(self.entries))
+
+    @cached_property
+    def identity(self) -> dict[str, Any]:
+        """The resolved configuration; empty when none was written."""
+        path = self.path / CAMPAIGN
+        if not path.is_file():
+            return {}
+        try:
+            return msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
+        except msgspec.MsgspecError as error:
+            raise FileError(f"{path} is damaged: {error}") from error
+
+    def names(self, *columns: str) -> dict[tuple[Any, ...], str]:
+        """Names of the runs by these columns of their keys."""
+        return {tuple(getattr(e.key, c) for c in columns): e.run for e in self.entries}
+
+    def log(self, run: str) -> Path | None:
+        """Where the log of the run of this name lies; None when it was not kept."""
+        folder = self.path / RUNS / run
+        return folder if (folder / TICKS).is_file() else None
+
+
+def snapshot(run: Path, t: float) -> Path | None:
+    """The picture that was taken in a run at `t` s, if there is one."""
+    return next(iter(sorted((run / SNAPSHOTS).glob(f"*_{t:07.2f}s.png"))), None)

@@ -7,7 +7,7 @@ import pytest
 from channel_worlds import Eyes, World, drive
 from skidpad.evidence.channels.hazards import Profile
 from skidpad.evidence.channels.indicators.catalogue import load_thresholds
-from skidpad.evidence.channels.indicators.panel import IndicatorSettings
+from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.watch import watch
 from skidpad.recording.hazards import read_hazards
 from skidpad.report.channels import drive_page, write_drive_report

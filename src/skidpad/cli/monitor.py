@@ -80,7 +80,7 @@ def monitor(
     from skidpad.evidence.channels.identifier.model import Identify, load_model
     from skidpad.evidence.channels.indicators.catalogue import load_thresholds
     from skidpad.evidence.channels.indicators.comfort import Form
-    from skidpad.evidence.channels.indicators.panel import IndicatorSettings
+    from skidpad.evidence.channels.indicators.settings import IndicatorSettings
     from skidpad.evidence.channels.watch import time_by_objects, timing_statistics, watch
     from skidpad.recording.sources import open_channels
     from skidpad.report.channels import write_drive_report

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.errors import MissingExtra
-from skidpad.evidence.channels.indicators.catalogue import CHANNEL_INDICATORS, PAIR_INDICATORS
 from skidpad.evidence.channels.monitor import Monitor
 
 Floats = NDArray[np.float64]
@@ -46,15 +45,13 @@ def log_drive(
         evidence = monitor.update(cycle)
         for c, (name, frame) in enumerate(zip(channels, cycle.frames, strict=True)):
             _world(rr, recording, name, frame, COLOURS[c % len(COLOURS)])
-        for indicators, subjects, table in (
-            (CHANNEL_INDICATORS, channels, evidence.readings.channel),
-            (PAIR_INDICATORS, monitor.pairs, evidence.readings.pair),
+        readings = evidence.readings
+        for (indicator, subject), value in zip(
+            readings.layout.places, readings.values.tolist(), strict=True
         ):
-            for indicator, row in zip(indicators, table, strict=True):
-                for subject, value in zip(subjects, row.tolist(), strict=True):
-                    if value == value:  # evaluated
-                        path = f"indicators/{indicator.value}/{subject.replace('+', '-')}"
-                        recording.log(path, rr.Scalars(value))
+            if value == value:  # evaluated
+                path = f"indicators/{indicator.value}/{subject.replace('+', '-')}"
+                recording.log(path, rr.Scalars(value))
         for hazard in evidence.fired:
             recording.log("hazards", rr.TextLog(hazard.value, level="WARN"))
         n += 1

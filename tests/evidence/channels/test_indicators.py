@@ -14,6 +14,7 @@ from scipy.optimize import linear_sum_assignment
 
 from channel_worlds import frame
 from skidpad.core.errors import ConfigError
+from skidpad.evidence.channels.frames import usable
 from skidpad.evidence.channels.indicators import comfort, prediction, similarity
 from skidpad.evidence.channels.indicators.catalogue import (
     CHANNEL_INDICATORS,
@@ -25,13 +26,9 @@ from skidpad.evidence.channels.indicators.catalogue import (
     safety_case,
 )
 from skidpad.evidence.channels.indicators.comfort import Form
-from skidpad.evidence.channels.indicators.panel import (
-    CHANNEL_ROW,
-    PAIR_ROW,
-    IndicatorPanel,
-    IndicatorSettings,
-    Readings,
-)
+from skidpad.evidence.channels.indicators.layout import Readings
+from skidpad.evidence.channels.indicators.panel import IndicatorPanel
+from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 
 coordinates = st.floats(-1e3, 1e3)
 angles = st.floats(-10.0, 10.0)
@@ -381,13 +378,12 @@ def test_a_thresholds_file_is_checked(tmp_path):
 # -- the panel
 
 
+def panel_of(n, settings=None) -> IndicatorPanel:
+    return IndicatorPanel([f"c{i}" for i in range(n)], settings or IndicatorSettings())
+
+
 def run(panel: IndicatorPanel, frames) -> Readings:
-    out = panel.begin(frames)
-    panel.comfort(frames, out)
-    panel.similarity(frames, out)
-    panel.counts([None if f is None else len(f.objects) for f in frames], out)
-    panel.prediction(frames, out)
-    return out
+    return panel.update([None if f is None else usable(f) for f in frames])
 
 
 def moving(t, dx=0.0, objects=((20.0, 0.0, 0.0, 8.0, 0.0),), **more):
@@ -397,7 +393,7 @@ def moving(t, dx=0.0, objects=((20.0, 0.0, 0.0, 8.0, 0.0),), **more):
 
 
 def readings_after(seconds, settings=None, n=2, **more) -> Readings:
-    panel = IndicatorPanel(n, settings or IndicatorSettings())
+    panel = panel_of(n, settings)
     for k in range(round(seconds * 10) + 1):
         out = run(panel, [moving(0.1 * k, **more) for _ in range(n)])
     return out
@@ -413,14 +409,14 @@ def test_agreeing_steady_channels_score_one_everywhere(form, n):
         Indicator.CHANNEL_PATH,
     ]  # fmt: skip
     for indicator in perfect:
-        assert out.channel[CHANNEL_ROW[indicator]] == pytest.approx(np.ones(n))
-    assert out.pair.shape[1] == n * (n - 1) // 2
+        assert out[indicator] == pytest.approx(np.ones(n))
+    assert out.by_pair().shape[1] == n * (n - 1) // 2
     zero = {
         Indicator.EGO_LOCATION_VARIANCE, Indicator.CROSS_PATH_VARIANCE, Indicator.EGO_SHIFT_SHORT,
         Indicator.EGO_SHIFT_LONG,
     }  # fmt: skip
-    for indicator, row in PAIR_ROW.items():
-        assert out.pair[row] == pytest.approx(0.0 if indicator in zero else 1.0), indicator
+    for indicator in PAIR_INDICATORS:
+        assert out[indicator] == pytest.approx(0.0 if indicator in zero else 1.0), indicator
 
 
 @pytest.mark.req("C-040", "C-052", "C-078", "C-075")
@@ -431,68 +427,68 @@ def test_what_needs_history_is_not_evaluated_in_the_first_cycle():
         Indicator.CHANNEL_PATH_VARIANCE,
     ]  # fmt: skip
     for indicator in history:
-        assert not out.channel_evaluated[CHANNEL_ROW[indicator]].any()
-    assert not out.pair_evaluated[PAIR_ROW[Indicator.EGO_LOCATION_VARIANCE]].any()
-    assert out.pair_evaluated[PAIR_ROW[Indicator.EGO_LOCATION]].all()
-    assert readings_after(0.4).pair_evaluated[PAIR_ROW[Indicator.EGO_LOCATION_VARIANCE]].all()
+        assert np.isnan(out[indicator]).all()
+    assert np.isnan(out[Indicator.EGO_LOCATION_VARIANCE]).all()
+    assert np.isfinite(out[Indicator.EGO_LOCATION]).all()
+    assert np.isfinite(readings_after(0.4)[Indicator.EGO_LOCATION_VARIANCE]).all()
 
 
 @pytest.mark.req("C-060")
 def test_an_absent_channel_leaves_its_own_and_its_pairs_values_open():
-    panel = IndicatorPanel(3, IndicatorSettings())
+    panel = panel_of(3)
     for k in range(5):
         out = run(panel, [moving(0.1 * k), None, moving(0.1 * k)])
-    assert not out.channel_evaluated[:, 1].any()
-    assert not out.pair_evaluated[:, [0, 2]].any()  # pairs 0+1 and 1+2
-    assert out.pair_evaluated[PAIR_ROW[Indicator.CROSS_PATH], 1]
+    assert np.isnan(out.by_channel()[:, 1]).all()
+    assert np.isnan(out.by_pair()[:, [0, 2]]).all()  # pairs 0+1 and 1+2
+    assert np.isfinite(out[Indicator.CROSS_PATH][1])
 
 
 @pytest.mark.req("C-052", "C-121")
 def test_a_jump_of_one_channel_shows_in_the_variance_and_in_the_shift():
-    panel = IndicatorPanel(2, IndicatorSettings())
+    panel = panel_of(2)
     out = []
     for k in range(20):
         jump = 1.5 if k >= 10 else 0.0
-        out.append(run(panel, [moving(0.1 * k), moving(0.1 * k, dx=jump)]).pair)
-    variance = [row[PAIR_ROW[Indicator.EGO_LOCATION_VARIANCE], 0] for row in out]
+        out.append(run(panel, [moving(0.1 * k), moving(0.1 * k, dx=jump)]))
+    variance = [each[Indicator.EGO_LOCATION_VARIANCE][0] for each in out]
     assert np.nanmax(variance) > 0.05
     assert variance[-1] == pytest.approx(0.0, abs=1e-12)
-    shift = [row[PAIR_ROW[Indicator.EGO_SHIFT_SHORT], 0] for row in out]
+    shift = [each[Indicator.EGO_SHIFT_SHORT][0] for each in out]
     assert shift[12] == pytest.approx(1.5)
     assert shift[18] == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.req("C-072", "C-079")
 def test_plans_of_different_length_are_compared_where_they_overlap():
-    panel = IndicatorPanel(2, IndicatorSettings())
+    panel = panel_of(2)
     out = run(panel, [moving(0.0, plan_length=4.0), moving(0.0, plan_length=2.0)])
-    assert out.pair[PAIR_ROW[Indicator.EGO_TRAJECTORY], 0] == pytest.approx(1.0)
-    assert out.pair[PAIR_ROW[Indicator.CROSS_PATH], 0] == pytest.approx(1.0)
+    assert out[Indicator.EGO_TRAJECTORY][0] == pytest.approx(1.0)
+    assert out[Indicator.CROSS_PATH][0] == pytest.approx(1.0)
 
 
 @pytest.mark.req("C-079")
 def test_a_channel_that_stops_parts_from_one_that_goes_on():
     t = np.arange(16) * 0.2
     stop = np.column_stack([10 * t - 5 * t**2 / 3, 0 * t, t])
-    panel = IndicatorPanel(2, IndicatorSettings())
+    panel = panel_of(2)
     out = run(panel, [moving(0.0, plan=stop), moving(0.0)])
     frechet = shapely.frechet_distance(
         shapely.LineString(stop[:, :2]), shapely.LineString(np.column_stack([10 * t, 0 * t]))
     )
-    assert out.pair[PAIR_ROW[Indicator.CROSS_PATH], 0] == pytest.approx(1 / (1 + frechet))
+    assert out[Indicator.CROSS_PATH][0] == pytest.approx(1 / (1 + frechet))
 
 
 @pytest.mark.req("C-075")
 def test_corrected_validation_tells_left_from_missed():
     scores = {}
     for form in (Form.COMPLETED, Form.CORRECTED):
-        panel = IndicatorPanel(2, IndicatorSettings(form=form))
+        panel = panel_of(2, IndicatorSettings(form=form))
         for k in range(13):
             objects = [(20.0, 0, 0, 8.0, 0), (40.0, 0, 0, 8.0, 0)][: 1 if k == 12 else 2]
             both = [moving(0.1 * k, objects=objects)] * 2
             out = run(panel, both)
-        scores[form] = out.channel[CHANNEL_ROW[Indicator.MOTION_VALIDATION], 0]
-        assert out.channel[CHANNEL_ROW[Indicator.OBJECTS_LEFT], 0] == 1
+        scores[form] = out[Indicator.MOTION_VALIDATION][0]
+        assert out[Indicator.OBJECTS_LEFT][0] == 1
     assert scores == {Form.COMPLETED: 0.5, Form.CORRECTED: 1.0}
 
 
@@ -501,12 +497,12 @@ def test_jitter_of_5_mm_is_harsh_when_differenced_and_smooth_when_fitted():
     scores = {}
     for form in (Form.COMPLETED, Form.CORRECTED):
         rng = np.random.default_rng(7)
-        panel = IndicatorPanel(2, IndicatorSettings(form=form))
+        panel = panel_of(2, IndicatorSettings(form=form))
         for k in range(40):
             f = moving(0.1 * k)
             f.ego[:2] += rng.normal(0, 0.005, 2)
             out = run(panel, [f, f])
-        scores[form] = out.channel[CHANNEL_ROW[Indicator.HISTORY_COMFORT], 0]
+        scores[form] = out[Indicator.HISTORY_COMFORT][0]
     assert scores[Form.COMPLETED] < 0.7 < 0.97 < scores[Form.CORRECTED]
 
 
@@ -534,7 +530,7 @@ def test_indicators_do_not_see_where_on_the_map_a_scene_lies(angle, dx, dy):
 
     values = []
     for place in (lambda f: f, placed):
-        panel = IndicatorPanel(2, IndicatorSettings())
+        panel = panel_of(2)
         rng = np.random.default_rng(2)
         for k in range(22):
             pair = []
@@ -543,16 +539,16 @@ def test_indicators_do_not_see_where_on_the_map_a_scene_lies(angle, dx, dy):
                 f = moving(0.1 * k, objects=[(20 + noise[0], noise[1], 0, 8, 0)])
                 pair.append(place(f))
             out = run(panel, pair)
-        values.append(np.concatenate([out.channel.ravel(), out.pair.ravel()]))
+        values.append(out.values)
     assert values[0] == pytest.approx(values[1], abs=1e-6, nan_ok=True)
 
 
 def test_swapping_the_channels_swaps_nothing_else():
     rng = np.random.default_rng(3)
-    panels = [IndicatorPanel(2, IndicatorSettings()) for _ in range(2)]
+    panels = [panel_of(2) for _ in range(2)]
     for k in range(15):
         a = moving(0.1 * k, dx=rng.normal(0, 0.2))
         b = moving(0.1 * k, objects=[(20.3, 0.1, 0.2, 8, 0), (60, 0, 0, 9, 0)])
         ab, ba = run(panels[0], [a, b]), run(panels[1], [b, a])
-        assert ab.pair == pytest.approx(ba.pair, nan_ok=True)
-        assert ab.channel == pytest.approx(ba.channel[:, ::-1], nan_ok=True)
+        assert ab.by_pair() == pytest.approx(ba.by_pair(), nan_ok=True)
+        assert ab.by_channel() == pytest.approx(ba.by_channel()[:, ::-1], nan_ok=True)

@@ -16,7 +16,7 @@ from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import Clause, Profile, Signal, load_rules
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.indicators.comfort import Form
-from skidpad.evidence.channels.indicators.panel import CHANNEL_ROW, PAIR_ROW, IndicatorSettings
+from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.monitor import Monitor, drive_events
 from skidpad.evidence.channels.recorder import WORLD_LIMIT
 from skidpad.evidence.channels.timefilter import TimeFilter
@@ -217,9 +217,7 @@ def test_a_hazard_without_end_is_cut_at_the_limit():
 
 
 def all_values(evidence):
-    return np.array(
-        [np.concatenate([e.readings.channel.ravel(), e.readings.pair.ravel()]) for e in evidence]
-    )
+    return np.array([e.readings.values for e in evidence])
 
 
 def without_context(records):
@@ -273,9 +271,9 @@ def test_strange_input_is_survived_marked_and_counted(form, profile):
     monitor = Monitor(["odd", "even"], settings=IndicatorSettings(form=form), profile=profile)
     for k, (odd, even) in enumerate(zip(rows, normal, strict=True)):
         e = monitor.update(Cycle(k, 0.1 * k, (odd, even)))
-        assert e.readings.channel_evaluated[CHANNEL_ROW[Indicator.PLANNED_PATH_COMFORT], 1]
-        for values in (e.readings.channel, e.readings.pair):
-            assert not np.isinf(values).any()
+        assert np.isfinite(e.readings[Indicator.PLANNED_PATH_COMFORT][1])
+        values = e.readings.values
+        assert not np.isinf(values).any()
     u = monitor.unusable
     assert (u.poses["odd"], u.objects["odd"], u.plans["odd"], u.shapes["odd"]) == (1, 1, 1, 2)
     assert u.objects_beyond_limit["odd"] == 10_000 - 300
@@ -288,7 +286,7 @@ def test_all_objects_are_counted_even_where_few_are_compared():
     many = np.zeros((1000, 5))
     monitor = Monitor(["a", "b"])
     e = monitor.update(Cycle(0, 0.0, (frame(0.0, EGO, many), frame(0.0, EGO, many[:999]))))
-    assert e.readings.pair[PAIR_ROW[Indicator.OBJECT_COUNT], 0] == 0.5
+    assert e.readings[Indicator.OBJECT_COUNT][0] == 0.5
 
 
 @pytest.mark.req("C-129")

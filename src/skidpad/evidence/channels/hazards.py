@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
-from skidpad.evidence.channels.indicators.panel import CHANNEL_ROW, PAIR_ROW, Readings
+from skidpad.evidence.channels.indicators.layout import Layout, Readings
 from skidpad.evidence.channels.risk import RiskMatrix
 
 Floats = NDArray[np.float64]
@@ -63,14 +63,17 @@ class Signal(str, Enum):
     COUNT_RANGE = "count_range"  # of the object count similarity
 
 
-_UNSTEADY_ROWS = (
-    PAIR_ROW[Indicator.CROSS_PATH],
-    PAIR_ROW[Indicator.CROSS_PATH_VARIANCE],
-    PAIR_ROW[Indicator.OBJECT_COUNT],
-    PAIR_ROW[Indicator.EGO_SHIFT_LONG],  # needs 10 s of its own
-    PAIR_ROW[Indicator.AGREEMENT],
-)
-_STEADY_ROWS = np.array([row for row in PAIR_ROW.values() if row not in _UNSTEADY_ROWS])
+_UNSTEADY = {
+    Indicator.CROSS_PATH,
+    Indicator.CROSS_PATH_VARIANCE,
+    Indicator.OBJECT_COUNT,
+    Indicator.EGO_SHIFT_LONG,  # needs 10 s of its own
+    Indicator.AGREEMENT,
+    Indicator.OBJECTS_LEFT,
+    Indicator.SAFETY_SCORE,
+    Indicator.RISK_BEHIND_SHARE,
+}
+_STEADY = tuple(i for i in Indicator if i not in _UNSTEADY)
 
 _OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">": operator.gt,
@@ -188,26 +191,24 @@ class SignalReadings:
 class SignalReader:
     """Signals of a cycle from readings and risk; remembers what a stuck vehicle looks like."""
 
-    def __init__(self, n_channels: int) -> None:
-        self.n = n_channels
-        self.steady = _Steadiness()
+    def __init__(self, layout: Layout) -> None:
+        self.steadiness = _Steadiness(layout)
 
     def read(
         self, t: float, readings: Readings, risk: RiskMatrix, driving: int | None
     ) -> SignalReadings:
         """The signals at `t`; without a recorded driving channel, that of the highest score."""
-        scores = readings.channel[CHANNEL_ROW[Indicator.SAFETY_SCORE]]
-        comfort = readings.channel[CHANNEL_ROW[Indicator.PLANNED_PATH_COMFORT]]
+        scores = readings[Indicator.SAFETY_SCORE]
+        comfort = readings[Indicator.PLANNED_PATH_COMFORT]
         if driving is None:
             known = [(score, -i) for i, score in enumerate(scores.tolist()) if score == score]
             driving = -max(known)[1] if known else None
         gap, pair, assumed = _largest_gap(readings)
-        pairs = readings.pair
         values = {
-            Signal.LOCATION_VARIANCE: _greatest(pairs[PAIR_ROW[Indicator.EGO_LOCATION_VARIANCE]]),
-            Signal.EGO_LOCATION: _least(pairs[PAIR_ROW[Indicator.EGO_LOCATION]]),
-            Signal.SHIFT_SHORT: _greatest(pairs[PAIR_ROW[Indicator.EGO_SHIFT_SHORT]]),
-            Signal.SHIFT_LONG: _greatest(pairs[PAIR_ROW[Indicator.EGO_SHIFT_LONG]]),
+            Signal.LOCATION_VARIANCE: _greatest(readings[Indicator.EGO_LOCATION_VARIANCE]),
+            Signal.EGO_LOCATION: _least(readings[Indicator.EGO_LOCATION]),
+            Signal.SHIFT_SHORT: _greatest(readings[Indicator.EGO_SHIFT_SHORT]),
+            Signal.SHIFT_LONG: _greatest(readings[Indicator.EGO_SHIFT_LONG]),
             Signal.GAP: abs(gap),
             Signal.GAP_SIGNED: gap,
             Signal.SAFETY_SCORE: _least(scores),
@@ -217,21 +218,19 @@ class SignalReader:
             - _greatest(risk.risk_behind.ravel()),
             Signal.COMFORT_DRIVING: float(comfort[driving]) if driving is not None else np.nan,
             Signal.COMFORT_LEAST: _least(comfort),
-            Signal.CROSS_PATH: _least(pairs[PAIR_ROW[Indicator.CROSS_PATH]]),
-            Signal.CROSS_PATH_VARIANCE: _greatest(pairs[PAIR_ROW[Indicator.CROSS_PATH_VARIANCE]]),
-            Signal.CHANNEL_PATH_VARIANCE: _greatest(
-                readings.channel[CHANNEL_ROW[Indicator.CHANNEL_PATH_VARIANCE]]
-            ),
-            Signal.EGO_TRAJECTORY: _least(pairs[PAIR_ROW[Indicator.EGO_TRAJECTORY]]),
+            Signal.CROSS_PATH: _least(readings[Indicator.CROSS_PATH]),
+            Signal.CROSS_PATH_VARIANCE: _greatest(readings[Indicator.CROSS_PATH_VARIANCE]),
+            Signal.CHANNEL_PATH_VARIANCE: _greatest(readings[Indicator.CHANNEL_PATH_VARIANCE]),
+            Signal.EGO_TRAJECTORY: _least(readings[Indicator.EGO_TRAJECTORY]),
         }
-        values.update(self.steady.update(t, readings, values))
+        values.update(self.steadiness.update(t, readings, values))
         return SignalReadings(values, pair, assumed, driving)
 
 
 def _largest_gap(readings: Readings) -> tuple[float, int | None, bool]:
     """OLSS - OCSS of the pair where it is largest by size, that pair, and whether assumed."""
-    count = readings.pair[PAIR_ROW[Indicator.OBJECT_COUNT]]
-    location = readings.pair[PAIR_ROW[Indicator.OBJECT_LOCATION]]
+    count = readings[Indicator.OBJECT_COUNT]
+    location = readings[Indicator.OBJECT_LOCATION]
     best, best_pair, best_assumed = float("nan"), None, False
     for p, (n, d) in enumerate(zip(count.tolist(), location.tolist(), strict=True)):
         if np.isnan(n):
@@ -246,7 +245,8 @@ def _largest_gap(readings: Readings) -> tuple[float, int | None, bool]:
 class _Steadiness:
     """Least and greatest values per second over the last 20 s, and dips of the cross path."""
 
-    def __init__(self) -> None:
+    def __init__(self, layout: Layout) -> None:
+        self.steady = layout.indices(_STEADY)
         self.blocks: deque[tuple[float, Floats, Floats]] = deque()  # start, least, greatest
         self.before: tuple[Floats, Floats] | None = (
             None  # extremes of all blocks when the last began
@@ -257,10 +257,8 @@ class _Steadiness:
     def update(
         self, t: float, readings: Readings, values: dict[Signal, float]
     ) -> dict[Signal, float]:
-        others = readings.pair[_STEADY_ROWS].ravel()
-        comfort = readings.channel[: CHANNEL_ROW[Indicator.OBJECTS_LEFT]].ravel()
-        count = _least(readings.pair[PAIR_ROW[Indicator.OBJECT_COUNT]])
-        row = np.concatenate([[values[Signal.SAFETY_SCORE], count], others, comfort])
+        count = _least(readings[Indicator.OBJECT_COUNT])
+        row = np.concatenate([[values[Signal.SAFETY_SCORE], count], readings.values[self.steady]])
         if self.blocks and not 0.0 <= t - self.blocks[-1][0] <= 2.0:
             self.blocks.clear()
             self.dips.clear()

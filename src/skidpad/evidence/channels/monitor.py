@@ -6,10 +6,8 @@ It reads what channels report and nothing else; truth and words about the drive 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,27 +27,21 @@ from skidpad.evidence.channels.hazards import (
 from skidpad.evidence.channels.identifier.features import feature_row
 from skidpad.evidence.channels.identifier.model import Detector, Identify, LearnedIdentifier
 from skidpad.evidence.channels.indicators.catalogue import (
-    CHANNEL_INDICATORS,
-    PAIR_INDICATORS,
     Bound,
     Indicator,
     Threshold,
     Violation,
     load_thresholds,
 )
-from skidpad.evidence.channels.indicators.panel import (
-    CHANNEL_ROW,
-    IndicatorPanel,
-    IndicatorSettings,
-    Readings,
-)
+from skidpad.evidence.channels.indicators.layout import Place, Readings
+from skidpad.evidence.channels.indicators.panel import IndicatorPanel, Lap, no_lap
+from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.recorder import CycleEvidence, Recorder
 from skidpad.evidence.channels.risk import RiskMatrix, risk_matrix
 from skidpad.evidence.channels.timefilter import Event, TimeFilter
 from skidpad.recording.hazards import HazardRecord
 
 Floats = NDArray[np.float64]
-Lap = Callable[[str], None]
 
 
 @dataclass(slots=True)
@@ -69,17 +61,6 @@ class Unusable:
         return {kind: dict(+getattr(self, kind)) for kind in kinds}
 
 
-class _Counts(NamedTuple):
-    """Cycles per indicator and subject."""
-
-    missing: NDArray[np.int64]
-    violated: NDArray[np.int64]
-
-    @classmethod
-    def of(cls, indicators: int, subjects: int) -> _Counts:
-        return cls(*np.zeros((2, indicators, subjects), dtype=np.int64))
-
-
 class Monitor:
     """Watches N channels; `update` per cycle, `finish` at the end; records come out as they close."""
 
@@ -96,15 +77,15 @@ class Monitor:
         detectors: Mapping[HazardType, Detector] | None = None,
     ) -> None:
         self.channels = tuple(channels)
-        self.pairs = tuple("+".join(p) for p in combinations(self.channels, 2))
         self.settings = settings or IndicatorSettings()
         self.profile = profile
         self.rules = tuple(rules) if rules is not None else load_rules(profile)
         self.thresholds = thresholds or load_thresholds()
-        self.panel = IndicatorPanel(len(self.channels), self.settings)
-        self.reader = SignalReader(len(self.channels))
+        self.panel = IndicatorPanel(self.channels, self.settings)
+        self.layout = self.panel.layout
+        self.reader = SignalReader(self.layout)
         self.hazards: TimeFilter[HazardType] = TimeFilter()
-        self.violations: TimeFilter[tuple[Indicator, str]] = TimeFilter()
+        self.violations: TimeFilter[Place] = TimeFilter()
         self.unusable = Unusable()
         self.ghosts = GhostCue(self.channels)
         self.undecided: Counter[HazardType] = Counter()
@@ -123,43 +104,26 @@ class Monitor:
             if keep_worlds
             else None
         )
-        scopes = ((CHANNEL_INDICATORS, self.channels), (PAIR_INDICATORS, self.pairs))
-        self._bounds = [_bounds(self.thresholds, indicators) for indicators, _ in scopes]
-        self._counts = [_Counts.of(len(indicators), len(names)) for indicators, names in scopes]
-        self._keys = [
-            [
-                [((i, name), self.thresholds[i].bound is Bound.LOWER) for name in names]
-                for i in indicators
-            ]
-            for indicators, names in scopes
-        ]
+        self._low, self._high = self._bounds()
+        self._missing, self._violated = np.zeros((2, len(self.layout.places)), dtype=np.int64)
 
-    def update(self, cycle: Cycle, lap: Lap | None = None) -> CycleEvidence:
+    def update(self, cycle: Cycle, lap: Lap = no_lap) -> CycleEvidence:
         """Judge one cycle. `lap(name)` is called when the part `name` is done, for profiling."""
-        done = lap or _no_lap
         kept = [None if f is None else usable(f) for f in cycle.frames]
         frames = [None if u is None else u.frame for u in kept]
         self._count_unusable(kept)
-        readings = self.panel.begin(frames)
-        done("prepare")
-        self.panel.comfort(frames, readings)
-        done("comfort")
-        self.panel.similarity(frames, readings)
-        self.panel.counts([None if u is None else u.reported for u in kept], readings)
-        self.ghosts.update(frames, self.panel.paired_rows())
-        done("similarity")
-        self.panel.prediction(frames, readings)
-        done("motion_prediction")
+        readings = self.panel.update(kept, lap)
+        self.ghosts.update(frames, readings.shared_rows())
         risk = risk_matrix(frames)
-        readings.channel[CHANNEL_ROW[Indicator.SAFETY_SCORE]] = risk.safety_scores
-        readings.channel[CHANNEL_ROW[Indicator.RISK_BEHIND_SHARE]] = risk.behind_share
-        done("risk")
+        readings[Indicator.SAFETY_SCORE][:] = risk.safety_scores
+        readings[Indicator.RISK_BEHIND_SHARE][:] = risk.behind_share
+        lap("risk")
         signals = self.reader.read(cycle.t, readings, risk, cycle.driving)
         evidence = self._apply_rules(cycle, readings, risk, signals)
         self._count_violations(cycle.t, readings)
         if self._recorder:
             self._recorder.update(cycle._replace(frames=tuple(frames)), evidence)
-        done("hazards")
+        lap("hazards")
         return evidence
 
     def _apply_rules(
@@ -226,71 +190,49 @@ class Monitor:
             u.shapes[name] += int((one.frame.polygon_size < 3).sum())
 
     def _count_violations(self, t: float, readings: Readings) -> None:
-        for values, counts, (low, high), keys in zip(
-            (readings.channel, readings.pair), self._counts, self._bounds, self._keys, strict=True
-        ):
-            np.add(counts.missing, np.isnan(values), out=counts.missing)
-            beyond = (values < low) | (values > high)
-            if not beyond.any():
-                continue
-            np.add(counts.violated, beyond, out=counts.violated)
-            for row, column in np.argwhere(beyond).tolist():
-                key, least = keys[row][column]
-                self.violations.add(key, t, float(values[row, column]), least)
+        self._missing += np.isnan(readings.values)
+        beyond = (readings.values < self._low) | (readings.values > self._high)
+        self._violated += beyond
+        for k in np.flatnonzero(beyond).tolist():
+            place = self.layout.places[k]
+            least = self.thresholds[place.indicator].bound is Bound.LOWER
+            self.violations.add(place, t, float(readings.values[k]), least)
 
     @property
-    def not_evaluated(self) -> Counter[tuple[Indicator, str]]:
+    def not_evaluated(self) -> Counter[Place]:
         """Cycles in which an indicator had no value, by indicator and subject."""
-        return self._tally([counts.missing for counts in self._counts])
+        return self._tally(self._missing)
 
     @property
-    def violation_cycles(self) -> Counter[tuple[Indicator, str]]:
+    def violation_cycles(self) -> Counter[Place]:
         """Cycles in which an indicator was beyond its threshold."""
-        return self._tally([counts.violated for counts in self._counts])
+        return self._tally(self._violated)
 
-    def _tally(self, tables: Sequence[NDArray[np.int64]]) -> Counter[tuple[Indicator, str]]:
-        return Counter(
-            {
-                keys[row][column][0]: int(table[row, column])
-                for table, keys in zip(tables, self._keys, strict=True)
-                for row, column in np.argwhere(table).tolist()
-            }
-        )
+    def _tally(self, cycles: NDArray[np.int64]) -> Counter[Place]:
+        return Counter({self.layout.places[k]: int(cycles[k]) for k in np.flatnonzero(cycles)})
 
     def violations_now(self, readings: Readings) -> list[Violation]:
         """The violations of one cycle, for reading aloud."""
         out = []
-        for values, indicators, subjects in (
-            (readings.channel, CHANNEL_INDICATORS, self.channels),
-            (readings.pair, PAIR_INDICATORS, self.pairs),
-        ):
-            for row, indicator in enumerate(indicators):
-                entry = self.thresholds[indicator]
-                for subject, value in zip(subjects, values[row].tolist(), strict=True):
-                    if entry.threshold is not None and entry.violated(value):
-                        out.append(Violation(indicator, subject, value, entry.threshold))
+        for place, value in zip(self.layout.places, readings.values.tolist(), strict=True):
+            entry = self.thresholds[place.indicator]
+            if entry.threshold is not None and entry.violated(value):
+                out.append(Violation(place.indicator, place.subject, value, entry.threshold))
         return out
 
-
-def _no_lap(_: str) -> None:
-    return
-
-
-def _bounds(
-    thresholds: dict[Indicator, Threshold], indicators: Sequence[Indicator]
-) -> tuple[Floats, Floats]:
-    """Least and greatest value of each indicator that raises no alarm."""
-    low, high = np.full((len(indicators), 1), -np.inf), np.full((len(indicators), 1), np.inf)
-    for row, indicator in enumerate(indicators):
-        entry = thresholds[indicator]
-        if entry.threshold is not None:
-            (low if entry.bound is Bound.LOWER else high)[row] = entry.threshold
-    return low, high
+    def _bounds(self) -> tuple[Floats, Floats]:
+        """Least and greatest value at each place that raises no alarm."""
+        low, high = np.full((2, len(self.layout.places)), [[-np.inf], [np.inf]])
+        for k, place in enumerate(self.layout.places):
+            entry = self.thresholds[place.indicator]
+            if entry.threshold is not None:
+                (low if entry.bound is Bound.LOWER else high)[k] = entry.threshold
+        return low, high
 
 
 def drive_events(
     monitor: Monitor,
-) -> tuple[list[Event[HazardType]], list[Event[tuple[Indicator, str]]]]:
+) -> tuple[list[Event[HazardType]], list[Event[Place]]]:
     """All hazard events and threshold-violation events of a finished drive, by start."""
     hazards = sorted(monitor.hazards.finish(), key=lambda e: (e.t_start, e.key.value))
     violations = sorted(

@@ -18,13 +18,13 @@ from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import Profile, load_rules
 from skidpad.evidence.channels.identifier.model import Identify, Model
 from skidpad.evidence.channels.indicators.catalogue import (
-    CHANNEL_INDICATORS,
-    PAIR_INDICATORS,
     Bound,
     Indicator,
     Threshold,
 )
-from skidpad.evidence.channels.indicators.panel import IndicatorSettings
+from skidpad.evidence.channels.indicators.layout import Place
+from skidpad.evidence.channels.indicators.panel import no_lap
+from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.monitor import Monitor, drive_events
 from skidpad.evidence.channels.timefilter import Event
 from skidpad.recording.channels import ChannelSource, Losses, Message
@@ -49,7 +49,7 @@ class Watched:
     cycles: int
     hours: float
     hazards: dict[HazardType, int]  # events
-    violations: dict[tuple[Indicator, str], int]  # events
+    violations: dict[Place, int]  # events
     timing: pl.DataFrame | None = None
     summary: dict[str, Any] = field(default_factory=dict)
 
@@ -90,11 +90,8 @@ def watch(
             first, last = first or cycle, cycle
             if timer:
                 timer.begin(cycle)
-            evidence = monitor.update(cycle, timer.lap if timer else None)
-            readings = evidence.readings
-            log.add(
-                cycle.k, cycle.t, np.concatenate([readings.channel.ravel(), readings.pair.ravel()])
-            )
+            evidence = monitor.update(cycle, timer.lap if timer else no_lap)
+            log.add(cycle.k, cycle.t, evidence.readings.values)
             for record in monitor.records():
                 writer.write(record)
             if timer:
@@ -149,12 +146,7 @@ def _columns(monitor: Monitor) -> list[Column]:
             monitor.thresholds[indicator].bound is Bound.UPPER,
             monitor.thresholds[indicator].claim,
         )
-        for indicators, subjects in (
-            (CHANNEL_INDICATORS, monitor.channels),
-            (PAIR_INDICATORS, monitor.pairs),
-        )
-        for indicator in indicators
-        for subject in subjects
+        for indicator, subject in monitor.layout.places
     ]
 
 
@@ -202,20 +194,15 @@ def _audit(monitor: Monitor, found: Watched) -> list[dict[str, Any]]:
     missing, beyond = monitor.not_evaluated, monitor.violation_cycles
     return [
         {
-            "indicator": indicator.value,
-            "subject": subject,
-            "claim": monitor.thresholds[indicator].claim,
-            "threshold": monitor.thresholds[indicator].threshold,
-            "violation_events": found.violations.get((indicator, subject), 0),
-            "violation_cycles": beyond[indicator, subject],
-            "not_evaluated_cycles": missing[indicator, subject],
+            "indicator": place.indicator.value,
+            "subject": place.subject,
+            "claim": monitor.thresholds[place.indicator].claim,
+            "threshold": monitor.thresholds[place.indicator].threshold,
+            "violation_events": found.violations.get(place, 0),
+            "violation_cycles": beyond[place],
+            "not_evaluated_cycles": missing[place],
         }
-        for indicators, subjects in (
-            (CHANNEL_INDICATORS, monitor.channels),
-            (PAIR_INDICATORS, monitor.pairs),
-        )
-        for indicator in indicators
-        for subject in subjects
+        for place in monitor.layout.places
     ]
 
 

@@ -16,7 +16,7 @@ from skidpad.evidence.channels.indicators.catalogue import (
     PAIR_INDICATORS,
     Indicator,
 )
-from skidpad.evidence.channels.indicators.panel import Readings
+from skidpad.evidence.channels.indicators.layout import Readings
 from skidpad.evidence.channels.risk import RiskMatrix
 
 Floats = NDArray[np.float64]
@@ -51,7 +51,7 @@ _UPPER = np.array([i in GREATEST for i in PAIR_INDICATORS])
 
 def feature_row(readings: Readings, risk: RiskMatrix, signals: SignalReadings) -> Floats:
     """One cycle as (len(ROW_NAMES),)."""
-    pairs = np.where(_UPPER, _greatest(readings.pair), _least(readings.pair))
+    pairs = np.where(_UPPER, _greatest(readings.by_pair()), _least(readings.by_pair()))
     ahead, behind = risk.risk_ahead.reshape(1, -1), risk.risk_behind.reshape(1, -1)
     times = np.minimum(
         [
@@ -62,8 +62,8 @@ def feature_row(readings: Readings, risk: RiskMatrix, signals: SignalReadings) -
     )
     return np.concatenate(
         [
-            _least(readings.channel),
-            _greatest(readings.channel),
+            _least(readings.by_channel()),
+            _greatest(readings.by_channel()),
             pairs,
             _greatest(ahead),
             _least(ahead),

@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.indicators.catalogue import Indicator
-from skidpad.evidence.channels.indicators.panel import PAIR_ROW
 from skidpad.evidence.channels.judging.causes import V_STANDING, YAW_RATE_TURN
 from skidpad.evidence.channels.monitor import Monitor
 from skidpad.evidence.channels.recorder import CycleEvidence
@@ -57,7 +56,7 @@ class Observer:
     def end(self, evidence: CycleEvidence) -> None:
         """Keep what this cycle showed."""
         for name, indicator in SERIES:
-            values = evidence.readings.pair[PAIR_ROW[indicator]]
+            values = evidence.readings[indicator]
             self.series[name][self.k] = np.fmin.reduce(values) if values.size else np.nan
         self.steady[self.k] = evidence.signals.values[Signal.STEADY_SHARE]
         counts = [len(f.objects) for f in evidence.cycle.frames if f is not None]

@@ -14,7 +14,8 @@ from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile, Rule, Sig
 from skidpad.evidence.channels.identifier.features import feature_row
 from skidpad.evidence.channels.identifier.model import Model, events_of, probability_of
 from skidpad.evidence.channels.indicators.comfort import Form
-from skidpad.evidence.channels.indicators.panel import IndicatorSettings
+from skidpad.evidence.channels.indicators.panel import no_lap
+from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.judging.causes import ego_motion, false_cause, missed_cause
 from skidpad.evidence.channels.judging.facts import Observer
 from skidpad.evidence.channels.judging.matching import Span, match, merged
@@ -143,7 +144,7 @@ def _practical(
     signals, rows = [], []
     for k, cycle in enumerate(cycles):
         observer.begin(k)
-        evidence = monitor.update(cycle, observer.lap if clock else None)
+        evidence = monitor.update(cycle, observer.lap if clock else no_lap)
         observer.end(evidence)
         signals.append((cycle.t, evidence.signals.values))
         rows.append(feature_row(evidence.readings, evidence.risk, evidence.signals))

@@ -1,0 +1,90 @@
+"""The values of a cycle as one row: every indicator of every channel, then of every pair."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import ConfigError
+from skidpad.evidence.channels.indicators.catalogue import (
+    CHANNEL_INDICATORS,
+    PAIR_INDICATORS,
+    Indicator,
+)
+
+Floats = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+
+class Place(NamedTuple):
+    """Whose value stands at one place of the row."""
+
+    indicator: Indicator
+    subject: str  # channel, or pair "a+b"
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """What stands where; `span[indicator]` are the places of all its subjects."""
+
+    channels: tuple[str, ...]
+    pairs: tuple[tuple[int, int], ...]  # numbers of channels
+    places: tuple[Place, ...]
+    span: dict[Indicator, slice]
+
+    @classmethod
+    def of(cls, channels: Sequence[str]) -> Layout:
+        """The layout for these channels."""
+        if not channels:
+            raise ConfigError("indicators need at least one channel, got none")
+        pairs = tuple(combinations(range(len(channels)), 2))
+        names = ["+".join(pair) for pair in combinations(channels, 2)]
+        places: list[Place] = []
+        span = {}
+        for indicators, subjects in ((CHANNEL_INDICATORS, channels), (PAIR_INDICATORS, names)):
+            for indicator in indicators:
+                span[indicator] = slice(len(places), len(places) + len(subjects))
+                places += [Place(indicator, subject) for subject in subjects]
+        return cls(tuple(channels), pairs, tuple(places), span)
+
+    def indices(self, indicators: Iterable[Indicator]) -> Counts:
+        """Places of all subjects of `indicators`, in their order."""
+        row = np.arange(len(self.places))
+        return np.concatenate([row[self.span[i]] for i in indicators])
+
+
+@dataclass(frozen=True, slots=True)
+class Readings:
+    """The values of one cycle; `readings[indicator]` is a view of those of its subjects."""
+
+    layout: Layout
+    values: Floats  # (len(layout.places),), NaN: not evaluated
+    matched: tuple[Counts | None, ...]  # per pair rows (k, 2) of the objects that both report
+
+    def __getitem__(self, indicator: Indicator) -> Floats:
+        view: Floats = self.values[self.layout.span[indicator]]
+        return view
+
+    def by_channel(self) -> Floats:
+        """View (len(CHANNEL_INDICATORS), n channels)."""
+        n = len(self.layout.channels)
+        return self.values[: len(CHANNEL_INDICATORS) * n].reshape(-1, n)
+
+    def by_pair(self) -> Floats:
+        """View (len(PAIR_INDICATORS), n pairs)."""
+        n = len(CHANNEL_INDICATORS) * len(self.layout.channels)
+        return self.values[n:].reshape(len(PAIR_INDICATORS), -1)
+
+    def shared_rows(self) -> list[set[int]]:
+        """Per channel the rows of its objects that some other channel also reports."""
+        rows: list[set[int]] = [set() for _ in self.layout.channels]
+        for (a, b), matched in zip(self.layout.pairs, self.matched, strict=True):
+            if matched is not None:
+                rows[a].update(matched[:, 0].tolist())
+                rows[b].update(matched[:, 1].tolist())
+        return rows

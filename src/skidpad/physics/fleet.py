@@ -42,10 +42,8 @@ class Fleet:
         """
         n = len(types)
         self.types = tuple(types)
-        self.dt = dt
-        self.steps = max(1, round(dt / substep))
-        if self.steps * substep < dt - 1e-9:
-            self.steps += 1
+        self.substep = substep
+        self.set_step(dt)
         rows = ActorStates.empty(n) if states is None else states
         self.states = ActorStates._make(column[:n] for column in rows)
         self.params = vehicle_params(self.types)
@@ -66,6 +64,13 @@ class Fleet:
 
     def __len__(self) -> int:
         return len(self.types)
+
+    def set_step(self, dt: float) -> None:
+        """s by which one step advances from now on."""
+        self.dt = dt
+        self.steps = max(1, round(dt / self.substep))
+        if self.steps * self.substep < dt - 1e-9:
+            self.steps += 1
 
     def place(self, i: int, pose: Pose, v: float = 0.0) -> None:
         """Put vehicle i at `pose` with speed v along its heading, wheels straight and rolling."""

@@ -39,7 +39,7 @@ def same_model(id: str = EGO) -> None:
 def without_road_noise(backend: EmbeddedBackend) -> None:
     """The server's road has none; ours has 1e-4 rad of cross slope (decision M-11)."""
     world = backend.world
-    for i, key in enumerate(world.keys):
+    for i, key in enumerate(world.rows.keys):
         world.bank[i] -= ROAD_NOISE * (2.0 * uniform(key, world.tick, NOISE_SALT) - 1.0)
 
 

@@ -80,11 +80,11 @@ def test_of_two_that_meet_exactly_one_yields_unless_the_lanes_part():
 @pytest.mark.req("C-210")
 def test_crossing_streets_never_have_green_together():
     for seed in range(5):
-        lights = Lights(TOWN.signals, seed, 0.05, TOWN.lanes)
+        lights = Lights.pretimed(TOWN, seed, 0.05)
         heading = TOWN.signals.heading[lights.rows]
         north_south = np.abs(np.sin(heading)) > 0.7
-        for tick in range(0, 1800, 5):
-            lights.update(tick)
+        for _ in range(1800):
+            lights.advance(0.05)
             go = lights.by_row[lights.rows] != LightState.RED
             assert not (go[north_south].any() and go[~north_south].any())
 

@@ -22,6 +22,7 @@ from skidpad.physics.presets import find_weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.lights import CYCLE_S, Lights
+from skidpad.simulation.world.stage import staged
 from skidpad.simulation.world.traffic.idm import A_EMERGENCY, idm
 from skidpad.simulation.world.traffic.mobil import incentive, is_safe
 from skidpad.simulation.world.traffic.placement import (
@@ -29,7 +30,7 @@ from skidpad.simulation.world.traffic.placement import (
     fixed_spawns,
     published_positions,
 )
-from skidpad.simulation.world.world import World
+from skidpad.simulation.world.world import EGO, World
 
 MAP = load_map("figure8")
 assert MAP.ego_start is not None
@@ -46,8 +47,9 @@ PARKED = VehicleCommand(brake=1.0)
 
 
 def world_without_ego(seed: int, setup: Setup = SETUP) -> World:
-    world = World(setup, seed)
+    world = staged(setup, seed)
     world.states.present[0] = False
+    world.command(EGO, PARKED)
     return world
 
 
@@ -146,7 +148,7 @@ def test_ordinary_dry_traffic_stays_whole_for_500_s(seed: int) -> None:
     changes, last = 0, world.traffic.drivers.state["change"].copy()
     speeds, offsets = [], []
     for _ in range(10_000):
-        world.step(PARKED, ())
+        world.step()
         driver = world.traffic.drivers.state
         changes += int((driver["change"] < last).sum())
         last = driver["change"].copy()
@@ -166,7 +168,7 @@ def test_nobody_drives_over_a_red_light() -> None:
     before = world.placed.copy()
     for _ in range(4000):
         red = world.lights.by_row == LightState.RED
-        world.step(PARKED, ())
+        world.step()
         for row in np.flatnonzero(signals.kind == 0):
             here = (before["lane"] == signals.lane[row]) & (world.placed["lane"] == before["lane"])
             front = before["s"] + before["half_length"], world.placed["s"] + before["half_length"]
@@ -185,22 +187,23 @@ def test_ice_that_drivers_do_not_know_makes_them_slide_and_knowing_helps() -> No
     for setup in (icy, careful):
         world = world_without_ego(1, setup)
         for _ in range(2500):
-            world.step(PARKED, ())
+            world.step()
         contacts.append(world.book.background)
     assert contacts[0] > contacts[1]
 
 
 @pytest.mark.req("M-7")
 def test_a_wreck_is_put_back_far_from_the_ego() -> None:
-    world = World(SETUP, 1)
+    world = staged(SETUP, 1)
+    world.command(EGO, PARKED)
     for _ in range(100):
-        world.step(PARKED, ())
+        world.step()
     place = world.placed[5]
     world.put(5, world.states.pose(5).moved(left=-12.0), 0.0)
     notes: list[str] = []
     for _ in range(300):
         world.states.vx[5] = world.states.vy[5] = 0.0
-        world.step(PARKED, ())
+        world.step()
         notes += world.notices
         if notes:
             break
@@ -214,16 +217,17 @@ def test_a_wreck_is_put_back_far_from_the_ego() -> None:
 
 @pytest.mark.req("A-209")
 def test_random_traffic_fills_up_and_stays_around_the_ego() -> None:
-    world = World(replace(SETUP, traffic=TrafficSetup(mode="random", vehicles=40)), 1)
+    world = staged(replace(SETUP, traffic=TrafficSetup(mode="random", vehicles=40)), 1)
+    world.command(EGO, PARKED)
     assert world.states.present.sum() == 1
     for _ in range(600):
-        world.step(PARKED, ())
+        world.step()
     states = world.states
     assert states.present.sum() == 41
     away = np.hypot(states.x - states.x[0], states.y - states.y[0])
     assert away.max() < 650.0
     with pytest.raises(ConfigError, match="between 0 and 80"):
-        World(replace(SETUP, traffic=TrafficSetup(mode="random", vehicles=81)), 1)
+        staged(replace(SETUP, traffic=TrafficSetup(mode="random", vehicles=81)), 1)
 
 
 @pytest.mark.req("M-6")
@@ -231,7 +235,7 @@ def test_an_initial_limit_holds_until_the_first_sign() -> None:
     world = world_without_ego(1, replace(SETUP, traffic=TrafficSetup(initial_limit_kmh=30.0)))
     capped = []
     for _ in range(3000):
-        world.step(PARKED, ())
+        world.step()
         cap = world.traffic.drivers.state["cap"][1:]
         slow = np.isfinite(cap)
         capped.append(int(slow.sum()))
@@ -243,11 +247,11 @@ def test_an_initial_limit_holds_until_the_first_sign() -> None:
 @pytest.mark.req("M-2")
 def test_lights_cycle_with_ten_three_and_thirty_two_seconds() -> None:
     dt = 0.05
-    lights = Lights(MAP.signals, seed=4, dt=dt)
+    lights = Lights.pretimed(MAP, seed=4, dt=dt)
     seen = []
-    for tick in range(round(2 * CYCLE_S / dt)):
-        lights.update(tick)
+    for _ in range(round(2 * CYCLE_S / dt)):
         seen.append(dict(lights.by_id))
+        lights.advance(dt)
     for id in lights.by_id:
         states = [s[id] for s in seen]
         assert states.count(LightState.GREEN) * dt == pytest.approx(20.0)
@@ -265,7 +269,7 @@ def test_drivers_follow_a_lane_through_every_branch_of_the_map() -> None:
     world = world_without_ego(2, replace(SETUP, traffic=TrafficSetup(mode="random", vehicles=30)))
     visited: set[int] = set()
     for _ in range(2500):
-        world.step(PARKED, ())
+        world.step()
         lanes = world.placed["lane"][1:]
         visited |= set(MAP.lanes.road[lanes[lanes >= 0]].tolist())
     assert {50, 102, 104} & visited, "some take the ramp"

@@ -40,7 +40,7 @@ class Programme:
 
     def __init__(self, carla: Any, world: Any, map: RoadMap, seed: int, dt: float) -> None:
         self._carla = carla
-        self._cycle = Lights(map.signals, seed, dt, map.lanes)
+        self._cycle, self._dt, self._tick = Lights.pretimed(map, seed, dt), dt, 0
         self._lights = find_lights(world)
         self._shown: dict[int, LightState] = {}
         world.freeze_all_traffic_lights(True)
@@ -48,7 +48,9 @@ class Programme:
 
     def show(self, tick: int) -> None:
         """Let the lights show what belongs to this tick; the server shows it in the coming one."""
-        self._cycle.update(tick)
+        while self._tick < tick:
+            self._cycle.advance(self._dt)
+            self._tick += 1
         for id, light in self._lights:
             state = self._cycle.by_id.get(id)
             if state is not None and self._shown.get(id) is not state:

@@ -15,6 +15,7 @@ from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.asked import AskedSensors
 from skidpad.simulation.sensing import sensing_of
+from skidpad.simulation.world.stage import staged
 from skidpad.simulation.world.world import EGO, World
 
 REVERSE = 4  # column of the commands
@@ -44,7 +45,7 @@ class EmbeddedBackend:
 
     def reset(self, setup: Setup, seed: int) -> Frame:
         """Begin a run: everything is built anew (decision X-12)."""
-        self._world = World(setup, seed)
+        self._world, self._noise = staged(setup, seed), setup.localisation_noise
         self._localisation = stream(seed, "ego", "localisation")
         self.sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
         self._asked = AskedSensors(self.map, self.world.table, setup) if setup.asked else None
@@ -52,7 +53,8 @@ class EmbeddedBackend:
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
         """Apply the commands for one step."""
-        self.world.step(command, actor_commands)
+        self.world.command(EGO, command)
+        self.world.step(actor_commands)
         return self._frame()
 
     def truth(self) -> WorldTruth:
@@ -97,7 +99,7 @@ class EmbeddedBackend:
     def _estimate(self) -> EgoEstimate:
         w, s = self.world, self.world.states
         pose = s.pose(EGO)
-        sigma = w.setup.localisation_noise
+        sigma = self._noise
         if sigma > 0.0:
             dx, dy = self._localisation.normal(0.0, sigma, 2).tolist()
             pose = replace(pose, x=pose.x + dx, y=pose.y + dy)

@@ -1,19 +1,16 @@
-"""Who takes part in a run: the table of actors, in the order of their rows."""
+"""Who takes part in a run, in the order of entering."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
-
-import numpy as np
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorSetup, LanePosition, Setup
-from skidpad.core.states import ActorTable
 from skidpad.core.vocabulary import ActorKind
-from skidpad.physics.types import VehicleType, traffic_types, vehicle_type, vehicle_types
+from skidpad.physics.types import traffic_types, vehicle_type, vehicle_types
 from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.simulation.world.rows import Newcomer, Shape
 from skidpad.simulation.world.traffic.placement import (
     RANDOM_MAX,
     Spawn,
@@ -38,17 +35,6 @@ PALETTE = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Shape:
-    """A body without wheels: size in m and mass in kg; inf cannot be moved."""
-
-    kind: ActorKind
-    length: float
-    width: float
-    height: float
-    mass: float
-
-
 # Adult 95th-percentile stance and mass; city bicycle with rider; usual construction-site sizes.
 SHAPES = {
     "pedestrian": Shape(ActorKind.PEDESTRIAN, 0.4, 0.6, 1.75, 78.0),
@@ -60,15 +46,18 @@ SHAPES = {
 
 
 @dataclass(frozen=True, slots=True)
-class Cast:
-    """All actors of a run: vehicles first, the ego before all; then bodies without wheels."""
+class Role:
+    """An actor of a run before it enters."""
 
-    actors: tuple[ActorSetup, ...]
-    factors: tuple[float, ...]  # desired speed over the limit, for drivers
-    late: tuple[bool, ...]  # enters when there is room (A-209)
-    vehicles: tuple[VehicleType, ...]
-    shapes: tuple[Shape, ...]
-    table: ActorTable
+    actor: ActorSetup
+    factor: float = 1.0  # desired speed over the limit, for drivers
+    late: bool = False  # enters when there is room (A-209)
+
+    def newcomer(self, i: int) -> Newcomer:
+        """How it enters as the i-th."""
+        a = self.actor
+        body = SHAPES[a.type] if a.type in SHAPES else vehicle_type(a.type)
+        return Newcomer(body, a.name, a.type, a.rgb or PALETTE[i % len(PALETTE)])
 
 
 def place_of(map: RoadMap, place: Pose | LanePosition) -> Pose:
@@ -79,54 +68,23 @@ def place_of(map: RoadMap, place: Pose | LanePosition) -> Pose:
     return point.pose.moved(left=point.offset)
 
 
-def cast_of(map: RoadMap, setup: Setup, seed: int) -> Cast:
-    """Ego, scripted and background actors, checked."""
-    rows = [(setup.ego, 1.0, False)]
-    rows += [(actor, 1.0, False) for actor in setup.actors]
-    rows += _traffic(map, setup, seed)
+def cast_of(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
+    """Ego, scripted and background actors, checked: vehicles first, the ego before all."""
+    roles = [Role(setup.ego), *(Role(actor) for actor in setup.actors)]
+    roles += _traffic(map, setup, seed)
     known = vehicle_types()
-    for actor, _, _ in rows:
-        require_choice("actor type", actor.type, [*known, *SHAPES])
-        require_choice(f"driver of {actor.name}", actor.driver, DRIVERS)
-    names = [actor.name for actor, _, _ in rows]
+    for role in roles:
+        require_choice("actor type", role.actor.type, [*known, *SHAPES])
+        require_choice(f"driver of {role.actor.name}", role.actor.driver, DRIVERS)
+    names = [role.actor.name for role in roles]
     if len(set(names)) != len(names):
         raise ConfigError(f"actors need different names, got {', '.join(sorted(names))}")
     if setup.ego.type not in known:
         raise ConfigError(f"the ego must be a vehicle, got type {setup.ego.type!r}")
-    wheeled = [row for row in rows if row[0].type in known]
-    others = [row for row in rows if row[0].type not in known]
-    rows = wheeled + others
-    vehicles = tuple(vehicle_type(actor.type) for actor, _, _ in wheeled)
-    shapes = tuple(SHAPES[actor.type] for actor, _, _ in others)
-    actors = tuple(actor for actor, _, _ in rows)
-    return Cast(
-        actors=actors,
-        factors=tuple(factor for _, factor, _ in rows),
-        late=tuple(late for _, _, late in rows),
-        vehicles=vehicles,
-        shapes=shapes,
-        table=_table(actors, vehicles, shapes),
-    )
+    return sorted(roles, key=lambda role: role.actor.type in SHAPES)
 
 
-def _table(
-    actors: Sequence[ActorSetup], vehicles: Sequence[VehicleType], shapes: Sequence[Shape]
-) -> ActorTable:
-    kinds = [t.actor_kind for t in vehicles] + [s.kind for s in shapes]
-    bodies: list[VehicleType | Shape] = [*vehicles, *shapes]
-    paint = [a.rgb or PALETTE[i % len(PALETTE)] for i, a in enumerate(actors)]
-    return ActorTable(
-        names=tuple(a.name for a in actors),
-        types=tuple(a.type for a in actors),
-        kind=np.array(kinds, dtype=np.uint8),
-        length=np.array([b.length for b in bodies]),
-        width=np.array([b.width for b in bodies]),
-        height=np.array([b.height for b in bodies]),
-        rgb=np.array(paint, dtype=np.uint8),
-    )
-
-
-def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[tuple[ActorSetup, float, bool]]:
+def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
     traffic = setup.traffic
     if traffic is None or traffic.vehicles == 0:
         return []
@@ -138,12 +96,12 @@ def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[tuple[ActorSetup, fl
         spawns = fixed_spawns(map, _ego_point(map, setup), traffic, seed)
     assert len(spawns) <= RANDOM_MAX
     types = traffic_types()
-    rows = []
+    roles = []
     for i, spawn in enumerate(spawns):
         pose = Pose(0.0, 0.0) if spawn.place is None else spawn.place.pose
         actor = ActorSetup(name=f"traffic_{i + 1:02d}", type=type_of(i, types), place=pose)
-        rows.append((actor, spawn.factor, spawn.place is None))
-    return rows
+        roles.append(Role(actor, spawn.factor, spawn.place is None))
+    return roles
 
 
 def _ego_point(map: RoadMap, setup: Setup) -> LanePoint:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from math import atan, cos, sin, tan
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
-from skidpad.core.states import ActorStates
 from skidpad.roads.kernels import (
     WIDTH,
     LaneArrays,
@@ -20,25 +20,26 @@ from skidpad.roads.kernels import (
     project_kernel,
     sample_kernel,
     segment_kernel,
+    signal_ahead,
 )
-from skidpad.simulation.world.traffic.occupancy import PLACE, Places
+from skidpad.roads.lanes import SignalKind
+from skidpad.roads.queries import RoadMap
+from skidpad.simulation.world.rows import Rows
+from skidpad.simulation.world.traffic.occupancy import Places
 from skidpad.simulation.world.traffic.path import uniform
 
 Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
 
 ROAD_NOISE = 1.0e-4  # rad of cross slope, uniform: breaks perfect symmetry (decision M-11)
 NOISE_SALT = 7
 STEPS = 6  # samples, more than a vehicle passes in one tick
+LIGHT = int(SignalKind.LIGHT)
+A_COMFORT = 4.0  # m/s^2 with which a driver stops at a red light
+ZONE_MIN = 6.0  # m before the stop line within which a standing vehicle is held
+PASSED = 1.0  # m behind the stop line up to which the light still governs
 EDGE = 0.05  # m from the lane's edge within which the nearest lane is searched
 LEVEL = 1.0  # m of height that still is the same road
-
-
-def places_for(length: Floats, width: Floats) -> Places:
-    """Places of n actors, on no lane yet."""
-    placed = np.zeros(len(length), dtype=PLACE)
-    placed["lane"] = -1
-    placed["half_length"], placed["half_width"] = length / 2.0, width / 2.0
-    return placed
 
 
 @kernel
@@ -69,20 +70,14 @@ def still_on_lane(
 
 
 @kernel
-def settle(
-    lanes: LaneArrays,
-    states: ActorStates,
-    placed: Places,
-    grade: Floats,
-    bank: Floats,
-    keys: NDArray[np.uint64],
-    tick: int,
-) -> None:
-    """Find the lane under every present actor and put it on the road's surface.
+def settle(lanes: LaneArrays, rows: Rows, noise: float, driving: bool, tick: int) -> None:
+    """Find the lane under every present actor and put those that are grounded on the surface.
 
-    Writes states.z, `placed`, and the slopes along and across each body, rad. Beyond 20 m of any
-    driving lane an actor keeps its height on level ground.
+    Writes states.z, `placed`, and the slopes along and across each body, rad. noise: rad of cross
+    slope. driving: on driving lanes only. Beyond 20 m of such a lane an actor keeps its height on
+    level ground.
     """
+    states, placed, grade, bank = rows.states, rows.placed, rows.grade, rows.bank
     for i in range(len(grade)):
         grade[i] = bank[i] = 0.0
         place = placed[i]
@@ -96,17 +91,57 @@ def settle(
         place.speed = states.vx[i] * cos(yaw) + states.vy[i] * sin(yaw)
         lane, s, offset = still_on_lane(lanes, place.lane, place.sample, x, y, states.z[i])
         if lane < 0:
-            lane, s, offset = project_kernel(lanes, x, y, states.z[i], place.lane, True)
+            lane, s, offset = project_kernel(lanes, x, y, states.z[i], place.lane, driving)
         place.lane = lane
         if lane < 0:
             continue
         place.sample, _ = segment_kernel(lanes, lane, s)
         _, _, z, heading, _, _, slope, cross, _ = sample_kernel(lanes, lane, s)
         tilt = tan(cross)
-        states.z[i] = z + offset * tilt
+        if rows.grounded[i]:
+            states.z[i] = z + offset * tilt
         place.s, place.offset, place.heading = s, offset, heading
         place.v = states.vx[i] * cos(heading) + states.vy[i] * sin(heading)
         c, sn = cos(yaw - heading), sin(yaw - heading)
         grade[i] = atan(slope * c + tilt * sn)
         bank[i] = atan(tilt * c - slope * sn)
-        bank[i] += ROAD_NOISE * (2.0 * uniform(keys[i], tick, NOISE_SALT) - 1.0)
+        bank[i] += noise * (2.0 * uniform(rows.keys[i], tick, NOISE_SALT) - 1.0)
+
+
+class RoadSigns(NamedTuple):
+    """What the road tells n drivers; arrays (n,)."""
+
+    limit: Floats  # m/s, NaN where the map gives none
+    signal: NDArray[np.int64]  # row of the governing light's signal, -1: none
+
+
+@kernel
+def _read_signs(lanes: LaneArrays, placed: Places, limit: Floats, signal: Ints) -> None:
+    for i in range(len(placed)):
+        place = placed[i]
+        limit[i], signal[i] = np.nan, -1
+        if place.lane < 0:
+            continue
+        _, _, _, _, _, _, _, _, limit[i] = sample_kernel(lanes, place.lane, place.s)
+        turned = cos(place.yaw - place.heading) < 0.5
+        if lanes.drivable[place.lane] == 0 or turned or place.v < -0.5:
+            continue
+        front = place.s + place.half_length - PASSED
+        reach = ZONE_MIN + PASSED + place.v * place.v / (2.0 * A_COMFORT)
+        start = min(front, lanes.length[place.lane])
+        row, gap = signal_ahead(lanes, place.lane, start, reach + front - start, LIGHT)
+        if row >= 0 and gap - (front - start) >= 0.0:
+            signal[i] = row
+
+
+def read_signs(map: RoadMap, placed: Places) -> RoadSigns:
+    """Limit and governing light at these places."""
+    signs = RoadSigns(np.empty(len(placed)), np.empty(len(placed), dtype=np.int64))
+    _read_signs(map.arrays, placed, signs.limit, signs.signal)
+    return signs
+
+
+def ground_height(map: RoadMap, x: float, y: float, z: float) -> float:
+    """Height of the nearest lane of any kind, m; z beside all roads."""
+    place = map.project(x, y, z, driving=False)
+    return z if place is None else place.z

@@ -1,7 +1,13 @@
-"""Traffic lights: a fixed cycle whose phase is part of the seed (decision M-2)."""
+"""Traffic lights: groups whose phases take turns, each green, then yellow, then red for all.
+
+A group is a junction. Its lights that look along one axis share a phase, so crossing streams never
+have green together.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import dataclass, field
 from math import pi
 
 import numpy as np
@@ -9,76 +15,193 @@ from numpy.typing import NDArray
 
 from skidpad.core.randomness import stream
 from skidpad.core.vocabulary import LightState
-from skidpad.roads.lanes import LaneTable, SignalKind, SignalTable
+from skidpad.roads.lanes import SignalKind
+from skidpad.roads.queries import RoadMap
 
-GREEN_S = 10.0  # CARLA's defaults for green and yellow; red as measured in the published set-up
-YELLOW_S = 3.0
-RED_S = 32.0
-NEVER = 2**62  # ticks
-STAGES = np.array([LightState.GREEN, LightState.YELLOW, LightState.RED], dtype=np.uint8)
-CYCLE_S = GREEN_S + YELLOW_S + RED_S
+GREEN_S, YELLOW_S, RED_S = 10.0, 3.0, 2.0  # CARLA's default times; red: for all, before the next
+CYCLE_S = 45.0  # of a pretimed group: green, yellow and 32 s of red as measured by the publication
+AXIS = pi / 4.0  # headings this close belong to one axis
+ROUNDING = 1e-6  # s by which summed steps may fall short
+
+
+@dataclass(slots=True, eq=False)
+class Light:
+    """One traffic light of the map."""
+
+    signal: int  # OpenDRIVE id
+    rows: tuple[int, ...]  # of the signal table: one per lane that it governs
+    group: int
+    state: LightState = LightState.RED
+    green: float = GREEN_S
+    yellow: float = YELLOW_S
+    red: float = RED_S
+    elapsed: float = 0.0  # s in this state
+
+    def show(self, state: LightState, elapsed: float = 0.0) -> None:
+        """Another state, its time anew."""
+        self.state, self.elapsed = state, elapsed
+
+
+@dataclass(slots=True)
+class Group:
+    """The lights of one junction and whose turn it is."""
+
+    id: int
+    phases: list[list[Light]] = field(default_factory=list)
+    turn: int = 0
+    frozen: bool = False
+
+    def lights(self) -> Iterable[Light]:
+        """All of them."""
+        return (light for phase in self.phases for light in phase)
+
+    def reset(self) -> None:
+        """The first phase has green, all timers start anew."""
+        self.begin(0, LightState.GREEN, 0.0)
+
+    def begin(self, turn: int, state: LightState, elapsed: float) -> None:
+        """Phase `turn` is in `state` since `elapsed` s, all others are red."""
+        self.turn = turn
+        for i, phase in enumerate(self.phases):
+            for light in phase:
+                light.show(state if i == turn else LightState.RED, elapsed)
+
+    def advance(self, dt: float) -> bool:
+        """Time passes; True when a lamp changed."""
+        for light in self.lights():
+            light.elapsed += dt
+        if self.frozen:
+            return False
+        phase = self.phases[self.turn]
+        first = phase[0]
+        spent = first.elapsed + ROUNDING
+        if first.state is LightState.GREEN and spent >= first.green:
+            return _show_all(phase, LightState.YELLOW)
+        if first.state is LightState.YELLOW and spent >= first.yellow:
+            return _show_all(phase, LightState.RED)
+        if first.state is LightState.RED and spent >= first.red:
+            self.turn = (self.turn + 1) % len(self.phases)
+            return _show_all(self.phases[self.turn], LightState.GREEN)
+        return False
+
+
+def _show_all(phase: list[Light], state: LightState) -> bool:
+    for light in phase:
+        light.show(state)
+    return True
 
 
 class Lights:
-    """States of all lights of a map as a function of the tick.
+    """All lights of a map; `by_row` and `by_id` are what they show."""
 
-    Lights of one group (a junction) take turns: approaches along one axis share their green, the
-    axes follow each other evenly within the cycle, so crossing streams never have green together.
-    """
-
-    def __init__(
-        self, signals: SignalTable, seed: int, dt: float, lanes: LaneTable | None = None
-    ) -> None:
-        """lanes: where controllers of one junction are to take turns as one group."""
-        if lanes is not None:
-            signals = signals._replace(group=_junctions(signals, lanes))
+    def __init__(self, map: RoadMap) -> None:
+        signals = map.signals
         self.rows = np.flatnonzero(signals.kind == SignalKind.LIGHT)
-        self.ids = signals.id[self.rows]
-        self._shift = np.round(_offsets(signals, self.rows, seed) / dt).astype(np.int64)
-        durations = [round(GREEN_S / dt), round(YELLOW_S / dt), round(RED_S / dt)]
-        self._ends = np.cumsum(durations)  # ticks from the start of green
         self.by_row = np.full(len(signals.id), LightState.OFF, dtype=np.uint8)  # (K,) LightState
         self.by_id: dict[int, LightState] = {}
-        self._changes = 0  # tick of the next change
-        self.update(0)
+        self.groups = _groups(map, self.rows)
+        self.lights = [light for group in self.groups.values() for light in group.lights()]
+        self.of_row = {row: light for light in self.lights for row in light.rows}
+        self.frozen = False  # all of them
+        self.reset()
 
-    def update(self, tick: int) -> None:
-        """Set `by_row` and `by_id` to the states of `tick`; ticks must not run backwards."""
-        if tick < self._changes:
-            return
-        phase = (tick + self._shift) % self._ends[-1]
-        stage = np.searchsorted(self._ends, phase, side="right")
-        self.by_row[self.rows] = STAGES[stage]
-        self.by_id = {
-            int(i): LightState(int(s))
-            for i, s in zip(self.ids, self.by_row[self.rows], strict=True)
-        }
-        left = self._ends[stage] - phase
-        self._changes = tick + int(left.min(initial=NEVER))
+    @classmethod
+    def pretimed(cls, map: RoadMap, seed: int, dt: float) -> Lights:
+        """Groups with the published cycle whose position is part of the seed (decision M-2)."""
+        lights = cls(map)
+        for group in lights.groups.values():
+            share = CYCLE_S / len(group.phases)
+            for light in group.lights():
+                light.red = max(share - GREEN_S - YELLOW_S, 0.0)
+            alone = group.id < 0
+            name = f"signal {group.phases[0][0].signal}" if alone else f"group {group.id}"
+            at = stream(seed, "lights", name).uniform(0.0, CYCLE_S)
+            ticks = round(at / dt) % round(CYCLE_S / dt)
+            turn = min(int(ticks * dt / share + ROUNDING), len(group.phases) - 1)
+            _set_clock(group, turn, ticks * dt - turn * share)
+        lights._show()
+        return lights
+
+    def advance(self, dt: float) -> bool:
+        """Time passes; True when a lamp changed."""
+        if self.frozen:
+            for light in self.lights:
+                light.elapsed += dt
+            return False
+        changed = False
+        for group in self.groups.values():
+            changed |= group.advance(dt)
+        if changed:
+            self._show()
+        return changed
+
+    def set_state(self, light: Light, state: LightState) -> None:
+        """One lamp is set; its group's clock goes on from there."""
+        light.show(state)
+        group = self.groups[light.group]
+        for i, phase in enumerate(group.phases):
+            if light in phase and state is not LightState.RED:
+                group.turn = i
+        self._show()
+
+    def phase_of(self, light: Light) -> list[Light]:
+        """The lights that change together with this one; they share their times."""
+        return next(phase for phase in self.groups[light.group].phases if light in phase)
+
+    def is_frozen(self, light: Light) -> bool:
+        """Whether its group stands still."""
+        return self.frozen or self.groups[light.group].frozen
+
+    def reset(self, group: Group | None = None) -> None:
+        """A group from the beginning; None: all."""
+        for each in self.groups.values() if group is None else (group,):
+            each.reset()
+        self._show()
+
+    def _show(self) -> None:
+        for light in self.lights:
+            self.by_row[list(light.rows)] = light.state
+        self.by_id = {light.signal: light.state for light in self.lights}
 
 
-def _junctions(signals: SignalTable, lanes: LaneTable) -> NDArray[np.int32]:
-    """(K,) the junction behind each signal's lane, else the signal's own group."""
-    group: NDArray[np.int32] = signals.group.copy()
-    for row, lane in enumerate(signals.lane):
-        if lanes.next_start[lane] == lanes.next_start[lane + 1]:
-            continue
-        junction = lanes.junction[lanes.next_lane[lanes.next_start[lane]]]
+def _set_clock(group: Group, turn: int, elapsed: float) -> None:
+    """`elapsed` s after phase `turn` got green."""
+    elapsed += ROUNDING
+    if elapsed < GREEN_S:
+        group.begin(turn, LightState.GREEN, elapsed - ROUNDING)
+    elif elapsed < GREEN_S + YELLOW_S:
+        group.begin(turn, LightState.YELLOW, elapsed - GREEN_S - ROUNDING)
+    else:
+        group.begin(turn, LightState.RED, elapsed - GREEN_S - YELLOW_S - ROUNDING)
+
+
+def _groups(map: RoadMap, rows: NDArray[np.intp]) -> dict[int, Group]:
+    """Lights by junction, those along one axis in one phase; a light without one is alone."""
+    signals = map.signals
+    by_id: dict[int, list[int]] = {}
+    for row in rows.tolist():
+        by_id.setdefault(int(signals.id[row]), []).append(row)
+    axes: dict[int, dict[int, list[Light]]] = {}
+    for id, governed in by_id.items():
+        group = _junction(map, governed[0])
+        light = Light(id, tuple(governed), group if group >= 0 else -1 - id)
+        axis = round((float(signals.heading[governed[0]]) % pi) / AXIS) % 4
+        axes.setdefault(light.group, {}).setdefault(axis, []).append(light)
+    return {
+        id: Group(
+            id, [phases[axis] for axis in sorted(phases, key=lambda a: (a > min(phases), -a))]
+        )
+        for id, phases in axes.items()
+    }
+
+
+def _junction(map: RoadMap, row: int) -> int:
+    """The junction behind a signal's lane, else the signal's own group."""
+    signals, lanes = map.signals, map.lanes
+    lane = int(signals.lane[row])
+    first = lanes.next_start[lane]
+    if first < lanes.next_start[lane + 1]:
+        junction = int(lanes.junction[lanes.next_lane[first]])
         if junction >= 0:
-            group[row] = junction
-    return group
-
-
-def _offsets(signals: SignalTable, rows: NDArray[np.intp], seed: int) -> NDArray[np.float64]:
-    """Phase of each light row in s: one draw per group, axes of a group spread over the cycle."""
-    offset = np.zeros(len(rows))
-    axis = np.round((signals.heading[rows] % pi) / (pi / 4.0)).astype(np.int64) % 4
-    for i, row in enumerate(rows):
-        group = int(signals.group[row])
-        alone = group < 0
-        name = f"signal {int(signals.id[row])}" if alone else f"group {group}"
-        offset[i] = stream(seed, "lights", name).uniform(0.0, CYCLE_S)
-        if not alone:
-            axes = np.unique(axis[signals.group[rows] == group])
-            offset[i] += CYCLE_S * np.searchsorted(axes, axis[i]) / len(axes)
-    return offset
+            return junction
+    return int(signals.group[row])

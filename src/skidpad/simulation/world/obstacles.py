@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from functools import lru_cache
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,55 +18,57 @@ from skidpad.roads.roadside import Barrier, BarrierKind, Box
 FOOT = 0.3  # m below the foot line that a barrier still stops: roads are not flat
 
 
+BARRIERS = {  # kerbs can be driven over
+    BarrierKind.GUARDRAIL: SemanticClass.GUARD_RAIL,
+    BarrierKind.WALL: SemanticClass.WALL,
+    BarrierKind.FENCE: SemanticClass.FENCE,
+}
+
+
 class Obstacles(NamedTuple):
-    """Segments, and for each what it belongs to: "guardrail", "building", ..."""
+    """Segments, and for each what it belongs to: "guardrail", "building", ... and its class."""
 
     segments: Segments
     names: tuple[str, ...]
+    labels: tuple[SemanticClass, ...]
+
+
+class _Segment(NamedTuple):
+    line: tuple[float, float, float, float]
+    low: float
+    high: float
+    name: str
+    label: SemanticClass
 
 
 @lru_cache(maxsize=8)
 def obstacles(map: RoadMap) -> Obstacles:
-    """Everything solid beside the road; kerbs can be driven over."""
-    lines: list[tuple[float, float, float, float]] = []
-    low: list[float] = []
-    high: list[float] = []
-    names: list[str] = []
-    for barrier in map.roadside.barriers:
-        if barrier.kind is not BarrierKind.KERB:
-            _add_barrier(barrier, lines, low, high, names)
-    for box in map.roadside.boxes:
-        if box.solid:
-            _add_box(box, lines, low, high, names)
-    array = np.array(lines, dtype=np.float64).reshape(-1, 4)
-    return Obstacles(static_segments(array, np.array(low), np.array(high)), tuple(names))
+    """Everything solid beside the road."""
+    found = [s for b in map.roadside.barriers if b.kind in BARRIERS for s in _of_barrier(b)]
+    found += [s for b in map.roadside.boxes if b.solid for s in _of_box(b)]
+    lines = np.array([s.line for s in found], dtype=np.float64).reshape(-1, 4)
+    low, high = np.array([s.low for s in found]), np.array([s.high for s in found])
+    return Obstacles(
+        static_segments(lines, low, high),
+        tuple(s.name for s in found),
+        tuple(s.label for s in found),
+    )
 
 
-def _add_barrier(
-    barrier: Barrier,
-    lines: list[tuple[float, float, float, float]],
-    low: list[float],
-    high: list[float],
-    names: list[str],
-) -> None:
-    for a, b in zip(barrier.points[:-1], barrier.points[1:], strict=True):
-        lines.append((float(a[0]), float(a[1]), float(b[0]), float(b[1])))
-        low.append(float(min(a[2], b[2])) - FOOT)
-        high.append(float(max(a[2], b[2])) + barrier.height)
-        names.append(barrier.kind.name.lower())
+def _of_barrier(barrier: Barrier) -> Iterator[_Segment]:
+    for a, b in pairwise(barrier.points):
+        yield _Segment(
+            (float(a[0]), float(a[1]), float(b[0]), float(b[1])),
+            float(min(a[2], b[2])) - FOOT,
+            float(max(a[2], b[2])) + barrier.height,
+            barrier.kind.name.lower(),
+            BARRIERS[barrier.kind],
+        )
 
 
-def _add_box(
-    box: Box,
-    lines: list[tuple[float, float, float, float]],
-    low: list[float],
-    high: list[float],
-    names: list[str],
-) -> None:
-    corners = footprint(box.x, box.y, box.yaw, box.length, box.width)
-    for k in range(4):
-        (x0, y0), (x1, y1) = corners[k].tolist(), corners[(k + 1) % 4].tolist()
-        lines.append((x0, y0, x1, y1))
-        low.append(box.z)
-        high.append(box.z + box.height)
-        names.append(SemanticClass(box.label).name.lower())
+def _of_box(box: Box) -> Iterator[_Segment]:
+    label = SemanticClass(box.label)
+    corners = footprint(box.x, box.y, box.yaw, box.length, box.width).tolist()
+    for (x0, y0), (x1, y1) in zip(corners, [*corners[1:], corners[0]], strict=True):
+        line = (x0, y0, x1, y1)
+        yield _Segment(line, box.z, box.z + box.height, label.name.lower(), label)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError, require_choice, require_range
+from skidpad.core.geometry import Pose
 from skidpad.core.setup import FrictionPatch
 from skidpad.core.states import ActorStates
 from skidpad.physics.types import VehicleType
@@ -18,14 +20,16 @@ SIDES = ("both", "left", "right")
 
 
 class Patches:
-    """Resolves patches to friction at each wheel; built once per run."""
+    """Resolves patches to friction at each wheel; fitted to the vehicles of a run."""
 
-    def __init__(
-        self, map: RoadMap, patches: Sequence[FrictionPatch], types: Sequence[VehicleType]
-    ) -> None:
+    def __init__(self, map: RoadMap, patches: Sequence[FrictionPatch]) -> None:
         self.map, self.patches = map, tuple(patches)
+        self.wheels: list[list[tuple[float, float]]] = []
         for k, patch in enumerate(self.patches):
             _check(k, patch)
+
+    def fit(self, types: Sequence[VehicleType]) -> None:
+        """These are the vehicles from now on."""
         self.wheels = [
             [(x, y) for x in (t.x_front_axle, t.x_rear_axle) for y in (t.track / 2, -t.track / 2)]
             for t in types
@@ -33,8 +37,6 @@ class Patches:
 
     def apply(self, states: ActorStates, mu: NDArray[np.float64]) -> None:
         """Multiply mu (n, 4) at FL, FR, RL, RR by the ratio of the patch under each wheel."""
-        if not self.patches:
-            return
         for i, wheels in enumerate(self.wheels):
             if not states.present[i]:
                 continue
@@ -59,6 +61,27 @@ class Patches:
             return False
         on_side = patch.side == "both" or (place.offset > 0.0) == (patch.side == "left")
         return on_side and patch.s_from <= self.map.s_road(place) <= patch.s_to
+
+
+@dataclass(frozen=True, slots=True)
+class FrictionZone:
+    """An upright box in which every tyre has this tire_friction."""
+
+    pose: Pose  # of its middle
+    half: tuple[float, float, float]  # m
+    tire_friction: float
+
+
+def in_zone(zone: FrictionZone, s: ActorStates) -> NDArray[np.bool_]:
+    """(n,) whose position is inside; feet up to 1 m below or above the box count."""
+    c, sn = cos(zone.pose.yaw), sin(zone.pose.yaw)
+    dx, dy = s.x - zone.pose.x, s.y - zone.pose.y
+    inside: NDArray[np.bool_] = (
+        (np.abs(dx * c + dy * sn) <= zone.half[0])
+        & (np.abs(dy * c - dx * sn) <= zone.half[1])
+        & (np.abs(s.z - zone.pose.z) <= zone.half[2] + 1.0)
+    )
+    return inside
 
 
 def _check(k: int, patch: FrictionPatch) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import cos, sin
 
 from skidpad.core.states import ActorTable, ContactEvent, LaneInvasion
@@ -23,6 +24,14 @@ class ContactBook:
         self.hold = round(HOLD / dt)
         self.last: dict[tuple[int, int | str], int] = {}
         self.background = 0  # contacts among the others that began so far
+
+    def arrange(self, rows: Mapping[int, int]) -> None:
+        """The actors have other rows; rows: the new one by the old one of those who stay."""
+        self.last = {
+            (rows[i], j if isinstance(j, str) else rows[j]): tick
+            for (i, j), tick in self.last.items()
+            if i in rows and (isinstance(j, str) or j in rows)
+        }
 
     def update(self, tick: int, contacts: Contacts, count: int) -> tuple[ContactEvent, ...]:
         """Contacts of the ego that began in this tick; the largest impulse speaks for each."""

@@ -1,113 +1,155 @@
-"""The moving world of one run: vehicles, drivers, lights and contacts; no sensors.
+"""The moving world: every actor's motion, the road under it, contacts, lights and drivers.
 
-The order within a step: commands, drivers, friction, vehicles, contacts, ground, lights, events.
+The order within a step: drivers, commands, friction, vehicles, contacts, ground, lights, events.
 Everything random comes from named streams of the seed.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from functools import lru_cache
-from math import cos, isfinite, sin
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from math import atan2, cos, isfinite, sin
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.core.randomness import stream_key
-from skidpad.core.setup import ActorCommand, Setup, TrafficSetup
+from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.states import ActorStates, ContactEvent, LaneInvasion, VehicleCommand
-from skidpad.core.vocabulary import ActorKind
-from skidpad.physics.contact import CONTACT_LAW, Bodies, Contacts, bodies, resolve_contacts
+from skidpad.physics.contact import CONTACT_LAW, Contacts, resolve_contacts
 from skidpad.physics.fleet import Fleet
-from skidpad.physics.grip import fill_mu, friction_ratio, grip_params
-from skidpad.roads.bundled import load_map
+from skidpad.physics.grip import GripParams, fill_mu
+from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.world.actors import Cast, cast_of, place_of
-from skidpad.simulation.world.ground import places_for, settle
+from skidpad.simulation.world.ground import ROAD_NOISE, RoadSigns, read_signs, settle
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.obstacles import obstacles
-from skidpad.simulation.world.patches import Patches
+from skidpad.simulation.world.patches import FrictionZone, Patches, in_zone
+from skidpad.simulation.world.rows import (
+    Member,
+    Newcomer,
+    Rows,
+    bodies_of,
+    table_of,
+)
 from skidpad.simulation.world.touch import ContactBook, MarkingWatch
 from skidpad.simulation.world.traffic.manager import Traffic
-from skidpad.simulation.world.traffic.network import Network, network
 
-EGO = 0
+EGO = 0  # row and id of the first actor of a run
 BRAKING = 0.05  # pedal at which the brake lamps light up
 
 
-@lru_cache(maxsize=8)
-def network_of(map: RoadMap) -> Network:
-    """The drivers' view of a map, made once per process."""
-    return network(map.samples, map.lanes, map.signals)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Conditions:
+    """What holds for all actors of a world."""
+
+    seed: int = 0
+    dt: float = DT
+    grip: GripParams
+    road_noise: float = ROAD_NOISE  # rad of cross slope, decision M-11
+    all_lanes: bool = False  # actors stand on sidewalks and shoulders too
 
 
 class World:
-    """Everything that changes during a run, built from a set-up and a seed."""
+    """Everything that changes during a run. Actors keep their id; rows are in order of entering,
+    vehicles before bodies without wheels."""
 
-    def __init__(self, setup: Setup, seed: int) -> None:
-        self.setup, self.dt, self.tick = setup, setup.dt, 0
-        self.map = load_map(setup.map)
-        self.cast = cast_of(self.map, setup, seed)
-        self.table = self.cast.table
-        n, wheeled = len(self.table), len(self.cast.vehicles)
-        self.wheeled = wheeled
-        self.states = ActorStates.empty(n)
-        self.fleet = Fleet(self.cast.vehicles, self.dt, states=self.states)
-        self.commands = np.zeros((n, 5))  # throttle, brake, steer, handbrake, reverse
-        self.road_mu = np.zeros((wheeled, 4))
-        self.mu = np.full((n, 4), np.nan)  # at the tyres; NaN where there is none
-        self.grade, self.bank = np.zeros(n), np.zeros(n)
-        self.placed = places_for(self.table.length, self.table.width)
-        self.keys = np.array([stream_key(seed, "road noise", i) for i in range(n)], np.uint64)
-        self.grip = grip_params(setup.weather, setup.grip, setup.mu_ref)
-        self.patches = Patches(self.map, setup.patches, self.cast.vehicles)
-        self.lights = Lights(self.map.signals, seed, self.dt, self.map.lanes)
-        self.obstacles = obstacles(self.map)
-        self.bodies = _bodies(self.cast)
+    def __init__(self, map: RoadMap, lights: Lights, conditions: Conditions) -> None:
+        self.map, self.lights, self.conditions = map, lights, conditions
+        self.dt, self.tick, self.grip = conditions.dt, 0, conditions.grip
+        self.obstacles = obstacles(map)
+        self.zones: Sequence[FrictionZone] = ()
+        self._zoned = False  # some were in force in the last step
+        self.held: dict[int, tuple[float, float]] = {}  # body velocity kept against all forces
         self.touching = Contacts.room()
-        self.book = ContactBook(self.obstacles.names, self.dt)
-        self.watch = MarkingWatch(self.map, self.table)
-        self.index = {name: i for i, name in enumerate(self.table.names)}
+        self.touches = 0  # contacts of this tick: rows of `touching`
+        self.traffic: Traffic | None = None
+        self.patches: Patches | None = None
+        self.book: ContactBook | None = None
+        self.watch: MarkingWatch | None = None
         self.contacts: tuple[ContactEvent, ...] = ()
         self.invasions: tuple[LaneInvasion, ...] = ()
         self.notices: tuple[str, ...] = ()
-        types = [*self.cast.vehicles, *(None for _ in self.cast.shapes)]
-        traffic = setup.traffic or TrafficSetup(vehicles=0)
-        ratio = friction_ratio(setup.weather, setup.grip)
-        net = network_of(self.map)
-        walkers = np.flatnonzero(self.table.kind == ActorKind.PEDESTRIAN)
-        self.traffic = Traffic(self.map, net, types, traffic, seed, self.dt, ratio, walkers)
-        self._place_all()
+        self._next_id = 0
+        self._begin([])
 
-    def step(self, command: VehicleCommand, actor_commands: Iterable[ActorCommand]) -> None:
-        """Advance by dt."""
-        self.tick += 1
-        self.traffic.decide(self.placed, self.lights.by_row, self.tick, self.commands)
-        self._drive(EGO, command)
-        moved = [self._obey(c) for c in actor_commands]
-        wheeled = self.wheeled
-        active = self.states.present[:wheeled]
-        if moved:
-            active = active.copy()
-            active[[i for i in moved if 0 <= i < wheeled]] = False
-        fill_mu(self.grip, self.fleet.states.vx, self.fleet.states.vy, self.road_mu)
-        self.patches.apply(self.states, self.road_mu)
-        grade, bank = self.grade[:wheeled], self.bank[:wheeled]
-        self.fleet.step(self.commands[:wheeled], self.road_mu, grade, bank, active)
-        self.mu[:wheeled] = self.fleet.mu
-        self._glide(moved)
-        count = resolve_contacts(
-            self.states, self.bodies, self.obstacles.segments, CONTACT_LAW, self.dt, self.touching
-        )
-        self.contacts = self.book.update(self.tick, self.touching, count) if count else ()
-        self._put_vehicles()
-        self._settle()
-        self.lights.update(self.tick)
-        self.invasions = self.watch.update(self.tick, self.placed)
+    # --- who is there
+
+    def enter(self, newcomers: Sequence[Newcomer]) -> list[int]:
+        """Let actors enter, not yet present; their ids."""
+        ids = range(self._next_id, self._next_id + len(newcomers))
+        self._next_id += len(newcomers)
+        self._arrange([*self.members, *map(Member, ids, newcomers)])
+        return list(ids)
+
+    def add(self, newcomer: Newcomer, pose: Pose, v: float = 0.0) -> int:
+        """One more actor at `pose` with speed v along it; its id."""
+        (id,) = self.enter([newcomer])
+        self.put(self.row(id), pose, v)
+        self.settle()
+        return id
+
+    def remove(self, id: int) -> None:
+        """Take an actor out; all others go on as they were."""
+        gone = self.row(id)
+        self.held.pop(id, None)
+        self._arrange([m for i, m in enumerate(self.members) if i != gone])
+
+    def row(self, id: int) -> int:
+        """Where an actor's values stand at present."""
+        return self._rows_by_id[id]
+
+    def reshape(self, id: int, body: VehicleType) -> None:
+        """A vehicle's physics changes: mass, brakes, wheels; it goes on moving."""
+        i = self.row(id)
+        old = self.members[i].actor
+        new = Newcomer(body, old.name, old.type, old.rgb)
+        self._arrange([*self.members[:i], Member(id, new), *self.members[i + 1 :]])
+
+    def _begin(self, members: list[Member]) -> None:
+        self.members = members
+        self._rows_by_id = {m.id: i for i, m in enumerate(members)}
+        self.index = {m.actor.name: i for i, m in enumerate(members)}
+        types = [b for m in members if isinstance(b := m.actor.body, VehicleType)]
+        self.wheeled = len(types)
+        self.table = table_of(members)
+        self.rows = Rows.of(members, self.conditions.seed)
+        self.states, self.commands, self.mu = self.rows.states, self.rows.commands, self.rows.mu
+        self.grade, self.bank, self.placed = self.rows.grade, self.rows.bank, self.rows.placed
+        self.fleet = Fleet(types, self.dt, states=self.states)
+        self.tyres = self.fleet.tire_friction.copy()  # (wheeled, 4) outside friction zones
+        self.road_mu = np.zeros((self.wheeled, 4))
+        self.bodies = bodies_of(members)
+
+    def _arrange(self, members: Sequence[Member]) -> None:
+        """New rows for these actors; who was there goes on from its old row."""
+        old, fleet, tyres, was = self.rows, self.fleet, self.tyres, self._rows_by_id
+        self._begin(sorted(members, key=lambda m: not m.wheeled))
+        kept = [(i, was[m.id]) for i, m in enumerate(self.members) if m.id in was]
+        to, source = np.array(kept, dtype=np.intp).reshape(-1, 2).T
+        self.rows.carry(old, to, source)
+        to, source = to[to < self.wheeled], source[to < self.wheeled]
+        for column, before in zip(self.fleet.wheels, fleet.wheels, strict=True):
+            column[to] = before[source]
+        for column, before in ((self.fleet.mu, fleet.mu), (self.tyres, tyres)):
+            column[to] = before[source]
+        self._weigh()
+        if self.traffic is not None:
+            self.traffic.arrange(self.members, dict(kept))
+        if self.patches is not None:
+            self.patches.fit(self.fleet.types)
+        if self.book is not None:
+            self.book.arrange({before: now for now, before in kept})
+
+    # --- control from outside
+
+    def command(self, id: int, c: VehicleCommand) -> None:
+        """Pedals and steer of a vehicle from now on."""
+        self._drive(self.row(id), c)
 
     def put(self, i: int, pose: Pose, v: float) -> None:
-        """Actor i stands at `pose` and moves along it with speed v."""
+        """The actor of row i stands at `pose` and moves along it with speed v."""
         s = self.states
         if i < self.wheeled:
             self.fleet.place(i, pose, v)
@@ -117,39 +159,159 @@ class World:
             s.vx[i], s.vy[i] = v * cos(pose.yaw), v * sin(pose.yaw)
             s.yaw_rate[i] = s.ax[i] = s.ay[i] = 0.0
             s.present[i] = True
-        if i == EGO:
+        if i == EGO and self.watch is not None:
             self.watch.forget()
+
+    def teleport(self, id: int, pose: Pose) -> None:
+        """Put an actor elsewhere; its velocity is kept."""
+        s, i = self.states, self.row(id)
+        s.x[i], s.y[i], s.z[i] = pose.x, pose.y, pose.z
+        s.yaw[i], s.pitch[i], s.roll[i] = wrap_angle(pose.yaw), pose.pitch, pose.roll
+        self.placed["lane"][i] = -1
+
+    def set_velocity(self, id: int, vx: float, vy: float) -> None:
+        """m/s in world axes; wheels roll with it."""
+        s, i = self.states, self.row(id)
+        s.vx[i], s.vy[i] = vx, vy
+        if i < self.wheeled:
+            along = vx * cos(s.yaw[i]) + vy * sin(s.yaw[i])
+            self.fleet.wheels.omega[i] = along / self.fleet.params.wheel_radius[i]
+
+    def walk(self, id: int, vx: float, vy: float) -> None:
+        """A body without wheels moves with this velocity from now on, looking where it goes."""
+        self.set_velocity(id, vx, vy)
+        if vx or vy:
+            self.states.yaw[self.row(id)] = atan2(vy, vx)
+
+    def push(
+        self, id: int, impulse: tuple[float, float], point: tuple[float, float] | None = None
+    ) -> None:
+        """N s on a vehicle at a point of the world, None: its centre of gravity."""
+        s, i = self.states, self.row(id)
+        if point is None:
+            x_cog = self.fleet.params.x_cog[i]
+            point = (s.x[i] + x_cog * cos(s.yaw[i]), s.y[i] + x_cog * sin(s.yaw[i]))
+        self.fleet.apply_impulse(i, impulse, point)
+
+    def twist(self, id: int, moment: float) -> None:
+        """An angular impulse on a vehicle about the vertical in N m s."""
+        i = self.row(id)
+        self.states.yaw_rate[i] += moment / self.fleet.params.yaw_inertia[i]
+
+    def hold_velocity(self, id: int, velocity: tuple[float, float] | None) -> None:
+        """Forward and left speed of a vehicle, kept against all forces; None: physics again."""
+        if velocity is None:
+            self.held.pop(id, None)
+        else:
+            self.held[id] = velocity
+
+    def set_simulated(self, id: int, on: bool) -> None:
+        """Off: it stays where it is put, at the height where it is put, and nothing pushes it."""
+        self.rows.simulated[self.row(id)] = on
+        self._weigh()
+
+    def _weigh(self) -> None:
+        """What is not simulated cannot be pushed."""
+        self.bodies = bodies_of(self.members)
+        self.bodies.inverse_mass[~self.rows.simulated] = 0.0
+        self.bodies.inverse_inertia[~self.rows.simulated] = 0.0
+
+    def set_collides(self, id: int, on: bool) -> None:
+        """Off: it passes through everything."""
+        self.rows.collides[self.row(id)] = on
+
+    def set_grounded(self, id: int, on: bool) -> None:
+        """Off: its height does not follow the road."""
+        self.rows.grounded[self.row(id)] = on
+
+    def set_tyres(self, id: int, friction: Sequence[float]) -> None:
+        """tire_friction of a vehicle at FL, FR, RL, RR outside friction zones."""
+        i = self.row(id)
+        self.tyres[i] = self.fleet.tire_friction[i] = friction
+
+    def set_step(self, dt: float) -> None:
+        """s by which one step advances from now on."""
+        self.dt = dt
+        self.fleet.set_step(dt)
+
+    # --- time
+
+    def step(self, words: Iterable[ActorCommand] = ()) -> None:
+        """Advance by dt. words: what a scenario tells actors for this step."""
+        self.tick += 1
+        if self.traffic is not None:
+            self.traffic.decide(self.placed, self.lights.by_row, self.tick, self.commands)
+        moved = [self._obey(word) for word in words]
+        self._move_vehicles(moved)
+        self._glide(moved)
+        self._touch()
+        if self.traffic is not None:
+            self._put_vehicles(self.traffic)
+        self.settle()
+        self.lights.advance(self.dt)
+        if self.watch is not None:
+            self.invasions = self.watch.update(self.tick, self.placed)
+
+    def _move_vehicles(self, moved: Sequence[int]) -> None:
+        n = self.wheeled
+        active: NDArray[np.bool_] = self.states.present[:n] & self.rows.simulated[:n]
+        active[[i for i in moved if 0 <= i < n]] = False
+        self.feel_grip()
+        self.fleet.step(self.commands[:n], self.road_mu, self.grade[:n], self.bank[:n], active)
+        self.mu[:n] = self.fleet.mu
+        for id, (u, v) in self.held.items():
+            yaw = self.states.yaw[self.row(id)]
+            c, s = cos(yaw), sin(yaw)
+            self.set_velocity(id, u * c - v * s, u * s + v * c)
+        for i in np.flatnonzero(~self.rows.simulated[:n]).tolist():
+            if self.members[i].id not in self.held:
+                _stand(self.states, i)
+
+    def feel_grip(self) -> None:
+        """mu at every wheel of a tyre with tire_friction 3.5, and the tyres' own scale."""
+        n, s = self.wheeled, self.fleet.states
+        fill_mu(self.grip, s.vx, s.vy, self.road_mu)
+        if self.patches is not None:
+            self.patches.apply(self.states, self.road_mu)
+        if self.zones or self._zoned:
+            self.fleet.tire_friction[:] = self.tyres
+            for zone in self.zones:
+                self.fleet.tire_friction[in_zone(zone, s)] = zone.tire_friction
+        self._zoned = bool(self.zones)
+        self.mu[:n] = self.road_mu
+
+    def _touch(self) -> None:
+        r = self.rows
+        touchable = self.states._replace(present=self.states.present & r.collides)
+        self.touches = resolve_contacts(
+            touchable, self.bodies, self.obstacles.segments, CONTACT_LAW, self.dt, self.touching
+        )
+        if self.book is not None:
+            self.contacts = (
+                self.book.update(self.tick, self.touching, self.touches) if self.touches else ()
+            )
+
+    def settle(self) -> None:
+        """Find the road under every actor."""
+        c = self.conditions
+        settle(self.map.arrays, self.rows, c.road_noise, not c.all_lanes, self.tick)
 
     def relocate(self, pose: Pose, v: float) -> None:
         """Put the ego somewhere else between two steps."""
         self.put(EGO, pose, v)
-        self._settle()
-        self.watch.update(self.tick, self.placed)
+        self.settle()
+        if self.watch is not None:
+            self.watch.update(self.tick, self.placed)
 
-    def braking(self) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    # --- questions
+
+    def braking(self) -> NDArray[np.bool_]:
         """(n,) whose brake lamps are lit."""
         return self.commands[:, 1] > BRAKING
 
-    def _place_all(self) -> None:
-        for i, actor in enumerate(self.cast.actors):
-            if self.cast.late[i]:
-                self.traffic.await_room(i, self.cast.factors[i])
-                continue
-            self.put(i, place_of(self.map, actor.place), actor.speed)
-        self._settle()
-        self.watch.update(self.tick, self.placed)
-        for i, actor in enumerate(self.cast.actors):
-            if i == EGO or self.cast.late[i] or actor.driver != "autopilot":
-                continue
-            if i >= self.wheeled:
-                raise ConfigError(f"{actor.name}: a {actor.type} has no autopilot")
-            place = self.placed[i]
-            if place["lane"] < 0:
-                raise ConfigError(f"{actor.name} has an autopilot but stands on no driving lane")
-            self.traffic.engage(i, int(place["lane"]), float(place["s"]), self.cast.factors[i])
-        fill_mu(self.grip, self.fleet.states.vx, self.fleet.states.vy, self.road_mu)
-        self.patches.apply(self.states, self.road_mu)
-        self.mu[: self.wheeled] = self.road_mu
+    def signs(self) -> RoadSigns:
+        """Speed limit and governing traffic light of every actor."""
+        return read_signs(self.map, self.placed)
 
     def _drive(self, i: int, c: VehicleCommand) -> None:
         self.commands[i] = (c.throttle, c.brake, c.steer, c.handbrake, c.reverse)
@@ -162,14 +324,14 @@ class World:
         if word.present is not None:
             self.states.present[i] = word.present
         if word.command is not None:
-            self.traffic.release(i)
+            self._release(i)
             self._drive(i, word.command)
         if word.place is None:
             return -1
         speed = 0.0 if word.speed is None else word.speed
         if not isfinite(speed):
             raise ConfigError(f"actor {word.actor}: speed must be finite, got {speed!r}")
-        self.traffic.release(i)
+        self._release(i)
         yaw_before = float(self.states.yaw[i])
         v_before = float(np.hypot(self.states.vx[i], self.states.vy[i]))
         self.put(i, word.place, speed)
@@ -177,19 +339,23 @@ class World:
         self.states.ax[i] = (speed - v_before) / self.dt
         return i
 
-    def _glide(self, placed: list[int]) -> None:
+    def _release(self, i: int) -> None:
+        if self.traffic is not None:
+            self.traffic.release(i)
+
+    def _glide(self, placed: Sequence[int]) -> None:
         """Bodies without wheels that nobody placed keep their velocity."""
         s = self.states
-        for i in range(self.wheeled, len(self.table)):
-            if s.present[i] and i not in placed:
+        for i in range(self.wheeled, len(self.members)):
+            if s.present[i] and i not in placed and self.rows.simulated[i]:
                 s.x[i] += s.vx[i] * self.dt
                 s.y[i] += s.vy[i] * self.dt
                 s.yaw[i] = wrap_angle(float(s.yaw[i] + s.yaw_rate[i] * self.dt))
 
-    def _put_vehicles(self) -> None:
+    def _put_vehicles(self, traffic: Traffic) -> None:
         """Traffic that enters, is respawned, or is put back as a wreck (decision M-7)."""
         notes = []
-        for move in self.traffic.moves(self.states, self.tick):
+        for move in traffic.moves(self.states, self.tick):
             self.put(move.actor, move.pose, move.v)
             if move.wreck:
                 notes.append(
@@ -198,29 +364,6 @@ class World:
                 )
         self.notices = tuple(notes)
 
-    def _settle(self) -> None:
-        settle(
-            self.map.arrays,
-            self.states,
-            self.placed,
-            self.grade,
-            self.bank,
-            self.keys,
-            self.tick,
-        )
 
-
-def _bodies(cast: Cast) -> Bodies:
-    """Masses and inertias; a body without wheels turns like a box of its size."""
-    t, types, shapes = cast.table, cast.vehicles, cast.shapes
-    return bodies(
-        t.length,
-        t.width,
-        t.height,
-        np.array([v.mass for v in types] + [s.mass for s in shapes]),
-        np.array(
-            [v.yaw_inertia for v in types]
-            + [s.mass * (s.length**2 + s.width**2) / 12.0 for s in shapes]
-        ),
-        np.array([v.x_cog for v in types] + [0.0 for _ in shapes]),
-    )
+def _stand(states: ActorStates, i: int) -> None:
+    states.vx[i] = states.vy[i] = states.yaw_rate[i] = states.ax[i] = states.ay[i] = 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import hypot
@@ -10,16 +10,17 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, mps_from_kmh
 from skidpad.core.randomness import stream, stream_key
 from skidpad.core.setup import TrafficSetup
 from skidpad.core.states import ActorStates
+from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
+from skidpad.simulation.world.rows import Member, Shape
 from skidpad.simulation.world.traffic.driver import drive_all
 from skidpad.simulation.world.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
-from skidpad.simulation.world.traffic.network import Network
+from skidpad.simulation.world.traffic.network import Network, network
 from skidpad.simulation.world.traffic.occupancy import Places, occupancy
 from skidpad.simulation.world.traffic.path import begin
 from skidpad.simulation.world.traffic.places import FreePlaces
@@ -36,6 +37,12 @@ PUT_BACK_SPEED = 0.8  # of the desired speed there
 BUBBLE = 500.0  # m, random traffic lives within this distance of the ego (A-209)
 BUBBLE_NEAREST = 150.0  # m, respawns stay out of the ego's sight
 CHECK_PERIOD = 20  # ticks between two looks at wrecks and the bubble
+
+
+@lru_cache(maxsize=8)
+def network_of(map: RoadMap) -> Network:
+    """The drivers' view of a map, made once per process."""
+    return network(map.samples, map.lanes, map.signals)
 
 
 @lru_cache(maxsize=8)
@@ -60,32 +67,33 @@ class Traffic:
     """Drivers of those actors that have one."""
 
     def __init__(
-        self,
-        map: RoadMap,
-        net: Network,
-        types: list[VehicleType | None],
-        setup: TrafficSetup,
-        seed: int,
-        dt: float,
-        grip: float,
-        walkers: NDArray[np.intp] | None = None,
+        self, map: RoadMap, setup: TrafficSetup, seed: int, dt: float, grip: float
     ) -> None:
-        """types: per actor, None where it is no vehicle. grip: friction over dry, in (0, 1].
-
-        walkers: actors to whom drivers yield at zebras.
-        """
-        n = len(types)
-        self.net, self.setup, self.dt = net, setup, dt
-        self.drivers = drivers(n)
-        self.drivers.state["key"] = [stream_key(seed, "traffic", "driver", i) for i in range(n)]
-        self.drivers.trait[:] = _traits(types, grip if setup.slow_in_weather else 1.0)
-        if setup.variety:
-            vary(self.drivers.trait, seed)
-        self.occupancy = occupancy(len(net.lane), n)
-        self.walkers = np.empty(0, dtype=np.intp) if walkers is None else walkers
+        """grip: friction over dry, in (0, 1]."""
+        self.net, self.setup, self.seed, self.dt = network_of(map), setup, seed, dt
+        self.caution = grip if setup.slow_in_weather else 1.0
+        self.drivers, self.occupancy = drivers(0), occupancy(0, 0)
+        self.walkers = np.empty(0, dtype=np.intp)  # to whom drivers yield at zebras
         self.entry, self.conflict, self.zebra, self.zebras = priority_of(map)
-        self.places = FreePlaces(map, net, stream(seed, "traffic", "places"))
-        self.waiting: list[int] = []  # enter when there is room
+        self.places = FreePlaces(map, self.net, stream(seed, "traffic", "places"))
+        self.row: dict[int, int] = {}  # by id
+        self.waiting: list[int] = []  # ids of those who enter when there is room
+
+    def arrange(self, members: Sequence[Member], source: Mapping[int, int]) -> None:
+        """The actors have other rows; source: old row by new row of those who were there."""
+        old, ids = self.drivers, [m.id for m in members]
+        self.drivers = drivers(len(ids))
+        self.drivers.state["key"] = [stream_key(self.seed, "traffic", "driver", id) for id in ids]
+        self.drivers.trait[:] = _traits([m.actor.body for m in members], self.caution)
+        if self.setup.variety:
+            vary(self.drivers.trait, ids, self.seed)
+        for new, before in source.items():
+            for column, was in zip(self.drivers, old, strict=True):
+                column[new] = was[before]
+        self.occupancy = occupancy(len(self.net.lane), len(ids))
+        self.walkers = np.flatnonzero([m.kind is ActorKind.PEDESTRIAN for m in members])
+        self.row = {id: i for i, id in enumerate(ids)}
+        self.waiting = [id for id in self.waiting if id in self.row]
 
     def engage(self, i: int, lane: int, s: float, factor: float = 1.0) -> None:
         """Actor i drives itself from here on, along `lane`."""
@@ -98,10 +106,10 @@ class Traffic:
         limit = self.setup.initial_limit_kmh
         me["cap"] = np.inf if limit is None else mps_from_kmh(limit)
 
-    def await_room(self, i: int, factor: float) -> None:
-        """Actor i enters as soon as there is a free place near the ego (A-209)."""
-        self.drivers.trait["factor"][i] *= factor
-        self.waiting.append(i)
+    def await_room(self, id: int, factor: float) -> None:
+        """An actor enters as soon as there is a free place near the ego (A-209)."""
+        self.drivers.trait["factor"][self.row[id]] *= factor
+        self.waiting.append(id)
 
     def release(self, i: int) -> None:
         """Actor i is moved by commands from here on."""
@@ -144,10 +152,10 @@ class Traffic:
             yield from self._keep_bubble(states)
 
     def _keep_bubble(self, states: ActorStates) -> Iterator[Move]:
-        for i in list(self.waiting):
-            for move in self._put(i, states, BUBBLE_NEAREST, BUBBLE, False):
-                self.waiting.remove(i)
-                self.drivers.state["active"][i] = True
+        for id in list(self.waiting):
+            for move in self._put(self.row[id], states, BUBBLE_NEAREST, BUBBLE, False):
+                self.waiting.remove(id)
+                self.drivers.state["active"][move.actor] = True
                 yield move
         x, y = float(states.x[0]), float(states.y[0])
         driving = self.drivers.state["active"] & states.present
@@ -176,19 +184,17 @@ class Traffic:
         yield Move(i, pose, v, wreck)
 
 
-def _traits(types: list[VehicleType | None], caution: float) -> NDArray[np.void]:
+def _traits(bodies: Sequence[VehicleType | Shape], caution: float) -> NDArray[np.void]:
     """Drivers know their vehicles; `caution` in (0, 1] slows those who mind the weather."""
-    known = [t for t in types if t is not None]
-    if not known:
-        raise ConfigError("a world needs at least one vehicle")
-    traits = np.zeros(len(types), dtype=TRAIT)
-    for trait, known_type in zip(traits, types, strict=True):
-        t = known[0] if known_type is None else known_type
+    traits = np.zeros(len(bodies), dtype=TRAIT)
+    traits["factor"] = _speed_choice(caution)
+    traits["headway"] = T_HEADWAY / caution
+    traits["a_max"] = A_MAX
+    traits["a_curve"] = A_CURVE * caution
+    for trait, t in zip(traits, bodies, strict=True):
+        if isinstance(t, Shape):
+            continue
         torque = 2.0 * (t.brake_torque_front + t.brake_torque_rear)
-        trait["factor"] = _speed_choice(caution)
-        trait["headway"] = T_HEADWAY / caution
-        trait["a_max"] = A_MAX
-        trait["a_curve"] = A_CURVE * caution
         trait["wheelbase"] = t.wheelbase
         trait["steer_angle"] = t.steer_max
         trait["understeer"] = (1.0 / t.stiffness_front - 1.0 / t.stiffness_rear) / G

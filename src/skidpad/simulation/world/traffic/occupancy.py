@@ -41,6 +41,14 @@ PLACE = np.dtype(
 Places = NDArray[np.void]  # (n,) PLACE: where the actors are, as drivers see it
 
 
+def places_for(length: Floats, width: Floats) -> Places:
+    """Places of n actors, on no lane yet."""
+    placed = np.zeros(len(length), dtype=PLACE)
+    placed["lane"] = -1
+    placed["half_length"], placed["half_width"] = length / 2.0, width / 2.0
+    return placed
+
+
 class Occupancy(NamedTuple):
     """Linked lists: lane l holds the slots head[l], next[head[l]], ... until -1."""
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,10 +20,10 @@ SPEED_SIGMA, SPEED_RANGE = 0.10, (0.75, 1.25)
 ACCELERATION_SIGMA, ACCELERATION_RANGE = 0.25, (0.5, 1.6)
 
 
-def vary(traits: NDArray[np.void], seed: int) -> None:
+def vary(traits: NDArray[np.void], ids: Sequence[int], seed: int) -> None:
     """Give every driver (row of TRAIT) a character of its own."""
-    for i, trait in enumerate(traits):
-        draw = stream(seed, "traffic", "character", i).standard_normal(3).tolist()
+    for id, trait in zip(ids, traits, strict=True):
+        draw = stream(seed, "traffic", "character", id).standard_normal(3).tolist()
         headway = HEADWAY_MEDIAN * np.exp(HEADWAY_SIGMA * draw[0])
         trait["headway"] = np.clip(headway, *HEADWAY_RANGE)
         trait["factor"] *= np.clip(1.0 + SPEED_SIGMA * draw[1], *SPEED_RANGE)

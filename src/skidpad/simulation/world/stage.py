@@ -1,0 +1,54 @@
+"""The world of a set-up: its actors enter, its traffic is engaged, the ego's events are noted."""
+
+from __future__ import annotations
+
+from skidpad.core.errors import ConfigError
+from skidpad.core.setup import Setup, TrafficSetup
+from skidpad.physics.grip import friction_ratio, grip_params
+from skidpad.roads.bundled import load_map
+from skidpad.simulation.world.actors import Role, cast_of, place_of
+from skidpad.simulation.world.lights import Lights
+from skidpad.simulation.world.patches import Patches
+from skidpad.simulation.world.touch import ContactBook, MarkingWatch
+from skidpad.simulation.world.traffic.manager import Traffic
+from skidpad.simulation.world.world import EGO, Conditions, World
+
+
+def staged(setup: Setup, seed: int) -> World:
+    """A world at the beginning of a run."""
+    map = load_map(setup.map)
+    roles = cast_of(map, setup, seed)
+    grip = grip_params(setup.weather, setup.grip, setup.mu_ref)
+    world = World(
+        map, Lights.pretimed(map, seed, setup.dt), Conditions(seed=seed, dt=setup.dt, grip=grip)
+    )
+    traffic = setup.traffic or TrafficSetup(vehicles=0)
+    ratio = friction_ratio(setup.weather, setup.grip)
+    world.traffic = Traffic(map, traffic, seed, setup.dt, ratio)
+    if setup.patches:
+        world.patches = Patches(map, setup.patches)
+    ids = world.enter([role.newcomer(i) for i, role in enumerate(roles)])
+    world.book = ContactBook(world.obstacles.names, setup.dt)
+    world.watch = MarkingWatch(map, world.table)
+    for id, role in zip(ids, roles, strict=True):
+        if role.late:
+            world.traffic.await_room(id, role.factor)
+        else:
+            world.put(world.row(id), place_of(map, role.actor.place), role.actor.speed)
+    world.settle()
+    world.watch.update(world.tick, world.placed)
+    for id, role in zip(ids, roles, strict=True):
+        if id != EGO and not role.late and role.actor.driver == "autopilot":
+            _engage(world, world.traffic, id, role)
+    world.feel_grip()
+    return world
+
+
+def _engage(world: World, traffic: Traffic, id: int, role: Role) -> None:
+    i, actor = world.row(id), role.actor
+    if i >= world.wheeled:
+        raise ConfigError(f"{actor.name}: a {actor.type} has no autopilot")
+    place = world.placed[i]
+    if place["lane"] < 0:
+        raise ConfigError(f"{actor.name} has an autopilot but stands on no driving lane")
+    traffic.engage(i, int(place["lane"]), float(place["s"]), role.factor)

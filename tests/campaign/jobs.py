@@ -39,6 +39,11 @@ def die_first(path):
     return "second"
 
 
+def fork(n):
+    os.fork()
+    return n
+
+
 def write_pid_and_sleep(path):
     Path(path).write_text(str(os.getpid()))
     time.sleep(60)

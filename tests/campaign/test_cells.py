@@ -1,7 +1,9 @@
 import pytest
 
-from skidpad.campaign.cells import Cell, Driver, cross, identity, published_drivers, sweep
+from skidpad.campaign.campaign import Campaign
+from skidpad.campaign.cells import Cell, Driver, cross, published_drivers, sweep
 from skidpad.campaign.drive import prepare
+from skidpad.campaign.matrix import RECIPE
 from skidpad.cli.adas_plan import Wish, plan
 from skidpad.core.errors import ConfigError
 from skidpad.core.weather import Weather
@@ -102,5 +104,8 @@ def test_a_weather_given_twice_is_refused():
 def test_the_identity_changes_with_anything_that_decides_a_run():
     base = cross(published_drivers("1"), [CLEAR], 1, template())
     other = cross(published_drivers("1"), [CLEAR], 2, template())
-    assert identity(base) != identity(other)
-    assert identity(base) == identity(cross(published_drivers("1"), [CLEAR], 1, template()))
+    again = cross(published_drivers("1"), [CLEAR], 1, template())
+    wetter = cross(published_drivers("1"), [RAIN], 1, template())
+    same, *others = [Campaign(RECIPE, cells).identity() for cells in (again, other, wetter)]
+    assert Campaign(RECIPE, base).identity() == same
+    assert same not in others

@@ -1,16 +1,26 @@
 """A driven segment: recorded, repeatable, and blind to the truth topic."""
 
-from dataclasses import replace
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
 
 import pytest
 
+from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.channel_drive import SegmentPlan, drive_segment
 from skidpad.campaign.channel_routes import chosen_routes, driven_routes
-from skidpad.campaign.channels import run_drives, segment_plans
+from skidpad.campaign.channels import RECIPE, segment_plans, warm_up
+from skidpad.campaign.pool import local
 from skidpad.core.channels import ChannelFrame, Decision, TruthFrame
 from skidpad.core.errors import ConfigError, OutputError
+from skidpad.recording.channel_drives import read_outcomes
 from skidpad.recording.channel_hash import recording_hash
 from skidpad.recording.channels import McapRecording
+from skidpad.recording.ledger import LEDGER
+from skidpad.recording.results import read_results
 
 BOTH = ("lav_like", "tfuse_like")
 
@@ -54,11 +64,11 @@ def test_routes_are_the_six_and_hours_are_split():
     assert {r.map for r in routes} == {"town", "figure8"}
     night = driven_routes()["route-4"].weather
     assert night.is_night
-    plans = segment_plans(routes, 2.5, channels=BOTH, seed=2)
+    plans = segment_plans(routes, 2.5, plan(seed=2))
     assert sum(p.duration for p in plans) == pytest.approx(9000.0)
     assert max(p.duration for p in plans) == 600.0
     assert len({p.name for p in plans}) == len(plans)
-    other = segment_plans(routes, 2.5, channels=BOTH, seed=3)
+    other = segment_plans(routes, 2.5, plan(seed=3))
     assert not {p.seed for p in plans} & {p.seed for p in other}
 
 
@@ -70,15 +80,18 @@ def test_wrong_words_are_refused():
 
 
 def test_a_campaign_resumes_and_refuses_other_settings(tmp_path):
-    plans = [plan(duration=1.0)]
-    first = run_drives(plans, tmp_path, workers=1)
+    campaign = Campaign(RECIPE, [plan(duration=1.0)])
+    first = campaign.run(tmp_path, local(1, warm_up))
     assert first.driven == 1
     assert not first.failed
-    again = run_drives(plans, tmp_path, workers=1)
-    assert again.driven == 0
-    assert again.outcomes == first.outcomes
-    with pytest.raises(OutputError, match="other settings"):
-        run_drives([replace(plans[0], noise=2.0)], tmp_path, workers=1)
+    (outcome,) = read_outcomes([tmp_path])
+    again = campaign.run(tmp_path, local(1), resume=True)
+    assert (again.driven, again.content_hash) == (0, first.content_hash)
+    row = read_results(tmp_path).row(0, named=True)
+    assert row["log_hash"] == outcome.content_hash
+    assert (row["distance_m"], row["ended"]) == (outcome.distance_m, "time")
+    with pytest.raises(OutputError, match="something else"):
+        Campaign(RECIPE, [plan(duration=1.0, noise=2.0)]).run(tmp_path, local(1), resume=True)
 
 
 @pytest.mark.req("C-026")
@@ -93,3 +106,27 @@ def test_one_channel_can_drive_without_any_other(tmp_path):
     alone = plan(channels=("tfuse_like",), drive_by="tfuse_like", duration=2.0)
     outcome = drive_segment(alone, tmp_path / "a.mcap")
     assert outcome.driving_s == {"tfuse_like": pytest.approx(2.0)}
+
+
+@pytest.mark.slow
+@pytest.mark.req("L-7")
+def test_a_campaign_that_was_killed_goes_on_to_the_same_results(tmp_path):
+    root = Path(__file__).parents[2]
+    environment = {**os.environ, "PYTHONPATH": str(root / "src")}
+    hours = f"{6 * 2.0 / 3600.0}"  # six routes, 2 s each
+    call = [sys.executable, "-m", "skidpad", "channels", "drive", "--hours", hours]
+    call += ["--workers", "1", "--out", str(tmp_path / "part")]
+    parent = subprocess.Popen(call, env=environment, stderr=subprocess.DEVNULL)
+    ledger = tmp_path / "part" / LEDGER
+    deadline = time.monotonic() + 240.0
+    while not (ledger.exists() and b"\n" in ledger.read_bytes()):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+    parent.send_signal(signal.SIGKILL)
+    parent.wait()
+    done = len(ledger.read_bytes().splitlines())
+    subprocess.run([*call, "--resume"], check=True, env=environment, timeout=300)
+    whole = Campaign(RECIPE, segment_plans(chosen_routes("all"), float(hours), plan(seed=0)))
+    whole.run(tmp_path / "whole", local(1))
+    assert done < 6 == len(ledger.read_bytes().splitlines())
+    assert read_results(tmp_path / "part").equals(read_results(tmp_path / "whole"))

@@ -12,10 +12,13 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from skidpad.campaign.campaign import Campaign, uncertain_cells
 from skidpad.campaign.cluster import run_on, runner_of
-from skidpad.campaign.grip import Runner, drive_one, local, run_grip, uncertain_cells
+from skidpad.campaign.grip import recipe, warm_up
 from skidpad.campaign.grip_cells import Friction, GripCell, cross, seeds
-from skidpad.campaign.grip_shown import keep_shown, shown
+from skidpad.campaign.grip_shown import shown
+from skidpad.campaign.pool import local
+from skidpad.campaign.worker import Finished, Runner
 from skidpad.core.errors import OutputError
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.presets import preset
@@ -38,16 +41,18 @@ def cells(n=1, scenarios=("lead_slowdown",), **more) -> list[GripCell]:
 
 def here(jobs):
     """A runner in this process: quick, and failures show their traceback."""
-    from skidpad.campaign.pool import Finished
-
     for job in jobs:
-        yield Finished(job, value=drive_one(job.argument))
+        yield Finished(job, value=job.work(job.argument))
+
+
+def run(cells, out, runner=here, **how):
+    return Campaign(recipe(), cells).run(out, runner, **how)
 
 
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory) -> Path:
     out = tmp_path_factory.mktemp("grip") / "out"
-    run_grip([cells(2, ("lead_slowdown", "ghost_cut_in"))], out, here)
+    run(cells(2, ("lead_slowdown", "ghost_cut_in")), out)
     return out
 
 
@@ -91,15 +96,14 @@ def test_pairs_begin_alike_and_seeds_differ(campaign):
 
 
 def test_a_campaign_is_not_overwritten_and_resumes_without_driving(campaign):
-    batch = [cells(2, ("lead_slowdown", "ghost_cut_in"))]
+    batch = cells(2, ("lead_slowdown", "ghost_cut_in"))
     with pytest.raises(OutputError, match="--resume"):
-        run_grip(batch, campaign, here)
-    again = run_grip(batch, campaign, here, resume=True)
+        run(batch, campaign)
+    again = run(batch, campaign, resume=True)
     assert (again.driven, again.runs) == (0, 16)
 
 
 def test_the_runs_that_a_report_shows_are_kept(campaign):
-    keep_shown(campaign, cells(2, ("lead_slowdown", "ghost_cut_in")), here)
     roles = shown(read_results(campaign))
     for row in roles.to_dicts():
         name = f"{row['scenario']}_{row['weather']}_{row['friction']}-{row['seed']:06d}"
@@ -111,8 +115,8 @@ def test_the_runs_that_a_report_shows_are_kept(campaign):
 @pytest.mark.req("X-1", "L-7")
 def test_two_workers_one_worker_and_kills_give_the_same_results(tmp_path):
     batch = cells(3)
-    one = run_grip([batch], tmp_path / "one", local(1))
-    two = run_grip([batch], tmp_path / "two", _killing(local(2)))
+    one = run(batch, tmp_path / "one", local(1, warm_up))
+    two = run(batch, tmp_path / "two", _killing(local(2, warm_up)))
     assert one.content_hash == two.content_hash
     assert (two.runs, two.failed) == (len(batch), 0)
 
@@ -146,9 +150,9 @@ def _killing(runner: Runner) -> Runner:
 def test_a_dask_cluster_gives_the_same_results(tmp_path):
     pytest.importorskip("distributed")
     batch = cells(1)
-    alone = run_grip([batch], tmp_path / "alone", here)
+    alone = run(batch, tmp_path / "alone")
     with runner_of("local:2") as runner:
-        far = run_grip([batch], tmp_path / "far", runner)
+        far = run(batch, tmp_path / "far", runner)
     assert far.content_hash == alone.content_hash
 
 
@@ -157,7 +161,7 @@ def test_a_dask_cluster_gives_the_same_results(tmp_path):
 def test_a_dask_worker_killed_during_a_run_loses_nothing(tmp_path):
     distributed = pytest.importorskip("distributed")
     batch = cells(3)
-    alone = run_grip([batch], tmp_path / "alone", here)
+    alone = run(batch, tmp_path / "alone")
 
     with (
         distributed.LocalCluster(
@@ -180,7 +184,7 @@ def test_a_dask_worker_killed_during_a_run_loses_nothing(tmp_path):
                 begun.set()
                 yield finished
 
-        far = run_grip([batch], tmp_path / "far", killing)
+        far = run(batch, tmp_path / "far", killing)
         thread.join()
     assert far.content_hash == alone.content_hash
     assert (far.runs, far.failed) == (len(batch), 0)
@@ -214,7 +218,7 @@ class Silent(Good):
 def test_an_agent_that_fails_is_an_outcome_and_the_campaign_goes_on(tmp_path, name, outcome, told):
     (tmp_path / "agents.py").write_text(AGENTS, encoding="utf-8")
     batch = cells(1, controller=f"agent:{tmp_path / 'agents.py'}:{name}")[:2]
-    run_grip([batch], tmp_path / "out", here)
+    run(batch, tmp_path / "out")
     entries = read_ledger(tmp_path / "out", GripEntry)
     if name == "Good":
         # it brakes at once, so that the lead drives off: the scenario takes place without it
@@ -229,18 +233,11 @@ def test_an_agent_that_fails_is_an_outcome_and_the_campaign_goes_on(tmp_path, na
 
 @pytest.mark.req("X-9")
 def test_only_cells_that_are_still_uncertain_get_more_runs(campaign):
-    entries = read_ledger(campaign, GripEntry)
-    assert uncertain_cells(entries, 0.001) == {e.run.rsplit("-", 1)[0] for e in entries}
-    assert uncertain_cells(entries * 400, 0.05) == set()
-
-
-def test_batches_stop_when_enough_is_known(tmp_path):
-    batches = [cells(1), [replace(c, seed=2) for c in cells(1)]]
-    only = "lead_slowdown_icy_30_reduced"
-    summary = run_grip(batches, tmp_path / "out", here, wanted=lambda entries: {only})
-    assert summary.runs == 5
-    table = read_results(tmp_path / "out")
-    assert table.filter(pl.col("seed") == 2)["weather"].to_list() == ["icy_30"]
+    trials = [
+        (e.run.rsplit("-", 1)[0], e.metrics.completion) for e in read_ledger(campaign, GripEntry)
+    ]
+    assert uncertain_cells(trials, 0.001) == {cell for cell, _ in trials}
+    assert uncertain_cells(trials * 400, 0.05) == set()
 
 
 @pytest.mark.req("B-070", "B-071", "B-074", "B-075", "B-076", "B-077", "B-079")
@@ -250,7 +247,7 @@ def test_the_spawn_delay_alone_breaks_the_cut_in_and_the_distance_repairs_it(tmp
     batch = cross(
         template, ["ghost_cut_in"], [preset("rain_0")], [Friction.ORIGINAL], variants, seeds(0, 4)
     )
-    run_grip([batch], tmp_path / "out", here)
+    run(batch, tmp_path / "out")
     outcomes = read_results(tmp_path / "out").group_by("cutin").agg(pl.col("outcome").unique())
     assert dict(outcomes.iter_rows()) == {
         "original": ["completed"], "unfixed": ["collision"], "fixed": ["completed"]
@@ -265,7 +262,7 @@ def test_the_spawn_delay_alone_breaks_the_cut_in_and_the_distance_repairs_it(tmp
 @pytest.mark.req("B-003")
 def test_the_physical_model_reaches_the_tyres(tmp_path):
     batch = [replace(c, model=GripModel.PHYSICAL) for c in cells(1)[2:]]
-    run_grip([batch], tmp_path / "out", here)
+    run(batch, tmp_path / "out")
     mu = dict(read_results(tmp_path / "out").select("friction", "mu").iter_rows())
     assert mu["original"] == pytest.approx(0.9)
     assert mu["reduced"] < 0.2  # sheet ice

@@ -12,8 +12,10 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
+from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells import Cell, Driver, cross, published_drivers
-from skidpad.campaign.matrix import run_matrix
+from skidpad.campaign.matrix import RECIPE, warm_up
+from skidpad.campaign.pool import local
 from skidpad.cli.main import app
 from skidpad.core.errors import InputError, OutputError
 from skidpad.core.vocabulary import SensorLevel
@@ -31,6 +33,10 @@ def run_command(call):
     return subprocess.run(
         call, check=False, env=environment(), capture_output=True, text=True, timeout=300
     )
+
+
+def run(cells, out, workers=1, **how):
+    return Campaign(RECIPE, cells).run(out, local(workers, warm_up), **how)
 
 
 def environment():
@@ -52,8 +58,8 @@ def cells(duration=4.0, weather=("clear-noon", "rain-night"), numbers="1,4"):
 
 @pytest.mark.req("X-1", "X-12")
 def test_one_and_two_workers_give_the_same_content(tmp_path):
-    one = run_matrix(cells(), tmp_path / "one", workers=1)
-    two = run_matrix(cells(), tmp_path / "two", workers=2, csv=True)
+    one = run(cells(), tmp_path / "one")
+    two = run(cells(), tmp_path / "two", workers=2, csv=True)
     assert one.content_hash == two.content_hash
     assert (tmp_path / "two" / "results.csv").exists()
     assert one.runs == 4
@@ -88,7 +94,7 @@ def test_a_stack_that_kills_its_worker_costs_its_own_runs_only(tmp_path, monkeyp
     monkeypatch.syspath_prepend(str(ROOT))
     (good,) = cells(numbers="1", weather=("clear-noon",))
     bad = replace(good, driver=Driver(label="bad", stack="tests.campaign.jobs:Suicide"))
-    summary = run_matrix([bad, good], tmp_path, workers=1)
+    summary = run([bad, good], tmp_path)
     results = read_results(tmp_path)
     assert summary.failed == 1
     outcome = dict(results.select("config", "outcome").iter_rows())
@@ -105,7 +111,7 @@ def test_a_stack_that_raises_is_an_outcome_with_its_traceback(tmp_path, monkeypa
         replace(good, driver=Driver(label=name, stack=f"tests.campaign.jobs:{name}"))
         for name in ("Raising", "Speechless")
     ]
-    run_matrix(bad, tmp_path, workers=1)
+    run(bad, tmp_path)
     assert read_results(tmp_path)["outcome"].to_list() == ["agent_error"] * 2
     raised, silent = sorted((tmp_path / "runs").glob("*/error.txt"))
     assert "ZeroDivisionError" in raised.read_text()
@@ -115,7 +121,7 @@ def test_a_stack_that_raises_is_an_outcome_with_its_traceback(tmp_path, monkeypa
 def test_a_folder_with_something_else_is_never_touched(tmp_path):
     (tmp_path / "thesis.txt").write_text("years of work")
     with pytest.raises(OutputError, match="choose another --out"):
-        run_matrix(cells(), tmp_path, workers=1)
+        run(cells(), tmp_path)
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.txt"]
 
 

@@ -5,37 +5,28 @@ import sys
 import time
 from pathlib import Path
 
+import jobs as work
 import pytest
 
-from skidpad.campaign.pool import Job, run_jobs
-
-HERE = "tests.campaign.jobs"
-
-
-@pytest.fixture(autouse=True)
-def importable_jobs(monkeypatch):
-    root = str(Path(__file__).parents[2])
-    monkeypatch.syspath_prepend(root)
-    src = str(Path(root) / "src")
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([root, src]))
+from skidpad.campaign.pool import run_jobs
+from skidpad.campaign.worker import Job
+from skidpad.core.vocabulary import Outcome
 
 
 def jobs(function, arguments, deadline=60.0):
-    return [
-        Job(f"{function}-{i}", f"{HERE}:{function}", a, deadline) for i, a in enumerate(arguments)
-    ]
+    return [Job(f"{function.__name__}-{i}", function, a, deadline) for i, a in enumerate(arguments)]
 
 
 def test_every_job_is_done_once_on_any_number_of_workers():
     for workers in (1, 2):
-        done = list(run_jobs(jobs("square", range(7)), workers))
+        done = list(run_jobs(jobs(work.square, range(7)), workers))
         assert sorted(f.value for f in done) == [0, 1, 4, 9, 16, 25, 36]
         assert all(f.failure is None for f in done)
 
 
 def test_an_exception_is_reported_with_its_traceback_and_others_go_on():
-    done = {f.job.argument: f for f in run_jobs(jobs("odd_only", [1, 2, 3]), 2)}
-    assert done[2].failure == "crashed"
+    done = {f.job.argument: f for f in run_jobs(jobs(work.odd_only, [1, 2, 3]), 2)}
+    assert done[2].failure is Outcome.CRASHED
     assert "ValueError: 2 is even" in done[2].detail
     assert done[1].value == 1
     assert done[3].value == 3
@@ -43,28 +34,34 @@ def test_an_exception_is_reported_with_its_traceback_and_others_go_on():
 
 def test_a_worker_that_kills_itself_costs_only_its_job(tmp_path):
     tries = tmp_path / "tries"
-    work = [*jobs("square", range(4)), *jobs("suicide", [str(tries)])]
-    done = {f.job.key: f for f in run_jobs(work, 2)}
-    assert done["suicide-0"].failure == "crashed"
+    some = [*jobs(work.square, range(4)), *jobs(work.suicide, [str(tries)])]
+    done = {f.job.key: f for f in run_jobs(some, 2)}
+    assert done["suicide-0"].failure is Outcome.CRASHED
     assert "exit code -9" in done["suicide-0"].detail
     assert tries.read_text() == "xx"  # tried twice, no more
     assert sum(f.failure is None for f in done.values()) == 4
 
 
 def test_a_hanging_job_is_killed_at_its_deadline():
-    work = [*jobs("sleep", [60.0], deadline=0.5), *jobs("square", range(3))]
-    done = {f.job.key: f for f in run_jobs(work, 2)}
-    assert done["sleep-0"].failure == "timeout"
+    some = [*jobs(work.sleep, [60.0], deadline=0.5), *jobs(work.square, range(3))]
+    done = {f.job.key: f for f in run_jobs(some, 2)}
+    assert done["sleep-0"].failure is Outcome.TIMEOUT
     assert sum(f.failure is None for f in done.values()) == 3
 
 
 def test_a_job_that_fails_once_succeeds_on_the_second_try(tmp_path):
-    done = list(run_jobs(jobs("die_first", [str(tmp_path / "mark")]), 1))
+    done = list(run_jobs(jobs(work.die_first, [str(tmp_path / "mark")]), 1))
     assert [f.value for f in done] == ["second"]
 
 
+def test_a_job_that_forks_is_answered_once():
+    done = list(run_jobs(jobs(work.fork, range(3)), 1))
+    assert [f.value for f in done] == [0, 1, 2]
+    assert [f.attempts for f in done] == [1, 1, 1]
+
+
 def test_a_worker_that_dies_idle_is_replaced_and_costs_no_attempt(tmp_path):
-    done, finished = [], run_jobs(jobs("own_pid", range(3)), 1)
+    done, finished = [], run_jobs(jobs(work.own_pid, range(3)), 1)
     for end in finished:
         done.append(end.value)
         os.kill(end.value, signal.SIGKILL)  # between two jobs: the pool is waiting for us
@@ -75,9 +72,12 @@ def test_a_worker_that_dies_idle_is_replaced_and_costs_no_attempt(tmp_path):
 def test_workers_leave_when_their_parent_is_killed(tmp_path):
     pid_file = tmp_path / "pid"
     code = (
-        "from skidpad.campaign.pool import Job, run_jobs\n"
+        f"import sys; sys.path.insert(0, {str(Path(work.__file__).parent)!r})\n"
+        "import jobs\n"
+        "from skidpad.campaign.pool import run_jobs\n"
+        "from skidpad.campaign.worker import Job\n"
         "if __name__ == '__main__':\n"
-        f"    list(run_jobs([Job('a', '{HERE}:write_pid_and_sleep', {str(pid_file)!r})], 1))\n"
+        f"    list(run_jobs([Job('a', jobs.write_pid_and_sleep, {str(pid_file)!r})], 1))\n"
     )
     script = tmp_path / "parent.py"
     script.write_text(code)
@@ -101,6 +101,6 @@ def test_workers_leave_when_their_parent_is_killed(tmp_path):
 
 def test_workers_use_one_thread_per_library(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
-    (done,) = run_jobs(jobs("environment", ["OMP_NUM_THREADS"]), 1)
+    (done,) = run_jobs(jobs(work.environment, ["OMP_NUM_THREADS"]), 1)
     assert done.value == "1"
     assert os.environ["OMP_NUM_THREADS"] == "7"

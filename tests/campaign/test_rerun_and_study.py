@@ -7,10 +7,12 @@ import pytest
 from typer.testing import CliRunner
 
 from skidpad.campaign import study
+from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells import Cell, Driver
 from skidpad.campaign.drive import run_cell
-from skidpad.campaign.matrix import run_matrix
+from skidpad.campaign.matrix import RECIPE
 from skidpad.campaign.pace import Pace
+from skidpad.campaign.pool import local
 from skidpad.campaign.rerun import read_cell
 from skidpad.campaign.views import SIZE, twelve_views
 from skidpad.cli.main import app
@@ -41,7 +43,8 @@ def cell(level=SensorLevel.OBJECTS, duration=6.0, **changes):
 @pytest.fixture(scope="module")
 def campaign(tmp_path_factory):
     folder = tmp_path_factory.mktemp("campaign")
-    run_matrix([cell(), cell(SensorLevel.PIXELS, 2.0, seed=4)], folder, workers=1)
+    cells = [cell(), cell(SensorLevel.PIXELS, 2.0, seed=4)]
+    Campaign(RECIPE, cells).run(folder, local(1))
     return folder
 
 

@@ -6,7 +6,7 @@ from typer.testing import CliRunner
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
 from skidpad.evidence.compare import compare_campaigns, parse_rule
-from skidpad.recording.results import Metrics, RunKey, results_table, write_results
+from skidpad.recording.matrix import MATRIX, Metrics, RunKey
 
 
 def rows(extra=0, seeds=range(1, 9), outcome="completed"):
@@ -39,7 +39,7 @@ def by(changes):
 
 def test_differences_are_paired_per_driver_and_equal_drives_counted():
     changes, _, _ = compare_campaigns(
-        results_table(rows()), results_table(rows(extra=2)), ["fatal_collisions"]
+        MATRIX.table(rows()), MATRIX.table(rows(extra=2)), ["fatal_collisions"]
     )
     table = by(changes)
     assert table["1", "fatal_collisions"].comparison.mean == 0.0
@@ -51,13 +51,11 @@ def test_differences_are_paired_per_driver_and_equal_drives_counted():
 
 def test_runs_without_a_partner_are_counted_and_none_in_common_is_refused():
     _, alone_a, alone_b = compare_campaigns(
-        results_table(rows()), results_table(rows(seeds=range(5, 12))), ["mean_speed_kmh"]
+        MATRIX.table(rows()), MATRIX.table(rows(seeds=range(5, 12))), ["mean_speed_kmh"]
     )
     assert (alone_a, alone_b) == (8, 6)
     with pytest.raises(ConfigError, match="share no run"):
-        compare_campaigns(
-            results_table(rows()), results_table(rows(seeds=[99])), ["mean_speed_kmh"]
-        )
+        compare_campaigns(MATRIX.table(rows()), MATRIX.table(rows(seeds=[99])), ["mean_speed_kmh"])
 
 
 def test_a_rule_that_cannot_be_read_says_how_to_write_one():
@@ -68,8 +66,8 @@ def test_a_rule_that_cannot_be_read_says_how_to_write_one():
 
 
 def test_the_command_fails_on_a_regression_and_writes_junit(tmp_path):
-    write_results(tmp_path / "a", rows())
-    write_results(tmp_path / "b", rows(extra=2))
+    MATRIX.write(tmp_path / "a", rows())
+    MATRIX.write(tmp_path / "b", rows(extra=2))
     run = CliRunner().invoke
     call = ["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--junit", str(tmp_path / "j.xml")]
     assert run(app, [*call, "--fail-if", "fatal_collisions > 0.5"]).exit_code == 1
@@ -79,9 +77,9 @@ def test_the_command_fails_on_a_regression_and_writes_junit(tmp_path):
 
 
 def test_surely_needs_the_whole_interval(tmp_path):
-    noisy = results_table(rows())
+    noisy = MATRIX.table(rows())
     noisy = noisy.with_columns(pl.col("fatal_collisions") + pl.Series([3, -2] * 8))
-    changes, _, _ = compare_campaigns(results_table(rows()), noisy, ["fatal_collisions"])
+    changes, _, _ = compare_campaigns(MATRIX.table(rows()), noisy, ["fatal_collisions"])
     rule = parse_rule("fatal_collisions > 0")
     assert rule.broken_by(by(changes)["", "fatal_collisions"], surely=False)
     assert not rule.broken_by(by(changes)["", "fatal_collisions"], surely=True)

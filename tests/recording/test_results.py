@@ -23,22 +23,15 @@ from skidpad.recording.ledger import (
     FolderState,
     Ledger,
     campaign_command,
+    common_configuration,
     encode_identity,
     fingerprints,
     folder_state,
     latest,
     read_ledger,
 )
-from skidpad.recording.results import (
-    Metrics,
-    RunKey,
-    Timing,
-    definitions,
-    read_results,
-    results_hash,
-    results_table,
-    write_results,
-)
+from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics, RunKey
+from skidpad.recording.results import Timing, definitions_of, read_results
 
 IDENTITY = {"configs": [0, 1], "seeds": 2}
 
@@ -60,8 +53,8 @@ def key(config: str = "1", seed: int = 0, **changes: Any) -> RunKey:
     return RunKey(**{**values, **changes})
 
 
-def entry(run: str, outcome: Outcome = Outcome.COMPLETED, collisions: int = 2) -> Entry:
-    timing = Timing(config="1", weather="rain-noon", seed=0, wall_s=9.0, cpu_s=8.0, rtf=50.0)
+def entry(run: str, outcome: Outcome = Outcome.COMPLETED, collisions: int = 2) -> MatrixEntry:
+    timing = Timing(wall_s=9.0, cpu_s=8.0, rtf=50.0)
     return Entry(
         run=run,
         key=key(outcome=outcome.value),
@@ -73,7 +66,7 @@ def entry(run: str, outcome: Outcome = Outcome.COMPLETED, collisions: int = 2) -
 
 @pytest.mark.req("A-252")
 def test_results_keep_the_published_names_and_units() -> None:
-    names = set(results_table([]).columns)
+    names = set(MATRIX.table([]).columns)
     assert names >= {
         "config", "weather", "precipitation_kind", "time_of_day", "seed", "profile",
         "fatal_collisions", "collisions_vehicle", "collisions_static", "wrong_way",
@@ -87,94 +80,96 @@ def test_results_keep_the_published_names_and_units() -> None:
 
 @pytest.mark.req("A-255")
 def test_variances_are_in_square_metres() -> None:
-    names = [name for name, _, _ in definitions() if "variance" in name]
+    names = [name for name, _, _ in definitions_of(Metrics) if "variance" in name]
     assert names
     assert all(name.endswith("_m2") for name in names)
 
 
 def test_rows_come_back_sorted_and_null_stays_null(tmp_path: Path) -> None:
     rows = [(key("2", 1), Metrics(fatal_collisions=3)), (key("1", 5), Metrics(min_ttc_s=0.5))]
-    written = write_results(tmp_path, rows, csv=True)
+    written = MATRIX.write(tmp_path, rows, csv=True)
     table = read_results(tmp_path)
     assert table["config"].to_list() == ["1", "2"]
     assert table["min_ttc_s"].to_list() == [0.5, None]
-    assert written == results_hash(table) == results_hash(table.reverse())
+    assert written == MATRIX.hash(table) == MATRIX.hash(table.reverse())
     assert pl.read_csv(tmp_path / "results.csv")["fatal_collisions"].to_list() == [None, 3]
 
 
 @pytest.mark.req("A-261")
 def test_wall_times_do_not_touch_the_hash(tmp_path: Path) -> None:
     rows = [(key(), Metrics(fatal_collisions=3))]
-    slow = Timing(config="1", weather="rain-noon", seed=0, wall_s=506.22, cpu_s=8.0, rtf=0.99)
+    slow = Timing(wall_s=506.22, cpu_s=8.0, rtf=0.99)
     fast = dataclasses.replace(slow, wall_s=5.0)
-    assert write_results(tmp_path, rows, [slow]) == write_results(tmp_path, rows, [fast])
+    assert MATRIX.write(tmp_path, rows, [slow]) == MATRIX.write(tmp_path, rows, [fast])
     assert pl.read_parquet(tmp_path / "timing.parquet")["wall_s"].to_list() == [5.0]
 
 
 def test_every_metric_says_what_it_means() -> None:
-    assert all(meaning and source for _, meaning, source in definitions())
+    assert all(meaning and source for _, meaning, source in definitions_of(Metrics))
 
 
 def test_a_second_start_needs_resume_and_then_knows_what_is_done(tmp_path: Path) -> None:
-    with Ledger(tmp_path / "out", IDENTITY) as ledger:
+    with Ledger(tmp_path / "out", MatrixEntry, IDENTITY) as ledger:
         ledger.append(entry("1-rain-noon-0"))
         ledger.append(entry("1-rain-noon-1", Outcome.TIMEOUT))
     with pytest.raises(OutputError, match="--resume"):
-        Ledger(tmp_path / "out", IDENTITY)
-    with Ledger(tmp_path / "out", IDENTITY, resume=True) as ledger:
+        Ledger(tmp_path / "out", MatrixEntry, IDENTITY)
+    with Ledger(tmp_path / "out", MatrixEntry, IDENTITY, resume=True) as ledger:
         assert ledger.done() == {"1-rain-noon-0"}
         ledger.append(entry("1-rain-noon-1", collisions=7))
         assert ledger.done() == {"1-rain-noon-0", "1-rain-noon-1"}
-    assert [e.metrics.fatal_collisions for e in latest(read_ledger(tmp_path / "out"))] == [2, 7]
-    assert read_ledger(tmp_path / "out")[0] == entry("1-rain-noon-0")
+    assert [
+        e.metrics.fatal_collisions for e in latest(read_ledger(tmp_path / "out", MatrixEntry))
+    ] == [2, 7]
+    assert read_ledger(tmp_path / "out", MatrixEntry)[0] == entry("1-rain-noon-0")
 
 
 def test_a_foreign_folder_is_never_touched(tmp_path: Path) -> None:
     (tmp_path / "thesis.doc").write_text("years of work")
     for resume in (False, True):
         with pytest.raises(OutputError, match="something else"):
-            Ledger(tmp_path, IDENTITY, resume=resume)
+            Ledger(tmp_path, MatrixEntry, IDENTITY, resume=resume)
     assert [p.name for p in tmp_path.iterdir()] == ["thesis.doc"]
     other = tmp_path / "out"
-    Ledger(other, IDENTITY).close()
+    Ledger(other, MatrixEntry, IDENTITY).close()
     with pytest.raises(OutputError, match="something else"):
-        Ledger(other, {"configs": [4]}, resume=True)
+        Ledger(other, MatrixEntry, {"configs": [4]}, resume=True)
 
 
 def test_two_writers_are_refused(tmp_path: Path) -> None:
-    with Ledger(tmp_path / "out", IDENTITY) as ledger:
+    with Ledger(tmp_path / "out", MatrixEntry, IDENTITY) as ledger:
         with pytest.raises(OutputError, match="another process"):
-            Ledger(tmp_path / "out", IDENTITY, resume=True)
+            Ledger(tmp_path / "out", MatrixEntry, IDENTITY, resume=True)
         ledger.append(entry("a"))
-    with Ledger(tmp_path / "out", IDENTITY, resume=True) as again:
+    with Ledger(tmp_path / "out", MatrixEntry, IDENTITY, resume=True) as again:
         assert again.done() == {"a"}
 
 
 @pytest.mark.parametrize("kept", [1, 20, 200])
 def test_a_torn_last_line_costs_that_line_only(tmp_path: Path, kept: int) -> None:
-    with Ledger(tmp_path, IDENTITY) as ledger:
+    with Ledger(tmp_path, MatrixEntry, IDENTITY) as ledger:
         ledger.append(entry("a"))
         ledger.append(entry("b"))
     path = tmp_path / LEDGER
     first = path.read_bytes().index(b"\n") + 1
     os.truncate(path, first + kept)
-    with Ledger(tmp_path, IDENTITY, resume=True) as ledger:
+    with Ledger(tmp_path, MatrixEntry, IDENTITY, resume=True) as ledger:
         assert ledger.done() == {"a"}
         ledger.append(entry("b"))
-    assert [e.run for e in read_ledger(tmp_path)] == ["a", "b"]
+    assert [e.run for e in read_ledger(tmp_path, MatrixEntry)] == ["a", "b"]
 
 
 def test_damage_inside_the_ledger_is_named(tmp_path: Path) -> None:
-    with Ledger(tmp_path, IDENTITY) as ledger:
+    with Ledger(tmp_path, MatrixEntry, IDENTITY) as ledger:
         ledger.append(entry("a"))
     path = tmp_path / LEDGER
     path.write_bytes(b"garbage\n" + path.read_bytes())
     with pytest.raises(FileError, match="line 1"):
-        read_ledger(tmp_path)
+        read_ledger(tmp_path, MatrixEntry)
 
 
 def test_a_full_disk_loses_no_earlier_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    with Ledger(tmp_path, IDENTITY) as ledger:
+    with Ledger(tmp_path, MatrixEntry, IDENTITY) as ledger:
         ledger.append(entry("a"))
         whole = os.write
         monkeypatch.setattr(ledger_module.os, "write", lambda file, line: whole(file, line[:10]))
@@ -183,7 +178,7 @@ def test_a_full_disk_loses_no_earlier_line(tmp_path: Path, monkeypatch: pytest.M
         monkeypatch.setattr(ledger_module.os, "write", whole)
         assert ledger.done() == {"a"}
         ledger.append(entry("c"))
-    assert [e.run for e in read_ledger(tmp_path)] == ["a", "c"]
+    assert [e.run for e in read_ledger(tmp_path, MatrixEntry)] == ["a", "c"]
 
 
 @pytest.mark.skipif(os.name == "nt", reason="kill -9")
@@ -192,15 +187,15 @@ def test_what_was_appended_survives_kill_9(tmp_path: Path) -> None:
         import os, signal, sys
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         from pathlib import Path
-        from test_results import IDENTITY, entry
+        from test_results import IDENTITY, MatrixEntry, entry
         from skidpad.recording.ledger import Ledger
-        ledger = Ledger(Path({str(tmp_path / "out")!r}), IDENTITY)
+        ledger = Ledger(Path({str(tmp_path / "out")!r}), MatrixEntry, IDENTITY)
         ledger.append(entry("a"))
         os.kill(os.getpid(), signal.SIGKILL)
     """)
     done = subprocess.run([sys.executable, "-c", script], check=False)
     assert done.returncode == -signal.SIGKILL
-    with Ledger(tmp_path / "out", IDENTITY, resume=True) as ledger:
+    with Ledger(tmp_path / "out", MatrixEntry, IDENTITY, resume=True) as ledger:
         assert ledger.done() == {"a"}
 
 
@@ -210,7 +205,7 @@ def test_folder_state(tmp_path: Path) -> None:
     out.mkdir()
     (out / LEDGER).touch()
     assert folder_state(out, IDENTITY) is FolderState.EMPTY
-    Ledger(out, IDENTITY).close()
+    Ledger(out, MatrixEntry, IDENTITY).close()
     assert folder_state(out, IDENTITY) is FolderState.SAME
     assert folder_state(out, {}) is FolderState.OTHER
 
@@ -230,6 +225,17 @@ def test_a_folder_says_which_command_wrote_it(tmp_path):
     (tmp_path / CAMPAIGN).write_text("{")
     with pytest.raises(FileError, match="damaged"):
         campaign_command(tmp_path)
+
+
+def test_what_all_runs_have_in_common_is_found_in_older_folders_too(tmp_path):
+    assert common_configuration(tmp_path) == {}
+    for identity in (
+        {"command": "adas", "cells": [{"a": 1}, {"a": 2}]},
+        {"command": "grip", "cells": ["x", "y"], "template": {"a": 1}},
+        {"command": "adas", "runs": 2, "common": {"a": 1}},
+    ):
+        (tmp_path / CAMPAIGN).write_bytes(encode_identity(identity))
+        assert common_configuration(tmp_path) == {"a": 1}
 
 
 def test_an_unfinished_campaign_says_how_to_finish_it(tmp_path):

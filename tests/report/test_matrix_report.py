@@ -3,7 +3,8 @@ import re
 import numpy as np
 import pytest
 
-from skidpad.recording.results import Metrics, RunKey, Timing, write_results
+from skidpad.recording.matrix import MATRIX, Metrics, RunKey
+from skidpad.recording.results import Timing
 from skidpad.report.matrix import build_page, write_report
 from skidpad.report.matrix_data import WEATHERS, load_matrix
 
@@ -58,10 +59,8 @@ def campaign(folder, seeds=3, **changes):
                     "duration_s": 500.0,
                 }
                 rows.append((key(config, weather, seed, **changes), Metrics(**values)))
-                timing.append(
-                    Timing(config=config, weather=weather, seed=seed, wall_s=9, cpu_s=8, rtf=55)
-                )
-    write_results(folder, rows, timing)
+                timing.append(Timing(wall_s=9, cpu_s=8, rtf=55))
+    MATRIX.write(folder, rows, timing)
     return rows
 
 
@@ -102,7 +101,7 @@ def test_equal_drives_are_named_and_count_once(tmp_path):
         (key("1", weather, 1, log_hash="same"), Metrics(fatal_collisions=2, distance_km=7.0))
         for weather in ("clear-noon", "rain-noon")
     ]
-    write_results(tmp_path, rows)
+    MATRIX.write(tmp_path, rows)
     matrix = load_matrix(tmp_path)
     assert matrix.same_weather == [("1", ["clear-noon", "rain-noon"])]
     assert matrix.rate("fatal_collisions", "1").events == 2
@@ -113,7 +112,7 @@ def test_runs_that_did_not_finish_are_said_and_left_out(tmp_path):
         (key("1", "clear-noon", 1), Metrics(fatal_collisions=2, distance_km=7.0, duration_s=500)),
         (key("1", "clear-noon", 2, outcome="crashed"), Metrics()),
     ]
-    write_results(tmp_path, rows)
+    MATRIX.write(tmp_path, rows)
     matrix = load_matrix(tmp_path)
     assert matrix.rate("fatal_collisions", "1", "clear-noon").runs == 1
     page = build_page(matrix)

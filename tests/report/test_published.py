@@ -6,7 +6,8 @@ import polars as pl
 import pytest
 
 import skidpad
-from skidpad.recording.results import Metrics, RunKey, schema
+from skidpad.recording.matrix import Metrics, RunKey
+from skidpad.recording.results import schema
 from skidpad.report.published import Source, published, published_matrix
 
 PACKAGE = Path(skidpad.__file__).parent

@@ -7,7 +7,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from skidpad.campaign.bench import SECONDS, bench_cell, warm_cost
-from skidpad.campaign.matrix import run_matrix, warm_up
+from skidpad.campaign.campaign import Campaign
+from skidpad.campaign.matrix import RECIPE, warm_up
+from skidpad.campaign.pool import local, warm
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import preset_groups
@@ -34,8 +36,8 @@ def driven_minutes() -> float:
         for weather in preset_groups()["matrix"]
         for n in CONFIGURATIONS
     ]
-    warm_up()
+    warm(warm_up)
     with TemporaryDirectory() as folder:
         begin = time.perf_counter()
-        run_matrix(cells, Path(folder) / "matrix", workers=CORES)
+        Campaign(RECIPE, cells).run(Path(folder) / "matrix", local(CORES))
         return (time.perf_counter() - begin) / 60.0

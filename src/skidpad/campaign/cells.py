@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
 from enum import Enum
-from pathlib import Path
 from typing import Any
 
 from skidpad.core.errors import ConfigError, require_range
@@ -167,19 +166,3 @@ def cross(
     if len({c.name for c in cells}) != len(cells):
         raise ConfigError("two cells have the same name: a driver or a weather is given twice")
     return cells
-
-
-def identity(cells: Sequence[Cell]) -> dict[str, Any]:
-    """The resolved configuration of a campaign, without workers and paths (decision M-18)."""
-    plain = [_plain(c.resolved()) for c in cells]
-    return {"command": "adas", "cells": plain}
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(v) for v in value]
-    if isinstance(value, Enum):
-        return value.value
-    return str(value) if isinstance(value, Path) else value

@@ -14,7 +14,9 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
+import msgspec
 import numpy as np
 
 from skidpad import __version__
@@ -24,7 +26,7 @@ from skidpad.campaign.channel_outcomes import Referee
 from skidpad.campaign.channel_routes import DrivenRoute
 from skidpad.campaign.channel_world import Segment, segment_of
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
-from skidpad.core.errors import ConfigError
+from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.setup import DT
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import ActorKind
@@ -42,6 +44,7 @@ from skidpad.stack.channels.channel import Channel
 from skidpad.stack.channels.settings import settings_of
 
 TICKS = round(CYCLE / DT)
+DEADLINE_S = 3600.0
 WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
 TRUTH_REACH = 120.0  # m around the ego within which the true world is recorded
 MINIMAL_RISK_BRAKE = 0.4  # of full brake, about 4 m/s^2 (UN R157 5.1.6: at most 4 m/s^2)
@@ -68,11 +71,22 @@ class SegmentPlan:
                 f"drive-by must be {ARBITER} or one of {', '.join(self.channels)}, "
                 f"got {self.drive_by!r}"
             )
+        require_range("noise", self.noise, 0.0, 10.0)
 
     @property
     def name(self) -> str:
         """File name without suffix."""
         return f"{self.route.name}-{self.seed:05d}"
+
+    @property
+    def deadline_s(self) -> float:
+        """Wall time after which the segment counts as hanging."""
+        return DEADLINE_S
+
+    def resolved(self) -> dict[str, Any]:
+        """Everything that decides the segment, as plain data; where a server is does not."""
+        plain: dict[str, Any] = msgspec.to_builtins(self)
+        return plain | {"backend": self.backend.resolved()}
 
 
 def drive_segment(plan: SegmentPlan, path: Path) -> DriveOutcome:

@@ -9,7 +9,7 @@ import numpy as np
 from skidpad.core.channels import Decision
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import LightState
-from skidpad.recording.channel_drives import DriveOutcome
+from skidpad.recording.channel_drives import DriveOutcome, Ending
 from skidpad.roads.lanes import SignalKind
 from skidpad.stack.channels.route import SEARCH, STEP, RoutePath, locate
 from skidpad.stack.channels.settings import CarModel
@@ -30,7 +30,7 @@ class Referee:
     def __init__(self, route: RoutePath, car: CarModel, dt: float) -> None:
         self.route, self.car, self.dt = route, car, dt
         self.over = False
-        self.ended = "time"
+        self.ended = Ending.TIME
         self.cycles = self.switches = self.reds = self.stalls = self.at = 0
         self.distance = self.stood = self.minimal_risk = 0.0
         self.driving: dict[str, float] = {}
@@ -59,7 +59,7 @@ class Referee:
         self._lines(truth)
         self._standing(v, truth)
         if abs(offset) > LOST or self.at * STEP > self.route.length - 30.0:
-            self.over, self.ended = True, "off the route"
+            self.over, self.ended = True, Ending.OFF_ROUTE
 
     def touched(self, t: float, truth: WorldTruth) -> None:
         """Contacts of one tick."""
@@ -92,7 +92,7 @@ class Referee:
         limit = STUCK_TIME if waits else STALL_TIME
         if self.stood > limit:
             self.stalls += 1
-            self.over, self.ended = True, "stalled"
+            self.over, self.ended = True, Ending.STALLED
 
     def _red_ahead(self, truth: WorldTruth) -> bool:
         here = self.at * STEP

@@ -110,13 +110,3 @@ def cross(
 def seeds(first: int, n: int) -> range:
     """n reported seeds beginning with the first-th, from 0."""
     return range(FIRST_SEED + first, FIRST_SEED + first + n)
-
-
-def identity(cells: Sequence[GripCell]) -> dict[str, Any]:
-    """The resolved configuration of a campaign, without workers and paths (decision M-18)."""
-    names = sorted({c.cell for c in cells})
-    template = cells[0].resolved() if cells else {}
-    for varied in ("scenario", "weather", "friction", "seed", "cutin", "overlay"):
-        template.pop(varied, None)
-    weathers = {c.weather.name: asdict(c.weather) for c in cells}
-    return {"command": "grip", "cells": names, "weathers": weathers, "template": template}

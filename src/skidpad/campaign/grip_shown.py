@@ -1,4 +1,4 @@
-"""What a report shows besides results: logs of a median and a worst run per cell, and full stops."""
+"""What a report shows besides results: a median and a worst run per cell, and full stops."""
 
 from __future__ import annotations
 
@@ -7,16 +7,10 @@ from pathlib import Path
 
 import polars as pl
 
-from skidpad.campaign.grip import TARGET, Runner, Task
-from skidpad.campaign.grip_cells import GripCell
-from skidpad.campaign.pool import Job
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.stopping import SPEEDS_KMH, grip_rows
-from skidpad.recording.campaigns import RUNS
 from skidpad.recording.files import write_parquet
-from skidpad.recording.logfiles import TICKS
-from skidpad.recording.results import read_results
 
 STOPPING = "stopping.parquet"
 CELL = ("scenario", "cutin", "overlay", "weather", "friction")
@@ -29,22 +23,6 @@ def shown(results: pl.DataFrame) -> pl.DataFrame:
     middle = order.agg(pl.col("seed").get(pl.len() // 2)).with_columns(role=pl.lit("median"))
     worst = order.agg(pl.col("seed").first()).with_columns(role=pl.lit("worst"))
     return pl.concat([middle, worst]).sort(*CELL, "role")
-
-
-def keep_shown(out: Path, cells: Sequence[GripCell], runner: Runner) -> None:
-    """Write the logs of these runs; a drive is the same whenever it is driven."""
-    wanted = {
-        tuple(row[name] for name in (*CELL, "seed")) for row in shown(read_results(out)).to_dicts()
-    }
-    jobs = [
-        Job(c.name, TARGET, Task(c, out, keep=True), c.deadline_s)
-        for c in cells
-        if (c.scenario, c.cutin.value, c.overlay, c.weather.name, c.friction.value, c.seed)
-        in wanted
-        and not (out / RUNS / c.name / TICKS).exists()
-    ]
-    for _ in runner(jobs):
-        pass
 
 
 def write_stopping(out: Path, weathers: Sequence[Weather], mu_ref: float) -> None:

@@ -149,10 +149,11 @@ def play_to(wish: Play, out: Path, choice: BackendChoice | None = None) -> Playe
     task = PlayTask(wish, out, BackendChoice() if choice is None else choice)
     if task.backend.kind is BackendKind.EMBEDDED:
         return play_task(task)
-    from skidpad.campaign.pool import Job, run_jobs
+    from skidpad.campaign.pool import run_jobs
+    from skidpad.campaign.worker import Job
 
     load(wish.file, wish.parameters, wish.ego)  # what is wrong in the file is said here
-    (finished,) = run_jobs([Job(out.name, "skidpad.campaign.play:play_task", task)], 1)
+    (finished,) = run_jobs([Job(out.name, play_task, task)], 1)
     if finished.failure is not None:
         raise BackendError(f"{wish.file.name} on CARLA: {finished.detail.strip()}")
     played: Played = finished.value

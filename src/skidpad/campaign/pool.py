@@ -7,23 +7,23 @@ travel through here, except one small value per run: runs write their own files.
 
 from __future__ import annotations
 
-import importlib
-import multiprocessing
 import os
-import signal
 import sys
-import threading
-import time
-import traceback
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
-from multiprocessing.connection import Connection, wait
-from multiprocessing.process import BaseProcess
-from typing import Any
+from dataclasses import dataclass, field, replace
+from multiprocessing.connection import wait
 
-from skidpad.core.errors import SkidpadError
+from skidpad.campaign.worker import (
+    CONTEXT,
+    Finished,
+    Job,
+    Runner,
+    Worker,
+    die_with_parent,
+    given,
+)
 
 ATTEMPTS = 2  # a run that killed its worker gets one more try
 SINGLE_THREADED = (
@@ -36,188 +36,86 @@ SINGLE_THREADED = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Job:
-    """One run: `target` names a function "module:function" that is called with `argument`."""
-
-    key: str
-    target: str
-    argument: Any
-    deadline_s: float = 3600.0
-
-
-@dataclass(frozen=True, slots=True)
-class Finished:
-    """How a job ended. `failure` is None, "crashed" or "timeout"."""
-
-    job: Job
-    value: Any = None
-    failure: str | None = None
-    detail: str = ""
-    wall_s: float = 0.0
-
-
-@dataclass(slots=True)
-class _Worker:
-    process: BaseProcess
-    pipe: Connection
-    job: Job | None = None
-    started: float = 0.0
-
-
 @dataclass(slots=True)
 class _Queue:
     waiting: deque[Job]
     attempts: dict[str, int] = field(default_factory=dict)
 
+    def next(self) -> Job:
+        """The next job to try."""
+        job = self.waiting.popleft()
+        self.attempts[job.key] = self.attempts.get(job.key, 0) + 1
+        return job
+
     def again(self, job: Job) -> bool:
         """Put a job whose worker died back, if it has tries left."""
-        self.attempts[job.key] = self.attempts.get(job.key, 1) + 1
-        if self.attempts[job.key] > ATTEMPTS:
+        if self.attempts[job.key] >= ATTEMPTS:
             return False
         self.waiting.append(job)
         return True
 
 
-def run_jobs(jobs: Iterable[Job], workers: int, warm: str | None = None) -> Iterator[Finished]:
-    """Run all jobs on `workers` processes; yield each as it ends, in order of ending.
-
-    warm: "module:function", called once in a process of its own before the workers start, so that
-    kernels are compiled once and not once per worker (decision X-10).
-    """
+def run_jobs(jobs: Iterable[Job], workers: int) -> Iterator[Finished]:
+    """Run all jobs on `workers` processes; yield each as it ends, in order of ending."""
     queue = _Queue(deque(jobs))
-    if not queue.waiting:
-        return
-    context = multiprocessing.get_context("spawn")
+    crew: list[Worker | None] = [None] * min(max(workers, 1), len(queue.waiting))
     with single_threaded():
-        if warm is not None:
-            process = context.Process(target=_warm, args=(warm,))
-            process.start()
-            process.join()
-        crew = [_hire(context) for _ in range(min(max(workers, 1), len(queue.waiting)))]
         try:
-            yield from _supervise(context, crew, queue)
+            yield from _supervise(crew, queue)
         finally:
             for worker in crew:
-                _dismiss(worker)
+                if worker is not None:
+                    worker.dismiss()
 
 
-def _supervise(
-    context: multiprocessing.context.SpawnContext, crew: list[_Worker], queue: _Queue
-) -> Iterator[Finished]:
-    while queue.waiting or any(w.job for w in crew):
+def _supervise(crew: list[Worker | None], queue: _Queue) -> Iterator[Finished]:
+    """crew: the workers by place; None where there is none yet, or no more."""
+    while True:
         for place, worker in enumerate(crew):
-            if worker.job is None and queue.waiting:
-                crew[place] = _give(context, worker, queue.waiting.popleft())
-        busy = [w for w in crew if w.job]
-        ready = wait([w.pipe for w in busy], timeout=_patience(busy))
-        for worker in busy:
-            finished = _collect(worker, worker.pipe in ready)
+            if (worker is None or worker.job is None) and queue.waiting:
+                crew[place] = given(worker, queue.next())
+        busy = {place: w for place, w in enumerate(crew) if w is not None and w.job is not None}
+        if not busy:
+            return
+        wait([w.pipe for w in busy.values()], min(w.patience() for w in busy.values()))
+        for place, worker in busy.items():
+            finished = worker.collect()
             if finished is None:
                 continue
+            worker.job = None
             if finished.failure is not None:
-                crew[crew.index(worker)] = _hire(context)
-                _dismiss(worker)
+                worker.dismiss()
+                crew[place] = None
                 if queue.again(finished.job):
                     continue
-            worker.job = None
-            yield finished
+            yield replace(finished, attempts=queue.attempts[finished.job.key])
 
 
-def _give(context: multiprocessing.context.SpawnContext, worker: _Worker, job: Job) -> _Worker:
-    """The worker with its job, or a new one when it died idle: no fault of the job."""
-    try:
-        worker.pipe.send(job)
-    except OSError:
-        _dismiss(worker)
-        worker = _hire(context)
-        worker.pipe.send(job)
-    worker.job, worker.started = job, time.monotonic()
-    return worker
+def warm(compile_all: Callable[[], None]) -> None:
+    """Compile in a process of its own, so that it is done once and not by each worker (X-10)."""
+    with single_threaded():
+        process = CONTEXT.Process(target=_warm, args=(compile_all,))
+        process.start()
+        process.join()
 
 
-def _patience(busy: list[_Worker]) -> float:
-    """Seconds until the next deadline."""
-    left = [w.started + w.job.deadline_s - time.monotonic() for w in busy if w.job]
-    return max(min(left, default=0.0), 0.0) + 0.01
+def local(workers: int, warm_up: Callable[[], None] | None = None) -> Runner:
+    """The pool of this machine; kernels are compiled before its first job."""
+
+    def run(jobs: Iterable[Job]) -> Iterator[Finished]:
+        nonlocal warm_up
+        jobs = list(jobs)
+        if jobs and warm_up is not None:
+            warm(warm_up)
+            warm_up = None
+        yield from run_jobs(jobs, workers)
+
+    return run
 
 
-def _collect(worker: _Worker, ready: bool) -> Finished | None:
-    """What became of the worker's job, None while it runs."""
-    job = worker.job
-    assert job is not None
-    wall = time.monotonic() - worker.started
-    if ready:
-        try:
-            value, error = worker.pipe.recv()
-        except (EOFError, OSError):
-            worker.process.join(timeout=5)
-            how = f"the worker process ended with exit code {worker.process.exitcode}"
-            return Finished(job, failure="crashed", detail=how, wall_s=wall)
-        if error:
-            return Finished(job, failure="crashed", detail=error, wall_s=wall)
-        return Finished(job, value=value, wall_s=wall)
-    if wall > job.deadline_s:
-        return Finished(
-            job, failure="timeout", detail=f"no end after {job.deadline_s:g} s", wall_s=wall
-        )
-    return None
-
-
-def _hire(context: multiprocessing.context.SpawnContext) -> _Worker:
-    here, there = context.Pipe()
-    process = context.Process(target=_work, args=(there,), daemon=True)
-    process.start()
-    there.close()
-    return _Worker(process, here)
-
-
-def _dismiss(worker: _Worker) -> None:
-    worker.pipe.close()
-    worker.process.kill()
-    worker.process.join()
-
-
-def _work(pipe: Connection) -> None:
-    """The worker process: jobs in, values out, until the parent is gone."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
-    _die_with_parent()
-    while True:
-        try:
-            job: Job = pipe.recv()
-        except (EOFError, OSError):
-            return
-        try:
-            answer: tuple[Any, str] = (resolve(job.target)(job.argument), "")
-        except SkidpadError as error:  # one sentence for a person; where it arose says no more
-            answer = (None, str(error))
-        except Exception:
-            answer = (None, traceback.format_exc())
-        pipe.send(answer)
-
-
-def _die_with_parent() -> None:
-    """Leave at once when the parent vanishes: an orphan would write beside a resumed campaign."""
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-
-    def watch() -> None:
-        wait([parent.sentinel])
-        os._exit(1)
-
-    threading.Thread(target=watch, daemon=True).start()
-
-
-def resolve(target: str) -> Callable[[Any], Any]:
-    """The function that `module:function` names."""
-    module, _, name = target.partition(":")
-    function: Callable[[Any], Any] = getattr(importlib.import_module(module), name)
-    return function
-
-
-def _warm(target: str) -> None:
-    module, _, name = target.partition(":")
-    getattr(importlib.import_module(module), name)()
+def _warm(compile_all: Callable[[], None]) -> None:
+    die_with_parent()
+    compile_all()
     sys.stdout.flush()
 
 

@@ -18,7 +18,7 @@ from PIL import Image
 from skidpad.campaign.backends import make_backend
 from skidpad.campaign.cells import Cell, Driver
 from skidpad.campaign.drive import loop, prepare
-from skidpad.campaign.matrix import CONFIG
+from skidpad.campaign.runfolder import CONFIG
 from skidpad.campaign.views import SIZE, twelve_views
 from skidpad.core.errors import ConfigError, FileError, OutputError
 from skidpad.core.frames import SensorFrame

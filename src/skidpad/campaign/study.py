@@ -11,8 +11,10 @@ import polars as pl
 
 from skidpad.campaign.cells import Cell, Driver, seeds
 from skidpad.campaign.drive import run_cell
+from skidpad.campaign.matrix import warm_up
 from skidpad.campaign.pace import Brake
-from skidpad.campaign.pool import Job, run_jobs
+from skidpad.campaign.pool import local
+from skidpad.campaign.worker import Job
 from skidpad.core.errors import SkidpadError, require_choice
 from skidpad.core.frames import RadarPoints, SensorFrame
 from skidpad.core.randomness import stream
@@ -203,14 +205,12 @@ def run_study(
     """Drive a study with n seeds and judge its finding."""
     require_choice("study", id, tuple(STUDIES))
     variants = STUDIES[id](n)
-    jobs = [
-        Job(f"{id}-{k}", "skidpad.campaign.study:drive_variant", v, v.cell.deadline_s)
-        for k, v in enumerate(variants)
-    ]
+    jobs = [Job(f"{id}-{k}", drive_variant, v, v.cell.deadline_s) for k, v in enumerate(variants)]
     rows: dict[str, dict[str, Any]] = {}
-    for finished in run_jobs(jobs, workers, warm="skidpad.campaign.matrix:warm_up"):
+    for finished in local(workers, warm_up)(jobs):
         if finished.failure is not None:
-            raise SkidpadError(f"study {id}: a run {finished.failure}: {finished.detail.strip()}")
+            how = finished.failure.value
+            raise SkidpadError(f"study {id}: a run {how}: {finished.detail.strip()}")
         rows[finished.job.key] = finished.value
         on_run(len(rows), len(jobs))
     table = pl.DataFrame([rows[j.key] for j in jobs])

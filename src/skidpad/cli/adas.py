@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import os
+from collections.abc import Callable
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from skidpad.cli.campaigns import How, Seeds
 from skidpad.cli.server_options import (
     Backend,
     Host,
@@ -21,7 +22,7 @@ from skidpad.cli.server_options import (
 
 
 def adas(
-    out: Annotated[Path, typer.Option(help="Folder for results and report.")],
+    how: How,
     configs: Annotated[
         str | None, typer.Option(help="Published configurations, e.g. 0,1,4; default all five.")
     ] = None,
@@ -43,7 +44,7 @@ def adas(
     range: Annotated[
         str | None, typer.Option(help="none or physical; default: the profile's.")
     ] = None,
-    seeds: Annotated[int, typer.Option(help="Runs per cell.")] = 1,
+    seeds: Seeds = 1,
     duration: Annotated[float, typer.Option(help="Simulated seconds per run.")] = 500.0,
     profile: Annotated[
         str, typer.Option(help="recommended, thesis_text, thesis_listing or preliminary.")
@@ -69,17 +70,10 @@ def adas(
     without: Without = None,
     server_command: ServerCommand = None,
     restart_every: RestartEvery = 0,
-    workers: Annotated[
-        int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
-    ] = os.cpu_count() or 1,
-    resume: Annotated[bool, typer.Option("--resume", help="Finish a campaign.")] = False,
-    or_next: Annotated[
-        bool, typer.Option("--or-next", help="If OUT holds another campaign, use OUT-2, OUT-3, ...")
-    ] = False,
-    csv: Annotated[bool, typer.Option("--csv", help="Write CSV beside Parquet.")] = False,
 ) -> None:
     """Drive configurations x weathers x seeds; prints the path of the report."""
-    from skidpad.cli.adas_plan import Wish, drive_to_report
+    from skidpad.cli.adas_plan import Wish, campaign_of
+    from skidpad.report.matrix import write_report
 
     wish = Wish(
         configs=configs,
@@ -108,21 +102,22 @@ def adas(
             restart_every=restart_every,
         ),
     )
-    typer.echo(drive_to_report(wish, out, or_next, workers=workers, resume=resume, csv=csv))
+    how(campaign_of(wish), write_report)
 
 
 def report(folder: Annotated[Path, typer.Argument(help="A campaign's folder.")]) -> None:
     """Write the report of a campaign again, from what it left behind."""
+    from skidpad.cli.channels_drive import totals
     from skidpad.recording.ledger import campaign_command
+    from skidpad.report.grip import write_grip_report
+    from skidpad.report.matrix import write_report
 
-    if campaign_command(folder) == "grip":
-        from skidpad.report.grip import write_grip_report
-
-        typer.echo(write_grip_report(folder))
-    else:
-        from skidpad.report.matrix import write_report
-
-        typer.echo(write_report(folder))
+    reports: dict[str, Callable[[Path], object]] = {
+        "adas": write_report,
+        "grip": write_grip_report,
+        "channels": totals,
+    }
+    typer.echo(reports[campaign_command(folder)](folder))
 
 
 def show(run: Annotated[Path, typer.Argument(help="A run's folder.")]) -> None:

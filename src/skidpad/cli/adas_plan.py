@@ -1,37 +1,31 @@
-"""From the options of `skidpad adas` to cells, and driving them under a progress bar."""
+"""From the options of `skidpad adas` to a campaign."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
-from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
+from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells import (
     DURATION,
     Cell,
     Driver,
     cross,
-    identity,
     published_drivers,
     sweep,
 )
-from skidpad.campaign.matrix import Summary, run_matrix
-from skidpad.cli.carla_backend import backend_choice, map_of, workers_for
+from skidpad.campaign.matrix import RECIPE
+from skidpad.cli.carla_backend import backend_choice, drives_alone, map_of
 from skidpad.cli.server_options import ServerWish
 from skidpad.core.errors import ConfigError, require_choice, require_range
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import MATRIX, find_weather, preset_groups
-from skidpad.recording.ledger import Entry, FolderState, folder_state
+from skidpad.recording.matrix import Metrics, RunKey
 from skidpad.roads.bundled import load_map
 from skidpad.stack.configurations import parse_functions
 from skidpad.stack.loading import load_stack
 from skidpad.stack.settings import load_profile, parse_assignments
-
-console = Console(stderr=True)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -89,68 +83,10 @@ def plan(wish: Wish) -> list[Cell]:
     return cross(drivers, climate, wish.seeds, template)
 
 
-def drive_to_report(
-    wish: Wish, out: Path, or_next: bool, *, workers: int, resume: bool, csv: bool
-) -> Path:
-    """Drive what is wished for into `out`, or with or_next beside it; the report's path."""
-    from skidpad.report.matrix import write_report
-
+def campaign_of(wish: Wish) -> Campaign[Cell, RunKey, Metrics]:
+    """The campaign that is wished for."""
     cells = plan(wish)
-    folder = next_folder(out, cells) if or_next else out
-    warn(drive_with_progress(cells, folder, workers=workers, resume=resume, csv=csv))
-    return write_report(folder)
-
-
-def warn(summary: Summary) -> None:
-    """Say what a reader of the report should know first."""
-    if summary.mixed_machines:
-        console.print("[yellow]runs of different machines or versions: bytes may differ[/]")
-    if summary.failed:
-        console.print(f"[yellow]{summary.failed} runs crashed or timed out; see the report[/]")
-
-
-def drive_with_progress(
-    cells: list[Cell], folder: Path, *, workers: int, resume: bool, csv: bool
-) -> Summary:
-    """Run the campaign under a progress bar with the time left."""
-    columns = (
-        TextColumn("{task.description}"),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeRemainingColumn(),
-    )
-    with Progress(*columns, console=console) as progress:
-        task = progress.add_task("driving", total=len(cells))
-
-        def on_run(entry: Entry) -> None:
-            fatal = entry.metrics.fatal_collisions
-            told = entry.key.outcome if fatal is None else f"{fatal} collisions"
-            progress.update(task, advance=1, description=f"{entry.run}: {told}")
-
-        try:
-            summary = run_matrix(
-                cells,
-                folder,
-                workers=workers_for(cells, workers),
-                resume=resume,
-                csv=csv,
-                on_run=on_run,
-            )
-        except KeyboardInterrupt:
-            console.print(f"interrupted; what is done is kept: --out {folder} --resume finishes it")
-            raise SystemExit(130) from None
-        progress.update(task, completed=len(cells), description=f"{summary.runs} runs")
-    return summary
-
-
-def next_folder(out: Path, cells: list[Cell]) -> Path:
-    """`out`, or the first of out-2, out-3, ... that is empty or holds this campaign (M-18)."""
-    wanted = identity(cells)
-    folder, n = out, 1
-    while folder_state(folder, wanted) is FolderState.OTHER:
-        n += 1
-        folder = out.with_name(f"{out.name}-{n}")
-    return folder
+    return Campaign(RECIPE, cells, alone=drives_alone(c.backend for c in cells))
 
 
 def weathers(text: str) -> list[Weather]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import multiprocessing
 import shlex
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable
 from pathlib import Path
 
-from skidpad.campaign.cells import BackendChoice, BackendKind, Cell
+from skidpad.campaign.cells import BackendChoice, BackendKind
 from skidpad.cli.server_options import ServerWish
 from skidpad.core.errors import BackendError, ConfigError, require_choice, require_range
 from skidpad.core.jit import user_cache
@@ -73,6 +73,6 @@ def _fetch(choice: BackendChoice, map: str, folder: Path) -> None:
         raise SystemExit(1) from None
 
 
-def workers_for(cells: Sequence[Cell], workers: int) -> int:
+def drives_alone(choices: Iterable[BackendChoice]) -> bool:
     """A CARLA server drives one run at a time."""
-    return 1 if any(c.backend.kind is BackendKind.CARLA for c in cells) else workers
+    return any(c.kind is BackendKind.CARLA for c in choices)

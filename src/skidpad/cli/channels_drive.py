@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Annotated
 
 import typer
 
+from skidpad.cli.campaigns import How
 from skidpad.cli.server_options import (
     Backend,
     Host,
@@ -15,28 +17,30 @@ from skidpad.cli.server_options import (
     ServerWish,
 )
 
-ROUTE = typer.Option("all", help="One of the six routes, or all.")
-OUT = typer.Option(..., help="Folder for recordings; driving again resumes.")
-HOURS = typer.Option(1.0, help="Hours in total, split equally among the routes.")
-CHANNELS = typer.Option("lav_like,tfuse_like", help="Names, the preferred one first.")
-SEED = typer.Option(0, help="First seed; different numbers give disjoint seeds.")
-MAP = typer.Option(None, help="Drive on this map (.xodr) instead of the route's own.")
-NOISE = typer.Option(1.0, help="Factor on all sensor errors: 0.5, 1 or 2 for the sweep.")
-WORKERS = typer.Option(1, help="Worker processes.")
 FOLDERS = typer.Argument(help="Folders of `skidpad channels drive`.")
-DRIVE_BY = typer.Option("arbiter", help="The arbiter, or the channel that drives alone.")
 
 
 def drive(
-    route: str = ROUTE,
-    out: Path = OUT,
-    hours: float = HOURS,
-    channels: str = CHANNELS,
-    seed: int = SEED,
-    map: Path | None = MAP,
-    noise: float = NOISE,
-    workers: int = WORKERS,
-    drive_by: str = DRIVE_BY,
+    how: How,
+    route: Annotated[str, typer.Option(help="One of the six routes, or all.")] = "all",
+    hours: Annotated[
+        float, typer.Option(help="Hours in total, split equally among the routes.")
+    ] = 1.0,
+    channels: Annotated[
+        str, typer.Option(help="Names, the preferred one first.")
+    ] = "lav_like,tfuse_like",
+    seed: Annotated[
+        int, typer.Option(help="First seed; different numbers give disjoint seeds.")
+    ] = 0,
+    map: Annotated[
+        Path | None, typer.Option(help="Drive on this map (.xodr) instead of the route's own.")
+    ] = None,
+    noise: Annotated[
+        float, typer.Option(help="Factor on all sensor errors: 0.5, 1 or 2 for the sweep.")
+    ] = 1.0,
+    drive_by: Annotated[
+        str, typer.Option(help="The arbiter, or the channel that drives alone.")
+    ] = "arbiter",
     backend: Backend = "embedded",
     host: Host = "127.0.0.1",
     port: Port = 2000,
@@ -44,10 +48,11 @@ def drive(
     restart_every: RestartEvery = 0,
 ) -> None:
     """Drive channels over routes on a simulator; one recording per ten minutes."""
-    from skidpad.campaign.cells import BackendChoice
+    from skidpad.campaign.campaign import Campaign
+    from skidpad.campaign.channel_drive import SegmentPlan
     from skidpad.campaign.channel_routes import chosen_routes
-    from skidpad.campaign.channels import run_drives, segment_plans
-    from skidpad.cli.carla_backend import backend_choice
+    from skidpad.campaign.channels import RECIPE, segment_plans
+    from skidpad.cli.carla_backend import backend_choice, drives_alone
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.channel_presets import senses_of
 
@@ -66,35 +71,33 @@ def drive(
             restart_every=restart_every,
         )
     )
-    plans = segment_plans(
-        routes,
-        hours,
+    template = SegmentPlan(
+        route=routes[0],
         channels=names,
         seed=seed,
         drive_by=drive_by,
         noise=noise,
         backend=choice,
     )
-    summary = run_drives(
-        plans,
-        out,
-        workers=workers if choice == BackendChoice() else 1,  # a server drives one run at a time
-        on_run=lambda o: typer.echo(
-            f"{o.route} seed {o.seed}: {o.driven_s:.0f} s, {o.distance_m:.0f} m, "
-            f"{o.collisions} collisions, {o.red_lights_run} red lights run, ended by {o.ended}"
-        ),
-    )
-    total = sum(o.driven_s for o in summary.outcomes)
-    typer.echo(
-        f"{out}: {len(summary.outcomes)} segments, {total / 3600.0:.2f} h, "
-        f"{sum(o.distance_m for o in summary.outcomes) / 1000.0:.1f} km, "
-        f"{sum(o.collisions for o in summary.outcomes)} collisions, "
-        f"{sum(o.red_lights_run for o in summary.outcomes)} red lights run, "
-        f"{sum(o.stalls for o in summary.outcomes)} stalls"
-    )
-    if summary.failed:
-        typer.echo(f"not driven to an end: {', '.join(summary.failed)}", err=True)
+    plans = segment_plans(routes, hours, template)
+    summary = how(Campaign(RECIPE, plans, alone=drives_alone([choice])), totals)
+    if summary is not None and summary.failed:
         raise typer.Exit(1)
+
+
+def totals(folder: Path) -> str:
+    """What a folder of driven segments came to, in one line."""
+    import polars as pl
+
+    from skidpad.recording.results import read_results
+
+    driven = read_results(folder).drop_nulls("driven_s")
+    sums = driven.select(pl.col(pl.Float64, pl.Int64).sum()).row(0, named=True)
+    return (
+        f"{folder}: {len(driven)} segments, {sums['driven_s'] / 3600.0:.2f} h, "
+        f"{sums['distance_m'] / 1000.0:.1f} km, {sums['collisions']} collisions, "
+        f"{sums['red_lights_run']} red lights run, {sums['stalls']} stalls"
+    )
 
 
 def outcomes(folders: list[Path] = FOLDERS) -> None:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
-from pathlib import Path
 from typing import Annotated
 
 import typer
 
+from skidpad.cli.campaigns import How, Seeds
 from skidpad.cli.server_options import (
     Backend,
     Host,
@@ -19,11 +18,9 @@ from skidpad.cli.server_options import (
     Without,
 )
 
-campaign = typer.Typer(name="campaign", help="About campaigns.", no_args_is_help=True)
-
 
 def grip(
-    out: Annotated[Path, typer.Option(help="Folder for results and report.")],
+    how: How,
     scenarios: Annotated[
         str, typer.Option(help="all, or ghost_cut_in,lead_slowdown,front_accident.")
     ] = "all",
@@ -40,7 +37,7 @@ def grip(
         str,
         typer.Option(help="original, unfixed, fixed: spawn delay and merge distance."),
     ] = "fixed",
-    repeats: Annotated[int, typer.Option(min=1, help="Seeds per cell.")] = 100,
+    seeds: Seeds = 100,
     config: Annotated[int, typer.Option(min=0, max=4, help="Configuration of our stack.")] = 2,
     set: Annotated[
         list[str] | None, typer.Option(help="Single settings over the profile: name=value.")
@@ -67,24 +64,13 @@ def grip(
     without: Without = None,
     server_command: ServerCommand = None,
     restart_every: RestartEvery = 0,
-    workers: Annotated[
-        int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
-    ] = os.cpu_count() or 1,
-    cluster: Annotated[
-        str | None, typer.Option(help="Dask scheduler's address, or local:N.")
-    ] = None,
-    until_halfwidth: Annotated[
-        float | None,
-        typer.Option(help="Stop a cell once its completion is known to +- this share."),
-    ] = None,
     keep: Annotated[
         str, typer.Option(help="shown: logs of runs in the report; all: of every run.")
     ] = "shown",
-    resume: Annotated[bool, typer.Option("--resume", help="Finish a campaign.")] = False,
-    csv: Annotated[bool, typer.Option("--csv", help="Write CSV beside Parquet.")] = False,
 ) -> None:
     """Drive scenarios x weathers x frictions x seeds; prints the path of the report."""
-    from skidpad.cli.grip_plan import GripWish, drive_grip, plan_grip
+    from skidpad.cli.grip_plan import GripWish, campaign_of
+    from skidpad.report.grip import write_grip_report
 
     wish = GripWish(
         scenarios=scenarios,
@@ -92,7 +78,7 @@ def grip(
         friction=friction,
         model=model,
         cutin=cutin,
-        repeats=repeats,
+        repeats=seeds,
         config=config,
         assignments=set or [],
         profile=profile,
@@ -101,7 +87,6 @@ def grip(
         actors=actors,
         overlay=overlay,
         four_cells=four_cells,
-        until_halfwidth=until_halfwidth,
         keep=keep,
         server=ServerWish(
             backend=backend,
@@ -113,34 +98,4 @@ def grip(
             restart_every=restart_every,
         ),
     )
-    plan = plan_grip(wish)
-    typer.echo(drive_grip(plan, out, workers=workers, cluster=cluster, resume=resume, csv=csv))
-
-
-@campaign.command()
-def estimate(
-    scenarios: Annotated[str, typer.Option(help="As for grip.")] = "all",
-    weather: Annotated[str, typer.Option(help="As for grip.")] = "all",
-    friction: Annotated[str, typer.Option(help="As for grip.")] = "original,reduced",
-    cutin: Annotated[str, typer.Option(help="As for grip.")] = "fixed",
-    repeats: Annotated[int, typer.Option(min=1, help="As for grip.")] = 100,
-    controller: Annotated[str, typer.Option(help="As for grip.")] = "stack",
-    sensors: Annotated[str, typer.Option(help="As for grip.")] = "objects",
-    workers: Annotated[
-        int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
-    ] = os.cpu_count() or 1,
-) -> None:
-    """Say how long a friction campaign will take, from a few of its runs."""
-    from skidpad.cli.grip_plan import GripWish, plan_grip, time_needed
-
-    wish = GripWish(
-        scenarios=scenarios,
-        weather=weather,
-        friction=friction,
-        cutin=cutin,
-        repeats=repeats,
-        controller=controller,
-        sensors=sensors,
-    )
-    plan = plan_grip(wish)
-    typer.echo(time_needed(plan, workers))
+    how(campaign_of(wish), write_grip_report)

@@ -7,12 +7,14 @@ import typer
 import skidpad
 from skidpad.cli.adas import adas, report, show
 from skidpad.cli.bench import bench
+from skidpad.cli.campaigns import Drive, Estimate
 from skidpad.cli.channels import channels
 from skidpad.cli.channels_drive import drive, outcomes
 from skidpad.cli.channels_evaluate import evaluate, train
 from skidpad.cli.compare import compare
+from skidpad.cli.declared import taking
 from skidpad.cli.friction import friction
-from skidpad.cli.grip import campaign, grip
+from skidpad.cli.grip import grip
 from skidpad.cli.hazards import hazards
 from skidpad.cli.map import maps
 from skidpad.cli.monitor import monitor, safety_case
@@ -46,7 +48,19 @@ def _root(
     """A proving ground for driving automation in bad weather."""
 
 
-app.command()(adas)
+campaign = typer.Typer(name="campaign", help="About campaigns.", no_args_is_help=True)
+estimate = typer.Typer(
+    name="estimate",
+    help="Say how long a campaign will take, from a few of its runs.",
+    no_args_is_help=True,
+)
+campaign.add_typer(estimate)
+driving, estimating = taking("how", Drive), taking("how", Estimate)
+app.command()(driving(adas))
+app.command()(driving(grip))
+channels.command()(driving(drive))
+for name, command in (("adas", adas), ("grip", grip), ("channels", drive)):
+    estimate.command(name)(estimating(command))
 app.command()(report)
 app.command()(compare)
 app.command()(rerun)
@@ -55,12 +69,11 @@ app.command()(bench)
 app.command()(show)
 app.add_typer(profiles)
 app.add_typer(maps)
-for command in (drive, outcomes, evaluate, train):
-    channels.command()(command)
+for reader in (outcomes, evaluate, train):
+    channels.command()(reader)
 app.add_typer(channels)
 app.add_typer(hazards)
 app.command()(friction)
-app.command()(grip)
 app.command()(play)
 app.add_typer(campaign)
 app.command()(monitor)

@@ -12,7 +12,8 @@ from skidpad.evidence.drive.collisions import find_crashes
 from skidpad.evidence.drive.metrics import run_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.logfiles import log_hash, read_log
-from skidpad.recording.results import definitions
+from skidpad.recording.matrix import Metrics
+from skidpad.recording.results import definitions_of
 from skidpad.report.cards import chain, headline
 from skidpad.roads.bundled import load_map
 
@@ -28,7 +29,7 @@ def show(run: Path) -> None:
     console.print(f"  content hash: {log_hash(log)}")
     if road_map.content_hash != log.header.map_hash:
         console.print("[yellow]the map has changed since this run: lanes may not match[/]")
-    meanings = {name: meaning for name, meaning, _ in definitions()}
+    meanings = {name: meaning for name, meaning, _ in definitions_of(Metrics)}
     table = Table("metric", "value", "meaning", box=None, pad_edge=False)
     for name, value in asdict(run_metrics(log, road_map)).items():
         table.add_row(name, _text(value), meanings[name])

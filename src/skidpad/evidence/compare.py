@@ -12,7 +12,8 @@ import polars as pl
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.evidence.statistics import Comparison, compare_pairs
-from skidpad.recording.results import definitions
+from skidpad.recording.matrix import Metrics
+from skidpad.recording.results import definitions_of
 
 PAIRED_BY = ("config", "weather", "seed")
 OPERATORS: dict[str, Callable[[float, float], bool]] = {
@@ -62,7 +63,7 @@ def parse_rule(text: str) -> Rule:
 
 def columns() -> list[str]:
     """The columns that can be compared."""
-    return [name for name, _, _ in definitions()]
+    return [name for name, _, _ in definitions_of(Metrics)]
 
 
 def compare_campaigns(

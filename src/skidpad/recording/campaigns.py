@@ -7,12 +7,11 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Generic
 
-import msgspec
 import polars as pl
 
 from skidpad.core.errors import FileError
 from skidpad.recording.files import read_parquet
-from skidpad.recording.ledger import CAMPAIGN, E, fingerprints, latest, read_ledger
+from skidpad.recording.ledger import E, common_configuration, fingerprints, latest, read_ledger
 from skidpad.recording.logfiles import TICKS
 from skidpad.recording.results import TIMING, read_results
 
@@ -50,15 +49,9 @@ class CampaignFolder(Generic[E]):
         return sorted(fingerprints(self.entries))
 
     @cached_property
-    def identity(self) -> dict[str, Any]:
-        """The resolved configuration; empty when none was written."""
-        path = self.path / CAMPAIGN
-        if not path.is_file():
-            return {}
-        try:
-            return msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
-        except msgspec.MsgspecError as error:
-            raise FileError(f"{path} is damaged: {error}") from error
+    def configuration(self) -> dict[str, Any]:
+        """What all runs have in common."""
+        return common_configuration(self.path)
 
     def names(self, *columns: str) -> dict[tuple[Any, ...], str]:
         """Names of the runs by these columns of their keys."""

@@ -3,31 +3,73 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass, field
+from enum import Enum
 from pathlib import Path
+from typing import Any
 
 import msgspec
+
+from skidpad.recording.ledger import Entry
+from skidpad.recording.results import Columns
 
 ARBITER = "arbiter"  # who drives, when it is not one of the channels
 
 
-class DriveOutcome(msgspec.Struct, frozen=True, kw_only=True):
-    """One row per segment; counts unless said otherwise."""
+class Ending(str, Enum):
+    """Why a segment ended."""
+
+    TIME = "time"
+    STALLED = "stalled"
+    OFF_ROUTE = "off the route"
+
+
+def column(meaning: str, source: str) -> Any:
+    """A results column that every driven segment has."""
+    return field(metadata={"meaning": meaning, "source": source})
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveKey:
+    """Which segment a row is about, and how it ended."""
 
     route: str
     seed: int
     drive_by: str
-    driven_s: float
-    distance_m: float
-    collisions: int
-    collisions_struck: int  # of these: the ego hit, seen by who closed in with its front
-    red_lights_run: int
-    stalls: int
-    ended: str  # "time", "stalled" or "off the route"
-    switches: int
-    minimal_risk_s: float
+    outcome: str  # core.Outcome
+    version: str = ""
+    log_hash: str | None = None  # of the recording
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveMetrics:
+    """What became of a segment; counts unless said otherwise."""
+
+    driven_s: float = column("simulated time", "C-12")
+    distance_m: float = column("way of the ego", "C-9")
+    collisions: int = column("collisions of the ego, once per 3 s with the same actor", "C-9")
+    collisions_struck: int = column("of these: the ego hit, seen by who closed in", "C-9")
+    red_lights_run: int = column("stop lines passed at red", "C-9")
+    stalls: int = column("standing for a minute without a cause", "C-9")
+    ended: Ending = column("why it ended", "C-9")
+    switches: int = column("changes of the driving channel", "C-9")
+    minimal_risk_s: float = column("time in a minimal-risk stop", "C-9")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class DriveOutcome(DriveMetrics):
+    """The same with the segment's identity, as it stands beside the recording."""
+
+    route: str
+    seed: int
+    drive_by: str
     driving_s: dict[str, float]
     content_hash: str = ""
     cpu_s: float = 0.0  # outside every hash
+
+
+DRIVES = Columns(DriveKey, DriveMetrics, ("route", "seed", "drive_by"))
+DriveEntry = Entry[DriveKey, DriveMetrics]
 
 
 class DriveRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

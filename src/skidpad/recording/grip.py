@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from skidpad.recording.files import content_hash, read_parquet, write_atomically, write_parquet
-from skidpad.recording.results import RESULTS, TIMING, metric, schema
+from skidpad.recording.files import read_parquet, write_parquet
+from skidpad.recording.ledger import Entry
+from skidpad.recording.results import Columns, metric
 
 SERIES = "series"
 
@@ -58,55 +58,11 @@ class GripMetrics:
     distance_m: float | None = metric("way of the ego", "B-105")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GripTiming:
-    """How long a run took; outside every hash."""
-
-    scenario: str
-    weather: str
-    friction: str
-    seed: int
-    wall_s: float
-    cpu_s: float
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class GripEntry:
-    """One finished run in the ledger."""
-
-    run: str
-    key: GripKey
-    metrics: GripMetrics
-    timing: GripTiming
-    fingerprint: str
-    attempts: int = 1
-    error: str = ""
-
-
-SORT = ("scenario", "cutin", "overlay", "weather", "friction", "seed")
+GRIP = Columns(
+    GripKey, GripMetrics, ("scenario", "cutin", "overlay", "weather", "friction", "seed")
+)
+GripEntry = Entry[GripKey, GripMetrics]
 COLUMNS = ("x", "y", "v", "cvip", "steer", "brake", "throttle", "npc_x", "npc_y")
-
-
-def grip_table(entries: Iterable[GripEntry]) -> pl.DataFrame:
-    """One row per run in canonical order."""
-    rows = [{**asdict(e.key), **asdict(e.metrics)} for e in entries]
-    return pl.DataFrame(rows, schema=schema(GripKey, GripMetrics)).sort(SORT)
-
-
-def write_grip_results(folder: Path, entries: list[GripEntry], csv: bool = False) -> str:
-    """Write results.parquet and timing.parquet; returns the content hash of the results."""
-    table = grip_table(entries)
-    timing = pl.DataFrame([asdict(e.timing) for e in entries], schema=schema(GripTiming))
-    for name, content in ((RESULTS, table), (TIMING, timing)):
-        write_parquet(folder / name, content)
-        if csv:
-            write_atomically((folder / name).with_suffix(".csv"), content.write_csv)
-    return grip_hash(table)
-
-
-def grip_hash(table: pl.DataFrame) -> str:
-    """Content hash of a results table (decision X-1)."""
-    return content_hash([table.sort(SORT)])
 
 
 def series_path(folder: Path, cell: str, seed: int) -> Path:

@@ -18,23 +18,10 @@ import msgspec
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.files import output_error, write_bytes
-from skidpad.recording.results import Metrics, RunKey, Timing
+from skidpad.recording.results import Timing
 
 LEDGER, CAMPAIGN = "ledger.jsonl", "campaign.json"
 RETRIED = frozenset({Outcome.CRASHED, Outcome.TIMEOUT})  # by resume (decision L-7)
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Entry:
-    """One finished run. `run` names it within the campaign: cell and seed."""
-
-    run: str
-    key: RunKey
-    metrics: Metrics
-    timing: Timing
-    fingerprint: str
-    attempts: int = 1
-    error: str = ""  # one sentence, for agent_error, crashed, timeout
 
 
 class HasOutcome(Protocol):
@@ -46,40 +33,34 @@ class HasOutcome(Protocol):
         ...
 
 
-class Line(Protocol):
-    """A line of any campaign's ledger: a dataclass like `Entry`."""
-
-    @property
-    def run(self) -> str:
-        """Name of the run within the campaign."""
-        ...
-
-    @property
-    def key(self) -> HasOutcome:
-        """Which run, and how it ended."""
-        ...
-
-    @property
-    def fingerprint(self) -> str:
-        """Where it was driven."""
-        ...
+K = TypeVar("K", bound=HasOutcome)
+M = TypeVar("M")
 
 
-E = TypeVar("E", bound=Line)
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Entry(Generic[K, M]):
+    """One finished run. `run` names it within the campaign: cell and seed."""
+
+    run: str
+    key: K
+    metrics: M | None  # None: it crashed or timed out
+    timing: Timing
+    fingerprint: str
+    attempts: int = 1
+    error: str = ""  # one sentence, for agent_error, crashed, timeout
+
+
+E = TypeVar("E", bound=Entry[Any, Any])
 
 
 class Ledger(Generic[E]):
     """The open ledger of the one process that writes a campaign; use it as a context."""
 
     def __init__(
-        self,
-        folder: Path,
-        identity: dict[str, Any],
-        resume: bool = False,
-        kind: type[E] = Entry,  # type: ignore[assignment]
+        self, folder: Path, kind: type[E], identity: dict[str, Any], resume: bool = False
     ) -> None:
-        """identity: the resolved configuration, without workers and paths (decision M-18).
-        kind: what its lines are.
+        """kind: what its lines are. identity: the resolved configuration, without workers and paths
+        (decision M-18).
 
         OutputError when the folder holds another campaign, or this one and `resume` is false, or
         another process is writing it.
@@ -156,10 +137,7 @@ class Ledger(Generic[E]):
         self.close()
 
 
-def read_ledger(
-    folder: Path,
-    kind: type[E] = Entry,  # type: ignore[assignment]
-) -> list[E]:
+def read_ledger(folder: Path, kind: type[E]) -> list[E]:
     """All entries, oldest first. A torn last line is passed over; any other damage is a FileError."""
     path = folder / LEDGER
     try:
@@ -181,7 +159,7 @@ def latest(entries: Iterable[E]) -> list[E]:
     return [by_run[run] for run in sorted(by_run)]
 
 
-def fingerprints(entries: Sequence[Line]) -> frozenset[str]:
+def fingerprints(entries: Sequence[Entry[Any, Any]]) -> frozenset[str]:
     """More than one: byte equality is not promised across this campaign (decision X-2)."""
     return frozenset(e.fingerprint for e in entries)
 
@@ -207,17 +185,29 @@ def folder_state(folder: Path, identity: dict[str, Any]) -> FolderState:
     return FolderState.SAME if same else FolderState.OTHER
 
 
-def campaign_command(folder: Path) -> str:
-    """Which command wrote a campaign's folder, "adas" where it does not say."""
+def read_identity(folder: Path) -> dict[str, Any]:
+    """campaign.json of a folder; empty when there is none."""
     path = folder / CAMPAIGN
     if not path.is_file():
-        return "adas"
+        return {}
     try:
-        return str(
-            msgspec.json.decode(path.read_bytes(), type=dict[str, Any]).get("command", "adas")
-        )
+        return msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
     except msgspec.MsgspecError as error:
         raise FileError(f"{path} is damaged: {error}") from error
+
+
+def campaign_command(folder: Path) -> str:
+    """Which command wrote a campaign's folder, "adas" where it does not say."""
+    return str(read_identity(folder).get("command", "adas"))
+
+
+def common_configuration(folder: Path) -> dict[str, Any]:
+    """What all runs of a campaign have in common."""
+    identity = read_identity(folder)
+    if "cells" in identity:  # written by version 0.1: a template, or every cell in full
+        common: dict[str, Any] = identity.get("template") or identity["cells"][0]
+        return common
+    return dict(identity.get("common", {}))
 
 
 def encode_identity(identity: dict[str, Any]) -> bytes:

@@ -1,7 +1,8 @@
 """The results of a campaign: one typed row per run, sorted, in results.parquet.
 
-Every column is a field here, with its meaning and source; units stand in the names (A-252). Wall
-times go to timing.parquet, outside every hash (decision X-1). Null means "there was none".
+What the columns are is said by two dataclasses for each kind of campaign: which run a row is about,
+and what its log says; units stand in the names (A-252). Wall times go to timing.parquet, outside
+every hash (decision X-1). Null means "there was none".
 """
 
 from __future__ import annotations
@@ -9,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import polars as pl
 
@@ -22,6 +23,9 @@ from skidpad.recording.files import (
 )
 
 RESULTS, TIMING = "results.parquet", "timing.parquet"
+TYPES: dict[str, Any] = {"int": pl.Int64, "float": pl.Float64, "str": pl.String, "bool": pl.Boolean}
+K = TypeVar("K")
+M = TypeVar("M")
 
 
 def metric(meaning: str, source: str) -> Any:
@@ -30,136 +34,65 @@ def metric(meaning: str, source: str) -> Any:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class RunKey:
-    """Which run a row is about, and how it ended."""
-
-    config: str  # "0" to "4", a set of functions, or module:Class
-    weather: str  # slug
-    precipitation_kind: str  # "clear" or "rain"
-    time_of_day: str  # "sunrise", "noon", "night"; "" for other weathers
-    seed: int
-    profile: str
-    map: str
-    sensors: str  # core.SensorLevel
-    grip: str  # core.GripModel
-    range: str  # core.RangeModel
-    outcome: str  # core.Outcome
-    version: str = ""  # of skidpad
-    log_hash: str | None = None  # content hash of the tick log; equal hashes are equal drives
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Metrics:
-    """What the log of one run says; None where there is nothing to say (decision X-3)."""
-
-    # collisions
-    fatal_collisions: int | None = metric("recoveries and wrong-way corrections", "A-247, M-8")
-    collisions_vehicle: int | None = metric("recoveries after hitting a vehicle", "A-190")
-    collisions_static: int | None = metric("recoveries after hitting anything else", "A-190")
-    wrong_way: int | None = metric("wrong-way corrections", "A-199")
-    contacts: int | None = metric("contacts, also those within the cool-down", "A-189")
-    rear_ended: int | None = metric("of the vehicle collisions: struck from behind", "M-8")
-    bend_exits: int | None = metric("of the static collisions: in a bend without a lead", "M-6")
-    stuck_relocations: int | None = metric("relocations of a stuck ego, not fatal", "A-253")
-    max_impact_kmh: float | None = metric("largest closing speed at a collision", "A-249")
-    # lanes
-    lane_invasions: int | None = metric("solid markings crossed", "A-030, A-248")
-    lane_invasions_all: int | None = metric("markings crossed, of any kind", "A-248")
-    lane_invasions_highway: int | None = metric("of the solid ones: on traced roads", "A-032")
-    lane_changes: int | None = metric("broken markings crossed, once per 12 s", "A-031")
-    lateral_mean_m: float | None = metric("distance from the lane centre, mean", "A-245")
-    lateral_max_m: float | None = metric("distance from the lane centre, largest", "A-245")
-    lateral_std_m: float | None = metric("distance from the lane centre, deviation", "A-245")
-    # conflicts, as the stack saw them
-    min_ttc_s: float | None = metric("least time to collision", "A-234")
-    min_ttc_above_10_kmh_s: float | None = metric("the same at more than 10 km/h", "A-254")
-    ttc_below_1_5_s: float | None = metric("time with a time to collision below 1.5 s", "A-234")
-    ttc_critical_count: int | None = metric("ticks with one below 1.5 s", "A-234")
-    # conflicts, in truth
-    min_ttc_true_s: float | None = metric("least true time to collision in lane", "M-8")
-    max_drac_true: float | None = metric("largest deceleration needed, m/s2", "M-8")
-    min_gap_true_m: float | None = metric("least true gap to the lead while driving", "M-8")
-    # perception
-    radar_fpr_pct: float | None = metric("radar false positive rate, lane-checked", "A-238")
-    radar_fnr_pct: float | None = metric("radar false negative rate, lane-checked", "A-238")
-    radar_fpr_pct_pre: float | None = metric("the same after the pre-filter", "A-239")
-    radar_fnr_pct_pre: float | None = metric("the same after the pre-filter", "A-239")
-    radar_fpr_pct_final: float | None = metric("the same of the final decision", "A-239")
-    radar_fnr_pct_final: float | None = metric("the same of the final decision", "A-239")
-    tp: int | None = metric("ticks: lane-checked return, vehicle there", "A-252")
-    fp: int | None = metric("ticks: lane-checked return, no vehicle", "A-252")
-    tn: int | None = metric("ticks: no return, no vehicle", "A-252")
-    fn: int | None = metric("ticks: no return, vehicle there", "A-252")
-    mean_error_m: float | None = metric("distance error, mean", "A-240")
-    max_error_m: float | None = metric("distance error, largest", "A-240")
-    max_error_at_s: float | None = metric("when the distance error was largest", "A-254")
-    headway_variance_m2: float | None = metric("population variance of that error", "A-241")
-    gap_variance_m2: float | None = metric("variance of the true gap while following", "A-242")
-    dropout_pct: float | None = metric("ticks without a target or persisting", "A-243")
-    dropout_present_pct: float | None = metric("the same with a vehicle truly there", "A-244")
-    # driving
-    mean_speed_kmh: float | None = metric("ego speed, mean", "A-249")
-    max_speed_kmh: float | None = metric("ego speed, largest", "A-249")
-    p50_speed_kmh: float | None = metric("ego speed, median", "A-249")
-    p95_speed_kmh: float | None = metric("ego speed, 95th percentile", "A-249")
-    bend_speed_kmh: float | None = metric("ego speed in bends, 95th percentile", "F-05")
-    distance_km: float | None = metric("distance driven", "M-8")
-    duration_s: float | None = metric("simulated time", "M-8")
-    fatal_per_100_km: float | None = metric("fatal collisions per 100 km", "M-8")
-    # ticks
-    samples: int | None = metric("ticks that count for perception", "A-250")
-    skipped_supervised: int | None = metric("ticks under the supervisor", "A-250")
-    skipped_no_report: int | None = metric("ticks on which the stack said nothing", "A-250")
-    notices: int | None = metric("errors and remarks in the log", "A-192")
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Timing:
     """How long a run took on the wall; outside every hash (A-246, A-261)."""
 
-    config: str
-    weather: str
-    seed: int
     wall_s: float
-    cpu_s: float
-    rtf: float  # simulated per wall time
+    cpu_s: float = 0.0  # 0: nobody knows, the run ended its process
+    rtf: float | None = None  # simulated per wall time
     rtf_below_0_9_pct: float | None = None  # ticks slower than that
 
 
-SORT = ("config", "weather", "seed", "profile", "sensors")
-TYPES: dict[str, Any] = {"int": pl.Int64, "float": pl.Float64, "str": pl.String, "bool": pl.Boolean}
+@dataclass(frozen=True, slots=True)
+class Columns(Generic[K, M]):
+    """The columns of one kind of campaign."""
+
+    key: type[K]  # which run, and how it ended
+    metrics: type[M]
+    sort: tuple[str, ...]  # columns of the key that tell runs apart
+
+    def table(self, rows: Iterable[tuple[K, M | None]]) -> pl.DataFrame:
+        """One row per run in canonical order; no metrics: nulls."""
+        flat = [_plain(self.key, key) | _plain(self.metrics, metrics) for key, metrics in rows]
+        return pl.DataFrame(flat, schema=schema(self.key, self.metrics)).sort(self.sort)
+
+    def write(
+        self,
+        folder: Path,
+        rows: Sequence[tuple[K, M | None]],
+        timing: Sequence[Timing] = (),
+        csv: bool = False,
+    ) -> str:
+        """Write results.parquet, and timing.parquet with a line for each row; returns the hash."""
+        table = self.table(rows)
+        names = {name: kind for name, kind in schema(self.key).items() if name in self.sort}
+        walls = [
+            {name: getattr(key, name) for name in names} | asdict(wall)
+            for (key, _), wall in zip(rows, timing, strict=False)
+        ]
+        walls_table = pl.DataFrame(walls, schema=names | schema(Timing)).sort(self.sort)
+        for name, content in ((RESULTS, table), (TIMING, walls_table)):
+            write_parquet(folder / name, content)
+            if csv:
+                write_atomically((folder / name).with_suffix(".csv"), content.write_csv)
+        return self.hash(table)
+
+    def hash(self, table: pl.DataFrame) -> str:
+        """Content hash of results; the order of rows does not matter (decision X-1)."""
+        return content_hash([table.sort(self.sort)])
+
+
+def _plain(kind: type[Any], row: Any) -> dict[str, Any]:
+    return {} if row is None else {f.name: getattr(row, f.name) for f in fields(kind)}
 
 
 def schema(*rows: type[Any]) -> dict[str, Any]:
     """Polars types of the fields of these row classes, in order."""
-    return {f.name: TYPES[str(f.type).split(" |")[0]] for row in rows for f in fields(row)}
-
-
-def results_table(rows: Iterable[tuple[RunKey, Metrics]]) -> pl.DataFrame:
-    """One row per run in canonical order."""
-    flat = [{**asdict(key), **asdict(metrics)} for key, metrics in rows]
-    return pl.DataFrame(flat, schema=schema(RunKey, Metrics)).sort(SORT)
-
-
-def timing_table(rows: Sequence[Timing]) -> pl.DataFrame:
-    """Wall times in the order of the results."""
-    table = pl.DataFrame([asdict(r) for r in rows], schema=schema(Timing))
-    return table.sort("config", "weather", "seed")
-
-
-def write_results(
-    folder: Path,
-    rows: Iterable[tuple[RunKey, Metrics]],
-    timing: Sequence[Timing] = (),
-    csv: bool = False,
-) -> str:
-    """Write results.parquet and timing.parquet, with CSV beside them if asked; returns the hash."""
-    table = results_table(rows)
-    for name, content in ((RESULTS, table), (TIMING, timing_table(timing))):
-        write_parquet(folder / name, content)
-        if csv:
-            write_atomically((folder / name).with_suffix(".csv"), content.write_csv)
-    return results_hash(table)
+    return {
+        f.name: TYPES.get(str(f.type).split(" |")[0], pl.String)  # the others are enums of words
+        for row in rows
+        for f in fields(row)
+    }
 
 
 def read_results(folder: Path) -> pl.DataFrame:
@@ -167,16 +100,6 @@ def read_results(folder: Path) -> pl.DataFrame:
     if (folder / "ledger.jsonl").is_file() and not (folder / RESULTS).is_file():
         raise FileError(f"{folder} holds a campaign that is not finished: finish it with --resume")
     return read_parquet(folder / RESULTS)[0]
-
-
-def results_hash(table: pl.DataFrame) -> str:
-    """Content hash of a results table; the order of rows does not matter."""
-    return content_hash([table.sort(SORT)])
-
-
-def definitions() -> list[tuple[str, str, str]]:
-    """(column, meaning, source) of every metric of the matrix, for the report."""
-    return definitions_of(Metrics)
 
 
 def definitions_of(rows: type[Any]) -> list[tuple[str, str, str]]:

@@ -105,15 +105,18 @@ class CampaignView(Generic[E]):
         """Every metric."""
         return Definitions([(m.name, m.unit, m.meaning) for m in metrics_of(self.metrics)])
 
-    def provenance(self, results_hash: str, title: str, configuration: Any) -> list[Block]:
-        """Versions, machines, times, and a resolved configuration under its title."""
+    def provenance(self, results_hash: str) -> list[Block]:
+        """Versions, machines, times, and what all runs have in common."""
         lines = [
             f"Skidpad {__version__}, results hash {results_hash}.",
             f"Machine fingerprints: {', '.join(self.folder.fingerprints) or 'none'}.",
             *self._times(),
         ]
-        plain = msgspec.json.encode(configuration).decode()
-        return [Text(" ".join(lines)), Code(title, msgspec.json.format(plain, indent=2))]
+        text = msgspec.json.format(
+            msgspec.json.encode(self.folder.configuration).decode(), indent=2
+        )
+        title = "Resolved configuration common to all runs"
+        return [Text(" ".join(lines)), Code(title, text)]
 
     def _times(self) -> list[str]:
         timing = self.folder.timing.filter(pl.col("wall_s") > 0.0)

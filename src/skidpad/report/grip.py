@@ -13,8 +13,8 @@ from skidpad.evidence.grip.findings import FINDINGS
 from skidpad.evidence.grip.study import Pair, completion, completion_p
 from skidpad.evidence.verdicts import judge
 from skidpad.recording.files import read_parquet
-from skidpad.recording.grip import GripEntry, GripMetrics, grip_hash
-from skidpad.recording.ledger import CAMPAIGN, fingerprints, latest, read_ledger
+from skidpad.recording.grip import GRIP, GripEntry, GripMetrics
+from skidpad.recording.ledger import common_configuration, fingerprints, latest, read_ledger
 from skidpad.recording.logfiles import TICKS, read_log
 from skidpad.recording.results import TIMING, definitions_of
 from skidpad.report import grip_figures, grip_tables
@@ -227,12 +227,11 @@ def _provenance(campaign: GripCampaign, folder: Path) -> list[Block]:
     timing = timing.filter(pl.col("cpu_s") > 0.0)
     prints = fingerprints(latest(read_ledger(folder, GripEntry)))
     lines = [
-        f"Skidpad {__version__}, results hash {grip_hash(campaign.all_runs)}.",
+        f"Skidpad {__version__}, results hash {GRIP.hash(campaign.all_runs)}.",
         f"Machine fingerprints: {', '.join(sorted(prints)) or 'none'}.",
     ]
     if len(timing):
         lines.append(f"CPU time per run: median {float(np.median(timing['cpu_s'])):.2f} s.")
-    campaign_file = folder / CAMPAIGN
-    plain = msgspec.json.decode(campaign_file.read_bytes()) if campaign_file.exists() else {}
-    text = msgspec.json.format(msgspec.json.encode(plain.get("template", {})).decode(), indent=2)
-    return [Text(" ".join(lines)), Code("Resolved configuration common to all cells", text)]
+    common = msgspec.json.encode(common_configuration(folder)).decode()
+    text = msgspec.json.format(common, indent=2)
+    return [Text(" ".join(lines)), Code("Resolved configuration common to all runs", text)]

@@ -7,7 +7,7 @@ from pathlib import Path
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS
 from skidpad.evidence.verdicts import judge
-from skidpad.recording.results import results_hash
+from skidpad.recording.matrix import MATRIX
 from skidpad.report import matrix_figures, matrix_tables
 from skidpad.report.crashes import crash_sections
 from skidpad.report.matrix_data import Matrix, load_matrix
@@ -43,7 +43,7 @@ def build_page(matrix: Matrix) -> Page:
         Section("Every crash", crash_sections(matrix)),
         Section("All metrics", matrix_tables.per_weather(matrix)),
         Section("Definitions", [matrix.definitions()]),
-        Section("Configuration and versions", _provenance(matrix)),
+        Section("Configuration and versions", matrix.provenance(MATRIX.hash(matrix.results))),
     ]
     return Page(
         title="Driver assistance in weather",
@@ -108,10 +108,3 @@ def _verdicts(matrix: Matrix) -> list[Block]:
         "of its own can be tested with `skidpad study ID`."
     )
     return [intro, *verdict_blocks(judged)]
-
-
-def _provenance(matrix: Matrix) -> list[Block]:
-    first = matrix.folder.identity.get("cells", [{}])[0]
-    return matrix.provenance(
-        results_hash(matrix.results), "Resolved configuration of the first cell", first
-    )

@@ -10,8 +10,7 @@ import polars as pl
 
 from skidpad.evidence.statistics import Rate, event_rate
 from skidpad.recording.campaigns import CampaignFolder
-from skidpad.recording.ledger import Entry
-from skidpad.recording.results import Metrics
+from skidpad.recording.matrix import MatrixEntry, Metrics
 from skidpad.report.campaign import CampaignView
 from skidpad.report.published import Source, published, published_matrix
 
@@ -33,7 +32,7 @@ WEATHERS = {
 
 
 @dataclass(frozen=True)
-class Matrix(CampaignView[Entry]):
+class Matrix(CampaignView[MatrixEntry]):
     """A campaign over configurations and weathers."""
 
     metrics = Metrics
@@ -104,7 +103,7 @@ class Matrix(CampaignView[Entry]):
 
 def load_matrix(folder: Path) -> Matrix:
     """The campaign in a folder; FileError when it holds no results."""
-    found = Matrix(CampaignFolder(folder, Entry))
+    found = Matrix(CampaignFolder(folder, MatrixEntry))
     assert len(found.results)
     return found
 

@@ -9,7 +9,7 @@ import polars as pl
 
 from skidpad.evidence.contrasts import differences
 from skidpad.evidence.statistics import Rate, bootstrap_interval, compare_pairs, p_text
-from skidpad.recording.results import Metrics
+from skidpad.recording.matrix import Metrics
 from skidpad.report.campaign import Metric, metrics_of
 from skidpad.report.matrix_data import Matrix, config_title, published_value, weather_title
 from skidpad.report.page import Block, Cell, Table, Text

@@ -24,7 +24,7 @@ from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import LeadDefinition, MetricSettings, prepare
 from skidpad.recording.events import Relocation
 from skidpad.recording.logfiles import read_log, write_log
-from skidpad.recording.results import Metrics
+from skidpad.recording.matrix import Metrics
 from skidpad.recording.runlog import RunLog
 from skidpad.recording.ticks import TickLog
 

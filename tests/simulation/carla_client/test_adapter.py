@@ -17,10 +17,12 @@ import pytest
 
 from backend_contract import CHECKS
 from carla_programs import HERE, environment
+from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells import BackendChoice, BackendKind, Cell, Driver
-from skidpad.campaign.matrix import run_matrix
+from skidpad.campaign.matrix import RECIPE
+from skidpad.campaign.pool import local
 from skidpad.physics.presets import find_weather
-from skidpad.recording.ledger import Entry
+from skidpad.recording.matrix import MatrixEntry
 from skidpad.simulation.carla_server.process import ServerProcess
 from skidpad.stack.settings import load_profile
 
@@ -193,9 +195,9 @@ def test_runs_without_a_server_are_recorded_and_the_campaign_goes_on(tmp_path: P
         duration=1.0,
         backend=BackendChoice(kind=BackendKind.CARLA, port=9),
     )
-    entries: list[Entry] = []
+    entries: list[MatrixEntry] = []
     cells = [template, replace(template, seed=2), replace(template, seed=3, backend=HERE_INSTEAD)]
-    summary = run_matrix(cells, tmp_path / "out", workers=1, on_run=entries.append)
+    summary = Campaign(RECIPE, cells).run(tmp_path / "out", local(1), on_run=entries.append)
     assert (summary.runs, summary.failed) == (3, 2)
     told = {e.key.seed: (e.key.outcome, e.error) for e in entries}
     for seed in (1, 2):

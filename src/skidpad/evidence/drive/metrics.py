@@ -19,7 +19,7 @@ from skidpad.evidence.drive.perception import (
 )
 from skidpad.evidence.drive.prepared import Drive, Floats, Mask, MetricSettings, prepare
 from skidpad.recording.events import Event
-from skidpad.recording.results import Metrics
+from skidpad.recording.matrix import Metrics
 from skidpad.recording.runlog import RunLog
 from skidpad.roads.queries import RoadMap
 

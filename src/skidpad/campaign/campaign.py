@@ -1,0 +1,219 @@
+"""The one campaign: runs in front, a ledger behind, results at the end.
+
+A `Recipe` says what is particular to a kind of campaign. Everything else stands here: what the
+ledger has is not driven again, what crashed is retried, cells stop when enough is known.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import Counter, defaultdict
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from hashlib import sha256
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Generic
+
+import msgspec
+
+from skidpad.campaign.recipe import Driven, M, Recipe, T, cell_of
+from skidpad.campaign.worker import Finished, Job, Runner
+from skidpad.core.errors import ConfigError, require_range
+from skidpad.core.vocabulary import Outcome
+from skidpad.evidence.statistics import clopper_pearson
+from skidpad.recording.fingerprint import fingerprint
+from skidpad.recording.ledger import RETRIED, Entry, K, Ledger, fingerprints, latest
+from skidpad.recording.results import Timing
+
+BATCH = 20  # runs per cell after which a stopping rule looks again (decision G-8)
+PROBES = 12  # runs that an estimate drives, spread over the campaign
+PROBING_S = 60.0  # CPU time after which it drives no further one
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What a campaign came to."""
+
+    folder: Path
+    runs: int
+    driven: int  # in this call; the others were in the ledger
+    failed: int  # crashed or timed out
+    content_hash: str
+    mixed_machines: bool  # byte equality is not promised across this campaign (X-2)
+
+    def warnings(self) -> Iterator[str]:
+        """What a reader of the report should know first."""
+        if self.mixed_machines:
+            yield "runs of different machines or versions: bytes may differ"
+        if self.failed:
+            yield f"{self.failed} runs crashed or timed out; --resume tries them again"
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """How long a campaign takes, from a sample of its runs; compilation apart."""
+
+    runs: int
+    probes: int
+    cpu_s: float  # per run
+
+    def minutes(self, workers: int) -> float:
+        """Wall time on so many workers."""
+        return self.cpu_s * self.runs / workers / 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class Campaign(Generic[T, K, M]):
+    """Runs of one kind.
+
+    alone: they need a simulator that drives one run at a time.
+    until_halfwidth: leave a cell once its share of successes is known to +- this.
+    """
+
+    recipe: Recipe[T, K, M]
+    tasks: Sequence[T]
+    alone: bool = False
+    until_halfwidth: float | None = None
+
+    def __post_init__(self) -> None:
+        twice = [name for name, n in Counter(t.name for t in self.tasks).items() if n > 1]
+        if twice:
+            raise ConfigError(f"two runs have the same name: {twice[0]}")
+        if self.until_halfwidth is not None:
+            require_range("--until-halfwidth", self.until_halfwidth, 0.001, 0.5)
+
+    def identity(self) -> dict[str, Any]:
+        """The resolved configuration, without workers and paths (decision M-18).
+
+        What all runs have in common, what varies, and a hash over every run.
+        """
+        plain = [t.resolved() for t in self.tasks]
+        names = sorted({name for p in plain for name in p})
+        values = {
+            name: list({_text(p.get(name)): p.get(name) for p in plain}.values()) for name in names
+        }
+        return {
+            "command": self.recipe.command,
+            "runs": len(plain),
+            "common": {name: only[0] for name, only in values.items() if len(only) == 1},
+            "varied": {name: several for name, several in values.items() if len(several) > 1},
+            "hash": sha256(b"\n".join(map(_text, plain))).hexdigest(),
+        }
+
+    def batches(self) -> list[list[T]]:
+        """What is driven before a stopping rule looks: whole batches per cell, in the order of tasks."""
+        if self.until_halfwidth is None:
+            return [list(self.tasks)]
+        batches: list[list[T]] = []
+        seen: Counter[str] = Counter()
+        for task in self.tasks:
+            number = seen[cell_of(task.name)] // BATCH
+            seen[cell_of(task.name)] += 1
+            if number == len(batches):
+                batches.append([])
+            batches[number].append(task)
+        return batches
+
+    def run(
+        self,
+        out: Path,
+        runner: Runner,
+        *,
+        resume: bool = False,
+        csv: bool = False,
+        on_run: Callable[[Entry[K, M]], None] = lambda _: None,
+    ) -> Summary:
+        """Drive what the ledger does not have yet, then write the results.
+
+        on_run: told of each run that is done, first of those in the ledger.
+        OutputError when `out` holds something else, or this campaign and `resume` is false.
+        """
+        driven, earlier = 0, set[str]()
+        with Ledger(out, self.recipe.entry, self.identity(), resume) as ledger:
+            done = ledger.done()
+            for entry in latest(ledger.entries):
+                if entry.run in done:
+                    on_run(entry)
+            for batch in self.batches():
+                wanted = self._wanted(
+                    batch, [e for e in latest(ledger.entries) if e.run in earlier]
+                )
+                todo = {t.name: t for t in wanted if t.name not in done}
+                for entry in self._drive(todo, out, runner):
+                    ledger.append(entry)
+                    on_run(entry)
+                driven += len(todo)
+                earlier |= {t.name for t in batch}
+            entries = latest(ledger.entries)
+        rows, timing = [(e.key, e.metrics) for e in entries], [e.timing for e in entries]
+        digest = self.recipe.columns.write(out, rows, timing, csv=csv)
+        self.recipe.finish(self.tasks, out, runner)
+        failed = sum(Outcome(e.key.outcome) in RETRIED for e in entries)
+        return Summary(out, len(entries), driven, failed, digest, len(fingerprints(entries)) > 1)
+
+    def _wanted(self, batch: Sequence[T], entries: Sequence[Entry[K, M]]) -> Sequence[T]:
+        """The runs of a batch whose cells are uncertain after the batches before it."""
+        if self.until_halfwidth is None or not entries:
+            return batch
+        trials = [(cell_of(e.run), self.success(e)) for e in entries]
+        still = uncertain_cells(trials, self.until_halfwidth)
+        return [t for t in batch if cell_of(t.name) in still]
+
+    def _drive(self, tasks: dict[str, T], out: Path, runner: Runner) -> Iterator[Entry[K, M]]:
+        here = fingerprint().short
+        work = partial(self.recipe.drive, out)
+        for finished in runner([Job(t.name, work, t, t.deadline_s) for t in tasks.values()]):
+            driven = self._driven(tasks[finished.job.key], finished)
+            yield Entry(
+                run=finished.job.key,
+                key=driven.key,
+                metrics=driven.metrics,
+                timing=driven.timing,
+                fingerprint=here,
+                attempts=finished.attempts,
+                error=driven.error,
+            )
+
+    def _driven(self, task: T, finished: Finished) -> Driven[K, M | None]:
+        if finished.failure is None:
+            driven: Driven[K, M | None] = finished.value
+            return driven
+        return Driven(
+            key=self.recipe.key(task, finished.failure),
+            metrics=None,
+            timing=Timing(wall_s=finished.wall_s),
+            error=finished.detail.strip(),
+        )
+
+    def success(self, entry: Entry[K, M]) -> bool | None:
+        """Whether a run went well, None where it does not count."""
+        return None if entry.metrics is None else self.recipe.success(entry.metrics)
+
+    def estimate(self) -> Estimate:
+        """Drive a few of the runs here."""
+        sample = self.tasks[:: max(len(self.tasks) // PROBES, 1)][:PROBES]
+        self.recipe.warm_up()
+        probes, began, spent = 0, time.process_time(), 0.0
+        with TemporaryDirectory() as folder:
+            for task in sample:
+                self.recipe.drive(Path(folder), task)
+                probes, spent = probes + 1, time.process_time() - began
+                if spent > PROBING_S:
+                    break
+        return Estimate(len(self.tasks), probes, spent / probes)
+
+
+def uncertain_cells(trials: Iterable[tuple[str, bool | None]], halfwidth: float) -> set[str]:
+    """Cells whose interval of success is still wider than asked for; trials: (cell, success)."""
+    runs: dict[str, list[bool]] = defaultdict(list)
+    for cell, success in trials:
+        if success is not None:
+            runs[cell].append(success)
+    bounds = {cell: clopper_pearson(sum(s), len(s)) for cell, s in runs.items()}
+    return {cell for cell, (low, high) in bounds.items() if (high - low) / 2.0 > halfwidth}
+
+
+def _text(plain: Any) -> bytes:
+    return msgspec.json.encode(plain, order="deterministic")

@@ -1,0 +1,57 @@
+"""What a driven run leaves in OUT/runs/<run>, whichever campaign it belongs to."""
+
+from __future__ import annotations
+
+import shutil
+import time
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from skidpad.recording.campaigns import RUNS
+from skidpad.recording.files import write_bytes
+from skidpad.recording.logfiles import write_log
+from skidpad.recording.results import Timing
+from skidpad.recording.runlog import RunLog
+
+CONFIG, ERROR = "config.yaml", "error.txt"
+
+
+class Stopwatch:
+    """Wall and processor time since it was made; outside every hash."""
+
+    def __init__(self) -> None:
+        self.wall, self.cpu = time.perf_counter(), time.process_time()
+
+    def timing(self, simulated_s: float | None = None, slow_pct: float | None = None) -> Timing:
+        """What a run took so far, and its real-time factor."""
+        wall, cpu = time.perf_counter() - self.wall, time.process_time() - self.cpu
+        rtf = None if simulated_s is None else simulated_s / wall
+        return Timing(wall_s=wall, cpu_s=cpu, rtf=rtf, rtf_below_0_9_pct=slow_pct)
+
+
+def fresh_folder(out: Path, run: str) -> Path:
+    """Where a run of this name goes, without what a killed attempt left; it does not exist yet."""
+    folder = out / RUNS / run
+    if folder.exists():
+        shutil.rmtree(folder)
+    return folder
+
+
+def write_config(folder: Path, config: dict[str, Any]) -> None:
+    """Write the resolved set-up of a run."""
+    write_bytes(folder / CONFIG, yaml.safe_dump(config, sort_keys=False).encode())
+
+
+def write_run(folder: Path, log: RunLog, error: str) -> str:
+    """Write log, events and the stack's error; returns the log's content hash."""
+    digest = write_log(folder, log)
+    if error:
+        write_bytes(folder / ERROR, error.encode())
+    return digest
+
+
+def last_line(error: str) -> str:
+    """What a traceback comes down to."""
+    return error.strip().rpartition("\n")[2]

@@ -1,0 +1,110 @@
+"""The options that every campaign takes, and what they do."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from skidpad.campaign.campaign import Campaign, Summary
+    from skidpad.campaign.worker import Runner
+
+Seeds = Annotated[int, typer.Option("--seeds", "--repeats", min=1, help="Runs per cell.")]
+Workers = Annotated[
+    int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
+]
+CORES = os.cpu_count() or 1
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Drive:
+    """How a campaign is driven."""
+
+    out: Annotated[Path, typer.Option(help="Folder for results and report.")]
+    workers: Workers = CORES
+    cluster: Annotated[str | None, typer.Option(help="Dask scheduler's address, or local:N.")] = (
+        None
+    )
+    until_halfwidth: Annotated[
+        float | None,
+        typer.Option(help="Stop a cell once its share of good runs is known to +- this share."),
+    ] = None
+    resume: Annotated[bool, typer.Option("--resume", help="Finish a campaign.")] = False
+    or_next: Annotated[
+        bool, typer.Option("--or-next", help="If OUT holds another campaign, use OUT-2, OUT-3, ...")
+    ] = False
+    csv: Annotated[bool, typer.Option("--csv", help="Write CSV beside Parquet.")] = False
+
+    def __call__(
+        self, campaign: Campaign[Any, Any, Any], report: Callable[[Path], object]
+    ) -> Summary:
+        """Drive it under a progress bar and print what `report` says of its folder."""
+        from dataclasses import replace
+
+        from skidpad.cli.progress import Shown, console
+
+        campaign = replace(campaign, until_halfwidth=self.until_halfwidth)
+        out = next_folder(self.out, campaign.identity()) if self.or_next else self.out
+        with self._runner(campaign) as runner, Shown(campaign) as shown:
+            try:
+                summary = campaign.run(
+                    out, runner, resume=self.resume, csv=self.csv, on_run=shown.ended
+                )
+            except KeyboardInterrupt:
+                kept = f"interrupted; what is done is kept: --out {out} --resume finishes it"
+                console.print(kept)
+                raise SystemExit(130) from None
+        for warning in summary.warnings():
+            console.print(f"[yellow]{warning}[/]")
+        typer.echo(report(out))
+        return summary
+
+    @contextmanager
+    def _runner(self, campaign: Campaign[Any, Any, Any]) -> Iterator[Runner]:
+        from skidpad.campaign.cluster import runner_of
+        from skidpad.campaign.pool import local
+        from skidpad.core.errors import ConfigError
+
+        if self.cluster is None:
+            yield local(1 if campaign.alone else self.workers, campaign.recipe.warm_up)
+            return
+        if campaign.alone:
+            raise ConfigError("--cluster needs --backend embedded: a CARLA server drives one run")
+        with runner_of(self.cluster, campaign.recipe.warm_up) as runner:
+            yield runner
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Estimate:
+    """How long a campaign would take, instead of driving it."""
+
+    workers: Workers = CORES
+
+    def __call__(self, campaign: Campaign[Any, Any, Any], report: Callable[[Path], object]) -> None:
+        """Drive a few of its runs and print one sentence."""
+        del report
+        found, workers = campaign.estimate(), 1 if campaign.alone else self.workers
+        typer.echo(
+            f"{found.runs} runs at {found.cpu_s:.2f} s each ({found.probes} were driven) on {workers} "
+            f"workers: about {found.minutes(workers):.1f} min, without compilation on first use"
+        )
+
+
+How = Drive | Estimate
+
+
+def next_folder(out: Path, identity: dict[str, Any]) -> Path:
+    """`out`, or the first of out-2, out-3, ... that is empty or holds this campaign (M-18)."""
+    from skidpad.recording.ledger import FolderState, folder_state
+
+    folder, n = out, 1
+    while folder_state(folder, identity) is FolderState.OTHER:
+        n += 1
+        folder = out.with_name(f"{out.name}-{n}")
+    return folder

@@ -1,0 +1,45 @@
+"""What the terminal shows during a campaign: a bar over all runs, a line for each cell that ended."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from typing import Any
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from skidpad.campaign.campaign import BATCH, Campaign
+from skidpad.campaign.recipe import cell_of
+from skidpad.recording.ledger import Entry
+
+console = Console(stderr=True)
+
+
+class Shown(Progress):
+    """A progress bar that is told of each run."""
+
+    def __init__(self, campaign: Campaign[Any, Any, Any]) -> None:
+        super().__init__(
+            TextColumn("{task.description}"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeRemainingColumn(),
+            console=console,
+        )
+        self.campaign = campaign
+        self.planned = Counter(cell_of(t.name) for t in campaign.tasks)
+        self.runs: dict[str, list[Entry[Any, Any]]] = defaultdict(list)
+        self.bar = self.add_task("driving", total=len(campaign.tasks))
+
+    def ended(self, entry: Entry[Any, Any]) -> None:
+        """A run has ended."""
+        cell = cell_of(entry.run)
+        runs = self.runs[cell]
+        runs.append(entry)
+        told = f"{entry.run}: {entry.key.outcome}"
+        self.update(self.bar, advance=1, description=told)
+        looked_at = self.campaign.until_halfwidth is not None and len(runs) % BATCH == 0
+        if looked_at or len(runs) == self.planned[cell]:
+            good = sum(self.campaign.success(e) is True for e in runs)
+            means = self.campaign.recipe.success_means
+            self.console.print(f"{cell}: {len(runs)} runs, {good} {means}")

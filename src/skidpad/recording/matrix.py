@@ -1,0 +1,96 @@
+"""Rows of the matrix: one per run. Every metric is a field with its meaning and its source (A-252)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from skidpad.recording.ledger import Entry
+from skidpad.recording.results import Columns, metric
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RunKey:
+    """Which run a row is about, and how it ended."""
+
+    config: str  # "0" to "4", a set of functions, or module:Class
+    weather: str  # slug
+    precipitation_kind: str  # "clear" or "rain"
+    time_of_day: str  # "sunrise", "noon", "night"; "" for other weathers
+    seed: int
+    profile: str
+    map: str
+    sensors: str  # core.SensorLevel
+    grip: str  # core.GripModel
+    range: str  # core.RangeModel
+    outcome: str  # core.Outcome
+    version: str = ""  # of skidpad
+    log_hash: str | None = None  # content hash of the tick log; equal hashes are equal drives
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Metrics:
+    """What the log of one run says; None where there is nothing to say (decision X-3)."""
+
+    # collisions
+    fatal_collisions: int | None = metric("recoveries and wrong-way corrections", "A-247, M-8")
+    collisions_vehicle: int | None = metric("recoveries after hitting a vehicle", "A-190")
+    collisions_static: int | None = metric("recoveries after hitting anything else", "A-190")
+    wrong_way: int | None = metric("wrong-way corrections", "A-199")
+    contacts: int | None = metric("contacts, also those within the cool-down", "A-189")
+    rear_ended: int | None = metric("of the vehicle collisions: struck from behind", "M-8")
+    bend_exits: int | None = metric("of the static collisions: in a bend without a lead", "M-6")
+    stuck_relocations: int | None = metric("relocations of a stuck ego, not fatal", "A-253")
+    max_impact_kmh: float | None = metric("largest closing speed at a collision", "A-249")
+    # lanes
+    lane_invasions: int | None = metric("solid markings crossed", "A-030, A-248")
+    lane_invasions_all: int | None = metric("markings crossed, of any kind", "A-248")
+    lane_invasions_highway: int | None = metric("of the solid ones: on traced roads", "A-032")
+    lane_changes: int | None = metric("broken markings crossed, once per 12 s", "A-031")
+    lateral_mean_m: float | None = metric("distance from the lane centre, mean", "A-245")
+    lateral_max_m: float | None = metric("distance from the lane centre, largest", "A-245")
+    lateral_std_m: float | None = metric("distance from the lane centre, deviation", "A-245")
+    # conflicts, as the stack saw them
+    min_ttc_s: float | None = metric("least time to collision", "A-234")
+    min_ttc_above_10_kmh_s: float | None = metric("the same at more than 10 km/h", "A-254")
+    ttc_below_1_5_s: float | None = metric("time with a time to collision below 1.5 s", "A-234")
+    ttc_critical_count: int | None = metric("ticks with one below 1.5 s", "A-234")
+    # conflicts, in truth
+    min_ttc_true_s: float | None = metric("least true time to collision in lane", "M-8")
+    max_drac_true: float | None = metric("largest deceleration needed, m/s2", "M-8")
+    min_gap_true_m: float | None = metric("least true gap to the lead while driving", "M-8")
+    # perception
+    radar_fpr_pct: float | None = metric("radar false positive rate, lane-checked", "A-238")
+    radar_fnr_pct: float | None = metric("radar false negative rate, lane-checked", "A-238")
+    radar_fpr_pct_pre: float | None = metric("the same after the pre-filter", "A-239")
+    radar_fnr_pct_pre: float | None = metric("the same after the pre-filter", "A-239")
+    radar_fpr_pct_final: float | None = metric("the same of the final decision", "A-239")
+    radar_fnr_pct_final: float | None = metric("the same of the final decision", "A-239")
+    tp: int | None = metric("ticks: lane-checked return, vehicle there", "A-252")
+    fp: int | None = metric("ticks: lane-checked return, no vehicle", "A-252")
+    tn: int | None = metric("ticks: no return, no vehicle", "A-252")
+    fn: int | None = metric("ticks: no return, vehicle there", "A-252")
+    mean_error_m: float | None = metric("distance error, mean", "A-240")
+    max_error_m: float | None = metric("distance error, largest", "A-240")
+    max_error_at_s: float | None = metric("when the distance error was largest", "A-254")
+    headway_variance_m2: float | None = metric("population variance of that error", "A-241")
+    gap_variance_m2: float | None = metric("variance of the true gap while following", "A-242")
+    dropout_pct: float | None = metric("ticks without a target or persisting", "A-243")
+    dropout_present_pct: float | None = metric("the same with a vehicle truly there", "A-244")
+    # driving
+    mean_speed_kmh: float | None = metric("ego speed, mean", "A-249")
+    max_speed_kmh: float | None = metric("ego speed, largest", "A-249")
+    p50_speed_kmh: float | None = metric("ego speed, median", "A-249")
+    p95_speed_kmh: float | None = metric("ego speed, 95th percentile", "A-249")
+    bend_speed_kmh: float | None = metric("ego speed in bends, 95th percentile", "F-05")
+    distance_km: float | None = metric("distance driven", "M-8")
+    duration_s: float | None = metric("simulated time", "M-8")
+    fatal_per_100_km: float | None = metric("fatal collisions per 100 km", "M-8")
+    # ticks
+    samples: int | None = metric("ticks that count for perception", "A-250")
+    skipped_supervised: int | None = metric("ticks under the supervisor", "A-250")
+    skipped_no_report: int | None = metric("ticks on which the stack said nothing", "A-250")
+    notices: int | None = metric("errors and remarks in the log", "A-192")
+
+
+MATRIX = Columns(RunKey, Metrics, ("config", "weather", "seed", "profile", "sensors"))
+MatrixEntry = Entry[RunKey, Metrics]

@@ -1,17 +1,296 @@
-"""Contrasts from results tables: pairs that agree in their factors, and what is compared."""
+"""Contrasts: differences that a claim says are positive, drawn from results by rows of data.
+
+A criterion names columns, rows and an amount; its label, its test and its margin are written from
+them. One whose columns or runs are not in the results cannot be drawn.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from math import ceil
+from typing import NamedTuple, Protocol
 
 import polars as pl
+from numpy.typing import ArrayLike
+from scipy import stats
 
 from skidpad.core.vocabulary import Outcome
-from skidpad.evidence.verdicts import Contrast, paired
+from skidpad.evidence.statistics import Interval, compare_pairs, pairs_needed, poisson_interval
 
 NOT_RUN = frozenset(  # leave every denominator (L-7)
     {Outcome.AGENT_ERROR.value, Outcome.CRASHED.value, Outcome.TIMEOUT.value}
 )
+RUNS_WITHOUT_EVENT = 3.7  # / limit: runs without an event that bound a rate, -ln(0.025)
+SIGNS = "sign changes, exact up to 12 pairs; bootstrap interval"
+
+
+@dataclass(frozen=True, slots=True)
+class Contrast:
+    """A difference that the claim says is positive."""
+
+    label: str
+    mean: float
+    interval: Interval
+    p_claimed: float  # of this or more if the difference were <= 0
+    p_reversed: float  # of this or less if it were >= 0
+    margin: float  # a smaller difference does not matter
+    units: int  # pairs or runs behind it
+    units_needed: int | None  # None: cannot be said
+    identical: bool = False  # all pairs are the same drive
+
+    @property
+    def negligible(self) -> bool:
+        """The whole interval lies below the margin: the claimed difference is not there."""
+        return self.margin > 0.0 and self.interval.high < self.margin
+
+
+@dataclass(frozen=True, slots=True)
+class Amount:
+    """A margin or a bound, with its unit for reading."""
+
+    value: float
+    unit: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.value:g} {self.unit}".rstrip()
+
+
+class Rows(NamedTuple):
+    """Rows of a table, by name."""
+
+    name: str
+    are: pl.Expr
+
+
+def rows_of(column: str, *values: str, name: str = "") -> Rows:
+    """The rows whose `column` has one of `values`, named by them or by `name`."""
+    return Rows(name or ", ".join(values), pl.col(column).is_in(values))
+
+
+class Criterion(Protocol):
+    """What a finding asks of results."""
+
+    @property
+    def test(self) -> tuple[str, ...]:
+        """How it is tested, in phrases."""
+
+    @property
+    def amounts(self) -> tuple[Amount, ...]:
+        """Margins and bounds by which it is judged."""
+
+    def draw(self, table: pl.DataFrame) -> Contrast | None:
+        """The contrast; None when its columns or rows are not in `table`."""
+
+
+class Claim(Enum):
+    """What a pair of runs is said to show about a column; d is the difference of its sides."""
+
+    MORE = "d"
+    HARDLY_MORE = "amount - d"
+    EQUAL = "amount - |d|"
+    OFTEN_OTHER = "(d != 0) - amount"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Paired:
+    """A claim about `column` on one side and on the other of runs that agree in `by`."""
+
+    column: str
+    more: Rows
+    less: Rows
+    by: tuple[str, ...]
+    amount: Amount  # of MORE the margin, of all others the bound
+    claim: Claim = Claim.MORE
+    where: Rows | None = None
+
+    @property
+    def test(self) -> tuple[str, ...]:
+        """Sign changes of paired differences."""
+        return (f"paired by {_listed(self.by)}", SIGNS)
+
+    @property
+    def amounts(self) -> tuple[Amount, ...]:
+        """The margin or bound."""
+        return (self.amount,)
+
+    @property
+    def label(self) -> str:
+        """What is positive if the claim is true."""
+        within = f" in {self.where.name}" if self.where and self.where.name else ""
+        sides = f"{self.column}{within}, {self.more.name} minus {self.less.name}"
+        return {
+            Claim.MORE: sides,
+            Claim.HARDLY_MORE: f"{self.amount} minus the difference of {sides}",
+            Claim.EQUAL: f"{self.amount} minus the change of {sides}",
+            Claim.OFTEN_OTHER: f"share of pairs with another {sides}, beyond {self.amount}",
+        }[self.claim]
+
+    def draw(self, table: pl.DataFrame) -> Contrast | None:
+        """From the differences of pairs."""
+        needed = (pl.col(self.column), self.more.are, self.less.are)
+        if not _has(table, *needed, *([self.where.are] if self.where else [])):
+            return None
+        rows = table.filter(self.where.are) if self.where else table
+        d, same = differences(rows, self.more.are, self.less.are, self.by, self.column)
+        if not len(d):
+            return None
+        bound = self.amount.value
+        if self.claim is Claim.MORE:
+            return paired(self.label, d, bound, same)
+        shown = {
+            Claim.HARDLY_MORE: bound - d,
+            Claim.EQUAL: bound - d.abs(),
+            Claim.OFTEN_OTHER: (d != 0.0).cast(pl.Float64) - bound,
+        }[self.claim]
+        return paired(self.label, shown, 0.0, same)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Outweighs:
+    """The effect of one factor on `column` is larger than that of the other, whatever its sign."""
+
+    column: str
+    factor: str  # a column; its greatest against its least value
+    other: str
+    by: tuple[str, ...]
+    margin: Amount
+
+    @property
+    def test(self) -> tuple[str, ...]:
+        """Sign changes of paired differences."""
+        return (f"paired by {_listed(self.by)}", SIGNS)
+
+    @property
+    def amounts(self) -> tuple[Amount, ...]:
+        """The margin."""
+        return (self.margin,)
+
+    def draw(self, table: pl.DataFrame) -> Contrast | None:
+        """From the differences of two effects per pair."""
+        if not {self.column, self.factor, self.other} <= set(table.columns):
+            return None
+        first, second = (
+            differences(table, highest(f).are, lowest(f).are, self.by, self.column)[0]
+            for f in (self.factor, self.other)
+        )
+        if not len(first) or len(first) != len(second):
+            return None
+        label = f"{self.column}, effect of {self.factor} minus effect of {self.other}"
+        return paired(label, first - second.abs(), self.margin.value)
+
+
+def highest(column: str) -> Rows:
+    """The rows in which a factor has its greatest value."""
+    return Rows(f"highest {column}", pl.col(column) == pl.col(column).max())
+
+
+def lowest(column: str) -> Rows:
+    """The rows in which a factor has its least value."""
+    return Rows(f"lowest {column}", pl.col(column) == pl.col(column).min())
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Mean:
+    """The mean of `value` over rows is positive; rows without a value count not."""
+
+    label: str
+    value: pl.Expr
+    margin: Amount = Amount(0.0)
+    where: pl.Expr | None = None
+    by: tuple[str, ...] = ()  # the order of rows
+    over: str = "runs"  # what a row is
+
+    @property
+    def test(self) -> tuple[str, ...]:
+        """Sign changes."""
+        return (f"means over {self.over}", SIGNS)
+
+    @property
+    def amounts(self) -> tuple[Amount, ...]:
+        """The margin."""
+        return (self.margin,)
+
+    def draw(self, table: pl.DataFrame) -> Contrast | None:
+        """From the values of all rows; sums within `value` are over the whole table."""
+        where = pl.lit(True) if self.where is None else self.where
+        if not _has(table, self.value, where):
+            return None
+        rows = table.sort([c for c in self.by if c in table.columns]) if self.by else table
+        rows = rows.select(value=self.value.cast(pl.Float64), counts=where)
+        values = rows.filter("counts")["value"].drop_nulls()
+        return paired(self.label, values, self.margin.value) if len(values) else None
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class RateBelow:
+    """Events per run, or hour, are fewer than the limit."""
+
+    what: str  # the events
+    events: pl.Expr  # their number, in total
+    limit: Amount
+    exposure: pl.Expr = pl.len()  # runs or hours, in total
+    where: pl.Expr | None = None
+    given: pl.Expr | None = None  # a total that must be positive, or there is nothing to say
+
+    @property
+    def test(self) -> tuple[str, ...]:
+        """An exact test."""
+        return (f"exact Poisson against {self.limit}",)
+
+    @property
+    def amounts(self) -> tuple[Amount, ...]:
+        """None: the limit is the claim."""
+        return ()
+
+    def draw(self, table: pl.DataFrame) -> Contrast | None:
+        """From sums over the rows."""
+        given = pl.lit(1) if self.given is None else self.given
+        where = pl.lit(True) if self.where is None else self.where
+        if not _has(table, self.events, self.exposure, given, where):
+            return None
+        rows = table.filter(where)
+        events, exposure, known = rows.select(e=self.events, x=self.exposure, g=given).row(0)
+        if not len(rows) or not known:
+            return None
+        return rate_below(
+            f"{self.limit} minus {self.what}", int(events), exposure, self.limit.value
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class Never:
+    """A deterministic claim: one case that breaks it contradicts, none shows it."""
+
+    cases: str  # what is counted
+    count: Callable[[pl.DataFrame], tuple[int, int]]  # cases that break it, and all
+
+    @property
+    def test(self) -> tuple[str, ...]:
+        """Counting."""
+        return (f"counting {self.cases}; one contradicts",)
+
+    @property
+    def amounts(self) -> tuple[Amount, ...]:
+        """None."""
+        return ()
+
+    def draw(self, table: pl.DataFrame) -> Contrast | None:
+        """Certain either way, so the p values are 0 and 1."""
+        broken, judged = self.count(table)
+        if not judged:
+            return None
+        value = 0.5 - broken
+        p_claimed, p_reversed = (1.0, 0.0) if broken else (0.0, 1.0)
+        label = f"0.5 minus the number of {self.cases}"
+        sure = Interval(value, value)
+        return Contrast(label, value, sure, p_claimed, p_reversed, 0.0, judged, judged)
+
+
+def finished(table: pl.DataFrame) -> pl.DataFrame:
+    """Without the runs that leave every denominator (L-7)."""
+    return table.filter(~pl.col("outcome").is_in(NOT_RUN)) if "outcome" in table.columns else table
 
 
 def differences(
@@ -21,8 +300,6 @@ def differences(
 
     Several rows of one side that agree are averaged. Also whether all pairs are equal drives.
     """
-    if "outcome" in table.columns:
-        table = table.filter(~pl.col("outcome").is_in(NOT_RUN))
     keys = [k for k in by if k in table.columns]
     hashes = pl.col("log_hash").sort() if "log_hash" in table.columns else pl.lit(None)
     wanted = [pl.col(column).cast(pl.Float64).mean().alias("value"), hashes.alias("hashes")]
@@ -34,20 +311,40 @@ def differences(
     return both["value"] - both["value_less"], same
 
 
-def contrast(
-    table: pl.DataFrame,
-    label: str,
-    column: str,
-    more: pl.Expr,
-    less: pl.Expr,
-    by: Sequence[str],
-    margin: float,
-) -> list[Contrast]:
-    """One contrast, or none when there are no pairs."""
-    values, same = differences(table, more, less, by, column)
-    return [paired(label, values.to_numpy(), margin, same)] if len(values) else []
+def paired(label: str, values: ArrayLike, margin: float, identical: bool = False) -> Contrast:
+    """A contrast from values that are claimed positive: differences of runs that share a seed."""
+    c = compare_pairs(values)
+    return Contrast(
+        label=label,
+        mean=c.mean,
+        interval=c.interval,
+        p_claimed=c.p_greater,
+        p_reversed=c.p_less,
+        margin=margin,
+        units=c.n,
+        units_needed=pairs_needed(c, margin),
+        identical=identical,
+    )
 
 
-def complete(parts: Sequence[list[Contrast]]) -> list[Contrast]:
-    """All contrasts, or none when one of them has no runs: a claim is judged whole."""
-    return [c for part in parts for c in part] if all(parts) else []
+def rate_below(label: str, events: int, runs: float, limit: float) -> Contrast:
+    """The claim that a rate per run, or hour, lies below `limit`, by exact Poisson tests."""
+    low, high = poisson_interval(events, runs)
+    return Contrast(
+        label=label,
+        mean=limit - events / runs,
+        interval=Interval(limit - high, limit - low),
+        p_claimed=float(stats.poisson.cdf(events, limit * runs)),
+        p_reversed=float(stats.poisson.sf(events - 1, limit * runs)),
+        margin=0.0,
+        units=max(1, round(runs)),
+        units_needed=ceil(RUNS_WITHOUT_EVENT / limit),
+    )
+
+
+def _has(table: pl.DataFrame, *needed: pl.Expr) -> bool:
+    return {name for e in needed for name in e.meta.root_names()} <= set(table.columns)
+
+
+def _listed(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

@@ -9,27 +9,17 @@ that it would take.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from math import ceil
 
 import polars as pl
-from numpy.typing import ArrayLike
-from scipy import stats
 
-from skidpad.evidence.statistics import (
-    Interval,
-    compare_pairs,
-    holm,
-    interval_text,
-    p_text,
-    pairs_needed,
-    poisson_interval,
-)
+from skidpad.evidence.contrasts import Contrast, Criterion, finished
+from skidpad.evidence.statistics import holm, interval_text, p_text
 
 ALPHA = 0.05
-RUNS_WITHOUT_EVENT = 3.7  # / limit: runs without an event that bound a rate, -ln(0.025)
 
 
 class Verdict(str, Enum):
@@ -43,26 +33,6 @@ class Verdict(str, Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Contrast:
-    """A difference that the claim says is positive."""
-
-    label: str
-    mean: float
-    interval: Interval
-    p_claimed: float  # of this or more if the difference were <= 0
-    p_reversed: float  # of this or less if it were >= 0
-    margin: float  # a smaller difference does not matter
-    units: int  # pairs or runs behind it
-    units_needed: int | None  # None: cannot be said
-    identical: bool = False  # all pairs are the same drive
-
-    @property
-    def negligible(self) -> bool:
-        """The whole interval lies below the margin: the claimed difference is not there."""
-        return self.margin > 0.0 and self.interval.high < self.margin
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Finding:
     """One claim of the sources and how it is judged."""
 
@@ -70,11 +40,25 @@ class Finding:
     claim: str
     estimand: str
     needs: str  # which runs
-    test: str
-    margin: str
-    contrasts: Callable[[pl.DataFrame], list[Contrast]]  # empty: the runs are not there
+    criteria: tuple[Criterion, ...]  # all must be shown
     study: bool = False  # needs runs of its own (`skidpad study ID`)
     built_in: str = ""  # what in the simulation brings the effect about; empty: it emerges
+
+    @property
+    def test(self) -> str:
+        """How it is tested."""
+        return "; ".join(dict.fromkeys(phrase for c in self.criteria for phrase in c.test))
+
+    @property
+    def margin(self) -> str:
+        """The amounts below which a difference does not matter."""
+        amounts = dict.fromkeys(a for c in self.criteria for a in c.amounts if a.value)
+        return ", ".join(map(str, amounts)) or "none"
+
+    def contrasts(self, table: pl.DataFrame) -> list[Contrast]:
+        """One per criterion, or none at all: a claim is judged whole."""
+        drawn = [c for criterion in self.criteria if (c := criterion.draw(finished(table)))]
+        return drawn if len(drawn) == len(self.criteria) else []
 
 
 @dataclass(frozen=True, slots=True)
@@ -166,34 +150,3 @@ def _text(
     if verdict is Verdict.UNDECIDED:
         text += f" It needs about {needed} seeds." if needed else " More seeds are needed."
     return text
-
-
-def paired(label: str, differences: ArrayLike, margin: float, identical: bool = False) -> Contrast:
-    """A contrast from differences of runs that share a seed; claimed positive."""
-    c = compare_pairs(differences)
-    return Contrast(
-        label=label,
-        mean=c.mean,
-        interval=c.interval,
-        p_claimed=c.p_greater,
-        p_reversed=c.p_less,
-        margin=margin,
-        units=c.n,
-        units_needed=pairs_needed(c, margin),
-        identical=identical,
-    )
-
-
-def rate_below(label: str, events: int, runs: float, limit: float) -> Contrast:
-    """The claim that a rate per run, or hour, lies below `limit`, by exact Poisson tests."""
-    low, high = poisson_interval(events, runs)
-    return Contrast(
-        label=label,
-        mean=limit - events / runs,
-        interval=Interval(limit - high, limit - low),
-        p_claimed=float(stats.poisson.cdf(events, limit * runs)),
-        p_reversed=float(stats.poisson.sf(events - 1, limit * runs)),
-        margin=0.0,
-        units=max(1, round(runs)),
-        units_needed=ceil(RUNS_WITHOUT_EVENT / limit),
-    )

@@ -38,7 +38,7 @@ def counts(**by_hazard):
 def ranked(first, others, last):
     values = dict.fromkeys(INDICATORS, others) | {INDICATORS[0]: first}
     values |= dict.fromkeys(INDICATORS[-3:], last)
-    return {f"violations_{i}": float(v) for i, v in values.items()}
+    return {f"violations_{i.value}": float(v) for i, v in values.items()}
 
 
 NIGHT = np.arange(N) % 3 == 0

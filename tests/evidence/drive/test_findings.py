@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -8,8 +9,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from skidpad.evidence.drive.findings import FINDINGS, f08
-from skidpad.evidence.verdicts import Finding, Verdict, judge, paired, rate_below
+from skidpad.evidence.contrasts import Amount, Contrast, paired, rate_below
+from skidpad.evidence.drive.findings import FINDINGS
+from skidpad.evidence.verdicts import Finding, Verdict, judge
 
 BY_ID = {f.id: f for f in FINDINGS}
 WEATHERS = [f"{p}-{t}" for p in ("clear", "rain") for t in ("sunrise", "noon", "night")]
@@ -183,7 +185,7 @@ def test_speed_against_dropout() -> None:
     assert judge(f, [study(2.0, 0.1)])[0].verdict is Verdict.SUPPORTED
     assert judge(f, [study(0.0, 2.0)])[0].verdict is Verdict.CONTRADICTED
     assert judge(f, [None])[0].verdict is Verdict.NOT_TESTABLE
-    assert len(f08(study(2.0, 0.1))) == 2
+    assert len(f[0].contrasts(study(2.0, 0.1))) == 2
 
 
 def test_one_unequal_log_contradicts_independence_of_pace() -> None:
@@ -206,17 +208,21 @@ def test_crashed_runs_leave_the_comparison() -> None:
     assert judge([BY_ID["F-10"]], [both])[0].contrasts[0].mean == honest
 
 
+@dataclass(frozen=True)
+class Given:
+    """A criterion whose differences are known."""
+
+    values: list[float]
+    test: tuple[str, ...] = ()
+    amounts: tuple[Amount, ...] = ()
+
+    def draw(self, table: pl.DataFrame) -> Contrast | None:
+        return paired("d", self.values, 0.0)
+
+
 def test_holm_makes_a_claim_harder_in_a_long_report() -> None:
-    def found(differences: list[float]) -> Finding:
-        return Finding(
-            id="X",
-            claim="",
-            estimand="",
-            needs="",
-            test="",
-            margin="",
-            contrasts=lambda _t: [paired("d", differences, 0.0)],
-        )
+    def found(values: list[float]) -> Finding:
+        return Finding("X", "", "", "", (Given(values),))
 
     clear, noise = [1.0, 1.1] * 4, [1.0, -1.0, 1.0, -1.0]
     table = pl.DataFrame({"seed": [1]})

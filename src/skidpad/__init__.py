@@ -12,5 +12,5 @@ __all__ = ["__version__", "drive"]
 def __getattr__(name: str) -> Any:
     # Lazy, so that `skidpad --version` does not pay for numba.
     if name == "drive":
-        return import_module("skidpad.campaign.drive").drive
+        return import_module("skidpad.campaign.run").drive
     raise AttributeError(f"module 'skidpad' has no attribute {name!r}")

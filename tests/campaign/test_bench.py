@@ -5,25 +5,13 @@ from __future__ import annotations
 import pytest
 
 from skidpad.campaign import bench, bench_matrix
-from skidpad.campaign.bench import TickCost, tick_cost
-from skidpad.campaign.cells import Cell, Driver
+from skidpad.campaign.bench import TickCost, bench_run, tick_cost
 from skidpad.core.vocabulary import SensorLevel
-from skidpad.physics.presets import find_weather
-from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import load_profile
 
 
 @pytest.mark.req("A-269")
 def test_parts_add_up_to_the_tick() -> None:
-    cell = Cell(
-        driver=Driver(label="2", functions=functions_of(2)),
-        weather=find_weather("clear-noon"),
-        seed=1,
-        profile="recommended",
-        settings=load_profile("recommended"),
-        level=SensorLevel.PIXELS,
-    )
-    cost = tick_cost(cell, seconds=1.0)
+    cost = tick_cost(bench_run(2, "clear-noon", SensorLevel.PIXELS), seconds=1.0)
     assert set(cost.parts) == {"world", "sensors", "rendering", "stack", "supervisor", "log"}
     assert all(ms > 0.0 for ms in cost.parts.values())
     assert sum(cost.parts.values()) <= cost.mean

@@ -1,23 +1,25 @@
 import pytest
+from msgspec.structs import replace
 
+from runs import adas_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.cells import Cell, Driver, cross, published_drivers, sweep
-from skidpad.campaign.drive import prepare
+from skidpad.campaign.cast import stage_of
+from skidpad.campaign.cells import cross, published_drivers, sweep
 from skidpad.campaign.matrix import RECIPE
-from skidpad.cli.adas_plan import Wish, plan
+from skidpad.cli.adas_plan import plan
+from skidpad.cli.asked import Climate, Drivers, Tuned
 from skidpad.core.errors import ConfigError
+from skidpad.core.run import Roads, RunSpec, Traffic
 from skidpad.core.weather import Weather
 from skidpad.simulation.recovery import Supervisor
-from skidpad.stack.settings import Settings
+from skidpad.stack.settings import settings_of
 
 RAIN = Weather(name="rain-noon", title="Heavy Rain - Noon", precipitation=100, wetness=100)
 CLEAR = Weather(name="clear-noon", title="Clear Sky - Noon")
 
 
 def template():
-    return Cell(
-        driver=Driver(label="0"), weather=CLEAR, seed=0, profile="recommended", settings=Settings()
-    )
+    return adas_run(0, CLEAR)
 
 
 @pytest.mark.req("A-006", "A-007", "A-008")
@@ -34,39 +36,33 @@ def test_the_matrix_is_every_driver_in_every_weather_with_common_seeds():
 
 @pytest.mark.req("A-210")
 def test_traffic_stands_at_the_fixed_places_unless_asked():
-    assert template().traffic == "fixed"
-    assert all(c.traffic == "fixed" for c in plan(Wish()))
+    assert RunSpec().course.traffic is Traffic.FIXED
+    runs = plan(template(), Drivers(), Climate())
+    assert all(c.course.traffic is Traffic.FIXED for c in runs)
 
 
 @pytest.mark.req("A-270")
 def test_the_command_line_reaches_the_cells():
-    wish = Wish(
-        configs="3",
-        weather="rain-night",
-        traffic="random",
-        vehicles=40,
-        duration=60.0,
-        seeds=2,
-        grip="none",
-        assignments=["mu_ref=0.7"],
-    )
-    cells = plan(wish)
+    run = Tuned(set=("mu_ref=0.7",)).resolve(RunSpec(duration=60.0), grip="none", range=None)
+    run = replace(run, course=Roads(traffic=Traffic.RANDOM, vehicles=40))
+    cells = plan(run, Drivers(configs="3"), Climate(weather="rain-night"), 2)
     assert [c.seed for c in cells] == [1, 2]
     (one, _) = cells
     assert (one.driver.label, one.weather.name) == ("3", "rain-night")
-    assert (one.traffic, one.vehicles, one.duration) == ("random", 40, 60.0)
-    assert (one.settings.grip.value, one.settings.mu_ref) == ("none", 0.7)
+    assert (one.course.traffic, one.course.vehicles, one.duration) == (Traffic.RANDOM, 40, 60.0)
+    settings = settings_of(one)
+    assert (settings.grip.value, settings.mu_ref) == ("none", 0.7)
 
 
 @pytest.mark.req("A-201")
 def test_recovery_and_wrong_way_watch_over_every_configuration():
-    for cell in plan(Wish(weather="clear-noon", sensors="objects")):
-        assert isinstance(prepare(cell).supervisor, Supervisor)
+    for run in plan(template(), Drivers(), Climate(weather="clear-noon")):
+        assert isinstance(stage_of(run).supervisor, Supervisor)
 
 
 @pytest.mark.req("A-005")
 def test_a_run_lasts_500_simulated_seconds():
-    assert template().duration == 500.0
+    assert RunSpec().duration == 500.0
 
 
 def test_a_sweep_varies_one_field_and_names_each_value():

@@ -3,18 +3,15 @@
 import jobs as work
 import pytest
 
+from runs import adas_run
 from skidpad.campaign import channels, matrix
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.cells import Cell, Driver
 from skidpad.campaign.channel_drive import SegmentPlan
 from skidpad.campaign.channel_routes import driven_routes
 from skidpad.campaign.cluster import runner_of
 from skidpad.campaign.worker import Finished, Job
 from skidpad.core.errors import BackendError, ConfigError
-from skidpad.core.vocabulary import Outcome, SensorLevel
-from skidpad.physics.presets import find_weather
-from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import load_profile
+from skidpad.core.vocabulary import Outcome
 
 pytest.importorskip("distributed")
 
@@ -25,18 +22,7 @@ def here(jobs):
 
 
 def cells():
-    return [
-        Cell(
-            driver=Driver(label="4", functions=functions_of(4)),
-            weather=find_weather("rain-night"),
-            seed=seed,
-            profile="recommended",
-            settings=load_profile("recommended"),
-            duration=4.0,
-            level=SensorLevel.OBJECTS,
-        )
-        for seed in (1, 2)
-    ]
+    return [adas_run(4, "rain-night", seed=seed, duration=4.0) for seed in (1, 2)]
 
 
 def plans():

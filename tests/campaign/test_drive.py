@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 from PIL import Image
 
-from skidpad.campaign.cells import Cell, Driver
-from skidpad.campaign.drive import Run, drive, run_cell
+from runs import adas_run
+from skidpad.campaign.run import Run, drive
+from skidpad.campaign.run import run as run_spec
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import Frame, Segments, SensorFrame
 from skidpad.core.geometry import Pose
+from skidpad.core.run import RunSpec
 from skidpad.core.setup import ActorCommand
 from skidpad.core.specs import CameraSpec, LidarSpec, Modality, PointSensorSpec, SensorSpec
 from skidpad.core.states import ContactEvent, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Outcome, RelocationReason, SensorLevel, Supervision, Tier
-from skidpad.physics.presets import find_weather
 from skidpad.recording.logfiles import log_hash
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.embedded.engine import EmbeddedBackend
-from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import load_profile
 
 
 class Gentle:
@@ -57,16 +57,8 @@ def short(stack: type[Gentle] = Gentle, seconds: float = 3.0, **options: Any) ->
     return drive(stack, duration=seconds, sensors="objects", seed=2, options=options)
 
 
-def cell(number: int = 4, seconds: float = 8.0, level: SensorLevel = SensorLevel.OBJECTS) -> Cell:
-    return Cell(
-        driver=Driver(label=str(number), functions=functions_of(number)),
-        weather=find_weather("clear-noon"),
-        seed=5,
-        profile="recommended",
-        settings=load_profile("recommended"),
-        duration=seconds,
-        level=level,
-    )
+def cell(number: int = 4, duration: float = 8.0, **changes: Any) -> RunSpec:
+    return adas_run(number, seed=5, duration=duration, **changes)
 
 
 def test_any_class_with_the_stack_interface_drives() -> None:
@@ -102,18 +94,18 @@ def test_a_stack_that_fails_is_an_outcome_with_its_traceback(
 @pytest.mark.req("X-1", "X-8", "X-12")
 def test_same_seed_same_content_whatever_ran_before() -> None:
     backend = EmbeddedBackend()
-    first = run_cell(cell(), backend=backend)
-    run_cell(replace(cell(1), seed=9, duration=2.0), backend=backend)
-    again = run_cell(cell(), backend=backend)
+    first = run_spec(cell(), backend=backend)
+    run_spec(replace(cell(1), seed=9, duration=2.0), backend=backend)
+    again = run_spec(cell(), backend=backend)
     assert log_hash(first.log) == log_hash(again.log)
-    assert log_hash(run_cell(replace(cell(), seed=6)).log) != log_hash(first.log)
+    assert log_hash(run_spec(replace(cell(), seed=6)).log) != log_hash(first.log)
 
 
 @pytest.mark.req("X-11")
 def test_nobody_keeps_a_buffer_beyond_its_tick() -> None:
-    wanted = cell(3, 2.0, SensorLevel.PIXELS)
-    clean = run_cell(wanted)
-    poisoned = run_cell(wanted, backend=EmbeddedBackend(poison=True))
+    wanted = cell(3, 2.0, sensors=SensorLevel.PIXELS)
+    clean = run_spec(wanted)
+    poisoned = run_spec(wanted, backend=EmbeddedBackend(poison=True))
     assert log_hash(clean.log) == log_hash(poisoned.log)
 
 
@@ -209,13 +201,13 @@ class TruthGone(Wrapped):
         states = true.states.copy()
         for column in states[:-1]:
             column[1:] = np.nan
-        return replace(true, states=states)
+        return dataclasses.replace(true, states=states)
 
 
 @pytest.mark.req("A-014", "L-3")
 def test_the_stack_never_sees_the_truth() -> None:
-    with_truth = run_cell(cell())
-    without = run_cell(cell(), backend=TruthGone())
+    with_truth = run_spec(cell())
+    without = run_spec(cell(), backend=TruthGone())
     for a, b in zip(with_truth.log.requested, without.log.requested, strict=True):
         assert np.array_equal(a, b)
     assert np.isnan(without.log.actors.x[:, 1]).all()
@@ -250,7 +242,9 @@ class StaleView(Wrapped):
         true = self.inner.truth()
         if true.tick != self.CONTACT_TICK:
             return true
-        return replace(true, contacts=(ContactEvent(true.tick, -1, "wall", 1.0, 1.0, 0.0, 0.0),))
+        return dataclasses.replace(
+            true, contacts=(ContactEvent(true.tick, -1, "wall", 1.0, 1.0, 0.0, 0.0),)
+        )
 
     def relocate(self, pose: Pose, v: float) -> None:
         super().relocate(pose, v)
@@ -269,13 +263,13 @@ class StaleView(Wrapped):
             np.array([1.5], np.float32),
             np.array([14], np.uint8),
         )
-        return replace(frame, segments=dict.fromkeys(frame.segments, near))
+        return dataclasses.replace(frame, segments=dict.fromkeys(frame.segments, near))
 
 
 @pytest.mark.req("A-195")
 def test_stale_images_after_a_relocation_cause_no_emergency_braking() -> None:
     backend = StaleView()
-    run = run_cell(replace(cell(1), vehicles=0, seed=1), backend=backend)
+    run = run_spec(replace(cell(1, vehicles=0), seed=1), backend=backend)
     phases, tier = run.log.supervision, run.log.report.tier
     warm = np.flatnonzero(phases == Supervision.WARM_UP)
     assert len(warm) == 10

@@ -6,7 +6,6 @@ import os
 import signal
 import threading
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import polars as pl
@@ -15,11 +14,12 @@ import pytest
 from skidpad.campaign.campaign import Campaign, uncertain_cells
 from skidpad.campaign.cluster import run_on, runner_of
 from skidpad.campaign.grip import recipe, warm_up
-from skidpad.campaign.grip_cells import Friction, GripCell, cross, seeds
+from skidpad.campaign.grip_cells import Cross, cross, seeds, template
 from skidpad.campaign.grip_shown import shown
 from skidpad.campaign.pool import local
 from skidpad.campaign.worker import Finished, Runner
 from skidpad.core.errors import OutputError
+from skidpad.core.run import AgentDriver, Friction, RunSpec
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.presets import preset
 from skidpad.recording.grip import GripEntry, read_series, series_path
@@ -27,16 +27,13 @@ from skidpad.recording.ledger import read_ledger
 from skidpad.recording.results import read_results
 from skidpad.report.grip_data import load_grip
 from skidpad.scenarios.variation import CutIn
+from skidpad.stack.settings import Settings
 
-TEMPLATE = GripCell(
-    scenario="lead_slowdown", weather=preset("icy_30"), friction=Friction.ORIGINAL, seed=0
-)
 WEATHERS = [preset("icy_0"), preset("icy_30")]
 
 
-def cells(n=1, scenarios=("lead_slowdown",), **more) -> list[GripCell]:
-    template = replace(TEMPLATE, **more)
-    return cross(template, list(scenarios), WEATHERS, list(Friction), [CutIn.FIXED], seeds(0, n))
+def cells(n=1, scenarios=("lead_slowdown",), **more) -> list[RunSpec]:
+    return cross(template(**more), Cross(scenarios=scenarios, weather=WEATHERS), seeds(0, n))
 
 
 def here(jobs):
@@ -217,7 +214,7 @@ class Silent(Good):
 )
 def test_an_agent_that_fails_is_an_outcome_and_the_campaign_goes_on(tmp_path, name, outcome, told):
     (tmp_path / "agents.py").write_text(AGENTS, encoding="utf-8")
-    batch = cells(1, controller=f"agent:{tmp_path / 'agents.py'}:{name}")[:2]
+    batch = cells(1, driver=AgentDriver(f"{tmp_path / 'agents.py'}:{name}"))[:2]
     run(batch, tmp_path / "out")
     entries = read_ledger(tmp_path / "out", GripEntry)
     if name == "Good":
@@ -243,10 +240,13 @@ def test_only_cells_that_are_still_uncertain_get_more_runs(campaign):
 @pytest.mark.req("B-070", "B-071", "B-074", "B-075", "B-076", "B-077", "B-079")
 def test_the_spawn_delay_alone_breaks_the_cut_in_and_the_distance_repairs_it(tmp_path):
     variants = [CutIn.ORIGINAL, CutIn.UNFIXED, CutIn.FIXED]
-    template = replace(TEMPLATE, weather=preset("rain_0"))
-    batch = cross(
-        template, ["ghost_cut_in"], [preset("rain_0")], [Friction.ORIGINAL], variants, seeds(0, 4)
+    varied = Cross(
+        scenarios=["ghost_cut_in"],
+        weather=[preset("rain_0")],
+        frictions=[Friction.ORIGINAL],
+        cutins=variants,
     )
+    batch = cross(template(), varied, seeds(0, 4))
     run(batch, tmp_path / "out")
     outcomes = read_results(tmp_path / "out").group_by("cutin").agg(pl.col("outcome").unique())
     assert dict(outcomes.iter_rows()) == {
@@ -261,7 +261,7 @@ def test_the_spawn_delay_alone_breaks_the_cut_in_and_the_distance_repairs_it(tmp
 
 @pytest.mark.req("B-003")
 def test_the_physical_model_reaches_the_tyres(tmp_path):
-    batch = [replace(c, model=GripModel.PHYSICAL) for c in cells(1)[2:]]
+    batch = cells(1, settings=Settings(grip=GripModel.PHYSICAL).as_plain())[2:]
     run(batch, tmp_path / "out")
     mu = dict(read_results(tmp_path / "out").select("friction", "mu").iter_rows())
     assert mu["original"] == pytest.approx(0.9)

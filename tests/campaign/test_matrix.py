@@ -5,24 +5,24 @@ import signal
 import subprocess
 import sys
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import polars as pl
 import pytest
+from msgspec.structs import replace
 from typer.testing import CliRunner
 
+from runs import adas_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.cells import Cell, Driver, cross, published_drivers
+from skidpad.campaign.cells import cross, published_drivers
 from skidpad.campaign.matrix import RECIPE, warm_up
 from skidpad.campaign.pool import local
 from skidpad.cli.main import app
 from skidpad.core.errors import InputError, OutputError
-from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.run import StackDriver
 from skidpad.physics.presets import find_weather
 from skidpad.recording.ledger import LEDGER
 from skidpad.recording.results import read_results
-from skidpad.stack.settings import load_profile
 
 ROOT = Path(__file__).resolve().parents[2]
 CALL = [sys.executable, "-m", "skidpad", "adas", "--sensors", "objects", "--duration", "6"]
@@ -44,15 +44,7 @@ def environment():
 
 
 def cells(duration=4.0, weather=("clear-noon", "rain-night"), numbers="1,4"):
-    template = Cell(
-        driver=Driver(label=""),
-        weather=find_weather(weather[0]),
-        seed=0,
-        profile="recommended",
-        settings=load_profile("recommended"),
-        duration=duration,
-        level=SensorLevel.OBJECTS,
-    )
+    template = adas_run(0, duration=duration)
     return cross(published_drivers(numbers), [find_weather(w) for w in weather], 1, template)
 
 
@@ -93,7 +85,7 @@ def test_a_stack_that_kills_its_worker_costs_its_own_runs_only(tmp_path, monkeyp
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(ROOT), str(ROOT / "src")]))
     monkeypatch.syspath_prepend(str(ROOT))
     (good,) = cells(numbers="1", weather=("clear-noon",))
-    bad = replace(good, driver=Driver(label="bad", stack="tests.campaign.jobs:Suicide"))
+    bad = replace(good, driver=StackDriver("tests.campaign.jobs:Suicide", name="bad"))
     summary = run([bad, good], tmp_path)
     results = read_results(tmp_path)
     assert summary.failed == 1
@@ -108,7 +100,7 @@ def test_a_stack_that_raises_is_an_outcome_with_its_traceback(tmp_path, monkeypa
     monkeypatch.syspath_prepend(str(ROOT))
     (good,) = cells(numbers="1", weather=("clear-noon",))
     bad = [
-        replace(good, driver=Driver(label=name, stack=f"tests.campaign.jobs:{name}"))
+        replace(good, driver=StackDriver(f"tests.campaign.jobs:{name}", name=name))
         for name in ("Raising", "Speechless")
     ]
     run(bad, tmp_path)

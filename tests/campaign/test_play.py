@@ -5,15 +5,18 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skidpad.campaign.play import Play, play, play_to
+from runs import scenario_run
+from skidpad.campaign.play import run_to
+from skidpad.campaign.run import run
 from skidpad.core.errors import OutputError
+from skidpad.core.run import ActorMode, AgentDriver, Scenario
 from skidpad.core.vocabulary import GripModel, Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.scenarios.generate import FOLDER
-from skidpad.scenarios.scene import Mode
 
-SHORT = Play(file=FOLDER / "lead_slowdown.xosc", label="t", weather=Weather(), duration=1.0)
+FILE = FOLDER / "lead_slowdown.xosc"
+SHORT = scenario_run(FILE, duration=1.0)
 WATCHER = """
 import numpy as np
 from types import SimpleNamespace
@@ -31,12 +34,12 @@ class Watcher:
 
 @pytest.mark.req("L-6", "X-1")
 def test_a_run_is_written_and_repeats_to_the_byte(tmp_path):
-    first = play_to(SHORT, tmp_path / "one")
+    first = run_to(SHORT, tmp_path / "one")
     assert first.outcome is Outcome.NOT_TRIGGERED  # too short for the lead to slow
-    assert log_hash(read_log(tmp_path / "one")) == log_hash(play(SHORT).run.log)
+    assert log_hash(read_log(tmp_path / "one")) == log_hash(run(SHORT).log)
     assert "lead_slowdown" in (tmp_path / "one" / "config.yaml").read_text(encoding="utf-8")
     with pytest.raises(OutputError, match="not empty"):
-        play_to(SHORT, tmp_path / "one")
+        run_to(SHORT, tmp_path / "one")
 
 
 @pytest.mark.req("B-160", "B-161")
@@ -45,12 +48,12 @@ def test_drops_on_the_lens_change_images_and_nothing_else(tmp_path):
     seen, logs = {}, {}
     for overlay in (False, True):
         for grip in (GripModel.NONE, GripModel.STATISTICAL):
-            wish = Play(
-                file=SHORT.file, label="t", weather=Weather(precipitation=80.0, wetness=80.0),
-                duration=0.2, controller=f"agent:{tmp_path / 'watcher.py'}:Watcher",
-                level=SensorLevel.PIXELS, grip=grip, overlay=overlay,
+            spec = scenario_run(
+                FILE, grip.value, weather=Weather(precipitation=80.0, wetness=80.0),
+                duration=0.2, driver=AgentDriver(f"{tmp_path / 'watcher.py'}:Watcher"),
+                sensors=SensorLevel.PIXELS, overlay=overlay,
             )  # fmt: skip
-            logs[overlay, grip] = play(wish).run.log
+            logs[overlay, grip] = run(spec).log
             import sys
 
             module = sys.modules["skidpad_user_agent_watcher"]
@@ -66,10 +69,10 @@ def test_drops_on_the_lens_change_images_and_nothing_else(tmp_path):
 @pytest.mark.req("B-062")
 def test_an_ideal_lead_stops_on_ice_as_if_it_were_dry():
     far = {}
-    for mode in (Mode.IDEAL, Mode.PHYSICAL):
-        wish = Play(
-            file=SHORT.file, label="t", weather=Weather(ice_thickness=100.0),
-            grip=GripModel.STATISTICAL, actors=mode, duration=12.0,
+    for mode in ActorMode:
+        spec = scenario_run(
+            FILE, "statistical", weather=Weather(ice_thickness=100.0),
+            course=Scenario(actors=mode), duration=12.0,
         )  # fmt: skip
-        far[mode] = float(play(wish).run.log.actors.x[-1, 1])
-    assert far[Mode.PHYSICAL] > far[Mode.IDEAL] + 20.0
+        far[mode] = float(run(spec).log.actors.x[-1, 1])
+    assert far[ActorMode.PHYSICAL] > far[ActorMode.IDEAL] + 20.0

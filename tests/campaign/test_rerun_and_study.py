@@ -4,40 +4,32 @@ from dataclasses import replace
 import numpy as np
 import polars as pl
 import pytest
+from msgspec import structs
 from typer.testing import CliRunner
 
+from runs import adas_run
 from skidpad.campaign import study
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.cells import Cell, Driver
-from skidpad.campaign.drive import run_cell
+from skidpad.campaign.drive import Sink
 from skidpad.campaign.matrix import RECIPE
 from skidpad.campaign.pace import Pace
 from skidpad.campaign.pool import local
-from skidpad.campaign.rerun import read_cell
+from skidpad.campaign.run import run
+from skidpad.campaign.stored import read_run
 from skidpad.campaign.views import SIZE, twelve_views
 from skidpad.cli.main import app
+from skidpad.core.run import StackDriver
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.evidence.drive.findings import FINDINGS
 from skidpad.evidence.verdicts import judge
-from skidpad.physics.presets import find_weather
 from skidpad.recording.logfiles import log_hash
 from skidpad.recording.results import read_results
 from skidpad.sensors.twelve import twelve_sensors
-from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import load_profile
 
 
-def cell(level=SensorLevel.OBJECTS, duration=6.0, **changes):
-    base = Cell(
-        driver=Driver(label="2", functions=functions_of(2)),
-        weather=find_weather("rain-noon"),
-        seed=3,
-        profile="thesis_text",
-        settings=load_profile("thesis_text", {"mu_ref": 0.8}),
-        duration=duration,
-        level=level,
-    )
-    return replace(base, **changes)
+def cell(sensors=SensorLevel.OBJECTS, duration=6.0, **changes):
+    named = {"profile": "thesis_text", "settings": {"mu_ref": 0.8}, "seed": 3}
+    return adas_run(2, "rain-noon", sensors=sensors, duration=duration, **{**named, **changes})
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +43,7 @@ def campaign(tmp_path_factory):
 @pytest.mark.req("A-139", "A-260", "A-261")
 def test_a_run_can_be_driven_again_from_what_it_left_behind(campaign):
     run = campaign / "runs" / "2_rain-noon-003"
-    assert read_cell(run) == cell()
+    assert read_run(run) == cell()
     done = CliRunner().invoke(app, ["rerun", str(run), "--from", "1", "--to", "3"])
     assert done.exit_code == 0, done.output
     assert "the same drive" in done.output
@@ -101,19 +93,19 @@ def test_slow_ticks_are_those_below_0_9_of_real_time(monkeypatch):
     monkeypatch.setattr("skidpad.campaign.pace.perf_counter", lambda: next(clock))
     pace = Pace(0.05)
     for _ in range(3):
-        pace.see(None, None, None)
+        pace.see(None)
     assert pace.slow_pct == pytest.approx(100.0 / 3.0)  # factors 1.0, 0.91, 0.83
 
 
 def test_the_picture_of_a_moment_has_all_views():
     seen = []
 
-    class Eye:
-        def see(self, frame, truth, report):
-            if frame.tick == 3:
-                seen.append(twelve_views(frame, truth, report, 0.05))
+    class Eye(Sink):
+        def see(self, moment):
+            if moment.frame.tick == 3:
+                seen.append(twelve_views(moment, 0.05))
 
-    run_cell(cell(SensorLevel.PIXELS, 0.4), watchers=(Eye(),))
+    run(cell(SensorLevel.PIXELS, 0.4), sinks=(Eye(),))
     (picture,) = seen
     assert picture.shape == (*SIZE, 3)
     assert picture[300:560, 20:780].std() > 10.0  # the front camera
@@ -123,7 +115,7 @@ def test_the_picture_of_a_moment_has_all_views():
 @pytest.mark.req("A-002", "A-099")
 def test_pace_changes_no_byte():
     plain = study.pace(1)
-    short = [replace(v, cell=replace(v.cell, duration=5.0)) for v in plain]
+    short = [replace(v, run=structs.replace(v.run, duration=5.0)) for v in plain]
     rows = [study.drive_variant(v) for v in short]
     assert rows[0]["log_hash"] == rows[1]["log_hash"]
     finding = next(f for f in FINDINGS if f.id == "F-25")
@@ -132,20 +124,20 @@ def test_pace_changes_no_byte():
 
 def test_injected_dropout_blinds_about_its_share_of_time():
     options = {"configuration": 2, "dropout": 0.2, "seed": 1}
-    driver = Driver(label="2", stack="skidpad.campaign.study:Blinking", options=options)
-    run = run_cell(cell(driver=driver, duration=30.0))
-    assert np.isfinite(run.log.report.tier).all()
+    driver = StackDriver("skidpad.campaign.study:Blinking", options, name="2")
+    blinking = run(cell(driver=driver, duration=30.0))
+    assert np.isfinite(blinking.log.report.tier).all()
     blind = study.Blinking(twelve_sensors(), study.load_map("figure8"), options).blind
     assert blind.mean() == pytest.approx(0.2, abs=0.03)
-    sighted = replace(driver, options={**options, "dropout": 0.0})
-    assert log_hash(run.log) != log_hash(run_cell(cell(driver=sighted, duration=30.0)).log)
+    sighted = structs.replace(driver, options={**options, "dropout": 0.0})
+    assert log_hash(blinking.log) != log_hash(run(cell(driver=sighted, duration=30.0)).log)
 
 
 def test_every_arm_of_every_study_has_common_seeds():
     for make in study.STUDIES.values():
         arms = {}
         for v in make(3):
-            arms.setdefault(tuple(v.labels.values()), set()).add(v.cell.seed)
+            arms.setdefault(tuple(v.labels.values()), set()).add(v.run.seed)
         assert len(set(map(frozenset, arms.values()))) == 1
         assert len(arms) >= 2
 

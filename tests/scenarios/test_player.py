@@ -2,23 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from math import hypot
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from skidpad.campaign.play import Play, play
+from runs import scenario_run
+from skidpad.campaign.run import run
 from skidpad.core.errors import FileError
-from skidpad.core.vocabulary import GripModel, Outcome
-from skidpad.core.weather import Weather
+from skidpad.core.run import ActorMode, Passenger, Scenario, StackDriver
+from skidpad.core.vocabulary import Outcome
 from skidpad.physics.presets import preset
-from skidpad.scenarios.generate import FOLDER
 from skidpad.scenarios.motion import Shape, Transition
 from skidpad.scenarios.player import load, problems
 from skidpad.scenarios.reader import Unsupported
-from skidpad.scenarios.scene import Mode
 
 HEAD = """<?xml version='1.0'?>
 <OpenSCENARIO>
@@ -92,8 +90,8 @@ def scenario(folder: Path, *events: str, end=6.0, init_more="", other_lane=-1, n
 
 
 def played(path: Path, **more):
-    wish = Play(file=path, label="test", weather=Weather(), controller="ideal", actors=Mode.IDEAL)
-    return play(replace(wish, **more))
+    course = Scenario(actors=more.pop("actors", ActorMode.IDEAL))
+    return run(scenario_run(path, course=course, **{"driver": Passenger(), **more}))
 
 
 def test_a_trajectory_is_followed_to_the_centimetre(tmp_path):
@@ -102,7 +100,7 @@ def test_a_trajectory_is_followed_to_the_centimetre(tmp_path):
         for t in np.arange(0.0, 5.01, 0.1)
     ]
     path = scenario(tmp_path, EVENT.format("e", trajectory(rows), 0, AT_2_S.replace("2", "0")))
-    log = played(path).run.log
+    log = played(path).log
     source = np.array(rows)
     for k in range(1, 100):
         t = log.t[k]
@@ -115,7 +113,7 @@ def test_a_relative_trajectory_counts_from_its_own_begin(tmp_path):
     timing = '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/>'
     rows = [(0.0, 150.0, -1.75, 0.0), (2.0, 170.0, -1.75, 0.0)]
     path = scenario(tmp_path, EVENT.format("e", trajectory(rows, timing), 0, AT_2_S))
-    log = played(path).run.log
+    log = played(path).log
     assert log.actors.x[60, 1] == pytest.approx(160.0, abs=0.01)  # 1 s after 2 s
     assert log.actors.x[-1, 1] == pytest.approx(170.0, abs=0.01)  # stands at the end
 
@@ -125,7 +123,7 @@ def test_entities_vanish_and_appear(tmp_path):
     path = scenario(
         tmp_path, EVENT.format("gone", VANISH, 0, AT_2_S), EVENT.format("back", APPEAR, 0, late)
     )
-    log = played(path).run.log
+    log = played(path).log
     there = log.present[:, 1]
     assert there[:40].all()
     assert not there[42:80].any()
@@ -133,12 +131,12 @@ def test_entities_vanish_and_appear(tmp_path):
     assert log.actors.x[81, 1] == pytest.approx(60.0, abs=1.1)
 
 
-@pytest.mark.parametrize("mode", [Mode.IDEAL, Mode.PHYSICAL])
+@pytest.mark.parametrize("mode", [ActorMode.IDEAL, ActorMode.PHYSICAL])
 def test_a_speed_action_starts_when_its_trigger_fires_and_keeps_its_rate(tmp_path, mode):
     path = scenario(tmp_path, EVENT.format("slow", slow_down(4.0, 2.0), 0, AT_2_S))
-    log = played(path, actors=mode).run.log
+    log = played(path, actors=mode).log
     v = np.hypot(log.actors.vx[:, 1], log.actors.vy[:, 1])
-    loose = 0.01 if mode is Mode.IDEAL else 0.4
+    loose = 0.01 if mode is ActorMode.IDEAL else 0.4
     assert v[40] == pytest.approx(10.0, abs=loose)
     assert v[70] == pytest.approx(10.0 - 2.0 * 1.5, abs=0.11 + loose)
     assert v[-1] == pytest.approx(4.0, abs=loose)
@@ -146,22 +144,22 @@ def test_a_speed_action_starts_when_its_trigger_fires_and_keeps_its_rate(tmp_pat
 
 def test_a_delay_puts_a_trigger_off(tmp_path):
     path = scenario(tmp_path, EVENT.format("slow", slow_down(0.0, 5.0), 1.5, AT_2_S))
-    v = np.hypot(*(column[:, 1] for column in played(path).run.log.actors[4:6]))
+    v = np.hypot(*(column[:, 1] for column in played(path).log.actors[4:6]))
     assert v[70] == pytest.approx(10.0, abs=0.01)
     assert v[75] < 9.0
 
 
-@pytest.mark.parametrize("mode", [Mode.IDEAL, Mode.PHYSICAL])
+@pytest.mark.parametrize("mode", [ActorMode.IDEAL, ActorMode.PHYSICAL])
 def test_a_lane_change_ends_on_the_other_lane(tmp_path, mode):
     change = """<PrivateAction><LateralAction><LaneChangeAction>
 <LaneChangeActionDynamics dynamicsShape="sinusoidal" value="2" dynamicsDimension="time"/>
 <LaneChangeTarget><RelativeTargetLane value="-1" entityRef="other"/></LaneChangeTarget>
 </LaneChangeAction></LateralAction></PrivateAction>"""
     path = scenario(tmp_path, EVENT.format("change", change, 0, AT_2_S), end=8.0)
-    y = played(path, actors=mode).run.log.actors.y[:, 1]
+    y = played(path, actors=mode).log.actors.y[:, 1]
     assert y[40] == pytest.approx(-1.75, abs=0.02)
-    assert y[60] == pytest.approx(-3.5, abs=0.05 if mode is Mode.IDEAL else 0.8)
-    assert y[-1] == pytest.approx(-5.25, abs=0.05 if mode is Mode.IDEAL else 0.2)
+    assert y[60] == pytest.approx(-3.5, abs=0.05 if mode is ActorMode.IDEAL else 0.8)
+    assert y[-1] == pytest.approx(-5.25, abs=0.05 if mode is ActorMode.IDEAL else 0.2)
 
 
 @pytest.mark.parametrize("shape", list(Shape))
@@ -181,7 +179,7 @@ def test_transitions_end_where_they_should_and_their_rates_are_derivatives(shape
 def test_a_parameter_decides_once_for_all(tmp_path, rule, happens):
     asked = f'<ByValueCondition><ParameterCondition parameterRef="V" value="15" rule="{rule}"/>'
     path = scenario(tmp_path, EVENT.format("gone", VANISH, 0, f"{asked}</ByValueCondition>"))
-    assert played(path).run.log.present[-1, 1] != happens
+    assert played(path).log.present[-1, 1] != happens
     path.write_text(path.read_text().replace('parameterRef="V"', 'parameterRef="W"'))
     with pytest.raises(FileError, match="parameter 'W' is not declared"):
         load(path)
@@ -247,8 +245,7 @@ def test_a_parameter_can_be_given(tmp_path):
 
 @pytest.mark.req("B-073")
 def test_the_ghost_merges_at_its_distance_whatever_the_ego_does():
-    wish = Play(file=FOLDER / "ghost_cut_in.xosc", label="t", weather=Weather())
-    a = play(wish).run.log.actors
+    a = run(scenario_run("ghost_cut_in")).log.actors
     begin = int(np.argmax(np.abs(a.y[:, 1] + 1.75) > 0.05))
     assert abs(a.x[begin, 1] - a.x[begin, 0]) < 2.0 + 0.5 * 8.0  # half a second of closing speed
 
@@ -256,21 +253,14 @@ def test_the_ghost_merges_at_its_distance_whatever_the_ego_does():
 @pytest.mark.req("B-094", "B-104")
 def test_a_collision_ends_the_run():
     # without a driver's brakes: the ego rolls on into the wreck
-    wish = Play(
-        file=FOLDER / "front_accident.xosc", label="t", weather=Weather(),
-        controller="tests.scenarios.blind:Blind",
-    )  # fmt: skip
-    result = play(wish)
+    result = run(scenario_run("front_accident", driver=StackDriver("tests.scenarios.blind:Blind")))
     assert result.outcome is Outcome.COLLISION
-    assert len(result.run.log.contacts) == 1
-    assert result.run.log.contacts[0].tick == result.run.log.tick[-1]
+    assert len(result.log.contacts) == 1
+    assert result.log.contacts[0].tick == result.log.tick[-1]
 
 
 @pytest.mark.req("B-062", "B-065")
 def test_reduced_friction_reaches_ego_and_others_alike():
-    wish = Play(
-        file=FOLDER / "lead_slowdown.xosc", label="t", weather=preset("icy_70"),
-        grip=GripModel.STATISTICAL, duration=2.0,
-    )  # fmt: skip
-    mu = play(wish).run.log.mu
+    spec = scenario_run("lead_slowdown", "statistical", weather=preset("icy_70"), duration=2.0)
+    mu = run(spec).log.mu
     assert mu[-1] == pytest.approx(np.full((2, 4), 0.9 * 0.156082), abs=1e-4)

@@ -7,17 +7,17 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from msgspec import structs
 
-from skidpad.campaign.cells import Cell, Driver
-from skidpad.campaign.drive import prepare, run_cell
-from skidpad.core.frames import SensorFrame
-from skidpad.core.states import StackReport, WorldTruth
+from runs import adas_run
+from skidpad.campaign.cast import stage_of
+from skidpad.campaign.drive import Moment, Sink
+from skidpad.campaign.run import run
+from skidpad.core.run import RunSpec
+from skidpad.core.states import StackReport
 from skidpad.core.vocabulary import DetectionStatus, SensorLevel, Supervision, Tier
-from skidpad.physics.presets import find_weather
 from skidpad.simulation.sensing import Objects
 from skidpad.stack.adas import AdasStack
-from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import load_profile
 
 SEEING = (DetectionStatus.FUSION_DETECT, DetectionStatus.FUSION_PERSIST)
 TO_A_LEAD = frozenset(
@@ -36,43 +36,33 @@ HARD = frozenset({Tier.HARD_STOP, Tier.STOPPED_TOO_CLOSE, Tier.EMERGENCY})
 Reports = list[tuple[StackReport, StackReport]]  # of pixels and of objects, tick by tick
 
 
-class Shadow:
+class Shadow(Sink):
     """A second stack that sees the drive of the first through the object level."""
 
-    def __init__(self, cell: Cell) -> None:
-        ready = prepare(replace(cell, level=SensorLevel.OBJECTS))
-        self.ready, self.seed = ready, cell.seed
+    def __init__(self, spec: RunSpec) -> None:
+        self.stage = stage_of(structs.replace(spec, sensors=SensorLevel.OBJECTS))
+        self.seed = spec.seed
         self.suite: Objects | None = None
-        plain = {
-            "functions": sorted(f.value for f in cell.driver.functions),
-            "profile": cell.profile,
-        }
-        self.stack = AdasStack(ready.setup.specs, ready.map, plain)
+        plain = {"configuration": int(spec.driver.label), "profile": spec.profile}
+        self.stack = AdasStack(self.stage.setup.specs, self.stage.map, plain)
         self.rows: Reports = []
 
-    def see(self, frame: SensorFrame, truth: WorldTruth, report: StackReport | None) -> None:
+    def see(self, moment: Moment) -> None:
+        frame, truth = moment.frame, moment.truth
         if self.suite is None:
-            self.suite = Objects(self.ready.map, truth.table, self.ready.setup, self.seed)
+            self.suite = Objects(self.stage.map, truth.table, self.stage.setup, self.seed)
         seen = self.suite.read(frame.tick, truth.states, frame.lights, None)
         self.stack.tick(replace(frame, images={}, segments=seen.segments, radar=seen.radar))
         if frame.supervision is Supervision.NONE:
-            assert report is not None
-            self.rows.append((report, self.stack.report))
+            self.rows.append((moment.report, self.stack.report))
 
 
 @lru_cache(maxsize=2)
 def in_lockstep(number: int, weather: str, seed: int) -> Reports:
     """One drive on pixels, seen by a shadow."""
-    cell = Cell(
-        driver=Driver(label=str(number), functions=functions_of(number)),
-        weather=find_weather(weather),
-        seed=seed,
-        profile="recommended",
-        settings=load_profile("recommended"),
-        duration=36.0,
-    )
-    shadow = Shadow(cell)
-    run_cell(cell, watchers=[shadow])
+    spec = adas_run(number, weather, sensors=SensorLevel.PIXELS, seed=seed, duration=36.0)
+    shadow = Shadow(spec)
+    run(spec, sinks=[shadow])
     return shadow.rows
 
 

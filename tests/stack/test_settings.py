@@ -12,11 +12,12 @@ from typer.testing import CliRunner
 from skidpad.cli.main import app, main
 from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.geometry import Pose
+from skidpad.core.run import Function
 from skidpad.core.specs import LidarSpec, PointSensorSpec, RadarSpec
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import GripModel
 from skidpad.stack.adas import AdasConfig
-from skidpad.stack.configurations import Function, functions_of, parse_functions
+from skidpad.stack.configurations import functions_of, parse_functions
 from skidpad.stack.loading import GuardedStack, load_stack
 from skidpad.stack.settings import (
     NAMES,

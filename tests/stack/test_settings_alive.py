@@ -24,22 +24,22 @@ from stackfakes import (
 )
 
 import makelog
-from skidpad.campaign.cells import Cell, Driver
-from skidpad.campaign.drive import recovery_settings, run_cell, setup_of
+from runs import adas_run
+from skidpad.campaign.cast import recovery_settings, stage_of
 from skidpad.campaign.matrix import metric_settings
+from skidpad.campaign.run import run
 from skidpad.core.geometry import Pose
+from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import ContactEvent, VehicleCommand
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import prepare
-from skidpad.physics.presets import find_weather
 from skidpad.recording.logfiles import log_hash
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.recovery import Supervisor
 from skidpad.stack.adas import AdasStack
-from skidpad.stack.configurations import functions_of
 from skidpad.stack.settings import NAMES, Settings
 
 Outcome = Callable[[Settings], Any]
@@ -139,27 +139,19 @@ STACK: dict[str, Scenario] = {
 # --- settings of other houses: their own functions, or a short drive at object level
 
 
-def cell(settings: Settings, weather: str = "clear-noon", level=SensorLevel.OBJECTS) -> Cell:
-    return Cell(
-        driver=Driver(label="2", functions=functions_of(2)),
-        weather=find_weather(weather),
-        seed=3,
-        profile="recommended",
-        settings=settings,
-        duration=2.0,
-        level=level,
-    )
+def cell(settings: Settings, weather: str = "clear-noon", **changes: Any) -> RunSpec:
+    return adas_run(2, weather, settings=settings, seed=3, duration=2.0, **changes)
 
 
 def short_drive(weather: str | Weather) -> Outcome:
-    return lambda settings: log_hash(run_cell(cell(settings, weather)).log)
+    return lambda settings: log_hash(run(cell(settings, weather)).log)
 
 
 def pictures(settings: Settings, weather: str, *ids: str) -> list[bytes]:
     """What some cameras show at the start."""
-    ready = cell(settings, weather, SensorLevel.PIXELS)
+    ready = cell(settings, weather, sensors=SensorLevel.PIXELS)
     backend = EmbeddedBackend()
-    images = backend.reset(setup_of(ready, load_map(ready.map)), ready.seed).images
+    images = backend.reset(stage_of(ready).setup, ready.seed).images
     found = []
     for name in ids:
         image = images[name]
@@ -235,6 +227,4 @@ def test_the_outcome_changes_with_the_setting_and_only_with_it(name):
 @pytest.mark.req("A-013")
 @pytest.mark.parametrize("configuration", range(5))
 def test_no_configuration_hands_the_ego_to_the_traffic(configuration):
-    functions = functions_of(configuration)
-    ready = replace(cell(Settings()), driver=Driver(label="x", functions=functions))
-    assert setup_of(ready, figure8()).ego.driver == "scripted"
+    assert stage_of(adas_run(configuration)).setup.ego.driver == "scripted"

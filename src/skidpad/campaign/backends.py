@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import shlex
 from typing import TYPE_CHECKING
 
-from skidpad.campaign.cells import BackendChoice, BackendKind
 from skidpad.core.errors import require_choice
+from skidpad.core.run import BackendChoice, BackendKind
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 
@@ -19,13 +20,13 @@ _KEEPERS: dict[BackendChoice, ServerKeeper] = {}  # of this process; a worker li
 
 def keep_server(choice: BackendChoice) -> None:
     """Where the campaign starts its own CARLA server: it is up, and not older than asked for."""
-    if choice.kind is BackendKind.EMBEDDED or not choice.server:
+    if choice.backend is BackendKind.EMBEDDED or not choice.server_command:
         return
     if choice not in _KEEPERS:
         from skidpad.simulation.carla.keeper import ServerKeeper
 
         _KEEPERS[choice] = ServerKeeper(
-            choice.server, choice.host, choice.port, choice.restart_every
+            shlex.split(choice.server_command), choice.host, choice.port, choice.restart_every
         )
     _KEEPERS[choice].before_run()
 
@@ -47,7 +48,7 @@ def carla_options(choice: BackendChoice, watchdog: float | None = None) -> Carla
 
 def make_backend(choice: BackendChoice, watchdog: float | None = None) -> Backend:
     """A fresh backend. watchdog: s without a tick after which this process ends; None: never."""
-    if choice.kind is BackendKind.EMBEDDED:
+    if choice.backend is BackendKind.EMBEDDED:
         return EmbeddedBackend()
     # The wheel and its threads concern only those who drive on it.
     from skidpad.simulation.carla.backend import CarlaBackend

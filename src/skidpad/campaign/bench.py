@@ -6,23 +6,24 @@ For `skidpad bench tick`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import wraps
 from time import process_time_ns
 from typing import Any, TypeVar
 
 import cv2
 import numpy as np
+from msgspec import structs
 
-from skidpad.campaign.cells import Cell, Driver
-from skidpad.campaign.drive import prepare
-from skidpad.core.vocabulary import SensorLevel, Supervision
+from skidpad.campaign.cast import driver_of, stage_of
+from skidpad.campaign.drive import Moment, Sink, loop
+from skidpad.campaign.run import log_of
+from skidpad.core.run import AdasDriver, Render, RunSpec
+from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather
-from skidpad.recording.ticks import TickLog
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.sensing import Pixels
 from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import load_profile
 
 F = TypeVar("F", bound=Callable[..., Any])
 WARM_UP = 2.0  # s simulated before the clock counts: kernels load, caches fill
@@ -57,18 +58,15 @@ class Row:
     target: float  # ms, for the mean
 
 
-def bench_cell(
-    configuration: int, weather: str, level: SensorLevel, render_all: bool = False
-) -> Cell:
-    """A cell of the matrix as users run it: figure8, 20 vehicles, recommended settings."""
-    return Cell(
-        driver=Driver(label=str(configuration), functions=functions_of(configuration)),
+def bench_run(
+    configuration: int, weather: str, level: SensorLevel, render: Render = Render.NEEDED
+) -> RunSpec:
+    """A run of the matrix as users run it: figure8, 20 vehicles, recommended settings."""
+    return RunSpec(
+        driver=AdasDriver(label=str(configuration), functions=functions_of(configuration)),
         weather=find_weather(weather),
-        seed=1,
-        profile="recommended",
-        settings=load_profile("recommended"),
-        level=level,
-        render_all=render_all,
+        sensors=level,
+        render=render,
     )
 
 
@@ -79,17 +77,17 @@ def tick_costs(seconds: float = SECONDS) -> Iterator[Row]:
             for weather in WEATHERS:
                 plain = TARGET_LIGHTS if configuration >= LIGHTS_FROM else TARGET_PLAIN
                 target = plain if level is SensorLevel.PIXELS else TARGET_OBJECTS
-                cell = bench_cell(configuration, weather, level)
-                yield Row(configuration, weather, level.value, warm_cost(cell, seconds), target)
+                spec = bench_run(configuration, weather, level)
+                yield Row(configuration, weather, level.value, warm_cost(spec, seconds), target)
     for weather in WEATHERS:
-        cell = bench_cell(2, weather, SensorLevel.PIXELS, render_all=True)
-        yield Row(2, weather, "all images", warm_cost(cell, seconds), TARGET_ALL_IMAGES)
+        spec = bench_run(2, weather, SensorLevel.PIXELS, render=Render.ALL)
+        yield Row(2, weather, "all images", warm_cost(spec, seconds), TARGET_ALL_IMAGES)
 
 
-def warm_cost(cell: Cell, seconds: float) -> TickCost:
+def warm_cost(spec: RunSpec, seconds: float) -> TickCost:
     """The cost of a drive whose kernels are compiled."""
-    tick_cost(cell, seconds=COMPILE_SECONDS)
-    return tick_cost(cell, seconds)
+    tick_cost(spec, seconds=COMPILE_SECONDS)
+    return tick_cost(spec, seconds)
 
 
 class Meter:
@@ -112,38 +110,48 @@ class Meter:
         return wrapper  # type: ignore[return-value]
 
 
-def tick_cost(cell: Cell, seconds: float = 60.0) -> TickCost:
-    """Drive `cell` for some simulated seconds on the embedded simulator and measure."""
+class Spans(Sink):
+    """CPU time from moment to moment; after `warm` of them the meter begins anew."""
+
+    def __init__(self, meter: Meter, warm: int) -> None:
+        self.meter, self.warm = meter, warm
+        self.stamps: list[int] = []
+
+    def see(self, moment: Moment) -> None:
+        """One more."""
+        del moment
+        if len(self.stamps) == self.warm:
+            self.meter.total.clear()
+        self.stamps.append(process_time_ns())
+
+    @property
+    def spans(self) -> np.ndarray[Any, Any]:
+        """ns per tick after the warm-up."""
+        return np.diff(self.stamps[self.warm :])
+
+
+def tick_cost(spec: RunSpec, seconds: float = 60.0) -> TickCost:
+    """Drive `spec` for some simulated seconds on the embedded simulator and measure."""
     cv2.setNumThreads(1)  # as in the workers (decision X-10): helpers that wait would count, too
     meter = Meter()
-    ready = prepare(replace(cell, duration=WARM_UP + seconds))
+    spec = structs.replace(spec, duration=WARM_UP + seconds)
+    stage = stage_of(spec)
+    driver: Any = driver_of(spec, stage)
+    supervisor: Any = stage.supervisor
+    log: Any = log_of(spec, stage)
     backend = EmbeddedBackend()
-    frame = backend.reset(ready.setup, cell.seed)
+    frame = backend.reset(stage.setup, spec.seed)
     _instrument(backend, meter)
-    tick = meter.timed("stack", ready.stack.tick)
-    observe = meter.timed("supervisor", ready.supervisor.observe)
-    act = meter.timed("supervisor", ready.supervisor.act)
-    warm, count = round(WARM_UP / ready.setup.dt), round(seconds / ready.setup.dt)
-    log = TickLog(backend.truth().table, ready.header, cell.weather.name, warm + count)
-    append = meter.timed("log", log.append)
-    spans = np.zeros(warm + count)
-    for k in range(warm + count):
-        if k == warm:
-            meter.total.clear()
-        begin = process_time_ns()
-        truth = backend.truth()
-        phase = observe(truth)
-        if phase is not Supervision.NONE:
-            frame = replace(frame, supervision=phase)
-        command = tick(frame)
-        action = act(command, ready.stack.report)
-        append(truth, frame, command, ready.stack.report, phase)
-        if action.relocate is not None:
-            backend.relocate(action.relocate.pose, action.relocate.v)
-        frame = backend.step(action.command)
-        spans[k] = process_time_ns() - begin
+    driver.drive = meter.timed("stack", driver.drive)
+    supervisor.observe = meter.timed("supervisor", supervisor.observe)
+    supervisor.act = meter.timed("supervisor", supervisor.act)
+    log.see = meter.timed("log", log.see)
+    clock = Spans(meter, round(WARM_UP / stage.setup.dt))
+    failure = loop(backend, frame, driver, supervisor, stage.script, (log, clock))
     backend.close()
-    return _summary(spans[warm:], meter.total, not cell.render_all)
+    if failure is not None:
+        raise failure
+    return _summary(clock.spans, meter.total, spec.render is Render.NEEDED)
 
 
 def _instrument(backend: EmbeddedBackend, meter: Meter) -> None:

@@ -6,7 +6,7 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from skidpad.campaign.bench import SECONDS, bench_cell, warm_cost
+from skidpad.campaign.bench import SECONDS, bench_run, warm_cost
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.matrix import RECIPE, warm_up
 from skidpad.campaign.pool import local, warm
@@ -22,7 +22,7 @@ TARGET = 9.0  # min, without installation and compilation (decision M-16)
 def estimated_minutes(seconds: float = SECONDS) -> float:
     """From the mean tick of every configuration, in clear weather and in rain at night."""
     costs = [
-        warm_cost(bench_cell(n, weather, SensorLevel.PIXELS), seconds).mean
+        warm_cost(bench_run(n, weather, SensorLevel.PIXELS), seconds).mean
         for n in CONFIGURATIONS
         for weather in ("clear-noon", "rain-night")
     ]
@@ -32,7 +32,7 @@ def estimated_minutes(seconds: float = SECONDS) -> float:
 def driven_minutes() -> float:
     """Wall time of all 30 runs by the campaign's own workers; results are thrown away."""
     cells = [
-        bench_cell(n, weather, SensorLevel.PIXELS)
+        bench_run(n, weather, SensorLevel.PIXELS)
         for weather in preset_groups()["matrix"]
         for n in CONFIGURATIONS
     ]

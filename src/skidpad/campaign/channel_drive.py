@@ -21,12 +21,12 @@ import numpy as np
 
 from skidpad import __version__
 from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
-from skidpad.campaign.cells import BackendChoice
 from skidpad.campaign.channel_outcomes import Referee
 from skidpad.campaign.channel_routes import DrivenRoute
 from skidpad.campaign.channel_world import Segment, segment_of
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
 from skidpad.core.errors import ConfigError, require_range
+from skidpad.core.run import BackendChoice
 from skidpad.core.setup import DT
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import ActorKind

@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import partial
+from operator import attrgetter
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from skidpad import __version__
-from skidpad.campaign.grip_cells import GripCell
+from skidpad.campaign.grip_cells import Cross, cross, scenario_of, template
 from skidpad.campaign.grip_shown import CELL, shown, write_stopping
 from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.campaign.runfolder import (
@@ -22,6 +22,7 @@ from skidpad.campaign.runfolder import (
     write_run,
 )
 from skidpad.campaign.worker import Job, Runner
+from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.campaigns import RUNS
 from skidpad.recording.grip import (
@@ -34,91 +35,61 @@ from skidpad.recording.grip import (
 )
 from skidpad.recording.logfiles import TICKS, log_hash
 from skidpad.recording.results import read_results
-
-if TYPE_CHECKING:
-    from skidpad.campaign.play import Played
+from skidpad.scenarios.variation import CutIn
+from skidpad.stack.settings import grip_of, settings_of
 
 
 def warm_up() -> None:
     """Compile every kernel that a run may need."""
-    from skidpad.campaign.grip_cells import Friction
+    from skidpad.campaign.run import run
     from skidpad.physics.presets import preset
 
-    for scenario in ("front_accident", "ghost_cut_in"):
-        for friction in Friction:
-            play_cell(
-                GripCell(scenario=scenario, weather=preset("icy_30"), friction=friction, seed=0)
-            )
+    varied = Cross(scenarios=("front_accident", "ghost_cut_in"), weather=(preset("icy_30"),))
+    for cell in cross(template(), varied, range(1)):
+        run(cell)
 
 
-def play_cell(cell: GripCell, folder: Path | None = None) -> Played:
-    """Play the scenario of a cell; returns what is left behind."""
-    from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
-    from skidpad.campaign.play import Play, play
-    from skidpad.scenarios.variation import drawn_parameters, drawn_skill, scenario_file
-
-    keep_server(cell.backend)
-    return play(
-        Play(
-            file=scenario_file(cell.scenario),
-            label=cell.controller,
-            weather=cell.weather,
-            seed=cell.seed,
-            parameters=drawn_parameters(cell.scenario, cell.seed, cell.cutin),
-            skill=drawn_skill(cell.scenario, cell.seed),
-            controller=cell.controller,
-            config=cell.config,
-            profile=cell.profile,
-            settings=cell.settings,
-            grip=cell.grip,
-            mu_ref=cell.mu_ref,
-            level=cell.level,
-            actors=cell.actors,
-            overlay=cell.overlay,
-        ),
-        make_backend(cell.backend, WATCHDOG),
-        folder,
-    )
-
-
-def drive_one(out: Path, cell: GripCell, *, keep: bool = False) -> Driven[GripKey, GripMetrics]:
+def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey, GripMetrics]:
     """In a worker: drive a cell and write its series, with `keep` its log too."""
+    from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
+    from skidpad.campaign.run import run
     from skidpad.evidence.grip.scores import grip_metrics, grip_series
     from skidpad.physics.grip import friction_ratio
 
     folder, watch = fresh_folder(out, cell.name), Stopwatch()
-    played = play_cell(cell, folder if keep else None)
-    log, error = played.run.log, played.run.error
+    keep_server(cell.backend)
+    backend = make_backend(cell.backend, WATCHDOG)
+    driven = run(cell, backend=backend, folder=folder if keep else None)
     metrics = grip_metrics(
-        log,
-        played.outcome,
-        triggered=played.triggered,
-        route_length=played.route_length,
-        ratio=friction_ratio(cell.weather, cell.grip),
+        driven.log,
+        driven.outcome,
+        triggered=driven.triggered,
+        route_length=driven.route_length,
+        ratio=friction_ratio(cell.weather, grip_of(cell)),
     )
-    write_series(series_path(out, cell.cell, cell.seed), grip_series(log))
-    if keep or error:
-        write_config(folder, cell.resolved())
-        write_run(folder, log, error)
+    write_series(series_path(out, cell.cell, cell.seed), grip_series(driven.log))
+    if keep or driven.error:
+        write_config(folder, cell.to_plain())
+        write_run(folder, driven.log, driven.error)
     return Driven(
-        key=grip_key(cell, played.outcome, log_hash(log)),
+        key=grip_key(cell, driven.outcome, log_hash(driven.log)),
         metrics=metrics,
         timing=watch.timing(),
-        error=last_line(error),
+        error=last_line(driven.error),
     )
 
 
-def grip_key(cell: GripCell, outcome: Outcome, log_hash: str | None = None) -> GripKey:
+def grip_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> GripKey:
     """The identifying columns of a cell's row."""
     return GripKey(
-        scenario=cell.scenario,
+        scenario=scenario_of(cell).file,
         weather=cell.weather.name,
         friction=cell.friction.value,
         seed=cell.seed,
-        cutin=cell.cutin.value,
-        controller=cell.controller,
-        sensors=cell.level.value,
-        model=cell.model.value,
+        cutin=scenario_of(cell).variant or CutIn.FIXED.value,
+        controller=cell.driver.label,
+        sensors=cell.sensors.value,
+        model=settings_of(cell).grip.value,
         overlay=cell.overlay,
         outcome=outcome.value,
         version=__version__,
@@ -126,23 +97,24 @@ def grip_key(cell: GripCell, outcome: Outcome, log_hash: str | None = None) -> G
     )
 
 
-def finish(cells: Sequence[GripCell], out: Path, runner: Runner) -> None:
+def finish(cells: Sequence[RunSpec], out: Path, runner: Runner) -> None:
     """Keep the logs of what the report shows (a drive is the same whenever it is driven)."""
     wanted = set(shown(read_results(out)).select(*CELL, "seed").iter_rows())
     work = partial(drive_one, out, keep=True)
     jobs = [
         Job(c.name, work, c, c.deadline_s)
         for c in cells
-        if (c.scenario, c.cutin.value, c.overlay, c.weather.name, c.friction.value, c.seed)
-        in wanted
+        if attrgetter(*CELL, "seed")(grip_key(c, Outcome.COMPLETED)) in wanted
         and not (out / RUNS / c.name / TICKS).exists()
     ]
     for _ in runner(jobs):
         pass
-    write_stopping(out, list({c.weather.name: c.weather for c in cells}.values()), cells[0].mu_ref)
+    write_stopping(
+        out, list({c.weather.name: c.weather for c in cells}.values()), settings_of(cells[0]).mu_ref
+    )
 
 
-def recipe(keep_all: bool = False) -> Recipe[GripCell, GripKey, GripMetrics]:
+def recipe(keep_all: bool = False) -> Recipe[RunSpec, GripKey, GripMetrics]:
     """keep_all: the whole log of every run."""
     return Recipe(
         command="grip",

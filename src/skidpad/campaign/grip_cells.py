@@ -1,110 +1,87 @@
-"""The cells of the friction campaign: scenario, weather, friction, seed. All of it is data."""
+"""The runs of the friction campaign: scenario, weather, friction, seed."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
-from enum import Enum
+from dataclasses import dataclass
+from functools import cache
 from typing import Any
 
-from skidpad.campaign.cells import FIRST_SEED, BackendChoice, BackendKind
+from msgspec import structs
+
+from skidpad.campaign.cells import FIRST_SEED
+from skidpad.core.errors import ConfigError
+from skidpad.core.run import AdasDriver, Friction, RunSpec, Scenario
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.core.weather import Weather
-from skidpad.scenarios.scene import Mode
-from skidpad.scenarios.variation import CUT_IN, CutIn
+from skidpad.scenarios.variation import CUT_IN, CutIn, drawn_parameters, drawn_skill
+from skidpad.stack.configurations import functions_of
 from skidpad.stack.settings import Settings
 
-DEADLINE_S = 120.0  # wall time after which a run counts as hanging
-DEADLINE_SLOW_S = 900.0  # with pixels, or over a network
-
-
-class Friction(str, Enum):
-    """The switch of B-004."""
-
-    ORIGINAL = "original"  # weather is seen, tyres know nothing of it
-    REDUCED = "reduced"
+DURATION = 120.0  # s, unless the file ends before
+STACK = "stack"  # what results call our own stack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class GripCell:
-    """One run."""
+class Cross:
+    """What a campaign varies."""
 
-    scenario: str
-    weather: Weather
-    friction: Friction
-    seed: int
-    cutin: CutIn = CutIn.FIXED
-    model: GripModel = GripModel.STATISTICAL
-    mu_ref: float = 0.9
-    controller: str = "stack"
-    config: int = 2
-    profile: str = "recommended"
-    settings: Settings = field(default_factory=Settings)
-    level: SensorLevel = SensorLevel.OBJECTS
-    actors: Mode = Mode.PHYSICAL
-    overlay: bool = False
-    backend: BackendChoice = field(default_factory=BackendChoice)
-
-    @property
-    def cell(self) -> str:
-        """Name without the seed."""
-        variant = "" if self.cutin is CutIn.FIXED else f"-{self.cutin.value}"
-        drops = "-drops" if self.overlay else ""
-        return f"{self.scenario}{variant}{drops}_{self.weather.name}_{self.friction.value}"
-
-    @property
-    def name(self) -> str:
-        """Name of the run and of its folder."""
-        return f"{self.cell}-{self.seed:06d}"
-
-    @property
-    def grip(self) -> GripModel:
-        """What acts on the tyres."""
-        return self.model if self.friction is Friction.REDUCED else GripModel.NONE
-
-    @property
-    def deadline_s(self) -> float:
-        """Wall time after which the run counts as hanging."""
-        quick = self.level is SensorLevel.OBJECTS and self.backend.kind is BackendKind.EMBEDDED
-        return DEADLINE_S if quick else DEADLINE_SLOW_S
-
-    def resolved(self) -> dict[str, Any]:
-        """Everything that decides the run, as plain data."""
-        plain = {
-            name: value.value if isinstance(value := getattr(self, name), Enum) else value
-            for name in self.__dataclass_fields__
-        }
-        return plain | {
-            "weather": asdict(self.weather),
-            "settings": self.settings.as_plain(),
-            "backend": self.backend.resolved(),
-        }
+    scenarios: Sequence[str]
+    weather: Sequence[Weather]
+    frictions: Sequence[Friction] = tuple(Friction)
+    cutins: Sequence[CutIn] = (CutIn.FIXED,)
+    overlays: Sequence[bool] = (False,)
 
 
-def cross(
-    template: GripCell,
-    scenarios: Sequence[str],
-    weather: Sequence[Weather],
-    frictions: Sequence[Friction],
-    cutins: Sequence[CutIn],
-    seeds: range,
-    overlays: Sequence[bool] | None = None,
-) -> list[GripCell]:
-    """Every combination; the rest as in `template`. Seeds vary slowest: pairs come early.
+def template(configuration: int = 2, **changes: Any) -> RunSpec:
+    """A run of the catalogue on objects, by our stack; `changes` are fields of it."""
+    driver = AdasDriver(label=STACK, functions=functions_of(configuration))
+    base = RunSpec(
+        driver=driver,
+        course=Scenario(file=CUT_IN),
+        duration=DURATION,
+        settings=Settings(grip=GripModel.STATISTICAL).as_plain(),
+        sensors=SensorLevel.OBJECTS,
+    )
+    return structs.replace(base, **changes)
 
-    overlays: drops on the cameras or not; None: as in the template.
-    """
-    from dataclasses import replace
 
+@cache
+def drawn_course(scenario: str, seed: int, cutin: CutIn) -> Scenario:
+    """The scenario with what a seed varies; the same for every weather and friction (X-8)."""
+    return Scenario(
+        file=scenario,
+        parameters=dict(drawn_parameters(scenario, seed, cutin)),
+        variant="" if cutin is CutIn.FIXED else cutin.value,
+        skill=drawn_skill(scenario, seed),
+    )
+
+
+def cross(template: RunSpec, varied: Cross, seeds: range) -> list[RunSpec]:
+    """Every combination; the rest as in `template`. Seeds vary slowest: pairs come early."""
     return [
-        replace(template, scenario=s, weather=w, friction=f, cutin=c, seed=seed, overlay=drops)
+        structs.replace(
+            template,
+            course=structs.replace(drawn_course(s, seed, c), actors=scenario_of(template).actors),
+            weather=w,
+            friction=f,
+            seed=seed,
+            overlay=drops,
+        )
         for seed in seeds
-        for s in scenarios
-        for c in (cutins if s == CUT_IN else (CutIn.FIXED,))
-        for w in weather
-        for drops in ((template.overlay,) if overlays is None else overlays)
-        for f in frictions
+        for s in varied.scenarios
+        for c in (varied.cutins if s == CUT_IN else (CutIn.FIXED,))
+        for w in varied.weather
+        for drops in varied.overlays
+        for f in varied.frictions
     ]
+
+
+def scenario_of(cell: RunSpec) -> Scenario:
+    """The scenario that a run of this campaign plays."""
+    if not isinstance(cell.course, Scenario):
+        raise ConfigError(f"{cell.name} plays no scenario")
+    return cell.course
 
 
 def seeds(first: int, n: int) -> range:

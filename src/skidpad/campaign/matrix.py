@@ -5,23 +5,24 @@ from __future__ import annotations
 from pathlib import Path
 
 from skidpad import __version__
-from skidpad.campaign.cells import Cell
 from skidpad.campaign.pace import Pace
 from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.campaign.runfolder import Stopwatch, fresh_folder, last_line, write_config, write_run
+from skidpad.core.errors import ConfigError
+from skidpad.core.run import Roads, RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import LeadDefinition, MetricSettings
 from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics, RunKey
-from skidpad.stack.settings import LaneTruth
+from skidpad.stack.settings import LaneTruth, settings_of
 
 TIMES_OF_DAY = ("sunrise", "noon", "night")
 
 
 def warm_up() -> None:
     """Compile every kernel that a run may need, by driving a moment of each kind."""
-    from skidpad.campaign.drive import drive
+    from skidpad.campaign.run import drive
     from skidpad.evidence.drive.metrics import run_metrics
     from skidpad.roads.bundled import load_map
 
@@ -46,43 +47,44 @@ def see_all() -> None:
     LampCamera(specs).look(suite.observe(0, states, {}).images)
 
 
-def drive_one(out: Path, cell: Cell) -> Driven[RunKey, Metrics]:
+def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
     """In a worker: drive a cell and write its folder."""
     # numba and friends are imported only where they are needed, not in the parent.
     from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
-    from skidpad.campaign.drive import run_cell
+    from skidpad.campaign.run import run
     from skidpad.evidence.drive.metrics import run_metrics
     from skidpad.roads.bundled import load_map
 
     folder = fresh_folder(out, cell.name)
-    write_config(folder, cell.resolved())
+    write_config(folder, cell.to_plain())
     watch, pace = Stopwatch(), Pace(DT)
     keep_server(cell.backend)
     backend = make_backend(cell.backend, WATCHDOG)
-    run = run_cell(cell, backend=backend, folder=folder, watchers=(pace,))
-    timing = watch.timing(len(run.log) * DT, pace.slow_pct)
-    digest = write_run(folder, run.log, run.error)
+    driven = run(cell, backend=backend, folder=folder, sinks=(pace,))
+    timing = watch.timing(len(driven.log) * DT, pace.slow_pct)
+    digest = write_run(folder, driven.log, driven.error)
     metrics = Metrics()
-    if len(run.log):  # a stack may fail before it has answered once
-        metrics = run_metrics(run.log, load_map(cell.map), metric_settings(cell))
+    if len(driven.log):  # a stack may fail before it has answered once
+        metrics = run_metrics(driven.log, load_map(roads_of(cell).map), metric_settings(cell))
     return Driven(
-        key=run_key(cell, run.outcome, digest),
+        key=run_key(cell, driven.outcome, digest),
         metrics=metrics,
         timing=timing,
-        error=last_line(run.error),
+        error=last_line(driven.error),
     )
 
 
-def metric_settings(cell: Cell) -> MetricSettings:
+def metric_settings(cell: RunSpec) -> MetricSettings:
     """The definitions that the cell's profile asks for (D-102, D-103)."""
-    same_road = cell.settings.lane_truth is LaneTruth.SAME_ROAD
+    same_road = settings_of(cell).lane_truth is LaneTruth.SAME_ROAD
     return MetricSettings(
         lead=LeadDefinition.SAME_ROAD_AND_LANE if same_road else LeadDefinition.AHEAD_ON_LANE
     )
 
 
-def run_key(cell: Cell, outcome: Outcome, log_hash: str | None = None) -> RunKey:
+def run_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> RunKey:
     """The identifying columns of a cell's row."""
+    settings = settings_of(cell)
     return RunKey(
         config=cell.driver.label,
         weather=cell.weather.name,
@@ -90,14 +92,21 @@ def run_key(cell: Cell, outcome: Outcome, log_hash: str | None = None) -> RunKey
         time_of_day=time_of_day(cell.weather),
         seed=cell.seed,
         profile=cell.profile,
-        map=cell.map,
-        sensors=cell.level.value,
-        grip=cell.settings.grip.value,
-        range=cell.settings.range.value,
+        map=roads_of(cell).map,
+        sensors=cell.sensors.value,
+        grip=settings.grip.value,
+        range=settings.range.value,
         outcome=outcome.value,
         version=__version__,
         log_hash=log_hash,
     )
+
+
+def roads_of(cell: RunSpec) -> Roads:
+    """The roads that a run of the matrix is driven on."""
+    if not isinstance(cell.course, Roads):
+        raise ConfigError(f"{cell.name} is no run of the matrix")
+    return cell.course
 
 
 def time_of_day(weather: Weather) -> str:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from time import perf_counter, sleep
 
-from skidpad.core.frames import SensorFrame
-from skidpad.core.states import StackReport, WorldTruth
+from skidpad.campaign.drive import Moment, Sink
 
 SLOW = 0.9  # real-time factor below which a tick counts as slow (A-246)
 
 
-class Pace:
+class Pace(Sink):
     """Wall time of every tick."""
 
     def __init__(self, dt: float) -> None:
@@ -18,9 +17,9 @@ class Pace:
         self.slow = self.ticks = 0
         self.last = perf_counter()
 
-    def see(self, frame: SensorFrame, truth: WorldTruth, report: StackReport | None) -> None:
+    def see(self, moment: Moment) -> None:
         """One tick is over."""
-        del frame, truth, report
+        del moment
         now = perf_counter()
         self.slow += self.dt < SLOW * (now - self.last)
         self.ticks += 1
@@ -32,13 +31,13 @@ class Pace:
         return 100.0 * self.slow / max(self.ticks, 1)
 
 
-class Brake:
+class Brake(Sink):
     """Makes every tick take `seconds` longer: for showing that pace changes nothing (F-25)."""
 
     def __init__(self, seconds: float) -> None:
         self.seconds = seconds
 
-    def see(self, frame: SensorFrame, truth: WorldTruth, report: StackReport | None) -> None:
+    def see(self, moment: Moment) -> None:
         """Wait."""
-        del frame, truth, report
+        del moment
         sleep(self.seconds)

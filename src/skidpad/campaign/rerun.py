@@ -10,27 +10,19 @@ from pathlib import Path
 from typing import Any
 
 import cv2
-import msgspec
 import numpy as np
-import yaml
 from PIL import Image
 
-from skidpad.campaign.backends import make_backend
-from skidpad.campaign.cells import Cell, Driver
-from skidpad.campaign.drive import loop, prepare
-from skidpad.campaign.runfolder import CONFIG
+from skidpad.campaign.backends import keep_server
+from skidpad.campaign.drive import Moment, Sink
+from skidpad.campaign.run import run as drive_again
+from skidpad.campaign.stored import read_run
 from skidpad.campaign.views import SIZE, twelve_views
-from skidpad.core.errors import ConfigError, FileError, OutputError
-from skidpad.core.frames import SensorFrame
+from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
-from skidpad.core.states import StackReport, WorldTruth
-from skidpad.core.vocabulary import SensorLevel
-from skidpad.core.weather import Weather
+from skidpad.core.states import StackReport
 from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.recording.runlog import RunLog
-from skidpad.stack.configurations import parse_functions
-from skidpad.stack.loading import GuardedStack
-from skidpad.stack.settings import Settings
 
 PICTURES = 40  # at most this many PNG files of a stretch when no film is asked for
 
@@ -48,24 +40,21 @@ class Rerun:
 def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None = None) -> Rerun:
     """Drive the run in folder `run` again up to `end_s`, keeping what happens from `begin_s` on."""
     stored = read_log(run)
-    cell = read_cell(run)
+    spec = read_run(run)
     last = float(stored.t[-1])
     if not 0.0 <= begin_s < end_s:
         raise ConfigError(f"--from {begin_s:g} must be >= 0 and below --to {end_s:g}")
     if begin_s > last:
         raise ConfigError(f"--from {begin_s:g} lies after the end of the run at {last:g} s")
     end_s = min(end_s, last + DT)
-    ready = prepare(replace(cell, duration=end_s))
-    watcher = Closely(begin_s, end_s, out, film, ready.stack)
-    backend = make_backend(cell.backend)
+    closely = Closely(begin_s, end_s, out, film)
+    keep_server(spec.backend)
     try:
-        again = loop(backend, ready, (watcher,))
+        again = drive_again(spec, sinks=(closely,), ticks=round(end_s / DT)).log
     finally:
-        backend.close()
-        watcher.close()
-    ticks = len(again.log)
-    same = log_hash(again.log) == log_hash(first_ticks(stored, ticks))
-    return Rerun(same, tuple(watcher.pictures), film, tuple(watcher.trace))
+        closely.close()
+    same = log_hash(again) == log_hash(first_ticks(stored, len(again)))
+    return Rerun(same, tuple(closely.pictures), film, tuple(closely.trace))
 
 
 def first_ticks(log: RunLog, n: int) -> RunLog:
@@ -91,75 +80,39 @@ def first_ticks(log: RunLog, n: int) -> RunLog:
     )
 
 
-def read_cell(run: Path) -> Cell:
-    """The cell that a run's config.yaml describes."""
-    path = run / CONFIG
-    try:
-        plain = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FileError(f"cannot read {path}: {error.strerror}") from error
-    try:
-        return Cell(
-            driver=Driver(
-                label=plain["driver"],
-                functions=parse_functions(",".join(plain["functions"])),
-                stack=plain["stack"],
-                options=plain["options"],
-            ),
-            weather=msgspec.convert(plain["weather"], Weather),
-            seed=plain["seed"],
-            profile=plain["profile"],
-            settings=Settings().with_values(plain["settings"]),
-            map=plain["map"],
-            duration=plain["duration"],
-            traffic=plain["traffic"],
-            vehicles=plain["vehicles"],
-            allow_fewer=plain["allow_fewer"],
-            level=SensorLevel(plain["sensors"]),
-            render_all=plain["render"] == "all",
-        )
-    except (KeyError, TypeError, ValueError) as error:
-        raise FileError(f"{path} does not describe a run: {error!r}") from error
-
-
-class Closely:
+class Closely(Sink):
     """Watches a stretch: pictures or a film of all views, and the trace of tiers."""
 
-    def __init__(
-        self, begin_s: float, end_s: float, out: Path, film: Path | None, stack: GuardedStack
-    ) -> None:
-        """stack: who drives, asked for its mode in words (A-139)."""
-        self.begin, self.out, self.stack = begin_s, out, stack
+    def __init__(self, begin_s: float, end_s: float, out: Path, film: Path | None) -> None:
+        self.begin_s, self.out = begin_s, out
         self.every = max(1, round((end_s - begin_s) / DT / PICTURES))
         self.pictures: list[Path] = []
         self.trace: list[str] = []
         self._before: tuple[Any, Any] | None = None
         self._film = None if film is None else open_film(film)
 
-    def see(self, frame: SensorFrame, truth: WorldTruth, report: StackReport | None) -> None:
+    def see(self, moment: Moment) -> None:
         """Keep this moment if it lies in the stretch."""
-        t = frame.tick * DT
-        if t < self.begin - 1e-9:
+        t = moment.frame.tick * DT
+        if t < self.begin_s - 1e-9:
             return
-        self._trace(t, report)
+        self._trace(t, moment.report, moment.driver.mode)
         if self._film is not None:
-            picture = twelve_views(frame, truth, report, DT, self.stack.mode)
-            self._film.write(np.ascontiguousarray(picture[..., ::-1]))
-        elif frame.tick % self.every == 0:
+            self._film.write(np.ascontiguousarray(twelve_views(moment, DT)[..., ::-1]))
+        elif moment.frame.tick % self.every == 0:
             self.out.mkdir(parents=True, exist_ok=True)
             path = self.out / f"{t:07.2f}s.png"
-            picture = twelve_views(frame, truth, report, DT, self.stack.mode)
-            Image.fromarray(picture).save(path)
+            Image.fromarray(twelve_views(moment, DT)).save(path)
             self.pictures.append(path)
 
-    def _trace(self, t: float, report: StackReport | None) -> None:
-        if report is None or (report.tier, report.status) == self._before:
+    def _trace(self, t: float, report: StackReport, mode: str) -> None:
+        if (report.tier, report.status) == self._before:
             return
         self._before = (report.tier, report.status)
         tier = report.tier.name if report.tier is not None else "-"
         status = report.status.name if report.status is not None else "-"
         distance = f", {report.distance:.1f} m" if report.distance is not None else ""
-        self.trace.append(f"{t:7.2f} s  {self.stack.mode or tier:<36} {status}{distance}")
+        self.trace.append(f"{t:7.2f} s  {mode or tier:<36} {status}{distance}")
 
     def close(self) -> None:
         """Finish the film."""

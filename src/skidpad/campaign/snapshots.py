@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
+from skidpad.campaign.drive import Moment, Sink
 from skidpad.core.frames import SensorFrame
-from skidpad.core.states import StackReport, WorldTruth
 from skidpad.recording.campaigns import SNAPSHOTS
 from skidpad.recording.files import output_error
 
@@ -16,7 +16,7 @@ FRONT, TOP = "rgb_front", "rgb_top"
 MARGIN = 12  # px
 
 
-class Snapshots:
+class Snapshots(Sink):
     """Writes PNG files named by configuration, weather and time; without a folder it does nothing."""
 
     def __init__(self, folder: Path | None, driver: str, weather: str, dt: float) -> None:
@@ -25,11 +25,10 @@ class Snapshots:
         self.stem, self.dt = f"{name}_{weather}", dt
         self.paths: list[Path] = []
 
-    def see(self, frame: SensorFrame, truth: WorldTruth, report: StackReport | None) -> None:
+    def see(self, moment: Moment) -> None:
         """Take a picture when the ego touches something."""
-        del report
-        if truth.contacts:
-            self.take(frame)
+        if moment.truth.contacts:
+            self.take(moment.frame)
 
     def take(self, frame: SensorFrame) -> None:
         """A picture of this moment, if there are cameras."""

@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 import polars as pl
+from msgspec import structs
 
-from skidpad.campaign.cells import Cell, Driver, seeds
-from skidpad.campaign.drive import run_cell
-from skidpad.campaign.matrix import warm_up
+from skidpad.campaign.cells import seeds
+from skidpad.campaign.matrix import roads_of, warm_up
 from skidpad.campaign.pace import Brake
 from skidpad.campaign.pool import local
+from skidpad.campaign.run import run
 from skidpad.campaign.worker import Job
 from skidpad.core.errors import SkidpadError, require_choice
 from skidpad.core.frames import RadarPoints, SensorFrame
 from skidpad.core.randomness import stream
+from skidpad.core.run import AdasDriver, RunSpec, StackDriver
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import SensorLevel, Tier
@@ -42,9 +44,9 @@ DROPOUT_S = 1.0  # length of one
 
 @dataclass(frozen=True, slots=True)
 class Variant:
-    """One arm of a study: a cell, columns that name it, and what is special about it."""
+    """One arm of a study: a run, columns that name it, and what is special about it."""
 
-    cell: Cell
+    run: RunSpec
     labels: Mapping[str, Any]
     dropout: float = 0.0
     slow_s: float = 0.0
@@ -76,37 +78,36 @@ class Blinking:
         return command
 
 
-def base_cell(
+def base_run(
     configuration: int, weather: str = "clear-noon", settings: Mapping[str, Any] | None = None
-) -> Cell:
-    """An object-level cell of the profile `recommended`."""
-    return Cell(
-        driver=Driver(label=str(configuration), functions=functions_of(configuration)),
+) -> RunSpec:
+    """An object-level run of the profile `recommended`."""
+    return RunSpec(
+        driver=AdasDriver(label=str(configuration), functions=functions_of(configuration)),
         weather=find_weather(weather),
-        seed=0,
-        profile="recommended",
-        settings=load_profile("recommended", settings),
-        level=SensorLevel.OBJECTS,
+        settings=load_profile("recommended", settings).as_plain(),
+        sensors=SensorLevel.OBJECTS,
     )
 
 
 def speed_and_dropout(n: int) -> list[Variant]:
     """F-08: cruise target x share of time without any sensing, configuration 2."""
-    cell = base_cell(2)
+    base = base_run(2)
     variants = []
     for seed in seeds(n):
         for target in TARGETS_KMH:
             for share in DROPOUT_SHARES:
                 options = {
                     "configuration": 2,
-                    "profile": cell.profile,
+                    "profile": base.profile,
                     "cruise_kmh": target,
                     "dropout": share,
                     "seed": seed,
                 }
-                driver = Driver(label="2", stack="skidpad.campaign.study:Blinking", options=options)
+                driver = StackDriver("skidpad.campaign.study:Blinking", options, name="2")
                 labels = {"target_kmh": target, "dropout_injected": share}
-                variants.append(Variant(replace(cell, driver=driver, seed=seed), labels))
+                spec = structs.replace(base, driver=driver, seed=seed)
+                variants.append(Variant(spec, labels))
     return variants
 
 
@@ -114,7 +115,7 @@ def persistence(n: int) -> list[Variant]:
     """F-17: holding a lost lead for 5 s, against the radar cascade."""
     arms: dict[str, dict[str, Any]] = {"cascade": {}, "safety_persist": {"safety_persist": True}}
     return [
-        Variant(replace(base_cell(2, settings=values), seed=seed), {"variant": name})
+        Variant(structs.replace(base_run(2, settings=values), seed=seed), {"variant": name})
         for seed in seeds(n)
         for name, values in arms.items()
     ]
@@ -127,7 +128,7 @@ def radar_filters(n: int) -> list[Variant]:
         "corridor": {"radar_corridor": "parabola"},
     }
     return [
-        Variant(replace(base_cell(2, settings=values), seed=seed), {"variant": name})
+        Variant(structs.replace(base_run(2, settings=values), seed=seed), {"variant": name})
         for seed in seeds(n)
         for name, values in arms.items()
     ]
@@ -138,7 +139,12 @@ def preliminary(n: int) -> list[Variant]:
     same = {"grip": "none", "range": "none", "mu_ref": 1.5, "camera": False}
     return [
         Variant(
-            replace(base_cell(2), seed=seed, profile=profile, settings=load_profile(profile, same)),
+            structs.replace(
+                base_run(2),
+                seed=seed,
+                profile=profile,
+                settings=load_profile(profile, same).as_plain(),
+            ),
             {"variant": name},
         )
         for seed in seeds(n)
@@ -148,9 +154,9 @@ def preliminary(n: int) -> list[Variant]:
 
 def pace(n: int) -> list[Variant]:
     """F-25: the same runs, each tick 1 ms slower."""
-    cell = replace(base_cell(4, "rain-night"), duration=100.0)
+    base = structs.replace(base_run(4, "rain-night"), duration=100.0)
     return [
-        Variant(replace(cell, seed=seed), {"variant": name}, slow_s=slow)
+        Variant(structs.replace(base, seed=seed), {"variant": name}, slow_s=slow)
         for seed in seeds(n)
         for name, slow in (("paced", 0.0), ("slowed", 1e-3))
     ]
@@ -167,21 +173,21 @@ STUDIES: dict[str, Callable[[int], list[Variant]]] = {
 
 def drive_variant(variant: Variant) -> dict[str, Any]:
     """In a worker: drive one arm and return its row."""
-    watchers = [Brake(variant.slow_s)] if variant.slow_s else []
-    run = run_cell(variant.cell, watchers=watchers)
-    metrics = run_metrics(run.log, load_map(variant.cell.map))
+    spec = variant.run
+    driven = run(spec, sinks=[Brake(variant.slow_s)] if variant.slow_s else [])
+    metrics = run_metrics(driven.log, load_map(roads_of(spec).map))
     return {
         **variant.labels,
-        "config": variant.cell.driver.label,
-        "weather": variant.cell.weather.name,
-        "seed": variant.cell.seed,
-        "outcome": run.outcome.value,
-        "log_hash": log_hash(run.log),
+        "config": spec.driver.label,
+        "weather": spec.weather.name,
+        "seed": spec.seed,
+        "outcome": driven.outcome.value,
+        "log_hash": log_hash(driven.log),
         "fatal_collisions": metrics.fatal_collisions,
         "radar_fpr_pct": metrics.radar_fpr_pct,
         "radar_fnr_pct": metrics.radar_fnr_pct,
         "dropout_pct": metrics.dropout_pct,
-        "phantom_brakings": phantom_brakings(run.log),
+        "phantom_brakings": phantom_brakings(driven.log),
     }
 
 
@@ -205,7 +211,7 @@ def run_study(
     """Drive a study with n seeds and judge its finding."""
     require_choice("study", id, tuple(STUDIES))
     variants = STUDIES[id](n)
-    jobs = [Job(f"{id}-{k}", drive_variant, v, v.cell.deadline_s) for k, v in enumerate(variants)]
+    jobs = [Job(f"{id}-{k}", drive_variant, v, v.run.deadline_s) for k, v in enumerate(variants)]
     rows: dict[str, dict[str, Any]] = {}
     for finished in local(workers, warm_up)(jobs):
         if finished.failure is not None:

@@ -14,8 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from skidpad.campaign.cells import TUNING_SEEDS
-from skidpad.campaign.play import Play, Played, play
+from skidpad.campaign.grip_cells import template
+from skidpad.campaign.run import Run, run
 from skidpad.core.geometry import mps_from_kmh
+from skidpad.core.run import Friction, Scenario
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome
 from skidpad.core.weather import Weather
@@ -27,7 +29,6 @@ from skidpad.scenarios.variation import (
     drawn_parameters,
     drawn_skill,
     names,
-    scenario_file,
     variant_parameters,
 )
 
@@ -90,7 +91,7 @@ def candidates(scenario: str) -> Iterator[Candidate]:
 def judge(candidate: Candidate, seeds: range = SEEDS) -> Row:
     """Drive it once per seed."""
     played = [_drive(candidate, preset(BASELINE), seed) for seed in seeds]
-    logs = [p.run.log for p in played]
+    logs = [p.log for p in played]
     way = [float(np.ptp(log.actors.x[:, 0])) for log in logs]
     return Row(
         completed=float(np.mean([p.outcome is Outcome.COMPLETED for p in played])),
@@ -102,23 +103,19 @@ def judge(candidate: Candidate, seeds: range = SEEDS) -> Row:
     )
 
 
-def _nearest(played: Played) -> float:
-    a = played.run.log.actors
+def _nearest(played: Run) -> float:
+    a = played.log.actors
     return float(np.hypot(a.x[:, 1:] - a.x[:, :1], a.y[:, 1:] - a.y[:, :1]).min())
 
 
-def _drive(candidate: Candidate, weather: Weather, seed: int) -> Played:
+def _drive(candidate: Candidate, weather: Weather, seed: int) -> Run:
     name = candidate.scenario
-    return play(
-        Play(
-            file=scenario_file(name),
-            label="tuning",
-            weather=weather,
-            seed=seed,
-            parameters=drawn_parameters(name, seed, candidate.cutin, candidate.values),
-            skill=drawn_skill(name, seed),
-        )
+    course = Scenario(
+        file=name,
+        parameters=dict(drawn_parameters(name, seed, candidate.cutin, candidate.values)),
+        skill=drawn_skill(name, seed),
     )
+    return run(template(course=course, weather=weather, seed=seed, friction=Friction.ORIGINAL))
 
 
 def main(scenarios: list[str]) -> None:

@@ -9,8 +9,9 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.frames import CameraImage, RadarPoints, SensorFrame
-from skidpad.core.states import StackReport, WorldTruth
+from skidpad.campaign.drive import Moment
+from skidpad.core.frames import CameraImage, RadarPoints
+from skidpad.core.states import StackReport
 from skidpad.core.vocabulary import Supervision
 from skidpad.sensors.encodings import cityscapes_colours
 
@@ -36,17 +37,9 @@ RADAR_SHOWN = 80.0  # m
 INK, DIM, ACCENT = (235, 235, 235), (150, 160, 170), (255, 133, 82)
 
 
-def twelve_views(
-    frame: SensorFrame,
-    truth: WorldTruth,
-    report: StackReport | None,
-    dt: float,
-    mode: str = "",
-) -> Picture:
-    """(720, 1600, 3) RGB: nine cameras, radar from above, contacts and markings, the tier trace.
-
-    mode: the stack's own words for its tier; without them the tier's name.
-    """
+def twelve_views(moment: Moment, dt: float) -> Picture:
+    """(720, 1600, 3) RGB: nine cameras, radar from above, contacts and markings, the tier trace."""
+    frame = moment.frame
     picture = np.zeros((*SIZE, 3), dtype=np.uint8)
     for id, (left, top, width, height) in LAYOUT.items():
         if id in frame.images:
@@ -56,7 +49,7 @@ def twelve_views(
             picture[top : top + height, left : left + width] = small
         _write(picture, id, left + 6, top + 16, DIM, 0.42)
     _draw_radar(picture, frame.radar)
-    _draw_text(picture, frame, truth, report, dt, mode)
+    _draw_text(picture, moment, dt)
     return picture
 
 
@@ -80,14 +73,8 @@ def _draw_radar(picture: Picture, points: RadarPoints) -> None:
     _write(picture, "radar: orange closing", left + 6, top + 16, DIM, 0.42)
 
 
-def _draw_text(
-    picture: Picture,
-    frame: SensorFrame,
-    truth: WorldTruth,
-    report: StackReport | None,
-    dt: float,
-    mode: str,
-) -> None:
+def _draw_text(picture: Picture, moment: Moment, dt: float) -> None:
+    frame, truth = moment.frame, moment.truth
     left, top, _, _ = TEXT_BOX
     first = f"{frame.tick * dt:7.2f} s   {3.6 * frame.ego.speed:5.1f} km/h"
     if frame.supervision is not Supervision.NONE:
@@ -95,8 +82,7 @@ def _draw_text(
     throttle, brake, steer = truth.commands[0, :3]
     first += f"   throttle {throttle:.2f}  brake {brake:.2f}  steer {steer:+.2f}"
     _write(picture, first, left + 12, top + 30, INK, 0.62)
-    if report is not None:
-        _write(picture, _said(report, mode), left + 12, top + 62, INK, 0.55)
+    _write(picture, _said(moment.report, moment.driver.mode), left + 12, top + 62, INK, 0.55)
     events = [f"contact with {c.static or truth.table.names[c.actor]}" for c in truth.contacts]
     events += [f"{i.marking} marking crossed" for i in truth.invasions]
     _write(picture, ", ".join(events), left + 12, top + 94, ACCENT, 0.55)

@@ -5,41 +5,36 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from msgspec import Meta, Struct
 
 if TYPE_CHECKING:
     from skidpad.campaign.campaign import Campaign, Summary
     from skidpad.campaign.worker import Runner
 
 Seeds = Annotated[int, typer.Option("--seeds", "--repeats", min=1, help="Runs per cell.")]
-Workers = Annotated[
-    int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
-]
+Workers = Annotated[int, Meta(ge=1, description="Processes; default: one per core.")]
 CORES = os.cpu_count() or 1
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Drive:
+class Drive(Struct, frozen=True, kw_only=True):
     """How a campaign is driven."""
 
-    out: Annotated[Path, typer.Option(help="Folder for results and report.")]
+    out: Annotated[Path, Meta(description="Folder for results and report.")]
     workers: Workers = CORES
-    cluster: Annotated[str | None, typer.Option(help="Dask scheduler's address, or local:N.")] = (
-        None
-    )
+    cluster: Annotated[str | None, Meta(description="Dask scheduler's address, or local:N.")] = None
     until_halfwidth: Annotated[
         float | None,
-        typer.Option(help="Stop a cell once its share of good runs is known to +- this share."),
+        Meta(description="Stop a cell once its share of good runs is known to +- this share."),
     ] = None
-    resume: Annotated[bool, typer.Option("--resume", help="Finish a campaign.")] = False
+    resume: Annotated[bool, Meta(description="Finish a campaign.")] = False
     or_next: Annotated[
-        bool, typer.Option("--or-next", help="If OUT holds another campaign, use OUT-2, OUT-3, ...")
+        bool, Meta(description="If OUT holds another campaign, use OUT-2, OUT-3, ...")
     ] = False
-    csv: Annotated[bool, typer.Option("--csv", help="Write CSV beside Parquet.")] = False
+    csv: Annotated[bool, Meta(description="Write CSV beside Parquet.")] = False
 
     def __call__(
         self, campaign: Campaign[Any, Any, Any], report: Callable[[Path], object]
@@ -80,8 +75,7 @@ class Drive:
             yield runner
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Estimate:
+class Estimate(Struct, frozen=True, kw_only=True):
     """How long a campaign would take, instead of driving it."""
 
     workers: Workers = CORES

@@ -3,42 +3,27 @@
 from __future__ import annotations
 
 import multiprocessing
-import shlex
 import sys
-from collections.abc import Iterable
 from pathlib import Path
 
-from skidpad.campaign.cells import BackendChoice, BackendKind
-from skidpad.cli.server_options import ServerWish
-from skidpad.core.errors import BackendError, ConfigError, require_choice, require_range
+from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.jit import user_cache
+from skidpad.core.run import BackendChoice, BackendKind
 from skidpad.roads.bundled import bundled_maps
 
 
-def backend_choice(wish: ServerWish) -> BackendChoice:
-    """The choice, checked; a CARLA server that shall run already must answer now."""
-    names = [k.value for k in BackendKind]
-    kind = BackendKind(require_choice("--backend", wish.backend, names))
-    if kind is BackendKind.EMBEDDED:
+def checked(choice: BackendChoice) -> BackendChoice:
+    """The choice, if it can be driven on: a CARLA server that runs already must answer now."""
+    if choice.backend is BackendKind.EMBEDDED:
         return BackendChoice()
-    require_range("--port", wish.port, 1, 65535)
-    if wish.restart_every and wish.server_command is None:
+    if choice.restart_every and not choice.server_command:
         raise ConfigError("--restart-every needs --server-command: only our own server is ours")
-    choice = BackendChoice(
-        kind=kind,
-        host=wish.host,
-        port=wish.port,
-        pace=wish.pace,
-        without=tuple(wish.without),
-        server=tuple(shlex.split(wish.server_command or "")),
-        restart_every=wish.restart_every,
-    )
     from skidpad.campaign.backends import carla_options
     from skidpad.simulation.carla.connection import require_server, wheel
 
     options = carla_options(choice)
     wheel()
-    if not choice.server:
+    if not choice.server_command:
         require_server(options)
     return choice
 
@@ -46,7 +31,7 @@ def backend_choice(wish: ServerWish) -> BackendChoice:
 def map_of(map: str, choice: BackendChoice) -> str:
     """A bundled map or a file as it is; a CARLA server's own map is fetched and kept as a file."""
     named = map in bundled_maps() or Path(map).is_file() or Path(map).suffix
-    if choice.kind is BackendKind.EMBEDDED or named:
+    if choice.backend is BackendKind.EMBEDDED or named:
         return map
     folder = user_cache() / "carla-maps"
     # In a process of its own: the wheel's threads can end their process at its exit.
@@ -73,6 +58,6 @@ def _fetch(choice: BackendChoice, map: str, folder: Path) -> None:
         raise SystemExit(1) from None
 
 
-def drives_alone(choices: Iterable[BackendChoice]) -> bool:
+def drives_alone(choice: BackendChoice) -> bool:
     """A CARLA server drives one run at a time."""
-    return any(c.kind is BackendKind.CARLA for c in choices)
+    return choice.backend is BackendKind.CARLA

@@ -8,20 +8,16 @@ from typing import Annotated
 import typer
 
 from skidpad.cli.campaigns import How
-from skidpad.cli.server_options import (
-    Backend,
-    Host,
-    Port,
-    RestartEvery,
-    ServerCommand,
-    ServerWish,
-)
+from skidpad.cli.spread import spread
+from skidpad.core.run import BackendChoice
 
 FOLDERS = typer.Argument(help="Folders of `skidpad channels drive`.")
 
 
+@spread()
 def drive(
     how: How,
+    backend: BackendChoice,
     route: Annotated[str, typer.Option(help="One of the six routes, or all.")] = "all",
     hours: Annotated[
         float, typer.Option(help="Hours in total, split equally among the routes.")
@@ -41,18 +37,13 @@ def drive(
     drive_by: Annotated[
         str, typer.Option(help="The arbiter, or the channel that drives alone.")
     ] = "arbiter",
-    backend: Backend = "embedded",
-    host: Host = "127.0.0.1",
-    port: Port = 2000,
-    server_command: ServerCommand = None,
-    restart_every: RestartEvery = 0,
 ) -> None:
     """Drive channels over routes on a simulator; one recording per ten minutes."""
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.channel_drive import SegmentPlan
     from skidpad.campaign.channel_routes import chosen_routes
     from skidpad.campaign.channels import RECIPE, segment_plans
-    from skidpad.cli.carla_backend import backend_choice, drives_alone
+    from skidpad.cli.carla_backend import checked, drives_alone
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.channel_presets import senses_of
 
@@ -62,15 +53,7 @@ def drive(
     routes = chosen_routes(route, map)
     for chosen in routes:
         load_map(chosen.map)
-    choice = backend_choice(
-        ServerWish(
-            backend=backend,
-            host=host,
-            port=port,
-            server_command=server_command,
-            restart_every=restart_every,
-        )
-    )
+    choice = checked(backend)
     template = SegmentPlan(
         route=routes[0],
         channels=names,
@@ -80,7 +63,7 @@ def drive(
         backend=choice,
     )
     plans = segment_plans(routes, hours, template)
-    summary = how(Campaign(RECIPE, plans, alone=drives_alone([choice])), totals)
+    summary = how(Campaign(RECIPE, plans, alone=drives_alone(choice)), totals)
     if summary is not None and summary.failed:
         raise typer.Exit(1)
 

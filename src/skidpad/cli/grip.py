@@ -2,100 +2,55 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Annotated
 
 import typer
+from msgspec import structs
 
+from skidpad.cli.asked import Controller, GripCross, Tuned
 from skidpad.cli.campaigns import How, Seeds
-from skidpad.cli.server_options import (
-    Backend,
-    Host,
-    Pace,
-    Port,
-    RestartEvery,
-    ServerCommand,
-    ServerWish,
-    Without,
-)
+from skidpad.cli.spread import spread
+from skidpad.core.run import BackendChoice, RunSpec, Scenario
+from skidpad.core.vocabulary import SensorLevel
 
 
+class Keep(str, Enum):
+    """Whose whole logs stay."""
+
+    SHOWN = "shown"
+    ALL = "all"
+
+
+@spread(sensors=SensorLevel.OBJECTS, duration=120.0)
 def grip(
     how: How,
-    scenarios: Annotated[
-        str, typer.Option(help="all, or ghost_cut_in,lead_slowdown,front_accident.")
-    ] = "all",
-    weather: Annotated[
-        str, typer.Option(help="all: the eleven of the study; or presets and YAML files.")
-    ] = "all",
-    friction: Annotated[
-        str, typer.Option(help="original: tyres know no weather; reduced: they do.")
-    ] = "original,reduced",
-    model: Annotated[
-        str, typer.Option(help="Of reduced friction: statistical or physical.")
-    ] = "statistical",
-    cutin: Annotated[
-        str,
-        typer.Option(help="original, unfixed, fixed: spawn delay and merge distance."),
-    ] = "fixed",
+    cross: GripCross,
+    controller: Controller,
+    run: RunSpec,
+    scenario: Scenario,
+    tuned: Tuned,
+    backend: BackendChoice,
     seeds: Seeds = 100,
-    config: Annotated[int, typer.Option(min=0, max=4, help="Configuration of our stack.")] = 2,
-    set: Annotated[
-        list[str] | None, typer.Option(help="Single settings over the profile: name=value.")
-    ] = None,
-    profile: Annotated[str, typer.Option(help="Profile of settings.")] = "recommended",
-    controller: Annotated[
-        str, typer.Option(help="stack, module:Class, or agent:PATH:CLASS.")
-    ] = "stack",
-    sensors: Annotated[str, typer.Option(help="objects, or pixels: real images.")] = "objects",
-    actors: Annotated[
-        str, typer.Option(help="physical: tyres decide; ideal: as the scenario says.")
-    ] = "physical",
-    overlay: Annotated[
-        bool, typer.Option("--overlay", help="Rain drops on the cameras (pixels).")
-    ] = False,
-    four_cells: Annotated[
-        bool,
-        typer.Option("--four-cells", help="Each run without and with drops, to part both effects."),
-    ] = False,
-    backend: Backend = "embedded",
-    host: Host = "127.0.0.1",
-    port: Port = 2000,
-    pace: Pace = False,
-    without: Without = None,
-    server_command: ServerCommand = None,
-    restart_every: RestartEvery = 0,
     keep: Annotated[
-        str, typer.Option(help="shown: logs of runs in the report; all: of every run.")
-    ] = "shown",
+        Keep, typer.Option(help="shown: logs of runs in the report; all: of every run.")
+    ] = Keep.SHOWN,
 ) -> None:
     """Drive scenarios x weathers x frictions x seeds; prints the path of the report."""
-    from skidpad.cli.grip_plan import GripWish, campaign_of
+    from skidpad.campaign.campaign import Campaign
+    from skidpad.campaign.grip import recipe
+    from skidpad.cli.carla_backend import checked, drives_alone
+    from skidpad.cli.grip_plan import plan_grip, with_model
     from skidpad.report.grip import write_grip_report
 
-    wish = GripWish(
-        scenarios=scenarios,
-        weather=weather,
-        friction=friction,
-        model=model,
-        cutin=cutin,
-        repeats=seeds,
-        config=config,
-        assignments=set or [],
-        profile=profile,
-        controller=controller,
-        sensors=sensors,
-        actors=actors,
-        overlay=overlay,
-        four_cells=four_cells,
-        keep=keep,
-        server=ServerWish(
-            backend=backend,
-            host=host,
-            port=port,
-            pace=pace,
-            without=without or [],
-            server_command=server_command,
-            restart_every=restart_every,
-        ),
+    run = structs.replace(
+        with_model(run, tuned, cross.model),
+        driver=controller.chosen(),
+        course=scenario,
+        backend=checked(backend),
     )
-    how(campaign_of(wish), write_grip_report)
+    cells = plan_grip(cross, run, seeds)
+    how(
+        Campaign(recipe(keep is Keep.ALL), cells, alone=drives_alone(run.backend)),
+        write_grip_report,
+    )

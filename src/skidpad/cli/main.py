@@ -12,7 +12,6 @@ from skidpad.cli.channels import channels
 from skidpad.cli.channels_drive import drive, outcomes
 from skidpad.cli.channels_evaluate import evaluate, train
 from skidpad.cli.compare import compare
-from skidpad.cli.declared import taking
 from skidpad.cli.friction import friction
 from skidpad.cli.grip import grip
 from skidpad.cli.hazards import hazards
@@ -21,6 +20,7 @@ from skidpad.cli.monitor import monitor, safety_case
 from skidpad.cli.play import play
 from skidpad.cli.profiles import profiles
 from skidpad.cli.rerun import rerun, study
+from skidpad.cli.spread import spread
 from skidpad.cli.view import view
 from skidpad.core.errors import InputError, SkidpadError
 
@@ -55,7 +55,7 @@ estimate = typer.Typer(
     no_args_is_help=True,
 )
 campaign.add_typer(estimate)
-driving, estimating = taking("how", Drive), taking("how", Estimate)
+driving, estimating = spread({"how": Drive}), spread({"how": Estimate})
 app.command()(driving(adas))
 app.command()(driving(grip))
 channels.command()(driving(drive))

@@ -6,32 +6,29 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from msgspec import structs
 
-from skidpad.cli.server_options import Backend, Host, Port, ServerWish
+from skidpad.cli.asked import Controller, Tuned
+from skidpad.cli.spread import spread
+from skidpad.core.run import BackendChoice, RunSpec, Scenario
+from skidpad.core.vocabulary import SensorLevel
 
 
+@spread(sensors=SensorLevel.OBJECTS, duration=120.0)
 def play(
     file: Annotated[Path, typer.Argument(help="OpenSCENARIO XML 1.0 to 1.3 (.xosc).")],
+    controller: Controller,
+    run: RunSpec,
+    scenario: Scenario,
+    tuned: Tuned,
+    backend: BackendChoice,
     out: Annotated[Path | None, typer.Option(help="Folder for the run.")] = None,
-    ego: Annotated[str | None, typer.Option(help="Which entity is the ego.")] = None,
-    controller: Annotated[
-        str, typer.Option(help="stack, ideal (as the file says), module:Class, agent:PATH:CLASS.")
-    ] = "stack",
-    actors: Annotated[
-        str, typer.Option(help="physical: tyres decide; ideal: as the file says.")
-    ] = "physical",
     weather: Annotated[str, typer.Option(help="A preset or a YAML file.")] = "clear-noon",
     grip: Annotated[str, typer.Option(help="none, statistical or physical.")] = "physical",
-    sensors: Annotated[str, typer.Option(help="objects, or pixels: real images.")] = "objects",
-    config: Annotated[int, typer.Option(min=0, max=4, help="Configuration of our stack.")] = 2,
     seed: Annotated[int, typer.Option(help="Of sensor noise and road.")] = 1,
     param: Annotated[
         list[str] | None, typer.Option(help="A parameter of the file: NAME=VALUE.")
     ] = None,
-    backend: Backend = "embedded",
-    host: Host = "127.0.0.1",
-    port: Port = 2000,
-    duration: Annotated[float, typer.Option(help="Longest time, s.")] = 120.0,
     check: Annotated[
         bool, typer.Option("--check", help="List what is not supported; run nothing.")
     ] = False,
@@ -44,36 +41,27 @@ def play(
         return
     if out is None:
         raise ConfigError("play needs --out DIR for the run, or --check")
-    from skidpad.campaign.play import Play, check_controller, play_to
-    from skidpad.cli.carla_backend import backend_choice
-    from skidpad.core.errors import require_choice
-    from skidpad.core.vocabulary import GripModel, SensorLevel
+    from skidpad.campaign.play import run_to
+    from skidpad.cli.carla_backend import checked
     from skidpad.physics.presets import find_weather
-    from skidpad.scenarios.scene import Mode
 
-    check_controller(controller)
-    climate = find_weather(weather)
-    wish = Play(
-        file=file,
-        label=controller,
-        weather=climate,
-        seed=seed,
-        parameters=_parameters(param or []),
-        ego=ego,
-        controller=controller,
-        config=config,
-        grip=GripModel(require_choice("--grip", grip, [g.value for g in GripModel])),
-        level=SensorLevel(require_choice("--sensors", sensors, ("objects", "pixels"))),
-        actors=Mode(require_choice("--actors", actors, ("physical", "ideal"))),
-        duration=duration,
+    parameters = _parameters(param or [])
+    driven = run_to(
+        structs.replace(
+            tuned.resolve(run, grip=grip),
+            driver=controller.chosen(),
+            course=structs.replace(scenario, file=str(file.resolve()), parameters=parameters),
+            weather=find_weather(weather),
+            seed=seed,
+            backend=checked(backend),
+        ),
+        out,
     )
-    choice = backend_choice(ServerWish(backend=backend, host=host, port=port))
-    played = play_to(wish, out, choice)
-    log = played.run.log
+    log = driven.log
     seconds = float(log.t[-1]) if len(log) else 0.0
-    typer.echo(f"{played.outcome.value} after {seconds:.2f} s; log in {out}")
-    if played.run.error:
-        typer.echo(played.run.error.strip().split("\n")[-1], err=True)
+    typer.echo(f"{driven.outcome.value} after {seconds:.2f} s; log in {out}")
+    if driven.error:
+        typer.echo(driven.error.strip().split("\n")[-1], err=True)
 
 
 def _check(file: Path) -> None:

@@ -62,6 +62,13 @@ class Supervision(IntEnum):
     WARM_UP = 4
 
 
+class Clearance(str, Enum):
+    """How a free place is searched for an ego that is put back (D-080)."""
+
+    OTHERS = "others"  # the ego is no obstacle, and the last place is checked too
+    LISTING = "listing"  # as printed: the ego counts, and after four shifts the place is taken
+
+
 class RelocationReason(IntEnum):
     """Why the supervisor put the ego somewhere else (A-194)."""
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from skidpad.core.geometry import Pose
+from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand, ActorSetup
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import ActorKind
@@ -22,7 +23,7 @@ from skidpad.scenarios.actions import (
 from skidpad.scenarios.conditions import condition
 from skidpad.scenarios.motion import Lane
 from skidpad.scenarios.reader import Node, Unsupported, read
-from skidpad.scenarios.scene import Actor, Mode, Running, Scene
+from skidpad.scenarios.scene import Actor, Running, Scene
 from skidpad.scenarios.storyboard import Storyboard
 from skidpad.simulation.scripted import ActorDriver, Motion, nearest_type
 
@@ -92,7 +93,7 @@ def load(
     entities = {e.name: e for e in _entities(root)}
     board = root.child("Storyboard")
     actors = {
-        name: Actor(name, 0, Mode.OTHER, 0.0, _still(ORIGIN), Lane(map, ORIGIN, 0.0), None)
+        name: Actor(name, 0, None, 0.0, _still(ORIGIN), Lane(map, ORIGIN, 0.0), None)
         for name in entities
     }
     scene = Scene(map, dt, actors)
@@ -253,14 +254,15 @@ def _still(pose: Pose) -> Motion:
 class Player:
     """Plays a script: one `step` per tick of the world.
 
-    modes: who moves each actor; those not named are physical. skill: of the drivers, by actor.
+    modes: how each actor is moved, None by somebody else; those not named are physical.
+    skill: of the drivers, by actor.
     """
 
     def __init__(
         self,
         script: Script,
         *,
-        modes: Mapping[str, Mode] | None = None,
+        modes: Mapping[str, ActorMode | None] | None = None,
         skill: Mapping[str, float] | None = None,
         duration: float = DURATION_MAX,
         dt: float = DT,
@@ -296,7 +298,7 @@ class Player:
             row = names.index(e.name)
             driver = ActorDriver(e.type, self.skill.get(e.name, 1.0)) if e.wheels else None
             lane = Lane(self.script.map, e.pose, e.speed)
-            mode = self.modes.get(e.name, Mode.PHYSICAL)
+            mode = self.modes.get(e.name, ActorMode.PHYSICAL)
             length = float(truth.table.length[row])
             actor = Actor(e.name, row, mode, length, _still(e.pose), lane, driver)
             self.scene.actors[e.name] = actor

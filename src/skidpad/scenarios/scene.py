@@ -8,6 +8,7 @@ from math import cos, hypot, sin
 from typing import Protocol
 
 from skidpad.core.geometry import Pose
+from skidpad.core.run import ActorMode
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import WorldTruth
 from skidpad.roads.queries import RoadMap
@@ -15,14 +16,6 @@ from skidpad.scenarios.motion import Lane, Track, track_demand
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 STANDING = 0.05  # m/s
-
-
-class Mode(str, Enum):
-    """Who moves an actor."""
-
-    PHYSICAL = "physical"  # a driver tracks what is demanded, through the tyre model
-    IDEAL = "ideal"  # it is exactly where it should be
-    OTHER = "other"  # somebody else: the stack under test
 
 
 class State(str, Enum):
@@ -47,7 +40,7 @@ class Actor:
 
     name: str
     row: int
-    mode: Mode
+    mode: ActorMode | None  # None: somebody else moves it, the stack under test
     length: float
     motion: Motion
     lane: Lane
@@ -70,9 +63,9 @@ class Actor:
         if self.word is not None:
             word, self.word = self.word, None
             return word
-        if not self.present or self.mode is Mode.OTHER:
+        if not self.present or self.mode is None:
             return None
-        if self.mode is Mode.IDEAL or self.driver is None:
+        if self.mode is ActorMode.IDEAL or self.driver is None:
             return self._placed(t + dt, dt)
         if self.track is not None:
             demand = track_demand(self.track, self.motion, t, dt)

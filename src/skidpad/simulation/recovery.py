@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from enum import Enum
 from math import cos, hypot, sin
 
 import numpy as np
@@ -17,7 +16,14 @@ import numpy as np
 from skidpad.core.errors import require_range
 from skidpad.core.geometry import Pose, mps_from_kmh
 from skidpad.core.states import ActorStates, StackReport, VehicleCommand, WorldTruth
-from skidpad.core.vocabulary import ActorKind, LightState, RelocationReason, Supervision, Tier
+from skidpad.core.vocabulary import (
+    ActorKind,
+    Clearance,
+    LightState,
+    RelocationReason,
+    Supervision,
+    Tier,
+)
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import LanePoint, RoadMap
 
@@ -46,20 +52,13 @@ HOLDING = frozenset(
 )
 
 
-class Clearance(Enum):
-    """How a place is searched (D-080)."""
-
-    CHECKED = "checked"  # the ego does not obstruct itself, and the last place is checked too
-    LISTING = "listing"  # as printed: the ego counts, and after four shifts the place is taken
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class RecoverySettings:
     """What the sources leave open about recovery."""
 
     warm_up: float = 0.5  # s with brakes held; 1.5 as listed (D-076)
     release_speed: float = 5.5  # m/s given at its end; 0 as listed (D-077)
-    clearance: Clearance = Clearance.CHECKED  # D-080
+    clearance: Clearance = Clearance.OTHERS  # D-080
     stuck_time: float = 10.0  # s, A-200
     stuck_speed: float = mps_from_kmh(1.0)  # m/s, A-200
 

@@ -9,6 +9,7 @@ from typing import Any
 from skidpad.core.errors import require_choice, require_range
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.run import Function
 from skidpad.core.setup import DT
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
@@ -17,7 +18,6 @@ from skidpad.roads.queries import RoadMap
 from skidpad.stack.configurations import (
     V_CRUISE_KMH,
     V_LIMITER_KMH,
-    Function,
     Functions,
     functions_of,
     parse_functions,

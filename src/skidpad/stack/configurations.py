@@ -2,23 +2,11 @@
 
 from __future__ import annotations
 
-from enum import Enum
-
 from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.run import Function
 
 V_CRUISE_KMH = 150.0  # cruise target without a limiter (A-009)
 V_LIMITER_KMH = 80.0  # limiter of configuration 4 (A-178)
-
-
-class Function(str, Enum):
-    """One function of driving automation; each can be switched by itself (A-011)."""
-
-    AEB = "aeb"  # emergency braking without following: tiers 1 to 3 alone (D-038)
-    ACC = "acc"  # following, which includes tiers 1 to 3
-    LCA = "lca"  # lane centring; without it the lazy driver steers
-    TLA = "tla"  # traffic-light assist
-    RESUME = "resume"  # post-stop resume protocol
-    LIMITER = "limiter"
 
 
 Functions = frozenset[Function]

@@ -17,7 +17,8 @@ from typing import Any, get_args, get_type_hints
 import msgspec
 
 from skidpad.core.errors import ConfigError, require_choice, require_range
-from skidpad.core.vocabulary import GripModel, RangeModel
+from skidpad.core.run import Friction, RunSpec
+from skidpad.core.vocabulary import Clearance, GripModel, RangeModel
 
 
 class RoofCorridor(str, Enum):
@@ -102,13 +103,6 @@ class Relocation(str, Enum):
 
     ROLLING = "rolling"  # 0.5 s of braking, then 5.5 m/s
     STANDING = "standing"  # 1.5 s of braking, then from rest
-
-
-class Clearance(str, Enum):
-    """D-080: the search for a free place."""
-
-    OTHERS = "others"  # the ego is no obstacle, the last place is checked too
-    LISTING = "listing"
 
 
 class TrafficPositions(str, Enum):
@@ -312,9 +306,23 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
 def load_profile(name: str, values: Mapping[str, Any] | None = None) -> Settings:
     """A profile of the package, with some values replaced."""
     require_choice("profile", name, PROFILES)
+    return _profile(name).with_values(values or {})
+
+
+@cache
+def _profile(name: str) -> Settings:
     text = (files("skidpad.stack") / "profiles" / f"{name}.yaml").read_text(encoding="utf-8")
-    plain = msgspec.yaml.decode(text, type=dict[str, Any])
-    return Settings().with_values(plain).with_values(values or {})
+    return Settings().with_values(msgspec.yaml.decode(text, type=dict[str, Any]))
+
+
+def settings_of(spec: RunSpec) -> Settings:
+    """The settings of a run, typed."""
+    return load_profile(spec.profile, spec.settings)
+
+
+def grip_of(spec: RunSpec) -> GripModel:
+    """What acts on the tyres of a run: its setting, unless friction stays the original one."""
+    return settings_of(spec).grip if spec.friction is Friction.REDUCED else GripModel.NONE
 
 
 def differences(a: Settings, b: Settings) -> list[tuple[str, Any, Any]]:

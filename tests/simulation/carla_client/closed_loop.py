@@ -10,13 +10,11 @@ from typing import Any
 
 from replay import without_road_noise
 
-from skidpad.campaign.cells import Cell, Driver
-from skidpad.campaign.drive import run_cell
-from skidpad.campaign.play import Play, play
+from runs import adas_run, scenario_run
+from skidpad.campaign.run import run
 from skidpad.core.frames import Frame
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import SensorLevel
 from skidpad.evidence.drive.metrics import run_metrics
 from skidpad.evidence.grip.scores import grip_metrics
 from skidpad.physics import types
@@ -31,8 +29,6 @@ from skidpad.simulation.carla.options import CarlaOptions
 from skidpad.simulation.carla_server.catalogue import load_catalogue
 from skidpad.simulation.carla_server.vehicles import model_of
 from skidpad.simulation.embedded.engine import EmbeddedBackend
-from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import load_profile
 
 SECONDS = 90.0
 BEFORE_CONTACT = 25.0  # s that configuration 2 drives before it meets the first guardrail
@@ -49,31 +45,21 @@ class SmoothRoad(EmbeddedBackend):
 
 def empty(config: int, seconds: float, backend: Backend) -> Numbers:
     """Nobody else on figure8."""
-    cell = Cell(
-        driver=Driver(label=str(config), functions=functions_of(config)),
-        weather=find_weather("clear-noon"),
-        seed=1,
-        profile="recommended",
-        settings=load_profile("recommended"),
-        duration=seconds,
-        vehicles=0,
-        level=SensorLevel.OBJECTS,
-    )
-    return asdict(run_metrics(run_cell(cell, backend=backend).log, load_map("figure8")))
+    spec = adas_run(config, vehicles=0, seed=1, duration=seconds)
+    return asdict(run_metrics(run(spec, backend=backend).log, load_map("figure8")))
 
 
 def behind_lead(backend: Backend) -> Numbers:
     """The lead of the friction study slows down; a scenario player moves it."""
-    wish = Play(file=scenario_file("lead_slowdown"), label="stack", weather=find_weather("rain_0"))
-    played = play(wish, backend)
+    driven = run(scenario_run("lead_slowdown", weather=find_weather("rain_0")), backend=backend)
     metrics = grip_metrics(
-        played.run.log,
-        played.outcome,
-        triggered=played.triggered,
-        route_length=played.route_length,
+        driven.log,
+        driven.outcome,
+        triggered=driven.triggered,
+        route_length=driven.route_length,
         ratio=1.0,
     )
-    return {"outcome": played.outcome.value, **asdict(metrics)}
+    return {"outcome": driven.outcome.value, **asdict(metrics)}
 
 
 def main(port: int) -> Any:
@@ -82,8 +68,8 @@ def main(port: int) -> Any:
     for setup in (ego, *actors):
         types.vehicle_types()[setup.type] = model_of(load_catalogue()[STANDS_FOR[setup.type][0]])
 
-    def both(run: Any) -> list[Numbers]:
-        return [run(SmoothRoad()), run(CarlaBackend(CarlaOptions(port=port)))]
+    def both(driven: Any) -> list[Numbers]:
+        return [driven(SmoothRoad()), driven(CarlaBackend(CarlaOptions(port=port)))]
 
     return {
         "empty 2": both(lambda b: empty(2, BEFORE_CONTACT, b)),

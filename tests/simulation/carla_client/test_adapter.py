@@ -17,14 +17,13 @@ import pytest
 
 from backend_contract import CHECKS
 from carla_programs import HERE, environment
+from runs import adas_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.cells import BackendChoice, BackendKind, Cell, Driver
 from skidpad.campaign.matrix import RECIPE
 from skidpad.campaign.pool import local
-from skidpad.physics.presets import find_weather
+from skidpad.core.run import BackendChoice, BackendKind
 from skidpad.recording.matrix import MatrixEntry
 from skidpad.simulation.carla_server.process import ServerProcess
-from skidpad.stack.settings import load_profile
 
 pytest.importorskip("carla")
 Serve = Callable[..., ServerProcess]
@@ -186,15 +185,8 @@ def adas(out: Path, *options: str) -> subprocess.CompletedProcess[str]:
 
 def test_runs_without_a_server_are_recorded_and_the_campaign_goes_on(tmp_path: Path) -> None:
     """The server is gone when the runs begin: each is crashed with one sentence."""
-    template = Cell(
-        driver=Driver(label="0"),
-        weather=find_weather("clear-noon"),
-        seed=1,
-        profile="recommended",
-        settings=load_profile("recommended"),
-        duration=1.0,
-        backend=BackendChoice(kind=BackendKind.CARLA, port=9),
-    )
+    server = BackendChoice(backend=BackendKind.CARLA, port=9)
+    template = adas_run(0, seed=1, duration=1.0, backend=server)
     entries: list[MatrixEntry] = []
     cells = [template, replace(template, seed=2), replace(template, seed=3, backend=HERE_INSTEAD)]
     summary = Campaign(RECIPE, cells).run(tmp_path / "out", local(1), on_run=entries.append)

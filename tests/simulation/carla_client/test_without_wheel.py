@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from skidpad.campaign.backends import carla_options
-from skidpad.campaign.cells import BackendChoice, BackendKind
 from skidpad.campaign.starts import start_of
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.geometry import Pose
+from skidpad.core.run import BackendChoice, BackendKind
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.weather import Weather
 from skidpad.roads.bundled import load_map
@@ -132,11 +132,11 @@ def test_a_paced_loop_waits_and_collects_garbage_itself(monkeypatch: pytest.Monk
 @pytest.mark.req("A-268")
 def test_each_optimisation_has_its_switch() -> None:
     for one in Optimisation:
-        options = carla_options(BackendChoice(kind=BackendKind.CARLA, without=(one.value,)))
+        options = carla_options(BackendChoice(backend=BackendKind.CARLA, without=(one.value,)))
         assert not options.uses(one)
         assert len(options.optimisations) == len(Optimisation) - 1
     with pytest.raises(ConfigError, match="choose one of: feed-pool"):
-        carla_options(BackendChoice(kind=BackendKind.CARLA, without=("magic",)))
+        carla_options(BackendChoice(backend=BackendKind.CARLA, without=("magic",)))
 
 
 def test_versions_and_maps_are_compared_by_what_matters() -> None:

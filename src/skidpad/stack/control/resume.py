@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from math import inf
 
-from skidpad.stack.configurations import Function, Functions
+from skidpad.core.run import Function
+from skidpad.stack.configurations import Functions
 from skidpad.stack.settings import CapScope, ResumeEnd
 from skidpad.stack.timing import ticks_to_reach
 

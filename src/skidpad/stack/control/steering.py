@@ -7,8 +7,9 @@ from math import atan2, cos, hypot, pi, sin
 from typing import NamedTuple
 
 from skidpad.core.geometry import Pose, kmh_from_mps
+from skidpad.core.run import Function
 from skidpad.roads.queries import LanePoint
-from skidpad.stack.configurations import Function, Functions
+from skidpad.stack.configurations import Functions
 from skidpad.stack.settings import Lookahead, Settings
 
 LOOKAHEAD_PER_KMH = 0.4  # m per km/h

@@ -8,8 +8,9 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple, Protocol
 
+from skidpad.core.run import Function
 from skidpad.core.vocabulary import Tier
-from skidpad.stack.configurations import Function, Functions
+from skidpad.stack.configurations import Functions
 from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, Pid
 from skidpad.stack.settings import Follower, LightBraking, Settings, Unconfirmed
 from skidpad.stack.timing import ticks_to_reach

@@ -6,10 +6,11 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 from skidpad.core.frames import SensorFrame
+from skidpad.core.run import Function
 from skidpad.core.specs import SensorSpec
 from skidpad.core.vocabulary import DetectionStatus
 from skidpad.roads.queries import RoadMap
-from skidpad.stack.configurations import Function, Functions
+from skidpad.stack.configurations import Functions
 from skidpad.stack.perception.fusion import (
     CameraPair,
     MedianFilter,

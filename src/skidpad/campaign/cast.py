@@ -1,0 +1,233 @@
+"""From the description of a run to its world and to those who act in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from skidpad.campaign.drive import Script, Supervising, Timer, Unsupervised
+from skidpad.campaign.starts import start_of
+from skidpad.core.errors import ConfigError
+from skidpad.core.frames import SensorFrame
+from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.run import (
+    ActorMode,
+    AdasDriver,
+    AgentDriver,
+    BackendKind,
+    Passenger,
+    Render,
+    Roads,
+    RunSpec,
+    Scenario,
+    StackDriver,
+)
+from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
+from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
+from skidpad.core.vocabulary import Outcome
+from skidpad.physics.types import EGO_TYPE
+from skidpad.roads.bundled import load_map
+from skidpad.roads.queries import RoadMap
+from skidpad.scenarios import player
+from skidpad.scenarios.player import Player
+from skidpad.scenarios.variation import names, scenario_file
+from skidpad.sensors.overlay import Lens
+from skidpad.sensors.twelve import twelve_sensors
+from skidpad.simulation.recovery import RecoverySettings, Supervisor
+from skidpad.stack import settings as options
+from skidpad.stack.adas import AdasStack
+from skidpad.stack.agents import load_agent
+from skidpad.stack.interface import Stack
+from skidpad.stack.loading import GuardedStack, load_stack
+from skidpad.stack.settings import Settings, grip_of, settings_of
+
+CRUISE = "cruise_speed"  # property of a scenario's ego, m/s
+ROUTE_LENGTH = "route_length"  # another one, m
+
+
+class StackAtWheel:
+    """A stack that drives: it is given frames, and never the truth."""
+
+    def __init__(self, stack: GuardedStack, lens: Lens | None = None) -> None:
+        """lens: with rain drops on it, before all cameras (B-160)."""
+        self.stack, self.lens = stack, lens
+
+    @property
+    def report(self) -> StackReport:
+        """What the stack says about its last tick."""
+        return self.stack.report
+
+    @property
+    def mode(self) -> str:
+        """Its mode in its own words."""
+        return self.stack.mode
+
+    def begin(self, table: ActorTable) -> None:
+        """Nothing: a stack does not know who takes part."""
+
+    def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
+        """The stack's answer to the frame."""
+        del truth
+        if self.lens is not None:
+            images, extra = self.lens.seen(frame.images), self.lens.seen(frame.extra)
+            frame = replace(frame, images=images, extra=extra)
+        return self.stack.tick(frame)
+
+
+class Seated:
+    """Drives nothing: the scenario moves the ego."""
+
+    def __init__(self, specs: object, map: object, settings: object) -> None:
+        del specs, map, settings
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        """Nothing pressed."""
+        del frame
+        return VehicleCommand()
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """The world of a run, and who acts in it besides the driver."""
+
+    map: RoadMap
+    setup: Setup
+    supervisor: Supervising
+    script: Script
+    player: Player | None = None  # of a scenario
+
+    @property
+    def cruise_kmh(self) -> float | None:
+        """The ego's cruise target where a scenario says it, else its first speed there (G-1)."""
+        if self.player is None:
+            return None
+        ego = self.player.script.ego_entity
+        return max(kmh_from_mps(float(ego.properties.get(CRUISE, ego.speed))), 1.0)
+
+    @property
+    def triggered(self) -> bool:
+        """Every event of the scenario has begun; always so without one."""
+        return self.player is None or self.player.triggered
+
+    @property
+    def route_length(self) -> float | None:
+        """m, of the ego's route where the scenario names one."""
+        if self.player is None:
+            return None
+        length = self.player.script.ego_entity.properties.get(ROUTE_LENGTH)
+        return None if length is None else float(length)
+
+    @property
+    def outcome(self) -> Outcome:
+        """How a drive ended in which nothing failed (decisions G-2, L-7)."""
+        if self.player is not None and self.player.hit:
+            return Outcome.COLLISION
+        return Outcome.COMPLETED if self.triggered else Outcome.NOT_TRIGGERED
+
+
+def stage_of(spec: RunSpec) -> Stage:
+    """The stage of a run with roads or a scenario; FileError for a file that cannot be played."""
+    if isinstance(spec.course, Scenario):
+        return _scenario(spec, spec.course)
+    if not isinstance(spec.course, Roads):
+        raise ConfigError("a route is driven by channels")
+    return _roads(spec, spec.course)
+
+
+def _roads(spec: RunSpec, course: Roads) -> Stage:
+    s = settings_of(spec)
+    map = load_map(course.map)
+    ego = ActorSetup(name="ego", type=EGO_TYPE, place=start_of(map), driver="scripted")
+    traffic = TrafficSetup(
+        mode=course.traffic.value,
+        vehicles=course.vehicles,
+        allow_fewer=course.allow_fewer,
+        variant=s.traffic_positions.value,
+        initial_limit_kmh=s.initial_limit_kmh,
+        slow_in_weather=s.drivers,
+    )
+    setup = replace(_setup(spec, course.map, ego), traffic=traffic)
+    supervisor = Supervisor(map, recovery_settings(s), setup.dt)
+    return Stage(map, setup, supervisor, Timer(round(spec.duration / setup.dt)))
+
+
+def _scenario(spec: RunSpec, course: Scenario) -> Stage:
+    script = load_scenario(course)
+    modes: dict[str, ActorMode | None] = dict.fromkeys(script.entities, course.actors)
+    modes[script.ego] = ActorMode.IDEAL if isinstance(spec.driver, Passenger) else None
+    played = Player(script, modes=modes, skill=course.skill, duration=spec.duration)
+    ego, actors = script.setups()
+    setup = replace(_setup(spec, script.map_name, ego), actors=actors)
+    return Stage(script.map, setup, Unsupervised(), played, played)
+
+
+def load_scenario(course: Scenario) -> player.Script:
+    """The file of a course, read and checked."""
+    file = scenario_file(course.file) if course.file in names() else Path(course.file)
+    return player.load(file, course.parameters, course.ego)
+
+
+def _setup(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
+    """What every set-up says: the weather, what it touches, and what is sensed of it."""
+    s = settings_of(spec)
+    return Setup(
+        map=map,
+        weather=spec.weather,
+        specs=twelve_sensors(bumper_depth_fov_deg=s.bumper_depth_fov_deg),
+        ego=ego,
+        grip=grip_of(spec),
+        range_model=s.range,
+        camera_effect=s.camera,
+        rain_hides_night=s.night_rain is options.NightRain.RAIN_ONLY,
+        mu_ref=s.mu_ref,
+        level=spec.sensors,
+        render_all=spec.render is Render.ALL or _foreign_on_carla(spec),
+    )
+
+
+def _foreign_on_carla(spec: RunSpec) -> bool:
+    """Nobody knows which images somebody else's stack reads, and CARLA sends none on demand."""
+    foreign = isinstance(spec.driver, (StackDriver, AgentDriver))
+    return foreign and spec.backend.backend is BackendKind.CARLA
+
+
+def recovery_settings(s: Settings) -> RecoverySettings:
+    """The supervisor's part of the settings (D-076, D-077, D-080)."""
+    if s.relocation is options.Relocation.STANDING:
+        return RecoverySettings(warm_up=1.5, release_speed=0.0, clearance=s.clearance)
+    return RecoverySettings(clearance=s.clearance)
+
+
+def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> StackAtWheel:
+    """The stack that drives, built; StackError when it cannot be. kind: its class, if loaded."""
+    found, settings = _class_of(spec, stage)
+    stack = GuardedStack(kind or found, stage.setup.specs, stage.map, settings)
+    return StackAtWheel(stack, Lens(spec.weather, spec.seed) if spec.overlay else None)
+
+
+def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, Any]]:
+    driver = spec.driver
+    match driver:
+        case StackDriver():
+            return load_stack(driver.where), driver.options
+        case AgentDriver():
+            return load_agent(driver.where), {}
+        case Passenger():
+            return Seated, {}
+        case AdasDriver():
+            cruise = {} if stage.cruise_kmh is None else {"cruise_kmh": stage.cruise_kmh}
+            return AdasStack, {
+                "functions": sorted(f.value for f in driver.functions),
+                "profile": spec.profile,
+                "set": settings_of(spec).as_plain(),
+                **cruise,
+            }
+    raise ConfigError(f"{driver.label} needs a route to drive")
+
+
+def with_sensors(setup: Setup, stack: GuardedStack) -> Setup:
+    """The set-up with the further sensors that the stack asks for (L-3)."""
+    more = stack.sensors()
+    return replace(setup, specs=(*setup.specs, *more), asked=frozenset(s.id for s in more))

@@ -1,0 +1,202 @@
+"""Drive one run and keep its log: in memory, or with everything else that it leaves in a folder."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from skidpad.campaign.backends import make_backend
+from skidpad.campaign.cast import Stage, driver_of, stage_of, with_sensors
+from skidpad.campaign.drive import Moment, Sink, Timer, loop
+from skidpad.campaign.snapshots import Snapshots
+from skidpad.core.errors import StackError, require_choice
+from skidpad.core.run import (
+    AdasDriver,
+    BackendChoice,
+    DriverSpec,
+    Roads,
+    RunSpec,
+    StackDriver,
+    Traffic,
+)
+from skidpad.core.states import ActorTable
+from skidpad.core.vocabulary import Outcome, SensorLevel
+from skidpad.core.weather import Weather
+from skidpad.physics.presets import find_weather
+from skidpad.recording.events import NoticeSource, Relocation
+from skidpad.recording.runlog import LogHeader, RunLog
+from skidpad.recording.ticks import TickLog
+from skidpad.simulation.backend import Backend
+from skidpad.stack.configurations import functions_of
+from skidpad.stack.interface import Stack
+from skidpad.stack.loading import load_stack
+from skidpad.stack.settings import load_profile
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a drive leaves behind."""
+
+    log: RunLog
+    outcome: Outcome
+    error: str = ""  # traceback of a stack that failed
+    snapshots: tuple[Path, ...] = ()
+    triggered: bool = True  # every event of the scenario has begun, where one is played
+    route_length: float | None = None  # m, of the ego's route where the scenario names one
+
+
+def drive(
+    stack: type[Stack] | str | int,
+    *,
+    map: str | Path = "figure8",
+    weather: str | Weather = "clear-noon",
+    seed: int = 0,
+    duration: float = 500.0,
+    traffic: str = "fixed",
+    vehicles: int = 20,
+    sensors: str = "pixels",
+    profile: str = "recommended",
+    settings: Mapping[str, Any] | None = None,
+    options: Mapping[str, Any] | None = None,
+    out: str | Path | None = None,
+    backend: BackendChoice | None = None,
+) -> Run:
+    """Drive a stack and return the log.
+
+    stack: a class with the stack interface, "module:Class", or 0 to 4 for a published
+    configuration. settings: single settings over the profile. options: what the class is given as
+    its settings. out: a folder for snapshots of collisions. backend: None is the embedded one.
+    """
+    driver, kind = _named(stack, dict(options or {}))
+    words = [v.value for v in SensorLevel], [v.value for v in Traffic]
+    spec = RunSpec(
+        driver=driver,
+        course=Roads(
+            map=str(map),
+            traffic=Traffic(require_choice("traffic", traffic, words[1])),
+            vehicles=vehicles,
+        ),
+        weather=find_weather(weather) if isinstance(weather, str) else weather,
+        seed=seed,
+        duration=duration,
+        profile=profile,
+        settings=load_profile(profile, settings).as_plain(),
+        sensors=SensorLevel(require_choice("sensors", sensors, words[0])),
+        backend=BackendChoice() if backend is None else backend,
+    )
+    return run(spec, kind, folder=None if out is None else Path(out))
+
+
+def _named(
+    stack: type[Stack] | str | int, options: dict[str, Any]
+) -> tuple[DriverSpec, type[Stack] | None]:
+    if isinstance(stack, int):
+        return AdasDriver(label=str(stack), functions=functions_of(stack)), None
+    if isinstance(stack, str):
+        return StackDriver(stack, options), load_stack(stack)
+    return StackDriver(f"{stack.__module__}:{stack.__qualname__}", options), stack
+
+
+class Log(Sink):
+    """The tick log of a run as a sink."""
+
+    def __init__(self, header: LogHeader, weather: str, ticks: int) -> None:
+        self.header, self.weather, self.ticks = header, weather, ticks
+
+    def begin(self, table: ActorTable) -> None:
+        """Make room."""
+        self.log = TickLog(table, self.header, self.weather, self.ticks)
+
+    def see(self, moment: Moment) -> None:
+        """Write down the moment, and what supervisor and world did besides driving (A-194)."""
+        frame, truth, action = moment.frame, moment.truth, moment.action
+        self.log.append(truth, frame, moment.command, moment.report, frame.supervision)
+        for text in truth.notices:
+            self.log.notice(truth.tick, NoticeSource.TRAFFIC, text)
+        if action.notice:
+            self.log.notice(truth.tick, NoticeSource.SUPERVISOR, action.notice)
+        if action.relocate is not None and action.relocate.moved is not None:
+            m = action.relocate.moved
+            self.log.relocated(Relocation(truth.tick, m.reason, m.shift, m.old, m.new))
+
+
+def run(
+    spec: RunSpec,
+    kind: type[Stack] | None = None,
+    *,
+    backend: Backend | None = None,
+    folder: Path | None = None,
+    sinks: Sequence[Sink] = (),
+    ticks: int | None = None,
+) -> Run:
+    """Drive a run on roads or in a scenario; a stack that fails is an outcome.
+
+    kind: the stack's class, if it is loaded. backend: by default a fresh one of the run's choice.
+    folder: where snapshots of collisions go. sinks: who else looks on. ticks: end
+    it after so many at the latest.
+    """
+    stage = stage_of(spec)
+    if ticks is not None:
+        stage = replace(stage, script=Timer(ticks, stage.script))
+    backend = make_backend(spec.backend) if backend is None else backend
+    log = log_of(spec, stage)
+    snapshots = Snapshots(folder, spec.driver.label, spec.weather.name, stage.setup.dt)
+    try:
+        failure = _drive(spec, stage, kind, backend, (log, snapshots, *sinks))
+        if failure is not None:
+            log.log.notice(backend.truth().tick, NoticeSource.STACK, str(failure))
+    finally:
+        backend.close()
+    outcome = stage.outcome if failure is None else Outcome.AGENT_ERROR
+    return Run(
+        log.log.finish(),
+        outcome,
+        "" if failure is None else story(failure),
+        tuple(snapshots.paths),
+        stage.triggered,
+        stage.route_length,
+    )
+
+
+def _drive(
+    spec: RunSpec,
+    stage: Stage,
+    kind: type[Stack] | None,
+    backend: Backend,
+    sinks: Sequence[Sink],
+) -> StackError | None:
+    try:
+        driver = driver_of(spec, stage, kind)
+        setup = with_sensors(stage.setup, driver.stack)
+    except StackError as error:  # it could not even be built
+        backend.reset(stage.setup, spec.seed)
+        for sink in sinks:
+            sink.begin(backend.truth().table)
+        return error
+    frame = backend.reset(setup, spec.seed)
+    failure = loop(backend, frame, driver, stage.supervisor, stage.script, sinks)
+    driver.stack.close()
+    return failure
+
+
+def log_of(spec: RunSpec, stage: Stage) -> Log:
+    """An empty log with what holds for the whole run."""
+    about = {
+        "config": spec.driver.label,
+        "weather": spec.weather.name,
+        "seed": str(spec.seed),
+        "profile": spec.profile,
+        "sensors": spec.sensors.value,
+    }
+    dt = stage.setup.dt
+    header = LogHeader(map=stage.map.name, map_hash=stage.map.content_hash, dt=dt, about=about)
+    return Log(header, spec.weather.name, round(spec.duration / dt) + 1)
+
+
+def story(error: StackError) -> str:
+    """The traceback of a stack that failed."""
+    cause = error.__cause__ or error
+    return "".join(traceback.format_exception(cause)) + f"\n{error}"

@@ -1,0 +1,102 @@
+"""Read what a run's folder says about the run, also folders of versions before this one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import yaml
+
+from skidpad.campaign.grip_cells import DURATION, drawn_course
+from skidpad.campaign.runfolder import CONFIG
+from skidpad.core.errors import FileError
+from skidpad.core.run import VERSION, RunSpec, run_from_plain
+from skidpad.scenarios.variation import CutIn
+from skidpad.stack.configurations import functions_of
+
+Plain = dict[str, Any]
+
+
+def read_run(folder: Path) -> RunSpec:
+    """The run that a folder's config.yaml describes; FileError when it cannot be told."""
+    path = folder / CONFIG
+    try:
+        plain = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise FileError(f"cannot read {path}: {error.strerror}") from error
+    except yaml.YAMLError as error:
+        raise FileError(f"{path} is not YAML: {error}") from error
+    if not isinstance(plain, dict):
+        raise FileError(f"{path} does not describe a run")
+    if "version" in plain:
+        return run_from_plain(plain, str(path))
+    try:
+        return run_from_plain(from_version_1(plain), str(path))
+    except (KeyError, TypeError, AttributeError) as error:
+        raise FileError(f"{path} does not describe a run: {error!r}") from error
+
+
+def from_version_1(plain: Plain) -> Plain:
+    """What `adas` and `grip` wrote before there was one description of a run.
+
+    FileError for a folder of `play`, which did not hold all that decides its run.
+    """
+    if "file" in plain:
+        raise FileError(
+            "this run of `play` was written by an older version, which did not store the place of "
+            "its file: play the file again"
+        )
+    return _grip_1(plain) if "scenario" in plain else _matrix_1(plain)
+
+
+def _matrix_1(plain: Plain) -> Plain:
+    where = plain["stack"] or ""
+    label = plain["driver"]
+    ours = {"type": "adas", "label": label, "functions": plain["functions"]}
+    foreign = {"type": "stack", "where": where, "options": plain["options"], "name": label}
+    return _common_1(plain) | {
+        "driver": foreign if ":" in where else ours,
+        "course": {"type": "roads"}
+        | {name: plain[name] for name in ("map", "traffic", "vehicles", "allow_fewer")},
+        "duration": plain["duration"],
+        "sensors": plain["sensors"],
+        "render": plain["render"],
+    }
+
+
+def _grip_1(plain: Plain) -> Plain:
+    course = drawn_course(plain["scenario"], plain["seed"], CutIn(plain["cutin"]))
+    course = msgspec.structs.replace(course, actors=plain["actors"])
+    return _common_1(plain) | {
+        "driver": _controller_1(plain["controller"], plain["config"]),
+        "course": msgspec.to_builtins(course),
+        "friction": plain["friction"],
+        "duration": DURATION,
+        "settings": plain["settings"] | {"grip": plain["model"], "mu_ref": plain["mu_ref"]},
+        "sensors": plain["level"],
+        "overlay": plain["overlay"],
+    }
+
+
+def _controller_1(text: str, configuration: int) -> Plain:
+    if text == "ideal":
+        return {"type": "ideal"}
+    if text == "stack":
+        functions = sorted(f.value for f in functions_of(configuration))
+        return {"type": "adas", "label": text, "functions": functions}
+    if text.startswith("agent:"):
+        return {"type": "agent", "where": text.removeprefix("agent:")}
+    return {"type": "stack", "where": text}
+
+
+def _common_1(plain: Plain) -> Plain:
+    backend = dict(plain["backend"])
+    return {
+        "version": VERSION,
+        "weather": plain["weather"],
+        "seed": plain["seed"],
+        "profile": plain["profile"],
+        "settings": plain["settings"],
+        "backend": {"backend": backend.pop("kind"), **backend},
+    }

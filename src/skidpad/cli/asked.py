@@ -1,0 +1,135 @@
+"""What a user asks of a campaign beyond one run: several drivers, weathers, settings by name."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from skidpad.core.errors import ConfigError
+from skidpad.core.run import AdasDriver, AgentDriver, DriverSpec, Passenger, RunSpec, StackDriver
+from skidpad.core.weather import Weather
+
+OURS, IDEAL, AGENT = "stack", "ideal", "agent:"
+
+
+class Drivers(Struct, frozen=True):
+    """Who drives, in turn."""
+
+    configs: Annotated[
+        str | None, Meta(description="Published configurations, e.g. 0,1,4; default all five.")
+    ] = None
+    functions: Annotated[
+        str | None, Meta(description="Any set of aeb,acc,lca,tla,resume,limiter.")
+    ] = None
+    stack: Annotated[
+        str | None, Meta(description="Your own stack: module:Class or file.py:Class.")
+    ] = None
+
+    def chosen(self) -> list[DriverSpec]:
+        """The drivers; ConfigError or FileError for what is not there."""
+        from skidpad.campaign.cells import published_drivers
+        from skidpad.stack.configurations import parse_functions
+        from skidpad.stack.loading import load_stack
+
+        given = [v for v in (self.configs, self.functions, self.stack) if v is not None]
+        if len(given) > 1:
+            raise ConfigError("give one of --configs, --functions and --stack, not several")
+        if self.functions is not None:
+            chosen = parse_functions(self.functions)
+            label = "+".join(sorted(f.value for f in chosen)) or "none"
+            return [AdasDriver(label=label, functions=chosen)]
+        if self.stack is not None:
+            load_stack(self.stack)  # a stack that is not there is wrong input, no run's outcome
+            return [StackDriver(self.stack)]
+        return [*published_drivers(self.configs or "all")]
+
+
+class Controller(Struct, frozen=True):
+    """Who drives a scenario."""
+
+    controller: Annotated[
+        str, Meta(description="stack, ideal (as the file says), module:Class, agent:PATH:CLASS.")
+    ] = OURS
+    config: Annotated[int, Meta(ge=0, le=4, description="Configuration of our stack.")] = 2
+
+    def chosen(self) -> DriverSpec:
+        """The driver; ConfigError or FileError for one that is not there."""
+        from skidpad.stack.agents import load_agent
+        from skidpad.stack.configurations import functions_of
+        from skidpad.stack.loading import load_stack
+
+        if self.controller == OURS:
+            return AdasDriver(label=OURS, functions=functions_of(self.config))
+        if self.controller == IDEAL:
+            return Passenger()
+        if self.controller.startswith(AGENT):
+            where = self.controller.removeprefix(AGENT)
+            load_agent(where)
+            return AgentDriver(where)
+        load_stack(self.controller)
+        return StackDriver(self.controller)
+
+
+class Climate(Struct, frozen=True):
+    """In which weathers."""
+
+    weather: Annotated[
+        str, Meta(description="all, or presets and YAML files parted by commas.")
+    ] = "all"
+    sweep: Annotated[
+        str | None, Meta(description="Vary one weather field: FIELD=FROM:TO:STEP.")
+    ] = None
+
+    def chosen(self) -> list[Weather]:
+        """The weathers; `all` is the six published presets."""
+        from skidpad.campaign.cells import sweep
+        from skidpad.physics.presets import MATRIX, find_weather, preset_groups
+
+        if self.weather == "all":
+            found = list(preset_groups()[MATRIX].values())
+        else:
+            found = [find_weather(part.strip()) for part in self.weather.split(",")]
+        return found if self.sweep is None else sweep(found, self.sweep)
+
+
+class Tuned(Struct, frozen=True):
+    """Single settings over those of the profile."""
+
+    set: Annotated[
+        tuple[str, ...], Meta(description="Single settings over the profile: name=value.")
+    ] = ()
+
+    def resolve(self, run: RunSpec, **more: str | None) -> RunSpec:
+        """`run` with all its settings written out. more: settings given by name, None: not given."""
+        from msgspec import structs
+
+        from skidpad.stack.settings import load_profile, parse_assignments
+
+        values = parse_assignments(self.set)
+        values |= parse_assignments(f"{k}={v}" for k, v in more.items() if v is not None)
+        settings = load_profile(run.profile, values).as_plain()
+        return structs.replace(run, settings=settings)
+
+
+class GripCross(Struct, frozen=True):
+    """What a friction campaign varies."""
+
+    scenarios: Annotated[
+        str, Meta(description="all, or ghost_cut_in,lead_slowdown,front_accident.")
+    ] = "all"
+    weather: Annotated[
+        str, Meta(description="all: the eleven of the study; or presets and YAML files.")
+    ] = "all"
+    friction: Annotated[
+        str, Meta(description="original: tyres know no weather; reduced: they do.")
+    ] = "original,reduced"
+    model: Annotated[str, Meta(description="Of reduced friction: statistical or physical.")] = (
+        "statistical"
+    )
+    cutin: Annotated[
+        str, Meta(description="original, unfixed, fixed: spawn delay and merge distance.")
+    ] = "fixed"
+    four_cells: Annotated[
+        bool, Meta(description="Each run without and with drops, to part both effects.")
+    ] = False

@@ -1,0 +1,298 @@
+"""One run as a value: what drives, where, in which weather, on which simulator, from which seed.
+
+`config.yaml` in a run's folder is this value, and driving it again gives the same run. A field with
+a description is an option of every command that drives (`skidpad.cli.spread`).
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Annotated, Any
+
+import msgspec
+from msgspec import Meta, Struct
+
+from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.weather import Weather
+
+VERSION = 2  # of config.yaml; folders without the word were written before there was one value
+DURATION = 500.0  # s (A-005)
+DEADLINE_BASE_S, DEADLINE_PER_SIMULATED_S = 180.0, 4.0  # wall time after which a run is killed
+ARBITER = "arbiter"  # who drives a crew, when it is not one of the channels
+
+Plain = bool | float | str | None
+
+
+# --- what drives
+
+
+class Function(str, Enum):
+    """One function of driving automation; each can be switched by itself (A-011)."""
+
+    AEB = "aeb"  # emergency braking without following: tiers 1 to 3 alone (D-038)
+    ACC = "acc"  # following, which includes tiers 1 to 3
+    LCA = "lca"  # lane centring; without it the lazy driver steers
+    TLA = "tla"  # traffic-light assist
+    RESUME = "resume"  # post-stop resume protocol
+    LIMITER = "limiter"
+
+
+class AdasDriver(Struct, frozen=True, kw_only=True, tag="adas", forbid_unknown_fields=True):
+    """Our own stack with a set of its functions; their settings are those of the run."""
+
+    label: str = "2"  # "0" to "4", "acc+lca", or what a scenario calls its controller
+    functions: frozenset[Function] = frozenset({Function.ACC, Function.LCA})
+
+
+class StackDriver(Struct, frozen=True, tag="stack", forbid_unknown_fields=True):
+    """Anybody's stack."""
+
+    where: str  # module:Class or file.py:Class
+    options: dict[str, Any] = {}  # what the class is given as its settings
+    name: str = ""  # "": as `where`
+
+    @property
+    def label(self) -> str:
+        """What results call it."""
+        return self.name or self.where
+
+
+class AgentDriver(Struct, frozen=True, tag="agent", forbid_unknown_fields=True):
+    """An agent of the CARLA leaderboard's interface (decision G-6)."""
+
+    where: str  # PATH:CLASS
+
+    @property
+    def label(self) -> str:
+        """What results call it."""
+        return f"agent:{self.where}"
+
+
+class Passenger(Struct, frozen=True, tag="ideal", forbid_unknown_fields=True):
+    """Nobody: the scenario moves the ego."""
+
+    @property
+    def label(self) -> str:
+        """What results call it."""
+        return "ideal"
+
+
+class ChannelCrew(Struct, frozen=True, kw_only=True, tag="channels", forbid_unknown_fields=True):
+    """Redundant channels, of which an arbiter or one of them drives."""
+
+    channels: tuple[str, ...]  # the preferred one first
+    drive_by: Annotated[str, Meta(description="The arbiter, or the channel that drives alone.")] = (
+        ARBITER
+    )
+    noise: Annotated[
+        float, Meta(ge=0.0, le=10.0, description="Factor on all sensor errors: 0.5, 1 or 2.")
+    ] = 1.0
+
+    def __post_init__(self) -> None:
+        if len(set(self.channels)) != len(self.channels) or not self.channels:
+            raise ConfigError(f"channels must be different names, got {list(self.channels)}")
+        if self.drive_by != ARBITER and self.drive_by not in self.channels:
+            raise ConfigError(
+                f"drive-by must be {ARBITER} or one of {', '.join(self.channels)}, "
+                f"got {self.drive_by!r}"
+            )
+
+    @property
+    def label(self) -> str:
+        """What results call it."""
+        return self.drive_by
+
+
+DriverSpec = AdasDriver | StackDriver | AgentDriver | Passenger | ChannelCrew
+
+
+# --- where, and among whom
+
+
+class Traffic(str, Enum):
+    """Where background traffic starts."""
+
+    FIXED = "fixed"  # A-202
+    RANDOM = "random"  # A-209
+
+
+class ActorMode(str, Enum):
+    """How a scenario moves an actor."""
+
+    PHYSICAL = "physical"  # a driver tracks what is demanded, through the tyre model
+    IDEAL = "ideal"  # it is exactly where it should be
+
+
+class Roads(Struct, frozen=True, kw_only=True, tag="roads", forbid_unknown_fields=True):
+    """A map with background traffic, from its ego's place on."""
+
+    map: Annotated[str, Meta(description="A bundled map's name, or an OpenDRIVE file.")] = "figure8"
+    traffic: Annotated[Traffic, Meta(description="Where background vehicles start.")] = (
+        Traffic.FIXED
+    )
+    vehicles: Annotated[int, Meta(ge=0, le=80, description="Background vehicles, 0 to 80.")] = 20
+    allow_fewer: bool = False  # A-208
+
+
+class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown_fields=True):
+    """An OpenSCENARIO file, played with these values of its parameters."""
+
+    file: str = ""  # name of the catalogue, or the path of a file
+    parameters: dict[str, float | str] = {}
+    variant: str = ""  # name of that choice of parameters, where it has one
+    skill: dict[str, float] = {}  # of scripted drivers, by actor
+    ego: Annotated[str | None, Meta(description="Which entity is the ego.")] = None
+    actors: Annotated[
+        ActorMode, Meta(description="physical: tyres decide; ideal: as the file says.")
+    ] = ActorMode.PHYSICAL
+
+
+class Route(Struct, frozen=True, kw_only=True, tag="route", forbid_unknown_fields=True):
+    """A way through a map, drawn from the seed, and those whom the ego meets there."""
+
+    name: str
+    title: str
+    map: str
+    vehicles: Annotated[int, Meta(ge=0, le=80)]
+    parked: Annotated[int, Meta(ge=0, le=80)]
+    pedestrians: Annotated[int, Meta(ge=0, le=80)]
+    cyclists: Annotated[int, Meta(ge=0, le=80)]
+
+
+Course = Roads | Scenario | Route
+
+
+# --- on which simulator
+
+
+class BackendKind(str, Enum):
+    """Which simulator drives the world."""
+
+    EMBEDDED = "embedded"
+    CARLA = "carla"
+
+
+class BackendChoice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A simulator and, for a CARLA server, where it is and how it is used."""
+
+    backend: Annotated[BackendKind, Meta(description="carla: a CARLA server drives the world.")] = (
+        BackendKind.EMBEDDED
+    )
+    host: Annotated[str, Meta(description="Of the CARLA server.")] = "127.0.0.1"
+    port: Annotated[int, Meta(ge=1, le=65535, description="Of the CARLA server.")] = 2000
+    pace: Annotated[bool, Meta(description="CARLA: hold runs at real time.")] = False  # A-262
+    without: Annotated[
+        tuple[str, ...],
+        Meta(description="CARLA: an optimisation to switch off, e.g. light-cache."),  # A-268
+    ] = ()
+    server_command: Annotated[
+        str, Meta(description="CARLA: command that starts the server for these runs.")
+    ] = ""  # "": it runs already
+    restart_every: Annotated[
+        int, Meta(ge=0, description="CARLA: runs after which that server is started anew.")
+    ] = 0  # 0: never
+
+    def resolved(self) -> dict[str, Any]:
+        """What of it decides a run; an address does not."""
+        plain: dict[str, Any] = msgspec.to_builtins(self)
+        return {name: value for name, value in plain.items() if name not in ADDRESS}
+
+
+ADDRESS = ("host", "port", "server_command", "restart_every")
+
+
+# --- the run
+
+
+class Render(str, Enum):
+    """Which images are drawn."""
+
+    NEEDED = "needed"  # those that something reads
+    ALL = "all"
+
+
+class Friction(str, Enum):
+    """The switch of B-004."""
+
+    ORIGINAL = "original"  # weather is seen, tyres know nothing of it
+    REDUCED = "reduced"  # tyres know it, by the setting `grip`
+
+
+class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """One run. Two equal values give equal recordings."""
+
+    driver: DriverSpec = AdasDriver()
+    course: Course = Roads()
+    weather: Weather = Weather(name="clear-noon")
+    friction: Friction = Friction.REDUCED
+    seed: int = 1
+    duration: Annotated[float, Meta(gt=0.0, le=1.0e5, description="Longest simulated time, s.")] = (
+        DURATION
+    )
+    profile: Annotated[
+        str, Meta(description="recommended, thesis_text, thesis_listing or preliminary.")
+    ] = "recommended"
+    settings: dict[str, Plain] = {}  # of the profile and over it; {}: all as recommended
+    sensors: Annotated[
+        SensorLevel, Meta(description="pixels: real images; objects: from boxes, much faster.")
+    ] = SensorLevel.PIXELS
+    render: Annotated[
+        Render, Meta(description="needed: images that something reads; all: every image.")
+    ] = Render.NEEDED
+    overlay: Annotated[bool, Meta(description="Rain drops on the cameras (pixels).")] = False
+    backend: BackendChoice = BackendChoice()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.driver, ChannelCrew) is not isinstance(self.course, Route):
+            raise ConfigError("channels drive routes, and only channels do")
+        if isinstance(self.driver, Passenger) and not isinstance(self.course, Scenario):
+            raise ConfigError("only a scenario moves the ego itself")
+
+    @property
+    def cell(self) -> str:
+        """Name of the runs that differ from this one in the seed alone."""
+        if isinstance(self.course, Route):
+            return self.course.name
+        if isinstance(self.course, Roads):
+            return f"{_slug(self.driver.label)}_{self.weather.name}"
+        scenario = self.course.file.rpartition("/")[2].removesuffix(".xosc")
+        what = "-".join(filter(None, (scenario, self.course.variant, "drops" * self.overlay)))
+        return f"{what}_{self.weather.name}_{self.friction.value}"
+
+    @property
+    def name(self) -> str:
+        """Name of the run and of its folder."""
+        return f"{self.cell}-{self.seed:0{_DIGITS[type(self.course)]}d}"
+
+    @property
+    def deadline_s(self) -> float:
+        """Wall time after which the run counts as hanging."""
+        return DEADLINE_BASE_S + DEADLINE_PER_SIMULATED_S * self.duration
+
+    def resolved(self) -> dict[str, Any]:
+        """Everything that decides the run, as plain data (A-260); an address does not."""
+        return self.to_plain() | {"backend": self.backend.resolved()}
+
+    def to_plain(self) -> dict[str, Any]:
+        """The whole value as plain data, as it stands in config.yaml."""
+        plain: dict[str, Any] = msgspec.to_builtins(self, order="deterministic")
+        return {"version": VERSION, **plain}
+
+
+_DIGITS: dict[type[Struct], int] = {Roads: 3, Scenario: 6, Route: 5}  # of the seed in a name
+
+
+def run_from_plain(plain: dict[str, Any], where: str) -> RunSpec:
+    """The run that `to_plain` described; FileError that names `where` for anything else."""
+    version = plain.get("version")
+    if version != VERSION:
+        raise FileError(f"{where} has version {version!r} of a run's description, not {VERSION}")
+    try:
+        return msgspec.convert({k: v for k, v in plain.items() if k != "version"}, RunSpec)
+    except msgspec.ValidationError as error:
+        raise FileError(f"{where} does not describe a run: {error}") from error
+
+
+def _slug(label: str) -> str:
+    return "".join(c if c.isalnum() else "-" for c in label)

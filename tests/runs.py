@@ -1,0 +1,43 @@
+"""Runs as tests ask for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from msgspec import structs
+
+from skidpad.campaign.grip_cells import template
+from skidpad.core.run import AdasDriver, Roads, RunSpec, Scenario
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.weather import Weather
+from skidpad.physics.presets import find_weather
+from skidpad.stack.configurations import functions_of
+from skidpad.stack.settings import Settings, load_profile
+
+
+def adas_run(number: int = 2, weather: str | Weather = "clear-noon", **changes: Any) -> RunSpec:
+    """A published configuration on objects, settings written out; `changes` are fields of the run.
+
+    vehicles: of the background. settings: single ones over the profile, or all of them.
+    """
+    profile, settings = changes.pop("profile", "recommended"), changes.pop("settings", None)
+    if not isinstance(settings, Settings):
+        settings = load_profile(profile, settings)
+    base = RunSpec(
+        driver=AdasDriver(label=str(number), functions=functions_of(number)),
+        course=Roads(vehicles=changes.pop("vehicles", 20)),
+        weather=find_weather(weather) if isinstance(weather, str) else weather,
+        profile=profile,
+        settings=settings.as_plain(),
+        sensors=SensorLevel.OBJECTS,
+    )
+    return structs.replace(base, **changes)
+
+
+def scenario_run(file: str | Path, grip: str = "none", **changes: Any) -> RunSpec:
+    """A scenario, by name or file, played on objects in clear weather by configuration 2."""
+    course = structs.replace(changes.pop("course", Scenario()), file=str(file))
+    settings = Settings().with_values({"grip": grip}).as_plain()
+    base = {"weather": Weather(), "seed": 0, "settings": settings}
+    return template(course=course, **{**base, **changes})

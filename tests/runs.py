@@ -7,8 +7,9 @@ from typing import Any
 
 from msgspec import structs
 
+from skidpad.campaign.channel_routes import driven_routes
 from skidpad.campaign.grip_cells import template
-from skidpad.core.run import AdasDriver, Roads, RunSpec, Scenario
+from skidpad.core.run import AdasDriver, ChannelCrew, Roads, RunSpec, Scenario
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
@@ -33,6 +34,13 @@ def adas_run(number: int = 2, weather: str | Weather = "clear-noon", **changes: 
         sensors=SensorLevel.OBJECTS,
     )
     return structs.replace(base, **changes)
+
+
+def segment_run(route: str = "route-4", crew: ChannelCrew | None = None, **changes: Any) -> RunSpec:
+    """Four seconds of a route with two channels; `changes` are fields of the run."""
+    driver = ChannelCrew() if crew is None else crew
+    fields = {"seed": 1, "duration": 4.0, "driver": driver, **changes}
+    return structs.replace(driven_routes()[route], **fields)
 
 
 def scenario_run(file: str | Path, grip: str = "none", **changes: Any) -> RunSpec:

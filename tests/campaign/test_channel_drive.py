@@ -8,14 +8,17 @@ import time
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
+from runs import segment_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.channel_drive import SegmentPlan, drive_segment
+from skidpad.campaign.channel_drive import drive_segment
 from skidpad.campaign.channel_routes import chosen_routes, driven_routes
-from skidpad.campaign.channels import RECIPE, segment_plans, warm_up
+from skidpad.campaign.channels import RECIPE, segments, warm_up
 from skidpad.campaign.pool import local
 from skidpad.core.channels import ChannelFrame, Decision, TruthFrame
 from skidpad.core.errors import ConfigError, OutputError
+from skidpad.core.run import ChannelCrew
 from skidpad.recording.channel_drives import read_outcomes
 from skidpad.recording.channel_hash import recording_hash
 from skidpad.recording.channels import McapRecording
@@ -25,17 +28,12 @@ from skidpad.recording.results import read_results
 BOTH = ("lav_like", "tfuse_like")
 
 
-def plan(**changes) -> SegmentPlan:
-    base = {"route": driven_routes()["route-4"], "channels": BOTH, "seed": 1, "duration": 4.0}
-    return SegmentPlan(**{**base, **changes})
-
-
 @pytest.mark.req("C-020", "C-022", "C-023", "C-210")
 def test_a_segment_gives_every_topic_each_cycle_and_the_same_bytes_again(tmp_path):
-    outcome = drive_segment(plan(), tmp_path / "a.mcap")
-    drive_segment(plan(), tmp_path / "b.mcap")
+    outcome = drive_segment(segment_run(), tmp_path / "a.mcap")
+    drive_segment(segment_run(), tmp_path / "b.mcap")
     assert recording_hash(tmp_path / "a.mcap") == recording_hash(tmp_path / "b.mcap")
-    drive_segment(plan(seed=2), tmp_path / "c.mcap")
+    drive_segment(segment_run(seed=2), tmp_path / "c.mcap")
     assert recording_hash(tmp_path / "a.mcap") != recording_hash(tmp_path / "c.mcap")
     recording = McapRecording(tmp_path / "a.mcap")
     items = [m.item for m in recording.messages()]
@@ -50,7 +48,7 @@ def test_a_segment_gives_every_topic_each_cycle_and_the_same_bytes_again(tmp_pat
 @pytest.mark.req("C-023")
 def test_three_channels_in_town(tmp_path):
     names = (*BOTH, "reference_like")
-    three = plan(route=driven_routes()["route-5"], channels=names, drive_by="reference_like")
+    three = segment_run("route-5", ChannelCrew(channels=names, drive_by="reference_like"))
     outcome = drive_segment(three, tmp_path / "a.mcap")
     assert list(outcome.driving_s) == ["reference_like"]
     frames = [m for m in McapRecording(tmp_path / "a.mcap").messages() if m.channel == 2]
@@ -61,14 +59,14 @@ def test_three_channels_in_town(tmp_path):
 def test_routes_are_the_six_and_hours_are_split():
     routes = chosen_routes("all")
     assert len(routes) == 6
-    assert {r.map for r in routes} == {"town", "figure8"}
+    assert {r.course.map for r in routes} == {"town", "figure8"}
     night = driven_routes()["route-4"].weather
     assert night.is_night
-    plans = segment_plans(routes, 2.5, plan(seed=2))
+    plans = segments(routes, 2.5, segment_run(seed=2))
     assert sum(p.duration for p in plans) == pytest.approx(9000.0)
     assert max(p.duration for p in plans) == 600.0
     assert len({p.name for p in plans}) == len(plans)
-    other = segment_plans(routes, 2.5, plan(seed=3))
+    other = segments(routes, 2.5, segment_run(seed=3))
     assert not {p.seed for p in plans} & {p.seed for p in other}
 
 
@@ -76,11 +74,11 @@ def test_wrong_words_are_refused():
     with pytest.raises(ConfigError, match="unknown route"):
         chosen_routes("route-9")
     with pytest.raises(ConfigError, match="drive-by"):
-        plan(drive_by="nobody")
+        ChannelCrew(drive_by="nobody")
 
 
 def test_a_campaign_resumes_and_refuses_other_settings(tmp_path):
-    campaign = Campaign(RECIPE, [plan(duration=1.0)])
+    campaign = Campaign(RECIPE, [segment_run(duration=1.0)])
     first = campaign.run(tmp_path, local(1, warm_up))
     assert first.driven == 1
     assert not first.failed
@@ -91,19 +89,22 @@ def test_a_campaign_resumes_and_refuses_other_settings(tmp_path):
     assert row["log_hash"] == outcome.content_hash
     assert (row["distance_m"], row["ended"]) == (outcome.distance_m, "time")
     with pytest.raises(OutputError, match="something else"):
-        Campaign(RECIPE, [plan(duration=1.0, noise=2.0)]).run(tmp_path, local(1), resume=True)
+        Campaign(RECIPE, [segment_run(crew=ChannelCrew(noise=2.0), duration=1.0)]).run(
+            tmp_path, local(1), resume=True
+        )
 
 
 @pytest.mark.req("C-026")
 def test_other_maps_by_name_or_file(tmp_path):
     (route,) = chosen_routes("route-6", "straight")
-    outcome = drive_segment(plan(route=route, duration=3.0), tmp_path / "a.mcap")
+    outcome = drive_segment(replace(route, duration=3.0), tmp_path / "a.mcap")
     assert outcome.distance_m > 3.0
 
 
 @pytest.mark.req("C-026")
 def test_one_channel_can_drive_without_any_other(tmp_path):
-    alone = plan(channels=("tfuse_like",), drive_by="tfuse_like", duration=2.0)
+    crew = ChannelCrew(channels=("tfuse_like",), drive_by="tfuse_like")
+    alone = segment_run(crew=crew, duration=2.0)
     outcome = drive_segment(alone, tmp_path / "a.mcap")
     assert outcome.driving_s == {"tfuse_like": pytest.approx(2.0)}
 
@@ -126,7 +127,7 @@ def test_a_campaign_that_was_killed_goes_on_to_the_same_results(tmp_path):
     parent.wait()
     done = len(ledger.read_bytes().splitlines())
     subprocess.run([*call, "--resume"], check=True, env=environment, timeout=300)
-    whole = Campaign(RECIPE, segment_plans(chosen_routes("all"), float(hours), plan(seed=0)))
+    whole = Campaign(RECIPE, segments(chosen_routes("all"), float(hours), segment_run(seed=0)))
     whole.run(tmp_path / "whole", local(1))
     assert done < 6 == len(ledger.read_bytes().splitlines())
     assert read_results(tmp_path / "part").equals(read_results(tmp_path / "whole"))

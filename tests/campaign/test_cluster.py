@@ -3,11 +3,9 @@
 import jobs as work
 import pytest
 
-from runs import adas_run
+from runs import adas_run, segment_run
 from skidpad.campaign import channels, matrix
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.channel_drive import SegmentPlan
-from skidpad.campaign.channel_routes import driven_routes
 from skidpad.campaign.cluster import runner_of
 from skidpad.campaign.worker import Finished, Job
 from skidpad.core.errors import BackendError, ConfigError
@@ -25,19 +23,15 @@ def cells():
     return [adas_run(4, "rain-night", seed=seed, duration=4.0) for seed in (1, 2)]
 
 
-def plans():
-    route = driven_routes()["route-4"]
-    return [
-        SegmentPlan(route=route, channels=("lav_like", "tfuse_like"), seed=seed, duration=2.0)
-        for seed in (1, 2)
-    ]
+def segments():
+    return [segment_run(seed=seed, duration=2.0) for seed in (1, 2)]
 
 
 @pytest.mark.slow
 @pytest.mark.req("X-1")
 @pytest.mark.parametrize(
     ("recipe", "tasks"),
-    [(matrix.RECIPE, cells), (channels.RECIPE, plans)],
+    [(matrix.RECIPE, cells), (channels.RECIPE, segments)],
     ids=["matrix", "channels"],
 )
 def test_a_cluster_gives_the_same_results_and_goes_on(tmp_path, recipe, tasks):

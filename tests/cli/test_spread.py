@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.cli.spread import described, spread
-from skidpad.core.run import BackendChoice, RunSpec
+from skidpad.core.run import PARTED, BackendChoice, RunSpec
 
 ROOT = typer.main.get_command(app)
 DRIVING = ("adas", "grip", "play")
@@ -29,6 +29,7 @@ class Paint(Struct, frozen=True):
     coats: Annotated[int, Meta(ge=1, le=3, description="How many.")] = 1
     wet: Annotated[bool, Meta(description="Not dry yet.")] = False
     marks: Annotated[tuple[str, ...], Meta(description="Words on it.")] = ()
+    layers: Annotated[tuple[str, ...], Meta(description="In turn.", extra=PARTED)] = ("a", "b")
     secret: int = 7
 
 
@@ -49,7 +50,8 @@ def invoke(*words: str) -> tuple[int, str]:
 def test_described_fields_become_options_and_the_command_gets_the_value() -> None:
     assert invoke() == (0, repr((Paint(coats=2), "x")))
     words = ("--colour", "blue", "--coats", "3", "--wet", "--marks", "a", "--marks", "b")
-    expected = Paint(Colour.BLUE, 3, wet=True, marks=("a", "b"))
+    words += ("--layers", "c, d,e")
+    expected = Paint(Colour.BLUE, 3, wet=True, marks=("a", "b"), layers=("c", "d", "e"))
     assert invoke(*words, "--name", "y") == (0, repr((expected, "y")))
 
 

@@ -148,7 +148,7 @@ def _roads(spec: RunSpec, course: Roads) -> Stage:
         initial_limit_kmh=s.initial_limit_kmh,
         slow_in_weather=s.drivers,
     )
-    setup = replace(_setup(spec, course.map, ego), traffic=traffic)
+    setup = replace(setup_of(spec, course.map, ego), traffic=traffic)
     supervisor = Supervisor(map, recovery_settings(s), setup.dt)
     return Stage(map, setup, supervisor, Timer(round(spec.duration / setup.dt)))
 
@@ -159,7 +159,7 @@ def _scenario(spec: RunSpec, course: Scenario) -> Stage:
     modes[script.ego] = ActorMode.IDEAL if isinstance(spec.driver, Passenger) else None
     played = Player(script, modes=modes, skill=course.skill, duration=spec.duration)
     ego, actors = script.setups()
-    setup = replace(_setup(spec, script.map_name, ego), actors=actors)
+    setup = replace(setup_of(spec, script.map_name, ego), actors=actors)
     return Stage(script.map, setup, Unsupervised(), played, played)
 
 
@@ -169,7 +169,7 @@ def load_scenario(course: Scenario) -> player.Script:
     return player.load(file, course.parameters, course.ego)
 
 
-def _setup(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
+def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
     """What every set-up says: the weather, what it touches, and what is sensed of it."""
     s = settings_of(spec)
     return Setup(

@@ -1,4 +1,4 @@
-"""One segment: world, channels, scores, arbiter, recording (decision L-5).
+"""One segment: channels with their arbiter as a driver, their recording as a sink (decision L-5).
 
     each 0.1 s:  view   = suite.observe(truth)         one per channel; nothing else is seen
                  frame  = channel.update(view)
@@ -12,173 +12,176 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import msgspec
 import numpy as np
 
 from skidpad import __version__
 from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
 from skidpad.campaign.channel_outcomes import Referee
-from skidpad.campaign.channel_routes import DrivenRoute
-from skidpad.campaign.channel_world import Segment, segment_of
+from skidpad.campaign.channel_world import Segment, crew_of, route_of, segment_of
+from skidpad.campaign.drive import Moment, Sink, Unsupervised, loop
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
-from skidpad.core.errors import ConfigError, require_range
-from skidpad.core.run import BackendChoice
-from skidpad.core.setup import DT
-from skidpad.core.states import VehicleCommand, WorldTruth
+from skidpad.core.frames import SensorFrame
+from skidpad.core.run import ARBITER, RunSpec
+from skidpad.core.setup import DT, ActorCommand
+from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import ActorKind
 from skidpad.evidence.channels.risk import safety_scores
-from skidpad.recording.channel_drives import ARBITER, DriveOutcome
+from skidpad.recording.channel_drives import DriveOutcome
 from skidpad.recording.channels import ChannelWriter
-from skidpad.roads.bundled import load_map
-from skidpad.roads.queries import RoadMap
 from skidpad.sensors.channel_presets import senses_of
 from skidpad.sensors.channel_suite import CYCLE, ChannelSuite
 from skidpad.sensors.objects import LABELS
-from skidpad.simulation.backend import Backend
 from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Choice, Reason
 from skidpad.stack.channels.channel import Channel
 from skidpad.stack.channels.settings import settings_of
 
-TICKS = round(CYCLE / DT)
-DEADLINE_S = 3600.0
+PERIOD = round(CYCLE / DT)  # ticks
 WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
 TRUTH_REACH = 120.0  # m around the ego within which the true world is recorded
 MINIMAL_RISK_BRAKE = 0.4  # of full brake, about 4 m/s^2 (UN R157 5.1.6: at most 4 m/s^2)
+NO_REPORT = StackReport()
 LABEL_OF = np.array([LABELS[kind] for kind in ActorKind], dtype=np.int64)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class SegmentPlan:
-    """What one recording is made of; two equal plans give equal recordings."""
+class Crew:
+    """Channels with their suites and arbiter: a driver that thinks every other tick."""
 
-    route: DrivenRoute
-    channels: tuple[str, ...]
-    seed: int
-    duration: float = 600.0  # s
-    drive_by: str = ARBITER  # or the name of the channel that drives alone
-    noise: float = 1.0
-    backend: BackendChoice = BackendChoice()
+    report = NO_REPORT
 
-    def __post_init__(self) -> None:
-        if len(set(self.channels)) != len(self.channels) or not self.channels:
-            raise ConfigError(f"channels must be different names, got {list(self.channels)}")
-        if self.drive_by != ARBITER and self.drive_by not in self.channels:
-            raise ConfigError(
-                f"drive-by must be {ARBITER} or one of {', '.join(self.channels)}, "
-                f"got {self.drive_by!r}"
-            )
-        require_range("noise", self.noise, 0.0, 10.0)
+    def __init__(self, spec: RunSpec, segment: Segment) -> None:
+        self.spec, self.crew, self.segment = spec, crew_of(spec), segment
+        names = self.crew.channels
+        self.channels = [
+            Channel(name, settings_of(name), segment.car, segment.map, segment.route)
+            for name in names
+        ]
+        self.arbiter = Arbiter(names, ArbiterSettings(preferred=names[0]))
+        self.ticks = 0  # driven so far
 
-    @property
-    def name(self) -> str:
-        """File name without suffix."""
-        return f"{self.route.name}-{self.seed:05d}"
-
-    @property
-    def deadline_s(self) -> float:
-        """Wall time after which the segment counts as hanging."""
-        return DEADLINE_S
-
-    def resolved(self) -> dict[str, Any]:
-        """Everything that decides the segment, as plain data; where a server is does not."""
-        plain: dict[str, Any] = msgspec.to_builtins(self)
-        return plain | {"backend": self.backend.resolved()}
-
-
-def drive_segment(plan: SegmentPlan, path: Path) -> DriveOutcome:
-    """Drive a segment and write its recording to `path`, which appears only when complete."""
-    map = load_map(plan.route.map)
-    segment = segment_of(plan.route, map, plan.seed, plan.duration)
-    keep_server(plan.backend)
-    backend = make_backend(plan.backend, WATCHDOG)
-    part = path.with_suffix(".part")
-    try:
-        with ChannelWriter(part, plan.channels) as writer:
-            outcome = _loop(plan, map, segment, backend, writer)
-    finally:
-        backend.close()
-    os.replace(part, path)
-    return outcome
-
-
-class _Crew:
-    """The channels of a drive with their suites and arbiter."""
-
-    def __init__(self, plan: SegmentPlan, map: RoadMap, segment: Segment, truth: WorldTruth):
-        self.plan = plan
+    def begin(self, table: ActorTable) -> None:
+        """Give every channel its sensors."""
         self.suites = [
             ChannelSuite(
-                name, senses_of(name), map.roadside, truth.table, plan.route.weather, plan.seed,
-                noise=plan.noise,
+                name, senses_of(name), self.segment.map.roadside, table, self.spec.weather,
+                self.spec.seed, noise=self.crew.noise,
             )
-            for name in plan.channels
+            for name in self.crew.channels
         ]  # fmt: skip
-        self.channels = [
-            Channel(name, settings_of(name), segment.car, map, segment.route)
-            for name in plan.channels
-        ]
-        self.arbiter = Arbiter(plan.channels, ArbiterSettings(preferred=plan.channels[0]))
 
-    def cycle(self, t: float, truth: WorldTruth) -> tuple[list[ChannelFrame], Decision]:
-        """What every channel says at time t, and who drives."""
-        frames = [
-            channel.update(suite.observe(t, truth.states, truth.lights))
-            for channel, suite in zip(self.channels, self.suites, strict=True)
-        ]
-        scores = safety_scores(frames).tolist()
-        if self.plan.drive_by == ARBITER:
-            progress = [c.v_planned for c in self.channels]
-            choice = self.arbiter.update(t, frames, scores, progress)
-        else:
-            choice = Choice(self.plan.channels.index(self.plan.drive_by), Reason.KEPT)
-        self.driving = choice.driving
-        name = "" if choice.driving is None else self.plan.channels[choice.driving]
-        return frames, Decision(t, name, choice.reason.value, tuple(scores))
+    @property
+    def cycle(self) -> int | None:
+        """Number of the cycle that the last tick began, negative in the warm-up; None: it began none."""
+        cycle, rest = divmod(self.ticks - 1, PERIOD)
+        return None if rest else cycle - round(WARM_UP / CYCLE)
 
-    def command(self) -> VehicleCommand:
-        """The driving channel's; in a minimal-risk stop brake along the first channel's path."""
+    @property
+    def mode(self) -> str:
+        """The driving channel; empty in a minimal-risk stop."""
+        return self.decision.driving
+
+    def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
+        """The driving channel's command; in a minimal-risk stop brake along the first channel's path."""
+        del frame
+        self.ticks += 1
+        if self.cycle is not None:
+            self._think(self.cycle * CYCLE, truth)
         if self.driving is not None:
             return self.channels[self.driving].command
         return VehicleCommand(brake=MINIMAL_RISK_BRAKE, steer=self.channels[0].command.steer)
 
+    def _think(self, t: float, truth: WorldTruth) -> None:
+        """What every channel says at time t, and who drives."""
+        self.frames: list[ChannelFrame] = [
+            channel.update(suite.observe(t, truth.states, truth.lights))
+            for channel, suite in zip(self.channels, self.suites, strict=True)
+        ]
+        scores = safety_scores(self.frames).tolist()
+        names, drive_by = self.crew.channels, self.crew.drive_by
+        if drive_by == ARBITER:
+            progress = [c.v_planned for c in self.channels]
+            choice = self.arbiter.update(t, self.frames, scores, progress)
+        else:
+            choice = Choice(names.index(drive_by), Reason.KEPT)
+        self.driving = choice.driving
+        name = "" if choice.driving is None else names[choice.driving]
+        self.decision = Decision(t, name, choice.reason.value, tuple(scores))
 
-def _loop(
-    plan: SegmentPlan,
-    map: RoadMap,
-    segment: Segment,
-    backend: Backend,
-    writer: ChannelWriter,
-) -> DriveOutcome:
-    backend.reset(segment.setup, plan.seed)
-    truth = backend.truth()
-    crew = _Crew(plan, map, segment, truth)
-    referee = Referee(segment.route, segment.car, CYCLE)
-    writer.write_context(Context(0.0, _about(plan, map)))
-    warm = round(WARM_UP / CYCLE)
-    cycles = round(plan.duration / CYCLE)
-    for k in range(-warm, cycles):
-        t = k * CYCLE
-        frames, decision = crew.cycle(t, truth)
-        words = segment.crowd.commands(t, truth)
-        if k >= 0:
-            referee.observe(truth, decision)
-            for name, frame in zip(plan.channels, frames, strict=True):
-                writer.write(name, frame)
-            writer.write_decision(decision)
-            writer.write_truth(truth_frame(t, truth))
-        command = crew.command()
-        for tick in range(TICKS):
-            backend.step(command, words if tick == 0 else ())
-            truth = backend.truth()
-            if k >= 0:
-                referee.touched(t, truth)
-        if k >= 0 and referee.over:
-            break
-    return referee.outcome(plan.route.name, plan.seed, plan.drive_by)
+
+class Recording(Sink):
+    """Writes every cycle after the warm-up, and has it judged; it knows when the segment is over."""
+
+    def __init__(self, crew: Crew, writer: ChannelWriter) -> None:
+        segment = crew.segment
+        self.crew, self.writer = crew, writer
+        self.referee = Referee(segment.route, segment.car, CYCLE)
+        self.left = round(crew.spec.duration / CYCLE)  # cycles to write
+        self.ended = False
+        self._t: float | None = None  # of the cycle under way, once cycles are written
+
+    def begin(self, table: ActorTable) -> None:
+        """Say what is recorded."""
+        del table
+        self.writer.write_context(Context(0.0, _about(self.crew.spec, self.crew.segment)))
+
+    def see(self, moment: Moment) -> None:
+        """The contacts of the step that led here; at the begin of a cycle what is said and true."""
+        crew, truth = self.crew, moment.truth
+        if self._t is not None:
+            self.referee.touched(self._t, truth)
+        if crew.cycle is None or crew.cycle < 0:
+            return
+        if self.referee.over or self.left == 0:
+            self.ended = True
+            return
+        self.left -= 1
+        self._t = crew.cycle * CYCLE
+        self.referee.observe(truth, crew.decision)
+        for name, frame in zip(crew.crew.channels, crew.frames, strict=True):
+            self.writer.write(name, frame)
+        self.writer.write_decision(crew.decision)
+        self.writer.write_truth(truth_frame(self._t, truth))
+
+
+class Street:
+    """The script of a segment: people walk and ride, until the recording has ended."""
+
+    def __init__(self, crew: Crew, recording: Recording) -> None:
+        self.crew, self.recording = crew, recording
+
+    @property
+    def ended(self) -> bool:
+        """Nothing more is recorded."""
+        return self.recording.ended
+
+    def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
+        """Words to people at the begin of each cycle."""
+        if self.crew.cycle is None:
+            return ()
+        return self.crew.segment.crowd.commands(self.crew.cycle * CYCLE, truth)
+
+
+def drive_segment(spec: RunSpec, path: Path) -> DriveOutcome:
+    """Drive a segment and write its recording to `path`, which appears only when complete."""
+    segment = segment_of(spec)
+    crew = Crew(spec, segment)
+    keep_server(spec.backend)
+    backend = make_backend(spec.backend, WATCHDOG)
+    part = path.with_suffix(".part")
+    try:
+        with ChannelWriter(part, crew.crew.channels) as writer:
+            recording = Recording(crew, writer)
+            frame = backend.reset(segment.setup, spec.seed)
+            street = Street(crew, recording)
+            failure = loop(backend, frame, crew, Unsupervised(), street, (recording,))
+    finally:
+        backend.close()
+    if failure is not None:
+        raise failure
+    os.replace(part, path)
+    return recording.referee.outcome(route_of(spec).name, spec.seed, crew.crew.drive_by)
 
 
 def truth_frame(t: float, truth: WorldTruth) -> TruthFrame:
@@ -204,16 +207,17 @@ def truth_frame(t: float, truth: WorldTruth) -> TruthFrame:
     )
 
 
-def _about(plan: SegmentPlan, map: RoadMap) -> dict[str, str]:
+def _about(spec: RunSpec, segment: Segment) -> dict[str, str]:
+    course, crew = route_of(spec), crew_of(spec)
     return {
-        "route": plan.route.name,
-        "title": plan.route.title,
-        "map": map.name,
-        "map_hash": map.content_hash,
-        "seed": str(plan.seed),
-        "drive_by": plan.drive_by,
-        "noise": f"{plan.noise:g}",
+        "route": course.name,
+        "title": course.title,
+        "map": segment.map.name,
+        "map_hash": segment.map.content_hash,
+        "seed": str(spec.seed),
+        "drive_by": crew.drive_by,
+        "noise": f"{crew.noise:g}",
         "version": __version__,
-        "sun_altitude_deg": f"{plan.route.weather.sun_altitude_deg:g}",
-        "precipitation": f"{plan.route.weather.precipitation:g}",
+        "sun_altitude_deg": f"{spec.weather.sun_altitude_deg:g}",
+        "precipitation": f"{spec.weather.precipitation:g}",
     }

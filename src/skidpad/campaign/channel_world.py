@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import hypot
 
 import numpy as np
 
-from skidpad.campaign.channel_routes import DrivenRoute
+from skidpad.campaign.cast import setup_of
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.randomness import stream
+from skidpad.core.run import ChannelCrew, Route, RunSpec
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
-from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.types import EGO_TYPE, traffic_types, vehicle_type
+from skidpad.roads.bundled import load_map
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.crowd import Crowd
@@ -33,17 +34,34 @@ V_MEAN_MAX = 25.0  # m/s, so that no route ends before its segment
 class Segment:
     """Everything that a segment begins with."""
 
+    map: RoadMap
     setup: Setup
     crowd: Crowd
     route: RoutePath
     car: CarModel
 
 
-def segment_of(route: DrivenRoute, map: RoadMap, seed: int, duration: float) -> Segment:
-    """The world of a route with this seed; `duration` in s decides how long the way is."""
+def route_of(spec: RunSpec) -> Route:
+    """The route of a segment."""
+    if not isinstance(spec.course, Route):
+        raise ConfigError(f"{spec.name} drives no route")
+    return spec.course
+
+
+def crew_of(spec: RunSpec) -> ChannelCrew:
+    """The channels of a segment."""
+    if not isinstance(spec.driver, ChannelCrew):
+        raise ConfigError(f"{spec.name} is driven by no channels")
+    return spec.driver
+
+
+def segment_of(spec: RunSpec) -> Segment:
+    """The world of a route; the duration decides how long the way is."""
+    route, seed = route_of(spec), spec.seed
+    map = load_map(route.map)
     rng = stream(seed, "channels", "route")
     lane = _first_lane(map, rng)
-    lanes = draw_route(map, lane, duration * V_MEAN_MAX + ROUTE_SPARE, rng)
+    lanes = draw_route(map, lane, spec.duration * V_MEAN_MAX + ROUTE_SPARE, rng)
     path = route_path(map, lanes, FIRST_S)
     start = map.at(lane, FIRST_S)
     crowd = Crowd(map, route.pedestrians, route.cyclists, seed)
@@ -64,16 +82,14 @@ def segment_of(route: DrivenRoute, map: RoadMap, seed: int, duration: float) -> 
         )
         for i, p in enumerate(spaces)
     ]
-    setup = Setup(
-        map=route.map,
-        weather=route.weather,
-        specs=(),
-        ego=ActorSetup(name="ego", type=EGO_TYPE, place=start.pose, driver="scripted"),
+    ego = ActorSetup(name="ego", type=EGO_TYPE, place=start.pose, driver="scripted")
+    setup = replace(
+        setup_of(spec, route.map, ego),
+        specs=(),  # channels bring their own
         actors=(*traffic, *parked, *crowd.actors()),
         traffic=TrafficSetup(mode="random", vehicles=0, variety=True),
-        level=SensorLevel.OBJECTS,
     )
-    return Segment(setup, crowd, path, car_model())
+    return Segment(map, setup, crowd, path, car_model())
 
 
 def car_model() -> CarModel:

@@ -12,13 +12,16 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import msgspec
+from msgspec import structs
 
 from skidpad import __version__
-from skidpad.campaign.channel_drive import SegmentPlan, drive_segment
-from skidpad.campaign.channel_routes import DrivenRoute, driven_routes
+from skidpad.campaign.channel_drive import drive_segment
+from skidpad.campaign.channel_routes import driven_routes
+from skidpad.campaign.channel_world import crew_of, route_of
 from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.campaign.runfolder import Stopwatch
 from skidpad.core.errors import require_range
+from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.channel_drives import (
     DRIVES,
@@ -34,19 +37,18 @@ SEGMENT = 600.0  # s (C-12)
 SEEDS_PER_ROUTE = 1000  # seeds of a route are seed * this + segment number
 
 
-def segment_plans(
-    routes: Sequence[DrivenRoute], hours: float, template: SegmentPlan
-) -> list[SegmentPlan]:
+def segments(routes: Sequence[RunSpec], hours: float, template: RunSpec) -> list[RunSpec]:
     """Segments of ten minutes, the hours split equally among routes; the last one is the rest.
 
-    template: everything else; its seed gives each route's first one.
+    template: what routes do not say; its seed gives each route's first one.
     """
     require_range("hours", hours, 1.0 / 3600.0, 10_000.0)
     seconds = hours * 3600.0 / len(routes)
     return [
-        replace(
+        structs.replace(
             template,
-            route=route,
+            course=route.course,
+            weather=route.weather,
             seed=template.seed * SEEDS_PER_ROUTE + i,
             duration=min(SEGMENT, seconds - i * SEGMENT),
         )
@@ -55,26 +57,26 @@ def segment_plans(
     ]
 
 
-def drive_one(out: Path, plan: SegmentPlan) -> Driven[DriveKey, DriveMetrics]:
+def drive_one(out: Path, spec: RunSpec) -> Driven[DriveKey, DriveMetrics]:
     """In a worker: drive one segment and write both files."""
     watch = Stopwatch()
-    folder = out / plan.route.name
+    folder = out / route_of(spec).name
     folder.mkdir(parents=True, exist_ok=True)
-    recording = folder / f"{plan.name}.mcap"
-    outcome = drive_segment(plan, recording)
+    recording = folder / f"{spec.name}.mcap"
+    outcome = drive_segment(spec, recording)
     timing, digest = watch.timing(outcome.driven_s), recording_hash(recording)
     outcome = replace(outcome, content_hash=digest, cpu_s=round(timing.cpu_s, 2))
-    record = msgspec.json.encode(DriveRecord(plan.resolved(), outcome))
+    record = msgspec.json.encode(DriveRecord(spec.to_plain(), outcome))
     write_bytes(recording.with_suffix(".json"), msgspec.json.format(record, indent=1))
-    return Driven(key=drive_key(plan, Outcome.COMPLETED, digest), metrics=outcome, timing=timing)
+    return Driven(key=drive_key(spec, Outcome.COMPLETED, digest), metrics=outcome, timing=timing)
 
 
-def drive_key(plan: SegmentPlan, outcome: Outcome, log_hash: str | None = None) -> DriveKey:
+def drive_key(spec: RunSpec, outcome: Outcome, log_hash: str | None = None) -> DriveKey:
     """The identifying columns of a segment's row."""
     return DriveKey(
-        route=plan.route.name,
-        seed=plan.seed,
-        drive_by=plan.drive_by,
+        route=route_of(spec).name,
+        seed=spec.seed,
+        drive_by=crew_of(spec).drive_by,
         outcome=outcome.value,
         version=__version__,
         log_hash=log_hash,
@@ -84,13 +86,8 @@ def drive_key(plan: SegmentPlan, outcome: Outcome, log_hash: str | None = None) 
 def warm_up() -> None:
     """Compile every kernel that a segment needs, by driving a moment."""
     with TemporaryDirectory() as folder:
-        plan = SegmentPlan(
-            route=driven_routes()["route-4"],
-            channels=("lav_like", "tfuse_like"),
-            seed=0,
-            duration=1.0,
-        )
-        drive_segment(plan, Path(folder) / "warm.mcap")
+        spec = structs.replace(driven_routes()["route-4"], duration=1.0)
+        drive_segment(spec, Path(folder) / "warm.mcap")
 
 
 RECIPE = Recipe(

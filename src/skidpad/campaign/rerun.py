@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import cv2
@@ -14,13 +15,15 @@ import numpy as np
 from PIL import Image
 
 from skidpad.campaign.backends import keep_server
+from skidpad.campaign.channel_drive import drive_segment
 from skidpad.campaign.drive import Moment, Sink
 from skidpad.campaign.run import run as drive_again
-from skidpad.campaign.stored import read_run
+from skidpad.campaign.stored import read_run, read_segment
 from skidpad.campaign.views import SIZE, twelve_views
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
 from skidpad.core.states import StackReport
+from skidpad.recording.channel_hash import recording_hash
 from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.recording.runlog import RunLog
 
@@ -55,6 +58,15 @@ def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None 
         closely.close()
     same = log_hash(again) == log_hash(first_ticks(stored, len(again)))
     return Rerun(same, tuple(closely.pictures), film, tuple(closely.trace))
+
+
+def same_segment(recording: Path) -> bool:
+    """Drive the segment of a recording of channels again, all of it; the contents are the same."""
+    spec = read_segment(recording)
+    with TemporaryDirectory() as folder:
+        again = Path(folder) / "again.mcap"
+        drive_segment(spec, again)
+        return recording_hash(again) == recording_hash(recording)
 
 
 def first_ticks(log: RunLog, n: int) -> RunLog:

@@ -12,6 +12,7 @@ from skidpad.campaign.grip_cells import DURATION, drawn_course
 from skidpad.campaign.runfolder import CONFIG
 from skidpad.core.errors import FileError
 from skidpad.core.run import VERSION, RunSpec, run_from_plain
+from skidpad.recording.channel_drives import read_record
 from skidpad.scenarios.variation import CutIn
 from skidpad.stack.configurations import functions_of
 
@@ -35,6 +36,20 @@ def read_run(folder: Path) -> RunSpec:
         return run_from_plain(from_version_1(plain), str(path))
     except (KeyError, TypeError, AttributeError) as error:
         raise FileError(f"{path} does not describe a run: {error!r}") from error
+
+
+def read_segment(recording: Path) -> RunSpec:
+    """The run that the file beside a recording of channels describes."""
+    path = recording.with_suffix(".json")
+    record = read_record(path)
+    if record is None:
+        raise FileError(f"{path} does not describe a driven segment")
+    if "version" in record.plan:
+        return run_from_plain(record.plan, str(path))
+    try:
+        return run_from_plain(_segment_1(record.plan), str(path))
+    except (KeyError, TypeError, AttributeError) as error:
+        raise FileError(f"{path} does not describe a driven segment: {error!r}") from error
 
 
 def from_version_1(plain: Plain) -> Plain:
@@ -76,6 +91,20 @@ def _grip_1(plain: Plain) -> Plain:
         "settings": plain["settings"] | {"grip": plain["model"], "mu_ref": plain["mu_ref"]},
         "sensors": plain["level"],
         "overlay": plain["overlay"],
+    }
+
+
+def _segment_1(plain: Plain) -> Plain:
+    route = dict(plain["route"])
+    weather = route.pop("weather")
+    crew = {name: plain[name] for name in ("channels", "drive_by", "noise")}
+    backend = plain.get("backend", {"kind": "embedded"})
+    common = {"seed": plain["seed"], "profile": "recommended", "settings": {}, "backend": backend}
+    return _common_1(common | {"weather": weather}) | {
+        "driver": {"type": "channels", **crew},
+        "course": {"type": "route", **route},
+        "duration": plain["duration"],
+        "sensors": "objects",
     }
 
 

@@ -17,10 +17,9 @@ from skidpad.campaign.cells import TUNING_SEEDS
 from skidpad.campaign.grip_cells import template
 from skidpad.campaign.run import Run, run
 from skidpad.core.geometry import mps_from_kmh
-from skidpad.core.run import Friction, Scenario
+from skidpad.core.run import Friction, RunSpec, Scenario
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome
-from skidpad.core.weather import Weather
 from skidpad.evidence.grip.scores import npc_contact_row
 from skidpad.physics.presets import preset
 from skidpad.scenarios.variation import (
@@ -90,7 +89,7 @@ def candidates(scenario: str) -> Iterator[Candidate]:
 
 def judge(candidate: Candidate, seeds: range = SEEDS) -> Row:
     """Drive it once per seed."""
-    played = [_drive(candidate, preset(BASELINE), seed) for seed in seeds]
+    played = [run(tuning_run(candidate, seed)) for seed in seeds]
     logs = [p.log for p in played]
     way = [float(np.ptp(log.actors.x[:, 0])) for log in logs]
     return Row(
@@ -108,14 +107,15 @@ def _nearest(played: Run) -> float:
     return float(np.hypot(a.x[:, 1:] - a.x[:, :1], a.y[:, 1:] - a.y[:, :1]).min())
 
 
-def _drive(candidate: Candidate, weather: Weather, seed: int) -> Run:
+def tuning_run(candidate: Candidate, seed: int) -> RunSpec:
+    """The candidate with a seed, on dry road with original friction."""
     name = candidate.scenario
     course = Scenario(
         file=name,
         parameters=dict(drawn_parameters(name, seed, candidate.cutin, candidate.values)),
         skill=drawn_skill(name, seed),
     )
-    return run(template(course=course, weather=weather, seed=seed, friction=Friction.ORIGINAL))
+    return template(course=course, weather=preset(BASELINE), seed=seed, friction=Friction.ORIGINAL)
 
 
 def main(scenarios: list[str]) -> None:

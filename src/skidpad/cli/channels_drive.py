@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+from msgspec import structs
 
 from skidpad.cli.campaigns import How
 from skidpad.cli.spread import spread
-from skidpad.core.run import BackendChoice
+from skidpad.core.run import BackendChoice, ChannelCrew
 
 FOLDERS = typer.Argument(help="Folders of `skidpad channels drive`.")
 
@@ -17,53 +18,38 @@ FOLDERS = typer.Argument(help="Folders of `skidpad channels drive`.")
 @spread()
 def drive(
     how: How,
+    crew: ChannelCrew,
     backend: BackendChoice,
     route: Annotated[str, typer.Option(help="One of the six routes, or all.")] = "all",
     hours: Annotated[
         float, typer.Option(help="Hours in total, split equally among the routes.")
     ] = 1.0,
-    channels: Annotated[
-        str, typer.Option(help="Names, the preferred one first.")
-    ] = "lav_like,tfuse_like",
     seed: Annotated[
         int, typer.Option(help="First seed; different numbers give disjoint seeds.")
     ] = 0,
     map: Annotated[
         Path | None, typer.Option(help="Drive on this map (.xodr) instead of the route's own.")
     ] = None,
-    noise: Annotated[
-        float, typer.Option(help="Factor on all sensor errors: 0.5, 1 or 2 for the sweep.")
-    ] = 1.0,
-    drive_by: Annotated[
-        str, typer.Option(help="The arbiter, or the channel that drives alone.")
-    ] = "arbiter",
 ) -> None:
     """Drive channels over routes on a simulator; one recording per ten minutes."""
     from skidpad.campaign.campaign import Campaign
-    from skidpad.campaign.channel_drive import SegmentPlan
     from skidpad.campaign.channel_routes import chosen_routes
-    from skidpad.campaign.channels import RECIPE, segment_plans
+    from skidpad.campaign.channel_world import route_of
+    from skidpad.campaign.channels import RECIPE, segments
     from skidpad.cli.carla_backend import checked, drives_alone
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.channel_presets import senses_of
 
-    names = tuple(name.strip() for name in channels.split(",") if name.strip())
-    for name in names:
+    for name in crew.channels:
         senses_of(name)
     routes = chosen_routes(route, map)
     for chosen in routes:
-        load_map(chosen.map)
-    choice = checked(backend)
-    template = SegmentPlan(
-        route=routes[0],
-        channels=names,
-        seed=seed,
-        drive_by=drive_by,
-        noise=noise,
-        backend=choice,
+        load_map(route_of(chosen).map)
+    template = structs.replace(routes[0], driver=crew, seed=seed, backend=checked(backend))
+    campaign = Campaign(
+        RECIPE, segments(routes, hours, template), alone=drives_alone(template.backend)
     )
-    plans = segment_plans(routes, hours, template)
-    summary = how(Campaign(RECIPE, plans, alone=drives_alone(choice)), totals)
+    summary = how(campaign, totals)
     if summary is not None and summary.failed:
         raise typer.Exit(1)
 

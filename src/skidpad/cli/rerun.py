@@ -4,34 +4,53 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+if TYPE_CHECKING:
+    from skidpad.campaign.rerun import Rerun
+
+
+RECORDING = ".mcap"
+
 
 def rerun(
-    run: Annotated[Path, typer.Argument(help="A run's folder.")],
+    run: Annotated[
+        Path, typer.Argument(help="A run's folder, or the .mcap recording of driven channels.")
+    ],
     begin: Annotated[float, typer.Option("--from", help="s of simulated time.")] = 0.0,
     end: Annotated[float, typer.Option("--to", help="s of simulated time.")] = 10.0,
     video: Annotated[Path | None, typer.Option(help="Write a film to this .mp4 file.")] = None,
 ) -> None:
-    """Drive a stored run again: all twelve views and the tier trace of a stretch, hash-checked."""
-    from skidpad.campaign.rerun import rerun as drive_again
+    """Drive a stored run again: all twelve views and the tier trace of a stretch, hash-checked.
 
-    result = drive_again(run, begin, end, run / "rerun", video)
-    for line in result.trace:
-        typer.echo(line)
-    if result.film is not None:
-        typer.echo(f"film: {result.film}")
-    elif result.pictures:
-        typer.echo(f"{len(result.pictures)} pictures: {result.pictures[0].parent}")
-    if not result.same:
+    Channels are driven again as a whole, without views.
+    """
+    from skidpad.campaign import rerun as again
+
+    if run.suffix == RECORDING:
+        same = again.same_segment(run)
+    else:
+        result = again.rerun(run, begin, end, run / "rerun", video)
+        _show(result)
+        same = result.same
+    if not same:
         typer.echo(
             "this is another drive than the stored one: machine, libraries or code have changed",
             err=True,
         )
         raise typer.Exit(1)
     typer.echo("the same drive as the stored one, by content hash")
+
+
+def _show(result: Rerun) -> None:
+    for line in result.trace:
+        typer.echo(line)
+    if result.film is not None:
+        typer.echo(f"film: {result.film}")
+    elif result.pictures:
+        typer.echo(f"{len(result.pictures)} pictures: {result.pictures[0].parent}")
 
 
 def study(

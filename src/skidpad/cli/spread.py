@@ -20,6 +20,8 @@ from typing import Annotated, Any, get_args, get_type_hints
 import typer
 from msgspec import NODEFAULT, Meta, Struct, structs
 
+from skidpad.core.run import PARTED
+
 Command = Callable[..., Any]
 
 
@@ -63,28 +65,37 @@ def described(kind: type[Struct], defaults: dict[str, Any]) -> list[inspect.Para
             inspect.Parameter(
                 field.name,
                 inspect.Parameter.KEYWORD_ONLY,
-                default=list(default) if isinstance(default, tuple) else default,
+                default=_shown(default, meta),
                 annotation=annotation,
             )
         )
     return found
 
 
+def _shown(default: Any, meta: Meta) -> Any:
+    """A default as typer takes it."""
+    if not isinstance(default, tuple):
+        return default
+    return ",".join(default) if meta.extra == PARTED else list(default)
+
+
 def _option(name: str, kind: Any, meta: Meta) -> Any:
     flag = [f"--{name.replace('_', '-')}"] if kind is bool else []  # without a --no-...
     option = typer.Option(*flag, help=meta.description, min=meta.ge, max=meta.le)
-    return Annotated[list[str] if kind == tuple[str, ...] else kind, option]
+    if kind == tuple[str, ...]:
+        kind = str if meta.extra == PARTED else list[str]
+    return Annotated[kind, option]
 
 
 def _gathering(
     command: Command, groups: dict[str, type[Struct]], parameters: list[inspect.Parameter]
 ) -> Command:
     """The command with these parameters, which gathers them into its Structs again."""
-    names = {name: {p.name for p in described(kind, {})} for name, kind in groups.items()}
+    names = {name: [p.name for p in described(kind, {})] for name, kind in groups.items()}
 
     def call(**values: Any) -> Any:
         given = {
-            name: kind(**{n: _frozen(values.pop(n)) for n in names[name]})
+            name: kind(**{n: _read(kind, n, values.pop(n)) for n in names[name]})
             for name, kind in groups.items()
         }
         return command(**values, **given)
@@ -96,5 +107,9 @@ def _gathering(
     return call
 
 
-def _frozen(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value
+def _read(kind: type[Struct], name: str, value: Any) -> Any:
+    """An option's value as the field holds it."""
+    if get_args(get_type_hints(kind, include_extras=True)[name])[0] != tuple[str, ...]:
+        return value
+    words = value.split(",") if isinstance(value, str) else value
+    return tuple(word.strip() for word in words if word.strip())

@@ -24,6 +24,9 @@ ARBITER = "arbiter"  # who drives a crew, when it is not one of the channels
 Plain = bool | float | str | None
 
 
+PARTED = {"parted": True}  # of an option: its words are parted by commas
+
+
 # --- what drives
 
 
@@ -81,7 +84,9 @@ class Passenger(Struct, frozen=True, tag="ideal", forbid_unknown_fields=True):
 class ChannelCrew(Struct, frozen=True, kw_only=True, tag="channels", forbid_unknown_fields=True):
     """Redundant channels, of which an arbiter or one of them drives."""
 
-    channels: tuple[str, ...]  # the preferred one first
+    channels: Annotated[
+        tuple[str, ...], Meta(description="Names, the preferred one first.", extra=PARTED)
+    ] = ("lav_like", "tfuse_like")
     drive_by: Annotated[str, Meta(description="The arbiter, or the channel that drives alone.")] = (
         ARBITER
     )
@@ -227,9 +232,9 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     weather: Weather = Weather(name="clear-noon")
     friction: Friction = Friction.REDUCED
     seed: int = 1
-    duration: Annotated[float, Meta(gt=0.0, le=1.0e5, description="Longest simulated time, s.")] = (
-        DURATION
-    )
+    duration: Annotated[
+        float, Meta(ge=0.05, le=1.0e5, description="Longest simulated time, s.")
+    ] = DURATION
     profile: Annotated[
         str, Meta(description="recommended, thesis_text, thesis_listing or preliminary.")
     ] = "recommended"

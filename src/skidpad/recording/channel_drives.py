@@ -13,8 +13,6 @@ import msgspec
 from skidpad.recording.ledger import Entry
 from skidpad.recording.results import Columns
 
-ARBITER = "arbiter"  # who drives, when it is not one of the channels
-
 
 class Ending(str, Enum):
     """Why a segment ended."""
@@ -75,7 +73,7 @@ DriveEntry = Entry[DriveKey, DriveMetrics]
 class DriveRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """The file: the plan as plain data, and the outcome."""
 
-    plan: dict[str, object]
+    plan: dict[str, Any]  # the run value
     outcome: DriveOutcome
 
 

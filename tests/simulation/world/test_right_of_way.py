@@ -1,11 +1,10 @@
 """Traffic in town: who yields to whom, and an hour without deadlock (decision C-11)."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
-from skidpad.campaign.channel_routes import driven_routes
+from runs import segment_run
 from skidpad.campaign.channel_world import segment_of
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import LightState
@@ -91,8 +90,8 @@ def test_crossing_streets_never_have_green_together():
 
 def drive_town(seed: int, seconds: float, vehicles: int) -> dict[str, float]:
     """Drive background traffic alone; what happened."""
-    route = replace(driven_routes()["route-3"], vehicles=vehicles)
-    segment = segment_of(route, TOWN, seed, 60.0)
+    run = segment_run("route-3", seed=seed, duration=60.0)
+    segment = segment_of(replace(run, course=replace(run.course, vehicles=vehicles)))
     backend = EmbeddedBackend()
     backend.reset(segment.setup, seed)
     world = backend.world

@@ -6,8 +6,9 @@ from collections import defaultdict
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from skidpad.core.run import ARBITER
 from skidpad.evidence.statistics import Comparison, Rate, compare_pairs, event_rate
-from skidpad.recording.channel_drives import ARBITER, DriveOutcome
+from skidpad.recording.channel_drives import DriveOutcome
 
 EVENTS = ("collisions", "collisions_struck", "red_lights_run", "stalls")
 Key = tuple[str, int]  # route and seed

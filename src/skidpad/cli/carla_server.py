@@ -40,8 +40,8 @@ def carla_server(
 ) -> None:
     """Serve unmodified CARLA 0.9.16 clients: no GPU, no download."""
     try:
+        from skidpad.simulation.carla_server.options import ServerOptions
         from skidpad.simulation.carla_server.server import CarlaServer, Ports
-        from skidpad.simulation.carla_server.world import ServerOptions
     except ModuleNotFoundError as error:
         if error.name != "msgpack":
             raise
@@ -69,7 +69,7 @@ def carla_server(
     def ready(ports: Ports) -> None:
         typer.echo(
             f"skidpad carla-server ready: CARLA 0.9.16 on {host}:{ports.rpc}, "
-            f"streams on {ports.streaming}, map {server.world.map.name}"
+            f"streams on {ports.streaming}, map {server.served.episode.map.name}"
         )
 
     with suppress(KeyboardInterrupt):

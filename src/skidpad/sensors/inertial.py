@@ -6,6 +6,7 @@ import re
 from math import cos, pi, sin
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.core.frames import GnssFix, ImuReading
 from skidpad.core.geodesy import geolocation
@@ -32,8 +33,8 @@ def gnss(antenna: Pose, origin: tuple[float, float]) -> GnssFix:
     return GnssFix(*geolocation(antenna.x, antenna.y, *origin), antenna.z)
 
 
-def imu(mount: Pose, states: ActorStates, i: int) -> ImuReading:
-    """What a unit mounted on actor i feels.
+def imu(mount: Pose, states: ActorStates, i: int, gravity: float = G) -> ImuReading:
+    """What a unit mounted on actor i feels. gravity: m/s^2.
 
     The lever arm adds its centripetal acceleration; what changes of the yaw rate would add is left
     out. The road's curvature in height is not felt either: bodies have no vertical acceleration.
@@ -43,10 +44,21 @@ def imu(mount: Pose, states: ActorStates, i: int) -> ImuReading:
     ax = float(states.ax[i]) - rate * rate * mount.x
     ay = float(states.ay[i]) - rate * rate * mount.y
     c, s = cos(body.yaw), sin(body.yaw)
-    to_sensor = (body @ mount).rotation().T
-    fx, fy, fz = (to_sensor @ np.array([ax * c - ay * s, ax * s + ay * c, G])).tolist()
+    force = np.array([ax * c - ay * s, ax * s + ay * c, gravity])
+    return _felt(body @ mount, force, rate)
+
+
+def imu_at_rest(unit: Pose, gravity: float = G) -> ImuReading:
+    """What a unit feels that nothing carries. gravity: m/s^2."""
+    return _felt(unit, np.array([0.0, 0.0, gravity]), 0.0)
+
+
+def _felt(unit: Pose, force: NDArray[np.float64], rate: float) -> ImuReading:
+    """force: (3,) specific, in the world's axes; rate: rad/s about the vertical."""
+    to_sensor = unit.rotation().T
+    fx, fy, fz = (to_sensor @ force).tolist()
     wx, wy, wz = (to_sensor @ np.array([0.0, 0.0, rate])).tolist()
-    return ImuReading((fx, fy, fz), (wx, wy, wz), compass(body @ mount))
+    return ImuReading((fx, fy, fz), (wx, wy, wz), compass(unit))
 
 
 def speed(states: ActorStates, i: int) -> float:

@@ -11,9 +11,10 @@ from pathlib import Path
 import pytest
 
 from carla_preface import PREFACE
+from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.process import ServerProcess
+from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.streams import StreamHub
-from skidpad.simulation.carla_server.world import ServerOptions, World
 
 CLIENT_LIMIT = 120.0  # s
 
@@ -65,6 +66,6 @@ def serve() -> Iterator[Callable[..., Server]]:
 
 
 @pytest.fixture
-def world(tmp_path: Path) -> World:
-    """A world without a network."""
-    return World(ServerOptions(data_dir=tmp_path), StreamHub())
+def served(tmp_path: Path) -> Served:
+    """A simulation without a network."""
+    return Served(ServerOptions(data_dir=tmp_path), StreamHub())

@@ -8,7 +8,7 @@ from dataclasses import replace
 from typing import Any
 
 from skidpad.core.geometry import Pose
-from skidpad.simulation.carla_server import moving, wire
+from skidpad.simulation.carla_server import filling, wire
 from skidpad.simulation.carla_server.sensing import inertial, pixels, points
 
 Function = Callable[..., Any]
@@ -65,11 +65,11 @@ def mirrored_image(function: Function) -> Function:
 
 # What is flipped: module, function, how.
 MUTANTS: dict[str, tuple[Any, str, Callable[[Function], Function]]] = {
-    "place in snapshots": (moving, "poses_to_carla", column(1)),
+    "place in snapshots": (filling, "poses_to_carla", column(1)),
     "pitch in snapshots": (wire, "transform", lambda f: lambda p: f(replace(p, pitch=-p.pitch))),
-    "yaw in snapshots": (moving, "poses_to_carla", column(4)),
-    "velocity": (moving, "vectors_to_carla", column(1)),
-    "angular velocity": (moving, "turns_to_carla", column(2)),
+    "yaw in snapshots": (filling, "poses_to_carla", column(4)),
+    "velocity": (filling, "vectors_to_carla", column(1)),
+    "angular velocity": (filling, "turns_to_carla", column(2)),
     "steer": (wire, "iso_steer", negated),
     "place of spawning": (wire, "pose", pose(lambda p: replace(p, y=-p.y))),
     "yaw of spawning": (wire, "pose", pose(lambda p: replace(p, yaw=-p.yaw))),

@@ -13,8 +13,8 @@ import pytest
 
 from skidpad.simulation.carla_server import server as module
 from skidpad.simulation.carla_server import streams
+from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.server import CarlaServer, Ports
-from skidpad.simulation.carla_server.world import ServerOptions
 
 Scene = Callable[[CarlaServer, Ports], Awaitable[None]]
 
@@ -151,12 +151,11 @@ def test_a_long_life_does_not_grow(tmp_path: Path) -> None:
     """Spawn, drive, listen, destroy, reload, again and again: every table ends as it began."""
 
     async def scene(server: CarlaServer, ports: Ports) -> None:
-        world = server.world
         caller = await Caller.connect(ports.rpc)
         settings = [True, False, [True, 0.05], True, 0.01, 10, 0.0, True, 3e3, 2e3, True]
         await caller.call("set_episode_settings", settings)
         points = (await caller.call("get_map_info"))[3][0][1][1]
-        begin = len(world.actors)
+        begin = len(server.served.episode.actors)
         for turn in range(30):
             ids = []
             for point in points[: 5 + turn % 3]:
@@ -174,10 +173,11 @@ def test_a_long_life_does_not_grow(tmp_path: Path) -> None:
             else:
                 for id in ids:
                     assert (await caller.call("destroy_actor", id))[3] == [[1, True]]
-            assert len(world.actors) == world.rows.count == begin
-            assert len(world.vehicles) == 0
-            assert not world.sensors._sensors
-            assert world.hub._open == {1}
+            episode = server.served.episode
+            assert len(episode.actors) == episode.rows.count == begin
+            assert len(episode.vehicles) == 0
+            assert not episode.sensors._sensors
+            assert server.hub._open == {1}
         caller.writer.close()
 
     played(scene, tmp_path)

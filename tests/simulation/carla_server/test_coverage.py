@@ -4,8 +4,8 @@ from pathlib import Path
 
 from skidpad.simulation.carla_server.catalogue import Family, load_catalogue
 from skidpad.simulation.carla_server.coverage import rewritten
-from skidpad.simulation.carla_server.effects import BY_FAMILY, BY_SENSOR, Remarks
-from skidpad.simulation.carla_server.sensing.sensors import PRODUCERS
+from skidpad.simulation.carla_server.effects import Remarks, load_acting
+from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
 
 PAGE = Path(__file__).parents[3] / "docs" / "carla.md"
 
@@ -17,12 +17,14 @@ def test_the_page_shows_what_is_registered() -> None:
 
 def test_every_acting_attribute_exists() -> None:
     catalogue = load_catalogue()
-    for sensor, names in BY_SENSOR.items():
+    table = load_acting()
+    for sensor, names in table.sensors.items():
         assert names <= set(catalogue[sensor].attributes), sensor
-    for family, names in BY_FAMILY.items():
+    for family, names in table.families.items():
         for blueprint in catalogue.values():
             if blueprint.family is family:
                 assert names <= set(blueprint.attributes)
+    assert set(PRODUCERS) == set(table.sensors)
     assert set(PRODUCERS) <= {b.id for b in catalogue.values() if b.family is Family.SENSOR}
 
 

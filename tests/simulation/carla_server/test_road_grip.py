@@ -11,10 +11,12 @@ from skidpad.core.vocabulary import GripModel
 from skidpad.physics.grip import friction_ratio
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE
 from skidpad.simulation.carla.grip import V_RATIO
-from skidpad.simulation.carla_server.spawning import spawn
+from skidpad.simulation.carla_server.episode import Episode, Wanted
+from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.streams import StreamHub
+from skidpad.simulation.carla_server.vehicles import Vehicle
 from skidpad.simulation.carla_server.weather import PACKED
-from skidpad.simulation.carla_server.world import ServerOptions, World
 
 MU_REF = 0.9
 CARS = ("vehicle.mini.cooper_s", "vehicle.tesla.model3", "vehicle.carlamotors.firetruck")
@@ -25,37 +27,47 @@ WEATHERS = {
 }
 
 
-def world_with(grip: GripModel, weather: str) -> World:
+def served_with(grip: GripModel, weather: str) -> Served:
     """Three cars at the speed at which the adapter takes its ratio; one wheel is worn."""
-    world = World(ServerOptions(weather_grip=grip, mu_ref=MU_REF), StreamHub())
+    served = Served(ServerOptions(weather_grip=grip, mu_ref=MU_REF), StreamHub())
+    episode = served.episode
     values, ice = WEATHERS[weather]
-    world.sky.apply([*(values.get(name, 0.0) for name in PACKED), 0.0])
-    world.sky.set_ice(ice)
-    for id, place in zip(CARS, world.map.spawn_points[::4], strict=False):
-        spawn(world, [0, id, []], place)
-    world.vehicles.fleet.states.vx[:] = V_RATIO
-    for vehicle in world.vehicles.members:
+    episode.sky.apply([*(values.get(name, 0.0) for name in PACKED), 0.0])
+    episode.sky.set_ice(ice)
+    for id, place in zip(CARS, episode.map.spawn_points[::4], strict=False):
+        episode.spawn(Wanted(id, {}), place)
+    episode.moving.fleet.states.vx[:] = V_RATIO
+    for vehicle in episode.vehicles:
         worn = [*vehicle.physics.tire_friction[:3], 2.0]
-        vehicle.physics = replace(vehicle.physics, tire_friction=np.array(worn))
-    return world
+        let_wear(episode, vehicle, np.array(worn))
+    return served
 
 
-def effective(world: World) -> np.ndarray:
+def let_wear(episode: Episode, vehicle: Vehicle, friction: np.ndarray) -> None:
+    """Other tyres."""
+    physics = replace(vehicle.physics, tire_friction=friction)
+    episode.vehicles.reshape(vehicle.actor, physics, vehicle.type)
+
+
+def effective(served: Served) -> np.ndarray:
     """(n, 4) what the tyres get."""
-    mu = world.grip.per_wheel(world).copy()
-    return mu * world.vehicles.fleet.tire_friction / TIRE_FRICTION_REFERENCE
+    moving = served.episode.moving
+    moving.grip = served.episode.sky.grip
+    moving.feel_grip()
+    return moving.road_mu * moving.fleet.tire_friction / TIRE_FRICTION_REFERENCE
 
 
 @pytest.mark.req("K-2")
 @pytest.mark.parametrize("model", [GripModel.STATISTICAL, GripModel.PHYSICAL])
 @pytest.mark.parametrize("weather", list(WEATHERS))
 def test_served_grip_and_scaled_wheels_agree_at_every_wheel(model: GripModel, weather: str) -> None:
-    served = world_with(model, weather)
-    scaled = world_with(GripModel.NONE, weather)
-    ratio = friction_ratio(served.sky.weather, model, V_RATIO)  # what the adapter multiplies by
-    for vehicle in scaled.vehicles.members:
-        friction = np.asarray(vehicle.physics.tire_friction) * ratio
-        vehicle.physics = replace(vehicle.physics, tire_friction=friction)
+    served = served_with(model, weather)
+    scaled = served_with(GripModel.NONE, weather)
+    ratio = friction_ratio(
+        served.episode.sky.weather, model, V_RATIO
+    )  # what the adapter multiplies by
+    for vehicle in scaled.episode.vehicles:
+        let_wear(scaled.episode, vehicle, vehicle.physics.tire_friction * ratio)
     one, two = effective(served), effective(scaled)
     assert one.shape == (3, 4)
     assert one == pytest.approx(two, rel=1e-6)

@@ -9,7 +9,7 @@ import pytest
 from skidpad.simulation.carla_server.codec import Request
 from skidpad.simulation.carla_server.methods import TABLES
 from skidpad.simulation.carla_server.rpc import CallError, Dispatcher, Shape, Table
-from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.served import Served
 
 
 def asked(dispatcher: Dispatcher, method: str, *arguments: Any) -> Any:
@@ -70,12 +70,12 @@ def _any_value(rng: random.Random, depth: int = 0) -> Any:
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_random_arguments_to_every_call_get_an_answer(seed: int, world: World) -> None:
-    dispatcher = Dispatcher(world, TABLES)
+def test_random_arguments_to_every_call_get_an_answer(seed: int, served: Served) -> None:
+    dispatcher = Dispatcher(served, TABLES)
     rng = random.Random(seed)
     for name, method in sorted(dispatcher.methods.items()):
         for _ in range(12):
             count = rng.randint(method.fewest, min(method.most, method.fewest + 3))
             answer = asked(dispatcher, name, *(_any_value(rng) for _ in range(count)))
             assert "internal error" not in str(answer), (name, answer)
-    assert len(world.actors) < 200
+    assert len(served.episode.actors) < 200

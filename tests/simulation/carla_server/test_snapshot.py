@@ -3,7 +3,7 @@ from __future__ import annotations
 import struct
 
 from skidpad.simulation.carla_server import snapshot
-from skidpad.simulation.carla_server.episode import Episode, EpisodeSettings
+from skidpad.simulation.carla_server.clock import Clock, EpisodeSettings
 from skidpad.simulation.carla_server.snapshot import Rows
 
 
@@ -42,9 +42,9 @@ def test_rows_grow_and_close_gaps() -> None:
     assert rows.vehicles["id"][: rows.count].tolist() == [i for i in range(600) if i != 10]
 
 
-def test_a_message_says_what_the_episode_says() -> None:
-    episode = Episode(id=3, frame=12, elapsed=0.6, settings=EpisodeSettings(fixed_step=0.05))
-    data = snapshot.message(episode, Rows(), 1.25, snapshot.MAP_CHANGED)
+def test_a_message_says_what_the_clock_says() -> None:
+    clock = Clock(episode=3, frame=12, elapsed=0.6, settings=EpisodeSettings(fixed_step=0.05))
+    data = snapshot.message(clock, Rows(), 1.25, snapshot.MAP_CHANGED)
     kind, frame, time = struct.unpack_from("<QQd", data)
     assert (kind, frame, time) == (17, 12, 0.6)
     id, wall, delta, *_, bits = struct.unpack_from("<Qdf3iI", data, 48)

@@ -6,26 +6,44 @@ import numpy as np
 import pytest
 
 from skidpad.core.geometry import Pose
+from skidpad.core.vocabulary import GripModel
+from skidpad.core.weather import Weather
+from skidpad.physics.grip import grip_params
+from skidpad.roads.bundled import load_map
 from skidpad.simulation.carla_server.catalogue import load_catalogue
 from skidpad.simulation.carla_server.vehicles import STICKY_SPEED, Vehicles
+from skidpad.simulation.world.lights import Lights
+from skidpad.simulation.world.world import Conditions, World
 
 CAR = 7
-SLOPE = np.array([0.05])  # rad, uphill
+DT = 0.05  # s
+SLOPE = 0.05  # rad, uphill
 
 
 @pytest.fixture
 def vehicles() -> Vehicles:
     """One car at rest."""
-    made = Vehicles()
+    map = load_map("figure8")
+    grip = grip_params(Weather(), GripModel.NONE, 1.0)
+    made = Vehicles(World(map, Lights(map), Conditions(grip=grip, dt=DT, road_noise=0.0)))
     made.add(CAR, load_catalogue()["vehicle.tesla.model3"], Pose(0.0, 0.0))
     return made
 
 
+def speed_of(vehicles: Vehicles) -> float:
+    """m/s, never negative."""
+    return abs(vehicles.moving.fleet.speed(0))
+
+
 def drive(vehicles: Vehicles, seconds: float) -> tuple[float, float]:
     """Way and speed after some time on the slope."""
-    for _ in range(round(seconds / vehicles.dt)):
-        vehicles.step(np.full((1, 4), 1.0), SLOPE, np.zeros(1))
-    return float(vehicles.fleet.states.x[0]), vehicles.speed(CAR)
+    moving = vehicles.moving
+    for _ in range(round(seconds / DT)):
+        vehicles.command(DT)
+        grade = np.full(1, SLOPE)
+        moving.feel_grip()
+        moving.fleet.step(moving.commands, moving.road_mu, grade, np.zeros(1))
+    return float(moving.states.x[0]), speed_of(vehicles)
 
 
 def test_it_stays_on_a_slope_without_brake(vehicles: Vehicles) -> None:

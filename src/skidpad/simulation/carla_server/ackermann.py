@@ -6,14 +6,12 @@ The client's settings are the gains of the speed and the acceleration controller
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.vehicle import steer_share
 from skidpad.simulation.carla_server import wire
-
-if TYPE_CHECKING:
-    from skidpad.simulation.carla_server.vehicles import Control
+from skidpad.simulation.carla_server.control import Control
 
 A_MAX = 3.0  # m/s^2 that the speed controller may ask for
 A_MIN = -6.0

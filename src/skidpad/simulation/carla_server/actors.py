@@ -1,4 +1,4 @@
-"""Everything that is in the world, by id; and tombstones of what was.
+"""Everything that is in an episode, by id; and tombstones of what was.
 
 An error answer about an actor that has just been destroyed would abort a client's Traffic Manager,
 so what the dead were is remembered for a while.
@@ -8,19 +8,28 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
-from typing import Any
+from typing import Any, NamedTuple
 
 from skidpad.core.geometry import Pose
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.catalogue import AttributeType, Blueprint, Family
 from skidpad.simulation.carla_server.rpc import CallError
 from skidpad.simulation.carla_server.wire import Vector
+from skidpad.simulation.world.world import World
 
 TOMBSTONES = 10_000
 MAX_ACTORS = 20_000
 STILL: Vector = (0.0, 0.0, 0.0)
+SOLID = (Family.VEHICLE, Family.WALKER, Family.PROP)
+
+
+class Box(NamedTuple):
+    """An upright box in the world."""
+
+    centre: Pose
+    half: Vector  # m, half extents
 
 
 class Attachment(IntEnum):
@@ -33,34 +42,34 @@ class Attachment(IntEnum):
 
 @dataclass(slots=True, eq=False)
 class Actor:
-    """One actor. Poses and vectors are ISO 8855, world frame; a vehicle's motion is the fleet's."""
+    """One actor. Poses and vectors are ISO 8855, world frame."""
 
     id: int
     blueprint: Blueprint
     attributes: dict[str, str]
-    pose: Pose
+    pose: Pose  # where it entered or last was; while it has a body, the body's counts
+    body: int | None = None  # its id in the moving world; None: no physics moves it
     parent: int = 0
     mount: Pose = Pose(0.0, 0.0)  # seen from the parent
     stream: int | None = None
-    velocity: Vector = STILL
-    turn: Vector = STILL  # rad/s
-    acceleration: Vector = STILL
     row: int = -1  # of the snapshot
     centre: Vector = STILL  # of the box from the actor's origin
     half: Vector = STILL  # half extents
-    box_yaw: float = 0.0  # rad
     children: list[int] = field(default_factory=list)
-    extra: Any = None  # what the topic that owns this family keeps about it
 
     @property
     def family(self) -> Family:
         """What it is."""
         return self.blueprint.family
 
+    @property
+    def lift(self) -> float:
+        """m of its origin above its feet: a walker's is the middle of its body, as in CARLA."""
+        return self.half[2] if self.family is Family.WALKER else 0.0
+
     def box(self) -> list[list[float]]:
         """Its BoundingBox as it travels."""
-        x, y, z = wire.iso_to_wire(self.centre)
-        return wire.box((x, y, z), self.half, wire.yaw_to_wire(self.box_yaw))
+        return wire.box(wire.iso_to_wire(self.centre), self.half)
 
     def description(self) -> list[Any]:
         """ActorDescription."""
@@ -80,10 +89,12 @@ class Actor:
 class ActorTable:
     """Actors by id, in order of spawning."""
 
-    def __init__(self) -> None:
-        self._next = 1
+    def __init__(self, moving: World, ids: Iterator[int]) -> None:
+        """moving: where their bodies are. ids: of those to come; no id is given twice."""
+        self._moving, self._ids = moving, ids
         self.alive: dict[int, Actor] = {}
         self.dead: OrderedDict[int, Actor] = OrderedDict()
+        self._by_body: dict[int, Actor] = {}
 
     def __iter__(self) -> Iterator[Actor]:
         return iter(self.alive.values())
@@ -92,22 +103,26 @@ class ActorTable:
         return len(self.alive)
 
     def new_id(self) -> int:
-        """The next free id; CallError when the world is full."""
+        """The next free id; CallError when there are too many."""
         if len(self.alive) >= MAX_ACTORS:
             raise CallError(f"the world is full: at most {MAX_ACTORS} actors")
-        id = self._next
-        self._next += 1
-        return id
+        return next(self._ids)
 
     def add(self, actor: Actor) -> None:
         """Enter a new actor."""
         self.alive[actor.id] = actor
+        if actor.body is not None:
+            self._by_body[actor.body] = actor
         if actor.parent:
             self.get(actor.parent).children.append(actor.id)
 
     def remove(self, id: int) -> Actor:
         """Take it out and keep its tombstone."""
-        actor = self.alive.pop(id)
+        actor = self.alive[id]
+        actor.pose = self.pose(actor)
+        del self.alive[id]
+        if actor.body is not None:
+            del self._by_body[actor.body]
         self.dead[id] = actor
         if len(self.dead) > TOMBSTONES:
             self.dead.popitem(last=False)
@@ -135,7 +150,29 @@ class ActorTable:
         """All living actors of a family."""
         return [a for a in self.alive.values() if a.family is family]
 
-    def clear(self) -> None:
-        """Another episode: ids go on, nothing else does."""
-        self.alive.clear()
-        self.dead.clear()
+    def in_row(self, i: int) -> Actor:
+        """The actor whose body stands in row i of the moving world."""
+        return self._by_body[self._moving.members[i].id]
+
+    def pose(self, actor: Actor) -> Pose:
+        """Where it is."""
+        if actor.body is None:
+            return actor.pose
+        feet = self._moving.states.pose(self._moving.row(actor.body))
+        return replace(feet, z=feet.z + actor.lift) if actor.lift else feet
+
+    def velocity(self, actor: Actor) -> Vector:
+        """m/s in the plane; what has no body stands still."""
+        if actor.body is None:
+            return STILL
+        s, i = self._moving.states, self._moving.row(actor.body)
+        return float(s.vx[i]), float(s.vy[i]), 0.0
+
+    def box(self, actor: Actor) -> Box:
+        """Its box in the world."""
+        x, y, z = actor.centre
+        return Box(self.pose(actor).moved(forward=x, left=y, up=z), actor.half)
+
+    def carrier(self, actor: Actor) -> Actor | None:
+        """Whom it is attached to, while that lives."""
+        return self.alive.get(actor.parent)

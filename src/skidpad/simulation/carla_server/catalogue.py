@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cache
@@ -206,9 +207,16 @@ def grip_in_force(blueprint: Blueprint, model: GripModel, mu_ref: float) -> Blue
 
 
 @cache
+def load_data() -> dict[str, Any]:
+    """The data file."""
+    data: dict[str, Any] = yaml.load(DATA.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader)
+    return data
+
+
+@cache
 def load_catalogue() -> dict[str, Blueprint]:
     """All blueprints by id."""
-    data = yaml.load(DATA.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader)
+    data = load_data()
     actor = _attributes(data["attributes"]["actor"])
     made: list[Blueprint] = []
     for group, family in (
@@ -225,7 +233,16 @@ def load_catalogue() -> dict[str, Blueprint]:
     return {b.id: b for b in sorted(made, key=lambda b: b.id)}
 
 
-def chosen(blueprint: Blueprint, given: dict[str, str]) -> dict[str, str]:
+def offered(grip: GripModel, mu_ref: float) -> dict[str, Blueprint]:
+    """The catalogue; the blueprint `skidpad.weather` says how weather acts on grip (K-2)."""
+    everything = load_catalogue()
+    if grip is GripModel.NONE:
+        return {id: b for id, b in everything.items() if b.family is not Family.GRIP}
+    told = grip_in_force(everything[GRIP_BLUEPRINT], grip, mu_ref)
+    return {**everything, GRIP_BLUEPRINT: told}
+
+
+def chosen(blueprint: Blueprint, given: Mapping[str, str]) -> dict[str, str]:
     """The attributes of a new actor: the client's where it gave some, else the defaults."""
     values = {a.id: a.recommended[0] for a in blueprint.attributes.values()}
     for name, value in given.items():

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from skidpad.simulation.carla_server.catalogue import Family, load_catalogue
-from skidpad.simulation.carla_server.effects import IN_THE_CLIENT, acting, produced
+from skidpad.simulation.carla_server.effects import acting, load_acting, produced
 from skidpad.simulation.carla_server.methods import TABLES
 from skidpad.simulation.carla_server.methods.unserved import REASONS
 
@@ -64,7 +64,7 @@ def _sensors() -> str:
         if blueprint.family is not Family.SENSOR:
             continue
         sends = "yes" if produced(blueprint.id) else "nothing"
-        if blueprint.id == IN_THE_CLIENT:
+        if blueprint.id in load_acting().in_the_client:
             sends = "computed in the client"
         own = acting(blueprint)
         vain = [a for a in blueprint.attributes if a not in own]

@@ -3,72 +3,51 @@
 from __future__ import annotations
 
 import logging
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
 
-from skidpad.simulation.carla_server.catalogue import Blueprint, Family
-from skidpad.simulation.carla_server.sensing.sensors import PRODUCERS
+from skidpad.simulation.carla_server.catalogue import Blueprint, Family, load_data
 
 log = logging.getLogger("skidpad.carla_server")
 
-ALWAYS = {"role_name", "sensor_tick"}
-CAMERA = {"fov", "image_size_x", "image_size_y"}
-LIDAR = {
-    "channels",
-    "range",
-    "points_per_second",
-    "rotation_frequency",
-    "upper_fov",
-    "lower_fov",
-    "horizontal_fov",
-}
-BY_SENSOR: dict[str, set[str]] = {
-    "sensor.camera.rgb": CAMERA,
-    "sensor.camera.depth": CAMERA,
-    "sensor.camera.semantic_segmentation": CAMERA,
-    "sensor.camera.instance_segmentation": CAMERA,
-    "sensor.lidar.ray_cast": LIDAR
-    | {
-        "atmosphere_attenuation_rate",
-        "noise_seed",
-        "dropoff_general_rate",
-        "dropoff_intensity_limit",
-        "dropoff_zero_intensity",
-        "noise_stddev",
-    },
-    "sensor.lidar.ray_cast_semantic": LIDAR,
-    "sensor.other.radar": {
-        "horizontal_fov",
-        "vertical_fov",
-        "range",
-        "points_per_second",
-        "noise_seed",
-    },
-    "sensor.other.obstacle": {"distance", "hit_radius", "only_dynamics"},
-}
-NOISY = ("sensor.other.imu", "sensor.other.gnss")  # every attribute named noise_* acts
-BY_FAMILY: dict[Family, set[str]] = {
-    Family.VEHICLE: {"color"},
-    Family.TRIGGER: {"friction", "extent_x", "extent_y", "extent_z"},
-    Family.GRIP: {"ice_thickness"},
-}
-IN_THE_CLIENT = "sensor.other.lane_invasion"  # computed there from map and snapshots
+
+@dataclass(frozen=True, slots=True)
+class Acting:
+    """Ids of the attributes that act: of every actor, by sensor that sends, and by family."""
+
+    always: frozenset[str]
+    sensors: dict[str, frozenset[str]]
+    families: dict[Family, frozenset[str]]
+    in_the_client: frozenset[str]  # sensors computed there from map and snapshots
+
+
+@cache
+def load_acting() -> Acting:
+    """As listed beside the blueprints."""
+    data = load_data()["acting"]
+    return Acting(
+        always=frozenset(data["always"]),
+        sensors={id: frozenset(names) for id, names in data["sensors"].items()},
+        families={Family(name): frozenset(ids) for name, ids in data["families"].items()},
+        in_the_client=frozenset(data["in_the_client"]),
+    )
 
 
 def acting(blueprint: Blueprint) -> set[str]:
     """Ids of the attributes that change something."""
-    names = {a.id for a in blueprint.attributes.values() if a.id.startswith("noise_")}
-    own = names if blueprint.id in NOISY else BY_SENSOR.get(blueprint.id, set())
     if blueprint.family is Family.SENSOR and not produced(blueprint.id):
         return {"role_name"}
-    return {
-        a.id
-        for a in blueprint.attributes.values()
-        if a.id in ALWAYS | own | BY_FAMILY.get(blueprint.family, set()) or not a.modifiable
-    }
+    table = load_acting()
+    known = table.always | table.sensors.get(blueprint.id, frozenset())
+    known |= table.families.get(blueprint.family, frozenset())
+    return {a.id for a in blueprint.attributes.values() if a.id in known or not a.modifiable}
 
 
 def produced(sensor: str) -> bool:
     """Whether a sensor of this kind sends anything."""
-    return sensor in PRODUCERS or sensor == IN_THE_CLIENT
+    table = load_acting()
+    return sensor in table.sensors or sensor in table.in_the_client
 
 
 class Remarks:
@@ -77,7 +56,7 @@ class Remarks:
     def __init__(self) -> None:
         self.made: set[tuple[str, str]] = set()
 
-    def remark(self, blueprint: Blueprint, given: dict[str, str]) -> None:
+    def remark(self, blueprint: Blueprint, given: Mapping[str, str]) -> None:
         """given: what a client sent; defaults say nothing."""
         known = acting(blueprint)
         for name, value in given.items():

@@ -1,102 +1,265 @@
-"""The episode: its id, its frame counter and simulated time, and the client's settings."""
+"""An episode: a map and everything on it since it was loaded."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
-from typing import Any
+from itertools import count
 
-from skidpad.core.setup import DT
-from skidpad.simulation.carla_server import wire
+from skidpad.core.geometry import Pose
+from skidpad.sensors.live_scene import scene_of
+from skidpad.simulation.carla_server import filling, shapes
+from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable, Attachment
+from skidpad.simulation.carla_server.catalogue import Blueprint, Family, chosen, offered
+from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.debug import DebugShapes
+from skidpad.simulation.carla_server.effects import Remarks
+from skidpad.simulation.carla_server.map_actors import (
+    light_actor,
+    sign_actor,
+    signs_of,
+    spectator,
+)
+from skidpad.simulation.carla_server.maps import ServedMap
+from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.posts import Posts, posts_of
+from skidpad.simulation.carla_server.rpc import CallError
+from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
+from skidpad.simulation.carla_server.sensing.sensors import SensorSet
+from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
+from skidpad.simulation.carla_server.snapshot import Rows
+from skidpad.simulation.carla_server.streams import StreamHub
+from skidpad.simulation.carla_server.vehicles import Vehicles
+from skidpad.simulation.carla_server.walkers import WalkerControl
+from skidpad.simulation.carla_server.weather import Sky
+from skidpad.simulation.world.ground import ground_height
+from skidpad.simulation.world.lights import Lights
+from skidpad.simulation.world.patches import FrictionZone
+from skidpad.simulation.world.world import Conditions, World
 
-SHORTEST_STEP = 1.0e-4  # s
-LONGEST_STEP = 10.0  # s
+COLLISION = "Spawn failed because of collision at spawn position"
+NO_STREAM = ("sensor.other.lane_invasion",)  # computed in the client
 
 
 @dataclass(frozen=True, slots=True)
-class EpisodeSettings:
-    """What `World.apply_settings` sends; only the first three members act (decision X-15)."""
+class Wanted:
+    """What a client wants to spawn: a blueprint's id and the attributes that it gave."""
 
-    synchronous: bool = False
-    no_rendering: bool = False
-    fixed_step: float | None = None  # s
-    substepping: bool = True
-    max_substep: float = 0.01  # s
-    max_substeps: int = 10
-    max_culling_distance: float = 0.0  # m
-    deterministic_ragdolls: bool = True
-    tile_stream_distance: float = 3000.0  # m
-    actor_active_distance: float = 2000.0  # m
-    spectator_as_ego: bool = True
+    blueprint: str
+    attributes: Mapping[str, str]
 
-    @property
-    def step(self) -> float:
-        """s by which one tick advances; without a fixed one the house's step."""
-        return DT if self.fixed_step is None else self.fixed_step
 
-    def packed(self) -> list[Any]:
-        """As it travels."""
-        return [
-            self.synchronous,
-            self.no_rendering,
-            wire.some(self.fixed_step),
-            self.substepping,
-            self.max_substep,
-            self.max_substeps,
-            self.max_culling_distance,
-            self.deterministic_ragdolls,
-            self.tile_stream_distance,
-            self.actor_active_distance,
-            self.spectator_as_ego,
+class Stock:
+    """What outlives episodes and every one of them draws on."""
+
+    def __init__(self, options: ServerOptions, hub: StreamHub) -> None:
+        self.options, self.hub = options, hub
+        self.catalogue = offered(options.weather_grip, options.mu_ref)
+        self.remarks = Remarks()
+        self.ids: Iterator[int] = count(1)  # of actors
+
+    def blueprint(self, id: str) -> Blueprint:
+        """The blueprint of that id; CallError when it is not offered."""
+        blueprint = self.catalogue.get(id)
+        if blueprint is None:
+            raise CallError(f"unknown blueprint {id!r:.80}")
+        return blueprint
+
+    def sky(self) -> Sky:
+        """The weather as the server was started."""
+        o = self.options
+        return Sky(o.ice, o.weather_grip, o.mu_ref)
+
+
+class Episode:
+    """The moving world of one map with its actors."""
+
+    def __init__(self, map: ServedMap, stock: Stock, clock: Clock) -> None:
+        """Everything that takes long is made here, so that a failure leaves the old episode."""
+        self.map, self.stock = map, stock
+        map.prepare()
+        scene_of(map.roads)  # triangles now, not in the first picture's tick
+        self.sky = stock.sky()
+        seed = stock.options.seed
+        conditions = Conditions(
+            seed=seed, dt=clock.step, grip=self.sky.grip, road_noise=0.0, all_lanes=True
+        )
+        self.moving = World(map.roads, Lights(map.roads), conditions)
+        self.actors = ActorTable(self.moving, stock.ids)
+        self.rows = Rows()
+        self.vehicles = Vehicles(self.moving)
+        self.walkers: dict[int, WalkerControl] = {}
+        self.debug = DebugShapes()
+        self.posts = Posts(self.moving.lights)
+        self.surroundings = Surroundings(map, self.actors, self.vehicles, self.sky, clock)
+        self.sensors = SensorSet(PRODUCERS, seed)
+        self._place_map_actors()
+        self.spectator = spectator(self.actors.new_id(), map.spawn_points[0])
+        self._enter(self.spectator)
+
+    def _place_map_actors(self) -> None:
+        """Traffic lights and signs."""
+        roads = self.map.roads
+        for post in posts_of(roads, self.moving.lights):
+            actor = light_actor(self.actors.new_id(), post)
+            self.posts.add(actor.id, post)
+            self._enter(actor)
+            filling.fill_sign(self.rows, actor, str(post.light.signal), post.pole)
+        for sign in signs_of(roads):
+            actor = sign_actor(self.actors.new_id(), sign)
+            self._enter(actor)
+            filling.fill_sign(self.rows, actor, str(sign.signal), 0)
+
+    # --- coming and going
+
+    def spawn(self, wanted: Wanted, pose: Pose) -> Actor:
+        """A new actor where a client wants it; CallError when something stands there."""
+        actor = self._made(wanted, pose)
+        if actor.family in SOLID:
+            feet = self._feet(actor)
+            if shapes.is_taken(self.moving, feet, actor.half):
+                raise CallError(COLLISION)
+            self._embody(actor, feet)
+        self._enlist(actor)
+        return actor
+
+    def attach(self, wanted: Wanted, mount: Pose, parent: int, kind: Attachment) -> Actor:
+        """A new actor that follows its parent; all attachments are rigid (listed)."""
+        del kind
+        carrier = self.actors.get(parent)
+        actor = self._made(wanted, mount)
+        if actor.family is Family.VEHICLE:
+            raise CallError("a vehicle cannot be attached")
+        actor.parent, actor.mount = carrier.id, mount
+        actor.pose = self.actors.pose(carrier) @ mount
+        self._enlist(actor)
+        return actor
+
+    def destroy(self, id: int) -> Actor:
+        """Take an actor and what is attached to it out of the world."""
+        actor = self.actors.get(id)
+        if actor is self.spectator or actor.family in (Family.TRAFFIC_LIGHT, Family.TRAFFIC_SIGN):
+            raise CallError(f"actor {id} belongs to the map and cannot be destroyed")
+        for child in list(actor.children):
+            if child in self.actors.alive:
+                self.destroy(child)
+        body = actor.body
+        self.actors.remove(id)
+        if id in self.vehicles:
+            self.vehicles.remove(id)
+        if body is not None:
+            self.moving.remove(body)
+        self.walkers.pop(id, None)
+        self.sensors.forget(id)
+        if actor.stream is not None:
+            self.stock.hub.close(actor.stream)
+        if actor.family is Family.GRIP:
+            self.sky.set_ice(None)
+        elif actor.family is Family.TRIGGER:
+            self._mark_zones()
+        self.rows.remove(actor.row)
+        order = self.rows.order()
+        for other in self.actors:
+            other.row = order[other.id]
+        return actor
+
+    def end(self) -> None:
+        """Nobody hears of these sensors any more."""
+        for actor in self.actors:
+            if actor.stream is not None:
+                self.stock.hub.close(actor.stream)
+
+    def _made(self, wanted: Wanted, pose: Pose) -> Actor:
+        blueprint = self.stock.blueprint(wanted.blueprint)
+        attributes = chosen(blueprint, wanted.attributes)
+        self.stock.remarks.remark(blueprint, wanted.attributes)
+        actor = Actor(self.actors.new_id(), blueprint, attributes, pose)
+        shapes.give_box(actor)
+        return actor
+
+    def _feet(self, actor: Actor) -> Pose:
+        """Where it stands: what falls, stands on the ground at once."""
+        feet = replace(actor.pose, z=actor.pose.z - actor.lift)
+        if actor.family is Family.PROP:
+            return feet
+        ground = ground_height(self.map.roads, feet.x, feet.y, feet.z)
+        return replace(feet, z=ground, roll=0.0, pitch=0.0)
+
+    def _embody(self, actor: Actor, feet: Pose) -> None:
+        """Let it enter the moving world."""
+        if actor.family is Family.VEHICLE:
+            actor.body = self.vehicles.add(actor.id, actor.blueprint, feet).body
+            return
+        (body,) = self.moving.enter([shapes.body_of(actor)])
+        actor.body = body
+        self.moving.set_grounded(body, actor.family is Family.WALKER)
+        self.moving.set_collides(body, not shapes.is_flat(actor))
+        self.moving.put(self.moving.row(body), feet, 0.0)
+        self.moving.teleport(body, feet)
+        self.moving.settle()
+
+    def _enlist(self, actor: Actor) -> None:
+        """Enter it in the tables of its family; a sensor that cannot work is refused first."""
+        family = actor.family
+        if family is Family.SENSOR:
+            self.sensors.add(actor)
+            if actor.blueprint.id not in NO_STREAM:
+                actor.stream = self.stock.hub.create()
+        self._enter(actor)
+        if family is Family.WALKER:
+            self.walkers[actor.id] = WalkerControl()
+        elif family is Family.GRIP:
+            self.sky.set_ice(float(actor.attributes["ice_thickness"]))
+        elif family is Family.TRIGGER:
+            self._mark_zones()
+
+    def _enter(self, actor: Actor) -> None:
+        self.actors.add(actor)
+        actor.row = self.rows.add(actor.id)
+
+    def _mark_zones(self) -> None:
+        """Friction triggers act on every tyre inside."""
+        self.moving.zones = [
+            FrictionZone(t.pose, t.half, float(t.attributes["friction"].rstrip("f")))
+            for t in self.actors.of(Family.TRIGGER)
         ]
 
+    # --- moving
 
-def parse_settings(value: Any) -> EpisodeSettings:
-    """EpisodeSettings from a call."""
-    v = wire.items(value, "settings", 11)
-    step = wire.optional(v[2], "settings.fixed_delta_seconds")
-    if step is not None:
-        step = wire.number(step, "settings.fixed_delta_seconds")
-        if step == 0.0:
-            step = None
-        elif not SHORTEST_STEP <= step <= LONGEST_STEP:
-            raise wire.WireError(
-                f"settings.fixed_delta_seconds must be between {SHORTEST_STEP:g} and "
-                f"{LONGEST_STEP:g} s, got {step!r}"
-            )
-    return EpisodeSettings(
-        synchronous=wire.flag(v[0], "settings.synchronous_mode"),
-        no_rendering=wire.flag(v[1], "settings.no_rendering_mode"),
-        fixed_step=step,
-        substepping=wire.flag(v[3], "settings.substepping"),
-        max_substep=wire.number(v[4], "settings.max_substep_delta_time"),
-        max_substeps=wire.integer(v[5], "settings.max_substeps", -(2**31)),
-        max_culling_distance=wire.number(v[6], "settings.max_culling_distance"),
-        deterministic_ragdolls=wire.flag(v[7], "settings.deterministic_ragdolls"),
-        tile_stream_distance=wire.number(v[8], "settings.tile_stream_distance"),
-        actor_active_distance=wire.number(v[9], "settings.actor_active_distance"),
-        spectator_as_ego=wire.flag(v[10], "settings.spectator_as_ego"),
-    )
+    def put(self, actor: Actor, pose: Pose) -> None:
+        """Place an actor; a child is placed relative to where its parent then is."""
+        if actor.parent:
+            actor.mount = pose
+        elif actor.body is None:
+            actor.pose = pose
+        else:
+            self.moving.teleport(actor.body, replace(pose, z=pose.z - actor.lift))
 
+    def simulate(self, actor: Actor, on: bool) -> None:
+        """Off: it stays where clients put it."""
+        if actor.body is not None and actor.family is not Family.PROP:
+            self.moving.set_simulated(actor.body, on)
+            self.moving.set_grounded(actor.body, on)
 
-@dataclass(slots=True)
-class Episode:
-    """One world since its map was loaded. Frames go on counting across episodes."""
+    def move(self, dt: float) -> None:
+        """One tick of driving and walking."""
+        self.moving.grip = self.sky.grip
+        self.vehicles.command(dt)
+        self.moving.step()
 
-    id: int = 1
-    frame: int = 0
-    elapsed: float = 0.0  # s of simulated time in this episode
-    settings: EpisodeSettings = EpisodeSettings()
-    map_changed: bool = True  # until the first snapshot of the episode has been sent
+    def follow(self) -> None:
+        """Children go where their parents went."""
+        for actor in self.actors:
+            carrier = self.actors.carrier(actor) if actor.parent else None
+            if carrier is not None:
+                actor.pose = self.actors.pose(carrier) @ actor.mount
 
-    def advance(self) -> None:
-        """One tick passes."""
-        self.frame += 1
-        self.elapsed += self.settings.step
-
-    def renew(self, reset_settings: bool) -> None:
-        """Another map, or the same one anew."""
-        self.id += 1
-        self.elapsed = 0.0
-        self.map_changed = True
-        if reset_settings:
-            self.settings = replace(EpisodeSettings(), no_rendering=self.settings.no_rendering)
+    def fill_rows(self, dt: float) -> None:
+        """The snapshot's columns as of now, dt s after the last time."""
+        filling.fill_vehicles(self.rows, self.actors, self.vehicles, self.posts)
+        filling.fill_lights(self.rows, self.actors, self.posts)
+        for actor in self.actors:
+            if actor.family not in filling.BY_COLUMNS:
+                filling.fill_actor(self.rows, self.actors, actor)
+        for id, control in self.walkers.items():
+            filling.fill_walker(self.rows, self.actors, self.actors.alive[id], control, dt)

@@ -7,15 +7,16 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import IO, Any
 
 from skidpad.core.errors import FileError
 from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.actors import ActorTable
+from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.replayer import FORMAT, PLAYED, Recording, recording
 from skidpad.simulation.carla_server.rpc import CallError
-
-if TYPE_CHECKING:
-    from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.touches import touches
+from skidpad.simulation.world.world import World
 
 MAX_BYTES = 2 * 1024**3
 MAX_READ = 256 * 1024**2  # a longer recording is kept, but neither summed up nor replayed
@@ -40,7 +41,7 @@ class Recorder:
         self._left = 0
         self._born: set[int] = set()  # actors that the recording describes
 
-    def start(self, name: str, world: World) -> str:
+    def start(self, name: str, map: str, clock: Clock) -> str:
         """Begin a recording; the text that the client prints."""
         path = safe_path(self.folder, name)
         self.stop()
@@ -50,7 +51,7 @@ class Recorder:
         except OSError as error:
             raise FileError(f"recording {path.name}: {error.strerror}") from error
         self._left, self._born = MAX_BYTES, set()
-        head = {"map": world.map.name, "episode": world.episode.id, "format": FORMAT}
+        head = {"map": map, "episode": clock.episode, "format": FORMAT}
         self._write(json.dumps(head))
         return f"Recording to file: {path.name}"
 
@@ -60,22 +61,23 @@ class Recorder:
             self._file.close()
             self._file = None
 
-    def tick(self, world: World) -> None:
+    def tick(self, clock: Clock, actors: ActorTable, moving: World) -> None:
         """One line: frame, time, id and Transform of what moves, contacts, and who is new."""
         if self._file is None:
             return
         poses, born = [], []
-        for actor in world.actors:
+        for actor in actors:
             if actor.family not in PLAYED:
                 continue
-            place, turn = wire.transform(world.pose(actor))
+            place, turn = wire.transform(actors.pose(actor))
             poses.append([actor.id, [round(v, 3) for v in place], [round(v, 3) for v in turn]])
             if actor.id not in self._born:
                 born.append([actor.id, actor.blueprint.id, actor.attributes])
                 self._born.add(actor.id)
-        contacts = [[c.actor, c.other] for c in world.contacts.events]
-        episode = world.episode
-        self._write(json.dumps([episode.frame, episode.elapsed, poses, contacts, born]))
+        contacts = [
+            [t.actor.id, 0 if t.other is None else t.other.id] for t in touches(moving, actors)
+        ]
+        self._write(json.dumps([clock.frame, clock.elapsed, poses, contacts, born]))
 
     def _write(self, line: str) -> None:
         assert self._file is not None

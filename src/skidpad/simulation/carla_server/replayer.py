@@ -7,20 +7,18 @@ lights, weather and sensors are not recorded, so they are not replayed.
 from __future__ import annotations
 
 from bisect import bisect_right
+from collections.abc import Container
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.actors import Actor
 from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.episode import Episode, Wanted
 from skidpad.simulation.carla_server.rpc import CallError
-from skidpad.simulation.carla_server.spawning import spawn
 from skidpad.simulation.carla_server.wire import Vector
-
-if TYPE_CHECKING:
-    from skidpad.simulation.carla_server.world import World
 
 FORMAT = 2  # of recordings that can be replayed
 PLAYED = (Family.VEHICLE, Family.WALKER)
@@ -88,113 +86,129 @@ def recording(name: str, head: dict[str, Any], ticks: list[list[Any]]) -> Record
     return Recording(str(head.get("map")), times, poses, kinds)
 
 
-@dataclass(slots=True)
 class Replayer:
     """Moves actors while it replays."""
 
-    time_factor: float = 1.0
-    ignore_hero: bool = False
-    ignore_spectator: bool = False
-    _source: Recording | None = None
-    _now: float = 0.0
-    _end: float = 0.0
-    _follow: int = 0  # recorded id
-    _actors: dict[int, int] = field(default_factory=dict)  # actor ids by recorded ids
-    _refused: set[int] = field(default_factory=set)
+    def __init__(self) -> None:
+        self.time_factor = 1.0
+        self.ignore_hero = False
+        self.ignore_spectator = False
+        self._run: _Run | None = None
 
     def start(
-        self, world: World, source: Recording, begin: float, duration: float, follow: int
+        self, episode: Episode, source: Recording, begin: float, duration: float, follow: int
     ) -> tuple[float, float]:
-        """Begin; the times in s from and to which it replays. A negative begin counts from the end."""
-        self.release(world)
-        if source.map != world.map.name:
-            world.load(source.map, reset_settings=False)
+        """Begin; the times in s from and to which it replays. A negative begin counts from the end.
+
+        episode: on the recording's map. follow: recorded id of whom the spectator follows.
+        """
+        self.release()
         begin = max(source.total + begin, 0.0) if begin < 0.0 else min(begin, source.total)
-        self._source, self._now, self._follow = source, begin, follow
-        self._end = min(begin + duration, source.total) if duration > 0.0 else source.total
-        self._place(world)
-        return self._now, self._end
+        end = min(begin + duration, source.total) if duration > 0.0 else source.total
+        self._run = _Run(episode, source, begin, end, follow)
+        self._place(self._run)
+        return begin, end
 
-    def tick(self, world: World, dt: float) -> None:
+    def tick(self, dt: float) -> None:
         """Move everybody on; at the end physics takes over."""
-        if self._source is None:
+        run = self._run
+        if run is None:
             return
-        self._now = min(self._now + dt * self.time_factor, self._end)
-        self._place(world)
-        if self._now >= self._end:
-            self.release(world)
+        run.now = min(run.now + dt * self.time_factor, run.end)
+        self._place(run)
+        if run.now >= run.end:
+            self.release()
 
-    def stop(self, world: World, keep_actors: bool) -> None:
+    def stop(self, keep_actors: bool) -> None:
         """End now; unless actors are kept, as the recording ends."""
-        if self._source is not None and not keep_actors:
-            self._now = self._source.total
-            self._place(world)
-        self.release(world)
+        if self._run is not None and not keep_actors:
+            self._run.now = self._run.source.total
+            self._place(self._run)
+        self.release()
 
-    def release(self, world: World) -> None:
+    def release(self) -> None:
         """Give the actors back to physics."""
-        for id in self._actors.values():
-            _simulate(world, id, True)
-        self._source = None
-        self._actors, self._refused = {}, set()
+        if self._run is not None:
+            self._run.free()
+        self._run = None
 
-    def _place(self, world: World) -> None:
-        assert self._source is not None
-        places = self._source.at(self._now)
-        for recorded in [r for r in self._actors if r not in places]:
-            id = self._actors.pop(recorded)
-            if id in world.actors.alive:
-                world.destroy(id)
+    def _place(self, run: _Run) -> None:
+        places = run.source.at(run.now)
+        run.drop(keep=places.keys())
         for recorded, (pose, velocity) in places.items():
-            actor = self._actor(world, recorded, pose)
+            actor = run.actor(recorded, pose, self.ignore_hero)
             if actor is not None:
-                _move(world, actor, pose, velocity)
-        followed = self._actors.get(self._follow)
-        if followed is not None and not self.ignore_spectator:
-            pose = world.pose(world.actors.get(followed))
-            world.spectator.pose = pose.moved(forward=-BEHIND, up=ABOVE)
+                _move(run.episode, actor, pose, velocity)
+        if not self.ignore_spectator:
+            run.watch()
 
-    def _actor(self, world: World, recorded: int, pose: Pose) -> Actor | None:
+
+@dataclass(slots=True)
+class _Run:
+    """One replay on one episode."""
+
+    episode: Episode
+    source: Recording
+    now: float  # s
+    end: float
+    follow: int
+    actors: dict[int, int] = field(default_factory=dict)  # actor ids by recorded ids
+    refused: set[int] = field(default_factory=set)
+
+    def drop(self, keep: Container[int]) -> None:
+        """Who is no longer in the recording vanishes."""
+        for recorded in [r for r in self.actors if r not in keep]:
+            id = self.actors.pop(recorded)
+            if id in self.episode.actors.alive:
+                self.episode.destroy(id)
+
+    def free(self) -> None:
+        """Physics has them again."""
+        for id in self.actors.values():
+            actor = self.episode.actors.alive.get(id)
+            if actor is not None:
+                self.episode.simulate(actor, True)
+
+    def watch(self) -> None:
+        """The spectator goes behind whom it follows."""
+        actors = self.episode.actors
+        followed = actors.alive.get(self.actors.get(self.follow, 0))
+        if followed is not None:
+            self.episode.spectator.pose = actors.pose(followed).moved(forward=-BEHIND, up=ABOVE)
+
+    def actor(self, recorded: int, pose: Pose, ignore_hero: bool) -> Actor | None:
         """The actor that plays a recorded one; None for those left out."""
-        if recorded in self._refused:
+        if recorded in self.refused:
             return None
-        if recorded not in self._actors:
-            found = self._cast(world, recorded, pose)
+        if recorded not in self.actors:
+            found = self._cast(recorded, pose, ignore_hero)
             if found is None:
-                self._refused.add(recorded)
+                self.refused.add(recorded)
                 return None
-            self._actors[recorded] = found.id
-            _simulate(world, found.id, False)
-        return world.actors.alive.get(self._actors[recorded])
+            self.actors[recorded] = found.id
+            self.episode.simulate(found, False)
+        return self.episode.actors.alive.get(self.actors[recorded])
 
-    def _cast(self, world: World, id: int, pose: Pose) -> Actor | None:
+    def _cast(self, id: int, pose: Pose, ignore_hero: bool) -> Actor | None:
         """The living actor of that id and blueprint, or a new one."""
-        assert self._source is not None
-        blueprint, attributes = self._source.kinds.get(id, ("", {}))
-        offered = world.catalogue.get(blueprint)
+        blueprint, attributes = self.source.kinds.get(id, ("", {}))
+        offered = self.episode.stock.catalogue.get(blueprint)
         if offered is None or offered.family not in PLAYED:
             return None
-        if self.ignore_hero and attributes.get("role_name") == HERO:
+        if ignore_hero and attributes.get("role_name") == HERO:
             return None
-        living = world.actors.alive.get(id)
+        living = self.episode.actors.alive.get(id)
         if living is not None and living.blueprint.id == blueprint:
             return living
-        given = [[name, 0, value] for name, value in attributes.items()]
         try:
-            return spawn(world, [0, blueprint, given], pose)
+            return self.episode.spawn(Wanted(blueprint, attributes), pose)
         except CallError:  # something stands there
             return None
 
 
-def _simulate(world: World, id: int, on: bool) -> None:
-    if id in world.vehicles.slots:
-        world.vehicles.of(id).simulated = on
-    elif id in world.walkers.members:
-        world.walkers.simulated[id] = on
-
-
-def _move(world: World, actor: Actor, pose: Pose, velocity: Vector) -> None:
-    actor.pose, actor.velocity = pose, velocity
-    if actor.family is Family.VEHICLE:
-        world.vehicles.teleport(actor.id, pose)
-        world.vehicles.set_velocity(actor.id, velocity)
+def _move(episode: Episode, actor: Actor, pose: Pose, velocity: Vector) -> None:
+    episode.put(actor, pose)
+    if actor.id in episode.vehicles:
+        episode.vehicles.set_velocity(actor.id, velocity)
+    elif actor.body is not None:
+        episode.moving.set_velocity(actor.body, velocity[0], velocity[1])

@@ -5,17 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 from math import cos, sin
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.carla_server import overlap, wire
-from skidpad.simulation.carla_server.spawning import SOLID, world_box
+from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.actors import SOLID, ActorTable, Box
 from skidpad.simulation.carla_server.wire import Vector
-
-if TYPE_CHECKING:
-    from skidpad.simulation.carla_server.world import World
 
 GROUND_STEP = 0.5  # m along a ray between looks at the road's height
 LONGEST_RAY = 2000.0  # m
@@ -51,13 +48,9 @@ class Hit:
     label: int
 
 
-def objects(world: World) -> tuple[EnvironmentObject, ...]:
-    """All objects of the current map."""
-    return _objects(world.map.roads)
-
-
 @lru_cache(maxsize=4)
-def _objects(roads: RoadMap) -> tuple[EnvironmentObject, ...]:
+def objects(roads: RoadMap) -> tuple[EnvironmentObject, ...]:
+    """All objects of a map."""
     found = []
     for i, b in enumerate(roads.roadside.boxes):
         name = f"{SemanticClass(b.label).name.title()}_{i}"
@@ -67,23 +60,21 @@ def _objects(roads: RoadMap) -> tuple[EnvironmentObject, ...]:
     return tuple(found)
 
 
-def cast(world: World, start: Vector, way: Vector, reach: float) -> list[Hit]:
+def cast(roads: RoadMap, actors: ActorTable, start: Vector, way: Vector, reach: float) -> list[Hit]:
     """Everything on a ray, near to far: actors, the map's objects, the road."""
     length = sum(v * v for v in way) ** 0.5
     if length == 0.0:
         return []
     reach = min(max(reach, 0.0), LONGEST_RAY)
     unit = (way[0] / length, way[1] / length, way[2] / length)
-    targets: list[tuple[overlap.Box, int]] = [
-        (world_box(world, a), int(a.blueprint.label)) for a in world.actors if a.family in SOLID
-    ]
-    targets += [((o.centre, o.half), o.label) for o in objects(world)]
+    targets = [(actors.box(a), int(a.blueprint.label)) for a in actors if a.family in SOLID]
+    targets += [(Box(o.centre, o.half), o.label) for o in objects(roads)]
     hits = []
     for box, label in targets:
         distance = _into_box(start, unit, box)
         if distance is not None and distance <= reach:
             hits.append(_hit(start, unit, distance, label))
-    road = _onto_road(world, start, unit, reach)
+    road = _onto_road(roads, start, unit, reach)
     if road is not None:
         hits.append(_hit(start, unit, road, int(SemanticClass.ROAD)))
     return sorted(hits, key=lambda h: h.distance)
@@ -94,7 +85,7 @@ def _hit(start: Vector, unit: Vector, distance: float, label: int) -> Hit:
     return Hit(distance, (place[0], place[1], place[2]), label)
 
 
-def _into_box(start: Vector, unit: Vector, box: overlap.Box) -> float | None:
+def _into_box(start: Vector, unit: Vector, box: Box) -> float | None:
     """Distance at which a ray enters an upright box (slab test); None when it misses."""
     pose, half = box
     c, s = cos(pose.yaw), sin(pose.yaw)
@@ -114,9 +105,8 @@ def _into_box(start: Vector, unit: Vector, box: overlap.Box) -> float | None:
     return near
 
 
-def _onto_road(world: World, start: Vector, unit: Vector, reach: float) -> float | None:
+def _onto_road(roads: RoadMap, start: Vector, unit: Vector, reach: float) -> float | None:
     """Distance at which a ray goes through a road from above; None when it does not."""
-    roads = world.map.roads
 
     def above(distance: float) -> float | None:
         x, y, z = (s + distance * u for s, u in zip(start, unit, strict=True))

@@ -12,15 +12,17 @@ from typing import IO, Any
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
+from skidpad.simulation.carla_server.actors import Attachment
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.codec import Decoder, ProtocolError, Request
+from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.methods import TABLES
+from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.pacer import MANAGER_REST, Pacer
 from skidpad.simulation.carla_server.rpc import Dispatcher
-from skidpad.simulation.carla_server.sensing.sensors import PRODUCERS
-from skidpad.simulation.carla_server.spawning import spawn, spawn_attached
+from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
+from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.streams import StreamHub
-from skidpad.simulation.carla_server.world import ServerOptions, World
 
 log = logging.getLogger("skidpad.carla_server")
 MAX_CLIENTS = 512
@@ -87,21 +89,21 @@ class Ports:
 
 
 class CarlaServer:
-    """A world behind CARLA's protocol."""
+    """The simulation behind CARLA's protocol."""
 
     def __init__(self, options: ServerOptions) -> None:
         self.options = options
         self.hub = StreamHub()
-        self.world = World(options, self.hub)
-        self.dispatcher = Dispatcher(self.world, TABLES)
-        self.pacer = Pacer(self.world.tick, self._own_step, lambda: not self._clients)
-        self.world.platform_time = self.pacer.elapsed
+        self.served = Served(options, self.hub)
+        self.dispatcher = Dispatcher(self.served, TABLES)
+        self.pacer = Pacer(self.served.tick, self._own_step, lambda: not self._clients)
+        self.served.platform_time = self.pacer.elapsed
         self._clients: set[RpcConnection] = set()
         self._calls: IO[str] | None = None
         self._servers: list[asyncio.Server] = []
 
     def _own_step(self) -> float | None:
-        settings = self.world.episode.settings
+        settings = self.served.clock.settings
         return None if settings.synchronous else settings.step
 
     def admit(self, client: RpcConnection) -> bool:
@@ -118,13 +120,13 @@ class CarlaServer:
     def answer(self, request: Request) -> bytes:
         """The answer to a request, which is written down when calls are recorded."""
         if self._calls is not None:
-            line = [self.world.episode.frame, request.method, request.arguments]
+            line = [self.served.clock.frame, request.method, request.arguments]
             self._calls.write(json.dumps(line, default=repr) + "\n")
         return self.dispatcher.answer(request)
 
     def rest_before(self, request: Request) -> float:
         """s by which the answer to a tick is held back while a Traffic Manager listens."""
-        ticks = request.method == "tick_cue" and self.world.managers.by_port
+        ticks = request.method == "tick_cue" and self.served.managers.by_port
         return MANAGER_REST if ticks else 0.0
 
     async def open(self) -> Ports:
@@ -156,7 +158,7 @@ class CarlaServer:
         """Stop listening."""
         for server in self._servers:
             server.close()
-        self.world.recorder.stop()
+        self.served.recorder.stop()
         if self._calls is not None:
             self._calls.close()
             self._calls = None
@@ -176,13 +178,14 @@ class EverybodyListens(StreamHub):
 
 def warm_up(options: ServerOptions) -> None:
     """Compile or load all kernels before clients wait, by a tick of a world that is thrown away."""
-    world = World(options, EverybodyListens())
-    names = [id for id, b in world.catalogue.items() if b.family is Family.VEHICLE]
-    car = spawn(world, [0, names[0], []], world.map.spawn_points[0])
+    served = Served(options, EverybodyListens())
+    episode = served.episode
+    name = next(id for id, b in served.stock.catalogue.items() if b.family is Family.VEHICLE)
+    car = episode.spawn(Wanted(name, {}), episode.map.spawn_points[0])
+    small = {"image_size_x": "64", "image_size_y": "48"}
     for kind in PRODUCERS:
-        small = [["image_size_x", 2, "64"], ["image_size_y", 2, "48"]]
-        spawn_attached(world, [0, kind, small], Pose(0.0, 0.0, 2.0), car.id, 0, "")
-    world.tick()
+        episode.attach(Wanted(kind, small), Pose(0.0, 0.0, 2.0), car.id, Attachment.RIGID)
+    served.tick()
 
 
 def _bound(host: str, port: int) -> socket.socket:

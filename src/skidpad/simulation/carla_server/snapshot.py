@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.vocabulary import LightState
-from skidpad.simulation.carla_server.episode import Episode
+from skidpad.simulation.carla_server.clock import Clock
 
 
 class SensorType(IntEnum):
@@ -145,12 +145,12 @@ def header(kind: SensorType, frame: int, time: float, pose: tuple[float, ...] | 
     return HEADER.pack(kind, frame, time, *(pose or (0.0,) * 6))
 
 
-def message(episode: Episode, rows: Rows, platform_time: float, bits: int) -> bytes:
+def message(clock: Clock, rows: Rows, platform_time: float, bits: int) -> bytes:
     """One snapshot, ready to send."""
     return b"".join(
         (
-            header(SensorType.WORLD, episode.frame, episode.elapsed, None),
-            EPISODE.pack(episode.id, platform_time, episode.settings.step, 0, 0, 0, bits),
+            header(SensorType.WORLD, clock.frame, clock.elapsed, None),
+            EPISODE.pack(clock.episode, platform_time, clock.step, 0, 0, 0, bits),
             rows.tobytes(),
         )
     )

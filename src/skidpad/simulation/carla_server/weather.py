@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import RANGES, Weather
+from skidpad.physics.grip import grip_params
 from skidpad.simulation.carla_server import wire
 
 PACKED = (  # order of the wire
@@ -29,13 +31,14 @@ COLD_C = -5.0  # air and road when there is ice (decision M-10)
 class Sky:
     """The weather as it acts, and as the client wrote it (which is what it reads back)."""
 
-    def __init__(self, ice_thickness: float = 0.0) -> None:
+    def __init__(self, ice_thickness: float, grip: GripModel, mu_ref: float) -> None:
+        """ice_thickness: percent of 20 mm, unless a client sets it. mu_ref: on a dry road."""
         self.server_ice = ice_thickness
+        self._model, self._mu_ref = grip, mu_ref
         self.client_ice: float | None = None
         self.values = dict.fromkeys(PACKED, 0.0) | {"sun_altitude_deg": 75.0}
         self.values["rayleigh_scattering_scale"] = 0.0331
         self.dust_storm = 0.0  # accepted without effect
-        self.weather = Weather()
         self._derive()
 
     def packed(self) -> list[float]:
@@ -71,3 +74,4 @@ class Sky:
         if weather.ice_thickness > 0.0:
             weather = replace(weather, air_temperature_c=COLD_C, road_temperature_c=COLD_C)
         self.weather = weather
+        self.grip = grip_params(weather, self._model, self._mu_ref)

@@ -6,76 +6,89 @@ from typing import Any
 
 from skidpad.core.geometry import Pose
 from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.actors import Actor, Attachment
+from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.rpc import CallError, Table
-from skidpad.simulation.carla_server.spawning import spawn, spawn_attached
-from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("actors")
 
 
-def packed(world: World, actor: Actor) -> list[Any]:
+def packed(served: Served, actor: Actor) -> list[Any]:
     """An actor as it travels, with its token when it is a sensor."""
-    token = b"" if actor.stream is None else world.hub.token(actor.stream)
+    token = b"" if actor.stream is None else served.hub.token(actor.stream)
     return actor.packed(token)
 
 
+def parse_description(value: Any) -> Wanted:
+    """An ActorDescription of a call."""
+    _, id, given = wire.items(value, "description", 3)
+    values = {}
+    for entry in wire.items(given, "description.attributes"):
+        name, _, text = wire.items(entry, "description.attribute", 3)
+        values[wire.text(name, "attribute id", 256)] = wire.text(text, "attribute value")
+    return Wanted(wire.text(id, "description.id"), values)
+
+
 @TABLE.method("get_actor_definitions")
-def get_actor_definitions(world: World) -> list[Any]:
+def get_actor_definitions(served: Served) -> list[Any]:
     """The whole catalogue."""
-    return [b.packed(uid) for uid, b in enumerate(world.catalogue.values(), start=1)]
+    return [b.packed(uid) for uid, b in enumerate(served.stock.catalogue.values(), start=1)]
 
 
 @TABLE.method("get_spectator")
-def get_spectator(world: World) -> list[Any]:
+def get_spectator(served: Served) -> list[Any]:
     """The free camera."""
-    return packed(world, world.spectator)
+    return packed(served, served.episode.spectator)
 
 
 @TABLE.method("get_actors_by_id")
-def get_actors_by_id(world: World, ids: Any) -> list[Any]:
+def get_actors_by_id(served: Served, ids: Any) -> list[Any]:
     """Those that live, or are remembered, of these ids."""
-    found = (world.actors.find(id) for id in wire.items(ids, "ids"))
-    return [packed(world, actor) for actor in found if actor is not None]
+    found = (served.episode.actors.find(id) for id in wire.items(ids, "ids"))
+    return [packed(served, actor) for actor in found if actor is not None]
 
 
 @TABLE.method("spawn_actor")
-def spawn_actor(world: World, description: Any, transform: Any) -> list[Any]:
+def spawn_actor(served: Served, description: Any, transform: Any) -> list[Any]:
     """A new actor."""
-    return packed(world, spawn(world, description, wire.pose(transform, "transform")))
+    pose = wire.pose(transform, "transform")
+    return packed(served, served.episode.spawn(parse_description(description), pose))
 
 
 @TABLE.method("spawn_actor_with_parent")
 def spawn_actor_with_parent(
-    world: World, description: Any, transform: Any, parent: Any, kind: Any, socket: Any = ""
+    served: Served, description: Any, transform: Any, parent: Any, kind: Any, socket: Any = ""
 ) -> list[Any]:
     """A new actor that follows another."""
+    wire.text(socket, "socket")  # not modelled (listed)
     mount = wire.pose(transform, "transform")
-    name = wire.text(socket, "socket")
-    return packed(world, spawn_attached(world, description, mount, parent, kind, name))
+    attachment = Attachment(wire.integer(kind, "attachment type", 0, max(Attachment)))
+    wanted = parse_description(description)
+    return packed(served, served.episode.attach(wanted, mount, parent, attachment))
 
 
 @TABLE.method("destroy_actor")
-def destroy_actor(world: World, id: Any) -> bool:
+def destroy_actor(served: Served, id: Any) -> bool:
     """False when there is no such actor; the client wants a truth value, not an error."""
     try:
-        world.destroy(wire.integer(id, "actor id"))
+        served.episode.destroy(wire.integer(id, "actor id"))
     except CallError:
         return False
     return True
 
 
 @TABLE.method("get_actor_bounding_box")
-def get_actor_bounding_box(world: World, id: Any) -> list[Any]:
+def get_actor_bounding_box(served: Served, id: Any) -> list[Any]:
     """Of the living and the dead: an error would abort a client's Traffic Manager."""
-    actor = world.actors.find(id)
+    actor = served.episode.actors.find(id)
     return wire.box((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) if actor is None else actor.box()
 
 
 @TABLE.method("get_traffic_sign_trigger_volume")
-def get_traffic_sign_trigger_volume(world: World, id: Any) -> list[Any]:
+def get_traffic_sign_trigger_volume(served: Served, id: Any) -> list[Any]:
     """The box in front of a light or sign."""
-    return get_actor_bounding_box(world, id)
+    return get_actor_bounding_box(served, id)
 
 
 def _named_parts(what: str) -> None:
@@ -83,23 +96,23 @@ def _named_parts(what: str) -> None:
     names = ["root"] if what == "component" else []
 
     @TABLE.method(f"get_actor_{what}_names")
-    def part_names(world: World, id: Any) -> list[str]:
+    def part_names(served: Served, id: Any) -> list[str]:
         """Names of parts."""
-        world.actors.get(id)
+        served.episode.actors.get(id)
         return names
 
     if what == "component":
 
         @TABLE.method("get_actor_component_world_transform")
-        def component_world(world: World, id: Any, name: Any) -> list[Any]:
+        def component_world(served: Served, id: Any, name: Any) -> list[Any]:
             """Where the root is."""
             wire.text(name, "component")
-            return wire.transform(world.pose(world.actors.get(id)))
+            return wire.transform(served.episode.actors.pose(served.episode.actors.get(id)))
 
         @TABLE.method("get_actor_component_relative_transform")
-        def component_relative(world: World, id: Any, name: Any) -> list[Any]:
+        def component_relative(served: Served, id: Any, name: Any) -> list[Any]:
             """The root, seen from itself."""
-            world.actors.get(id)
+            served.episode.actors.get(id)
             wire.text(name, "component")
             return wire.transform(Pose(0.0, 0.0))
 
@@ -108,9 +121,9 @@ def _named_parts(what: str) -> None:
     for seen_from in ("world", "relative"):
 
         @TABLE.method(f"get_actor_{what}_{seen_from}_transforms")
-        def part_transforms(world: World, id: Any) -> list[Any]:
+        def part_transforms(served: Served, id: Any) -> list[Any]:
             """There are none."""
-            world.actors.get(id)
+            served.episode.actors.get(id)
             return []
 
 
@@ -119,7 +132,7 @@ for _what in ("component", "bone", "socket"):
 
 
 @TABLE.method("get_vehicle_bone_world_transforms")
-def get_vehicle_bone_world_transforms(world: World, id: Any) -> list[Any]:
+def get_vehicle_bone_world_transforms(served: Served, id: Any) -> list[Any]:
     """There are none."""
-    world.actors.get(id)
+    served.episode.actors.get(id)
     return []

@@ -8,21 +8,20 @@ from typing import Any
 from skidpad.core.errors import SkidpadError
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.actors import Attachment
-from skidpad.simulation.carla_server.methods import lights, motion, vehicles, walkers
+from skidpad.simulation.carla_server.methods import actors, lights, motion, vehicles, walkers
 from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
-from skidpad.simulation.carla_server.spawning import spawn, spawn_attached
-from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("batch")
 MAX_DEPTH = 4  # of spawn commands inside `do_after`
 Command = Callable[..., Any]
 
 
-def _destroy(world: World, id: Any) -> None:
-    world.destroy(world.actors.get(id).id)
+def _destroy(served: Served, id: Any) -> None:
+    served.episode.destroy(served.episode.actors.get(id).id)
 
 
-def _nothing(_: World, *__: Any) -> None:
+def _nothing(_: Served, *__: Any) -> None:
     """Accepted without effect: the Traffic Manager lives in the client, nothing is drawn."""
 
 
@@ -54,53 +53,53 @@ SPAWN = 0
 
 
 @TABLE.method("apply_batch", Shape.PLAIN)
-def apply_batch(world: World, commands: Any, do_tick: Any) -> list[Any]:
+def apply_batch(served: Served, commands: Any, do_tick: Any) -> list[Any]:
     """Each command's actor id, or its error."""
-    outcomes = [_outcome(world, c) for c in wire.items(commands, "commands")]
-    if wire.flag(do_tick, "do_tick") and world.episode.settings.synchronous:
-        world.tick()
+    outcomes = [_outcome(served, c) for c in wire.items(commands, "commands")]
+    if wire.flag(do_tick, "do_tick") and served.clock.settings.synchronous:
+        served.tick()
     return outcomes
 
 
-def _outcome(world: World, command: Any) -> list[Any]:
+def _outcome(served: Served, command: Any) -> list[Any]:
     try:
         (variant,) = wire.items(command, "command", 1)
-        return [[1, run(world, variant)]]
+        return [[1, run(served, variant)]]
     except SkidpadError as error:
         return [[0, [str(error)]]]
 
 
-def run(world: World, variant: Any, depth: int = 0) -> int:
+def run(served: Served, variant: Any, depth: int = 0) -> int:
     """One command; the actor id that it is about, 0 when there is none."""
     index, body = wire.items(variant, "command", 2)
     number = wire.integer(index, "command", 0, max(COMMANDS))
     members = wire.items(body, "command body")
     if number == SPAWN:
-        return _spawn(world, members, depth)
+        return _spawn(served, members, depth)
     try:
-        COMMANDS[number](world, *members)
+        COMMANDS[number](served, *members)
     except TypeError as error:
         raise wire.WireError(f"command {number} has a wrong number of members") from error
     id = members[0] if members else 0
     return id if isinstance(id, int) else 0
 
 
-def _attachment(kind: Any) -> int:
+def _attachment(kind: Any) -> Attachment:
     """The client's spawn command leaves this member unset unless told, so chance values arrive."""
-    return int(kind) if kind in tuple(Attachment) else int(Attachment.RIGID)
+    return Attachment(kind) if kind in tuple(Attachment) else Attachment.RIGID
 
 
-def _spawn(world: World, members: list[Any], depth: int) -> int:
+def _spawn(served: Served, members: list[Any], depth: int) -> int:
     if len(members) != 6 or depth > MAX_DEPTH:
         raise wire.WireError("a spawn command has six members and is nested at most four deep")
     description, transform, parent, kind, socket, after = members
-    pose = wire.pose(transform, "transform")
+    wanted, pose = actors.parse_description(description), wire.pose(transform, "transform")
     parent_id = wire.optional(parent, "parent")
     if parent_id is None:
-        actor = spawn(world, description, pose)
+        actor = served.episode.spawn(wanted, pose)
     else:
-        name = wire.text(socket, "socket")
-        actor = spawn_attached(world, description, pose, parent_id, _attachment(kind), name)
+        wire.text(socket, "socket")
+        actor = served.episode.attach(wanted, pose, parent_id, _attachment(kind))
     for command in wire.items(after, "do_after"):
         (variant,) = wire.items(command, "command", 1)
         index, body = wire.items(variant, "command", 2)
@@ -110,7 +109,7 @@ def _spawn(world: World, members: list[Any], depth: int) -> int:
         elif own:
             own = [actor.id, *own[1:]]
         try:
-            run(world, [index, own], depth + 1)
+            run(served, [index, own], depth + 1)
         except CallError:
             continue
     return actor.id

@@ -5,63 +5,62 @@ from __future__ import annotations
 from typing import Any
 
 from skidpad.simulation.carla_server import wire
-from skidpad.simulation.carla_server.episode import parse_settings
+from skidpad.simulation.carla_server.clock import parse_settings
 from skidpad.simulation.carla_server.rpc import CallError, Table
-from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.served import Served
 
 VERSION = "0.9.16"
 TABLE = Table("episode")
 
 
 @TABLE.method("version")
-def version(_: World) -> str:
+def version(_: Served) -> str:
     """The version whose protocol is spoken."""
     return VERSION
 
 
 @TABLE.method("get_episode_info")
-def get_episode_info(world: World) -> list[Any]:
+def get_episode_info(served: Served) -> list[Any]:
     """Episode id and the token of the snapshots."""
-    return [world.episode.id, [world.hub.episode_token()]]
+    return [served.clock.episode, [served.hub.episode_token()]]
 
 
 @TABLE.method("get_sensor_token")
-def get_sensor_token(world: World, stream: Any) -> list[bytes]:
+def get_sensor_token(served: Served, stream: Any) -> list[bytes]:
     """The token of a stream, asked for before every subscription."""
     number = wire.integer(stream, "stream id", 0, 2**32 - 1)
-    if not world.hub.exists(number):
+    if not served.hub.exists(number):
         raise CallError(f"stream {number} not found")
-    return [world.hub.token(number)]
+    return [served.hub.token(number)]
 
 
 @TABLE.method("get_episode_settings")
-def get_episode_settings(world: World) -> list[Any]:
+def get_episode_settings(served: Served) -> list[Any]:
     """As last set."""
-    return world.episode.settings.packed()
+    return served.clock.settings.packed()
 
 
 @TABLE.method("set_episode_settings")
-def set_episode_settings(world: World, settings: Any) -> int:
+def set_episode_settings(served: Served, settings: Any) -> int:
     """From the next tick on; the current frame."""
-    world.episode.settings = parse_settings(settings)
-    world.vehicles.set_step(world.episode.settings.step)
-    return world.episode.frame
+    served.apply(parse_settings(settings))
+    return served.clock.frame
 
 
 @TABLE.method("tick_cue")
-def tick_cue(world: World) -> int:
+def tick_cue(served: Served) -> int:
     """One tick in synchronous mode; in asynchronous mode the pacer ticks."""
-    return world.tick() if world.episode.settings.synchronous else world.episode.frame
+    return served.tick() if served.clock.settings.synchronous else served.clock.frame
 
 
 for _name in ("enable_sensor_for_ros", "disable_sensor_for_ros", "send"):
 
     @TABLE.method(_name, without_effect="there is no ROS publisher and no radio")
-    def no_publisher(_: World, *__: Any) -> None:
+    def no_publisher(_: Served, *__: Any) -> None:
         """Accepted."""
 
 
 @TABLE.method("is_sensor_enabled_for_ros")
-def is_sensor_enabled_for_ros(_: World, __: Any) -> bool:
+def is_sensor_enabled_for_ros(_: Served, __: Any) -> bool:
     """Never."""
     return False

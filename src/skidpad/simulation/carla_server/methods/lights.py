@@ -7,18 +7,26 @@ from typing import Any
 from skidpad.core.vocabulary import LightState
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.catalogue import Family
-from skidpad.simulation.carla_server.lights import Light
 from skidpad.simulation.carla_server.rpc import Shape, Table
-from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.world.lights import Group, Light, Lights
 
 TABLE = Table("traffic lights")
 LONGEST = 1.0e6  # s
 
 
-def light_of(world: World, id: Any) -> Light:
+def light_of(served: Served, id: Any) -> Light:
     """The light with this actor id."""
-    light: Light = world.actors.get(id, Family.TRAFFIC_LIGHT).extra
-    return light
+    episode = served.episode
+    return episode.posts.light(episode.actors.get(id, Family.TRAFFIC_LIGHT).id)
+
+
+def _lights(served: Served) -> Lights:
+    return served.episode.moving.lights
+
+
+def _group(served: Served, id: Any) -> Group:
+    return _lights(served).groups[light_of(served, id).group]
 
 
 def parse_state(value: Any) -> LightState:
@@ -31,72 +39,68 @@ def _seconds(value: Any) -> float:
 
 
 @TABLE.method("set_traffic_light_state", Shape.VOID)
-def set_traffic_light_state(world: World, id: Any, state: Any) -> None:
+def set_traffic_light_state(served: Served, id: Any, state: Any) -> None:
     """Now; its timer starts anew."""
-    world.lights.set_state(light_of(world, id), parse_state(state))
-    world.lights_changed = True
+    _lights(served).set_state(light_of(served, id), parse_state(state))
 
 
 @TABLE.method("set_traffic_light_green_time", Shape.VOID)
-def set_traffic_light_green_time(world: World, id: Any, seconds: Any) -> None:
+def set_traffic_light_green_time(served: Served, id: Any, seconds: Any) -> None:
     """s, of all lights that change together with it."""
-    for light in world.lights.phase_of(light_of(world, id)):
+    for light in _lights(served).phase_of(light_of(served, id)):
         light.green = _seconds(seconds)
 
 
 @TABLE.method("set_traffic_light_yellow_time", Shape.VOID)
-def set_traffic_light_yellow_time(world: World, id: Any, seconds: Any) -> None:
+def set_traffic_light_yellow_time(served: Served, id: Any, seconds: Any) -> None:
     """s, of all lights that change together with it."""
-    for light in world.lights.phase_of(light_of(world, id)):
+    for light in _lights(served).phase_of(light_of(served, id)):
         light.yellow = _seconds(seconds)
 
 
 @TABLE.method("set_traffic_light_red_time", Shape.VOID)
-def set_traffic_light_red_time(world: World, id: Any, seconds: Any) -> None:
+def set_traffic_light_red_time(served: Served, id: Any, seconds: Any) -> None:
     """s, of all lights that change together with it."""
-    for light in world.lights.phase_of(light_of(world, id)):
+    for light in _lights(served).phase_of(light_of(served, id)):
         light.red = _seconds(seconds)
 
 
 @TABLE.method("freeze_traffic_light", Shape.VOID)
-def freeze_traffic_light(world: World, id: Any, frozen: Any) -> None:
+def freeze_traffic_light(served: Served, id: Any, frozen: Any) -> None:
     """Its whole group stands still."""
-    world.lights.groups[light_of(world, id).group].frozen = wire.flag(frozen, "freeze")
+    _group(served, id).frozen = wire.flag(frozen, "freeze")
 
 
 @TABLE.method("freeze_all_traffic_lights", Shape.VOID)
-def freeze_all_traffic_lights(world: World, frozen: Any) -> None:
+def freeze_all_traffic_lights(served: Served, frozen: Any) -> None:
     """All stand still."""
-    world.lights.all_frozen = wire.flag(frozen, "freeze")
+    _lights(served).frozen = wire.flag(frozen, "freeze")
 
 
 @TABLE.method("reset_traffic_light_group", Shape.VOID)
-def reset_traffic_light_group(world: World, id: Any) -> None:
+def reset_traffic_light_group(served: Served, id: Any) -> None:
     """Its group from the beginning."""
-    world.lights.groups[light_of(world, id).group].reset()
-    world.lights_changed = True
+    _lights(served).reset(_group(served, id))
 
 
 @TABLE.method("reset_all_traffic_lights", Shape.VOID)
-def reset_all_traffic_lights(world: World) -> None:
+def reset_all_traffic_lights(served: Served) -> None:
     """All from the beginning."""
-    world.lights.reset()
-    world.lights_changed = True
+    _lights(served).reset()
 
 
 @TABLE.method("get_group_traffic_lights")
-def get_group_traffic_lights(world: World, id: Any) -> list[int]:
+def get_group_traffic_lights(served: Served, id: Any) -> list[int]:
     """Ids of the lights of its junction."""
-    group = world.lights.groups[light_of(world, id).group]
-    return [light.actor for light in group.lights()]
+    return [served.episode.posts.actor(light) for light in _group(served, id).lights()]
 
 
 @TABLE.method("get_light_boxes")
-def get_light_boxes(world: World, id: Any) -> list[Any]:
+def get_light_boxes(served: Served, id: Any) -> list[Any]:
     """Boxes of its heads in the world."""
-    light = light_of(world, id)
+    light = light_of(served, id)
     boxes = []
-    for head in world.map.roads.roadside.heads:
+    for head in served.episode.map.roads.roadside.heads:
         if head.signal == light.signal:
             centre = wire.iso_to_wire((head.x, head.y, head.z))
             half = (0.5 * head.lamp_diameter, 0.6 * head.lamp_diameter, 1.7 * head.lamp_diameter)

@@ -8,7 +8,7 @@ from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.maps import MAX_XODR, PREFIX
 from skidpad.simulation.carla_server.recorder import safe_path
 from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
-from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("maps")
 MAX_FILE = 16 * 1024 * 1024
@@ -17,71 +17,76 @@ NO_LAYERS = "maps have no layers"
 
 
 @TABLE.method("get_available_maps")
-def get_available_maps(world: World) -> list[str]:
+def get_available_maps(served: Served) -> list[str]:
     """All maps, as CARLA's content paths."""
-    return [f"/Game/{PREFIX}{name}" for name in world.maps.names()]
+    return [f"/Game/{PREFIX}{name}" for name in served.maps.names()]
 
 
 @TABLE.method("get_map_info")
-def get_map_info(world: World) -> list[Any]:
+def get_map_info(served: Served) -> list[Any]:
     """Name and recommended spawn points."""
-    return [world.map.full_name, [wire.transform(p) for p in world.map.spawn_points]]
+    return [
+        served.episode.map.full_name,
+        [wire.transform(p) for p in served.episode.map.spawn_points],
+    ]
 
 
 @TABLE.method("get_map_data")
-def get_map_data(world: World) -> str:
+def get_map_data(served: Served) -> str:
     """The OpenDRIVE text."""
-    return world.map.xodr
+    return served.episode.map.xodr
 
 
 @TABLE.method("load_new_episode", Shape.VOID)
-def load_new_episode(world: World, name: Any, reset: Any, layers: Any = 0) -> None:
+def load_new_episode(served: Served, name: Any, reset: Any, layers: Any = 0) -> None:
     """Another map; "" loads the current one anew."""
     wire.integer(layers, "map layers")
-    world.load(wire.text(name, "map name"), wire.flag(reset, "reset_settings"))
+    served.load(wire.text(name, "map name"), wire.flag(reset, "reset_settings"))
 
 
 @TABLE.method("copy_opendrive_to_file", Shape.VOID)
-def copy_opendrive_to_file(world: World, xodr: Any, parameters: Any) -> None:
+def copy_opendrive_to_file(served: Served, xodr: Any, parameters: Any) -> None:
     """OpenDRIVE text that the next load shall use; mesh parameters have no effect."""
     wire.items(parameters, "opendrive parameters")
-    world.maps.keep_text(wire.text(xodr, "OpenDRIVE", MAX_XODR))
+    served.maps.keep_text(wire.text(xodr, "OpenDRIVE", MAX_XODR))
 
 
 @TABLE.method("get_required_files")
-def get_required_files(world: World, folder: Any) -> list[str]:
+def get_required_files(served: Served, folder: Any) -> list[str]:
     """The navigation mesh, in its folder; clients build their other caches themselves."""
-    navigation = world.map.navigation if wire.text(folder, "folder") == NAVIGATION else None
+    navigation = (
+        served.episode.map.navigation if wire.text(folder, "folder") == NAVIGATION else None
+    )
     return [] if navigation is None else [navigation[0]]
 
 
 @TABLE.method("request_file")
-def request_file(world: World, name: Any) -> bytes:
+def request_file(served: Served, name: Any) -> bytes:
     """The navigation mesh, or a file of the data folder (decision K-8)."""
     asked = wire.text(name, "file name")
-    navigation = world.map.navigation
+    navigation = served.episode.map.navigation
     if navigation is not None and navigation[0] == asked:
         return navigation[1]
-    path = safe_path(world.options.data_dir, asked)
+    path = safe_path(served.options.data_dir, asked)
     if not path.is_file() or path.stat().st_size > MAX_FILE:
         raise CallError(f"file {path.name} not found")
     return path.read_bytes()
 
 
 @TABLE.method("get_navigation_mesh")
-def get_navigation_mesh(world: World) -> bytes:
+def get_navigation_mesh(served: Served) -> bytes:
     """Its content; empty where the map has none, and the client then says so."""
-    navigation = world.map.navigation
+    navigation = served.episode.map.navigation
     return b"" if navigation is None else navigation[1]
 
 
 @TABLE.method("load_map_layer", Shape.VOID, without_effect=NO_LAYERS)
-def load_map_layer(_: World, layers: Any) -> None:
+def load_map_layer(_: Served, layers: Any) -> None:
     """Accepted."""
     wire.integer(layers, "map layers")
 
 
 @TABLE.method("unload_map_layer", Shape.VOID, without_effect=NO_LAYERS)
-def unload_map_layer(_: World, layers: Any) -> None:
+def unload_map_layer(_: Served, layers: Any) -> None:
     """Accepted."""
     wire.integer(layers, "map layers")

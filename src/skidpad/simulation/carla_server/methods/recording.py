@@ -6,59 +6,63 @@ from typing import Any
 
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
-from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("recorder")
 MAX_FACTOR = 100.0  # times real time
 
 
 @TABLE.method("start_recorder")
-def start_recorder(world: World, name: Any, additional: Any = False) -> str:
+def start_recorder(served: Served, name: Any, additional: Any = False) -> str:
     """Begin; needs --data-dir."""
     wire.flag(additional, "additional_data")
-    return world.recorder.start(wire.text(name, "file name"), world)
+    return served.recorder.start(
+        wire.text(name, "file name"), served.episode.map.name, served.clock
+    )
 
 
 @TABLE.method("stop_recorder", Shape.VOID)
-def stop_recorder(world: World) -> None:
+def stop_recorder(served: Served) -> None:
     """End."""
-    world.recorder.stop()
+    served.recorder.stop()
 
 
 @TABLE.method("show_recorder_file_info")
-def show_recorder_file_info(world: World, name: Any, show_all: Any = False) -> str:
+def show_recorder_file_info(served: Served, name: Any, show_all: Any = False) -> str:
     """A summary."""
     wire.flag(show_all, "show_all")
-    return world.recorder.summary(wire.text(name, "file name"))
+    return served.recorder.summary(wire.text(name, "file name"))
 
 
 @TABLE.method("show_recorder_collisions")
-def show_recorder_collisions(world: World, name: Any, a: Any, b: Any) -> str:
+def show_recorder_collisions(served: Served, name: Any, a: Any, b: Any) -> str:
     """Contacts in a recording; the type filters have no effect."""
     del a, b
-    return world.recorder.collisions(wire.text(name, "file name"))
+    return served.recorder.collisions(wire.text(name, "file name"))
 
 
 @TABLE.method("show_recorder_actors_blocked")
-def show_recorder_actors_blocked(world: World, name: Any, seconds: Any, metres: Any) -> str:
+def show_recorder_actors_blocked(served: Served, name: Any, seconds: Any, metres: Any) -> str:
     """Not evaluated."""
     wire.number(seconds, "min_time")
     wire.number(metres, "min_distance")
-    return world.recorder.summary(wire.text(name, "file name"))
+    return served.recorder.summary(wire.text(name, "file name"))
 
 
 @TABLE.method("replay_file")
 def replay_file(
-    world: World, name: Any, start: Any, duration: Any, follow: Any = 0, *without_effect: Any
+    served: Served, name: Any, start: Any, duration: Any, follow: Any = 0, *without_effect: Any
 ) -> str:
     """Begin; neither recorded sensors nor an offset of the followed view are served."""
     del without_effect
     asked = wire.text(name, "file name")
     begin, length = wire.number(start, "time_start"), wire.number(duration, "duration")
     followed = wire.integer(follow, "follow_id")
-    source = world.recorder.recording(asked)
-    world.recorder.stop()
-    since, until = world.replayer.start(world, source, begin, length, followed)
+    source = served.recorder.recording(asked)
+    served.recorder.stop()
+    if source.map != served.episode.map.name:
+        served.load(source.map, reset_settings=False)
+    since, until = served.replayer.start(served.episode, source, begin, length, followed)
     return (
         f"Replaying File: {asked:.200}\nTotal time recorded: {source.total:.3f}\n"
         f"Replaying from {since:.3f} s - {until:.3f} s ({source.total:.3f} s)\n"
@@ -66,27 +70,27 @@ def replay_file(
 
 
 @TABLE.method("stop_replayer", Shape.VOID)
-def stop_replayer(world: World, keep_actors: Any) -> None:
+def stop_replayer(served: Served, keep_actors: Any) -> None:
     """End; actors that the recording lets vanish do so unless they are kept."""
-    world.replayer.stop(world, wire.flag(keep_actors, "keep_actors"))
+    served.replayer.stop(wire.flag(keep_actors, "keep_actors"))
 
 
 @TABLE.method("set_replayer_time_factor", Shape.VOID)
-def set_replayer_time_factor(world: World, factor: Any) -> None:
+def set_replayer_time_factor(served: Served, factor: Any) -> None:
     """Faster or slower."""
     wanted = wire.number(factor, "time_factor")
     if not 0.0 < wanted <= MAX_FACTOR:
         raise CallError(f"time_factor must be in (0, {MAX_FACTOR:g}], got {wanted:g}")
-    world.replayer.time_factor = wanted
+    served.replayer.time_factor = wanted
 
 
 @TABLE.method("set_replayer_ignore_hero", Shape.VOID)
-def set_replayer_ignore_hero(world: World, ignore: Any) -> None:
+def set_replayer_ignore_hero(served: Served, ignore: Any) -> None:
     """Leave out who has the role `hero`."""
-    world.replayer.ignore_hero = wire.flag(ignore, "ignore_hero")
+    served.replayer.ignore_hero = wire.flag(ignore, "ignore_hero")
 
 
 @TABLE.method("set_replayer_ignore_spectator", Shape.VOID)
-def set_replayer_ignore_spectator(world: World, ignore: Any) -> None:
+def set_replayer_ignore_spectator(served: Served, ignore: Any) -> None:
     """Leave the spectator where it is."""
-    world.replayer.ignore_spectator = wire.flag(ignore, "ignore_spectator")
+    served.replayer.ignore_spectator = wire.flag(ignore, "ignore_spectator")

@@ -6,7 +6,8 @@ from typing import Any
 
 from skidpad.simulation.carla_server import scenery, wire
 from skidpad.simulation.carla_server.rpc import Shape, Table
-from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.carla_server.wire import Vector
 
 TABLE = Table("scenery")
 ANY = 0xFF
@@ -14,77 +15,83 @@ NO_PAINT = "the map's surfaces cannot be painted"
 
 
 @TABLE.method("draw_debug_shape", Shape.VOID)
-def draw_debug_shape(world: World, shape: Any) -> None:
+def draw_debug_shape(served: Served, shape: Any) -> None:
     """Kept for its life time."""
-    world.debug.draw(shape)
+    served.episode.debug.draw(shape)
 
 
 @TABLE.method("clear_debug_shape", Shape.VOID)
-def clear_debug_shape(world: World) -> None:
+def clear_debug_shape(served: Served) -> None:
     """All but the texts."""
-    world.debug.clear(texts=False)
+    served.episode.debug.clear(texts=False)
 
 
 @TABLE.method("clear_debug_string", Shape.VOID)
-def clear_debug_string(world: World) -> None:
+def clear_debug_string(served: Served) -> None:
     """All texts."""
-    world.debug.clear(texts=True)
+    served.episode.debug.clear(texts=True)
 
 
 @TABLE.method("get_all_level_BBs")
-def get_all_level_bbs(world: World, tag: Any) -> list[Any]:
+def get_all_level_bbs(served: Served, tag: Any) -> list[Any]:
     """Boxes of what belongs to the map, by tag."""
     label = wire.integer(tag, "tag", 0, ANY)
-    return [o.box() for o in scenery.objects(world) if label in (ANY, o.label)]
+    return [o.box() for o in scenery.objects(served.episode.map.roads) if label in (ANY, o.label)]
 
 
 @TABLE.method("get_environment_objects")
-def get_environment_objects(world: World, tag: Any) -> list[Any]:
+def get_environment_objects(served: Served, tag: Any) -> list[Any]:
     """What belongs to the map, by tag."""
     label = wire.integer(tag, "tag", 0, ANY)
-    return [o.packed() for o in scenery.objects(world) if label in (ANY, o.label)]
+    return [
+        o.packed() for o in scenery.objects(served.episode.map.roads) if label in (ANY, o.label)
+    ]
 
 
 @TABLE.method(
     "enable_environment_objects", Shape.VOID, without_effect="the map's objects stay where they are"
 )
-def enable_environment_objects(_: World, ids: Any, enable: Any) -> None:
+def enable_environment_objects(_: Served, ids: Any, enable: Any) -> None:
     """Accepted."""
     wire.items(ids, "ids")
     wire.flag(enable, "enable")
 
 
 @TABLE.method("get_names_of_all_objects")
-def get_names_of_all_objects(world: World) -> list[str]:
+def get_names_of_all_objects(served: Served) -> list[str]:
     """Names of what belongs to the map."""
-    return [o.name for o in scenery.objects(world)]
+    return [o.name for o in scenery.objects(served.episode.map.roads)]
+
+
+def _cast(served: Served, start: Vector, way: Vector, reach: float) -> list[scenery.Hit]:
+    return scenery.cast(served.episode.map.roads, served.episode.actors, start, way, reach)
 
 
 @TABLE.method("project_point")
-def project_point(world: World, location: Any, direction: Any, distance: Any) -> list[Any]:
+def project_point(served: Served, location: Any, direction: Any, distance: Any) -> list[Any]:
     """[hit, [location, label]] of the first thing on a ray."""
     start = wire.iso_vector(location, "location")
     way = wire.iso_vector(direction, "direction")
-    hits = scenery.cast(world, start, way, wire.number(distance, "distance"))
+    hits = _cast(served, start, way, wire.number(distance, "distance"))
     if not hits:
         return [False, [[0.0, 0.0, 0.0], 0]]
     return [True, [list(wire.iso_to_wire(hits[0].place)), hits[0].label]]
 
 
 @TABLE.method("cast_ray")
-def cast_ray(world: World, start: Any, end: Any) -> list[Any]:
+def cast_ray(served: Served, start: Any, end: Any) -> list[Any]:
     """All things between two points, near to far."""
     a, b = wire.iso_vector(start, "start"), wire.iso_vector(end, "end")
     way = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
     length = sum(v * v for v in way) ** 0.5
-    hits = scenery.cast(world, a, way, length) if length > 0.0 else []
+    hits = _cast(served, a, way, length) if length > 0.0 else []
     return [[list(wire.iso_to_wire(h.place)), h.label] for h in hits]
 
 
 for _name in ("apply_color_texture_to_objects", "apply_float_color_texture_to_objects"):
 
     @TABLE.method(_name, Shape.VOID, without_effect=NO_PAINT)
-    def paint(_: World, names: Any, material: Any, texture: Any) -> None:
+    def paint(_: Served, names: Any, material: Any, texture: Any) -> None:
         """Accepted."""
         wire.items(names, "names")
         wire.integer(material, "material")
@@ -94,6 +101,6 @@ for _name in ("apply_color_texture_to_objects", "apply_float_color_texture_to_ob
 @TABLE.method(
     "set_annotations_traverse_translucency", Shape.VOID, without_effect="nothing is translucent"
 )
-def set_annotations_traverse_translucency(_: World, enable: Any) -> None:
+def set_annotations_traverse_translucency(_: Served, enable: Any) -> None:
     """Accepted."""
     wire.flag(enable, "enable")

@@ -5,31 +5,31 @@ from __future__ import annotations
 from typing import Any
 
 from skidpad.simulation.carla_server.rpc import Table
-from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("traffic manager")
 MOST = 1000
 
 
 @TABLE.method("is_traffic_manager_running")
-def is_traffic_manager_running(world: World, port: Any) -> bool:
+def is_traffic_manager_running(served: Served, port: Any) -> bool:
     """Whether one registered with this port."""
-    return port in world.managers.by_port if isinstance(port, int) else False
+    return port in served.managers.by_port if isinstance(port, int) else False
 
 
 @TABLE.method("get_traffic_manager_running")
-def get_traffic_manager_running(world: World, port: Any) -> list[Any]:
+def get_traffic_manager_running(served: Served, port: Any) -> list[Any]:
     """Its address."""
-    known = world.managers.by_port.get(port) if isinstance(port, int) else None
+    known = served.managers.by_port.get(port) if isinstance(port, int) else None
     return ["", 0] if known is None else [known, port]
 
 
 @TABLE.method("add_traffic_manager_running")
-def add_traffic_manager_running(world: World, address: Any) -> bool:
+def add_traffic_manager_running(served: Served, address: Any) -> bool:
     """Register one; False when the port is taken."""
     if not (isinstance(address, list) and len(address) == 2 and isinstance(address[1], int)):
         return False
-    known = world.managers.by_port
+    known = served.managers.by_port
     if address[1] in known or len(known) >= MOST:
         return False
     known[address[1]] = str(address[0])[:256]
@@ -37,6 +37,6 @@ def add_traffic_manager_running(world: World, address: Any) -> bool:
 
 
 @TABLE.method("destroy_traffic_manager")
-def destroy_traffic_manager(world: World, port: Any) -> bool:
+def destroy_traffic_manager(served: Served, port: Any) -> bool:
     """Forget one."""
-    return isinstance(port, int) and world.managers.by_port.pop(port, None) is not None
+    return isinstance(port, int) and served.managers.by_port.pop(port, None) is not None

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from skidpad.simulation.carla_server.rpc import CallError, Table
-from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("not served")
 REASONS = {
@@ -15,7 +15,7 @@ REASONS = {
 
 def _refuse(name: str, reason: str) -> None:
     @TABLE.method(name)
-    def refused(_: World, *__: Any) -> None:
+    def refused(_: Served, *__: Any) -> None:
         """Refused."""
         raise CallError(f"{name} is not served: {reason}")
 
@@ -25,17 +25,17 @@ for _name, _reason in REASONS.items():
 
 
 @TABLE.method("enable_gbuffers", without_effect=REASONS["get_gbuffer_token"])
-def enable_gbuffers(_: World, *__: Any) -> None:
+def enable_gbuffers(_: Served, *__: Any) -> None:
     """Accepted."""
 
 
 @TABLE.method("are_gbuffers_enabled")
-def are_gbuffers_enabled(_: World, *__: Any) -> bool:
+def are_gbuffers_enabled(_: Served, *__: Any) -> bool:
     """Never."""
     return False
 
 
 @TABLE.method("console_command", without_effect="there is no console")
-def console_command(_: World, *__: Any) -> bool:
+def console_command(_: Served, *__: Any) -> bool:
     """Accepted."""
     return True

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from skidpad.physics.vehicle import G
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.ackermann import (
     AckermannDriver,
@@ -11,17 +12,18 @@ from skidpad.simulation.carla_server.ackermann import (
     parse_target,
 )
 from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.control import Control
 from skidpad.simulation.carla_server.physics_control import applied, parse_physics
 from skidpad.simulation.carla_server.rpc import Shape, Table
-from skidpad.simulation.carla_server.vehicles import Control, Vehicle
-from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.carla_server.vehicles import Vehicle
 
 TABLE = Table("vehicles")
 
 
-def vehicle_of(world: World, id: Any) -> Vehicle:
+def vehicle_of(served: Served, id: Any) -> Vehicle:
     """The living vehicle with this id."""
-    return world.vehicles.of(world.actors.get(id, Family.VEHICLE).id)
+    return served.episode.vehicles.of(served.episode.actors.get(id, Family.VEHICLE).id)
 
 
 def parse_control(value: Any) -> Control:
@@ -40,17 +42,17 @@ def parse_control(value: Any) -> Control:
 
 
 @TABLE.method("apply_control_to_vehicle", Shape.VOID)
-def apply_control_to_vehicle(world: World, id: Any, control: Any) -> None:
+def apply_control_to_vehicle(served: Served, id: Any, control: Any) -> None:
     """Held until the next one."""
-    vehicle = vehicle_of(world, id)
+    vehicle = vehicle_of(served, id)
     vehicle.control = parse_control(control)
     vehicle.driver = None
 
 
 @TABLE.method("apply_ackermann_control_to_vehicle", Shape.VOID)
-def apply_ackermann_control_to_vehicle(world: World, id: Any, control: Any) -> None:
+def apply_ackermann_control_to_vehicle(served: Served, id: Any, control: Any) -> None:
     """Two controllers drive it from now on."""
-    vehicle = vehicle_of(world, id)
+    vehicle = vehicle_of(served, id)
     target = parse_target(control)
     if vehicle.driver is None:
         vehicle.driver = AckermannDriver(vehicle.ackermann)
@@ -58,26 +60,26 @@ def apply_ackermann_control_to_vehicle(world: World, id: Any, control: Any) -> N
 
 
 @TABLE.method("get_ackermann_controller_settings")
-def get_ackermann_controller_settings(world: World, id: Any) -> list[float]:
+def get_ackermann_controller_settings(served: Served, id: Any) -> list[float]:
     """Gains."""
-    return vehicle_of(world, id).ackermann.packed()
+    return vehicle_of(served, id).ackermann.packed()
 
 
 @TABLE.method("apply_ackermann_controller_settings", Shape.VOID)
-def apply_ackermann_controller_settings(world: World, id: Any, settings: Any) -> None:
+def apply_ackermann_controller_settings(served: Served, id: Any, settings: Any) -> None:
     """Other gains."""
-    vehicle = vehicle_of(world, id)
+    vehicle = vehicle_of(served, id)
     vehicle.ackermann = AckermannSettings(*wire.numbers(settings, "ackermann settings", 6))
     if vehicle.driver is not None:
         vehicle.driver.settings = vehicle.ackermann
 
 
 @TABLE.method("get_physics_control")
-def get_physics_control(world: World, id: Any) -> list[Any]:
+def get_physics_control(served: Served, id: Any) -> list[Any]:
     """As last set, with the wheels' present places."""
-    actor = world.actors.get(id, Family.VEHICLE)
-    vehicle = world.vehicles.of(actor.id)
-    pose = world.pose(actor)
+    actor = served.episode.actors.get(id, Family.VEHICLE)
+    vehicle = served.episode.vehicles.of(actor.id)
+    pose = served.episode.actors.pose(actor)
     places = []
     for x, y in wheel_centres(vehicle):
         place = pose.moved(forward=x, left=y, up=vehicle.type.wheel_radius)
@@ -99,46 +101,43 @@ def wheel_centres(vehicle: Vehicle) -> list[tuple[float, float]]:
 
 
 @TABLE.method("apply_physics_control", Shape.VOID)
-def apply_physics_control(world: World, id: Any, control: Any) -> None:
+def apply_physics_control(served: Served, id: Any, control: Any) -> None:
     """What acts: mass, drag, wheels' friction, radius, brakes and steering angle."""
-    vehicle = vehicle_of(world, id)
+    vehicle = vehicle_of(served, id)
     new = parse_physics(control)
     model = applied(vehicle.type, vehicle.physics, new)
-    vehicle.physics = new
-    if model is not vehicle.type:
-        world.vehicles.replace_type(vehicle.actor, model)
-    world.vehicles.fleet.tire_friction[world.vehicles.slots[vehicle.actor]] = new.tire_friction
+    served.episode.vehicles.reshape(vehicle.actor, new, model)
 
 
 @TABLE.method("get_vehicle_light_state")
-def get_vehicle_light_state(world: World, id: Any) -> list[int]:
+def get_vehicle_light_state(served: Served, id: Any) -> list[int]:
     """Lamp flags."""
-    return [vehicle_of(world, id).lights]
+    return [vehicle_of(served, id).lights]
 
 
 @TABLE.method("get_vehicle_light_states")
-def get_vehicle_light_states(world: World) -> list[list[int]]:
+def get_vehicle_light_states(served: Served) -> list[list[int]]:
     """Lamp flags of all vehicles."""
-    return [[v.actor, v.lights] for v in world.vehicles.members]
+    return [[v.actor, v.lights] for v in served.episode.vehicles]
 
 
 @TABLE.method("set_vehicle_light_state", Shape.VOID)
-def set_vehicle_light_state(world: World, id: Any, state: Any) -> None:
+def set_vehicle_light_state(served: Served, id: Any, state: Any) -> None:
     """Lamp flags; the lamps are kept, not drawn."""
     flags = state[0] if isinstance(state, list) and len(state) == 1 else state
-    vehicle_of(world, id).lights = wire.integer(flags, "light state", 0, 2**32 - 1)
+    vehicle_of(served, id).lights = wire.integer(flags, "light state", 0, 2**32 - 1)
 
 
 @TABLE.method("get_telemetry_data")
-def get_telemetry_data(world: World, id: Any) -> list[Any]:
+def get_telemetry_data(served: Served, id: Any) -> list[Any]:
     """Speed, pedals and per wheel: friction, spin, load."""
-    vehicle = vehicle_of(world, id)
-    i = world.vehicles.slots[vehicle.actor]
-    fleet, c = world.vehicles.fleet, vehicle.control
+    vehicle = vehicle_of(served, id)
+    i = served.episode.vehicles.row(vehicle.actor)
+    fleet, c = served.episode.moving.fleet, vehicle.control
     wheels = []
     for w in range(4):
         load, mu = float(fleet.wheels.load[i, w]), float(fleet.mu[i, w])
-        rest = vehicle.type.mass * 9.80665 / 4.0
+        rest = vehicle.type.mass * G / 4.0
         omega = float(fleet.wheels.omega[i, w])
         friction = float(fleet.tire_friction[i, w])
         wheels.append(
@@ -150,30 +149,30 @@ def get_telemetry_data(world: World, id: Any) -> list[Any]:
 
 
 @TABLE.method("get_wheel_steer_angle")
-def get_wheel_steer_angle(world: World, id: Any, wheel: Any) -> float:
+def get_wheel_steer_angle(served: Served, id: Any, wheel: Any) -> float:
     """deg; rear wheels do not steer."""
-    vehicle = vehicle_of(world, id)
+    vehicle = vehicle_of(served, id)
     if wire.integer(wheel, "wheel", 0, 8) > 1:
         return 0.0
-    angle = float(world.vehicles.fleet.wheels.steer[world.vehicles.slots[vehicle.actor]])
-    return wire.yaw_to_wire(angle)
+    row = served.episode.vehicles.row(vehicle.actor)
+    return wire.yaw_to_wire(float(served.episode.moving.fleet.wheels.steer[row]))
 
 
 @TABLE.method("get_wheel_pitch_angle")
-def get_wheel_pitch_angle(world: World, id: Any, wheel: Any) -> float:
+def get_wheel_pitch_angle(served: Served, id: Any, wheel: Any) -> float:
     """deg turned; not tracked."""
-    vehicle_of(world, id)
+    vehicle_of(served, id)
     wire.integer(wheel, "wheel", 0, 8)
     return 0.0
 
 
 def _accepted(name: str, reason: str) -> None:
     @TABLE.method(name, Shape.VOID, without_effect=reason)
-    def accepted(world: World, id: Any, a: Any = None, b: Any = None, c: Any = None, d: Any = None,
+    def accepted(served: Served, id: Any, a: Any = None, b: Any = None, c: Any = None, d: Any = None,
                  e: Any = None, f: Any = None) -> None:  # fmt: skip
         """Checked for a living actor, else without effect."""
         del a, b, c, d, e, f
-        world.actors.get(id)
+        served.episode.actors.get(id)
 
 
 for _name, _reason in {

@@ -7,8 +7,8 @@ from typing import Any
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.rpc import Shape, Table
+from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.walkers import WalkerControl
-from skidpad.simulation.carla_server.world import World
 
 TABLE = Table("walkers")
 NO_BONES = "walkers are boxes without bones"
@@ -25,36 +25,37 @@ def parse_control(value: Any) -> WalkerControl:
 
 
 @TABLE.method("apply_control_to_walker", Shape.VOID)
-def apply_control_to_walker(world: World, id: Any, control: Any) -> None:
+def apply_control_to_walker(served: Served, id: Any, control: Any) -> None:
     """Held until the next one; jumping has no effect."""
-    actor = world.actors.get(id, Family.WALKER)
+    actor = served.episode.actors.get(id, Family.WALKER)
     new = parse_control(control)
-    new.lane = actor.extra.lane
-    actor.extra = new
+    served.episode.walkers[actor.id] = new
+    if actor.body is not None:
+        served.episode.moving.walk(actor.body, *new.velocity())
 
 
 @TABLE.method("get_bones_transform", without_effect=NO_BONES)
-def get_bones_transform(world: World, id: Any) -> list[Any]:
+def get_bones_transform(served: Served, id: Any) -> list[Any]:
     """None."""
-    world.actors.get(id, Family.WALKER)
+    served.episode.actors.get(id, Family.WALKER)
     return [[]]
 
 
 @TABLE.method("set_bones_transform", Shape.VOID, without_effect=NO_BONES)
-def set_bones_transform(world: World, id: Any, bones: Any) -> None:
+def set_bones_transform(served: Served, id: Any, bones: Any) -> None:
     """Accepted."""
-    world.actors.get(id, Family.WALKER)
+    served.episode.actors.get(id, Family.WALKER)
     wire.items(bones, "bones")
 
 
 @TABLE.method("blend_pose", Shape.VOID, without_effect=NO_BONES)
-def blend_pose(world: World, id: Any, blend: Any) -> None:
+def blend_pose(served: Served, id: Any, blend: Any) -> None:
     """Accepted."""
-    world.actors.get(id, Family.WALKER)
+    served.episode.actors.get(id, Family.WALKER)
     wire.number(blend, "blend")
 
 
 @TABLE.method("get_pose_from_animation", Shape.VOID, without_effect=NO_BONES)
-def get_pose_from_animation(world: World, id: Any) -> None:
+def get_pose_from_animation(served: Served, id: Any) -> None:
     """Accepted."""
-    world.actors.get(id, Family.WALKER)
+    served.episode.actors.get(id, Family.WALKER)

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from math import cos, sin
-from typing import TYPE_CHECKING
 
+from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.simulation.carla_server import codec, wire
-from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.actors import SOLID, Actor
 from skidpad.simulation.carla_server.catalogue import Blueprint, Family
-from skidpad.simulation.carla_server.spawning import SOLID, world_box
+from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
+from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
+from skidpad.simulation.carla_server.touches import touches
 
-if TYPE_CHECKING:
-    from skidpad.simulation.carla_server.sensing.sensors import Sensor
-    from skidpad.simulation.carla_server.world import World
-
-Messages = list[tuple[bytes | memoryview, ...]]
 MAP_THINGS = {
     SemanticClass.GUARD_RAIL: "static.guardrail",
     SemanticClass.WALL: "static.wall",
@@ -25,46 +23,40 @@ MAP_THINGS = {
 }
 
 
-def collision(world: World, sensor: Sensor) -> Messages:
+def collision(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
     """One message per contact of the carrier in this tick."""
-    carrier = world.actors.alive.get(sensor.actor.parent)
-    if carrier is None:
-        return []
-    messages: Messages = []
-    for touch in world.contacts.events:
-        if touch.actor == carrier.id and any(touch.impulse):
-            other = _touched(world, touch.other, touch.label)
+    carrier = around.actors.carrier(sensor.actor)
+    messages: list[Message] = []
+    for touch in touches(around.moving, around.actors):
+        if touch.actor is carrier and any(touch.impulse):
+            other = _of_map(touch.label) if touch.other is None else touch.other
             impulse = list(wire.iso_to_wire(touch.impulse))
             messages.append((codec.pack([carrier.packed(), other.packed(), impulse]),))
     return messages
 
 
-def _touched(world: World, id: int, label: int) -> Actor:
-    """The other actor, or a nameless piece of the map."""
-    found = world.actors.find(id) if id else None
-    if found is not None:
-        return found
-    kind = SemanticClass(label)
-    blueprint = Blueprint(MAP_THINGS.get(kind, "static.unknown"), Family.PROP, {}, label=kind)
-    return Actor(0, blueprint, {}, world.spectator.pose)
+def _of_map(label: SemanticClass) -> Actor:
+    """A nameless piece of the map."""
+    blueprint = Blueprint(MAP_THINGS.get(label, "static.unknown"), Family.PROP, {}, label=label)
+    return Actor(0, blueprint, {}, Pose(0.0, 0.0))
 
 
-def obstacle(world: World, sensor: Sensor) -> Messages:
+def obstacle(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
     """The nearest solid actor within `distance` ahead of the sensor, by a swept sphere."""
-    carrier = world.actors.alive.get(sensor.actor.parent)
+    carrier, actors = around.actors.carrier(sensor.actor), around.actors
     if carrier is None:
         return []
     reach, radius = sensor.number("distance"), sensor.number("hit_radius")
     moving_only = sensor.actor.attributes["only_dynamics"].lower() == "true"
-    pose = world.pose(sensor.actor)
+    pose = actors.pose(sensor.actor)
     c, s = cos(pose.yaw), sin(pose.yaw)
     best: tuple[float, Actor] | None = None
-    for other in world.actors:
+    for other in actors:
         if other.family not in SOLID or other is carrier or other.parent:
             continue
         if moving_only and other.family is Family.PROP:
             continue
-        centre, half = world_box(world, other)
+        centre, half = actors.box(other)
         ahead = (centre.x - pose.x) * c + (centre.y - pose.y) * s
         aside = abs((centre.y - pose.y) * c - (centre.x - pose.x) * s)
         turn = centre.yaw - pose.yaw

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import struct
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +11,18 @@ from numpy.typing import NDArray
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.sensors.passes import Pass
-from skidpad.sensors.rasteriser import AUTO_LEVEL, raster
+from skidpad.sensors.rasteriser import AUTO_LEVEL
 from skidpad.sensors.view import camera_view
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing import pixels
-from skidpad.simulation.carla_server.sensing.scene import WIDEST
-
-if TYPE_CHECKING:
-    from skidpad.simulation.carla_server.sensing.sensors import Sensor
-    from skidpad.simulation.carla_server.world import World
+from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
+from skidpad.simulation.carla_server.sensing.surroundings import (
+    WIDEST,
+    Surroundings,
+    headlights,
+)
 
 IMAGE_HEAD = struct.Struct("<IIf")  # width, height, field of view in deg
 MAX_PIXELS = 16_000_000
@@ -44,7 +45,7 @@ class Camera:
     head: bytes
 
 
-def make_camera(actor: Actor) -> Camera:
+def make_camera(actor: Actor, _: int) -> Camera:
     """From an actor's attributes; WireError or ConfigError when they cannot be used."""
     width = wire.integer(int(actor.attributes["image_size_x"]), "image_size_x", 1, WIDEST)
     height = wire.integer(int(actor.attributes["image_size_y"]), "image_size_y", 1, WIDEST)
@@ -62,24 +63,12 @@ def make_camera(actor: Actor) -> Camera:
     )
 
 
-def image(world: World, sensor: Sensor) -> list[tuple[bytes | memoryview, ...]]:
+def image(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
     """One picture."""
-    camera: Camera = sensor.state
-    scene = world.sensors.scene(world)
-    pose = world.pose(sensor.actor)
-    view = camera_view(camera.spec, pose)
-    drawn = camera.drawn
-    raster(
-        scene.static.chunks,
-        scene.keys,
-        scene.actors,
-        scene.hidden_for(world, sensor.actor),
-        view,
-        AUTO_LEVEL,
-        scene.scratch,
-        drawn.inverse,
-        drawn.key,
-    )
+    camera: Camera = sensor.equipment
+    scene, drawn = around.picture(), camera.drawn
+    view = camera_view(camera.spec, around.actors.pose(sensor.actor))
+    scene.live.draw(view, around.hidden_for(sensor.actor), AUTO_LEVEL, drawn)
     if camera.spec.modality is Modality.DEPTH:
         pixels.bgra_from_depth(drawn.inverse, camera.bgra)
     elif camera.spec.modality is Modality.SEMANTIC:
@@ -87,7 +76,7 @@ def image(world: World, sensor: Sensor) -> list[tuple[bytes | memoryview, ...]]:
     elif camera.spec.modality is Modality.INSTANCE:
         pixels.bgra_from_instances(drawn.labels, drawn.instances, scene.ids, camera.bgra)
     else:
-        carrier = scene.headlights(world, sensor.actor)
-        scene.shading.paint(view, carrier, drawn.inverse, drawn.key, camera.rgb)
+        lamps = headlights(around.actors, sensor.actor)
+        scene.shading.paint(view, lamps, drawn.inverse, drawn.key, camera.rgb)
         pixels.bgra_from_rgb(camera.rgb, camera.bgra)
     return [(camera.head, camera.bgra.tobytes())]

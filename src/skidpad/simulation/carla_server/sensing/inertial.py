@@ -2,69 +2,49 @@
 
 from __future__ import annotations
 
-from math import cos, sin
-from typing import TYPE_CHECKING
-
-import numpy as np
-from numpy.typing import NDArray
-
+from skidpad.core.frames import ImuReading
 from skidpad.core.geodesy import geolocation
 from skidpad.core.lefthanded import turn_from_carla, vector_from_carla
-from skidpad.sensors.inertial import compass
+from skidpad.sensors import inertial
 from skidpad.simulation.carla_server import codec
-from skidpad.simulation.carla_server.catalogue import Family
-
-if TYPE_CHECKING:
-    from skidpad.simulation.carla_server.sensing.sensors import Sensor
-    from skidpad.simulation.carla_server.world import World
-
-Floats = NDArray[np.float64]
-Motion = tuple[Floats, Floats]
+from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
+from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 
 
-def motion_of_carrier(world: World, sensor: Sensor) -> Motion:
-    """(acceleration at the sensor, angular velocity) in world axes, ISO."""
-    carrier = world.actors.alive.get(sensor.actor.parent)
-    if carrier is None:
-        return np.zeros(3), np.zeros(3)
-    if carrier.family is not Family.VEHICLE:
-        return np.array(carrier.acceleration), np.array(carrier.turn)
-    s, i = world.vehicles.fleet.states, world.vehicles.slots[carrier.id]
-    c, sn = cos(s.yaw[i]), sin(s.yaw[i])
-    rate = float(s.yaw_rate[i])
-    lever = sensor.actor.mount
-    ax = s.ax[i] - rate * rate * lever.x  # centripetal part of the lever arm
-    ay = s.ay[i] - rate * rate * lever.y
-    return np.array([ax * c - ay * sn, ax * sn + ay * c, 0.0]), np.array([0.0, 0.0, rate])
+def _felt(around: Surroundings, actor: Actor) -> ImuReading:
+    """What a unit on its carrier feels; without one it stands still."""
+    carrier = around.actors.carrier(actor)
+    if carrier is None or carrier.body is None:
+        return inertial.imu_at_rest(around.actors.pose(actor), around.gravity)
+    row = around.moving.row(carrier.body)
+    return inertial.imu(actor.mount, around.moving.states, row, around.gravity)
 
 
-def imu(world: World, sensor: Sensor) -> list[tuple[bytes | memoryview, ...]]:
+def imu(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
     """Specific force, rate of turn and compass in the sensor's axes."""
-    acceleration, turn = motion_of_carrier(world, sensor)
-    pose = world.pose(sensor.actor)
-    to_sensor = pose.rotation().T
-    force = to_sensor @ (acceleration + np.array([0.0, 0.0, world.sensors.gravity]))
-    rate = to_sensor @ turn
+    felt = _felt(around, sensor.actor)
     noise, n = sensor.rng.standard_normal(6), sensor.number
-    out_force = [
+    force = [
         v + noise[k] * n(f"noise_accel_stddev_{axis}")
-        for k, (axis, v) in enumerate(zip("xyz", vector_from_carla(*force.tolist()), strict=True))
+        for k, (axis, v) in enumerate(zip("xyz", vector_from_carla(*felt.force), strict=True))
     ]
-    out_rate = [
+    rate = [
         v + n(f"noise_gyro_bias_{axis}") + noise[3 + k] * n(f"noise_gyro_stddev_{axis}")
-        for k, (axis, v) in enumerate(zip("xyz", turn_from_carla(*rate.tolist()), strict=True))
+        for k, (axis, v) in enumerate(zip("xyz", turn_from_carla(*felt.rate), strict=True))
     ]
-    return [(codec.pack([out_force, out_rate, compass(pose)]),)]
+    return [(codec.pack([force, rate, felt.compass]),)]
 
 
-def gnss(world: World, sensor: Sensor) -> list[tuple[bytes | memoryview, ...]]:
+def gnss(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
     """Latitude and longitude in deg, altitude in m.
 
     Latitude grows with CARLA's y, as in the client's own map, although the IMU's north is its -y.
     """
-    pose = world.pose(sensor.actor)
-    x, y, _ = vector_from_carla(pose.x, pose.y, pose.z)
-    latitude, longitude = geolocation(x, y, *world.map.origin)
+    pose = around.actors.pose(sensor.actor)
+    x, y, _z = vector_from_carla(pose.x, pose.y, pose.z)
+    latitude, longitude = geolocation(x, y, *around.map.origin)
     noise, n = sensor.rng.standard_normal(3), sensor.number
     values = [
         v + n(f"noise_{name}_bias") + noise[k] * n(f"noise_{name}_stddev")

@@ -1,0 +1,27 @@
+"""The kinds of sensors that send something, by blueprint."""
+
+from __future__ import annotations
+
+from skidpad.simulation.carla_server.sensing import events, images, inertial, points
+from skidpad.simulation.carla_server.sensing.sensor import Producer
+from skidpad.simulation.carla_server.snapshot import SensorType
+
+PRODUCERS = {
+    "sensor.camera.rgb": Producer(SensorType.RGB, images.image, images.make_camera),
+    "sensor.camera.depth": Producer(SensorType.DEPTH, images.image, images.make_camera),
+    "sensor.camera.semantic_segmentation": Producer(
+        SensorType.SEMANTIC, images.image, images.make_camera
+    ),
+    "sensor.camera.instance_segmentation": Producer(
+        SensorType.INSTANCE, images.image, images.make_camera
+    ),
+    "sensor.other.radar": Producer(SensorType.RADAR, points.radar, points.make_radar),
+    "sensor.lidar.ray_cast": Producer(SensorType.LIDAR, points.plain_lidar, points.make_lidar),
+    "sensor.lidar.ray_cast_semantic": Producer(
+        SensorType.SEMANTIC_LIDAR, points.semantic_lidar, points.make_lidar
+    ),
+    "sensor.other.imu": Producer(SensorType.IMU, inertial.imu),
+    "sensor.other.gnss": Producer(SensorType.GNSS, inertial.gnss),
+    "sensor.other.collision": Producer(SensorType.COLLISION, events.collision),
+    "sensor.other.obstacle": Producer(SensorType.OBSTACLE, events.obstacle),
+}

@@ -1,0 +1,129 @@
+"""What sensors look at: actors and map, as they are in the newest frame.
+
+Meshes are made when a camera or ray first needs them, and again when actors come or go.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skidpad.core.geometry import Pose
+from skidpad.core.states import ActorStates
+from skidpad.core.states import ActorTable as Bodies
+from skidpad.core.weather import Weather
+from skidpad.physics.vehicle import G
+from skidpad.sensors.lighting import lighting
+from skidpad.sensors.live_scene import LiveScene
+from skidpad.sensors.shading import Shading
+from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable
+from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.maps import ServedMap
+from skidpad.simulation.carla_server.vehicles import Vehicles
+from skidpad.simulation.carla_server.weather import Sky
+
+WIDEST = 8192  # px
+PAINT = (160, 160, 160)
+SKIN = 0.1  # m around a body within which a camera counts as inside
+
+
+class Pictured:
+    """Map and actors with a body for rays and cameras, in the state of one frame."""
+
+    def __init__(self, map: ServedMap, members: list[Actor]) -> None:
+        self.members = members
+        self.rows = {a.id: i for i, a in enumerate(members)}
+        self.ids = np.array([0, *(a.id for a in members)], dtype=np.int64)  # by instance
+        self.bodies = _bodies(members)
+        self.live = LiveScene(map.roads, self.bodies, WIDEST)
+        self.weather: Weather | None = None
+        self.elapsed = -np.inf
+
+    def shade(self, weather: Weather) -> None:
+        """The light of this weather."""
+        if self.weather is not weather:
+            self.weather = weather
+            self.shading = Shading(self.live.static.palette, self.bodies, lighting(weather))
+
+
+class Surroundings:
+    """The world as sensors may see it."""
+
+    def __init__(
+        self, map: ServedMap, actors: ActorTable, vehicles: Vehicles, sky: Sky, clock: Clock
+    ) -> None:
+        self.map, self.actors, self.moving = map, actors, vehicles.moving
+        self.gravity = G  # m/s^2, as set by clients
+        self._vehicles, self._sky, self._clock = vehicles, sky, clock
+        self._pictured: Pictured | None = None
+
+    def picture(self) -> Pictured:
+        """Everything with a body as it is now; brought up to date once per frame."""
+        members = [a for a in self.actors if a.family in SOLID]
+        seen = self._pictured
+        if seen is None or seen.members != members:
+            self._pictured = seen = Pictured(self.map, members)
+        now = self._clock.elapsed
+        if seen.elapsed != now:
+            seen.live.place(self._states(members), now - seen.elapsed)
+            seen.live.show(self.moving.lights.by_id)
+            seen.elapsed = now
+        seen.shade(self._sky.weather)
+        seen.shading.set_braking(np.array([self._brakes(a) for a in members], dtype=np.bool_))
+        return seen
+
+    def carrier_row(self, sensor: Actor) -> int:
+        """Row of the sensor's carrier in the picture, -1 when it has none there."""
+        return self.picture().rows.get(sensor.parent, -1)
+
+    def hidden_for(self, sensor: Actor) -> int:
+        """Row of the carrier when the sensor sits inside its body, else -1."""
+        row = self.carrier_row(sensor)
+        if row < 0:
+            return -1
+        carrier, mount = self.actors.alive[sensor.parent], sensor.mount
+        offsets = zip((mount.x, mount.y, mount.z), carrier.centre, carrier.half, strict=True)
+        return row if all(abs(m - c) < h + SKIN for m, c, h in offsets) else -1
+
+    def _brakes(self, actor: Actor) -> bool:
+        return actor.id in self._vehicles and self._vehicles.of(actor.id).control.brake > 0.0
+
+    def _states(self, members: list[Actor]) -> ActorStates:
+        """Poses and motion of all members: bodies by columns, what is attached one by one."""
+        out = ActorStates.empty(len(members))
+        to = [i for i, a in enumerate(members) if a.body is not None]
+        source = [self.moving.row(a.body) for a in members if a.body is not None]
+        for column, moving in zip(out, self.moving.states, strict=True):
+            column[to] = moving[source]
+        for i, actor in enumerate(members):
+            if actor.body is None:
+                p = actor.pose
+                out.x[i], out.y[i], out.z[i] = p.x, p.y, p.z - actor.lift
+                out.yaw[i], out.pitch[i], out.roll[i] = p.yaw, p.pitch, p.roll
+                out.present[i] = True
+        return out
+
+
+def _bodies(members: list[Actor]) -> Bodies:
+    size = 2.0 * np.array([a.half for a in members]).reshape(-1, 3)
+    return Bodies(
+        names=tuple(str(a.id) for a in members),
+        types=tuple(a.blueprint.id for a in members),
+        kind=np.array([a.blueprint.kind for a in members], dtype=np.uint8),
+        length=size[:, 0],
+        width=size[:, 1],
+        height=size[:, 2],
+        rgb=np.array([_paint(a) for a in members], dtype=np.uint8).reshape(-1, 3),
+    )
+
+
+def _paint(actor: Actor) -> tuple[int, int, int]:
+    text = actor.attributes.get("color")
+    if text is None:
+        return PAINT
+    red, green, blue = (int(v) for v in text.split(","))
+    return red, green, blue
+
+
+def headlights(actors: ActorTable, sensor: Actor) -> Pose:
+    """The pose that carries the headlights of a picture."""
+    return actors.pose(actors.carrier(sensor) or sensor)

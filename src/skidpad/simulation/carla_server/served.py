@@ -1,0 +1,92 @@
+"""The served simulation: an episode, and what a tick does to it and tells of it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from skidpad.core.vocabulary import LightState
+from skidpad.simulation.carla_server import snapshot
+from skidpad.simulation.carla_server.clock import Clock, EpisodeSettings
+from skidpad.simulation.carla_server.episode import Episode, Stock
+from skidpad.simulation.carla_server.maps import MapStore
+from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.recorder import Recorder
+from skidpad.simulation.carla_server.replayer import Replayer
+from skidpad.simulation.carla_server.streams import EPISODE_STREAM, StreamHub
+
+
+@dataclass(slots=True)
+class TrafficManagers:
+    """Addresses at which clients' Traffic Managers said that they listen."""
+
+    by_port: dict[int, str] = field(default_factory=dict)
+
+
+class Served:
+    """What clients' calls act on."""
+
+    def __init__(self, options: ServerOptions, hub: StreamHub) -> None:
+        self.options, self.hub = options, hub
+        self.maps = MapStore(options.maps)
+        self.stock = Stock(options, hub)
+        self.clock = Clock()
+        self.recorder = Recorder(options.data_dir)
+        self.replayer = Replayer()
+        self.managers = TrafficManagers()
+        self.platform_time: Callable[[], float] = lambda: 0.0
+        self.last_snapshot: bytes | None = None
+        self._map_changed = True  # until the first snapshot of the episode has been sent
+        self._lights_told: dict[int, LightState] = {}
+        hub.on_subscribe = self._latest
+        self.episode = Episode(self.maps.load(options.map), self.stock, self.clock)
+        self._publish_snapshot()
+
+    def _latest(self, stream: int) -> bytes | None:
+        """A second client in synchronous mode gets the newest snapshot at once."""
+        return self.last_snapshot if stream == EPISODE_STREAM else None
+
+    def load(self, name: str, reset_settings: bool) -> None:
+        """Another map, or with "" the same one anew; a map that cannot be served changes nothing."""
+        map = self.episode.map if name == "" else self.maps.load(name)
+        episode = Episode(map, self.stock, self.clock)
+        self.hub.hold(EPISODE_STREAM)
+        self.replayer.release()
+        self.episode.end()
+        self.episode = episode
+        self.clock.renew(reset_settings)
+        episode.moving.set_step(self.clock.step)
+        self._map_changed = True
+        self._publish_snapshot()
+
+    def apply(self, settings: EpisodeSettings) -> None:
+        """From the next tick on."""
+        self.clock.settings = settings
+        self.episode.moving.set_step(settings.step)
+
+    def tick(self) -> int:
+        """Advance by one step; the frame that is now the newest."""
+        clock, episode = self.clock, self.episode
+        clock.advance()
+        episode.move(clock.step)
+        self.replayer.tick(clock.step)
+        episode.follow()
+        episode.debug.age(clock.step)
+        self._publish_snapshot()
+        self.recorder.tick(clock, episode.actors, episode.moving)
+        episode.sensors.produce(episode.surroundings, clock, self.hub)
+        return clock.frame
+
+    def _publish_snapshot(self) -> None:
+        lights = self.episode.moving.lights.by_id
+        bits = snapshot.MAP_CHANGED if self._map_changed else 0
+        if lights != self._lights_told:
+            bits |= snapshot.LIGHTS_CHANGED
+        self._lights_told = lights
+        self.episode.fill_rows(self.clock.step)
+        self.last_snapshot = snapshot.message(
+            self.clock, self.episode.rows, self.platform_time(), bits
+        )
+        if self.hub.wanted(EPISODE_STREAM):
+            self.hub.publish(EPISODE_STREAM, self.last_snapshot)
+            self._map_changed = False

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import msgspec
 import pytest
-from toy import RECIPE, Toss
 
 from skidpad.campaign.campaign import PROBES, Campaign
 from skidpad.campaign.recipe import cell_of
@@ -14,6 +13,7 @@ from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.ledger import CAMPAIGN, read_ledger
 from skidpad.recording.results import read_results
+from toy_campaign import RECIPE, Toss
 
 
 def here(jobs):

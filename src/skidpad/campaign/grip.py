@@ -82,7 +82,7 @@ def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey
 def grip_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> GripKey:
     """The identifying columns of a cell's row."""
     return GripKey(
-        scenario=scenario_of(cell).file,
+        scenario=Path(scenario_of(cell).file).name.removesuffix(".xosc"),
         weather=cell.weather.name,
         friction=cell.friction.value,
         seed=cell.seed,

@@ -48,6 +48,7 @@ def adas(
 def report(folder: Annotated[Path, typer.Argument(help="A campaign's folder.")]) -> None:
     """Write the report of a campaign again, from what it left behind."""
     from skidpad.cli.channels_drive import totals
+    from skidpad.cli.play import table
     from skidpad.recording.ledger import campaign_command
     from skidpad.report.grip import write_grip_report
     from skidpad.report.matrix import write_report
@@ -56,6 +57,7 @@ def report(folder: Annotated[Path, typer.Argument(help="A campaign's folder.")])
         "adas": write_report,
         "grip": write_grip_report,
         "channels": totals,
+        "play": table,
     }
     typer.echo(reports[campaign_command(folder)](folder))
 

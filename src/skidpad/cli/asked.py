@@ -6,8 +6,17 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from skidpad.core.errors import ConfigError
-from skidpad.core.run import AdasDriver, AgentDriver, DriverSpec, Passenger, RunSpec, StackDriver
+from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.run import (
+    AdasDriver,
+    AgentDriver,
+    DriverSpec,
+    Friction,
+    Passenger,
+    RunSpec,
+    StackDriver,
+)
+from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 
 OURS, IDEAL, AGENT = "stack", "ideal", "agent:"
@@ -110,6 +119,39 @@ class Tuned(Struct, frozen=True):
         values |= parse_assignments(f"{k}={v}" for k, v in more.items() if v is not None)
         settings = load_profile(run.profile, values).as_plain()
         return structs.replace(run, settings=settings)
+
+
+class PlayCross(Struct, frozen=True):
+    """How a scenario is played; a folder of scenarios in every combination."""
+
+    weather: Annotated[str, Meta(description="Presets or YAML files, parted by commas.")] = (
+        "clear-noon"
+    )
+    grip: Annotated[
+        str, Meta(description="none, statistical or physical; none and one other by a comma.")
+    ] = "physical"
+    seed: Annotated[int, Meta(description="Of sensor noise and road, the first one.")] = 1
+    param: Annotated[tuple[str, ...], Meta(description="A parameter of the file: NAME=VALUE.")] = ()
+
+    def parameters(self) -> dict[str, float | str]:
+        """Values by name."""
+        values: dict[str, float | str] = {}
+        for text in self.param:
+            name, equals, value = text.partition("=")
+            if not equals:
+                raise ConfigError(f"--param takes NAME=VALUE, got {text!r}")
+            values[name.strip()] = value.strip()
+        return values
+
+    def frictions(self) -> tuple[list[Friction], str]:
+        """Without and with the weather's grip, as asked for, and the model of the latter."""
+        allowed = [model.value for model in GripModel]
+        words = [require_choice("--grip", word.strip(), allowed) for word in self.grip.split(",")]
+        models = [word for word in words if word != GripModel.NONE.value]
+        if len(models) > 1 or len(set(words)) < len(words):
+            raise ConfigError(f"--grip takes none and one model at most, got {self.grip!r}")
+        frictions = [Friction.REDUCED if word in models else Friction.ORIGINAL for word in words]
+        return frictions, models[0] if models else GripModel.NONE.value
 
 
 class GripCross(Struct, frozen=True):

@@ -20,10 +20,9 @@ Workers = Annotated[int, Meta(ge=1, description="Processes; default: one per cor
 CORES = os.cpu_count() or 1
 
 
-class Drive(Struct, frozen=True, kw_only=True):
+class Driving(Struct, frozen=True, kw_only=True):
     """How a campaign is driven."""
 
-    out: Annotated[Path, Meta(description="Folder for results and report.")]
     workers: Workers = CORES
     cluster: Annotated[str | None, Meta(description="Dask scheduler's address, or local:N.")] = None
     until_halfwidth: Annotated[
@@ -35,6 +34,12 @@ class Drive(Struct, frozen=True, kw_only=True):
         bool, Meta(description="If OUT holds another campaign, use OUT-2, OUT-3, ...")
     ] = False
     csv: Annotated[bool, Meta(description="Write CSV beside Parquet.")] = False
+
+
+class Drive(Driving, frozen=True, kw_only=True):
+    """How and where to."""
+
+    out: Annotated[Path, Meta(description="Folder for results and report.")]
 
     def __call__(
         self, campaign: Campaign[Any, Any, Any], report: Callable[[Path], object]

@@ -17,7 +17,7 @@ from skidpad.cli.grip import grip
 from skidpad.cli.hazards import hazards
 from skidpad.cli.map import maps
 from skidpad.cli.monitor import monitor, safety_case
-from skidpad.cli.play import play
+from skidpad.cli.play import play, play_folder
 from skidpad.cli.profiles import profiles
 from skidpad.cli.rerun import rerun, study
 from skidpad.cli.spread import spread
@@ -59,7 +59,7 @@ driving, estimating = spread({"how": Drive}), spread({"how": Estimate})
 app.command()(driving(adas))
 app.command()(driving(grip))
 channels.command()(driving(drive))
-for name, command in (("adas", adas), ("grip", grip), ("channels", drive)):
+for name, command in (("adas", adas), ("grip", grip), ("channels", drive), ("play", play_folder)):
     estimate.command(name)(estimating(command))
 app.command()(report)
 app.command()(compare)

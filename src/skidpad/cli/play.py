@@ -1,39 +1,63 @@
-"""`skidpad play`: play an OpenSCENARIO file, or say what in it cannot be played."""
+"""`skidpad play`: play OpenSCENARIO files, or say what in them cannot be played."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from msgspec import structs
 
-from skidpad.cli.asked import Controller, Tuned
+from skidpad.cli.asked import Controller, PlayCross, Tuned
+from skidpad.cli.campaigns import Drive, Driving, How, Seeds
 from skidpad.cli.spread import spread
 from skidpad.core.run import BackendChoice, RunSpec, Scenario
 from skidpad.core.vocabulary import SensorLevel
 
+if TYPE_CHECKING:
+    from skidpad.campaign.campaign import Campaign
+    from skidpad.recording.grip import GripKey, GripMetrics
 
-@spread(sensors=SensorLevel.OBJECTS, duration=120.0)
-def play(
-    file: Annotated[Path, typer.Argument(help="OpenSCENARIO XML 1.0 to 1.3 (.xosc).")],
+scenario_options = spread(sensors=SensorLevel.OBJECTS, duration=120.0)
+
+
+@scenario_options
+def play_folder(
+    how: How,
+    folder: Annotated[Path, typer.Argument(help="Folder with .xosc files, at any depth.")],
+    cross: PlayCross,
     controller: Controller,
     run: RunSpec,
     scenario: Scenario,
     tuned: Tuned,
     backend: BackendChoice,
-    out: Annotated[Path | None, typer.Option(help="Folder for the run.")] = None,
-    weather: Annotated[str, typer.Option(help="A preset or a YAML file.")] = "clear-noon",
-    grip: Annotated[str, typer.Option(help="none, statistical or physical.")] = "physical",
-    seed: Annotated[int, typer.Option(help="Of sensor noise and road.")] = 1,
-    param: Annotated[
-        list[str] | None, typer.Option(help="A parameter of the file: NAME=VALUE.")
-    ] = None,
+    seeds: Seeds = 1,
+) -> None:
+    """Play every scenario of a folder in every weather, with and without its grip."""
+    template = _template(cross, controller, run, scenario, tuned, backend)
+    how(_campaign(template, cross, folder, seeds), table)
+
+
+@scenario_options
+def play(
+    file: Annotated[
+        Path, typer.Argument(help="OpenSCENARIO XML 1.0 to 1.3 (.xosc), or a folder of them.")
+    ],
+    cross: PlayCross,
+    controller: Controller,
+    run: RunSpec,
+    scenario: Scenario,
+    tuned: Tuned,
+    backend: BackendChoice,
+    driving: Driving,
+    seeds: Seeds = 1,
+    out: Annotated[Path | None, typer.Option(help="Folder for the run, or for the runs.")] = None,
     check: Annotated[
         bool, typer.Option("--check", help="List what is not supported; run nothing.")
     ] = False,
 ) -> None:
-    """Play a scenario; prints how it ended and where the log lies."""
+    """Play a scenario, or as a campaign all of a folder; prints how it ended and where logs lie."""
     from skidpad.core.errors import ConfigError
 
     if check:
@@ -42,21 +66,16 @@ def play(
     if out is None:
         raise ConfigError("play needs --out DIR for the run, or --check")
     from skidpad.campaign.play import run_to
-    from skidpad.cli.carla_backend import checked
-    from skidpad.physics.presets import find_weather
 
-    parameters = _parameters(param or [])
-    driven = run_to(
-        structs.replace(
-            tuned.resolve(run, grip=grip),
-            driver=controller.chosen(),
-            course=structs.replace(scenario, file=str(file.resolve()), parameters=parameters),
-            weather=find_weather(weather),
-            seed=seed,
-            backend=checked(backend),
-        ),
-        out,
-    )
+    template = _template(cross, controller, run, scenario, tuned, backend)
+    if file.is_dir():
+        how = Drive(out=out, **structs.asdict(driving))
+        how(_campaign(template, cross, file, seeds), table)
+        return
+    runs = _runs(template, cross, [file], seeds)
+    if len(runs) > 1:
+        raise ConfigError("one file is one run: several weathers, grips or seeds take a folder")
+    driven = run_to(runs[0], out)
     log = driven.log
     seconds = float(log.t[-1]) if len(log) else 0.0
     typer.echo(f"{driven.outcome.value} after {seconds:.2f} s; log in {out}")
@@ -64,26 +83,89 @@ def play(
         typer.echo(driven.error.strip().split("\n")[-1], err=True)
 
 
-def _check(file: Path) -> None:
+def table(folder: Path) -> str:
+    """How the runs of each cell ended, a line per cell."""
+    from skidpad.recording.results import read_results
+
+    lines = []
+    for runs in read_results(folder).partition_by("scenario", "weather", "friction"):
+        counts = runs["outcome"].value_counts().sort("outcome").iter_rows()
+        ended = ", ".join(f"{n} {outcome}" for outcome, n in counts)
+        nearest = runs["min_cvip_m"].drop_nulls().to_list()
+        told = f"; least distance {min(nearest):.1f} m" if nearest else ""
+        first = runs.row(0, named=True)
+        cell = f"{first['scenario']} in {first['weather']}, {first['friction']} friction"
+        lines.append(f"{cell}: {ended}{told}")
+    return "\n".join([*lines, f"results in {folder}"])
+
+
+def _template(
+    cross: PlayCross,
+    controller: Controller,
+    run: RunSpec,
+    scenario: Scenario,
+    tuned: Tuned,
+    backend: BackendChoice,
+) -> RunSpec:
+    from skidpad.cli.carla_backend import checked
+
+    return structs.replace(
+        tuned.resolve(run, grip=cross.frictions()[1]),
+        driver=controller.chosen(),
+        course=structs.replace(scenario, parameters=cross.parameters()),
+        backend=checked(backend),
+    )
+
+
+def _campaign(
+    template: RunSpec, cross: PlayCross, folder: Path, seeds: int
+) -> Campaign[RunSpec, GripKey, GripMetrics]:
+    from skidpad.campaign.campaign import Campaign
+    from skidpad.campaign.files import RECIPE, scenario_files
+    from skidpad.cli.carla_backend import drives_alone
+
+    files = [file for file in scenario_files(folder) if _playable(file, template)]
+    runs = _runs(template, cross, files, seeds)
+    return Campaign(RECIPE, runs, alone=drives_alone(template.backend))
+
+
+def _runs(template: RunSpec, cross: PlayCross, files: Sequence[Path], seeds: int) -> list[RunSpec]:
+    from skidpad.campaign.files import runs_of
+    from skidpad.physics.presets import find_weather
+
+    weathers = [find_weather(part.strip()) for part in cross.weather.split(",")]
+    first = range(cross.seed, cross.seed + seeds)
+    return runs_of(template, files, weathers, cross.frictions()[0], first)
+
+
+def _playable(file: Path, template: RunSpec) -> bool:
+    """Whether it can be played; says what hinders."""
+    from skidpad.campaign.grip_cells import scenario_of
+    from skidpad.core.errors import InputError
+    from skidpad.scenarios.player import load
+
+    course = scenario_of(template)
+    try:
+        load(file, course.parameters, course.ego)
+    except InputError as error:
+        typer.echo(f"left out: {error}", err=True)
+        return False
+    return True
+
+
+def _check(path: Path) -> None:
+    """Say of a file, or of each in a folder, what is not supported in it."""
+    from skidpad.campaign.files import scenario_files
     from skidpad.scenarios.player import load, problems
 
-    found = problems(file)
-    for problem in found:
-        typer.echo(f"{file.name}, line {problem.line}: {problem.what}")
-    if not found:
-        load(file)  # what is wrong rather than unknown raises, with its line
-        typer.echo(f"{file.name}: everything in it is supported")
-        return
-    raise typer.Exit(2)
-
-
-def _parameters(assignments: list[str]) -> dict[str, float | str]:
-    from skidpad.core.errors import ConfigError
-
-    values: dict[str, float | str] = {}
-    for text in assignments:
-        name, equals, value = text.partition("=")
-        if not equals:
-            raise ConfigError(f"--param takes NAME=VALUE, got {text!r}")
-        values[name.strip()] = value.strip()
-    return values
+    odd = False
+    for file in scenario_files(path) if path.is_dir() else [path]:
+        found = problems(file)
+        odd = odd or bool(found)
+        for problem in found:
+            typer.echo(f"{file.name}, line {problem.line}: {problem.what}")
+        if not found:
+            load(file)  # what is wrong rather than unknown raises, with its line
+            typer.echo(f"{file.name}: everything in it is supported")
+    if odd:
+        raise typer.Exit(2)

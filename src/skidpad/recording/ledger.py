@@ -148,7 +148,7 @@ def read_ledger(folder: Path, kind: type[E]) -> list[E]:
     for number, line in enumerate(lines[:-1], start=1):  # what follows the last newline is torn
         try:
             entries.append(msgspec.json.decode(line, type=kind))
-        except msgspec.MsgspecError as error:
+        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
             raise FileError(f"{path}, line {number} is damaged: {error}") from error
     return entries
 

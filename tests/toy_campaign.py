@@ -2,9 +2,12 @@
 
 from dataclasses import dataclass
 
+from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.recording.ledger import Entry
 from skidpad.recording.results import Columns, Timing, metric
+
+SHARES = {"sure": 1.0, "even": 0.5}
 
 
 @dataclass(frozen=True)
@@ -61,3 +64,8 @@ RECIPE = Recipe(
     success=lambda metrics: metrics.heads,
     success_means="heads",
 )
+
+
+def campaign(n=4):
+    """n tosses each of two cells: in one of them always heads."""
+    return Campaign(RECIPE, [Toss(c, k, p) for k in range(n) for c, p in SHARES.items()])

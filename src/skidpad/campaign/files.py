@@ -1,0 +1,53 @@
+"""The recipe of a folder of scenario files: each in every weather, with and without its grip.
+
+Rows are those of the friction campaign; the whole log of every run is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from msgspec import structs
+
+from skidpad.campaign.grip import recipe
+from skidpad.campaign.grip_cells import scenario_of
+from skidpad.campaign.recipe import nothing_else
+from skidpad.core.errors import FileError
+from skidpad.core.run import Friction, RunSpec
+from skidpad.core.weather import Weather
+
+RECIPE = replace(recipe(keep_all=True), command="play", finish=nothing_else)
+
+
+def scenario_files(folder: Path) -> list[Path]:
+    """The .xosc files of a folder, at any depth, in order."""
+    found = sorted(folder.rglob("*.xosc"))
+    if not found:
+        raise FileError(f"{folder} holds no .xosc file")
+    return found
+
+
+def runs_of(
+    template: RunSpec,
+    files: Sequence[Path],
+    weathers: Sequence[Weather],
+    frictions: Sequence[Friction],
+    seeds: Iterable[int],
+) -> list[RunSpec]:
+    """Every combination; the rest as in `template`, whose course is a scenario."""
+    course = scenario_of(template)
+    return [
+        structs.replace(
+            template,
+            course=structs.replace(course, file=str(file.resolve())),
+            weather=weather,
+            friction=friction,
+            seed=seed,
+        )
+        for seed in seeds
+        for file in files
+        for weather in weathers
+        for friction in frictions
+    ]

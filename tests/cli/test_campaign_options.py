@@ -1,0 +1,59 @@
+"""What all campaigns take and show: the same options, a line per cell, one sentence beforehand."""
+
+import pytest
+import typer
+from typer.core import TyperOption
+
+from skidpad.cli.campaigns import Drive, Estimate
+from skidpad.cli.main import app
+from skidpad.core.errors import OutputError
+from toy_campaign import campaign
+
+ROOT = typer.main.get_command(app)
+CAMPAIGNS = {"adas": "adas", "grip": "grip", "channels drive": "channels", "play": "play"}
+SHARED = {"out", "workers", "cluster", "until_halfwidth", "resume", "or_next", "csv"}
+
+
+def options(path):
+    command = ROOT
+    for name in path.split():
+        command = command.commands[name]
+    return {p.name: (p.help, tuple(p.opts)) for p in command.params if isinstance(p, TyperOption)}
+
+
+@pytest.mark.parametrize("path", CAMPAIGNS)
+def test_every_campaign_takes_the_same_options_and_can_be_estimated(path):
+    taken = options(path)
+    assert set(taken) >= SHARED
+    alike = SHARED - {"out"} if path == "play" else SHARED
+    assert {k: taken[k] for k in alike} == {k: options("grip")[k] for k in alike}
+    estimated = options(f"campaign estimate {CAMPAIGNS[path]}")
+    assert set(estimated) == set(taken) - SHARED - {"check"} | {"workers"}
+
+
+def test_the_terminal_shows_cells_as_they_end_and_then_the_report(tmp_path, capsys):
+    how = Drive(out=tmp_path / "out", workers=1)
+    summary = how(campaign(), lambda folder: f"report of {folder.name}")
+    shown = capsys.readouterr()
+    assert shown.out == "report of out\n"
+    assert "even: 4 runs, 2 heads" in shown.err
+    assert summary.runs == 8
+    with pytest.raises(OutputError, match="--resume"):
+        how(campaign(), str)
+    again = Drive(out=tmp_path / "out", workers=1, resume=True)(campaign(), str)
+    assert (again.driven, again.content_hash) == (0, summary.content_hash)
+    assert "even: 4 runs, 2 heads" in capsys.readouterr().err
+
+
+def test_another_campaign_goes_to_the_next_folder(tmp_path, capsys):
+    out = tmp_path / "out"
+    for n, wanted in ((4, "out"), (5, "out-2"), (5, "out-2")):
+        how = Drive(out=out, workers=1, or_next=True, resume=True)
+        assert how(campaign(n), str).folder.name == wanted
+
+
+def test_an_estimate_is_one_sentence(capsys):
+    Estimate(workers=3)(campaign(), str)
+    told = capsys.readouterr().out
+    assert told.startswith("8 runs at 0.00 s each (8 were driven) on 3 workers: about 0.0 min")
+    assert told.count("\n") == 1

@@ -1,0 +1,92 @@
+"""`skidpad play DIR`: a folder of scenarios as a campaign."""
+
+import pytest
+from typer.testing import CliRunner
+
+from skidpad.cli.asked import PlayCross
+from skidpad.cli.main import app
+from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.run import Friction
+from skidpad.recording.grip import GripEntry
+from skidpad.recording.ledger import read_ledger
+from skidpad.recording.results import read_results
+from skidpad.scenarios.generate import FOLDER
+
+
+def play(*call):
+    return CliRunner().invoke(app, ["play", *map(str, call)], catch_exceptions=False)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    below = tmp_path / "scenarios" / "below"
+    below.mkdir(parents=True)
+    text = (FOLDER / "ghost_cut_in.xosc").read_text(encoding="utf-8")
+    (below / "cut.in.xosc").write_text(text, encoding="utf-8")
+    odd = text.replace("StandStillCondition", "OffroadCondition")
+    (tmp_path / "scenarios" / "odd.xosc").write_text(odd, encoding="utf-8")
+    return tmp_path / "scenarios"
+
+
+def test_every_file_is_driven_in_every_weather_with_and_without_its_grip(folder, tmp_path):
+    out = tmp_path / "out"
+    call = [
+        folder,
+        "--out",
+        out,
+        "--duration",
+        "1",
+        "--workers",
+        "1",
+        "--seeds",
+        "2",
+        "--seed",
+        "5",
+    ]
+    call += ["--weather", "rain-noon,clear-noon", "--grip", "none,statistical"]
+    done = play(*call)
+    assert done.exit_code == 0
+    assert "OffroadCondition" in done.stderr
+    assert "cut.in in rain-noon, reduced friction: 2 not_triggered; least distance" in done.stdout
+    table = read_results(out)
+    assert len(table) == len(read_ledger(out, GripEntry)) == 1 * 2 * 2 * 2
+    assert set(table["scenario"]) == {"cut.in"}
+    assert sorted(set(table["seed"])) == [5, 6]
+    assert set(table["friction"]) == {"original", "reduced"}
+    assert (out / "runs" / "cut.in_rain-noon_reduced-000005" / "ticks.parquet").is_file()
+    again = CliRunner().invoke(app, ["report", str(out)])
+    assert again.stdout == done.stdout
+    resumed = play(*call, "--resume")
+    assert resumed.exit_code == 0
+    assert len(read_ledger(out, GripEntry)) == 8
+
+
+def test_what_cannot_be_played_is_told_of_a_whole_folder(folder):
+    done = play(folder, "--check")
+    assert done.exit_code == 2
+    assert "cut.in.xosc: everything in it is supported" in done.stdout
+    assert "odd.xosc, line" in done.stdout
+
+
+def test_a_folder_without_scenarios_and_a_file_with_two_weathers_are_refused(folder, tmp_path):
+    (folder / "below" / "no").mkdir()
+    with pytest.raises(FileError, match=r"holds no \.xosc"):
+        play(folder / "below" / "no", "--out", tmp_path / "o")
+    file = folder / "below" / "cut.in.xosc"
+    with pytest.raises(ConfigError, match="take a folder"):
+        play(file, "--out", tmp_path / "o", "--weather", "rain-noon,clear-noon")
+
+
+@pytest.mark.parametrize(
+    ("text", "frictions", "model"),
+    [
+        ("physical", [Friction.REDUCED], "physical"),
+        ("none", [Friction.ORIGINAL], "none"),
+        ("none,statistical", [Friction.ORIGINAL, Friction.REDUCED], "statistical"),
+    ],
+)
+def test_grips_are_none_and_one_model(text, frictions, model):
+    assert PlayCross(grip=text).frictions() == (frictions, model)
+    for wrong in ("physical,statistical", "none,none", "ice"):
+        with pytest.raises(ConfigError, match="--grip"):
+            PlayCross(grip=wrong).frictions()

@@ -17,7 +17,7 @@ from channel_worlds import Eyes, World, drive
 from skidpad.cli.main import app, main
 from skidpad.core.channels import Context
 from skidpad.evidence.channels.indicators.catalogue import Indicator
-from skidpad.evidence.channels.watch import time_by_objects, timing_statistics
+from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
 from skidpad.recording.channels import ChannelWriter
 from skidpad.recording.hazards import read_hazards
 

@@ -5,10 +5,8 @@ import numpy as np
 import pytest
 
 from channel_worlds import Eyes, World, drive
-from skidpad.evidence.channels.hazards import Profile
-from skidpad.evidence.channels.indicators.catalogue import load_thresholds
-from skidpad.evidence.channels.indicators.settings import IndicatorSettings
-from skidpad.evidence.channels.watch import watch
+from skidpad.campaign.watch import Timer, watch
+from skidpad.evidence.channels.monitor import MonitorSettings
 from skidpad.recording.hazards import read_hazards
 from skidpad.report.channels import drive_page, write_drive_report
 from skidpad.report.channels_data import load_drive
@@ -23,14 +21,7 @@ EYES = (Eyes("lav", 0.03), Eyes("tfuse", 0.03, blind=(0,)))
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("watched")
     ticks = iter(range(0, 10**12, 1_000_000))
-    watch(
-        drive(WORLD, EYES, 12.0),
-        folder,
-        settings=IndicatorSettings(),
-        profile=Profile.PRACTICAL,
-        thresholds=load_thresholds(),
-        clock=lambda: next(ticks),
-    )
+    watch(drive(WORLD, EYES, 12.0), folder, MonitorSettings(), Timer(lambda: next(ticks)))
     return folder
 
 

@@ -78,7 +78,7 @@ def evaluate(
 
 def train(folder: Path = DIR, out: Path = MODEL_OUT, workers: int = WORKERS) -> None:
     """Train the learned identifier on recordings with truth; writes the model and its card."""
-    from skidpad.evidence.channels.identifier.model import save_model
+    from skidpad.evidence.channels.identifier.model import model_bytes
     from skidpad.evidence.channels.identifier.training import (
         TrainingDrive,
         card_text,
@@ -97,7 +97,7 @@ def train(folder: Path = DIR, out: Path = MODEL_OUT, workers: int = WORKERS) -> 
         for s in _segments(tasks, workers)
     ]
     model = train_model(drives, typer.echo)
-    save_model(out, model)
+    write_bytes(out, model_bytes(model))
     write_bytes(out.with_suffix(".md"), card_text(model).encode())
     typer.echo(f"{out}: written, with its card {out.with_suffix('.md').name}")
 
@@ -118,6 +118,7 @@ def judge_one(task: _Task) -> Segment:
     """In a worker: read and judge one recording."""
     import time
 
+    from skidpad.campaign.watch import Timer
     from skidpad.evidence.channels.identifier.model import load_model
     from skidpad.evidence.channels.judging.segments import judge
     from skidpad.recording.channels import McapRecording
@@ -136,7 +137,7 @@ def judge_one(task: _Task) -> Segment:
         task.curve,
         load_model(task.model) if task.model else None,
         context,
-        time.thread_time_ns,
+        Timer(time.thread_time_ns),
     )
 
 

@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from skidpad.core.vocabulary import HazardType
     from skidpad.evidence.channels.indicators.catalogue import Indicator
-    from skidpad.evidence.channels.watch import Watched
+    from skidpad.evidence.channels.summary import Watched
 
 
 class Rules(str, Enum):
@@ -75,13 +75,15 @@ def monitor(
     """Watch what driving channels say: indicators, violations, hazardous scenes."""
     import time
 
+    from skidpad.campaign.watch import Timer, watch
     from skidpad.core.errors import ConfigError
-    from skidpad.evidence.channels.hazards import Profile
+    from skidpad.evidence.channels.hazards import Profile, load_rules
     from skidpad.evidence.channels.identifier.model import Identify, load_model
     from skidpad.evidence.channels.indicators.catalogue import load_thresholds
     from skidpad.evidence.channels.indicators.comfort import Form
     from skidpad.evidence.channels.indicators.settings import IndicatorSettings
-    from skidpad.evidence.channels.watch import time_by_objects, timing_statistics, watch
+    from skidpad.evidence.channels.monitor import MonitorSettings
+    from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
     from skidpad.recording.sources import open_channels
     from skidpad.report.channels import write_drive_report
 
@@ -90,22 +92,23 @@ def monitor(
         raise ConfigError("--junit writes the verdicts of --fail-if, and none is given")
     default = Form.COMPLETED if rules is Rules.as_printed else Form.CORRECTED
     source = open_channels(file, mapping, truth=False)
-    found = watch(
-        source,
-        out,
-        settings=IndicatorSettings(form=Form(forms.value) if forms else default),
-        profile=Profile(rules.value),
+    profile = Profile(rules.value)
+    settings = MonitorSettings(
+        indicators=IndicatorSettings(form=Form(forms.value) if forms else default),
+        profile=profile,
+        rules=load_rules(profile, rules_file),
         thresholds=load_thresholds(thresholds),
-        rules_file=rules_file,
-        clock=time.thread_time_ns if timing else None,
         identify=Identify(identifier.value),
-        model=None if identifier is Identifier.rules else load_model(model),
+        detectors={} if identifier is Identifier.rules else load_model(model).identifier(),
     )
+    timer = Timer(time.thread_time_ns) if timing else None
+    found = watch(source, out, settings, timer)
     write_drive_report(out)
     _print(found, out)
-    if found.timing is not None:
-        _print_table(timing_statistics(found.timing))
-        _print_table(time_by_objects(found.timing))
+    if timer is not None:
+        times = timer.table()
+        _print_table(timing_statistics(times))
+        _print_table(time_by_objects(times))
     if wanted:
         _gate({name: _events(found, rule) for name, rule in wanted.items()}, junit)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,12 +11,10 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from skidpad.core.errors import FileError
 from skidpad.evidence.channels.indicators.catalogue import Indicator, Threshold, load_thresholds
-from skidpad.evidence.channels.watch import SUMMARY, TIMING
-from skidpad.recording.files import read_parquet
 from skidpad.recording.hazards import HazardRecord, read_hazards
 from skidpad.recording.indicators import read_indicators
+from skidpad.recording.monitored import read_summary, read_timing
 
 Floats = NDArray[np.float64]
 
@@ -73,21 +70,11 @@ class MonitoredDrive:
 
 def load_drive(folder: Path) -> MonitoredDrive:
     """Read the output folder of `skidpad monitor`."""
-    path = folder / SUMMARY
-    try:
-        summary = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FileError(
-            f"{path}: cannot be read ({error.strerror}); `skidpad monitor` writes it"
-        ) from error
-    except ValueError as error:
-        raise FileError(f"{path}: is not JSON ({error})") from error
-    timing = read_parquet(folder / TIMING)[0] if (folder / TIMING).exists() else None
     return MonitoredDrive(
         name=folder.name,
-        summary=summary,
+        summary=read_summary(folder),
         table=read_indicators(folder),
         records=tuple(read_hazards(folder)),
-        timing=timing,
+        timing=read_timing(folder),
         thresholds=load_thresholds(),
     )

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS
 from skidpad.evidence.channels.indicators.catalogue import Bound, Indicator
-from skidpad.evidence.channels.watch import BUDGET_MS, MODULES, time_by_objects
+from skidpad.evidence.channels.timing import BUDGET_MS, MODULES, time_by_objects
 from skidpad.report.channels_data import MonitoredDrive, Trace
 from skidpad.report.figures import PALETTE, canvas, lines, svg_of
 from skidpad.report.page import Block, Figure, Text

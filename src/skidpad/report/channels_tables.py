@@ -14,7 +14,7 @@ from skidpad.evidence.channels.indicators.catalogue import (
     Statement,
     safety_case,
 )
-from skidpad.evidence.channels.watch import timing_statistics
+from skidpad.evidence.channels.timing import timing_statistics
 from skidpad.recording.hazards import HazardRecord
 from skidpad.report.channels_data import MonitoredDrive
 from skidpad.report.page import Block, Cell, Node, Table, Text, Tree

@@ -17,7 +17,7 @@ from skidpad.evidence.channels.hazards import Clause, Profile, Signal, load_rule
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
-from skidpad.evidence.channels.monitor import Monitor, drive_events
+from skidpad.evidence.channels.monitor import Monitor, MonitorSettings, drive_events
 from skidpad.evidence.channels.recorder import WORLD_LIMIT
 from skidpad.evidence.channels.timefilter import TimeFilter
 from skidpad.recording.channels import ChannelWriter, McapRecording
@@ -173,8 +173,8 @@ def test_the_filter_joins_exactly_what_pauses_for_less_than_two_seconds(ticks):
         assert e.extreme == pytest.approx(-10.0 * e.t_end)
 
 
-def monitored(source, **more):
-    monitor = Monitor(source.channels, **more)
+def monitored(source):
+    monitor = Monitor(source.channels)
     evidence = [monitor.update(c) for c in cycles(source)]
     return monitor, evidence, monitor.records() + monitor.finish()
 
@@ -268,7 +268,10 @@ def test_strange_input_is_survived_marked_and_counted(form, profile):
         frame(0.6, (1e300, -1e300, 1e9, 0, 0)),
     ]
     normal = [frame(0.1 * k, EGO, [(20.0, 0, 0, 9, 0)]) for k in range(len(rows))]
-    monitor = Monitor(["odd", "even"], settings=IndicatorSettings(form=form), profile=profile)
+    monitor = Monitor(
+        ["odd", "even"],
+        MonitorSettings(indicators=IndicatorSettings(form=form), profile=profile),
+    )
     for k, (odd, even) in enumerate(zip(rows, normal, strict=True)):
         e = monitor.update(Cycle(k, 0.1 * k, (odd, even)))
         assert np.isfinite(e.readings[Indicator.PLANNED_PATH_COMFORT][1])

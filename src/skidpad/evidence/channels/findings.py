@@ -11,6 +11,7 @@ import polars as pl
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS
 from skidpad.evidence.channels.indicators.catalogue import Indicator
+from skidpad.evidence.channels.timing import BUDGET_MS
 from skidpad.evidence.contrasts import Amount, Mean, RateBelow
 from skidpad.evidence.verdicts import Finding
 
@@ -18,7 +19,6 @@ GOOD = 0.8  # precision and recall that the overall claim stands for (85.4 and 8
 FALSE_PER_HOUR = Amount(
     0.5, "per hour"
 )  # of a rule that "never cries wolf"; 0 in 8 h excludes more
-BUDGET_MS = 25.0
 NONE = Amount(0.0)
 SCORE = Amount(0.02)  # of an indicator; less does not matter
 EVENTS = Amount(0.1, "per segment")

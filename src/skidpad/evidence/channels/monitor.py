@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.channels import Cycle
+from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.frames import Usable, usable
 from skidpad.evidence.channels.ghosts import GhostCue
@@ -61,27 +62,32 @@ class Unusable:
         return {kind: dict(+getattr(self, kind)) for kind in kinds}
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class MonitorSettings:
+    """How a drive is judged."""
+
+    indicators: IndicatorSettings = field(default_factory=IndicatorSettings)
+    profile: Profile = Profile.PRACTICAL
+    rules: tuple[Rule, ...] = ()  # empty: the built-in ones of the profile
+    thresholds: Mapping[Indicator, Threshold] = field(default_factory=load_thresholds)
+    identify: Identify = Identify.RULES
+    detectors: Mapping[HazardType, Detector] = field(default_factory=dict)
+    keep_worlds: bool = True  # gather records of hazards
+
+    def __post_init__(self) -> None:
+        if self.identify is not Identify.RULES and not self.detectors:
+            raise ConfigError(f"--identifier {self.identify.value} needs a trained model")
+
+
 class Monitor:
     """Watches N channels; `update` per cycle, `finish` at the end; records come out as they close."""
 
-    def __init__(
-        self,
-        channels: Sequence[str],
-        *,
-        settings: IndicatorSettings | None = None,
-        profile: Profile = Profile.PRACTICAL,
-        rules: Sequence[Rule] | None = None,
-        thresholds: dict[Indicator, Threshold] | None = None,
-        keep_worlds: bool = True,
-        identify: Identify = Identify.RULES,
-        detectors: Mapping[HazardType, Detector] | None = None,
-    ) -> None:
+    def __init__(self, channels: Sequence[str], settings: MonitorSettings | None = None) -> None:
         self.channels = tuple(channels)
-        self.settings = settings or IndicatorSettings()
-        self.profile = profile
-        self.rules = tuple(rules) if rules is not None else load_rules(profile)
-        self.thresholds = thresholds or load_thresholds()
-        self.panel = IndicatorPanel(self.channels, self.settings)
+        self.settings = settings = settings or MonitorSettings()
+        self.rules = settings.rules or load_rules(settings.profile)
+        self.thresholds = settings.thresholds
+        self.panel = IndicatorPanel(self.channels, settings.indicators)
         self.layout = self.panel.layout
         self.reader = SignalReader(self.layout)
         self.hazards: TimeFilter[HazardType] = TimeFilter()
@@ -89,19 +95,18 @@ class Monitor:
         self.unusable = Unusable()
         self.ghosts = GhostCue(self.channels)
         self.undecided: Counter[HazardType] = Counter()
-        self.identify = identify
         self.learned = (
-            LearnedIdentifier(detectors or {}) if identify is not Identify.RULES else None
+            None if settings.identify is Identify.RULES else LearnedIdentifier(settings.detectors)
         )
         self._recorder = (
             Recorder(
                 self.channels,
                 self.rules,
-                profile.value,
-                self.settings.form.value,
+                settings.profile.value,
+                settings.indicators.form.value,
                 self.hazards.pause,
             )
-            if keep_worlds
+            if settings.keep_worlds
             else None
         )
         self._low, self._high = self._bounds()
@@ -133,7 +138,7 @@ class Monitor:
         learned = self._learned(cycle.t, readings, risk, signals)
         for rule in self.rules:
             verdict = rule.fires(signals.values)
-            if self.identify is Identify.LEARNED and rule.hazard in SCORED_HAZARDS:
+            if self.settings.identify is Identify.LEARNED and rule.hazard in SCORED_HAZARDS:
                 verdict = rule.hazard in learned
             elif rule.hazard in learned:
                 verdict = True

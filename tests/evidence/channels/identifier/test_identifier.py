@@ -21,12 +21,12 @@ from skidpad.evidence.channels.identifier.model import (
     LearnedIdentifier,
     events_of,
     load_model,
+    model_bytes,
     probability_of,
-    save_model,
 )
 from skidpad.evidence.channels.judging.matching import Span
 from skidpad.evidence.channels.judging.segments import judge
-from skidpad.evidence.channels.monitor import Monitor
+from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.recording.cycles import cycles
 
 TAILGATED = HazardType.EGO_TAILGATED
@@ -181,7 +181,7 @@ def test_own_evaluation_of_the_trees_is_that_of_the_library(trained):
 @pytest.mark.req("C-15")
 def test_a_stored_model_says_the_same_and_holds_no_code(trained, tmp_path):
     model, drives = trained
-    save_model(tmp_path / "m.npz", model)
+    (tmp_path / "m.npz").write_bytes(model_bytes(model))
     again = load_model(tmp_path / "m.npz")
     d = drives[1]
     for key, detectors in model.detectors.items():
@@ -201,9 +201,7 @@ def test_training_twice_gives_the_same_bytes(trained, tmp_path):
     from skidpad.evidence.channels.identifier.training import card_text, train_model
 
     model, drives = trained
-    save_model(tmp_path / "a.npz", model)
-    save_model(tmp_path / "b.npz", train_model(drives))
-    assert (tmp_path / "a.npz").read_bytes() == (tmp_path / "b.npz").read_bytes()
+    assert model_bytes(model) == model_bytes(train_model(drives))
     assert "Trained on" in card_text(model)
 
 
@@ -215,7 +213,8 @@ def test_the_monitor_uses_rules_the_model_or_both(trained):
     fired = {}
     for identify in Identify:
         monitor = Monitor(
-            source.channels, identify=identify, detectors=model.identifier(), keep_worlds=False
+            source.channels,
+            MonitorSettings(identify=identify, detectors=model.identifier(), keep_worlds=False),
         )
         fired[identify] = [set(monitor.update(c).fired) & set(SCORED_HAZARDS) for c in rows]
     for r, l, b in zip(*fired.values(), strict=True):

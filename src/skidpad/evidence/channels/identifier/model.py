@@ -19,7 +19,6 @@ from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.identifier.features import FEATURE_NAMES, FeatureHistory, features_at
 from skidpad.evidence.channels.identifier.forest import Forest, check_forest, probabilities
 from skidpad.evidence.channels.timefilter import PAUSE, SAME_TIME
-from skidpad.recording.files import write_bytes
 
 Floats = NDArray[np.float64]
 VERSION = 1
@@ -113,8 +112,8 @@ def events_of(t: Floats, p: Floats, limit: float, confirm: int) -> list[tuple[fl
     return list(zip(present[first].tolist(), present[last].tolist(), strict=True))
 
 
-def save_model(path: Path, model: Model) -> None:
-    """Write as .npz: arrays and a JSON card, nothing that runs."""
+def model_bytes(model: Model) -> bytes:
+    """The model as .npz: arrays and a JSON card, nothing that runs."""
     arrays: dict[str, Any] = {}
     index: list[dict[str, Any]] = []
     for (truth, route), detectors in model.detectors.items():
@@ -141,7 +140,7 @@ def save_model(path: Path, model: Model) -> None:
     arrays["card"] = np.frombuffer(json.dumps(card, allow_nan=False).encode(), dtype=np.uint8)
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
-    write_bytes(path, buffer.getvalue())
+    return buffer.getvalue()
 
 
 def load_model(path: Path | None) -> Model:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from skidpad.evidence.channels.hazards import Signal
@@ -12,10 +13,10 @@ from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.judging.causes import V_STANDING, YAW_RATE_TURN
 from skidpad.evidence.channels.monitor import Monitor
 from skidpad.evidence.channels.recorder import CycleEvidence
+from skidpad.evidence.channels.timing import MODULES
 
 Floats = NDArray[np.float64]
-Clock = Callable[[], int]  # ns
-MODULES = ("comfort", "similarity", "motion_prediction")  # those of C-232
+COMPARED = MODULES[:3]  # those of C-232
 MANY_OBJECTS = 5  # objects of the busiest channel (C-238)
 WARM_CYCLES = 20  # whose times are left out
 CYCLES_MIN = 20  # on either side of a comparison
@@ -29,38 +30,21 @@ SERIES = (
 class Observer:
     """Watches a monitor at work on one drive."""
 
-    def __init__(self, monitor: Monitor, motion: Mapping[str, Floats], clock: Clock | None) -> None:
+    def __init__(self, monitor: Monitor, motion: Mapping[str, Floats]) -> None:
         n = motion["t"].size
-        self.monitor, self.motion, self.clock = monitor, motion, clock
+        self.monitor, self.motion = monitor, motion
         self.series = {name: np.full(n, np.nan) for name, _ in SERIES}
         self.steady = np.full(n, np.nan)
         self.objects = np.zeros(n)
-        self.times = {name: np.zeros(n) for name in (*MODULES, "total")}
-        self.k, self.last, self.first = 0, 0, 0
 
-    def begin(self, k: int) -> None:
-        """Cycle number k of the drive starts."""
-        self.k = k
-        if self.clock:
-            self.first = self.last = self.clock()
-
-    def lap(self, name: str) -> None:
-        """The part `name` of the cycle is done."""
-        assert self.clock is not None
-        now = self.clock()
-        if name in MODULES:
-            self.times[name][self.k] = (now - self.last) / 1e6
-        self.times["total"][self.k] = (now - self.first) / 1e6
-        self.last = self.clock()
-
-    def end(self, evidence: CycleEvidence) -> None:
-        """Keep what this cycle showed."""
+    def see(self, k: int, evidence: CycleEvidence) -> None:
+        """Keep what cycle number k of the drive showed."""
         for name, indicator in SERIES:
             values = evidence.readings[indicator]
-            self.series[name][self.k] = np.fmin.reduce(values) if values.size else np.nan
-        self.steady[self.k] = evidence.signals.values[Signal.STEADY_SHARE]
+            self.series[name][k] = np.fmin.reduce(values) if values.size else np.nan
+        self.steady[k] = evidence.signals.values[Signal.STEADY_SHARE]
         counts = [len(f.objects) for f in evidence.cycle.frames if f is not None]
-        self.objects[self.k] = max(counts, default=0)
+        self.objects[k] = max(counts, default=0)
 
     def facts(self) -> dict[str, float | None]:
         """Numbers of the drive; None where there was too little to say."""
@@ -78,16 +62,6 @@ class Observer:
             "objects_mean": float(self.objects.mean()) if self.objects.size else None,
         }
         out |= self._violations()
-        if self.clock and self.objects.size > 2 * WARM_CYCLES:
-            total = self.times["total"][WARM_CYCLES:]
-            means = {m: float(self.times[m][WARM_CYCLES:].mean()) for m in MODULES}
-            out |= {f"{m}_mean_ms": mean for m, mean in means.items()}
-            out["total_mean_ms"] = float(total.mean())
-            out["total_p999_ms"] = float(np.percentile(total, 99.9))
-            out["total_max_ms"] = float(total.max())
-            out["motion_prediction_share"] = means["motion_prediction"] / max(
-                sum(means.values()), 1e-9
-            )
         return out
 
     def _violations(self) -> dict[str, float | None]:
@@ -98,6 +72,21 @@ class Observer:
             for i, entry in self.monitor.thresholds.items()
             if entry.threshold is not None
         }
+
+
+def times_of(times: pl.DataFrame) -> dict[str, float]:
+    """Times of a drive in ms, without its first cycles; nothing of a short drive."""
+    if len(times) <= 2 * WARM_CYCLES:
+        return {}
+    warm = times[WARM_CYCLES:]
+    total = warm["total"].to_numpy()
+    means = {m: float(warm[m].to_numpy().mean()) for m in COMPARED}
+    return {f"{m}_mean_ms": mean for m, mean in means.items()} | {
+        "total_mean_ms": float(total.mean()),
+        "total_p999_ms": float(np.percentile(total, 99.9)),
+        "total_max_ms": float(total.max()),
+        "motion_prediction_share": means["motion_prediction"] / max(sum(means.values()), 1e-9),
+    }
 
 
 def _apart(values: Floats, a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float | None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,14 +17,14 @@ from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.panel import no_lap
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.judging.causes import ego_motion, false_cause, missed_cause
-from skidpad.evidence.channels.judging.facts import Observer
+from skidpad.evidence.channels.judging.facts import Observer, times_of
 from skidpad.evidence.channels.judging.matching import Span, match, merged
 from skidpad.evidence.channels.judging.truth import TrueHazard, simulator_truth, world_model_truth
-from skidpad.evidence.channels.monitor import Monitor
+from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.evidence.channels.timefilter import TimeFilter
+from skidpad.evidence.channels.timing import Stopwatch
 
 Floats = NDArray[np.float64]
-Clock = Callable[[], int]  # ns
 Signals = Sequence[tuple[float, dict[Signal, float]]]
 FORMS = {Profile.PRACTICAL: Form.CORRECTED, Profile.AS_PRINTED: Form.COMPLETED}  # decision C-16
 CURVE_FACTORS = (0.5, 0.67, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
@@ -84,7 +84,7 @@ def judge(
     curve: Signal | None = None,
     model: Model | None = None,
     context: Mapping[str, str] | None = None,
-    clock: Clock | None = None,
+    timer: Stopwatch | None = None,
 ) -> Segment:
     """Run all identifiers and the truths over a recording's cycles.
 
@@ -94,13 +94,8 @@ def judge(
     begin = cycles[0].t + WARM_UP if cycles else 0.0
     t = np.array([c.t for c in cycles])
     detected: dict[str, tuple[Span, ...]] = {}
-    seen, candidates, detected[Profile.PRACTICAL.value] = _practical(channels, cycles, begin, clock)
-    printed = Monitor(
-        channels,
-        settings=IndicatorSettings(form=FORMS[Profile.AS_PRINTED]),
-        profile=Profile.AS_PRINTED,
-        keep_worlds=False,
-    )
+    seen, candidates, detected[Profile.PRACTICAL.value] = _practical(channels, cycles, begin, timer)
+    printed = Monitor(channels, _settings(Profile.AS_PRINTED))
     for cycle in cycles:
         printed.update(cycle)
     detected[Profile.AS_PRINTED.value] = _scored(_found(printed.hazards, begin))
@@ -135,23 +130,30 @@ def judge(
     )
 
 
+def _settings(profile: Profile) -> MonitorSettings:
+    return MonitorSettings(
+        indicators=IndicatorSettings(form=FORMS[profile]), profile=profile, keep_worlds=False
+    )
+
+
 def _practical(
-    channels: Sequence[str], cycles: Sequence[Cycle], begin: float, clock: Clock | None
+    channels: Sequence[str], cycles: Sequence[Cycle], begin: float, timer: Stopwatch | None
 ) -> tuple[_Pass, dict[HazardType, int], tuple[Span, ...]]:
-    settings = IndicatorSettings(form=FORMS[Profile.PRACTICAL])
-    monitor = Monitor(channels, settings=settings, keep_worlds=False)
-    observer = Observer(monitor, ego_motion(cycles), clock)
+    monitor = Monitor(channels, _settings(Profile.PRACTICAL))
+    observer = Observer(monitor, ego_motion(cycles))
     signals, rows = [], []
     for k, cycle in enumerate(cycles):
-        observer.begin(k)
-        evidence = monitor.update(cycle, observer.lap if clock else no_lap)
-        observer.end(evidence)
+        if timer:
+            timer.begin(cycle)
+        evidence = monitor.update(cycle, timer.lap if timer else no_lap)
+        observer.see(k, evidence)
         signals.append((cycle.t, evidence.signals.values))
         rows.append(feature_row(evidence.readings, evidence.risk, evidence.signals))
+    facts = observer.facts() | (times_of(timer.table()) if timer and cycles else {})
     spans = _found(monitor.hazards, begin)
     others = [s.hazard for s in spans if s.hazard not in SCORED_HAZARDS]
     return (
-        _Pass(signals, np.array(rows), observer.facts()),
+        _Pass(signals, np.array(rows), facts),
         {hazard: others.count(hazard) for hazard in dict.fromkeys(others)},
         _scored(spans),
     )

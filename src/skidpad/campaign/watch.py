@@ -1,0 +1,106 @@
+"""One recording through the monitor, and what it leaves in a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from itertools import chain, islice
+from pathlib import Path
+
+import polars as pl
+
+from skidpad.core.channels import Context, Cycle
+from skidpad.core.errors import FileError
+from skidpad.evidence.channels.indicators.panel import no_lap
+from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
+from skidpad.evidence.channels.summary import Watched, columns, watched
+from skidpad.evidence.channels.timing import MODULES
+from skidpad.recording.channels import ChannelSource, Losses, Message
+from skidpad.recording.cycles import cycles
+from skidpad.recording.hazards import HazardWriter
+from skidpad.recording.indicators import IndicatorLog
+from skidpad.recording.monitored import write_summary, write_timing
+
+WARM_CYCLES = 20
+Clock = Callable[[], int]  # ns
+
+
+class Timer:
+    """Time per part of a cycle (C-232)."""
+
+    def __init__(self, clock: Clock) -> None:
+        self.clock = clock
+        self.rows: list[dict[str, float]] = []
+
+    def begin(self, cycle: Cycle) -> None:
+        """A cycle starts."""
+        objects = sum(len(f.objects) for f in cycle.frames if f is not None)
+        self.rows.append({"cycle": cycle.k, "objects": objects, "writing": 0.0})
+        self.last = self.clock()
+
+    def lap(self, name: str) -> None:
+        """The part `name` of the cycle is done."""
+        now = self.clock()
+        self.rows[-1][name] = (now - self.last) / 1e6
+        self.last = self.clock()
+
+    def table(self) -> pl.DataFrame:
+        """Milliseconds per part and cycle; total = all parts but the writing (DC-65)."""
+        return pl.DataFrame(self.rows).with_columns(total=pl.sum_horizontal("prepare", *MODULES))
+
+
+def watch(
+    source: ChannelSource, folder: Path, settings: MonitorSettings, timer: Timer | None = None
+) -> Watched:
+    """Monitor `source`; writes indicators, hazards, a summary, and times if given a timer."""
+    monitor = Monitor(source.channels, settings)
+    log = IndicatorLog(columns(monitor))
+    seen: list[float] = []
+    with HazardWriter(folder) as writer:
+        stream = cycles(_ContextTap(source, monitor))
+        for cycle in _warmed_up(stream, monitor) if timer else stream:
+            seen.append(cycle.t)
+            if timer:
+                timer.begin(cycle)
+            evidence = monitor.update(cycle, timer.lap if timer else no_lap)
+            log.add(cycle.k, cycle.t, evidence.readings.values)
+            for record in monitor.records():
+                writer.write(record)
+            if timer:
+                timer.lap("writing")
+        for record in monitor.finish():
+            writer.write(record)
+    if not seen:
+        raise FileError("the recording holds no cycle that can be evaluated")
+    found = watched(monitor, source.losses, seen[-1] - seen[0], len(seen))
+    log.write(folder)
+    write_summary(folder, found.summary)
+    if timer:
+        write_timing(folder, timer.table())
+    return found
+
+
+def _warmed_up(stream: Iterator[Cycle], like: Monitor) -> Iterator[Cycle]:
+    """The same cycles, after the first ones went through another monitor: times are of warm code."""
+    head = list(islice(stream, WARM_CYCLES))
+    spare = Monitor(like.channels, like.settings)
+    for cycle in head:
+        spare.update(cycle)
+    return chain(head, stream)
+
+
+class _ContextTap:
+    """Passes messages on; words about the drive go to the monitor, for its records only."""
+
+    def __init__(self, source: ChannelSource, monitor: Monitor) -> None:
+        self.source, self.monitor = source, monitor
+        self.channels = source.channels
+
+    @property
+    def losses(self) -> Losses:
+        return self.source.losses
+
+    def messages(self) -> Iterator[Message]:
+        for message in self.source.messages():
+            if isinstance(message.item, Context):
+                self.monitor.note(message.item.entries)
+            yield message

@@ -1,0 +1,61 @@
+"""What the parts of a cycle take, and against which budget (C-232 to C-238)."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+import polars as pl
+
+from skidpad.core.channels import Cycle
+
+BUDGET_MS = 25.0  # C-006, C-233
+MODULES = ("comfort", "similarity", "motion_prediction", "risk", "hazards")
+
+
+class Stopwatch(Protocol):
+    """Measures a monitor at work; whoever has a clock brings one."""
+
+    def begin(self, cycle: Cycle) -> None:
+        """A cycle starts."""
+
+    def lap(self, name: str) -> None:
+        """The part `name` of the cycle is done."""
+
+    def table(self) -> pl.DataFrame:
+        """Milliseconds per part, one row per cycle: prepare, MODULES, total, and objects."""
+
+
+def timing_statistics(timing: pl.DataFrame) -> pl.DataFrame:
+    """The table of C-233: per module mean, extremes, deviation and shares against its threshold.
+
+    Threshold of the total: 25 ms; of a module: its own maximum. "Within 90 %" is 0.9 T <= t <= T
+    (C-234, DC-64).
+    """
+    rows = []
+    for module in ("total", "prepare", *MODULES, "writing"):
+        t = timing[module].to_numpy()
+        limit = BUDGET_MS if module == "total" else float(t.max())
+        rows.append(
+            {
+                "module": module,
+                "mean_ms": float(t.mean()),
+                "max_ms": float(t.max()),
+                "min_ms": float(t.min()),
+                "std_ms": float(t.std()),
+                "p999_ms": float(np.percentile(t, 99.9)),
+                "breaches_pct": float(100.0 * (t > limit).mean()),
+                "within_90_pct": float(100.0 * ((t >= 0.9 * limit) & (t <= limit)).mean()),
+                "under_50_pct": float(100.0 * (t < 0.5 * limit).mean()),
+            }
+        )
+    return pl.DataFrame(rows)
+
+
+def time_by_objects(timing: pl.DataFrame) -> pl.DataFrame:
+    """Mean time per module against the number of objects of all channels (C-238)."""
+    return (
+        timing.group_by("objects")
+        .agg(pl.len().alias("cycles"), pl.col("total", *MODULES).mean())
+        .sort("objects")
+    )

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from skidpad.evidence.drive.collisions import find_crashes
-from skidpad.evidence.drive.metrics import run_metrics
+from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.recording.matrix import Metrics
@@ -30,9 +30,13 @@ def show(run: Path) -> None:
     if road_map.content_hash != log.header.map_hash:
         console.print("[yellow]the map has changed since this run: lanes may not match[/]")
     meanings = {name: meaning for name, meaning, _ in definitions_of(Metrics)}
-    table = Table("metric", "value", "meaning", box=None, pad_edge=False)
-    for name, value in asdict(run_metrics(log, road_map)).items():
-        table.add_row(name, _text(value), meanings[name])
+    columns = {"value": asdict(run_metrics(log, road_map))}
+    by_weather = weather_metrics(log, road_map)
+    if len(by_weather) > 1:  # it changed on the way
+        columns |= {f"in {slug}": asdict(metrics) for slug, metrics in by_weather.items()}
+    table = Table("metric", *columns, "meaning", box=None, pad_edge=False)
+    for name in columns["value"]:
+        table.add_row(name, *(_text(c[name]) for c in columns.values()), meanings[name])
     console.print(table)
     for crash in find_crashes(prepare(log, road_map)):
         console.print(f"\n[bold]{crash.t:.2f} s: {headline(crash)}[/]")

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import product
-from math import ceil, sqrt
+from math import ceil
 from typing import NamedTuple
 
 import numpy as np
@@ -36,14 +36,6 @@ class Interval(NamedTuple):
 
     low: float
     high: float
-
-
-class Side(str, Enum):
-    """Alternative hypothesis about the first quantity."""
-
-    TWO = "two-sided"
-    GREATER = "greater"
-    LESS = "less"
 
 
 class Method(str, Enum):
@@ -143,62 +135,6 @@ def event_rate(counts: Sequence[int], exposures: Sequence[float] | None = None) 
     return Rate(total, c.size, exposure, total / exposure, interval, method, dispersion)
 
 
-def compare_counts(
-    a: int, b: int, exposure_a: float = 1.0, exposure_b: float = 1.0, side: Side = Side.TWO
-) -> float:
-    """p value of equal Poisson rates, given the sum of both counts; `side` is about a.
-
-    Source: Przyborowski and Wilenski (1940), Biometrika 31.
-    """
-    if a + b == 0:
-        return 1.0
-    share = exposure_a / (exposure_a + exposure_b)
-    return float(stats.binomtest(a, a + b, share, alternative=side.value).pvalue)
-
-
-def rate_ratio_interval(
-    a: int, b: int, exposure_a: float = 1.0, exposure_b: float = 1.0
-) -> Interval | None:
-    """Exact limits of rate a over rate b, given the sum; None without events."""
-    if a + b == 0:
-        return None
-    low, high = clopper_pearson(a, a + b)
-    scale = exposure_b / exposure_a
-    return Interval(
-        scale * low / (1.0 - low) if low < 1.0 else float("inf"),
-        scale * high / (1.0 - high) if high < 1.0 else float("inf"),
-    )
-
-
-def runs_to_tell_apart(
-    rate_a: float, rate_b: float, power: float = 0.8, alpha: float = 0.05
-) -> int | None:
-    """Runs per side until the exact two-sided comparison of counts finds the difference with
-    this power; None beyond 10 000."""
-    low, high = 1, 1
-    while _power(rate_a, rate_b, high, alpha) < power:
-        low, high = high + 1, 2 * high
-        if high > 10_000:
-            return None
-    while low < high:
-        middle = (low + high) // 2
-        if _power(rate_a, rate_b, middle, alpha) < power:
-            low = middle + 1
-        else:
-            high = middle
-    return high
-
-
-def _power(rate_a: float, rate_b: float, runs: int, alpha: float) -> float:
-    total = runs * (rate_a + rate_b)
-    sums = np.arange(1, ceil(total + 8.0 * sqrt(total) + 10.0))
-    share = rate_a / (rate_a + rate_b)
-    edge = stats.binom.ppf(alpha / 2.0, sums, 0.5)
-    edge = np.where(stats.binom.cdf(edge, sums, 0.5) > alpha / 2.0, edge - 1, edge)
-    low, high = stats.binom.cdf(edge, sums, share), stats.binom.sf(sums - edge - 1, sums, share)
-    return float(np.sum(stats.poisson.pmf(sums, total) * (low + high)))
-
-
 def compare_pairs(differences: ArrayLike) -> Comparison:
     """Test and interval of the mean of differences of runs with equal seeds (n,), n >= 1.
 
@@ -250,19 +186,10 @@ def mcnemar(only_a: int, only_b: int) -> float:
 
 def clopper_pearson(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:
     """Exact limits of a share k of n. Source: Clopper and Pearson (1934), Biometrika 26."""
-    return _share(k, n, confidence, "exact")
-
-
-def wilson(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:
-    """Score limits of a share k of n. Source: Wilson (1927), JASA 22."""
-    return _share(k, n, confidence, "wilson")
-
-
-def _share(k: int, n: int, confidence: float, method: str) -> Interval:
     require_range("successes", k, 0, n)
     if n == 0:
         return Interval(0.0, 1.0)
-    limits = stats.binomtest(k, n).proportion_ci(confidence, method=method)
+    limits = stats.binomtest(k, n).proportion_ci(confidence, method="exact")
     return Interval(float(limits.low), float(limits.high))
 
 
@@ -274,20 +201,6 @@ def holm(p_values: Sequence[float]) -> list[float]:
     adjusted = np.empty_like(p)
     adjusted[order] = np.minimum(np.maximum.accumulate(steps), 1.0)
     return [float(v) for v in adjusted]
-
-
-def rate_text(rate: Rate, unit: str = "run", stopped: bool = False) -> str:
-    """`3 in 6 runs: 0.5 per run (95 % 0.1 to 1.46), too few events to say more`."""
-    runs = "run" if rate.runs == 1 else "runs"
-    text = (
-        f"{rate.events} in {rate.runs} {runs}: {rate.rate:.3g} per {unit} "
-        f"({interval_text(rate.interval)})"
-    )
-    if rate.too_few:
-        text += ", too few events to say more"
-    if stopped:
-        text += "; the number of runs followed from the results, so the interval is approximate"
-    return text
 
 
 def interval_text(interval: Interval) -> str:

@@ -31,7 +31,6 @@ from skidpad.evidence.channels.indicators.catalogue import (
     Bound,
     Indicator,
     Threshold,
-    Violation,
     load_thresholds,
 )
 from skidpad.evidence.channels.indicators.layout import Place, Readings
@@ -215,15 +214,6 @@ class Monitor:
 
     def _tally(self, cycles: NDArray[np.int64]) -> Counter[Place]:
         return Counter({self.layout.places[k]: int(cycles[k]) for k in np.flatnonzero(cycles)})
-
-    def violations_now(self, readings: Readings) -> list[Violation]:
-        """The violations of one cycle, for reading aloud."""
-        out = []
-        for place, value in zip(self.layout.places, readings.values.tolist(), strict=True):
-            entry = self.thresholds[place.indicator]
-            if entry.threshold is not None and entry.violated(value):
-                out.append(Violation(place.indicator, place.subject, value, entry.threshold))
-        return out
 
     def _bounds(self) -> tuple[Floats, Floats]:
         """Least and greatest value at each place that raises no alarm."""

@@ -5,7 +5,6 @@ Every threshold is configuration (C-103): `load_thresholds` takes a file of the 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 from importlib.resources import files
@@ -140,16 +139,6 @@ class SafetyCase(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def safety_case() -> SafetyCase:
     """The tree of C-030 and C-031, with the homes of indicators settled as in DC-28."""
     return msgspec.yaml.decode(_built_in("safety_case.yaml"), type=SafetyCase)
-
-
-@dataclass(frozen=True, slots=True)
-class Violation:
-    """One indicator beyond its threshold in one cycle."""
-
-    indicator: Indicator
-    subject: str  # channel, or pair "a+b"
-    value: float
-    threshold: float
 
 
 def _built_in(name: str) -> bytes:

@@ -27,13 +27,13 @@ from skidpad.evidence.channels.judging.matching import (
     tally,
 )
 from skidpad.evidence.channels.judging.segments import judge
-from skidpad.evidence.channels.judging.truth import (
+from skidpad.evidence.channels.judging.truth.simulator import (
     G,
     footprint,
     simulator_truth,
-    world_model_truth,
     would_hit,
 )
+from skidpad.evidence.channels.judging.truth.worldmodel import world_model_truth
 from skidpad.recording.cycles import cycles
 
 TAILGATED, TAILGATING = HazardType.EGO_TAILGATED, HazardType.EGO_TAILGATING

@@ -1,0 +1,222 @@
+"""Oriented boxes in motion: when two of them meet, and how nearly they do not (C-091, C-092)."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.channels import ChannelFrame
+from skidpad.core.jit import kernel
+from skidpad.evidence.channels.paths import sample_path, sample_plan
+
+Floats = NDArray[np.float64]
+HORIZON = 4.0  # s, also the time to collision without risk (C-094)
+STEP = 0.1  # s between samples; at 40 m/s closing a step is shorter than a car
+SAMPLES = round(HORIZON / STEP) + 1
+PET_SAFE = 2.0  # s, the post-encroachment time without risk (C-094)
+V_STANDING = 0.5  # m/s, slower motion does not turn the heading
+BISECTIONS = 8
+
+
+class Movers(NamedTuple):
+    """n oriented boxes in motion, for kernels."""
+
+    motion: Floats  # (n, SAMPLES, 4) x, y of the box centre, cos and sin of the heading
+    half: Floats  # (n, 2) half length and half width
+    bounds: Floats  # (n, 4) x_min, x_max, y_min, y_max swept by the boxes
+
+
+@kernel
+def box_of(polygon: Floats, size: int) -> tuple[float, float, float, float]:
+    """Centre x, y and half length, half width of the box around a polygon in its own frame.
+
+    Vertices that are not numbers are left out; a shape without any is a point.
+    """
+    x0 = y0 = np.inf
+    x1 = y1 = -np.inf
+    for i in range(size):
+        if np.isfinite(polygon[i, 0] + polygon[i, 1]):
+            x0, x1 = min(x0, polygon[i, 0]), max(x1, polygon[i, 0])
+            y0, y1 = min(y0, polygon[i, 1]), max(y1, polygon[i, 1])
+    if x1 < x0:
+        return 0.0, 0.0, 0.0, 0.0
+    return 0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (x1 - x0), 0.5 * (y1 - y0)
+
+
+@kernel
+def _oriented(
+    points: Floats, heading: float, polygon: Floats, size: int, movers: Movers, i: int
+) -> None:
+    """Fill row i of `movers` with the box of `polygon` carried along points (SAMPLES, 2)."""
+    cx, cy, half_l, half_w = box_of(polygon, size)
+    movers.half[i, 0], movers.half[i, 1] = half_l, half_w
+    c, s = np.cos(heading), np.sin(heading)
+    reach = np.hypot(half_l, half_w)
+    x0 = y0 = np.inf
+    x1 = y1 = -np.inf
+    n = points.shape[0]
+    for k in range(n):
+        if k < n - 1:  # the direction of the step that begins here
+            dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
+            d = np.hypot(dx, dy)
+            if d >= V_STANDING * STEP:
+                sign = -1.0 if dx * c + dy * s < 0.0 else 1.0  # in reverse the heading stays
+                c, s = sign * dx / d, sign * dy / d
+        x = points[k, 0] + c * cx - s * cy
+        y = points[k, 1] + s * cx + c * cy
+        row = movers.motion[i, k]
+        row[0], row[1], row[2], row[3] = x, y, c, s
+        x0, x1 = min(x0, x - reach), max(x1, x + reach)
+        y0, y1 = min(y0, y - reach), max(y1, y + reach)
+    bounds = movers.bounds[i]
+    bounds[0], bounds[1], bounds[2], bounds[3] = x0, x1, y0, y1
+
+
+@kernel
+def _move_plan(ego: Floats, polygon: Floats, plan: Floats, movers: Movers) -> int:
+    points = np.empty((SAMPLES, 2))
+    inside = sample_plan(plan, ego, 0.0, STEP, points)
+    _oriented(points, ego[2], polygon, polygon.shape[0], movers, 0)
+    return inside
+
+
+@kernel
+def _move_objects(
+    objects: Floats,
+    polygons: Floats,
+    size: NDArray[np.int64],
+    predictions: Floats,
+    prediction_t: Floats,
+    movers: Movers,
+) -> None:
+    points = np.empty((SAMPLES, 2))
+    for i in range(objects.shape[0]):
+        sample_path(prediction_t, predictions[i], objects[i], 0.0, STEP, points)
+        _oriented(points, objects[i, 2], polygons[i], size[i], movers, i)
+
+
+@kernel
+def boxes_overlap(
+    ax: float, ay: float, ac: float, as_: float, al: float, aw: float,
+    bx: float, by: float, bc: float, bs: float, bl: float, bw: float,
+) -> bool:  # fmt: skip
+    """Whether two oriented boxes (centre, cos, sin, half length, half width) overlap.
+
+    By separating axes: the four edge normals of both boxes.
+    """
+    dx, dy = bx - ax, by - ay
+    cc = abs(ac * bc + as_ * bs)
+    cs = abs(as_ * bc - ac * bs)
+    if abs(dx * ac + dy * as_) > al + bl * cc + bw * cs:
+        return False
+    if abs(dy * ac - dx * as_) > aw + bl * cs + bw * cc:
+        return False
+    if abs(dx * bc + dy * bs) > bl + al * cc + aw * cs:
+        return False
+    return abs(dy * bc - dx * bs) <= bw + al * cs + aw * cc
+
+
+@kernel
+def _meet(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> bool:
+    """Whether two boxes meet: rows (4,) of `Movers.motion` and halves (2,)."""
+    dx, dy = b[0] - a[0], b[1] - a[1]
+    reach = half_a[0] + half_a[1] + half_b[0] + half_b[1]
+    if dx * dx + dy * dy > reach * reach:
+        return False
+    return boxes_overlap(
+        a[0], a[1], a[2], a[3], half_a[0], half_a[1], b[0], b[1], b[2], b[3], half_b[0], half_b[1]
+    )
+
+
+@kernel
+def _between(a: Floats, b: Floats, f: float, out: Floats) -> None:
+    """Pose a fraction f of the way from row a to row b; the heading of the nearer one."""
+    out[0] = a[0] + f * (b[0] - a[0])
+    out[1] = a[1] + f * (b[1] - a[1])
+    near = a if f < 0.5 else b
+    out[2], out[3] = near[2], near[3]
+
+
+@kernel
+def first_overlap(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> float:
+    """Time in s of the first overlap of two motions (SAMPLES, 4); inf when they never meet."""
+    for k in range(a.shape[0]):
+        if not _meet(a[k], half_a, b[k], half_b):
+            continue
+        if k == 0:
+            return 0.0
+        low, high = 0.0, 1.0
+        row_a, row_b = np.empty(4), np.empty(4)
+        for _ in range(BISECTIONS):
+            f = 0.5 * (low + high)
+            _between(a[k - 1], a[k], f, row_a)
+            _between(b[k - 1], b[k], f, row_b)
+            if _meet(row_a, half_a, row_b, half_b):
+                high = f
+            else:
+                low = f
+        return (k - 1 + high) * STEP
+    return np.inf
+
+
+@kernel
+def encroachment(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> float:
+    """Smallest shift in s that makes two motions (SAMPLES, 4) touch; inf above PET_SAFE."""
+    n = a.shape[0]
+    row = np.empty(4)
+    for shift in range(1, round(PET_SAFE / STEP) + 1):
+        best = np.inf
+        for k in range(n - shift):
+            for swap in range(2):
+                early, late = (k, k + shift) if swap == 0 else (k + shift, k)
+                if not _meet(a[early], half_a, b[late], half_b):
+                    continue
+                low, high = 0.0, 1.0  # of the last step of the shift
+                for _ in range(BISECTIONS):
+                    f = 0.5 * (low + high)
+                    if swap == 0:
+                        _between(b[k + shift - 1], b[k + shift], f, row)
+                        met = _meet(a[k], half_a, row, half_b)
+                    else:
+                        _between(a[k + shift - 1], a[k + shift], f, row)
+                        met = _meet(row, half_a, b[k], half_b)
+                    if met:
+                        high = f
+                    else:
+                        low = f
+                best = min(best, (shift - 1 + high) * STEP)
+        if best < np.inf:
+            return best
+    return np.inf
+
+
+def ego_movers(frame: ChannelFrame | None) -> Movers | None:
+    """The ego on its plan, one box; None without a place or a plan."""
+    if frame is None or not np.isfinite(frame.ego).all():
+        return None
+    movers = _movers(1)
+    if _move_plan(frame.ego, frame.ego_polygon, frame.plan, movers) == 0:
+        return None  # without a plan there is nothing to judge
+    return movers
+
+
+def world_movers(frame: ChannelFrame | None) -> Movers | None:
+    """All objects of a channel on their predictions."""
+    if frame is None:
+        return None
+    movers = _movers(len(frame.objects))
+    _move_objects(
+        frame.objects,
+        frame.polygons,
+        frame.polygon_size,
+        frame.predictions,
+        frame.prediction_t,
+        movers,
+    )
+    return movers
+
+
+def _movers(n: int) -> Movers:
+    return Movers(np.empty((n, SAMPLES, 4)), np.empty((n, 2)), np.empty((n, 4)))

@@ -1,0 +1,1 @@
+"""Two truths about hazards; neither shares code with the rules or indicators that it judges."""

@@ -1,0 +1,164 @@
+"""Truth by true states and, with hindsight, the path that was driven (C-212, decision C-3)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+from shapely import affinity
+
+from skidpad.core.channels import ChannelFrame, Cycle, TruthFrame
+from skidpad.core.vocabulary import HazardType, SemanticClass
+from skidpad.evidence.channels.judging.truth.marks import (
+    Mark,
+    TrueHazard,
+    World,
+    lasting,
+    merged,
+    offsets,
+)
+
+Floats = NDArray[np.float64]
+G = 9.80665  # m/s^2
+BRAKE_LEADER = 6.0  # m/s^2, decision C-3
+REACTION_TIME = 1.0  # s
+MIN_DURATION = 0.5  # s
+V_EGO_MIN = 2.0  # m/s
+REACH = 80.0  # m of driven path before and after the ego that is looked at
+VEHICLES = {
+    int(c)
+    for c in (
+        SemanticClass.CAR, SemanticClass.TRUCK, SemanticClass.BUS, SemanticClass.TRAIN,
+        SemanticClass.MOTORCYCLE, SemanticClass.BICYCLE, SemanticClass.RIDER, SemanticClass.NONE,
+    )
+}  # fmt: skip
+
+
+def simulator_truth(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[TrueHazard]:
+    """Hazards by true states; empty when the recording holds none."""
+    known = [c for c in cycles if c.truth is not None]
+    path = _DrivenPath([c.truth for c in known if c.truth is not None])
+    marks: list[Mark] = []
+    for k, cycle in enumerate(known):
+        truth = cycle.truth
+        if truth is not None and np.hypot(*truth.ego[3:]) > V_EGO_MIN:
+            marks.extend(_tail_marks(k, cycle.t, truth, path, cycle.frames))
+    marks = lasting(marks, MIN_DURATION)
+    marks.extend(_position_errors(known, channels))
+    return merged(marks, World.SIM)
+
+
+class _DrivenPath:
+    """The path that the ego's centre drove in the whole recording."""
+
+    def __init__(self, truths: Sequence[TruthFrame]) -> None:
+        self.xy = np.array([t.ego[:2] for t in truths]).reshape(-1, 2)
+        steps = np.hypot(*np.diff(self.xy, axis=0).T) if len(self.xy) > 1 else np.zeros(0)
+        self.s = np.concatenate([[0.0], np.cumsum(steps)])
+
+    def around(self, k: int) -> tuple[shapely.LineString | None, float]:
+        """The path from REACH before to REACH after cycle k, and where on it the ego is."""
+        first = int(np.searchsorted(self.s, self.s[k] - REACH))
+        last = int(np.searchsorted(self.s, self.s[k] + REACH, side="right"))
+        moved = np.concatenate([[True], np.diff(self.s[first:last]) > 1e-3])
+        points = self.xy[first:last][moved]
+        if len(points) < 2:
+            return None, 0.0
+        return shapely.LineString(points), float(self.s[k] - self.s[first])
+
+
+def _tail_marks(
+    k: int, t: float, truth: TruthFrame, path: _DrivenPath, frames: Sequence[ChannelFrame | None]
+) -> list[Mark]:
+    line, s_ego = path.around(k)
+    near = np.flatnonzero(np.hypot(*(truth.actors[:, :2] - truth.ego[:2]).T) < REACH)
+    if line is None or near.size == 0:
+        return []
+    front, rear, half_width = _extent(truth.ego_polygon)
+    corridor = line.buffer(half_width, cap_style="flat")
+    v_ego = float(np.hypot(*truth.ego[3:]))
+    marks = []
+    for i in near:
+        if int(truth.classes[i]) not in VEHICLES and truth.classes[i] != -1:
+            continue
+        shape = footprint(truth.polygons[i, : truth.polygon_size[i]], truth.actors[i])
+        if not shape.intersects(corridor):
+            continue
+        s = line.project(shapely.Point(truth.actors[i, :2]))
+        ahead = line.interpolate(min(s + 0.5, line.length))
+        back = line.interpolate(max(s - 0.5, 0.0))
+        tangent = np.array([ahead.x - back.x, ahead.y - back.y])
+        tangent /= max(np.hypot(*tangent), 1e-9)
+        v_other = max(float(truth.actors[i, 3:] @ tangent), 0.0)
+        along = [
+            float((np.array(p) - truth.actors[i, :2]) @ tangent) for p in shape.exterior.coords
+        ]
+        if s < s_ego:
+            gap = (s_ego - rear) - (s + max(along))
+            hazard, about = HazardType.EGO_TAILGATED, (v_ego, truth.ego_mu, v_other, truth.mu[i])
+        else:
+            gap = (s + min(along)) - (s_ego + front)
+            hazard, about = HazardType.EGO_TAILGATING, (v_other, truth.mu[i], v_ego, truth.ego_mu)
+        if would_hit(max(gap, 0.0), *map(float, about)):
+            marks.append(
+                Mark(
+                    hazard, t, f"actor {int(truth.ids[i])}", seen=_reported(truth.actors[i], frames)
+                )
+            )
+    return marks
+
+
+def would_hit(
+    gap: float, v_leader: float, mu_leader: float, v_follower: float, mu_follower: float
+) -> bool:
+    """Whether the follower hits a leader that brakes at 6 m/s^2 and reacts after 1 s (C-3).
+
+    The follower then brakes at all its grip; the leader at no more than its own. gap in m.
+    """
+    a_leader = min(BRAKE_LEADER, mu_leader * G)
+    a_follower = mu_follower * G
+    t_leader = v_leader / a_leader
+    t_follower = REACTION_TIME + v_follower / a_follower
+    t = np.linspace(0.0, max(t_leader, t_follower), 200)
+    leader = v_leader * np.minimum(t, t_leader) - a_leader * np.minimum(t, t_leader) ** 2 / 2.0
+    braked = np.clip(t - REACTION_TIME, 0.0, v_follower / a_follower)
+    follower = v_follower * (np.minimum(t, REACTION_TIME) + braked) - a_follower * braked**2 / 2.0
+    return bool((gap + leader - follower).min() <= 0.0)
+
+
+def _reported(actor: Floats, frames: Sequence[ChannelFrame | None], within: float = 3.0) -> bool:
+    """Whether any channel has an object within `within` m of the actor."""
+    return any(
+        bool((np.hypot(*(frame.objects[:, :2] - actor[:2]).T) < within).any())
+        for frame in frames
+        if frame is not None and len(frame.objects)
+    )
+
+
+def _position_errors(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[Mark]:
+    marks = []
+    for c, name in enumerate(channels):
+        rows = [
+            (cycle.t, *(frame.ego[:2] - truth.ego[:2]))
+            for cycle in cycles
+            if (frame := cycle.frames[c]) is not None and (truth := cycle.truth) is not None
+        ]
+        marks.extend(offsets(np.array(rows).reshape(-1, 3), name))
+    return marks
+
+
+def footprint(shape: Floats, state: Floats) -> shapely.Geometry:
+    """A polygon (k, 2) in its own frame, placed at the state (5,) in the world."""
+    points = shape[np.isfinite(shape).all(axis=1)]
+    if len(points) < 3:
+        return shapely.Point(state[:2])
+    turned = affinity.rotate(shapely.Polygon(points), state[2], origin=(0, 0), use_radians=True)
+    return affinity.translate(turned, state[0], state[1])
+
+
+def _extent(polygon: Floats) -> tuple[float, float, float]:
+    """Front and rear from the reference point along the body, and half width."""
+    x, y = polygon[:, 0], polygon[:, 1]
+    return float(x.max()), float(-x.min()), float(np.abs(y).max())

@@ -1,0 +1,141 @@
+"""Truth in the world that the channels report, ghosts included (C-212, C-218, decision C-4)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+import shapely
+from numpy.typing import NDArray
+
+from skidpad.core.channels import ChannelFrame, Cycle
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.judging.truth.marks import Mark, TrueHazard, World, merged, offsets
+
+Floats = NDArray[np.float64]
+SWEEP_TIME = 3.0  # s, decision C-4
+SWEEP_STEP = 0.25  # s; the hull of two steps tells where to look closer
+SUBSTEPS = 5  # of a step, 0.05 s apart: hulls alone would join cars that follow each other closely
+
+
+def world_model_truth(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[TrueHazard]:
+    """Hazards in the union of all channels' worlds, ghosts included (C-218)."""
+    marks: list[Mark] = []
+    for cycle in cycles:
+        for frame in cycle.frames:
+            if frame is not None and len(frame.plan) >= 2 and np.isfinite(frame.ego).all():
+                marks.extend(_sweeps(cycle, frame, channels))
+    for a in range(len(channels)):
+        for b in range(a + 1, len(channels)):
+            rows = [
+                (cycle.t, *(one.ego[:2] - two.ego[:2]))
+                for cycle in cycles
+                if (one := cycle.frames[a]) is not None and (two := cycle.frames[b]) is not None
+            ]
+            marks.extend(offsets(np.array(rows).reshape(-1, 3), f"{channels[a]}+{channels[b]}"))
+    return merged(marks, World.CHANNELS)
+
+
+def _sweeps(cycle: Cycle, ego: ChannelFrame, channels: Sequence[str]) -> list[Mark]:
+    """Objects of any channel that the plan of `ego` and their prediction bring together."""
+    plan = ego.plan[np.isfinite(ego.plan).all(axis=1)]
+    plan_t = np.concatenate([[0.0], plan[:, 2]])
+    plan_xy = np.vstack([ego.ego[:2], plan[:, :2]])
+    marks = []
+    for b, frame in enumerate(cycle.frames):
+        if frame is None or len(frame.objects) == 0:
+            continue
+        times = np.arange(0.0, min(SWEEP_TIME, plan_t[-1]) + 1e-9, SWEEP_STEP)
+        whole = _along(times, plan_t, plan_xy)
+        ego_reach = _radius(ego.ego_polygon) + _stride(whole)
+        for i, state in enumerate(frame.objects):
+            if not np.isfinite(state).all():
+                continue
+            said = np.isfinite(frame.predictions[i]).all(
+                axis=1
+            )  # an object's own end may be earlier
+            p_t = np.concatenate([[0.0], frame.prediction_t[said]])
+            n = int(np.searchsorted(times, p_t[-1] + 1e-9, side="right"))
+            theirs = _along(times[:n], p_t, np.vstack([state[:2], frame.predictions[i, said]]))
+            mine = whole[:n]
+            shape = frame.polygons[i, : frame.polygon_size[i]]
+            reach = ego_reach + _radius(shape) + _stride(theirs)
+            near = np.flatnonzero(np.hypot(*(mine - theirs).T) < reach)
+            if near.size == 0:
+                continue
+            if _meet(
+                _Sweep.of(ego.ego_polygon, ego.ego, mine), _Sweep.of(shape, state, theirs), near
+            ):
+                offset = state[:2] - ego.ego[:2]
+                behind = offset @ [np.cos(ego.ego[2]), np.sin(ego.ego[2])] < 0.0
+                hazard = HazardType.EGO_TAILGATED if behind else HazardType.EGO_TAILGATING
+                marks.append(Mark(hazard, cycle.t, _object_name(channels[b], frame, i)))
+    return marks
+
+
+def _object_name(channel: str, frame: ChannelFrame, i: int) -> str:
+    return f"{channel} {int(frame.ids[i])}" if frame.ids[i] >= 0 else ""
+
+
+def _along(times: Floats, path_t: Floats, path: Floats) -> Floats:
+    return np.column_stack([np.interp(times, path_t, path[:, k]) for k in (0, 1)])
+
+
+def _stride(path: Floats) -> float:
+    """Longest step of a path, m."""
+    return float(np.hypot(*(path[1:] - path[:-1]).T).max(initial=0.0))
+
+
+class _Sweep(NamedTuple):
+    """A footprint along a path of n steps."""
+
+    corners: Floats  # (n, vertices, 2)
+    moves: Floats  # (n, 2) m to the next step; none after the last
+
+    @classmethod
+    def of(cls, shape: Floats, state: Floats, path: Floats) -> _Sweep:
+        """It turns into the direction of motion; where it hardly moves it keeps its heading."""
+        points = shape[np.isfinite(shape).all(axis=1)]
+        if len(points) == 0:
+            points = np.zeros((1, 2))
+        moves = np.diff(path, axis=0, append=path[-1:])
+        turns = moves.copy()
+        if len(path) > 1:
+            turns[-1] = turns[-2]
+        heading = np.where(np.hypot(*turns.T) > 0.1, np.arctan2(turns[:, 1], turns[:, 0]), state[2])
+        heading = np.where(np.cos(heading - state[2]) < 0.0, heading + np.pi, heading)  # in reverse
+        c, s = np.cos(heading)[:, None], np.sin(heading)[:, None]
+        x = path[:, :1] + c * points[:, 0] - s * points[:, 1]
+        y = path[:, 1:] + s * points[:, 0] + c * points[:, 1]
+        return cls(np.stack([x, y], axis=2), moves)
+
+    def between(self, steps: NDArray[np.int64]) -> NDArray[np.object_]:
+        """(m,) hulls of the footprint at each of `steps` together with the step after it."""
+        after = np.minimum(steps + 1, len(self.corners) - 1)
+        return _hulls(np.concatenate([self.corners[steps], self.corners[after]], axis=1))
+
+    def at(self, steps: NDArray[np.int64], share: float) -> NDArray[np.object_]:
+        """(m,) footprints when a share of the way to the next step is done."""
+        return _hulls(self.corners[steps] + share * self.moves[steps][:, None])
+
+
+def _hulls(corners: Floats) -> NDArray[np.object_]:
+    owner = np.repeat(np.arange(len(corners)), corners.shape[1])
+    hulls: NDArray[np.object_] = shapely.convex_hull(
+        shapely.multipoints(corners.reshape(-1, 2), indices=owner)
+    )
+    return hulls
+
+
+def _meet(mine: _Sweep, theirs: _Sweep, near: NDArray[np.int64]) -> bool:
+    """Whether two footprints overlap at any time within the steps `near`."""
+    steps = near[shapely.intersects(mine.between(near), theirs.between(near))]
+    return steps.size > 0 and any(
+        bool(shapely.intersects(mine.at(steps, share), theirs.at(steps, share)).any())
+        for share in np.linspace(0.0, 1.0, SUBSTEPS + 1)
+    )
+
+
+def _radius(polygon: Floats) -> float:
+    return float(np.nan_to_num(np.hypot(*polygon.T)).max(initial=0.0))

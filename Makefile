@@ -16,9 +16,10 @@ test: $(VENV)/.tested-with
 	$(BIN)/python -m pytest -n 2 $(TEST_ARGS)
 
 check: $(VENV)/.checked-with
-	$(BIN)/ruff format --check src tests
-	$(BIN)/ruff check src tests
+	$(BIN)/ruff format --check src tests tools
+	$(BIN)/ruff check src tests tools
 	$(BIN)/mypy
+	$(BIN)/python tools/kernel_lint.py
 	$(BIN)/lint-imports
 
 wheel-check: $(BIN)/python

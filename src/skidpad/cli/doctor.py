@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.table import Table
 
 import skidpad
-from skidpad.core.jit import kernel_source_hash
+from skidpad.core.jit import kernel_cache
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,7 +45,7 @@ def doctor() -> None:
     )
     for name in CORE:
         console.print(f"  {name} {metadata.version(name)}")
-    console.print(f"  compiled kernels: set {kernel_source_hash()}")
+    console.print(f"  compiled kernels: in {kernel_cache()}")
     table = Table("extra", "installed", "gives", "install", box=None, pad_edge=False)
     for extra in EXTRAS:
         there = find_spec(extra.module) is not None

@@ -1,34 +1,57 @@
 """The one decorator for compiled kernels, and where their machine code is kept.
 
 Numba's cache notices an edit of the file that holds a kernel, not of the files whose kernels it
-calls. So the cache folder is named after a hash of every source file that defines kernels: any
-edit gives a fresh folder, and a stale callee can never be run (decision X-10).
+calls or whose constants it reads. So the machine code of a file is kept in a folder named after a
+hash of that file, of what it imports from here, and so on through files that define kernels: an
+edit gives fresh folders to all who may call the edited kernel, a stale callee can never be run
+(decision X-10), and nothing else is compiled again.
 """
 
 from __future__ import annotations
 
 import hashlib
 import os
+import re
 import shutil
 import sys
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numba
+
 F = TypeVar("F", bound=Callable[..., Any])
 PACKAGE = Path(__file__).resolve().parents[1]
-KEPT_CACHES = 4
+KEPT_CACHES = 4  # of one file
+IMPORT = re.compile(r"^ *from (\w+(?:\.\w+)*) import (\([^)]*\)|[^\n]*)", re.MULTILINE)
 
 
-def kernel_source_hash(root: Path = PACKAGE) -> str:
-    """Hash of the text of all files below `root` that define kernels."""
+def kernel_hash(file: Path, root: Path = PACKAGE) -> str:
+    """Hash of the text of `file` and of all files below `root` that its kernels may depend on."""
+    reached, waiting = {file}, [file]
+    while waiting:
+        new = imported(waiting.pop(), root) - reached
+        reached |= new
+        waiting += [path for path in new if b"@kernel" in path.read_bytes()]
     digest = hashlib.sha256()
-    for path in sorted(root.rglob("*.py")):
-        text = path.read_bytes()
-        if b"@kernel" in text:
-            digest.update(str(path.relative_to(root)).encode())
-            digest.update(text)
+    for path in sorted(reached):
+        digest.update(str(path.relative_to(root)).encode())
+        digest.update(path.read_bytes())
     return digest.hexdigest()[:16]
+
+
+@cache
+def imported(file: Path, root: Path) -> frozenset[Path]:
+    """The files below `root` that `file` imports from."""
+    found = set()
+    for module, names in IMPORT.findall(file.read_text(encoding="utf-8")):
+        package = root.parent.joinpath(*module.split("."))
+        for path in (package, *(package / name for name in re.findall(r"\w+", names))):
+            source = path.with_suffix(".py")
+            if source.is_relative_to(root) and source.is_file():
+                found.add(source)
+    return frozenset(found)
 
 
 def user_cache() -> Path:
@@ -40,11 +63,16 @@ def user_cache() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "skidpad"
 
 
-def _choose_cache() -> None:
-    if "NUMBA_CACHE_DIR" in os.environ:  # numba's own variable: the user's word is final
-        return
-    parent = user_cache() / "kernels"
-    folder = parent / kernel_source_hash()
+def kernel_cache() -> Path:
+    """Where machine code is kept: one folder per file, in it one per hash."""
+    return user_cache() / "kernels"
+
+
+@cache
+def _cache_of(file: Path) -> str:
+    """The folder for the kernels of `file`; those of its oldest texts are removed."""
+    parent = kernel_cache() / ".".join(file.relative_to(PACKAGE).with_suffix("").parts)
+    folder = parent / kernel_hash(file)
     try:
         folder.mkdir(parents=True, exist_ok=True)
         os.utime(folder)
@@ -52,15 +80,8 @@ def _choose_cache() -> None:
         for old in by_age[KEPT_CACHES:]:
             shutil.rmtree(old, ignore_errors=True)
     except OSError:  # a read-only home: compile in memory, slower but right
-        return
-    os.environ["NUMBA_CACHE_DIR"] = str(folder)
-
-
-_choose_cache()
-
-import numba
-
-numba.config.CACHE_DIR = os.environ.get("NUMBA_CACHE_DIR", numba.config.CACHE_DIR)
+        return ""
+    return str(folder)
 
 
 def kernel(function: F) -> F:
@@ -68,4 +89,7 @@ def kernel(function: F) -> F:
 
     Fast-math would let results differ between processors (decision X-2), so no kernel has it.
     """
+    if "NUMBA_CACHE_DIR" not in os.environ:  # numba's own variable: the user's word is final
+        file = Path(function.__code__.co_filename).resolve()
+        numba.config.CACHE_DIR = _cache_of(file) if file.is_relative_to(PACKAGE) else ""
     return numba.njit(cache=True, nogil=True, error_model="numpy")(function)  # type: ignore[no-any-return]

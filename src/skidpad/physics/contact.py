@@ -22,6 +22,7 @@ from skidpad.physics.segments import Segments, candidates
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
+NEAR = 64  # segments in reach of one actor at most
 PASSES = 2  # over all contacts, so that a car squeezed between two feels both
 Z_OVERLAP = 0.2  # m of shared height below which bodies pass over each other
 DEPTH_KEPT = 0.01  # m of overlap left standing, so that resting contacts do not flicker
@@ -69,12 +70,15 @@ class Contacts(NamedTuple):
     depth: Floats  # m of overlap found
     impulse: Floats  # N s along the normal, >= 0
     v_closing: Floats  # m/s before the impulse, positive when closing
+    near: Ints  # (NEAR,) scratch: segments in reach of one actor
+    corners: Floats  # (2, 12, 2) scratch of `Boxes`
 
     @classmethod
     def room(cls, capacity: int = 512) -> Contacts:
         """Empty arrays for up to `capacity` contacts."""
         ints = [np.full(capacity, -1, dtype=np.int64) for _ in range(3)]
-        return cls._make([*ints, *np.zeros((7, capacity))])
+        near, corners = np.empty(NEAR, dtype=np.int64), np.empty((2, 12, 2))
+        return cls._make([*ints, *np.zeros((7, capacity)), near, corners])
 
 
 def bodies(
@@ -196,9 +200,8 @@ def find_contacts(
     states: ActorStates, b: Bodies, segments: Segments, dt: float, out: Contacts
 ) -> int:
     """All touching pairs, in order of i, then j, then segment; returns their number."""
-    boxes = Boxes(states.x, states.y, states.yaw, b.half_length, b.half_width)
+    boxes = Boxes(states.x, states.y, states.yaw, b.half_length, b.half_width, out.corners)
     n = states.x.shape[0]
-    near = np.empty(64, dtype=np.int64)
     count = 0
     for i in range(n):
         if not states.present[i]:
@@ -217,8 +220,8 @@ def find_contacts(
             count = _record(out, count, i, j, -1, box_box(boxes, i, j))
         if b.inverse_mass[i] <= 0.0:
             continue
-        for q in range(candidates(segments, states.x[i], states.y[i], reach, near)):
-            m = near[q]
+        for q in range(candidates(segments, states.x[i], states.y[i], reach, out.near)):
+            m = out.near[q]
             if min(top, segments.z_high[m]) - max(states.z[i], segments.z_low[m]) < Z_OVERLAP:
                 continue
             back = (states.x[i] - states.vx[i] * dt, states.y[i] - states.vy[i] * dt)

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from math import exp
+from math import exp, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -224,7 +224,7 @@ def fill_mu(
 ) -> None:
     """mu of all four tyres of n vehicles by their speeds. vx, vy (n,); out (n, 4)."""
     for i in range(vx.shape[0]):
-        out[i, :] = mu_at(params, np.sqrt(vx[i] * vx[i] + vy[i] * vy[i]))
+        out[i, :] = mu_at(params, sqrt(vx[i] * vx[i] + vy[i] * vy[i]))
 
 
 def friction_ratio(weather: Weather, model: GripModel, v: float = 0.0) -> float:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, sin, sqrt
+from math import cos, inf, sin, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -22,6 +22,7 @@ class Boxes(NamedTuple):
     yaw: Floats
     half_length: Floats
     half_width: Floats
+    corners: Floats  # (2, 12, 2) scratch for the clipped polygons
 
 
 @kernel
@@ -47,7 +48,7 @@ def _middle(boxes: Boxes, i: int, j: int) -> tuple[float, float]:
     """Mean corner of the overlap of boxes i and j, in the world."""
     c, s = cos(boxes.yaw[j]), sin(boxes.yaw[j])
     ci, si = cos(boxes.yaw[i]), sin(boxes.yaw[i])
-    here, there = np.empty((12, 2)), np.empty((12, 2))
+    here, there = boxes.corners[0], boxes.corners[1]
     for k in range(4):
         along = boxes.half_length[i] if k in (0, 3) else -boxes.half_length[i]
         across = boxes.half_width[i] if k < 2 else -boxes.half_width[i]
@@ -79,7 +80,7 @@ def _radius(boxes: Boxes, i: int, nx: float, ny: float) -> float:
 def box_box(boxes: Boxes, i: int, j: int) -> Overlap:
     """Overlap of boxes i and j by separating axes; the normal pushes i away from j."""
     dx, dy = boxes.x[i] - boxes.x[j], boxes.y[i] - boxes.y[j]
-    depth, nx, ny = np.inf, 0.0, 0.0
+    depth, nx, ny = inf, 0.0, 0.0
     for k in range(4):
         yaw = boxes.yaw[i] if k < 2 else boxes.yaw[j]
         ux, uy = (cos(yaw), sin(yaw)) if k % 2 == 0 else (-sin(yaw), cos(yaw))
@@ -95,7 +96,9 @@ def box_box(boxes: Boxes, i: int, j: int) -> Overlap:
 
 
 @kernel
-def _clipped_line(boxes: Boxes, i: int, line: tuple[float, float, float, float]) -> Floats:
+def _clipped_line(
+    boxes: Boxes, i: int, line: tuple[float, float, float, float]
+) -> tuple[float, float]:
     """Shares of the line's length where it enters and leaves box i; enter > leave: it misses."""
     c, s = cos(boxes.yaw[i]), sin(boxes.yaw[i])
     ax, ay = line[0] - boxes.x[i], line[1] - boxes.y[i]
@@ -103,17 +106,17 @@ def _clipped_line(boxes: Boxes, i: int, line: tuple[float, float, float, float])
     start = (ax * c + ay * s, ay * c - ax * s)
     along = (dx * c + dy * s, dy * c - dx * s)
     half = (boxes.half_length[i], boxes.half_width[i])
-    span = np.array([0.0, 1.0])
+    enter, leave = 0.0, 1.0
     for axis in range(2):
         if abs(along[axis]) < 1e-12:
             if abs(start[axis]) > half[axis]:
-                span[0], span[1] = 1.0, 0.0
+                enter, leave = 1.0, 0.0
             continue
         t0 = (-half[axis] - start[axis]) / along[axis]
         t1 = (half[axis] - start[axis]) / along[axis]
-        span[0] = max(span[0], min(t0, t1))
-        span[1] = min(span[1], max(t0, t1))
-    return span
+        enter = max(enter, min(t0, t1))
+        leave = min(leave, max(t0, t1))
+    return enter, leave
 
 
 @kernel
@@ -125,11 +128,11 @@ def box_segment(
     back: where the box's centre was before the step. It tells the side of the line that the box
     came from, so that a fast car is thrown back and not drawn through a guardrail.
     """
-    span = _clipped_line(boxes, i, line)
-    if span[0] > span[1]:
+    enter, leave = _clipped_line(boxes, i, line)
+    if enter > leave:
         return False, 0.0, 0.0, 0.0, 0.0, 0.0
     dx, dy = line[2] - line[0], line[3] - line[1]
-    middle = 0.5 * (span[0] + span[1])
+    middle = 0.5 * (enter + leave)
     x, y = line[0] + middle * dx, line[1] + middle * dy
     length = sqrt(dx * dx + dy * dy)
     nx, ny = -dy / length, dx / length

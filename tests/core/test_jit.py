@@ -1,0 +1,79 @@
+"""Where machine code is kept: an edit of a callee reaches its callers, and nobody else."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from skidpad.core.jit import imported, kernel_hash
+
+FILES = {
+    "low": "from house.jit import kernel\n@kernel\ndef f(x): return x",
+    "middle": "from house.low import (\n    f,\n)\n@kernel\ndef g(x): return f(x)",
+    "high": "from house import middle\n@kernel\ndef h(x): return middle.g(x)",
+    "other": "import numpy\n@kernel\ndef k(x): return x",
+    "constants": "G = 9.81",
+    "reader": "from house.constants import G\n@kernel\ndef r(x): return G * x",
+}
+
+
+@pytest.fixture
+def house(tmp_path: Path) -> Path:
+    root = tmp_path / "house"
+    root.mkdir()
+    for name, text in FILES.items():
+        (root / f"{name}.py").write_text(text)
+    return root
+
+
+def hashes(root: Path) -> dict[str, str]:
+    imported.cache_clear()
+    return {name: kernel_hash(root / f"{name}.py", root) for name in FILES}
+
+
+@pytest.mark.parametrize(
+    ("edited", "fresh"),
+    [
+        ("low", {"low", "middle", "high"}),
+        ("constants", {"constants", "reader"}),
+        ("middle", {"middle", "high"}),
+        ("high", {"high"}),
+        ("other", {"other"}),
+    ],
+)
+def test_an_edit_reaches_those_who_may_call_it(house: Path, edited: str, fresh: set[str]) -> None:
+    before = hashes(house)
+    (house / f"{edited}.py").write_text(FILES[edited] + "\n# edited")
+    after = hashes(house)
+    assert {name for name in FILES if before[name] != after[name]} == fresh
+
+
+def test_an_edited_callee_is_compiled_into_its_caller(tmp_path: Path) -> None:
+    """The real decorator over two files, in processes of their own."""
+    root = tmp_path / "skidpad"
+    (root / "core").mkdir(parents=True)
+    for package in (root, root / "core"):
+        (package / "__init__.py").touch()
+    source = Path(sys.modules["skidpad.core.jit"].__file__ or "")
+    (root / "core" / "jit.py").write_bytes(source.read_bytes())
+    head = "from skidpad.core.jit import kernel\n"
+    caller = head + "from skidpad.callee import f\n@kernel\ndef g(x):\n    return f(x)\n"
+    (root / "caller.py").write_text(caller)
+
+    def answer(body: str) -> str:
+        (root / "callee.py").write_text(f"{head}@kernel\ndef f(x):\n    return {body}\n")
+        code = "from skidpad.caller import g; print(g(2.0), sum(g.stats.cache_hits.values()))"
+        env = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
+        env |= {"PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}
+        done = subprocess.run(
+            [sys.executable, "-c", code], env=env, capture_output=True, text=True, check=True
+        )
+        return done.stdout.strip()
+
+    assert answer("x + 1.0") == "3.0 0"
+    assert answer("x + 1.0") == "3.0 1"
+    assert answer("x + 5.0") == "7.0 0"

@@ -96,7 +96,7 @@ class ArcMap:
             int(self.lanes.road[lane]), int(self.lanes.lane_id[lane]), offset,
         )  # fmt: skip
 
-    def project(self, x, y, z, hint=-1, driving=True):
+    def project(self, x, y, z, driving=True):
         self.queries += 1
         if abs(z) > 4.0:
             return None

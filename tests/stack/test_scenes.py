@@ -116,7 +116,7 @@ class Centred(ArcMap):
     def _point(self, s, left):
         return super()._point(s, left - LANE_WIDTH)
 
-    def project(self, x, y, z, hint=-1, driving=True):
+    def project(self, x, y, z, driving=True):
         k = self.curvature
         heading = 0.0 if k == 0.0 else float(np.arctan2(k * x, 1.0 - k * y))
         s = x if k == 0.0 else heading / k

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, mps_from_kmh
 from skidpad.core.vocabulary import GripModel
@@ -15,7 +16,6 @@ from skidpad.core.weather import Weather
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import MU_REF, GripParams, grip_params, mu_at
 from skidpad.physics.types import EGO_TYPE, VehicleType, vehicle_type
-from skidpad.physics.vehicle import G
 
 SPEEDS_KMH = (50.0, 80.0, 100.0)
 TICK = 0.01  # s

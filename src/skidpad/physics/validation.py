@@ -12,13 +12,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.constants import G
 from skidpad.core.errors import MissingExtra
 from skidpad.core.geometry import Pose, kmh_from_mps, mps_from_kmh
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import GripParams
 from skidpad.physics.stopping import stops
 from skidpad.physics.types import EGO_TYPE, Drive, VehicleType, vehicle_type
-from skidpad.physics.vehicle import G, steer_share
+from skidpad.physics.vehicle import steer_share
 
 Floats = NDArray[np.float64]
 

@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.constants import G
 from skidpad.core.jit import kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.types import VehicleType
@@ -24,7 +25,6 @@ from skidpad.physics.tyre import V_SLIP_MIN, brush_secant
 
 Floats = NDArray[np.float64]
 
-G = 9.80665  # m/s^2, standard gravity, 3rd CGPM (1901)
 AIR_DENSITY = 1.225  # kg/m^3, ISO 2533 at sea level
 LOAD_TIME = 0.08  # s, lag of load transfer: body on its springs, heave and roll near 2 Hz
 STEER_TIME = 0.05  # s, lag of the steering actuator

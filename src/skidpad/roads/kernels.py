@@ -112,13 +112,12 @@ def project_kernel(
     x: float,
     y: float,
     z: float,
-    hint: int = -1,  # noqa: ARG001  the grid finds the lane at once
     driving: bool = True,
 ) -> tuple[int, float, float]:
     """Nearest lane centre to a point: (lane, s, left offset); lane -1 beyond 20 m.
 
-    Nearest in space with heights counted double (decision M-12). hint: a lane; the answer does not
-    depend on it. driving: only driving lanes and ramps.
+    Nearest in space with heights counted double (decision M-12). driving: only driving lanes and
+    ramps.
     """
     if not (abs(x) < inf and abs(y) < inf and abs(z) < inf):
         return -1, nan, nan
@@ -229,10 +228,10 @@ def sample_kernel(
 
 @kernel
 def project_point(
-    a: LaneArrays, x: float, y: float, z: float, hint: int, driving: bool
+    a: LaneArrays, x: float, y: float, z: float, driving: bool
 ) -> tuple[int, float, float, float, float, float, float, float, float]:
     """`project_kernel` and what the facade tells about the place: one call from Python."""
-    lane, s, offset = project_kernel(a, x, y, z, hint, driving)
+    lane, s, offset = project_kernel(a, x, y, z, driving)
     if lane < 0:
         return -1, nan, nan, nan, nan, nan, nan, nan, nan
     px, py, pz, heading, curvature, width, _, _, _ = sample_kernel(a, lane, s)

@@ -73,15 +73,10 @@ class RoadMap:
         self.arrays = lane_arrays(baked)
         self._names = list(zip(self.lanes.road.tolist(), self.lanes.lane_id.tolist(), strict=True))
 
-    def project(
-        self, x: float, y: float, z: float, hint: int = -1, driving: bool = True
-    ) -> LanePoint | None:
-        """Nearest (driving) lane centre at about this height; None beyond 20 m.
-
-        hint: a lane index near which to search first; the answer does not depend on it.
-        """
+    def project(self, x: float, y: float, z: float, driving: bool = True) -> LanePoint | None:
+        """Nearest (driving) lane centre at about this height; None beyond 20 m."""
         return self._point(
-            *kernels.project_point(self.arrays, float(x), float(y), float(z), hint, driving)
+            *kernels.project_point(self.arrays, float(x), float(y), float(z), driving)
         )
 
     def _point(self, lane: int, s: float, offset: float, *place: float) -> LanePoint | None:

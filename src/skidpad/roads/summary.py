@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from skidpad.core.constants import G
 from skidpad.roads.lanes import LaneKind, SignalKind
 from skidpad.roads.queries import RoadMap
 
-G = 9.80665  # m/s^2, standard gravity, 3rd CGPM (1901)
 BEND_RADIUS = 300.0  # m; 90 km/h asks for 0.21 g there
 
 

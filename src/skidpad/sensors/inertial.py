@@ -8,12 +8,11 @@ from math import cos, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.constants import G
 from skidpad.core.frames import GnssFix, ImuReading
 from skidpad.core.geodesy import geolocation
 from skidpad.core.geometry import Pose
 from skidpad.core.states import ActorStates
-
-G = 9.80665  # m/s^2, standard gravity, 3rd CGPM (1901)
 
 
 def map_origin(geo_reference: str) -> tuple[float, float]:

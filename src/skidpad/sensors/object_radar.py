@@ -115,7 +115,7 @@ def cast_radar(
 def road_slope(lanes: LaneArrays, x: float, y: float, z: float) -> Floats:
     """(2,) dz/dx and dz/dy of the road at a place; level where there is no lane."""
     slope = np.zeros(2)
-    lane, s, _ = project_kernel(lanes, x, y, z, -1, True)
+    lane, s, _ = project_kernel(lanes, x, y, z, True)
     if lane >= 0:
         _, _, _, heading, _, _, grade, bank, _ = sample_kernel(lanes, lane, s)
         tilt = np.tan(bank)

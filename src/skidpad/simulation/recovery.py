@@ -115,7 +115,6 @@ class Supervisor:
         self.recoveries = 0
         self.contacts_seen = 0  # index into the collision history (A-193)
         self.reason = RelocationReason.COLLISION
-        self.lane = -1
         self.truth: WorldTruth | None = None
 
     def observe(self, truth: WorldTruth) -> Supervision:
@@ -165,10 +164,7 @@ class Supervisor:
 
     def _place(self, states: ActorStates) -> LanePoint | None:
         x, y, z = float(states.x[0]), float(states.y[0]), float(states.z[0])
-        place = self.map.project(x, y, z, self.lane)
-        if place is not None:
-            self.lane = place.lane
-        return place
+        return self.map.project(x, y, z)
 
     def _reverse(self, states: ActorStates) -> VehicleCommand:
         """Backwards towards the lane (A-182). The published cross product is CARLA-handed: in

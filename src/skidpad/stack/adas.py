@@ -128,7 +128,6 @@ class AdasStack:
         self.hierarchy.reset()
         self.lock.reset()
         self.smoothing.reset()
-        self.tracker.hint = -1
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
         """Sense, decide, actuate (A-010)."""

@@ -45,7 +45,7 @@ POINT_SENSORS = (GNSS, IMU, SPEEDOMETER, "sensor.other.speedometer")
 LIDAR = "sensor.lidar.ray_cast"
 KINDS = (*CAMERAS, LIDAR, *POINT_SENSORS)
 MARK = "agent/"  # before an agent's sensor ids: ours may have the same
-G = 9.81  # m/s^2, what CARLA's accelerometer feels at rest
+G_CARLA = 9.81  # m/s^2, what CARLA's accelerometer feels at rest
 DEPTH_FAR = 1000.0  # m, full scale of CARLA's depth images
 DEPTH_STEPS = 256**3 - 1
 ROUTE_LENGTH, ROUTE_STEP = 500.0, 5.0  # m
@@ -157,7 +157,7 @@ class AgentStack:
             place = _gps(ego.pose)
             return np.array([place["lat"], place["lon"], place["z"]])
         if kind == IMU:
-            ax, ay, az = vector_from_carla(ego.ax, ego.ay, G)
+            ax, ay, az = vector_from_carla(ego.ax, ego.ay, G_CARLA)
             wx, wy, wz = turn_from_carla(0.0, 0.0, ego.yaw_rate)
             return np.array([ax, ay, az, wx, wy, wz, (pi / 2.0 - ego.pose.yaw) % tau])
         if kind in CAMERAS:

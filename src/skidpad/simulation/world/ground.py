@@ -91,7 +91,7 @@ def settle(lanes: LaneArrays, rows: Rows, noise: float, driving: bool, tick: int
         place.speed = states.vx[i] * cos(yaw) + states.vy[i] * sin(yaw)
         lane, s, offset = still_on_lane(lanes, place.lane, place.sample, x, y, states.z[i])
         if lane < 0:
-            lane, s, offset = project_kernel(lanes, x, y, states.z[i], place.lane, driving)
+            lane, s, offset = project_kernel(lanes, x, y, states.z[i], driving)
         place.lane = lane
         if lane < 0:
             continue

@@ -43,7 +43,7 @@ def predict(
             out[i, k, 0], out[i, k, 1] = x + vx * times[k], y + vy * times[k]
         if not along_lanes or v == 0.0 or labels[i] == PERSON:
             continue
-        lane, s, offset, _, _, _, heading, _, _ = project_point(lanes, x, y, z, -1, True)
+        lane, s, offset, _, _, _, heading, _, _ = project_point(lanes, x, y, z, True)
         if lane < 0 or abs(offset) > OFFSET_MAX:
             continue
         if vx * cos(heading) + vy * sin(heading) < ALIGNED * v:

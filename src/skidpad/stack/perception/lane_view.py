@@ -86,19 +86,13 @@ class LaneTracker:
 
     def __init__(self, map: RoadMap, route: RouteRule) -> None:
         self.map, self.route = map, route
-        self.reset()
-
-    def reset(self) -> None:
-        """Forget the place and the traced highway."""
-        self.hint = -1
         self.highway: frozenset[int] | None = None
 
     def update(self, pose: Pose) -> LaneView:
         """The view from `pose` (world frame, ego's origin)."""
-        point = self.map.project(pose.x, pose.y, pose.z, self.hint)
+        point = self.map.project(pose.x, pose.y, pose.z)
         if point is None:
             return LaneView(None, None, 0.0, 0.0, self.highway or frozenset())
-        self.hint = point.lane
         if self.highway is None:
             self.highway = self.map.traced_roads(point)
         reference = self.route.reference(self.map, point, self.highway)

@@ -106,7 +106,7 @@ class LaneMatch:
         bearing = pose.yaw + azimuth
         x = pose.x + MOUNT * c + range * cos(bearing)
         y = pose.y + MOUNT * s + range * sin(bearing)
-        target = self.map.project(x, y, pose.z, view.ego.lane)
+        target = self.map.project(x, y, pose.z)
         if target is None:
             return False
         target = self._onto_highway(target, view.highway)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidpad.physics.vehicle import G
+from skidpad.core.constants import G
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.ackermann import (
     AckermannDriver,

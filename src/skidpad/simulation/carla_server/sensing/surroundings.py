@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from skidpad.core.constants import G
 from skidpad.core.geometry import Pose
 from skidpad.core.states import ActorStates
 from skidpad.core.states import ActorTable as Bodies
 from skidpad.core.weather import Weather
-from skidpad.physics.vehicle import G
 from skidpad.sensors.lighting import lighting
 from skidpad.sensors.live_scene import LiveScene
 from skidpad.sensors.shading import Shading

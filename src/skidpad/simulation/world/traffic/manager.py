@@ -10,6 +10,7 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.constants import G
 from skidpad.core.geometry import Pose, mps_from_kmh
 from skidpad.core.randomness import stream, stream_key
 from skidpad.core.setup import TrafficSetup
@@ -28,7 +29,6 @@ from skidpad.simulation.world.traffic.priority import bake_priority
 from skidpad.simulation.world.traffic.state import TRAIT, View, drivers
 from skidpad.simulation.world.traffic.variety import vary
 
-G = 9.80665  # m/s^2
 KERB = 0.5  # m beside the road from which a pedestrian in motion counts as on the zebra
 AIR_DENSITY = 1.204  # kg/m^3 at 20 C
 STUCK_TIME = 10.0  # s, decision M-7

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from math import atan, cos, sin
 
+from skidpad.core.constants import G
 from skidpad.core.jit import kernel
 from skidpad.physics.vehicle import steer_share
 from skidpad.simulation.world.traffic.path import PATH
 from skidpad.simulation.world.traffic.state import CHANGE_TIME, Drivers, View
 
-G = 9.80665  # m/s^2
 OMEGA, ZETA = 1.0, 0.9  # rad/s and damping of the lateral control: half the yaw response's
 PREVIEW_TIME = 0.25  # s by which the curvature is anticipated: steering and yaw lag
 V_LATERAL_MIN = 4.0  # m/s, keeps gains finite at walking speed

@@ -27,13 +27,12 @@ from skidpad.core.frames import SensorFrame
 from skidpad.core.run import ARBITER, RunSpec
 from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
-from skidpad.core.vocabulary import ActorKind
+from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind
 from skidpad.evidence.channels.risk import safety_scores
 from skidpad.recording.channel_drives import DriveOutcome
 from skidpad.recording.channels import ChannelWriter
 from skidpad.sensors.channel_presets import senses_of
 from skidpad.sensors.channel_suite import CYCLE, ChannelSuite
-from skidpad.sensors.objects import LABELS
 from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Choice, Reason
 from skidpad.stack.channels.channel import Channel
 from skidpad.stack.channels.settings import settings_of
@@ -43,7 +42,7 @@ WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
 TRUTH_REACH = 120.0  # m around the ego within which the true world is recorded
 MINIMAL_RISK_BRAKE = 0.4  # of full brake, about 4 m/s^2 (UN R157 5.1.6: at most 4 m/s^2)
 NO_REPORT = StackReport()
-LABEL_OF = np.array([LABELS[kind] for kind in ActorKind], dtype=np.int64)
+LABEL_OF = np.array([LABEL_OF_KIND[kind] for kind in ActorKind], dtype=np.int64)
 
 
 class Crew:

@@ -95,14 +95,13 @@ def segment_of(spec: RunSpec) -> Segment:
 def car_model() -> CarModel:
     """What channels know about the ego."""
     t = vehicle_type(EGO_TYPE)
-    brake = 2.0 * (t.brake_torque_front + t.brake_torque_rear)
     return CarModel(
         length=t.length,
         width=t.width,
         wheelbase=t.wheelbase,
         steer_max=t.steer_max,
-        a_drive=t.force_max / t.mass,
-        a_brake=brake / (t.wheel_radius * t.mass),
+        a_drive=t.a_drive,
+        a_brake=t.a_brake,
     )
 
 

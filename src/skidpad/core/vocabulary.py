@@ -166,3 +166,16 @@ class SensorLevel(str, Enum):
 
     PIXELS = "pixels"
     OBJECTS = "objects"
+
+
+# Vans count as cars in semantic images, as the published stack looks for car, truck and bus.
+LABEL_OF_KIND = {
+    ActorKind.CAR: SemanticClass.CAR,
+    ActorKind.VAN: SemanticClass.CAR,
+    ActorKind.TRUCK: SemanticClass.TRUCK,
+    ActorKind.BUS: SemanticClass.BUS,
+    ActorKind.MOTORCYCLE: SemanticClass.MOTORCYCLE,
+    ActorKind.BICYCLE: SemanticClass.BICYCLE,
+    ActorKind.PEDESTRIAN: SemanticClass.PEDESTRIAN,
+    ActorKind.PROP: SemanticClass.DYNAMIC,
+}

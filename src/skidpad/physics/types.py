@@ -9,6 +9,7 @@ from math import radians
 
 import msgspec
 
+from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError, require_choice, require_range
 from skidpad.core.vocabulary import ActorKind
 
@@ -99,6 +100,22 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     def steer_max(self) -> float:
         """Largest road-wheel angle, rad."""
         return radians(self.steer_max_deg)
+
+    @property
+    def a_brake(self) -> float:
+        """m/s^2 at full brake, before the tyres have their say."""
+        torque = 2.0 * (self.brake_torque_front + self.brake_torque_rear)
+        return torque / (self.wheel_radius * self.mass)
+
+    @property
+    def a_drive(self) -> float:
+        """m/s^2 at full throttle in the lowest gear."""
+        return self.force_max / self.mass
+
+    @property
+    def understeer(self) -> float:
+        """Steering angle per lateral acceleration beyond the wheelbase's own, rad s^2/m."""
+        return (1.0 / self.stiffness_front - 1.0 / self.stiffness_rear) / G
 
     @property
     def drive_share_front(self) -> float:

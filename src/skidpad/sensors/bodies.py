@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from skidpad.core.vocabulary import ActorKind, SemanticClass
+from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind, SemanticClass
 from skidpad.sensors.materials import Material
 from skidpad.sensors.mesh import (
     Mesh,
@@ -25,16 +25,6 @@ from skidpad.sensors.mesh import (
     patches,
 )
 
-LABEL: dict[ActorKind, SemanticClass] = {
-    ActorKind.CAR: SemanticClass.CAR,
-    ActorKind.VAN: SemanticClass.CAR,
-    ActorKind.TRUCK: SemanticClass.TRUCK,
-    ActorKind.BUS: SemanticClass.BUS,
-    ActorKind.MOTORCYCLE: SemanticClass.MOTORCYCLE,
-    ActorKind.BICYCLE: SemanticClass.BICYCLE,
-    ActorKind.PEDESTRIAN: SemanticClass.PEDESTRIAN,
-    ActorKind.PROP: SemanticClass.DYNAMIC,
-}
 WHEEL_SIDES = 10
 
 
@@ -50,7 +40,7 @@ def body_mesh(kind: ActorKind, length: float, width: float, height: float) -> Me
         ActorKind.PEDESTRIAN: _pedestrian,
         ActorKind.PROP: _prop,
     }
-    return shapes[kind](int(LABEL[kind]), length, width, height)
+    return shapes[kind](int(LABEL_OF_KIND[kind]), length, width, height)
 
 
 def _hull(label: int, stations: Sequence[tuple[float, float, float, float]], half: float) -> Mesh:

@@ -18,14 +18,13 @@ from skidpad.core.channels import ChannelView
 from skidpad.core.errors import require_range
 from skidpad.core.randomness import stream
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import ActorKind, LightState, SemanticClass
+from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind, LightState, SemanticClass
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import daylight, label_range
 from skidpad.roads.roadside import Roadside
 from skidpad.sensors.boxes import Boxes, posts_of
 from skidpad.sensors.ghosts import Ghosts, GhostSettings
 from skidpad.sensors.localisation import Localisation, LocalisationError, gauss_markov
-from skidpad.sensors.objects import LABELS
 from skidpad.sensors.sight import empty_sight, look, sees_point
 
 Floats = NDArray[np.float64]
@@ -120,7 +119,7 @@ class ChannelSuite:
     ) -> None:
         """noise: factor of the sweep."""
         self.name, self.sensing, self.table = name, sensing.scaled(noise), table
-        self._labels = np.array([LABELS[ActorKind(k)] for k in table.kind], dtype=np.int64)
+        self._labels = np.array([LABEL_OF_KIND[ActorKind(k)] for k in table.kind], dtype=np.int64)
         self._reach = _reach(self.sensing, table, weather)
         self._light_range = sensing.light_range if sensing.lights else 0.0
         self._heads = roadside.heads

@@ -20,7 +20,7 @@ from skidpad.core.frames import RadarPoints, Segments
 from skidpad.core.jit import kernel
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import ActorKind, SemanticClass
+from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import label_range
 from skidpad.roads.kernels import LaneArrays
@@ -50,17 +50,6 @@ WIDEN = 1.3  # of the horizontal view before culling: a pitched camera sees wide
 LEVEL_GAP = 1.5  # m
 LEVEL_GRADE = 0.065
 LEVEL = np.zeros(2)
-
-LABELS = {
-    ActorKind.CAR: SemanticClass.CAR,
-    ActorKind.VAN: SemanticClass.CAR,
-    ActorKind.TRUCK: SemanticClass.TRUCK,
-    ActorKind.BUS: SemanticClass.BUS,
-    ActorKind.MOTORCYCLE: SemanticClass.MOTORCYCLE,
-    ActorKind.BICYCLE: SemanticClass.BICYCLE,
-    ActorKind.PEDESTRIAN: SemanticClass.PEDESTRIAN,
-    ActorKind.PROP: SemanticClass.DYNAMIC,
-}
 
 
 class Camera(NamedTuple):
@@ -100,7 +89,7 @@ class ObjectSuite:
         self.antennas = [
             antenna_of(s, seed, dt, weather) for s in specs if isinstance(s, RadarSpec)
         ]
-        self.labels = np.array([LABELS[ActorKind(k)] for k in table.kind], dtype=np.uint8)
+        self.labels = np.array([LABEL_OF_KIND[ActorKind(k)] for k in table.kind], dtype=np.uint8)
         self.limit = SIGHT if weather is None else min(label_range(weather), SIGHT)
         self.lanes = lanes
         self.walls = walls_of(roadside)

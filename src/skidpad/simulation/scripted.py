@@ -62,12 +62,9 @@ class ActorDriver:
         t = vehicle_type(kind)
         self.type = t
         self.speed_gain, self.omega = SPEED_GAIN * skill, OMEGA * skill
-        torque = 2.0 * (t.brake_torque_front + t.brake_torque_rear)
-        self.a_brake = torque / (t.wheel_radius * t.mass)
-        self.a_drive, self.p_drive = t.force_max / t.mass, t.power / t.mass
+        self.a_drive, self.p_drive = t.a_drive, t.power / t.mass
         self.drag = 0.5 * AIR_DENSITY * t.drag_area / t.mass
         self.rolling = t.rolling_resistance * G
-        self.understeer = (1.0 / t.stiffness_front - 1.0 / t.stiffness_rear) / G
 
     def command(self, motion: Motion, demand: Demand) -> VehicleCommand:
         """Pedals and steer for the coming step."""
@@ -80,7 +77,7 @@ class ActorDriver:
         a = d.a_lateral - w * w * d.error - 2.0 * ZETA * w * d.error_rate
         most = A_LATERAL_MAX / (v * v)
         kappa = min(max(d.curvature + a / (v * v), -most), most)
-        angle = atan(self.type.wheelbase * kappa) + self.understeer * v * v * kappa
+        angle = atan(self.type.wheelbase * kappa) + self.type.understeer * v * v * kappa
         return float(min(max(angle / (self.type.steer_max * steer_share(v)), -1.0), 1.0))
 
     def _pedals(self, v: float, d: Demand) -> tuple[float, float]:
@@ -90,7 +87,7 @@ class ActorDriver:
         wanted = a + self.drag * v * v + self.rolling
         if wanted >= 0.0:
             return min(wanted / min(self.a_drive, self.p_drive / max(v, 1.0)), 1.0), 0.0
-        return 0.0, min(-wanted / self.a_brake, 1.0)
+        return 0.0, min(-wanted / self.type.a_brake, 1.0)
 
 
 def nearest_type(kind: ActorKind, length: float, width: float, height: float) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import yaml
 
-from skidpad.core.vocabulary import ActorKind, GripModel, SemanticClass
+from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind, GripModel, SemanticClass
 from skidpad.simulation.carla_server import wire
 
 DATA = Path(__file__).with_name("data") / "blueprints.yaml"
@@ -91,16 +91,7 @@ _KINDS = {
     "motorcycle": ActorKind.MOTORCYCLE,
     "bicycle": ActorKind.BICYCLE,
 }
-LABELS = {
-    ActorKind.CAR: SemanticClass.CAR,
-    ActorKind.VAN: SemanticClass.TRUCK,
-    ActorKind.TRUCK: SemanticClass.TRUCK,
-    ActorKind.BUS: SemanticClass.BUS,
-    ActorKind.MOTORCYCLE: SemanticClass.MOTORCYCLE,
-    ActorKind.BICYCLE: SemanticClass.BICYCLE,
-    ActorKind.PEDESTRIAN: SemanticClass.PEDESTRIAN,
-    ActorKind.PROP: SemanticClass.DYNAMIC,
-}
+CLASS_OF_KIND = LABEL_OF_KIND | {ActorKind.VAN: SemanticClass.TRUCK}  # as CARLA tags vans
 
 
 def _attributes(entry: dict[str, Any]) -> dict[str, Attribute]:
@@ -143,7 +134,7 @@ def _vehicle(id: str, row: list[Any], actor: dict[str, Attribute], colours: list
         attributes[attribute.id] = attribute
     kind = _KINDS[base]
     return Blueprint(
-        id, Family.VEHICLE, attributes, (length, width, height), kind, label=LABELS[kind]
+        id, Family.VEHICLE, attributes, (length, width, height), kind, label=CLASS_OF_KIND[kind]
     )
 
 

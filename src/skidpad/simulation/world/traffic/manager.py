@@ -194,13 +194,12 @@ def _traits(bodies: Sequence[VehicleType | Shape], caution: float) -> NDArray[np
     for trait, t in zip(traits, bodies, strict=True):
         if isinstance(t, Shape):
             continue
-        torque = 2.0 * (t.brake_torque_front + t.brake_torque_rear)
         trait["wheelbase"] = t.wheelbase
         trait["steer_angle"] = t.steer_max
-        trait["understeer"] = (1.0 / t.stiffness_front - 1.0 / t.stiffness_rear) / G
-        trait["a_drive"] = t.force_max / t.mass
+        trait["understeer"] = t.understeer
+        trait["a_drive"] = t.a_drive
         trait["p_drive"] = t.power / t.mass
-        trait["a_brake"] = torque / (t.wheel_radius * t.mass)
+        trait["a_brake"] = t.a_brake
         trait["drag"] = 0.5 * AIR_DENSITY * t.drag_area / t.mass
         trait["rolling"] = t.rolling_resistance * G + t.engine_drag
     return traits

@@ -8,24 +8,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
+from skidpad.core.splitmix import GOLDEN, scrambled, unit
 from skidpad.simulation.world.traffic.network import Network
 
 Ints = NDArray[np.int32]
 
 PATH = 12  # lanes remembered ahead, the present one first
 LOOKAHEAD = 250.0  # m of path that a driver knows
-UNIT = 1.0 / 2**53
+SALT = np.uint64(0xD1B54A32D192ED03)
 
 
 @kernel
 def uniform(key: np.uint64, tick: int, salt: int) -> float:
-    """A number in [0, 1) from (key, tick, salt): splitmix64 (Steele, Lea, Flood 2014)."""
-    z = np.uint64(key) + np.uint64(0x9E3779B97F4A7C15) * np.uint64(2 * tick + 1)
-    z += np.uint64(0xD1B54A32D192ED03) * np.uint64(salt)
-    z = (z ^ (z >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    z = (z ^ (z >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    z = z ^ (z >> np.uint64(31))
-    return float(z >> np.uint64(11)) * UNIT
+    """A number in [0, 1) from (key, tick, salt)."""
+    counter = np.uint64(key) + GOLDEN * np.uint64(2 * tick + 1)
+    return unit(scrambled(counter + SALT * np.uint64(salt)))
 
 
 @kernel

@@ -7,7 +7,7 @@ OUT ?= out/adas
 RUN_ARGS ?=
 TEST_ARGS ?=
 
-.PHONY: run test check wheel-check bench refs clean
+.PHONY: run test check wheel-check bench refs data figures clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next $(RUN_ARGS)
@@ -30,6 +30,14 @@ bench: $(VENV)/.installed
 
 refs: $(VENV)/.tested-with
 	$(BIN)/python -m pytest tests/references -s --rewrite-references
+
+# what tools/ writes is committed; tests compare it byte for byte
+data: $(VENV)/.tested-with
+	PYTHONPATH=tools $(BIN)/python -m mapmaker
+	$(BIN)/python tools/scenario_catalogue.py
+
+figures: $(VENV)/.tested-with
+	$(BIN)/python tools/vehicle_validation.py docs/img
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "skidpad needs Python 3.10, 3.11 or 3.12 on the PATH"; exit 2; }

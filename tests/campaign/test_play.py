@@ -13,7 +13,7 @@ from skidpad.core.run import ActorMode, AgentDriver, Scenario
 from skidpad.core.vocabulary import GripModel, Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.recording.logfiles import log_hash, read_log
-from skidpad.scenarios.generate import FOLDER
+from skidpad.scenarios.shipped import FOLDER
 
 FILE = FOLDER / "lead_slowdown.xosc"
 SHORT = scenario_run(FILE, duration=1.0)

@@ -4,8 +4,8 @@ import pytest
 
 from skidpad.campaign.cells import FIRST_SEED
 from skidpad.campaign.tuning import SEEDS, Candidate, candidates, judge
-from skidpad.scenarios.generate import SCENARIOS
-from skidpad.scenarios.variation import CUT_IN, CutIn, names, variant_parameters
+from skidpad.scenarios.shipped import NAMES, shipped
+from skidpad.scenarios.variation import CUT_IN, CutIn, variant_parameters
 
 FEW = SEEDS[:3]
 
@@ -16,13 +16,13 @@ def test_no_report_can_reach_a_tuning_seed():
 
 
 @pytest.mark.req("X-8", "B-074")
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", NAMES)
 def test_what_ships_is_one_of_the_candidates(name):
-    shipped = dict(next(s for s in SCENARIOS if s.name == name).parameters)
+    nominal = dict(shipped(name).parameters)
     if name == CUT_IN:
-        shipped |= variant_parameters(CutIn.FIXED)
+        nominal |= variant_parameters(CutIn.FIXED)
     near = [
-        all(shipped[k] == pytest.approx(v, abs=0.05) for k, v in c.values.items())
+        all(nominal[k] == pytest.approx(v, abs=0.05) for k, v in c.values.items())
         for c in candidates(name)
     ]
     assert any(near)

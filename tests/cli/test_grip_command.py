@@ -18,7 +18,7 @@ from skidpad.core.errors import ConfigError, InputError
 from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.report.grip import write_grip_report
-from skidpad.scenarios.generate import FOLDER
+from skidpad.scenarios.shipped import FOLDER
 
 SMALL = (
     "--scenarios", "lead_slowdown", "--weather", "icy_0,icy_30", "--repeats", "2", "--workers", "1",

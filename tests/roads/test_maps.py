@@ -7,9 +7,9 @@ from math import cos, hypot, pi, sin
 import numpy as np
 import pytest
 
+from mapmaker.__main__ import MAPS
 from skidpad.core.geometry import footprint, wrap_angle
 from skidpad.roads.bundled import FOLDER, bake_file, load_map
-from skidpad.roads.generate.__main__ import MAPS
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.roads.routing import shortest_route

@@ -11,16 +11,16 @@ import numpy as np
 import pytest
 from lxml import etree
 
+from scenario_catalogue import SCENARIOS, file_name, write
 from skidpad.roads.bundled import FOLDER as MAPS
-from skidpad.scenarios.generate import FOLDER, SCENARIOS, file_name, write
 from skidpad.scenarios.hazard_export import OscVersion
 from skidpad.scenarios.player import load, problems
+from skidpad.scenarios.shipped import FOLDER, NAMES
 from skidpad.scenarios.variation import (
     CUT_IN,
     CutIn,
     drawn_parameters,
     drawn_skill,
-    names,
     variant_parameters,
     variations,
 )
@@ -115,7 +115,7 @@ def test_one_other_vehicle_in_two_scenarios_and_two_in_the_third():
 
 
 @pytest.mark.req("X-8")
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", NAMES)
 def test_a_seed_draws_every_varied_parameter_from_its_own_stream(name):
     nominal = dict(next(s for s in SCENARIOS if s.name == name).parameters)
     if name == CUT_IN:

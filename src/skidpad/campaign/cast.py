@@ -32,7 +32,7 @@ from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios import player
 from skidpad.scenarios.player import Player
-from skidpad.scenarios.variation import names, scenario_file
+from skidpad.scenarios.shipped import NAMES, scenario_file
 from skidpad.sensors.overlay import Lens
 from skidpad.sensors.twelve import twelve_sensors
 from skidpad.simulation.recovery import RecoverySettings, Supervisor
@@ -165,7 +165,7 @@ def _scenario(spec: RunSpec, course: Scenario) -> Stage:
 
 def load_scenario(course: Scenario) -> player.Script:
     """The file of a course, read and checked."""
-    file = scenario_file(course.file) if course.file in names() else Path(course.file)
+    file = scenario_file(course.file) if course.file in NAMES else Path(course.file)
     return player.load(file, course.parameters, course.ego)
 
 

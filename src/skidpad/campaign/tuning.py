@@ -22,12 +22,12 @@ from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.grip.scores import npc_contact_row
 from skidpad.physics.presets import preset
+from skidpad.scenarios.shipped import NAMES
 from skidpad.scenarios.variation import (
     CUT_IN,
     CutIn,
     drawn_parameters,
     drawn_skill,
-    names,
     variant_parameters,
 )
 
@@ -120,7 +120,7 @@ def tuning_run(candidate: Candidate, seed: int) -> RunSpec:
 
 def main(scenarios: list[str]) -> None:
     """Print the rows of these scenarios, or of all."""
-    for scenario in scenarios or names():
+    for scenario in scenarios or NAMES:
         shipped = Candidate(scenario, {})
         for candidate in [*candidates(scenario), shipped]:
             row = judge(candidate, FRESH_SEEDS if candidate is shipped else SEEDS)

@@ -12,7 +12,8 @@ from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import friction_ratio
 from skidpad.physics.presets import GRIP, SNOW, find_weather, preset_groups
-from skidpad.scenarios.variation import CutIn, names
+from skidpad.scenarios.shipped import NAMES
+from skidpad.scenarios.variation import CutIn
 from skidpad.stack.settings import settings_of
 
 Choice = TypeVar("Choice", Friction, CutIn)
@@ -36,9 +37,9 @@ def _varied(ask: GripCross, run: RunSpec) -> Cross:
         raise ConfigError("--four-cells drives with and without drops: leave --overlay away")
     if (run.overlay or ask.four_cells) and run.sensors is not SensorLevel.PIXELS:
         raise ConfigError("--overlay and --four-cells draw on images: they need --sensors pixels")
-    chosen = list(names()) if ask.scenarios == "all" else _parted(ask.scenarios)
+    chosen = list(NAMES) if ask.scenarios == "all" else _parted(ask.scenarios)
     for name in chosen:
-        require_choice("scenario", name, names())
+        require_choice("scenario", name, NAMES)
     frictions = _choices("--friction", ask.friction, Friction)
     if ask.four_cells and len(frictions) != len(Friction):
         raise ConfigError("--four-cells needs both frictions")

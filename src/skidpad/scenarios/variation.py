@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 from importlib.resources import files
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
 import msgspec
 import numpy as np
 
-from skidpad.core.errors import require_choice
 from skidpad.core.randomness import stream
 from skidpad.core.setup import DT
-from skidpad.scenarios.generate import FOLDER, SCENARIOS
+from skidpad.scenarios.shipped import NAMES, shipped
 
 CUT = 2.5  # deviations
 SKILL_SPREAD = 0.15  # of the gains of scripted drivers
@@ -68,17 +66,6 @@ def variant_parameters(
 
 
 @cache
-def names() -> tuple[str, ...]:
-    """Scenarios of the catalogue."""
-    return tuple(s.name for s in SCENARIOS)
-
-
-def scenario_file(name: str) -> Path:
-    """The 1.2 file of a scenario of the catalogue."""
-    return FOLDER / f"{require_choice('scenario', name, names())}.xosc"
-
-
-@cache
 def variations() -> dict[str, dict[str, Spread]]:
     """What a seed varies, by scenario and parameter."""
     text = (files("skidpad.scenarios") / "variation.yaml").read_bytes()
@@ -95,8 +82,7 @@ def drawn_parameters(
 
     nominal: values drawn around in place of the file's.
     """
-    scenario = next(s for s in SCENARIOS if s.name == name)
-    values = dict(scenario.parameters)
+    values = dict(shipped(name).parameters)
     if name == CUT_IN:
         values |= variant_parameters(variant)
     values |= nominal
@@ -111,14 +97,13 @@ def drawn_parameters(
 
 def drawn_skill(name: str, seed: int) -> dict[str, float]:
     """Gains of the scripted drivers, by actor."""
-    scenario = next(s for s in SCENARIOS if s.name == name)
     spread = Spread(spread=SKILL_SPREAD)
     return {
         actor: spread.draw(1.0, stream(seed, "scenario", name, "driver", actor))
-        for actor in scenario.actors
+        for actor in shipped(name).actors
     }
 
 
 def described() -> dict[str, Any]:
     """Nominal parameters by scenario, for reports."""
-    return {s.name: dict(s.parameters) for s in SCENARIOS}
+    return {name: dict(shipped(name).parameters) for name in NAMES}

@@ -21,7 +21,7 @@ from skidpad.physics import types
 from skidpad.physics.presets import find_weather
 from skidpad.roads.bundled import load_map
 from skidpad.scenarios.player import load
-from skidpad.scenarios.variation import scenario_file
+from skidpad.scenarios.shipped import scenario_file
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.carla.backend import CarlaBackend
 from skidpad.simulation.carla.blueprints import STANDS_FOR

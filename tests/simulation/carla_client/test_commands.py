@@ -18,7 +18,7 @@ from skidpad.recording.channel_drives import read_outcomes
 from skidpad.recording.channels import McapRecording
 from skidpad.recording.logfiles import read_log
 from skidpad.recording.sources import recordings_below
-from skidpad.scenarios.generate import FOLDER
+from skidpad.scenarios.shipped import FOLDER
 from skidpad.simulation.carla_server.process import ServerProcess
 
 pytest.importorskip("carla")

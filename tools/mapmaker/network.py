@@ -10,7 +10,7 @@ from xml.etree.ElementTree import tostring
 from lxml import etree
 from scenariogeneration import xodr
 
-from skidpad.roads.generate.paths import Heights, cut
+from mapmaker.paths import Heights, cut
 from skidpad.roads.opendrive.reference_line import Clothoid, Element
 
 GEO_REFERENCE = (

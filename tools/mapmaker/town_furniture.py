@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from scenariogeneration import xodr
 
-from skidpad.roads.generate.furniture import (
+from mapmaker.furniture import (
     Numbers,
     box,
     crosswalk,
@@ -16,7 +16,7 @@ from skidpad.roads.generate.furniture import (
     sign,
     stop_line,
 )
-from skidpad.roads.generate.network import Network, RoadSpec
+from mapmaker.network import Network, RoadSpec
 
 CONTROLLERS = {5001: [1001, 1002], 5002: [1003, 1004]}  # west and east, north and south
 LINE_BACK, ZEBRA_BACK, ZEBRA_WIDTH = 7.0, 3.0, 4.0  # m before the end of the street

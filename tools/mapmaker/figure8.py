@@ -11,7 +11,7 @@ from math import pi, sin
 
 from scenariogeneration import xodr
 
-from skidpad.roads.generate.furniture import (
+from mapmaker.furniture import (
     Numbers,
     box,
     gantry,
@@ -20,8 +20,8 @@ from skidpad.roads.generate.furniture import (
     sign,
     stop_line,
 )
-from skidpad.roads.generate.network import Connection, LaneSpec, Mark, Network, RoadSpec, stretch
-from skidpad.roads.generate.paths import (
+from mapmaker.network import Connection, LaneSpec, Mark, Network, RoadSpec, stretch
+from mapmaker.paths import (
     Bend,
     Heights,
     Piece,

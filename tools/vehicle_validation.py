@@ -1,4 +1,4 @@
-"""Manoeuvres that show how far the vehicle can be trusted; `python -m skidpad.physics.validation DIR`
+"""Manoeuvres that show how far the vehicle can be trusted; `python tools/vehicle_validation.py DIR`
 draws the figures of docs/physics.md. The comparison needs commonroad-vehicle-models (extra `test`).
 """
 

@@ -8,9 +8,9 @@ from math import cos, pi, sin
 
 from scenariogeneration import xodr
 
+from mapmaker.network import Connection, LaneSpec, Network, RoadSpec
+from mapmaker.paths import Bend, Piece, Start, Straight, elements, fitted
 from skidpad.core.geometry import wrap_angle
-from skidpad.roads.generate.network import Connection, LaneSpec, Network, RoadSpec
-from skidpad.roads.generate.paths import Bend, Piece, Start, Straight, elements, fitted
 
 LANE = 3.5
 FLAT = ((0.0, 0.0, 0.0, 0.0, 0.0),)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from scenariogeneration import xodr
 
-from skidpad.roads.generate.furniture import Numbers, box, guardrail
-from skidpad.roads.generate.network import LaneSpec, Mark, Network, RoadSpec
-from skidpad.roads.generate.paths import Start, Straight, elements
+from mapmaker.furniture import Numbers, box, guardrail
+from mapmaker.network import LaneSpec, Mark, Network, RoadSpec
+from mapmaker.paths import Start, Straight, elements
 
 LENGTH = 1500.0
 LANE, SHOULDER = 3.5, 2.0

@@ -12,7 +12,7 @@ from math import cos, pi, sin
 
 from scenariogeneration import xodr
 
-from skidpad.roads.generate.crossings import (
+from mapmaker.crossings import (
     FLAT,
     LANE,
     Ids,
@@ -22,8 +22,8 @@ from skidpad.roads.generate.crossings import (
     roundabout,
     street_mouth,
 )
-from skidpad.roads.generate.network import Connection, LaneSpec, Mark, Network, RoadSpec
-from skidpad.roads.generate.paths import (
+from mapmaker.network import Connection, LaneSpec, Mark, Network, RoadSpec
+from mapmaker.paths import (
     Bend,
     Piece,
     Start,
@@ -34,7 +34,7 @@ from skidpad.roads.generate.paths import (
     fitted,
     length,
 )
-from skidpad.roads.generate.town_furniture import furnish_ring, furnish_streets
+from mapmaker.town_furniture import furnish_ring, furnish_streets
 from skidpad.roads.opendrive.reference_line import Element
 
 EAST, NORTH, WEST, SOUTH = 0.0, pi / 2, pi, -pi / 2

@@ -1,12 +1,12 @@
-"""Write the bundled maps: `python -m skidpad.roads.generate [FOLDER]`."""
+"""Write the bundled maps: `PYTHONPATH=tools python -m mapmaker [FOLDER]`."""
 
 from __future__ import annotations
 
 import sys
 from pathlib import Path
 
+from mapmaker import figure8, straight, town
 from skidpad.roads.bundled import FOLDER, bake_file
-from skidpad.roads.generate import figure8, straight, town
 
 MAPS = {"figure8": figure8.network, "straight": straight.network, "town": town.network}
 

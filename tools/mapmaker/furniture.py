@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from scenariogeneration import xodr
 
-from skidpad.roads.generate.network import RoadSpec
+from mapmaker.network import RoadSpec
 
 RAIL_HEIGHT = 0.75
 ALONG = {True: xodr.Orientation.positive, False: xodr.Orientation.negative}

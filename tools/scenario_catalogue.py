@@ -1,6 +1,6 @@
 """The three scenarios of the friction study, written from here as OpenSCENARIO XML (B-090 to B-092).
 
-`python -m skidpad.scenarios.generate` writes the files of the catalogue anew: each as 1.2, and as
+`make data` writes the files of the catalogue anew: each as 1.2, and as
 1.0 for ScenarioRunner. Everything that repeats vary is a parameter of the file.
 
 What ScenarioRunner 0.9.16 reads otherwise, and what the 1.0 files do about it: it measures lane
@@ -24,8 +24,8 @@ from scenariogeneration import xosc
 
 from skidpad.roads.bundled import map_file
 from skidpad.scenarios.hazard_export import OscVersion
+from skidpad.scenarios.shipped import FOLDER
 
-FOLDER = Path(__file__).parent / "catalogue"
 ROAD = "straight"
 EPOCH = datetime(2026, 1, 1)  # noqa: DTZ001  # the library writes naive times
 LANE = -2  # the ego's; -1 lies to its left

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from skidpad.physics.validation import ORACLE, brake, handbrake_turn, oracle, step_steer
+from vehicle_validation import ORACLE, brake, handbrake_turn, oracle, step_steer
 
 pytest.importorskip("vehiclemodels")
 

@@ -16,7 +16,8 @@ import carla
 import numpy as np
 
 TICKS = 180
-PATIENCE = 60.0  # s
+PATIENCE = 60.0  # s for an answer
+LATE = 20.0  # s for a reading: one that was sent before the stream stood never comes
 VEHICLES = ("vehicle.tesla.model3", "vehicle.audi.tt", "vehicle.mercedes.sprinter")
 IMAGE = {"image_size_x": "80", "image_size_y": "60"}
 SENSORS: dict[str, dict[str, str]] = {
@@ -115,12 +116,14 @@ def main(port: int, out: str) -> None:
         for car, control in zip(cars, controls(k), strict=True):
             car.apply_control(control)
         walker.apply_control(carla.WalkerControl(carla.Vector3D(x=0.6, y=0.8), 1.4))
-        world.tick(PATIENCE)
+        frame = world.tick(PATIENCE)
         for car in (*cars, walker):
             rows.setdefault(f"motion {car.type_id}", []).append(motion(car))
         rows.setdefault("lights", []).append([int(light.get_state()) for light in lights])
         for kind, readings in heard.items():
-            for name, value in numbers(kind, readings.get(timeout=PATIENCE)):
+            reading = readings.get(timeout=LATE)
+            assert reading.frame == frame, f"{kind}: a reading was lost"
+            for name, value in numbers(kind, reading):
                 rows.setdefault(name, []).append(value)
     columns = {f"ticks/{name}": np.array(values) for name, values in rows.items()}
     columns["events/contact.tick"] = np.array([frame - begin for frame, _ in struck])

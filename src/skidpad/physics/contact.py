@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
 from skidpad.core.states import ActorStates
-from skidpad.physics.overlap import Boxes, box_box, box_segment
+from skidpad.physics.overlap import Boxes, box_box, box_segment, corners_room
 from skidpad.physics.segments import Segments, candidates
 
 Floats = NDArray[np.float64]
@@ -71,14 +71,14 @@ class Contacts(NamedTuple):
     impulse: Floats  # N s along the normal, >= 0
     v_closing: Floats  # m/s before the impulse, positive when closing
     near: Ints  # (NEAR,) scratch: segments in reach of one actor
-    corners: Floats  # (2, 12, 2) scratch of `Boxes`
+    corners: Floats  # scratch of `Boxes`
 
     @classmethod
     def room(cls, capacity: int = 512) -> Contacts:
         """Empty arrays for up to `capacity` contacts."""
         ints = [np.full(capacity, -1, dtype=np.int64) for _ in range(3)]
-        near, corners = np.empty(NEAR, dtype=np.int64), np.empty((2, 12, 2))
-        return cls._make([*ints, *np.zeros((7, capacity)), near, corners])
+        near = np.empty(NEAR, dtype=np.int64)
+        return cls._make([*ints, *np.zeros((7, capacity)), near, corners_room()])
 
 
 def bodies(

@@ -22,7 +22,12 @@ class Boxes(NamedTuple):
     yaw: Floats
     half_length: Floats
     half_width: Floats
-    corners: Floats  # (2, 12, 2) scratch for the clipped polygons
+    corners: Floats  # scratch: `corners_room`
+
+
+def corners_room() -> Floats:
+    """Room for the two polygons between which one is clipped."""
+    return np.empty((2, 12, 2))
 
 
 @kernel

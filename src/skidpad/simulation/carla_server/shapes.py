@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from skidpad.core.geometry import Pose
-from skidpad.physics.overlap import Boxes, box_box
+from skidpad.physics.overlap import Boxes, box_box, corners_room
 from skidpad.simulation.carla_server.actors import Actor
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.wire import Vector
@@ -50,6 +50,7 @@ def is_taken(moving: World, feet: Pose, half: Vector) -> bool:
         np.append(s.yaw, feet.yaw),
         np.append(b.half_length, own[0]),
         np.append(b.half_width, own[1]),
+        corners_room(),
     )
     far = own[0] + own[1] + b.half_length + b.half_width
     near = (np.abs(s.x - feet.x) < far) & (np.abs(s.y - feet.y) < far)

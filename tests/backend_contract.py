@@ -14,7 +14,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorCommand, ActorSetup, Setup
 from skidpad.core.specs import CameraSpec, LidarSpec, PointSensorSpec
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import SemanticClass, SensorLevel
+from skidpad.core.vocabulary import Control, SemanticClass, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
@@ -29,7 +29,7 @@ ALONE = Setup(
     map="figure8",
     weather=Weather(),
     specs=twelve_sensors(),
-    ego=ActorSetup(name="ego", type=EGO_TYPE, place=MAP.ego_start, driver="scripted"),
+    ego=ActorSetup(name="ego", type=EGO_TYPE, place=MAP.ego_start, driver=Control.SCRIPTED),
     level=SensorLevel.OBJECTS,
 )
 
@@ -37,7 +37,7 @@ ALONE = Setup(
 def lead(distance: float, kind: str = "hatchback") -> ActorSetup:
     place = MAP.ahead(START, distance)
     assert place is not None
-    return ActorSetup(name="lead", type=kind, place=place.pose, driver="scripted")
+    return ActorSetup(name="lead", type=kind, place=place.pose, driver=Control.SCRIPTED)
 
 
 def must_be_reset_and_closes_twice(make: Make) -> None:
@@ -105,7 +105,7 @@ def moves_actors_as_told(make: Make) -> None:
         name="walker",
         type="pedestrian",
         place=replace(START.pose.moved(40.0, 5.0)),
-        driver="scripted",
+        driver=Control.SCRIPTED,
     )
     backend.reset(replace(ALONE, actors=(lead(30.0), walker)), 0)
     table = backend.truth().table

@@ -9,7 +9,8 @@ from skidpad.campaign.matrix import RECIPE
 from skidpad.cli.adas_plan import plan
 from skidpad.cli.asked import Climate, Drivers, Tuned
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Roads, RunSpec, Traffic
+from skidpad.core.run import Roads, RunSpec
+from skidpad.core.vocabulary import TrafficStart
 from skidpad.core.weather import Weather
 from skidpad.simulation.recovery import Supervisor
 from skidpad.stack.settings import settings_of
@@ -36,20 +37,24 @@ def test_the_matrix_is_every_driver_in_every_weather_with_common_seeds():
 
 @pytest.mark.req("A-210")
 def test_traffic_stands_at_the_fixed_places_unless_asked():
-    assert RunSpec().course.traffic is Traffic.FIXED
+    assert RunSpec().course.traffic is TrafficStart.FIXED
     runs = plan(template(), Drivers(), Climate())
-    assert all(c.course.traffic is Traffic.FIXED for c in runs)
+    assert all(c.course.traffic is TrafficStart.FIXED for c in runs)
 
 
 @pytest.mark.req("A-270")
 def test_the_command_line_reaches_the_cells():
     run = Tuned(set=("mu_ref=0.7",)).resolve(RunSpec(duration=60.0), grip="none", range=None)
-    run = replace(run, course=Roads(traffic=Traffic.RANDOM, vehicles=40))
+    run = replace(run, course=Roads(traffic=TrafficStart.RANDOM, vehicles=40))
     cells = plan(run, Drivers(configs="3"), Climate(weather="rain-night"), 2)
     assert [c.seed for c in cells] == [1, 2]
     (one, _) = cells
     assert (one.driver.label, one.weather.name) == ("3", "rain-night")
-    assert (one.course.traffic, one.course.vehicles, one.duration) == (Traffic.RANDOM, 40, 60.0)
+    assert (one.course.traffic, one.course.vehicles, one.duration) == (
+        TrafficStart.RANDOM,
+        40,
+        60.0,
+    )
     settings = settings_of(one)
     assert (settings.grip.value, settings.mu_ref) == ("none", 0.7)
 

@@ -32,7 +32,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import ContactEvent, VehicleCommand
-from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.vocabulary import Control, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.logfiles import log_hash
@@ -227,4 +227,4 @@ def test_the_outcome_changes_with_the_setting_and_only_with_it(name):
 @pytest.mark.req("A-013")
 @pytest.mark.parametrize("configuration", range(5))
 def test_no_configuration_hands_the_ego_to_the_traffic(configuration):
-    assert stage_of(adas_run(configuration)).setup.ego.driver == "scripted"
+    assert stage_of(adas_run(configuration)).setup.ego.driver is Control.SCRIPTED

@@ -26,7 +26,7 @@ from skidpad.core.run import (
 )
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
-from skidpad.core.vocabulary import Outcome
+from skidpad.core.vocabulary import Control, Outcome
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
@@ -139,9 +139,9 @@ def stage_of(spec: RunSpec) -> Stage:
 def _roads(spec: RunSpec, course: Roads) -> Stage:
     s = settings_of(spec)
     map = load_map(course.map)
-    ego = ActorSetup(name="ego", type=EGO_TYPE, place=start_of(map), driver="scripted")
+    ego = ActorSetup(name="ego", type=EGO_TYPE, place=start_of(map), driver=Control.SCRIPTED)
     traffic = TrafficSetup(
-        mode=course.traffic.value,
+        mode=course.traffic,
         vehicles=course.vehicles,
         allow_fewer=course.allow_fewer,
         variant=s.traffic_positions.value,

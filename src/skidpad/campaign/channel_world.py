@@ -13,6 +13,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.randomness import stream
 from skidpad.core.run import ChannelCrew, Route, RunSpec
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
+from skidpad.core.vocabulary import Control, TrafficStart
 from skidpad.physics.types import EGO_TYPE, traffic_types, vehicle_type
 from skidpad.roads.bundled import load_map
 from skidpad.roads.lanes import LaneKind
@@ -78,16 +79,16 @@ def segment_of(spec: RunSpec) -> Segment:
             name=f"parked_{i + 1:02d}",
             type=cars[i % len(cars)],
             place=Pose(p.x, p.y, p.z, yaw=p.yaw),
-            driver="scripted",
+            driver=Control.SCRIPTED,
         )
         for i, p in enumerate(spaces)
     ]
-    ego = ActorSetup(name="ego", type=EGO_TYPE, place=start.pose, driver="scripted")
+    ego = ActorSetup(name="ego", type=EGO_TYPE, place=start.pose, driver=Control.SCRIPTED)
     setup = replace(
         setup_of(spec, route.map, ego),
         specs=(),  # channels bring their own
         actors=(*traffic, *parked, *crowd.actors()),
-        traffic=TrafficSetup(mode="random", vehicles=0, variety=True),
+        traffic=TrafficSetup(mode=TrafficStart.RANDOM, vehicles=0, variety=True),
     )
     return Segment(map, setup, crowd, path, car_model())
 

@@ -20,10 +20,9 @@ from skidpad.core.run import (
     Roads,
     RunSpec,
     StackDriver,
-    Traffic,
 )
 from skidpad.core.states import ActorTable
-from skidpad.core.vocabulary import Outcome, SensorLevel
+from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
 from skidpad.recording.events import NoticeSource, Relocation
@@ -71,12 +70,12 @@ def drive(
     its settings. out: a folder for snapshots of collisions. backend: None is the embedded one.
     """
     driver, kind = _named(stack, dict(options or {}))
-    words = [v.value for v in SensorLevel], [v.value for v in Traffic]
+    words = [v.value for v in SensorLevel], [v.value for v in TrafficStart]
     spec = RunSpec(
         driver=driver,
         course=Roads(
             map=str(map),
-            traffic=Traffic(require_choice("traffic", traffic, words[1])),
+            traffic=TrafficStart(require_choice("traffic", traffic, words[1])),
             vehicles=vehicles,
         ),
         weather=find_weather(weather) if isinstance(weather, str) else weather,

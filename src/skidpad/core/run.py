@@ -13,7 +13,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.vocabulary import SensorLevel, TrafficStart
 from skidpad.core.weather import Weather
 
 VERSION = 2  # of config.yaml; folders without the word were written before there was one value
@@ -115,13 +115,6 @@ DriverSpec = AdasDriver | StackDriver | AgentDriver | Passenger | ChannelCrew
 # --- where, and among whom
 
 
-class Traffic(str, Enum):
-    """Where background traffic starts."""
-
-    FIXED = "fixed"  # A-202
-    RANDOM = "random"  # A-209
-
-
 class ActorMode(str, Enum):
     """How a scenario moves an actor."""
 
@@ -133,8 +126,8 @@ class Roads(Struct, frozen=True, kw_only=True, tag="roads", forbid_unknown_field
     """A map with background traffic, from its ego's place on."""
 
     map: Annotated[str, Meta(description="A bundled map's name, or an OpenDRIVE file.")] = "figure8"
-    traffic: Annotated[Traffic, Meta(description="Where background vehicles start.")] = (
-        Traffic.FIXED
+    traffic: Annotated[TrafficStart, Meta(description="Where background vehicles start.")] = (
+        TrafficStart.FIXED
     )
     vehicles: Annotated[int, Meta(ge=0, le=80, description="Background vehicles, 0 to 80.")] = 20
     allow_fewer: bool = False  # A-208

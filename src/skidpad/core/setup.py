@@ -8,7 +8,7 @@ from pathlib import Path
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import GripModel, RangeModel, SensorLevel
+from skidpad.core.vocabulary import Control, GripModel, RangeModel, SensorLevel, TrafficStart
 from skidpad.core.weather import Weather
 
 DT = 0.05  # s, the fixed step of the published runs (A-001); time is a count of these
@@ -26,21 +26,21 @@ class LanePosition:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ActorSetup:
-    """One actor at the start. `driver` is "autopilot", or "scripted" for actors moved by commands."""
+    """One actor at the start."""
 
     name: str
     type: str  # vehicle type id, "pedestrian", "bicycle" or a prop id
     place: Pose | LanePosition
     speed: float = 0.0  # m/s
-    driver: str = "autopilot"
+    driver: Control = Control.AUTOPILOT
     rgb: tuple[int, int, int] | None = None  # None: by index from the type's palette
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrafficSetup:
-    """Background traffic placed by the backend. `mode` is "fixed" (A-202) or "random" (A-209)."""
+    """Background traffic placed by the backend."""
 
-    mode: str = "fixed"
+    mode: TrafficStart = TrafficStart.FIXED
     vehicles: int = 20
     allow_fewer: bool = False  # A-208
     variant: str = "listing"  # or "table": which published positions (D-085, D-086)

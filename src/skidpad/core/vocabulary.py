@@ -62,6 +62,20 @@ class Supervision(IntEnum):
     WARM_UP = 4
 
 
+class TrafficStart(str, Enum):
+    """Where background vehicles start."""
+
+    FIXED = "fixed"  # A-202
+    RANDOM = "random"  # A-209
+
+
+class Control(str, Enum):
+    """What drives an actor."""
+
+    AUTOPILOT = "autopilot"  # a driver of the background
+    SCRIPTED = "scripted"  # commands from outside
+
+
 class Clearance(str, Enum):
     """How a free place is searched for an ego that is put back (D-080)."""
 

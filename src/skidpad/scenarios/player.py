@@ -10,7 +10,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand, ActorSetup
 from skidpad.core.states import WorldTruth
-from skidpad.core.vocabulary import ActorKind
+from skidpad.core.vocabulary import ActorKind, Control
 from skidpad.roads.bundled import FOLDER, bundled_maps, load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.actions import (
@@ -74,7 +74,7 @@ class Script:
         """The ego and the other actors, for a backend's set-up."""
         made = {
             e.name: ActorSetup(
-                name=e.name, type=e.type, place=e.pose, speed=e.speed, driver="scripted"
+                name=e.name, type=e.type, place=e.pose, speed=e.speed, driver=Control.SCRIPTED
             )
             for e in self.entities.values()
         }

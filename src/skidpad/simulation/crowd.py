@@ -17,7 +17,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.randomness import stream
 from skidpad.core.setup import ActorCommand, ActorSetup
 from skidpad.core.states import WorldTruth
-from skidpad.core.vocabulary import LightState
+from skidpad.core.vocabulary import Control, LightState
 from skidpad.roads.lanes import LaneKind, SignalKind
 from skidpad.roads.queries import RoadMap
 
@@ -72,11 +72,13 @@ class Crowd:
     def actors(self) -> tuple[ActorSetup, ...]:
         """Where they begin."""
         walkers = [
-            ActorSetup(name=w.name, type="pedestrian", place=Pose(w.x, w.y), driver="scripted")
+            ActorSetup(
+                name=w.name, type="pedestrian", place=Pose(w.x, w.y), driver=Control.SCRIPTED
+            )
             for w in self.walkers
         ]
         riders = [
-            ActorSetup(name=r.name, type="bicycle", place=self._pose(r), driver="scripted")
+            ActorSetup(name=r.name, type="bicycle", place=self._pose(r), driver=Control.SCRIPTED)
             for r in self.riders
         ]
         return (*walkers, *riders)

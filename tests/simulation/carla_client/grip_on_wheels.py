@@ -10,7 +10,7 @@ from typing import Any
 from backend_contract import ALONE, lead
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import GripModel
+from skidpad.core.vocabulary import Control, GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
 from skidpad.simulation.carla.backend import CarlaBackend
@@ -58,7 +58,9 @@ def stop(backend: CarlaBackend, setup: Setup) -> float:
 
 def main(port: int, grip: str) -> dict[str, Any]:
     backend = CarlaBackend(CarlaOptions(port=port))
-    walker = ActorSetup(name="walker", type="pedestrian", place=lead(60.0).place, driver="scripted")
+    walker = ActorSetup(
+        name="walker", type="pedestrian", place=lead(60.0).place, driver=Control.SCRIPTED
+    )
     dry = replace(ALONE, actors=(lead(30.0, "van"), walker), grip=GripModel.NONE)
     rain = replace(dry, weather=find_weather("rain-noon"), grip=GripModel(grip))
     ice = replace(dry, weather=ICE, grip=GripModel(grip))

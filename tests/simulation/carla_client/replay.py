@@ -11,7 +11,7 @@ import numpy as np
 
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.vocabulary import Control, SensorLevel
 from skidpad.physics import types
 from skidpad.physics.presets import find_weather
 from skidpad.roads.bundled import load_map
@@ -50,7 +50,7 @@ def setup_for(weather: str) -> Setup:
         map="figure8",
         weather=find_weather(weather),
         specs=(),
-        ego=ActorSetup(name="ego", type=EGO, place=MAP.ego_start, driver="scripted"),
+        ego=ActorSetup(name="ego", type=EGO, place=MAP.ego_start, driver=Control.SCRIPTED),
         level=SensorLevel.OBJECTS,
     )
 

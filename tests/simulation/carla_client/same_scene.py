@@ -17,7 +17,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import pose_from_carla, pose_to_carla
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.vocabulary import Control, SensorLevel
 from skidpad.sensors.rays import make_hits, make_rays
 from skidpad.simulation.carla.backend import CarlaBackend
 from skidpad.simulation.carla.options import CarlaOptions
@@ -34,8 +34,10 @@ def scene(ego_speed: float, lead_speed: float) -> Setup:
     assert ahead is not None
     assert aside is not None
     actors = (
-        ActorSetup(name="lead", type=LEAD, place=ahead.pose, speed=lead_speed, driver="scripted"),
-        ActorSetup(name="van", type=VAN, place=aside.pose.moved(left=3.5), driver="scripted"),
+        ActorSetup(
+            name="lead", type=LEAD, place=ahead.pose, speed=lead_speed, driver=Control.SCRIPTED
+        ),
+        ActorSetup(name="van", type=VAN, place=aside.pose.moved(left=3.5), driver=Control.SCRIPTED),
     )
     ego = replace(ALONE.ego, type=EGO, speed=ego_speed)
     specs = tuple(replace(s, mount=as_sent(s.mount)) for s in ALONE.specs)

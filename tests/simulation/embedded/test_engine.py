@@ -14,7 +14,7 @@ from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorCommand, ActorSetup, FrictionPatch, Setup, TrafficSetup
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.vocabulary import Control, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
@@ -23,7 +23,7 @@ from skidpad.simulation.embedded.engine import EmbeddedBackend
 
 MAP = load_map("figure8")
 assert MAP.ego_start is not None
-EGO = ActorSetup(name="ego", type=EGO_TYPE, place=MAP.ego_start, driver="scripted")
+EGO = ActorSetup(name="ego", type=EGO_TYPE, place=MAP.ego_start, driver=Control.SCRIPTED)
 START = MAP.place(MAP.ego_start)
 SETUP = Setup(
     map="figure8",
@@ -128,7 +128,9 @@ def test_relocation_takes_place_and_speed_at_once() -> None:
 def lead_at(distance: float, kind: str = "hatchback", speed: float = 0.0) -> ActorSetup:
     place = MAP.ahead(START, distance)
     assert place is not None
-    return ActorSetup(name="lead", type=kind, place=place.pose, speed=speed, driver="scripted")
+    return ActorSetup(
+        name="lead", type=kind, place=place.pose, speed=speed, driver=Control.SCRIPTED
+    )
 
 
 @pytest.mark.req("A-029")
@@ -170,7 +172,7 @@ def test_players_move_actors_by_place_command_and_presence() -> None:
                     name="walker",
                     type="pedestrian",
                     place=Pose(START.x + 40.0, START.y + 5.0),
-                    driver="scripted",
+                    driver=Control.SCRIPTED,
                 ),
             ),
         ),

@@ -16,7 +16,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import mps_from_kmh
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import LightState, SensorLevel
+from skidpad.core.vocabulary import Control, LightState, SensorLevel, TrafficStart
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
 from skidpad.physics.types import EGO_TYPE
@@ -39,7 +39,7 @@ SETUP = Setup(
     map="figure8",
     weather=Weather(),
     specs=(),
-    ego=ActorSetup(name="ego", type=EGO_TYPE, place=MAP.ego_start, driver="scripted"),
+    ego=ActorSetup(name="ego", type=EGO_TYPE, place=MAP.ego_start, driver=Control.SCRIPTED),
     traffic=TrafficSetup(),
     level=SensorLevel.OBJECTS,
 )
@@ -217,7 +217,7 @@ def test_a_wreck_is_put_back_far_from_the_ego() -> None:
 
 @pytest.mark.req("A-209")
 def test_random_traffic_fills_up_and_stays_around_the_ego() -> None:
-    world = staged(replace(SETUP, traffic=TrafficSetup(mode="random", vehicles=40)), 1)
+    world = staged(replace(SETUP, traffic=TrafficSetup(mode=TrafficStart.RANDOM, vehicles=40)), 1)
     world.command(EGO, PARKED)
     assert world.states.present.sum() == 1
     for _ in range(600):
@@ -227,7 +227,7 @@ def test_random_traffic_fills_up_and_stays_around_the_ego() -> None:
     away = np.hypot(states.x - states.x[0], states.y - states.y[0])
     assert away.max() < 650.0
     with pytest.raises(ConfigError, match="between 0 and 80"):
-        staged(replace(SETUP, traffic=TrafficSetup(mode="random", vehicles=81)), 1)
+        staged(replace(SETUP, traffic=TrafficSetup(mode=TrafficStart.RANDOM, vehicles=81)), 1)
 
 
 @pytest.mark.req("M-6")
@@ -266,7 +266,9 @@ def test_lights_cycle_with_ten_three_and_thirty_two_seconds() -> None:
 
 
 def test_drivers_follow_a_lane_through_every_branch_of_the_map() -> None:
-    world = world_without_ego(2, replace(SETUP, traffic=TrafficSetup(mode="random", vehicles=30)))
+    world = world_without_ego(
+        2, replace(SETUP, traffic=TrafficSetup(mode=TrafficStart.RANDOM, vehicles=30))
+    )
     visited: set[int] = set()
     for _ in range(2500):
         world.step()

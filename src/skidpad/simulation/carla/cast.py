@@ -12,7 +12,7 @@ from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorSetup, LanePosition
 from skidpad.core.states import ActorTable
-from skidpad.core.vocabulary import ActorKind
+from skidpad.core.vocabulary import ActorKind, Control
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.carla import blueprints
 from skidpad.simulation.carla.axes import from_vector, to_transform
@@ -81,8 +81,8 @@ def spawn_setup(carla: Any, world: Any, map: RoadMap, setup: ActorSetup) -> Play
             f"({pose.x:.1f}, {pose.y:.1f}, {pose.z:.1f}): the place is taken"
         )
     player = measured(setup.name, actor)
-    player.autopilot = setup.driver == "autopilot" and player.is_vehicle
-    if setup.driver == "autopilot" and not player.is_vehicle:
+    player.autopilot = setup.driver is Control.AUTOPILOT and player.is_vehicle
+    if setup.driver is Control.AUTOPILOT and not player.is_vehicle:
         raise ConfigError(f"{setup.name}: a {setup.type} has no autopilot")
     return player
 

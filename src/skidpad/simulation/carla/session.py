@@ -17,7 +17,7 @@ from skidpad.core.lefthanded import mirrored
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.specs import LidarSpec, RadarSpec
 from skidpad.core.states import ActorStates, VehicleCommand, WorldTruth
-from skidpad.core.vocabulary import RangeModel, SensorLevel
+from skidpad.core.vocabulary import RangeModel, SensorLevel, TrafficStart
 from skidpad.physics.optics import radar_range
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import LanePoint
@@ -36,7 +36,7 @@ from skidpad.simulation.carla.pictures import Pictures
 from skidpad.simulation.carla.ports import free_port
 from skidpad.simulation.carla.scene import load_scene, release, synchronise
 from skidpad.simulation.carla.sensors import Sensors
-from skidpad.simulation.carla.traffic import Traffic, check_mode, spawn_fixed, spawn_random
+from skidpad.simulation.carla.traffic import Traffic, spawn_fixed, spawn_random
 from skidpad.simulation.carla.weather import set_weather
 from skidpad.simulation.sensing import Objects, Readings
 
@@ -105,7 +105,7 @@ class Session:
         traffic = setup.traffic
         if traffic is None or traffic.vehicles == 0:
             return
-        if check_mode(traffic) == "fixed":
+        if traffic.mode is TrafficStart.FIXED:
             if point is None:
                 raise ConfigError("fixed traffic needs an ego that starts on a driving lane")
             players, told = spawn_fixed(self.carla, world, self.map, point, traffic, self.seed)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.randomness import stream
 from skidpad.core.setup import TrafficSetup
@@ -15,7 +15,6 @@ from skidpad.simulation.carla.cast import Player, awaited, measured, try_spawn
 from skidpad.simulation.carla.connection import Connection
 from skidpad.simulation.world.traffic.placement import fixed_spawns, random_factors
 
-MODES = ("fixed", "random")
 TOP_UP_EVERY = 20  # ticks between attempts to let missing vehicles in (A-209)
 NEAR, FAR = 25.0, 250.0  # m from the ego, where random vehicles begin; TM's own respawn bounds
 MANAGER_SEEDS = 2**31 - 1
@@ -120,11 +119,6 @@ def spawn_random(carla: Any, world: Any, ego: Pose, setup: TrafficSetup, seed: i
         player.factor, player.autopilot = float(factor), actor is not None
         players.append(player)
     return players
-
-
-def check_mode(setup: TrafficSetup) -> str:
-    """`fixed` or `random`."""
-    return require_choice("traffic mode", setup.mode, MODES)
 
 
 def places_around(world: Any, ego: Pose, random: Any) -> list[Pose]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorSetup, LanePosition, Setup
-from skidpad.core.vocabulary import ActorKind
+from skidpad.core.vocabulary import ActorKind, TrafficStart
 from skidpad.physics.types import traffic_types, vehicle_type, vehicle_types
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.simulation.world.rows import Newcomer, Shape
@@ -19,8 +19,6 @@ from skidpad.simulation.world.traffic.placement import (
     type_of,
 )
 
-TRAFFIC_MODES = ("fixed", "random")
-DRIVERS = ("autopilot", "scripted")
 # Paint of cars by registrations: white, black, grey, silver, blue, red, green, yellow
 # (shares in the Axalta Global Automotive Color Popularity Report 2022).
 PALETTE = (
@@ -75,7 +73,6 @@ def cast_of(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
     known = vehicle_types()
     for role in roles:
         require_choice("actor type", role.actor.type, [*known, *SHAPES])
-        require_choice(f"driver of {role.actor.name}", role.actor.driver, DRIVERS)
     names = [role.actor.name for role in roles]
     if len(set(names)) != len(names):
         raise ConfigError(f"actors need different names, got {', '.join(sorted(names))}")
@@ -88,8 +85,7 @@ def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
     traffic = setup.traffic
     if traffic is None or traffic.vehicles == 0:
         return []
-    require_choice("traffic mode", traffic.mode, TRAFFIC_MODES)
-    if traffic.mode == "random":
+    if traffic.mode is TrafficStart.RANDOM:
         factors = random_factors(traffic.vehicles, seed)
         spawns = [Spawn(None, float(f)) for f in factors]
     else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.setup import Setup, TrafficSetup
+from skidpad.core.vocabulary import Control
 from skidpad.physics.grip import friction_ratio, grip_params
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.actors import Role, cast_of, place_of
@@ -38,7 +39,7 @@ def staged(setup: Setup, seed: int) -> World:
     world.settle()
     world.watch.update(world.tick, world.placed)
     for id, role in zip(ids, roles, strict=True):
-        if id != EGO and not role.late and role.actor.driver == "autopilot":
+        if id != EGO and not role.late and role.actor.driver is Control.AUTOPILOT:
             _engage(world, world.traffic, id, role)
     world.feel_grip()
     return world

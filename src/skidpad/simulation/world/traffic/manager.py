@@ -15,7 +15,7 @@ from skidpad.core.geometry import Pose, mps_from_kmh
 from skidpad.core.randomness import stream, stream_key
 from skidpad.core.setup import TrafficSetup
 from skidpad.core.states import ActorStates
-from skidpad.core.vocabulary import ActorKind
+from skidpad.core.vocabulary import ActorKind, TrafficStart
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.rows import Member, Shape
@@ -119,7 +119,7 @@ class Traffic:
         self, placed: Places, lights: NDArray[np.uint8], tick: int, commands: NDArray[np.float64]
     ) -> None:
         """Write the commands of all driven actors for the coming step."""
-        free_choice = self.setup.mode == "random"
+        free_choice = self.setup.mode is TrafficStart.RANDOM
         view = View(
             self.net, self.occupancy, placed, lights, tick, self.dt, free_choice,
             self.entry, self.conflict, self.zebra, self._busy(placed),
@@ -148,7 +148,7 @@ class Traffic:
             wrecks = np.flatnonzero(driver["active"] & (driver["stuck"] > STUCK_TIME))
             for i in wrecks.tolist():
                 yield from self._put(i, states, PUT_BACK_NEAREST, np.inf, True)
-        if self.setup.mode == "random":
+        if self.setup.mode is TrafficStart.RANDOM:
             yield from self._keep_bubble(states)
 
     def _keep_bubble(self, states: ActorStates) -> Iterator[Move]:

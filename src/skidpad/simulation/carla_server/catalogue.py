@@ -13,10 +13,10 @@ import yaml
 
 from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind, GripModel, SemanticClass
 from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.options import MU_REF
 
 DATA = Path(__file__).with_name("data") / "blueprints.yaml"
 GRIP_BLUEPRINT = "skidpad.weather"  # decision K-2
-MU_REF = 1.5  # of a tyre with tire_friction 3.5 on a dry road, near CARLA's (decision K-3)
 
 
 class AttributeType(int, Enum):

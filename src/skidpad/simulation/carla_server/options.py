@@ -1,27 +1,37 @@
-"""How the server was started (decision K-3)."""
+"""How the server is started (decision K-3): each field is an option of `skidpad carla-server`."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
+
+from msgspec import Meta, Struct
 
 from skidpad.core.vocabulary import GripModel
-from skidpad.simulation.carla_server.catalogue import MU_REF
+
+MU_REF = 1.5  # of a tyre with tire_friction 3.5 on a dry road, near CARLA's (decision K-3)
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class ServerOptions:
+class ServerOptions(Struct, frozen=True, kw_only=True):
     """The command line of `skidpad carla-server`."""
 
-    host: str = "127.0.0.1"
-    port: int = 2000  # 0: any free pair
-    map: str = "figure8"
-    maps: Path | None = None
-    weather_grip: GripModel = GripModel.PHYSICAL
-    ice: float = 0.0  # percent of 20 mm
-    mu_ref: float = MU_REF
-    seed: int = 0
-    strict: bool = False
-    record_calls: Path | None = None
-    data_dir: Path | None = None
-    idle_exit: float | None = None  # s without a client
+    host: Annotated[str, Meta(description="Address to listen on.")] = "127.0.0.1"
+    port: Annotated[int, Meta(description="RPC port; 0: any free one. Streams use the next.")] = (
+        2000
+    )
+    map: Annotated[str, Meta(description="Map to begin with.")] = "figure8"
+    maps: Annotated[Path | None, Meta(description="Folder of your own .xodr files.")] = None
+    weather_grip: Annotated[GripModel, Meta(description="How weather acts on tyres.")] = (
+        GripModel.PHYSICAL
+    )
+    ice: Annotated[float, Meta(ge=0.0, le=100.0, description="Ice, percent of 2 cm.")] = 0.0
+    mu_ref: Annotated[
+        float, Meta(ge=0.05, le=3.0, description="Friction at tire_friction 3.5 on dry road.")
+    ] = MU_REF
+    seed: Annotated[int, Meta(description="Seed of sensor noise.")] = 0
+    strict: Annotated[bool, Meta(description="Report unknown calls; exit with 1.")] = False
+    record_calls: Annotated[Path | None, Meta(description="Write every call here.")] = None
+    data_dir: Annotated[Path | None, Meta(description="Folder for files named by clients.")] = None
+    idle_exit: Annotated[
+        float | None, Meta(ge=0.0, description="Stop after so many seconds without a client.")
+    ] = None

@@ -13,8 +13,8 @@ if TYPE_CHECKING:
     from collections.abc import Iterable, Iterator
 
     from skidpad.evidence.channels.hazards import Signal
-    from skidpad.evidence.channels.judging.matching import Span
     from skidpad.evidence.channels.judging.segments import Segment
+    from skidpad.evidence.channels.matching import Span
 
 
 class Truth(str, Enum):
@@ -178,7 +178,7 @@ def _refuse_training_drives(path: Path, segments: list[Segment]) -> None:
 
 
 def _print_results(table: dict[str, object]) -> None:
-    from skidpad.evidence.channels.judging.matching import percent
+    from skidpad.evidence.channels.matching import percent
 
     def ratio(row: dict[str, object], name: str) -> str:
         value, interval = row[name], row[f"{name}_interval"]

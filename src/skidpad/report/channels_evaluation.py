@@ -12,7 +12,7 @@ import polars as pl
 from skidpad import __version__
 from skidpad.core.errors import FileError
 from skidpad.evidence.channels.findings import FINDINGS
-from skidpad.evidence.channels.judging.matching import percent
+from skidpad.evidence.channels.matching import percent
 from skidpad.evidence.verdicts import judge
 from skidpad.report.channels_redundancy import redundancy
 from skidpad.report.figures import PALETTE, canvas, svg_of

@@ -24,8 +24,8 @@ from skidpad.evidence.channels.identifier.model import (
     model_bytes,
     probability_of,
 )
-from skidpad.evidence.channels.judging.matching import Span
 from skidpad.evidence.channels.judging.segments import judge
+from skidpad.evidence.channels.matching import Span
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.recording.cycles import cycles
 

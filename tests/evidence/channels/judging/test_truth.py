@@ -15,7 +15,15 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import Profile
 from skidpad.evidence.channels.judging.evaluation import Evaluation, read_labels
-from skidpad.evidence.channels.judging.matching import (
+from skidpad.evidence.channels.judging.segments import judge
+from skidpad.evidence.channels.judging.truth.simulator import (
+    G,
+    footprint,
+    simulator_truth,
+    would_hit,
+)
+from skidpad.evidence.channels.judging.truth.worldmodel import world_model_truth
+from skidpad.evidence.channels.matching import (
     Span,
     Tally,
     macro,
@@ -26,14 +34,6 @@ from skidpad.evidence.channels.judging.matching import (
     score,
     tally,
 )
-from skidpad.evidence.channels.judging.segments import judge
-from skidpad.evidence.channels.judging.truth.simulator import (
-    G,
-    footprint,
-    simulator_truth,
-    would_hit,
-)
-from skidpad.evidence.channels.judging.truth.worldmodel import world_model_truth
 from skidpad.recording.cycles import cycles
 
 TAILGATED, TAILGATING = HazardType.EGO_TAILGATED, HazardType.EGO_TAILGATING

@@ -22,7 +22,7 @@ from skidpad.evidence.channels.identifier.model import (
     events_of,
     probability_of,
 )
-from skidpad.evidence.channels.judging.matching import Span, tally
+from skidpad.evidence.channels.matching import Span, tally
 
 Floats = NDArray[np.float64]
 THIN = 8  # of the cycles without the hazard each eighth is used, with that weight

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import Cycle
 from skidpad.evidence.channels.hazards import Rule, Signal
-from skidpad.evidence.channels.judging.matching import Span
+from skidpad.evidence.channels.matching import Span
 
 Floats = NDArray[np.float64]
 REACH = 1.0  # s around a hazard that is looked at

@@ -14,7 +14,8 @@ from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile
 from skidpad.evidence.channels.judging.causes import EXPLAINED
-from skidpad.evidence.channels.judging.matching import (
+from skidpad.evidence.channels.judging.segments import Segment
+from skidpad.evidence.channels.matching import (
     TOLERANCES,
     Score,
     Span,
@@ -24,7 +25,6 @@ from skidpad.evidence.channels.judging.matching import (
     score,
     tally,
 )
-from skidpad.evidence.channels.judging.segments import Segment
 
 LABEL_COLUMNS = ("hazard", "start_s", "end_s", "world", "annotator", "note")
 

@@ -18,10 +18,10 @@ from skidpad.evidence.channels.indicators.panel import no_lap
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.judging.causes import ego_motion, false_cause, missed_cause
 from skidpad.evidence.channels.judging.facts import Observer, times_of
-from skidpad.evidence.channels.judging.matching import Span, match, merged
 from skidpad.evidence.channels.judging.truth.marks import TrueHazard
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
 from skidpad.evidence.channels.judging.truth.worldmodel import world_model_truth
+from skidpad.evidence.channels.matching import Span, match, merged
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.evidence.channels.timefilter import TimeFilter
 from skidpad.evidence.channels.timing import Stopwatch

@@ -2,12 +2,20 @@
 
 import pytest
 
+from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells import FIRST_SEED
-from skidpad.campaign.tuning import SEEDS, Candidate, candidates, judge
+from skidpad.campaign.tuning import RECIPE, SEEDS, Candidate, candidates, summary, trials
+from skidpad.campaign.worker import Finished
+from skidpad.recording.results import read_results
 from skidpad.scenarios.shipped import NAMES, shipped
 from skidpad.scenarios.variation import CUT_IN, CutIn, variant_parameters
 
 FEW = SEEDS[:3]
+
+
+def here(jobs):
+    for job in jobs:
+        yield Finished(job, value=job.work(job.argument))
 
 
 @pytest.mark.req("X-8")
@@ -29,12 +37,12 @@ def test_what_ships_is_one_of_the_candidates(name):
 
 
 @pytest.mark.req("B-070", "B-074", "B-075", "B-076", "B-078")
-def test_the_delay_breaks_the_cut_in_and_the_shorter_distance_repairs_it():
-    shares = {
-        cutin: judge(
-            Candidate(CUT_IN, {"MergeDistance": variant_parameters(cutin)["MergeDistance"]}, cutin),
-            FEW,
-        ).completed
+def test_the_delay_breaks_the_cut_in_and_the_shorter_distance_repairs_it(tmp_path):
+    tried = [
+        Candidate(CUT_IN, {"MergeDistance": variant_parameters(cutin)["MergeDistance"]}, cutin)
         for cutin in CutIn
-    }
-    assert shares == {CutIn.ORIGINAL: 1.0, CutIn.UNFIXED: 0.0, CutIn.FIXED: 1.0}
+    ]
+    Campaign(RECIPE, trials(tried, FEW)).run(tmp_path / "out", here)
+    rows = summary(read_results(tmp_path / "out"))
+    shares = dict(rows.select("cutin", "completed").iter_rows())
+    assert shares == {"original": 1.0, "unfixed": 0.0, "fixed": 1.0}

@@ -10,7 +10,7 @@ from skidpad.core.run import Friction
 from skidpad.recording.grip import GripEntry
 from skidpad.recording.ledger import read_ledger
 from skidpad.recording.results import read_results
-from skidpad.scenarios.generate import FOLDER
+from skidpad.scenarios.shipped import FOLDER
 
 
 def play(*call):

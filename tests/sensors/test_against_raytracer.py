@@ -8,7 +8,7 @@ from skidpad.core.weather import Weather
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.bench import convoy
 from skidpad.sensors.rasteriser import AUTO_LEVEL
-from skidpad.sensors.suite import PixelSuite
+from skidpad.sensors.suite import PixelSettings, PixelSuite
 from skidpad.sensors.twelve import twelve_sensors
 from skidpad.sensors.view import camera_view
 
@@ -39,7 +39,7 @@ def eyes(map, place, level, move=None):
     table, states = convoy(map, place)
     if move:
         move(states)
-    suite = PixelSuite(map, table, twelve_sensors(), Weather(), seed=7, level=level)
+    suite = PixelSuite(map, table, twelve_sensors(), Weather(), PixelSettings(seed=7, level=level))
     return suite, suite.observe(0, states, {}), states
 
 

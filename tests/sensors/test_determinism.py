@@ -15,7 +15,7 @@ from skidpad.core.vocabulary import RangeModel
 from skidpad.physics.presets import preset
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.bench import convoy
-from skidpad.sensors.suite import PixelSuite
+from skidpad.sensors.suite import PixelSettings, PixelSuite
 from skidpad.sensors.twelve import twelve_sensors
 
 IDS = ("depth_roof", "semantic_roof", "depth_bumper", "semantic_bumper", "rgb_front", "rgb_rear")
@@ -30,8 +30,7 @@ def drive_hash(seed: int = 3) -> str:
         table,
         twelve_sensors(),
         preset("rain-night"),
-        range_model=RangeModel.PHYSICAL,
-        seed=seed,
+        PixelSettings(range_model=RangeModel.PHYSICAL, seed=seed),
     )
     digest = hashlib.sha256()
     for tick in range(4):
@@ -86,7 +85,9 @@ def test_same_bytes_for_an_older_processor(tmp_path):
 def test_stale_buffers_are_spoilt_in_test_mode():
     map = load_map("figure8")
     table, states = convoy(map)
-    suite = PixelSuite(map, table, twelve_sensors(), preset("clear-noon"), poison_old=True)
+    suite = PixelSuite(
+        map, table, twelve_sensors(), preset("clear-noon"), PixelSettings(poison_old=True)
+    )
     old = suite.observe(0, states, {}).images
     depth, labels = old["depth_roof"].inverse_depth, old["semantic_roof"].labels
     kept = depth.copy()
@@ -122,7 +123,9 @@ def test_actors_that_are_not_present_are_not_drawn():
 def test_own_body_is_drawn_in_mirrors_and_top_view_only():
     map = load_map("figure8")
     table, states = convoy(map)
-    suite = PixelSuite(map, table, twelve_sensors(), preset("clear-noon"), render_all=True)
+    suite = PixelSuite(
+        map, table, twelve_sensors(), preset("clear-noon"), PixelSettings(render_all=True)
+    )
     suite.observe(0, states, {})
     own = {id: bool((one.instances == 1).any()) for id, one in suite._pass_of.items()}
     assert {id for id, seen in own.items() if seen} == {

@@ -6,7 +6,7 @@ from worlds import World, lanes_along, states_at, table_of
 
 from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.core.weather import Weather
-from skidpad.sensors.suite import PixelSuite
+from skidpad.sensors.suite import PixelSettings, PixelSuite
 from skidpad.sensors.twelve import twelve_sensors
 
 
@@ -34,7 +34,7 @@ def test_a_car_on_the_other_level_is_neither_in_the_corridor_nor_on_radar(ego_he
         ego, others = (203.5, -40.0, 8.0, np.pi / 2), [(203.5, 0, 0, 0), (206, 8, 0, 0)]
     else:
         ego, others = (160.0, 0.0, 0.0, 0.0), [(200, 0, 8.0, 1.57), (203, 3, 8.0, 1.57)]
-    suite = PixelSuite(world, table, twelve_sensors(), Weather(), seed=2)
+    suite = PixelSuite(world, table, twelve_sensors(), Weather(), PixelSettings(seed=2))
     with_cars = states_at([ego, *others], [20.0, 10.0, 10.0])
     without = with_cars.copy()
     without.present[1:] = False

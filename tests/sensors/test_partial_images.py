@@ -9,7 +9,7 @@ from skidpad.core.vocabulary import RangeModel
 from skidpad.physics.presets import preset
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.bench import convoy
-from skidpad.sensors.suite import PixelSuite
+from skidpad.sensors.suite import PixelSettings, PixelSuite
 from skidpad.sensors.twelve import twelve_sensors
 
 IDS = ("depth_roof", "semantic_roof", "depth_bumper", "rgb_front", "rgb_rear")
@@ -27,7 +27,7 @@ def suites(request):
     return [
         PixelSuite(
             map, table, twelve_sensors(), preset(request.param),
-            range_model=RangeModel.PHYSICAL, seed=3, poison_old=poison,
+            PixelSettings(range_model=RangeModel.PHYSICAL, seed=3, poison_old=poison),
         )
         for poison in (False, True)
     ]  # fmt: skip

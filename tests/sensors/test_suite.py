@@ -10,7 +10,7 @@ from skidpad.core.specs import CameraSpec, Modality, RadarSpec
 from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.core.weather import Weather
 from skidpad.roads.roadside import Box
-from skidpad.sensors.suite import PixelSuite
+from skidpad.sensors.suite import PixelSettings, PixelSuite
 from skidpad.sensors.twelve import twelve_sensors
 
 LEVEL = Pose(0.0, 0.0, 1.5)
@@ -20,7 +20,7 @@ INSTANCES = CameraSpec("i", Modality.INSTANCE, 160, 120, 90.0, LEVEL)
 
 
 def suite(world, table, specs=(DEPTH, LABELS, INSTANCES), **options):
-    return PixelSuite(world, table, specs, Weather(), **options)
+    return PixelSuite(world, table, specs, Weather(), PixelSettings(**options))
 
 
 @pytest.mark.req("A-020", "A-033")
@@ -105,8 +105,8 @@ def test_images_read_too_late_are_refused():
 def test_rendering_needed_images_only_changes_no_value_that_is_read():
     table, states = traffic(straight())
     specs = twelve_sensors()
-    lazy = PixelSuite(straight(), table, specs, Weather(), seed=5, poison_old=True)
-    eager = PixelSuite(straight(), table, specs, Weather(), seed=5, render_all=True)
+    lazy = PixelSuite(straight(), table, specs, Weather(), PixelSettings(seed=5, poison_old=True))
+    eager = PixelSuite(straight(), table, specs, Weather(), PixelSettings(seed=5, render_all=True))
     for tick in range(3):
         states.x[:] += 1.0
         a, b = lazy.observe(tick, states, {}), eager.observe(tick, states, {})

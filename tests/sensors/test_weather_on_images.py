@@ -20,7 +20,7 @@ from skidpad.sensors.degradation import (
     glass_mask,
 )
 from skidpad.sensors.perception_noise import PerceptionNoise
-from skidpad.sensors.suite import PixelSuite
+from skidpad.sensors.suite import PixelSettings, PixelSuite
 from skidpad.sensors.twelve import twelve_sensors
 
 SIX = ("clear-sunrise", "clear-noon", "clear-night", "rain-sunrise", "rain-noon", "rain-night")
@@ -135,7 +135,7 @@ def test_depth_and_labels_are_equal_in_all_presets_without_a_range_model():
     table, states = traffic(world)
     frames = []
     for name in SIX:
-        suite = PixelSuite(world, table, twelve_sensors(), preset(name), seed=4)
+        suite = PixelSuite(world, table, twelve_sensors(), preset(name), PixelSettings(seed=4))
         images = suite.observe(5, states, {}).images
         frames.append(
             b"".join(
@@ -156,7 +156,7 @@ def test_fog_hides_what_lies_beyond_the_sight():
     table, states = traffic(world)
     seen = {}
     for model in RangeModel.NONE, RangeModel.PHYSICAL:
-        suite = PixelSuite(world, table, twelve_sensors(), fog, range_model=model)
+        suite = PixelSuite(world, table, twelve_sensors(), fog, PixelSettings(range_model=model))
         images = suite.observe(0, states, {}).images
         seen[model] = (images["depth_roof"].depth().copy(), images["semantic_roof"].labels.copy())
     free, foggy = seen[RangeModel.NONE], seen[RangeModel.PHYSICAL]
@@ -178,7 +178,7 @@ def test_perception_noise_is_off_by_default_and_has_its_strength():
         table,
         twelve_sensors(),
         Weather(),
-        perception_noise=PerceptionNoise(depth_sigma_ratio=0.02, label_dropout=0.1),
+        PixelSettings(perception_noise=PerceptionNoise(depth_sigma_ratio=0.02, label_dropout=0.1)),
     ).observe(0, states, {})
     a, b = exact.images["depth_roof"].depth(), noisy.images["depth_roof"].depth()
     near = np.isfinite(a)
@@ -194,7 +194,9 @@ MAP_EYE = CameraSpec("map", Modality.INSTANCE, 800, 600, 90.0, Pose(0.05, 0.35, 
 def picture(world, weather, lights=None, braking=None, table=None, states=None, effect=False):
     if table is None:
         table, states = table_of([]), states_at([(100, -5.25, 0, 0)])
-    suite = PixelSuite(world, table, [EYE, MAP_EYE], preset(weather), camera_effect=effect)
+    suite = PixelSuite(
+        world, table, [EYE, MAP_EYE], preset(weather), PixelSettings(camera_effect=effect)
+    )
     images = suite.observe(0, states, lights or {}, braking).images
     return images["eye"].rgb, images["map"].instances
 

@@ -37,13 +37,13 @@ def see_all() -> None:
     from skidpad.physics.presets import preset
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.bench import convoy
-    from skidpad.sensors.suite import PixelSuite
+    from skidpad.sensors.suite import PixelSettings, PixelSuite
     from skidpad.sensors.twelve import twelve_sensors
     from skidpad.stack.perception.hsv import LampCamera
 
     road_map, specs = load_map("figure8"), twelve_sensors()
     table, states = convoy(road_map)
-    suite = PixelSuite(road_map, table, specs, preset("rain-night"), render_all=True)
+    suite = PixelSuite(road_map, table, specs, preset("rain-night"), PixelSettings(render_all=True))
     LampCamera(specs).look(suite.observe(0, states, {}).images)
 
 

@@ -15,7 +15,7 @@ from skidpad.core.vocabulary import ActorKind, LightState, RangeModel
 from skidpad.physics.presets import preset
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import LanePoint, RoadMap
-from skidpad.sensors.suite import PixelSuite
+from skidpad.sensors.suite import PixelSettings, PixelSuite
 from skidpad.sensors.twelve import twelve_sensors
 
 TICKS = 200
@@ -83,7 +83,9 @@ def run(ticks: int = TICKS, weather: str = "rain-night") -> dict[str, float]:
     map = load_map("figure8")
     table, _ = convoy(map)
     specs = twelve_sensors()
-    suite = PixelSuite(map, table, specs, preset(weather), range_model=RangeModel.PHYSICAL, seed=1)
+    suite = PixelSuite(
+        map, table, specs, preset(weather), PixelSettings(range_model=RangeModel.PHYSICAL, seed=1)
+    )
     frames = [convoy(map, STEP * 10 * k)[1] for k in range(ticks // 10)]
     rgb = [id for id, c in suite.cameras.items() if c.modality is Modality.RGB]
     core = _medians(suite, frames, CORE, ticks)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -39,6 +40,21 @@ class Observation(NamedTuple):
     radar: RadarPoints
 
 
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PixelSettings:
+    """How pixels come about, apart from what is looked at."""
+
+    range_model: RangeModel = RangeModel.NONE
+    camera_effect: bool = True  # degrade RGB images (A-222, A-223)
+    exclusive_stages: bool = False  # rain switches the night stage off (D-094)
+    perception_noise: PerceptionNoise = NO_NOISE
+    seed: int = 0
+    dt: float = DT  # s
+    render_all: bool = False
+    level: int = AUTO_LEVEL  # one level of detail for all (tests)
+    poison_old: bool = False  # spoil buffers that went stale (tests)
+
+
 class PixelSuite:
     """Cameras and radar at pixel level (A-018 to A-028).
 
@@ -53,27 +69,12 @@ class PixelSuite:
         table: ActorTable,
         specs: Sequence[SensorSpec],
         weather: Weather,
-        *,
-        range_model: RangeModel = RangeModel.NONE,
-        camera_effect: bool = True,
-        exclusive_stages: bool = False,
-        perception_noise: PerceptionNoise = NO_NOISE,
-        seed: int = 0,
-        dt: float = DT,
-        render_all: bool = False,
-        level: int = AUTO_LEVEL,
-        poison_old: bool = False,
+        settings: PixelSettings = PixelSettings(),
     ) -> None:
-        """Specs that are neither camera nor radar are somebody else's.
-
-        camera_effect: degrade RGB images (A-222, A-223). exclusive_stages: rain switches the night
-        stage off (D-094). level: one level of detail for all (tests). poison_old: spoil buffers
-        that went stale (tests).
-        """
+        """Specs that are neither camera nor radar are somebody else's."""
         self.cameras = {s.id: s for s in specs if isinstance(s, CameraSpec)}
-        self._render_all, self._level, self._poison_old = render_all, level, poison_old
-        self._dt, self._seed, self._noise = dt, seed, perception_noise
-        limited = range_model is RangeModel.PHYSICAL
+        self.settings, seed, dt = settings, settings.seed, settings.dt
+        limited = settings.range_model is RangeModel.PHYSICAL
         sight = Sight(depth_range(weather), label_range(weather)) if limited else UNLIMITED
         widest = max((c.width for c in self.cameras.values()), default=1)
         self.scene = LiveScene(map, table, widest)
@@ -89,9 +90,11 @@ class PixelSuite:
             for c in self.cameras.values()
             if c.modality is Modality.RGB
         }
-        effect = degradation(weather, exclusive=exclusive_stages)
+        effect = degradation(weather, exclusive=settings.exclusive_stages)
         self._degraded = (
-            {id: CameraNoise(id, seed, effect) for id in self._rgb} if camera_effect else {}
+            {id: CameraNoise(id, seed, effect) for id in self._rgb}
+            if settings.camera_effect
+            else {}
         )
         self.radars = [
             Radar(s, beam_of(s, seed, dt), radar_range(weather, s.range) if limited else s.range)
@@ -111,26 +114,27 @@ class PixelSuite:
         """What the sensors see of this state. braking: (n,) whose brake lamps are lit."""
         self.tick = tick
         self._ego = states.pose(EGO)
-        self.scene.place(states, self._dt)
+        self.scene.place(states, self.settings.dt)
         self.scene.show(lights)
         if braking is not None:
             self.shading.set_braking(braking)
         for one in self._passes.values():
             one.drawn = NOTHING
-            if self._poison_old:
+            if self.settings.poison_old:
                 poison(one.inverse, one.key)
-        if self._poison_old:
+        if self.settings.poison_old:
             poison(*self._rgb.values())
         images = LazyImages(self, tick)
-        if self._render_all:
+        if self.settings.render_all:
             images = LazyImages(self, tick, {id: self.render(id) for id in self.cameras})
         return Observation(images, self._measure(tick))
 
     def render(self, id: str, rows: range | None = None) -> CameraImage:
         """The image of one camera in the current state; with `rows`, at least those of it."""
         camera, one = self.cameras[id], self._pass_of[id]
+        noise, seed = self.settings.perception_noise, self.settings.seed
         whole = range(camera.height)
-        if rows is None or self._noise != NO_NOISE:  # noise is drawn for whole images
+        if rows is None or noise != NO_NOISE:  # noise is drawn for whole images
             rows = whole
         view = camera_view(camera, self._ego)
         if camera.modality is Modality.RGB:  # a normal is read off the rows above and below
@@ -138,10 +142,10 @@ class PixelSuite:
             return self._picture(id, view._replace(top=rows.start, height=rows.stop), one)
         self._draw(camera, view, one, rows)
         if camera.modality is Modality.DEPTH:
-            noisy = self._noise.on_depth(one.inverse, self._seed, id, self.tick)
+            noisy = noise.on_depth(one.inverse, seed, id, self.tick)
             return CameraImage(inverse_depth=noisy)
         if camera.modality is Modality.SEMANTIC:
-            labels = self._noise.on_labels(one.labels, self._seed, id, self.tick)
+            labels = noise.on_labels(one.labels, seed, id, self.tick)
             return CameraImage(labels=labels)
         return CameraImage(instances=one.instances)
 
@@ -151,7 +155,7 @@ class PixelSuite:
         if not missing:
             return
         view = view._replace(top=missing.start, height=missing.stop)
-        self.scene.draw(view, -1 if camera.shows_own_body else EGO, self._level, one)
+        self.scene.draw(view, -1 if camera.shows_own_body else EGO, self.settings.level, one)
         one.limit_sight(view)
         one.drawn = missing
 

@@ -14,7 +14,7 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, RangeModel, SensorLevel
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.objects import ObjectSuite
-from skidpad.sensors.suite import PixelSuite
+from skidpad.sensors.suite import PixelSettings, PixelSuite
 
 NO_IMAGES: Mapping[str, CameraImage] = {}
 NO_SEGMENTS: Mapping[str, Segments] = {}
@@ -53,13 +53,15 @@ class Pixels:
             table,
             setup.specs,
             setup.weather,
-            range_model=setup.range_model,
-            camera_effect=setup.camera_effect,
-            exclusive_stages=setup.rain_hides_night,
-            seed=seed,
-            dt=setup.dt,
-            render_all=setup.render_all,
-            poison_old=poison,
+            PixelSettings(
+                range_model=setup.range_model,
+                camera_effect=setup.camera_effect,
+                exclusive_stages=setup.rain_hides_night,
+                seed=seed,
+                dt=setup.dt,
+                render_all=setup.render_all,
+                poison_old=poison,
+            ),
         )
 
     def read(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from itertools import pairwise
 from math import ceil
 from typing import NamedTuple
@@ -216,11 +216,15 @@ def _bands(road: RoadRecord, section: SectionRecord, s: Floats, select: Floats) 
     """Lanes of both sides from the centre outwards; lanes without any width are left out."""
     offset = np.array(road.lane_offset.at(s, select))  # value and derivatives: (3, n)
     centre = next((lane for lane in section.lanes if lane.id == 0), None)
+
+    def cubic(record: Cubics) -> Floats:
+        return np.array(record.at(s - section.s_start, select - section.s_start))
+
     for side in (1.0, -1.0):
         lanes = sorted((r for r in section.lanes if r.id * side > 0), key=lambda r: abs(r.id))
         inner, inner_mark = offset, centre
         for lane in lanes:
-            outer = _outer_border(lane, side, inner, offset, section.s_start, s, select)
+            outer = _outer_border(lane, side, inner, offset, cubic)
             middle, width = 0.5 * (inner + outer), side * (outer - inner)[0]
             if np.any(width > 0.0):
                 t, dt, ddt = middle
@@ -233,13 +237,8 @@ def _outer_border(
     side: float,
     inner: Floats,
     offset: Floats,
-    s_start: float,
-    s: Floats,
-    select: Floats,
+    cubic: Callable[[Cubics], Floats],
 ) -> Floats:
-    def cubic(record: Cubics) -> Floats:
-        return np.array(record.at(s - s_start, select - s_start))
-
     if lane.width is not None:
         return inner + side * cubic(lane.width)
     if lane.border is not None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from math import cos, sin
 
@@ -17,7 +18,7 @@ from skidpad.physics.vehicle import WheelStates, step_vehicles, vehicle_params
 Floats = NDArray[np.float64]
 
 SUBSTEP = 0.01  # s; stopping distances and yaw rates within 3 % of 1 ms (docs/physics.md)
-GEAR_UP_V = np.array([4.0, 8.5, 14.0, 20.0, 27.0])  # m/s, full-load shift points of a compact car
+GEAR_UP_V = (4.0, 8.5, 14.0, 20.0, 27.0)  # m/s, full-load shift points of a compact car
 
 
 class Fleet:
@@ -161,4 +162,4 @@ class Fleet:
         """Gear that an automatic box shows: -1 in reverse, else 1 to 6 by speed."""
         if reverse:
             return -1
-        return 1 + int(np.searchsorted(GEAR_UP_V, abs(self.speed(i))))
+        return 1 + bisect_left(GEAR_UP_V, abs(self.speed(i)))

@@ -322,7 +322,7 @@ def step_vehicles(
     FR, RL, RR. grade (n,): slope along the heading, rad, uphill positive. bank (n,): roll of the
     road about the heading, rad, left side up positive.
     """
-    for i in range(states.x.shape[0]):
+    for i in range(active.shape[0]):
         if active[i]:
             _advance(
                 i, states, wheels, params, commands[i], mu[i], grade[i], bank[i], h, steps

@@ -7,8 +7,9 @@ from math import ceil, nan
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
+from skidpad.core.jit import Held, hold
 from skidpad.core.setup import LanePosition
-from skidpad.roads import kernels
+from skidpad.roads import entries, kernels
 from skidpad.roads.baked import BakedMap
 from skidpad.roads.lanes import LaneSamples, LaneTable, SignalKind, SignalTable
 from skidpad.roads.packing import lane_arrays
@@ -61,6 +62,7 @@ class RoadMap:
     signals: SignalTable
     roadside: Roadside
     arrays: kernels.LaneArrays
+    held: Held[kernels.LaneArrays]  # the same for entry kernels
     geo_reference: str
     ego_start: LanePosition | None
 
@@ -71,13 +73,12 @@ class RoadMap:
         self.geo_reference, self.ego_start = baked.geo_reference, baked.ego_start
         self.content_hash = baked.content_hash()
         self.arrays = lane_arrays(baked)
+        self.held = hold(self.arrays)
         self._names = list(zip(self.lanes.road.tolist(), self.lanes.lane_id.tolist(), strict=True))
 
     def project(self, x: float, y: float, z: float, driving: bool = True) -> LanePoint | None:
         """Nearest (driving) lane centre at about this height; None beyond 20 m."""
-        return self._point(
-            *kernels.project_point(self.arrays, float(x), float(y), float(z), driving)
-        )
+        return self._point(*entries.project(self.held, float(x), float(y), float(z), driving))
 
     def _point(self, lane: int, s: float, offset: float, *place: float) -> LanePoint | None:
         if lane < 0:
@@ -88,9 +89,7 @@ class RoadMap:
 
     def at(self, lane: int, s: float, offset: float = 0.0) -> LanePoint:
         """The place `s` m along a lane, given by its index."""
-        x, y, z, heading, curvature, width, _, _, _ = kernels.sample_kernel(
-            self.arrays, int(lane), float(s)
-        )
+        x, y, z, heading, curvature, width, _, _, _ = entries.sample(self.held, int(lane), float(s))
         road, lane_id = self._names[lane]
         return LanePoint(
             int(lane), float(s), x, y, z, heading, curvature, width, road, lane_id, float(offset)
@@ -105,7 +104,7 @@ class RoadMap:
         """
         measured = nan if heading is None else heading
         return self._point(
-            *kernels.advance_point(self.arrays, point.lane, point.s, float(distance), measured)
+            *entries.advance(self.held, point.lane, point.s, float(distance), measured)
         )
 
     def behind(self, point: LanePoint, distance: float) -> LanePoint | None:
@@ -169,7 +168,7 @@ class RoadMap:
 
     def limit(self, point: LanePoint) -> float | None:
         """Speed limit in m/s; None where the map gives none."""
-        value = float(kernels.sample_kernel(self.arrays, point.lane, point.s)[8])
+        value = float(entries.sample(self.held, point.lane, point.s)[8])
         return None if value != value else value
 
     def on_lane(self, road: int, lane_id: int, s_road: float) -> LanePoint:
@@ -196,9 +195,7 @@ class RoadMap:
         self, point: LanePoint, distance: float, kind: SignalKind = SignalKind.LIGHT
     ) -> SignalAhead | None:
         """The first signal of a kind on the straightest path, with the way to its stop line."""
-        row, gap = kernels.signal_ahead(
-            self.arrays, point.lane, point.s, float(distance), int(kind)
-        )
+        row, gap = entries.signal_ahead(self.held, point.lane, point.s, float(distance), int(kind))
         return None if row < 0 else SignalAhead(int(row), int(self.signals.id[row]), float(gap))
 
     def traced_roads(

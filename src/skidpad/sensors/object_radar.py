@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import Held, kernel
 from skidpad.core.specs import RadarSpec
 from skidpad.core.states import ActorStates
 from skidpad.core.weather import Weather
@@ -112,9 +112,9 @@ def cast_radar(
 
 
 @kernel
-def road_slope(lanes: LaneArrays, x: float, y: float, z: float) -> Floats:
+def road_slope(map: Held[LaneArrays], x: float, y: float, z: float) -> Floats:
     """(2,) dz/dx and dz/dy of the road at a place; level where there is no lane."""
-    slope = np.zeros(2)
+    lanes, slope = map.value, np.zeros(2)
     lane, s, _ = project_kernel(lanes, x, y, z, True)
     if lane >= 0:
         _, _, _, heading, _, _, grade, bank, _ = sample_kernel(lanes, lane, s)

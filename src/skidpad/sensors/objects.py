@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.frames import RadarPoints, Segments
-from skidpad.core.jit import kernel
+from skidpad.core.jit import Held, hold, kernel
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind
@@ -28,13 +28,14 @@ from skidpad.roads.roadside import Roadside
 from skidpad.sensors.boxes import (
     Boxes,
     Mount,
+    Walls,
     boxes_in_view,
     mount_of,
     placed,
     posts_of,
     walls_of,
 )
-from skidpad.sensors.object_radar import antenna_of, cast_radar, road_slope
+from skidpad.sensors.object_radar import Antenna, antenna_of, cast_radar, road_slope
 
 Floats = NDArray[np.float64]
 
@@ -63,6 +64,16 @@ class Camera(NamedTuple):
     runs: int  # vertical runs per strip
 
 
+class Surroundings(NamedTuple):
+    """Everything that sensors can meet: actors and what stands beside the road."""
+
+    states: ActorStates
+    boxes: Boxes  # of the actors
+    labels: NDArray[np.uint8]  # (n,) SemanticClass of the actors
+    walls: Walls
+    posts: Boxes
+
+
 class ObjectSuite:
     """Segments of every depth camera and points of every radar, tick by tick.
 
@@ -78,7 +89,7 @@ class ObjectSuite:
         seed: int,
         dt: float,
         weather: Weather | None = None,
-        lanes: LaneArrays | None = None,
+        lanes: Held[LaneArrays] | None = None,
     ) -> None:
         self.table = table
         self.cameras = [
@@ -94,15 +105,14 @@ class ObjectSuite:
         self.lanes = lanes
         self.walls = walls_of(roadside)
         self.posts = posts_of(roadside)
+        self._states: ActorStates | None = None
 
     def segments(self, states: ActorStates) -> dict[str, Segments]:
         """What each depth camera sees of vehicles, by camera id."""
-        boxes = self._boxes(states)
+        around = self._around(states)
         seen = {}
         for spec, mount in self.cameras:
-            rows, labels = _segments(
-                mount, spec.focal, spec.width, spec.height, boxes, states, self.labels, self.limit
-            )
+            rows, labels = _segments(around, mount, spec.focal, spec.width, spec.height, self.limit)
             u, width, top, bottom, depth = rows.T
             seen[spec.id] = Segments(u, width, top, bottom, depth, labels)
         return seen
@@ -111,15 +121,7 @@ class ObjectSuite:
         """Returns of the first radar; none when the suite has no radar."""
         if not self.antennas:
             return RadarPoints.none()
-        raw = cast_radar(
-            self.antennas[0],
-            tick,
-            self._boxes(states),
-            states,
-            self.walls,
-            self.posts,
-            self._slope(states),
-        )
+        raw = _echoes(self._around(states), self.antennas[0], tick, self._slope(states))
         return RadarPoints(raw[:, 0], raw[:, 1], raw[:, 2], raw[:, 3])
 
     def _slope(self, states: ActorStates) -> Floats:
@@ -128,23 +130,30 @@ class ObjectSuite:
             return LEVEL
         return road_slope(self.lanes, states.x[0], states.y[0], states.z[0])
 
-    def _boxes(self, states: ActorStates) -> Boxes:
-        t = self.table
-        return Boxes(states.x, states.y, states.z, states.yaw, t.length, t.width, t.height)
+    def _around(self, states: ActorStates) -> Held[Surroundings]:
+        """The surroundings, held as long as the states stay the same arrays."""
+        if states is not self._states:
+            t = self.table
+            boxes = Boxes(states.x, states.y, states.z, states.yaw, t.length, t.width, t.height)
+            self._states = states
+            self._held = hold(Surroundings(states, boxes, self.labels, self.walls, self.posts))
+        return self._held
+
+
+@kernel
+def _echoes(
+    around: Held[Surroundings], radar: Antenna, tick: int, slope: Floats
+) -> NDArray[np.float32]:
+    a = around.value
+    return cast_radar(radar, tick, a.boxes, a.states, a.walls, a.posts, slope)
 
 
 @kernel
 def _segments(
-    mount: Mount,
-    focal: float,
-    width: int,
-    height: int,
-    boxes: Boxes,
-    states: ActorStates,
-    labels: NDArray[np.uint8],
-    limit: float,
+    around: Held[Surroundings], mount: Mount, focal: float, width: int, height: int, limit: float
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
     """(m, 5) u, width, top, bottom, depth and (m,) label of what a camera on box 0 sees."""
+    states, boxes, labels = around.value.states, around.value.boxes, around.value.labels
     seat = placed(mount, states)
     # A camera that looks level sees an upright face at one depth; a pitched one at several.
     runs = 1 + int(12.0 * abs(seat.rotation[2, 0]))

@@ -88,7 +88,7 @@ class Objects:
             seed,
             setup.dt,
             weather=setup.weather if physical else None,
-            lanes=map.arrays,
+            lanes=map.held,
         )
 
     def read(

@@ -54,7 +54,7 @@ def effective(served: Served) -> np.ndarray:
     moving = served.episode.moving
     moving.grip = served.episode.sky.grip
     moving.feel_grip()
-    return moving.road_mu * moving.fleet.tire_friction / TIRE_FRICTION_REFERENCE
+    return moving.on_wheels.road_mu * moving.fleet.tire_friction / TIRE_FRICTION_REFERENCE
 
 
 @pytest.mark.req("K-2")

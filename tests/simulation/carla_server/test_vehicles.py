@@ -42,7 +42,7 @@ def drive(vehicles: Vehicles, seconds: float) -> tuple[float, float]:
         vehicles.command(DT)
         grade = np.full(1, SLOPE)
         moving.feel_grip()
-        moving.fleet.step(moving.commands, moving.road_mu, grade, np.zeros(1))
+        moving.fleet.step(moving.commands, moving.on_wheels.road_mu, grade, np.zeros(1))
     return float(moving.states.x[0]), speed_of(vehicles)
 
 

@@ -98,7 +98,7 @@ def drive_town(seed: int, seconds: float, vehicles: int) -> dict[str, float]:
     world.states.present[0] = False
     driven = world.traffic.drivers.state["active"]
     still, longest, wrecks, halts = np.zeros(len(driven)), 0.0, 0, set()
-    stops = {int(lane) for lane in np.flatnonzero(world.traffic.entry["control"] == STOP)}
+    stops = {int(lane) for lane in np.flatnonzero(world.traffic.streets.entry["control"] == STOP)}
     for k in range(round(seconds / 0.05)):
         words = segment.crowd.commands(0.05 * k, backend.truth()) if k % 2 == 0 else ()
         backend.step(VehicleCommand(brake=1.0), words)

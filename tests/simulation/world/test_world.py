@@ -158,6 +158,15 @@ def test_other_physics_and_other_tyres_act_at_once():
     assert slippery.fleet.speed(0) < 0.6 * light.fleet.speed(0)
 
 
+def test_tyres_stay_what_they_are_when_others_come():
+    world = empty()
+    car = world.add(CAR, START)
+    world.set_tyres(car, (1.0, 2.0, 3.0, 4.0))
+    world.add(CAR, START.moved(forward=50.0))
+    world.step()
+    assert world.fleet.tire_friction[world.row(car)].tolist() == [1.0, 2.0, 3.0, 4.0]
+
+
 def test_a_shorter_step_gives_nearly_the_same_drive():
     ends = []
     for dt in (0.05, 0.02):

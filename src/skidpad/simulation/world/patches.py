@@ -35,8 +35,8 @@ class Patches:
             for t in types
         ]
 
-    def apply(self, states: ActorStates, mu: NDArray[np.float64]) -> None:
-        """Multiply mu (n, 4) at FL, FR, RL, RR by the ratio of the patch under each wheel."""
+    def fill(self, states: ActorStates, share: NDArray[np.float64]) -> None:
+        """Set share (w, 4) at FL, FR, RL, RR to the ratio of the patch under each wheel."""
         for i, wheels in enumerate(self.wheels):
             if not states.present[i]:
                 continue
@@ -44,7 +44,7 @@ class Patches:
             for w, (forward, left) in enumerate(wheels):
                 x = float(states.x[i] + forward * c - left * s)
                 y = float(states.y[i] + forward * s + left * c)
-                mu[i, w] *= self.ratio_at(x, y, float(states.z[i]))
+                share[i, w] = self.ratio_at(x, y, float(states.z[i]))
 
     def ratio_at(self, x: float, y: float, z: float) -> float:
         """Ratio at a point of the road; where patches overlap the slippery one counts."""

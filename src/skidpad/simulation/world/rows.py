@@ -73,6 +73,7 @@ class Rows(NamedTuple):
     simulated: Flags  # physics moves it
     collides: Flags
     grounded: Flags  # its height follows from the road
+    held: Floats  # (n, 2) forward and left speed kept against all forces; NaN: none
 
     @classmethod
     def of(cls, members: Sequence[Member], seed: int) -> Rows:
@@ -92,6 +93,7 @@ class Rows(NamedTuple):
             simulated=np.ones(n, dtype=np.bool_),
             collides=np.ones(n, dtype=np.bool_),
             grounded=np.ones(n, dtype=np.bool_),
+            held=np.full((n, 2), np.nan),
         )
 
     def carry(self, old: Rows, to: NDArray[np.intp], source: NDArray[np.intp]) -> None:

@@ -10,7 +10,7 @@ from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.actors import Role, cast_of, place_of
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.patches import Patches
-from skidpad.simulation.world.touch import ContactBook, MarkingWatch
+from skidpad.simulation.world.touch import ContactBook
 from skidpad.simulation.world.traffic.manager import Traffic
 from skidpad.simulation.world.world import EGO, Conditions, World
 
@@ -25,22 +25,21 @@ def staged(setup: Setup, seed: int) -> World:
     )
     traffic = setup.traffic or TrafficSetup(vehicles=0)
     ratio = friction_ratio(setup.weather, setup.grip)
-    world.traffic = Traffic(map, traffic, seed, setup.dt, ratio)
+    drivers = Traffic(map, traffic, seed, ratio)
+    world.let_drive(drivers)
     if setup.patches:
         world.patches = Patches(map, setup.patches)
     ids = world.enter([role.newcomer(i) for i, role in enumerate(roles)])
     world.book = ContactBook(world.obstacles.names, setup.dt)
-    world.watch = MarkingWatch(map, world.table)
     for id, role in zip(ids, roles, strict=True):
         if role.late:
-            world.traffic.await_room(id, role.factor)
+            drivers.await_room(id, role.factor)
         else:
             world.put(world.row(id), place_of(map, role.actor.place), role.actor.speed)
     world.settle()
-    world.watch.update(world.tick, world.placed)
     for id, role in zip(ids, roles, strict=True):
         if id != EGO and not role.late and role.actor.driver is Control.AUTOPILOT:
-            _engage(world, world.traffic, id, role)
+            _engage(world, drivers, id, role)
     world.feel_grip()
     return world
 

@@ -4,16 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from math import cos, sin
+from typing import NamedTuple
 
-from skidpad.core.states import ActorTable, ContactEvent, LaneInvasion
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import kernel
+from skidpad.core.states import ContactEvent, LaneInvasion
 from skidpad.physics.contact import Contacts
+from skidpad.roads.kernels import WIDTH, LaneArrays
 from skidpad.roads.lanes import Marking
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.world.traffic.occupancy import PLACE, Places
+from skidpad.simulation.world.traffic.occupancy import Places
 
 HOLD = 0.5  # s: bodies that bounce apart and touch again within this are one contact
 EGO = 0
-FIELDS = PLACE.names or ()
+LEFT, RIGHT = 1, 2  # bits of crossed markings
 
 
 class ContactBook:
@@ -62,54 +68,56 @@ class ContactBook:
         return tuple(events.values())
 
 
-class MarkingWatch:
-    """Reports a marking when the ego's outline begins to lie across it (A-030)."""
+class Markings(NamedTuple):
+    """What the ego's outline stands across: arrays that a step reads and writes."""
 
-    def __init__(self, map: RoadMap, table: ActorTable) -> None:
-        self.map = map
-        self.half_length = float(table.length[EGO]) / 2.0
-        self.half_width = float(table.width[EGO]) / 2.0
-        self.lane = -1
-        self.across = (False, False)  # left, right marking of the present lane
+    left: NDArray[np.uint8]  # (N,) Marking at each lane sample
+    right: NDArray[np.uint8]
+    standing: NDArray[np.int64]  # (3,) lane, -1: unknown; across its left, its right marking
 
-    def forget(self) -> None:
-        """The ego was put somewhere else: what it stands across there is no invasion."""
-        self.lane = -1
 
-    def update(self, tick: int, placed: Places) -> tuple[LaneInvasion, ...]:
-        """Markings that the outline began to cross in this tick."""
-        place = dict(zip(FIELDS, placed[EGO].item(), strict=True))
-        lane = place["lane"]
-        if lane < 0:
-            self.lane = -1
-            return ()
-        turn = place["yaw"] - place["heading"]
-        reach = self.half_width * abs(cos(turn)) + self.half_length * abs(sin(turn))
-        lanes = self.map.lanes
-        at, offset = place["sample"], place["offset"]
-        half = float(self.map.samples.width[at]) / 2.0
-        across = (offset + reach > half, offset - reach < -half)
-        before = self._before(lane)
-        self.lane, self.across = lane, across
-        samples = self.map.samples
-        events = []
-        for now, was, marking in zip(
-            across, before, (samples.marking_left[at], samples.marking_right[at]), strict=True
-        ):
-            if now and not was:
-                name = Marking(int(marking)).name.lower()
-                events.append(LaneInvasion(tick, name, int(lanes.road[lane])))
-        return tuple(events)
+def markings_of(map: RoadMap) -> Markings:
+    """Nothing crossed yet."""
+    return Markings(
+        map.samples.marking_left, map.samples.marking_right, np.array([-1, 0, 0], dtype=np.int64)
+    )
 
-    def _before(self, lane: int) -> tuple[bool, bool]:
-        """Of the markings of `lane`, those across which the ego already stood."""
-        if self.lane < 0:
-            return (True, True)
-        if lane == self.lane:
-            return self.across
-        left, right = self.across
-        if lane == int(self.map.lanes.left[self.lane]):
-            return (False, left)
-        if lane == int(self.map.lanes.right[self.lane]):
-            return (right, False)
-        return self.across  # the next lane of the same strip
+
+def forget(markings: Markings) -> None:
+    """The ego was put somewhere else: what it stands across there is no invasion."""
+    markings.standing[0] = -1
+
+
+@kernel
+def cross_markings(m: Markings, lanes: LaneArrays, placed: Places) -> int:
+    """Markings that the ego's outline began to cross (A-030): LEFT and RIGHT as bits."""
+    if len(placed) == 0:
+        return 0
+    ego, standing = placed[EGO], m.standing
+    lane = ego.lane
+    if lane < 0:
+        standing[0] = -1
+        return 0
+    turn = ego.yaw - ego.heading
+    reach = ego.half_width * abs(cos(turn)) + ego.half_length * abs(sin(turn))
+    half = lanes.sample[ego.sample, WIDTH] / 2.0
+    left, right = ego.offset + reach > half, ego.offset - reach < -half
+    was_left, was_right = standing[1] != 0, standing[2] != 0
+    if standing[0] < 0:
+        was_left = was_right = True
+    elif lane != standing[0]:
+        if lane == lanes.left[standing[0]]:
+            was_left, was_right = False, was_left
+        elif lane == lanes.right[standing[0]]:
+            was_left, was_right = was_right, False
+    standing[0], standing[1], standing[2] = lane, left, right
+    return LEFT * (left and not was_left) + RIGHT * (right and not was_right)
+
+
+def invasions(
+    m: Markings, map: RoadMap, placed: Places, tick: int, crossed: int
+) -> tuple[LaneInvasion, ...]:
+    """The events behind these bits."""
+    at, road = int(placed["sample"][EGO]), int(map.lanes.road[placed["lane"][EGO]])
+    sides = [column[at] for bit, column in ((LEFT, m.left), (RIGHT, m.right)) if crossed & bit]
+    return tuple(LaneInvasion(tick, Marking(int(kind)).name.lower(), road) for kind in sides)

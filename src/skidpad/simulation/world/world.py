@@ -6,7 +6,7 @@ Everything random comes from named streams of the seed.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import atan2, cos, isfinite, sin
 
@@ -15,26 +15,33 @@ from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
+from skidpad.core.jit import hold
 from skidpad.core.setup import DT, ActorCommand
-from skidpad.core.states import ActorStates, ContactEvent, LaneInvasion, VehicleCommand
-from skidpad.physics.contact import CONTACT_LAW, Contacts, resolve_contacts
+from skidpad.core.states import ContactEvent, LaneInvasion, VehicleCommand
+from skidpad.physics.contact import CONTACT_LAW, Contacts
 from skidpad.physics.fleet import Fleet
-from skidpad.physics.grip import GripParams, fill_mu
+from skidpad.physics.grip import GripParams
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.world.ground import ROAD_NOISE, RoadSigns, read_signs, settle
+from skidpad.simulation.world.ground import ROAD_NOISE, RoadSigns, read_signs
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.obstacles import obstacles
 from skidpad.simulation.world.patches import FrictionZone, Patches, in_zone
-from skidpad.simulation.world.rows import (
-    Member,
-    Newcomer,
-    Rows,
-    bodies_of,
-    table_of,
+from skidpad.simulation.world.rows import Member, Newcomer, Rows, bodies_of, table_of
+from skidpad.simulation.world.step import (
+    DECIDE,
+    MOVE,
+    SETTLE,
+    Arena,
+    Now,
+    Wheeled,
+    advance,
+    feel_grip,
 )
-from skidpad.simulation.world.touch import ContactBook, MarkingWatch
-from skidpad.simulation.world.traffic.manager import Traffic
+from skidpad.simulation.world.touch import ContactBook, forget, invasions, markings_of
+from skidpad.simulation.world.traffic.manager import CHECK_PERIOD, Traffic, no_streets
+from skidpad.simulation.world.traffic.occupancy import occupancy
+from skidpad.simulation.world.traffic.state import drivers
 
 EGO = 0  # row and id of the first actor of a run
 BRAKING = 0.05  # pedal at which the brake lamps light up
@@ -61,18 +68,18 @@ class World:
         self.obstacles = obstacles(map)
         self.zones: Sequence[FrictionZone] = ()
         self._zoned = False  # some were in force in the last step
-        self.held: dict[int, tuple[float, float]] = {}  # body velocity kept against all forces
         self.touching = Contacts.room()
         self.touches = 0  # contacts of this tick: rows of `touching`
         self.traffic: Traffic | None = None
         self.patches: Patches | None = None
         self.book: ContactBook | None = None
-        self.watch: MarkingWatch | None = None
+        self.markings = markings_of(map)
         self.contacts: tuple[ContactEvent, ...] = ()
         self.invasions: tuple[LaneInvasion, ...] = ()
         self.notices: tuple[str, ...] = ()
         self._next_id = 0
         self._begin([])
+        self._outfit()
 
     # --- who is there
 
@@ -93,7 +100,6 @@ class World:
     def remove(self, id: int) -> None:
         """Take an actor out; all others go on as they were."""
         gone = self.row(id)
-        self.held.pop(id, None)
         self._arrange([m for i, m in enumerate(self.members) if i != gone])
 
     def row(self, id: int) -> int:
@@ -119,7 +125,6 @@ class World:
         self.grade, self.bank, self.placed = self.rows.grade, self.rows.bank, self.rows.placed
         self.fleet = Fleet(types, self.dt, states=self.states)
         self.tyres = self.fleet.tire_friction.copy()  # (wheeled, 4) outside friction zones
-        self.road_mu = np.zeros((self.wheeled, 4))
         self.bodies = bodies_of(members)
 
     def _arrange(self, members: Sequence[Member]) -> None:
@@ -134,6 +139,7 @@ class World:
             column[to] = before[source]
         for column, before in ((self.fleet.mu, fleet.mu), (self.tyres, tyres)):
             column[to] = before[source]
+        self.fleet.tire_friction[:] = self.tyres
         self._weigh()
         if self.traffic is not None:
             self.traffic.arrange(self.members, dict(kept))
@@ -141,6 +147,42 @@ class World:
             self.patches.fit(self.fleet.types)
         if self.book is not None:
             self.book.arrange({before: now for now, before in kept})
+        self._outfit()
+
+    def _outfit(self) -> None:
+        """The arrays of a step for the present actors."""
+        n, w, traffic = len(self.members), self.wheeled, self.traffic
+        self.moved = np.zeros(n, dtype=np.bool_)
+        self.patched = np.ones((w, 4))
+        self.on_wheels = Wheeled(
+            self.fleet.wheels,
+            self.fleet.params,
+            self.fleet.tire_friction,
+            self.patched,
+            np.zeros((w, 4)),
+            self.fleet.mu,
+            np.zeros(w, dtype=np.bool_),
+        )
+        arena = Arena(
+            self.rows,
+            self.moved,
+            self.on_wheels,
+            self.bodies,
+            np.zeros(n, dtype=np.bool_),
+            self.obstacles.segments,
+            self.touching,
+            self.map.arrays,
+            no_streets() if traffic is None else traffic.streets,
+            drivers(n) if traffic is None else traffic.drivers,
+            occupancy(0, n) if traffic is None else traffic.occupancy,
+            self.markings,
+        )
+        self.arena = hold(arena)
+
+    def let_drive(self, traffic: Traffic) -> None:
+        """From now on actors can have drivers."""
+        self.traffic = traffic
+        self._arrange(self.members)
 
     # --- control from outside
 
@@ -159,8 +201,8 @@ class World:
             s.vx[i], s.vy[i] = v * cos(pose.yaw), v * sin(pose.yaw)
             s.yaw_rate[i] = s.ax[i] = s.ay[i] = 0.0
             s.present[i] = True
-        if i == EGO and self.watch is not None:
-            self.watch.forget()
+        if i == EGO:
+            forget(self.markings)
 
     def teleport(self, id: int, pose: Pose) -> None:
         """Put an actor elsewhere; its velocity is kept."""
@@ -200,19 +242,17 @@ class World:
 
     def hold_velocity(self, id: int, velocity: tuple[float, float] | None) -> None:
         """Forward and left speed of a vehicle, kept against all forces; None: physics again."""
-        if velocity is None:
-            self.held.pop(id, None)
-        else:
-            self.held[id] = velocity
+        self.rows.held[self.row(id)] = np.nan if velocity is None else velocity
 
     def set_simulated(self, id: int, on: bool) -> None:
-        """Off: it stays where it is put, at the height where it is put, and nothing pushes it."""
+        """Off: it stays where it is put, and nothing pushes it."""
         self.rows.simulated[self.row(id)] = on
         self._weigh()
 
     def _weigh(self) -> None:
         """What is not simulated cannot be pushed."""
-        self.bodies = bodies_of(self.members)
+        for column, original in zip(self.bodies, bodies_of(self.members), strict=True):
+            column[:] = original
         self.bodies.inverse_mass[~self.rows.simulated] = 0.0
         self.bodies.inverse_inertia[~self.rows.simulated] = 0.0
 
@@ -236,72 +276,82 @@ class World:
 
     # --- time
 
-    def step(self, words: Iterable[ActorCommand] = ()) -> None:
+    def step(self, words: Sequence[ActorCommand] = ()) -> None:
         """Advance by dt. words: what a scenario tells actors for this step."""
         self.tick += 1
+        stages = MOVE | SETTLE
         if self.traffic is not None:
-            self.traffic.decide(self.placed, self.lights.by_row, self.tick, self.commands)
-        moved = [self._obey(word) for word in words]
-        self._move_vehicles(moved)
-        self._glide(moved)
-        self._touch()
-        if self.traffic is not None:
+            stages |= DECIDE
+        if words:
+            self._advance(stages & DECIDE)
+            stages &= ~DECIDE
+            for word in words:
+                self._obey(word)
+        self._feel_road()
+        self.notices = ()
+        if self.traffic is not None and self.tick % CHECK_PERIOD == 0:
+            self._advance(stages & ~SETTLE)
             self._put_vehicles(self.traffic)
-        self.settle()
-        self.lights.advance(self.dt)
-        if self.watch is not None:
-            self.invasions = self.watch.update(self.tick, self.placed)
-
-    def _move_vehicles(self, moved: Sequence[int]) -> None:
-        n = self.wheeled
-        active: NDArray[np.bool_] = self.states.present[:n] & self.rows.simulated[:n]
-        active[[i for i in moved if 0 <= i < n]] = False
-        self.feel_grip()
-        self.fleet.step(self.commands[:n], self.road_mu, self.grade[:n], self.bank[:n], active)
-        self.mu[:n] = self.fleet.mu
-        for id, (u, v) in self.held.items():
-            yaw = self.states.yaw[self.row(id)]
-            c, s = cos(yaw), sin(yaw)
-            self.set_velocity(id, u * c - v * s, u * s + v * c)
-        for i in np.flatnonzero(~self.rows.simulated[:n]).tolist():
-            if self.members[i].id not in self.held:
-                _stand(self.states, i)
-
-    def feel_grip(self) -> None:
-        """mu at every wheel of a tyre with tire_friction 3.5, and the tyres' own scale."""
-        n, s = self.wheeled, self.fleet.states
-        fill_mu(self.grip, s.vx, s.vy, self.road_mu)
-        if self.patches is not None:
-            self.patches.apply(self.states, self.road_mu)
-        if self.zones or self._zoned:
-            self.fleet.tire_friction[:] = self.tyres
-            for zone in self.zones:
-                self.fleet.tire_friction[in_zone(zone, s)] = zone.tire_friction
-        self._zoned = bool(self.zones)
-        self.mu[:n] = self.road_mu
-
-    def _touch(self) -> None:
-        r = self.rows
-        touchable = self.states._replace(present=self.states.present & r.collides)
-        self.touches = resolve_contacts(
-            touchable, self.bodies, self.obstacles.segments, CONTACT_LAW, self.dt, self.touching
-        )
+            stages = SETTLE
+        self._advance(stages)
+        if words:
+            self.moved[:] = False
         if self.book is not None:
             self.contacts = (
                 self.book.update(self.tick, self.touching, self.touches) if self.touches else ()
             )
+        self.lights.advance(self.dt)
+
+    def _advance(self, stages: int) -> None:
+        c = self.conditions
+        now = Now(
+            stages,
+            self.tick,
+            self.dt,
+            self.fleet.steps,
+            self.lights.by_row,
+            self.grip,
+            CONTACT_LAW,
+            self.traffic is not None and self.traffic.free_choice,
+            c.road_noise,
+            not c.all_lanes,
+        )
+        touches, crossed = advance(self.arena, now)
+        if stages & MOVE:
+            self.touches = touches
+        if stages & SETTLE:
+            self.invasions = (
+                invasions(self.markings, self.map, self.placed, self.tick, crossed)
+                if crossed
+                else ()
+            )
+
+    def _feel_road(self) -> None:
+        """Patches under the wheels, and zones in which tyres are others."""
+        if self.patches is not None:
+            self.patched[:] = 1.0
+            self.patches.fill(self.states, self.patched)
+        if self.zones or self._zoned:
+            self.fleet.tire_friction[:] = self.tyres
+            for zone in self.zones:
+                self.fleet.tire_friction[in_zone(zone, self.fleet.states)] = zone.tire_friction
+        self._zoned = bool(self.zones)
+
+    def feel_grip(self) -> None:
+        """The road's friction where everybody stands, before the first step."""
+        self._feel_road()
+        feel_grip(self.rows, self.on_wheels, self.grip)
+        self.mu[: self.wheeled] = self.on_wheels.road_mu
 
     def settle(self) -> None:
-        """Find the road under every actor."""
-        c = self.conditions
-        settle(self.map.arrays, self.rows, c.road_noise, not c.all_lanes, self.tick)
+        """Find the road under every actor, after some were moved between steps."""
+        self._advance(SETTLE)
+        self.invasions = ()
 
     def relocate(self, pose: Pose, v: float) -> None:
         """Put the ego somewhere else between two steps."""
         self.put(EGO, pose, v)
         self.settle()
-        if self.watch is not None:
-            self.watch.update(self.tick, self.placed)
 
     # --- questions
 
@@ -316,8 +366,8 @@ class World:
     def _drive(self, i: int, c: VehicleCommand) -> None:
         self.commands[i] = (c.throttle, c.brake, c.steer, c.handbrake, c.reverse)
 
-    def _obey(self, word: ActorCommand) -> int:
-        """Follow a player's word; returns the row that was placed, else -1."""
+    def _obey(self, word: ActorCommand) -> None:
+        """Follow a player's word."""
         i = self.index.get(word.actor)
         if i is None:
             raise ConfigError(f"there is no actor {word.actor!r} in this run")
@@ -327,7 +377,7 @@ class World:
             self._release(i)
             self._drive(i, word.command)
         if word.place is None:
-            return -1
+            return
         speed = 0.0 if word.speed is None else word.speed
         if not isfinite(speed):
             raise ConfigError(f"actor {word.actor}: speed must be finite, got {speed!r}")
@@ -337,20 +387,11 @@ class World:
         self.put(i, word.place, speed)
         self.states.yaw_rate[i] = wrap_angle(word.place.yaw - yaw_before) / self.dt
         self.states.ax[i] = (speed - v_before) / self.dt
-        return i
+        self.moved[i] = True
 
     def _release(self, i: int) -> None:
         if self.traffic is not None:
             self.traffic.release(i)
-
-    def _glide(self, placed: Sequence[int]) -> None:
-        """Bodies without wheels that nobody placed keep their velocity."""
-        s = self.states
-        for i in range(self.wheeled, len(self.members)):
-            if s.present[i] and i not in placed and self.rows.simulated[i]:
-                s.x[i] += s.vx[i] * self.dt
-                s.y[i] += s.vy[i] * self.dt
-                s.yaw[i] = wrap_angle(float(s.yaw[i] + s.yaw_rate[i] * self.dt))
 
     def _put_vehicles(self, traffic: Traffic) -> None:
         """Traffic that enters, is respawned, or is put back as a wreck (decision M-7)."""
@@ -363,7 +404,3 @@ class World:
                     f"put back at ({move.pose.x:.1f}, {move.pose.y:.1f})"
                 )
         self.notices = tuple(notes)
-
-
-def _stand(states: ActorStates, i: int) -> None:
-    states.vx[i] = states.vy[i] = states.yaw_rate[i] = states.ax[i] = states.ay[i] = 0.0

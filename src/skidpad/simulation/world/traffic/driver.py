@@ -24,6 +24,7 @@ from skidpad.simulation.world.traffic.outlook import (
     stop_gap,
 )
 from skidpad.simulation.world.traffic.path import (
+    PATH,
     along,
     begin,
     extend,
@@ -59,12 +60,13 @@ WRONG_WAY = -0.5  # cosine of 120 deg
 @kernel
 def follow_path(view: View, d: Drivers, i: int) -> None:
     """Update where driver i is along its path; enter the next lane when it is reached."""
-    net, path, me, body = view.net, d.path[i], d.state[i], view.placed[i]
+    net, path, me, body = view.streets.net, d.path[i], d.state[i], view.placed[i]
     start = me.at + 1
     at, t = along(net, path[0], me.at, body.x, body.y)
     while t > 1.0 and path[1] >= 0:
-        path[:-1] = path[1:]
-        path[-1] = -1
+        for k in range(PATH - 1):
+            path[k] = path[k + 1]
+        path[PATH - 1] = -1
         me.turns += 1
         start = net.lane[path[0]].first
         at, t = along(net, path[0], start, body.x, body.y)
@@ -80,7 +82,7 @@ def follow_path(view: View, d: Drivers, i: int) -> None:
 @kernel
 def turn_to(view: View, d: Drivers, i: int, lane: int, s: float) -> None:
     """Follow `lane` from about s on, sliding over from the present lateral offset."""
-    me, target = d.state[i], view.net.lane[lane]
+    me, target = d.state[i], view.streets.net.lane[lane]
     cap = me.cap
     begin(d.path[i], lane)
     me.at = target.first + int((target.size - 1) * s / target.length)
@@ -96,7 +98,7 @@ def acceleration_along(
     view: View, d: Drivers, i: int, path: Ints, s: float, v_desired: float
 ) -> tuple[float, float]:
     """IDM acceleration of i on `path` at `s`, and the gap to its leader there."""
-    leader, gap = occ_.find_ahead(view.net, view.occ, view.placed, path, s, i, REACH_AHEAD)
+    leader, gap = occ_.find_ahead(view.streets.net, view.occ, view.placed, path, s, i, REACH_AHEAD)
     v_lead = view.placed[leader].v if leader != NOBODY else 0.0
     v, trait = view.placed[i].speed, d.trait[i]
     return idm(v, v_desired, gap, v_lead, trait.headway, trait.a_max), gap
@@ -115,16 +117,17 @@ def follower_acceleration(view: View, d: Drivers, j: int, gap: float, v_lead: fl
 def change_gain(view: View, d: Drivers, i: int, lane: int, a_now: float, v_desired: float) -> float:
     """MOBIL's advantage of moving to `lane` in m/s^2; -inf when it is not safe."""
     me, v = d.state[i], view.placed[i].speed
-    s = occ_.beside(view.net, d.path[i, 0], me.s, lane)
-    scratch = np.empty(4, dtype=np.int32)
-    straight_path(view.net, lane, scratch)
-    a_new, gap_ahead = acceleration_along(view, d, i, scratch, s, v_desired)
-    behind, gap_behind = occ_.find_behind(view.net, view.occ, view.placed, lane, s, i, REACH_BEHIND)
+    s = occ_.beside(view.streets.net, d.path[i, 0], me.s, lane)
+    straight_path(view.streets.net, lane, d.aside)
+    a_new, gap_ahead = acceleration_along(view, d, i, d.aside, s, v_desired)
+    behind, gap_behind = occ_.find_behind(
+        view.streets.net, view.occ, view.placed, lane, s, i, REACH_BEHIND
+    )
     a_behind = follower_acceleration(view, d, behind, gap_behind, v)
     if not is_safe(a_new, a_behind, gap_ahead, gap_behind):
         return -np.inf
     old, gap_old = occ_.find_behind(
-        view.net, view.occ, view.placed, d.path[i, 0], me.s, i, REACH_BEHIND
+        view.streets.net, view.occ, view.placed, d.path[i, 0], me.s, i, REACH_BEHIND
     )
     a_old = follower_acceleration(view, d, old, gap_old, v)
     return incentive(a_new - a_now, min(a_behind, 0.0), max(-a_old, 0.0))
@@ -133,9 +136,9 @@ def change_gain(view: View, d: Drivers, i: int, lane: int, a_now: float, v_desir
 @kernel
 def may_enter(view: View, d: Drivers, i: int, lane: int, left: bool) -> bool:
     """There is such a driving lane, it goes on, and the marking may be crossed: broken or none."""
-    if lane < 0 or view.net.lane[lane].kind != 0 or view.net.lane[lane].ahead < 0:
+    if lane < 0 or view.streets.net.lane[lane].kind != 0 or view.streets.net.lane[lane].ahead < 0:
         return False  # LaneKind.DRIVING only: ramps are entered at forks
-    here = view.net.point[d.state[i].at]
+    here = view.streets.net.point[d.state[i].at]
     return bool((here.marking_left if left else here.marking_right) <= 1)  # Marking.NONE, BROKEN
 
 
@@ -145,13 +148,13 @@ def consider_change(view: View, d: Drivers, i: int, a_now: float, v_desired: flo
     me = d.state[i]
     if me.change < CHANGE_TIME + CHANGE_COOLDOWN or view.placed[i].speed < CHANGE_MIN_SPEED:
         return
-    bend = abs(view.net.point[me.at].curvature)
+    bend = abs(view.streets.net.point[me.at].curvature)
     if (view.tick + 3 * i) % CHANGE_PERIOD != 0 or bend > CHANGE_MAX_CURVE:
         return
     must = end_gap(view, d, i) < END_MARGIN
     drawn = uniform(me.key, view.tick, 2) < RANDOM_RATE * CHANGE_PERIOD * view.dt
     drawn_left = uniform(me.key, view.tick, 3) < 0.5
-    lane_now = view.net.lane[d.path[i, 0]]
+    lane_now = view.streets.net.lane[d.path[i, 0]]
     best, best_gain = -1, A_THRESHOLD
     for left in (True, False):
         lane = lane_now.left if left else lane_now.right
@@ -163,7 +166,7 @@ def consider_change(view: View, d: Drivers, i: int, a_now: float, v_desired: flo
         if gain > best_gain:
             best, best_gain = lane, gain
     if best >= 0:
-        turn_to(view, d, i, best, occ_.beside(view.net, d.path[i, 0], me.s, best))
+        turn_to(view, d, i, best, occ_.beside(view.streets.net, d.path[i, 0], me.s, best))
 
 
 @kernel
@@ -175,9 +178,8 @@ def plan(view: View, d: Drivers, i: int) -> None:
     v, v_desired = body.speed, me.v_desired
     a, gap = acceleration_along(view, d, i, d.path[i], me.s, v_desired)
     if body.lane >= 0 and body.lane != d.path[i, 0] and me.change < LEFT_BEHIND * CHANGE_TIME:
-        scratch = np.empty(4, dtype=np.int32)
-        straight_path(view.net, body.lane, scratch)
-        a_old, gap_old = acceleration_along(view, d, i, scratch, body.s, v_desired)
+        straight_path(view.streets.net, body.lane, d.aside)
+        a_old, gap_old = acceleration_along(view, d, i, d.aside, body.s, v_desired)
         a, gap = min(a, a_old), min(gap, gap_old)
     merging, gap_merge = merge_gap(view, d, i)
     if merging != NOBODY:
@@ -191,7 +193,7 @@ def plan(view: View, d: Drivers, i: int) -> None:
         a = min(a, max((v_desired - v) / TOO_FAST_TIME, TOO_FAST_BRAKE))
     me.target = a
     consider_change(view, d, i, a, v_desired)
-    strayed = abs(me.offset) > view.net.point[me.at].half_width + STRAYED
+    strayed = abs(me.offset) > view.streets.net.point[me.at].half_width + STRAYED
     standing = v < STUCK_SPEED and min(gap, gap_stop, gap_merge) > CAUSE_GAP
     wrong_way = cos(body.yaw - me.heading) < WRONG_WAY
     if standing or (strayed and me.change > CHANGE_TIME) or wrong_way:
@@ -206,15 +208,15 @@ def keep_lane_if_pushed(view: View, d: Drivers, i: int) -> None:
     me, body = d.state[i], view.placed[i]
     if me.change <= CHANGE_TIME or body.lane < 0 or body.lane == d.path[i, 0]:
         return
-    kind = view.net.lane[body.lane].kind
-    if abs(me.offset) > 1.5 * view.net.point[me.at].half_width and (kind == 0 or kind == 7):
+    kind = view.streets.net.lane[body.lane].kind
+    if abs(me.offset) > 1.5 * view.streets.net.point[me.at].half_width and (kind == 0 or kind == 7):
         turn_to(view, d, i, body.lane, body.s)
 
 
 @kernel
 def drive_all(view: View, d: Drivers, commands: Floats) -> None:
     """One tick of all active drivers; writes throttle, brake, steer, ... into commands (n, 5)."""
-    occ_.fill(view.net, view.placed, view.occ)
+    occ_.fill(view.streets.net, view.placed, view.occ)
     for i in range(len(d.state)):
         if d.state[i].active and view.placed[i].present:
             d.state[i].change += view.dt

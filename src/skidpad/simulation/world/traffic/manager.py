@@ -19,17 +19,15 @@ from skidpad.core.vocabulary import ActorKind, TrafficStart
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.rows import Member, Shape
-from skidpad.simulation.world.traffic.driver import drive_all
 from skidpad.simulation.world.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
-from skidpad.simulation.world.traffic.network import Network, network
-from skidpad.simulation.world.traffic.occupancy import Places, occupancy
+from skidpad.simulation.world.traffic.network import LANE, POINT, STOP, Network, network
+from skidpad.simulation.world.traffic.occupancy import occupancy
 from skidpad.simulation.world.traffic.path import begin
 from skidpad.simulation.world.traffic.places import FreePlaces
-from skidpad.simulation.world.traffic.priority import bake_priority
-from skidpad.simulation.world.traffic.state import TRAIT, View, drivers
+from skidpad.simulation.world.traffic.priority import CONFLICT, ENTRY, ZEBRA, bake_priority
+from skidpad.simulation.world.traffic.state import TRAIT, Streets, drivers
 from skidpad.simulation.world.traffic.variety import vary
 
-KERB = 0.5  # m beside the road from which a pedestrian in motion counts as on the zebra
 AIR_DENSITY = 1.204  # kg/m^3 at 20 C
 STUCK_TIME = 10.0  # s, decision M-7
 PUT_BACK_NEAREST = 100.0  # m from the ego, decision M-7
@@ -53,6 +51,22 @@ def priority_of(
     return bake_priority(map.samples, map.lanes, map.signals, map.roadside)
 
 
+def streets_of(map: RoadMap) -> Streets:
+    """What drivers know of a map; nobody walks."""
+    entry, conflict, zebra, zebras = priority_of(map)
+    nobody, free = np.empty(0, dtype=np.int64), np.zeros(len(zebras), dtype=np.bool_)
+    return Streets(network_of(map), entry, conflict, zebra, zebras, nobody, free)
+
+
+def no_streets() -> Streets:
+    """Of a world without drivers."""
+    lanes = np.empty(0, dtype=np.int32)
+    net = Network(np.empty(0, POINT), np.empty(0, LANE), np.empty(0, STOP), lanes, lanes)
+    rows = np.empty(0, ENTRY), np.empty(0, CONFLICT), np.empty(0, ZEBRA)
+    nobody, free = np.empty(0, dtype=np.int64), np.zeros(0, dtype=np.bool_)
+    return Streets(net, *rows, np.empty((0, 5)), nobody, free)
+
+
 @dataclass(frozen=True, slots=True)
 class Move:
     """A vehicle that is to be put somewhere: entering, respawned, or a wreck put back."""
@@ -66,15 +80,12 @@ class Move:
 class Traffic:
     """Drivers of those actors that have one."""
 
-    def __init__(
-        self, map: RoadMap, setup: TrafficSetup, seed: int, dt: float, grip: float
-    ) -> None:
+    def __init__(self, map: RoadMap, setup: TrafficSetup, seed: int, grip: float) -> None:
         """grip: friction over dry, in (0, 1]."""
-        self.net, self.setup, self.seed, self.dt = network_of(map), setup, seed, dt
+        self.net, self.setup, self.seed = network_of(map), setup, seed
         self.caution = grip if setup.slow_in_weather else 1.0
         self.drivers, self.occupancy = drivers(0), occupancy(0, 0)
-        self.walkers = np.empty(0, dtype=np.intp)  # to whom drivers yield at zebras
-        self.entry, self.conflict, self.zebra, self.zebras = priority_of(map)
+        self.streets = streets_of(map)
         self.places = FreePlaces(map, self.net, stream(seed, "traffic", "places"))
         self.row: dict[int, int] = {}  # by id
         self.waiting: list[int] = []  # ids of those who enter when there is room
@@ -88,12 +99,18 @@ class Traffic:
         if self.setup.variety:
             vary(self.drivers.trait, ids, self.seed)
         for new, before in source.items():
-            for column, was in zip(self.drivers, old, strict=True):
+            for column, was in zip(self.drivers[:3], old[:3], strict=True):
                 column[new] = was[before]
         self.occupancy = occupancy(len(self.net.lane), len(ids))
-        self.walkers = np.flatnonzero([m.kind is ActorKind.PEDESTRIAN for m in members])
+        walkers = np.flatnonzero([m.kind is ActorKind.PEDESTRIAN for m in members])
+        self.streets = self.streets._replace(walkers=walkers)
         self.row = {id: i for i, id in enumerate(ids)}
         self.waiting = [id for id in self.waiting if id in self.row]
+
+    @property
+    def free_choice(self) -> bool:
+        """Branches are drawn instead of taking the straightest."""
+        return self.setup.mode is TrafficStart.RANDOM
 
     def engage(self, i: int, lane: int, s: float, factor: float = 1.0) -> None:
         """Actor i drives itself from here on, along `lane`."""
@@ -115,30 +132,6 @@ class Traffic:
         """Actor i is moved by commands from here on."""
         self.drivers.state["active"][i] = False
 
-    def decide(
-        self, placed: Places, lights: NDArray[np.uint8], tick: int, commands: NDArray[np.float64]
-    ) -> None:
-        """Write the commands of all driven actors for the coming step."""
-        free_choice = self.setup.mode is TrafficStart.RANDOM
-        view = View(
-            self.net, self.occupancy, placed, lights, tick, self.dt, free_choice,
-            self.entry, self.conflict, self.zebra, self._busy(placed),
-        )  # fmt: skip
-        drive_all(view, self.drivers, commands)
-
-    def _busy(self, placed: Places) -> NDArray[np.bool_]:
-        """(Z,) zebras on which somebody walks, or steps from the kerb."""
-        who = placed[self.walkers]
-        if not len(who) or not len(self.zebras):
-            return np.zeros(len(self.zebras), dtype=np.bool_)
-        x, y, h, half_l, half_w = self.zebras.T[:, :, None]
-        dx, dy = who["x"] - x, who["y"] - y
-        along, across = np.cos(h) * dx + np.sin(h) * dy, -np.sin(h) * dx + np.cos(h) * dy
-        moving = who["present"] & (np.hypot(who["vx"], who["vy"]) > 0.1)
-        on = (np.abs(along) < half_l + KERB) & (np.abs(across) < half_w) & moving
-        busy: NDArray[np.bool_] = on.any(axis=1)
-        return busy
-
     def moves(self, states: ActorStates, tick: int) -> Iterator[Move]:
         """Vehicles to put somewhere in this tick; apply each before asking for the next."""
         if tick % CHECK_PERIOD:
@@ -148,7 +141,7 @@ class Traffic:
             wrecks = np.flatnonzero(driver["active"] & (driver["stuck"] > STUCK_TIME))
             for i in wrecks.tolist():
                 yield from self._put(i, states, PUT_BACK_NEAREST, np.inf, True)
-        if self.setup.mode is TrafficStart.RANDOM:
+        if self.free_choice:
             yield from self._keep_bubble(states)
 
     def _keep_bubble(self, states: ActorStates) -> Iterator[Move]:

@@ -95,8 +95,10 @@ def beside(net: Network, lane: int, s: float, other: int) -> float:
 @kernel
 def fill(net: Network, placed: Places, occ: Occupancy) -> None:
     """Enter every present actor into each lane that its body overlaps."""
-    occ.head[:] = NOBODY
-    occ.used[:] = 0
+    for lane in range(len(occ.head)):
+        occ.head[lane] = NOBODY
+    for i in range(len(occ.used)):
+        occ.used[i] = 0
     for i in range(len(placed)):
         lane = placed[i].lane
         if not placed[i].present or lane < 0:

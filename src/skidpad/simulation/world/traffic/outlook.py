@@ -23,7 +23,7 @@ V_PREVIEW = 10.0  # m/s, look at least this far beyond the comfortable braking d
 @kernel
 def desired_speed(view: View, d: Drivers, i: int) -> float:
     """Speed in m/s that limits and bends ahead allow, each reached by comfortable braking."""
-    net, me, trait = view.net, d.state[i], d.trait[i]
+    net, me, trait = view.streets.net, d.state[i], d.trait[i]
     v = view.placed[i].speed
     reach = v * v / (2.0 * B_COMFORT) + V_PREVIEW
     best_sq = (min(net.point[me.at].limit, me.cap) * trait.factor) ** 2
@@ -50,7 +50,7 @@ def desired_speed(view: View, d: Drivers, i: int) -> float:
 @kernel
 def stop_gap(view: View, d: Drivers, i: int) -> float:
     """Metres from the front bumper to the next line at which driver i has to stop; inf: none."""
-    net, v = view.net, view.placed[i].speed
+    net, v = view.streets.net, view.placed[i].speed
     start = -d.state[i].s - view.placed[i].half_length
     for k in range(PATH):
         if d.path[i, k] < 0 or start > REACH_LIGHT:
@@ -73,16 +73,16 @@ def end_gap(view: View, d: Drivers, i: int) -> float:
     known = -d.state[i].s
     for k in range(PATH):
         if d.path[i, k] < 0:
-            last = view.net.lane[d.path[i, k - 1]]
+            last = view.streets.net.lane[d.path[i, k - 1]]
             return max(known, 0.1) if last.ahead < 0 else np.inf
-        known += view.net.lane[d.path[i, k]].length
+        known += view.streets.net.lane[d.path[i, k]].length
     return np.inf
 
 
 @kernel
 def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
     """Who arrives at a merge ahead just before driver i on another branch, and the gap to it."""
-    net, occ = view.net, view.occ
+    net, occ = view.streets.net, view.occ
     start = net.lane[d.path[i, 0]].length - d.state[i].s
     best, best_gap = NOBODY, np.inf
     for k in range(1, PATH):

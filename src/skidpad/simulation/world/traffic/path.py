@@ -57,7 +57,8 @@ def extend(net: Network, path: Ints, s: float, key: np.uint64, turn: int, free: 
 @kernel
 def begin(path: Ints, lane: int) -> None:
     """Restart `path` on `lane`."""
-    path[:] = -1
+    for k in range(PATH):
+        path[k] = -1
     path[0] = lane
 
 

@@ -7,15 +7,15 @@ of areas in which somebody stands.
 
 from __future__ import annotations
 
-from math import sqrt
+from math import cos, sin, sqrt
 
 import numpy as np
 
 from skidpad.core.jit import kernel
-from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, find_ahead
+from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, Places, find_ahead
 from skidpad.simulation.world.traffic.path import PATH
 from skidpad.simulation.world.traffic.priority import LIGHT, STOP, YIELD
-from skidpad.simulation.world.traffic.state import Drivers, View
+from skidpad.simulation.world.traffic.state import Drivers, Streets, View
 
 REACH = 60.0  # m before a junction from which a driver looks
 DECIDE = 25.0  # m before it from which gaps are judged; before, a driver is only ready to stop
@@ -30,6 +30,8 @@ QUEUE_REACH = 26.0  # m before the area; who stands farther away stands in a que
 TAKEN_TIME = 20.0  # s after which a driver in a junction creeps on
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
 V_QUEUE = 2.0  # m/s, slower leaders make a queue
+KERB = 0.5  # m beside the road from which a pedestrian in motion counts as on the zebra
+V_WALKING = 0.1  # m/s
 INDICATED = 5  # lanes ahead that others can guess
 
 
@@ -42,10 +44,10 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
         lane = d.path[i, k]
         if lane < 0 or start > REACH:
             break
-        entry = view.entry[lane]
+        entry = view.streets.entry[lane]
         if entry.size > 0:
-            before = view.entry[d.path[i, k - 1]] if k > 0 else view.entry[lane]
-            length_before = view.net.lane[d.path[i, k - 1]].length if k > 0 else 0.0
+            before = view.streets.entry[d.path[i, k - 1]] if k > 0 else view.streets.entry[lane]
+            length_before = view.streets.net.lane[d.path[i, k - 1]].length if k > 0 else 0.0
             line = start - (length_before - before.line) if k > 0 else -1.0
             if line > -0.5:
                 if before.control == LIGHT and view.lights[before.signal] <= 1:
@@ -62,7 +64,7 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
                     me.waited += view.dt
                     if me.waited < TAKEN_TIME:
                         return max(blocked, 0.1)
-        start += view.net.lane[lane].length
+        start += view.streets.net.lane[lane].length
     return np.inf
 
 
@@ -80,9 +82,9 @@ def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, co
         return control == YIELD and body.speed > V_THROUGH
     if _queue_behind(view, d, i, k, start):
         return True
-    entry = view.entry[lane]
+    entry = view.streets.entry[lane]
     for c in range(entry.first, entry.first + entry.size):
-        conflict = view.conflict[c]
+        conflict = view.streets.conflict[c]
         if _occupied(view, i, conflict.other, conflict.other_start, conflict.other_end):
             return True
         if not conflict.yields:
@@ -123,10 +125,10 @@ def _occupied(view: View, i: int, lane: int, start: float, end: float) -> bool:
 @kernel
 def _taken_ahead(view: View, d: Drivers, i: int, k: int, start: float) -> float:
     """m to the nearest shared area on path[k] in which somebody is, for who is in the junction."""
-    entry = view.entry[d.path[i, k]]
+    entry = view.streets.entry[d.path[i, k]]
     nearest = np.inf
     for c in range(entry.first, entry.first + entry.size):
-        conflict = view.conflict[c]
+        conflict = view.streets.conflict[c]
         gap = start + conflict.start
         if gap < 0.0 or gap > nearest:
             continue
@@ -139,11 +141,11 @@ def _taken_ahead(view: View, d: Drivers, i: int, k: int, start: float) -> float:
 def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> bool:
     """Whether a queue leaves no room behind the junction lane path[k]."""
     body, me = view.placed[i], d.state[i]
-    room = start + view.net.lane[d.path[i, k]].length + 2.0 * body.half_length + EXIT_ROOM
-    if d.path[i, k + 1] >= 0 and view.entry[d.path[i, k + 1]].size > 0:
+    room = start + view.streets.net.lane[d.path[i, k]].length + 2.0 * body.half_length + EXIT_ROOM
+    if d.path[i, k + 1] >= 0 and view.streets.entry[d.path[i, k + 1]].size > 0:
         return False  # in roundabouts junctions follow each other
     leader, gap = find_ahead(
-        view.net, view.occ, view.placed, d.path[i], me.s, i, room + body.half_length
+        view.streets.net, view.occ, view.placed, d.path[i], me.s, i, room + body.half_length
     )
     return leader != NOBODY and gap < room and view.placed[leader].v < V_QUEUE
 
@@ -153,20 +155,22 @@ def _is_coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: fl
     """Whether somebody arrives at `zone` m along `lane` within `clear` s."""
     if _arrives(view, d, i, lane, lane, zone, clear):
         return True
-    row = view.net.lane[lane]
+    row = view.streets.net.lane[lane]
     for p in range(row.prev_first, row.prev_first + row.prevs):
-        first = view.net.prev_lane[p]
+        first = view.streets.net.prev_lane[p]
         if _held_by_light(view, first):
             continue
-        way = zone + view.net.lane[first].length
+        way = zone + view.streets.net.lane[first].length
         if _arrives(view, d, i, first, lane, way, clear):
             return True
         if way > WATCH:
             continue
-        row_2 = view.net.lane[first]
+        row_2 = view.streets.net.lane[first]
         for q in range(row_2.prev_first, row_2.prev_first + row_2.prevs):
-            second = view.net.prev_lane[q]
-            if _arrives(view, d, i, second, lane, way + view.net.lane[second].length, clear):
+            second = view.streets.net.prev_lane[q]
+            if _arrives(
+                view, d, i, second, lane, way + view.streets.net.lane[second].length, clear
+            ):
                 return True
     return False
 
@@ -174,7 +178,7 @@ def _is_coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: fl
 @kernel
 def _held_by_light(view: View, lane: int) -> bool:
     """Whether a red light stands at the end of a lane."""
-    entry = view.entry[lane]
+    entry = view.streets.entry[lane]
     return bool(entry.control == LIGHT and view.lights[entry.signal] == 0)
 
 
@@ -205,7 +209,27 @@ def _arrives(
 @kernel
 def _leads_to(d: Drivers, j: int, lane: int) -> bool:
     """Whether driver j's path goes over a lane: its indicators say so."""
-    return bool(np.any(d.path[j, :INDICATED] == lane))
+    found = False
+    for k in range(INDICATED):
+        found = found or d.path[j, k] == lane
+    return found
+
+
+@kernel
+def note_walkers(streets: Streets, placed: Places) -> None:
+    """Mark the zebras on which somebody walks, or steps from the kerb."""
+    for z in range(len(streets.zebras)):
+        zebra = streets.zebras[z]
+        c, s = cos(zebra[2]), sin(zebra[2])
+        streets.busy[z] = False
+        for i in streets.walkers:
+            who = placed[i]
+            if not who.present or who.vx * who.vx + who.vy * who.vy <= V_WALKING * V_WALKING:
+                continue
+            dx, dy = who.x - zebra[0], who.y - zebra[1]
+            along, across = c * dx + s * dy, -s * dx + c * dy
+            if abs(along) < zebra[3] + KERB and abs(across) < zebra[4]:
+                streets.busy[z] = True
 
 
 @kernel
@@ -217,10 +241,10 @@ def zebra_gap(view: View, d: Drivers, i: int) -> float:
         lane = d.path[i, k]
         if lane < 0 or start > REACH:
             break
-        entry = view.entry[lane]
+        entry = view.streets.entry[lane]
         for row in range(entry.zebra_first, entry.zebra_first + entry.zebras):
-            gap = start + view.zebra[row].s - 1.0
-            if gap > -1.0 and view.busy[view.zebra[row].zebra]:
+            gap = start + view.streets.zebra[row].s - 1.0
+            if gap > -1.0 and view.streets.busy[view.streets.zebra[row].zebra]:
                 return float(max(gap, 0.1))
-        start += view.net.lane[lane].length
+        start += view.streets.net.lane[lane].length
     return np.inf

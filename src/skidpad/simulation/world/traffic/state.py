@@ -11,6 +11,7 @@ from skidpad.simulation.world.traffic.network import Network
 from skidpad.simulation.world.traffic.occupancy import Occupancy, Places
 from skidpad.simulation.world.traffic.path import PATH
 
+Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
 CHANGE_TIME = 5.0  # s for one lane; naturalistic mean 4 to 6 s (Toledo and Zohar 2007)
@@ -61,22 +62,31 @@ class Drivers(NamedTuple):
     state: NDArray[np.void]  # (n,) DRIVER
     trait: NDArray[np.void]  # (n,) TRAIT
     path: Ints  # (n, PATH) lanes to follow, the present one first
+    aside: Ints  # (4,) room for the lanes of another way
+
+
+class Streets(NamedTuple):
+    """What drivers know of the map, and who walks over its zebras."""
+
+    net: Network
+    entry: NDArray[np.void]  # (L,) ENTRY of `priority`
+    conflict: NDArray[np.void]  # CONFLICT
+    zebra: NDArray[np.void]  # ZEBRA
+    zebras: Floats  # (Z, 5) x, y, heading, half length along it, half width
+    walkers: NDArray[np.int64]  # rows of actors to whom drivers yield at zebras
+    busy: NDArray[np.bool_]  # (Z,) somebody walks over the zebra
 
 
 class View(NamedTuple):
     """Everything that drivers see in one tick."""
 
-    net: Network
+    streets: Streets
     occ: Occupancy
     placed: Places
     lights: NDArray[np.uint8]  # (K,) LightState by signal row
     tick: int
     dt: float
     free_choice: bool  # branches are drawn instead of taking the straightest
-    entry: NDArray[np.void]  # (L,) ENTRY of `priority`
-    conflict: NDArray[np.void]  # CONFLICT
-    zebra: NDArray[np.void]  # ZEBRA
-    busy: NDArray[np.bool_]  # (Z,) somebody walks over the zebra
 
 
 def drivers(n: int) -> Drivers:
@@ -84,4 +94,9 @@ def drivers(n: int) -> Drivers:
     state = np.zeros(n, dtype=DRIVER)
     state["change"] = state["cap"] = np.inf
     state["halted"] = -1
-    return Drivers(state, np.zeros(n, dtype=TRAIT), np.full((n, PATH), -1, dtype=np.int32))
+    return Drivers(
+        state,
+        np.zeros(n, dtype=TRAIT),
+        np.full((n, PATH), -1, dtype=np.int32),
+        np.full(4, -1, dtype=np.int32),
+    )

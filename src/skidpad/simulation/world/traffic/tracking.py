@@ -53,10 +53,10 @@ def curvature_ahead(view: View, d: Drivers, i: int, distance: float) -> float:
     for k in range(PATH):
         if d.path[i, k] < 0:
             return 0.0
-        lane = view.net.lane[d.path[i, k]]
+        lane = view.streets.net.lane[d.path[i, k]]
         if s <= lane.length:
             j = int(s / lane.length * (lane.size - 1))
-            return float(view.net.point[lane.first + max(j, 0)].curvature)
+            return float(view.streets.net.point[lane.first + max(j, 0)].curvature)
         s -= lane.length
     return 0.0
 
@@ -69,7 +69,7 @@ def pedals(view: View, d: Drivers, i: int) -> tuple[float, float]:
     if v < V_STANDING and a <= 0.05:
         me.trim = 0.0
         return 0.0, BRAKE_STANDING
-    grade = view.net.point[me.at].grade
+    grade = view.streets.net.point[me.at].grade
     wanted = a + G * grade + trait.drag * v * v + trait.rolling + me.trim
     if wanted >= 0.0:
         throttle, brake = wanted / min(trait.a_drive, trait.p_drive / max(v, 1.0)), 0.0

@@ -1,0 +1,159 @@
+"""One step of the world as one compiled call: it allocates nothing, all room is in the arrays.
+
+The order: drivers, friction, vehicles, other bodies, contacts; then ground and markings.
+"""
+
+from __future__ import annotations
+
+from math import cos, isnan, pi, sin, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import Held, kernel
+from skidpad.core.states import ActorStates
+from skidpad.physics.contact import Bodies, ContactLaw, Contacts, resolve_contacts
+from skidpad.physics.grip import GripParams, mu_at
+from skidpad.physics.segments import Segments
+from skidpad.physics.types import TIRE_FRICTION_REFERENCE
+from skidpad.physics.vehicle import VehicleParams, WheelStates, step_vehicles
+from skidpad.roads.kernels import LaneArrays
+from skidpad.simulation.world.ground import settle
+from skidpad.simulation.world.rows import Rows
+from skidpad.simulation.world.touch import Markings, cross_markings
+from skidpad.simulation.world.traffic.driver import drive_all
+from skidpad.simulation.world.traffic.occupancy import Occupancy
+from skidpad.simulation.world.traffic.path import wrapped
+from skidpad.simulation.world.traffic.right_of_way import note_walkers
+from skidpad.simulation.world.traffic.state import Drivers, Streets, View
+
+Floats = NDArray[np.float64]
+Flags = NDArray[np.bool_]
+
+
+DECIDE, MOVE, SETTLE = 1, 2, 4  # stages of a step; a scenario's words come before MOVE
+
+
+class Wheeled(NamedTuple):
+    """The vehicles, which are the first rows, as their physics needs them."""
+
+    wheels: WheelStates
+    params: VehicleParams
+    tire_friction: Floats  # (w, 4)
+    patched: Floats  # (w, 4) share of the grip that friction patches leave
+    road_mu: Floats  # (w, 4) of a tyre with tire_friction 3.5
+    felt: Floats  # (w, 4) at the tyres
+    active: Flags  # (w,) moved by physics in this step
+
+
+class Arena(NamedTuple):
+    """Everything that a step reads and writes, until actors come or go."""
+
+    rows: Rows
+    moved: Flags  # (n,) put somewhere by a scenario in this step
+    wheeled: Wheeled
+    bodies: Bodies
+    touchable: Flags  # (n,)
+    segments: Segments
+    touching: Contacts
+    lanes: LaneArrays
+    streets: Streets
+    drivers: Drivers
+    occupancy: Occupancy
+    markings: Markings
+
+
+class Now(NamedTuple):
+    """What changes from step to step."""
+
+    stages: int  # DECIDE, MOVE, SETTLE as bits
+    tick: int
+    dt: float  # s
+    substeps: int
+    lights: NDArray[np.uint8]  # (K,) LightState by signal row
+    grip: GripParams
+    law: ContactLaw
+    free_choice: bool  # drivers draw branches instead of taking the straightest
+    road_noise: float  # rad
+    driving_only: bool
+
+
+@kernel
+def advance(arena: Held[Arena], now: Now) -> tuple[int, int]:
+    """The asked stages of a step; returns contacts found, and markings crossed as bits."""
+    a = arena.value
+    rows = a.rows
+    if now.stages & DECIDE:
+        note_walkers(a.streets, rows.placed)
+        view = View(a.streets, a.occupancy, rows.placed, now.lights, now.tick, now.dt,
+                    now.free_choice)  # fmt: skip
+        drive_all(view, a.drivers, rows.commands)
+    touches = crossed = 0
+    if now.stages & MOVE:
+        _drive(rows, a.moved, a.wheeled, now)
+        _glide(rows, a.moved, len(a.wheeled.active), now.dt)
+        touches = _touch(a, now)
+    if now.stages & SETTLE:
+        settle(a.lanes, rows, now.road_noise, now.driving_only, now.tick)
+        crossed = cross_markings(a.markings, a.lanes, rows.placed)
+    return touches, crossed
+
+
+@kernel
+def feel_grip(rows: Rows, w: Wheeled, grip: GripParams) -> None:
+    """Friction at every wheel, with weather, patches and the tyres' own scale."""
+    s = rows.states
+    for i in range(len(w.active)):
+        mu = mu_at(grip, sqrt(s.vx[i] * s.vx[i] + s.vy[i] * s.vy[i]))
+        for k in range(4):
+            w.road_mu[i, k] = mu * w.patched[i, k]
+            w.felt[i, k] = w.road_mu[i, k] * w.tire_friction[i, k] / TIRE_FRICTION_REFERENCE
+
+
+@kernel
+def _drive(rows: Rows, moved: Flags, w: Wheeled, now: Now) -> None:
+    """Vehicles through their physics, or as they are told."""
+    s = rows.states
+    feel_grip(rows, w, now.grip)
+    for i in range(len(w.active)):
+        w.active[i] = s.present[i] and rows.simulated[i] and not moved[i]
+    step_vehicles(
+        s, w.wheels, w.params, rows.commands, w.felt, rows.grade, rows.bank, w.active,
+        now.dt / now.substeps, now.substeps,
+    )  # fmt: skip
+    for i in range(len(w.active)):
+        for k in range(4):
+            rows.mu[i, k] = w.felt[i, k]
+        forward, left = rows.held[i, 0], rows.held[i, 1]
+        if not isnan(forward):
+            c, sn = cos(s.yaw[i]), sin(s.yaw[i])
+            s.vx[i], s.vy[i] = forward * c - left * sn, forward * sn + left * c
+            for k in range(4):
+                w.wheels.omega[i, k] = forward / w.params.wheel_radius[i]
+        elif not rows.simulated[i]:
+            s.vx[i] = s.vy[i] = s.yaw_rate[i] = s.ax[i] = s.ay[i] = 0.0
+
+
+@kernel
+def _glide(rows: Rows, moved: Flags, first: int, dt: float) -> None:
+    """Bodies without wheels that nobody placed keep their velocity."""
+    s = rows.states
+    for i in range(first, len(moved)):
+        if s.present[i] and rows.simulated[i] and not moved[i]:
+            s.x[i] += s.vx[i] * dt
+            s.y[i] += s.vy[i] * dt
+            yaw = wrapped(s.yaw[i] + s.yaw_rate[i] * dt)
+            s.yaw[i] = yaw if yaw > -pi else pi
+
+
+@kernel
+def _touch(a: Arena, now: Now) -> int:
+    """Contacts of those that collide."""
+    s = a.rows.states
+    for i in range(len(a.touchable)):
+        a.touchable[i] = s.present[i] and a.rows.collides[i]
+    states = ActorStates(
+        s.x, s.y, s.z, s.yaw, s.pitch, s.roll, s.vx, s.vy, s.yaw_rate, s.ax, s.ay, a.touchable
+    )
+    return resolve_contacts(states, a.bodies, a.segments, now.law, now.dt, a.touching)

@@ -9,6 +9,7 @@ from PIL import Image
 
 from skidpad.campaign.drive import Moment, Sink
 from skidpad.core.frames import SensorFrame
+from skidpad.core.run import slug
 from skidpad.recording.campaigns import SNAPSHOTS
 from skidpad.recording.files import output_error
 
@@ -21,8 +22,7 @@ class Snapshots(Sink):
 
     def __init__(self, folder: Path | None, driver: str, weather: str, dt: float) -> None:
         self.folder = None if folder is None else folder / SNAPSHOTS
-        name = "".join(c if c.isalnum() else "-" for c in driver)
-        self.stem, self.dt = f"{name}_{weather}", dt
+        self.stem, self.dt = f"{slug(driver)}_{weather}", dt
         self.paths: list[Path] = []
 
     def see(self, moment: Moment) -> None:

@@ -253,7 +253,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         if isinstance(self.course, Route):
             return self.course.name
         if isinstance(self.course, Roads):
-            return f"{_slug(self.driver.label)}_{self.weather.name}"
+            return f"{slug(self.driver.label)}_{self.weather.name}"
         scenario = self.course.file.rpartition("/")[2].removesuffix(".xosc")
         what = "-".join(filter(None, (scenario, self.course.variant, "drops" * self.overlay)))
         return f"{what}_{self.weather.name}_{self.friction.value}"
@@ -292,5 +292,6 @@ def run_from_plain(plain: dict[str, Any], where: str) -> RunSpec:
         raise FileError(f"{where} does not describe a run: {error}") from error
 
 
-def _slug(label: str) -> str:
+def slug(label: str) -> str:
+    """A label as part of a file's name."""
     return "".join(c if c.isalnum() else "-" for c in label)

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import polars as pl
 
+from skidpad.core.run import slug
 from skidpad.evidence.drive.collisions import Crash, find_crashes
 from skidpad.evidence.drive.prepared import Drive, prepare
 from skidpad.recording.logfiles import read_log
@@ -68,7 +69,7 @@ def _cell_block(matrix: Matrix, config: str, weather: str, found: list[Found]) -
     inline = [crash_card(*item) for item in found[:INLINE]]
     if len(found) <= INLINE and len(crashed) <= RUNS_READ:
         return Cards(title, inline)
-    name = "".join(c if c.isalnum() else "-" for c in f"{config}_{weather}") + ".html"
+    name = slug(f"{config}_{weather}") + ".html"
     pages = matrix.folder.path / CARDS
     pages.mkdir(exist_ok=True)
     section = Section(title, [Cards(title, [crash_card(*item) for item in found], open=True)])

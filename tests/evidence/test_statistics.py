@@ -89,6 +89,32 @@ def test_sign_changes_agree_with_scipy(d: list[float]) -> None:
     assert (mirrored.p_less, mirrored.mean) == (c.p_greater, pytest.approx(-c.mean))
 
 
+@pytest.mark.parametrize("n", [6, 10, 20])
+def test_the_interval_of_paired_differences_covers_what_it_promises(n: int) -> None:
+    """2000 draws of counts as uneven as crashes: about 95 % of the intervals hold the truth."""
+    rng = np.random.default_rng(n)
+    counts = rng.negative_binomial(0.5, 1.0 / 3.0, (2, 2000, n))  # mean 1, variance 3
+    held = [
+        c.low <= 0.0 <= c.high for c in (compare_pairs(d).interval for d in counts[0] - counts[1])
+    ]
+    assert np.mean(held) > 0.94
+
+
+def test_few_pairs_have_no_limits_and_six_have_their_extremes() -> None:
+    assert compare_pairs([1.0, 2.0, 3.0, 4.0, 5.0]).interval == (-np.inf, np.inf)
+    assert compare_pairs([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]).interval == (1.0, 6.0)
+
+
+@given(st.lists(st.floats(-9.0, 9.0), min_size=6, max_size=9, unique=True))
+def test_the_interval_holds_the_shifts_that_are_not_rejected(d: list[float]) -> None:
+    low, high = compare_pairs(d).interval
+    for edge, inside in ((low, 1.0), (high, -1.0)):
+        for step in (1e-3, -1e-3):
+            shifted = compare_pairs(np.array(d) - (edge + step * inside))
+            tail = shifted.p_greater if inside > 0 else shifted.p_less
+            assert (tail > 0.025) == (step > 0.0) or high - low < 2e-3
+
+
 def test_many_pairs_find_a_shift_and_say_how_many_were_needed() -> None:
     d = np.random.default_rng(4).normal(1.0, 2.0, 60)
     c = compare_pairs(d)

@@ -12,6 +12,7 @@ from enum import Enum
 from math import ceil
 from typing import NamedTuple, Protocol
 
+import numpy as np
 import polars as pl
 from numpy.typing import ArrayLike
 from scipy import stats
@@ -23,7 +24,8 @@ NOT_RUN = frozenset(  # leave every denominator (L-7)
     {Outcome.AGENT_ERROR.value, Outcome.CRASHED.value, Outcome.TIMEOUT.value}
 )
 RUNS_WITHOUT_EVENT = 3.7  # / limit: runs without an event that bound a rate, -ln(0.025)
-SIGNS = "sign changes, exact up to 12 pairs; bootstrap interval"
+SIGNS = "sign changes of the means per seed, exact up to 12"
+SEGMENTS = "sign changes, exact up to 12"
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,16 +36,16 @@ class Contrast:
     mean: float
     interval: Interval
     p_claimed: float  # of this or more if the difference were <= 0
-    p_reversed: float  # of this or less if it were >= 0
+    p_against: float  # of this or less if it were >= the margin
     margin: float  # a smaller difference does not matter
-    units: int  # pairs or runs behind it
+    units: int  # seeds or runs behind it
     units_needed: int | None  # None: cannot be said
     identical: bool = False  # all pairs are the same drive
 
     @property
-    def negligible(self) -> bool:
-        """The whole interval lies below the margin: the claimed difference is not there."""
-        return self.margin > 0.0 and self.interval.high < self.margin
+    def small(self) -> bool:
+        """What was found lies below the margin."""
+        return self.mean < self.margin
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,18 +135,18 @@ class Paired:
         if not _has(table, *needed, *([self.where.are] if self.where else [])):
             return None
         rows = table.filter(self.where.are) if self.where else table
-        d, same = differences(rows, self.more.are, self.less.are, self.by, self.column)
-        if not len(d):
+        pairs, same = paired_runs(rows, self.more.are, self.less.are, self.by, self.column)
+        if not len(pairs):
             return None
-        bound = self.amount.value
-        if self.claim is Claim.MORE:
-            return paired(self.label, d, bound, same)
+        d, bound = pl.col("difference"), self.amount.value
         shown = {
+            Claim.MORE: d,
             Claim.HARDLY_MORE: bound - d,
             Claim.EQUAL: bound - d.abs(),
             Claim.OFTEN_OTHER: (d != 0.0).cast(pl.Float64) - bound,
         }[self.claim]
-        return paired(self.label, shown, 0.0, same)
+        margin = bound if self.claim is Claim.MORE else 0.0
+        return paired(self.label, per_seed(pairs, shown), margin, same)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -172,7 +174,10 @@ class Outweighs:
         if not {self.column, self.factor, self.other} <= set(table.columns):
             return None
         first, second = (
-            differences(table, highest(f).are, lowest(f).are, self.by, self.column)[0]
+            per_seed(
+                paired_runs(table, highest(f).are, lowest(f).are, self.by, self.column)[0],
+                pl.col("difference"),
+            )
             for f in (self.factor, self.other)
         )
         if not len(first) or len(first) != len(second):
@@ -205,7 +210,7 @@ class Mean:
     @property
     def test(self) -> tuple[str, ...]:
         """Sign changes."""
-        return (f"means over {self.over}", SIGNS)
+        return (f"means over {self.over}", SIGNS if "seed" in self.by else SEGMENTS)
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
@@ -218,8 +223,9 @@ class Mean:
         if not _has(table, self.value, where):
             return None
         rows = table.sort([c for c in self.by if c in table.columns]) if self.by else table
-        rows = rows.select(value=self.value.cast(pl.Float64), counts=where)
-        values = rows.filter("counts")["value"].drop_nulls()
+        rows = rows.with_columns(shown=self.value.cast(pl.Float64), counts=where)
+        rows = rows.filter("counts").drop_nulls("shown")
+        values = per_seed(rows, pl.col("shown")) if "seed" in self.by else rows["shown"]
         return paired(self.label, values, self.margin.value) if len(values) else None
 
 
@@ -282,10 +288,10 @@ class Never:
         if not judged:
             return None
         value = 0.5 - broken
-        p_claimed, p_reversed = (1.0, 0.0) if broken else (0.0, 1.0)
+        p_claimed, p_against = (1.0, 0.0) if broken else (0.0, 1.0)
         label = f"0.5 minus the number of {self.cases}"
         sure = Interval(value, value)
-        return Contrast(label, value, sure, p_claimed, p_reversed, 0.0, judged, judged)
+        return Contrast(label, value, sure, p_claimed, p_against, 0.0, judged, judged)
 
 
 def finished(table: pl.DataFrame) -> pl.DataFrame:
@@ -293,10 +299,18 @@ def finished(table: pl.DataFrame) -> pl.DataFrame:
     return table.filter(~pl.col("outcome").is_in(NOT_RUN)) if "outcome" in table.columns else table
 
 
-def differences(
+def per_seed(rows: pl.DataFrame, value: pl.Expr) -> pl.Series:
+    """Mean of `value` per seed: what shares a seed is not independent, so seeds are the units."""
+    rows = rows.with_columns(shown=value)
+    if "seed" not in rows.columns:
+        return rows["shown"]
+    return rows.group_by("seed").agg(pl.col("shown").mean()).sort("seed")["shown"]
+
+
+def paired_runs(
     table: pl.DataFrame, more: pl.Expr, less: pl.Expr, by: Sequence[str], column: str
-) -> tuple[pl.Series, bool]:
-    """Differences of `column` between the rows of `more` and of `less` that agree in `by`.
+) -> tuple[pl.DataFrame, bool]:
+    """`difference` of `column` between the rows of `more` and of `less` that agree in `by`.
 
     Several rows of one side that agree are averaged. Also whether all pairs are equal drives.
     """
@@ -308,18 +322,19 @@ def differences(
     both = both.sort(keys)
     known = "log_hash" in table.columns and not table["log_hash"].has_nulls()
     same = known and len(both) > 0 and bool((both["hashes"] == both["hashes_less"]).all())
-    return both["value"] - both["value_less"], same
+    return both.with_columns(difference=pl.col("value") - pl.col("value_less")), same
 
 
 def paired(label: str, values: ArrayLike, margin: float, identical: bool = False) -> Contrast:
     """A contrast from values that are claimed positive: differences of runs that share a seed."""
     c = compare_pairs(values)
+    below = compare_pairs(np.asarray(values, dtype=np.float64) - margin) if margin else c
     return Contrast(
         label=label,
         mean=c.mean,
         interval=c.interval,
         p_claimed=c.p_greater,
-        p_reversed=c.p_less,
+        p_against=below.p_less,
         margin=margin,
         units=c.n,
         units_needed=pairs_needed(c, margin),
@@ -335,7 +350,7 @@ def rate_below(label: str, events: int, runs: float, limit: float) -> Contrast:
         mean=limit - events / runs,
         interval=Interval(limit - high, limit - low),
         p_claimed=float(stats.poisson.cdf(events, limit * runs)),
-        p_reversed=float(stats.poisson.sf(events - 1, limit * runs)),
+        p_against=float(stats.poisson.sf(events - 1, limit * runs)),
         margin=0.0,
         units=max(1, round(runs)),
         units_needed=ceil(RUNS_WITHOUT_EVENT / limit),

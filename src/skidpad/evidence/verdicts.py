@@ -55,6 +55,11 @@ class Finding:
         amounts = dict.fromkeys(a for c in self.criteria for a in c.amounts if a.value)
         return ", ".join(map(str, amounts)) or "none"
 
+    @property
+    def nature(self) -> str:
+        """Whether the effect is put in, in words."""
+        return f"By construction: {self.built_in}." if self.built_in else "Emergent."
+
     def contrasts(self, table: pl.DataFrame) -> list[Contrast]:
         """One per criterion, or none at all: a claim is judged whole."""
         drawn = [c for criterion in self.criteria if (c := criterion.draw(finished(table)))]
@@ -67,7 +72,7 @@ class Judgement:
 
     finding: Finding
     verdict: Verdict
-    p: float | None  # Holm-adjusted within the report
+    p: float | None  # the smaller of both sides, Holm-adjusted within the report
     contrasts: tuple[Contrast, ...]
     seeds_needed: int | None
     text: str
@@ -80,7 +85,8 @@ def judge(findings: Sequence[Finding], results: Sequence[pl.DataFrame | None]) -
         for finding, table in zip(findings, results, strict=True)
     ]
     tested = [k for k, c in enumerate(evidence) if c and not all(x.identical for x in c)]
-    adjusted = dict(zip(tested, holm([_p(evidence[k]) for k in tested]), strict=True))
+    sides = holm([p for k in tested for p in _sides(evidence[k])])
+    adjusted = dict(zip(tested, zip(sides[::2], sides[1::2], strict=True), strict=True))
     seeds = [0 if t is None or "seed" not in t.columns else t["seed"].n_unique() for t in results]
     return [
         _judgement(finding, evidence[k], adjusted.get(k), seeds[k])
@@ -88,38 +94,33 @@ def judge(findings: Sequence[Finding], results: Sequence[pl.DataFrame | None]) -
     ]
 
 
-def _p(contrasts: list[Contrast]) -> float:
-    """Two-sided p of a finding: all contrasts must show the claim, one suffices against it."""
-    claimed, reversed_ = _sides(contrasts)
-    return min(1.0, 2.0 * min(claimed, reversed_))
-
-
 def _sides(contrasts: list[Contrast]) -> tuple[float, float]:
+    """p for and against a claim: all contrasts must show it, one suffices against it."""
     claimed = max(c.p_claimed for c in contrasts)
-    reversed_ = min(1.0, len(contrasts) * min(c.p_reversed for c in contrasts))
-    return claimed, reversed_
+    return claimed, min(1.0, len(contrasts) * min(c.p_against for c in contrasts))
 
 
 def _judgement(
-    finding: Finding, contrasts: list[Contrast], p: float | None, seeds: int
+    finding: Finding, contrasts: list[Contrast], p: tuple[float, float] | None, seeds: int
 ) -> Judgement:
     verdict = _verdict(contrasts, p)
     needed = _seeds_needed(contrasts, seeds) if verdict is Verdict.UNDECIDED else None
-    text = _text(finding, verdict, contrasts, p, needed)
-    return Judgement(finding, verdict, p, tuple(contrasts), needed, text)
+    least = min(p) if p else None
+    text = _text(finding, verdict, contrasts, least, needed)
+    return Judgement(finding, verdict, least, tuple(contrasts), needed, text)
 
 
-def _verdict(contrasts: list[Contrast], p: float | None) -> Verdict:
+def _verdict(contrasts: list[Contrast], p: tuple[float, float] | None) -> Verdict:
+    """From the adjusted p for and against; against comes first, for what is there may be too
+    small to matter however sure it is."""
     if not contrasts:
         return Verdict.NOT_TESTABLE
     if p is None:
         return Verdict.BY_CONSTRUCTION
-    if any(c.negligible and not c.identical for c in contrasts):
-        return Verdict.CONTRADICTED  # also where a difference too small to matter is significant
-    claimed, reversed_ = _sides(contrasts)
-    if p < ALPHA:
-        return Verdict.SUPPORTED if claimed < reversed_ else Verdict.CONTRADICTED
-    return Verdict.UNDECIDED
+    claimed, against = p
+    if against < ALPHA:
+        return Verdict.CONTRADICTED
+    return Verdict.SUPPORTED if claimed < ALPHA else Verdict.UNDECIDED
 
 
 def _seeds_needed(contrasts: list[Contrast], seeds: int) -> int | None:
@@ -145,7 +146,7 @@ def _text(
     if p is not None:
         text += f" {p_text(p)} after correction for all findings of this report."
     if verdict is Verdict.CONTRADICTED:
-        small = [c.label for c in contrasts if c.negligible]
+        small = [c.label for c in contrasts if c.small and c.margin]
         text += f" Smaller than the margin: {', '.join(small)}." if small else ""
     if verdict is Verdict.UNDECIDED:
         text += f" It needs about {needed} seeds." if needed else " More seeds are needed."

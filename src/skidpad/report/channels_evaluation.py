@@ -26,10 +26,10 @@ from skidpad.report.page import (
     Section,
     Table,
     Text,
-    Verdict,
     write_page,
 )
 from skidpad.report.published import Source, published
+from skidpad.report.verdicts import verdict_blocks
 
 EVALUATION = "evaluation.json"
 REPORT = "report.html"
@@ -271,11 +271,7 @@ def verdicts(table: Mapping[str, Any]) -> list[Block]:
             "bring about by how they are made is marked; all others emerge from the drives."
         )
     ]
-    for j in judged:
-        f = j.finding
-        nature = f"By construction: {f.built_in}." if f.built_in else "Emergent."
-        detail = f"{nature} {f.estimand}; test: {f.test}; margin: {f.margin}."
-        blocks.append(Verdict(f.id, f.claim, j.verdict.value, j.text, detail))
+    blocks += verdict_blocks(judged)
     return blocks
 
 

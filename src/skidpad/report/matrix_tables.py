@@ -7,7 +7,7 @@ from functools import partial
 
 import polars as pl
 
-from skidpad.evidence.contrasts import differences
+from skidpad.evidence.contrasts import paired_runs, per_seed
 from skidpad.evidence.statistics import Rate, bootstrap_interval, compare_pairs, p_text
 from skidpad.recording.matrix import Metrics
 from skidpad.report.campaign import Metric, metrics_of
@@ -182,10 +182,10 @@ def pairs(matrix: Matrix) -> list[Block]:
 def step_quantity(matrix: Matrix, column: str, step: tuple[str, str]) -> Quantity:
     """The second configuration less the first, paired; a clear sign is marked better or worse."""
     less, more = (pl.col("config") == config for config in step)
-    values, _ = differences(matrix.finished, more, less, BY_RUN, column)
-    if not len(values):
+    pairs, _ = paired_runs(matrix.finished, more, less, BY_RUN, column)
+    if not len(pairs):
         return Quantity(value=None)
-    c = compare_pairs(values.to_numpy())
+    c = compare_pairs(per_seed(pairs, pl.col("difference")))
     judged = column in WORSE_UP and (c.interval.low > 0.0 or c.interval.high < 0.0)
     return Quantity(
         value=c.mean,

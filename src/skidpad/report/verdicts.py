@@ -16,7 +16,7 @@ def verdict_blocks(judged: Iterable[Judgement]) -> list[Verdict]:
             j.finding.claim,
             j.verdict.value,
             j.text,
-            f"{j.finding.estimand}; test: {j.finding.test}; margin: {j.finding.margin}.",
+            f"{j.finding.nature} {j.finding.estimand}; test: {j.finding.test}; margin: {j.finding.margin}.",
         )
         for j in judged
     ]

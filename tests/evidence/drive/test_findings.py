@@ -213,11 +213,12 @@ class Given:
     """A criterion whose differences are known."""
 
     values: list[float]
+    margin: float = 0.0
     test: tuple[str, ...] = ()
     amounts: tuple[Amount, ...] = ()
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        return paired("d", self.values, 0.0)
+        return paired("d", self.values, self.margin)
 
 
 def test_holm_makes_a_claim_harder_in_a_long_report() -> None:
@@ -231,11 +232,29 @@ def test_holm_makes_a_claim_harder_in_a_long_report() -> None:
     assert judge(family, [table] * 8)[0].verdict is Verdict.UNDECIDED
 
 
+@pytest.mark.req("X-7")
+def test_a_difference_below_its_margin_contradicts_only_after_correction() -> None:
+    def found(values: list[float]) -> Finding:
+        return Finding("X", "", "", "", (Given(values, 0.5),))
+
+    small, noise = [0.0, 0.1] * 3, [2.0, -1.0] * 3
+    table = pl.DataFrame({"seed": [1]})
+    assert judge([found(small)], [table])[0].verdict is Verdict.CONTRADICTED
+    family = [found(small)] + [found(noise)] * 7
+    assert judge(family, [table] * 8)[0].verdict is Verdict.UNDECIDED
+
+
+def test_weathers_of_one_seed_are_one_unit() -> None:
+    (contrast,) = BY_ID["F-10"].contrasts(campaign("F-10", TRUE["F-10"], 1.0, seeds=3))
+    assert contrast.units == 3
+    assert contrast.p_claimed == pytest.approx(1.0 / 8.0)
+
+
 def test_a_rate_is_bounded_exactly() -> None:
     none = rate_below("r", 0, 40, 0.1)
     assert none.p_claimed == pytest.approx(np.exp(-4.0))
     many = rate_below("r", 20, 40, 0.1)
-    assert many.p_reversed < 1e-6
+    assert many.p_against < 1e-6
     assert many.interval.high < 0.0
 
 

@@ -145,6 +145,7 @@ FINDINGS: tuple[Finding, ...] = (
                 where=ASSISTED,
             ),
         ),
+        built_in="without noise the sun cannot act on depth and radar",
     ),
     Finding(
         "F-12", "Night raises distance error and variance without more dropout.",
@@ -154,6 +155,7 @@ FINDINGS: tuple[Finding, ...] = (
             at_night("headway_variance_m2", VARIANCE),
             at_night("dropout_pct", POINT, Claim.HARDLY_MORE),
         ),
+        built_in="without noise the sun cannot act on depth and radar",
     ),
     Finding(
         "F-13", "Rain makes configuration 3 collide more.",
@@ -202,6 +204,7 @@ FINDINGS: tuple[Finding, ...] = (
         "F-25", "Slowing the client changes no metric in synchronous mode.",
         "pairs of runs with unequal content hash", "its own study: the same runs paced and slowed",
         (Never("unequal pairs of logs", unequal_logs),), study=True,
+        built_in="no clock is read within the loop, so it is held against itself",
     ),
     Finding(
         "F-26",

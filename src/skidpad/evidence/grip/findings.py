@@ -172,5 +172,6 @@ FINDINGS: tuple[Finding, ...] = (
         "BF-18", "A spawn delay alone breaks the cut-in, and a shorter merge distance repairs it.",
         "completion of the variants, friction untouched", "--cutin original,unfixed,fixed at rain_0",
         (cut_ins("original", "unfixed"), cut_ins("fixed", "unfixed")),
+        built_in="the shorter merge distance was chosen for this result",
     ),
 )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import cos, pi, sin
+from math import cos, pi, sin, tan
 
 import numpy as np
 import pytest
@@ -113,7 +113,7 @@ def test_superelevation_lifts_the_left_side() -> None:
     tilted = '<superelevation s="0" a="0.05" b="0" c="0" d="0"/>'
     map = road(LINE, LANES, tilted)
     left, right = map.on_lane(7, 1, 50.0), map.on_lane(7, -1, 50.0)
-    assert left.z - right.z == pytest.approx((left.y - right.y) * sin(0.05), abs=1e-5)
+    assert left.z - right.z == pytest.approx((left.y - right.y) * tan(0.05), abs=1e-5)
     bank = map.samples.bank[[map.lanes.first[left.lane], map.lanes.first[right.lane]]]
     assert bank.tolist() == pytest.approx([-0.05, 0.05])
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import isfinite
+from math import cos, isfinite, sin
 from typing import Any
+from zlib import crc32
 
 import numpy as np
 from lxml import etree
@@ -19,7 +20,33 @@ from skidpad.roads.opendrive.reference_line import (
 )
 
 SIZE_MAX = 64 * 2**20  # bytes; the largest town that we know has 3.4 MB
+NAMED = 2**30  # ids that are no numbers count from here, away from all usual numbers
 Node = Any  # lxml's element
+
+
+def id_number(text: str) -> int:
+    """The number of an id, which OpenDRIVE allows to be any text."""
+    try:
+        number = int(text)
+    except ValueError:
+        number = 2**31
+    return number if abs(number) < 2**31 else NAMED + crc32(text.encode()) % NAMED
+
+
+@dataclass(frozen=True, slots=True)
+class Shift:
+    """The <offset> of a header: everything is moved, then turned about the origin."""
+
+    x: float = 0.0
+    y: float = 0.0
+    z: float = 0.0
+    heading: float = 0.0
+
+    def applied(self, x: float, y: float) -> tuple[float, float]:
+        """Where a point of the file lies in the world."""
+        c, s = cos(self.heading), sin(self.heading)
+        x, y = x + self.x, y + self.y
+        return x * c - y * s, x * s + y * c
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,10 +125,10 @@ class Document:
 
 
 class Reader:
-    """Attribute access with errors that say where."""
+    """Attribute access with errors that say where; `shift` is that of the file's header."""
 
-    def __init__(self, file: str) -> None:
-        self.file = file
+    def __init__(self, file: str, shift: Shift = Shift()) -> None:
+        self.file, self.shift = file, shift
 
     def fail(self, node: Node, problem: str) -> FileError:
         """The error to raise about `node`."""
@@ -133,6 +160,13 @@ class Reader:
         if abs(value) >= 2**31:
             raise self.fail(node, f"needs {name} below 2^31, got {text!r}")
         return value
+
+    def id(self, node: Node, name: str = "id", default: str | None = None) -> int:
+        """An id as a number."""
+        text = node.get(name, default)
+        if text is None:
+            raise self.fail(node, f"needs {name}")
+        return id_number(text)
 
     def cubics(self, nodes: list[Node], start: str = "s") -> Cubics:
         """Records with attributes a, b, c, d as one function; zero when there are none."""
@@ -168,7 +202,7 @@ def parse(text: bytes, file: str) -> Document:
         raise FileError(f"{file}: not OpenDRIVE, its root element is <{root.tag}>")
     if root.getroottree().docinfo.internalDTD is not None:
         raise FileError(f"{file}: a document type declaration is not allowed")
-    read = Reader(file)
+    read = Reader(file, _shift(Reader(file), root.find("header/offset")))
     roads: dict[int, RoadRecord] = {}
     for node in root.findall("road"):
         road = _road(read, node)
@@ -178,15 +212,22 @@ def parse(text: bytes, file: str) -> Document:
     return Document(
         file=file,
         roads=roads,
-        junctions={read.integer(n, "id"): _connections(read, n) for n in root.findall("junction")},
+        junctions={read.id(n): _connections(read, n) for n in root.findall("junction")},
         controllers={
-            read.integer(c, "signalId"): read.integer(n, "id")
+            read.id(c, "signalId"): read.id(n)
             for n in root.findall("controller")
             for c in n.findall("control")
         },
         geo_reference=(root.findtext("header/geoReference") or "").strip(),
         user_data={n.get("code", ""): n.get("value", "") for n in root.findall("header/userData")},
     )
+
+
+def _shift(read: Reader, node: Node | None) -> Shift:
+    if node is None:
+        return Shift()
+    x, y, z, heading = (read.number(node, name, 0.0) for name in ("x", "y", "z", "hdg"))
+    return Shift(x, y, z, heading)
 
 
 def _road(read: Reader, node: Node) -> RoadRecord:
@@ -204,12 +245,12 @@ def _road(read: Reader, node: Node) -> RoadRecord:
         if (v := read.speed(n)) is not None
     ]
     return RoadRecord(
-        id=read.integer(node, "id"),
-        junction=read.integer(node, "junction", -1),
+        id=read.id(node),
+        junction=read.id(node, "junction", "-1"),
         length=length,
         left_hand=node.get("rule", "RHT") == "LHT",
         line=ReferenceLine(sorted(elements, key=lambda e: e.s)),
-        elevation=read.cubics(node.findall("elevationProfile/elevation")),
+        elevation=_raised(read, read.cubics(node.findall("elevationProfile/elevation"))),
         superelevation=read.cubics(node.findall("lateralProfile/superelevation")),
         lane_offset=read.cubics(node.findall("lanes/laneOffset")),
         sections=_sections(read, node, length),
@@ -220,6 +261,11 @@ def _road(read: Reader, node: Node) -> RoadRecord:
         references=tuple(node.findall("signals/signalReference")),
         objects=tuple(node.findall("objects/object")),
     )
+
+
+def _raised(read: Reader, elevation: Cubics) -> Cubics:
+    lift = np.array([read.shift.z, 0.0, 0.0, 0.0])
+    return Cubics(elevation.start, elevation.coefficients + lift)
 
 
 def _element(read: Reader, node: Node) -> Element:
@@ -247,7 +293,7 @@ def _element(read: Reader, node: Node) -> Element:
                 node, f"needs line, arc, spiral, poly3 or paramPoly3, got {tag or 'nothing'}"
             )
     s, x, y, heading = (read.number(node, k) for k in ("s", "x", "y", "hdg"))
-    return Element(s, x, y, heading, length, shape)
+    return Element(s, *read.shift.applied(x, y), heading + read.shift.heading, length, shape)
 
 
 def _sections(read: Reader, road: Node, length: float) -> tuple[SectionRecord, ...]:
@@ -299,7 +345,7 @@ def _link(read: Reader, node: Node | None) -> Link | None:
     if node is None:
         return None
     return Link(
-        target=read.integer(node, "elementId"),
+        target=read.id(node, "elementId"),
         junction=node.get("elementType") == "junction",
         at_start=node.get("contactPoint", "start") == "start",
     )
@@ -308,13 +354,18 @@ def _link(read: Reader, node: Node | None) -> Link | None:
 def _connections(read: Reader, junction: Node) -> tuple[ConnectionRecord, ...]:
     return tuple(
         ConnectionRecord(
-            incoming=read.integer(node, "incomingRoad"),
-            connecting=read.integer(node, "connectingRoad"),
+            incoming=read.id(node, "incomingRoad"),
+            connecting=read.id(node, _leads_to(node)),
             at_start=node.get("contactPoint", "start") == "start",
             lanes=tuple(
                 (read.integer(n, "from"), read.integer(n, "to")) for n in node.findall("laneLink")
             ),
         )
         for node in junction.findall("connection")
-        if node.get("incomingRoad") is not None and node.get("connectingRoad") is not None
+        if node.get("incomingRoad") is not None and node.get(_leads_to(node)) is not None
     )
+
+
+def _leads_to(connection: Node) -> str:
+    """The attribute that names the road; direct junctions have no roads of their own."""
+    return "linkedRoad" if connection.get("linkedRoad") is not None else "connectingRoad"

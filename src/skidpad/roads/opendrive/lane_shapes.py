@@ -164,18 +164,19 @@ def _sampled(road: RoadRecord, index: int, section: SectionRecord, s: Floats) ->
     select = np.clip(s, section.s_start + JOINT, section.s_end - JOINT)
     line = road.line.at(s)
     z_line, grade_line, _ = road.elevation.at(s, select)
-    roll, d_roll, _ = road.superelevation.at(s, select)
+    roll, d_roll, dd_roll = road.superelevation.at(s, select)
     shapes = []
     for band in _bands(road, section, s, select):
         along = (band.lane.id < 0) != road.left_hand
-        stretch = 1.0 - line.curvature * band.t  # length of a parallel line per length of the line
-        turn = np.arctan2(band.dt, stretch)
-        d_stretch = -line.d_curvature * band.t - line.curvature * band.dt
-        speed = np.maximum(np.hypot(stretch, band.dt), 1e-6)
-        d_turn = (band.ddt * stretch - band.dt * d_stretch) / speed**2
+        t, dt, ddt = _from_above(band, roll, d_roll, dd_roll)
+        stretch = 1.0 - line.curvature * t  # length of a parallel line per length of the line
+        turn = np.arctan2(dt, stretch)
+        d_stretch = -line.d_curvature * t - line.curvature * dt
+        speed = np.maximum(np.hypot(stretch, dt), 1e-6)
+        d_turn = (ddt * stretch - dt * d_stretch) / speed**2
         heading = np.unwrap(line.heading + turn)
-        x = line.x - band.t * np.sin(line.heading)
-        y = line.y + band.t * np.cos(line.heading)
+        x = line.x - t * np.sin(line.heading)
+        y = line.y + t * np.cos(line.heading)
         d_z = grade_line + band.dt * np.sin(roll) + band.t * np.cos(roll) * d_roll
         sign = 1.0 if along else -1.0
         order = slice(None) if along else slice(None, None, -1)
@@ -203,6 +204,18 @@ def _sampled(road: RoadRecord, index: int, section: SectionRecord, s: Floats) ->
             )
         )
     return shapes
+
+
+def _from_above(
+    band: _Band, roll: Floats, d_roll: Floats, dd_roll: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """t cos(roll), how far a place of a banked road lies beside its line; derivatives by s."""
+    c, s = np.cos(roll), np.sin(roll)
+    return (
+        band.t * c,
+        band.dt * c - band.t * s * d_roll,
+        band.ddt * c - 2.0 * band.dt * s * d_roll - band.t * (c * d_roll**2 + s * dd_roll),
+    )
 
 
 def _lengths(x: Floats, y: Floats, heading: Floats) -> Floats:

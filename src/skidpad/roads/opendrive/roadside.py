@@ -17,7 +17,8 @@ from skidpad.roads.roadside import Barrier, BarrierKind, Box, ParkingSpace, Road
 Floats = NDArray[np.float64]
 
 BARRIER_STEP = 2.0  # m between the points of a barrier; 7 mm of chord at R 70
-REPEATS_MAX = 10_000
+REPEATS_MAX = 1_000_000  # of one object
+CONTINUOUS = 2.0  # m between the pieces of an object that is repeated without a gap
 THICKNESS = 0.3  # m, of an object for which the file gives no size
 
 BARRIERS = {
@@ -202,7 +203,7 @@ def _places(read: Reader, node: Node) -> Iterator[tuple[float, float, float]]:
     if not repeats:
         yield read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
     for repeat in repeats:
-        step, length = read.number(repeat, "distance"), read.number(repeat, "length")
+        step, length = read.number(repeat, "distance") or CONTINUOUS, read.number(repeat, "length")
         if step <= 0.0 or length / step > REPEATS_MAX:
             raise read.fail(
                 node, f"needs a repeat distance that gives at most {REPEATS_MAX} objects"

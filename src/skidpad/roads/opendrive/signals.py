@@ -51,9 +51,10 @@ def road_place(road: RoadRecord, s: float, t: float, z_offset: float = 0.0) -> P
     line = road.line.at(at)
     heading = float(line.heading[0])
     roll = float(road.superelevation.at(at)[0][0])
+    across = t * np.cos(roll)  # seen from above
     return Place(
-        float(line.x[0]) - t * np.sin(heading),
-        float(line.y[0]) + t * np.cos(heading),
+        float(line.x[0]) - across * np.sin(heading),
+        float(line.y[0]) + across * np.cos(heading),
         float(road.elevation.at(at)[0][0]) + t * np.sin(roll) + z_offset,
         heading,
     )
@@ -97,7 +98,7 @@ def signal_heads(document: Document, table: SignalTable) -> tuple[SignalHead, ..
     read = Reader(document.file)
     heads = {}
     for _road, node in _signals(document):
-        signal = read.integer(node, "id")
+        signal = read.id(node)
         governed = np.flatnonzero((table.id == signal) & (table.kind == SignalKind.LIGHT))
         if len(governed):
             i = governed[0]
@@ -128,10 +129,10 @@ def _rows(
     shapes: Sequence[LaneShape],
     index: Mapping[LaneKey, int],
 ) -> Iterator[_Row]:
-    signals = {read.integer(node, "id"): (road, node) for road, node in _signals(document)}
+    signals = {read.id(node): (road, node) for road, node in _signals(document)}
     places = [(id, road, node) for id, (road, node) in signals.items()]
     for road in document.roads.values():
-        places += [(read.integer(node, "id"), road, node) for node in road.references]
+        places += [(read.id(node), road, node) for node in road.references]
     for id, road, node in places:
         if id not in signals or signals[id][1].get("type") == STOP_LINE:
             continue

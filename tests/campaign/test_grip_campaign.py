@@ -253,7 +253,7 @@ def test_the_spawn_delay_alone_breaks_the_cut_in_and_the_distance_repairs_it(tmp
         "original": ["completed"], "unfixed": ["collision"], "fixed": ["completed"]
     }  # fmt: skip
     found = load_grip(tmp_path / "out").variant_distances
-    distance = {name: {d.metric: d.value for d in ds} for name, ds in found.items()}
+    distance = {name: {m: d.value for m, d in ds.items()} for name, ds in found.items()}
     assert set(distance["original"].values()) == {0.0}
     for metric in ("y", "cvip"):
         assert distance["unfixed"][metric] > distance["fixed"][metric] > 0.0, metric

@@ -11,8 +11,8 @@ from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.stopping import SPEEDS_KMH, grip_rows
 from skidpad.recording.files import write_parquet
+from skidpad.recording.grip import STOPPING
 
-STOPPING = "stopping.parquet"
 CELL = ("scenario", "cutin", "overlay", "weather", "friction")
 
 

@@ -13,7 +13,7 @@ from skidpad.recording.files import read_parquet, write_parquet
 from skidpad.recording.ledger import Entry
 from skidpad.recording.results import Columns, metric
 
-SERIES = "series"
+SERIES, STOPPING = "series", "stopping.parquet"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -75,6 +75,13 @@ def write_series(path: Path, series: NDArray[np.float32]) -> None:
     write_parquet(path, pl.DataFrame(series, schema=dict.fromkeys(COLUMNS, pl.Float32)))
 
 
-def read_series(path: Path) -> pl.DataFrame:
-    """The series of one run."""
-    return read_parquet(path)[0]
+def read_series(folder: Path, run: str) -> pl.DataFrame:
+    """The series of the run of this name."""
+    cell, _, seed = run.rpartition("-")
+    return read_parquet(series_path(folder, cell, int(seed)))[0]
+
+
+def read_stopping(folder: Path) -> pl.DataFrame:
+    """Ratio, friction and stopping distances of each weather and model; empty if not computed."""
+    path = folder / STOPPING
+    return read_parquet(path)[0] if path.is_file() else pl.DataFrame()

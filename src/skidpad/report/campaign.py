@@ -7,20 +7,19 @@ from functools import cached_property
 from typing import Any, ClassVar, Generic
 
 import msgspec
-import numpy as np
 import polars as pl
 
 from skidpad import __version__
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.ledger import E
-from skidpad.recording.results import definitions_of
+from skidpad.recording.results import Columns, definitions_of
 from skidpad.report.page import Block, Code, Definitions, Text
 
 NAMED = 5  # runs
 CLOCKS = {
-    "wall_s": ("wall time", "s"),
-    "cpu_s": ("processor time", "s"),
+    "wall_s": ("wall time", " s"),
+    "cpu_s": ("processor time", " s"),
     "rtf": ("real-time factor", ""),
 }
 UNITS = {
@@ -62,8 +61,7 @@ def unit_of(name: str) -> str:
 class CampaignView(Generic[E]):
     """A campaign as a report looks at it; each kind of campaign says what its rows are."""
 
-    metrics: ClassVar[type[Any]]
-    run_key: ClassVar[tuple[str, ...]]  # columns that tell runs apart
+    columns: ClassVar[Columns[Any, Any]]
     common: ClassVar[tuple[str, ...]]  # columns that are facts of the whole campaign
 
     folder: CampaignFolder[E]
@@ -79,9 +77,12 @@ class CampaignView(Generic[E]):
         return self.results.filter(~pl.col("outcome").is_in(NOT_RUN))
 
     @cached_property
-    def run_names(self) -> dict[tuple[Any, ...], str]:
-        """Names of the runs by what tells them apart."""
-        return self.folder.names(*self.run_key)
+    def _run_names(self) -> dict[tuple[Any, ...], str]:
+        return self.folder.names(*self.columns.sort)
+
+    def names(self, runs: pl.DataFrame) -> list[str | None]:
+        """Names of these runs; None for one that the ledger does not know."""
+        return [self._run_names.get(key) for key in runs.select(self.columns.sort).rows()]
 
     def values(self, column: str) -> str:
         """All values of a column, for people."""
@@ -96,19 +97,19 @@ class CampaignView(Generic[E]):
         gone = self.results.filter(pl.col("outcome").is_in(NOT_RUN))
         if not len(gone):
             return []
-        named = gone.select(*self.run_key, "outcome").head(NAMED).rows()
-        names = "; ".join(" ".join(map(str, row)) for row in named)
+        named = gone.select(*self.columns.sort, "outcome").head(NAMED).rows()
+        names = "; ".join(" ".join(str(v) for v in r if not isinstance(v, bool)) for r in named)
         text = f"{len(gone)} of {len(self.results)} runs did not finish ({names}); "
         return [Text(text + "they are in no denominator.", tone="warning")]
 
     def definitions(self) -> Definitions:
         """Every metric."""
-        return Definitions([(m.name, m.unit, m.meaning) for m in metrics_of(self.metrics)])
+        return Definitions([(m.name, m.unit, m.meaning) for m in metrics_of(self.columns.metrics)])
 
-    def provenance(self, results_hash: str) -> list[Block]:
+    def provenance(self) -> list[Block]:
         """Versions, machines, times, and what all runs have in common."""
         lines = [
-            f"Skidpad {__version__}, results hash {results_hash}.",
+            f"Skidpad {__version__}, results hash {self.columns.hash(self.results)}.",
             f"Machine fingerprints: {', '.join(self.folder.fingerprints) or 'none'}.",
             *self._times(),
         ]
@@ -119,14 +120,12 @@ class CampaignView(Generic[E]):
         return [Text(" ".join(lines)), Code(title, text)]
 
     def _times(self) -> list[str]:
-        timing = self.folder.timing.filter(pl.col("wall_s") > 0.0)
-        if not len(timing):
-            return []
-        parts = [
-            f"{name} median {np.median(timing[c]):.2f} {unit}".rstrip()
-            for c, (name, unit) in CLOCKS.items()
-            if c in timing.columns
-        ]
-        if "rtf" in timing.columns:
-            parts.append(f"least {min(timing['rtf']):.1f}")
-        return [f"Per run: {', '.join(parts)}."]
+        parts = []
+        for column, (name, unit) in CLOCKS.items():
+            if column in self.folder.timing.columns:
+                known = self.folder.timing[column].drop_nulls()
+                known = known.filter(known > 0.0)
+                if len(known):
+                    least, median = known.min(), known.median()
+                    parts.append(f"{name} median {median:.2f}{unit}, least {least:.2f}{unit}")
+        return [f"Per run: {'; '.join(parts)}."] if parts else []

@@ -49,7 +49,7 @@ def _hardest(matrix: Matrix, config: str, weather: str) -> list[Found]:
     runs = _crashed(matrix, config, weather).sort(
         "max_impact_kmh", "seed", descending=[True, False], nulls_last=True
     )
-    names = (matrix.run_names.get((config, weather, s)) for s in runs["seed"].head(RUNS_READ))
+    names = matrix.names(runs.head(RUNS_READ))
     found = [crash for name in names if name is not None for crash in _crashes(matrix, name)]
     return sorted(found, key=lambda item: severity(item[0]), reverse=True)
 

@@ -11,12 +11,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import matplotlib as mpl
-import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Canvas
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
-Floats = NDArray[np.float64]
 INK, FRAME = "#1c2530", "#8996a3"
 PALETTE = ("#2b6cb0", "#d9541e", "#1f7a4d", "#8a5fb0", "#b8860b", "#5b6875", "#c2458a", "#2a9d8f")
 STYLE: dict[Any, Any] = {
@@ -143,10 +141,10 @@ class Curve:
     """A line or a cloud of points; curves of one name share their entry in the legend."""
 
     name: str
-    x: Sequence[float] | Floats
-    y: Sequence[float] | Floats
+    x: ArrayLike
+    y: ArrayLike
     colour: int | None = None  # of the palette; None: by its place in the chart
-    band: tuple[Floats, Floats] | None = None  # shaded, low and high
+    band: tuple[ArrayLike, ArrayLike] | None = None  # shaded, low and high
     style: Mapping[str, Any] = field(default_factory=dict)  # as for the library
 
 
@@ -201,7 +199,7 @@ def _draw_curves(axes: Axes, chart: Chart, named: set[str]) -> None:
         axes.set_ylim(*chart.y_range)
 
 
-Named = tuple[str, Sequence[float], Sequence[float]]  # name, x, y
+Named = tuple[str, ArrayLike, ArrayLike]  # name, x, y
 
 
 def scatter(points: Sequence[Named], x_label: str, y_label: str) -> str:

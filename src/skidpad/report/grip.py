@@ -4,19 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-import msgspec
 import numpy as np
 import polars as pl
 
-from skidpad import __version__
 from skidpad.evidence.grip.findings import FINDINGS
-from skidpad.evidence.grip.study import Pair, completion, completion_p
+from skidpad.evidence.grip.study import ORIGINAL, REDUCED, completion, completion_p
 from skidpad.evidence.verdicts import judge
-from skidpad.recording.files import read_parquet
-from skidpad.recording.grip import GRIP, GripEntry, GripMetrics
-from skidpad.recording.ledger import common_configuration, fingerprints, latest, read_ledger
-from skidpad.recording.logfiles import TICKS, read_log
-from skidpad.recording.results import TIMING, definitions_of
+from skidpad.recording.grip import read_stopping
+from skidpad.recording.logfiles import read_log
 from skidpad.report import grip_figures, grip_tables
 from skidpad.report.grip_data import GripCampaign, load_grip, scenario_title
 from skidpad.report.grip_rain import rain_tables
@@ -24,20 +19,17 @@ from skidpad.report.page import (
     Block,
     Card,
     Cards,
-    Code,
-    Definitions,
     Number,
     Numbers,
     Page,
     Section,
     Text,
-    write_page,
+    write_report_page,
 )
 from skidpad.report.replay import replay
 from skidpad.report.verdicts import verdict_blocks
 from skidpad.roads.bundled import load_map
 
-REPORT, RUNS, STOPPING = "report.html", "runs", "stopping.parquet"
 LEAD = """Every run was driven twice with the same seed: once with the weather only seen, and once with \
 tyres that feel it, those of the ego and of every other vehicle. Seeds are common to all cells, so that \
 differences are paired.
@@ -54,13 +46,10 @@ rain at 0.27, below packed snow (0.34) and far below what braking tests measure 
 
 def write_grip_report(folder: Path) -> Path:
     """Write report.html into a campaign's folder; returns its path."""
-    campaign = load_grip(folder)
-    path = folder / REPORT
-    write_page(build_page(campaign, folder), path)
-    return path
+    return write_report_page(build_page(load_grip(folder)), folder)
 
 
-def build_page(campaign: GripCampaign, folder: Path) -> Page:
+def build_page(campaign: GripCampaign) -> Page:
     """All sections in the order in which a reader asks."""
     both = campaign.both
     sections = [
@@ -76,58 +65,42 @@ def build_page(campaign: GripCampaign, folder: Path) -> Page:
         Section("Trajectories of the cut-in", grip_figures.trajectories(campaign)),
         Section("The cut-in and the spawn delay", grip_tables.variant_table(campaign)),
         Section("Distances between series", grip_tables.distance_tables(campaign) if both else []),
-        Section("Replays", _replays(campaign, folder)),
-        Section("Stopping distances", grip_tables.stopping_table(_stopping(folder))),
-        Section("Definitions", [_definitions()]),
-        Section("Configuration and versions", _provenance(campaign, folder)),
+        Section("Replays", _replays(campaign)),
+        Section(
+            "Stopping distances", grip_tables.stopping_table(read_stopping(campaign.folder.path))
+        ),
+        Section("Definitions", [campaign.definitions()]),
+        Section("Configuration and versions", campaign.provenance()),
     ]
     return Page(
         title="Grip in weather",
         subtitle=_subtitle(campaign),
-        facts=_facts(campaign),
-        sections=[s for s in sections if s.blocks],
+        facts=campaign.facts(),
+        sections=sections,
     )
 
 
 def _subtitle(campaign: GripCampaign) -> str:
-    r = campaign.results
+    r = campaign.plain
     return (
         f"{r['scenario'].n_unique()} scenarios in {r['weather'].n_unique()} weathers, friction "
         f"{' and '.join(sorted(r['friction'].unique().to_list()))}, {r['seed'].n_unique()} repeats."
     )
 
 
-def _facts(campaign: GripCampaign) -> list[tuple[str, str]]:
-    columns = ("controller", "sensors", "model", "version")
-    return [
-        (c, ", ".join(sorted(map(str, campaign.results[c].unique().to_list())))) for c in columns
-    ]
-
-
 def _warnings(campaign: GripCampaign) -> list[Block]:
-    blocks: list[Block] = []
-    missing = len(campaign.results) - len(campaign.finished)
-    if missing:
-        counts = campaign.results["outcome"].value_counts().sort("outcome").iter_rows()
-        told = ", ".join(f"{n} {outcome}" for outcome, n in counts)
-        text = f"{missing} of {len(campaign.results)} runs are in no denominator ({told})."
-        blocks.append(Text(text, tone="warning"))
     same = [f"{scenario_title(s)} in {w}" for (s, w), p in campaign.pairs.items() if p.identical]
-    if same:
-        text = f"Identical drives with both frictions, as the ratio is 1: {', '.join(same)}."
-        blocks.append(Text(text, tone="note"))
-    return blocks
+    if not same:
+        return campaign.missing()
+    text = f"Identical drives with both frictions, as the ratio is 1: {', '.join(same)}."
+    return [*campaign.missing(), Text(text, tone="note")]
 
 
 def _headline(campaign: GripCampaign) -> Numbers:
-    t = campaign.finished.filter(pl.col("cutin") == "fixed")
-    items = [
-        Number(
-            f"{len(campaign.results)}", "runs", f"{campaign.results['seed'].n_unique()} per cell"
-        )
-    ]
-    for friction in ("original", "reduced"):
-        runs = t.filter(pl.col("friction") == friction)
+    all_runs = campaign.plain
+    items = [Number(f"{len(all_runs)}", "runs", f"{all_runs['seed'].n_unique()} per cell")]
+    for friction in (ORIGINAL, REDUCED):
+        runs = campaign.counted.filter(pl.col("friction") == friction)
         share = completion(runs)
         if share.value is not None:
             low, high = share.interval
@@ -135,22 +108,18 @@ def _headline(campaign: GripCampaign) -> Numbers:
             items.append(
                 Number(f"{100 * share.value:.1f} %", f"completed, {friction} friction", note)
             )
-    changed = sum(1 for p in campaign.pairs.values() if len(p.common) and _changed(p))
+    changed = sum(len(p.common) > 0 and completion_p(p) < 0.05 for p in campaign.pairs.values())
     items.append(Number(f"{changed}", "cells with another outcome", f"of {len(campaign.pairs)}"))
-    lost = t.filter(pl.col("friction") == "reduced")["loss_of_control_npc"].mean()
+    reduced = campaign.counted.filter(pl.col("friction") == REDUCED)
+    lost = reduced["loss_of_control_npc"].mean()
     if lost is not None:
-        items.append(
-            Number(f"{100 * float(lost):.0f} %", "others out of control", "with reduced friction")  # type: ignore[arg-type]
-        )
+        told = f"{100 * float(lost):.0f} %"  # type: ignore[arg-type]
+        items.append(Number(told, "others out of control", "with reduced friction"))
     return Numbers(items)
 
 
-def _changed(pair: Pair) -> bool:
-    return completion_p(pair) < 0.05
-
-
 def _verdicts(campaign: GripCampaign) -> list[Block]:
-    table = campaign.with_delays() if campaign.both else campaign.results
+    table = campaign.with_delays() if campaign.both else campaign.plain
     judged = judge(FINDINGS, [table for _ in FINDINGS])
     intro = Text(
         "Claims are the source's. Tests and margins were written after a trial of three seeds had been "
@@ -160,78 +129,40 @@ def _verdicts(campaign: GripCampaign) -> list[Block]:
     return [intro, *verdict_blocks(judged)]
 
 
-def _replays(campaign: GripCampaign, folder: Path) -> list[Block]:
+def _replays(campaign: GripCampaign) -> list[Block]:
     """The median and the worst run of each cell, as far as their logs were kept."""
     blocks: list[Block] = []
     for (scenario, weather), pair in campaign.pairs.items():
         cards = []
-        for friction in ("original", "reduced"):
-            if friction == "reduced" and pair.identical:
-                continue
+        for friction in (ORIGINAL,) if pair.identical else (ORIGINAL, REDUCED):
             runs = pair.side(friction).drop_nulls("min_cvip_m")
             order = runs.sort("completion", "min_cvip_m", "seed")
-            if not len(order):
-                continue
-            chosen = {"worst": order.row(0, named=True)}
-            chosen["median"] = order.row(len(order) // 2, named=True)
-            for role, row in chosen.items():
-                card = _card(folder, row, role)
-                cards += [card] if card is not None else []
+            for role, row in (("worst", 0), ("median", len(order) // 2)) if len(order) else ():
+                cards += _card(campaign, order[row], role)
         if cards:
             blocks.append(Cards(f"{scenario_title(scenario)}, {weather}", cards))
     return blocks
 
 
-def _card(folder: Path, row: dict[str, object], role: str) -> Card | None:
-    drops = "-drops" if row["overlay"] else ""
-    name = f"{row['scenario']}{drops}_{row['weather']}_{row['friction']}-{row['seed']:06d}"
-    run = folder / RUNS / name
-    if not (run / TICKS).exists():
-        return None
-    log = read_log(run)
-    gaps = np.hypot(
-        log.actors.x[:, 1:] - log.actors.x[:, :1], log.actors.y[:, 1:] - log.actors.y[:, :1]
-    ).min(axis=1)
+def _card(campaign: GripCampaign, run: pl.DataFrame, role: str) -> list[Card]:
+    """Card of a run (one row); none without its log."""
+    row = run.row(0, named=True)
+    (name,) = campaign.names(run)
+    folder = None if name is None else campaign.folder.log(name)
+    if folder is None:
+        return []
+    log = read_log(folder)
+    x, y = log.actors.x, log.actors.y
+    gaps = np.hypot(x[:, 1:] - x[:, :1], y[:, 1:] - y[:, :1]).min(axis=1)
     at = len(log) - 1 if log.contacts else int(np.argmin(gaps))
-    impact = row["impact_kmh"]
     facts = [("least distance of centres", f"{row['min_cvip_m']:.2f} m")]
-    if impact is not None:
-        facts.append(("closing speed", f"{impact:.0f} km/h"))
-    return Card(
-        title=f"{row['friction']} friction, {role} run: {row['outcome']}",
-        subtitle=f"{name}, around {log.t[at]:.1f} s",
-        facts=facts,
-        replay=replay(log, load_map(log.header.map), at),
-    )
-
-
-def _stopping(folder: Path) -> pl.DataFrame:
-    path = folder / STOPPING
-    return read_parquet(path)[0] if path.exists() else pl.DataFrame()
-
-
-UNITS = {"_m": "m", "_s": "s", "_kmh": "km/h", "_deg": "deg", "_deg_s": "deg/s"}
-
-
-def _definitions() -> Definitions:
-    items = []
-    for name, meaning, source in definitions_of(GripMetrics):
-        ends = [end for end in UNITS if name.endswith(end)]
-        unit = UNITS[max(ends, key=len)] if ends else ""
-        items.append((name, unit, f"{meaning} ({source})"))
-    return Definitions(items)
-
-
-def _provenance(campaign: GripCampaign, folder: Path) -> list[Block]:
-    timing, _ = read_parquet(folder / TIMING)
-    timing = timing.filter(pl.col("cpu_s") > 0.0)
-    prints = fingerprints(latest(read_ledger(folder, GripEntry)))
-    lines = [
-        f"Skidpad {__version__}, results hash {GRIP.hash(campaign.all_runs)}.",
-        f"Machine fingerprints: {', '.join(sorted(prints)) or 'none'}.",
+    if row["impact_kmh"] is not None:
+        facts.append(("closing speed", f"{row['impact_kmh']:.0f} km/h"))
+    return [
+        Card(
+            title=f"{row['friction']} friction, {role} run: {row['outcome']}",
+            subtitle=f"{name}, around {log.t[at]:.1f} s",
+            facts=facts,
+            replay=replay(log, load_map(log.header.map), at),
+        )
     ]
-    if len(timing):
-        lines.append(f"CPU time per run: median {float(np.median(timing['cpu_s'])):.2f} s.")
-    common = msgspec.json.encode(common_configuration(folder)).decode()
-    text = msgspec.json.format(common, indent=2)
-    return [Text(" ".join(lines)), Code("Resolved configuration common to all runs", text)]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -23,9 +23,9 @@ from skidpad.evidence.grip.study import (
     distances,
     pairs,
 )
-from skidpad.recording.grip import read_series, series_path
-from skidpad.recording.results import read_results
-from skidpad.report.published import Source, published
+from skidpad.recording.campaigns import CampaignFolder
+from skidpad.recording.grip import GRIP, GripEntry, read_series
+from skidpad.report.campaign import CampaignView
 
 SCENARIOS = {
     "ghost_cut_in": "Ghost cut-in",
@@ -42,37 +42,40 @@ Key = tuple[str, str]  # scenario, weather
 
 
 @dataclass(frozen=True)
-class GripCampaign:
-    """A campaign's results and where its series lie."""
+class GripCampaign(CampaignView[GripEntry]):
+    """A campaign with and without friction of weathers."""
 
-    folder: Path
-    results: pl.DataFrame
-    behind_drops: pl.DataFrame | None = None  # the same runs with drops on the cameras (B-161)
-
-    @cached_property
-    def all_runs(self) -> pl.DataFrame:
-        """With and without drops."""
-        if self.behind_drops is None:
-            return self.results
-        return pl.concat([self.results, self.behind_drops])
+    columns = GRIP
+    common = ("controller", "sensors", "model", "version")
 
     @cached_property
-    def finished(self) -> pl.DataFrame:
-        """Runs that count in denominators (decision L-7)."""
-        return self.results.filter(~pl.col("outcome").is_in(NOT_RUN))
+    def four_cells(self) -> bool:
+        """Each run was driven with and without drops on the cameras (B-161)."""
+        return self.results["overlay"].n_unique() > 1
+
+    @cached_property
+    def plain(self) -> pl.DataFrame:
+        """The campaign proper: where both were driven, the runs without drops."""
+        return self.results.filter(~pl.col("overlay")) if self.four_cells else self.results
 
     @cached_property
     def pairs(self) -> dict[Key, Pair]:
         """Cells of the campaign proper, in the published order."""
-        found = {(p.scenario, p.weather): p for p in pairs(self.results) if p.cutin == FIXED}
+        found = {(p.scenario, p.weather): p for p in pairs(self.plain) if p.cutin == FIXED}
         return {k: found[k] for k in sorted(found, key=self._order)}
 
     @cached_property
     def variants(self) -> dict[str, Pair]:
         """Variants of the cut-in at the baseline; none when only one was driven (B-075)."""
-        cut_ins = [p for p in pairs(self.results) if p.scenario == CUT_IN]
+        cut_ins = [p for p in pairs(self.plain) if p.scenario == CUT_IN]
         found = {p.cutin: p for p in cut_ins if p.weather == BASELINE}
         return found if len(found) > 1 else {}
+
+    @cached_property
+    def counted(self) -> pl.DataFrame:
+        """Finished runs of the campaign proper."""
+        here = ~pl.col("outcome").is_in(NOT_RUN) & (pl.col("cutin") == FIXED)
+        return self.plain.filter(here)
 
     def _order(self, key: Key) -> tuple[int, int, str]:
         scenario, weather = key
@@ -84,9 +87,14 @@ class GripCampaign:
         """Those that were driven."""
         return list(dict.fromkeys(s for s, _ in self.pairs))
 
-    def weathers(self, scenario: str) -> list[str]:
-        """Those in which a scenario was driven."""
-        return [w for s, w in self.pairs if s == scenario]
+    def of(self, scenario: str) -> list[Pair]:
+        """Its cells, in the order of weathers."""
+        return [pair for pair in self.pairs.values() if pair.scenario == scenario]
+
+    @property
+    def titles(self) -> list[tuple[str, str]]:
+        """Scenarios with their names for people."""
+        return [(s, scenario_title(s)) for s in self.scenarios]
 
     @cached_property
     def both(self) -> bool:
@@ -100,30 +108,26 @@ class GripCampaign:
     def series(self, pair: Pair, friction: str) -> CellSeries | None:
         """Recorded series of a cell; None without runs."""
         key = (pair.scenario, pair.cutin, pair.weather, friction)
-        if key not in self._series:
-            runs = pair.side(friction)
-            if not len(runs):
-                return None
-            variant = "" if pair.cutin == FIXED else f"-{pair.cutin}"
-            variant += "-drops" if runs["overlay"][0] else ""
-            name = f"{pair.scenario}{variant}_{pair.weather}_{friction}"
+        runs = pair.side(friction)
+        if key not in self._series and len(runs):
+            names = dict(zip(runs["seed"], self.names(runs), strict=True))
             self._series[key] = cell_series(
-                runs, lambda seed: read_series(series_path(self.folder, name, seed))
+                runs, lambda seed: read_series(self.folder.path, str(names[seed]))
             )
-        return self._series[key]
+        return self._series.get(key)
 
     @cached_property
-    def distances(self) -> dict[Key, list[Distance]]:
+    def distances(self) -> dict[Key, dict[str, Distance]]:
         """Reduced against original, of every metric and cell."""
         found = {}
         for key, pair in self.pairs.items():
             a, b = self.series(pair, ORIGINAL), self.series(pair, REDUCED)
             if a is not None and b is not None:
-                found[key] = list(distances(a, b, pair.identical))
+                found[key] = {d.metric: d for d in distances(a, b, pair.identical)}
         return found
 
     @cached_property
-    def variant_distances(self) -> dict[str, list[Distance]]:
+    def variant_distances(self) -> dict[str, dict[str, Distance]]:
         """Each variant of the cut-in against `original`, friction untouched (B-077)."""
         base = self.variants.get("original")
         start = self.series(base, ORIGINAL) if base is not None else None
@@ -131,7 +135,8 @@ class GripCampaign:
         for name, pair in self.variants.items():
             mine = self.series(pair, ORIGINAL)
             if start is not None and mine is not None:
-                found[name] = list(distances(start, mine, identical=name == "original"))
+                compared = distances(start, mine, identical=name == "original")
+                found[name] = {d.metric: d for d in compared}
         return found
 
     @cached_property
@@ -162,59 +167,19 @@ class GripCampaign:
                 )
             )
         if not parts:
-            return self.results
+            return self.plain
         on = ["scenario", "weather", "friction", "cutin", "seed"]
-        return self.results.join(pl.concat(parts), on=on, how="left")
+        return self.plain.join(pl.concat(parts), on=on, how="left")
 
 
 def load_grip(folder: Path) -> GripCampaign:
-    """The results in a campaign's folder; FileError when there are none."""
-    results = read_results(folder)
-    if "friction" not in results.columns:
+    """The campaign in a folder; FileError when it holds no results of one."""
+    found = GripCampaign(CampaignFolder(folder, GripEntry))
+    if "friction" not in found.results.columns:
         raise FileError(f"{folder} holds no friction campaign")
-    if not len(results):
-        raise FileError(f"{folder} holds no finished run yet")
-    if results["overlay"].n_unique() == 1:
-        return GripCampaign(folder, results)
-    drops = results["overlay"]
-    return GripCampaign(folder, results.filter(~drops), results.filter(drops))
+    return found
 
 
 def scenario_title(name: str) -> str:
     """Name for people."""
     return SCENARIOS.get(name, name)
-
-
-@cache
-def published_completion() -> dict[tuple[str, str, str], tuple[float, float, bool]]:
-    """Completion in percent, score and whether we doubt it, by scenario, weather, friction."""
-    rows = published(Source.COMPLETION).to_dicts()
-    return {
-        (r["scenario"], r["preset"], r["friction_mode"]): (
-            r["completion_rate_pct"],
-            r["mean_score_pct"],
-            r["consistency_flag_derived"] != "ok",
-        )
-        for r in rows
-    }
-
-
-@cache
-def published_distances() -> dict[tuple[str, str, str], float]:
-    """By scenario, weather and metric."""
-    rows = published(Source.WARPING).to_dicts()
-    return {(r["scenario"], r["preset"], r["metric"]): r["dtw_distance"] for r in rows}
-
-
-@cache
-def published_variants() -> dict[str, tuple[float, float]]:
-    """Completion in percent and score of the cut-in's variants."""
-    rows = published(Source.CUTIN_COMPLETION).to_dicts()
-    return {r["variant"]: (r["completion_rate_pct"], r["mean_score_pct"]) for r in rows}
-
-
-@cache
-def published_variant_distances() -> dict[tuple[str, str], float]:
-    """By variant and metric."""
-    rows = published(Source.CUTIN_WARPING).to_dicts()
-    return {(r["variant_compared_with_original"], r["metric"]): r["dtw_distance"] for r in rows}

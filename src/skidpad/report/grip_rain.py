@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
+from typing import Literal
+
 from skidpad.evidence.grip.rain import CELLS, FourCells, four_cells
-from skidpad.evidence.statistics import Comparison
-from skidpad.report.grip_data import GripCampaign, scenario_title
-from skidpad.report.page import Block, Cell, Table
+from skidpad.evidence.statistics import Interval
+from skidpad.report.grip_data import FIXED, GripCampaign, scenario_title
+from skidpad.report.page import Block, Cell
+from skidpad.report.tables import Column, Format, Quantity, table
 
 QUANTITIES = {
     "completion": ("completion, %", 100.0),
@@ -17,36 +21,47 @@ NOTE = (
     "reduced friction alone; together: what both do beyond the sum of the two. Small: 95 % interval, "
     "paired by seed."
 )
+Effect = Literal["visual", "physical", "interaction"]
+EFFECTS: tuple[tuple[Effect, str], ...] = (
+    ("visual", "visual effect"),
+    ("physical", "physical effect"),
+    ("interaction", "together"),
+)
 
 
 def rain_tables(campaign: GripCampaign) -> list[Block]:
     """One table per quantity; none unless the campaign drove the four cells."""
-    if campaign.behind_drops is None:
+    if not campaign.four_cells:
         return []
-    blocks: list[Block] = []
+    tables: list[Block] = []
     for quantity, (title, scale) in QUANTITIES.items():
-        rows = [_row(found, scale) for found in four_cells(campaign.all_runs, quantity)]
-        if rows:
-            heads = ["scenario", "weather", "seeds", *CELLS, "visual effect", "physical effect"]
-            columns = [(name, "") for name in (*heads, "together")]
-            blocks.append(Table(columns, rows, caption=f"Four cells: {title}", note=NOTE))
-    return blocks
+        cells = list(four_cells(campaign.results, quantity))
+        tables += [table(_columns(scale), cells, f"Four cells: {title}", NOTE)] if cells else []
+    return tables
 
 
-def _row(found: FourCells, scale: float) -> list[Cell]:
-    means = [scale * found.means[name] for name in CELLS]
-    variant = "" if found.cutin == "fixed" else f", {found.cutin}"
+def _columns(scale: float) -> list[Column[FourCells]]:
+    def mean(name: str, cell: FourCells) -> float:
+        return scale * cell.means[name]
+
+    def effect(name: Effect, cell: FourCells) -> Quantity:
+        c = getattr(cell, name)
+        clear = c.interval.low > 0.0 or c.interval.high < 0.0
+        limits = Interval(*(scale * end for end in c.interval))
+        return Quantity(value=scale * c.mean, interval=limits, kind="" if clear else "muted")
+
     return [
-        Cell(scenario_title(found.scenario) + variant),
-        Cell(found.weather),
-        Cell(f"{found.n}", sort=found.n),
-        *(Cell(f"{m:.3g}", sort=m) for m in means),
-        *(_effect(c, scale) for c in (found.visual, found.physical, found.interaction)),
+        Column("scenario", _name),
+        Column("weather", lambda cell: cell.weather),
+        Column("seeds", lambda cell: Cell(f"{cell.n}", sort=cell.n)),
+        *(Column(name, partial(mean, name), format=Format(".3g")) for name in CELLS),
+        *(
+            Column(title, partial(effect, name), format=Format("+.3g", "+.3g"))
+            for name, title in EFFECTS
+        ),
     ]
 
 
-def _effect(c: Comparison, scale: float) -> Cell:
-    low, high = scale * c.interval.low, scale * c.interval.high
-    kind = "" if low > 0.0 or high < 0.0 else "muted"
-    mean = scale * c.mean
-    return Cell(f"{mean:+.3g}", sort=mean, note=f"{low:+.3g} to {high:+.3g}", kind=kind)
+def _name(cell: FourCells) -> str:
+    variant = "" if cell.cutin == FIXED else f", {cell.cutin}"
+    return scenario_title(cell.scenario) + variant

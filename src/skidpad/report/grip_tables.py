@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+from typing import Any, TypeVar
+
 import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 
 from skidpad.evidence.grip.study import (
     METRICS,
@@ -18,275 +23,279 @@ from skidpad.evidence.grip.study import (
     completion_p,
     mean_interval,
 )
-from skidpad.evidence.statistics import Comparison, compare_pairs, p_text
-from skidpad.report.grip_data import (
-    GripCampaign,
-    published_completion,
-    published_distances,
-    published_variant_distances,
-    published_variants,
-    scenario_title,
-)
-from skidpad.report.page import Block, Cell, Table
+from skidpad.evidence.statistics import Comparison, Interval, compare_pairs, p_text
+from skidpad.report.grip_data import GripCampaign
+from skidpad.report.page import Block, Cell
+from skidpad.report.published import Source, published_rows
+from skidpad.report.tables import Column, Format, Quantity, table
 
 EFFECT_MAX = 100.0  # beyond, the differences hardly vary and the number says nothing
+P_MARKED = 0.05
 UNITS = {"x": "m", "y": "m", "v": "m/s", "cvip": "m"}
+SHARE = Format(".1f", ".0f", "no run")
+SCORE = Format(".2f", ".1f", "no run")
+DISTANCE = Format(".3g", ".3g")
+DELAY = Format("+.3g", "+.3g")
+DIFFERENCE = Format("+.3g", "+.3g", "no pairs")
+COMPLETED = "completion_rate_pct"  # published columns
+SCORED = "mean_score_pct"
+R = TypeVar("R")
 
 
 def completion_tables(campaign: GripCampaign) -> list[Block]:
     """Both completions and the score of every cell, original beside reduced (B-147)."""
-    blocks: list[Block] = []
-    for scenario in campaign.scenarios:
-        rows = [
-            [Cell(weather), *_completion_cells(campaign.pairs[scenario, weather])]
-            for weather in campaign.weathers(scenario)
-        ]
-        columns = [
-            ("weather", ""),
-            ("original, %", "runs without an accident, friction untouched"),
-            ("reduced, %", "runs without an accident, friction reduced"),
-            ("McNemar", "exact p of the paired outcomes"),
-            ("original if triggered, %", "of runs in which the scenario happened"),
-            ("reduced if triggered, %", "of runs in which the scenario happened"),
-            ("score original", "mean benchmark score"),
-            ("score reduced", "mean benchmark score"),
-        ]
-        blocks.append(
-            Table(
-                columns,
-                rows,
-                caption=f"{scenario_title(scenario)}: completion and score",
-                note="Small: 95 % interval, then the published value (? marks values that contradict "
-                "themselves). Red: worse with reduced friction, green: better, by the paired test.",
-                sortable=False,
-            )
-        )
-    return blocks
-
-
-def _completion_cells(pair: Pair) -> list[Cell]:
-    p = completion_p(pair) if len(pair.common) else 1.0
-    before, after = completion(pair.original), completion(pair.reduced)
-    mark = ""
-    if p < 0.05 and before.value is not None and after.value is not None:
-        mark = "bad" if after.value < before.value else "good"
-    test = "same drives" if pair.identical else p_text(p)
+    without = "runs without an accident, friction"
+    happened = "of runs in which the scenario happened"
+    columns = (
+        Column[Pair]("weather", lambda pair: pair.weather),
+        Column("original", partial(completed, ORIGINAL), f"{without} untouched", "%", SHARE),
+        Column("reduced", partial(completed, REDUCED), f"{without} reduced", "%", SHARE),
+        Column("McNemar", paired_test, "exact p of the paired outcomes"),
+        Column("original if triggered", partial(if_triggered, ORIGINAL), happened, "%", SHARE),
+        Column("reduced if triggered", partial(if_triggered, REDUCED), happened, "%", SHARE),
+        Column("score original", partial(score, ORIGINAL), "mean benchmark score", "", SCORE),
+        Column("score reduced", partial(score, REDUCED), "mean benchmark score", "", SCORE),
+    )
+    note = (
+        "Small: 95 % interval, then the published value (? marks values that contradict themselves). "
+        "Red: worse with reduced friction, green: better, by the paired test."
+    )
     return [
-        _share_cell(before, _said(pair, ORIGINAL, 0)),
-        _share_cell(after, _said(pair, REDUCED, 0), mark),
-        Cell(test, sort=p, kind="muted" if p >= 0.05 else ""),
-        _share_cell(completion(pair.original, given_triggered=True), ""),
-        _share_cell(completion(pair.reduced, given_triggered=True), "", mark),
-        _score_cell(pair.original, _said(pair, ORIGINAL, 1)),
-        _score_cell(pair.reduced, _said(pair, REDUCED, 1), mark),
+        table(columns, campaign.of(scenario), f"{title}: completion and score", note, False)
+        for scenario, title in campaign.titles
     ]
 
 
-def _said(pair: Pair, friction: str, column: int) -> str:
-    row = published_completion().get((pair.scenario, pair.weather, friction))
-    if row is None:
+def completed(friction: str, pair: Pair) -> Quantity:
+    """Share without an accident, in percent."""
+    found = completion(pair.side(friction))
+    return share(found, kind=mark(pair, friction), **said(pair, friction, COMPLETED))
+
+
+def if_triggered(friction: str, pair: Pair) -> Quantity:
+    """The same of the runs in which the scenario happened."""
+    return share(completion(pair.side(friction), given_triggered=True), kind=mark(pair, friction))
+
+
+def score(friction: str, pair: Pair) -> Quantity:
+    """Mean benchmark score."""
+    found = mean_interval(pair.side(friction)["score"])
+    value, interval = found if found is not None else (None, None)
+    kind = mark(pair, friction)
+    return Quantity(value=value, interval=interval, kind=kind, **said(pair, friction, SCORED))
+
+
+def paired_test(pair: Pair) -> Cell:
+    """Whether both frictions complete alike."""
+    p = completion_p(pair) if len(pair.common) else 1.0
+    text = "same drives" if pair.identical else p_text(p)
+    return Cell(text, sort=p, kind="muted" if p >= P_MARKED else "")
+
+
+def mark(pair: Pair, friction: str) -> str:
+    """Reduced friction stands out where the paired test finds it better or worse."""
+    before, after = completion(pair.original).value, completion(pair.reduced).value
+    if friction == ORIGINAL or before is None or after is None or not len(pair.common):
         return ""
-    return f"\npublished {row[column]:g}{' ?' if row[2] else ''}"
+    if completion_p(pair) >= P_MARKED:
+        return ""
+    return "bad" if after < before else "good"
 
 
-def _share_cell(share: Share, said: str, kind: str = "") -> Cell:
-    if share.value is None:
-        return Cell("no run", kind="muted", note=said.strip())
-    low, high = share.interval
-    note = f"{100 * low:.0f} to {100 * high:.0f}, n = {share.n}{said}"
-    return Cell(f"{100 * share.value:.1f}", sort=share.value, note=note, kind=kind)
+def said(pair: Pair, friction: str, column: str) -> dict[str, Any]:
+    """The published value of a cell and whether we doubt it."""
+    rows = published_rows(Source.COMPLETION, "scenario", "preset", "friction_mode")
+    row = rows.get((pair.scenario, pair.weather, friction))
+    if row is None:
+        return {}
+    return {"published": row[column], "doubted": row["consistency_flag_derived"] != "ok"}
 
 
-def _score_cell(runs: pl.DataFrame, said: str, kind: str = "") -> Cell:
-    found = mean_interval(runs["score"])
-    if found is None:
-        return Cell("no run", kind="muted", note=said.strip())
-    mean, (low, high) = found
-    return Cell(f"{mean:.2f}", sort=mean, note=f"{low:.1f} to {high:.1f}{said}", kind=kind)
+def share(found: Share, kind: str = "", **more: Any) -> Quantity:
+    """A share in percent."""
+    if found.value is None:
+        return Quantity(value=None, **more)
+    limits = Interval(*(100.0 * end for end in found.interval))
+    return Quantity(
+        value=100.0 * found.value, interval=limits, remark=f"n = {found.n}", kind=kind, **more
+    )
 
 
 def distance_tables(campaign: GripCampaign) -> list[Block]:
     """Warping distance of the seven series (B-148)."""
-    blocks: list[Block] = []
-    for scenario in campaign.scenarios:
-        rows = []
-        for weather in campaign.weathers(scenario):
-            found = campaign.distances.get((scenario, weather))
-            if found is None:
-                continue
-            said = {
-                d.metric: published_distances().get((scenario, weather, d.metric)) for d in found
-            }
-            baseline = campaign.pairs[scenario, weather].identical
-            head = Cell(weather, note="baseline: the same drives" if baseline else "")
-            rows.append([head, *(_distance_cell(d, said[d.metric]) for d in found)])
-        if rows:
-            blocks.append(
-                Table(
-                    [("weather", ""), *((_heading(m), "") for m in METRICS)],
-                    rows,
-                    caption=f"{scenario_title(scenario)}: distance of the median series, reduced "
-                    "against original",
-                    note="Dynamic time warping: root of the least sum of squared differences, not "
-                    "normalised. Small: 95 % interval from 200 resamples at 5 Hz; floor: the distance "
-                    "between two halves of the original runs; then the published value.",
-                    sortable=False,
-                )
-            )
-    return blocks
+    published = published_rows(Source.WARPING, "scenario", "preset", "metric")
 
+    def of(metric: str, pair: Pair) -> Quantity:
+        row = published.get((pair.scenario, pair.weather, metric))
+        return distance(campaign.distances[pair.scenario, pair.weather][metric], row)
 
-def _heading(metric: str) -> str:
-    return f"{metric}, {UNITS[metric]}" if metric in UNITS else metric
+    def name(pair: Pair) -> Cell:
+        return Cell(pair.weather, note="baseline: the same drives" if pair.identical else "")
 
-
-def _distance_cell(d: Distance, said: float | None) -> Cell:
-    notes = []
-    if d.interval is not None and d.value > 0.0:
-        notes.append(f"{d.interval.low:.3g} to {d.interval.high:.3g}")
-    if d.floor is not None:
-        notes.append(f"floor {d.floor:.3g}")
-    if said is not None:
-        notes.append(f"published {said:g}")
-    above = d.floor is not None and d.value > d.floor
-    return Cell(
-        f"{d.value:.3g}", sort=d.value, note="\n".join(notes), kind="" if above else "muted"
+    note = (
+        "Dynamic time warping: root of the least sum of squared differences, not normalised. Small: "
+        "95 % interval from 200 resamples at 5 Hz; floor: the distance between two halves of the "
+        "original runs; then the published value."
     )
+    columns = [Column("weather", name), *metric_columns(of)]
+    tables: list[Block] = []
+    for scenario, title in campaign.titles:
+        caption = f"{title}: distance of the median series, reduced against original"
+        pairs = [p for p in campaign.of(scenario) if (p.scenario, p.weather) in campaign.distances]
+        tables += [table(columns, pairs, caption, note, False)] if pairs else []
+    return tables
 
 
-CHANGES = (
-    (
-        "min_cvip_m",
-        "least distance, m",
-        "least distance of box centres: warns of collisions (B-149)",
-    ),
-    ("steer_std", "steering spread", "deviation of the steering command (B-144)"),
-    ("steer_corrections", "corrections, 1/s", "changes of steering direction per second (B-144)"),
-)
+def metric_columns(of: Callable[[str, R], Quantity], definition: str = "") -> list[Column[R]]:
+    """One column per compared series."""
+    return [
+        Column(m, partial(of, m), definition, UNITS.get(m, ""), format=DISTANCE) for m in METRICS
+    ]
+
+
+def distance(d: Distance, published: dict[str, Any] | None) -> Quantity:
+    """Distance between two series, muted where chance alone gives as much."""
+    return Quantity(
+        value=d.value,
+        interval=d.interval if d.value > 0.0 else None,
+        lines=() if d.floor is None else (f"floor {d.floor:.3g}",),
+        published=None if published is None else published["dtw_distance"],
+        kind="" if d.floor is not None and d.value > d.floor else "muted",
+    )
 
 
 def change_tables(campaign: GripCampaign) -> list[Block]:
     """What else changes: outcome, delay, control (B-142 to B-145, B-149)."""
-    blocks: list[Block] = []
-    for scenario in campaign.scenarios:
-        rows = []
-        for weather in campaign.weathers(scenario):
-            pair = campaign.pairs[scenario, weather]
-            if not len(pair.common) or pair.identical:
-                continue
-            rows.append([Cell(weather), *_change_cells(campaign, pair)])
-        if not rows:
-            continue
-        columns = [
-            ("weather", ""),
-            ("other outcome, %", "pairs of which one collided and the other did not (B-143)"),
-            ("ego out of control, %", "original and reduced (B-145)"),
-            ("others out of control, %", "original and reduced, before any contact (B-145)"),
-            ("delay, s", "constant shift of the speed series, where one explains it (B-142)"),
-            *((title, hint) for _, title, hint in CHANGES),
-        ]
-        caption = f"{scenario_title(scenario)}: what reduced friction changes, paired by seed"
-        note = "Reduced minus original, with 95 % interval and effect size d (mean over deviation)."
-        blocks.append(Table(columns, rows, caption=caption, note=note, sortable=False))
-    return blocks
 
+    def difference_of(column: str, pair: Pair) -> Quantity:
+        return difference(compared(pair, column))
 
-def _change_cells(campaign: GripCampaign, pair: Pair) -> list[Cell]:
-    delay = campaign.delays.get((pair.scenario, pair.weather), np.empty(0))
-    return [
-        _share_cell(changed_outcome(pair), ""),
-        _lost_cell(pair, "loss_of_control_ego"),
-        _lost_cell(pair, "loss_of_control_npc"),
-        _delay_cell(delay),
-        *(_difference_cell(compared(pair, column)) for column, _, _ in CHANGES),
-    ]
+    def delay(pair: Pair) -> Quantity:
+        return late(campaign.delays.get((pair.scenario, pair.weather), np.empty(0)))
 
-
-def _lost_cell(pair: Pair, column: str) -> Cell:
-    shares = [100.0 * float(side[column].mean() or 0.0) for side in (pair.original, pair.reduced)]  # type: ignore[arg-type]
-    kind = "bad" if shares[1] > shares[0] + 5.0 else ""
-    return Cell(f"{shares[0]:.0f} → {shares[1]:.0f}", sort=shares[1], kind=kind)
-
-
-def _delay_cell(delay: np.ndarray[tuple[int], np.dtype[np.float64]]) -> Cell:
-    known = delay[~np.isnan(delay)]
-    if 2 * len(known) < len(delay) or not len(known):
-        return Cell("none", kind="muted", note=f"in {len(known)} of {len(delay)} pairs")
-    c = compare_pairs(known)
-    return _difference_cell(c, f"in {len(known)} of {len(delay)} pairs")
-
-
-def _difference_cell(c: Comparison | None, more: str = "") -> Cell:
-    if c is None:
-        return Cell("no pairs", kind="muted")
-    note = f"{c.interval.low:+.3g} to {c.interval.high:+.3g}"
-    if c.effect is not None and abs(c.effect) < EFFECT_MAX:
-        note += f", d = {c.effect:.1f}"
-    clear = c.interval.low > 0.0 or c.interval.high < 0.0
-    return Cell(
-        f"{c.mean:+.3g}", sort=c.mean, note=note + (f"\n{more}" if more else ""),
-        kind="" if clear else "muted", hint=f"{c.n} pairs",
+    columns = (
+        Column[Pair]("weather", lambda pair: pair.weather),
+        Column[Pair]("other outcome", lambda pair: share(changed_outcome(pair)),
+                     "pairs of which one collided and the other did not (B-143)", "%", SHARE),
+        Column("ego out of control", partial(lost, "loss_of_control_ego"),
+               "original and reduced (B-145)", "%"),
+        Column("others out of control", partial(lost, "loss_of_control_npc"),
+               "original and reduced, before any contact (B-145)", "%"),
+        Column("delay", delay,
+               "constant shift of the speed series, where one explains it (B-142)", "s", DELAY),
+        Column("least distance", partial(difference_of, "min_cvip_m"),
+               "least distance of box centres: warns of collisions (B-149)", "m", DIFFERENCE),
+        Column("steering spread", partial(difference_of, "steer_std"),
+               "deviation of the steering command (B-144)", "", DIFFERENCE),
+        Column("corrections", partial(difference_of, "steer_corrections"),
+               "changes of steering direction per second (B-144)", "1/s", DIFFERENCE),
     )  # fmt: skip
+    note = "Reduced minus original, with 95 % interval and effect size d (mean over deviation)."
+    tables: list[Block] = []
+    for scenario, title in campaign.titles:
+        pairs = [p for p in campaign.of(scenario) if len(p.common) and not p.identical]
+        caption = f"{title}: what reduced friction changes, paired by seed"
+        tables += [table(columns, pairs, caption, note, False)] if pairs else []
+    return tables
+
+
+def lost(column: str, pair: Pair) -> Cell:
+    """Shares out of control, before and after."""
+    before, after = (
+        100.0 * float(side[column].mean() or 0.0)  # type: ignore[arg-type]
+        for side in (pair.original, pair.reduced)
+    )
+    kind = "bad" if after > before + 5.0 else ""
+    return Cell(f"{before:.0f} → {after:.0f}", sort=after, kind=kind)
+
+
+def late(delay: NDArray[np.float64]) -> Quantity:
+    """Mean delay, where at least half of the pairs have one."""
+    known = delay[~np.isnan(delay)]
+    told = (f"in {len(known)} of {len(delay)} pairs",)
+    if 2 * len(known) < len(delay) or not len(known):
+        return Quantity(value=None, lines=told)
+    return difference(compare_pairs(known), told)
+
+
+def difference(c: Comparison | None, lines: tuple[str, ...] = ()) -> Quantity:
+    """A paired difference with its effect size, muted where its sign is not clear."""
+    if c is None:
+        return Quantity(value=None)
+    sized = c.effect is not None and abs(c.effect) < EFFECT_MAX
+    return Quantity(
+        value=c.mean,
+        interval=c.interval,
+        remark=f"d = {c.effect:.1f}" if sized else "",
+        lines=lines,
+        kind="" if c.interval.low > 0.0 or c.interval.high < 0.0 else "muted",
+        hint=f"{c.n} pairs",
+    )
 
 
 def variant_table(campaign: GripCampaign) -> list[Block]:
     """Original, unfixed and fixed cut-in, friction untouched (B-075 to B-077)."""
-    rows = []
-    for name in ("original", "unfixed", "fixed"):
-        pair = campaign.variants.get(name)
-        if pair is None or not len(pair.original):
-            continue
-        said = published_variants().get(name)
-        first = "" if said is None else f"\npublished {said[0]:g}"
-        second = "" if said is None else f"\npublished {said[1]:g}"
-        rows.append(
-            [
-                Cell(name),
-                _share_cell(completion(pair.original), first),
-                _score_cell(pair.original, second),
-                *(
-                    _distance_cell(d, published_variant_distances().get((name, d.metric)))
-                    for d in campaign.variant_distances.get(name, [])
-                ),
-            ]
+    outcomes = published_rows(Source.CUTIN_COMPLETION, "variant")
+    distances = published_rows(Source.CUTIN_WARPING, "variant_compared_with_original", "metric")
+
+    def completion_of(pair: Pair) -> Quantity:
+        return share(
+            completion(pair.original), published=outcomes.get(pair.cutin, {}).get(COMPLETED)
         )
-    if not rows:
-        return []
-    columns = [("variant", ""), ("completion, %", ""), ("score", "")]
-    columns += [(_heading(m), "distance to the original variant") for m in METRICS]
+
+    def score_of(pair: Pair) -> Quantity:
+        found = mean_interval(pair.original["score"])
+        value, interval = found if found is not None else (None, None)
+        theirs = outcomes.get(pair.cutin, {}).get(SCORED)
+        return Quantity(value=value, interval=interval, published=theirs)
+
+    def of(metric: str, pair: Pair) -> Quantity:
+        found = campaign.variant_distances.get(pair.cutin)
+        if found is None:
+            return Quantity(value=None)
+        return distance(found[metric], distances.get((pair.cutin, metric)))
+
+    columns = [
+        Column[Pair]("variant", lambda pair: pair.cutin),
+        Column("completion", completion_of, unit="%", format=SHARE),
+        Column("score", score_of, format=SCORE),
+        *metric_columns(of, "distance to the original variant"),
+    ]
+    pairs = [campaign.variants.get(name) for name in ("original", "unfixed", "fixed")]
+    driven = [pair for pair in pairs if pair is not None and len(pair.original)]
     caption = "Ghost cut-in: what a spawn delay alone does, and a shorter merge distance"
-    return [Table(columns, rows, caption=caption, sortable=False)]
+    return [table(columns, driven, caption, sortable=False)] if driven else []
+
+
+STOPS = (
+    ("ratio", "ratio", ".3f"),
+    ("mu_80", "mu at 80", ".2f"),
+    ("stop_50_m", "m from 50", ".1f"),
+    ("stop_80_m", "m from 80", ".1f"),
+    ("stop_100_m", "m from 100", ".1f"),
+)
 
 
 def stopping_table(rows: pl.DataFrame) -> list[Block]:
     """Ratio, friction and stopping distances under both models (decision G-5)."""
     if not len(rows):
         return []
-    weathers = rows["weather"].unique(maintain_order=True).to_list()
-    body = []
-    for weather in weathers:
-        cells = [Cell(weather)]
-        for model in ("statistical", "physical"):
-            found = rows.filter(
-                (pl.col("weather") == weather) & (pl.col("model") == model)
-            ).to_dicts()
-            if not found:
-                cells += [Cell("none", kind="muted")] * 5
-                continue
-            r = found[0]
-            values = (r["ratio"], r["mu_80"], r["stop_50_m"], r["stop_80_m"], r["stop_100_m"])
-            cells += [
-                Cell(f"{v:.{d}f}", sort=v) for v, d in zip(values, (3, 2, 1, 1, 1), strict=True)
-            ]
-        body.append(cells)
-    columns = [("weather", "")]
-    for model in ("stat.", "phys."):
-        columns += [
-            (f"{model} {name}", "")
-            for name in ("ratio", "mu at 80", "m from 50", "m from 80", "m from 100")
-        ]
+    by_cell = {(row["weather"], row["model"]): row for row in rows.to_dicts()}
+
+    def of(model: str, quantity: str, weather: str) -> float | None:
+        return by_cell.get((weather, model), {}).get(quantity)
+
+    columns = [
+        Column[str]("weather", lambda weather: weather),
+        *(
+            Column(f"{model[:4]}. {title}", partial(of, model, name), format=Format(digits))
+            for model in ("statistical", "physical")
+            for name, title, digits in STOPS
+        ),
+    ]
     note = (
         "Full stops of the ego. Measured by braking tests: dry 0.90 to 1.03, wet 0.63 to 0.72, packed "
         "snow 0.34, sheet ice 0.12; the statistical ratio puts heavy rain below packed snow."
     )
-    return [Table(columns, body, caption="What each weather does to stopping", note=note)]
+    weathers = rows["weather"].unique(maintain_order=True).to_list()
+    return [table(columns, weathers, "What each weather does to stopping", note)]

@@ -7,7 +7,6 @@ from pathlib import Path
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS
 from skidpad.evidence.verdicts import judge
-from skidpad.recording.matrix import MATRIX
 from skidpad.report import matrix_figures, matrix_tables
 from skidpad.report.crashes import crash_sections
 from skidpad.report.matrix_data import Matrix, load_matrix
@@ -43,7 +42,7 @@ def build_page(matrix: Matrix) -> Page:
         Section("Every crash", crash_sections(matrix)),
         Section("All metrics", matrix_tables.per_weather(matrix)),
         Section("Definitions", [matrix.definitions()]),
-        Section("Configuration and versions", matrix.provenance(MATRIX.hash(matrix.results))),
+        Section("Configuration and versions", matrix.provenance()),
     ]
     return Page(
         title="Driver assistance in weather",

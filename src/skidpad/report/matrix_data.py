@@ -10,7 +10,7 @@ import polars as pl
 
 from skidpad.evidence.statistics import Rate, event_rate
 from skidpad.recording.campaigns import CampaignFolder
-from skidpad.recording.matrix import MatrixEntry, Metrics
+from skidpad.recording.matrix import MATRIX, MatrixEntry
 from skidpad.report.campaign import CampaignView
 from skidpad.report.published import Source, published, published_matrix
 
@@ -35,8 +35,7 @@ WEATHERS = {
 class Matrix(CampaignView[MatrixEntry]):
     """A campaign over configurations and weathers."""
 
-    metrics = Metrics
-    run_key = ("config", "weather", "seed")
+    columns = MATRIX
     common = ("profile", "grip", "range", "version")
 
     @cached_property

@@ -7,7 +7,9 @@ that knew the answer would prove nothing. Each cell of the matrix was one run of
 from __future__ import annotations
 
 from enum import Enum
+from functools import cache
 from importlib.resources import files
+from typing import Any
 
 import polars as pl
 
@@ -39,6 +41,13 @@ def published(source: Source) -> pl.DataFrame:
     """A table as copied."""
     text = (files(__name__) / f"{source.value}.csv").read_bytes()
     return pl.read_csv(text, infer_schema_length=None)
+
+
+@cache
+def published_rows(source: Source, *keys: str) -> dict[Any, dict[str, Any]]:
+    """Rows of a table by the values of these columns: a tuple, or one value for one column."""
+    rows = published(source).to_dicts()
+    return {tuple(r[k] for k in keys) if len(keys) > 1 else r[keys[0]]: r for r in rows}
 
 
 def published_matrix() -> pl.DataFrame:

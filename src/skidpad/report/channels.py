@@ -23,11 +23,11 @@ from skidpad.report.page import (
     Page,
     Section,
     Text,
-    write_page,
+    words,
+    write_report_page,
 )
 from skidpad.report.worlds import worlds_replay
 
-REPORT = "report.html"
 CARDS = 20  # of one hazard, the worst ones
 REPLAYS = 12  # worlds of the worst hazards are drawn; the others are listed
 LEAD = """Indicators compare what the channels of one car report, ten times a second, and nothing else: no \
@@ -35,14 +35,6 @@ map, no raw sensor and no ground truth. One means full support for the claim, ze
 Grey stretches could not be evaluated, which is never counted as good.
 
 Hazards come from rules over these indicators and the risk of each channel's plan in every channel's world."""
-NAMES = {
-    HazardType.INCONSISTENT_LOCALISATION: "Inconsistent localisation",
-    HazardType.EGO_TAILGATING: "Ego tailgating",
-    HazardType.EGO_TAILGATED: "Ego tailgated",
-    HazardType.CROSSING_OBJECT: "Crossing object (candidate)",
-    HazardType.CONFLICTING_PATHS: "Conflicting paths (candidate)",
-    HazardType.STUCK_VEHICLE: "Stuck vehicle (candidate)",
-}
 MEANING = {
     HazardType.INCONSISTENT_LOCALISATION: "the channels' ego positions jump or drift apart",
     HazardType.EGO_TAILGATING: "a channel's plan risks running into the vehicle ahead",
@@ -55,9 +47,7 @@ MEANING = {
 
 def write_drive_report(folder: Path) -> Path:
     """Write report.html into a monitor's output folder; returns its path."""
-    path = folder / REPORT
-    write_page(drive_page(load_drive(folder)), path)
-    return path
+    return write_report_page(drive_page(load_drive(folder)), folder)
 
 
 def drive_page(drive: MonitoredDrive) -> Page:
@@ -76,7 +66,7 @@ def drive_page(drive: MonitoredDrive) -> Page:
         title="Channels under watch",
         subtitle=_subtitle(drive),
         facts=_facts(drive),
-        sections=[s for s in sections if s.blocks],
+        sections=sections,
     )
 
 
@@ -102,7 +92,7 @@ def _warnings(drive: MonitoredDrive) -> list[Block]:
     lost = {k: v for k, v in drive.summary["losses"].items() if v}
     if not lost:
         return []
-    words = ", ".join(f"{k.replace('_', ' ')}: {v}" for k, v in lost.items())
+    words = ", ".join(f"{words(k)}: {v}" for k, v in lost.items())
     return [Text(f"The recording was not read in full ({words}).", tone="warning")]
 
 
@@ -150,13 +140,13 @@ def _hazards(drive: MonitoredDrive) -> list[Block]:
     order = sorted(drive.records, key=_severity)
     drawn = {r.id for r in order[:REPLAYS]}
     scored = [r for r in drive.records if not _candidate(r.type.value)]
-    blocks: list[Block] = [tables.hazard_list(scored, NAMES)] if scored else []
+    blocks: list[Block] = [tables.hazard_list(scored)] if scored else []
     for hazard in HazardType:
         records = [r for r in drive.records if r.type is hazard]
         if records:
             records.sort(key=_severity)
             cards = [hazard_card(r, r.id in drawn) for r in records[:CARDS]]
-            blocks.append(Cards(NAMES[hazard], cards, open=records[0].id in drawn))
+            blocks.append(Cards(tables.NAMES[hazard], cards, open=records[0].id in drawn))
             if len(records) > CARDS:
                 left = len(records) - CARDS
                 blocks.append(Text(f"{left} more, in hazards.jsonl.", tone="note"))
@@ -184,7 +174,7 @@ def hazard_card(record: HazardRecord, drawn: bool) -> Card:
         ("channels", ", ".join(record.involved) or "all"),
         ("driving", record.driving or "not recorded"),
     ]
-    facts += [(k.replace("_", " "), f"{v:.2f}") for k, v in record.extremes.items() if k in SHOWN]
+    facts += [(words(k), f"{v:.2f}") for k, v in record.extremes.items() if k in SHOWN]
     chain = [MEANING[record.type].capitalize() + "."]
     chain += [
         f"Object {'' if o.id is None else o.id} of {o.channel} at ({o.x:.1f}, {o.y:.1f}) m."
@@ -195,7 +185,7 @@ def hazard_card(record: HazardRecord, drawn: bool) -> Card:
     if "cut" in record.flags:
         chain.append("The record is cut: the drive or the record's limit ended it.")
     return Card(
-        title=f"{NAMES[record.type]} at {record.t_start:.1f} s",
+        title=f"{tables.NAMES[record.type]} at {record.t_start:.1f} s",
         subtitle=f"{record.id}, rules {record.profile}",
         tags=record.flags,
         facts=facts,

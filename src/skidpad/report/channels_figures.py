@@ -10,8 +10,8 @@ from skidpad.evidence.channels.hazards import SCORED_HAZARDS
 from skidpad.evidence.channels.indicators.catalogue import Bound, Indicator
 from skidpad.evidence.channels.timing import BUDGET_MS, MODULES, time_by_objects
 from skidpad.report.channels_data import MonitoredDrive, Trace
-from skidpad.report.figures import PALETTE, canvas, lines, svg_of
-from skidpad.report.page import Block, Figure, Text
+from skidpad.report.figures import Chart, Curve, curves, lines
+from skidpad.report.page import Block, Figure, Text, words
 from skidpad.report.timeline import Mark, Strip, timelines
 
 MARGIN = 5.0  # s around a hazard that are not hazard-free
@@ -58,7 +58,7 @@ def _strip(drive: MonitoredDrive, indicator: Indicator) -> Strip | None:
 
 
 def _label(indicator: Indicator) -> str:
-    name = indicator.value.replace("_", " ")
+    name = words(indicator.value)
     return name.replace("object motion prediction", "motion").replace(" planned", "")
 
 
@@ -73,45 +73,50 @@ def _worst(traces: list[Trace], upper: bool) -> NDArray[np.float64]:
 
 def risk(drive: MonitoredDrive) -> list[Block]:
     """Risk of every channel's plan, in hazard-free driving (decision C-8) and near hazards."""
-    curves, said = [], []
-    for trace in drive.traces(Indicator.SAFETY_SCORE):
-        near = np.zeros(trace.t.size, dtype=bool)
-        for e in drive.summary["hazards"]:
-            near |= (trace.t >= e["t_start"] - MARGIN) & (trace.t <= e["t_end"] + MARGIN)
-        value = 1.0 - trace.value
-        free = np.sort(value[~near & np.isfinite(value)])
-        if free.size:
-            curves.append(
-                (trace.subject, free.tolist(), (np.arange(1, free.size + 1) / free.size).tolist())
-            )
-            q = ", ".join(f"{np.quantile(free, p):.2f}" for p in QUANTILES)
-            said.append(
-                f"{trace.subject}: median, 90 % and 99 % of {free.size} cycles: {q}; "
-                f"above 0.2 in {100.0 * (free > 0.2).mean():.1f} %"
-            )
-    behind = [
+    scores = drive.traces(Indicator.SAFETY_SCORE)
+    free = {t.subject: values for t in scores if (values := _free_risk(drive, t)).size}
+    if not free:
+        return [Text("No cycle was free of hazards and had a risk.", tone="note")]
+    cumulated = []
+    for name, values in free.items():
+        share = np.arange(1, values.size + 1) / values.size
+        thin = slice(None, None, max(1, values.size // 200))
+        cumulated.append((name, values[thin], share[thin]))
+    return [
+        Figure(
+            lines(cumulated, "risk of the plan in the worst world", "share of cycles"),
+            f"Risk in driving without hazards ({MARGIN:g} s around each left out), cumulated: what "
+            "the rules must tell from a hazard.",
+        ),
+        Text("; ".join(_quantiles(*one) for one in free.items()) + "." + _risk_behind(drive)),
+    ]
+
+
+def _free_risk(drive: MonitoredDrive, trace: Trace) -> NDArray[np.float64]:
+    """Sorted risks of the cycles that are far from every hazard."""
+    near = np.zeros(trace.t.size, dtype=bool)
+    for e in drive.summary["hazards"]:
+        near |= (trace.t >= e["t_start"] - MARGIN) & (trace.t <= e["t_end"] + MARGIN)
+    value: NDArray[np.float64] = 1.0 - trace.value
+    return np.sort(value[~near & np.isfinite(value)])
+
+
+def _quantiles(name: str, risks: NDArray[np.float64]) -> str:
+    q = ", ".join(f"{np.quantile(risks, p):.2f}" for p in QUANTILES)
+    above = 100.0 * (risks > 0.2).mean()
+    return f"{name}: median, 90 % and 99 % of {risks.size} cycles: {q}; above 0.2 in {above:.1f} %"
+
+
+def _risk_behind(drive: MonitoredDrive) -> str:
+    means = [
         f"{trace.subject} {np.nanmean(trace.value):.2f}"
         for trace in drive.traces(Indicator.RISK_BEHIND_SHARE)
         if np.isfinite(trace.value).any()
     ]
-    if not curves:
-        return [Text("No cycle was free of hazards and had a risk.", tone="note")]
-    thinned = [(n, x[:: max(1, len(x) // 200)], y[:: max(1, len(y) // 200)]) for n, x, y in curves]
-    text = "; ".join(said) + "."
-    if behind:
-        text += (
-            " Mean share of the risk that objects behind add, where there is risk: "
-            + ", ".join(behind)
-            + "."
-        )
-    return [
-        Figure(
-            lines(thinned, "risk of the plan in the worst world", "share of cycles"),
-            f"Risk in driving without hazards ({MARGIN:g} s around each left out), cumulated: what "
-            "the rules must tell from a hazard.",
-        ),
-        Text(text),
-    ]
+    if not means:
+        return ""
+    told = ", ".join(means)
+    return f" Mean share of the risk that objects behind add, where there is risk: {told}."
 
 
 def timing(drive: MonitoredDrive) -> list[Block]:
@@ -120,7 +125,7 @@ def timing(drive: MonitoredDrive) -> list[Block]:
         return []
     by_objects = time_by_objects(drive.timing)
     objects = by_objects["objects"].to_list()
-    curves = [(m.replace("_", " "), objects, by_objects[m].to_list()) for m in ("total", *MODULES)]
+    curves = [(words(m), objects, by_objects[m].to_list()) for m in ("total", *MODULES)]
     return [
         Figure(
             _over_time(drive.timing),
@@ -137,20 +142,11 @@ def timing(drive: MonitoredDrive) -> list[Block]:
 def _over_time(timing: pl.DataFrame) -> str:
     seconds = (timing["cycle"].to_numpy() - timing["cycle"][0]) * 0.1
     bins = np.minimum((seconds / max(seconds[-1], 0.1) * TIME_BINS).astype(int), TIME_BINS - 1)
-    with canvas(height=3.6) as (figure, (axes,)):
-        for k, module in enumerate(("total", *MODULES)):
-            peak = np.full(TIME_BINS, np.nan)
-            np.fmax.at(peak, bins, timing[module].to_numpy())
-            at = np.flatnonzero(np.isfinite(peak))
-            axes.plot(
-                at * seconds[-1] / TIME_BINS,
-                peak[at],
-                color=PALETTE[k],
-                linewidth=1.0,
-                label=module.replace("_", " "),
-            )
-        axes.set_yscale("log")
-        axes.set_xlabel("s")
-        axes.set_ylabel("ms")
-        figure.legend(loc="outside upper center", ncols=6)
-        return svg_of(figure)
+    peaks = []
+    for module in ("total", *MODULES):
+        peak = np.full(TIME_BINS, np.nan)
+        np.fmax.at(peak, bins, timing[module].to_numpy())
+        at = np.flatnonzero(np.isfinite(peak))
+        x = at * seconds[-1] / TIME_BINS
+        peaks.append(Curve(words(module), x, peak[at], style={"linewidth": 1.0}))
+    return curves([Chart(peaks, "s", "ms", log=True)], height=3.6)

@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
-from skidpad.evidence.channels.redundancy import EVENTS, Difference, compare_drivers, differences
-from skidpad.evidence.statistics import Rate, interval_text, p_text
+from skidpad.evidence.channels.redundancy import (
+    EVENTS,
+    Difference,
+    DriverRow,
+    compare_drivers,
+    differences,
+)
+from skidpad.evidence.statistics import interval_text, p_text
 from skidpad.recording.channel_drives import read_outcomes
-from skidpad.report.page import Block, Cell, Table, Text
+from skidpad.report.page import Block, Cell, Text
+from skidpad.report.tables import Column, Format, table
 
 TITLES = {
     "collisions": "collisions",
@@ -29,25 +37,24 @@ def redundancy(folder: Path) -> list[Block]:
                 tone="note",
             )
         ]
-    rows = [
-        [
-            Cell(d.drive_by),
-            Cell(str(d.segments), float(d.segments)),
-            Cell(f"{d.hours:.2f}", d.hours),
-            Cell(f"{d.km:.1f}", d.km),
-            *(_rate(d.rates[event]) for event in EVENTS),
-        ]
-        for d in drivers
+    columns = [
+        Column[DriverRow]("driven by", lambda d: d.drive_by),
+        Column[DriverRow]("segments", lambda d: d.segments, "driven by all"),
+        Column[DriverRow]("hours", lambda d: d.hours, format=Format(".2f")),
+        Column[DriverRow]("km", lambda d: d.km, format=Format(".1f")),
+        *(
+            Column(TITLES[event], partial(_rate, event), "count, rate per hour below")
+            for event in EVENTS
+        ),
     ]
-    heads = [("driven by", ""), ("segments", "driven by all"), ("hours", ""), ("km", "")]
-    heads += [(TITLES[event], "count, rate per hour below") for event in EVENTS]
     return [
-        Table(heads, rows, caption="Outcomes by driver, on the seeds that all have driven"),
+        table(columns, drivers, "Outcomes by driver, on the seeds that all have driven"),
         Text(" ".join(map(_sentence, differences(outcomes)))),
     ]
 
 
-def _rate(rate: Rate) -> Cell:
+def _rate(event: str, driver: DriverRow) -> Cell:
+    rate = driver.rates[event]
     note = f"{rate.rate:.2f} per h, {interval_text(rate.interval)}"
     return Cell(str(rate.events), float(rate.events), note=note)
 

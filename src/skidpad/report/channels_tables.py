@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
 
 import polars as pl
 
@@ -17,8 +19,20 @@ from skidpad.evidence.channels.indicators.catalogue import (
 from skidpad.evidence.channels.timing import timing_statistics
 from skidpad.recording.hazards import HazardRecord
 from skidpad.report.channels_data import MonitoredDrive
-from skidpad.report.page import Block, Cell, Node, Table, Text, Tree
-from skidpad.report.published import Source, published
+from skidpad.report.page import Block, Cell, Node, Table, Text, Tree, words
+from skidpad.report.published import Source, published, published_rows
+from skidpad.report.tables import Column, Format, Quantity, table
+
+Row = dict[str, Any]  # of the monitor's summary
+TWO_DIGITS, THREE_DIGITS = Format(".2f", absent=""), Format(".3f", absent="")
+NAMES = {
+    HazardType.INCONSISTENT_LOCALISATION: "Inconsistent localisation",
+    HazardType.EGO_TAILGATING: "Ego tailgating",
+    HazardType.EGO_TAILGATED: "Ego tailgated",
+    HazardType.CROSSING_OBJECT: "Crossing object (candidate)",
+    HazardType.CONFLICTING_PATHS: "Conflicting paths (candidate)",
+    HazardType.STUCK_VEHICLE: "Stuck vehicle (candidate)",
+}
 
 CHALLENGED, SUPPORTED, SILENT = "challenged", "supported", "no evidence"
 PUBLISHED_MODULES = {
@@ -29,35 +43,24 @@ PUBLISHED_MODULES = {
 }
 
 
-def hazard_list(records: Sequence[HazardRecord], names: Mapping[HazardType, str]) -> Table:
+HAZARD_COLUMNS: tuple[Column[HazardRecord], ...] = (
+    Column("record", lambda r: r.id, "as in hazards.txt"),
+    Column("hazard", lambda r: NAMES[r.type]),
+    Column("start", lambda r: r.t_start, unit="s", format=Format(".1f")),
+    Column("length", lambda r: r.t_end - r.t_start, "first to last cycle in which it was found", "s",
+           Format(".1f")),
+    Column("cycles", lambda r: r.count, "in which it was found"),
+    Column("safety score", lambda r: r.extremes.get("safety_score"), "when it was worst",
+           format=TWO_DIGITS),
+    Column("channels", lambda r: ", ".join(r.involved), "that stand behind it"),
+    Column("flags", lambda r: ", ".join(r.flags),
+           "assumed: no objects were paired; cut: the record ends early", kind="muted"),
+)  # fmt: skip
+
+
+def hazard_list(records: Sequence[HazardRecord]) -> Table:
     """One row per record."""
-    rows = [
-        [
-            Cell(r.id),
-            Cell(names[r.type]),
-            Cell(f"{r.t_start:.1f}", r.t_start),
-            Cell(f"{r.t_end - r.t_start:.1f}", r.t_end - r.t_start),
-            Cell(f"{r.count}", float(r.count)),
-            Cell(_number(r.extremes.get("safety_score")), r.extremes.get("safety_score")),
-            Cell(", ".join(r.involved)),
-            Cell(", ".join(r.flags), kind="muted"),
-        ]
-        for r in records
-    ]
-    return Table(
-        [
-            ("record", "as in hazards.txt"),
-            ("hazard", ""),
-            ("start, s", ""),
-            ("length, s", "first to last cycle in which it was found"),
-            ("cycles", "in which it was found"),
-            ("safety score", "when it was worst"),
-            ("channels", "that stand behind it"),
-            ("flags", "assumed: no objects were paired; cut: the record ends early"),
-        ],
-        rows,
-        caption="All hazards",
-    )
+    return table(HAZARD_COLUMNS, records, "All hazards")
 
 
 def safety_case_tree(drive: MonitoredDrive) -> Tree:
@@ -97,69 +100,70 @@ def _worst(states: Sequence[str]) -> str:
     return next((s for s in (CHALLENGED, SUPPORTED) if s in states), SILENT)
 
 
-def words(name: str) -> str:
-    """A name as it is read."""
-    return name.replace("_", " ")
-
-
 def indicators(drive: MonitoredDrive) -> list[Block]:
     """Every indicator and subject: claim, threshold, violations and gaps (decision C-17)."""
-    said = _published_violations()
-    values = _statistics(drive.table)
-    rows = []
-    for row in drive.summary["indicators"]:
-        entry = drive.thresholds[Indicator(row["indicator"])]
-        mean, least = values.get((row["indicator"], row["subject"]), (None, None))
-        cycles, events = drive.summary["cycles"], row["violation_events"]
-        rows.append(
-            [
-                Cell(words(row["indicator"]), hint=entry.meaning),
-                Cell(row["subject"]),
-                Cell(row["claim"] or "", kind="muted"),
-                Cell(_number(row["threshold"]), row["threshold"]),
-                Cell(_number(mean), mean),
-                Cell(_number(least), least),
-                Cell(
-                    f"{events}",
-                    float(events),
-                    kind="bad" if events else "muted",
-                    heat=min(1.0, row["violation_cycles"] / max(cycles, 1)),
-                ),
-                Cell(f"{row['violation_cycles']}", float(row["violation_cycles"])),
-                Cell(f"{row['not_evaluated_cycles']}", float(row["not_evaluated_cycles"])),
-                Cell(said.get(row["indicator"], ""), kind="published"),
-            ]
+    return [
+        table(
+            _indicator_columns(drive),
+            drive.summary["indicators"],
+            "Indicators",
+            "Published counts are of another simulator, other channels and 8 h of driving.",
         )
-    table = Table(
-        [
-            ("indicator", "hover for what a violation points at"),
-            ("of", "channel, or pair of channels"),
-            ("claim", "statement of the safety case"),
-            ("threshold", "alarm beyond it; equality passes"),
-            ("mean", "of evaluated cycles"),
-            ("least", ""),
-            ("violations", "events: repeats within 2 s count once"),
-            ("cycles violated", ""),
-            ("cycles not evaluated", ""),
-            ("published", "violations in 8 h over six towns, sums of towns"),
-        ],
-        rows,
-        caption="Indicators",
-        note="Published counts are of another simulator, other channels and 8 h of driving.",
+    ]
+
+
+def _indicator_columns(drive: MonitoredDrive) -> tuple[Column[Row], ...]:
+    said = published_rows(Source.VIOLATIONS, "spi")
+    values = drive.table.group_by("indicator", "subject").agg(
+        mean=pl.col("value").mean(), least=pl.col("value").min()
     )
-    return [table]
+    found = {(r["indicator"], r["subject"]): r for r in values.to_dicts()}
+    cycles = max(drive.summary["cycles"], 1)
+
+    def statistic(name: str, row: Row) -> float | None:
+        return found.get((row["indicator"], row["subject"]), {}).get(name)
+
+    def name(row: Row) -> Cell:
+        meaning = drive.thresholds[Indicator(row["indicator"])].meaning
+        return Cell(words(row["indicator"]), hint=meaning)
+
+    def violations(row: Row) -> Quantity:
+        events, share = row["violation_events"], row["violation_cycles"] / cycles
+        return Quantity(value=events, kind="bad" if events else "muted", heat=min(1.0, share))
+
+    return (
+        Column("indicator", name, "hover for what a violation points at"),
+        Column("of", lambda r: r["subject"], "channel, or pair of channels"),
+        Column("claim", lambda r: r["claim"] or "", "statement of the safety case", kind="muted"),
+        Column("threshold", lambda r: r["threshold"], "alarm beyond it; equality passes",
+               format=TWO_DIGITS),
+        Column("mean", partial(statistic, "mean"), "of evaluated cycles", format=TWO_DIGITS),
+        Column("least", partial(statistic, "least"), format=TWO_DIGITS),
+        Column("violations", violations, "events: repeats within 2 s count once"),
+        Column("cycles violated", lambda r: r["violation_cycles"]),
+        Column("cycles not evaluated", lambda r: r["not_evaluated_cycles"]),
+        Column("published",
+               lambda r: said.get(r["indicator"], {}).get("violations_sum_of_towns"),
+               "violations in 8 h over six towns, sums of towns", format=Format(absent=""), kind="published"),
+    )  # fmt: skip
 
 
-def _statistics(table: pl.DataFrame) -> dict[tuple[str, str], tuple[float | None, float | None]]:
-    rows = table.group_by("indicator", "subject").agg(
-        pl.col("value").mean().alias("mean"), pl.col("value").min().alias("least")
-    )
-    return {(i, s): (mean, least) for i, s, mean, least in rows.iter_rows()}
-
-
-def _published_violations() -> dict[str, str]:
-    table = published(Source.VIOLATIONS)
-    return {spi: f"{n}" for spi, n in table.select("spi", "violations_sum_of_towns").iter_rows()}
+TIMING_COLUMNS: tuple[Column[Row], ...] = (
+    Column("module", lambda r: words(r["module"])),
+    Column("mean", lambda r: r["mean_ms"], unit="ms", format=THREE_DIGITS),
+    Column("greatest", lambda r: r["max_ms"], unit="ms", format=THREE_DIGITS),
+    Column("least", lambda r: r["min_ms"], unit="ms", format=THREE_DIGITS),
+    Column("deviation", lambda r: r["std_ms"], unit="ms", format=THREE_DIGITS),
+    Column("99.9 %", lambda r: r["p999_ms"], unit="ms", format=THREE_DIGITS),
+    Column("breaches", lambda r: r["breaches_pct"],
+           "cycles above the threshold: 25 ms; of a module its own maximum", "%", TWO_DIGITS),
+    Column("within 90 %", lambda r: r["within_90_pct"],
+           "cycles from 0.9 of the threshold to the threshold", "%", TWO_DIGITS),
+    Column("under 50 %", lambda r: r["under_50_pct"], "cycles below half the threshold", "%",
+           TWO_DIGITS),
+    Column("published mean", lambda r: _published_time(r["module"]),
+           "least and greatest of six towns, four Cortex-A53", "ms", kind="published"),
+)  # fmt: skip
 
 
 def timing(drive: MonitoredDrive) -> list[Block]:
@@ -168,76 +172,47 @@ def timing(drive: MonitoredDrive) -> list[Block]:
         return [
             Text("Not measured: `skidpad monitor --timing` measures every module.", tone="note")
         ]
-    said = published(Source.TIMING).filter(pl.col("statistic") == "mean_ms")
-    rows = []
-    for row in timing_statistics(drive.timing).iter_rows(named=True):
-        theirs = said.filter(pl.col("module") == PUBLISHED_MODULES.get(row["module"], ""))["value"]
-        known = sorted(theirs.to_list())
-        text = f"{known[0]:.2f} to {known[-1]:.2f}" if known else ""
-        numbers = [row[c] for c in TIMING_COLUMNS]
-        rows.append(
-            [
-                Cell(words(row["module"])),
-                *[Cell(f"{v:.3f}", v) for v in numbers[:5]],
-                *[Cell(f"{v:.2f}", v) for v in numbers[5:]],
-                Cell(text, kind="published"),
-            ]
-        )
-    return [
-        Table(
-            [
-                ("module", ""),
-                ("mean, ms", ""),
-                ("greatest, ms", ""),
-                ("least, ms", ""),
-                ("deviation, ms", ""),
-                ("99.9 %, ms", ""),
-                ("breaches, %", "cycles above the threshold: 25 ms; of a module its own maximum"),
-                ("within 90 %, %", "cycles from 0.9 of the threshold to the threshold"),
-                ("under 50 %, %", "cycles below half the threshold"),
-                ("published mean, ms", "least and greatest of six towns, four Cortex-A53"),
-            ],
-            rows,
-            caption="Processor time per cycle",
-            note="The total has a budget of 25 ms. Ours is the time of one thread on this machine; the "
-            "published times come from an automotive processor and do not compare.",
-        )
-    ]
+    rows = timing_statistics(drive.timing).to_dicts()
+    note = (
+        "The total has a budget of 25 ms. Ours is the time of one thread on this machine; the "
+        "published times come from an automotive processor and do not compare."
+    )
+    return [table(TIMING_COLUMNS, rows, "Processor time per cycle", note)]
 
 
-TIMING_COLUMNS = (
-    "mean_ms", "max_ms", "min_ms", "std_ms", "p999_ms", "breaches_pct", "within_90_pct",
-    "under_50_pct",
-)  # fmt: skip
+def _published_time(module: str) -> str:
+    name = PUBLISHED_MODULES.get(module, "")
+    rows = published(Source.TIMING).filter(pl.col("statistic") == "mean_ms")
+    known = sorted(rows.filter(pl.col("module") == name)["value"].to_list())
+    return f"{known[0]:.2f} to {known[-1]:.2f}" if known else ""
+
+
+LOSS_COLUMNS: tuple[Column[tuple[str, str, int]], ...] = (
+    Column("what", lambda loss: loss[0]),
+    Column("channel or kind", lambda loss: loss[1]),
+    Column("count", lambda loss: loss[2], "cycles, objects or messages"),
+)
 
 
 def losses(drive: MonitoredDrive) -> list[Block]:
     """What was lost while reading or could not be evaluated."""
+    s = drive.summary
     rows = [
-        [Cell(words(kind)), Cell(channel), Cell(f"{n}", float(n))]
-        for group in (drive.summary["unusable"], {"lost while reading": drive.summary["losses"]})
-        for kind, table in group.items()
-        for channel, n in table.items()
+        (words(kind), channel, n)
+        for group in (s["unusable"], {"lost while reading": s["losses"]})
+        for kind, counts in group.items()
+        for channel, n in counts.items()
         if n and not isinstance(n, dict)
     ]
     rows += [
-        [Cell("objects seen for a moment by one channel"), Cell(channel), Cell(f"{n}", float(n))]
-        for channel, n in drive.summary["brief_objects"].items()
+        ("objects seen for a moment by one channel", channel, n)
+        for channel, n in s["brief_objects"].items()
     ]
     rows += [
-        [Cell(f"rule of {words(hazard)} undecided"), Cell("all"), Cell(f"{n}", float(n))]
-        for hazard, n in drive.summary["undecided_cycles"].items()
+        (f"rule of {words(hazard)} undecided", "all", n)
+        for hazard, n in s["undecided_cycles"].items()
     ]
     if not rows:
         return [Text("Everything in the recording could be read and evaluated.")]
-    return [
-        Table(
-            [("what", ""), ("channel or kind", ""), ("count", "cycles, objects or messages")],
-            rows,
-            note="Objects that one channel shows for a moment hint at ghosts.",
-        )
-    ]
-
-
-def _number(value: float | None) -> str:
-    return "" if value is None else f"{value:.2f}"
+    note = "Objects that one channel shows for a moment hint at ghosts."
+    return [table(LOSS_COLUMNS, rows, note=note)]

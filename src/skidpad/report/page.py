@@ -241,6 +241,11 @@ def render(page: Page) -> str:
     )
 
 
+def words(name: str) -> str:
+    """An identifier as it is read."""
+    return name.replace("_", " ")
+
+
 def anchor(text: str) -> str:
     """Text as the name of a place or file."""
     return "".join(c if c.isalnum() else "-" for c in text.lower()).strip("-")

@@ -7,8 +7,6 @@ from numpy.typing import NDArray
 
 from skidpad.core.vocabulary import SemanticClass
 
-DEPTH_RANGE = 1000.0  # m, A-033
-DEPTH_STEPS = 256**3 - 1
 Bytes = NDArray[np.uint8]
 
 # CityScapes colours as documented for CARLA 0.9.15.
@@ -46,22 +44,6 @@ CITYSCAPES: dict[SemanticClass, tuple[int, int, int]] = {
 _COLOURS: Bytes = np.zeros((256, 3), dtype=np.uint8)
 for _label, _rgb in CITYSCAPES.items():
     _COLOURS[_label] = _rgb
-
-
-def encode_carla_depth(inverse_depth: NDArray[np.float32]) -> Bytes:
-    """(H, W) 1/m to (H, W, 3) red, green, blue of the 24-bit code (A-033); beyond 1000 m is full."""
-    with np.errstate(divide="ignore"):
-        share = np.minimum(1.0 / inverse_depth.astype(np.float64) / DEPTH_RANGE, 1.0)
-    code = np.rint(share * DEPTH_STEPS).astype(np.uint32)
-    parts = [(code >> shift) & 0xFF for shift in (0, 8, 16)]
-    return np.stack(parts, axis=-1).astype(np.uint8)
-
-
-def decode_carla_depth(rgb: Bytes) -> NDArray[np.float64]:
-    """(H, W, 3) red, green, blue to metres (A-033)."""
-    r, g, b = (rgb[..., i].astype(np.float64) for i in range(3))
-    metres: NDArray[np.float64] = (r + 256.0 * g + 65536.0 * b) / DEPTH_STEPS * DEPTH_RANGE
-    return metres
 
 
 def cityscapes_colours(labels: NDArray[np.uint8]) -> Bytes:

@@ -14,7 +14,9 @@ from math import pi, tau
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from skidpad.core.depthcode import bgra_from_inverse_depth
 from skidpad.core.errors import ConfigError, StackError
 from skidpad.core.frames import LidarPoints, SensorFrame
 from skidpad.core.geodesy import geolocation
@@ -46,8 +48,7 @@ LIDAR = "sensor.lidar.ray_cast"
 KINDS = (*CAMERAS, LIDAR, *POINT_SENSORS)
 MARK = "agent/"  # before an agent's sensor ids: ours may have the same
 G_CARLA = 9.81  # m/s^2, what CARLA's accelerometer feels at rest
-DEPTH_FAR = 1000.0  # m, full scale of CARLA's depth images
-DEPTH_STEPS = 256**3 - 1
+RED, ALPHA = 2, 3  # channels of BGRA
 ROUTE_LENGTH, ROUTE_STEP = 500.0, 5.0  # m
 
 
@@ -215,26 +216,27 @@ def _spec(wanted: Mapping[str, Any]) -> SensorSpec:
     )
 
 
-def _image(id: str, modality: Modality, frame: SensorFrame) -> np.ndarray[Any, Any]:
+def _image(id: str, modality: Modality, frame: SensorFrame) -> NDArray[np.uint8]:
     """(H, W, 4) BGRA bytes, as CARLA's sensors deliver them."""
     if id not in frame.images:
         raise StackError(
             f"camera {id.removeprefix(MARK)!r} delivers no image: run with --sensors pixels"
         )
     image = frame.images[id]
+    if modality is Modality.DEPTH:
+        assert image.inverse_depth is not None
+        bgra = np.zeros((*image.inverse_depth.shape, 4), dtype=np.uint8)
+        bgra_from_inverse_depth(image.inverse_depth, bgra)
+        return bgra
+    drawn = image.rgb if modality is Modality.RGB else image.labels
+    assert drawn is not None
+    bgra = np.zeros((*drawn.shape[:2], 4), dtype=np.uint8)
+    bgra[..., ALPHA] = 255
     if modality is Modality.RGB:
-        assert image.rgb is not None
-        bgr = image.rgb[:, :, ::-1]
-    elif modality is Modality.SEMANTIC:
-        assert image.labels is not None
-        zero = np.zeros_like(image.labels)
-        bgr = np.stack([zero, zero, image.labels], axis=2)
+        bgra[..., :ALPHA] = drawn[:, :, ::-1]
     else:
-        share = np.clip(image.depth() / DEPTH_FAR, 0.0, 1.0)
-        steps = (share * DEPTH_STEPS).astype(np.uint32)
-        bgr = np.stack([steps >> 16 & 255, steps >> 8 & 255, steps & 255], axis=2).astype(np.uint8)
-    alpha = np.full((*bgr.shape[:2], 1), 255, dtype=np.uint8)
-    return np.concatenate([bgr, alpha], axis=2)
+        bgra[..., RED] = drawn
+    return bgra
 
 
 def _gps(pose: Pose) -> dict[str, float]:

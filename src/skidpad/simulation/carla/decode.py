@@ -16,22 +16,7 @@ from skidpad.core.vocabulary import SemanticClass
 
 Bytes = NDArray[np.uint8]
 Float32 = NDArray[np.float32]
-METRES_PER_STEP = 1000.0 / (256.0**3 - 1.0)  # A-033
-FULL = 256**3 - 1  # the code of everything at 1000 m or beyond
 SKY = int(SemanticClass.SKY)
-
-
-@kernel
-def inverse_depth(bgra: Bytes, out: Float32) -> None:
-    """(H, W, 4) of the 24-bit code, low byte in red, to (H, W) 1/m; full scale is nothing."""
-    for y in range(out.shape[0]):
-        for x in range(out.shape[1]):
-            code = (
-                np.int64(bgra[y, x, 2])
-                + 256 * np.int64(bgra[y, x, 1])
-                + 65536 * np.int64(bgra[y, x, 0])
-            )
-            out[y, x] = 0.0 if code >= FULL else 1.0 / (max(code, 1) * METRES_PER_STEP)
 
 
 @kernel

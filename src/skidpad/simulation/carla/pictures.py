@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.depthcode import inverse_depth_from_bgra
 from skidpad.core.errors import BackendError
 from skidpad.core.frames import CameraImage
 from skidpad.core.setup import Setup
@@ -66,7 +67,7 @@ class Pictures:
         out = self._buffers[camera.id]
         bgra = _bytes(messages[camera.id], camera)
         if camera.modality is Modality.DEPTH:
-            decode.inverse_depth(bgra, out)
+            inverse_depth_from_bgra(bgra, out)
             if isfinite(self._depth_sight):
                 decode.limit_depth(camera, self._depth_sight, out)
             return CameraImage(inverse_depth=out)
@@ -75,7 +76,7 @@ class Pictures:
             twin = self._twin.get(camera.id)
             if twin is not None and twin.id in messages and isfinite(self._label_sight):
                 inverse = np.empty((twin.height, twin.width), dtype=np.float32)
-                decode.inverse_depth(_bytes(messages[twin.id], twin), inverse)
+                inverse_depth_from_bgra(_bytes(messages[twin.id], twin), inverse)
                 decode.limit_labels(camera, self._label_sight, inverse, out)
             return CameraImage(labels=out)
         if camera.modality is Modality.INSTANCE:

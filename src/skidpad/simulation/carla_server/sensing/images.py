@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.depthcode import bgra_from_inverse_depth
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.sensors.passes import Pass
@@ -70,7 +71,7 @@ def image(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
     view = camera_view(camera.spec, around.actors.pose(sensor.actor))
     scene.live.draw(view, around.hidden_for(sensor.actor), AUTO_LEVEL, drawn)
     if camera.spec.modality is Modality.DEPTH:
-        pixels.bgra_from_depth(drawn.inverse, camera.bgra)
+        bgra_from_inverse_depth(drawn.inverse, camera.bgra)
     elif camera.spec.modality is Modality.SEMANTIC:
         pixels.bgra_from_labels(drawn.labels, camera.bgra)
     elif camera.spec.modality is Modality.INSTANCE:

@@ -1,4 +1,4 @@
-"""Images as CARLA's clients decode them: BGRA, depth in 24 bits, tags in red."""
+"""Images as CARLA's clients decode them: BGRA, tags in red."""
 
 from __future__ import annotations
 
@@ -9,29 +9,12 @@ from numpy.typing import NDArray
 from skidpad.core.jit import kernel
 
 Bytes = NDArray[np.uint8]
-DEPTH_RANGE = 1000.0  # m
-DEPTH_STEPS = 256.0**3 - 1.0
 
 
 def bgra_from_rgb(packed: NDArray[np.uint32], out: Bytes) -> None:
     """(H, W) packed red, green, blue, 255 into (H, W, 4)."""
     rgba = packed.view(np.uint8).reshape(*packed.shape, 4)
     cv2.cvtColor(rgba, cv2.COLOR_RGBA2BGRA, dst=out)
-
-
-@kernel
-def bgra_from_depth(inverse: NDArray[np.float32], out: Bytes) -> None:
-    """(H, W) 1/m into the 24-bit code, low byte in red; nothing is 1000 m."""
-    for y in range(inverse.shape[0]):
-        for x in range(inverse.shape[1]):
-            share = 1.0
-            if inverse[y, x] * DEPTH_RANGE > 1.0:
-                share = 1.0 / (float(inverse[y, x]) * DEPTH_RANGE)
-            code = int(share * DEPTH_STEPS + 0.5)
-            out[y, x, 2] = code & 255
-            out[y, x, 1] = (code >> 8) & 255
-            out[y, x, 0] = (code >> 16) & 255
-            out[y, x, 3] = 255
 
 
 @kernel

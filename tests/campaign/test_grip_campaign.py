@@ -22,7 +22,7 @@ from skidpad.core.errors import OutputError
 from skidpad.core.run import AgentDriver, Friction, RunSpec
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.presets import preset
-from skidpad.recording.grip import GripEntry, read_series, series_path
+from skidpad.recording.grip import GripEntry, read_series
 from skidpad.recording.ledger import read_ledger
 from skidpad.recording.results import read_results
 from skidpad.report.grip_data import load_grip
@@ -72,7 +72,7 @@ def test_every_run_leaves_its_row_and_its_series(campaign):
     assert len(table) == 2 * 2 * 2 * 2
     for row in table.to_dicts():
         name = f"{row['scenario']}_{row['weather']}_{row['friction']}"
-        series = read_series(series_path(campaign, name, row["seed"]))
+        series = read_series(campaign, f"{name}-{row['seed']:06d}")
         assert len(series) == round(row["duration_s"] / 0.05) + 1
         assert row["score"] is not None
         assert row["mu"] == pytest.approx(0.9 * row["ratio"], rel=1e-6)
@@ -84,7 +84,7 @@ def test_pairs_begin_alike_and_seeds_differ(campaign):
     first = table.filter((pl.col("scenario") == "lead_slowdown") & (pl.col("weather") == "icy_30"))
     series = {
         (r["friction"], r["seed"]): read_series(
-            series_path(campaign, f"lead_slowdown_icy_30_{r['friction']}", r["seed"])
+            campaign, f"lead_slowdown_icy_30_{r['friction']}-{r['seed']:06d}"
         )
         for r in first.to_dicts()
     }

@@ -24,8 +24,8 @@ from skidpad.roads.kernels import (
 )
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap
+from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.rows import Rows
-from skidpad.simulation.world.traffic.occupancy import Places
 from skidpad.simulation.world.traffic.path import uniform
 
 Floats = NDArray[np.float64]

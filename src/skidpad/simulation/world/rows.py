@@ -14,7 +14,7 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.contact import Bodies, bodies
 from skidpad.physics.types import VehicleType
-from skidpad.simulation.world.traffic.occupancy import Places, places_for
+from skidpad.simulation.world.placed import Places, places_for
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

@@ -15,7 +15,7 @@ from skidpad.physics.contact import Contacts
 from skidpad.roads.kernels import WIDTH, LaneArrays
 from skidpad.roads.lanes import Marking
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.world.traffic.occupancy import Places
+from skidpad.simulation.world.placed import Places
 
 HOLD = 0.5  # s: bodies that bounce apart and touch again within this are one contact
 EGO = 0

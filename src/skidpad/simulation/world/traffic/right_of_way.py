@@ -12,7 +12,8 @@ from math import cos, sin, sqrt
 import numpy as np
 
 from skidpad.core.jit import kernel
-from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, Places, find_ahead
+from skidpad.simulation.world.placed import Places
+from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, find_ahead
 from skidpad.simulation.world.traffic.path import PATH
 from skidpad.simulation.world.traffic.priority import LIGHT, STOP, YIELD
 from skidpad.simulation.world.traffic.state import Drivers, Streets, View

@@ -7,8 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.network import Network
-from skidpad.simulation.world.traffic.occupancy import Occupancy, Places
+from skidpad.simulation.world.traffic.occupancy import Occupancy
 from skidpad.simulation.world.traffic.path import PATH
 
 Floats = NDArray[np.float64]

@@ -1,0 +1,77 @@
+"""The ego's sensor readings, from the messages of a tick or from our own object level."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import inf
+from typing import Any
+
+from skidpad.core.frames import LidarPoints, RadarPoints
+from skidpad.core.setup import Setup
+from skidpad.core.specs import LidarSpec, RadarSpec
+from skidpad.core.states import ActorStates, ActorTable, Floats
+from skidpad.core.vocabulary import LightState, RangeModel, SensorLevel
+from skidpad.physics.optics import radar_range
+from skidpad.roads.queries import RoadMap
+from skidpad.sensors.asked import AskedSensors
+from skidpad.simulation.carla import decode
+from skidpad.simulation.carla.cast import Player
+from skidpad.simulation.carla.pictures import Pictures
+from skidpad.simulation.sensing import Objects, Readings
+
+Messages = Mapping[str, Any]  # what the wheel delivered, by sensor id
+
+
+class Reader:
+    """Turns messages into readings; one per run."""
+
+    def __init__(
+        self, map: RoadMap, table: ActorTable, setup: Setup, seed: int, pictures: Pictures
+    ) -> None:
+        self.pictures = pictures
+        self._messages: Messages = {}
+        self._objects: Objects | None = None
+        if setup.level is SensorLevel.OBJECTS:
+            self._objects = Objects(map, table, setup, seed)
+        self._asked: AskedSensors | None = None
+        if setup.asked:
+            self._asked = AskedSensors(map, table, setup, self._lidar)
+        radar = next((s for s in setup.specs if isinstance(s, RadarSpec)), None)
+        self._radar_id = None if radar is None else radar.id
+        self._radar_limit = inf
+        if radar is not None and setup.range_model is RangeModel.PHYSICAL:
+            self._radar_limit = radar_range(setup.weather, radar.range)
+
+    def know(self, players: Sequence[Player]) -> None:
+        """Which actors' ids in the messages are which rows."""
+        rows = self.pictures.rows
+        for i, player in enumerate(players):
+            if player.actor is not None:
+                rows[player.actor.id % len(rows)] = i + 1
+
+    def read(
+        self,
+        tick: int,
+        messages: Messages,
+        states: ActorStates,
+        commands: Floats,
+        lights: dict[int, LightState],
+    ) -> tuple[Readings, Mapping[str, Any]]:
+        """The common sensors' readings, and those that the stack asked for besides."""
+        self._messages = messages
+        if self._objects is not None:
+            seen = self._objects.read(tick, states, lights, commands[:, 1] > 0.0)
+        else:
+            radar = RadarPoints.none()
+            if self._radar_id is not None:
+                raw = messages[self._radar_id].raw_data
+                radar = decode.radar_points(raw, self._radar_limit)
+            seen = Readings(self.pictures.of(tick, messages), {}, radar)
+        asked = self._asked
+        return seen, {} if asked is None else asked.read(tick, states, seen.images)
+
+    def _lidar(self, spec: LidarSpec) -> LidarPoints:
+        """The server's; GNSS, IMU and speedometer are read off the body, as in our own world."""
+        assert self._asked is not None
+        raw = self._messages[spec.id].raw_data
+        return decode.lidar_points(raw, self.pictures.rows, self._asked.air)

@@ -7,7 +7,7 @@ nose down, steer > 0 left, azimuth > 0 left. Every map is its own inverse up to 
 
 from __future__ import annotations
 
-from math import degrees, radians
+from math import degrees, pi, radians
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ def pose_to_carla(pose: Pose) -> tuple[float, float, float, float, float, float]
         pose.z,
         degrees(pose.roll),
         -degrees(pose.pitch),
-        -degrees(pose.yaw),
+        180.0 if pose.yaw == pi else -degrees(pose.yaw),  # CARLA's range is (-180, 180]
     )
 
 
@@ -50,7 +50,8 @@ def poses_to_carla(
     x: Floats, y: Floats, z: Floats, roll: Floats, pitch: Floats, yaw: Floats
 ) -> Floats:
     """(n, 6) x, y, z in m, pitch, yaw, roll in deg, as CARLA's snapshots order them."""
-    return np.column_stack((x, -y, z, np.degrees(-pitch), np.degrees(-yaw), np.degrees(roll)))
+    turned = np.where(yaw == pi, 180.0, np.degrees(-yaw))  # in (-180, 180]
+    return np.column_stack((x, -y, z, np.degrees(-pitch), turned, np.degrees(roll)))
 
 
 def vectors_to_carla(x: Floats, y: Floats, z: Floats) -> Floats:

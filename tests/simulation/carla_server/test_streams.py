@@ -79,3 +79,37 @@ def test_listeners_of_a_closed_stream_may_hang_up_first(monkeypatch: Any) -> Non
         return at_once, wire.closed
 
     assert asyncio.run(play()) == (False, True)
+
+
+def test_who_asks_for_a_stream_that_ended_is_kept_waiting() -> None:
+    """Hung up on, the client would connect again at once and for ever."""
+
+    async def play() -> tuple[bool, bool]:
+        hub = StreamHub()
+        stream = hub.create()
+        hub.close(stream)
+        return listener(hub, stream).closed, listener(hub, stream + 1).closed
+
+    assert asyncio.run(play()) == (False, True)
+
+
+def test_a_tick_waits_for_streams_on_their_way_but_not_for_ever(monkeypatch: Any) -> None:
+    monkeypatch.setattr(streams, "PATIENCE", 0.03)
+
+    async def play() -> list[str]:
+        hub, said = StreamHub(), []
+        one, two = hub.create(), hub.create()
+        hub.announce(one)
+        hub.announce(two)
+        hub.when_complete(lambda: said.append("go"))
+        listener(hub, one)
+        await asyncio.sleep(0.005)
+        said.append("one is missing" if not hub.complete else "complete")
+        listener(hub, two)
+        await asyncio.sleep(0.005)
+        hub.announce(two)
+        hub.when_complete(lambda: said.append("in vain"))
+        await asyncio.sleep(0.06)
+        return said
+
+    assert asyncio.run(play()) == ["one is missing", "go", "in vain"]

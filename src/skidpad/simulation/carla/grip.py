@@ -11,7 +11,7 @@ from skidpad.core.vocabulary import GripModel
 from skidpad.physics.grip import GripParams, friction_ratio, grip_params, mu_at
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE
 
-BLUEPRINT = "skidpad.weather"
+BLUEPRINTS = ("skidpad.weather.grip", "skidpad.weather")  # of our servers now and before (R-15)
 V_RATIO = mps_from_kmh(
     80.0
 )  # tire_friction knows no speed: the ratio at the published cruise speed
@@ -74,17 +74,17 @@ def prepare_grip(carla: Any, world: Any, setup: Setup) -> Grip:
     """Look for the server's own model, and give it the ice; else compute the ratio once."""
     params = grip_params(setup.weather, setup.grip, setup.mu_ref)
     library = world.get_blueprint_library()
-    found = [b for b in library.filter(BLUEPRINT) if b.id == BLUEPRINT]
-    if not found:
+    emitter = next((b for name in BLUEPRINTS for b in library if b.id == name), None)
+    if emitter is None:
         ratio = friction_ratio(setup.weather, setup.grip, V_RATIO)
         return Grip(setup, False, ratio, params)
-    model, mu_ref = in_force(found[0], setup)
-    found[0].set_attribute("ice_thickness", f"{setup.weather.ice_thickness:g}")
-    emitter = world.spawn_actor(found[0], carla.Transform())
+    model, mu_ref = in_force(emitter, setup)
+    emitter.set_attribute("ice_thickness", f"{setup.weather.ice_thickness:g}")
+    actor = world.spawn_actor(emitter, carla.Transform())
     params = grip_params(setup.weather, model, mu_ref)
-    grip = Grip(setup, True, 1.0, params, emitter=emitter)
+    grip = Grip(setup, True, 1.0, params, emitter=actor)
     grip.notices.append(
-        f"grip: the server lets weather act on tyres (skidpad.weather): {model.value}, mu_ref {mu_ref:g}"
+        f"grip: the server lets weather act on tyres ({emitter.id}): {model.value}, mu_ref {mu_ref:g}"
     )
     if setup.grip is not GripModel.NONE and (model, mu_ref) != (setup.grip, setup.mu_ref):
         grip.notices.append(

@@ -1,4 +1,4 @@
-"""Our weather as CARLA's parameters, and ice through the blueprint `skidpad.weather`."""
+"""Our weather as CARLA's parameters, and ice through the blueprint `skidpad.weather.grip`."""
 
 from __future__ import annotations
 

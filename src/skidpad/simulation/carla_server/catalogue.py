@@ -16,7 +16,7 @@ from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.options import MU_REF
 
 DATA = Path(__file__).with_name("data") / "blueprints.yaml"
-GRIP_BLUEPRINT = "skidpad.weather"  # decision K-2
+GRIP_BLUEPRINT = "skidpad.weather.grip"  # decisions K-2, R-15
 
 
 class AttributeType(int, Enum):
@@ -225,7 +225,7 @@ def load_catalogue() -> dict[str, Blueprint]:
 
 
 def offered(grip: GripModel, mu_ref: float) -> dict[str, Blueprint]:
-    """The catalogue; the blueprint `skidpad.weather` says how weather acts on grip (K-2)."""
+    """The catalogue; the blueprint `skidpad.weather.grip` says how weather acts on grip (K-2)."""
     everything = load_catalogue()
     if grip is GripModel.NONE:
         return {id: b for id, b in everything.items() if b.family is not Family.GRIP}

@@ -188,7 +188,9 @@ class Episode:
     def _embody(self, actor: Actor, feet: Pose) -> None:
         """Let it enter the moving world."""
         if actor.family is Family.VEHICLE:
-            actor.body = self.vehicles.add(actor.id, actor.blueprint, feet).body
+            vehicle = self.vehicles.add(actor.id, actor.blueprint, feet)
+            vehicle.sticky = actor.attributes["sticky_control"].lower() == "true"
+            actor.body = vehicle.body
             return
         (body,) = self.moving.enter([shapes.body_of(actor)])
         actor.body = body

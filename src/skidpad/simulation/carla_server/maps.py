@@ -6,6 +6,8 @@ import logging
 from dataclasses import dataclass
 from pathlib import Path
 
+from shapely.errors import ShapelyError
+
 from skidpad.core.errors import ConfigError, SkidpadError
 from skidpad.core.geometry import Pose
 from skidpad.roads.bundled import bundled_maps, load_map, map_file
@@ -62,7 +64,11 @@ class ServedMap:
 
 
 def _navigation(name: str, roads: RoadMap) -> tuple[str, bytes] | None:
-    mesh = walk_mesh(roads)
+    try:
+        mesh = walk_mesh(roads)
+    except ShapelyError as error:
+        log.warning("map %s: no navigation mesh can be made: %s", name, error)
+        mesh = None
     content = None if mesh is None else navmesh.packed(mesh)
     if content is None:
         log.info("map %s has no navigation mesh: AI walkers stay where they are", name)

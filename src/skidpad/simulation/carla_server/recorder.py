@@ -51,7 +51,12 @@ class Recorder:
         except OSError as error:
             raise FileError(f"recording {path.name}: {error.strerror}") from error
         self._left, self._born = MAX_BYTES, set()
-        head = {"map": map, "episode": clock.episode, "format": FORMAT}
+        head = {
+            "map": map,
+            "episode": clock.episode,
+            "format": FORMAT,
+            "start": clock.elapsed,
+        }
         self._write(json.dumps(head))
         return f"Recording to file: {path.name}"
 
@@ -90,7 +95,7 @@ class Recorder:
     def summary(self, name: str) -> str:
         """What `show_recorder_file_info` prints."""
         head, ticks = self._read(name)
-        seconds = ticks[-1][1] if ticks else 0.0
+        seconds = ticks[-1][1] - _start(head, ticks) if ticks else 0.0
         return (
             f"Map: {head.get('map')}\nFrames: {len(ticks)}\nDuration: {seconds:.3f} seconds\n"
             "Format: Skidpad JSON lines\n"
@@ -98,8 +103,9 @@ class Recorder:
 
     def collisions(self, name: str) -> str:
         """What `show_recorder_collisions` prints."""
-        _, ticks = self._read(name)
-        lines = [f"{t[1]:10.3f} {a:6d} {b:6d}" for t in ticks for a, b in t[3]]
+        head, ticks = self._read(name)
+        start = _start(head, ticks) if ticks else 0.0
+        lines = [f"{t[1] - start:10.3f} {a:6d} {b:6d}" for t in ticks for a, b in t[3]]
         return "\n".join(["      Time  actor  other", *lines]) + "\n"
 
     def recording(self, name: str) -> Recording:
@@ -122,3 +128,8 @@ class Recorder:
         except (OSError, ValueError, IndexError) as error:
             raise CallError(f"File {path.name} not found on server, or no recording") from error
         return head, ticks
+
+
+def _start(head: dict[str, Any], ticks: list[list[Any]]) -> float:
+    """s of the episode when a recording began; recordings of before told only their first tick."""
+    return float(head.get("start", ticks[0][1]))

@@ -73,6 +73,7 @@ class Served:
         episode.follow()
         episode.debug.age(clock.step)
         self._publish_snapshot()
+        episode.vehicles.let_go()
         self.recorder.tick(clock, episode.actors, episode.moving)
         episode.sensors.produce(episode.surroundings, clock, self.hub)
         return clock.frame

@@ -6,6 +6,7 @@ import asyncio
 import json
 import logging
 import socket
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import IO, Any
@@ -36,6 +37,7 @@ class RpcConnection(asyncio.Protocol):
     def __init__(self, server: CarlaServer) -> None:
         self._server = server
         self._decoder = Decoder()
+        self._queue: deque[Request] = deque()
         self._transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
@@ -47,23 +49,44 @@ class RpcConnection(asyncio.Protocol):
 
     def data_received(self, data: bytes) -> None:
         """Answer every request that is complete; close on anything else."""
-        transport = self._transport
-        assert transport is not None
+        assert self._transport is not None
+        waiting, broken = bool(self._queue), False
         try:
-            for request in self._decoder.feed(data):
-                answer = self._server.answer(request)
-                rest = self._server.rest_before(request)
-                if rest > 0.0:
-                    asyncio.get_running_loop().call_later(rest, transport.write, answer)
-                else:
-                    transport.write(answer)
-                if transport.get_write_buffer_size() > MAX_UNREAD:
-                    log.warning("closing a client that does not read its answers")
-                    transport.abort()
-                    return
+            self._queue.extend(self._decoder.feed(data))
         except ProtocolError as error:
             log.warning("closing a client: %s", error)
-            transport.close()
+            broken = True
+        if not waiting:
+            self._work()
+        if broken:
+            self._transport.close()
+
+    def _work(self) -> None:
+        """Answer what was asked; a tick and what follows it wait for streams on their way."""
+        transport = self._transport
+        assert transport is not None
+        while self._queue and not transport.is_closing():
+            if ticks(self._queue[0]) and not self._server.hub.complete:
+                transport.pause_reading()
+                self._server.hub.when_complete(self._go_on)
+                return
+            self._answer(transport, self._queue.popleft())
+
+    def _go_on(self) -> None:
+        self._work()
+        if not self._queue:
+            self.resume_writing()
+
+    def _answer(self, transport: asyncio.Transport, request: Request) -> None:
+        answer = self._server.answer(request)
+        rest = self._server.rest_before(request)
+        if rest > 0.0:
+            asyncio.get_running_loop().call_later(rest, transport.write, answer)
+        else:
+            transport.write(answer)
+        if transport.get_write_buffer_size() > MAX_UNREAD:
+            log.warning("closing a client that does not read its answers")
+            transport.abort()
 
     def pause_writing(self) -> None:
         """The client reads slowly: take no more requests from it."""
@@ -78,6 +101,13 @@ class RpcConnection(asyncio.Protocol):
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  asyncio's name
         """The client went away."""
         self._server.release(self)
+
+
+def ticks(request: Request) -> bool:
+    """Whether a request advances the simulation."""
+    if request.method == "apply_batch":
+        return len(request.arguments) == 2 and request.arguments[1] is True
+    return request.method == "tick_cue"
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,12 +152,19 @@ class CarlaServer:
         if self._calls is not None:
             line = [self.served.clock.frame, request.method, request.arguments]
             self._calls.write(json.dumps(line, default=repr) + "\n")
+        if request.method == "get_sensor_token":  # which clients ask for before they connect
+            self._expect(request.arguments)
         return self.dispatcher.answer(request)
+
+    def _expect(self, arguments: list[Any]) -> None:
+        stream = arguments[0] if arguments else None
+        if isinstance(stream, int) and self.hub.exists(stream):
+            self.hub.announce(stream)
 
     def rest_before(self, request: Request) -> float:
         """s by which the answer to a tick is held back while a Traffic Manager listens."""
-        ticks = request.method == "tick_cue" and self.served.managers.by_port
-        return MANAGER_REST if ticks else 0.0
+        held = request.method == "tick_cue" and self.served.managers.by_port
+        return MANAGER_REST if held else 0.0
 
     async def open(self) -> Ports:
         """Listen on the port pair; the streaming port is the next one."""

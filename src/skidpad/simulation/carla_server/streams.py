@@ -23,6 +23,9 @@ HOLD = 0.05
 # Subscriptions to snapshots from here on up: each client's episode has an id of its own, because the
 # client's table is by id and holds the old episode and the new one for a moment.
 EPISODE_ALIASES = 2**31
+# s that a tick waits at most for a stream whose token was asked for. The client's `listen` returns
+# before its thread has connected, and what the tick sends to nobody is lost.
+PATIENCE = 1.0
 TCP = 1
 ADDRESS_NOT_SET = 0  # the client then uses the host it was given
 TOKEN = struct.Struct("<IHBB16s")
@@ -45,6 +48,8 @@ class StreamHub:
         self._connections = 0
         self._aliases = EPISODE_ALIASES
         self._held: dict[asyncio.Transport, bytes | None] = {}  # and the newest message withheld
+        self._announced: set[int] = set()  # asked for and not connected yet
+        self._eager: list[Callable[[], None]] = []  # to be called when all are connected
         self.on_subscribe: Callable[[int], bytes | None] = lambda _: None
 
     def create(self) -> int:
@@ -66,6 +71,30 @@ class StreamHub:
     def exists(self, stream: int) -> bool:
         """Whether `stream` may be subscribed."""
         return canonical(stream) in self._open
+
+    def announce(self, stream: int) -> None:
+        """A client is about to connect."""
+        stream = canonical(stream)
+        if stream not in self._announced:
+            self._announced.add(stream)
+            asyncio.get_running_loop().call_later(PATIENCE, self._arrived, stream)
+
+    def _arrived(self, stream: int) -> None:
+        """It has connected, or is no longer waited for."""
+        self._announced.discard(stream)
+        if not self._announced:
+            eager, self._eager = self._eager, []
+            for callback in eager:
+                callback()
+
+    @property
+    def complete(self) -> bool:
+        """Whether every stream that was announced is connected."""
+        return not self._announced
+
+    def when_complete(self, callback: Callable[[], None]) -> None:
+        """Call once when every stream that was announced is connected."""
+        self._eager.append(callback)
 
     def wanted(self, stream: int) -> bool:
         """Whether anybody listens."""
@@ -129,11 +158,17 @@ class StreamHub:
             listeners.remove(transport)
 
     def subscribe(self, stream: int, transport: asyncio.Transport) -> None:
-        """Attach a listener; the newest message of a steady stream is sent at once."""
+        """Attach a listener; the newest message of a steady stream is sent at once.
+
+        Who asks for a stream that has ended is kept waiting: hung up on, it would try for ever.
+        """
         if not self.exists(stream):
-            transport.close()
+            if stream >= self._next:
+                transport.close()
             return
         self._listeners.setdefault(stream, []).append(transport)
+        if stream in self._announced:
+            asyncio.get_running_loop().call_soon(self._arrived, stream)
         latest = self.on_subscribe(stream)
         if latest is not None:
             transport.write(len(latest).to_bytes(4, "little") + latest)

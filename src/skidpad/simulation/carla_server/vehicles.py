@@ -44,6 +44,7 @@ class Vehicle:
     control: Control = field(default_factory=Control)
     driver: AckermannDriver | None = None  # while Ackermann commands drive it
     ackermann: AckermannSettings = field(default_factory=AckermannSettings)
+    sticky: bool = True  # a control holds until the next one; else for one tick
     pushed: float = 0.0  # s for which a push still frees it
     lights: int = 0  # VehicleLightState flags
     speed_limit: float = 30.0 / 3.6  # m/s; CARLA's default until the first sign
@@ -164,6 +165,12 @@ class Vehicles:
                 vehicle.driver.drive(vehicle.control, fleet, i, dt)
             commands.append(vehicle.command(slow[i], dt))
         self.moving.commands[: len(commands)] = commands
+
+    def let_go(self) -> None:
+        """A tick is over: controls that are not sticky have acted."""
+        for vehicle in self:
+            if not vehicle.sticky:
+                vehicle.control = Control()
 
     def heed(self, limits: list[float]) -> None:
         """Take note of the speed limits, m/s by row, where the road gives one."""

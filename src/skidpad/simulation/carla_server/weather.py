@@ -1,4 +1,4 @@
-"""CARLA's weather parameters and ours; ice comes from the blueprint `skidpad.weather` (K-2)."""
+"""CARLA's weather parameters and ours; ice comes from the blueprint `skidpad.weather.grip` (R-15)."""
 
 from __future__ import annotations
 

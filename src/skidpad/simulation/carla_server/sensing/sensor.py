@@ -13,6 +13,7 @@ from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 from skidpad.simulation.carla_server.snapshot import SensorType
 
+EARLY = 1e-4  # s, so that a period of whole ticks is met in spite of rounding
 Message = tuple[bytes | memoryview, ...]
 
 
@@ -24,11 +25,20 @@ class Sensor:
     period: float  # s; 0: every tick
     rng: np.random.Generator
     equipment: Any  # what its producer made for it
-    due: float = 0.0  # s of simulated time
+    due: float | None = None  # s of simulated time; None until the first reading
 
     def number(self, attribute: str) -> float:
         """A numeric attribute."""
         return float(self.actor.attributes[attribute])
+
+    def is_due(self, time: float) -> bool:
+        """Whether it reads now; the period counts from its first reading."""
+        due = time if self.due is None else self.due
+        if time < due - EARLY:
+            return False
+        later = due + self.period
+        self.due = later if later > time + EARLY else time + self.period
+        return True
 
     def share(self, clock: Clock) -> float:
         """s of work that one reading stands for."""

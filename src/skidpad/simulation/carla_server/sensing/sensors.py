@@ -18,7 +18,6 @@ from skidpad.simulation.carla_server.streams import StreamHub
 # s. Every stream has a connection of its own, and the client's threads race: a collision gets ahead
 # of what its tick sends afterwards, so that a client that waits for that has the collision too.
 EVENT_PAUSE = 0.002
-EARLY = 1e-4  # s, so that a period of whole ticks is met in spite of rounding
 
 
 class SensorSet:
@@ -49,10 +48,8 @@ class SensorSet:
         time = clock.elapsed
         for sensor in list(self._sensors.values()):
             number = sensor.actor.stream
-            if number is None or not hub.wanted(number) or time < sensor.due - EARLY:
+            if number is None or not hub.wanted(number) or not sensor.is_due(time):
                 continue
-            later = sensor.due + sensor.period
-            sensor.due = later if later > time + EARLY else time + sensor.period
             producer = self._producers[sensor.actor.blueprint.id]
             messages = producer.produce(around, clock, sensor)
             for message in messages:

@@ -62,7 +62,8 @@ def cell(
 def scenario(folder: Path, name: str, grip: str) -> Columns:
     """One scenario of the friction study on ice."""
     file = SCENARIOS / f"{name}.xosc"
-    command("play", file, "--weather", "icy_30", "--grip", grip, "--out", folder)
+    asked = ("--weather", "icy_30", "--grip", grip, "--end-on-collision")
+    command("play", file, *asked, "--out", folder)
     return of_log(folder)
 
 

@@ -82,8 +82,8 @@ def test_the_file_holds_every_ego_and_object_where_the_record_has_them(tmp_path)
         o.get("name"): o.find(".//Property[@name='color']").get("value")
         for o in root.iter("ScenarioObject")
     }
-    assert (colours["Ego_lav"], colours["lav_1"]) == ("1,0,0", "1,1,1")
-    assert (colours["Ego_tfuse"], colours["tfuse_1"]) == ("0,0,1", "1,1,0")
+    assert (colours["Ego_lav"], colours["lav_1"]) == ("#FF0000", "#FFFFFF")
+    assert (colours["Ego_tfuse"], colours["tfuse_1"]) == ("#0000FF", "#FFFF00")
 
 
 @pytest.mark.req("C-155", "C-156")
@@ -135,6 +135,17 @@ def test_a_record_without_worlds_is_refused(tmp_path):
     )
     with pytest.raises(InputError, match="no world"):
         export_hazard(empty, tmp_path)
+
+
+def test_the_two_versions_stand_side_by_side(tmp_path):
+    record = a_record(2)
+    new = export_hazard(record, tmp_path)
+    old = export_hazard(record, tmp_path, OscVersion.V1_0)
+    assert len({*new, *old}) == 4
+    root, _ = vertices(old[0])
+    assert root.find("RoadNetwork/LogicFile").get("filepath") == old[1].name
+    colours = {p.get("value") for p in root.iter("Property") if p.get("name") == "color"}
+    assert colours <= {"0,0,255", "255,255,0"}
 
 
 def test_export_is_repeatable(tmp_path):

@@ -14,9 +14,9 @@ from skidpad.core.errors import FileError
 from skidpad.core.run import ActorMode, Passenger, Scenario, StackDriver
 from skidpad.core.vocabulary import Outcome
 from skidpad.physics.presets import preset
+from skidpad.scenarios.findings import HARMLESS, Kind
 from skidpad.scenarios.motion import Shape, Transition
-from skidpad.scenarios.player import load, problems
-from skidpad.scenarios.reader import Unsupported
+from skidpad.scenarios.scenario import check, compile_scenario
 
 HEAD = """<?xml version='1.0'?>
 <OpenSCENARIO>
@@ -115,7 +115,7 @@ def test_a_relative_trajectory_counts_from_its_own_begin(tmp_path):
     path = scenario(tmp_path, EVENT.format("e", trajectory(rows, timing), 0, AT_2_S))
     log = played(path).log
     assert log.actors.x[60, 1] == pytest.approx(160.0, abs=0.01)  # 1 s after 2 s
-    assert log.actors.x[-1, 1] == pytest.approx(170.0, abs=0.01)  # stands at the end
+    assert log.actors.x[-1, 1] == pytest.approx(170.0 + 10.0 * 2.0, abs=0.01)  # and drives on
 
 
 def test_entities_vanish_and_appear(tmp_path):
@@ -182,48 +182,68 @@ def test_a_parameter_decides_once_for_all(tmp_path, rule, happens):
     assert played(path).log.present[-1, 1] != happens
     path.write_text(path.read_text().replace('parameterRef="V"', 'parameterRef="W"'))
     with pytest.raises(FileError, match="parameter 'W' is not declared"):
-        load(path)
+        compile_scenario(path)
 
 
-def test_what_is_unknown_is_refused_by_element_and_line(tmp_path):
-    odd = "<PrivateAction><VisibilityAction graphics='true'/></PrivateAction>"
-    weird = "<ByValueCondition><TrafficSignalCondition name='x' state='y'/></ByValueCondition>"
+def serious(path, **more):
+    return [f for f in check(path, **more).findings if f.kind not in HARMLESS]
+
+
+def test_everything_unknown_and_wrong_is_listed_at_once_with_its_line(tmp_path):
+    swarm = """<GlobalAction><TrafficAction><TrafficSwarmAction/></TrafficAction></GlobalAction>"""
+    weird = """<ByValueCondition><UserDefinedValueCondition name='x' value='y' rule='equalTo'/>
+</ByValueCondition>"""
+    nobody = AT_2_S.replace("SimulationTime", "Tidal")
     path = scenario(
         tmp_path,
-        EVENT.format("one", odd, 0, AT_2_S),
+        EVENT.format("one", swarm, 0, AT_2_S),
         EVENT.format("two", slow_down(shape="ramp"), 0, weird),
+        EVENT.format("three", slow_down(rate="$Nothing"), 0, nobody),
     )
-    with pytest.raises(Unsupported, match=r"x\.xosc, line \d+, <VisibilityAction>"):
-        load(path)
-    found = problems(path)
-    assert [p.element for p in found] == [
-        "VisibilityAction",
-        "SpeedActionDynamics",
-        "TrafficSignalCondition",
+    found = serious(path)
+    assert [(f.element, f.kind) for f in found] == [
+        ("TrafficAction", Kind.UNSUPPORTED),
+        ("SpeedActionDynamics", Kind.UNSUPPORTED),
+        ("UserDefinedValueCondition", Kind.UNSUPPORTED),
+        ("SpeedActionDynamics", Kind.ERROR),
+        ("TidalCondition", Kind.UNSUPPORTED),
     ]
     lines = path.read_text(encoding="utf-8").splitlines()
-    for problem in found:
-        assert f"<{problem.element}" in lines[problem.line - 1]
+    for finding in found:
+        assert f"<{finding.element}" in lines[finding.line - 1]
+    with pytest.raises(FileError, match=r"x\.xosc, line \d+, <TrafficAction>"):
+        compile_scenario(path)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
         ('value="$V"', 'value="$W"', "parameter '\\$W' is not declared"),
-        ('value="$V"', 'value="nan"', "must be finite"),
+        ('value="$V"', 'value="${V + W}"', "parameter 'W' is not declared"),
+        ('value="$V"', 'value="nan"', "must be a number"),
+        ('value="$V"', 'value="inf"', "must be finite"),
         ('s="120"', 's="far"', "must be a number"),
-        ('s="120"', 's="9120"', "is not there"),
+        ('roadId="1"', 'roadId="77"', "is not there"),
         ('entityRef="other"', 'entityRef="nobody"', "no entity 'nobody'"),
         ("<OpenSCENARIO>", "<OpenDRIVE>", "not XML"),
         ("straight.xodr", "nowhere.xodr", "no road file"),
-        ('revMinor="2"', 'revMinor="9"', "revMinor"),
+        ('revMinor="2"', 'revMinor="9"', "1.9 is not supported"),
+        ('dynamicsShape="linear"', 'dynamicsShape="$V"', "dynamicsShape='10'"),
+        ('<EntityRef entityRef="other"/>', '<EntityRef entityRef="ghost"/>', "no entity 'ghost'"),
     ],
 )
 def test_what_is_wrong_is_named(tmp_path, old, new, message):
     path = scenario(tmp_path, EVENT.format("slow", slow_down(), 0, AT_2_S))
     path.write_text(path.read_text(encoding="utf-8").replace(old, new, 1), encoding="utf-8")
     with pytest.raises(FileError, match=message):
-        load(path)
+        compile_scenario(path)
+
+
+def test_what_the_schema_forbids_but_is_clear_is_noted_only(tmp_path):
+    path = scenario(tmp_path, EVENT.format("slow", slow_down(), 0, AT_2_S))
+    found = check(path)
+    assert found.scenario is not None
+    assert {f.kind for f in found.findings} == {Kind.SCHEMA}  # the fixture leaves out <Performance>
 
 
 def test_entities_of_xml_are_not_expanded(tmp_path):
@@ -233,14 +253,14 @@ def test_entities_of_xml_are_not_expanded(tmp_path):
     )
     path.write_text(text, encoding="utf-8")
     with pytest.raises(FileError, match="document type"):
-        load(path)
+        compile_scenario(path)
 
 
 def test_a_parameter_can_be_given(tmp_path):
     path = scenario(tmp_path, EVENT.format("slow", slow_down(), 0, AT_2_S))
-    assert load(path, {"V": 7.5}).entities["other"].speed == 7.5
+    assert compile_scenario(path, {"V": 7.5}).start.entities["other"].speed == 7.5
     with pytest.raises(FileError, match="declares no parameter 'U'"):
-        load(path, {"U": 1.0})
+        compile_scenario(path, {"U": 1.0})
 
 
 @pytest.mark.req("B-073")
@@ -253,7 +273,9 @@ def test_the_ghost_merges_at_its_distance_whatever_the_ego_does():
 @pytest.mark.req("B-094", "B-104")
 def test_a_collision_ends_the_run():
     # without a driver's brakes: the ego rolls on into the wreck
-    result = run(scenario_run("front_accident", driver=StackDriver("tests.scenarios.blind:Blind")))
+    course = Scenario(end_on_collision=True)
+    blind = StackDriver("tests.scenarios.blind:Blind")
+    result = run(scenario_run("front_accident", course=course, driver=blind))
     assert result.outcome is Outcome.COLLISION
     assert len(result.log.contacts) == 1
     assert result.log.contacts[0].tick == result.log.tick[-1]

@@ -30,8 +30,8 @@ from skidpad.core.vocabulary import Control, Outcome
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
-from skidpad.scenarios import player
-from skidpad.scenarios.player import Player
+from skidpad.scenarios import scenario as scenarios
+from skidpad.scenarios.player import Player, setups
 from skidpad.scenarios.shipped import NAMES, scenario_file
 from skidpad.sensors.overlay import Lens
 from skidpad.sensors.twelve import twelve_sensors
@@ -103,8 +103,9 @@ class Stage:
         """The ego's cruise target where a scenario says it, else its first speed there (G-1)."""
         if self.player is None:
             return None
-        ego = self.player.script.ego_entity
-        return max(kmh_from_mps(float(ego.properties.get(CRUISE, ego.speed))), 1.0)
+        played = self.player.scenario
+        first = played.start.entities[played.ego].speed
+        return max(kmh_from_mps(float(played.ego_entity.properties.get(CRUISE, first))), 1.0)
 
     @property
     def triggered(self) -> bool:
@@ -116,7 +117,7 @@ class Stage:
         """m, of the ego's route where the scenario names one."""
         if self.player is None:
             return None
-        length = self.player.script.ego_entity.properties.get(ROUTE_LENGTH)
+        length = self.player.scenario.ego_entity.properties.get(ROUTE_LENGTH)
         return None if length is None else float(length)
 
     @property
@@ -154,19 +155,40 @@ def _roads(spec: RunSpec, course: Roads) -> Stage:
 
 
 def _scenario(spec: RunSpec, course: Scenario) -> Stage:
-    script = load_scenario(course)
-    modes: dict[str, ActorMode | None] = dict.fromkeys(script.entities, course.actors)
-    modes[script.ego] = ActorMode.IDEAL if isinstance(spec.driver, Passenger) else None
-    played = Player(script, modes=modes, skill=course.skill, duration=spec.duration)
-    ego, actors = script.setups()
-    setup = replace(setup_of(spec, script.map_name, ego), actors=actors)
-    return Stage(script.map, setup, Unsupervised(), played, played)
+    compiled = load_scenario(course)
+    modes: dict[str, ActorMode | None] = dict.fromkeys(compiled.entities, course.actors)
+    modes[compiled.ego] = ActorMode.IDEAL if isinstance(spec.driver, Passenger) else None
+    played = Player(
+        compiled,
+        modes=modes,
+        skill=course.skill,
+        duration=spec.duration,
+        end_on_collision=course.end_on_collision,
+    )
+    ego, actors = setups(compiled)
+    setup = replace(setup_of(spec, compiled.map_name, ego), actors=actors)
+    environment = compiled.start.environment
+    if environment is not None:  # of its weather the run's own stands; its road is scaled
+        setup = replace(setup, mu_ref=setup.mu_ref * environment.friction_scale)
+    return Stage(compiled.map, setup, Unsupervised(), played, played)
 
 
-def load_scenario(course: Scenario) -> player.Script:
-    """The file of a course, read and checked."""
+def load_scenario(course: Scenario) -> scenarios.Scenario:
+    """The file of a course, compiled; ScenarioError lists all that keeps it from being played."""
+    checked = check_scenario(course)
+    return checked.playable()
+
+
+def check_scenario(course: Scenario) -> scenarios.Compiled:
+    """The same, with everything that was found."""
     file = scenario_file(course.file) if course.file in NAMES else Path(course.file)
-    return player.load(file, course.parameters, course.ego)
+    return scenarios.check(
+        file,
+        course.parameters,
+        course.ego,
+        maps=[Path(folder) for folder in course.maps],
+        ignore_unsupported=course.ignore_unsupported,
+    )
 
 
 def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:

@@ -54,6 +54,7 @@ def drawn_course(scenario: str, seed: int, cutin: CutIn) -> Scenario:
         parameters=dict(drawn_parameters(scenario, seed, cutin)),
         variant="" if cutin is CutIn.FIXED else cutin.value,
         skill=drawn_skill(scenario, seed),
+        end_on_collision=True,  # B-094
     )
 
 

@@ -54,14 +54,14 @@ def play(
     seeds: Seeds = 1,
     out: Annotated[Path | None, typer.Option(help="Folder for the run, or for the runs.")] = None,
     check: Annotated[
-        bool, typer.Option("--check", help="List what is not supported; run nothing.")
+        bool, typer.Option("--check", help="List all that is wrong or unknown; run nothing.")
     ] = False,
 ) -> None:
     """Play a scenario, or as a campaign all of a folder; prints how it ended and where logs lie."""
     from skidpad.core.errors import ConfigError
 
     if check:
-        _check(file)
+        _check(file, structs.replace(scenario, parameters=cross.parameters()))
         return
     if out is None:
         raise ConfigError("play needs --out DIR for the run, or --check")
@@ -140,32 +140,31 @@ def _runs(template: RunSpec, cross: PlayCross, files: Sequence[Path], seeds: int
 
 def _playable(file: Path, template: RunSpec) -> bool:
     """Whether it can be played; says what hinders."""
+    from skidpad.campaign.cast import load_scenario
     from skidpad.campaign.grip_cells import scenario_of
     from skidpad.core.errors import InputError
-    from skidpad.scenarios.player import load
 
-    course = scenario_of(template)
     try:
-        load(file, course.parameters, course.ego)
+        load_scenario(structs.replace(scenario_of(template), file=str(file)))
     except InputError as error:
         typer.echo(f"left out: {error}", err=True)
         return False
     return True
 
 
-def _check(path: Path) -> None:
-    """Say of a file, or of each in a folder, what is not supported in it."""
+def _check(path: Path, course: Scenario) -> None:
+    """Say of a file, or of each in a folder, everything that is wrong or unknown in it."""
+    from skidpad.campaign.cast import check_scenario
     from skidpad.campaign.files import scenario_files
-    from skidpad.scenarios.player import load, problems
 
     odd = False
     for file in scenario_files(path) if path.is_dir() else [path]:
-        found = problems(file)
-        odd = odd or bool(found)
-        for problem in found:
-            typer.echo(f"{file.name}, line {problem.line}: {problem.what}")
-        if not found:
-            load(file)  # what is wrong rather than unknown raises, with its line
-            typer.echo(f"{file.name}: everything in it is supported")
+        found = check_scenario(structs.replace(course, file=str(file)))
+        for finding in found.findings:
+            typer.echo(f"{finding.kind.value}: {finding}")
+        if found.scenario is None:
+            odd = True
+        else:
+            typer.echo(f"{file.name}: can be played")
     if odd:
         raise typer.Exit(2)

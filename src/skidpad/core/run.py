@@ -144,6 +144,15 @@ class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown
     actors: Annotated[
         ActorMode, Meta(description="physical: tyres decide; ideal: as the file says.")
     ] = ActorMode.PHYSICAL
+    end_on_collision: Annotated[
+        bool, Meta(description="A contact of the ego ends the run; else the file alone decides.")
+    ] = False
+    maps: Annotated[
+        tuple[str, ...], Meta(description="A folder of roads that files name by bare name.")
+    ] = ()
+    ignore_unsupported: Annotated[
+        bool, Meta(description="Leave out what is not known in the file.")
+    ] = False
 
 
 class Route(Struct, frozen=True, kw_only=True, tag="route", forbid_unknown_fields=True):

@@ -26,8 +26,8 @@ LANE_WIDTH = 3.5  # m
 ROAD_MARGIN = 20.0  # m beyond the outermost position
 ROAD_SIZE_MAX = 20_000.0  # m; positions further apart are no single scene
 HEIGHTS = {SemanticClass.TRUCK: 3.5, SemanticClass.BUS: 3.2, SemanticClass.PEDESTRIAN: 1.75}
-EGO_COLOURS = ("1,0,0", "0,0,1", "0,0.6,0", "0.6,0,0.6")  # C-155: LAV red, TFuse blue
-OBJECT_COLOURS = ("1,1,1", "1,1,0", "0.6,1,0.6", "1,0.6,1")  # LAV white, TFuse yellow
+EGO_COLOURS = ("#FF0000", "#0000FF", "#009900", "#990099")  # C-155: LAV red, TFuse blue
+OBJECT_COLOURS = ("#FFFFFF", "#FFFF00", "#99FF99", "#FF99FF")  # LAV white, TFuse yellow
 EPOCH = datetime(1970, 1, 1)  # noqa: DTZ001  # the library writes naive times
 
 
@@ -67,12 +67,16 @@ def export_hazard(
     version: OscVersion = OscVersion.V1_2,
     world: str | None = None,
 ) -> tuple[Path, Path]:
-    """Write ID-TYPE.xosc and .xodr into `folder`; `world` names the one channel of a 1.0 file."""
+    """Write ID-TYPE.xosc and .xodr into `folder`, ID-TYPE_1.0 for version 1.0.
+
+    world: the one channel of a 1.0 file.
+    """
     channels = _channels(record, version, world)
     entities = [track for track in tracks(record, channels) if track.t]
     if not any(track.is_ego for track in entities):
         raise InputError(f"hazard {record.id}: no world with an ego to export")
-    stem = f"{record.id}-{record.type.value}"
+    old = version is OscVersion.V1_0
+    stem = f"{record.id}-{record.type.value}{'_1.0' if old else ''}"
     t_end = max(track.t[-1] for track in entities)
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -189,10 +193,16 @@ def _entity(track: Track, record: HazardRecord, version: OscVersion) -> Any:
             70.0, 12.0, 12.0, **mass,
         )  # fmt: skip
     colours = EGO_COLOURS if track.is_ego else OBJECT_COLOURS
-    entity.add_property("color", colours[record.channels.index(track.channel) % len(colours)])
+    colour = colours[record.channels.index(track.channel) % len(colours)]
+    entity.add_property("color", _rgb(colour) if version is OscVersion.V1_0 else colour)
     entity.add_property("channel", track.channel)
     entity.add_property("type", "ego_vehicle" if track.is_ego else "simulation")
     return entity
+
+
+def _rgb(colour: str) -> str:
+    """As CARLA's blueprints want it: red, green and blue from 0 to 255."""
+    return ",".join(str(int(colour[k : k + 2], 16)) for k in (1, 3, 5))
 
 
 def _initial(

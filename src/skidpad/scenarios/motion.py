@@ -1,24 +1,33 @@
-"""What a scenario demands of one actor: a speed over time, a path, a sideways shift."""
+"""What a scenario demands of one actor: a change over time or distance, and a lane to keep to."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import atan2, cos, hypot, pi, sin, tau
-from typing import Protocol
+from math import atan2, cos, pi, sin, sqrt
 
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.roads.queries import LanePoint
+from skidpad.scenarios.network import Network, Place
 from skidpad.simulation.scripted import Demand, Motion
 
+SLOW = 1e-6  # m/s, nothing moves
+STEEPEST_TURN = pi / 2.0 - 1e-3  # rad, of an actor against its lane while it goes sideways
+SQUEEZED = 0.1  # least length of a path beside a bend's inner side, per length of the lane
 
-class Shape(str, Enum):
+
+class Shape(Enum):
     """How a quantity goes from one value to another."""
 
     STEP = "step"
     LINEAR = "linear"
     SINUSOIDAL = "sinusoidal"
     CUBIC = "cubic"
+
+
+STEEPEST = {Shape.LINEAR: 1.0, Shape.SINUSOIDAL: pi / 2.0, Shape.CUBIC: 1.5}  # of the mean rate
+# largest second derivative for a span of 1 in a duration of 1; a straight line is read as a cubic
+SHARPEST = {Shape.LINEAR: 6.0, Shape.SINUSOIDAL: pi * pi / 2.0, Shape.CUBIC: 6.0}
 
 
 def progress(shape: Shape, u: float) -> tuple[float, float, float]:
@@ -32,50 +41,50 @@ def progress(shape: Shape, u: float) -> tuple[float, float, float]:
 
 @dataclass(frozen=True, slots=True)
 class Transition:
-    """From `start` to `end` in `duration` s."""
+    """From `start` to `end` while something (time in s, or distance in m) goes from 0 to `span`."""
 
     start: float
     end: float
-    duration: float
+    span: float
     shape: Shape
 
-    def at(self, t: float) -> tuple[float, float, float]:
-        """Value, rate and second derivative `t` s after the begin."""
-        if self.shape is Shape.STEP or self.duration <= 0.0 or t >= self.duration:
+    def at(self, p: float) -> tuple[float, float, float]:
+        """Value and first two derivatives at `p`."""
+        if self.over(p):
             return self.end, 0.0, 0.0
-        share, rate, bend = progress(self.shape, t / self.duration)
-        span = self.end - self.start
+        share, rate, bend = progress(self.shape, p / self.span)
+        size = self.end - self.start
         return (
-            self.start + share * span,
-            rate * span / self.duration,
-            bend * span / self.duration**2,
+            self.start + share * size,
+            rate * size / self.span,
+            bend * size / self.span**2,
         )
 
-    def over(self, t: float) -> bool:
+    def over(self, p: float) -> bool:
         """The end is reached."""
-        return self.shape is Shape.STEP or t >= self.duration
+        return self.shape is Shape.STEP or p >= self.span - 1e-9
 
 
-class Track(Protocol):
-    """Where an actor is led, instead of along its lane."""
+class Guide:
+    """Keeps to a lane at a demanded speed; a change of lane is a sideways shift of the offset.
 
-    def at(self, t: float) -> tuple[Pose, float, float]:
-        """Pose, speed and acceleration at scenario time t."""
-        ...
+    v, a: demanded speed and its rate; offset: m left of the lane's centre as the lane runs, with
+    its rate and bend in time; along: -1 where the actor looks against the lane; turn: the heading
+    that it keeps against the lane; roads: to take at forks.
+    """
 
-
-class Lane:
-    """Keeps to a lane at a demanded speed; a change of lane is a sideways shift over time."""
-
-    def __init__(self, map: RoadMap, pose: Pose, v: float) -> None:
-        place = map.project(pose.x, pose.y, pose.z)
-        self.map = map
-        self.base = place
+    def __init__(self, network: Network, place: Place, v: float) -> None:
+        point, pose = place.lane, place.pose
+        self.network, self.base = network, point
         self.free = pose  # where there is no lane: straight on
         self.v, self.a = v, 0.0
-        self.offset = 0.0 if place is None else place.offset
+        self.offset = 0.0 if point is None else point.offset
         self.offset_rate = self.offset_bend = 0.0
-        self.along = 1.0 if place is None or cos(place.heading - pose.yaw) >= 0.0 else -1.0
+        self.roads: tuple[int, ...] = ()
+        self.at_end = False
+        look = 0.0 if point is None else wrap_angle(pose.yaw - point.heading)
+        self.along = 1.0 if abs(look) <= pi / 2.0 else -1.0
+        self.turn = look if self.along > 0.0 else wrap_angle(look - pi)
 
     def advance(self, motion: Motion) -> None:
         """Move the reference point abreast of the actor."""
@@ -83,111 +92,91 @@ class Lane:
             return
         dx, dy = motion.x - self.base.x, motion.y - self.base.y
         forward = dx * cos(self.base.heading) + dy * sin(self.base.heading)
-        further = self.map.ahead(self.base, forward)
+        further = self.network.ahead(self.base, forward, self.roads)
         self.base = further or self.base
 
-    def change(self, lanes_left: int) -> float | None:
-        """Make the lane so many to the left the reference; returns the shift to it, in m."""
+    def shift_to(self, lane_id: int) -> float | None:
+        """Make another lane across the road the reference; returns the way left to it, m.
+
+        None where there is no such lane: the reference stays.
+        """
         if self.base is None:
             return None
-        target = self.map.shifted(self.base, lanes_left)
+        target = self.network.beside(self.base, lane_id)
         if target is None:
             return None
-        dx, dy = target.x - self.base.x, target.y - self.base.y
-        shift = dy * cos(self.base.heading) - dx * sin(self.base.heading)
-        self.base = target
-        self.offset -= shift
-        return shift
+        old = self.base.pose.moved(left=self.offset)
+        point, left = self.network.abreast(target, old.x, old.y)
+        if cos(point.heading - self.base.heading) < 0.0:
+            self.along, self.offset_rate = -self.along, -self.offset_rate
+        self.base, self.offset = point, left
+        return -left
 
     def demand(self, motion: Motion) -> Demand:
-        """What the driver has to do now."""
+        """What a driver has to do now."""
         self.advance(motion)
         if self.base is None:
             return Demand(self.v, self.a, 0.0, 0.0, 0.0, 0.0)
-        c, s = cos(self.base.heading), sin(self.base.heading)
+        heading = self.base.heading if self.along > 0.0 else self.base.heading + pi
+        c, s = cos(heading), sin(heading)
         dx, dy = motion.x - self.base.x, motion.y - self.base.y
         left = dy * c - dx * s
         drift = motion.vy * c - motion.vx * s
         return Demand(
             v=self.v,
             a=self.a,
-            curvature=self.base.curvature,
-            error=left - self.offset,
-            error_rate=drift - self.offset_rate,
-            a_lateral=self.offset_bend,
+            curvature=self.along * self.base.curvature,
+            error=left - self.along * self.offset,
+            error_rate=drift - self.along * self.offset_rate,
+            a_lateral=self.along * self.offset_bend,
         )
 
     def ideal(self, dt: float) -> Pose:
         """The pose of an actor that does exactly as demanded, one step on."""
-        distance = self.v * dt
+        way = self.v * dt
         if self.base is None:
-            self.free = self.free.moved(forward=distance)
+            self.free = self.free.moved(forward=way)
             return self.free
-        self.base = self.map.ahead(self.base, distance * self.along) or self._beyond(distance)
-        turn = atan2(self.offset_rate, self.v) if self.v > 0.5 else 0.0
+        sideways = min(abs(self.offset_rate) * dt, abs(way))
+        forward = sqrt(way * way - sideways * sideways)
+        squeezed = max(1.0 - self.base.curvature * self.offset, SQUEEZED)
+        distance = self.along * (forward if way >= 0.0 else -forward) / squeezed
+        self._move(distance)
+        return self._posed()
+
+    def _move(self, distance: float) -> None:
+        assert self.base is not None
+        further = self.network.ahead(self.base, distance, self.roads)
+        self.at_end = further is None
+        if further is not None:
+            self.base = further
+            return
+        rest = self._rest(distance)
+        if rest is not None:
+            self.base = rest
+
+    def _rest(self, distance: float) -> LanePoint | None:
+        """The last place before the road's end."""
+        assert self.base is not None
+        low, high = 0.0, abs(distance)
+        sign = 1.0 if distance > 0.0 else -1.0
+        found = None
+        for _ in range(20):
+            middle = 0.5 * (low + high)
+            further = self.network.ahead(self.base, sign * middle, self.roads)
+            if further is None:
+                high = middle
+            else:
+                low, found = middle, further
+        return found
+
+    def _posed(self) -> Pose:
+        assert self.base is not None
         pose = self.base.pose.moved(left=self.offset)
+        turn = self.turn
+        if self.offset_rate and abs(self.v) > SLOW:
+            forward = sqrt(max(self.v**2 - self.offset_rate**2, 0.0))
+            lean = min(max(atan2(self.offset_rate, forward), -STEEPEST_TURN), STEEPEST_TURN)
+            turn = self.along * (lean if self.v > 0.0 else -lean)
         yaw = pose.yaw + turn if self.along > 0.0 else pose.yaw + pi + turn
         return replace(pose, yaw=wrap_angle(yaw))
-
-    def _beyond(self, distance: float) -> LanePoint:
-        """Straight on where the road ends."""
-        assert self.base is not None
-        c, s = cos(self.base.heading), sin(self.base.heading)
-        return replace(self.base, x=self.base.x + distance * c, y=self.base.y + distance * s)
-
-
-class Polyline:
-    """A trajectory with a time at every vertex; beyond the last one the actor stands."""
-
-    def __init__(self, rows: list[tuple[float, Pose]]) -> None:
-        self.t = [t for t, _ in rows]
-        self.poses = [pose for _, pose in rows]
-
-    @property
-    def end(self) -> float:
-        """Time of the last vertex."""
-        return self.t[-1]
-
-    def at(self, t: float) -> tuple[Pose, float, float]:
-        """Pose, speed and acceleration (0) at time t, linear between vertices."""
-        if t <= self.t[0] or len(self.t) == 1:
-            return self.poses[0], 0.0, 0.0
-        if t >= self.end:
-            return self.poses[-1], 0.0, 0.0
-        k = self._segment(t)
-        a, b = self.poses[k], self.poses[k + 1]
-        span = self.t[k + 1] - self.t[k]
-        u = (t - self.t[k]) / span
-        turn = (b.yaw - a.yaw + pi) % tau - pi
-        pose = Pose(
-            a.x + u * (b.x - a.x),
-            a.y + u * (b.y - a.y),
-            a.z + u * (b.z - a.z),
-            yaw=wrap_angle(a.yaw + u * turn),
-        )
-        distance = hypot(b.x - a.x, b.y - a.y)
-        forward = (b.x - a.x) * cos(pose.yaw) + (b.y - a.y) * sin(pose.yaw)
-        return pose, (distance if forward >= 0.0 else -distance) / span, 0.0
-
-    def _segment(self, t: float) -> int:
-        low, high = 0, len(self.t) - 1
-        while high - low > 1:
-            middle = (low + high) // 2
-            if self.t[middle] <= t:
-                low = middle
-            else:
-                high = middle
-        return low
-
-
-def track_demand(track: Track, motion: Motion, t: float, dt: float) -> Demand:
-    """A driver's task to be at the track's place: the way to go enters as speed."""
-    pose, v, a = track.at(t)
-    after, _, _ = track.at(t + dt)
-    c, s = cos(pose.yaw), sin(pose.yaw)
-    dx, dy = motion.x - pose.x, motion.y - pose.y
-    behind = -(dx * c + dy * s)
-    drift = motion.vy * c - motion.vx * s
-    turn = wrap_angle(after.yaw - pose.yaw)
-    curvature = turn / max(abs(v) * dt, 0.05)
-    return Demand(v + behind, a, curvature, dy * c - dx * s, drift, 0.0)

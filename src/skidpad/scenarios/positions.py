@@ -1,140 +1,246 @@
-"""Positions: one small class each, found through the table at the end."""
+"""Positions: one small class each, found through the table at the end.
+
+A place that does not depend on anything that moves is worked out when the file is read.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+from math import cos, pi, radians
 from typing import Protocol
 
+from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.core.setup import LanePosition
-from skidpad.scenarios.reader import Node, Unsupported
+from skidpad.roads.opendrive.document import id_number
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.findings import Kind
+from skidpad.scenarios.network import END_SLACK, Place, next_lane_id
 from skidpad.scenarios.scene import Scene
+
+EARTH_RADIUS = 6_378_137.0  # m, WGS 84, for maps without a projection of their own
 
 
 class Position(Protocol):
     """A place, perhaps relative to something that moves."""
 
-    def pose(self, scene: Scene, actor: str) -> Pose:
+    def place(self, scene: Scene) -> Place:
         """Where it is now."""
         ...
 
 
-class World:
-    """Coordinates of the world."""
+class Frame(Enum):
+    """What an orientation counts from."""
 
-    def __init__(self, node: Node) -> None:
-        self.fixed = Pose(
-            node.number("x"),
-            node.number("y"),
-            node.number("z", 0.0),
-            yaw=wrap_angle(node.number("h", 0.0)),
-        )
+    ABSOLUTE = "absolute"
+    RELATIVE = "relative"
 
-    def pose(self, scene: Scene, actor: str) -> Pose:
+
+@dataclass(frozen=True, slots=True)
+class Orientation:
+    """The heading of an <Orientation>; None where the file says nothing."""
+
+    heading: float | None
+    frame: Frame
+
+    def turned(self, base: float) -> float:
+        """The heading in the world, where `base` is that of what it may be relative to."""
+        if self.heading is None:
+            return base
+        return wrap_angle(self.heading + (base if self.frame is Frame.RELATIVE else 0.0))
+
+
+def orientation(node: Node) -> Orientation:
+    """That of a position; without one it looks as its reference does."""
+    found = node.find("Orientation")
+    if found is None:
+        return Orientation(None, Frame.RELATIVE)
+    heading = found.number("h") if found.has("h") else None
+    return Orientation(heading, found.choice("type", Frame, Frame.ABSOLUTE))
+
+
+@dataclass(frozen=True, slots=True)
+class Fixed:
+    """A place that never changes."""
+
+    fixed: Place
+
+    def place(self, scene: Scene) -> Place:
         """The same at all times."""
-        del scene, actor
+        del scene
         return self.fixed
 
 
-class Lane:
-    """A place on a lane; heading along it, turned by a relative <Orientation>."""
+def _world(node: Node, ctx: Context) -> Position:
+    pose = Pose(
+        node.number("x"), node.number("y"), node.number("z", 0.0),
+        yaw=wrap_angle(node.number("h", 0.0)),
+    )  # fmt: skip
+    return Fixed(ctx.network.place_of(pose))
 
-    def __init__(self, node: Node) -> None:
-        self.node = node
-        self.place = LanePosition(
-            int(node.number("roadId")),
-            int(node.number("laneId")),
-            node.number("s"),
-            node.number("offset", 0.0),
+
+def _lane(node: Node, ctx: Context) -> Position:
+    road, lane = id_number(node.text("roadId")), node.whole("laneId")
+    s, offset = node.number("s"), node.number("offset", 0.0)
+    try:
+        if lane == 0:  # the line in the middle, where no lane is
+            return Fixed(_facing(ctx.network.on_road(road, s, offset), orientation(node)))
+        inside = ctx.network.within(road, lane, s)
+        place = ctx.network.on_lane(road, lane, inside, offset)
+    except ConfigError as error:
+        raise node.error(str(error)) from None
+    if abs(inside - s) > END_SLACK:
+        what = f"s = {s:g} lies beyond the lane; its end at {inside:g} is taken"
+        ctx.findings.append(node.finding(what, Kind.NOTE))
+    return Fixed(_facing(place, orientation(node)))
+
+
+def _road(node: Node, ctx: Context) -> Position:
+    try:
+        place = ctx.network.on_road(
+            id_number(node.text("roadId")), node.number("s"), node.number("t")
         )
-        self.turn = _relative_heading(node)
-
-    def pose(self, scene: Scene, actor: str) -> Pose:
-        """By the map; FileError when the lane is not there."""
-        del actor
-        try:
-            point = scene.map.place(self.place)
-        except ValueError as error:
-            raise self.node.error(str(error)) from None
-        left = point.offset if self.place.lane < 0 else -point.offset
-        pose = point.pose.moved(left=left)
-        return replace(pose, yaw=wrap_angle(pose.yaw + self.turn))
+    except ConfigError as error:
+        raise node.error(str(error)) from None
+    return Fixed(_facing(place, orientation(node)))
 
 
+def _geo(node: Node, ctx: Context) -> Position:
+    """Degrees about the map's origin, on the plane that touches the earth there."""
+    lat = node.number("latitudeDeg") if node.has("latitudeDeg") else node.number("latitude")
+    lon = node.number("longitudeDeg") if node.has("longitudeDeg") else node.number("longitude")
+    lat_0, lon_0 = _origin(ctx.network.map.geo_reference)
+    east = EARTH_RADIUS * radians(lon - lon_0) * cos(radians(lat_0))
+    north = EARTH_RADIUS * radians(lat - lat_0)
+    place = ctx.network.place_of(Pose(east, north, node.number("altitude", 0.0)))
+    return Fixed(_facing(place, orientation(node)))
+
+
+def _origin(projection: str) -> tuple[float, float]:
+    """Latitude and longitude of a PROJ text's origin, degrees."""
+    parts = dict(p.split("=", 1) for p in projection.replace("+", "").split() if "=" in p)
+    return float(parts.get("lat_0", 0.0)), float(parts.get("lon_0", 0.0))
+
+
+def _facing(place: Place, facing: Orientation) -> Place:
+    return replace(place, pose=replace(place.pose, yaw=facing.turned(place.pose.yaw)))
+
+
+@dataclass(frozen=True, slots=True)
 class RelativeLane:
-    """So many metres along and lanes aside of an entity."""
+    """So many metres along and lanes aside of an entity.
 
-    def __init__(self, node: Node) -> None:
-        self.node, self.other = node, node.text("entityRef")
-        self.lanes = int(node.number("dLane"))
-        self.ds, self.offset = node.number("ds"), node.number("offset", 0.0)
-        self.turn = _relative_heading(node)
+    along_lane: ds, dLane and offset count in the driving direction, else in that of the road.
+    """
 
-    def pose(self, scene: Scene, actor: str) -> Pose:
-        """Seen from the entity's lane now."""
-        del actor
-        m = scene.actors[self.other].motion
-        here = scene.map.project(m.x, m.y, 0.0)
-        beside = scene.map.shifted(here, self.lanes) if here is not None else None
-        place = scene.map.ahead(beside, self.ds) if beside is not None else None
-        if place is None:
-            raise self.node.error(f"there is no such lane beside {self.other}")
-        pose = place.pose.moved(left=self.offset)
-        return replace(pose, yaw=wrap_angle(pose.yaw + self.turn))
+    other: str
+    lanes: int
+    ds: float
+    offset: float
+    along_lane: bool
+    facing: Orientation
+
+    def place(self, scene: Scene) -> Place:
+        """Seen from the entity's lane now; on its own lane where there is no other."""
+        network = scene.network
+        pose = scene.actors[self.other].pose
+        here = scene.actors[self.other].guide.base or network.place_of(pose).lane
+        if here is None:
+            moved = pose.moved(forward=self.ds, left=self.offset)
+            return Place(replace(moved, yaw=self.facing.turned(pose.yaw)))
+        forward = network.forward(here)
+        backwards = not (forward or self.along_lane)
+        sign = -1 if self.along_lane and not forward else 1
+        point = network.map.ahead(here, -self.ds if backwards else self.ds) or here
+        if self.lanes:
+            point = network.beside(point, next_lane_id(here.lane_id, sign * self.lanes)) or point
+        aligned = network.forward(point)
+        left = self.offset if (aligned or self.along_lane) else -self.offset
+        base = point.heading if (aligned or self.along_lane) else point.heading + pi
+        at = point.pose.moved(left=left)
+        pose = replace(at, yaw=self.facing.turned(wrap_angle(base)))
+        return Place(pose, replace(point, offset=left))
 
 
+@dataclass(frozen=True, slots=True)
+class RelativeRoad:
+    """Shifted from an entity in the road's s and t."""
+
+    other: str
+    ds: float
+    dt: float
+    facing: Orientation
+
+    def place(self, scene: Scene) -> Place:
+        """Seen from the entity now; the road's end ends the shift."""
+        network, pose = scene.network, scene.actors[self.other].pose
+        at = network.coordinates(pose)
+        if at is None:
+            return Place(pose.moved(forward=self.ds, left=self.dt))
+        s = min(max(at.s + self.ds, 0.0), network.roads[at.road].length)
+        return _facing(network.on_road(at.road, s, at.t + self.dt), self.facing)
+
+
+@dataclass(frozen=True, slots=True)
 class RelativeObject:
-    """Ahead and left of an entity, in its own axes."""
+    """Ahead and left of an entity, in its own axes, or in those of the world."""
 
-    def __init__(self, node: Node) -> None:
-        self.other = node.text("entityRef")
-        self.dx, self.dy = node.number("dx"), node.number("dy")
-        self.turn = _relative_heading(node)
+    other: str
+    dx: float
+    dy: float
+    own_axes: bool
+    facing: Orientation
 
-    def pose(self, scene: Scene, actor: str) -> Pose:
+    def place(self, scene: Scene) -> Place:
         """Seen from the entity now."""
-        del actor
-        m = scene.actors[self.other].motion
-        pose = Pose(m.x, m.y, yaw=m.yaw).moved(forward=self.dx, left=self.dy)
-        return replace(pose, yaw=wrap_angle(pose.yaw + self.turn))
+        pose = scene.actors[self.other].pose
+        if self.own_axes:
+            moved = pose.moved(forward=self.dx, left=self.dy)
+        else:
+            moved = replace(pose, x=pose.x + self.dx, y=pose.y + self.dy)
+        return scene.network.place_of(replace(moved, yaw=self.facing.turned(pose.yaw)))
 
 
-class RelativeWorld:
-    """Shifted from an entity in the axes of the world."""
-
-    def __init__(self, node: Node) -> None:
-        self.other = node.text("entityRef")
-        self.dx, self.dy = node.number("dx"), node.number("dy")
-        self.turn = _relative_heading(node)
-
-    def pose(self, scene: Scene, actor: str) -> Pose:
-        """Seen from the entity now."""
-        del actor
-        m = scene.actors[self.other].motion
-        return Pose(m.x + self.dx, m.y + self.dy, yaw=wrap_angle(m.yaw + self.turn))
+def _relative_lane(node: Node, ctx: Context) -> Position:
+    along_lane = node.has("dsLane")
+    return RelativeLane(
+        ctx.entity(node),
+        node.whole("dLane"),
+        node.number("dsLane" if along_lane else "ds", 0.0),
+        node.number("offset", 0.0),
+        along_lane,
+        orientation(node),
+    )
 
 
-POSITIONS: dict[str, Callable[[Node], Position]] = {
-    "WorldPosition": World,
-    "LanePosition": Lane,
-    "RelativeLanePosition": RelativeLane,
-    "RelativeObjectPosition": RelativeObject,
-    "RelativeWorldPosition": RelativeWorld,
+def _relative_road(node: Node, ctx: Context) -> Position:
+    return RelativeRoad(ctx.entity(node), node.number("ds"), node.number("dt"), orientation(node))
+
+
+def _relative_object(node: Node, ctx: Context) -> Position:
+    own = node.tag == "RelativeObjectPosition"
+    dx, dy = node.number("dx"), node.number("dy")
+    return RelativeObject(ctx.entity(node), dx, dy, own, orientation(node))
+
+
+POSITIONS: Mapping[str, Callable[[Node, Context], Position]] = {
+    "WorldPosition": _world,
+    "LanePosition": _lane,
+    "RoadPosition": _road,
+    "GeoPosition": _geo,
+    "RelativeLanePosition": _relative_lane,
+    "RelativeRoadPosition": _relative_road,
+    "RelativeObjectPosition": _relative_object,
+    "RelativeWorldPosition": _relative_object,
 }
 
 
-def position(node: Node) -> Position:
+def position(node: Node, ctx: Context) -> Position:
     """The place inside a <Position>."""
     inner = node.only()
-    if inner.tag not in POSITIONS:
-        raise Unsupported(inner)
-    return POSITIONS[inner.tag](inner)
-
-
-def _relative_heading(node: Node) -> float:
-    orientation = node.find("Orientation")
-    if orientation is None:
-        return 0.0
-    orientation.choice("type", ("relative",), "absolute")
-    return orientation.number("h", 0.0)
+    make = POSITIONS.get(inner.tag) or ctx.further_positions.get(inner.tag)
+    if make is None:
+        raise inner.unsupported()
+    return make(inner, ctx)

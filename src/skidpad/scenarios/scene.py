@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 from math import cos, hypot, sin
@@ -11,11 +12,16 @@ from skidpad.core.geometry import Pose
 from skidpad.core.run import ActorMode
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import WorldTruth
-from skidpad.roads.queries import RoadMap
-from skidpad.scenarios.motion import Lane, Track, track_demand
+from skidpad.scenarios.entities import Entity
+from skidpad.scenarios.measures import Point, corners, overlap
+from skidpad.scenarios.motion import Guide
+from skidpad.scenarios.network import Network, Place
+from skidpad.scenarios.tracking import Track, track_demand
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 STANDING = 0.05  # m/s
+TOUCHING = 0.05  # m, bodies that the physics keeps apart are this near
+Path = tuple[str, ...]
 
 
 class State(str, Enum):
@@ -26,6 +32,15 @@ class State(str, Enum):
     COMPLETE = "completeState"
 
 
+class Move(str, Enum):
+    """How a storyboard element changes its state."""
+
+    START = "startTransition"
+    END = "endTransition"
+    STOP = "stopTransition"
+    SKIP = "skipTransition"
+
+
 class Running(Protocol):
     """An action under way."""
 
@@ -34,95 +49,190 @@ class Running(Protocol):
         ...
 
 
+class Done:
+    """An action that takes no time."""
+
+    def step(self, scene: Scene) -> bool:
+        """It is over at once."""
+        del scene
+        return True
+
+
+DONE = Done()
+
+
 @dataclass
 class Actor:
-    """One entity while the scenario is played."""
+    """One entity while the scenario is played.
 
-    name: str
+    pose: of the reference point that the file means; motion: of the box's centre, which moves
+    through the tyres.
+    """
+
+    entity: Entity
     row: int
     mode: ActorMode | None  # None: somebody else moves it, the stack under test
-    length: float
     motion: Motion
-    lane: Lane
+    guide: Guide
     driver: ActorDriver | None  # None: a body without wheels, always ideal
+    pose: Pose
     track: Track | None = None
     longitudinal: Running | None = None  # the newest action of its kind replaces the one before
     lateral: Running | None = None
     present: bool = True
+    seen: bool = False  # in a tick before
+    handed: bool = True  # somebody else's controller is active, where mode is None
     word: ActorCommand | None = None  # appear or vanish, said once
+    a: float = 0.0  # m/s^2 of the speed
     travelled: float = 0.0  # m
     stood: float = 0.0  # s
+    off_since: float | None = None  # s, when it left the road, if somebody asks
+    at_end: float = 0.0  # s at the end of a road
+
+    @property
+    def name(self) -> str:
+        """Of the entity."""
+        return self.entity.name
 
     @property
     def v(self) -> float:
         """Speed over ground, m/s."""
         return hypot(self.motion.vx, self.motion.vy)
 
+    @property
+    def driven_by_file(self) -> bool:
+        """The scenario decides where it goes."""
+        return self.mode is not None or not self.handed
+
+    def off_road(self, network: Network, t: float) -> float:
+        """How long it has been beside every lane, s; kept by asking in every step."""
+        point = network.map.project(self.pose.x, self.pose.y, self.pose.z, driving=False)
+        if point is not None and abs(point.offset) <= 0.5 * point.width:
+            self.off_since = None
+            return 0.0
+        self.off_since = t if self.off_since is None else self.off_since
+        return t - self.off_since
+
+    def catch_up(self) -> None:
+        """Bring the lane's point abreast of an actor that the tyres have moved."""
+        if self.mode is not ActorMode.IDEAL and self.driver is not None:
+            self.guide.advance(self.motion)
+
+    def outline(self) -> list[Point]:
+        """Corners on the ground."""
+        return corners(self.pose, self.entity.box)
+
+    def centre(self, pose: Pose) -> Pose:
+        """Where the box's centre is when the reference point is at `pose`."""
+        return pose.moved(forward=self.entity.box.forward, left=self.entity.box.left)
+
     def command(self, t: float, dt: float) -> ActorCommand | None:
         """The word to the backend for the step from t to t + dt."""
         if self.word is not None:
             word, self.word = self.word, None
             return word
-        if not self.present or self.mode is None:
+        if not self.present or not self.driven_by_file:
             return None
-        if self.mode is ActorMode.IDEAL or self.driver is None:
+        if self.driver is None or self.mode is not ActorMode.PHYSICAL:
             return self._placed(t + dt, dt)
         if self.track is not None:
-            demand = track_demand(self.track, self.motion, t, dt)
+            demand = track_demand(self.track, self.motion, t, dt, self.centre)
         else:
-            demand = self.lane.demand(self.motion)
+            demand = self.guide.demand(self.motion)
         return ActorCommand(self.name, command=self.driver.command(self.motion, demand))
 
     def _placed(self, t: float, dt: float) -> ActorCommand:
         if self.track is not None:
             pose, v, _ = self.track.at(t)
         else:
-            pose, v = self.lane.ideal(dt), self.lane.v
-        return ActorCommand(self.name, place=pose, speed=v)
+            pose, v = self.guide.ideal(dt), self.guide.v
+            if self.guide.at_end:
+                v = 0.0
+        self.pose = pose
+        return ActorCommand(self.name, place=self.centre(pose), speed=v)
 
-    def put(self, map: RoadMap, pose: Pose, v: float) -> None:
+    def put(self, network: Network, place: Place, v: float) -> None:
         """It stands somewhere else from now on."""
-        self.lane = Lane(map, pose, v)
+        roads = self.guide.roads
+        self.guide = Guide(network, place, v)
+        self.guide.roads = roads
         self.track = None
         self.present = True
-        self.word = ActorCommand(self.name, place=pose, speed=v)
+        self.pose = place.pose
+        self.word = ActorCommand(self.name, place=self.centre(place.pose), speed=v)
+
+    def follow_road(self, network: Network, v: float) -> None:
+        """From where it is, along the lane there at speed v: the default controller."""
+        roads = self.guide.roads
+        self.guide = Guide(network, network.place_of(self.pose), v)
+        self.guide.roads = roads
+        self.track = None
+
+    def observe(self, motion: Motion, dt: float) -> None:
+        """Take over a tick's motion of the box's centre; nothing has lasted in the first one."""
+        v = self.v
+        self.motion = motion
+        dt, self.seen = dt if self.seen else 0.0, True
+        box = self.entity.box
+        if box.forward or box.left:
+            at = Pose(motion.x, motion.y, self.pose.z, yaw=motion.yaw)
+            self.pose = at.moved(forward=-box.forward, left=-box.left)
+        else:
+            self.pose = Pose(motion.x, motion.y, self.pose.z, yaw=motion.yaw)
+        self.a = (self.v - v) / dt if dt > 0.0 else 0.0
+        self.travelled += self.v * dt
+        self.stood = self.stood + dt if self.v < STANDING else 0.0
+        self.at_end = self.at_end + dt if self.guide.at_end else 0.0
 
 
 @dataclass
 class Scene:
     """The moment: truth of the world and of the storyboard."""
 
-    map: RoadMap
+    network: Network
     dt: float
-    actors: dict[str, Actor]
+    actors: Mapping[str, Actor]
+    parameters: dict[str, str] = field(default_factory=dict)
+    variables: dict[str, str] = field(default_factory=dict)
+    signals: dict[str, str] = field(default_factory=dict)  # states that the file has set
     t: float = 0.0
-    states: dict[str, State] = field(default_factory=dict)  # of storyboard elements, by name
-    moves: dict[str, str] = field(default_factory=dict)  # transitions of the last step
-    contacts: set[str] = field(default_factory=set)  # names that touched the ego so far
+    states: dict[Path, State] = field(default_factory=dict)
+    moves: list[tuple[Path, Move]] = field(default_factory=list)  # all, in their order
+    contacts: set[str] = field(default_factory=set)  # names that touch the ego in this tick
+    ego: str = ""
+    notices: list[str] = field(default_factory=list)  # what could not be done, for the log
 
     def observe(self, truth: WorldTruth) -> None:
         """Take over positions and velocities of a tick."""
         self.t = truth.tick * self.dt
         s = truth.states
+        columns = (s.x.tolist(), s.y.tolist(), s.yaw.tolist(), s.vx.tolist(), s.vy.tolist())
         for actor in self.actors.values():
             i = actor.row
-            actor.motion = Motion(
-                float(s.x[i]), float(s.y[i]), float(s.yaw[i]), float(s.vx[i]), float(s.vy[i])
-            )
-            actor.travelled += actor.v * self.dt
-            actor.stood = actor.stood + self.dt if actor.v < STANDING else 0.0
-        for contact in truth.contacts:
-            self.contacts.add(contact.static or truth.table.names[contact.actor])
+            motion = Motion(*(column[i] for column in columns))
+            actor.observe(motion, self.dt)
+        self.contacts = {c.static or truth.table.names[c.actor] for c in truth.contacts}
 
-    def between(self, a: str, b: str) -> tuple[float, float]:
+    def between(self, a: str, b: str) -> Point:
         """Where b lies as seen from a: m forward, m left."""
-        from_, to = self.actors[a].motion, self.actors[b].motion
+        from_, to = self.actors[a].pose, self.actors[b].pose
         dx, dy = to.x - from_.x, to.y - from_.y
         c, s = cos(from_.yaw), sin(from_.yaw)
         return dx * c + dy * s, dy * c - dx * s
 
-    def gap(self, a: str, b: str) -> float:
-        """Longitudinal distance of a and b without their own lengths, >= 0, in m."""
-        forward, _ = self.between(a, b)
-        half = 0.5 * (self.actors[a].length + self.actors[b].length)
-        return max(abs(forward) - half, 0.0)
+    def touch(self, a: str, b: str) -> bool:
+        """Whether two entities are in contact now."""
+        if (a == self.ego and b in self.contacts) or (b == self.ego and a in self.contacts):
+            return True
+        one, other = self.actors[a], self.actors[b]
+        if not (one.present and other.present):
+            return False
+        reach = one.entity.box.length + other.entity.box.length + 2.0
+        if hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y) > reach:
+            return False
+        return overlap(one.outline(), other.outline()) <= TOUCHING
+
+    def notice(self, text: str) -> None:
+        """Say once what could not be done."""
+        if text not in self.notices:
+            self.notices.append(text)

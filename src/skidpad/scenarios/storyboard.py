@@ -1,200 +1,207 @@
-"""Stories, acts, groups, manoeuvres and events: who does what, when, and how far it has come."""
+"""The storyboard of a file: stories, acts, groups, manoeuvres and events, as they are written."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
+from enum import Enum
+from functools import partial
+from typing import NamedTuple
 
-from skidpad.scenarios.actions import GlobalAction, PrivateAction, global_action, private_action
-from skidpad.scenarios.conditions import Trigger
-from skidpad.scenarios.reader import Node, Unsupported
-from skidpad.scenarios.scene import Running, Scene, State
-
-PRIORITIES = ("parallel", "override", "overwrite", "skip")
-
-
-class Element:
-    """Something with a name and a state, told to the scene when it changes."""
-
-    def __init__(self, node: Node) -> None:
-        self.name = node.text("name")
-        self.state = State.STANDBY
-
-    def turn(self, scene: Scene, state: State, move: str) -> None:
-        """Into another state."""
-        self.state = state
-        scene.states[self.name] = state
-        scene.moves[self.name] = move
-
-    def start(self, scene: Scene) -> None:
-        """Into the running state."""
-        self.turn(scene, State.RUNNING, "startTransition")
-
-    def end(self, scene: Scene) -> None:
-        """Into the complete state."""
-        self.turn(scene, State.COMPLETE, "endTransition")
+from skidpad.scenarios.actions.base import GlobalAction, PrivateAction
+from skidpad.scenarios.actions.private import private_action
+from skidpad.scenarios.actions.world import global_action, user_defined
+from skidpad.scenarios.context import Context, Path
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.findings import Fault
+from skidpad.scenarios.parameters import inner
+from skidpad.scenarios.triggers import Trigger, compile_trigger
 
 
-class Act(Element):
-    """A set of groups between a start and a stop trigger."""
+class Priority(Enum):
+    """What an event does to others of its manoeuvre that are under way."""
 
-    def __init__(self, node: Node, dt: float) -> None:
-        super().__init__(node)
-        self.groups = [Group(g, dt) for g in node.children("ManeuverGroup")]
-        self.begin = Trigger(node.find("StartTrigger"), dt)
-        self.stop = Trigger(node.find("StopTrigger"), dt)
-
-    def step(self, scene: Scene) -> None:
-        """One step of everything inside."""
-        if self.state is State.STANDBY and (not self.begin or self.begin.fires(scene)):
-            self.start(scene)
-        if self.state is not State.RUNNING:
-            return
-        if self.stop.fires(scene):
-            self.turn(scene, State.COMPLETE, "stopTransition")
-            return
-        for group in self.groups:
-            group.step(scene)
-        if all(group.state is State.COMPLETE for group in self.groups):
-            self.end(scene)
-
-
-class Group(Element):
-    """Manoeuvres of the same actors."""
-
-    def __init__(self, node: Node, dt: float) -> None:
-        super().__init__(node)
-        actors = node.child("Actors")
-        if actors.flag("selectTriggeringEntities", default=False):
-            raise Unsupported(actors, "selectTriggeringEntities is not supported")
-        if node.number("maximumExecutionCount", 1.0) != 1.0:
-            raise Unsupported(node, "groups that run several times are not supported")
-        names = tuple(n.text("entityRef") for n in actors.children("EntityRef"))
-        found = list(node.children("Maneuver"))
-        for reference in node.children("CatalogReference"):
-            raise Unsupported(reference)
-        self.manoeuvres = [Manoeuvre(m, names, dt) for m in found]
-
-    def step(self, scene: Scene) -> None:
-        """One step of everything inside."""
-        if self.state is State.STANDBY:
-            self.start(scene)
-        if self.state is State.COMPLETE:
-            return
-        for manoeuvre in self.manoeuvres:
-            manoeuvre.step(scene)
-        if all(m.state is State.COMPLETE for m in self.manoeuvres):
-            self.end(scene)
-
-
-class Manoeuvre(Element):
-    """Events that share actors."""
-
-    def __init__(self, node: Node, actors: tuple[str, ...], dt: float) -> None:
-        super().__init__(node)
-        self.events = [Event(e, actors, dt) for e in node.children("Event")]
-
-    def step(self, scene: Scene) -> None:
-        """Let events begin by their triggers, and go on with those under way."""
-        if self.state is State.STANDBY:
-            self.start(scene)
-        for event in self.events:
-            if event.wants_to_begin(scene):
-                event.launch(scene, [e for e in self.events if e.state is State.RUNNING])
-        for event in self.events:
-            event.step(scene)
-        if self.state is State.RUNNING and all(e.state is State.COMPLETE for e in self.events):
-            self.end(scene)
-
-
-class Event(Element):
-    """Actions that begin together."""
-
-    def __init__(self, node: Node, actors: tuple[str, ...], dt: float) -> None:
-        super().__init__(node)
-        self.priority = node.choice("priority", PRIORITIES)
-        self.left = int(node.number("maximumExecutionCount", 1.0))
-        self.actors = actors
-        self.actions = [_action(a) for a in node.children("Action")]
-        self.begin = Trigger(node.find("StartTrigger"), dt)
-        self.running: list[Running] = []
-        self.happened = False
-
-    def wants_to_begin(self, scene: Scene) -> bool:
-        """The trigger fires, and the event may still run."""
-        fires = not self.begin or self.begin.fires(scene)
-        return fires and self.left > 0 and self.state is not State.RUNNING
-
-    def launch(self, scene: Scene, others: Sequence[Event]) -> None:
-        """Begin, as the priority has it with other events under way."""
-        if others and self.priority == "skip":
-            self.left -= 1
-            self.turn(scene, State.STANDBY, "skipTransition")
-            return
-        if self.priority in ("override", "overwrite"):
-            for other in others:
-                other.running.clear()
-                other.turn(scene, State.COMPLETE, "stopTransition")
-        self.left -= 1
-        self.happened = True
-        self.running = [r for action in self.actions for r in self._begin(action, scene)]
-        self.start(scene)
-
-    def _begin(self, action: PrivateAction | Worldwide, scene: Scene) -> Iterator[Running]:
-        if isinstance(action, Worldwide):
-            yield action.action.begin(scene)
-            return
-        for name in self.actors:
-            yield action.begin(scene, scene.actors[name])
-
-    def step(self, scene: Scene) -> None:
-        """Go on with the actions under way."""
-        if self.state is not State.RUNNING:
-            return
-        self.running = [r for r in self.running if not r.step(scene)]
-        if not self.running:
-            if self.left > 0:
-                self.turn(scene, State.STANDBY, "endTransition")
-            else:
-                self.end(scene)
+    PARALLEL = "parallel"
+    OVERRIDE = "override"
+    OVERWRITE = "overwrite"  # its name before 1.2
+    SKIP = "skip"
 
 
 @dataclass(frozen=True, slots=True)
-class Worldwide:
-    """An action that has no actor."""
+class NamedAction:
+    """An action of an event, of its actors or of the world."""
 
-    action: GlobalAction
-
-
-def _action(node: Node) -> PrivateAction | Worldwide:
-    inner = node.only()
-    if inner.tag == "PrivateAction":
-        return private_action(inner)
-    if inner.tag == "GlobalAction":
-        return Worldwide(global_action(inner))
-    raise Unsupported(inner)
+    path: Path
+    private: PrivateAction | None
+    worldwide: GlobalAction | None
 
 
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Actions that begin together, at most `count` times."""
+
+    path: Path
+    priority: Priority
+    count: int
+    actions: tuple[NamedAction, ...]
+    start: Trigger
+
+
+@dataclass(frozen=True, slots=True)
+class Manoeuvre:
+    """Events that share actors."""
+
+    path: Path
+    events: tuple[Event, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Group:
+    """Manoeuvres of the same actors, done `count` times."""
+
+    path: Path
+    count: int
+    actors: tuple[str, ...]
+    manoeuvres: tuple[Manoeuvre, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Act:
+    """Groups between a start and a stop trigger."""
+
+    path: Path
+    groups: tuple[Group, ...]
+    start: Trigger
+    stop: Trigger
+
+
+@dataclass(frozen=True, slots=True)
+class Story:
+    """Acts under a name."""
+
+    path: Path
+    acts: tuple[Act, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Storyboard:
-    """All acts of all stories, and what ends them."""
+    """All stories, and what ends them."""
 
-    def __init__(self, node: Node, dt: float) -> None:
-        self.acts = [Act(a, dt) for s in node.children("Story") for a in s.children("Act")]
-        self.stop = Trigger(node.find("StopTrigger"), dt)
-        self.ended = False
+    stories: tuple[Story, ...]
+    stop: Trigger
 
     @property
-    def events(self) -> list[Event]:
+    def events(self) -> tuple[Event, ...]:
         """Every event."""
-        groups = (g for a in self.acts for g in a.groups)
-        return [e for g in groups for m in g.manoeuvres for e in m.events]
+        acts = [a for s in self.stories for a in s.acts]
+        return tuple(e for a in acts for g in a.groups for m in g.manoeuvres for e in m.events)
 
-    def step(self, scene: Scene) -> None:
-        """One step. Without a stop trigger it ends when all acts are complete."""
-        for act in self.acts:
-            act.step(scene)
-        if self.stop:
-            self.ended = self.ended or self.stop.fires(scene)
-        elif self.acts and all(a.state is State.COMPLETE for a in self.acts):
-            self.ended = True
-        scene.moves.clear()
+
+class Level(NamedTuple):
+    """One level of the storyboard: its element, its type as conditions name it, what is inside."""
+
+    tag: str
+    type: str
+    inside: str
+
+
+LEVELS: Mapping[str, Level] = {
+    "Story": Level("Story", "story", "Act"),
+    "Act": Level("Act", "act", "ManeuverGroup"),
+    "ManeuverGroup": Level("ManeuverGroup", "maneuverGroup", "Maneuver"),
+    "Maneuver": Level("Maneuver", "maneuver", "Event"),
+    "Event": Level("Event", "event", "Action"),
+    "Action": Level("Action", "action", ""),
+}
+
+
+def element_paths(board: Node, ctx: Context) -> list[tuple[str, Path]]:
+    """Types and paths of all elements, for conditions that name them, entries of catalogs too."""
+    found: list[tuple[str, Path]] = []
+
+    def look(node: Node, above: Path) -> None:
+        if node.tag == "CatalogReference":
+            try:
+                node = ctx.catalogs.resolved(node)
+            except Fault:
+                return  # reported where the manoeuvre is compiled
+        level = LEVELS[node.tag]
+        path = (*above, node.element.get("name", ""))
+        found.append((level.type, path))
+        inside = (
+            (level.inside, "CatalogReference") if level.inside == "Maneuver" else (level.inside,)
+        )
+        for child in node.children(*inside) if level.inside else ():
+            look(child, path)
+
+    for story in board.children("Story"):
+        look(story, ())
+    return found
+
+
+def compile_storyboard(board: Node, ctx: Context) -> Storyboard:
+    """The <Storyboard>; what is faulty goes to the list of findings."""
+    ctx.elements = element_paths(board, ctx)
+    stories = tuple(_story(inner(s), ctx) for s in board.children("Story"))
+    return Storyboard(stories, compile_trigger(board.find("StopTrigger"), ctx))
+
+
+def _story(node: Node, ctx: Context) -> Story:
+    path = (node.element.get("name", ""),)
+    return Story(path, tuple(_act(a, path, ctx) for a in node.children("Act")))
+
+
+def _act(node: Node, above: Path, ctx: Context) -> Act:
+    path = (*above, node.element.get("name", ""))
+    groups = [ctx.attempt(partial(_group, g, path, ctx)) for g in node.children("ManeuverGroup")]
+    return Act(
+        path,
+        tuple(g for g in groups if g is not None),
+        compile_trigger(node.find("StartTrigger"), ctx),
+        compile_trigger(node.find("StopTrigger"), ctx),
+    )
+
+
+def _group(node: Node, above: Path, ctx: Context) -> Group:
+    path = (*above, node.element.get("name", ""))
+    found = node.child("Actors")
+    if found.flag("selectTriggeringEntities", default=False):
+        fault = found.unsupported("selectTriggeringEntities is not supported")
+        ctx.findings.append(fault.finding)
+    actors = ctx.attempt(lambda: ctx.actors(found.children("EntityRef"))) or ()
+    count = node.whole("maximumExecutionCount", 1)
+    nodes = node.children("Maneuver", "CatalogReference")
+    made = [ctx.attempt(partial(_manoeuvre, m, path, ctx)) for m in nodes]
+    return Group(path, count, actors, tuple(m for m in made if m is not None))
+
+
+def _manoeuvre(node: Node, above: Path, ctx: Context) -> Manoeuvre:
+    node = ctx.catalogs.resolved(node)
+    path = (*above, node.element.get("name", ""))
+    events = [ctx.attempt(partial(_event, e, path, ctx)) for e in node.children("Event")]
+    return Manoeuvre(path, tuple(e for e in events if e is not None))
+
+
+def _event(node: Node, above: Path, ctx: Context) -> Event:
+    path = (*above, node.element.get("name", ""))
+    start = compile_trigger(node.find("StartTrigger"), ctx)
+    actions = [ctx.attempt(partial(_action, a, path, ctx)) for a in node.children("Action")]
+    return Event(
+        path,
+        node.choice("priority", Priority),
+        node.whole("maximumExecutionCount", 1),
+        tuple(a for a in actions if a is not None),
+        start,
+    )
+
+
+def _action(node: Node, above: Path, ctx: Context) -> NamedAction:
+    path = (*above, node.element.get("name", ""))
+    what = node.only()
+    if what.tag == "PrivateAction":
+        return NamedAction(path, private_action(what, ctx), None)
+    if what.tag == "GlobalAction":
+        return NamedAction(path, None, global_action(what, ctx))
+    if what.tag == "UserDefinedAction":
+        return NamedAction(path, None, user_defined(what, ctx))
+    raise what.unsupported()

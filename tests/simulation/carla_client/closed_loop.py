@@ -20,7 +20,8 @@ from skidpad.evidence.grip.scores import grip_metrics
 from skidpad.physics import types
 from skidpad.physics.presets import find_weather
 from skidpad.roads.bundled import load_map
-from skidpad.scenarios.player import load
+from skidpad.scenarios.player import setups
+from skidpad.scenarios.scenario import compile_scenario
 from skidpad.scenarios.shipped import scenario_file
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.carla.backend import CarlaBackend
@@ -63,8 +64,8 @@ def behind_lead(backend: Backend) -> Numbers:
 
 
 def main(port: int) -> Any:
-    script = load(scenario_file("lead_slowdown"), {}, None)
-    ego, actors = script.setups()
+    script = compile_scenario(scenario_file("lead_slowdown"))
+    ego, actors = setups(script)
     for setup in (ego, *actors):
         types.vehicle_types()[setup.type] = model_of(load_catalogue()[STANDS_FOR[setup.type][0]])
 

@@ -1,0 +1,85 @@
+"""What all actions are, and how a change is spread over time, distance or rate."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Protocol
+
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.motion import STEEPEST, Shape
+from skidpad.scenarios.scene import DONE, Actor, Running, Scene
+
+
+class PrivateAction(Protocol):
+    """Something that one entity does."""
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """Start it for an entity."""
+        ...
+
+
+class GlobalAction(Protocol):
+    """Something that happens to the world."""
+
+    def happen(self, scene: Scene) -> None:
+        """At once."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class NoEffect:
+    """An action that changes nothing that this world can show; the log says so."""
+
+    what: str
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """Over at once."""
+        scene.notice(f"<{self.what}> of {actor.name} has no effect")
+        return DONE
+
+    def happen(self, scene: Scene) -> None:
+        """Nothing."""
+        scene.notice(f"<{self.what}> has no effect")
+
+
+class Dimension(Enum):
+    """What the number of a change means."""
+
+    TIME = "time"
+    RATE = "rate"
+    DISTANCE = "distance"
+
+
+class Following(Enum):
+    """How closely a change is followed; both are read alike, as by esmini."""
+
+    POSITION = "position"
+    FOLLOW = "follow"
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamics:
+    """How fast a change is. A time or distance that is not positive makes a step, as in esmini."""
+
+    shape: Shape
+    dimension: Dimension
+    value: float
+
+    def span(self, size: float) -> float:
+        """Time in s, or distance in m, of a change by `size`; 0 for a step."""
+        if self.shape is Shape.STEP:
+            return 0.0
+        if self.dimension is not Dimension.RATE:
+            return max(self.value, 0.0)
+        rate = abs(self.value)
+        return abs(size) * STEEPEST[self.shape] / rate if rate > 0.0 else 0.0
+
+
+def dynamics(node: Node) -> Dynamics:
+    """<...Dynamics> of an action."""
+    node.choice("followingMode", Following, Following.POSITION)
+    shape = node.choice("dynamicsShape", Shape)
+    if shape is Shape.STEP and not node.has("value"):
+        return Dynamics(shape, Dimension.TIME, 0.0)
+    return Dynamics(shape, node.choice("dynamicsDimension", Dimension), node.number("value"))

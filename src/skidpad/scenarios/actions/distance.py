@@ -1,0 +1,218 @@
+"""Keeping a distance to another entity, and arriving somewhere together with it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from math import copysign, inf, sqrt
+
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.entities import Performance
+from skidpad.scenarios.measures import Axes, along_road, way
+from skidpad.scenarios.positions import Position, position
+from skidpad.scenarios.scene import Actor, Running, Scene
+
+SPRING = 0.4  # 1/m, of the controller that closes a gap (esmini's, so that files play alike)
+REACHED = 0.1  # m
+ARRIVED = 0.3  # m, where a file gives no tolerance
+V_LEAST = 0.1  # m/s
+
+
+class Displacement(Enum):
+    """On which side of the other entity."""
+
+    ANY = "any"
+    TRAILING = "trailingReferencedEntity"
+    LEADING = "leadingReferencedEntity"
+
+
+@dataclass(frozen=True, slots=True)
+class Limits:
+    """Of a controlled approach; all infinite: the entity simply is where it should be."""
+
+    a_max: float = inf
+    b_max: float = inf
+    v_max: float = inf
+
+    @property
+    def none(self) -> bool:
+        """Nothing is limited."""
+        return self.a_max == self.b_max == inf
+
+    def of(self, own: Performance) -> Performance:
+        """Together with what the entity can do."""
+        return Performance(
+            min(self.v_max, own.v_max), min(self.a_max, own.a_max), min(self.b_max, own.b_max)
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class KeepGap:
+    """Keep a distance or a time behind or before another entity, along the road."""
+
+    other: str
+    distance: float | None
+    time_gap: float | None
+    free: bool
+    continuous: bool
+    side: Displacement
+    road: bool
+    limits: Limits
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """From now on."""
+        side = self.side
+        if side is Displacement.ANY:
+            ahead = self.ahead(scene, actor)
+            side = Displacement.TRAILING if ahead >= 0.0 else Displacement.LEADING
+        actor.longitudinal = GapKept(self, actor, side, self.limits.of(actor.entity.performance))
+        return actor.longitudinal
+
+    def ahead(self, scene: Scene, actor: Actor) -> float:
+        """How far the other one is ahead, m; its length and half the own one taken off if free."""
+        other = scene.actors[self.other]
+        found = along_road(scene.network, actor.pose, other.pose) if self.road else None
+        gap = found[0] if found else scene.between(actor.name, self.other)[0]
+        if not self.free:
+            return gap
+        own, its = actor.entity.box, other.entity.box
+        if gap >= 0.0:
+            room = (its.forward - its.length / 2.0) - (own.forward + own.length / 2.0)
+            return max(gap + room, 0.0)
+        room = (its.forward + its.length / 2.0) - (own.forward - own.length / 2.0)
+        return min(gap + room, 0.0)
+
+    def wanted(self, scene: Scene, side: Displacement) -> float:
+        """How far the other one should be ahead, m."""
+        v = abs(scene.actors[self.other].guide.v)
+        size = abs(self.distance if self.distance is not None else (self.time_gap or 0.0) * v)
+        return -size if side is Displacement.LEADING else size
+
+
+class GapKept:
+    """A gap being kept: a critically damped spring, within the limits."""
+
+    def __init__(
+        self, action: KeepGap, actor: Actor, side: Displacement, limits: Performance
+    ) -> None:
+        self.action, self.actor, self.side, self.limits = action, actor, side, limits
+
+    def step(self, scene: Scene) -> bool:
+        """Demand the speed of the end of this step."""
+        if self.actor.longitudinal is not self:
+            return True
+        action, guide = self.action, self.actor.guide
+        v_other = scene.actors[action.other].guide.v
+        excess = action.ahead(scene, self.actor) - action.wanted(scene, self.side)
+        if not action.continuous and abs(excess) < REACHED:
+            return True
+        if action.limits.none:
+            guide.v, guide.a = v_other + excess / scene.dt, 0.0
+            return False
+        limits = self.limits
+        tension = limits.a_max if excess < 0.0 else limits.b_max
+        stiffness = min(tension, 1e3) * SPRING
+        a = excess * stiffness - (guide.v - v_other) * 2.0 * sqrt(stiffness)
+        guide.a = min(max(a, -limits.b_max), limits.a_max)
+        v = guide.v + guide.a * scene.dt
+        guide.v = copysign(min(abs(v), limits.v_max), v)
+        return False
+
+
+def compile_gap(node: Node, ctx: Context) -> KeepGap:
+    """A <LongitudinalDistanceAction>."""
+    if node.has("distance") == node.has("timeGap"):
+        raise node.error("needs either distance or timeGap")
+    limits = Limits()
+    found = node.find("DynamicConstraints")
+    if found is not None:
+        limits = Limits(*(found.limit(k, inf) for k in _LIMITS))
+    axes = node.choice("coordinateSystem", Axes, Axes.ENTITY)
+    return KeepGap(
+        ctx.entity(node),
+        node.number("distance") if node.has("distance") else None,
+        node.number("timeGap") if node.has("timeGap") else None,
+        node.flag("freespace", default=False),
+        node.flag("continuous", default=False),
+        node.choice("displacement", Displacement, Displacement.ANY),
+        axes in (Axes.ROAD, Axes.LANE),
+        limits,
+    )
+
+
+_LIMITS = ("maxAcceleration", "maxDeceleration", "maxSpeed")
+
+
+@dataclass(frozen=True, slots=True)
+class Synchronize:
+    """Be at a place when another entity is at its own; v_end: speed then, perhaps relative."""
+
+    other: str
+    other_goal: Position
+    goal: Position
+    tolerance: float
+    other_tolerance: float
+    v_end: float | None
+    relative: bool
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """From now on."""
+        del scene
+        actor.longitudinal = Synchronized(self, actor)
+        return actor.longitudinal
+
+
+class Synchronized:
+    """On the way: the speed follows a curve that is planned anew in each step."""
+
+    def __init__(self, action: Synchronize, actor: Actor) -> None:
+        self.action, self.actor = action, actor
+        self.before = inf
+
+    def step(self, scene: Scene) -> bool:
+        """Demand the speed of the end of this step."""
+        if self.actor.longitudinal is not self:
+            return True
+        action, guide, network = self.action, self.actor.guide, scene.network
+        other = scene.actors[action.other]
+        own_way = way(network, self.actor.pose, action.goal.place(scene).pose)
+        its_way = way(network, other.pose, action.other_goal.place(scene).pose)
+        passed = its_way > self.before + 1e-6
+        self.before = its_way
+        if own_way <= action.tolerance or its_way <= action.other_tolerance or passed:
+            return True
+        if abs(other.guide.v) < V_LEAST:
+            return False
+        time = max(its_way / abs(other.guide.v), scene.dt)
+        if action.v_end is None:
+            guide.v, guide.a = own_way / time, 0.0
+            return False
+        v_end = action.v_end + (other.guide.v if action.relative else 0.0)
+        # v(t) = v + a t + c t^2 that is v_end after `time` and has covered the way then
+        c = 6.0 * ((guide.v + v_end) * time / 2.0 - own_way) / time**3
+        guide.a = (v_end - guide.v - c * time * time) / time
+        guide.v = max(guide.v + guide.a * scene.dt, 0.0)
+        return False
+
+
+def compile_synchronize(node: Node, ctx: Context) -> Synchronize:
+    """A <SynchronizeAction>."""
+    v_end, relative = None, False
+    found = node.find("FinalSpeed")
+    if found is not None:
+        speed = found.only()
+        relative = speed.tag == "RelativeSpeedToMaster"
+        if not relative and speed.tag != "AbsoluteSpeed":
+            raise speed.unsupported()
+        v_end = speed.number("value")
+    master = "masterEntityRef" if node.has("masterEntityRef") else "entityRef"
+    return Synchronize(
+        ctx.entity(node, master),
+        position(node.child("TargetPositionMaster"), ctx),
+        position(node.child("TargetPosition"), ctx),
+        node.number("targetTolerance", ARRIVED),
+        node.number("targetToleranceMaster", ARRIVED),
+        v_end,
+        relative,
+    )

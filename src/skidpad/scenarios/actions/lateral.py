@@ -1,0 +1,208 @@
+"""Sideways: to another lane, to an offset in the lane, to a distance from another entity."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from math import inf, sqrt
+
+from skidpad.scenarios.actions.base import Dimension, Dynamics, dynamics
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.motion import SHARPEST, SLOW, Shape, Transition
+from skidpad.scenarios.network import next_lane_id
+from skidpad.scenarios.scene import DONE, Actor, Running, Scene
+
+A_LATERAL = 1.0  # m/s^2, of a change of offset for which the file gives no limit
+
+
+class ChangeOfOffset:
+    """A sideways motion under way; by_way: its shape runs over distance instead of time."""
+
+    def __init__(self, actor: Actor, change: Transition, by_way: bool = False) -> None:
+        self.actor, self.change, self.by_way, self.done = actor, change, by_way, 0.0
+
+    def step(self, scene: Scene) -> bool:
+        """Demand the offset of the end of this step; an actor that stands does not move aside."""
+        actor, guide = self.actor, self.actor.guide
+        if actor.lateral is not self or actor.track is not None:
+            return True
+        v = abs(guide.v)
+        if v < SLOW and not self.change.over(self.done):
+            guide.offset_rate = guide.offset_bend = 0.0
+            return False
+        _, slope, _ = self.change.at(self.done)
+        pace = v / sqrt(1.0 + slope * slope) if self.by_way else 1.0
+        if not self.by_way and abs(slope) > v:
+            pace = v / abs(slope)  # no actor goes sideways faster than it goes
+        self.done += pace * scene.dt
+        guide.offset, slope, bend = self.change.at(self.done)
+        guide.offset_rate, guide.offset_bend = slope * pace, bend * pace * pace
+        return self.change.over(self.done)
+
+
+@dataclass(frozen=True, slots=True)
+class LaneChange:
+    """Go to another lane: an absolute id, or so many lanes from an entity's own."""
+
+    dynamics: Dynamics
+    value: int
+    other: str | None
+    offset: float
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """From where the entity is now."""
+        guide, network = actor.guide, scene.network
+        actor.catch_up()
+        here = guide.base
+        target = self.target(scene)
+        if here is None or target is None:
+            scene.notice(f"{actor.name} changes no lane: it or its reference is on none")
+            return DONE
+        lanes = target - here.lane_id
+        forward = network.forward(here)
+        if guide.shift_to(target) is None:  # it may begin further on; keep beside the own lane
+            end = guide.offset + (lanes if forward else -lanes) * here.width
+            scene.notice(f"{actor.name}: there is no lane {target} beside it yet")
+        else:
+            now = guide.base
+            end = self.offset if now is None or network.forward(now) else -self.offset
+        span = self.dynamics.span(end - guide.offset)
+        change = Transition(guide.offset, end, span, self.dynamics.shape)
+        by_way = self.dynamics.dimension is Dimension.DISTANCE
+        actor.lateral = ChangeOfOffset(actor, change, by_way)
+        return actor.lateral
+
+    def target(self, scene: Scene) -> int | None:
+        """Id of the lane to go to; None where the reference is on no lane."""
+        if self.other is None:
+            return self.value
+        reference = scene.actors[self.other].guide
+        if reference.base is None:
+            return None
+        ahead = scene.network.forward(reference.base) == (reference.along > 0.0)
+        return next_lane_id(reference.base.lane_id, self.value if ahead else -self.value)
+
+
+def compile_lane_change(node: Node, ctx: Context) -> LaneChange:
+    """A <LaneChangeAction>."""
+    change = dynamics(node.child("LaneChangeActionDynamics"))
+    target = node.child("LaneChangeTarget").only()
+    if target.tag not in ("RelativeTargetLane", "AbsoluteTargetLane"):
+        raise target.unsupported()
+    other = ctx.entity(target) if target.tag == "RelativeTargetLane" else None
+    return LaneChange(change, target.whole("value"), other, node.number("targetLaneOffset", 0.0))
+
+
+@dataclass(frozen=True, slots=True)
+class LaneOffset:
+    """Keep to a lateral offset from the lane's centre, or from another entity."""
+
+    shape: Shape
+    a_max: float
+    value: float
+    other: str | None
+    continuous: bool
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """The duration follows from the largest lateral acceleration."""
+        guide = actor.guide
+        actor.catch_up()
+        end = self.target(scene, actor)
+        size = abs(end - guide.offset)
+        sharp = 0.0 if self.shape is Shape.STEP else SHARPEST[self.shape]
+        change = Transition(guide.offset, end, sqrt(sharp * size / self.a_max), self.shape)
+        actor.lateral = ChangeOfOffset(actor, change)
+        return actor.lateral
+
+    def target(self, scene: Scene, actor: Actor) -> float:
+        """Offset left of the lane as it runs, m; the file's counts left of increasing s."""
+        base = actor.guide.base
+        if base is None:
+            return actor.guide.offset
+        forward = scene.network.forward(base)
+        value = self.value if forward else -self.value
+        if self.other is None:
+            return value
+        other = scene.actors[self.other]
+        _, left = scene.network.abreast(base, other.pose.x, other.pose.y)
+        return left + value
+
+
+def compile_lane_offset(node: Node, ctx: Context) -> LaneOffset:
+    """A <LaneOffsetAction>."""
+    found = node.child("LaneOffsetActionDynamics")
+    a_max = found.limit("maxLateralAcc", A_LATERAL)
+    if a_max <= 0.0:
+        raise found.error(f"maxLateralAcc must be positive, got {a_max:g}")
+    target = node.child("LaneOffsetTarget").only()
+    if target.tag not in ("AbsoluteTargetLaneOffset", "RelativeTargetLaneOffset"):
+        raise target.unsupported()
+    other = ctx.entity(target) if target.tag == "RelativeTargetLaneOffset" else None
+    shape = found.choice("dynamicsShape", Shape)
+    continuous = node.flag("continuous", default=False)
+    return LaneOffset(shape, min(a_max, 1e6), target.number("value"), other, continuous)
+
+
+class Side(Enum):
+    """Of the entity that a distance is kept to."""
+
+    ANY = "any"
+    LEFT = "leftToReferencedEntity"
+    RIGHT = "rightToReferencedEntity"
+
+
+@dataclass(frozen=True, slots=True)
+class LateralDistance:
+    """Keep a sideways distance to another entity."""
+
+    other: str
+    distance: float
+    free: bool
+    continuous: bool
+    side: Side
+    v_max: float
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """From now on."""
+        _, left = scene.between(self.other, actor.name)
+        to_left = left >= 0.0 if self.side is Side.ANY else self.side is Side.LEFT
+        actor.lateral = DistanceKept(self, actor, 1.0 if to_left else -1.0)
+        return actor.lateral
+
+
+class DistanceKept:
+    """A sideways distance being kept."""
+
+    def __init__(self, action: LateralDistance, actor: Actor, sign: float) -> None:
+        self.action, self.actor, self.sign = action, actor, sign
+
+    def step(self, scene: Scene) -> bool:
+        """Move the offset towards it as fast as is allowed."""
+        actor, guide, action = self.actor, self.actor.guide, self.action
+        if actor.lateral is not self or guide.base is None:
+            return True
+        other = scene.actors[action.other]
+        _, left = scene.network.abreast(guide.base, other.pose.x, other.pose.y)
+        size = action.distance
+        if action.free:
+            size += 0.5 * (actor.entity.box.width + other.entity.box.width)
+        end = left + self.sign * guide.along * size
+        most = min(action.v_max, abs(guide.v)) * scene.dt
+        move = min(max(end - guide.offset, -most), most)
+        guide.offset += move
+        guide.offset_rate = move / scene.dt
+        return not action.continuous and abs(end - guide.offset) < 1e-3
+
+
+def compile_lateral_distance(node: Node, ctx: Context) -> LateralDistance:
+    """A <LateralDistanceAction>."""
+    found = node.find("DynamicConstraints")
+    return LateralDistance(
+        ctx.entity(node),
+        node.number("distance", 0.0),
+        node.flag("freespace", default=False),
+        node.flag("continuous", default=False),
+        node.choice("displacement", Side, Side.ANY),
+        inf if found is None else found.limit("maxSpeed", inf),
+    )

@@ -1,0 +1,56 @@
+"""All actions of entities, by their elements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from skidpad.scenarios.actions import controllers
+from skidpad.scenarios.actions.base import PrivateAction
+from skidpad.scenarios.actions.distance import compile_gap, compile_synchronize
+from skidpad.scenarios.actions.lateral import (
+    compile_lane_change,
+    compile_lane_offset,
+    compile_lateral_distance,
+)
+from skidpad.scenarios.actions.routing import (
+    compile_acquire,
+    compile_assign_route,
+    compile_follow,
+    compile_teleport,
+)
+from skidpad.scenarios.actions.speed import compile_profile, compile_speed
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+
+Compile = Callable[[Node, Context], PrivateAction]
+
+PRIVATE: Mapping[str, Compile] = {
+    "TeleportAction": compile_teleport,
+    "SpeedAction": compile_speed,
+    "SpeedProfileAction": compile_profile,
+    "LongitudinalDistanceAction": compile_gap,
+    "SynchronizeAction": compile_synchronize,
+    "LaneChangeAction": compile_lane_change,
+    "LaneOffsetAction": compile_lane_offset,
+    "LateralDistanceAction": compile_lateral_distance,
+    "AssignRouteAction": compile_assign_route,
+    "AcquirePositionAction": compile_acquire,
+    "FollowTrajectoryAction": compile_follow,
+    "ControllerAction": controllers.compile_controller,
+    **controllers.TABLE,  # where they stood before 1.1, and may stand since
+    "VisibilityAction": controllers.no_effect,
+    "LightStateAction": controllers.no_effect,
+    "AnimationAction": controllers.no_effect,
+    "TrailerAction": controllers.no_effect,
+}
+GROUPS = ("LongitudinalAction", "LateralAction", "RoutingAction", "AppearanceAction")
+
+
+def private_action(node: Node, ctx: Context) -> PrivateAction:
+    """The action inside a <PrivateAction>."""
+    inner = node.only()
+    if inner.tag in GROUPS:
+        inner = inner.only()
+    if inner.tag not in PRIVATE:
+        raise inner.unsupported()
+    return PRIVATE[inner.tag](inner, ctx)

@@ -1,0 +1,171 @@
+"""Where to: places, routes and trajectories."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from skidpad.core.geometry import Pose
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.network import Network
+from skidpad.scenarios.positions import Position, position
+from skidpad.scenarios.routes import Route, compile_route, roads_through
+from skidpad.scenarios.scene import DONE, Actor, Running, Scene
+from skidpad.scenarios.tracking import PacedTrack, TimedTrack, Track
+from skidpad.scenarios.trajectories import Trajectory, compile_trajectory
+
+
+@dataclass(frozen=True, slots=True)
+class Teleport:
+    """Be somewhere else."""
+
+    position: Position
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """At once, keeping the demanded speed."""
+        actor.put(scene.network, self.position.place(scene), actor.guide.v)
+        return DONE
+
+
+def compile_teleport(node: Node, ctx: Context) -> Teleport:
+    """A <TeleportAction>."""
+    return Teleport(position(node.child("Position"), ctx))
+
+
+@dataclass(frozen=True, slots=True)
+class AssignRoute:
+    """Take certain roads from now on."""
+
+    route: Route
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """At once; it matters at the next fork."""
+        del scene
+        actor.guide.roads = self.route.roads
+        return DONE
+
+
+def compile_assign_route(node: Node, ctx: Context) -> AssignRoute:
+    """An <AssignRouteAction>."""
+    return AssignRoute(compile_route(node.only(), ctx))
+
+
+@dataclass(frozen=True, slots=True)
+class AcquirePosition:
+    """Drive to a place: its roads from now on."""
+
+    position: Position
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """At once; it matters at the next fork."""
+        actor.guide.roads = _way_there(scene.network, actor, self.position, scene)
+        return DONE
+
+
+def _way_there(network: Network, actor: Actor, goal: Position, scene: Scene) -> tuple[int, ...]:
+    here, there = actor.guide.base, goal.place(scene).lane
+    if here is None or there is None:
+        scene.notice(f"{actor.name} acquires no position: it or the place is on no road")
+        return ()
+    return roads_through(network, (here, there))
+
+
+def compile_acquire(node: Node, ctx: Context) -> AcquirePosition:
+    """An <AcquirePositionAction>."""
+    return AcquirePosition(position(node.child("Position"), ctx))
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """How the times of a trajectory are read; relative: they count from the action's begin."""
+
+    relative: bool
+    scale: float
+    offset: float
+
+
+@dataclass(frozen=True, slots=True)
+class FollowTrajectory:
+    """Go along a line by its times, or at the own speed where timing is None."""
+
+    trajectory: Trajectory
+    timing: Timing | None
+    s_begin: float
+
+    @property
+    def first(self) -> Pose | None:
+        """Where it is at the begin of the scenario; None where that depends on what moves."""
+        line = self.trajectory.line
+        if line is None:
+            return None
+        if self.timing is None or line.t is None:
+            return line.at_length(self.s_begin)
+        return line.at_time(-self.timing.offset / self.timing.scale)
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """Absolute times count from the begin of the scenario."""
+        line = self.trajectory.traced(scene)
+        guide = actor.guide
+        track: Track
+        if self.timing is None or line.t is None:
+            track = PacedTrack(line, self.s_begin, scene.t, self.trajectory.closed, lambda: guide.v)
+            actor.track = track
+            return Paced(actor, track)
+        begin = self.timing.offset + (scene.t if self.timing.relative else 0.0)
+        track = TimedTrack(line, begin, self.timing.scale)
+        actor.track = track
+        return Timed(actor, track)
+
+
+class Timed:
+    """A timed trajectory under way."""
+
+    def __init__(self, actor: Actor, track: TimedTrack) -> None:
+        self.actor, self.track = actor, track
+
+    def step(self, scene: Scene) -> bool:
+        """Until the last point; the entity then drives on along its lane."""
+        if self.actor.track is not self.track:
+            return True
+        if scene.t < self.track.end - 1e-9:
+            v = self.track.at(min(scene.t + scene.dt, self.track.end))[1]
+            self.actor.guide.v, self.actor.guide.a = v, 0.0
+            return False
+        self.actor.follow_road(scene.network, self.track.v_end)
+        return True
+
+
+class Paced:
+    """A trajectory at the entity's own speed."""
+
+    def __init__(self, actor: Actor, track: PacedTrack) -> None:
+        self.actor, self.track = actor, track
+
+    def step(self, scene: Scene) -> bool:
+        """Until its end; the entity then drives on along its lane."""
+        if self.actor.track is not self.track:
+            return True
+        if not self.track.step(scene.t):
+            return False
+        self.actor.follow_road(scene.network, self.actor.guide.v)
+        return True
+
+
+def compile_follow(node: Node, ctx: Context) -> FollowTrajectory:
+    """A <FollowTrajectoryAction>, with the places of its parts in 1.0 and since."""
+    reference = node.find("Trajectory") or node.find("CatalogReference")
+    if reference is None:
+        reference = node.child("TrajectoryRef").only()
+    trajectory = compile_trajectory(reference, ctx)
+    timing = (node.find("TimeReference") or node).find("Timing")
+    s = node.number("initialDistanceOffset", 0.0)
+    if timing is None:
+        return FollowTrajectory(trajectory, None, s)
+    domain = timing.text("domainAbsoluteRelative")
+    if domain not in ("absolute", "relative"):
+        raise timing.error(f"domainAbsoluteRelative must be absolute or relative, got {domain!r}")
+    scale = timing.number("scale", 1.0)
+    if scale <= 0.0:
+        raise timing.error(f"scale must be positive, got {scale:g}")
+    how = Timing(domain == "relative", scale, timing.number("offset", 0.0))
+    return FollowTrajectory(trajectory, how, s)

@@ -1,0 +1,198 @@
+"""Changes of speed: to a value, to that of another entity, by a profile."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise
+from math import copysign, inf
+
+from skidpad.scenarios.actions.base import Dimension, Dynamics, Following, dynamics
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.entities import Performance
+from skidpad.scenarios.motion import SLOW, STEEPEST, Shape, Transition
+from skidpad.scenarios.scene import Actor, Running, Scene
+
+
+class Relation(Enum):
+    """How a relative speed is meant."""
+
+    DELTA = "delta"
+    FACTOR = "factor"
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A speed, perhaps of another entity."""
+
+    value: float
+    other: str | None = None
+    relation: Relation = Relation.DELTA
+    continuous: bool = False
+
+    def speed(self, scene: Scene) -> float:
+        """As it is now, m/s."""
+        if self.other is None:
+            return self.value
+        v = scene.actors[self.other].guide.v
+        return v * self.value if self.relation is Relation.FACTOR else v + self.value
+
+
+@dataclass(frozen=True, slots=True)
+class Speed:
+    """Change of the demanded speed."""
+
+    dynamics: Dynamics
+    target: Target
+
+    @property
+    def at_once(self) -> bool:
+        """It takes no time."""
+        d = self.dynamics
+        return d.shape is Shape.STEP or (d.dimension is not Dimension.RATE and d.value <= 0.0)
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """From the speed demanded so far."""
+        v, limits = actor.guide.v, actor.entity.performance
+        end = limited(self.target.speed(scene), limits)
+        if self.dynamics.dimension is Dimension.DISTANCE:
+            span = over_distance(v, end, self.dynamics)
+        else:
+            span = self.dynamics.span(end - v)
+        span = max(span, least_span(end - v, span, self.dynamics.shape, limits))
+        change = Transition(v, end, span, self.dynamics.shape)
+        follow = self.target if self.target.continuous else None
+        actor.longitudinal = ChangeOfSpeed(actor, change, scene.t, follow)
+        return actor.longitudinal
+
+
+def limited(v: float, limits: Performance) -> float:
+    """A speed that the entity can reach."""
+    return copysign(min(abs(v), limits.v_max), v)
+
+
+def over_distance(v: float, end: float, change: Dynamics) -> float:
+    """Time of a change over a distance: it takes place at the mean of both speeds."""
+    if change.shape is Shape.STEP or abs(end - v) < SLOW:
+        return 0.0
+    way = max(change.value, 0.0)
+    if v * end >= 0.0:
+        return 2.0 * way / abs(v + end)
+    share = v * v / (v * v + end * end)  # of the way until it stands; then it goes the other way
+    return 2.0 * way * share / abs(v) + 2.0 * way * (1.0 - share) / abs(end)
+
+
+def least_span(size: float, span: float, shape: Shape, limits: Performance) -> float:
+    """Time that the entity needs at least; a step stays one."""
+    most = limits.a_max if size > 0.0 else limits.b_max
+    if span <= 0.0 or shape is Shape.STEP or most == inf:
+        return 0.0
+    return abs(size) * STEEPEST[shape] / most
+
+
+class ChangeOfSpeed:
+    """A speed action under way; follow: a target that is kept to when it is reached."""
+
+    def __init__(
+        self, actor: Actor, change: Transition, began: float, follow: Target | None = None
+    ) -> None:
+        self.actor, self.change, self.began, self.follow = actor, change, began, follow
+
+    def step(self, scene: Scene) -> bool:
+        """Demand the speed of the end of this step."""
+        if self.actor.longitudinal is not self:
+            return True
+        t = scene.t + scene.dt - self.began
+        guide = self.actor.guide
+        guide.v, guide.a, _ = self.change.at(t)
+        if self.follow is None:
+            return self.change.over(t)
+        if self.change.over(t):
+            v = limited(self.follow.speed(scene), self.actor.entity.performance)
+            guide.v, guide.a = v, 0.0
+        return False
+
+
+def compile_speed(node: Node, ctx: Context) -> Speed:
+    """A <SpeedAction>."""
+    change = dynamics(node.child("SpeedActionDynamics"))
+    target = node.child("SpeedActionTarget").only()
+    if target.tag == "AbsoluteTargetSpeed":
+        return Speed(change, Target(target.number("value")))
+    if target.tag != "RelativeTargetSpeed":
+        raise target.unsupported()
+    relation = target.choice("speedTargetValueType", Relation)
+    continuous = target.flag("continuous", default=False)
+    other = ctx.entity(target)
+    return Speed(change, Target(target.number("value"), other, relation, continuous))
+
+
+@dataclass(frozen=True, slots=True)
+class Profile:
+    """Speeds one after the other; a time of None means as fast as the entity can."""
+
+    entries: tuple[tuple[float, float | None], ...]  # speed in m/s, seconds
+    other: str | None
+    limits: Performance
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """From the speed demanded so far."""
+        base = 0.0 if self.other is None else scene.actors[self.other].guide.v
+        own = actor.entity.performance
+        a = min(self.limits.a_max, own.a_max, DEFAULT_CHANGE)
+        b = min(self.limits.b_max, own.b_max, DEFAULT_CHANGE)
+        times, speeds = [scene.t], [actor.guide.v]
+        for entry, duration in self.entries:
+            v = limited(base + entry, own)
+            needed = abs(v - speeds[-1]) / (a if v > speeds[-1] else b)
+            times.append(times[-1] + (needed if duration is None else duration))
+            speeds.append(v)
+        actor.longitudinal = Profiled(actor, times, speeds)
+        return actor.longitudinal
+
+
+DEFAULT_CHANGE = 10.0  # m/s^2, where a profile's file and its vehicle set no limit
+
+
+class Profiled:
+    """A profile under way: straight lines between its speeds."""
+
+    def __init__(self, actor: Actor, times: list[float], speeds: list[float]) -> None:
+        self.actor, self.rows = actor, list(zip(times, speeds, strict=True))
+
+    def step(self, scene: Scene) -> bool:
+        """Demand the speed of the end of this step."""
+        if self.actor.longitudinal is not self:
+            return True
+        t, guide = scene.t + scene.dt, self.actor.guide
+        for (t0, v0), (t1, v1) in pairwise(self.rows):
+            if t0 <= t < t1:
+                guide.a = (v1 - v0) / (t1 - t0)
+                guide.v = v0 + guide.a * (t - t0)
+                return False
+        guide.v, guide.a = self.rows[-1][1], 0.0
+        return True
+
+
+def compile_profile(node: Node, ctx: Context) -> Profile:
+    """A <SpeedProfileAction>."""
+    node.choice("followingMode", Following, Following.POSITION)
+    entries = []
+    for entry in node.children("SpeedProfileEntry"):
+        duration = entry.number("time") if entry.has("time") else None
+        if duration is not None and duration < 0.0:
+            raise entry.error(f"time must be >= 0, got {duration:g}")
+        entries.append((entry.number("speed"), duration))
+    if not entries:
+        raise node.error("needs a <SpeedProfileEntry>")
+    limits = Performance()
+    found = node.find("DynamicConstraints")
+    if found is not None:
+        limits = Performance(
+            found.limit("maxSpeed", inf),
+            found.limit("maxAcceleration", inf),
+            found.limit("maxDeceleration", inf),
+        )
+    other = ctx.entity(node) if node.has("entityRef") else None
+    return Profile(tuple(entries), other, limits)

@@ -1,0 +1,149 @@
+"""Actions without an actor: entities come and go, values change, lights switch, weather is set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from skidpad.core.setup import ActorCommand
+from skidpad.scenarios.actions.base import GlobalAction, NoEffect
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.environment import Environment, compile_environment
+from skidpad.scenarios.expressions import as_text
+from skidpad.scenarios.positions import Position, position
+from skidpad.scenarios.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class AddEntity:
+    """Appear."""
+
+    name: str
+    position: Position
+
+    def happen(self, scene: Scene) -> None:
+        """At a place, with the speed demanded so far."""
+        actor = scene.actors[self.name]
+        actor.put(scene.network, self.position.place(scene), actor.guide.v)
+
+
+@dataclass(frozen=True, slots=True)
+class DeleteEntity:
+    """Vanish."""
+
+    name: str
+
+    def happen(self, scene: Scene) -> None:
+        """From the next step on."""
+        actor = scene.actors[self.name]
+        actor.present = False
+        actor.word = ActorCommand(self.name, present=False)
+
+
+def _entity(node: Node, ctx: Context) -> GlobalAction:
+    name, what = ctx.entity(node), node.only()
+    if what.tag == "AddEntityAction":
+        return AddEntity(name, position(what.child("Position"), ctx))
+    if what.tag == "DeleteEntityAction":
+        return DeleteEntity(name)
+    raise what.unsupported()
+
+
+@dataclass(frozen=True, slots=True)
+class SetValue:
+    """A parameter or variable gets another value; change works it out from the old one."""
+
+    name: str
+    variable: bool
+    change: Callable[[str], str]
+
+    def happen(self, scene: Scene) -> None:
+        """At once."""
+        values = scene.variables if self.variable else scene.parameters
+        values[self.name] = self.change(values[self.name])
+
+
+def _value(node: Node, ctx: Context) -> GlobalAction:
+    variable = node.tag == "VariableAction"
+    known = ctx.variables if variable else ctx.parameters
+    name = node.plain("variableRef" if variable else "parameterRef")
+    if name not in known:
+        raise node.error(f"{'variable' if variable else 'parameter'} {name!r} is not declared")
+    what = node.only()
+    if what.tag == "SetAction":
+        value = what.text("value")
+        return SetValue(name, variable, lambda _: value)
+    if what.tag != "ModifyAction":
+        raise what.unsupported()
+    rule = what.child("Rule").only()
+    size = rule.number("value")
+    try:
+        float(known[name])
+    except ValueError:
+        raise node.error(f"{name!r} is no number and cannot be changed by one") from None
+    if rule.tag == "AddValue":
+        return SetValue(name, variable, lambda old: as_text(float(old) + size))
+    if rule.tag == "MultiplyByValue":
+        return SetValue(name, variable, lambda old: as_text(float(old) * size))
+    raise rule.unsupported()
+
+
+@dataclass(frozen=True, slots=True)
+class SetSignal:
+    """A signal or a controller gets a state; conditions see it, the road's lights do not."""
+
+    name: str
+    state: str
+
+    def happen(self, scene: Scene) -> None:
+        """At once."""
+        scene.signals[self.name] = self.state
+
+
+def _infrastructure(node: Node, ctx: Context) -> GlobalAction:
+    del ctx
+    what = node.child("TrafficSignalAction").only()
+    if what.tag == "TrafficSignalStateAction":
+        return SetSignal(what.text("name"), what.text("state"))
+    if what.tag == "TrafficSignalControllerAction":
+        return SetSignal(what.text("trafficSignalControllerRef"), what.text("phase"))
+    raise what.unsupported()
+
+
+@dataclass(frozen=True, slots=True)
+class SetEnvironment:
+    """Weather, time of day and road. A run has one: that of <Init>."""
+
+    environment: Environment
+
+    def happen(self, scene: Scene) -> None:
+        """Later ones are noted."""
+        scene.notice("an <EnvironmentAction> after the begin has no effect")
+
+
+def _environment(node: Node, ctx: Context) -> GlobalAction:
+    return SetEnvironment(compile_environment(ctx.catalogs.resolved(node.only())))
+
+
+GLOBAL: Mapping[str, Callable[[Node, Context], GlobalAction]] = {
+    "EntityAction": _entity,
+    "ParameterAction": _value,
+    "VariableAction": _value,
+    "InfrastructureAction": _infrastructure,
+    "EnvironmentAction": _environment,
+}
+
+
+def global_action(node: Node, ctx: Context) -> GlobalAction:
+    """The action inside a <GlobalAction>."""
+    inner = node.only()
+    if inner.tag not in GLOBAL:
+        raise inner.unsupported()
+    return GLOBAL[inner.tag](inner, ctx)
+
+
+def user_defined(node: Node, ctx: Context) -> GlobalAction:
+    """A <UserDefinedAction>: nobody but its author knows what it means."""
+    del ctx
+    return NoEffect(node.tag)

@@ -1,0 +1,1 @@
+"""Conditions of triggers: what holds now or not, by value and by entity."""

@@ -1,0 +1,58 @@
+"""What all conditions are, and rules by which they compare."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.parameters import RULES
+from skidpad.scenarios.scene import Scene
+
+Probe = Callable[[Scene], bool]
+SAME = 1e-9  # differences below this come from adding up steps
+
+
+class Condition(Protocol):
+    """Something that holds now or not; `probe` makes what is asked once per step."""
+
+    def probe(self) -> Probe:
+        """A fresh observer, as a run begins."""
+        ...
+
+
+class EntityCondition(Protocol):
+    """Something that holds for an entity or not."""
+
+    def holds(self, scene: Scene, actor: str) -> bool:
+        """Looked at once per step and entity."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Rule:
+    """Compares with a number."""
+
+    rule: str
+    value: float
+
+    def met(self, quantity: float) -> bool:
+        """Whether the quantity stands so to the value; infinity is beyond every number."""
+        difference = quantity - self.value
+        if abs(difference) < SAME:
+            return self.rule in ("equalTo", "greaterOrEqual", "lessOrEqual")
+        return RULES[self.rule](quantity, self.value)
+
+
+def rule(node: Node, value: str = "value") -> Rule:
+    """The attributes `rule` and `value` of a condition."""
+    return Rule(rule_name(node), node.number(value))
+
+
+def rule_name(node: Node) -> str:
+    """The attribute `rule`."""
+    name = node.text("rule")
+    if name not in RULES:
+        raise node.unsupported(f"rule={name!r} is not supported, only {', '.join(RULES)}")
+    return name

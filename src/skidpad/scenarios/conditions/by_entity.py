@@ -1,0 +1,237 @@
+"""Conditions on entities: their motion, their places, and each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from math import hypot, inf
+
+from skidpad.core.geometry import wrap_angle
+from skidpad.scenarios.conditions.base import EntityCondition, Rule, rule
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.entities import Body
+from skidpad.scenarios.network import next_lane_id
+from skidpad.scenarios.positions import Position, position
+from skidpad.scenarios.scene import Actor, Scene
+
+SOME = 1e-9  # s, what has begun to last
+
+
+class Quantity(Enum):
+    """How long something has lasted, or how far it went."""
+
+    TRAVELLED = "TraveledDistanceCondition"
+    STOOD = "StandStillCondition"
+    OFF_ROAD = "OffroadCondition"
+    AT_END = "EndOfRoadCondition"
+
+
+@dataclass(frozen=True, slots=True)
+class Reaches:
+    """A count of an entity is at least a value."""
+
+    quantity: Quantity
+    value: float
+
+    def holds(self, scene: Scene, actor: str) -> bool:
+        """As it is now; before the first tick nothing has lasted."""
+        a = scene.actors[actor]
+        if self.quantity is Quantity.OFF_ROAD:
+            lasted = a.off_road(scene.network, scene.t)
+        else:
+            counts = {
+                Quantity.TRAVELLED: a.travelled,
+                Quantity.STOOD: a.stood,
+                Quantity.AT_END: a.at_end,
+            }
+            lasted = counts[self.quantity]
+        least = 0.0 if self.quantity is Quantity.TRAVELLED else SOME
+        return lasted >= max(self.value - SOME, least)
+
+
+def _reaches(node: Node, ctx: Context) -> EntityCondition:
+    del ctx
+    quantity = Quantity(node.tag)
+    name = "value" if quantity is Quantity.TRAVELLED else "duration"
+    return Reaches(quantity, node.number(name))
+
+
+class Component(Enum):
+    """Of a motion, in the entity's own axes."""
+
+    TOTAL = ""
+    LONGITUDINAL = "longitudinal"
+    LATERAL = "lateral"
+    VERTICAL = "vertical"
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Speed or acceleration, own or relative to another entity."""
+
+    rule: Rule
+    component: Component
+    acceleration: bool
+    other: str | None
+
+    def holds(self, scene: Scene, actor: str) -> bool:
+        """Against the value."""
+        value = self._value(scene.actors[actor])
+        if self.other is not None:
+            value -= self._value(scene.actors[self.other])
+        return self.rule.met(value)
+
+    def _value(self, actor: Actor) -> float:
+        if self.component is Component.VERTICAL:
+            return 0.0
+        if self.acceleration:
+            return 0.0 if self.component is Component.LATERAL else actor.a
+        m = actor.motion
+        if self.component is Component.TOTAL:
+            return actor.v
+        if self.component is Component.LONGITUDINAL:
+            return m.speed
+        return (m.vx**2 + m.vy**2 - m.speed**2) ** 0.5 if actor.v > abs(m.speed) else 0.0
+
+
+def _motion(node: Node, ctx: Context) -> EntityCondition:
+    component = node.choice("direction", Component, Component.TOTAL)
+    other = ctx.entity(node) if node.tag == "RelativeSpeedCondition" else None
+    return Motion(rule(node), component, node.tag == "AccelerationCondition", other)
+
+
+@dataclass(frozen=True, slots=True)
+class ReachPosition:
+    """Within a tolerance of a place."""
+
+    tolerance: float
+    position: Position
+
+    def holds(self, scene: Scene, actor: str) -> bool:
+        """Straight distance."""
+        goal, here = self.position.place(scene).pose, scene.actors[actor].pose
+        return hypot(goal.x - here.x, goal.y - here.y) <= self.tolerance
+
+
+def _reach_position(node: Node, ctx: Context) -> EntityCondition:
+    return ReachPosition(node.number("tolerance"), position(node.child("Position"), ctx))
+
+
+@dataclass(frozen=True, slots=True)
+class Collision:
+    """The entity touches another one, or one of a kind."""
+
+    others: tuple[str, ...]
+
+    def holds(self, scene: Scene, actor: str) -> bool:
+        """Now."""
+        return any(other != actor and scene.touch(actor, other) for other in self.others)
+
+
+def _collision(node: Node, ctx: Context) -> EntityCondition:
+    by = node.only()
+    if by.tag == "EntityRef":
+        return Collision(ctx.actors([by]))
+    if by.tag != "ByType":
+        raise by.unsupported()
+    body = by.choice("type", Body)
+    return Collision(tuple(n for n, e in ctx.entities.items() if e.body is body))
+
+
+@dataclass(frozen=True, slots=True)
+class Angle:
+    """Heading against another entity's, or against the lane, within a tolerance."""
+
+    angle: float
+    tolerance: float
+    other: str | None
+
+    def holds(self, scene: Scene, actor: str) -> bool:
+        """As it is now."""
+        here = scene.actors[actor].pose
+        if self.other is not None:
+            base = scene.actors[self.other].pose.yaw
+        else:
+            lane = scene.network.place_of(here).lane
+            base = 0.0 if lane is None else lane.heading
+        return abs(wrap_angle(here.yaw - base - self.angle)) <= self.tolerance
+
+
+def _angle(node: Node, ctx: Context) -> EntityCondition:
+    if node.text("angleType") != "heading":
+        raise node.unsupported("only angleType heading is supported")
+    other = ctx.entity(node) if node.tag == "RelativeAngleCondition" else None
+    return Angle(node.number("angle"), node.number("angleTolerance"), other)
+
+
+@dataclass(frozen=True, slots=True)
+class Clearance:
+    """No entity within a stretch of lanes beside, before and behind."""
+
+    others: tuple[str, ...]
+    ahead: float
+    behind: float
+    free: bool
+    opposite: bool
+    lanes: tuple[tuple[float, float], ...]  # from, to; relative to the own lane
+
+    def holds(self, scene: Scene, actor: str) -> bool:
+        """Nothing is there now."""
+        here = scene.actors[actor]
+        base = scene.network.place_of(here.pose).lane
+        others = (n for n in self.others if n != actor and scene.actors[n].present)
+        if base is None:
+            return True
+        sign = 1 if scene.network.forward(base) == (here.guide.along > 0.0) else -1
+        return not any(self._inside(scene, here, base.lane_id, sign, n) for n in others)
+
+    def _inside(self, scene: Scene, here: Actor, lane: int, sign: int, other: str) -> bool:
+        it = scene.actors[other]
+        there = scene.network.place_of(it.pose).lane
+        if there is None:
+            return False
+        wanted = {
+            next_lane_id(lane, sign * k) if k else lane
+            for low, high in self.lanes
+            for k in range(int(max(low, -9)), int(min(high, 9)) + 1)
+        }
+        if self.lanes and there.lane_id not in wanted:
+            return False
+        if self.opposite and abs(wrap_angle(it.pose.yaw - here.pose.yaw)) < 1.57:
+            return False
+        forward, _ = scene.between(here.name, other)
+        room = 0.5 * (here.entity.box.length + it.entity.box.length) if self.free else 0.0
+        return -self.behind - room <= forward <= self.ahead + room
+
+
+def _clearance(node: Node, ctx: Context) -> EntityCondition:
+    lanes = tuple(
+        (r.limit("from", -inf), r.limit("to", inf)) for r in node.children("RelativeLaneRange")
+    )
+    named = ctx.actors(node.children("EntityRef"))
+    return Clearance(
+        named or tuple(ctx.entities),
+        node.number("distanceForward", 0.0),
+        node.number("distanceBackward", 0.0),
+        node.flag("freeSpace", default=False),
+        node.flag("oppositeLanes", default=False),
+        lanes,
+    )
+
+
+BY_ENTITY: Mapping[str, Callable[[Node, Context], EntityCondition]] = {
+    "TraveledDistanceCondition": _reaches,
+    "StandStillCondition": _reaches,
+    "OffroadCondition": _reaches,
+    "EndOfRoadCondition": _reaches,
+    "SpeedCondition": _motion,
+    "RelativeSpeedCondition": _motion,
+    "AccelerationCondition": _motion,
+    "ReachPositionCondition": _reach_position,
+    "CollisionCondition": _collision,
+    "AngleCondition": _angle,
+    "RelativeAngleCondition": _angle,
+    "RelativeClearanceCondition": _clearance,
+}

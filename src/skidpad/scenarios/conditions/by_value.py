@@ -1,0 +1,146 @@
+"""Conditions on time, values, signals and the storyboard itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from skidpad.scenarios.conditions.base import Condition, Probe, Rule, rule, rule_name
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.findings import Kind
+from skidpad.scenarios.parameters import compared
+from skidpad.scenarios.scene import Move, Path, Scene, State
+
+
+@dataclass(frozen=True, slots=True)
+class SimulationTime:
+    """Time since the scenario began."""
+
+    rule: Rule
+
+    def probe(self) -> Probe:
+        """t against the value."""
+        return lambda scene: self.rule.met(scene.t)
+
+
+def _time(node: Node, ctx: Context) -> Condition:
+    del ctx
+    return SimulationTime(rule(node))
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A parameter or a variable against a value, as numbers where both are."""
+
+    name: str
+    variable: bool
+    rule: str
+    value: str
+
+    def probe(self) -> Probe:
+        """As it is now."""
+        return self._holds
+
+    def _holds(self, scene: Scene) -> bool:
+        values = scene.variables if self.variable else scene.parameters
+        return compared(self.rule, values[self.name], self.value)
+
+
+def _value(node: Node, ctx: Context) -> Condition:
+    variable = node.tag == "VariableCondition"
+    known = ctx.variables if variable else ctx.parameters
+    name = node.plain("variableRef" if variable else "parameterRef")
+    if name not in known and (not name or _is_criterion(node)):
+        what = f"a criterion of ScenarioRunner ({name!r} is not declared) never holds"
+        ctx.findings.append(node.finding(what, Kind.NOTE))
+        return Never()
+    if name not in known:
+        raise node.error(f"{'variable' if variable else 'parameter'} {name!r} is not declared")
+    return Value(name, variable, rule_name(node), node.text("value"))
+
+
+def _is_criterion(node: Node) -> bool:
+    """ScenarioRunner judges by conditions of these names, and reads nothing else of them."""
+    named = next(node.element.iterancestors("Condition"), None)
+    return named is not None and str(named.get("name", "")).startswith("criteria_")
+
+
+@dataclass(frozen=True, slots=True)
+class Never:
+    """In the place of a condition that means nothing here."""
+
+    def probe(self) -> Probe:
+        """Never."""
+        return lambda _: False
+
+
+@dataclass(frozen=True, slots=True)
+class ElementState:
+    """An element is in a state."""
+
+    path: Path
+    state: State
+
+    def probe(self) -> Probe:
+        """As it is now."""
+        return lambda scene: scene.states.get(self.path, State.STANDBY) is self.state
+
+
+@dataclass(frozen=True, slots=True)
+class ElementMove:
+    """An element has just gone through a transition."""
+
+    path: Path
+    move: Move
+
+    def probe(self) -> Probe:
+        """True once after each; every observer keeps its own place in the list of moves."""
+        seen = 0
+
+        def holds(scene: Scene) -> bool:
+            nonlocal seen
+            fresh, seen = scene.moves[seen:], len(scene.moves)
+            return (self.path, self.move) in fresh
+
+        return holds
+
+
+def _element(node: Node, ctx: Context) -> Condition:
+    path, text = ctx.element(node), node.text("state")
+    for kind in State:
+        if kind.value == text:
+            return ElementState(path, kind)
+    for move in Move:
+        if move.value == text:
+            return ElementMove(path, move)
+    raise node.unsupported(f"state={text!r} is not supported")
+
+
+@dataclass(frozen=True, slots=True)
+class Signal:
+    """A signal or signal controller is in the state that the file has set."""
+
+    name: str
+    state: str
+
+    def probe(self) -> Probe:
+        """As it is now."""
+        return lambda scene: scene.signals.get(self.name) == self.state
+
+
+def _signal(node: Node, ctx: Context) -> Condition:
+    del ctx
+    if node.tag == "TrafficSignalCondition":
+        return Signal(node.text("name"), node.text("state"))
+    return Signal(node.text("trafficSignalControllerRef"), node.text("phase"))
+
+
+BY_VALUE: Mapping[str, Callable[[Node, Context], Condition]] = {
+    "SimulationTimeCondition": _time,
+    "ParameterCondition": _value,
+    "VariableCondition": _value,
+    "StoryboardElementStateCondition": _element,
+    "TrafficSignalCondition": _signal,
+    "TrafficSignalControllerCondition": _signal,
+}

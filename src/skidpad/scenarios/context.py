@@ -1,0 +1,68 @@
+"""What the parts of a scenario need to know of each other while it is compiled."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, TypeVar
+
+from skidpad.scenarios.catalogs import Catalogs
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.entities import Entity
+from skidpad.scenarios.findings import Fault, Finding
+from skidpad.scenarios.network import Network
+
+Made = TypeVar("Made")
+Path = tuple[str, ...]  # names from the story down to a storyboard element
+
+
+@dataclass(slots=True)
+class Context:
+    """One file's compilation. elements: paths of all storyboard elements, with their types."""
+
+    network: Network
+    catalogs: Catalogs
+    entities: Mapping[str, Entity]
+    groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  # entity selections
+    parameters: Mapping[str, str] = field(default_factory=dict)
+    variables: Mapping[str, str] = field(default_factory=dict)
+    signals: frozenset[str] = frozenset()
+    # places on what is itself made of places: routes and trajectories
+    further_positions: Mapping[str, Callable[[Node, Context], Any]] = field(default_factory=dict)
+    added: frozenset[str] = frozenset()  # entities that some event adds
+    elements: Sequence[tuple[str, Path]] = ()
+    findings: list[Finding] = field(default_factory=list)
+
+    def entity(self, node: Node, name: str = "entityRef") -> str:
+        """An entity that an attribute names; a fault when there is none."""
+        text = node.text(name)
+        if text not in self.entities:
+            raise node.error(f"{name}: there is no entity {text!r}")
+        return text
+
+    def actors(self, nodes: Iterable[Node]) -> tuple[str, ...]:
+        """The entities that <EntityRef>s name, selections taken apart."""
+        found: list[str] = []
+        for node in nodes:
+            name = node.text("entityRef")
+            members = self.groups.get(name) or (self.entity(node),)
+            found += [m for m in members if m not in found]
+        return tuple(found)
+
+    def element(self, node: Node) -> Path:
+        """The storyboard element that a condition names, by its name or the end of its path."""
+        text = node.text("storyboardElementRef")
+        kind = node.text("storyboardElementType", "")
+        wanted = tuple(text.split("::"))
+        fits = [p for k, p in self.elements if p[-len(wanted) :] == wanted and kind in ("", k)]
+        if not fits:
+            raise node.error(f"storyboardElementRef: there is no {kind or 'element'} {text!r}")
+        return fits[0]
+
+    def attempt(self, make: Callable[[], Made]) -> Made | None:
+        """What is made, or None with the fault on the list, so that one hides no other."""
+        try:
+            return make()
+        except Fault as fault:
+            self.findings.append(fault.finding)
+            return None

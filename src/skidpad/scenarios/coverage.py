@@ -1,0 +1,106 @@
+"""Which elements of OpenSCENARIO XML are understood: read from the tables that the compiler uses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum
+from types import MappingProxyType
+
+from lxml import etree
+
+from skidpad.scenarios.actions.controllers import TABLE as CONTROLLERS
+from skidpad.scenarios.actions.private import GROUPS, PRIVATE
+from skidpad.scenarios.actions.world import GLOBAL
+from skidpad.scenarios.conditions.by_value import BY_VALUE
+from skidpad.scenarios.positions import POSITIONS
+from skidpad.scenarios.scenario import FURTHER_POSITIONS
+from skidpad.scenarios.schema import schema_file
+from skidpad.scenarios.trajectories import SHAPES
+from skidpad.scenarios.triggers import ENTITY_CONDITIONS
+
+XS = "{http://www.w3.org/2001/XMLSchema}"
+ENDINGS = ("Action", "Condition", "Position", "TargetLane", "TargetLaneOffset", "TargetSpeed")
+INSIDE = frozenset(  # understood where they stand inside others
+    {
+        "AbsoluteTargetSpeed", "RelativeTargetSpeed", "AbsoluteTargetLane", "RelativeTargetLane",
+        "AbsoluteTargetLaneOffset", "RelativeTargetLaneOffset", "AddEntityAction",
+        "DeleteEntityAction", "SetAction", "ModifyAction", "TrafficSignalStateAction",
+        "TrafficSignalControllerAction", "TrafficSignalAction", "UserDefinedAction",
+        "GlobalAction", "PrivateAction", "Position", "Action", "Condition", "EntityCondition",
+        "ByEntityCondition", "ByValueCondition",
+        "TargetPosition", "InRoutePosition", "RoadCondition",
+    }
+)  # fmt: skip
+PARTIAL: Mapping[str, str] = MappingProxyType(
+    {
+        "EnvironmentAction": "in <Init>, where its friction scale counts; the weather is the run's",
+        "TrafficSignalStateAction": "conditions see it, the lights of the road do not",
+        "TrafficSignalControllerAction": "conditions see it, the lights of the road do not",
+        "TrafficSignalCondition": "sees states that the file has set",
+        "TrafficSignalControllerCondition": "sees phases that the file has set",
+        "InfrastructureAction": "conditions see it, the lights of the road do not",
+        "AngleCondition": "headings only",
+        "RelativeAngleCondition": "headings only",
+        "AssignControllerAction": "matters for the ego only",
+        "ActivateControllerAction": "matters for the ego only",
+        "GeoPosition": "on the plane that touches the earth at the map's origin",
+        "AcquirePositionAction": "chooses the way at forks; does not change lanes by itself",
+        "AssignRouteAction": "chooses the way at forks; does not change lanes by itself",
+        "UserDefinedAction": "is noted, without effect",
+        "OverrideControllerValueAction": "is noted, without effect",
+    }
+)
+
+
+class Support(Enum):
+    """How far an element is understood."""
+
+    YES = "yes"
+    PARTIAL = "partial"
+    NO = "no"
+
+
+@dataclass(frozen=True, slots=True)
+class Coverage:
+    """One element of the standard."""
+
+    element: str
+    support: Support
+    remark: str = ""
+
+
+def without_effect() -> tuple[str, ...]:
+    """Actions that are read and noted, and change nothing that this world can show."""
+    return tuple(tag for tag, make in PRIVATE.items() if make.__name__ == "no_effect")
+
+
+def known_elements() -> frozenset[str]:
+    """Elements that the compiler has a place for."""
+    tables = (
+        PRIVATE,
+        GLOBAL,
+        BY_VALUE,
+        ENTITY_CONDITIONS,
+        POSITIONS,
+        FURTHER_POSITIONS,
+        SHAPES,
+        CONTROLLERS,
+    )
+    return INSIDE.union(GROUPS, *tables)
+
+
+def coverage() -> list[Coverage]:
+    """Actions, conditions, positions, targets and shapes of OpenSCENARIO XML 1.3, by name."""
+    schema = etree.parse(str(schema_file("3")))
+    names = {str(e.get("name")) for e in schema.iter(f"{XS}element")}
+    wanted = {n for n in names if n.endswith(ENDINGS)} | set(SHAPES)
+    known, silent = known_elements(), without_effect()
+    found = []
+    for name in sorted(wanted):
+        remark = "is noted, without effect" if name in silent else PARTIAL.get(name, "")
+        if name not in known:
+            found.append(Coverage(name, Support.NO))
+        else:
+            found.append(Coverage(name, Support.PARTIAL if remark else Support.YES, remark))
+    return found

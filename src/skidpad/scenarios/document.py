@@ -1,0 +1,189 @@
+"""OpenSCENARIO XML as elements with parameters filled in; what is wrong is named by line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from enum import Enum
+from math import isfinite
+from pathlib import Path
+from typing import Any, TypeVar
+
+from lxml import etree
+
+from skidpad.core.errors import FileError
+from skidpad.scenarios.expressions import ExpressionError, evaluate
+from skidpad.scenarios.findings import Fault, Finding, Kind
+
+SIZE_MAX = 64_000_000  # bytes
+TRUE, FALSE = ("true", "1"), ("false", "0")
+Choice = TypeVar("Choice", bound=Enum)
+
+
+@dataclass(frozen=True, slots=True)
+class Node:
+    """One element; attributes are read through it, with `$parameters` and expressions filled in."""
+
+    element: etree._Element
+    file: Path
+    values: Mapping[str, str]  # parameters in scope, by name
+
+    @property
+    def tag(self) -> str:
+        """Name of the element."""
+        return str(self.element.tag)
+
+    @property
+    def line(self) -> int:
+        """In the file, from 1."""
+        line: Any = self.element.sourceline
+        return int(line or 0)
+
+    def finding(self, what: str, kind: Kind = Kind.ERROR) -> Finding:
+        """Something about this element."""
+        return Finding(self.file.name, self.line, self.tag, what, kind)
+
+    def error(self, what: str) -> Fault:
+        """Something in this element is wrong."""
+        return Fault(self.finding(what))
+
+    def unsupported(self, what: str = "") -> Fault:
+        """The element is sound, but unknown here."""
+        text = what or f"<{self.tag}> is not supported"
+        return Fault(self.finding(text, Kind.UNSUPPORTED))
+
+    def scoped(self, values: Mapping[str, str]) -> Node:
+        """The same element with other parameters in scope."""
+        return replace(self, values=values)
+
+    def children(self, *tags: str) -> Iterator[Node]:
+        """Child elements, all or those with one of these names."""
+        for child in self.element.iterchildren(*(tags or ("*",))):
+            yield Node(child, self.file, self.values)
+
+    def find(self, *path: str) -> Node | None:
+        """The first descendant along a path of names."""
+        found: etree._Element | None = self.element
+        for tag in path:
+            found = None if found is None else found.find(tag)
+        return None if found is None else Node(found, self.file, self.values)
+
+    def child(self, *path: str) -> Node:
+        """The same; a fault when it is missing."""
+        found = self.find(*path)
+        if found is None:
+            raise self.error(f"needs <{'/'.join(path)}>")
+        return found
+
+    def only(self) -> Node:
+        """The single child of a choice such as <Position>."""
+        children = list(self.children())
+        if len(children) != 1:
+            raise self.error(f"needs exactly one child element, has {len(children)}")
+        return children[0]
+
+    def has(self, name: str) -> bool:
+        """Whether the attribute is there."""
+        return self.element.get(name) is not None
+
+    def label(self) -> str:
+        """The attribute `name` as it is shown to people; what cannot be worked out stays as it is."""
+        raw = self.element.get("name", "")
+        try:
+            return self.text("name", "")
+        except Fault:
+            return raw
+
+    def plain(self, name: str) -> str:
+        """An attribute that names a parameter, with or without its `$`."""
+        value = self.element.get(name)
+        if value is None:
+            raise self.error(f"needs the attribute {name}")
+        return value.removeprefix("$")
+
+    def text(self, name: str, default: str | None = None) -> str:
+        """An attribute; a fault when it is missing and there is no default."""
+        value = self.element.get(name)
+        if value is None:
+            if default is None:
+                raise self.error(f"needs the attribute {name}")
+            return default
+        return self.filled(value, name) if "$" in value else value
+
+    def filled(self, value: str, name: str) -> str:
+        """A text with its parameter or expression replaced; name: of the attribute."""
+        if value.startswith("${") and value.endswith("}"):
+            try:
+                return evaluate(value[2:-1], self.values)
+            except ExpressionError as error:
+                raise self.error(f"{name}: {value}: {error}") from None
+        if not value.startswith("$"):
+            return value
+        if value[1:] not in self.values:
+            raise self.error(f"{name}: parameter {value!r} is not declared")
+        return self.values[value[1:]]
+
+    def number(self, name: str, default: float | None = None) -> float:
+        """A finite number."""
+        value = self.limit(name, default)
+        if not isfinite(value):
+            raise self.error(f"{name} must be finite, got {value!r}")
+        return value
+
+    def limit(self, name: str, default: float | None = None) -> float:
+        """A number that may be infinite."""
+        text = self.text(name, None if default is None else repr(default))
+        try:
+            value = float(text)
+        except ValueError:
+            raise self.error(f"{name} must be a number, got {text!r}") from None
+        if value != value:
+            raise self.error(f"{name} must be a number, got {text!r}")
+        return value
+
+    def whole(self, name: str, default: int | None = None) -> int:
+        """A whole number."""
+        value = self.number(name, None if default is None else float(default))
+        if value != int(value):
+            raise self.error(f"{name} must be a whole number, got {value:g}")
+        return int(value)
+
+    def choice(self, name: str, allowed: type[Choice], default: Choice | None = None) -> Choice:
+        """One of the values that are known."""
+        text = self.text(name, None if default is None else default.value)
+        try:
+            return allowed(text)
+        except ValueError:
+            known = ", ".join(str(c.value) for c in allowed)
+            raise self.unsupported(f"{name}={text!r} is not supported, only {known}") from None
+
+    def flag(self, name: str, default: bool) -> bool:
+        """`true` or `false`."""
+        value = self.text(name, "true" if default else "false").lower()
+        if value not in TRUE + FALSE:
+            raise self.error(f"{name} must be true or false, got {value!r}")
+        return value in TRUE
+
+
+def parse(path: Path) -> Node:
+    """The root element of a file, without parameters; FileError when it is no OpenSCENARIO XML."""
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise FileError(f"scenario {path}: cannot be read: {error.strerror}") from None
+    if len(text) > SIZE_MAX:
+        raise FileError(f"scenario {path}: {len(text)} bytes are more than {SIZE_MAX}")
+    parser = etree.XMLParser(
+        resolve_entities=False, no_network=True, load_dtd=False, remove_comments=True,
+        remove_pis=True,
+    )  # fmt: skip
+    try:
+        root = etree.fromstring(text, parser)
+    except etree.XMLSyntaxError as error:
+        raise FileError(f"scenario {path}: not XML: {error.msg}") from None
+    info: Any = root.getroottree().docinfo
+    if info.doctype:
+        raise FileError(f"scenario {path}: a document type is not allowed")
+    if root.tag != "OpenSCENARIO":
+        raise FileError(f"scenario {path}: the root is <{root.tag}>, not <OpenSCENARIO>")
+    return Node(root, path, {})

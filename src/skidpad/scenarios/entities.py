@@ -1,0 +1,206 @@
+"""Entities: vehicles, pedestrians and objects of a scenario, as types that every backend knows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from math import inf
+
+from skidpad.core.vocabulary import ActorKind
+from skidpad.scenarios.catalogs import Catalogs
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.findings import Fault, Finding, Kind
+from skidpad.simulation.scripted import nearest_type
+
+EGO_NAMES = ("ego", "hero", "ego_vehicle")
+WHEELED = {
+    "car": ActorKind.CAR,
+    "van": ActorKind.VAN,
+    "truck": ActorKind.TRUCK,
+    "semitrailer": ActorKind.TRUCK,
+    "trailer": ActorKind.TRUCK,
+    "bus": ActorKind.BUS,
+    "train": ActorKind.BUS,
+    "tram": ActorKind.BUS,
+}
+TWO_WHEELED = ("bicycle", "motorbike", "standup_scooter", "wheelchair")
+PROPS = (("cone", 0.6), ("box", 1.5), ("barrier", inf))  # backend's props by largest size, m
+
+
+class Body(Enum):
+    """What kind of thing an entity is, as conditions by type name it."""
+
+    VEHICLE = "vehicle"
+    PEDESTRIAN = "pedestrian"
+    PROP = "miscellaneous"
+
+
+@dataclass(frozen=True, slots=True)
+class Box:
+    """Size in m, and where its centre lies seen from the entity's reference point."""
+
+    length: float = 4.5
+    width: float = 1.8
+    height: float = 1.5
+    forward: float = 0.0
+    left: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Performance:
+    """What an entity can do at most, SI."""
+
+    v_max: float = inf
+    a_max: float = inf
+    b_max: float = inf
+
+
+@dataclass(frozen=True, slots=True)
+class Entity:
+    """One entity. type: of the backend; wheels: it can be driven through the tyres."""
+
+    name: str
+    body: Body
+    type: str
+    wheels: bool
+    box: Box
+    performance: Performance = Performance()
+    properties: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def is_marked_ego(self) -> bool:
+        """The file says that this is the ego, as ScenarioRunner wants it said."""
+        return self.properties.get("type") == "ego_vehicle"
+
+
+@dataclass(frozen=True, slots=True)
+class Entities:
+    """All entities of a file, its selections of them, and what was wrong with the others."""
+
+    by_name: Mapping[str, Entity]
+    groups: Mapping[str, tuple[str, ...]]
+    findings: tuple[Finding, ...]
+
+
+def compile_entities(root: Node, catalogs: Catalogs) -> Entities:
+    """The <Entities> of a file."""
+    found: dict[str, Entity] = {}
+    findings: list[Finding] = []
+    node = root.child("Entities")
+    for one in node.children("ScenarioObject"):
+        try:
+            findings += _controllers(one, catalogs)
+            entity = _entity(one, catalogs)
+            if entity.name in found:
+                raise one.error(f"there are two entities {entity.name!r}")
+            found[entity.name] = entity
+        except Fault as fault:
+            findings.append(fault.finding)
+            found.setdefault(one.element.get("name", ""), UNKNOWN)  # one fault hides no other
+    groups = {}
+    for one in node.children("EntitySelection"):
+        try:
+            groups[one.text("name")] = tuple(_members(one, found))
+        except Fault as fault:
+            findings.append(fault.finding)
+    return Entities(found, groups, tuple(findings))
+
+
+UNKNOWN = Entity("", Body.PROP, "box", False, Box())
+
+
+def _members(node: Node, known: Mapping[str, Entity]) -> Iterator[str]:
+    members = node.child("Members")
+    for one in members.children("EntityRef"):
+        if one.text("entityRef") not in known:
+            raise one.error(f"there is no entity {one.text('entityRef')!r}")
+        yield one.text("entityRef")
+    kinds = [one.choice("objectType", Body) for one in members.children("ByType", "ByObjectType")]
+    yield from (name for name, entity in known.items() if entity.body in kinds)
+
+
+def _entity(node: Node, catalogs: Catalogs) -> Entity:
+    described = next((n for n in node.children() if n.tag != "ObjectController"), None)
+    if described is None:
+        raise node.error("needs a <Vehicle>, <Pedestrian>, <MiscObject> or a reference to one")
+    body = catalogs.resolved(described)
+    name = node.text("name")
+    properties = _properties(body)
+    if body.tag == "Vehicle":
+        return _vehicle(name, body, properties)
+    if body.tag == "Pedestrian":
+        box = _box(body, Box(0.5, 0.6, 1.8))
+        return Entity(name, Body.PEDESTRIAN, "pedestrian", False, box, properties=properties)
+    if body.tag == "MiscObject":
+        box = _box(body, Box(1.0, 1.0, 1.0))
+        size = max(box.length, box.width)
+        type = next(kind for kind, largest in PROPS if size <= largest)
+        return Entity(name, Body.PROP, type, False, box, properties=properties)
+    raise body.unsupported()
+
+
+def _controllers(node: Node, catalogs: Catalogs) -> Iterator[Finding]:
+    """Those that are nowhere: who drives is chosen by option, so that they are only noted."""
+    for controller in node.children("ObjectController"):
+        for reference in controller.children("CatalogReference"):
+            try:
+                catalogs.entry(reference)
+            except Fault as fault:
+                yield replace(fault.finding, kind=Kind.NOTE)
+
+
+def _vehicle(name: str, node: Node, properties: Mapping[str, str]) -> Entity:
+    category = node.text("vehicleCategory")
+    box, limits = _box(node, Box()), _performance(node)
+    if category in TWO_WHEELED:
+        return Entity(name, Body.VEHICLE, "bicycle", False, box, limits, properties)
+    if category not in WHEELED:
+        raise node.unsupported(f"vehicleCategory={category!r} is not supported")
+    type = nearest_type(WHEELED[category], box.length, box.width, box.height)
+    return Entity(name, Body.VEHICLE, type, True, box, limits, properties)
+
+
+def _box(node: Node, default: Box) -> Box:
+    box = node.find("BoundingBox")
+    if box is None:
+        return default
+    size, centre = box.child("Dimensions"), box.child("Center")
+    return Box(
+        size.number("length"),
+        size.number("width"),
+        size.number("height"),
+        centre.number("x"),
+        centre.number("y"),
+    )
+
+
+def _performance(node: Node) -> Performance:
+    found = node.find("Performance")
+    if found is None:
+        return Performance()
+    most = (found.limit(k) for k in ("maxSpeed", "maxAcceleration", "maxDeceleration"))
+    v, a, b = (m if m > 0.0 else inf for m in most)
+    return Performance(v, a, b)
+
+
+def _properties(node: Node) -> dict[str, str]:
+    found = node.find("Properties")
+    if found is None:
+        return {}
+    return {p.text("name"): p.text("value") for p in found.children("Property")}
+
+
+def choose_ego(root: Node, entities: Mapping[str, Entity], wanted: str | None) -> str:
+    """The ego: as asked for, as marked, by name, else the first vehicle."""
+    node = root.child("Entities")
+    if wanted is not None:
+        if wanted not in entities:
+            raise node.error(f"there is no entity {wanted!r}")
+        return wanted
+    vehicles = [e for e in entities.values() if e.wheels]
+    if not vehicles:
+        raise node.error("needs a vehicle that is the ego")
+    marked = [e.name for e in vehicles if e.is_marked_ego]
+    named = [e.name for e in vehicles if e.name.lower() in EGO_NAMES]
+    return (marked + named + [e.name for e in vehicles])[0]

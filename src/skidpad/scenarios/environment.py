@@ -1,0 +1,105 @@
+"""Environments of a file: weather, time of day and road condition, in SI."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum
+from math import degrees
+from typing import Any
+
+from skidpad.scenarios.document import Node
+
+CELSIUS = 273.15  # K at 0 deg C
+CLOUDS = {  # share of the sky, by both vocabularies
+    "free": 0.0, "cloudy": 0.6, "overcast": 1.0, "rainy": 0.9, "skyOff": 0.0,
+    "zeroOktas": 0.0, "oneOktas": 0.125, "twoOktas": 0.25, "threeOktas": 0.375, "fourOktas": 0.5,
+    "fiveOktas": 0.625, "sixOktas": 0.75, "sevenOktas": 0.875, "eightOktas": 1.0, "nineOktas": 1.0,
+}  # fmt: skip
+HEAVY = 50.0  # mm/h, what an intensity of 1 means in files before 1.1
+
+
+class Fall(Enum):
+    """What falls from the sky."""
+
+    DRY = "dry"
+    RAIN = "rain"
+    SNOW = "snow"
+
+
+class Wetness(Enum):
+    """Water on the road."""
+
+    DRY = "dry"
+    MOIST = "moist"
+    PUDDLES = "wetWithPuddles"
+    LOW_FLOODED = "lowFlooded"
+    HIGH_FLOODED = "highFlooded"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Environment:
+    """What the file says; None is left as the run has it."""
+
+    name: str = ""
+    clouds: float | None = None  # share of the sky
+    sun_elevation_deg: float | None = None
+    sun_azimuth_deg: float | None = None
+    fall: Fall = Fall.DRY
+    fall_mm_h: float = 0.0
+    visual_range: float | None = None  # m
+    temperature_c: float | None = None
+    wind: float = 0.0  # m/s
+    wetness: Wetness | None = None
+    friction_scale: float = 1.0  # of what the road has otherwise
+    time_of_day: str = ""  # ISO 8601
+
+    @property
+    def says_weather(self) -> bool:
+        """It names something of the sky or the water on the road."""
+        return any(
+            value is not None
+            for value in (self.clouds, self.sun_elevation_deg, self.visual_range, self.wetness)
+        )
+
+
+def compile_environment(node: Node) -> Environment:
+    """An <Environment>."""
+    if node.tag != "Environment":
+        raise node.error("needs an <Environment>")
+    weather, road, time = (node.find(t) for t in ("Weather", "RoadCondition", "TimeOfDay"))
+    wetness, scale = None, 1.0
+    if road is not None:
+        scale = road.number("frictionScaleFactor", 1.0)
+        if scale < 0.0:
+            raise road.error(f"frictionScaleFactor must be >= 0, got {scale:g}")
+        wetness = road.choice("wetness", Wetness) if road.has("wetness") else None
+    found = {} if weather is None else _weather(weather)
+    return Environment(
+        name=node.label(),
+        wetness=wetness,
+        friction_scale=scale,
+        time_of_day="" if time is None else time.text("dateTime", ""),
+        **found,
+    )
+
+
+def _weather(node: Node) -> dict[str, Any]:
+    clouds = node.text("fractionalCloudCover", node.text("cloudState", ""))
+    if clouds and clouds not in CLOUDS:
+        raise node.unsupported(f"clouds {clouds!r} are not known")
+    sun, rain, fog, wind = (node.find(t) for t in ("Sun", "Precipitation", "Fog", "Wind"))
+    fall, rate = Fall.DRY, 0.0
+    if rain is not None:
+        fall = rain.choice("precipitationType", Fall)
+        old = rain.number("intensity", 0.0) * HEAVY
+        rate = 0.0 if fall is Fall.DRY else rain.number("precipitationIntensity", old)
+    return {
+        "clouds": CLOUDS.get(clouds),
+        "sun_elevation_deg": None if sun is None else degrees(sun.number("elevation")),
+        "sun_azimuth_deg": None if sun is None else degrees(sun.number("azimuth")) % 360.0,
+        "fall": fall,
+        "fall_mm_h": rate,
+        "visual_range": None if fog is None else fog.limit("visualRange"),
+        "temperature_c": node.number("temperature") - CELSIUS if node.has("temperature") else None,
+        "wind": 0.0 if wind is None else wind.number("speed"),
+    }

@@ -1,0 +1,176 @@
+"""Lines of trajectories: polylines, clothoids and NURBS as points, followed by time or by length."""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import atan2, cos, hypot, pi, sin
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+from skidpad.core.geometry import Pose, wrap_angle
+
+STEP = 0.25  # m between the points of a curve
+STEPS_MAX = 200_000
+NEAR = 1e-9  # m, points closer than this are one place
+
+
+@dataclass(frozen=True, slots=True)
+class Vertex:
+    """A point of a line; what is not said is None. time: s; heading: rad."""
+
+    x: float
+    y: float
+    z: float
+    heading: float | None = None
+    time: float | None = None
+
+
+class Line:
+    """Points with their lengths and headings, and with times where all have one.
+
+    Headings that the vertices do not name are those of the motion from point to point.
+    """
+
+    def __init__(self, vertices: Sequence[Vertex]) -> None:
+        self.x = [v.x for v in vertices]
+        self.y = [v.y for v in vertices]
+        self.z = [v.z for v in vertices]
+        self.named = [v.heading for v in vertices]
+        self.s = [0.0]
+        for k in range(1, len(vertices)):
+            step = hypot(self.x[k] - self.x[k - 1], self.y[k] - self.y[k - 1])
+            self.s.append(self.s[-1] + step)
+        times = [v.time for v in vertices]
+        self.t: list[float] | None = None
+        if all(t is not None for t in times):
+            self.t = [t for t in times if t is not None]
+
+    @property
+    def length(self) -> float:
+        """In m."""
+        return self.s[-1]
+
+    def at_length(self, s: float) -> Pose:
+        """The pose at length s, clamped to the line."""
+        return self._between(*self._find(self.s, s))
+
+    def at_time(self, t: float) -> Pose:
+        """The pose at time t, clamped to the line; linear between points."""
+        assert self.t is not None
+        return self._between(*self._find(self.t, t))
+
+    def speed_at(self, t: float) -> float:
+        """Speed at time t along the heading, m/s; that of the last moving segment beyond the end."""
+        assert self.t is not None
+        k, _ = self._find(self.t, t)
+        span = self.t[k + 1] - self.t[k] if k + 1 < len(self.t) else 0.0
+        if span <= 0.0:
+            return 0.0
+        dx, dy = self.x[k + 1] - self.x[k], self.y[k + 1] - self.y[k]
+        heading = self._between(k, 0.5).yaw
+        distance = hypot(dx, dy)
+        backwards = dx * cos(heading) + dy * sin(heading) < 0.0
+        return (-distance if backwards else distance) / span
+
+    def length_at(self, t: float) -> float:
+        """Length at time t."""
+        assert self.t is not None
+        k, u = self._find(self.t, t)
+        return self.s[k] + (u * (self.s[k + 1] - self.s[k]) if k + 1 < len(self.s) else 0.0)
+
+    @staticmethod
+    def _find(values: Sequence[float], value: float) -> tuple[int, float]:
+        """Segment and share of it."""
+        last = len(values) - 1
+        if last == 0 or value <= values[0]:
+            return 0, 0.0
+        if value >= values[last]:
+            return last - 1, 1.0
+        k = bisect_right(values, value) - 1
+        return k, (value - values[k]) / (values[k + 1] - values[k])
+
+    def _between(self, k: int, u: float) -> Pose:
+        j = min(k + 1, len(self.x) - 1)
+        return Pose(
+            self.x[k] + u * (self.x[j] - self.x[k]),
+            self.y[k] + u * (self.y[j] - self.y[k]),
+            self.z[k] + u * (self.z[j] - self.z[k]),
+            yaw=self._heading(k, j, u),
+        )
+
+    def _heading(self, k: int, j: int, u: float) -> float:
+        a, b = self.named[k], self.named[j]
+        if a is not None and b is not None:
+            return wrap_angle(a + u * ((b - a + pi) % (2.0 * pi) - pi))
+        if a is not None and u == 0.0:
+            return wrap_angle(a)
+        while j < len(self.x) - 1 and hypot(self.x[j] - self.x[k], self.y[j] - self.y[k]) < NEAR:
+            j += 1
+        while k > 0 and hypot(self.x[j] - self.x[k], self.y[j] - self.y[k]) < NEAR:
+            k -= 1
+        if j == k:
+            return 0.0 if a is None else wrap_angle(a)
+        return atan2(self.y[j] - self.y[k], self.x[j] - self.x[k])
+
+
+def clothoid(
+    start: Pose, curvature: float, rate: float, length: float, times: tuple[float, float] | None
+) -> list[Vertex]:
+    """Points of a curve whose curvature begins at `curvature` and grows by `rate` per m."""
+    count = min(max(int(length / STEP), 4), STEPS_MAX)
+    s = np.linspace(0.0, length, count + 1)
+    heading = start.yaw + s * (curvature + 0.5 * rate * s)
+    x, y = _integrated(start.x, np.cos(heading), s), _integrated(start.y, np.sin(heading), s)
+    t = [None] * len(s) if times is None else np.linspace(*times, len(s)).tolist()
+    rows = zip(x.tolist(), y.tolist(), heading.tolist(), t, strict=True)
+    return [Vertex(px, py, start.z, h, when) for px, py, h, when in rows]
+
+
+def _integrated(
+    start: float, rate: NDArray[np.float64], s: NDArray[np.float64]
+) -> NDArray[np.float64]:
+    """Integral of samples by the rule of Gregory: trapezoids with their end slopes."""
+    step = s[1] - s[0]
+    trapezoids = 0.5 * step * (rate[1:] + rate[:-1])
+    slope = np.gradient(rate, step, edge_order=2)
+    corrected = trapezoids - step**2 / 12.0 * np.diff(slope)
+    total: NDArray[np.float64] = start + np.concatenate(([0.0], np.cumsum(corrected)))
+    return total
+
+
+def nurbs(
+    order: int, points: Sequence[Vertex], weights: Sequence[float], knots: Sequence[float]
+) -> list[Vertex]:
+    """Points of a rational B-spline; time runs evenly along it where its ends have times."""
+    degree, n = order - 1, len(points)
+    w = np.array(weights)
+    homogeneous = np.column_stack(
+        [w * [p.x for p in points], w * [p.y for p in points], w * [p.z for p in points], w]
+    )
+    spline = BSpline(np.array(knots), homogeneous, degree)
+    reach = sum(hypot(b.x - a.x, b.y - a.y) for a, b in pairwise(points))
+    count = min(max(int(reach / STEP), 8 * n), STEPS_MAX)
+    u = np.linspace(knots[degree], knots[n], count + 1)
+    rows = spline(u)
+    xyz = rows[:, :3] / rows[:, 3:]
+    t0, t1 = points[0].time, points[-1].time
+    if t0 is None or t1 is None or t1 <= t0:
+        return [Vertex(x, y, z) for x, y, z in xyz.tolist()]
+    s = np.concatenate(([0.0], np.cumsum(np.hypot(*np.diff(xyz[:, :2], axis=0).T))))
+    t = t0 + (t1 - t0) * s / max(float(s[-1]), NEAR)
+    return [
+        Vertex(x, y, z, None, when)
+        for (x, y, z), when in zip(xyz.tolist(), t.tolist(), strict=True)
+    ]
+
+
+def even_knots(order: int, points: int) -> list[float]:
+    """The knots of a spline whose file gives none: clamped at its ends, even between them."""
+    inside = points - order
+    middle = [(k + 1) / (inside + 1) for k in range(inside)]
+    return [0.0] * order + middle + [1.0] * order

@@ -1,0 +1,119 @@
+"""Distances, gaps and overlaps between entities, straight, in their own axes, or along the road."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from enum import Enum
+from itertools import product
+from math import cos, hypot, inf, sin
+
+from skidpad.core.geometry import Pose
+from skidpad.roads.routing import shortest_route
+from skidpad.scenarios.entities import Box
+from skidpad.scenarios.network import Network
+
+Point = tuple[float, float]
+
+
+class Axes(Enum):
+    """Coordinates in which a distance is measured."""
+
+    ENTITY = "entity"
+    LANE = "lane"
+    ROAD = "road"
+    TRAJECTORY = "trajectory"
+    WORLD = "world"
+
+
+class Direction(Enum):
+    """Which component of a distance counts."""
+
+    LONGITUDINAL = "longitudinal"
+    LATERAL = "lateral"
+    EUCLIDEAN = "euclidianDistance"
+    CARTESIAN = "cartesianDistance"  # its name before 1.1
+
+
+def corners(pose: Pose, box: Box) -> list[Point]:
+    """The outline of an entity on the ground."""
+    found = []
+    for a, b in ((0.5, 0.5), (-0.5, 0.5), (-0.5, -0.5), (0.5, -0.5)):
+        p = pose.moved(forward=box.forward + a * box.length, left=box.left + b * box.width)
+        found.append((p.x, p.y))
+    return found
+
+
+def between(origin: Pose, x: float, y: float) -> Point:
+    """A point in the axes of a pose: m forward, m left."""
+    dx, dy = x - origin.x, y - origin.y
+    c, s = cos(origin.yaw), sin(origin.yaw)
+    return dx * c + dy * s, dy * c - dx * s
+
+
+def overlap(a: Sequence[Point], b: Sequence[Point]) -> float:
+    """Distance of two convex outlines along the best separating axis; negative where they overlap."""
+    best = -inf
+    for shape in (a, b):
+        for k, (x0, y0) in enumerate(shape):
+            x1, y1 = shape[(k + 1) % len(shape)]
+            nx, ny = y1 - y0, x0 - x1
+            size = hypot(nx, ny)
+            if size == 0.0:
+                continue
+            pa = [(x * nx + y * ny) / size for x, y in a]
+            pb = [(x * nx + y * ny) / size for x, y in b]
+            best = max(best, min(pb) - max(pa), min(pa) - max(pb))
+    return best
+
+
+def clearance(a: Sequence[Point], b: Sequence[Point]) -> float:
+    """Shortest distance of two convex outlines, 0 where they touch."""
+    if overlap(a, b) <= 0.0:
+        return 0.0
+    return min(_to_edges(p, shape) for one, shape in ((a, b), (b, a)) for p in one)
+
+
+def _to_edges(p: Point, shape: Sequence[Point]) -> float:
+    best = inf
+    for k, (x0, y0) in enumerate(shape):
+        x1, y1 = shape[(k + 1) % len(shape)]
+        ex, ey = x1 - x0, y1 - y0
+        length_sq = ex * ex + ey * ey
+        u = 0.0 if length_sq == 0.0 else ((p[0] - x0) * ex + (p[1] - y0) * ey) / length_sq
+        u = min(max(u, 0.0), 1.0)
+        best = min(best, hypot(p[0] - x0 - u * ex, p[1] - y0 - u * ey))
+    return best
+
+
+def extent_gap(a: Sequence[float], b: Sequence[float]) -> float:
+    """Free room between two intervals on one axis, 0 where they meet."""
+    return max(min(b) - max(a), min(a) - max(b), 0.0)
+
+
+def along_road(network: Network, a: Pose, b: Pose) -> Point | None:
+    """From a to b along the road and across it: m, positive ahead of and left of a; None off road."""
+    here, there = network.coordinates(a), network.coordinates(b)
+    if here is None or there is None:
+        return None
+    forward = 1.0 if cos(here.turn) >= 0.0 else -1.0
+    left = forward * (there.t - here.t)
+    if here.road == there.road:
+        return forward * (there.s - here.s), left
+    p, q = network.place_of(a).lane, network.place_of(b).lane
+    if p is None or q is None:
+        return None
+    ahead, behind = shortest_route(network.map, p, q), shortest_route(network.map, q, p)
+    ways = [r.length * sign for r, sign in ((ahead, 1.0), (behind, -1.0)) if r is not None]
+    return (min(ways, key=abs), left) if ways else None
+
+
+def way(network: Network, a: Pose, b: Pose) -> float:
+    """How far it is from a to b along the road, else straight, m."""
+    found = along_road(network, a, b)
+    return hypot(b.x - a.x, b.y - a.y) if found is None else abs(found[0])
+
+
+def box_corners(box: Box) -> list[Point]:
+    """The outline in the entity's own axes."""
+    signs = product((-0.5, 0.5), repeat=2)
+    return [(box.forward + a * box.length, box.left + b * box.width) for a, b in signs]

@@ -1,0 +1,171 @@
+"""The road of a scenario: places by lane and by road coordinates, lanes side by side, ways ahead."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from math import cos, sin
+
+import numpy as np
+
+from skidpad.core.errors import ConfigError
+from skidpad.core.geometry import Pose, wrap_angle
+from skidpad.roads.bundled import map_file
+from skidpad.roads.opendrive.document import RoadRecord, parse
+from skidpad.roads.opendrive.signals import road_place
+from skidpad.roads.queries import LanePoint, RoadMap
+
+ON_LANE = 1.0  # m beyond a lane's edge that still is on it
+END_SLACK = 0.5  # m beyond the end of a road that still is its end
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A pose and, where it was given by lane, the lane's point with the offset from it."""
+
+    pose: Pose
+    lane: LanePoint | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class RoadCoordinates:
+    """OpenDRIVE s and t of a place, and its heading relative to increasing s."""
+
+    road: int
+    s: float
+    t: float
+    turn: float
+
+
+class Network:
+    """One map. `name` is a bundled map's, or a file's path."""
+
+    def __init__(self, map: RoadMap, name: str) -> None:
+        self.map, self.name = map, name
+
+    @cached_property
+    def roads(self) -> dict[int, RoadRecord]:
+        """Reference lines, read only where a file asks for road coordinates."""
+        file = map_file(self.name)
+        return parse(file.read_bytes(), file.name).roads
+
+    def place_of(self, pose: Pose) -> Place:
+        """A pose with the lane under it: a driving lane where there is one, else any."""
+        for driving in (True, False):
+            point = self.map.project(pose.x, pose.y, pose.z, driving=driving)
+            if point is not None and abs(point.offset) <= 0.5 * point.width + ON_LANE:
+                return Place(replace(pose, z=point.z), point)
+        return Place(pose, self.map.project(pose.x, pose.y, pose.z))
+
+    def on_lane(self, road: int, lane: int, s: float, offset: float) -> Place:
+        """On a lane, `offset` to the left of increasing s; ConfigError when it is not there."""
+        point = self.map.on_lane(road, lane, s)
+        left = offset if self.forward(point) else -offset
+        point = replace(point, offset=left)
+        return Place(point.pose.moved(left=left), point)
+
+    def within(self, road: int, lane: int, s: float) -> float:
+        """s, or the nearest end of the lane where it does not reach there; as esmini reads it."""
+        of_lane = (self.map.lanes.road == road) & (self.map.lanes.lane_id == lane)
+        ends = [self._ends(int(i)) for i in np.flatnonzero(of_lane)]
+        nearest = [min(max(s, low), high) for low, high in ends]
+        return min(nearest, key=lambda at: abs(at - s), default=s)
+
+    def _ends(self, lane: int) -> tuple[float, float]:
+        first = int(self.map.lanes.first[lane])
+        last = first + int(self.map.lanes.size[lane]) - 1
+        a, b = float(self.map.samples.s_road[first]), float(self.map.samples.s_road[last])
+        return min(a, b), max(a, b)
+
+    def on_road(self, road: int, s: float, t: float) -> Place:
+        """At (s, t) of a road, looking along increasing s."""
+        record = self.roads.get(road)
+        if record is None or not 0.0 <= s <= record.length + END_SLACK:
+            has = "no such road" if record is None else f"s from 0 to {record.length:.1f}"
+            raise ConfigError(f"map {self.map.name}: road {road} at s = {s:g} is not there ({has})")
+        at = road_place(record, min(s, record.length), t)
+        return self.place_of(Pose(at.x, at.y, at.z, yaw=wrap_angle(at.heading)))
+
+    def coordinates(self, pose: Pose) -> RoadCoordinates | None:
+        """Road coordinates of a pose; None off the map."""
+        point = self.place_of(pose).lane
+        if point is None:
+            return None
+        s = self.map.s_road(point)
+        at = road_place(self.roads[point.road], s, 0.0)
+        dx, dy = pose.x - at.x, pose.y - at.y
+        t = dy * cos(at.heading) - dx * sin(at.heading)
+        return RoadCoordinates(point.road, s, t, wrap_angle(pose.yaw - at.heading))
+
+    def forward(self, point: LanePoint) -> bool:
+        """Traffic of this lane runs with increasing road s."""
+        first = int(self.map.lanes.first[point.lane])
+        s = self.map.samples.s_road
+        return bool(s[first + 1] > s[first])
+
+    def beside(self, point: LanePoint, lane_id: int) -> LanePoint | None:
+        """The same place across the road on another lane of it; None where there is no such lane."""
+        lanes = self.map.lanes
+        same = (lanes.road == point.road) & (lanes.section == lanes.section[point.lane])
+        found = np.flatnonzero(same & (lanes.lane_id == lane_id))
+        if len(found) == 0:
+            return None
+        try:
+            return self.map.on_lane(point.road, lane_id, self.map.s_road(point))
+        except ConfigError:
+            return None
+
+    def abreast(self, point: LanePoint, x: float, y: float) -> tuple[LanePoint, float]:
+        """The place of a point's lane that is abreast of (x, y), and how far left of it that is."""
+        dx, dy = x - point.x, y - point.y
+        forward = dx * cos(point.heading) + dy * sin(point.heading)
+        near = self.map.ahead(point, forward) or point
+        dx, dy = x - near.x, y - near.y
+        return near, dy * cos(near.heading) - dx * sin(near.heading)
+
+    def ahead(self, point: LanePoint, distance: float, roads: tuple[int, ...]) -> LanePoint | None:
+        """The place further along; at forks towards the given roads, else straight on."""
+        if not roads:
+            return self.map.ahead(point, distance)
+        while True:
+            length = float(self.map.lanes.length[point.lane])
+            s = point.s + distance
+            if 0.0 <= s <= length:
+                return self.map.at(point.lane, s)
+            forward = s > length
+            following = self._wanted(point.lane, forward, roads)
+            if following is None:
+                return self.map.ahead(point, distance)
+            entry = 0.0 if forward else float(self.map.lanes.length[following])
+            distance = s - length if forward else s
+            point = self.map.at(following, entry)
+
+    def _wanted(self, lane: int, forward: bool, roads: tuple[int, ...]) -> int | None:
+        step = self.map.successors if forward else self.map.predecessors
+        found = step(lane)
+        here = int(self.map.lanes.road[lane])
+        of_route = [i for i in found if int(self.map.lanes.road[i]) in roads]
+        if not of_route:
+            return None
+        at = roads.index(here) if here in roads else -1
+
+        def rank(i: int) -> int:
+            road = int(self.map.lanes.road[i])
+            later = [k for k, r in enumerate(roads) if r == road and k >= at]
+            return later[0] if later else len(roads)
+
+        return min(of_route, key=rank)
+
+
+def next_lane_id(lane: int, change: int) -> int:
+    """`change` lanes towards higher ids; the centre line has id 0 and is no lane."""
+    target = lane + change
+    if target == 0 or (target > 0) != (lane > 0):
+        target += 1 if change > 0 else -1
+    return target
+
+
+@lru_cache(maxsize=8)
+def network_of(map: RoadMap, name: str) -> Network:
+    """The network of a loaded map, made once."""
+    return Network(map, name)

@@ -1,0 +1,115 @@
+"""Parameters and variables: declarations, values from outside, constraints, nested scopes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from skidpad.core.errors import FileError
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.expressions import as_text
+
+NUMBERS = ("double", "integer", "int", "unsignedInt", "unsignedShort")
+RULES: Mapping[str, Callable[[float | str, float | str], bool]] = {
+    "equalTo": lambda a, b: a == b,
+    "notEqualTo": lambda a, b: a != b,
+    "greaterThan": lambda a, b: a > b,  # type: ignore[operator]
+    "lessThan": lambda a, b: a < b,  # type: ignore[operator]
+    "greaterOrEqual": lambda a, b: a >= b,  # type: ignore[operator]
+    "lessOrEqual": lambda a, b: a <= b,  # type: ignore[operator]
+}
+
+
+def compared(rule: str, left: str, right: str) -> bool:
+    """Texts by a rule: as numbers where both are, else letter by letter."""
+    try:
+        return RULES[rule](float(left), float(right))
+    except ValueError:
+        return RULES[rule](left, right)
+
+
+def root_values(root: Node, given: Mapping[str, float | str]) -> dict[str, str]:
+    """The parameters of a file, some of them overridden from outside."""
+    values = declared(root, {}, given)
+    for name in given:
+        if name not in values:
+            known = ", ".join(values) or "none"
+            raise FileError(f"{root.file.name} declares no parameter {name!r}; it has {known}")
+    return values
+
+
+def declared(
+    node: Node, outer: Mapping[str, str], given: Mapping[str, float | str]
+) -> dict[str, str]:
+    """Parameters in scope inside an element that may declare some; given: assigned values."""
+    values = dict(outer)
+    declarations = node.find("ParameterDeclarations")
+    if declarations is None:
+        return values
+    for one in declarations.children("ParameterDeclaration"):
+        name = one.plain("name")
+        value = given.get(name)
+        text = one.scoped(values).text("value") if value is None else _text(value)
+        _require_type(one, text)
+        values[name] = text
+    for one in declarations.children("ParameterDeclaration"):  # which may name each other
+        name = one.plain("name")
+        _require_constraints(one.scoped(values), name, values[name])
+    return values
+
+
+def inner(node: Node) -> Node:
+    """An element with its own declarations in scope."""
+    if node.find("ParameterDeclarations") is None:
+        return node
+    return node.scoped(declared(node, node.values, {}))
+
+
+def assignments(node: Node) -> dict[str, str]:
+    """The values that a catalog reference or a distribution assigns, by parameter."""
+    found = node.find("ParameterAssignments")
+    if found is None:
+        return {}
+    return {
+        one.plain("parameterRef"): one.text("value")
+        for one in found.children("ParameterAssignment")
+    }
+
+
+def variables(root: Node) -> dict[str, str]:
+    """The variables of a file with their first values."""
+    declarations = root.find("VariableDeclarations")
+    if declarations is None:
+        return {}
+    found = {}
+    for one in declarations.children("VariableDeclaration"):
+        name = one.plain("name")
+        found[name] = one.text("value")
+        _require_type(one, found[name])
+    return found
+
+
+def _text(value: float | str) -> str:
+    return value if isinstance(value, str) else as_text(float(value))
+
+
+def _require_type(node: Node, text: str) -> None:
+    kind = node.text("parameterType" if node.has("parameterType") else "variableType", "string")
+    if kind in NUMBERS:
+        try:
+            float(text)
+        except ValueError:
+            raise node.error(f"value must be a number of type {kind}, got {text!r}") from None
+    elif kind == "boolean" and text not in ("true", "false", "1", "0"):
+        raise node.error(f"value must be true or false, got {text!r}")
+
+
+def _require_constraints(node: Node, name: str, text: str) -> None:
+    groups = [list(g.children("ValueConstraint")) for g in node.children("ConstraintGroup")]
+    if not groups:
+        return
+    for group in groups:
+        for one in group:
+            if one.text("rule") not in RULES:
+                raise one.unsupported(f"rule={one.text('rule')!r} is not supported")
+    if not any(all(compared(c.text("rule"), text, c.text("value")) for c in g) for g in groups):
+        raise node.error(f"{name} = {text} meets none of its constraint groups")

@@ -1,0 +1,108 @@
+"""Routes: waypoints turned into the roads to take, and places along them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from skidpad.roads.queries import LanePoint
+from skidpad.roads.routing import shortest_route
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.network import Network, Place
+from skidpad.scenarios.positions import Fixed, Orientation, Position, orientation, position
+from skidpad.scenarios.scene import Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """A way over the map: where it begins, and the roads in their order."""
+
+    name: str
+    start: LanePoint
+    roads: tuple[int, ...]
+
+    def at(self, network: Network, s: float) -> LanePoint:
+        """The place `s` m along it, at most its end."""
+        return network.ahead(self.start, s, self.roads) or self.start
+
+
+def compile_route(node: Node, ctx: Context) -> Route:
+    """A <Route> or a reference to one; waypoints must not depend on what moves."""
+    node = ctx.catalogs.resolved(node)
+    if node.tag != "Route":
+        raise node.error("needs a <Route>")
+    points = []
+    for waypoint in node.children("Waypoint"):
+        at = position(waypoint.child("Position"), ctx)
+        if not isinstance(at, Fixed):
+            raise waypoint.unsupported("waypoints that depend on entities are not supported")
+        if at.fixed.lane is None:
+            raise waypoint.error("is on no road")
+        points.append(at.fixed.lane)
+    if len(points) < 2:
+        raise node.error("needs at least two <Waypoint>s")
+    return Route(node.label(), points[0], roads_through(ctx.network, points))
+
+
+def roads_through(network: Network, points: Sequence[LanePoint]) -> tuple[int, ...]:
+    """The roads from point to point by the shortest way; where there is none, their own roads."""
+    roads: list[int] = []
+    for a, b in pairwise(points):
+        route = shortest_route(network.map, a, b)
+        found = [a.road, b.road] if route is None else [
+            int(network.map.lanes.road[i]) for i in route.lanes
+        ]  # fmt: skip
+        for road in found:
+            if not roads or roads[-1] != road:
+                roads.append(road)
+    return tuple(roads)
+
+
+@dataclass(frozen=True, slots=True)
+class OnRoute:
+    """So far along a route; lane None: the lane that the route begins on."""
+
+    route: Route
+    s: float
+    lane_id: int | None
+    offset: float
+    facing: Orientation
+
+    def place(self, scene: Scene) -> Place:
+        """By the lanes of the route."""
+        point = self.route.at(scene.network, self.s)
+        if self.lane_id is not None:
+            point = scene.network.beside(point, self.lane_id) or point
+        pose = point.pose.moved(left=self.offset)
+        pose = replace(pose, yaw=self.facing.turned(pose.yaw))
+        return Place(pose, replace(point, offset=self.offset))
+
+
+@dataclass(frozen=True, slots=True)
+class OfEntity:
+    """Where an entity is on its own route."""
+
+    other: str
+
+    def place(self, scene: Scene) -> Place:
+        """Where the entity is now."""
+        actor = scene.actors[self.other]
+        return Place(actor.pose, actor.guide.base)
+
+
+def route_position(node: Node, ctx: Context) -> Position:
+    """A <RoutePosition>."""
+    inside = node.child("InRoutePosition").only()
+    if inside.tag == "FromCurrentEntity":
+        return OfEntity(ctx.entity(inside))
+    route = compile_route(node.child("RouteRef").only(), ctx)
+    if inside.tag == "FromRoadCoordinates":
+        return OnRoute(route, inside.number("pathS"), None, inside.number("t"), orientation(node))
+    if inside.tag == "FromLaneCoordinates":
+        offset = inside.number("laneOffset", 0.0)
+        return OnRoute(
+            route, inside.number("pathS"), inside.whole("laneId"), offset, orientation(node)
+        )
+    raise inside.unsupported()

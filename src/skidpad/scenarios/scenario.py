@@ -1,0 +1,227 @@
+"""From a file to a scenario that can be played: the one compiler, for checks and for runs alike."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from skidpad.core.errors import ConfigError, FileError
+from skidpad.roads.bundled import bundled_maps, load_map
+from skidpad.roads.queries import RoadMap
+from skidpad.scenarios.actions.controllers import Activate, Several
+from skidpad.scenarios.catalogs import Catalogs
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node, parse
+from skidpad.scenarios.entities import Entity, choose_ego, compile_entities
+from skidpad.scenarios.findings import HARMLESS, Fault, Finding, Kind, ScenarioError
+from skidpad.scenarios.network import Network, network_of
+from skidpad.scenarios.parameters import root_values, variables
+from skidpad.scenarios.routes import route_position
+from skidpad.scenarios.schema import violations
+from skidpad.scenarios.shipped import FOLDER
+from skidpad.scenarios.start import Start, compile_start
+from skidpad.scenarios.storyboard import Storyboard, compile_storyboard
+from skidpad.scenarios.trajectories import trajectory_position
+
+NOTHING: Mapping[str, float | str] = {}
+FURTHER_POSITIONS = {
+    "RoutePosition": route_position,
+    "TrajectoryPosition": trajectory_position,
+}
+EMPTY_ROAD = "straight"  # for files without a road
+
+
+@dataclass(frozen=True, slots=True)
+class Scenario:
+    """A file, compiled: everything that is named in it is there."""
+
+    file: Path
+    network: Network
+    entities: Mapping[str, Entity]
+    ego: str
+    start: Start
+    storyboard: Storyboard
+    parameters: Mapping[str, str]
+    variables: Mapping[str, str]
+    ego_is_handed_later: bool  # the file drives the ego until it activates its controller
+    findings: tuple[Finding, ...] = ()  # of the schema, and what is left out on request
+
+    @property
+    def map(self) -> RoadMap:
+        """The road."""
+        return self.network.map
+
+    @property
+    def map_name(self) -> str:
+        """A bundled map's name, or a file's path."""
+        return self.network.name
+
+    @property
+    def ego_entity(self) -> Entity:
+        """The ego."""
+        return self.entities[self.ego]
+
+
+@dataclass(frozen=True, slots=True)
+class Compiled:
+    """What compiling gives: a scenario where nothing forbids it, and all findings."""
+
+    scenario: Scenario | None
+    findings: tuple[Finding, ...]
+
+    def playable(self) -> Scenario:
+        """The scenario; ScenarioError lists everything that keeps it from being played."""
+        if self.scenario is None:
+            raise ScenarioError([f for f in self.findings if f.kind not in HARMLESS])
+        return self.scenario
+
+
+def compile_scenario(
+    file: Path,
+    parameters: Mapping[str, float | str] = NOTHING,
+    ego: str | None = None,
+    *,
+    maps: Sequence[Path] = (),
+    ignore_unsupported: bool = False,
+) -> Scenario:
+    """The file as a scenario; ScenarioError lists everything that keeps it from being played.
+
+    maps: folders with roads that files name without saying where they are.
+    """
+    found = check(file, parameters, ego, maps=maps, ignore_unsupported=ignore_unsupported)
+    return found.playable()
+
+
+def check(
+    file: Path,
+    parameters: Mapping[str, float | str] = NOTHING,
+    ego: str | None = None,
+    *,
+    maps: Sequence[Path] = (),
+    ignore_unsupported: bool = False,
+) -> Compiled:
+    """Compile, and tell everything that was found; FileError for what is no scenario at all."""
+    allowed = HARMLESS | {Kind.UNSUPPORTED} if ignore_unsupported else HARMLESS
+    root = parse(file)
+    findings: list[Finding] = []
+    scenario = None
+    try:
+        findings += violations(root.element, file.name, _minor_revision(root))
+        scenario = _compiled(root, _Wish(parameters, ego, maps, allowed), findings)
+    except Fault as fault:
+        findings.append(fault.finding)
+    found = tuple(sorted(set(findings), key=lambda f: (f.file != file.name, f.line, f.what)))
+    if not all(f.kind in allowed for f in found):
+        scenario = None
+    return Compiled(scenario, found)
+
+
+def _minor_revision(root: Node) -> str:
+    """Of the header, for the schema; "" where none fits (before 1.0)."""
+    if root.find("ParameterValueDistribution") is not None:
+        raise root.unsupported("a distribution is a campaign of another file: play it as one")
+    if root.find("Catalog") is not None:
+        raise root.unsupported("a catalog holds no scenario")
+    header = root.child("FileHeader")
+    header = header.scoped(root_values(root, {}))
+    major, minor = header.whole("revMajor"), header.whole("revMinor")
+    if (major, minor) == (0, 9):
+        return ""
+    if major != 1 or minor > NEWEST:
+        raise header.unsupported(f"OpenSCENARIO XML {major}.{minor} is not supported")
+    return str(minor)
+
+
+NEWEST = 3  # minor revision
+
+
+@dataclass(frozen=True, slots=True)
+class _Wish:
+    """What is asked of a compilation; allowed: findings in spite of which the file is played."""
+
+    parameters: Mapping[str, float | str]
+    ego: str | None
+    maps: Sequence[Path]
+    allowed: frozenset[Kind]
+
+
+def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | None:
+    values = root_values(root, wish.parameters)
+    root = root.scoped(values)
+    network = _network(root, wish.maps)
+    catalogs = Catalogs(root)
+    entities = compile_entities(root, catalogs)
+    findings += entities.findings
+    ctx = Context(
+        network, catalogs, entities.by_name, entities.groups, values, variables(root),
+        findings=findings, further_positions=FURTHER_POSITIONS,
+    )  # fmt: skip
+    board = root.child("Storyboard")
+    ctx.added = _added(board)
+    start = compile_start(board.child("Init"), ctx)
+    storyboard = compile_storyboard(board, ctx)
+    faulty = any(f.kind not in wish.allowed for f in findings)
+    chosen = None if faulty else ctx.attempt(lambda: choose_ego(root, entities.by_name, wish.ego))
+    if chosen is None:
+        return None
+    if start.entities[chosen].place is None:
+        findings.append(
+            board.child("Init").finding(f"the ego {chosen!r} is not there at the begin")
+        )
+        return None
+    later = not start.handed.get(chosen, False) and any(_activations(storyboard, chosen))
+    return Scenario(
+        root.file, network, entities.by_name, chosen, start, storyboard, values, ctx.variables,
+        later, tuple(findings),
+    )  # fmt: skip
+
+
+def _added(board: Node) -> frozenset[str]:
+    """Entities that events put into the world."""
+    found = board.element.iterfind("Story//EntityAction[AddEntityAction]")
+    return frozenset(node.get("entityRef", "") for node in found)
+
+
+def _activations(board: Storyboard, name: str) -> Iterator[bool]:
+    """Controllers of an entity that events switch on."""
+    for story in board.stories:
+        for act in story.acts:
+            for group in act.groups:
+                if name not in group.actors:
+                    continue
+                events = [e for m in group.manoeuvres for e in m.events]
+                for action in (a.private for e in events for a in e.actions):
+                    parts = action.actions if isinstance(action, Several) else (action,)
+                    yield from (True for p in parts if isinstance(p, Activate) and p.says)
+
+
+def _network(root: Node, maps: Sequence[Path]) -> Network:
+    """The road beside the file; a bundled map by its bare name; a straight road where none is named."""
+    logic = root.find("RoadNetwork", "LogicFile")
+    if logic is None:
+        return network_of(load_map(EMPTY_ROAD), EMPTY_ROAD)
+    name = logic.text("filepath").replace("\\", "/")
+    beside = root.file.parent / name
+    elsewhere = [folder / f"{Path(name).stem}.xodr" for folder in maps]
+    found = [p for p in (beside, *elsewhere) if p.is_file()]
+    if found and not _is_bundled(root.file, name):
+        path = str(found[0])
+    elif _bare(name) in bundled_maps():
+        path = _bare(name)
+    else:
+        raise logic.error(f"there is no road file {name!r} beside the scenario")
+    try:
+        return network_of(load_map(path), path)
+    except (FileError, ConfigError) as error:
+        raise logic.error(f"the road {name!r} cannot be read: {error}") from None
+
+
+def _bare(name: str) -> str:
+    """The name of a map where a file names no folder."""
+    return Path(name).stem if len(Path(name).parts) == 1 else ""
+
+
+def _is_bundled(file: Path, name: str) -> bool:
+    """The road beside a scenario of our catalogue is a copy of a bundled one."""
+    return file.parent == FOLDER and _bare(name) in bundled_maps()

@@ -1,0 +1,50 @@
+"""Validation by the XML schemas of OpenSCENARIO, as the `scenariogeneration` package installs them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from importlib.metadata import distribution
+from pathlib import Path
+
+from lxml import etree
+
+from skidpad.scenarios.findings import Finding, Kind
+
+FILES = {  # by minor revision; 0.9 has no schema that its files follow
+    "0": "OpenSCENARIO_1_0.xsd",
+    "1": "OpenSCENARIO_1_1.xsd",
+    "2": "OpenSCENARIO_1_2.xsd",
+    "3": "OpenSCENARIO_1_3_1.xsd",
+}
+INSTALLER = "scenariogeneration"
+
+
+def schema_file(minor: str) -> Path:
+    """The schema of OpenSCENARIO 1.`minor`."""
+    installed = distribution(INSTALLER)
+    found = next(f for f in installed.files or () if Path(f).name == FILES[minor])
+    return Path(str(installed.locate_file(found)))
+
+
+@cache
+def schema(minor: str) -> etree.XMLSchema | None:
+    """The same, ready to validate; None where there is none."""
+    return etree.XMLSchema(etree.parse(str(schema_file(minor)))) if minor in FILES else None
+
+
+def violations(root: etree._Element, file: str, minor: str) -> list[Finding]:
+    """What the schema has against a document."""
+    rules = schema(minor)
+    if rules is None or rules.validate(root):
+        return []
+    messages: Iterable[etree._LogEntry] = rules.error_log  # type: ignore[assignment]
+    return [
+        Finding(file, int(e.line), _element(e.message), e.message, Kind.SCHEMA) for e in messages
+    ]
+
+
+def _element(message: str) -> str:
+    """The element that a message begins with: "Element 'X', attribute ..."."""
+    parts = message.split("'")
+    return parts[1] if len(parts) > 1 else "OpenSCENARIO"

@@ -1,0 +1,141 @@
+"""A world without physics, in which everything is where its scenario says: the file by itself.
+
+For trajectories as the file means them, for comparing with other players, and for trying thousands
+of files.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import cos, hypot, sin
+
+import numpy as np
+
+from skidpad.core.geometry import Pose
+from skidpad.core.run import ActorMode
+from skidpad.core.setup import DT, ActorCommand
+from skidpad.core.states import ActorStates, ActorTable, WorldTruth
+from skidpad.core.vocabulary import ActorKind
+from skidpad.scenarios.entities import Body
+from skidpad.scenarios.player import Player, setups
+from skidpad.scenarios.scenario import Scenario
+
+KINDS = {
+    Body.VEHICLE: ActorKind.CAR,
+    Body.PEDESTRIAN: ActorKind.PEDESTRIAN,
+    Body.PROP: ActorKind.PROP,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One entity at one time; the place of its reference point, m, rad, m/s."""
+
+    time: float
+    id: int
+    name: str
+    x: float
+    y: float
+    z: float
+    h: float
+    speed: float
+
+
+@dataclass(frozen=True, slots=True)
+class Told:
+    """A scenario played by itself: where everything was, and the player at the end."""
+
+    rows: tuple[Row, ...]
+    player: Player
+
+    def of(self, name: str) -> list[Row]:
+        """One entity's rows."""
+        return [row for row in self.rows if row.name == name]
+
+    def csv(self) -> str:
+        """With the columns time,id,name,x,y,z,h,speed."""
+        text = io.StringIO()
+        writer = csv.writer(text, lineterminator="\n")
+        writer.writerow(Row.__dataclass_fields__)
+        for r in self.rows:
+            numbers = (f"{v:.4f}" for v in (r.x, r.y, r.z, r.h, r.speed))
+            writer.writerow((f"{r.time:.3f}", r.id, r.name, *numbers))
+        return text.getvalue()
+
+
+class Stage:
+    """The world: it does as it is told."""
+
+    def __init__(self, scenario: Scenario) -> None:
+        ego, others = setups(scenario)
+        actors = [ego, *others]
+        self.tick, n = 0, len(actors)
+        entities = [scenario.entities[a.name] for a in actors]
+        self.table = ActorTable(
+            names=tuple(a.name for a in actors),
+            types=tuple(a.type for a in actors),
+            kind=np.array([KINDS[e.body] for e in entities], np.uint8),
+            length=np.array([e.box.length for e in entities]),
+            width=np.array([e.box.width for e in entities]),
+            height=np.array([e.box.height for e in entities]),
+            rgb=np.zeros((n, 3), np.uint8),
+        )
+        self.index = {a.name: i for i, a in enumerate(actors)}
+        self.states = ActorStates.empty(n)
+        self.mu, self.commands = np.ones((n, 4)), np.zeros((n, 5))
+        for actor in actors:
+            assert isinstance(actor.place, Pose)
+            self._put(ActorCommand(actor.name, place=actor.place, speed=actor.speed))
+
+    def _put(self, word: ActorCommand) -> None:
+        i, s = self.index[word.actor], self.states
+        if word.present is not None:
+            s.present[i] = word.present
+        if word.place is None:
+            return
+        v, yaw = word.speed or 0.0, word.place.yaw
+        s.x[i], s.y[i], s.z[i], s.yaw[i] = word.place.x, word.place.y, word.place.z, yaw
+        s.vx[i], s.vy[i] = v * cos(yaw), v * sin(yaw)
+        s.present[i] = True
+
+    def step(self, words: Sequence[ActorCommand]) -> None:
+        """One tick on."""
+        self.tick += 1
+        for word in words:
+            self._put(word)
+
+    def truth(self) -> WorldTruth:
+        """The moment."""
+        return WorldTruth(self.tick, self.table, self.states, self.mu, self.commands, {}, (), ())
+
+
+def played(scenario: Scenario, duration: float, dt: float = DT) -> Told:
+    """The scenario as its file says, everything ideal, until it ends or for `duration` s."""
+    stage = Stage(scenario)
+    player = Player(scenario, modes=dict.fromkeys(scenario.entities, ActorMode.IDEAL), dt=dt)
+    rows: list[Row] = []
+    for _ in range(round(duration / dt) + 1):
+        words = player.step(stage.truth())
+        rows += _rows(player, stage)
+        if player.ended:
+            break
+        stage.step(words)
+    return Told(tuple(rows), player)
+
+
+def _rows(player: Player, stage: Stage) -> list[Row]:
+    found = []
+    s, t = stage.states, player.scene.t
+    for i, (name, actor) in enumerate(player.actors.items()):
+        k = actor.row
+        if not s.present[k]:
+            continue
+        yaw, box = float(s.yaw[k]), actor.entity.box
+        x = float(s.x[k]) - box.forward * cos(yaw) + box.left * sin(yaw)
+        y = float(s.y[k]) - box.forward * sin(yaw) - box.left * cos(yaw)
+        v = hypot(float(s.vx[k]), float(s.vy[k]))
+        found.append(Row(t, i, name, x, y, float(s.z[k]), yaw, v))
+    return found

@@ -1,0 +1,208 @@
+"""How a scenario begins: the <Init> of a file, worked out for all entities in their own order.
+
+A place or speed may refer to another entity's; those are worked out first, and a circle is an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any, cast
+
+from skidpad.core.geometry import Pose
+from skidpad.scenarios.actions.base import GlobalAction, PrivateAction
+from skidpad.scenarios.actions.controllers import Activate, Several
+from skidpad.scenarios.actions.private import private_action
+from skidpad.scenarios.actions.routing import FollowTrajectory, Teleport
+from skidpad.scenarios.actions.speed import Speed, limited
+from skidpad.scenarios.actions.world import (
+    AddEntity,
+    DeleteEntity,
+    SetEnvironment,
+    global_action,
+    user_defined,
+)
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.environment import Environment
+from skidpad.scenarios.findings import Fault
+from skidpad.scenarios.motion import Guide
+from skidpad.scenarios.network import Place
+from skidpad.scenarios.positions import Position
+from skidpad.scenarios.scene import Actor, Scene
+
+ORIGIN = Pose(0.0, 0.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Begin:
+    """One entity at the begin. place: None where it is not in the world yet."""
+
+    place: Place | None
+    speed: float
+    actions: tuple[PrivateAction, ...] = ()  # what else it does from the begin on
+
+
+@dataclass(frozen=True, slots=True)
+class Start:
+    """Everything at the begin."""
+
+    entities: Mapping[str, Begin]
+    actions: tuple[GlobalAction, ...] = ()
+    environment: Environment | None = None
+    handed: Mapping[str, bool] = field(default_factory=dict)  # controllers switched by the file
+
+
+@dataclass(slots=True)
+class _Wish:
+    """What <Init> says about one entity, with the element for messages."""
+
+    node: Node
+    positions: list[Position] = field(default_factory=list)  # one after the other
+    speed: Speed | None = None
+    actions: list[PrivateAction] = field(default_factory=list)
+
+
+def compile_start(init: Node, ctx: Context) -> Start:
+    """The <Init> of a storyboard; what is faulty goes to the list of findings."""
+    wishes: dict[str, _Wish] = {}
+    worldwide: list[GlobalAction] = []
+    gone: set[str] = set()
+    environment: Environment | None = None
+    for node in init.child("Actions").children():
+        if node.tag == "Private":
+            ctx.attempt(partial(_private, node, ctx, wishes))
+            continue
+        make = {"GlobalAction": global_action, "UserDefinedAction": user_defined}.get(node.tag)
+        if make is None:
+            ctx.findings.append(node.unsupported().finding)
+            continue
+        action = ctx.attempt(partial(make, node, ctx))
+        if isinstance(action, AddEntity):
+            wishes.setdefault(action.name, _Wish(node)).positions.append(action.position)
+        elif isinstance(action, DeleteEntity):
+            gone.add(action.name)
+        elif isinstance(action, SetEnvironment):
+            environment = action.environment
+        elif action is not None:
+            worldwide.append(action)
+    begins = dict(_worked_out(init, wishes, gone, ctx))
+    return Start(begins, tuple(worldwide), environment, dict(_handed(wishes)))
+
+
+def _private(node: Node, ctx: Context, wishes: dict[str, _Wish]) -> None:
+    for name in ctx.actors([node]):
+        wish = wishes.setdefault(name, _Wish(node))
+        for one in node.children("PrivateAction"):
+            action = ctx.attempt(partial(private_action, one, ctx))
+            if isinstance(action, Teleport):
+                wish.positions.append(action.position)
+            elif isinstance(action, Speed) and action.at_once and not action.target.continuous:
+                wish.speed = action
+            elif action is not None:
+                wish.actions.append(action)
+
+
+def _handed(wishes: Mapping[str, _Wish]) -> Iterator[tuple[str, bool]]:
+    for name, wish in wishes.items():
+        flat: list[Any] = []
+        for action in wish.actions:
+            flat += action.actions if isinstance(action, Several) else [action]
+        for action in flat:
+            if isinstance(action, Activate) and action.says is not None:
+                yield name, action.says
+
+
+class _Starting:
+    """An entity whose place and speed are worked out when somebody asks; looks like an actor."""
+
+    def __init__(self, name: str, wish: _Wish, ctx: Context, scene: Scene) -> None:
+        self.name, self.wish, self.ctx, self.scene = name, wish, ctx, scene
+        self.entity = ctx.entities[name]
+        self._known: dict[str, Any] = {}
+        self._so_far: Place | None = None  # where the teleports before the one at hand have put it
+
+    def _once(self, key: str, make: Callable[[], Any]) -> Any:
+        if key not in self._known:
+            self._known[key] = _ASKED
+            self._known[key] = make()
+        if self._known[key] is _ASKED:
+            raise self.wish.node.error(f"the {key} of {self.name!r} depends on itself")
+        return self._known[key]
+
+    @property
+    def place(self) -> Place:
+        """Where it begins; while that is worked out, where it is so far."""
+        if self._known.get("place") is _ASKED and self._so_far is not None:
+            return self._so_far
+        return cast("Place", self._once("place", self._place))
+
+    def _place(self) -> Place:
+        for position in self.wish.positions:
+            self._so_far = position.place(self.scene)
+        for action in self.wish.actions:
+            first = action.first if isinstance(action, FollowTrajectory) else None
+            if first is not None:
+                self._so_far = self.ctx.network.place_of(first)
+        return self._so_far or self.ctx.network.place_of(ORIGIN)
+
+    @property
+    def pose(self) -> Pose:
+        """As an actor has it."""
+        return self.place.pose
+
+    @property
+    def speed(self) -> float:
+        """At the begin, m/s."""
+        return cast("float", self._once("speed", self._speed))
+
+    def _speed(self) -> float:
+        if self.wish.speed is None:
+            return 0.0
+        v = self.wish.speed.target.speed(self.scene)
+        return limited(v, self.entity.performance)
+
+    @property
+    def guide(self) -> Guide:
+        """As an actor has it; places are seen from it, and speeds."""
+        return cast("Guide", _StartGuide(self))
+
+
+class _StartGuide:
+    """What of a guide other entities may refer to at the begin."""
+
+    def __init__(self, of: _Starting) -> None:
+        self.of = of
+
+    @property
+    def base(self) -> Any:
+        """Lane point."""
+        return self.of.place.lane
+
+    @property
+    def v(self) -> float:
+        """Demanded speed."""
+        return self.of.speed
+
+
+_ASKED = object()
+
+
+def _worked_out(
+    init: Node, wishes: Mapping[str, _Wish], gone: set[str], ctx: Context
+) -> Iterator[tuple[str, Begin]]:
+    """As in esmini, what <Init> puts nowhere stands at the origin, unless it is added later."""
+    actors: dict[str, _Starting] = {}
+    scene = Scene(ctx.network, 0.0, cast("Mapping[str, Actor]", actors))
+    for name in ctx.entities:
+        actors[name] = _Starting(name, wishes.get(name, _Wish(init)), ctx, scene)
+    for name, one in actors.items():
+        try:
+            place = None if name in gone else one.place
+            if not one.wish.positions and name in ctx.added:
+                place = None
+            yield name, Begin(place, one.speed, tuple(one.wish.actions))
+        except Fault as fault:
+            ctx.findings.append(fault.finding)
+            yield name, Begin(None, 0.0)

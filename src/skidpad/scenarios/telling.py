@@ -1,0 +1,257 @@
+"""A storyboard being told: what has begun, what is under way, what is complete.
+
+In each step triggers are looked at from the top down, then what is under way goes on, as in
+esmini: what begins in a step takes part in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from skidpad.scenarios.scene import DONE, Move, Path, Running, Scene, State
+from skidpad.scenarios.storyboard import (
+    Act,
+    Event,
+    Group,
+    Manoeuvre,
+    NamedAction,
+    Priority,
+    Story,
+    Storyboard,
+)
+from skidpad.scenarios.triggers import Watch
+
+
+class Told:
+    """An element with a state, told to the scene when it changes."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.state = path, State.STANDBY
+
+    def turn(self, scene: Scene, state: State, move: Move) -> None:
+        """Into another state."""
+        self.state = state
+        scene.states[self.path] = state
+        scene.moves.append((self.path, move))
+
+    @property
+    def running(self) -> bool:
+        """Under way."""
+        return self.state is State.RUNNING
+
+    @property
+    def complete(self) -> bool:
+        """Over."""
+        return self.state is State.COMPLETE
+
+
+class ToldEvent(Told):
+    """An event of a run, with its actions under way."""
+
+    def __init__(self, event: Event, actors: Sequence[str]) -> None:
+        super().__init__(event.path)
+        self.event, self.actors, self.left = event, actors, event.count
+        self.watch = Watch(event.start)
+        self.going: list[tuple[Path, list[Running]]] = []
+        self.happened_at: float | None = None  # s, the first time
+
+    def due(self, scene: Scene) -> bool:
+        """The trigger fires, and the event may still run."""
+        fires = not self.watch or self.watch.fires(scene)
+        return fires and self.left > 0 and not self.running
+
+    def launch(self, scene: Scene, others: Iterable[ToldEvent]) -> None:
+        """Begin, as the priority has it with other events under way."""
+        under_way = [e for e in others if e.running]
+        if under_way and self.event.priority is Priority.SKIP:
+            self.left -= 1
+            over = self.left <= 0
+            self.turn(scene, State.COMPLETE if over else State.STANDBY, Move.SKIP)
+            return
+        if self.event.priority in (Priority.OVERRIDE, Priority.OVERWRITE):
+            for other in under_way:
+                other.stop(scene)
+        self.left -= 1
+        if self.happened_at is None:
+            self.happened_at = scene.t
+        self.turn(scene, State.RUNNING, Move.START)
+        self.going = []
+        for action in self.event.actions:
+            scene.states[action.path] = State.RUNNING
+            scene.moves.append((action.path, Move.START))
+            self.going.append((action.path, list(_begun(action, self.actors, scene))))
+
+    def step(self, scene: Scene) -> None:
+        """Go on with the actions under way."""
+        if not self.running:
+            return
+        still = []
+        for path, runs in self.going:
+            runs = [r for r in runs if not r.step(scene)]
+            if runs:
+                still.append((path, runs))
+            else:
+                scene.states[path] = State.COMPLETE
+                scene.moves.append((path, Move.END))
+        self.going = still
+        if not still:
+            self.turn(scene, State.STANDBY if self.left > 0 else State.COMPLETE, Move.END)
+
+    def stop(self, scene: Scene) -> None:
+        """Before its end."""
+        if self.complete:
+            return
+        for path, _ in self.going:
+            scene.states[path] = State.COMPLETE
+            scene.moves.append((path, Move.STOP))
+        self.going = []
+        self.turn(scene, State.COMPLETE, Move.STOP)
+
+
+def _begun(action: NamedAction, actors: Sequence[str], scene: Scene) -> Iterable[Running]:
+    if action.worldwide is not None:
+        action.worldwide.happen(scene)
+        yield DONE
+    if action.private is not None:
+        for name in actors:
+            yield action.private.begin(scene, scene.actors[name])
+
+
+class ToldParent(Told):
+    """An element that is complete when all its children are."""
+
+    def __init__(self, path: Path, children: Sequence[ToldParent | ToldEvent]) -> None:
+        super().__init__(path)
+        self.children = children
+
+    def start(self, scene: Scene) -> None:
+        """With its children, which have no triggers of their own."""
+        self.turn(scene, State.RUNNING, Move.START)
+        for child in self.children:
+            if isinstance(child, ToldParent):
+                child.start(scene)
+
+    def look(self, scene: Scene) -> None:
+        """Look at the triggers inside."""
+        if self.running:
+            for child in self.children:
+                if isinstance(child, ToldParent):
+                    child.look(scene)
+
+    def step(self, scene: Scene) -> None:
+        """Go on with what is inside."""
+        if not self.running:
+            return
+        for child in self.children:
+            child.step(scene)
+        if all(child.complete for child in self.children):
+            self.end(scene)
+
+    def end(self, scene: Scene) -> None:
+        """All inside is complete."""
+        self.turn(scene, State.COMPLETE, Move.END)
+
+    def stop(self, scene: Scene) -> None:
+        """Before its end."""
+        for child in self.children:
+            child.stop(scene)
+        if not self.complete:
+            self.turn(scene, State.COMPLETE, Move.STOP)
+
+
+class ToldManoeuvre(ToldParent):
+    """Events, which begin by their triggers."""
+
+    def __init__(self, manoeuvre: Manoeuvre, actors: Sequence[str]) -> None:
+        self.events = [ToldEvent(e, actors) for e in manoeuvre.events]
+        super().__init__(manoeuvre.path, self.events)
+
+    def look(self, scene: Scene) -> None:
+        """Let events begin."""
+        if not self.running:
+            return
+        for event in self.events:
+            if event.due(scene):
+                event.launch(scene, [e for e in self.events if e is not event])
+
+
+class ToldGroup(ToldParent):
+    """Manoeuvres, told several times where the file says so."""
+
+    def __init__(self, group: Group) -> None:
+        self.group, self.left = group, group.count
+        self.manoeuvres = [ToldManoeuvre(m, group.actors) for m in group.manoeuvres]
+        super().__init__(group.path, self.manoeuvres)
+
+    def end(self, scene: Scene) -> None:
+        """Once more, or complete."""
+        self.left -= 1
+        if self.left <= 0:
+            self.turn(scene, State.COMPLETE, Move.END)
+            return
+        scene.moves.append((self.path, Move.END))
+        self.manoeuvres = [ToldManoeuvre(m, self.group.actors) for m in self.group.manoeuvres]
+        self.children = self.manoeuvres
+        self.start(scene)
+
+
+class ToldAct(ToldParent):
+    """Groups between a start and a stop trigger."""
+
+    def __init__(self, act: Act) -> None:
+        self.groups = [ToldGroup(g) for g in act.groups]
+        super().__init__(act.path, self.groups)
+        self.begin, self.halt = Watch(act.start), Watch(act.stop)
+
+    def look(self, scene: Scene) -> None:
+        """Begin or stop by its triggers, then look inside."""
+        if self.running and self.halt and self.halt.fires(scene):
+            self.stop(scene)
+        if self.state is State.STANDBY and (not self.begin or self.begin.fires(scene)):
+            self.turn(scene, State.RUNNING, Move.START)
+            for group in self.groups:
+                group.start(scene)
+        super().look(scene)
+
+
+class ToldStory(ToldParent):
+    """Acts under a name."""
+
+    def __init__(self, story: Story) -> None:
+        self.acts = [ToldAct(a) for a in story.acts]
+        super().__init__(story.path, self.acts)
+
+    def start(self, scene: Scene) -> None:
+        """Acts have triggers of their own."""
+        self.turn(scene, State.RUNNING, Move.START)
+
+
+class Telling:
+    """All stories of a run. Without a stop trigger it ends when all acts are complete."""
+
+    def __init__(self, board: Storyboard) -> None:
+        self.stories = [ToldStory(s) for s in board.stories]
+        self.halt = Watch(board.stop)
+        self.begun = self.ended = False
+
+    @property
+    def events(self) -> list[ToldEvent]:
+        """Every event."""
+        acts = [a for s in self.stories for a in s.acts]
+        return [e for a in acts for g in a.groups for m in g.manoeuvres for e in m.events]
+
+    def step(self, scene: Scene) -> None:
+        """One step of everything."""
+        if not self.begun:
+            self.begun = True
+            for story in self.stories:
+                story.start(scene)
+        if self.halt and self.halt.fires(scene):
+            self.ended = True
+        for story in self.stories:
+            story.look(scene)
+        for story in self.stories:
+            story.step(scene)
+        acts = [a for s in self.stories for a in s.acts]
+        if not self.halt and acts and all(a.complete for a in acts):
+            self.ended = True

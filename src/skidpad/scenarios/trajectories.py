@@ -1,0 +1,220 @@
+"""Trajectories of a file: shapes compiled to lines, at once or when an action begins."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+from lxml import etree
+
+from skidpad.core.geometry import Pose
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.lines import Line, Vertex, clothoid, even_knots, nurbs
+from skidpad.scenarios.network import Place
+from skidpad.scenarios.positions import Fixed, Orientation, Position, orientation, position
+from skidpad.scenarios.scene import Scene
+
+Shape = Callable[[Sequence[Pose]], list[Vertex]]
+
+
+@dataclass(frozen=True, slots=True)
+class Trajectory:
+    """A line, or places that depend on what moves and how they make one when it is begun."""
+
+    name: str
+    closed: bool
+    line: Line | None
+    places: tuple[Position, ...] = ()
+    shape: Shape | None = None
+
+    def traced(self, scene: Scene) -> Line:
+        """The line as things are now."""
+        if self.line is not None or self.shape is None:
+            return self.line or Line([Vertex(0.0, 0.0, 0.0)])
+        return Line(self.shape([p.place(scene).pose for p in self.places]))
+
+
+def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
+    """A <Trajectory>, or a reference to one."""
+    node = ctx.catalogs.resolved(node)
+    if node.tag != "Trajectory":
+        raise node.error("needs a <Trajectory>")
+    closed = node.flag("closed", default=False)
+    shape = node.child("Shape").only()
+    name = node.label()
+    if shape.tag == "Polyline":
+        quick = [_plain_vertex(v) for v in shape.element.iterchildren("Vertex")]
+        known = [v for v in quick if v is not None]
+        if known and len(known) == len(quick):
+            return Trajectory(name, closed, Line(_checked(shape, known, closed)))
+    if shape.tag not in SHAPES:
+        raise shape.unsupported()
+    nodes, make = SHAPES[shape.tag](shape, closed)
+    places = tuple(position(n, ctx) for n in nodes)
+    fixed = [p.fixed.pose for p in places if isinstance(p, Fixed)]
+    if len(fixed) == len(places):
+        return Trajectory(name, closed, Line(make(fixed)))
+    return Trajectory(name, closed, None, places, make)
+
+
+def _checked(shape: Node, vertices: list[Vertex], closed: bool) -> list[Vertex]:
+    """Vertices in the order of their times; a closed line ends where it begins."""
+    times = [v.time for v in vertices]
+    if any(a is not None and b is not None and b < a for a, b in pairwise(times)):
+        raise shape.error("the times of its vertices must not fall")
+    return [*vertices, replace(vertices[0], time=None)] if closed else vertices
+
+
+def _polyline(shape: Node, closed: bool) -> tuple[list[Node], Shape]:
+    nodes = list(shape.children("Vertex"))
+    if not nodes:
+        raise shape.error("needs at least one <Vertex>")
+    times = [n.number("time") if n.has("time") else None for n in nodes]
+    places = [n.child("Position") for n in nodes]
+    named = [_named(p.only()) for p in places]
+    _checked(shape, [Vertex(0.0, 0.0, 0.0, None, t) for t in times], False)
+
+    def make(poses: Sequence[Pose]) -> list[Vertex]:
+        rows = zip(poses, named, times, strict=True)
+        vertices = [Vertex(p.x, p.y, p.z, p.yaw if n else None, t) for p, n, t in rows]
+        return [*vertices, replace(vertices[0], time=None)] if closed else vertices
+
+    return places, make
+
+
+def _named(place: Node) -> bool:
+    """A heading is said; that of a place on a road counts as such."""
+    return place.tag != "WorldPosition" or place.has("h")
+
+
+def _plain_vertex(element: etree._Element) -> Vertex | None:
+    """A vertex in coordinates of the world without parameters: files have ten thousands of them."""
+    if len(element) != 1 or len(element[0]) != 1 or element[0][0].tag != "WorldPosition":
+        return None
+    place = element[0][0].attrib
+    try:
+        h, t = place.get("h"), element.get("time")
+        values = Vertex(
+            float(place["x"]),
+            float(place["y"]),
+            float(place.get("z", 0.0)),
+            None if h is None else float(h),
+            None if t is None else float(t),
+        )
+    except (KeyError, ValueError):
+        return None  # read again with care, which names what is wrong
+    total = values.x + values.y + values.z + (values.heading or 0.0) + (values.time or 0.0)
+    return values if abs(total) < float("inf") else None
+
+
+def _clothoid(shape: Node, closed: bool) -> tuple[list[Node], Shape]:
+    del closed
+    rate = shape.number("curvatureDot", 0.0)  # the name before 1.1
+    times = None
+    if shape.has("startTime") and shape.has("stopTime"):
+        times = shape.number("startTime"), shape.number("stopTime")
+    curvature, length = shape.number("curvature"), shape.number("length")
+    prime = shape.number("curvaturePrime", rate)
+    return [shape.child("Position")], lambda p: clothoid(p[0], curvature, prime, length, times)
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """One piece of a spline of clothoids; begins: a place of its own, else the end before it."""
+
+    begins: bool
+    turn: float
+    curvatures: tuple[float, float]
+    length: float
+    times: tuple[float, float] | None
+
+
+def _spline(shape: Node, closed: bool) -> tuple[list[Node], Shape]:
+    del closed
+    nodes = list(shape.children("ClothoidSplineSegment", "Segment"))
+    if not nodes:
+        raise shape.error("needs a <ClothoidSplineSegment>")
+    starts = [n.number("timeStart") if n.has("timeStart") else None for n in nodes]
+    end = shape.number("timeEnd") if shape.has("timeEnd") else None
+    segments = []
+    for node, t0, t1 in zip(nodes, starts, [*starts[1:], end], strict=True):
+        curvatures = node.number("curvatureStart"), node.number("curvatureEnd")
+        times = None if t0 is None or t1 is None else (t0, t1)
+        begins = node.find("PositionStart") is not None
+        turn, length = node.number("hOffset", 0.0), node.number("length")
+        segments.append(Segment(begins, turn, curvatures, length, times))
+    if not segments[0].begins:
+        raise nodes[0].error("the first one needs <PositionStart>")
+    places = [p for n in nodes if (p := n.find("PositionStart")) is not None]
+    return places, lambda poses: list(_joined(segments, poses))
+
+
+def _joined(segments: Sequence[Segment], poses: Sequence[Pose]) -> Iterator[Vertex]:
+    own = iter(poses)
+    pose = poses[0]
+    for segment in segments:
+        if segment.begins:
+            pose = next(own)
+        k0, k1 = segment.curvatures
+        rate = (k1 - k0) / max(segment.length, 1e-9)
+        turned = replace(pose, yaw=pose.yaw + segment.turn)
+        points = clothoid(turned, k0, rate, segment.length, segment.times)
+        yield from points
+        last = points[-1]
+        pose = Pose(last.x, last.y, last.z, yaw=last.heading or 0.0)
+
+
+def _nurbs(shape: Node, closed: bool) -> tuple[list[Node], Shape]:
+    del closed
+    order = shape.whole("order")
+    nodes = list(shape.children("ControlPoint"))
+    times = [n.number("time") if n.has("time") else None for n in nodes]
+    weights = [n.number("weight", 1.0) for n in nodes]
+    knots = [k.number("value") for k in shape.children("Knot")]
+    if order < 2 or len(nodes) < order:
+        raise shape.error(f"order {order} needs at least {max(order, 2)} control points")
+    knots = knots or even_knots(order, len(nodes))
+    if len(knots) != len(nodes) + order or any(b < a for a, b in pairwise(knots)):
+        raise shape.error(f"needs {len(nodes) + order} knots that do not fall, got {len(knots)}")
+    if not knots[order - 1] < knots[len(nodes)]:
+        raise shape.error("its knots leave no curve")
+    if not all(w > 0.0 for w in weights):
+        raise shape.error("weights must be positive")
+
+    def make(poses: Sequence[Pose]) -> list[Vertex]:
+        rows = zip(poses, times, strict=True)
+        return nurbs(order, [Vertex(p.x, p.y, p.z, None, t) for p, t in rows], weights, knots)
+
+    return [n.child("Position") for n in nodes], make
+
+
+SHAPES: Mapping[str, Callable[[Node, bool], tuple[list[Node], Shape]]] = {
+    "Polyline": _polyline,
+    "Clothoid": _clothoid,
+    "ClothoidSpline": _spline,
+    "Nurbs": _nurbs,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class OnTrajectory:
+    """So far along a trajectory, and to the left of it."""
+
+    trajectory: Trajectory
+    s: float
+    t: float
+    facing: Orientation
+
+    def place(self, scene: Scene) -> Place:
+        """On the line as it is now."""
+        pose = self.trajectory.traced(scene).at_length(self.s).moved(left=self.t)
+        return scene.network.place_of(replace(pose, yaw=self.facing.turned(pose.yaw)))
+
+
+def trajectory_position(node: Node, ctx: Context) -> Position:
+    """A <TrajectoryPosition>."""
+    trajectory = compile_trajectory(node.child("TrajectoryRef").only(), ctx)
+    s, t = node.number("s"), node.number("t", 0.0)
+    return OnTrajectory(trajectory, s, t, orientation(node))

@@ -1,0 +1,148 @@
+"""Triggers: groups of conditions with edges and delays, compiled once and observed by each run."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+from enum import Enum
+from functools import partial
+
+from skidpad.scenarios.conditions.base import Condition, EntityCondition, Probe
+from skidpad.scenarios.conditions.by_entity import BY_ENTITY
+from skidpad.scenarios.conditions.by_value import BY_VALUE, Never
+from skidpad.scenarios.conditions.distances import DISTANCES
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.scene import Scene
+
+ENTITY_CONDITIONS = {**BY_ENTITY, **DISTANCES}
+
+
+class Edge(Enum):
+    """Which change of a condition counts."""
+
+    NONE = "none"
+    RISING = "rising"
+    FALLING = "falling"
+    BOTH = "risingOrFalling"
+
+
+@dataclass(frozen=True, slots=True)
+class AnyEntity:
+    """An entity condition for some or all triggering entities."""
+
+    names: tuple[str, ...]
+    of_all: bool
+    condition: EntityCondition
+
+    def probe(self) -> Probe:
+        """By the rule `any` or `all`."""
+        return self._holds
+
+    def _holds(self, scene: Scene) -> bool:
+        found = (
+            scene.actors[name].present and self.condition.holds(scene, name) for name in self.names
+        )
+        return all(found) if self.of_all else any(found)
+
+
+@dataclass(frozen=True, slots=True)
+class Timed:
+    """A condition with its name, edge and delay in s."""
+
+    name: str
+    condition: Condition
+    edge: Edge
+    delay: float
+
+
+@dataclass(frozen=True, slots=True)
+class Trigger:
+    """Groups of conditions: it fires when all of one group hold."""
+
+    groups: tuple[tuple[Timed, ...], ...]
+
+    def __bool__(self) -> bool:
+        return bool(self.groups)
+
+
+EMPTY = Trigger(())
+
+
+class Watched:
+    """A condition as one run sees it."""
+
+    def __init__(self, timed: Timed) -> None:
+        self.timed, self.probe = timed, timed.condition.probe()
+        self.before: bool | None = None
+        self.past: deque[tuple[float, bool]] = deque()
+
+    def holds(self, scene: Scene) -> bool:
+        """The result of `delay` s ago."""
+        now = self.probe(scene)
+        before, self.before = self.before, now
+        edge = self.timed.edge
+        if edge is not Edge.NONE:
+            rose, fell = now and before is False, before is True and not now
+            now = (rose and edge is not Edge.FALLING) or (fell and edge is not Edge.RISING)
+        if self.timed.delay <= 0.0:
+            return now
+        self.past.append((scene.t + self.timed.delay, now))
+        if self.past[0][0] <= scene.t + 1e-9:
+            return self.past.popleft()[1]
+        return False
+
+
+class Watch:
+    """A trigger as one run sees it."""
+
+    def __init__(self, trigger: Trigger) -> None:
+        self.groups = [[Watched(c) for c in group] for group in trigger.groups]
+
+    def __bool__(self) -> bool:
+        return bool(self.groups)
+
+    def fires(self, scene: Scene) -> bool:
+        """Every condition is looked at in every step, so that delays and edges stay true."""
+        results = [[c.holds(scene) for c in group] for group in self.groups]
+        return any(all(group) for group in results)
+
+
+def compile_trigger(node: Node | None, ctx: Context) -> Trigger:
+    """A <StartTrigger> or <StopTrigger>; faulty conditions go to the list of findings."""
+    if node is None:
+        return EMPTY
+    groups = []
+    for group in node.children("ConditionGroup"):
+        found = [ctx.attempt(partial(_timed, c, ctx)) for c in group.children("Condition")]
+        groups.append(tuple(c or Timed("", Never(), Edge.NONE, 0.0) for c in found))
+    return Trigger(tuple(g for g in groups if g))
+
+
+def _timed(node: Node, ctx: Context) -> Timed:
+    edge = node.choice("conditionEdge", Edge, Edge.NONE)
+    delay = node.number("delay", 0.0)
+    if delay < 0.0:
+        raise node.error(f"delay must be >= 0, got {delay:g}")
+    return Timed(node.label(), condition(node, ctx), edge, delay)
+
+
+def condition(node: Node, ctx: Context) -> Condition:
+    """The condition inside a <Condition>."""
+    inner = node.only()
+    if inner.tag == "ByValueCondition":
+        leaf = inner.only()
+        if leaf.tag not in BY_VALUE:
+            raise leaf.unsupported()
+        return BY_VALUE[leaf.tag](leaf, ctx)
+    if inner.tag != "ByEntityCondition":
+        raise inner.unsupported()
+    who = inner.child("TriggeringEntities")
+    leaf = inner.child("EntityCondition").only()
+    if leaf.tag not in ENTITY_CONDITIONS:
+        raise leaf.unsupported()
+    names = ctx.actors(who.children("EntityRef"))
+    rule = who.text("triggeringEntitiesRule")
+    if rule not in ("any", "all"):
+        raise who.error(f"triggeringEntitiesRule must be any or all, got {rule!r}")
+    return AnyEntity(names, rule == "all", ENTITY_CONDITIONS[leaf.tag](leaf, ctx))

@@ -1,0 +1,129 @@
+"""Small OpenSCENARIO files for tests, put together from parts."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from skidpad.scenarios.scenario import Scenario, compile_scenario
+from skidpad.scenarios.stage import Told, played
+
+FILE = """<?xml version='1.0'?>
+<OpenSCENARIO>
+  <FileHeader revMajor="1" revMinor="{minor}" date="2026-01-01T00:00:00" description="x" author="x"/>
+  <ParameterDeclarations>{parameters}</ParameterDeclarations>
+  {variables}
+  <CatalogLocations>{catalogs}</CatalogLocations>
+  <RoadNetwork>{road}</RoadNetwork>
+  <Entities>{entities}</Entities>
+  <Storyboard><Init><Actions>{init}</Actions></Init>{stories}
+    <StopTrigger>{stop}</StopTrigger>
+  </Storyboard>
+</OpenSCENARIO>
+"""
+VEHICLE = """<Vehicle name="v" vehicleCategory="car"><BoundingBox><Center x="{x}" y="0" z="0.7"/>
+<Dimensions width="1.8" length="4.2" height="1.5"/></BoundingBox>
+<Performance maxSpeed="70" maxDeceleration="10" maxAcceleration="10"/>
+<Axles><FrontAxle maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.7"
+positionZ="0.3"/><RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0"
+positionZ="0.3"/></Axles><Properties/></Vehicle>"""
+ROAD = '<LogicFile filepath="straight.xodr"/>'
+
+
+def vehicle(name: str, x: float = 0.0) -> str:
+    return f'<ScenarioObject name="{name}">{VEHICLE.format(x=x)}</ScenarioObject>'
+
+
+def on_lane(lane: int, s: float, offset: float = 0.0, road: int = 1) -> str:
+    return f'<LanePosition roadId="{road}" laneId="{lane}" s="{s}" offset="{offset}"/>'
+
+
+def private(action: str) -> str:
+    return f"<PrivateAction>{action}</PrivateAction>"
+
+
+def teleport(position: str) -> str:
+    return f"<TeleportAction><Position>{position}</Position></TeleportAction>"
+
+
+def speed(target: str, shape: str = "step", value: object = 0, dimension: str = "time") -> str:
+    return f"""<LongitudinalAction><SpeedAction>
+<SpeedActionDynamics dynamicsShape="{shape}" value="{value}" dynamicsDimension="{dimension}"/>
+<SpeedActionTarget>{target}</SpeedActionTarget></SpeedAction></LongitudinalAction>"""
+
+
+def to(v: object) -> str:
+    return f'<AbsoluteTargetSpeed value="{v}"/>'
+
+
+def init(name: str, *actions: str) -> str:
+    return f'<Private entityRef="{name}">{"".join(map(private, actions))}</Private>'
+
+
+def at(name: str, lane: int, s: float, v: object = 10) -> str:
+    return init(name, teleport(on_lane(lane, s)), speed(to(v)))
+
+
+def condition(body: str, edge: str = "none", delay: float = 0.0) -> str:
+    return f"""<ConditionGroup><Condition name="c" delay="{delay}" conditionEdge="{edge}">
+{body}</Condition></ConditionGroup>"""
+
+
+def by_value(body: str) -> str:
+    return f"<ByValueCondition>{body}</ByValueCondition>"
+
+
+def time(t: float, rule: str = "greaterOrEqual") -> str:
+    return by_value(f'<SimulationTimeCondition value="{t}" rule="{rule}"/>')
+
+
+def state(kind: str, name: str, state: str) -> str:
+    return by_value(
+        f'<StoryboardElementStateCondition storyboardElementType="{kind}" '
+        f'storyboardElementRef="{name}" state="{state}"/>'
+    )
+
+
+def by_entity(body: str, *names: str) -> str:
+    who = "".join(f'<EntityRef entityRef="{n}"/>' for n in names or ("ego",))
+    return f"""<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any">{who}
+</TriggeringEntities><EntityCondition>{body}</EntityCondition></ByEntityCondition>"""
+
+
+def event(name: str, action: str, when: str, edge: str = "none", priority: str = "parallel") -> str:
+    return f"""<Event name="{name}" priority="{priority}"><Action name="{name}_action">{action}</Action>
+<StartTrigger>{condition(when, edge)}</StartTrigger></Event>"""
+
+
+def story(*events: str, actor: str = "other", name: str = "story", start: str = "") -> str:
+    begin = condition(start) if start else ""
+    return f"""<Story name="{name}"><Act name="{name}_act"><ManeuverGroup name="{name}_group"
+maximumExecutionCount="1"><Actors selectTriggeringEntities="false"><EntityRef entityRef="{actor}"/>
+</Actors><Maneuver name="{name}_manoeuvre">{"".join(events)}</Maneuver></ManeuverGroup>
+<StartTrigger>{begin}</StartTrigger></Act></Story>"""
+
+
+def write(folder: Path, **parts: object) -> Path:
+    """A file with an ego on lane -3 and another car on lane -1, unless the parts say otherwise."""
+    values = {
+        "minor": 2,
+        "parameters": "",
+        "variables": "",
+        "catalogs": "",
+        "road": ROAD,
+        "entities": vehicle("ego") + vehicle("other"),
+        "init": at("ego", -3, 100) + at("other", -1, 120),
+        "stories": "",
+        "stop": condition(time(parts.pop("end", 6.0))),
+    }
+    path = folder / "x.xosc"
+    path.write_text(FILE.format(**values | parts), encoding="utf-8")
+    return path
+
+
+def compiled(folder: Path, **parts: object) -> Scenario:
+    return compile_scenario(write(folder, **parts))
+
+
+def told(folder: Path, **parts: object) -> Told:
+    """The file played by itself, everything ideal."""
+    return played(compiled(folder, **parts), 60.0)

@@ -1,0 +1,133 @@
+"""Lane changes and offsets: where they end, how far they get meanwhile, across the centre line."""
+
+from __future__ import annotations
+
+import itertools
+from math import hypot
+
+import pytest
+from tests.scenarios.files import (
+    at,
+    event,
+    init,
+    on_lane,
+    private,
+    speed,
+    story,
+    teleport,
+    time,
+    to,
+    told,
+)
+
+
+def lane_change(target, shape="sinusoidal", value=4, dimension="time", offset=0.0):
+    return private(f"""<LateralAction><LaneChangeAction targetLaneOffset="{offset}">
+<LaneChangeActionDynamics dynamicsShape="{shape}" value="{value}" dynamicsDimension="{dimension}"/>
+<LaneChangeTarget>{target}</LaneChangeTarget></LaneChangeAction></LateralAction>""")
+
+
+def relative(value, other="other"):
+    return f'<RelativeTargetLane entityRef="{other}" value="{value}"/>'
+
+
+def absolute(lane):
+    return f'<AbsoluteTargetLane value="{lane}"/>'
+
+
+def changed(tmp_path, action, **parts):
+    return told(tmp_path, stories=story(event("e", action, time(1.0))), end=9.0, **parts).of(
+        "other"
+    )
+
+
+def way(rows):
+    return sum(hypot(b.x - a.x, b.y - a.y) for a, b in itertools.pairwise(rows))
+
+
+@pytest.mark.osc("LaneChangeAction", "RelativeTargetLane")
+@pytest.mark.parametrize("shape", ["linear", "sinusoidal", "cubic"])
+def test_the_way_of_a_lane_change_is_as_long_as_the_speed_says(tmp_path, shape):
+    rows = changed(tmp_path, lane_change(relative(-1), shape, 3))
+    assert rows[-1].y == pytest.approx(-5.25, abs=1e-3)
+    assert way(rows) == pytest.approx(10.0 * 9.0, abs=0.02)
+    assert rows[-1].x < 120.0 + 90.0 - 0.2  # the way aside is no way ahead
+
+
+@pytest.mark.osc("AbsoluteTargetLane")
+@pytest.mark.parametrize("target", [absolute(1), relative(1)])
+def test_from_the_innermost_lane_to_the_one_beyond_the_centre_line_is_one_change(tmp_path, target):
+    rows = changed(tmp_path, lane_change(target))
+    assert rows[-1].y == pytest.approx(1.75, abs=1e-3)
+    assert rows[-1].x > rows[0].x + 80.0  # it still drives the way it looked
+    assert abs(rows[-1].h) < 0.01
+
+
+def test_an_oncoming_car_changes_lanes_in_its_own_left_and_right(tmp_path):
+    begin = at("ego", -3, 100) + at("other", 1, 300)
+    rows = changed(tmp_path, lane_change(relative(1)), init=begin)
+    assert rows[-1].y == pytest.approx(-1.75, abs=1e-3)
+    assert rows[-1].x < 300.0 - 80.0
+
+
+def test_a_change_to_a_lane_that_is_not_there_keeps_the_distance_and_is_no_error(tmp_path):
+    rows = changed(tmp_path, lane_change(absolute(-9)))
+    assert rows[-1].y == pytest.approx(-1.75 - 8 * 3.5, abs=0.05)
+
+
+@pytest.mark.parametrize("value", [0, -2])
+def test_no_time_for_a_lane_change_is_a_step(tmp_path, value):
+    rows = changed(tmp_path, lane_change(absolute(-2), "linear", value))
+    assert rows[21].y == pytest.approx(-5.25, abs=1e-3)
+
+
+def test_a_lane_change_over_a_distance_takes_that_distance(tmp_path):
+    rows = changed(tmp_path, lane_change(absolute(-2), "sinusoidal", 30, "distance"))
+    moving = [r for r in rows if 1e-6 < abs(r.y + 1.75) < 3.5 - 1e-6]
+    assert moving[-1].x - moving[0].x == pytest.approx(30.0, abs=1.0)
+
+
+def test_a_rate_is_the_largest_speed_aside(tmp_path):
+    rows = changed(tmp_path, lane_change(absolute(-2), "sinusoidal", 1.4, "rate"))
+    steps = [abs(b.y - a.y) / 0.05 for a, b in itertools.pairwise(rows)]
+    assert max(steps) == pytest.approx(1.4, abs=0.01)
+
+
+def test_nothing_goes_aside_while_it_stands(tmp_path):
+    begin = at("ego", -3, 100) + at("other", -1, 120, 0)
+    rows = changed(tmp_path, lane_change(absolute(-2)), init=begin)
+    assert rows[-1].y == pytest.approx(-1.75)
+
+
+@pytest.mark.osc("LaneOffsetAction", "AbsoluteTargetLaneOffset")
+@pytest.mark.parametrize("lane", [-1, 1])
+def test_an_offset_counts_to_the_left_of_the_road(tmp_path, lane):
+    offset = private("""<LateralAction><LaneOffsetAction continuous="false">
+<LaneOffsetActionDynamics dynamicsShape="cubic" maxLateralAcc="1.5"/><LaneOffsetTarget>
+<AbsoluteTargetLaneOffset value="0.8"/></LaneOffsetTarget></LaneOffsetAction></LateralAction>""")
+    rows = changed(tmp_path, offset, init=at("ego", -3, 100) + at("other", lane, 400))
+    assert rows[-1].y - rows[0].y == pytest.approx(0.8, abs=1e-3)
+    sharp = [abs(a.y - 2 * b.y + c.y) / 0.05**2 for a, b, c in zip(rows, rows[1:], rows[2:])]  # noqa: B905
+    assert max(sharp) == pytest.approx(1.5, abs=0.15)
+
+
+@pytest.mark.osc("RelativeTargetLaneOffset")
+def test_an_offset_may_be_that_of_another_car(tmp_path):
+    offset = private("""<LateralAction><LaneOffsetAction continuous="false">
+<LaneOffsetActionDynamics dynamicsShape="sinusoidal" maxLateralAcc="1"/><LaneOffsetTarget>
+<RelativeTargetLaneOffset entityRef="ego" value="0.5"/></LaneOffsetTarget></LaneOffsetAction>
+</LateralAction>""")
+    begin = init("ego", teleport(on_lane(-1, 100, 0.4)), speed(to(10))) + at("other", -1, 140)
+    rows = changed(tmp_path, offset, init=begin)
+    assert rows[-1].y == pytest.approx(-1.75 + 0.9, abs=1e-3)
+
+
+@pytest.mark.osc("LateralDistanceAction")
+def test_a_sideways_distance_is_kept(tmp_path):
+    keep = private("""<LateralAction><LateralDistanceAction entityRef="ego" distance="2.5"
+freespace="false" continuous="true" displacement="leftToReferencedEntity">
+<DynamicConstraints maxAcceleration="2" maxDeceleration="2" maxSpeed="1.0"/>
+</LateralDistanceAction></LateralAction>""")
+    rows = changed(tmp_path, keep)
+    assert rows[-1].y == pytest.approx(-8.75 + 2.5, abs=1e-3)
+    assert max(abs(b.y - a.y) for a, b in itertools.pairwise(rows)) <= 0.05 + 1e-6

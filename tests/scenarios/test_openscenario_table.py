@@ -1,0 +1,16 @@
+"""The coverage table of the docs is that of the code."""
+
+from __future__ import annotations
+
+from openscenario_table import PAGE, marked_tests, page
+from skidpad.scenarios.coverage import Support, coverage
+
+
+def test_the_page_says_what_the_code_knows():
+    text = PAGE.read_text(encoding="utf-8")
+    assert page(text) == text, "python tools/openscenario_table.py writes it anew"
+
+
+def test_marks_name_elements_of_the_standard_that_are_known():
+    known = {row.element for row in coverage() if row.support is not Support.NO}
+    assert set(marked_tests()) <= known

@@ -1,0 +1,150 @@
+"""Trajectories: with and without times, of all shapes, what comes after them; positions of all kinds."""
+
+# ruff: noqa: ISC004  elements in lists of parameters
+from __future__ import annotations
+
+from math import cos, hypot, pi, sin
+
+import pytest
+from tests.scenarios.files import (
+    at,
+    compiled,
+    event,
+    init,
+    on_lane,
+    private,
+    speed,
+    story,
+    teleport,
+    time,
+    to,
+    told,
+)
+
+from skidpad.core.geometry import wrap_angle
+
+ABSOLUTE = '<Timing domainAbsoluteRelative="absolute" scale="1" offset="0"/>'
+RELATIVE = '<Timing domainAbsoluteRelative="relative" scale="2" offset="0.5"/>'
+
+
+def world(x, y, h=None):
+    heading = "" if h is None else f' h="{h}"'
+    return f'<WorldPosition x="{x}" y="{y}"{heading}/>'
+
+
+def follow(shape, timing="<None/>", closed="false"):
+    return private(f"""<RoutingAction><FollowTrajectoryAction><TrajectoryRef>
+<Trajectory name="t" closed="{closed}"><Shape>{shape}</Shape></Trajectory></TrajectoryRef>
+<TimeReference>{timing}</TimeReference><TrajectoryFollowingMode followingMode="position"/>
+</FollowTrajectoryAction></RoutingAction>""")
+
+
+def polyline(*rows):
+    vertices = "".join(
+        f'<Vertex{"" if t is None else f""" time="{t}" """}><Position>{p}</Position></Vertex>'
+        for t, p in rows
+    )
+    return f"<Polyline>{vertices}</Polyline>"
+
+
+def rows_of(tmp_path, action, end=8.0, **parts):
+    return told(tmp_path, stories=story(event("e", action, time(1.0))), end=end, **parts).of(
+        "other"
+    )
+
+
+def test_after_its_end_the_entity_drives_on_along_its_lane(tmp_path):
+    line = polyline((1.0, world(200, -1.75)), (3.0, world(230, -1.75)))
+    rows = rows_of(tmp_path, follow(line, ABSOLUTE))
+    assert rows[60].x == pytest.approx(230.0, abs=1e-6)
+    assert rows[-1].x == pytest.approx(230.0 + 15.0 * 5.0, abs=0.01)
+    assert rows[-1].speed == pytest.approx(15.0)
+
+
+@pytest.mark.osc("FollowTrajectoryAction", "Polyline")
+def test_relative_times_are_stretched_and_put_off(tmp_path):
+    line = polyline((0.0, world(200, -1.75)), (2.0, world(220, -1.75)))
+    rows = rows_of(tmp_path, follow(line, RELATIVE))
+    assert rows[30].x == pytest.approx(200.0, abs=1e-6)  # 1 s + 0.5 s
+    assert rows[70].x == pytest.approx(210.0, abs=1e-6)  # half of 2 s stretched to 4 s
+
+
+def test_without_times_the_own_speed_counts(tmp_path):
+    corner = polyline((None, world(200, -1.75)), (None, world(215, -1.75)), (None, world(215, 30)))
+    rows = rows_of(tmp_path, follow(corner), end=4.0)
+    assert rows[50].y == pytest.approx(-1.75 + 0.0, abs=0.01)
+    assert hypot(rows[60].x - 215.0, rows[60].y - 3.25) < 0.02
+    assert rows[60].h == pytest.approx(pi / 2, abs=0.01)
+
+
+@pytest.mark.osc("Clothoid")
+def test_a_clothoid_of_constant_curvature_is_an_arc(tmp_path):
+    arc = f"""<Clothoid curvature="0.02" curvaturePrime="0" length="60"><Position>{world(200, -1.75, 0)}
+</Position></Clothoid>"""
+    row = rows_of(tmp_path, follow(arc), end=5.0)[80]  # 3 s at 10 m/s: 30 m, 0.6 rad
+    assert row.x == pytest.approx(200.0 + 50.0 * sin(0.6), abs=0.02)
+    assert row.y == pytest.approx(-1.75 + 50.0 * (1.0 - cos(0.6)), abs=0.02)
+    assert row.h == pytest.approx(0.6, abs=0.01)
+
+
+@pytest.mark.osc("Nurbs")
+def test_a_spline_of_order_two_is_its_polygon(tmp_path):
+    points = "".join(
+        f"<ControlPoint><Position>{world(x, y)}</Position></ControlPoint>"
+        for x, y in ((200, -1.75), (220, -1.75), (240, -5.25))
+    )
+    knots = "".join(f'<Knot value="{k}"/>' for k in (0, 0, 1, 2, 2))
+    rows = rows_of(tmp_path, follow(f'<Nurbs order="2">{points}{knots}</Nurbs>'), end=6.0)
+    assert rows[40].x == pytest.approx(210.0, abs=0.02)
+    assert rows[80].y == pytest.approx(-1.75 - 3.5 * 10.0 / hypot(20.0, 3.5), abs=0.02)
+
+
+@pytest.mark.osc("ClothoidSpline")
+def test_pieces_of_a_spline_of_clothoids_follow_each_other(tmp_path):
+    spline = f"""<ClothoidSpline timeEnd="6"><ClothoidSplineSegment curvatureStart="0"
+curvatureEnd="0" length="20" timeStart="2"><PositionStart>{world(200, -1.75, 0)}</PositionStart>
+</ClothoidSplineSegment><ClothoidSplineSegment curvatureStart="0.05" curvatureEnd="0.05" length="20"
+timeStart="4"/></ClothoidSpline>"""
+    rows = rows_of(tmp_path, follow(spline, ABSOLUTE), minor=3)
+    assert rows[60].x == pytest.approx(210.0, abs=0.01)
+    assert rows[100].x == pytest.approx(220.0 + 20.0 * sin(0.5), abs=0.01)
+
+
+def place(tmp_path, position, ego=None):
+    wish = (ego or at("ego", -2, 100)) + init("other", teleport(position), speed(to(0)))
+    return compiled(tmp_path, init=wish).start.entities["other"].place.pose
+
+
+@pytest.mark.osc("WorldPosition", "LanePosition", "RoadPosition", "RelativeLanePosition",
+                 "RelativeRoadPosition", "RelativeObjectPosition", "RelativeWorldPosition",
+                 "TrajectoryPosition", "RoutePosition")  # fmt: skip
+@pytest.mark.parametrize(
+    ("position", "x", "y", "yaw"),
+    [
+        (world(50, 1, 0.3), 50.0, 1.0, 0.3),
+        (on_lane(-1, 60, 0.5), 60.0, -1.25, 0.0),
+        (on_lane(1, 60, 0.5), 60.0, 2.25, pi),
+        ('<RoadPosition roadId="1" s="70" t="-3"/>', 70.0, -3.0, 0.0),
+        ('<RoadPosition roadId="1" s="70" t="2"><Orientation type="relative" h="0.2"/></RoadPosition>',
+         70.0, 2.0, 0.2),
+        ('<RelativeLanePosition entityRef="ego" dLane="1" ds="20" offset="0"/>', 120.0, -1.75, 0.0),
+        ('<RelativeLanePosition entityRef="ego" dLane="-1" dsLane="-20" offset="0.5"/>',
+         80.0, -8.25, 0.0),
+        ('<RelativeRoadPosition entityRef="ego" ds="10" dt="1"/>', 110.0, -4.25, 0.0),
+        ('<RelativeObjectPosition entityRef="ego" dx="5" dy="2"/>', 105.0, -3.25, 0.0),
+        ('<RelativeWorldPosition entityRef="ego" dx="-5" dy="2"><Orientation type="absolute" h="1"/>'
+         '</RelativeWorldPosition>', 95.0, -3.25, 1.0),
+        (f'<TrajectoryPosition s="15" t="1"><TrajectoryRef><Trajectory name="t" closed="false">'
+         f'<Shape>{polyline((None, world(10, 0)), (None, world(40, 0)))}</Shape></Trajectory>'
+         f'</TrajectoryRef></TrajectoryPosition>', 25.0, 1.0, 0.0),
+        (f'<RoutePosition><RouteRef><Route name="r" closed="false">'
+         f'<Waypoint routeStrategy="shortest"><Position>{on_lane(-1, 10)}</Position></Waypoint>'
+         f'<Waypoint routeStrategy="shortest"><Position>{on_lane(-1, 900)}</Position></Waypoint>'
+         f'</Route></RouteRef><InRoutePosition><FromLaneCoordinates pathS="30" laneId="-2"/>'
+         f'</InRoutePosition></RoutePosition>', 40.0, -5.25, 0.0),
+    ],
+)  # fmt: skip
+def test_positions_are_where_the_standard_says(tmp_path, position, x, y, yaw):
+    pose = place(tmp_path, position)
+    assert (pose.x, pose.y) == pytest.approx((x, y), abs=0.01)
+    assert wrap_angle(pose.yaw - yaw) == pytest.approx(0.0, abs=1e-4)

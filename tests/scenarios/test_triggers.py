@@ -1,0 +1,249 @@
+"""Triggers: states and transitions of all elements, collisions between any, values, distances."""
+
+# ruff: noqa: ISC004  elements in lists of parameters
+from __future__ import annotations
+
+import pytest
+from tests.scenarios.files import (
+    at,
+    by_entity,
+    by_value,
+    condition,
+    event,
+    init,
+    on_lane,
+    private,
+    speed,
+    state,
+    story,
+    teleport,
+    time,
+    to,
+    told,
+    vehicle,
+)
+
+STOP = private(speed(to(0)))
+SLOW = private(speed(to(4), "linear", 2))
+
+
+def fired(tmp_path, when, edge="none", end=12.0, more="", **parts):
+    """When an event with this condition begins, s; None: never."""
+    events = story(event("probe", STOP, when, edge), actor="ego", name="probing")
+    result = told(tmp_path, stories=more + events, end=end, **parts)
+    return next(e.t for e in result.player.events if e.name.endswith("probe"))
+
+
+@pytest.mark.osc("StoryboardElementStateCondition")
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        ("story", "s"),
+        ("act", "s_act"),
+        ("maneuverGroup", "s_group"),
+        ("maneuver", "s_manoeuvre"),
+        ("event", "slow"),
+        ("action", "slow_action"),
+        ("event", "s_manoeuvre::slow"),
+    ],
+)
+@pytest.mark.parametrize(
+    ("what", "t"), [("completeState", 5.0), ("endTransition", 5.0), ("runningState", 3.0)]
+)
+def test_the_state_of_every_element_can_be_asked(tmp_path, kind, name, what, t):
+    slow = story(event("slow", SLOW, time(3.0)), name="s")
+    begun = fired(tmp_path, state(kind, name, what), more=slow)
+    if what == "runningState" and kind not in ("event", "action"):
+        assert begun == pytest.approx(0.0, abs=0.051)
+    else:
+        assert begun == pytest.approx(t, abs=0.051)
+
+
+def test_a_transition_is_seen_once(tmp_path):
+    twice = story(event("slow", SLOW, time(3.0)), name="s")
+    probe = event("probe", private(speed(to(4))), state("event", "slow", "endTransition"))
+    probe = probe.replace('priority="parallel"', 'priority="parallel" maximumExecutionCount="5"', 1)
+    result = told(tmp_path, stories=twice + story(probe, actor="ego", name="p"))
+    assert next(e for e in result.player.telling.events if e.path[-1] == "probe").left == 4
+
+
+@pytest.mark.osc("CollisionCondition")
+@pytest.mark.parametrize("who", ['<EntityRef entityRef="other"/>', '<ByType type="vehicle"/>'])
+def test_a_collision_between_two_others_is_seen(tmp_path, who):
+    hit = f"<CollisionCondition>{who}</CollisionCondition>"
+    entities = vehicle("ego") + vehicle("other") + vehicle("third")
+    begin = at("ego", -3, 100) + at("other", -1, 120, 0) + at("third", -1, 80, 10)
+    t = fired(tmp_path, by_entity(hit, "third"), entities=entities, init=begin)
+    assert t == pytest.approx((40.0 - 4.2) / 10.0, abs=0.06)
+    assert fired(tmp_path, by_entity(hit, "ego"), entities=entities, init=begin) is None
+
+
+def test_a_contact_of_the_ego_does_not_end_what_the_file_goes_on_with(tmp_path):
+    begin = at("ego", -1, 100, 10) + at("other", -1, 120, 0)
+    result = told(tmp_path, init=begin, end=4.0)
+    assert result.rows[-1].time == pytest.approx(4.0)
+
+
+@pytest.mark.osc("TraveledDistanceCondition")
+def test_travelled_distance(tmp_path):
+    when = by_entity('<TraveledDistanceCondition value="35"/>', "other")
+    assert fired(tmp_path, when) == pytest.approx(3.5, abs=0.06)
+
+
+@pytest.mark.osc("StandStillCondition")
+def test_standing_still(tmp_path):
+    stop = story(event("e", STOP, time(2.0)))
+    when = by_entity('<StandStillCondition duration="1.5"/>', "other")
+    assert fired(tmp_path, when, more=stop) == pytest.approx(3.5, abs=0.11)
+
+
+@pytest.mark.osc("SpeedCondition", "AccelerationCondition")
+@pytest.mark.parametrize(
+    ("body", "t"),
+    [
+        ('<SpeedCondition value="7" rule="lessThan"/>', 4.0),
+        ('<SpeedCondition value="7" rule="lessThan" direction="longitudinal"/>', 4.0),
+        ('<AccelerationCondition value="-2" rule="lessThan"/>', 3.0),
+        ('<SpeedCondition value="1" rule="greaterThan" direction="lateral"/>', None),
+    ],
+)
+def test_speed_and_acceleration(tmp_path, body, t):
+    slow = story(event("e", SLOW, time(3.0)))
+    begun = fired(tmp_path, by_entity(body, "other"), more=slow)
+    assert begun == (None if t is None else pytest.approx(t, abs=0.11))
+
+
+@pytest.mark.osc("RelativeSpeedCondition")
+def test_relative_speed(tmp_path):
+    slow = story(event("e", SLOW, time(3.0)))
+    body = '<RelativeSpeedCondition entityRef="other" value="3" rule="greaterThan"/>'
+    assert fired(tmp_path, by_entity(body), more=slow) == pytest.approx(4.0, abs=0.11)
+
+
+FASTER = at("ego", -1, 100, 20) + at("other", -1, 160, 10)
+
+
+@pytest.mark.osc("RelativeDistanceCondition", "DistanceCondition", "TimeHeadwayCondition",
+                 "TimeToCollisionCondition", "ReachPositionCondition")  # fmt: skip
+@pytest.mark.parametrize(
+    ("body", "t"),
+    [
+        ('<RelativeDistanceCondition entityRef="other" relativeDistanceType="longitudinal" '
+         'value="20" freespace="false" rule="lessThan"/>', 4.0),
+        ('<RelativeDistanceCondition entityRef="other" relativeDistanceType="longitudinal" '
+         'value="20" freespace="true" rule="lessThan"/>', 3.58),
+        ('<RelativeDistanceCondition entityRef="other" relativeDistanceType="longitudinal" '
+         'coordinateSystem="road" value="20" freespace="true" rule="lessThan"/>', 3.58),
+        ('<RelativeDistanceCondition entityRef="other" relativeDistanceType="euclidianDistance" '
+         'value="20" freespace="true" rule="lessThan"/>', 3.58),
+        ('<TimeHeadwayCondition entityRef="other" value="1" freespace="false" alongRoute="true" '
+         'rule="lessThan"/>', 4.0),
+        ('<TimeToCollisionCondition value="2" freespace="true" rule="lessThan" '
+         'relativeDistanceType="longitudinal"><TimeToCollisionConditionTarget>'
+         '<EntityRef entityRef="other"/></TimeToCollisionConditionTarget>'
+         '</TimeToCollisionCondition>', 3.58),
+        (f'<DistanceCondition value="40" freespace="false" alongRoute="false" rule="lessThan">'
+         f'<Position>{on_lane(-1, 200)}</Position></DistanceCondition>', 3.0),
+        (f'<ReachPositionCondition tolerance="5"><Position>{on_lane(-1, 200)}</Position>'
+         f'</ReachPositionCondition>', 4.75),
+    ],
+)  # fmt: skip
+def test_distances_and_times_to_others(tmp_path, body, t):
+    assert fired(tmp_path, by_entity(body), init=FASTER) == pytest.approx(t, abs=0.06)
+
+
+def test_there_is_no_headway_to_one_behind(tmp_path):
+    body = """<TimeHeadwayCondition entityRef="other" value="99" freespace="false" rule="lessThan"
+relativeDistanceType="longitudinal" coordinateSystem="entity"/>"""
+    assert fired(tmp_path, by_entity(body), init=at("ego", -1, 200) + at("other", -1, 100)) is None
+
+
+@pytest.mark.osc("EndOfRoadCondition")
+def test_the_end_of_the_road(tmp_path):
+    body = '<EndOfRoadCondition duration="1"/>'
+    begin = at("ego", -3, 100) + at("other", -1, 1480)
+    assert fired(tmp_path, by_entity(body, "other"), init=begin) == pytest.approx(3.0, abs=0.2)
+
+
+@pytest.mark.osc("OffroadCondition")
+def test_off_the_road(tmp_path):
+    body = '<OffroadCondition duration="1"/>'
+    begin = at("ego", -3, 100) + init("other", teleport('<WorldPosition x="100" y="90" h="0"/>'))
+    assert fired(tmp_path, by_entity(body, "other"), init=begin) == pytest.approx(1.0, abs=0.11)
+    assert fired(tmp_path, by_entity(body, "ego"), init=begin) is None
+
+
+@pytest.mark.osc("RelativeClearanceCondition")
+def test_nothing_in_the_way(tmp_path):
+    body = """<RelativeClearanceCondition distanceForward="30" distanceBackward="10"
+freeSpace="false" oppositeLanes="false"><RelativeLaneRange from="0" to="0"/>
+</RelativeClearanceCondition>"""
+    assert fired(tmp_path, by_entity(body), init=FASTER) == pytest.approx(0.0)
+    near = at("ego", -1, 100, 20) + at("other", -1, 120, 10)
+    assert fired(tmp_path, by_entity(body), init=near) == pytest.approx(3.0, abs=0.11)
+
+
+@pytest.mark.osc("RelativeAngleCondition", "AngleCondition")
+def test_angles(tmp_path):
+    begin = at("ego", -1, 100) + at("other", 1, 300)
+    body = """<RelativeAngleCondition angleType="heading" entityRef="other" angle="3.1416"
+angleTolerance="0.1"/>"""
+    assert fired(tmp_path, by_entity(body), init=begin, minor=3) == pytest.approx(0.0)
+    body = '<AngleCondition angleType="heading" angle="1" angleTolerance="0.1"/>'
+    assert fired(tmp_path, by_entity(body), init=begin, minor=3) is None
+
+
+VARIABLES = """<VariableDeclarations><VariableDeclaration name="v" variableType="double" value="1"/>
+</VariableDeclarations>"""
+MODES = """<ParameterDeclaration name="mode" parameterType="string" value="calm"/>"""
+
+
+@pytest.mark.osc("VariableAction", "VariableCondition", "ParameterAction", "ParameterCondition")
+@pytest.mark.parametrize(
+    ("action", "when"),
+    [
+        ('<VariableAction variableRef="v"><SetAction value="4"/></VariableAction>',
+         '<VariableCondition variableRef="v" value="3.5" rule="greaterThan"/>'),
+        ('<VariableAction variableRef="v"><ModifyAction><Rule><AddValue value="3"/></Rule>'
+         '</ModifyAction></VariableAction>',
+         '<VariableCondition variableRef="v" value="4" rule="equalTo"/>'),
+        ('<VariableAction variableRef="v"><ModifyAction><Rule><MultiplyByValue value="-2"/></Rule>'
+         '</ModifyAction></VariableAction>',
+         '<VariableCondition variableRef="v" value="-2" rule="equalTo"/>'),
+        ('<ParameterAction parameterRef="mode"><SetAction value="wild"/></ParameterAction>',
+         '<ParameterCondition parameterRef="mode" value="wild" rule="equalTo"/>'),
+    ],
+)  # fmt: skip
+def test_values_change_and_are_seen(tmp_path, action, when):
+    change = story(event("e", f"<GlobalAction>{action}</GlobalAction>", time(2.0)))
+    t = fired(tmp_path, by_value(when), more=change, variables=VARIABLES, parameters=MODES)
+    assert t == pytest.approx(2.0, abs=0.051)
+
+
+@pytest.mark.osc("TrafficSignalStateAction", "TrafficSignalCondition")
+def test_the_state_of_a_signal_is_set_and_seen(tmp_path):
+    action = """<GlobalAction><InfrastructureAction><TrafficSignalAction><TrafficSignalStateAction
+name="7" state="on;off;off"/></TrafficSignalAction></InfrastructureAction></GlobalAction>"""
+    when = by_value('<TrafficSignalCondition name="7" state="on;off;off"/>')
+    assert fired(tmp_path, when, more=story(event("e", action, time(2.0)))) == pytest.approx(
+        2.0, abs=0.051
+    )
+
+
+@pytest.mark.parametrize(
+    ("edge", "t"), [("none", 2.0), ("rising", 2.0), ("falling", 4.0), ("risingOrFalling", 2.0)]
+)
+def test_edges(tmp_path, edge, t):
+    body = """<RelativeDistanceCondition entityRef="other" relativeDistanceType="longitudinal"
+value="20" freespace="false" rule="lessThan"/>"""
+    begin = at("ego", -1, 100, 30) + at("other", -3, 160, 10)
+    assert fired(tmp_path, by_entity(body), edge, init=begin) == pytest.approx(t, abs=0.06)
+
+
+def test_all_conditions_of_a_group_and_any_group(tmp_path):
+    both = condition(time(2.0)).replace("</ConditionGroup>", "") + condition(time(3.0)).replace(
+        "<ConditionGroup>", ""
+    )
+    probe = event("probe", STOP, time(0)).replace(condition(time(0)), both + condition(time(5.0)))
+    result = told(tmp_path, stories=story(probe))
+    assert result.player.events[0].t == pytest.approx(3.0, abs=0.01)

@@ -15,8 +15,9 @@ from skidpad.campaign.grip import recipe
 from skidpad.campaign.grip_cells import scenario_of
 from skidpad.campaign.recipe import nothing_else
 from skidpad.core.errors import FileError
-from skidpad.core.run import Friction, RunSpec
+from skidpad.core.run import Friction, RunSpec, Scenario
 from skidpad.core.weather import Weather
+from skidpad.scenarios.distributions import choices, is_distribution
 
 RECIPE = replace(recipe(keep_all=True), command="play", finish=nothing_else)
 
@@ -29,6 +30,21 @@ def scenario_files(folder: Path) -> list[Path]:
     return found
 
 
+def courses_of(course: Scenario, file: Path) -> list[Scenario]:
+    """What a file asks to play: itself, or the choices of parameters that it makes for another."""
+    if not is_distribution(file):
+        return [structs.replace(course, file=str(file.resolve()))]
+    return [
+        structs.replace(
+            course,
+            file=str(choice.file),
+            parameters={**choice.parameters, **course.parameters},
+            variant=f"{file.stem}-{k:04d}",
+        )
+        for k, choice in enumerate(choices(file))
+    ]
+
+
 def runs_of(
     template: RunSpec,
     files: Sequence[Path],
@@ -37,17 +53,11 @@ def runs_of(
     seeds: Iterable[int],
 ) -> list[RunSpec]:
     """Every combination; the rest as in `template`, whose course is a scenario."""
-    course = scenario_of(template)
+    courses = [course for file in files for course in courses_of(scenario_of(template), file)]
     return [
-        structs.replace(
-            template,
-            course=structs.replace(course, file=str(file.resolve())),
-            weather=weather,
-            friction=friction,
-            seed=seed,
-        )
+        structs.replace(template, course=course, weather=weather, friction=friction, seed=seed)
         for seed in seeds
-        for file in files
+        for course in courses
         for weather in weathers
         for friction in frictions
     ]

@@ -66,9 +66,10 @@ def play(
     if out is None:
         raise ConfigError("play needs --out DIR for the run, or --check")
     from skidpad.campaign.play import run_to
+    from skidpad.scenarios.distributions import is_distribution
 
     template = _template(cross, controller, run, scenario, tuned, backend)
-    if file.is_dir():
+    if file.is_dir() or is_distribution(file):
         how = Drive(out=out, **structs.asdict(driving))
         how(_campaign(template, cross, file, seeds), table)
         return
@@ -124,7 +125,8 @@ def _campaign(
     from skidpad.campaign.files import RECIPE, scenario_files
     from skidpad.cli.carla_backend import drives_alone
 
-    files = [file for file in scenario_files(folder) if _playable(file, template)]
+    found = scenario_files(folder) if folder.is_dir() else [folder]
+    files = [file for file in found if _playable(file, template)]
     runs = _runs(template, cross, files, seeds)
     return Campaign(RECIPE, runs, alone=drives_alone(template.backend))
 
@@ -141,11 +143,13 @@ def _runs(template: RunSpec, cross: PlayCross, files: Sequence[Path], seeds: int
 def _playable(file: Path, template: RunSpec) -> bool:
     """Whether it can be played; says what hinders."""
     from skidpad.campaign.cast import load_scenario
+    from skidpad.campaign.files import courses_of
     from skidpad.campaign.grip_cells import scenario_of
     from skidpad.core.errors import InputError
 
     try:
-        load_scenario(structs.replace(scenario_of(template), file=str(file)))
+        for course in courses_of(scenario_of(template), file):
+            load_scenario(course)
     except InputError as error:
         typer.echo(f"left out: {error}", err=True)
         return False

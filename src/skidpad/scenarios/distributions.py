@@ -1,0 +1,151 @@
+"""Files of <ParameterValueDistribution>: many choices of parameters for one scenario file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+from math import inf, prod, sqrt
+from pathlib import Path
+
+import numpy as np
+
+from skidpad.core.errors import FileError
+from skidpad.scenarios.document import Node, parse
+from skidpad.scenarios.expressions import as_text
+from skidpad.scenarios.parameters import assignments, inner
+
+CHOICES_MAX = 100_000
+TRIES_MAX = 10_000  # draws until one lies in its range
+DIGITS = 12  # of a range's values, so that ten steps of 0.1 make 1
+SLACK = 1e-9  # of a step, by which a range still reaches its end
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """A scenario file with values of its parameters."""
+
+    file: Path
+    parameters: Mapping[str, str]
+
+
+def is_distribution(file: Path) -> bool:
+    """Whether the file holds choices instead of a scenario; False for what cannot be read."""
+    try:
+        return parse(file).find("ParameterValueDistribution") is not None
+    except FileError:
+        return False
+
+
+def choices(file: Path) -> list[Choice]:
+    """All choices that a file makes: every combination of sets and ranges, or as many draws."""
+    node = inner(parse(file)).child("ParameterValueDistribution")
+    scenario = file.parent / node.child("ScenarioFile").text("filepath").replace("\\", "/")
+    if not scenario.is_file():
+        raise node.child("ScenarioFile").error("there is no such file")
+    drawn = node.find("Stochastic")
+    values = _combined(node.child("Deterministic")) if drawn is None else _draws(drawn)
+    return [Choice(scenario.resolve(), found) for found in values]
+
+
+def _combined(node: Node) -> list[dict[str, str]]:
+    factors: list[list[dict[str, str]]] = []
+    for one in node.children("DeterministicSingleParameterDistribution"):
+        name = one.plain("parameterName")
+        factors.append([{name: value} for value in _values(one.only())])
+    for many in node.children("DeterministicMultiParameterDistribution"):
+        sets = many.child("ValueSetDistribution").children("ParameterValueSet")
+        factors.append([_set(s) for s in sets])
+    if prod(len(f) for f in factors) > CHOICES_MAX:
+        raise node.error(f"makes more than {CHOICES_MAX} choices")
+    return [{k: v for part in parts for k, v in part.items()} for parts in product(*factors)]
+
+
+def _set(node: Node) -> dict[str, str]:
+    direct = {
+        one.plain("parameterRef"): one.text("value") for one in node.children("ParameterAssignment")
+    }
+    return direct | assignments(node)
+
+
+def _values(node: Node) -> list[str]:
+    if node.tag == "DistributionSet":
+        return [e.text("value") for e in node.children("Element")]
+    if node.tag != "DistributionRange":
+        raise node.unsupported()
+    step, (low, high) = node.number("stepWidth"), _range(node)
+    if step <= 0.0 or (high - low) / step > CHOICES_MAX:
+        raise node.error(f"stepWidth {step:g} makes too many choices or none")
+    count = int((high - low) / step + SLACK) + 1
+    return [as_text(round(low + k * step, DIGITS)) for k in range(count)]
+
+
+def _range(node: Node) -> tuple[float, float]:
+    found = node.find("Range")
+    if found is None:
+        return -inf, inf
+    return found.number("lowerLimit"), found.number("upperLimit")
+
+
+Draw = Callable[[np.random.Generator], float | str]
+
+
+def _draws(node: Node) -> Iterator[dict[str, str]]:
+    count = node.whole("numberOfTestRuns")
+    if not 0 < count <= CHOICES_MAX:
+        raise node.error(f"numberOfTestRuns must be 1 to {CHOICES_MAX}, got {count}")
+    rng = np.random.default_rng(int(abs(node.number("randomSeed", 0.0))))
+    draws = {
+        one.plain("parameterName"): _draw(one.only())
+        for one in node.children("StochasticDistribution")
+    }
+    for _ in range(count):
+        drawn = {name: draw(rng) for name, draw in draws.items()}
+        yield {k: v if isinstance(v, str) else as_text(float(v)) for k, v in drawn.items()}
+
+
+def _draw(node: Node) -> Draw:
+    if node.tag == "ProbabilityDistributionSet":
+        elements = list(node.children("Element"))
+        return _weighted(
+            [e.text("value") for e in elements], [e.number("weight") for e in elements]
+        )
+    low, high = _range(node)
+    if node.tag == "UniformDistribution":
+        return lambda rng: float(rng.uniform(low, high))
+    if node.tag in ("NormalDistribution", "LogNormalDistribution"):
+        mean, sigma = node.number("expectedValue"), sqrt(max(node.number("variance"), 0.0))
+        plain = node.tag == "NormalDistribution"
+        return _within(
+            node,
+            low,
+            high,
+            lambda rng: rng.normal(mean, sigma) if plain else rng.lognormal(mean, sigma),
+        )
+    if node.tag == "PoissonDistribution":
+        mean = node.number("expectedValue")
+        return _within(node, low, high, lambda rng: float(rng.poisson(mean)))
+    if node.tag == "Histogram":
+        bins = list(node.children("HistogramBin"))
+        which = _weighted(list(range(len(bins))), [b.number("weight") for b in bins])
+        edges = [_range(b) for b in bins]
+        return lambda rng: float(rng.uniform(*edges[int(which(rng))]))
+    raise node.unsupported()
+
+
+def _weighted(values: Sequence[str] | Sequence[int], weights: Sequence[float]) -> Draw:
+    shares = np.array(weights) / sum(weights)
+    return lambda rng: values[int(rng.choice(len(values), p=shares))]
+
+
+def _within(
+    node: Node, low: float, high: float, draw: Callable[[np.random.Generator], float]
+) -> Draw:
+    def drawn(rng: np.random.Generator) -> float:
+        for _ in range(TRIES_MAX):
+            value = float(draw(rng))
+            if low <= value <= high:
+                return value
+        raise node.error(f"hardly ever lies in its range from {low:g} to {high:g}")
+
+    return drawn

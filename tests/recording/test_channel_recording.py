@@ -136,7 +136,7 @@ def test_a_damaged_chunk_costs_only_itself(recording, tmp_path):
     assert len(read) > 100
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=150)
 @given(data=st.data())
 def test_no_damage_makes_the_reader_raise_anything_but_its_own_error(
     recording, tmp_path_factory, data
@@ -153,7 +153,7 @@ def test_no_damage_makes_the_reader_raise_anything_but_its_own_error(
         pass
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=200)
 @given(st.binary(max_size=400))
 def test_message_content_never_raises_anything_but_its_own_error(data):
     from google.protobuf.message import DecodeError

@@ -108,7 +108,6 @@ def strange_frames(draw, t):
 @given(st.data())
 @settings(
     max_examples=60,
-    deadline=None,
     suppress_health_check=[HealthCheck.too_slow],
     report_multiple_bugs=False,
 )
@@ -155,7 +154,7 @@ TEXT = encode_record(record(worlds_of(2, 1.0)))
 
 
 @given(st.data())
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=300)
 def test_no_damage_makes_the_text_reader_raise_anything_but_its_own_error(data):
     text = list(TEXT)
     for _ in range(data.draw(st.integers(1, 5))):

@@ -19,7 +19,7 @@ curvatures = st.floats(-0.1, 0.1)
 
 
 @given(curvatures, curvatures, st.floats(1.0, 120.0), st.floats(-pi, pi))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_spirals_are_what_integration_of_their_curvature_gives(
     k0: float, k1: float, length: float, heading: float
 ) -> None:

@@ -22,7 +22,7 @@ TEXTS = st.sampled_from(["", "x", "nan", "inf", "-1", "0", "1e308", "99999999999
 
 
 @given(st.data())
-@settings(max_examples=150, deadline=None, suppress_health_check=list(HealthCheck))
+@settings(max_examples=150, suppress_health_check=list(HealthCheck))
 def test_damaged_files_are_refused_or_baked(data: st.DataObject) -> None:
     root = copy.deepcopy(ROOT)
     nodes = list(root.iter())

@@ -77,7 +77,7 @@ def test_a_nearer_car_hides_the_one_behind_it_and_not_the_one_beside():
 
 
 @given(floats(5.0, 70.0), floats(-6.0, 6.0), floats(-3.0, 3.0))
-@settings(max_examples=50, deadline=None)
+@settings(max_examples=50)
 def test_a_mirrored_scene_gives_mirrored_columns(x, y, yaw):
     table, states = world((x, y, 0.0, yaw))
     _, mirrored = world((x, -y, 0.0, -yaw))

@@ -141,7 +141,7 @@ class Centred(ArcMap):
 
 
 @pytest.mark.req("A-016", "A-042", "A-068", "A-142", "X-4")
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     st.sampled_from([-0.004, -0.001, 0.0, 0.002, 0.003]),
     st.floats(-1.5, 1.5),

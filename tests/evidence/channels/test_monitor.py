@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from channel_worlds import Eyes, Listed, World, drive, frame, traffic, truth
@@ -81,7 +81,6 @@ def test_printed_rules_row_by_row(hazard, values, expected):
 
 @pytest.mark.req("C-125", "C-126")
 @given(gap=st.floats(0, 1), score=st.floats(0, 1), driving=st.floats(0, 1), least=st.floats(0, 1))
-@settings(deadline=None)
 def test_the_printed_tailgating_rules_exclude_each_other(gap, score, driving, least):
     values = {
         "gap": gap, "safety_score": score, "comfort_driving": driving, "comfort_least": least
@@ -158,7 +157,6 @@ def test_rules_are_checked_when_read(tmp_path):
 
 @pytest.mark.req("C-140", "C-141")
 @given(st.lists(st.integers(0, 200), unique=True, min_size=1).map(sorted))
-@settings(deadline=None)
 def test_the_filter_joins_exactly_what_pauses_for_less_than_two_seconds(ticks):
     repeats: TimeFilter[str] = TimeFilter()
     for k in ticks:

@@ -116,7 +116,7 @@ states = st.tuples(
 
 @pytest.mark.req("C-092", "C-095")
 @given(states)
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_times_agree_with_shapely_footprints_in_small_steps(state):
     x, y, heading, v, stands = state
     v = 0.0 if stands else v
@@ -145,7 +145,7 @@ def test_times_agree_with_shapely_footprints_in_small_steps(state):
 
 
 @given(st.floats(-np.pi, np.pi), st.floats(-1e4, 1e4), states)
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_scores_are_bounded_and_do_not_see_the_map(angle, shift, state):
     x, y, heading, v, _ = state
     c, s = np.cos(angle), np.sin(angle)

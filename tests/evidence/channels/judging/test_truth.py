@@ -41,7 +41,7 @@ LOCALISATION = HazardType.INCONSISTENT_LOCALISATION
 
 
 @given(v=st.floats(3.0, 40.0), gap=st.floats(0.5, 100.0), mu=st.floats(0.2, 1.0))
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_equal_speeds_hit_as_their_stopping_distances_say(v, gap, mu):
     a_lead, a_follow = min(6.0, mu * G), mu * G
     distance = v * 1.0 + v * v / (2 * a_follow) - v * v / (2 * a_lead)
@@ -52,7 +52,7 @@ def test_equal_speeds_hit_as_their_stopping_distances_say(v, gap, mu):
 
 
 @given(st.floats(0, 60), st.floats(0, 40), st.floats(0, 40), st.floats(0.1, 1.0))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_hit_stays_a_hit_when_nearer_faster_or_slicker(gap, v_lead, v_follow, mu):
     if would_hit(gap, v_lead, 0.9, v_follow, mu):
         assert would_hit(gap * 0.9, v_lead, 0.9, v_follow, mu)
@@ -127,7 +127,7 @@ def test_world_model_truth_believes_ghosts_and_tells_ahead_from_behind():
 
 
 @given(st.data())
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_world_model_truth_agrees_with_footprints_moved_in_small_steps(data):
     ego = (0.0, 0.0, 0.0, 10.0, 0.0)
     x, y = data.draw(st.floats(-35, 35)), data.draw(st.floats(-25, 25))
@@ -181,7 +181,7 @@ spans = st.lists(
 
 @pytest.mark.req("C-214")
 @given(spans, spans)
-@settings(max_examples=80, deadline=None)
+@settings(max_examples=80)
 def test_matching_is_one_to_one_and_the_largest_possible(detected, true):
     m = match(detected, true)
     assert len({d for d, _ in m.pairs}) == len({h for _, h in m.pairs}) == len(m.pairs)

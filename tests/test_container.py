@@ -75,7 +75,7 @@ def test_extras_and_commands_exist():
 
 def test_the_cluster_recipe_calls_programs_of_the_image():
     pytest.importorskip("distributed")
-    text = (ROOT / "docs" / "grip.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "campaigns.md").read_text(encoding="utf-8")
     named = re.findall(r"args: \[(\w+), (\w+)", text)
     assert named == [("dask", "scheduler"), ("dask", "worker")]
     assert "dask" in {e.name for e in metadata.entry_points(group="console_scripts")}

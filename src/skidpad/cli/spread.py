@@ -15,11 +15,14 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Mapping
+from enum import Enum
+from math import inf
 from typing import Annotated, Any, get_args, get_type_hints
 
 import typer
 from msgspec import NODEFAULT, Meta, Struct, structs
 
+from skidpad.core.errors import require_choice, require_range
 from skidpad.core.run import PARTED
 
 Command = Callable[..., Any]
@@ -74,17 +77,32 @@ def described(kind: type[Struct], defaults: dict[str, Any]) -> list[inspect.Para
 
 def _shown(default: Any, meta: Meta) -> Any:
     """A default as typer takes it."""
+    if isinstance(default, Enum):
+        return default.value
     if not isinstance(default, tuple):
         return default
     return ",".join(default) if meta.extra == PARTED else list(default)
 
 
 def _option(name: str, kind: Any, meta: Meta) -> Any:
-    flag = [f"--{name.replace('_', '-')}"] if kind is bool else []  # without a --no-...
-    option = typer.Option(*flag, help=meta.description, min=meta.ge, max=meta.le)
-    if kind == tuple[str, ...]:
+    """How typer takes it: as plain as it can be, since `_read` is who judges the value."""
+    flags = [_flag(name)] if kind is bool else []  # without a --no-...
+    words = _words(kind)
+    metavar = f"<{'|'.join(words)}>" if words else None
+    if words:
+        kind = str
+    elif kind == tuple[str, ...]:
         kind = str if meta.extra == PARTED else list[str]
-    return Annotated[kind, option]
+    return Annotated[kind, typer.Option(*flags, help=meta.description, metavar=metavar)]
+
+
+def _flag(name: str) -> str:
+    return f"--{name.replace('_', '-')}"
+
+
+def _words(kind: Any) -> list[str]:
+    """The values of an enum, none of any other type."""
+    return [m.value for m in kind] if isinstance(kind, type) and issubclass(kind, Enum) else []
 
 
 def _gathering(
@@ -108,8 +126,15 @@ def _gathering(
 
 
 def _read(kind: type[Struct], name: str, value: Any) -> Any:
-    """An option's value as the field holds it."""
-    if get_args(get_type_hints(kind, include_extras=True)[name])[0] != tuple[str, ...]:
-        return value
-    words = value.split(",") if isinstance(value, str) else value
-    return tuple(word.strip() for word in words if word.strip())
+    """An option's value as the field holds it; ConfigError for one that the field does not allow."""
+    wanted, *about = get_args(get_type_hints(kind, include_extras=True)[name])
+    meta = next(m for m in about if isinstance(m, Meta))
+    if wanted == tuple[str, ...]:
+        words = value.split(",") if isinstance(value, str) else value
+        return tuple(word.strip() for word in words if word.strip())
+    if words := _words(wanted):
+        return wanted(require_choice(_flag(name), value, words))
+    if value is not None and (meta.ge is not None or meta.le is not None):
+        low, high = (-inf if meta.ge is None else meta.ge), (inf if meta.le is None else meta.le)
+        require_range(_flag(name), value, low, high)
+    return value

@@ -119,3 +119,35 @@ def test_runs_that_did_not_finish_are_said_and_left_out(tmp_path):
     assert any(
         "1 of 2 runs did not finish" in getattr(b, "text", "") for b in page.sections[0].blocks
     )
+
+
+def answers_of(folder, seeds):
+    campaign(folder, seeds)
+    blocks = build_page(load_matrix(folder)).sections[0].blocks
+    return dict(next(b for b in blocks if b.kind == "answers").items)
+
+
+def test_the_page_answers_first_which_functions_and_how_sure(tmp_path):
+    told = answers_of(tmp_path, seeds=7)
+    functions = told["Which functions crash least?"]
+    assert functions.startswith("0 · baseline, no ADAS has the most fatal collisions")
+    assert "4 · + 80 km/h limiter the fewest, 0.00 per run" in functions
+    assert "differ beyond chance (p = 0.016, 7 seeds)" in functions  # 2 of 2^7 signs
+    assert told["How sure is that?"].startswith("7 seeds per cell, the same in all cells.")
+
+
+def test_one_seed_per_cell_carries_no_verdict(tmp_path):
+    told = answers_of(tmp_path, seeds=1)
+    assert "no verdict can rest on it" in told["How sure is that?"]
+
+
+def test_metrics_are_named_in_words_with_their_units(tmp_path):
+    campaign(tmp_path)
+    page = write_report(tmp_path).read_text()
+    for name in (
+        "mean speed, km/h",
+        "ttc below 1.5, s",
+        "fatal collisions",
+        "headway variance, m²",
+    ):
+        assert f">{name}<" in page

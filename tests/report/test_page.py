@@ -3,6 +3,7 @@ import re
 import pytest
 
 from skidpad.report.page import (
+    Answers,
     Card,
     Cards,
     Cell,
@@ -36,7 +37,14 @@ def page():
         subtitle="what it is",
         facts=[("seed", "1")],
         sections=[
-            Section("First", [Text("one\n\ntwo"), Numbers([Number("3", "runs", "of 3")])]),
+            Section(
+                "First",
+                [
+                    Answers([("Is it safe?", "No.")]),
+                    Text("one\n\ntwo"),
+                    Numbers([Number("3", "runs", "of 3")]),
+                ],
+            ),
             Section(
                 "Tables",
                 [
@@ -45,7 +53,7 @@ def page():
                         [[Cell("a"), Cell("10", sort=10, note="[4, 18]", heat=0.5)]],
                         caption="A table",
                     ),
-                    Verdict("F-01", "claim", "supported", "because"),
+                    Verdict("F-01", "claim", "supported", "These runs show it.", "+3, p = 0.01"),
                     Cards("crashes", [Card("one", replay=REPLAY, chain=["</script><b>"])]),
                     Definitions([("min_ttc_s", "s", "least time to collision")]),
                 ],
@@ -62,6 +70,16 @@ def test_the_page_is_self_contained_and_escapes_what_it_shows():
     assert 'href="#tables"' in html
     assert 'id="tables"' in html
     assert html.count("<script") == html.count("</script>")
+
+
+def test_questions_come_with_answers_and_verdicts_fold_their_numbers():
+    html = render(page())
+    assert "<dt>Is it safe?</dt><dd>No.</dd>" in html
+    verdict = html[html.index('class="verdict supported"') :]
+    shown, folded = verdict.split("<details>", 1)
+    assert "These runs show it." in shown
+    assert "+3, p = 0.01" not in shown
+    assert "+3, p = 0.01" in folded.split("</details>", 1)[0]
 
 
 def test_a_report_is_replaced_only_by_a_complete_one(tmp_path, monkeypatch):

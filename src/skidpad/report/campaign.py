@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, ClassVar, Generic
@@ -14,7 +15,7 @@ from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.ledger import E
 from skidpad.recording.results import Columns, definitions_of
-from skidpad.report.page import Block, Code, Definitions, Text
+from skidpad.report.page import Block, Code, Definitions, Text, words
 
 NAMED = 5  # runs
 CLOCKS = {
@@ -32,6 +33,7 @@ UNITS = {
     "_deg": "deg",
     "_deg_s": "deg/s",
 }
+ENDINGS = sorted(UNITS, key=len, reverse=True)
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,17 @@ class Metric:
     name: str
     unit: str
     meaning: str
+
+    @property
+    def title(self) -> str:
+        """Its name in words, without the unit."""
+        ending = next((end for end in ENDINGS if self.name.endswith(end)), "")
+        return re.sub(r"(\d) (\d)", r"\1.\2", words(self.name.removesuffix(ending)))
+
+    @property
+    def heading(self) -> str:
+        """Words and unit."""
+        return f"{self.title}, {self.unit}" if self.unit else self.title
 
 
 def metrics_of(rows: type[Any]) -> list[Metric]:
@@ -52,9 +65,8 @@ def metrics_of(rows: type[Any]) -> list[Metric]:
 
 
 def unit_of(name: str) -> str:
-    """Unit by the longest suffix that is one."""
-    ends = [end for end in UNITS if name.endswith(end)]
-    return UNITS[max(ends, key=len)] if ends else ""
+    """Unit by the suffix."""
+    return next((UNITS[end] for end in ENDINGS if name.endswith(end)), "")
 
 
 @dataclass(frozen=True)

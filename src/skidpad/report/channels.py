@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from skidpad.report import channels_figures as figures
 from skidpad.report import channels_tables as tables
 from skidpad.report.channels_data import MonitoredDrive, load_drive
 from skidpad.report.page import (
+    Answers,
     Block,
     Card,
     Cards,
@@ -53,7 +55,9 @@ def write_drive_report(folder: Path) -> Path:
 def drive_page(drive: MonitoredDrive) -> Page:
     """All sections in the order in which a reader asks."""
     sections = [
-        Section("What happened", [*_warnings(drive), _headline(drive), Text(LEAD)]),
+        Section(
+            "What happened", [*_warnings(drive), _answers(drive), _headline(drive), Text(LEAD)]
+        ),
         Section("Timeline", _timeline(drive)),
         Section("Hazards", _hazards(drive)),
         Section("Safety case", [tables.safety_case_tree(drive)]),
@@ -94,6 +98,30 @@ def _warnings(drive: MonitoredDrive) -> list[Block]:
         return []
     words = ", ".join(f"{words(k)}: {v}" for k, v in lost.items())
     return [Text(f"The recording was not read in full ({words}).", tone="warning")]
+
+
+def _answers(drive: MonitoredDrive) -> Answers:
+    """What was found, how bad it was, how sure."""
+    scored = [r for r in drive.records if not _candidate(r.type.value)]
+    counts = Counter(r.type for r in scored)
+    told = ", ".join(f"{n} of {tables.NAMES[h].lower()}" for h, n in counts.most_common())
+    minutes = drive.summary["seconds"] / 60.0
+    found = f"{len(scored)} hazards in {minutes:.1f} min" + (f": {told}." if told else ".")
+    worst = min(scored, key=_severity, default=None)
+    audit = drive.summary["indicators"]
+    missing = sum(a["not_evaluated_cycles"] for a in audit)
+    share = 100.0 * missing / max(1, len(audit) * drive.summary["cycles"])
+    items = [("Was anything hazardous?", found)]
+    if worst is not None:
+        score = worst.extremes.get("safety_score")
+        at = "" if score is None else f", safety score {score:.2f}"
+        name = tables.NAMES[worst.type]
+        items.append(("What was the worst?", f"{name} at {worst.t_start:.1f} s{at}."))
+    sure = (
+        f"Rules on what the channels themselves report; {share:.0f} % of the indicators' values could "
+        "not be evaluated, which is never counted as good."
+    )
+    return Answers([*items, ("How sure is that?", sure)])
 
 
 def _headline(drive: MonitoredDrive) -> Numbers:

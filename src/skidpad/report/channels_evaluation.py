@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 
 import polars as pl
@@ -10,12 +11,13 @@ import polars as pl
 from skidpad import __version__
 from skidpad.core.errors import FileError
 from skidpad.evidence.channels.findings import FINDINGS
-from skidpad.evidence.verdicts import judge
+from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import channels_scores as scores
 from skidpad.report.channels_redundancy import redundancy
-from skidpad.report.channels_scores import HAZARDS, TRUTHS, Row, headline, ratio_text, short
+from skidpad.report.channels_scores import FEW, HAZARDS, TRUTHS, Row, headline, ratio_text, short
 from skidpad.report.figures import Chart, Curve, curves
 from skidpad.report.page import (
+    Answers,
     Block,
     Figure,
     Number,
@@ -26,7 +28,7 @@ from skidpad.report.page import (
     words,
     write_report_page,
 )
-from skidpad.report.verdicts import verdict_blocks
+from skidpad.report.verdicts import tally_text, verdict_blocks
 
 EVALUATION = "evaluation.json"
 LEAD = """A detection is right when a true hazard of the same kind overlaps it within 1 s; each counts once. \
@@ -49,16 +51,19 @@ def write_evaluation_report(folder: Path) -> Path:
 
 def evaluation_page(evaluation: Row, folder: Path) -> Page:
     """All sections in the order in which a reader asks."""
+    judged = _judged(evaluation)
     truths = sorted({r["truth"] for r in evaluation["results"]}, key=list(TRUTHS).index)
     return Page(
         title="Who finds the hazards",
         subtitle=f"{evaluation['segments']} drive segments, {evaluation['hours']:.2f} h evaluated",
         facts=[("Skidpad", __version__)],
         sections=[
-            Section("What came out", [_numbers(evaluation), Text(LEAD)]),
+            Section(
+                "What came out", [_answers(evaluation, judged), _numbers(evaluation), Text(LEAD)]
+            ),
             *[Section(f"Against the {short(t)}", [scores.results(evaluation, t)]) for t in truths],
             Section("By route", [scores.routes(evaluation, t) for t in truths]),
-            Section("Findings of the source, judged", verdicts(evaluation)),
+            Section("Findings of the source, judged", verdicts(judged)),
             Section("Why it errs", [scores.causes(evaluation)]),
             Section("One threshold, both errors", _curve(evaluation)),
             Section("Does redundancy pay", redundancy(folder)),
@@ -66,6 +71,25 @@ def evaluation_page(evaluation: Row, folder: Path) -> Page:
             Section("Segments", [scores.segments(evaluation)]),
         ],
     )
+
+
+def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:
+    """Who finds hazards, and how sure."""
+    judged_by = [r for r in headline(evaluation) if r["truth"] == "world"]
+    items = []
+    for result in judged_by:
+        precision, recall = map(ratio_text, result["micro"])
+        sentence = (
+            f"They find {recall} % of the hazards that the channels' own reports hold, and "
+            f"{precision} % of what they find is one."
+        )
+        items.append((f"How good are the {words(result['rules'])} rules?", sentence))
+    rows = [row for result in judged_by[:1] for row in result["hazards"].values()]
+    true = sum(row["tp"] + row["fn"] for row in rows)
+    few = ", too few to say much" if true < FEW else ""
+    sure = f"{evaluation['segments']} drive segments with {true} true hazards{few}. "
+    sure += tally_text(judged)
+    return Answers([*items, ("How sure is that?", sure)])
 
 
 def _numbers(evaluation: Row) -> Numbers:
@@ -87,19 +111,20 @@ def _numbers(evaluation: Row) -> Numbers:
     )
 
 
-def verdicts(evaluation: Row) -> list[Block]:
-    """Each finding with its verdict, marked by what brings it about."""
+def _judged(evaluation: Row) -> list[Judgement]:
     results = pl.DataFrame(evaluation["segment_table"], infer_schema_length=None)
-    judged = judge(FINDINGS, [results if len(results) else None] * len(FINDINGS))
-    blocks: list[Block] = [
-        Text(
-            "Practical rules against world-model truth. Claims, tests and margins were written before "
-            "results were seen; that a margin comes before significance is a rule of all reports, "
-            "settled after results of the friction campaign. A finding that the simulated channels "
-            "bring about by how they are made is marked; all others emerge from the drives."
-        )
-    ]
-    return [*blocks, *verdict_blocks(judged)]
+    return judge(FINDINGS, [results if len(results) else None] * len(FINDINGS))
+
+
+def verdicts(judged: Sequence[Judgement]) -> list[Block]:
+    """Each finding with its verdict, marked by what brings it about."""
+    intro = Text(
+        "Practical rules against world-model truth. Claims, tests and margins were written before "
+        "results were seen; that a margin comes before significance is a rule of all reports, "
+        "settled after results of the friction campaign. A finding that the simulated channels "
+        "bring about by how they are made is marked; all others emerge from the drives."
+    )
+    return [intro, *verdict_blocks(judged)]
 
 
 def _curve(evaluation: Row) -> list[Block]:

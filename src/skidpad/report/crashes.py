@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import polars as pl
@@ -20,24 +21,41 @@ from skidpad.roads.queries import RoadMap
 CARDS = "cards"
 INLINE = 3  # per cell
 RUNS_READ = 10  # per cell, those with the hardest impacts
+Cell = tuple[str, str]  # configuration, weather
 Found = tuple[Crash, Drive, RoadMap, Path]  # Path: of the run
 
 
-def crash_sections(matrix: Matrix) -> list[Block]:
-    """One fold per cell with its worst crashes; pages with all of them beside the report."""
-    blocks: list[Block] = [
-        _cell_block(matrix, config, weather, found)
-        for config in matrix.configs
-        for weather in matrix.weathers
-        if (found := _hardest(matrix, config, weather))
+def found_crashes(matrix: Matrix) -> dict[Cell, list[Found]]:
+    """The crashes of every cell that has some, hardest first."""
+    cells = [(config, weather) for config in matrix.configs for weather in matrix.weathers]
+    return {cell: found for cell in cells if (found := _hardest(matrix, *cell))}
+
+
+def worst_of_each(crashes: dict[Cell, list[Found]]) -> list[Block]:
+    """The hardest crash of each configuration, open."""
+    worst: dict[str, Found] = {}
+    for (config, _), found in crashes.items():
+        if config not in worst or severity(found[0][0]) > severity(worst[config][0]):
+            worst[config] = found[0]
+    if not worst:
+        return []
+    cards = [
+        replace(card, title=f"{config_title(config)}: {card.title}")
+        for config, item in worst.items()
+        for card in [crash_card(*item)]
     ]
-    if not blocks:
+    return [Cards("The worst crash of each configuration", cards, open=True)]
+
+
+def crash_sections(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[Block]:
+    """One fold per cell with its worst crashes; pages with all of them beside the report."""
+    if not crashes:
         return [Text("No fatal collision.")]
     intro = Text(
         "The three hardest crashes of each cell. Times in a chain count back from the contact. "
         "Every other crash stands on its cell's own page in the folder cards."
     )
-    return [intro, *blocks]
+    return [intro, *(_cell_block(matrix, *cell, found) for cell, found in crashes.items())]
 
 
 def _crashed(matrix: Matrix, config: str, weather: str) -> pl.DataFrame:

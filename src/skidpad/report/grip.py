@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 
 from skidpad.evidence.grip.findings import FINDINGS
-from skidpad.evidence.grip.study import ORIGINAL, REDUCED, completion, completion_p
-from skidpad.evidence.verdicts import judge
+from skidpad.evidence.grip.study import ORIGINAL, REDUCED, Share, completion, completion_p
+from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.grip import read_stopping
 from skidpad.recording.logfiles import read_log
 from skidpad.report import grip_figures, grip_tables
 from skidpad.report.grip_data import GripCampaign, load_grip, scenario_title
 from skidpad.report.grip_rain import rain_tables
 from skidpad.report.page import (
+    Answers,
     Block,
     Card,
     Cards,
@@ -27,9 +29,10 @@ from skidpad.report.page import (
     write_report_page,
 )
 from skidpad.report.replay import replay
-from skidpad.report.verdicts import verdict_blocks
+from skidpad.report.verdicts import seeds_text, tally_text, verdict_blocks
 from skidpad.roads.bundled import load_map
 
+ALPHA = 0.05
 LEAD = """Every run was driven twice with the same seed: once with the weather only seen, and once with \
 tyres that feel it, those of the ego and of every other vehicle. Seeds are common to all cells, so that \
 differences are paired.
@@ -52,12 +55,12 @@ def write_grip_report(folder: Path) -> Path:
 def build_page(campaign: GripCampaign) -> Page:
     """All sections in the order in which a reader asks."""
     both = campaign.both
+    judged = judge(FINDINGS, [campaign.with_delays() if both else campaign.plain] * len(FINDINGS))
+    first: list[Block] = [_answers(campaign, judged), _headline(campaign), Text(LEAD), Text(MODEL)]
     sections = [
-        Section(
-            "What happened", [*_warnings(campaign), _headline(campaign), Text(LEAD), Text(MODEL)]
-        ),
+        Section("What happened", [*_warnings(campaign), *first]),
         Section("Completion and score", grip_tables.completion_tables(campaign)),
-        Section("Findings of the source, judged", _verdicts(campaign)),
+        Section("Findings of the source, judged", _verdicts(judged)),
         Section("What changes besides", grip_tables.change_tables(campaign) if both else []),
         Section("Rain on the lens and rain on the road", rain_tables(campaign)),
         Section("Series over time", grip_figures.both_modes(campaign) if both else []),
@@ -96,6 +99,39 @@ def _warnings(campaign: GripCampaign) -> list[Block]:
     return [*campaign.missing(), Text(text, tone="note")]
 
 
+def _answers(campaign: GripCampaign, judged: Sequence[Judgement]) -> Answers:
+    """Whether grip matters, where, how sure."""
+    runs = campaign.counted
+    shares = {f: completion(runs.filter(pl.col("friction") == f)) for f in (ORIGINAL, REDUCED)}
+    told = [f"{_percent(s)} with {f} friction" for f, s in shares.items() if s.value is not None]
+    changed = [p for p in campaign.pairs.values() if len(p.common) and completion_p(p) < ALPHA]
+    after = {
+        (p.scenario, p.weather): share
+        for p in campaign.pairs.values()
+        if (share := completion(p.reduced)).value is not None
+    }
+    items = [
+        ("Does less grip change the outcome?", f"Runs without an accident: {', '.join(told)}.")
+    ]
+    if campaign.both and after:
+        worst = min(after, key=lambda cell: after[cell].value or 0.0)
+        where = f"{scenario_title(worst[0])} in {worst[1]}"
+        text = (
+            f"Fewest runs are completed in {where}, {_percent(after[worst])}; the outcome changes "
+            f"beyond chance in {len(changed)} of {len(campaign.pairs)} cells."
+        )
+        items.append(("Where most?", text))
+    seeds = campaign.plain["seed"].n_unique()
+    items.append(("How sure is that?", f"{seeds_text(seeds)} {tally_text(judged)}"))
+    return Answers(items)
+
+
+def _percent(share: Share) -> str:
+    low, high = share.interval
+    value = 100.0 * (share.value or 0.0)
+    return f"{value:.0f} % (95 % {100 * low:.0f} to {100 * high:.0f})"
+
+
 def _headline(campaign: GripCampaign) -> Numbers:
     all_runs = campaign.plain
     items = [Number(f"{len(all_runs)}", "runs", f"{all_runs['seed'].n_unique()} per cell")]
@@ -108,7 +144,7 @@ def _headline(campaign: GripCampaign) -> Numbers:
             items.append(
                 Number(f"{100 * share.value:.1f} %", f"completed, {friction} friction", note)
             )
-    changed = sum(len(p.common) > 0 and completion_p(p) < 0.05 for p in campaign.pairs.values())
+    changed = sum(len(p.common) > 0 and completion_p(p) < ALPHA for p in campaign.pairs.values())
     items.append(Number(f"{changed}", "cells with another outcome", f"of {len(campaign.pairs)}"))
     reduced = campaign.counted.filter(pl.col("friction") == REDUCED)
     lost = reduced["loss_of_control_npc"].mean()
@@ -118,9 +154,7 @@ def _headline(campaign: GripCampaign) -> Numbers:
     return Numbers(items)
 
 
-def _verdicts(campaign: GripCampaign) -> list[Block]:
-    table = campaign.with_delays() if campaign.both else campaign.plain
-    judged = judge(FINDINGS, [table for _ in FINDINGS])
+def _verdicts(judged: Sequence[Judgement]) -> list[Block]:
     intro = Text(
         "Claims are the source's. Tests and margins were written after a trial of three seeds had been "
         "seen, and two rules for verdicts were settled after 65; they are not blind. The other "

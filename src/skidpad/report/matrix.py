@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS
-from skidpad.evidence.verdicts import judge
+from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import matrix_figures, matrix_tables
-from skidpad.report.crashes import crash_sections
+from skidpad.report.crashes import crash_sections, found_crashes, worst_of_each
+from skidpad.report.matrix_answers import answers, speed_figure
 from skidpad.report.matrix_data import Matrix, load_matrix
 from skidpad.report.page import Block, Number, Numbers, Page, Section, Text, write_report_page
 from skidpad.report.verdicts import verdict_blocks
@@ -30,16 +32,29 @@ def write_report(folder: Path) -> Path:
 
 def build_page(matrix: Matrix) -> Page:
     """All sections in the order in which a reader asks."""
+    claims = (*FINDINGS, *ACCEPTANCE)
+    judged = judge(claims, [None if f.study else matrix.results for f in claims])
+    crashes = found_crashes(matrix)
     sections = [
-        Section("What happened", [*_warnings(matrix), _headline(matrix), Text(LEAD)]),
+        Section(
+            "What happened",
+            [
+                *_warnings(matrix),
+                answers(matrix, judged),
+                _headline(matrix),
+                speed_figure(matrix),
+                *worst_of_each(crashes),
+                Text(LEAD),
+            ],
+        ),
         Section("Collisions", matrix_tables.collisions(matrix) + matrix_figures.collisions(matrix)),
-        Section("Findings of the sources, judged", _verdicts(matrix)),
+        Section("Findings of the sources, judged", _verdicts(judged)),
         Section(
             "Lane keeping and perception",
             matrix_tables.others(matrix) + matrix_figures.others(matrix),
         ),
         Section("One step at a time", matrix_tables.pairs(matrix)),
-        Section("Every crash", crash_sections(matrix)),
+        Section("Every crash", crash_sections(matrix, crashes)),
         Section("All metrics", matrix_tables.per_weather(matrix)),
         Section("Definitions", [matrix.definitions()]),
         Section("Configuration and versions", matrix.provenance()),
@@ -95,9 +110,7 @@ def _headline(matrix: Matrix) -> Numbers:
     )
 
 
-def _verdicts(matrix: Matrix) -> list[Block]:
-    claims = (*FINDINGS, *ACCEPTANCE)
-    judged = judge(claims, [None if f.study else matrix.results for f in claims])
+def _verdicts(judged: Sequence[Judgement]) -> list[Block]:
     intro = Text(
         "Each claim, its test and its margin were written down before results of the matrix were "
         "seen. One rule is not blind: that a margin comes before significance, so that a difference "

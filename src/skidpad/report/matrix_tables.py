@@ -160,16 +160,17 @@ def pairs(matrix: Matrix) -> list[Block]:
         "The difference that each step makes, paired by weather and seed: second minus first "
         "configuration. The step from 2 to 4 adds light assist, resume protocol and limiter at once."
     )
-    meanings = {m.name: m.meaning for m in metrics_of(Metrics)}
+    metrics = {m.name: m for m in metrics_of(Metrics)}
     columns = [
         Column[tuple[str, str]](
             "step", lambda step: Cell(" to ".join(step), note=config_title(step[1])[4:])
         ),
         *(
             Column[tuple[str, str]](
-                name,
+                metrics[name].title,
                 partial(step_quantity, matrix, name),
-                meanings[name],
+                metrics[name].meaning,
+                metrics[name].unit,
                 format=Format("+.2f", absent="no pairs"),
             )
             for name in STEP_COLUMNS
@@ -206,7 +207,7 @@ def _metrics_table(matrix: Matrix, config: str) -> Table:
         return mean_quantity(matrix.cell(config, weather)[metric.name])
 
     columns = [
-        Column[Metric]("metric", lambda m: Cell(m.name, hint=m.meaning)),
+        Column[Metric]("metric", lambda m: Cell(m.heading, note=m.meaning)),
         *(
             Column[Metric](
                 weather_title(w),

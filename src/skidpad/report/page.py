@@ -95,6 +95,14 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
+class Answers:
+    """What a reader asks first, each question with one sentence that answers it."""
+
+    items: Sequence[tuple[str, str]]  # question, answer
+    kind: str = "answers"
+
+
+@dataclass(frozen=True, slots=True)
 class Number:
     """A headline number with its meaning."""
 
@@ -113,12 +121,13 @@ class Numbers:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """A claim and what the data say of it."""
+    """A claim and what the data say of it in one plain sentence; the numbers are folded away."""
 
     id: str
     claim: str
     verdict: str
-    text: str
+    plain: str
+    numbers: str
     detail: str = ""
     kind: str = "verdict"
 
@@ -204,7 +213,9 @@ class Code:
     kind: str = "code"
 
 
-Block = Table | Figure | Text | Numbers | Verdict | Cards | Card | Definitions | Code | Tree
+Block = (
+    Answers | Table | Figure | Text | Numbers | Verdict | Cards | Card | Definitions | Code | Tree
+)
 
 
 @dataclass(frozen=True, slots=True)

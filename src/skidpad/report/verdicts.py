@@ -2,21 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections import Counter
+from collections.abc import Iterable, Sequence
 
 from skidpad.evidence.verdicts import Judgement
+from skidpad.evidence.verdicts import Verdict as Outcome
 from skidpad.report.page import Verdict
 
 
 def verdict_blocks(judged: Iterable[Judgement]) -> list[Verdict]:
-    """One block per finding: claim, verdict, numbers, and how it was judged."""
+    """One block per finding: claim, verdict, a plain sentence, numbers, and how it was judged."""
     return [
         Verdict(
             j.finding.id,
             j.finding.claim,
             j.verdict.value,
+            plain(j),
             j.text,
-            f"{j.finding.nature} {j.finding.estimand}; test: {j.finding.test}; margin: {j.finding.margin}.",
+            f"{j.finding.nature} {j.finding.estimand}; test: {j.finding.test}; "
+            f"margin: {j.finding.margin}.",
         )
         for j in judged
     ]
+
+
+def plain(j: Judgement) -> str:
+    """What the runs say about a claim, without numbers of statistics."""
+    match j.verdict:
+        case Outcome.SUPPORTED:
+            return "These runs show it, beyond what chance explains."
+        case Outcome.CONTRADICTED:
+            small = any(c.small and c.margin for c in j.contrasts)
+            return (
+                "These runs show too small a difference to matter."
+                if small
+                else "These runs show the opposite, beyond what chance explains."
+            )
+        case Outcome.UNDECIDED:
+            more = f"about {j.seeds_needed} seeds" if j.seeds_needed else "more seeds"
+            return f"These runs cannot tell; it would take {more}."
+        case Outcome.BY_CONSTRUCTION:
+            return "Both sides are the same drive: there is nothing to measure."
+        case Outcome.NOT_TESTABLE:
+            return f"These runs cannot test it; it needs {j.finding.needs}."
+
+
+def tally_text(judged: Sequence[Judgement]) -> str:
+    """How many claims were judged how."""
+    counts = Counter(j.verdict for j in judged)
+    told = ", ".join(f"{counts[v]} {v.value}" for v in Outcome if counts[v])
+    return f"Of the sources' {len(judged)} claims: {told}."
+
+
+def seeds_text(seeds: int) -> str:
+    """How far verdicts can be trusted with so many seeds per cell."""
+    if seeds == 1:
+        return (
+            "One seed per cell: what differs between two cells may be chance; no verdict can rest "
+            "on it."
+        )
+    return f"{seeds} seeds per cell, the same in all cells."

@@ -17,7 +17,7 @@ import inspect
 from collections.abc import Callable, Mapping
 from enum import Enum
 from math import inf
-from typing import Annotated, Any, get_args, get_type_hints
+from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 
 import typer
 from msgspec import NODEFAULT, Meta, Struct, structs
@@ -53,26 +53,38 @@ def spread(
     return decorate
 
 
+class Described(NamedTuple):
+    """A field that has a description, so that it is an option."""
+
+    name: str
+    kind: Any
+    meta: Meta
+    default: Any
+
+
+def _described(kind: type[Struct]) -> dict[str, Described]:
+    hints = get_type_hints(kind, include_extras=True)
+    found = {}
+    for field in structs.fields(kind):
+        plain, *about = get_args(hints[field.name]) or (hints[field.name],)
+        meta = next((m for m in about if isinstance(m, Meta)), None)
+        if meta is not None and meta.description is not None:
+            own = inspect.Parameter.empty if field.default is NODEFAULT else field.default
+            found[field.name] = Described(field.name, plain, meta, own)
+    return found
+
+
 def described(kind: type[Struct], defaults: dict[str, Any]) -> list[inspect.Parameter]:
     """A parameter for every field of `kind` that has a description."""
-    hints = get_type_hints(kind, include_extras=True)
-    found = []
-    for field in structs.fields(kind):
-        meta = next((m for m in get_args(hints[field.name])[1:] if isinstance(m, Meta)), None)
-        if meta is None or meta.description is None:
-            continue
-        own = inspect.Parameter.empty if field.default is NODEFAULT else field.default
-        default = defaults.get(field.name, own)
-        annotation = _option(field.name, get_args(hints[field.name])[0], meta)
-        found.append(
-            inspect.Parameter(
-                field.name,
-                inspect.Parameter.KEYWORD_ONLY,
-                default=_shown(default, meta),
-                annotation=annotation,
-            )
+    return [
+        inspect.Parameter(
+            field.name,
+            inspect.Parameter.KEYWORD_ONLY,
+            default=_shown(defaults.get(field.name, field.default), field.meta),
+            annotation=_option(field),
         )
-    return found
+        for field in _described(kind).values()
+    ]
 
 
 def _shown(default: Any, meta: Meta) -> Any:
@@ -84,8 +96,9 @@ def _shown(default: Any, meta: Meta) -> Any:
     return ",".join(default) if meta.extra == PARTED else list(default)
 
 
-def _option(name: str, kind: Any, meta: Meta) -> Any:
+def _option(field: Described) -> Any:
     """How typer takes it: as plain as it can be, since `_read` is who judges the value."""
+    name, kind, meta, _ = field
     flags = [_flag(name)] if kind is bool else []  # without a --no-...
     words = _words(kind)
     metavar = f"<{'|'.join(words)}>" if words else None
@@ -109,11 +122,11 @@ def _gathering(
     command: Command, groups: dict[str, type[Struct]], parameters: list[inspect.Parameter]
 ) -> Command:
     """The command with these parameters, which gathers them into its Structs again."""
-    names = {name: [p.name for p in described(kind, {})] for name, kind in groups.items()}
+    fields = {name: _described(kind) for name, kind in groups.items()}
 
     def call(**values: Any) -> Any:
         given = {
-            name: kind(**{n: _read(kind, n, values.pop(n)) for n in names[name]})
+            name: kind(**{n: _read(f, values.pop(n)) for n, f in fields[name].items()})
             for name, kind in groups.items()
         }
         return command(**values, **given)
@@ -125,10 +138,9 @@ def _gathering(
     return call
 
 
-def _read(kind: type[Struct], name: str, value: Any) -> Any:
+def _read(field: Described, value: Any) -> Any:
     """An option's value as the field holds it; ConfigError for one that the field does not allow."""
-    wanted, *about = get_args(get_type_hints(kind, include_extras=True)[name])
-    meta = next(m for m in about if isinstance(m, Meta))
+    name, wanted, meta, _ = field
     if wanted == tuple[str, ...]:
         words = value.split(",") if isinstance(value, str) else value
         return tuple(word.strip() for word in words if word.strip())

@@ -10,7 +10,6 @@ from math import atan2, cos, hypot, pi, sin
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import BSpline
 
 from skidpad.core.geometry import Pose, wrap_angle
 
@@ -147,6 +146,8 @@ def nurbs(
     order: int, points: Sequence[Vertex], weights: Sequence[float], knots: Sequence[float]
 ) -> list[Vertex]:
     """Points of a rational B-spline; time runs evenly along it where its ends have times."""
+    from scipy.interpolate import BSpline  # 20 MB that only a file with splines needs
+
     degree, n = order - 1, len(points)
     w = np.array(weights)
     homogeneous = np.column_stack(

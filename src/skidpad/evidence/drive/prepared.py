@@ -45,6 +45,21 @@ class Leads(NamedTuple):
     overlap: Mask  # the two boxes overlap across the lane
 
 
+class Pairs(NamedTuple):
+    """The ego and a vehicle near it, arrays (m,): one entry per tick and vehicle."""
+
+    row: Ints  # of the log
+    actor: Ints
+    ego: LaneMatch
+    other: LaneMatch
+    along: Floats  # m along the lane between positions, not finite where no lane leads there
+
+    def where(self, chosen: Mask) -> Pairs:
+        """Only those."""
+        ego, other = self.ego.at(chosen), self.other.at(chosen)
+        return Pairs(self.row[chosen], self.actor[chosen], ego, other, self.along[chosen])
+
+
 @dataclass(frozen=True, slots=True)
 class Drive:
     """A log, the ego on its lanes, and its leads. T ticks."""
@@ -85,19 +100,15 @@ def find_leads(log: RunLog, index: LaneIndex, place: LaneMatch, rule: LeadDefini
     near = log.present & (distance < LEAD_RANGE) & (table.kind <= ActorKind.MOTORCYCLE)
     near[:, 0] = False
     k, i = np.nonzero(near)
-    other = index.match(a.x[k, i], a.y[k, i], a.z[k, i])
-    ego = place.at(k)
-    along = index.distance_ahead(ego, other, LEAD_RANGE)
+    ego, other = place.at(k), index.match(a.x[k, i], a.y[k, i], a.z[k, i])
+    pairs = Pairs(k, i, ego, other, index.distance_ahead(ego, other, LEAD_RANGE))
     if rule is LeadDefinition.AHEAD_ON_LANE:
-        is_lead = np.isfinite(along)
+        is_lead = np.isfinite(pairs.along)
     else:
         is_lead = _same_ids(index, ego, other)
     best = np.full(distance.shape, np.inf)
     best[k[is_lead], i[is_lead]] = distance[k[is_lead], i[is_lead]]
-    actor = np.argmin(best, axis=1)
-    exists = np.isfinite(best[np.arange(len(log)), actor])
-    chosen = is_lead & (actor[k] == i)
-    return _describe(log, ego, other, along, k, i, chosen, np.where(exists, actor, -1))
+    return _describe(log, pairs.where(is_lead & (np.argmin(best, axis=1)[k] == i)))
 
 
 def _same_ids(index: LaneIndex, a: LaneMatch, b: LaneMatch) -> Mask:
@@ -107,29 +118,21 @@ def _same_ids(index: LaneIndex, a: LaneMatch, b: LaneMatch) -> Mask:
     return known
 
 
-def _describe(
-    log: RunLog,
-    ego: LaneMatch,
-    other: LaneMatch,
-    along: Floats,
-    k: Ints,
-    i: Ints,
-    chosen: Mask,
-    actor: Ints,
-) -> Leads:
-    a = log.actors
+def _describe(log: RunLog, leads: Pairs) -> Leads:
+    """The leads of a drive from at most one pair per tick."""
+    a, (k, i, e, o, along) = log.actors, leads
     distance, gap, closing = (np.full(len(log), np.nan) for _ in range(3))
+    actor = np.full(len(log), -1, dtype=np.int64)
     overlap = np.zeros(len(log), dtype=np.bool_)
-    e, o = ego.at(chosen), other.at(chosen)
-    k, i, along = k[chosen], i[chosen], along[chosen]
-    zero = np.zeros_like(i)
-    long_e, wide_e = _extent(log, k, zero, e.heading)
+    ego = np.zeros_like(i)
+    long_e, wide_e = _extent(log, k, ego, e.heading)
     long_o, wide_o = _extent(log, k, i, o.heading)
+    actor[k] = i
     distance[k] = np.hypot(a.x[k, i] - a.x[k, 0], a.y[k, i] - a.y[k, 0])
     gap[k] = np.where(np.isfinite(along), np.maximum(along - long_e - long_o, 0.0), np.nan)
-    closing[k] = _speed_along(log, k, zero, e.heading) - _speed_along(log, k, i, o.heading)
+    closing[k] = _speed_along(log, k, ego, e.heading) - _speed_along(log, k, i, o.heading)
     overlap[k] = np.abs(o.offset - e.offset) < wide_e + wide_o
-    return Leads(actor.astype(np.int64), distance, gap, closing, overlap)
+    return Leads(actor, distance, gap, closing, overlap)
 
 
 def _extent(log: RunLog, k: Ints, i: Ints, heading: Floats) -> tuple[Floats, Floats]:

@@ -8,8 +8,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import CubicHermiteSpline
-from scipy.special import fresnel
 
 Floats = NDArray[np.float64]
 
@@ -125,6 +123,8 @@ def _clothoid(e: Element, shape: Clothoid, ds: Floats) -> LinePoints:
         x = e.x + chord * np.cos(e.heading + half)
         y = e.y + chord * np.sin(e.heading + half)
         return LinePoints(x, y, heading, np.full_like(ds, k0), np.zeros_like(ds))
+    from scipy.special import fresnel  # few maps have clothoids, and it is 10 MB of a worker
+
     sign = np.sign(rate)
     scale = np.sqrt(np.pi / abs(rate))
     root = np.sqrt(np.pi * abs(rate))
@@ -139,6 +139,8 @@ def _clothoid(e: Element, shape: Clothoid, ds: Floats) -> LinePoints:
 
 def _parametric(e: Element, shape: Parametric, ds: Floats) -> LinePoints:
     """Parameter from arc length by a table; then the cubic and its derivatives."""
+    from scipy.interpolate import CubicHermiteSpline  # likewise
+
     p_table = np.linspace(0.0, shape.p_end, max(int(e.length / TABLE_STEP), 8) + 1)
     middle = 0.5 * (p_table[1:] + p_table[:-1])
     speed, speed_middle = (np.hypot(*_derivatives(shape, p)[2:4]) for p in (p_table, middle))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil, nan
 
 from skidpad.core.errors import ConfigError
@@ -62,7 +63,6 @@ class RoadMap:
     signals: SignalTable
     roadside: Roadside
     arrays: kernels.LaneArrays
-    held: Held[kernels.LaneArrays]  # the same for entry kernels
     geo_reference: str
     ego_start: LanePosition | None
 
@@ -73,8 +73,12 @@ class RoadMap:
         self.geo_reference, self.ego_start = baked.geo_reference, baked.ego_start
         self.content_hash = baked.content_hash()
         self.arrays = lane_arrays(baked)
-        self.held = hold(self.arrays)
         self._names = list(zip(self.lanes.road.tolist(), self.lanes.lane_id.tolist(), strict=True))
+
+    @cached_property
+    def held(self) -> Held[kernels.LaneArrays]:
+        """`arrays` for entry kernels; made when asked, as who only names a map runs no kernel."""
+        return hold(self.arrays)
 
     def project(self, x: float, y: float, z: float, driving: bool = True) -> LanePoint | None:
         """Nearest (driving) lane centre at about this height; None beyond 20 m."""

@@ -49,7 +49,7 @@ $(VENV)/.installed: $(BIN)/python pyproject.toml
 	touch $@
 
 $(VENV)/.tested-with: $(VENV)/.installed
-	$(BIN)/python -m pip install --quiet --prefer-binary -e '.[test,server,cluster,ros,learn,cockpit]'
+	$(BIN)/python -m pip install --quiet --prefer-binary -e '.[test,server,cluster,ros,learn,cockpit,fleet]'
 	-$(BIN)/python -m pip install --quiet --prefer-binary -e '.[carla]'
 	touch $@
 

@@ -12,6 +12,7 @@ from skidpad.cli.channels import channels
 from skidpad.cli.channels_drive import drive, outcomes
 from skidpad.cli.channels_evaluate import evaluate, train
 from skidpad.cli.compare import compare
+from skidpad.cli.fleet import fleet
 from skidpad.cli.friction import friction
 from skidpad.cli.grip import grip
 from skidpad.cli.hazards import hazards
@@ -73,6 +74,7 @@ for reader in (outcomes, evaluate, train):
     channels.command()(reader)
 app.add_typer(channels)
 app.add_typer(hazards)
+app.add_typer(fleet)
 app.command()(friction)
 app.command()(play)
 app.add_typer(campaign)

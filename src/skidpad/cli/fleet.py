@@ -1,0 +1,166 @@
+"""`skidpad fleet`: the service that vehicles report to, and the vehicle's side of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from skidpad.fleet.service import Places
+
+fleet = typer.Typer(
+    name="fleet",
+    help="From one car's hazards to what goes wrong everywhere.",
+    no_args_is_help=True,
+)
+Data = Annotated[Path, typer.Option(help="Folder of the fleet's store.")]
+Database = Annotated[
+    str | None, typer.Option(help="postgresql://... instead of the SQLite file in --data.")
+]
+BlobUrl = Annotated[
+    str | None,
+    typer.Option("--blobs", help="Where bodies are kept: a folder or an fsspec address."),
+]
+TokenFile = Annotated[Path, typer.Option(help="File that holds the vehicle's credential.")]
+
+
+@contextmanager
+def _extra() -> Iterator[None]:
+    """One sentence when the optional part is not installed."""
+    from skidpad.core.errors import MissingExtra
+
+    try:
+        yield
+    except MissingExtra:
+        raise
+    except ImportError as error:
+        raise MissingExtra("skidpad fleet", "fleet") from error
+
+
+def _places(data: Path, database: str | None, blobs: str | None) -> Places:
+    with _extra():
+        from skidpad.fleet.service import Places
+    return Places(data=data, database=database, blobs=blobs)
+
+
+@fleet.command()
+def serve(
+    data: Data,
+    host: Annotated[str, typer.Option(help="Address to listen on.")] = "127.0.0.1",
+    port: Annotated[int, typer.Option(help="0: any free one, which is printed.")] = 8470,
+    database: Database = None,
+    blobs: BlobUrl = None,
+    certificate: Annotated[
+        Path | None, typer.Option(help="PEM of the server; with --key serves HTTPS.")
+    ] = None,
+    key: Annotated[Path | None, typer.Option(help="PEM of its private key.")] = None,
+) -> None:
+    """Serve the fleet; nothing listens beyond this machine unless --host says so."""
+    from skidpad.core.errors import ConfigError
+
+    with _extra():
+        from skidpad.fleet.server import Listen, run
+        from skidpad.fleet.service import open_fleet
+    from skidpad.scenarios.hazard_export import export_hazard
+
+    if (certificate is None) is not (key is None):
+        raise ConfigError("--certificate and --key go together")
+    if host not in ("127.0.0.1", "::1", "localhost") and certificate is None:
+        raise ConfigError(f"--host {host} leaves this machine and needs --certificate and --key")
+    places = _places(data, database, blobs)
+    service = open_fleet(places, exporter=export_hazard)
+    try:
+        run(service, Listen(host, port, certificate, key), typer.echo)
+    finally:
+        service.close()
+
+
+@fleet.command()
+def enrol(
+    data: Data,
+    role: Annotated[str, typer.Argument(help="manufacturer, operator, ..., vehicle.")],
+    name: Annotated[str, typer.Argument(help="Of the person or vehicle.")],
+    tenant: Annotated[str, typer.Option(help="Organisation; of a vehicle: its operator.")],
+    manufacturer: Annotated[str | None, typer.Option(help="Of a vehicle: who made it.")] = None,
+    database: Database = None,
+) -> None:
+    """Add someone to the fleet and print the credential, which is not kept."""
+    import time
+
+    from skidpad.core.errors import ConfigError, require_choice
+
+    with _extra():
+        from skidpad.fleet.service import open_store
+        from skidpad.fleet.store.accounts import add_person, add_vehicle
+        from skidpad.fleet.words import Role
+    known = Role(require_choice("role", role, [r.value for r in Role]))
+    if (known is Role.VEHICLE) is (manufacturer is None):
+        raise ConfigError("--manufacturer is needed for a vehicle, and for nobody else")
+    engine = open_store(_places(data, database, None))
+    try:
+        with engine.begin() as connection:
+            account = (
+                add_person(connection, tenant, known, name, time.time())
+                if manufacturer is None
+                else add_vehicle(connection, tenant, manufacturer, name, time.time())
+            )
+    finally:
+        engine.dispose()
+    typer.echo(account.token)
+
+
+@fleet.command()
+def upload(
+    spool: Annotated[Path, typer.Option(help="Folder that holds what is not acknowledged.")],
+    to: Annotated[str, typer.Option(help="Address of the fleet.")],
+    token_file: TokenFile,
+    folders: Annotated[
+        list[Path] | None, typer.Argument(help="Output folders of `skidpad monitor` to add.")
+    ] = None,
+    release: Annotated[str, typer.Option(help="Update under which the vehicle drove.")] = "",
+    ca: Annotated[Path | None, typer.Option(help="PEM of the authority that is trusted.")] = None,
+    wait: Annotated[float, typer.Option(help="Seconds to go on trying when nobody answers.")] = 0.0,
+) -> None:
+    """Send hazards, drives and indicators; what is not acknowledged waits in the spool."""
+    import ssl
+
+    from skidpad.core.errors import ConfigError, FileError
+
+    with _extra():
+        import httpx
+
+        from skidpad.fleet.monitored import spool_folder
+        from skidpad.fleet.spool import Spool
+        from skidpad.fleet.uploader import TIMEOUT_S, poster, send_all
+    if not to.startswith(("https://", "http://127.0.0.1", "http://localhost")):
+        raise ConfigError(f"--to must be https://, or http:// on this machine, got {to!r}")
+    try:
+        token = token_file.read_text(encoding="ascii").strip()
+        verify = ssl.create_default_context(cafile=str(ca) if ca else None)
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileError(f"{token_file} or {ca}: cannot be read ({error})") from error
+    kept = Spool(spool)
+    for folder in folders or []:
+        spool_folder(kept, folder, release)
+    headers = {"Authorization": f"Bearer {token}"}
+    with httpx.Client(
+        base_url=to, headers=headers, verify=verify, timeout=TIMEOUT_S, trust_env=False
+    ) as client:
+        sent = send_all(kept, poster(client), wait)
+    typer.echo(f"{sent.acknowledged} acknowledged, {sent.refused} refused, {sent.waiting} waiting")
+
+
+@fleet.command()
+def certificate(
+    out: Annotated[Path, typer.Option(help="Folder for ca.pem, server.pem and server.key.")],
+    host: Annotated[list[str], typer.Option(help="Name or address of the server.")] = ["127.0.0.1"],  # noqa: B006
+) -> None:
+    """Make a certificate authority of one's own and a server's certificate for HTTPS."""
+    with _extra():
+        from skidpad.fleet.certificates import make_certificates
+    for path in make_certificates(out, host):
+        typer.echo(str(path))

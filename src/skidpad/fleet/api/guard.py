@@ -1,0 +1,98 @@
+"""Who asks, whether they may, and how often: before anything of a request is looked at."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from threading import Lock
+
+from fastapi import Request
+
+from skidpad.fleet.identity import token_hash
+from skidpad.fleet.service import Fleet
+from skidpad.fleet.store.accounts import principal_of
+from skidpad.fleet.words import Action, Principal, Refused
+
+REMEMBERED_S = 10.0  # a credential ended by another process is refused after that
+KNOWN_MAX = 100_000  # credentials remembered
+
+
+@dataclass(slots=True)
+class _Bucket:
+    left: float
+    at: float
+
+
+class Rate:
+    """A bucket per credential: so many requests at once, refilled at a lasting rate."""
+
+    def __init__(self, per_s: float, burst: int) -> None:
+        self.per_s, self.burst = per_s, float(burst)
+        self._buckets: dict[str, _Bucket] = {}
+        self._lock = Lock()
+
+    def take(self, who: str, now: float) -> float:
+        """0 when a request is granted, else the seconds until one will be."""
+        with self._lock:
+            bucket = self._buckets.setdefault(who, _Bucket(self.burst, now))
+            gained = max(0.0, now - bucket.at) * self.per_s
+            bucket.left, bucket.at = min(self.burst, bucket.left + gained), now
+            if bucket.left >= 1.0:
+                bucket.left -= 1.0
+                return 0.0
+            return (1.0 - bucket.left) / self.per_s
+
+
+class Guard:
+    """Knows credentials for a moment, so that a busy vehicle costs one look-up per second."""
+
+    def __init__(self, fleet: Fleet) -> None:
+        self.fleet = fleet
+        self.rate = Rate(fleet.limits.requests_per_s, fleet.limits.burst)
+        self._known: dict[str, tuple[float, Principal]] = {}
+
+    def principal(self, authorization: str | None) -> Principal:
+        """Whose credential the header carries; Refused (401, 429) otherwise."""
+        scheme, _, token = (authorization or "").partition(" ")
+        if scheme.lower() != "bearer" or not token:
+            raise Refused(401, "a credential is needed: Authorization: Bearer TOKEN")
+        who = self._look_up(token)
+        wait = self.rate.take(who.id, self.fleet.clock())
+        if wait > 0.0:
+            raise Refused(429, f"too many requests, wait {wait:.2f} s")
+        return who
+
+    def _look_up(self, token: str) -> Principal:
+        name, now = token_hash(token), self.fleet.clock()
+        known = self._known.get(name)
+        if known is not None and 0.0 <= now - known[0] < REMEMBERED_S:
+            return known[1]
+        with self.fleet.engine.connect() as connection:
+            who = principal_of(connection, token, now)
+        if who is None:
+            self._known.pop(name, None)
+            raise Refused(401, "this credential is not known, has expired or was ended")
+        if len(self._known) >= KNOWN_MAX:
+            self._known.clear()
+        self._known[name] = now, who
+        return who
+
+
+@dataclass(frozen=True, slots=True)
+class Needs:
+    """A dependency of a route: the principal, when its role has the right to `action`."""
+
+    action: Action
+
+    async def __call__(self, request: Request) -> Principal:
+        """Refused (401, 403, 429) unless granted."""
+        guard: Guard = request.app.state.guard
+        who = guard.principal(request.headers.get("authorization"))
+        if not who.may(self.action):
+            raise Refused(403, f"the role {who.role.value} may not {self.action.value}")
+        return who
+
+
+def fleet_of(request: Request) -> Fleet:
+    """The fleet that a request is answered from."""
+    fleet: Fleet = request.app.state.fleet
+    return fleet

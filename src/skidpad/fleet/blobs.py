@@ -1,0 +1,71 @@
+"""Content-addressed blobs through fsspec: a folder, or an object store as a setting."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import fsspec
+
+from skidpad.core.errors import FileError
+from skidpad.fleet.identity import digest
+from skidpad.recording.files import write_bytes
+
+DIGITS = frozenset("0123456789abcdef")
+
+
+class Blobs:
+    """Bytes by the SHA-256 of themselves; what was put stays as it is."""
+
+    def __init__(self, url: str) -> None:
+        self._fs, self._root = fsspec.core.url_to_fs(url)
+        protocol = self._fs.protocol
+        self._local = "file" in ((protocol,) if isinstance(protocol, str) else protocol)
+
+    def put(self, content: bytes) -> str:
+        """Store `content` durably before returning its name."""
+        name = digest(content)
+        path = self._path(name)
+        if self._fs.exists(path):
+            return name
+        if self._local:
+            write_bytes(Path(path), content)
+            _sync_folder(Path(path).parent)
+        else:
+            self._fs.makedirs(path.rpartition("/")[0], exist_ok=True)
+            self._fs.pipe_file(path, content)
+        return name
+
+    def get(self, name: str) -> bytes:
+        """The whole blob; FileError when it is absent or not what its name says."""
+        content = self._read(name, None, None)
+        if digest(content) != name:
+            raise FileError(f"blob {name} is damaged")
+        return content
+
+    def part(self, name: str, start: int, size: int) -> bytes:
+        """Bytes of a blob from `start`; their own digest is the caller's to check."""
+        return self._read(name, start, start + size)
+
+    def _read(self, name: str, start: int | None, end: int | None) -> bytes:
+        try:
+            content: Any = self._fs.cat_file(self._path(name), start=start, end=end)
+        except FileNotFoundError as error:
+            raise FileError(f"there is no blob {name}") from error
+        return bytes(content)
+
+    def _path(self, name: str) -> str:
+        if len(name) != 64 or not DIGITS.issuperset(name):
+            raise FileError("a blob's name is 64 hexadecimal digits")
+        return f"{self._root}/{name[:2]}/{name}"
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make a rename durable, and the folder's own birth."""
+    for each in (folder, folder.parent):
+        descriptor = os.open(each, os.O_RDONLY)
+        try:
+            os.fsync(descriptor)
+        finally:
+            os.close(descriptor)

@@ -1,0 +1,30 @@
+"""Random identifiers, credentials, and the hashes that are kept of them."""
+
+from __future__ import annotations
+
+import hashlib
+import secrets
+
+ID_BYTES = 16
+TOKEN_BYTES = 32
+PREFIX = "skidpad-"
+
+
+def new_id() -> str:
+    """An identifier that says nothing about what it names (32 hexadecimal digits)."""
+    return secrets.token_hex(ID_BYTES)
+
+
+def new_token() -> str:
+    """A credential of 256 random bits; only its hash is kept."""
+    return PREFIX + secrets.token_urlsafe(TOKEN_BYTES)
+
+
+def token_hash(token: str) -> str:
+    """What is kept of a credential: it has 256 random bits, so a plain hash cannot be searched."""
+    return digest(token.encode("utf-8", "surrogatepass"))
+
+
+def digest(content: bytes) -> str:
+    """SHA-256 as hexadecimal digits."""
+    return hashlib.sha256(content).hexdigest()

@@ -1,0 +1,81 @@
+"""A monitor's output folder as batches: hazards, the drive, indicators by minute."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import polars as pl
+
+from skidpad.core.errors import FileError
+from skidpad.fleet.identity import digest
+from skidpad.fleet.spool import Spool
+from skidpad.fleet.words import Kind
+from skidpad.recording import indicators, monitored
+from skidpad.recording.hazard_text import HEADER
+from skidpad.recording.hazards import TEXT_FILE
+
+RECORDS = 100  # of a batch
+BYTES = 4 * 1024 * 1024  # of a batch of hazards before it is packed
+MINUTE = 60.0  # s
+
+
+def spool_folder(spool: Spool, folder: Path, release: str = "") -> list[str]:
+    """Spool what `skidpad monitor` wrote into `folder`; returns the keys of its batches.
+
+    release: the update under which the vehicle drove, "" for what it came with.
+    """
+    summary = monitored.read_summary(folder) | {"release": release}
+    content = json.dumps(summary, sort_keys=True).encode()
+    drive = digest(content)[:32]
+    keys = [spool.put(Kind.HAZARDS, batch, drive) for batch in hazard_batches(folder)]
+    keys.append(spool.put(Kind.DRIVE, content, drive))
+    if (folder / indicators.FILE).exists():
+        rows = indicator_rows(indicators.read_indicators(folder))
+        if rows:
+            keys.append(spool.put(Kind.INDICATORS, rows, drive))
+    return keys
+
+
+def hazard_batches(folder: Path) -> Iterator[bytes]:
+    """The records of a folder in batches; a record cut off at the end is left out."""
+    path = folder / TEXT_FILE
+    try:
+        text = path.read_bytes()
+    except OSError as error:
+        raise FileError(
+            f"{path}: cannot be read ({error.strerror}); `skidpad monitor` writes it"
+        ) from error
+    head, _, rest = text.partition(b"\n")
+    if head != HEADER.encode():
+        raise FileError(f"{path}: its first line must be {HEADER!r}")
+    batch: list[bytes] = []
+    for record in rest.split(b"\nZ\n")[:-1]:
+        if batch and (len(batch) == RECORDS or sum(map(len, batch)) + len(record) > BYTES):
+            yield _joined(batch)
+            batch = []
+        batch.append(record + b"\nZ\n")
+    if batch:
+        yield _joined(batch)
+
+
+def _joined(batch: list[bytes]) -> bytes:
+    return HEADER.encode() + b"\n" + b"".join(batch)
+
+
+def indicator_rows(table: pl.DataFrame) -> bytes:
+    """Values of a drive by minute, subject and indicator: one JSON row per line."""
+    found = (
+        table.filter(pl.col("value").is_finite())
+        .with_columns(minute=(pl.col("t") / MINUTE).floor().cast(pl.Int64))
+        .group_by("minute", "subject", "indicator", maintain_order=True)
+        .agg(
+            n=pl.len().cast(pl.Int64),
+            violated=pl.col("violated").sum().cast(pl.Int64),
+            mean=pl.col("value").mean(),
+            least=pl.col("value").min(),
+            greatest=pl.col("value").max(),
+        )
+    )
+    return b"".join(json.dumps(row).encode() + b"\n" for row in found.iter_rows(named=True))

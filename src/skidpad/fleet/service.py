@@ -1,0 +1,70 @@
+"""The fleet as one object: its store, its blobs, its intake, and the clock that it goes by."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from sqlalchemy import Engine
+
+from skidpad.core.errors import OutputError
+from skidpad.fleet.blobs import Blobs
+from skidpad.fleet.store.engine import migrate, open_engine, sqlite_url
+from skidpad.fleet.store.intake import Intake
+from skidpad.fleet.words import Limits
+from skidpad.recording.hazards import HazardRecord
+
+Clock = Callable[[], float]  # s since 1970
+Exporter = Callable[[HazardRecord, Path], tuple[Path, Path]]  # writes scenario and road
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Places:
+    """Where things are kept; None: in the data folder."""
+
+    data: Path
+    database: str | None = None
+    blobs: str | None = None
+
+
+@dataclass(slots=True)
+class Fleet:
+    """Everything that requests are answered from."""
+
+    engine: Engine
+    blobs: Blobs
+    intake: Intake
+    clock: Clock
+    limits: Limits = field(default_factory=Limits)
+    exporter: Exporter | None = None  # handed in: this house knows no scenarios
+    owners: dict[str, tuple[str, str]] = field(default_factory=dict)  # tenants of a vehicle: facts
+
+    def close(self) -> None:
+        """Commit what was submitted and let go of everything."""
+        self.intake.close()
+        self.engine.dispose()
+
+
+def open_fleet(
+    places: Places,
+    clock: Clock = time.time,
+    limits: Limits | None = None,
+    exporter: Exporter | None = None,
+) -> Fleet:
+    """Open the store at `places`, made or brought to this version where needed."""
+    engine = open_store(places)
+    blobs = Blobs(places.blobs or str(places.data.absolute() / "blobs"))
+    return Fleet(engine, blobs, Intake(engine, blobs, clock), clock, limits or Limits(), exporter)
+
+
+def open_store(places: Places) -> Engine:
+    """The store alone, for commands that do not serve."""
+    try:
+        places.data.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"{places.data}: cannot be written ({error.strerror})") from error
+    engine = open_engine(places.database or sqlite_url(places.data))
+    migrate(engine)
+    return engine

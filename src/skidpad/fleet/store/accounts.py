@@ -1,0 +1,113 @@
+"""Tenants, vehicles, people and their credentials; a credential is ended by an event."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, select
+
+from skidpad.core.errors import ConfigError
+from skidpad.fleet.identity import new_id, new_token, token_hash
+from skidpad.fleet.store.events import add_event
+from skidpad.fleet.store.tables import credentials, events, principals, tenants, vehicles
+from skidpad.fleet.words import Principal, Role
+
+YEAR = 365.25 * 86400.0  # s that a credential is good for
+ENDED = "credential ended"
+
+
+@dataclass(frozen=True, slots=True)
+class Account:
+    """Someone new; the token is shown once and not kept."""
+
+    principal: Principal
+    token: str
+
+
+def tenant_id(connection: Connection, name: str, at: float) -> str:
+    """The tenant of that name, made when it is new."""
+    if not 0 < len(name) <= 200:
+        raise ConfigError(f"a tenant's name has 1 to 200 characters, got {len(name)}")
+    row = connection.execute(select(tenants.c.id).where(tenants.c.name == name)).first()
+    if row is not None:
+        return str(row.id)
+    known = new_id()
+    connection.execute(tenants.insert(), {"id": known, "name": name, "at": at})
+    return known
+
+
+def add_person(connection: Connection, tenant: str, role: Role, name: str, at: float) -> Account:
+    """A person of `tenant` (its name) with a fresh credential."""
+    if role is Role.VEHICLE:
+        raise ConfigError("a vehicle is added with its manufacturer, not as a person")
+    return _add(connection, tenant_id(connection, tenant, at), role, name, None, at)
+
+
+def add_vehicle(
+    connection: Connection, operator: str, manufacturer: str, name: str, at: float
+) -> Account:
+    """A vehicle of two tenants (their names) with a fresh credential of its own."""
+    owner, maker = tenant_id(connection, operator, at), tenant_id(connection, manufacturer, at)
+    there = (vehicles.c.operator == owner) & (vehicles.c.name == name)
+    if connection.execute(select(vehicles.c.id).where(there)).first() is not None:
+        raise ConfigError(f"operator {operator!r} already has a vehicle {name!r}")
+    row: dict[str, Any] = {
+        "id": new_id(), "operator": owner, "manufacturer": maker, "name": name, "at": at,
+    }  # fmt: skip
+    connection.execute(vehicles.insert(), row)
+    return _add(connection, owner, Role.VEHICLE, name, row["id"], at)
+
+
+def _add(
+    connection: Connection, tenant: str, role: Role, name: str, vehicle: str | None, at: float
+) -> Account:
+    principal = Principal(new_id(), tenant, role, name, vehicle)
+    connection.execute(
+        principals.insert(),
+        {
+            "id": principal.id, "tenant": tenant, "role": role.value, "name": name,
+            "vehicle": vehicle, "at": at,
+        },
+    )  # fmt: skip
+    token = new_token()
+    row = {
+        "id": new_id(), "principal": principal.id, "token_hash": token_hash(token),
+        "expires": at + YEAR, "at": at,
+    }  # fmt: skip
+    connection.execute(credentials.insert(), row)
+    return Account(principal, token)
+
+
+def principal_of(connection: Connection, token: str, at: float) -> Principal | None:
+    """Whose credential `token` is; None when it is nobody's, expired or ended."""
+    ended = select(events.c.number).where(
+        events.c.subject == credentials.c.id, events.c.what == ENDED
+    )
+    row = connection.execute(
+        select(principals)
+        .join(credentials, credentials.c.principal == principals.c.id)
+        .where(
+            credentials.c.token_hash == token_hash(token),
+            credentials.c.expires > at,
+            ~ended.exists(),
+        )
+    ).first()
+    if row is None:
+        return None
+    return Principal(row.id, row.tenant, Role(row.role), row.name, row.vehicle)
+
+
+def end_credentials(connection: Connection, principal: str, by: str, at: float) -> int:
+    """End every credential of a principal; says how many there are."""
+    rows = connection.execute(
+        select(credentials.c.id).where(credentials.c.principal == principal)
+    ).all()
+    for row in rows:
+        add_event(connection, ("credential", row.id), ENDED, (by, at))
+    return len(rows)
+
+
+def vehicle_row(connection: Connection, vehicle: str) -> Any:
+    """The row of a vehicle that is known to exist."""
+    return connection.execute(select(vehicles).where(vehicles.c.id == vehicle)).one()

@@ -1,0 +1,53 @@
+"""Events: what became of a fact, who did it and when (decision R-11)."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, select
+
+from skidpad.fleet.store.tables import events
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One event as it is kept."""
+
+    number: int
+    subject: str
+    kind: str
+    what: str
+    actor: str
+    at: float  # s, server
+    detail: dict[str, Any]
+
+
+def add_event(
+    connection: Connection,
+    subject: tuple[str, str],
+    what: str,
+    by: tuple[str, float],
+    **detail: Any,
+) -> None:
+    """Say that `what` happened to `subject` (kind, id), `by` whom and when (s)."""
+    connection.execute(
+        events.insert(),
+        {
+            "kind": subject[0], "subject": subject[1], "what": what, "actor": by[0], "at": by[1],
+            "detail": json.dumps(detail, sort_keys=True, allow_nan=False),
+        },
+    )  # fmt: skip
+
+
+def events_of(connection: Connection, subjects: Sequence[str]) -> list[Event]:
+    """The events of some subjects in the order in which they were kept."""
+    rows = connection.execute(
+        select(events).where(events.c.subject.in_(list(subjects))).order_by(events.c.number)
+    )
+    return [
+        Event(r.number, r.subject, r.kind, r.what, r.actor, r.at, json.loads(r.detail))
+        for r in rows
+    ]

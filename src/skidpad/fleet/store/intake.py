@@ -1,0 +1,215 @@
+"""Taking batches in: many at once in one durable commit, and no answer before it (C-172).
+
+Bodies of a commit are one pack, a content-addressed blob; rows say where each lies in it.
+"""
+
+from __future__ import annotations
+
+import json
+import queue
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import Future
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, Engine, select
+from sqlalchemy.exc import IntegrityError
+
+from skidpad.fleet.batch import Drive, Found, weather_class
+from skidpad.fleet.blobs import Blobs
+from skidpad.fleet.identity import digest, new_id
+from skidpad.fleet.store.tables import batches, drives, hazards
+from skidpad.fleet.words import Kind, Refused
+
+Clock = Callable[[], float]  # s since 1970
+GROUP = 128  # batches of one commit at most
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Batch:
+    """A batch that was checked, with everything that is kept of it."""
+
+    vehicle: str
+    operator: str
+    manufacturer: str
+    kind: Kind
+    key: str
+    body: bytes  # as sent
+    drive: str = ""
+    vehicle_time: float | None = None
+    found: Sequence[Found] = ()
+    summary: Drive | None = None
+    summary_text: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Receipt:
+    """What a vehicle is told once its batch is durable."""
+
+    batch: str
+    ids: tuple[str, ...]  # of its records, in their order; known ones keep theirs
+    known: bool  # nothing new was kept
+
+
+class Intake:
+    """One thread that commits what has gathered while it committed."""
+
+    def __init__(self, engine: Engine, blobs: Blobs, clock: Clock) -> None:
+        self.engine, self.blobs, self.clock = engine, blobs, clock
+        self._queue: queue.SimpleQueue[tuple[Batch, Future[Receipt]] | None] = queue.SimpleQueue()
+        self._thread = threading.Thread(target=self._run, name="fleet-intake")
+        self._closed = False
+        self._thread.start()
+
+    def submit(self, batch: Batch) -> Future[Receipt]:
+        """The receipt, when `batch` is durable."""
+        if self._closed:
+            raise Refused(503, "the fleet is closing")
+        future: Future[Receipt] = Future()
+        self._queue.put((batch, future))
+        return future
+
+    def close(self) -> None:
+        """Commit what was submitted and end the thread; safe to call twice."""
+        if not self._closed:
+            self._closed = True
+            self._queue.put(None)
+        self._thread.join()
+
+    def _run(self) -> None:
+        while True:
+            first = self._queue.get()
+            if first is None:
+                return
+            group, last = [first], False
+            while len(group) < GROUP and not last:
+                try:
+                    more = self._queue.get_nowait()
+                except queue.Empty:
+                    break
+                last = more is None
+                if more is not None:
+                    group.append(more)
+            self._commit(group)
+            if last:
+                return
+
+    def _commit(self, group: list[tuple[Batch, Future[Receipt]]]) -> None:
+        try:
+            receipts = self._write([batch for batch, _ in group])
+        except IntegrityError:
+            if len(group) == 1:
+                group[0][1].set_exception(Refused(409, "this was being kept at the same time"))
+                return
+            for one in group:  # another process keeps the same: each by itself
+                self._commit([one])
+            return
+        except Exception as error:  # becomes the answer of each request of this commit
+            for _, future in group:
+                future.set_exception(error)
+            return
+        for (_, future), receipt in zip(group, receipts, strict=True):
+            if isinstance(receipt, Refused):
+                future.set_exception(receipt)
+            else:
+                future.set_result(receipt)
+
+    def _write(self, group: list[Batch]) -> list[Receipt | Refused]:
+        pack = self.blobs.put(b"".join(batch.body for batch in group))
+        starts = [0]
+        for batch in group:
+            starts.append(starts[-1] + len(batch.body))
+        with self.engine.begin() as connection:
+            return [
+                self._write_one(connection, batch, pack, start)
+                for batch, start in zip(group, starts, strict=False)
+            ]
+
+    def _write_one(
+        self, connection: Connection, batch: Batch, pack: str, start: int
+    ) -> Receipt | Refused:
+        body = digest(batch.body)
+        known = connection.execute(
+            select(batches.c.id, batches.c.digest).where(
+                batches.c.vehicle == batch.vehicle, batches.c.key == batch.key
+            )
+        ).first()
+        if known is not None:
+            if known.digest != body:
+                return Refused(409, "this idempotency key was used for another body")
+            return Receipt(known.id, _ids(connection, batch), known=True)
+        row: dict[str, Any] = {
+            "id": new_id(), "vehicle": batch.vehicle, "kind": batch.kind.value, "key": batch.key,
+            "digest": body, "pack": pack, "start": start, "size": len(batch.body),
+            "vehicle_time": batch.vehicle_time, "at": self.clock(),
+        }  # fmt: skip
+        connection.execute(batches.insert(), row)
+        new = self._facts(connection, batch, row)
+        return Receipt(row["id"], _ids(connection, batch), known=not new)
+
+    def _facts(self, connection: Connection, batch: Batch, row: dict[str, Any]) -> bool:
+        """Keep what the batch says; False when all of it was known."""
+        owned = {
+            "operator": batch.operator, "manufacturer": batch.manufacturer,
+            "vehicle": batch.vehicle, "batch": row["id"], "drive": batch.drive,
+            "vehicle_time": batch.vehicle_time, "at": row["at"],
+        }  # fmt: skip
+        if batch.summary is not None:
+            words = batch.summary.context
+            there = (drives.c.vehicle == batch.vehicle) & (drives.c.drive == batch.drive)
+            if connection.execute(select(drives.c.id).where(there)).first() is not None:
+                return False
+            drive = owned | {
+                "id": new_id(), "seconds": batch.summary.seconds, "map": words.get("map", ""),
+                "weather": weather_class(words), "release": batch.summary.release,
+                "summary": batch.summary_text,
+            }  # fmt: skip
+            connection.execute(drives.insert(), drive)
+            return True
+        known = _known(connection, batch)
+        fresh = {f.digest: f for f in batch.found if f.digest not in known}
+        if fresh:
+            rows = [owned | _hazard_row(found) for found in fresh.values()]
+            connection.execute(hazards.insert(), rows)
+        return bool(fresh) or not batch.found
+
+
+def _hazard_row(found: Found) -> dict[str, Any]:
+    head = found.head
+    return {
+        "id": new_id(), "start": found.start, "size": found.size, "digest": found.digest,
+        "type": head.type.value, "map": head.context.get("map", ""),
+        "weather": weather_class(head.context), "x": found.x, "y": found.y,
+        "t_start": head.t_start, "t_end": head.t_end, "head": found.text,
+    }  # fmt: skip
+
+
+def _known(connection: Connection, batch: Batch) -> dict[str, str]:
+    """Id by digest of those records of the batch that are kept."""
+    asked = [found.digest for found in batch.found]
+    known: dict[str, str] = {}
+    for first in range(0, len(asked), 500):
+        some = asked[first : first + 500]
+        rows = connection.execute(
+            select(hazards.c.digest, hazards.c.id).where(
+                hazards.c.vehicle == batch.vehicle, hazards.c.digest.in_(some)
+            )
+        )
+        known.update((row.digest, row.id) for row in rows)
+    return known
+
+
+def _ids(connection: Connection, batch: Batch) -> tuple[str, ...]:
+    known = _known(connection, batch)
+    return tuple(known[found.digest] for found in batch.found)
+
+
+def plain(receipt: Receipt) -> dict[str, Any]:
+    """The receipt as it is sent."""
+    return {"batch": receipt.batch, "ids": list(receipt.ids), "known": receipt.known}
+
+
+def summary_text(content: bytes) -> str:
+    """A drive's summary as it is kept: JSON on one line."""
+    return json.dumps(json.loads(content), separators=(",", ":"))

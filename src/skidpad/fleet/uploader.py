@@ -1,0 +1,91 @@
+"""Sending a spool: each batch until it is acknowledged, and nothing is lost when nobody answers."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import httpx
+
+from skidpad.core.errors import BackendError
+from skidpad.fleet.spool import Spool, Waiting
+
+TIMEOUT_S = 60.0
+FINAL = frozenset({400, 409, 413, 422})  # this batch will never be taken
+DENIED = frozenset({401, 403})
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 1.0, 300.0
+Post = Callable[[Waiting], httpx.Response]
+
+
+@dataclass(frozen=True, slots=True)
+class Sent:
+    """What became of a spool."""
+
+    acknowledged: int
+    refused: int
+    waiting: int
+
+
+def poster(client: httpx.Client, clock: Callable[[], float] = time.time) -> Post:
+    """Sends a batch through `client`, whose headers carry the credential."""
+
+    def post(batch: Waiting) -> httpx.Response:
+        headers = {
+            "Idempotency-Key": batch.key,
+            "X-Skidpad-Drive": batch.drive,
+            "X-Skidpad-Time": f"{clock():.3f}",
+            "Content-Type": "application/gzip",
+        }
+        url = f"/api/v1/batches/{batch.kind.value}"
+        return client.post(url, content=batch.body, headers=headers)
+
+    return post
+
+
+def send(spool: Spool, post: Post) -> Sent:
+    """Send what waits, once each; what cannot be sent now goes on waiting.
+
+    BackendError when the credential is not accepted: waiting would not help.
+    """
+    acknowledged = refused = 0
+    for batch in spool.batches():
+        try:
+            answer = post(batch)
+        except httpx.TransportError:
+            break  # off line: the rest would fare alike
+        if answer.status_code in DENIED:
+            raise BackendError(f"the fleet does not accept this vehicle: {_detail(answer)}")
+        if answer.status_code == 200:
+            spool.acknowledge(batch.key, answer.json())
+            acknowledged += 1
+        elif answer.status_code in FINAL:
+            spool.refuse(batch.key)
+            refused += 1
+        else:
+            break  # busy
+    return Sent(acknowledged, refused, spool.count())
+
+
+def send_all(
+    spool: Spool, post: Post, patience_s: float, sleep: Callable[[float], None] = time.sleep
+) -> Sent:
+    """Send until nothing waits, pausing ever longer; gives up after `patience_s` of pauses."""
+    pause, paused, acknowledged, refused = FIRST_PAUSE_S, 0.0, 0, 0
+    while True:
+        sent = send(spool, post)
+        acknowledged, refused = acknowledged + sent.acknowledged, refused + sent.refused
+        if not sent.waiting or paused >= patience_s:
+            return Sent(acknowledged, refused, sent.waiting)
+        pause = FIRST_PAUSE_S if sent.acknowledged else min(pause * 2.0, LONGEST_PAUSE_S)
+        rest = min(pause, patience_s - paused)
+        sleep(rest)
+        paused += rest
+
+
+def _detail(answer: httpx.Response) -> Any:
+    try:
+        return answer.json()["detail"]
+    except (ValueError, KeyError, TypeError):
+        return f"status {answer.status_code}"

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from skidpad.roads.edge import RoadEdge
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable
 from skidpad.roads.queries import LanePoint
 
@@ -55,6 +56,10 @@ class TestMap:
             prev_start=np.zeros(len(lanes) + 1, np.int32),
             prev_lane=np.zeros(0, np.int32),
         )
+
+    @property
+    def edge(self) -> RoadEdge:
+        return RoadEdge(self.samples, self.lanes)
 
     def project(self, x: float, y: float, z: float) -> LanePoint:
         return LanePoint(0, x, x, 0.0, 0.0, 0.0, 0.0, WIDTH, 1, -1)

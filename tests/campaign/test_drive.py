@@ -23,9 +23,12 @@ from skidpad.core.setup import ActorCommand
 from skidpad.core.specs import CameraSpec, LidarSpec, Modality, PointSensorSpec, SensorSpec
 from skidpad.core.states import ContactEvent, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Outcome, RelocationReason, SensorLevel, Supervision, Tier
+from skidpad.evidence.drive.metrics import run_metrics
 from skidpad.recording.logfiles import log_hash
+from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.embedded.engine import EmbeddedBackend
+from stadium import written
 
 
 class Gentle:
@@ -211,6 +214,35 @@ def test_the_stack_never_sees_the_truth() -> None:
     for a, b in zip(with_truth.log.requested, without.log.requested, strict=True):
         assert np.array_equal(a, b)
     assert np.isnan(without.log.actors.x[:, 1]).all()
+
+
+@pytest.mark.req("R-6")
+def test_on_a_town_without_barriers_leaving_the_road_counts(tmp_path: Path) -> None:
+    # Without the outcome configuration 0 drove 20 km over grass and scored no collision.
+    town = written(tmp_path)
+    run = drive(0, map=town, duration=60.0, vehicles=0, sensors="objects")
+    found = run_metrics(run.log, load_map(town))
+    reasons = {r.reason for r in run.log.relocations}
+    assert RelocationReason.OFF_ROAD in reasons
+    assert found.off_road is not None
+    assert found.off_road >= 1
+    assert found.road_departures == found.fatal_collisions
+    assert found.collisions_vehicle == 0
+    assert found.off_lanes_pct == 0.0
+    assert run.off_road is not None
+    assert run.off_road.mean() < 0.1
+    street = load_map(town).edge.beyond(
+        run.log.actors.x[:, 0], run.log.actors.y[:, 0], run.log.actors.z[:, 0]
+    )
+    assert street.max() < 8.0  # m
+
+
+@pytest.mark.req("A-257", "R-6")
+def test_a_departure_leaves_a_picture(tmp_path: Path) -> None:
+    run = drive(0, map=written(tmp_path), duration=16.0, vehicles=0, out=tmp_path)
+    moves = [r for r in run.log.relocations if r.reason is RelocationReason.OFF_ROAD]
+    assert len(run.snapshots) == len(moves) >= 1
+    assert run.snapshots[0].name.endswith(f"_{moves[0].tick * 0.05:07.2f}s.png")
 
 
 @pytest.mark.req("A-179", "A-191", "A-194")

@@ -1,6 +1,7 @@
+import polars as pl
 import pytest
 
-from skidpad.evidence.drive.findings import FINDINGS
+from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.verdicts import Judgement, Verdict, judge
 from skidpad.report.verdicts import plain, tally_text
 
@@ -17,6 +18,7 @@ def judged(verdict, seeds=None):
         (Verdict.UNDECIDED, "would take about 40 seeds"),
         (Verdict.BY_CONSTRUCTION, "the same drive"),
         (Verdict.NOT_TESTABLE, "cannot test it"),
+        (Verdict.REFUSED, "numbers"),
     ],
 )
 def test_every_verdict_has_its_plain_sentence(verdict, said):
@@ -31,3 +33,13 @@ def test_the_tally_counts_every_claim_once():
     )
     mixed = [judged(Verdict.SUPPORTED), judged(Verdict.UNDECIDED), judged(Verdict.SUPPORTED)]
     assert tally_text(mixed) == "Of the sources' 3 claims: 2 supported, 1 undecided."
+
+
+@pytest.mark.req("R-6")
+@pytest.mark.parametrize(("shares", "refused"), [((0.0, 2.0), False), ((0.5, 1.6), True)])
+def test_nothing_is_judged_of_drives_off_the_road(shares, refused):
+    runs = [{"outcome": "completed", "off_lanes_pct": s} for s in shares]
+    table = pl.DataFrame([*runs, {"outcome": "crashed", "off_lanes_pct": 90.0}])
+    verdicts = {j.verdict for j in judge(FINDINGS, [None] * len(FINDINGS), astray(table))}
+    assert verdicts == {Verdict.REFUSED if refused else Verdict.NOT_TESTABLE}
+    assert ("at most 1 %" in astray(table)) is refused

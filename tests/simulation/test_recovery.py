@@ -22,13 +22,15 @@ from skidpad.core.states import (
 )
 from skidpad.core.vocabulary import LightState, RelocationReason, Supervision, Tier
 from skidpad.roads.bundled import load_map
-from skidpad.roads.queries import LanePoint
+from skidpad.roads.opendrive.bake import bake
+from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.simulation.recovery import (
     Action,
     Clearance,
     RecoverySettings,
     Supervisor,
 )
+from stadium import WIDTH, stadium
 
 MAP = load_map("figure8")
 assert MAP.ego_start is not None
@@ -228,6 +230,77 @@ def test_far_from_any_lane_nothing_is_wrong_way() -> None:
     phase, action = play(supervisor(), 1, Pose(1.0e5, 0.0, yaw=3.0))[0]
     assert phase is Supervision.NONE
     assert action.command == DRIVING
+
+
+TOWN = RoadMap(bake(stadium("sidewalk").encode(), "elsewhere"))
+ON_STREET = Pose(150.0, -0.5 * WIDTH)
+
+
+def street(**settings: object) -> Supervisor:
+    """The supervisor of a town without barriers, which has seen the ego on its street."""
+    s = Supervisor(TOWN, RecoverySettings(**settings), DT)  # type: ignore[arg-type]
+    play(s, 1, ON_STREET)
+    return s
+
+
+def reasons(rows: Sequence[tuple[Supervision, Action]]) -> dict[int, RelocationReason]:
+    """Why the ego was moved, by the row."""
+    placed = {k: a.relocate.moved for k, (_, a) in enumerate(rows) if a.relocate}
+    return {k: moved.reason for k, moved in placed.items() if moved is not None}
+
+
+@pytest.mark.req("R-6")
+def test_a_second_on_the_pavement_with_all_wheels_is_a_departure() -> None:
+    beside_it = Pose(150.0, -WIDTH - 1.2)  # wheels at 0.756 m from the middle: 0.44 m off
+    rows = play(street(), 40, beside_it)
+    k, reason = next(iter(reasons(rows).items()))
+    assert (k + 1, reason) == (round(1.0 / DT), RelocationReason.OFF_ROAD)
+    assert [p for p, _ in rows[: k + 1]] == [Supervision.NONE] * k + [Supervision.REALIGN]
+    placed = rows[k][1].relocate
+    assert placed is not None
+    assert (placed.pose.x, placed.pose.y) == pytest.approx((150.0, -0.5 * WIDTH), abs=1e-3)
+    assert rows[k + 1][0] is Supervision.WARM_UP
+
+
+@pytest.mark.req("R-6")
+def test_with_a_wheel_on_the_road_or_back_in_time_nobody_is_moved() -> None:
+    one_wheel = Pose(150.0, -WIDTH - 0.7)
+    assert not reasons(play(street(), 100, one_wheel))
+    s = street()
+    for _ in range(5):
+        assert not reasons(play(s, round(1.0 / DT) - 1, Pose(150.0, -WIDTH - 1.2)))
+        assert not reasons(play(s, 1, ON_STREET))
+
+
+@pytest.mark.req("R-6")
+@pytest.mark.parametrize(("beyond", "at_once"), [(2.9, False), (3.1, True)])
+def test_more_than_three_metres_beyond_the_edge_is_a_departure_at_once(
+    beyond: float, at_once: bool
+) -> None:
+    rows = play(street(), 1, Pose(150.0, -WIDTH - beyond))
+    assert bool(reasons(rows)) is at_once
+
+
+@pytest.mark.req("R-6")
+def test_who_flew_out_of_reach_is_put_where_the_road_was_left() -> None:
+    rows = play(street(), 1, Pose(150.0, -80.0))
+    placed = rows[0][1].relocate
+    assert placed is not None
+    assert (placed.pose.x, placed.pose.y) == pytest.approx((150.0, -0.5 * WIDTH), abs=1e-3)
+
+
+@pytest.mark.req("R-6")
+def test_where_the_map_ends_nobody_has_left_the_road() -> None:
+    cut = RoadMap(bake(stadium(closed=False).encode(), "cut"))
+    s = Supervisor(cut, RecoverySettings(), DT)
+    play(s, 1, ON_STREET)
+    play(s, 1, Pose(299.0, -0.5 * WIDTH))
+    rows = play(s, 1, Pose(305.5, -0.5 * WIDTH))
+    assert list(reasons(rows).values()) == [RelocationReason.ROAD_END]
+    placed = rows[0][1].relocate
+    assert placed is not None
+    assert placed.pose.x == pytest.approx(ON_STREET.x, abs=1e-3)
+    assert "map ends" in rows[0][1].notice
 
 
 @pytest.mark.req("A-200", "A-188")

@@ -66,6 +66,7 @@ def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey
         triggered=driven.triggered,
         route_length=driven.route_length,
         ratio=friction_ratio(cell.weather, grip_of(cell)),
+        off_road=driven.off_road,
     )
     write_series(series_path(out, cell.cell, cell.seed), grip_series(driven.log))
     if keep or driven.error:

@@ -8,6 +8,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
 from skidpad.campaign.backends import make_backend
 from skidpad.campaign.cast import Stage, driver_of, stage_of, with_sensors
 from skidpad.campaign.drive import Moment, Sink, Timer, loop
@@ -28,6 +31,7 @@ from skidpad.physics.presets import find_weather
 from skidpad.recording.events import NoticeSource, Relocation
 from skidpad.recording.runlog import LogHeader, RunLog
 from skidpad.recording.ticks import TickLog
+from skidpad.roads.queries import RoadMap
 from skidpad.simulation.backend import Backend
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.interface import Stack
@@ -45,6 +49,7 @@ class Run:
     snapshots: tuple[Path, ...] = ()
     triggered: bool = True  # every event of the scenario has begun, where one is played
     route_length: float | None = None  # m, of the ego's route where the scenario names one
+    off_road: NDArray[np.bool_] | None = None  # (T,) ticks with all wheels off every lane
 
 
 def drive(
@@ -150,13 +155,15 @@ def run(
     finally:
         backend.close()
     outcome = stage.outcome if failure is None else Outcome.AGENT_ERROR
+    finished = log.log.finish()
     return Run(
-        log.log.finish(),
+        finished,
         outcome,
         "" if failure is None else story(failure),
         tuple(snapshots.paths),
         stage.triggered,
         stage.route_length,
+        off_road(finished, stage.map),
     )
 
 
@@ -193,6 +200,13 @@ def log_of(spec: RunSpec, stage: Stage) -> Log:
     dt = stage.setup.dt
     header = LogHeader(map=stage.map.name, map_hash=stage.map.content_hash, dt=dt, about=about)
     return Log(header, spec.weather.name, round(spec.duration / dt) + 1)
+
+
+def off_road(log: RunLog, map: RoadMap) -> NDArray[np.bool_]:
+    """(T,) whether the ego has all wheels off every lane (decision R-6)."""
+    a, table = log.actors, log.table
+    size = float(table.length[0]), float(table.width[0])
+    return map.edge.off(a.x[:, 0], a.y[:, 0], a.z[:, 0], a.yaw[:, 0], *size)
 
 
 def story(error: StackError) -> str:

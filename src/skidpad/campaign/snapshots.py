@@ -1,4 +1,4 @@
-"""One picture per collision: the view ahead, with the top view in its corner (A-257)."""
+"""One picture per fatal event: the view ahead, with the top view in its corner (A-257)."""
 
 from __future__ import annotations
 
@@ -10,11 +10,13 @@ from PIL import Image
 from skidpad.campaign.drive import Moment, Sink
 from skidpad.core.frames import SensorFrame
 from skidpad.core.run import slug
+from skidpad.core.vocabulary import RelocationReason
 from skidpad.recording.campaigns import SNAPSHOTS
 from skidpad.recording.files import output_error
 
 FRONT, TOP = "rgb_front", "rgb_top"
 MARGIN = 12  # px
+FATAL = (RelocationReason.WRONG_WAY, RelocationReason.OFF_ROAD)  # without a contact
 
 
 class Snapshots(Sink):
@@ -26,8 +28,10 @@ class Snapshots(Sink):
         self.paths: list[Path] = []
 
     def see(self, moment: Moment) -> None:
-        """Take a picture when the ego touches something."""
-        if moment.truth.contacts:
+        """Take a picture when the ego touches something, or has left its way."""
+        relocate = moment.action.relocate
+        moved = None if relocate is None else relocate.moved
+        if moment.truth.contacts or (moved is not None and moved.reason in FATAL):
             self.take(moment.frame)
 
     def take(self, frame: SensorFrame) -> None:

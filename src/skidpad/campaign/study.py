@@ -24,7 +24,7 @@ from skidpad.core.specs import SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import SensorLevel, Tier
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
-from skidpad.evidence.drive.findings import FINDINGS
+from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.drive.metrics import run_metrics
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.physics.presets import find_weather
@@ -184,6 +184,7 @@ def drive_variant(variant: Variant) -> dict[str, Any]:
         "outcome": driven.outcome.value,
         "log_hash": log_hash(driven.log),
         "fatal_collisions": metrics.fatal_collisions,
+        "off_lanes_pct": metrics.off_lanes_pct,
         "radar_fpr_pct": metrics.radar_fpr_pct,
         "radar_fnr_pct": metrics.radar_fnr_pct,
         "dropout_pct": metrics.dropout_pct,
@@ -221,4 +222,4 @@ def run_study(
         on_run(len(rows), len(jobs))
     table = pl.DataFrame([rows[j.key] for j in jobs])
     finding = next(f for f in (*FINDINGS, *ACCEPTANCE) if f.id == id)
-    return judge([finding], [table])[0], table
+    return judge([finding], [table], astray(table))[0], table

@@ -12,8 +12,8 @@ if TYPE_CHECKING:
 
 SHOWN = (
     "fatal_collisions",
-    "collisions_vehicle",
-    "collisions_static",
+    "crashes_vehicle",
+    "road_departures",
     "lane_invasions",
     "ttc_below_1_5_s",
     "min_gap_true_m",

@@ -89,6 +89,8 @@ class RelocationReason(IntEnum):
     COLLISION = 1
     WRONG_WAY = 2
     STUCK = 3
+    OFF_ROAD = 4
+    ROAD_END = 5  # the map ends there: nobody's fault
 
 
 class Outcome(str, Enum):

@@ -30,6 +30,7 @@ class Verdict(str, Enum):
     UNDECIDED = "undecided"
     BY_CONSTRUCTION = "by construction"  # the two sides are the same drive: nothing to measure
     NOT_TESTABLE = "not testable"  # the runs that it needs are not there
+    REFUSED = "refused"  # the runs are there, but nothing can be said of them
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,8 +79,15 @@ class Judgement:
     text: str
 
 
-def judge(findings: Sequence[Finding], results: Sequence[pl.DataFrame | None]) -> list[Judgement]:
-    """Judge a report's findings, each on its table (None: never run), Holm-adjusted together."""
+def judge(
+    findings: Sequence[Finding], results: Sequence[pl.DataFrame | None], refused: str = ""
+) -> list[Judgement]:
+    """Judge a report's findings, each on its table (None: never run), Holm-adjusted together.
+
+    refused: why these runs allow no verdict at all; empty: they do.
+    """
+    if refused:
+        return [Judgement(f, Verdict.REFUSED, None, (), None, refused) for f in findings]
     evidence = [
         [] if table is None else finding.contrasts(table)
         for finding, table in zip(findings, results, strict=True)

@@ -42,6 +42,7 @@ class GripMetrics:
     completion: bool | None = metric("no accident", "B-104")
     score: float | None = metric("route completion times penalties, 0 to 100", "B-105")
     route_completion: float | None = metric("share of the route driven, percent", "BD-07")
+    off_lanes_pct: float | None = metric("share of the way off all lanes", "B-106")
     min_cvip_m: float | None = metric("least distance of box centres, ego to nearest NPC", "B-149")
     loss_of_control_ego: bool | None = metric("ego slid or spun before any contact", "B-145")
     loss_of_control_npc: bool | None = metric("an NPC slid or spun before any contact", "B-145")

@@ -32,13 +32,20 @@ class Metrics:
     """What the log of one run says; None where there is nothing to say (decision X-3)."""
 
     # collisions
-    fatal_collisions: int | None = metric("recoveries and wrong-way corrections", "A-247, M-8")
+    fatal_collisions: int | None = metric("recoveries, wrong ways and departures", "A-247, R-6")
+    crashes_vehicle: int | None = metric("of these with vehicles", "A-190, R-6")
+    road_departures: int | None = metric("of these static, off the road or wrong way", "R-6")
     collisions_vehicle: int | None = metric("recoveries after hitting a vehicle", "A-190")
     collisions_static: int | None = metric("recoveries after hitting anything else", "A-190")
+    off_road: int | None = metric("times that the car left the road and was put back", "R-6")
     wrong_way: int | None = metric("wrong-way corrections", "A-199")
+    fatal_first: int | None = metric("fatal ones that follow on no relocation (8 s, 100 m)", "R-6")
+    crashes_vehicle_first: int | None = metric("of these with vehicles", "R-6")
+    road_departures_first: int | None = metric("of these static, off the road, wrong way", "R-6")
+    first_fatal_s: float | None = metric("time to the first fatal one; none: beyond the run", "R-6")
     contacts: int | None = metric("contacts, also those within the cool-down", "A-189")
     rear_ended: int | None = metric("of the vehicle collisions: struck from behind", "M-8")
-    bend_exits: int | None = metric("of the static collisions: in a bend without a lead", "M-6")
+    bend_exits: int | None = metric("static or off the road: in a bend without a lead", "M-6")
     stuck_relocations: int | None = metric("relocations of a stuck ego, not fatal", "A-253")
     max_impact_kmh: float | None = metric("largest closing speed at a collision", "A-249")
     # lanes
@@ -85,6 +92,9 @@ class Metrics:
     distance_km: float | None = metric("distance driven", "M-8")
     duration_s: float | None = metric("simulated time", "M-8")
     fatal_per_100_km: float | None = metric("fatal collisions per 100 km", "M-8")
+    crashes_vehicle_per_100_km: float | None = metric("crashes with vehicles per 100 km", "R-6")
+    road_departures_per_100_km: float | None = metric("departures from the road per 100 km", "R-6")
+    off_lanes_pct: float | None = metric("ticks off all lanes, less counted departures", "R-6")
     # ticks
     samples: int | None = metric("ticks that count for perception", "A-250")
     skipped_supervised: int | None = metric("ticks under the supervisor", "A-250")

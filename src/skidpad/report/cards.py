@@ -66,6 +66,9 @@ def headline(crash: Crash) -> str:
     """One line that says what happened."""
     if crash.kind is CrashKind.WRONG_WAY:
         return "Facing the wrong way"
+    if crash.kind is CrashKind.OFF_ROAD:
+        where = " in a bend, without a lead" if crash.bend_exit else ""
+        return f"Off the road at {_kmh(crash.v_ego)}{where}"
     if crash.kind is CrashKind.STATIC:
         where = " in a bend, without a lead" if crash.bend_exit else ""
         return f"Into the {crash.other} at {_kmh(crash.v_ego)}{where}"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
-from skidpad.evidence.drive.findings import FINDINGS
+from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import matrix_figures, matrix_tables
 from skidpad.report.crashes import crash_sections, found_crashes, worst_of_each
@@ -17,7 +17,8 @@ from skidpad.report.verdicts import verdict_blocks
 
 LEAD = """Each row below is a set of driving functions, each column a weather. A cell was driven with \
 every seed; seeds are common to all cells, so differences between cells are paired. A fatal collision \
-is a contact that started the recovery supervisor, or a wrong-way correction.
+is a contact that started the recovery supervisor, a departure from the road (all wheels off every lane \
+for 1 s, or more than 3 m beyond the edge), or a wrong-way correction.
 
 Intervals are 95 %: exact Poisson for counts, or a bootstrap over runs where counts vary more than \
 Poisson or there are ten or more seeds. Published numbers stand beside ours in italics. They come from \
@@ -33,7 +34,8 @@ def write_report(folder: Path) -> Path:
 def build_page(matrix: Matrix) -> Page:
     """All sections in the order in which a reader asks."""
     claims = (*FINDINGS, *ACCEPTANCE)
-    judged = judge(claims, [None if f.study else matrix.results for f in claims])
+    tables = [None if f.study else matrix.results for f in claims]
+    judged = judge(claims, tables, astray(matrix.results))
     crashes = found_crashes(matrix)
     sections = [
         Section(

@@ -45,6 +45,8 @@ def plain(j: Judgement) -> str:
             return "Both sides are the same drive: there is nothing to measure."
         case Outcome.NOT_TESTABLE:
             return f"These runs cannot test it; it needs {j.finding.needs}."
+        case Outcome.REFUSED:
+            return j.text
 
 
 def tally_text(judged: Sequence[Judgement]) -> str:

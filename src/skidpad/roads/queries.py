@@ -12,6 +12,7 @@ from skidpad.core.jit import Held, hold
 from skidpad.core.setup import LanePosition
 from skidpad.roads import entries, kernels
 from skidpad.roads.baked import BakedMap
+from skidpad.roads.edge import RoadEdge
 from skidpad.roads.lanes import LaneSamples, LaneTable, SignalKind, SignalTable
 from skidpad.roads.packing import lane_arrays
 from skidpad.roads.roadside import Roadside
@@ -79,6 +80,11 @@ class RoadMap:
     def held(self) -> Held[kernels.LaneArrays]:
         """`arrays` for entry kernels; made when asked, as who only names a map runs no kernel."""
         return hold(self.arrays)
+
+    @cached_property
+    def edge(self) -> RoadEdge:
+        """Where the road ends."""
+        return RoadEdge(self.samples, self.lanes)
 
     def project(self, x: float, y: float, z: float, driving: bool = True) -> LanePoint | None:
         """Nearest (driving) lane centre at about this height; None beyond 20 m."""

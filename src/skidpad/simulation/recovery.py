@@ -42,6 +42,8 @@ GRACE = 8.0  # s without the stuck detector after a relocation, A-188
 WRONG_WAY_DOT = -0.5  # cosine of 120 deg, A-196
 LEVEL = 4.0  # m: whatever is farther above or below is on another road (decision M-12)
 LIGHT_REACH = 30.0  # m to a stop line that explains standing
+OFF_ROAD_TIME = 1.0  # s with all wheels off every lane (decision R-6)
+OFF_ROAD_LIMIT = 3.0  # m that the car's middle lies beyond the road's edge
 MARGIN = 0.3  # m around the ego's own box where it is put
 
 FULL_STOP = VehicleCommand(brake=1.0, handbrake=True)
@@ -116,6 +118,9 @@ class Supervisor:
         self.contacts_seen = 0  # index into the collision history (A-193)
         self.reason = RelocationReason.COLLISION
         self.truth: WorldTruth | None = None
+        self.off = 0  # ticks with all wheels off every lane
+        self.first: LanePoint | None = None  # where the run began
+        self.last: LanePoint | None = None  # nearest lane, as long as there was one
 
     def observe(self, truth: WorldTruth) -> Supervision:
         """The phase of the tick that `truth` begins."""
@@ -127,8 +132,8 @@ class Supervisor:
         elif truth.contacts and self.cool_down == 0:
             self.recoveries += 1
             self._begin(Supervision.BRAKE, BRAKE_TIME, RelocationReason.COLLISION)
-        elif self._is_wrong_way(truth.states):
-            self._begin(Supervision.REALIGN, 0.0, RelocationReason.WRONG_WAY)
+        elif (reason := self._astray(truth)) is not None:
+            self._begin(Supervision.REALIGN, 0.0, reason)
         return self.phase
 
     def act(self, command: VehicleCommand, report: StackReport | None = None) -> Action:
@@ -152,7 +157,7 @@ class Supervisor:
 
     def _begin(self, phase: Supervision, duration: float, reason: RelocationReason) -> None:
         self.phase, self.left = phase, round(duration / self.dt)
-        self.reason, self.standing = reason, 0
+        self.reason, self.standing, self.off = reason, 0, 0
 
     def _next_phase(self) -> None:
         if self.phase is Supervision.BRAKE:
@@ -184,6 +189,10 @@ class Supervisor:
         """Put the ego on the lane (A-183 to A-186, A-198); without a lane, wait (A-192)."""
         assert self.truth is not None
         nearest = self._place(states)
+        if self.reason is RelocationReason.ROAD_END:
+            nearest = self.first
+        elif self.reason is RelocationReason.OFF_ROAD and nearest is None:
+            nearest = self.last
         if nearest is None:
             return Action(FULL_STOP, notice="no driving lane near the ego, relocation is retried")
         place, shift, clear = self._clear_place(nearest)
@@ -193,6 +202,8 @@ class Supervisor:
         self.grace = round(GRACE / self.dt)
         self._begin(Supervision.WARM_UP, self.settings.warm_up, self.reason)
         notice = "" if clear else "no free place found, the ego was put near another vehicle"
+        if self.reason is RelocationReason.ROAD_END:
+            notice = "the map ends there, the ego was put back where it began"
         return Action(HELD, Relocate(new, 0.0, moved), notice)
 
     def _warm_up(self, states: ActorStates) -> Action:
@@ -238,10 +249,42 @@ class Supervisor:
         touching &= aside < 0.5 * (table.width + table.width[0]) + MARGIN
         return not bool((blocking | touching)[1:].any())
 
-    def _is_wrong_way(self, states: ActorStates) -> bool:
-        """More than 120 deg off the lane's heading (A-196, A-197)."""
+    def _astray(self, truth: WorldTruth) -> RelocationReason | None:
+        """Why the ego is put back although it touched nothing: wrong way, or off the road."""
+        states = truth.states
         place = self._place(states)
-        return place is not None and cos(place.heading - float(states.yaw[0])) < WRONG_WAY_DOT
+        if place is not None:
+            self.first, self.last = self.first or place, place
+            if cos(place.heading - float(states.yaw[0])) < WRONG_WAY_DOT:
+                return RelocationReason.WRONG_WAY  # more than 120 deg off (A-196, A-197)
+        if self.last is None or not self._has_left(truth, place):
+            return None
+        ended = self._is_past_the_end(states, self.last)
+        return RelocationReason.ROAD_END if ended else RelocationReason.OFF_ROAD
+
+    def _has_left(self, truth: WorldTruth, place: LanePoint | None) -> bool:
+        """All wheels off every lane for a second, or the car far beyond the edge (R-6)."""
+        states, table = truth.states, truth.table
+        x, y, z, yaw = states.x[:1], states.y[:1], states.z[:1], states.yaw[:1]
+        inside = place is not None and hypot(x[0] - place.x, y[0] - place.y) < 0.5 * place.width
+        size = float(table.length[0]), float(table.width[0])
+        if inside or not self.map.edge.off(x, y, z, yaw, *size)[0]:
+            self.off = 0
+            return False
+        self.off += 1
+        beyond = float(self.map.edge.beyond(x, y, z)[0])
+        return self.off * self.dt >= OFF_ROAD_TIME or beyond > OFF_ROAD_LIMIT
+
+    def _is_past_the_end(self, states: ActorStates, last: LanePoint) -> bool:
+        """It left over the end of a lane that leads nowhere: there the map ends, not the road."""
+        lanes, drivable = self.map.lanes, self.map.arrays.drivable
+        if last.s < lanes.length[last.lane] - 0.01 or any(
+            drivable[lane] for lane in self.map.successors(last.lane)
+        ):
+            return False
+        dx, dy = float(states.x[0]) - last.x, float(states.y[0]) - last.y
+        ahead = dx * cos(last.heading) + dy * sin(last.heading)
+        return ahead > abs(dy * cos(last.heading) - dx * sin(last.heading))
 
     def _is_stuck(self, truth: WorldTruth, report: StackReport | None) -> bool:
         """Near standstill for too long without a reason to stand (A-200)."""

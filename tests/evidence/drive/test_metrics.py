@@ -419,6 +419,66 @@ def test_wrong_way_is_fatal_and_a_stuck_ego_is_not() -> None:
     assert (m.fatal_collisions, m.collisions_vehicle) == (2, 1)
 
 
+def field(
+    n: int, off_from: int, off_to: int, moves: tuple[Relocation, ...] = (), v: float = 20.0
+) -> RunLog:
+    """A drive of `n` ticks along x that is 8 m beside the lane for some of them."""
+
+    def extra(log: TickLog, k: int) -> None:
+        for move in moves:
+            if move.tick == k:
+                log.relocated(move)
+
+    def rows(k: int) -> list[dict[str, float]]:
+        return [{"x": 50.0 + v * k * DT, "y": -8.0 if off_from <= k < off_to else 0.0, "vx": v}]
+
+    def supervision(k: int) -> Supervision:
+        moved = any(0 <= k - m.tick < 11 for m in moves)
+        return Supervision.WARM_UP if moved else Supervision.NONE
+
+    return drive(n, rows, extra=extra, supervision=supervision)
+
+
+def left(tick: int, x: float = 50.0, reason: int = RelocationReason.OFF_ROAD) -> Relocation:
+    return Relocation(tick, RelocationReason(reason), 0.0, pose(x), pose(x))
+
+
+@pytest.mark.req("R-6")
+def test_leaving_the_road_is_fatal_counted_and_explained() -> None:
+    log = field(100, 20, 40, (left(40),))
+    m = metrics(log)
+    assert (m.fatal_collisions, m.off_road, m.road_departures, m.crashes_vehicle) == (1, 1, 1, 0)
+    assert m.first_fatal_s == pytest.approx(40 * DT)
+    assert m.road_departures_per_100_km == pytest.approx(100.0 / (100 * 20.0 * DT / 1000.0))
+    assert m.crashes_vehicle_per_100_km == 0.0
+    assert m.off_lanes_pct == 0.0
+    (c,) = find_crashes(prepare(log, straight_map()))
+    assert (c.kind, c.bend_exit, c.v_ego) == (CrashKind.OFF_ROAD, False, 20.0)
+
+
+@pytest.mark.req("R-6")
+def test_ticks_off_all_lanes_that_nothing_counts_are_a_share() -> None:
+    assert metrics(field(200, 20, 30)).off_lanes_pct == pytest.approx(5.0)
+    half = field(200, 20, 40, (left(30),))  # the later ten are recovery
+    assert metrics(half).off_lanes_pct == 0.0
+    map_ends = field(200, 20, 40, (left(40, reason=RelocationReason.ROAD_END),))
+    assert (metrics(map_ends).off_lanes_pct, metrics(map_ends).fatal_collisions) == (0.0, 0)
+
+
+@pytest.mark.req("R-6", "A-188")
+@pytest.mark.parametrize(
+    ("tick", "x", "first"), [(160, 90.0, 1), (161, 90.0, 2), (60, 199.0, 1), (60, 201.0, 2)]
+)
+def test_what_happens_soon_and_near_a_relocation_follows_on_it(
+    tick: int, x: float, first: int
+) -> None:
+    moved = Relocation(0, RelocationReason.WRONG_WAY, 0.0, pose(x), pose(x))
+    log = field(tick + 5, 0, 0, (moved, left(tick)), v=50.0 / tick / DT)  # then at x = 100
+    m = metrics(log)
+    assert (m.fatal_collisions, m.fatal_first) == (2, first)
+    assert (m.road_departures, m.road_departures_first) == (2, first)
+
+
 def rail(lead_angle: float | None, radius: float) -> RunLog:
     def rows(k: int) -> list[dict[str, float]]:
         a = 20.0 * k * DT / radius

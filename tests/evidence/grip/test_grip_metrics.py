@@ -67,6 +67,18 @@ def test_score_is_route_times_a_penalty_for_each_infraction():
     assert (whole.completion, whole.route_completion, whole.score) == (True, 100.0, 100.0)
 
 
+@pytest.mark.req("B-106")
+def test_a_share_of_the_way_off_all_lanes_multiplies_by_what_remains():
+    log = drive(11, lambda k: [going(2.0 * k), going(60.0)])
+    off = np.arange(11) > 7  # the last three of ten steps
+    m = metrics(log, off_road=off)
+    assert (m.score, m.off_lanes_pct) == (pytest.approx(70.0), pytest.approx(30.0))
+    hit = ContactEvent(9, -1, "wall", 100.0, 5.0, 0.0, 0.0)
+    crashed = drive(11, lambda k: [going(2.0 * k), going(60.0)], contacts=[hit])
+    with_both = metrics(crashed, Outcome.COLLISION, route_length=40.0, off_road=off)
+    assert with_both.score == pytest.approx(50.0 * 0.65 * 0.7)
+
+
 def test_a_failed_agent_has_driven_nothing_and_a_crash_no_more_than_the_route():
     assert route_share(Outcome.AGENT_ERROR, 50.0, 100.0) == 0.0
     assert route_share(Outcome.COLLISION, 150.0, 100.0) == 100.0

@@ -18,6 +18,10 @@ LOOK_BACK = 10.0  # s of history in the chain of causes
 JUST_BEFORE = 2.0  # s, for bend, lead and brake
 RECOVERY_LAG = 0.25  # s within which a contact has started a recovery
 BEHIND = -0.5  # cosine of the direction to the other car: it stands behind
+CHAIN_TIME, CHAIN_WAY = (
+    8.0,
+    100.0,
+)  # s (A-188) and m from a relocation: what happens there follows on
 
 
 class CrashKind(str, Enum):
@@ -26,6 +30,13 @@ class CrashKind(str, Enum):
     VEHICLE = "vehicle"
     STATIC = "static"
     WRONG_WAY = "wrong_way"
+    OFF_ROAD = "off_road"  # decision R-6
+
+
+CORRECTIONS = {
+    RelocationReason.WRONG_WAY: CrashKind.WRONG_WAY,
+    RelocationReason.OFF_ROAD: CrashKind.OFF_ROAD,
+}  # relocations that are fatal by themselves, without a contact
 
 
 class Striker(str, Enum):
@@ -58,6 +69,7 @@ class Crash:
     striker: Striker | None
     rear_ended: bool
     bend_exit: bool  # off the road in a bend without a lead (decision M-6)
+    follows: bool  # soon and near after a relocation: no first of its chain
     v_ego: float  # m/s just before
     v_other: float | None
     v_closing: float | None  # m/s at the contact
@@ -82,13 +94,13 @@ def recovery_rows(log: RunLog) -> list[int]:
 
 
 def find_crashes(drive: Drive) -> tuple[Crash, ...]:
-    """All fatal events of a drive in order: recoveries and wrong-way corrections (A-247)."""
+    """All fatal events of a drive in order: recoveries, wrong ways, departures (A-247, R-6)."""
     log = drive.log
     crashes = [_crash(drive, row, _culprit(log, row)) for row in recovery_rows(log)]
     crashes += [
-        _wrong_way(drive, drive.row(r.tick))
+        _corrected(drive, drive.row(r.tick), CORRECTIONS[r.reason])
         for r in log.relocations
-        if r.reason is RelocationReason.WRONG_WAY
+        if r.reason in CORRECTIONS
     ]
     return tuple(sorted(crashes, key=lambda c: c.tick))
 
@@ -104,8 +116,6 @@ def _crash(drive: Drive, row: int, contact: ContactEvent | None) -> Crash:
     log = drive.log
     at = row if contact is None else drive.row(contact.tick)
     other = contact.actor if contact is not None and contact.actor > 0 else None
-    radius = _bend_radius(drive, at)
-    alone = not np.any(drive.lead.actor[_since(drive, at, JUST_BEFORE) : at + 1] >= 0)
     behind, struck = (False, None) if other is None else _who(log, at, other)
     before = max(at - 1, 0)  # the contact itself changes the speeds
     static = "something" if contact is None else contact.static
@@ -117,14 +127,34 @@ def _crash(drive: Drive, row: int, contact: ContactEvent | None) -> Crash:
         actor=other,
         striker=struck,
         rear_ended=behind and struck is Striker.OTHER,
-        bend_exit=other is None and radius is not None and radius < BEND_RADIUS and alone,
+        bend_exit=other is None and _is_bend_exit(drive, at),
         v_other=None if other is None else _speed(log, before, other),
         contact=contact,
     )
 
 
-def _wrong_way(drive: Drive, at: int) -> Crash:
-    return _event(drive, at, kind=CrashKind.WRONG_WAY, other="")
+def _corrected(drive: Drive, at: int, kind: CrashKind) -> Crash:
+    left = kind is CrashKind.OFF_ROAD
+    return _event(drive, at, kind=kind, other="", bend_exit=left and _is_bend_exit(drive, at))
+
+
+def _is_bend_exit(drive: Drive, at: int) -> bool:
+    """In a bend, and nobody was ahead."""
+    radius = _bend_radius(drive, at)
+    alone = not np.any(drive.lead.actor[_since(drive, at, JUST_BEFORE) : at + 1] >= 0)
+    return radius is not None and radius < BEND_RADIUS and alone
+
+
+def _follows(drive: Drive, at: int) -> bool:
+    """Within 8 s and 100 m of where the ego was last put."""
+    log = drive.log
+    tick = int(log.tick[at])
+    before = [r for r in log.relocations if r.tick < tick]
+    if not before:
+        return False
+    last, a = before[-1], log.actors
+    way = float(np.hypot(a.x[at, 0] - last.new.x, a.y[at, 0] - last.new.y))
+    return (tick - last.tick) * log.header.dt <= CHAIN_TIME and way <= CHAIN_WAY
 
 
 def _event(
@@ -154,6 +184,7 @@ def _event(
         striker=striker,
         rear_ended=rear_ended,
         bend_exit=bend_exit,
+        follows=_follows(drive, at),
         v_ego=float(drive.v[max(at - 1, 0)]),
         v_other=v_other,
         v_closing=None if contact is None else contact.v_closing,

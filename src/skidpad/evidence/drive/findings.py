@@ -13,6 +13,7 @@ from skidpad.evidence.contrasts import (
     Paired,
     RateBelow,
     Rows,
+    finished,
     highest,
     lowest,
     rows_of,
@@ -29,6 +30,7 @@ METRES = Amount(0.2, "m")
 VARIANCE = Amount(5.0, "m2")
 SECONDS = Amount(1.0, "s per run")
 TTC = Amount(0.1, "s")
+OFF_LANES_MAX_PCT = 1.0  # of all ticks
 BY_RUN = ("weather", "seed")
 ASSISTED = rows_of("config", "1", "2", "3", "4", name="configurations 1 to 4")
 NIGHT = rows_of("time_of_day", "night")
@@ -77,6 +79,23 @@ def unequal_logs(table: pl.DataFrame) -> tuple[int, int]:
     keys = [k for k in ("config", "weather", "seed") if k in table.columns]
     both = sides[0].join(sides[1], on=keys, suffix="_slowed")
     return int((both["log_hash"] != both["log_hash_slowed"]).sum()), len(both)
+
+
+def astray(table: pl.DataFrame) -> str:
+    """Why no verdict may rest on these runs: they drove off all lanes and nothing counted it (R-6).
+
+    Empty: they kept to the road.
+    """
+    if "off_lanes_pct" not in table.columns:
+        return ""
+    known = finished(table).drop_nulls("off_lanes_pct")
+    share = float(known["off_lanes_pct"].mean() or 0.0)  # type: ignore[arg-type]
+    if share <= OFF_LANES_MAX_PCT:
+        return ""
+    return (
+        f"No verdict: {share:.1f} % of the ticks are off all lanes outside a counted departure; "
+        f"at most {OFF_LANES_MAX_PCT:g} % may be."
+    )
 
 
 MATRIX = "all configurations and weathers"

@@ -69,7 +69,7 @@ def summarise(
         _conflicts(drive, where),
         _radar(drive, where),
         _distances(drive, where),
-        _driving(drive, len(here), where),
+        _driving(drive, here, where),
         _ticks(drive, where),
     )
 
@@ -87,20 +87,34 @@ def _among(drive: Drive, events: Iterable[Event], where: Mask) -> int:
 
 def _collisions(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
     log = drive.log
-    kinds = [c.kind for c in here]
+    kinds, first = [c.kind for c in here], [c.kind for c in here if not c.follows]
     impacts = [c.v_closing * KMH for c in here if c.v_closing is not None]
     stuck = [r for r in log.relocations if r.reason is RelocationReason.STUCK]
     return Metrics(
         fatal_collisions=len(here),
+        crashes_vehicle=kinds.count(CrashKind.VEHICLE),
+        road_departures=len(kinds) - kinds.count(CrashKind.VEHICLE),
         collisions_vehicle=kinds.count(CrashKind.VEHICLE),
         collisions_static=kinds.count(CrashKind.STATIC),
+        off_road=kinds.count(CrashKind.OFF_ROAD),
         wrong_way=kinds.count(CrashKind.WRONG_WAY),
+        fatal_first=len(first),
+        crashes_vehicle_first=first.count(CrashKind.VEHICLE),
+        road_departures_first=len(first) - first.count(CrashKind.VEHICLE),
+        first_fatal_s=_first_fatal(drive, here, where),
         contacts=_among(drive, log.contacts, where),
         rear_ended=sum(c.rear_ended for c in here),
         bend_exits=sum(c.bend_exit for c in here),
         stuck_relocations=_among(drive, stuck, where),
         max_impact_kmh=max(impacts, default=None),
     )
+
+
+def _first_fatal(drive: Drive, here: Sequence[Crash], where: Mask) -> float | None:
+    """s driven among `where` to the first fatal event; None: none, it lies beyond the run."""
+    if not here:
+        return None
+    return float(np.count_nonzero(where[: drive.row(here[0].tick)]) * drive.log.header.dt)
 
 
 def _lanes(drive: Drive, highway: frozenset[int], where: Mask) -> Metrics:
@@ -162,12 +176,17 @@ def _distances(drive: Drive, where: Mask) -> Metrics:
     )
 
 
-def _driving(drive: Drive, fatal: int, where: Mask) -> Metrics:
+def _driving(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
     counted = where & drive.free
     v = drive.v * KMH
     in_bend = counted & (np.abs(drive.place.curvature) > 1.0 / BEND_RADIUS)
     dt = drive.log.header.dt
     distance_km = float(drive.v[where].sum() * dt / 1000.0)
+    hits = sum(c.kind is CrashKind.VEHICLE for c in here)
+
+    def per_100_km(events: int) -> float | None:
+        return 100.0 * events / distance_km if distance_km > 0.0 else None
+
     return Metrics(
         mean_speed_kmh=float(v[counted].mean()) if counted.any() else None,
         max_speed_kmh=_percentile(v[counted], 100.0),
@@ -176,7 +195,10 @@ def _driving(drive: Drive, fatal: int, where: Mask) -> Metrics:
         bend_speed_kmh=_percentile(v[in_bend], 95.0),
         distance_km=distance_km,
         duration_s=float(np.count_nonzero(where) * dt),
-        fatal_per_100_km=100.0 * fatal / distance_km if distance_km > 0.0 else None,
+        fatal_per_100_km=per_100_km(len(here)),
+        crashes_vehicle_per_100_km=per_100_km(hits),
+        road_departures_per_100_km=per_100_km(len(here) - hits),
+        off_lanes_pct=100.0 * float(drive.strays[where].mean()) if where.any() else None,
     )
 
 

@@ -70,6 +70,7 @@ class Drive:
     v: Floats  # (T,) m/s
     free: Mask  # (T,) the supervisor does not drive
     sample: Mask  # (T,) ticks that count for perception (A-250)
+    strays: Mask  # (T,) all wheels off every lane, and no counted departure follows (R-6)
 
     def row(self, tick: int) -> int:
         """The row of a tick, or of the first one after it."""
@@ -90,7 +91,21 @@ def prepare(log: RunLog, road_map: RoadMap, settings: MetricSettings | None = No
         v=log.v_ego,
         free=free,
         sample=free & reported,
+        strays=_strays(log, road_map, free),
     )
+
+
+def _strays(log: RunLog, road_map: RoadMap, free: Mask) -> Mask:
+    """Ticks off all lanes that nothing counts: a stretch that the supervisor ended is counted."""
+    a, table = log.actors, log.table
+    size = float(table.length[0]), float(table.width[0])
+    off = road_map.edge.off(a.x[:, 0], a.y[:, 0], a.z[:, 0], a.yaw[:, 0], *size)
+    strays: Mask = off & free
+    for row in np.flatnonzero(free[:-1] & ~free[1:]).tolist():
+        while row >= 0 and strays[row]:
+            strays[row] = False
+            row -= 1
+    return strays
 
 
 def find_leads(log: RunLog, index: LaneIndex, place: LaneMatch, rule: LeadDefinition) -> Leads:

@@ -77,8 +77,13 @@ def grip_metrics(
     triggered: bool,
     route_length: float | None,
     ratio: float,
+    off_road: NDArray[np.bool_] | None = None,
 ) -> GripMetrics:
-    """The row of a run. route_length: m; ratio: of friction, at standstill."""
+    """The row of a run.
+
+    route_length: m; ratio: of friction, at standstill; off_road: (T,) ticks with all wheels off
+    every lane, None: never.
+    """
     if len(log) == 0:
         return GripMetrics(triggered=triggered, ratio=ratio)
     contacts = log.contacts
@@ -88,15 +93,20 @@ def grip_metrics(
     quiet = before if touching is None else min(before, touching)
     slips = side_slips(log)
     npcs = range(1, len(log.table))
-    distance = float(np.hypot(np.diff(log.actors.x[:, EGO]), np.diff(log.actors.y[:, EGO])).sum())
+    steps = np.hypot(np.diff(log.actors.x[:, EGO]), np.diff(log.actors.y[:, EGO]))
+    distance = float(steps.sum())
+    strayed = (
+        0.0 if off_road is None or not distance else float(steps[off_road[1:]].sum()) / distance
+    )
     route = route_share(outcome, distance, route_length)
     crashed = outcome is Outcome.COLLISION
     nearest = centre_distance(log).min()
     return GripMetrics(
         triggered=triggered,
         completion=not crashed,
-        score=None if route is None else score(route, log, contacts),
+        score=None if route is None else score(route, log, contacts, strayed),
         route_completion=route,
+        off_lanes_pct=100.0 * strayed,
         min_cvip_m=float(nearest) if np.isfinite(nearest) else None,
         loss_of_control_ego=loses_control(log, slips, EGO, before),
         loss_of_control_npc=any(loses_control(log, slips, i, quiet) for i in npcs),
@@ -123,10 +133,15 @@ def route_share(outcome: Outcome, distance: float, route_length: float | None) -
     return None if not route_length else 100.0 * min(distance / route_length, 1.0)
 
 
-def score(route: float, log: RunLog, contacts: tuple[ContactEvent, ...]) -> float:
-    """Route completion times a penalty for each infraction (B-105)."""
+def score(
+    route: float, log: RunLog, contacts: tuple[ContactEvent, ...], strayed: float = 0.0
+) -> float:
+    """Route completion times a penalty for each infraction (B-105).
+
+    strayed: share of the way driven off all lanes; the benchmark multiplies by what remains (B-106).
+    """
     factors = penalties()
-    value = route
+    value = route * (1.0 - strayed)
     for contact in contacts:
         if contact.static:
             value *= factors["collision_static"]

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable
 
 Floats = NDArray[np.float64]

@@ -172,17 +172,16 @@ class Supervisor:
         return self.map.project(x, y, z)
 
     def _reverse(self, states: ActorStates) -> VehicleCommand:
-        """Backwards towards the lane (A-182). The published cross product is CARLA-handed: in
-        ISO 8855 both it and the steer change sign, so the formula keeps its form."""
+        """Backwards towards the lane (A-182): by the cross product of the heading and the vector to
+        the lane in m, the lane's lateral distance. The published one is CARLA-handed: in ISO 8855
+        both it and the steer change sign, so the formula keeps its form."""
         place = self._place(states)
         steer = 0.0
         if place is not None:
             dx, dy = place.x - float(states.x[0]), place.y - float(states.y[0])
-            distance = hypot(dx, dy)
-            if distance > 0.0:
-                yaw = float(states.yaw[0])
-                cross = (cos(yaw) * dy - sin(yaw) * dx) / distance
-                steer = min(max(-REVERSE_STEER_GAIN * cross, -REVERSE_STEER_MAX), REVERSE_STEER_MAX)
+            yaw = float(states.yaw[0])
+            lateral = cos(yaw) * dy - sin(yaw) * dx
+            steer = min(max(-REVERSE_STEER_GAIN * lateral, -REVERSE_STEER_MAX), REVERSE_STEER_MAX)
         return VehicleCommand(throttle=REVERSE_THROTTLE, steer=steer, reverse=True)
 
     def _realign(self, states: ActorStates) -> Action:

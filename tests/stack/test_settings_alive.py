@@ -32,7 +32,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import ContactEvent, VehicleCommand
-from skidpad.core.vocabulary import Control, SensorLevel
+from skidpad.core.vocabulary import Control, SemanticClass, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.logfiles import log_hash
@@ -92,6 +92,7 @@ def gone(distance: float, missing: int):
     return [{"cars": [Car(distance)]}] * 6 + [{}] * missing
 
 
+PEDESTRIAN = Car(20.0, label=int(SemanticClass.PEDESTRIAN))
 LIGHT = ArcMap(lights=((7, 0, 100.0),))
 STOP = {"lights": {7: RED}, "x": 99.0, "v": 0.5}
 STACK: dict[str, Scenario] = {
@@ -110,6 +111,8 @@ STACK: dict[str, Scenario] = {
     "aeb_without_acc": Scenario(True, driven(*[{"cars": [Car(8.0)]}] * 5, configuration=0)),
     # A target that is not confirmed comes from the safety memory alone.
     "unconfirmed": Scenario("consume", driven(*gone(8.0, 40), safety_persist=True)),
+    "targets": Scenario("vehicles", driven(*[{"cars": [PEDESTRIAN]}] * 5)),
+    "cruise": Scenario("published", driven({"v": 41.6}, {"v": 41.7})),
     "light_braking": Scenario(
         "proportional",
         driven({"lights": {7: RED}, "x": 60.0, "v": 12.0}, configuration=4, map=LIGHT),

@@ -49,6 +49,20 @@ class RadarCorridor(str, Enum):
     PARABOLA = "parabola"
 
 
+class Targets(str, Enum):
+    """D-011: what the cameras look for ahead."""
+
+    ROAD_USERS = "road_users"  # and whatever else lies in the lane
+    VEHICLES = "vehicles"  # car, truck and bus, as published (A-034)
+
+
+class CruiseLaw(str, Enum):
+    """A-107, A-135: what holds the cruise speed."""
+
+    STEADY = "steady"  # smooth pedals
+    PUBLISHED = "published"  # the speed PID, whose derivative alternates full throttle and brake
+
+
 class Unconfirmed(str, Enum):
     """D-044: tier 1 or 3 is entered but the detection is not confirmed yet."""
 
@@ -172,6 +186,12 @@ class Settings:
     )
     aeb_without_acc: bool = _setting(
         False, "D-038", "stack", "configuration 0 has emergency braking"
+    )
+    targets: Targets = _setting(
+        Targets.ROAD_USERS, "D-011, R-5", "stack", "what the cameras look for ahead"
+    )
+    cruise: CruiseLaw = _setting(
+        CruiseLaw.STEADY, "A-135, R-5", "stack", "what holds the cruise speed"
     )
     unconfirmed: Unconfirmed = _setting(
         Unconfirmed.FALL_THROUGH, "D-044", "stack", "tiers 1 and 3 before confirmation"

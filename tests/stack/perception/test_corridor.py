@@ -14,6 +14,7 @@ from stackfakes import BUMPER_SEMANTIC, ROOF_SEMANTIC, ArcMap, Car, draw
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.stack.perception.corridor import (
+    ROAD_USERS,
     Corridor,
     half_width,
     in_corridor,
@@ -184,6 +185,18 @@ def test_cars_trucks_and_buses_are_vehicles(label):
     image = strip(ROOF_SEMANTIC, 100, 30.0, 250, cars=int(label))
     vehicles = {SemanticClass.CAR, SemanticClass.TRUCK, SemanticClass.BUS}
     assert (read(*image, roof()) is not None) is (label in vehicles)
+
+
+@pytest.mark.req("A-034")
+@pytest.mark.parametrize("label", list(SemanticClass))
+def test_road_users_are_everything_that_moves_or_lies_on_the_road(label):
+    users = range(SemanticClass.PEDESTRIAN, SemanticClass.DYNAMIC + 1)
+    for camera, c in (
+        (ROOF_SEMANTIC, roof_corridor(ROOF_SEMANTIC, wanted=ROAD_USERS)),
+        (BUMPER_SEMANTIC, bumper_corridor(BUMPER_SEMANTIC, ROAD_USERS)),
+    ):
+        image = strip(camera, 150, 20.0, c.row_first + 30, cars=int(label))
+        assert (read(*image, c) is not None) is (label in users)
 
 
 @pytest.mark.req("A-047", "A-053")

@@ -12,7 +12,8 @@ from skidpad.core.run import Function
 from skidpad.core.vocabulary import Tier
 from skidpad.stack.configurations import Functions
 from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, Pid
-from skidpad.stack.settings import Follower, LightBraking, Settings, Unconfirmed
+from skidpad.stack.control.steady import SteadySpeed
+from skidpad.stack.settings import CruiseLaw, Follower, LightBraking, Settings, Unconfirmed
 from skidpad.stack.timing import ticks_to_reach
 
 V_GAP_MIN = 0.1  # m/s, divisor of the time gap (A-110)
@@ -104,6 +105,18 @@ class Request(NamedTuple):
 
 
 NO_ACTION = Request(Tier.NONE)
+
+
+class SpeedControl(Protocol):
+    """What holds a speed."""
+
+    def reset(self) -> None:
+        """Forget what was summed."""
+        ...
+
+    def update(self, error: float) -> float:
+        """Throttle if positive, brake if negative; error: wanted minus driven speed in km/h."""
+        ...
 
 
 class Rule(Protocol):
@@ -267,8 +280,8 @@ class LightStop:
 class Cruise:
     """Tier 7: coast for a second after a lead, else hold the cruise speed (A-134 to A-136)."""
 
-    def __init__(self, speed_pid: Pid, dt: float) -> None:
-        self.pid = speed_pid
+    def __init__(self, speed: SpeedControl, dt: float) -> None:
+        self.speed = speed
         self.coast_ticks = ticks_to_reach(COAST_DURATION, dt)
         self.reset()
 
@@ -280,7 +293,7 @@ class Cruise:
         """Always a request, so that the hierarchy is total."""
         if self.ticks_since_lead < self.coast_ticks and s.v_kmh > COAST_ABOVE_KMH:
             return Request(Tier.COAST, brake=COAST_BRAKE)
-        u = self.pid.update(s.cruise_kmh - s.v_kmh)
+        u = self.speed.update(s.cruise_kmh - s.v_kmh)
         if u > 0.0:
             return Request(Tier.CRUISE, throttle=min(u, 1.0))
         return Request(Tier.CRUISE, brake=min(-u, CRUISE_BRAKE_MAX))
@@ -297,7 +310,9 @@ class Hierarchy:
         self.speed_pid = Pid(SPEED_GAINS, dt)
         self.distance_pid = Pid(DISTANCE_GAINS, dt)
         self.lead_at_light = LeadAtLight()
-        self.cruise = Cruise(self.speed_pid, dt)
+        steady = settings.cruise is CruiseLaw.STEADY
+        self.speed_hold = SteadySpeed(dt) if steady else self.speed_pid
+        self.cruise = Cruise(self.speed_hold, dt)
         self.last = Tier.NONE
         self.brakes = bool(functions & {Function.ACC, Function.AEB})  # tiers 1 to 3 (A-140)
         self.rules = self._rules(functions, settings)
@@ -323,6 +338,7 @@ class Hierarchy:
     def reset_pids(self) -> None:
         """After tiers 1 and 3 and after a relocation (A-109)."""
         self.speed_pid.reset()
+        self.speed_hold.reset()
         self.distance_pid.reset()
 
     def reset(self) -> None:

@@ -12,10 +12,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
+from skidpad.core.vocabulary import SemanticClass
 
-# Car, truck and bus stand side by side in SemanticClass, so one comparison finds them (D-011).
-FIRST_VEHICLE = np.uint8(14)
-VEHICLE_CLASSES = np.uint8(3)
+
+class Labels(NamedTuple):
+    """Classes that stand side by side in SemanticClass, so that one comparison finds them."""
+
+    first: int
+    count: int
+
+
+VEHICLES = Labels(int(SemanticClass.CAR), 3)  # car, truck, bus (D-011)
+# From pedestrian to dynamic: whoever uses the road, and whatever lies on it.
+ROAD_USERS = Labels(int(SemanticClass.PEDESTRIAN), 10)
 
 
 class Corridor(NamedTuple):
@@ -32,6 +41,7 @@ class Corridor(NamedTuple):
     far: float  # m
     min_vehicle: float  # px in the rows read, fewer: no target
     min_kept: float  # px in the corridor, fewer: no target
+    wanted: Labels = VEHICLES  # classes
 
 
 @kernel
@@ -58,8 +68,8 @@ def in_corridor(z: float, u: float, c: Corridor, sin_yaw: float, kappa: float) -
 
 
 @kernel
-def _is_vehicle(label: np.uint8) -> bool:
-    return bool(np.uint8(label - FIRST_VEHICLE) < VEHICLE_CLASSES)
+def _is_one(label: np.uint8, first: np.uint8, count: np.uint8) -> bool:
+    return bool(np.uint8(label - first) < count)
 
 
 @kernel
@@ -78,21 +88,22 @@ def reachable_columns(c: Corridor, sin_yaw: float, kappa: float, width: int) -> 
 
 
 @kernel
-def _vehicles_in_row(labels: NDArray[np.uint8], row: int, col_first: int, col_end: int) -> int:
+def _found_in_row(
+    labels: NDArray[np.uint8], row: int, col_first: int, col_end: int, wanted: Labels
+) -> int:
     """Counted without a branch, so that the compiler takes many pixels at once."""
+    first, classes = np.uint8(wanted.first), np.uint8(wanted.count)
     count = np.int32(0)
     for u in range(col_first, col_end):
-        count += np.int32(_is_vehicle(labels[row, u]))
+        count += np.int32(_is_one(labels[row, u], first, classes))
     return int(count)
 
 
 @kernel
-def _count_vehicle(
-    labels: NDArray[np.uint8], row_first: int, row_end: int, col_first: int, col_end: int
-) -> int:
+def _count_beside(labels: NDArray[np.uint8], c: Corridor, col_first: int, col_end: int) -> int:
     count = 0
-    for row in range(row_first, row_end):
-        count += _vehicles_in_row(labels, row, col_first, col_end)
+    for row in range(c.row_first, c.row_end):
+        count += _found_in_row(labels, row, col_first, col_end, c.wanted)
     return count
 
 
@@ -151,15 +162,16 @@ def read_pixels(
     """
     width = labels.shape[1]
     first, end = reachable_columns(c, sin_yaw, kappa, width)
+    class_first, classes = np.uint8(c.wanted.first), np.uint8(c.wanted.count)
     vehicle = 0
     kept = 0
     for row in range(c.row_first, c.row_end):
-        here = _vehicles_in_row(labels, row, first, end)
-        if here == 0:  # most rows show no vehicle
+        here = _found_in_row(labels, row, first, end, c.wanted)
+        if here == 0:  # most rows show none
             continue
         vehicle += here
         for u in range(first, end):
-            if _is_vehicle(labels[row, u]):
+            if _is_one(labels[row, u], class_first, classes):
                 inverse = inverse_depth[row, u]
                 if inverse > 0.0:
                     z = 1.0 / float(inverse)
@@ -169,8 +181,8 @@ def read_pixels(
     if kept < c.min_kept or kept == 0:
         return np.nan
     if vehicle < c.min_vehicle:  # the rest of the image decides
-        vehicle += _count_vehicle(labels, c.row_first, c.row_end, 0, first)
-        vehicle += _count_vehicle(labels, c.row_first, c.row_end, end, width)
+        vehicle += _count_beside(labels, c, 0, first)
+        vehicle += _count_beside(labels, c, end, width)
         if vehicle < c.min_vehicle:
             return np.nan
     return percentile(scratch, kept, fraction)
@@ -193,12 +205,13 @@ def read_segments(
     n = len(u)
     z = np.empty(n, dtype=np.float64)
     weight = np.empty(n, dtype=np.float64)
+    class_first, classes = np.uint8(c.wanted.first), np.uint8(c.wanted.count)
     vehicle = 0.0
     kept = 0
     total = 0.0
     for i in range(n):
         rows = min(float(bottom[i]), float(c.row_end)) - max(float(top[i]), float(c.row_first))
-        if rows <= 0.0 or not _is_vehicle(label[i]):
+        if rows <= 0.0 or not _is_one(label[i], class_first, classes):
             continue
         pixels = rows * float(width[i])
         vehicle += pixels

@@ -11,6 +11,7 @@ from skidpad.core.specs import SensorSpec
 from skidpad.core.vocabulary import DetectionStatus
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.configurations import Functions
+from skidpad.stack.perception.corridor import ROAD_USERS, VEHICLES
 from skidpad.stack.perception.fusion import (
     CameraPair,
     MedianFilter,
@@ -32,7 +33,13 @@ from skidpad.stack.perception.radar import (
     Radar,
     RadarReading,
 )
-from skidpad.stack.settings import RadarCandidates, RadarCorridor, RoofCorridor, Settings
+from skidpad.stack.settings import (
+    RadarCandidates,
+    RadarCorridor,
+    RoofCorridor,
+    Settings,
+    Targets,
+)
 
 ROOF = ("depth_roof", "semantic_roof")
 BUMPER = ("depth_bumper", "semantic_bumper")
@@ -64,7 +71,10 @@ class Front:
         self.settings = settings
         bumper_depth, bumper_semantic = camera_pair(specs, *BUMPER)
         self.roof_depth, self.roof_semantic = camera_pair(specs, *ROOF)
-        self.bumper = CameraPair(bumper_depth, bumper_semantic, bumper_corridor(bumper_semantic))
+        self.wanted = VEHICLES if settings.targets is Targets.VEHICLES else ROAD_USERS
+        self.bumper = CameraPair(
+            bumper_depth, bumper_semantic, bumper_corridor(bumper_semantic, self.wanted)
+        )
         self.median = MedianFilter()
         self.rate = RateFilter(dt) if settings.rate_filter else None
         self.radar = _radar(map, settings) if settings.radar else None
@@ -83,7 +93,9 @@ class Front:
         narrow = self.settings.roof_corridor is RoofCorridor.FLAT_WITHOUT_LCA
         flat = narrow and Function.LCA not in functions
         self.roof = CameraPair(
-            self.roof_depth, self.roof_semantic, roof_corridor(self.roof_semantic, flat)
+            self.roof_depth,
+            self.roof_semantic,
+            roof_corridor(self.roof_semantic, flat, self.wanted),
         )
         self.verification = Verification(self.bumper, self.roof)
 
@@ -122,7 +134,7 @@ class Front:
         self.persistence.conclude(sight.distance is not None, self.follows, stopping)
 
     def verify(self, frame: SensorFrame, distance: float, view: LaneView) -> tuple[bool, str]:
-        """Whether vehicle pixels near `distance` bear the target out, and who says so."""
+        """Whether wanted pixels near `distance` bear the target out, and who says so."""
         return self.verification.confirm(frame, distance, view.yaw_error, view.kappa)
 
 

@@ -14,7 +14,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.frames import CameraImage, SensorFrame, image_rows
 from skidpad.core.specs import CameraSpec, Modality, SensorSpec
 from skidpad.stack.perception import corridor
-from skidpad.stack.perception.corridor import Corridor
+from skidpad.stack.perception.corridor import VEHICLES, Corridor, Labels
 from skidpad.stack.timing import ticks_within
 
 PERCENTILE = 0.10  # of the kept depths (A-047, A-053)
@@ -49,24 +49,24 @@ def _rows(height: int, share: tuple[float, float]) -> tuple[int, int]:
     return round(height * share[0]), round(height * share[1])
 
 
-def bumper_corridor(camera: CameraSpec) -> Corridor:
+def bumper_corridor(camera: CameraSpec, wanted: Labels = VEHICLES) -> Corridor:
     """What the bumper tier keeps. `camera` is the semantic one: depth is read at its pixels."""
     first, end = _rows(camera.height, BUMPER_ROWS)
     near, far = BUMPER_DEPTHS
     return Corridor(
         camera.focal, camera.cx, first, end, BUMPER_HALF_WIDTH, 0.0, BUMPER_HALF_WIDTH,
-        near, far, BUMPER_MIN_VEHICLE, BUMPER_MIN_KEPT,
+        near, far, BUMPER_MIN_VEHICLE, BUMPER_MIN_KEPT, wanted,
     )  # fmt: skip
 
 
-def roof_corridor(camera: CameraSpec, flat: bool = False) -> Corridor:
+def roof_corridor(camera: CameraSpec, flat: bool = False, wanted: Labels = VEHICLES) -> Corridor:
     """What the roof tier keeps; flat: 1.6 m at every depth (A-051)."""
     first, end = _rows(camera.height, ROOF_ROWS)
     near, far = ROOF_DEPTHS
     widening = 0.0 if flat else ROOF_WIDENING
     return Corridor(
         camera.focal, camera.cx, first, end, ROOF_HALF_WIDTH, widening, ROOF_HALF_WIDTH_MAX,
-        near, far, ROOF_MIN_VEHICLE, ROOF_MIN_KEPT,
+        near, far, ROOF_MIN_VEHICLE, ROOF_MIN_KEPT, wanted,
     )  # fmt: skip
 
 
@@ -190,7 +190,7 @@ class RateFilter:
 
 
 class Verification:
-    """Are there vehicle pixels in the ego's corridor near the reported distance? (A-065)"""
+    """Are there wanted pixels in the ego's corridor near the reported distance? (A-065)"""
 
     def __init__(self, bumper: CameraPair, roof: CameraPair) -> None:
         self.pairs = (("bumper", bumper), ("roof", roof))

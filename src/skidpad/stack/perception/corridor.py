@@ -19,7 +19,7 @@ class Labels(NamedTuple):
     """Classes that stand side by side in SemanticClass, so that one comparison finds them."""
 
     first: int
-    count: int
+    size: int
 
 
 VEHICLES = Labels(int(SemanticClass.CAR), 3)  # car, truck, bus (D-011)
@@ -92,7 +92,7 @@ def _found_in_row(
     labels: NDArray[np.uint8], row: int, col_first: int, col_end: int, wanted: Labels
 ) -> int:
     """Counted without a branch, so that the compiler takes many pixels at once."""
-    first, classes = np.uint8(wanted.first), np.uint8(wanted.count)
+    first, classes = np.uint8(wanted.first), np.uint8(wanted.size)
     count = np.int32(0)
     for u in range(col_first, col_end):
         count += np.int32(_is_one(labels[row, u], first, classes))
@@ -162,7 +162,7 @@ def read_pixels(
     """
     width = labels.shape[1]
     first, end = reachable_columns(c, sin_yaw, kappa, width)
-    class_first, classes = np.uint8(c.wanted.first), np.uint8(c.wanted.count)
+    class_first, classes = np.uint8(c.wanted.first), np.uint8(c.wanted.size)
     vehicle = 0
     kept = 0
     for row in range(c.row_first, c.row_end):
@@ -205,7 +205,7 @@ def read_segments(
     n = len(u)
     z = np.empty(n, dtype=np.float64)
     weight = np.empty(n, dtype=np.float64)
-    class_first, classes = np.uint8(c.wanted.first), np.uint8(c.wanted.count)
+    class_first, classes = np.uint8(c.wanted.first), np.uint8(c.wanted.size)
     vehicle = 0.0
     kept = 0
     total = 0.0

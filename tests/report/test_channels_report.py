@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from channel_worlds import Eyes, World, drive
-from skidpad.campaign.watch import Timer, watch
 from skidpad.evidence.channels.monitor import MonitorSettings
+from skidpad.live.watch import Timer, watch
 from skidpad.recording.hazards import read_hazards
 from skidpad.report.channels import drive_page, write_drive_report
 from skidpad.report.channels_data import load_drive

@@ -22,6 +22,7 @@ from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
 from skidpad.campaign.channel_outcomes import Referee
 from skidpad.campaign.channel_world import Segment, crew_of, route_of, segment_of
 from skidpad.campaign.drive import Moment, Sink, Unsupervised, loop
+from skidpad.campaign.pace import RealTime
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
 from skidpad.core.frames import SensorFrame
 from skidpad.core.run import ARBITER, RunSpec
@@ -29,8 +30,11 @@ from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind
 from skidpad.evidence.channels.risk import safety_scores
+from skidpad.live.links import opened
+from skidpad.live.listener import Listener
+from skidpad.live.settings import Links
 from skidpad.recording.channel_drives import DriveOutcome
-from skidpad.recording.channels import ChannelWriter
+from skidpad.recording.channels import ChannelWriter, Item
 from skidpad.sensors.channel_presets import senses_of
 from skidpad.sensors.channel_suite import CYCLE, ChannelSuite
 from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Choice, Reason
@@ -110,11 +114,13 @@ class Crew:
 
 
 class Recording(Sink):
-    """Writes every cycle after the warm-up, and has it judged; it knows when the segment is over."""
+    """Writes every cycle after the warm-up and tells listeners; it knows when the segment is over."""
 
-    def __init__(self, crew: Crew, writer: ChannelWriter) -> None:
+    def __init__(
+        self, crew: Crew, writer: ChannelWriter, listeners: Sequence[Listener] = ()
+    ) -> None:
         segment = crew.segment
-        self.crew, self.writer = crew, writer
+        self.crew, self.writer, self.listeners = crew, writer, listeners
         self.referee = Referee(segment.route, segment.car, CYCLE)
         self.left = round(crew.spec.duration / CYCLE)  # cycles to write
         self.ended = False
@@ -123,7 +129,7 @@ class Recording(Sink):
     def begin(self, table: ActorTable) -> None:
         """Say what is recorded."""
         del table
-        self.writer.write_context(Context(0.0, _about(self.crew.spec, self.crew.segment)))
+        self._say(Context(0.0, _about(self.crew.spec, self.crew.segment)))
 
     def see(self, moment: Moment) -> None:
         """The contacts of the step that led here; at the begin of a cycle what is said and true."""
@@ -138,10 +144,17 @@ class Recording(Sink):
         self.left -= 1
         self._t = crew.cycle * CYCLE
         self.referee.observe(truth, crew.decision)
-        for name, frame in zip(crew.crew.channels, crew.frames, strict=True):
-            self.writer.write(name, frame)
-        self.writer.write_decision(crew.decision)
-        self.writer.write_truth(truth_frame(self._t, truth))
+        for channel, frame in enumerate(crew.frames):
+            self._say(frame, channel)
+        self._say(crew.decision)
+        self._say(truth_frame(self._t, truth))
+        for listener in self.listeners:
+            listener.cycle_over(crew.cycle, self._t)
+
+    def _say(self, item: Item, channel: int | None = None) -> None:
+        self.writer.add(item, channel)
+        for listener in self.listeners:
+            listener.hear(channel, item)
 
 
 class Street:
@@ -162,19 +175,24 @@ class Street:
         return self.crew.segment.crowd.commands(self.crew.cycle * CYCLE, truth)
 
 
-def drive_segment(spec: RunSpec, path: Path) -> DriveOutcome:
+def drive_segment(spec: RunSpec, path: Path, links: Links | None = None) -> DriveOutcome:
     """Drive a segment and write its recording to `path`, which appears only when complete."""
+    links = links or Links()
     segment = segment_of(spec)
     crew = Crew(spec, segment)
     keep_server(spec.backend)
     backend = make_backend(spec.backend, WATCHDOG)
     part = path.with_suffix(".part")
     try:
-        with ChannelWriter(part, crew.crew.channels) as writer:
-            recording = Recording(crew, writer)
+        with (
+            opened(links, crew.crew.channels, path) as listeners,
+            ChannelWriter(part, crew.crew.channels) as writer,
+        ):
+            recording = Recording(crew, writer, listeners)
+            sinks = (recording, RealTime(DT)) if links.live else (recording,)
             frame = backend.reset(segment.setup, spec.seed)
             street = Street(crew, recording)
-            failure = loop(backend, frame, crew, Unsupervised(), street, (recording,))
+            failure = loop(backend, frame, crew, Unsupervised(), street, sinks)
     finally:
         backend.close()
     if failure is not None:

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from math import ceil
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -23,6 +24,7 @@ from skidpad.campaign.runfolder import Stopwatch
 from skidpad.core.errors import require_range
 from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import Outcome
+from skidpad.live.settings import Links
 from skidpad.recording.channel_drives import (
     DRIVES,
     DriveEntry,
@@ -57,13 +59,15 @@ def segments(routes: Sequence[RunSpec], hours: float, template: RunSpec) -> list
     ]
 
 
-def drive_one(out: Path, spec: RunSpec) -> Driven[DriveKey, DriveMetrics]:
+def drive_one(
+    out: Path, spec: RunSpec, links: Links | None = None
+) -> Driven[DriveKey, DriveMetrics]:
     """In a worker: drive one segment and write both files."""
     watch = Stopwatch()
     folder = out / route_of(spec).name
     folder.mkdir(parents=True, exist_ok=True)
     recording = folder / f"{spec.name}.mcap"
-    outcome = drive_segment(spec, recording)
+    outcome = drive_segment(spec, recording, links)
     timing, digest = watch.timing(outcome.driven_s), recording_hash(recording)
     outcome = replace(outcome, content_hash=digest, cpu_s=round(timing.cpu_s, 2))
     record = msgspec.json.encode(DriveRecord(spec.to_plain(), outcome))
@@ -100,3 +104,8 @@ RECIPE = Recipe(
     success=lambda metrics: metrics.collisions == 0,
     success_means="without a collision",
 )
+
+
+def linked(links: Links) -> Recipe[RunSpec, DriveKey, DriveMetrics]:
+    """The recipe with these listeners at every drive."""
+    return replace(RECIPE, drive=partial(drive_one, links=links))

@@ -41,3 +41,18 @@ class Brake(Sink):
         """Wait."""
         del moment
         sleep(self.seconds)
+
+
+class RealTime(Sink):
+    """Holds a run at real time: no tick is over before its time; what is late is not caught up."""
+
+    def __init__(self, dt: float) -> None:
+        self.dt = dt
+        self.due = perf_counter()
+
+    def see(self, moment: Moment) -> None:
+        """Wait for the end of the tick."""
+        del moment
+        now = perf_counter()
+        self.due = max(self.due + self.dt, now)
+        sleep(self.due - now)

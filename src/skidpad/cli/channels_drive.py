@@ -11,6 +11,7 @@ from msgspec import structs
 from skidpad.cli.campaigns import How
 from skidpad.cli.spread import spread
 from skidpad.core.run import BackendChoice, ChannelCrew
+from skidpad.live.settings import Links
 
 FOLDERS = typer.Argument(help="Folders of `skidpad channels drive`.")
 
@@ -20,6 +21,7 @@ def drive(
     how: How,
     crew: ChannelCrew,
     backend: BackendChoice,
+    links: Links,
     route: Annotated[str, typer.Option(help="One of the six routes, or all.")] = "all",
     hours: Annotated[
         float, typer.Option(help="Hours in total, split equally among the routes.")
@@ -35,7 +37,7 @@ def drive(
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.channel_routes import chosen_routes
     from skidpad.campaign.channel_world import route_of
-    from skidpad.campaign.channels import RECIPE, segments
+    from skidpad.campaign.channels import linked, segments
     from skidpad.cli.carla_backend import checked, drives_alone
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.channel_presets import senses_of
@@ -47,7 +49,7 @@ def drive(
         load_map(route_of(chosen).map)
     template = structs.replace(routes[0], driver=crew, seed=seed, backend=checked(backend))
     campaign = Campaign(
-        RECIPE, segments(routes, hours, template), alone=drives_alone(template.backend)
+        linked(links), segments(routes, hours, template), alone=drives_alone(template.backend)
     )
     summary = how(campaign, totals)
     if summary is not None and summary.failed:
@@ -58,14 +60,19 @@ def totals(folder: Path) -> str:
     """What a folder of driven segments came to, in one line."""
     import polars as pl
 
+    from skidpad.live.outcome import LINK, read_outcome
     from skidpad.recording.results import read_results
 
     driven = read_results(folder).drop_nulls("driven_s")
     sums = driven.select(pl.col(pl.Float64, pl.Int64).sum()).row(0, named=True)
+    watched = "".join(
+        f"\nmonitor of {link.parent.name}: {read_outcome(link.parent).sentence}"
+        for link in sorted(folder.glob(f"*/*/{LINK}"))
+    )
     return (
         f"{folder}: {len(driven)} segments, {sums['driven_s'] / 3600.0:.2f} h, "
         f"{sums['distance_m'] / 1000.0:.1f} km, {sums['collisions']} collisions, "
-        f"{sums['red_lights_run']} red lights run, {sums['stalls']} stalls"
+        f"{sums['red_lights_run']} red lights run, {sums['stalls']} stalls{watched}"
     )
 
 

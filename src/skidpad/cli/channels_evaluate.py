@@ -118,9 +118,9 @@ def judge_one(task: _Task) -> Segment:
     """In a worker: read and judge one recording."""
     import time
 
-    from skidpad.campaign.watch import Timer
     from skidpad.evidence.channels.identifier.model import load_model
     from skidpad.evidence.channels.judging.segments import judge
+    from skidpad.live.watch import Timer
     from skidpad.recording.channels import McapRecording
     from skidpad.recording.context import context_of
     from skidpad.recording.cycles import cycles

@@ -75,7 +75,6 @@ def monitor(
     """Watch what driving channels say: indicators, violations, hazardous scenes."""
     import time
 
-    from skidpad.campaign.watch import Timer, watch
     from skidpad.core.errors import ConfigError
     from skidpad.evidence.channels.hazards import Profile, load_rules
     from skidpad.evidence.channels.identifier.model import Identify, load_model
@@ -84,6 +83,7 @@ def monitor(
     from skidpad.evidence.channels.indicators.settings import IndicatorSettings
     from skidpad.evidence.channels.monitor import MonitorSettings
     from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
+    from skidpad.live.watch import Timer, watch
     from skidpad.recording.sources import open_channels
     from skidpad.report.channels import write_drive_report
 

@@ -67,6 +67,12 @@ class Context(NamedTuple):
     entries: dict[str, str]
 
 
+class Due(NamedTuple):
+    """Everything up to t has been said: a live source says so, and the cycle is judged at once."""
+
+    t: float  # s
+
+
 class Cycle(NamedTuple):
     """One step of the evaluation grid: what each channel last said, in the recording's order."""
 

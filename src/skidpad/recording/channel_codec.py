@@ -116,8 +116,8 @@ def message_from_context(context: Context) -> pb.Context:
 
 
 def context_from_message(message: pb.Context) -> Context:
-    """The context in `message`."""
-    return Context(message.t, dict(message.entries))
+    """The context in `message`; a map on the wire has no order of its own."""
+    return Context(message.t, dict(sorted(message.entries.items())))
 
 
 def padded_polygons(shapes: Iterable[Floats]) -> tuple[NDArray[np.int64], Floats]:

@@ -17,7 +17,7 @@ from google.protobuf.message import DecodeError
 from mcap.stream_reader import StreamReader, breakup_chunk
 from mcap.writer import Writer
 
-from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
+from skidpad.core.channels import ChannelFrame, Context, Decision, Due, TruthFrame
 from skidpad.core.errors import ConfigError, FileError, OutputError
 from skidpad.recording import channel_codec as codec
 from skidpad.recording import channels_pb2 as pb
@@ -40,7 +40,7 @@ class Message:
 
     channel: int | None  # None: truth, decision or context
     t: float  # s
-    item: Item
+    item: Item | Due  # Due: from live sources only
 
 
 @dataclass(slots=True)
@@ -124,6 +124,18 @@ class ChannelWriter:
 
     def _topic(self, topic: str, schema: int) -> int:
         return int(self._writer.register_channel(topic, "protobuf", schema))
+
+    def add(self, item: Item, channel: int | None = None) -> None:
+        """Append any item; a frame with the index of the channel that said it."""
+        if isinstance(item, ChannelFrame):
+            assert channel is not None
+            self.write(self.channels[channel], item)
+        elif isinstance(item, TruthFrame):
+            self.write_truth(item)
+        elif isinstance(item, Decision):
+            self.write_decision(item)
+        else:
+            self.write_context(item)
 
     def write(self, channel: str, frame: ChannelFrame) -> None:
         """Append what `channel` said."""

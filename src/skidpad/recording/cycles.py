@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import floor, isfinite
+from math import floor, inf, isfinite
 
-from skidpad.core.channels import ChannelFrame, Cycle, Decision, TruthFrame
+from skidpad.core.channels import ChannelFrame, Cycle, Decision, Due, TruthFrame
 from skidpad.recording.channels import ChannelSource, Message
 
 STEP = 0.1  # s, the cycle of the published stacks (C-022)
 MAX_AGE = 0.15  # s, older messages count as absent (decision C-10)
 MAX_GAP = 10.0  # s, a message further ahead must be confirmed by the next of its channel
+STRETCH = round(MAX_GAP / STEP)  # cycles
 SAME_TIME = 1e-6  # s, rounding of stamps
 
 
@@ -62,7 +63,8 @@ class _Clock:
 def cycles(source: ChannelSource) -> Iterator[Cycle]:
     """The cycles of a recording: grid times from its first message to its last.
 
-    A stretch of more than MAX_GAP without any message is left out; k keeps counting the grid.
+    A stretch of more than MAX_GAP without any message is left out; k keeps counting the grid. A live
+    source says with `Due` that a cycle is complete, which then need not wait for the next message.
     """
     clock = _Clock(source)
     state = _State(source)
@@ -70,13 +72,21 @@ def cycles(source: ChannelSource) -> Iterator[Cycle]:
     k = 0
     for message in source.messages():
         state.losses = clock.losses = source.losses
-        if not clock.accept(message):
+        heard = -inf if clock.t is None else clock.t
+        live = isinstance(message.item, Due)
+        if t_first is None if live else not clock.accept(message):
             continue
         if t_first is None:
             t_first = message.t
         # a message moves the grid to just before it: everything older is now known
         due = _last_before(message.t, t_first)
-        k = max(k, due - round(MAX_GAP / STEP))
+        if live or k < due - STRETCH:  # what was said before a stretch is not left out with it
+            while t_first + k * STEP <= heard + SAME_TIME:
+                yield state.cycle(k, t_first + k * STEP)
+                k += 1
+        if live:
+            continue
+        k = max(k, due - STRETCH)
         while k <= due:
             yield state.cycle(k, t_first + k * STEP)
             k += 1

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from typing import Protocol
 
 import numpy as np
@@ -59,3 +60,38 @@ def time_by_objects(timing: pl.DataFrame) -> pl.DataFrame:
         .agg(pl.len().alias("cycles"), pl.col("total", *MODULES).mean())
         .sort("objects")
     )
+
+
+class LateCause(str, Enum):
+    """Why a cycle was judged later than the budget allows."""
+
+    OWN = "own work"
+    WAITED = "no processor was free"
+    BEHIND = "behind an earlier late cycle"
+    FAULTS = "page faults"
+    UNKNOWN = "unknown"
+
+
+FAULTS_MANY = 64  # in a cycle; a warm one has next to none
+
+
+def late_cycles(timing: pl.DataFrame) -> pl.DataFrame:
+    """Cycles of a live drive whose judgement came over 25 ms after their last word, with causes.
+
+    timing: as `timing_statistics`, with wall_ms, waited_ms (in the queue for a processor), faults.
+    """
+    late = pl.col("wall_ms") > BUDGET_MS
+    excess = pl.col("wall_ms") - BUDGET_MS
+    cause = (
+        pl.when(pl.col("total") + pl.col("writing") > BUDGET_MS)
+        .then(pl.lit(LateCause.OWN.value))
+        .when(pl.col("waited_ms") >= excess)
+        .then(pl.lit(LateCause.WAITED.value))
+        .when(late.shift(1, fill_value=False))
+        .then(pl.lit(LateCause.BEHIND.value))
+        .when(pl.col("faults") >= FAULTS_MANY)
+        .then(pl.lit(LateCause.FAULTS.value))
+        .otherwise(pl.lit(LateCause.UNKNOWN.value))
+    )
+    columns = ("cycle", "wall_ms", "total", "waited_ms", "faults", "cause")
+    return timing.with_columns(cause=cause).filter(late).select(columns)

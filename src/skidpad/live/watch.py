@@ -1,10 +1,12 @@
-"""One recording through the monitor, and what it leaves in a folder."""
+"""Channels through the monitor, recorded or driving now, and what it leaves in a folder."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Iterator
 from itertools import chain, islice
 from pathlib import Path
+from typing import TextIO
 
 import polars as pl
 
@@ -12,6 +14,7 @@ from skidpad.core.channels import Context, Cycle
 from skidpad.core.errors import FileError
 from skidpad.evidence.channels.indicators.panel import no_lap
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
+from skidpad.evidence.channels.recorder import CycleEvidence
 from skidpad.evidence.channels.summary import Watched, columns, watched
 from skidpad.evidence.channels.timing import MODULES
 from skidpad.recording.channels import ChannelSource, Losses, Message
@@ -43,21 +46,31 @@ class Timer:
         self.rows[-1][name] = (now - self.last) / 1e6
         self.last = self.clock()
 
+    def end(self) -> None:
+        """The cycle is judged and written."""
+
     def table(self) -> pl.DataFrame:
         """Milliseconds per part and cycle; total = all parts but the writing (DC-65)."""
         return pl.DataFrame(self.rows).with_columns(total=pl.sum_horizontal("prepare", *MODULES))
 
 
 def watch(
-    source: ChannelSource, folder: Path, settings: MonitorSettings, timer: Timer | None = None
+    source: ChannelSource,
+    folder: Path,
+    settings: MonitorSettings,
+    timer: Timer | None = None,
+    alarms: Alarms | None = None,
 ) -> Watched:
-    """Monitor `source`; writes indicators, hazards, a summary, and times if given a timer."""
+    """Monitor `source`; writes indicators, hazards, a summary, and times if given a timer.
+
+    With `alarms` each cycle is judged as it comes; else times are taken of warm code.
+    """
     monitor = Monitor(source.channels, settings)
     log = IndicatorLog(columns(monitor))
     seen: list[float] = []
     with HazardWriter(folder) as writer:
         stream = cycles(_ContextTap(source, monitor))
-        for cycle in _warmed_up(stream, monitor) if timer else stream:
+        for cycle in _warmed_up(stream, monitor) if timer and alarms is None else stream:
             seen.append(cycle.t)
             if timer:
                 timer.begin(cycle)
@@ -65,8 +78,11 @@ def watch(
             log.add(cycle.k, cycle.t, evidence.readings.values)
             for record in monitor.records():
                 writer.write(record)
+            if alarms is not None:
+                alarms.see(monitor, evidence)
             if timer:
                 timer.lap("writing")
+                timer.end()
         for record in monitor.finish():
             writer.write(record)
     if not seen:
@@ -77,6 +93,22 @@ def watch(
     if timer:
         write_timing(folder, timer.table())
     return found
+
+
+class Alarms:
+    """Tells each hazard when it begins, while the drive goes on: one line of JSON, flushed."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self.stream = stream
+
+    def see(self, monitor: Monitor, evidence: CycleEvidence) -> None:
+        """A judged cycle."""
+        k, t = evidence.cycle.k, evidence.cycle.t
+        for hazard in evidence.fired:
+            if monitor.hazards.open[hazard].t_start == t:
+                row = {"cycle": k, "t": round(t, 3), "hazard": hazard.value}
+                self.stream.write(json.dumps(row) + "\n")
+                self.stream.flush()
 
 
 def _warmed_up(stream: Iterator[Cycle], like: Monitor) -> Iterator[Cycle]:

@@ -1,0 +1,25 @@
+"""Opens what was asked to listen to a drive, and closes it whatever happens."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from skidpad.live.listener import Listener
+from skidpad.live.monitor_link import MonitorLink
+from skidpad.live.settings import Links, MonitorLinkSettings
+
+MONITORED = ".monitor"  # suffix of the folder beside a recording
+
+
+@contextmanager
+def opened(links: Links, channels: Sequence[str], recording: Path) -> Iterator[list[Listener]]:
+    """The listeners of a drive that is recorded as `recording`."""
+    with ExitStack() as stack:
+        listeners: list[Listener] = []
+        if links.monitor:
+            settings = MonitorLinkSettings(flow=links.flow, pin=links.pin)
+            listeners.append(MonitorLink(channels, recording.with_suffix(MONITORED), settings))
+            stack.callback(listeners[-1].close)
+        yield listeners

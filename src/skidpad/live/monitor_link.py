@@ -1,0 +1,207 @@
+"""The monitor beside a drive, in a process of its own: the arbiter never waits for it (C-005).
+
+Lossless: the drive waits while the pipe is full, and the result is that of the recording. Live: a
+thread of this process feeds the pipe from a bounded queue; a cycle that does not fit is dropped,
+and its number kept. A monitor that dies or hangs is one sentence in `link.json`; the drive goes on.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import skidpad
+from skidpad.live.outcome import LinkOutcome, write_outcome
+from skidpad.live.settings import Flow, MonitorLinkSettings
+from skidpad.live.wire import cycle_mark, end_mark, packed
+from skidpad.recording.channels import Item
+
+START_PATIENCE = 600.0  # s: kernels may have to be compiled first
+
+
+class MonitorLink:
+    """A `Listener` that passes everything on to `skidpad.live.child`."""
+
+    def __init__(
+        self, channels: Sequence[str], folder: Path, settings: MonitorLinkSettings
+    ) -> None:
+        shutil.rmtree(folder, ignore_errors=True)  # of an earlier drive
+        self.folder, self.settings = folder, settings
+        self.cycles = 0
+        self.missing: list[int] = []
+        self.ended = ""  # why the monitor is gone; empty while it is there
+        self.isolation: dict[str, Any] = {}
+        self._cycle: list[bytes] = []
+        self._errors = tempfile.TemporaryFile()  # noqa: SIM115, closed by `close`
+        self.process = _start(channels, folder, settings.pin, self._errors.fileno())
+        assert self.process.stdin is not None
+        self._pipe = self.process.stdin.fileno()
+        os.set_blocking(self._pipe, False)
+        self._await_ready()
+        self._queue = _Queue(self._deliver, settings.capacity)
+        if settings.flow is Flow.LIVE:
+            self._queue.start()
+
+    def hear(self, channel: int | None, item: Item) -> None:
+        """Gather what is said in this cycle."""
+        self._cycle.append(packed(channel, item))
+
+    def cycle_over(self, k: int, t: float) -> None:
+        """Send the cycle, or drop it whole."""
+        self._cycle.append(cycle_mark(k, t, time.monotonic_ns()))
+        content = b"".join(self._cycle)
+        self._cycle.clear()
+        self.cycles += 1
+        if self.settings.flow is Flow.LOSSLESS:
+            self._deliver(k, content)
+        elif self.ended or not self._queue.offer(k, content):
+            self.missing.append(k)
+
+    def close(self) -> None:
+        """End the monitor and write what became of the link."""
+        self._queue.close()
+        self._push(end_mark())
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.close()
+        self._await_end()
+        self.process.stdout.close()
+        self._errors.close()
+        write_outcome(self.folder, self.outcome)
+
+    @property
+    def outcome(self) -> LinkOutcome:
+        """What became of it so far."""
+        return LinkOutcome(
+            flow=self.settings.flow,
+            cycles=self.cycles,
+            missing=sorted(self.missing),
+            ended=self.ended or "complete",
+            isolation=self.isolation,
+        )
+
+    def _deliver(self, k: int, content: bytes) -> None:
+        if not self._push(content):
+            self.missing.append(k)
+
+    def _push(self, content: bytes) -> bool:
+        """Write everything into the pipe, waiting for room; False when the monitor is gone."""
+        view = memoryview(content)
+        while view and not self.ended:
+            _, writable, _ = select.select([], [self._pipe], [], self.settings.patience)
+            if not writable:
+                self.process.kill()
+                self._lost(f"the monitor took nothing for {self.settings.patience:g} s")
+                break
+            try:
+                view = view[os.write(self._pipe, view) :]
+            except BlockingIOError:
+                continue  # room for less than the pipe writes at once
+            except OSError:
+                self._lost(self._last_words())
+        return not self.ended
+
+    def _lost(self, why: str) -> None:
+        self.ended = self.ended or f"{why}, after {self.cycles} cycles"
+
+    def _last_words(self) -> str:
+        """How the process ended, with the last line that it said."""
+        try:
+            code = self.process.wait(self.settings.patience)
+        except subprocess.TimeoutExpired:  # it hears no more, and lives
+            self.process.kill()
+            code = self.process.wait()
+        self._errors.seek(0)
+        said = self._errors.read().decode(errors="replace").strip().splitlines()
+        return f"the monitor ended with code {code}" + (f" ({said[-1]})" if said else "")
+
+    def _await_ready(self) -> None:
+        assert self.process.stdout is not None
+        ready, _, _ = select.select([self.process.stdout], [], [], START_PATIENCE)
+        line = self.process.stdout.readline() if ready else b""
+        if line:
+            self.isolation = json.loads(line)
+            return
+        self.process.kill()
+        self._lost(self._last_words())
+
+    def _await_end(self) -> None:
+        try:
+            code = self.process.wait(self.settings.patience)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            self._lost(f"the monitor did not end within {self.settings.patience:g} s")
+            self.process.wait()
+            return
+        if code:
+            self._lost(self._last_words())
+
+
+class _Queue:
+    """Cycles that wait for the pipe; a thread takes them there, so that who offers never waits."""
+
+    def __init__(self, deliver: Callable[[int, bytes], None], capacity: int) -> None:
+        self.deliver, self.capacity = deliver, capacity
+        self.waiting: deque[tuple[int, bytes]] = deque()
+        self.changed = threading.Condition()
+        self.closing = False
+        self.thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin to take."""
+        self.thread = threading.Thread(target=self._run, name="monitor link", daemon=True)
+        self.thread.start()
+
+    def offer(self, k: int, content: bytes) -> bool:
+        """False when there is no room."""
+        with self.changed:
+            if len(self.waiting) >= self.capacity:
+                return False
+            self.waiting.append((k, content))
+            self.changed.notify()
+        return True
+
+    def close(self) -> None:
+        """Everything that waits has been taken on return."""
+        with self.changed:
+            self.closing = True
+            self.changed.notify()
+        if self.thread is not None:
+            self.thread.join()
+
+    def _run(self) -> None:
+        while True:
+            with self.changed:
+                self.changed.wait_for(lambda: bool(self.waiting) or self.closing)
+                if not self.waiting:
+                    return
+                k, content = self.waiting.popleft()
+            self.deliver(k, content)
+
+
+def _start(
+    channels: Sequence[str], folder: Path, pin: int | None, errors: int
+) -> subprocess.Popen[bytes]:
+    """The process; it finds the same Skidpad as this one."""
+    root = str(Path(skidpad.__file__).parents[1])
+    path = os.pathsep.join(filter(None, (root, os.environ.get("PYTHONPATH"))))
+    words = [str(folder), json.dumps(list(channels)), json.dumps(pin)]
+    return subprocess.Popen(
+        [sys.executable, "-m", "skidpad.live.child", *words],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=errors,
+        bufsize=0,
+        env={**os.environ, "PYTHONPATH": path},
+    )

@@ -1,0 +1,44 @@
+"""What became of a link, beside what the monitor wrote."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from skidpad.core.errors import FileError
+from skidpad.live.settings import Flow
+from skidpad.recording.files import write_bytes
+
+LINK = "link.json"
+
+
+class LinkOutcome(msgspec.Struct, frozen=True, kw_only=True):
+    """What became of a link."""
+
+    flow: Flow
+    cycles: int  # of the drive
+    missing: list[int]  # numbers of the cycles that the monitor was not given
+    ended: str  # "complete", or one sentence
+    isolation: dict[str, Any] = {}  # what C-231 asks for and this system allowed
+
+    @property
+    def sentence(self) -> str:
+        """For people."""
+        lost = f", {len(self.missing)} of them missing" if self.missing else ""
+        return f"{self.cycles} cycles{lost}; {self.ended}"
+
+
+def write_outcome(folder: Path, outcome: LinkOutcome) -> None:
+    """Write it into the monitor's folder."""
+    write_bytes(folder / LINK, msgspec.json.format(msgspec.json.encode(outcome), indent=1))
+
+
+def read_outcome(folder: Path) -> LinkOutcome:
+    """The outcome in a monitor's folder."""
+    path = folder / LINK
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=LinkOutcome)
+    except (OSError, msgspec.DecodeError) as error:
+        raise FileError(f"{path}: is not the outcome of a link ({error})") from error

@@ -1,0 +1,51 @@
+"""How a drive is linked to those who listen."""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Annotated
+
+from msgspec import Meta, Struct
+
+from skidpad.core.errors import ConfigError
+
+
+class Flow(str, Enum):
+    """Who waits for whom."""
+
+    LOSSLESS = "lossless"  # the drive waits: campaigns, recordings
+    LIVE = "live"  # the drive never waits: what does not fit in the queue is dropped and counted
+
+
+class Links(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Who listens while channels drive. It changes nothing of the drive, so no run value has it."""
+
+    monitor: Annotated[
+        bool,
+        Meta(description="Judge each drive while it goes on: NAME.monitor beside its recording."),
+    ] = False
+    live: Annotated[
+        bool,
+        Meta(description="Hold drives at real time; what a listener is too slow for is dropped."),
+    ] = False
+    pin: Annotated[
+        int | None, Meta(ge=0, description="Processor for the monitor, at highest priority.")
+    ] = None
+
+    def __post_init__(self) -> None:
+        if self.pin is not None and not self.monitor:
+            raise ConfigError("--pin gives the monitor a processor and needs --monitor")
+
+    @property
+    def flow(self) -> Flow:
+        """Who waits."""
+        return Flow.LIVE if self.live else Flow.LOSSLESS
+
+
+class MonitorLinkSettings(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A monitor in a process of its own."""
+
+    flow: Flow = Flow.LOSSLESS
+    capacity: int = 20  # cycles that wait in the drive's process: 2 s
+    patience: float = 120.0  # s without any progress after which the monitor counts as hanging
+    pin: int | None = None  # processor for the monitor alone (C-231)

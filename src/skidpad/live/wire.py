@@ -1,0 +1,97 @@
+"""What goes from a drive to its monitor: the messages of the recording, with a mark per cycle.
+
+record:  kind (1 byte), channel (2 bytes, signed), length (4 bytes), content
+content: the protobuf message of the recording; of a mark k, t and the sender's monotonic clock
+"""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from typing import Any, BinaryIO
+
+from google.protobuf.message import DecodeError
+
+from skidpad.core.channels import ChannelFrame, Context, Decision, Due, TruthFrame
+from skidpad.core.errors import FileError
+from skidpad.recording import channel_codec as codec
+from skidpad.recording import channels_pb2 as pb
+from skidpad.recording.channels import Item, Losses, Message
+
+HEAD = struct.Struct("<BhI")
+MARK = struct.Struct("<qdq")
+NOBODY = -1
+LIMIT = 64 * 1024 * 1024  # bytes; a longer record is damage
+FRAME, DECISION, CONTEXT, CYCLE_OVER, END = range(5)
+
+_KINDS: dict[type, tuple[int, Callable[[Any], Any]]] = {
+    ChannelFrame: (FRAME, codec.message_from_frame),
+    Decision: (DECISION, codec.message_from_decision),
+    Context: (CONTEXT, codec.message_from_context),
+}
+_READERS: dict[int, tuple[Any, Callable[[Any], Item]]] = {
+    FRAME: (pb.Channel, codec.frame_from_message),
+    DECISION: (pb.Decision, codec.decision_from_message),
+    CONTEXT: (pb.Context, codec.context_from_message),
+}
+
+
+def packed(channel: int | None, item: Item) -> bytes:
+    """An item as a record; the true world gives none (C-021)."""
+    if isinstance(item, TruthFrame):
+        return b""
+    kind, message_of = _KINDS[type(item)]
+    content: bytes = message_of(item).SerializeToString()
+    return HEAD.pack(kind, NOBODY if channel is None else channel, len(content)) + content
+
+
+def cycle_mark(k: int, t: float, now_ns: int) -> bytes:
+    """The mark behind cycle k."""
+    return HEAD.pack(CYCLE_OVER, NOBODY, MARK.size) + MARK.pack(k, t, now_ns)
+
+
+def end_mark() -> bytes:
+    """The mark of a drive that ended; a stream that stops without it was cut."""
+    return HEAD.pack(END, NOBODY, 0)
+
+
+class WireSource:
+    """A stream of records read as channels; `sent_ns` is the clock of the last mark."""
+
+    def __init__(self, stream: BinaryIO, channels: tuple[str, ...]) -> None:
+        self.stream, self.channels = stream, channels
+        self.losses = Losses()
+        self.sent_ns = 0
+
+    def messages(self) -> Iterator[Message]:
+        """All messages until the end of the drive, and a `Due` behind each cycle."""
+        while True:
+            head = self.stream.read(HEAD.size)
+            if len(head) < HEAD.size:
+                self.losses.cut = True
+                return
+            kind, channel, length = HEAD.unpack(head)
+            if kind == END:
+                return
+            content = self.stream.read(length) if length <= LIMIT else b""
+            if len(content) < length:
+                self.losses.cut = True
+                return
+            if kind == CYCLE_OVER:
+                _, t, self.sent_ns = MARK.unpack(content)
+                yield Message(None, t, Due(t))
+                continue
+            item = self._item(kind, content)
+            if item is not None:
+                yield Message(None if channel == NOBODY else channel, item.t, item)
+
+    def _item(self, kind: int, content: bytes) -> Item | None:
+        if kind not in _READERS:
+            self.losses.foreign += 1
+            return None
+        message, read = _READERS[kind]
+        try:
+            return read(message.FromString(content))
+        except (FileError, ValueError, OverflowError, DecodeError):
+            self.losses.malformed += 1
+            return None

@@ -304,7 +304,9 @@ def per_seed(rows: pl.DataFrame, value: pl.Expr) -> pl.Series:
     rows = rows.with_columns(shown=value)
     if "seed" not in rows.columns:
         return rows["shown"]
-    return rows.group_by("seed").agg(pl.col("shown").mean()).sort("seed")["shown"]
+    return (
+        rows.group_by("seed", maintain_order=True).agg(pl.col("shown").mean()).sort("seed")["shown"]
+    )
 
 
 def paired_runs(
@@ -317,7 +319,9 @@ def paired_runs(
     keys = [k for k in by if k in table.columns]
     hashes = pl.col("log_hash").sort() if "log_hash" in table.columns else pl.lit(None)
     wanted = [pl.col(column).cast(pl.Float64).mean().alias("value"), hashes.alias("hashes")]
-    sides = [table.filter(side).group_by(keys).agg(wanted) for side in (more, less)]
+    sides = [
+        table.filter(side).group_by(keys, maintain_order=True).agg(wanted) for side in (more, less)
+    ]
     both = sides[0].join(sides[1], on=keys, suffix="_less").drop_nulls(["value", "value_less"])
     both = both.sort(keys)
     known = "log_hash" in table.columns and not table["log_hash"].has_nulls()

@@ -114,7 +114,7 @@ def indicators(drive: MonitoredDrive) -> list[Block]:
 
 def _indicator_columns(drive: MonitoredDrive) -> tuple[Column[Row], ...]:
     said = published_rows(Source.VIOLATIONS, "spi")
-    values = drive.table.group_by("indicator", "subject").agg(
+    values = drive.table.group_by("indicator", "subject", maintain_order=True).agg(
         mean=pl.col("value").mean(), least=pl.col("value").min()
     )
     found = {(r["indicator"], r["subject"]): r for r in values.to_dicts()}

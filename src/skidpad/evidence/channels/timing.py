@@ -56,7 +56,7 @@ def timing_statistics(timing: pl.DataFrame) -> pl.DataFrame:
 def time_by_objects(timing: pl.DataFrame) -> pl.DataFrame:
     """Mean time per module against the number of objects of all channels (C-238)."""
     return (
-        timing.group_by("objects")
+        timing.group_by("objects", maintain_order=True)
         .agg(pl.len().alias("cycles"), pl.col("total", *MODULES).mean())
         .sort("objects")
     )

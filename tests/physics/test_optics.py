@@ -5,6 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis.strategies import floats
 
+from skidpad.core.inputs import Beam
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import (
     daylight,
@@ -80,7 +81,7 @@ def test_daylight():
 @pytest.mark.req("A-218")
 def test_night_sight_needs_headlights():
     night = preset("clear-night")
-    assert label_range(night, headlights=False) == 0.0
+    assert label_range(night, Beam.OFF) == 0.0
     assert 70 < label_range(night) < 110
     assert label_range(preset("rain-night")) < label_range(night)
-    assert label_range(preset("clear-noon"), headlights=False) > 1000
+    assert label_range(preset("clear-noon"), Beam.OFF) > 1000

@@ -7,8 +7,15 @@ import pytest
 from worlds import World, lanes_along, states_at, straight, table_of, traffic
 
 from skidpad.core.geometry import Pose
+from skidpad.core.inputs import Beam, Outside
 from skidpad.core.specs import CameraSpec, Modality
-from skidpad.core.vocabulary import ActorKind, LightState, RangeModel, SemanticClass
+from skidpad.core.vocabulary import (
+    ActorKind,
+    GripModel,
+    LightState,
+    RangeModel,
+    SemanticClass,
+)
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import preset
 from skidpad.roads.roadside import SignalHead
@@ -291,3 +298,59 @@ def test_an_even_road_is_evenly_lit_up_to_the_borders_of_the_image():
     row = rgb[590, [0, 1, 400, 798, 799]].astype(int)
     assert np.ptp(column, axis=0).max() <= 2
     assert np.ptp(row, axis=0).max() <= 2
+
+
+@pytest.mark.parametrize("beam", [None, *Beam])
+def test_a_suite_whose_weather_changed_sees_as_one_that_began_with_it(beam):
+    world = straight()
+    table, states = traffic(world)
+    night = preset("rain-night")
+    settings = PixelSettings(range_model=RangeModel.PHYSICAL, seed=4)
+    changed = PixelSuite(world, table, twelve_sensors(), preset("clear-noon"), settings)
+    changed.observe(0, states, {})
+    outside = Outside(
+        weather=night, grip=GripModel.NONE, range_model=RangeModel.PHYSICAL, beam=beam
+    )
+    changed.change(outside)
+    began = PixelSuite(world, table, twelve_sensors(), night, settings)
+    if beam is not None:
+        began.change(outside)
+    a, b = changed.observe(1, states, {}), began.observe(1, states, {})
+    for id in ("rgb_front", "rgb_top"):
+        assert np.array_equal(a.images[id].rgb, b.images[id].rgb)
+    assert np.array_equal(
+        a.images["depth_roof"].inverse_depth, b.images["depth_roof"].inverse_depth
+    )
+    assert np.array_equal(a.images["semantic_roof"].labels, b.images["semantic_roof"].labels)
+    assert all(np.array_equal(p, q) for p, q in zip(a.radar, b.radar, strict=True))
+
+
+@pytest.mark.req("A-219")
+def test_a_high_beam_lights_the_road_farther_and_nothing_else_changes():
+    world = straight(400, rails=False)
+    table, states = traffic(world)
+    eyes = PixelSuite(world, table, twelve_sensors(), preset("clear-night"))
+    seen = {}
+    for beam in (None, *Beam):
+        eyes.change(
+            Outside(
+                weather=preset("clear-night"),
+                grip=GripModel.NONE,
+                range_model=RangeModel.PHYSICAL,
+                beam=beam,
+            )
+        )
+        images = eyes.observe(0, states, {}).images
+        depth = images["depth_roof"].inverse_depth.copy()
+        rgb = images["rgb_front"].rgb.astype(float)
+        # the ego's own lane at 15 m and 60 m, 1.3 m below the camera: rows from focal length 400
+        near, far = (rgb[300 + round(400 * 1.3 / d), 380:420].mean() for d in (15.0, 60.0))
+        seen[beam] = near, far, depth, images["semantic_roof"].labels.copy()
+    off, low, high = (seen[beam] for beam in Beam)
+    assert off[0] + 10 < low[0] <= high[0] + 1
+    assert high[1] > low[1] + 5 > off[1] + 5
+    assert seen[None][:2] == low[:2]  # by night the low beam is on by itself
+    far_off, far_low, far_high = (
+        np.count_nonzero(s[3] == SemanticClass.CAR) for s in (off, low, high)
+    )
+    assert far_off <= far_low <= far_high

@@ -16,14 +16,17 @@ from PIL import Image
 
 from skidpad.campaign.backends import keep_server
 from skidpad.campaign.channel_drive import drive_segment
+from skidpad.campaign.desk import Desk, Recorded
 from skidpad.campaign.drive import Moment, Sink
 from skidpad.campaign.run import run as drive_again
 from skidpad.campaign.stored import read_run, read_segment
 from skidpad.campaign.views import SIZE, twelve_views
 from skidpad.core.errors import ConfigError, OutputError
+from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import StackReport
 from skidpad.recording.channel_hash import recording_hash
+from skidpad.recording.inputs import read_inputs
 from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.recording.runlog import RunLog
 
@@ -53,11 +56,20 @@ def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None 
     closely = Closely(begin_s, end_s, out, film)
     keep_server(spec.backend)
     try:
-        again = drive_again(spec, sinks=(closely,), ticks=round(end_s / DT)).log
+        ticks = round(end_s / DT)
+        again = drive_again(spec, sinks=(closely,), ticks=ticks, desk=desk_of(run, spec)).log
     finally:
         closely.close()
-    same = log_hash(again) == log_hash(first_ticks(stored, len(again)))
+    n = len(again)
+    same = log_hash(first_ticks(again, n)) == log_hash(first_ticks(stored, n))
     return Rerun(same, tuple(closely.pictures), film, tuple(closely.trace))
+
+
+def desk_of(run: Path, spec: RunSpec) -> Desk | None:
+    """The desk of a stored run, at which everything is done again; None: nobody sat there."""
+    if not spec.inputs:
+        return None
+    return Desk(Recorded(read_inputs(run, spec.inputs)), spec)
 
 
 def same_segment(recording: Path) -> bool:
@@ -88,6 +100,7 @@ def first_ticks(log: RunLog, n: int) -> RunLog:
         report=cut(log.report),
         supervision=log.supervision[:n],
         weather=log.weather[:n],
+        weathers=log.weathers[: int(log.weather[:n].max()) + 1],
         events=tuple(e for e in log.events if e.tick <= last),
     )
 

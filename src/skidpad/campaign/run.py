@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from skidpad.campaign.backends import make_backend
 from skidpad.campaign.cast import Stage, driver_of, stage_of, with_sensors
+from skidpad.campaign.desk import Desk, DeskBackend, DeskDriver, DeskSupervisor, UntilEnded
 from skidpad.campaign.drive import Moment, Sink, Timer, loop
 from skidpad.campaign.snapshots import Snapshots
 from skidpad.core.errors import StackError, require_choice
@@ -37,6 +38,8 @@ from skidpad.stack.configurations import functions_of
 from skidpad.stack.interface import Stack
 from skidpad.stack.loading import load_stack
 from skidpad.stack.settings import load_profile
+
+DESK_ROOM = 12_000  # ticks of a log at first, as nobody knows how long a person drives
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,6 +130,20 @@ class Log(Sink):
             self.log.relocated(Relocation(truth.tick, m.reason, m.shift, m.old, m.new))
 
 
+class DeskLog(Log):
+    """The same, with the weather that a person chooses."""
+
+    def __init__(self, header: LogHeader, weather: str, ticks: int, desk: Desk) -> None:
+        super().__init__(header, weather, ticks)
+        self.desk = desk
+
+    def see(self, moment: Moment) -> None:
+        """Write down the moment; the weather is another one from the next one on."""
+        super().see(moment)
+        if self.desk.changed:
+            self.log.set_weather(self.desk.outside.weather.name)
+
+
 def run(
     spec: RunSpec,
     kind: type[Stack] | None = None,
@@ -135,21 +152,26 @@ def run(
     folder: Path | None = None,
     sinks: Sequence[Sink] = (),
     ticks: int | None = None,
+    desk: Desk | None = None,
 ) -> Run:
     """Drive a run on roads or in a scenario; a stack that fails is an outcome.
 
     kind: the stack's class, if it is loaded. backend: by default a fresh one of the run's choice.
     folder: where snapshots of collisions go. sinks: who else looks on. ticks: end
-    it after so many at the latest.
+    it after so many at the latest. desk: where a person sits, or sat.
     """
     stage = stage_of(spec)
     if ticks is not None:
         stage = replace(stage, script=Timer(ticks, stage.script))
     backend = make_backend(spec.backend) if backend is None else backend
-    log = log_of(spec, stage)
+    if desk is not None:
+        backend = DeskBackend(backend, desk)
+        script = UntilEnded(stage.script, desk)
+        stage = replace(stage, supervisor=DeskSupervisor(stage.supervisor, desk), script=script)
+    log = log_of(spec, stage, desk)
     snapshots = Snapshots(folder, spec.driver.label, spec.weather.name, stage.setup.dt)
     try:
-        failure = _drive(spec, stage, kind, backend, (log, snapshots, *sinks))
+        failure = _drive(spec, stage, kind, desk, backend, (log, snapshots, *sinks))
         if failure is not None:
             log.log.notice(backend.truth().tick, NoticeSource.STACK, str(failure))
     finally:
@@ -171,6 +193,7 @@ def _drive(
     spec: RunSpec,
     stage: Stage,
     kind: type[Stack] | None,
+    desk: Desk | None,
     backend: Backend,
     sinks: Sequence[Sink],
 ) -> StackError | None:
@@ -183,12 +206,13 @@ def _drive(
             sink.begin(backend.truth().table)
         return error
     frame = backend.reset(setup, spec.seed)
-    failure = loop(backend, frame, driver, stage.supervisor, stage.script, sinks)
+    at_wheel = driver if desk is None else DeskDriver(driver, desk)
+    failure = loop(backend, frame, at_wheel, stage.supervisor, stage.script, sinks)
     driver.stack.close()
     return failure
 
 
-def log_of(spec: RunSpec, stage: Stage) -> Log:
+def log_of(spec: RunSpec, stage: Stage, desk: Desk | None = None) -> Log:
     """An empty log with what holds for the whole run."""
     about = {
         "config": spec.driver.label,
@@ -199,7 +223,10 @@ def log_of(spec: RunSpec, stage: Stage) -> Log:
     }
     dt = stage.setup.dt
     header = LogHeader(map=stage.map.name, map_hash=stage.map.content_hash, dt=dt, about=about)
-    return Log(header, spec.weather.name, round(spec.duration / dt) + 1)
+    room = round(spec.duration / dt) + 1
+    if desk is None:
+        return Log(header, spec.weather.name, room)
+    return DeskLog(header, spec.weather.name, min(room, DESK_ROOM), desk)
 
 
 def off_road(log: RunLog, map: RoadMap) -> NDArray[np.bool_]:

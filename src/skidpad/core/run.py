@@ -249,6 +249,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ] = Render.NEEDED
     overlay: Annotated[bool, Meta(description="Rain drops on the cameras (pixels).")] = False
     backend: BackendChoice = BackendChoice()
+    inputs: str = ""  # SHA-256 of what a person did meanwhile (inputs.jsonl); "": nobody was there
 
     def __post_init__(self) -> None:
         if isinstance(self.driver, ChannelCrew) is not isinstance(self.course, Route):

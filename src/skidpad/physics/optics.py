@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from math import exp, inf, log, log10, radians, sin, sqrt
 
+from skidpad.core.inputs import Beam
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import rain_rate
 
@@ -24,6 +25,8 @@ RAIN_SIGHT_CONTRAST = 0.02  # the contrast of that formula (Koschmieder, 1924)
 RADAR_GHZ = 77.0
 
 HEADLIGHT_CANDELA = 10_000.0  # low beam towards a car ahead, UN R112 order of magnitude
+HIGH_BEAM_CANDELA = 40_500.0  # least maximum of a class B driving beam, UN R149 table 5
+VISIBILITY_MOST = 1000.0  # m, what an estimate begins with (A-220)
 E_SEEN_LUX = 1.0  # illuminance at which a dark object is noticed; Schmidt-Clausen (1982), 1 to 3
 NIGHT_LUX = 0.05  # moonless sky with skyglow beside a road
 
@@ -54,6 +57,11 @@ def extinction(weather: Weather) -> float:
 def sight(weather: Weather) -> float:
     """Meteorological optical range in m (5 % contrast of a black target by day)."""
     return -log(CONTRAST_SEEN) / extinction(weather)
+
+
+def visibility(weather: Weather) -> float:
+    """Estimate of visibility in m as automatic headlights read it, at most 1000 m (A-220)."""
+    return min(sight(weather), VISIBILITY_MOST)
 
 
 def transmission(weather: Weather, distance: float) -> float:
@@ -101,20 +109,21 @@ def depth_range(weather: Weather) -> float:
     return _reach(rain + fog, weather.fog_distance, budget - spent)
 
 
-def label_range(weather: Weather, headlights: bool = True) -> float:
+def label_range(weather: Weather, beam: Beam = Beam.LOW) -> float:
     """Distance in m to which an unlit object is recognised: by contrast, and at night by light.
 
-    At night a low beam must throw E_SEEN_LUX through the air onto it: I exp(-beta r) / r^2.
+    At night a beam must throw E_SEEN_LUX through the air onto it: I exp(-beta r) / r^2.
     """
     by_contrast = depth_range(weather)
     if daylight(weather) >= 10.0 * E_SEEN_LUX:
         return by_contrast
-    if not headlights:
+    if beam is Beam.OFF:
         return 0.0
+    candela = HIGH_BEAM_CANDELA if beam is Beam.HIGH else HEADLIGHT_CANDELA
     low, high = 0.1, 1000.0
     for _ in range(60):
         middle = 0.5 * (low + high)
-        lux = HEADLIGHT_CANDELA / middle**2 * transmission(weather, middle)
+        lux = candela / middle**2 * transmission(weather, middle)
         low, high = (middle, high) if lux > E_SEEN_LUX else (low, middle)
     return min(by_contrast, low)
 

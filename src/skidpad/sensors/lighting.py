@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.inputs import Beam
 from skidpad.core.lefthanded import mirrored
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import extinction
@@ -36,12 +37,15 @@ class Lighting(NamedTuple):
     haze_begins: float  # m
     wet: float  # 0 dry .. 1 water on the road
     snow: float  # 0 .. 1 share of white ground
-    headlights: float  # strength of the ego's low beam, 0 off
+    headlights: float  # strength of the ego's beam, 0 off
+    high: bool  # it is the high beam
     lamps: float  # strength of other vehicles' lamps, 0 by day
 
 
-def lighting(weather: Weather) -> Lighting:
-    """The light of a weather."""
+def lighting(weather: Weather, beam: Beam | None = None) -> Lighting:
+    """The light of a weather. beam: of the ego; None: low beam by night (A-218)."""
+    if beam is None:
+        beam = Beam.LOW if weather.is_night else Beam.OFF
     altitude = radians(weather.sun_altitude_deg)
     azimuth = radians(mirrored(weather.sun_azimuth_deg))
     direction = np.array(
@@ -73,7 +77,8 @@ def lighting(weather: Weather) -> Lighting:
         weather.fog_distance if weather.fog_density > 0.0 else 0.0,
         max(weather.wetness, weather.precipitation_deposits) / 100.0,
         _smooth(weather.snow_depth_mm / 20.0),
-        1.0 if weather.is_night else 0.0,
+        0.0 if beam is Beam.OFF else 1.0,
+        beam is Beam.HIGH,
         night,
     )
 

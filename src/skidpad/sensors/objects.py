@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.frames import RadarPoints, Segments
+from skidpad.core.inputs import Beam
 from skidpad.core.jit import Held, hold, kernel
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
@@ -97,15 +98,23 @@ class ObjectSuite:
             for s in specs
             if isinstance(s, CameraSpec) and s.modality is Modality.DEPTH
         ]
-        self.antennas = [
-            antenna_of(s, seed, dt, weather) for s in specs if isinstance(s, RadarSpec)
-        ]
+        self._specs, self._seed, self._dt = specs, seed, dt
+        self.see_through(weather, None)
         self.labels = np.array([LABEL_OF_KIND[ActorKind(k)] for k in table.kind], dtype=np.uint8)
-        self.limit = SIGHT if weather is None else min(label_range(weather), SIGHT)
         self.lanes = lanes
         self.walls = walls_of(roadside)
         self.posts = posts_of(roadside)
         self._states: ActorStates | None = None
+
+    def see_through(self, weather: Weather | None, beam: Beam | None) -> None:
+        """The weather that limits the ranges, None: it does not; beam None: as by night (A-218)."""
+        self.antennas = [
+            antenna_of(s, self._seed, self._dt, weather)
+            for s in self._specs
+            if isinstance(s, RadarSpec)
+        ]
+        lit = Beam.LOW if beam is None else beam
+        self.limit = SIGHT if weather is None else min(label_range(weather, lit), SIGHT)
 
     def segments(self, states: ActorStates) -> dict[str, Segments]:
         """What each depth camera sees of vehicles, by camera id."""

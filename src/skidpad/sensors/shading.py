@@ -112,6 +112,8 @@ _F0 = np.float32(0.03)  # reflectance of water and glass at normal incidence, ab
 _BEAM_WIDTH = np.float32(2.6)  # 1 / tangent squared: half the light at 22 deg to the side
 _BEAM_RANGE = np.float32(1.0 / 380.0)  # 1/m^2: a low beam lights some 40 m of road
 _CUT_SLOPE = np.float32(42.0)  # the cut-off: half the light 1.4 deg above the lamp
+_HIGH_RANGE = np.float32(1.0 / 3000.0)  # 1/m^2: a high beam lights some 110 m of road
+_HIGH_SLOPE = np.float32(6.0)  # and falls to half 10 deg above the lamp: no cut-off, by eye
 _LAMP_X, _LAMP_Z = np.float32(HEADLAMP_X), np.float32(HEADLAMP_Z)
 _BEAM_BLUE = np.float32(0.82)
 _BEAM_POWER = np.float32(2.6)
@@ -187,9 +189,17 @@ def _slopes(
 
 @kernel
 def _headlights(
-    v: np.float32, count: int, beam: np.float32, to_body: Float32, offset: Float32, work: Float32
+    v: np.float32,
+    count: int,
+    light: Lighting,
+    to_body: Float32,
+    offset: Float32,
+    work: Float32,
 ) -> None:
-    """Light of the ego's low beam on a block: a soft cone, cut off above the lamps."""
+    """Light of the ego's beam on a block: a soft cone, the low one cut off above the lamps."""
+    beam = np.float32(light.headlights) * _BEAM_POWER
+    slope = _HIGH_SLOPE if light.high else _CUT_SLOPE
+    reach = _HIGH_RANGE if light.high else _BEAM_RANGE
     b00, b01, b02 = to_body[0, 0], to_body[0, 1], to_body[0, 2]
     b10, b11, b12 = to_body[1, 0], to_body[1, 1], to_body[1, 2]
     b20, b21, b22 = to_body[2, 0], to_body[2, 1], to_body[2, 2]
@@ -202,10 +212,10 @@ def _headlights(
         pz = z * (b20 * u + b21 * v + b22) + o2
         lead = px if px > _NEAR_LAMP else _NEAR_LAMP
         side = py / (lead + _LAMP_APART)
-        rise = pz / lead * _CUT_SLOPE
+        rise = pz / lead * slope
         rise = rise if rise > _ZERO else _ZERO
         spread = _ONE + _BEAM_WIDTH * side * side
-        fall = _ONE + (px * px + py * py) * _BEAM_RANGE
+        fall = _ONE + (px * px + py * py) * reach
         lit = beam / (spread * spread * fall * fall * (_ONE + rise * rise))
         work[_H + x] = lit if px > _ZERO else _ZERO
 
@@ -328,7 +338,6 @@ def shade(
     sun, up: (3,) camera axes; to_body, offset: camera to ego frame.
     """
     width = inverse.shape[1]
-    beam = np.float32(light.headlights) * _BEAM_POWER
     work[_H : _H + BLOCK] = _ZERO
     for y in range(view.top, view.height):
         v = np.float32((y + 0.5 - view.cy) / view.focal)
@@ -337,8 +346,8 @@ def shade(
             solid, empty = _slopes(inverse, y, first, count, view, work)
             if solid:
                 _gather(key, y, first, count, table, work)
-                if beam > _ZERO:
-                    _headlights(v, count, beam, to_body, offset, work)
+                if light.headlights > 0.0:
+                    _headlights(v, count, light, to_body, offset, work)
                 _surfaces(v, count, light, sun, up, work)
             if empty:
                 _sky(v, count, light, sun, up, work)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from skidpad.core.errors import BackendError
 from skidpad.core.frames import CameraImage, PartialImages, RadarPoints
 from skidpad.core.geometry import Pose
+from skidpad.core.inputs import Beam, Outside
 from skidpad.core.setup import DT
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
@@ -73,23 +74,36 @@ class PixelSuite:
     ) -> None:
         """Specs that are neither camera nor radar are somebody else's."""
         self.cameras = {s.id: s for s in specs if isinstance(s, CameraSpec)}
-        self.settings, seed, dt = settings, settings.seed, settings.dt
-        limited = settings.range_model is RangeModel.PHYSICAL
-        sight = Sight(depth_range(weather), label_range(weather)) if limited else UNLIMITED
+        self.settings, self._table, self._specs = settings, table, specs
         widest = max((c.width for c in self.cameras.values()), default=1)
         self.scene = LiveScene(map, table, widest)
-        self.shading = Shading(self.scene.static.palette, table, lighting(weather))
+        self._rgb = {
+            c.id: np.zeros((c.height, c.width), dtype=np.dtype("<u4"))
+            for c in self.cameras.values()
+            if c.modality is Modality.RGB
+        }
+        self._look_out(weather, settings.range_model, None)
+        self._ego = Pose(0.0, 0.0)
+        self.tick = -1
+
+    def change(self, outside: Outside) -> None:
+        """Weather and headlights are others from the next observation on."""
+        self._look_out(outside.weather, outside.range_model, outside.beam)
+
+    def _look_out(self, weather: Weather, range_model: RangeModel, beam: Beam | None) -> None:
+        """Light, sight and noise of a weather."""
+        settings, seed, dt = self.settings, self.settings.seed, self.settings.dt
+        limited = range_model is RangeModel.PHYSICAL
+        labels = label_range(weather, Beam.LOW if beam is None else beam)
+        sight = Sight(depth_range(weather), labels) if limited else UNLIMITED
+        light = lighting(weather, beam)
+        self.shading = Shading(self.scene.static.palette, self._table, light)
         self._passes: dict[tuple[object, Sight], Pass] = {}
         self._pass_of: dict[str, Pass] = {}
         for camera in self.cameras.values():
             eye = UNLIMITED if camera.modality is Modality.RGB else sight
             key = (camera.view, eye)
             self._pass_of[camera.id] = self._passes.setdefault(key, Pass(camera, eye))
-        self._rgb = {
-            c.id: np.zeros((c.height, c.width), dtype=np.dtype("<u4"))
-            for c in self.cameras.values()
-            if c.modality is Modality.RGB
-        }
         effect = degradation(weather, exclusive=settings.exclusive_stages)
         self._degraded = (
             {id: CameraNoise(id, seed, effect) for id in self._rgb}
@@ -98,11 +112,9 @@ class PixelSuite:
         )
         self.radars = [
             Radar(s, beam_of(s, seed, dt), radar_range(weather, s.range) if limited else s.range)
-            for s in specs
+            for s in self._specs
             if isinstance(s, RadarSpec)
         ]
-        self._ego = Pose(0.0, 0.0)
-        self.tick = -1
 
     def observe(
         self,

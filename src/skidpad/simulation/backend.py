@@ -7,6 +7,7 @@ from typing import Protocol
 
 from skidpad.core.frames import Frame
 from skidpad.core.geometry import Pose
+from skidpad.core.inputs import Outside
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import VehicleCommand, WorldTruth
 
@@ -28,6 +29,10 @@ class Backend(Protocol):
 
     def relocate(self, pose: Pose, v: float) -> None:
         """Put the ego at `pose` with speed `v` along it, no rotation."""
+        ...
+
+    def change(self, outside: Outside) -> None:
+        """Weather, grip and headlights are others from the next step on."""
         ...
 
     def close(self) -> None:

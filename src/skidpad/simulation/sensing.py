@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.frames import CameraImage, RadarPoints, Segments
+from skidpad.core.inputs import Outside
 from skidpad.core.setup import Setup
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, RangeModel, SensorLevel
@@ -39,6 +40,10 @@ class Sensing(Protocol):
         braking: NDArray[np.bool_],
     ) -> Readings:
         """Readings of this state; valid until the next call (decision X-11)."""
+        ...
+
+    def change(self, outside: Outside) -> None:
+        """Weather and headlights are others from the next reading on."""
         ...
 
 
@@ -75,6 +80,10 @@ class Pixels:
         seen = self.suite.observe(tick, states, lights, braking)
         return Readings(seen.images, NO_SEGMENTS, seen.radar)
 
+    def change(self, outside: Outside) -> None:
+        """Weather and headlights are others from the next reading on."""
+        self.suite.change(outside)
+
 
 class Objects:
     """Geometric detection from boxes (decision M-3)."""
@@ -101,6 +110,11 @@ class Objects:
         """Segments of the depth cameras; lights and lamps play no part at this level."""
         del lights, braking
         return Readings(NO_IMAGES, self.suite.segments(states), self.suite.radar(tick, states))
+
+    def change(self, outside: Outside) -> None:
+        """Weather and headlights are others from the next reading on."""
+        physical = outside.range_model is RangeModel.PHYSICAL
+        self.suite.see_through(outside.weather if physical else None, outside.beam)
 
 
 def sensing_of(

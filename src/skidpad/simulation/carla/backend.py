@@ -8,12 +8,14 @@ from contextlib import suppress
 from skidpad.core.errors import BackendError
 from skidpad.core.frames import Frame
 from skidpad.core.geometry import Pose
+from skidpad.core.inputs import Outside
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.simulation.carla.connection import connect, speaking
 from skidpad.simulation.carla.options import CarlaOptions
 from skidpad.simulation.carla.pacer import Pacer, Watchdog
 from skidpad.simulation.carla.session import Session
+from skidpad.simulation.carla.weather import set_weather
 
 
 class CarlaBackend:
@@ -69,6 +71,12 @@ class CarlaBackend:
         """Put the ego at `pose` with speed v along it; its height follows from the road."""
         with speaking(self.options, "relocating the ego"):
             self.session.relocate(pose, v)
+
+    def change(self, outside: Outside) -> None:
+        """The server's weather is another one; grip and headlights stay as the run began."""
+        session = self.session
+        with speaking(self.options, "changing the weather"):
+            set_weather(session.carla, session.world, outside.weather)
 
     def close(self) -> None:
         """Sensors first, then actors, then the time mode; a dead server does not matter."""

@@ -9,9 +9,11 @@ from types import MappingProxyType
 from skidpad.core.errors import BackendError
 from skidpad.core.frames import Frame, SensorFrame
 from skidpad.core.geometry import Pose
+from skidpad.core.inputs import Outside
 from skidpad.core.randomness import stream
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
+from skidpad.physics.grip import grip_params
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.asked import AskedSensors
 from skidpad.simulation.sensing import sensing_of
@@ -46,6 +48,7 @@ class EmbeddedBackend:
     def reset(self, setup: Setup, seed: int) -> Frame:
         """Begin a run: everything is built anew (decision X-12)."""
         self._world, self._noise = staged(setup, seed), setup.localisation_noise
+        self._setup = setup
         self._localisation = stream(seed, "ego", "localisation")
         self.sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
         self._asked = AskedSensors(self.map, self.world.table, setup) if setup.asked else None
@@ -75,6 +78,18 @@ class EmbeddedBackend:
     def relocate(self, pose: Pose, v: float) -> None:
         """Put the ego at `pose` with speed v along it; its height follows from the road."""
         self.world.relocate(pose, v)
+
+    def change(self, outside: Outside) -> None:
+        """Weather, grip and headlights are others from the next step on.
+
+        Drivers of the background keep the caution that they began with.
+        """
+        weather, range_model = outside.weather, outside.range_model
+        self.world.grip = grip_params(weather, outside.grip, self._setup.mu_ref)
+        self.sensing.change(outside)
+        self._setup = replace(self._setup, weather=weather, range_model=range_model)
+        if self._asked is not None:
+            self._asked = AskedSensors(self.map, self.world.table, self._setup)
 
     def close(self) -> None:
         """Forget the run."""

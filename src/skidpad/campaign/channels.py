@@ -64,7 +64,7 @@ def drive_one(
 ) -> Driven[DriveKey, DriveMetrics]:
     """In a worker: drive one segment and write both files."""
     watch = Stopwatch()
-    folder = out / route_of(spec).name
+    folder = out / spec.cell
     folder.mkdir(parents=True, exist_ok=True)
     recording = folder / f"{spec.name}.mcap"
     outcome = drive_segment(spec, recording, links)

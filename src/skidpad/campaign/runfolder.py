@@ -9,8 +9,9 @@ from typing import Any
 
 import yaml
 
+from skidpad.core.names import inside
 from skidpad.recording.campaigns import RUNS
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import output_error, write_bytes
 from skidpad.recording.logfiles import write_log
 from skidpad.recording.results import Timing
 from skidpad.recording.runlog import RunLog
@@ -32,10 +33,18 @@ class Stopwatch:
 
 
 def fresh_folder(out: Path, run: str) -> Path:
-    """Where a run of this name goes, without what a killed attempt left; it does not exist yet."""
-    folder = out / RUNS / run
-    if folder.exists():
-        shutil.rmtree(folder)
+    """Where a run of this name goes, without what a killed attempt left; it does not exist yet.
+
+    Nothing outside OUT/runs is ever removed: ConfigError for a name that leads out of it.
+    """
+    folder = inside(out / RUNS, run)
+    try:
+        if folder.is_symlink():
+            folder.unlink()
+        elif folder.exists():
+            shutil.rmtree(folder)
+    except OSError as error:
+        raise output_error(folder, error) from error
     return folder
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.jit import user_cache
+from skidpad.core.names import path_part
 from skidpad.core.run import BackendChoice, BackendKind
 from skidpad.roads.bundled import bundled_maps
 
@@ -40,7 +41,7 @@ def map_of(map: str, choice: BackendChoice) -> str:
     )
     process.start()
     process.join()
-    path = folder / f"{map}.xodr"
+    path = folder / path_part(f"{map}.xodr")
     if not path.is_file() or process.exitcode == 1:
         raise BackendError(f"map {map} could not be fetched from the CARLA server")
     return str(path)

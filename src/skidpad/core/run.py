@@ -13,6 +13,7 @@ import msgspec
 from msgspec import Meta, Struct
 
 from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.names import path_part, slug
 from skidpad.core.vocabulary import SensorLevel, TrafficStart
 from skidpad.core.weather import Weather
 
@@ -259,14 +260,14 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def cell(self) -> str:
-        """Name of the runs that differ from this one in the seed alone."""
+        """Name of the runs that differ from this one in the seed alone; it can name a folder."""
         if isinstance(self.course, Route):
-            return self.course.name
+            return path_part(self.course.name)
         if isinstance(self.course, Roads):
-            return f"{slug(self.driver.label)}_{self.weather.name}"
+            return path_part(f"{slug(self.driver.label)}_{self.weather.name}")
         scenario = self.course.file.rpartition("/")[2].removesuffix(".xosc")
         what = "-".join(filter(None, (scenario, self.course.variant, "drops" * self.overlay)))
-        return f"{what}_{self.weather.name}_{self.friction.value}"
+        return path_part(f"{what}_{self.weather.name}_{self.friction.value}")
 
     @property
     def name(self) -> str:
@@ -300,8 +301,3 @@ def run_from_plain(plain: dict[str, Any], where: str) -> RunSpec:
         return msgspec.convert({k: v for k, v in plain.items() if k != "version"}, RunSpec)
     except msgspec.ValidationError as error:
         raise FileError(f"{where} does not describe a run: {error}") from error
-
-
-def slug(label: str) -> str:
-    """A label as part of a file's name."""
-    return "".join(c if c.isalnum() else "-" for c in label)

@@ -10,6 +10,7 @@ from typing import Any, Generic
 import polars as pl
 
 from skidpad.core.errors import FileError
+from skidpad.core.names import inside
 from skidpad.recording.files import read_parquet
 from skidpad.recording.ledger import E, common_configuration, fingerprints, latest, read_ledger
 from skidpad.recording.logfiles import TICKS
@@ -59,7 +60,7 @@ class CampaignFolder(Generic[E]):
 
     def log(self, run: str) -> Path | None:
         """Where the log of the run of this name lies; None when it was not kept."""
-        folder = self.path / RUNS / run
+        folder = inside(self.path / RUNS, run)
         return folder if (folder / TICKS).is_file() else None
 
 

@@ -9,6 +9,8 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from skidpad.core.errors import FileError
+from skidpad.core.names import inside
 from skidpad.recording.files import read_parquet, write_parquet
 from skidpad.recording.ledger import Entry
 from skidpad.recording.results import Columns, metric
@@ -68,7 +70,7 @@ COLUMNS = ("x", "y", "v", "cvip", "steer", "brake", "throttle", "npc_x", "npc_y"
 
 def series_path(folder: Path, cell: str, seed: int) -> Path:
     """Where the recorded series of a run lie."""
-    return folder / SERIES / cell / f"{seed:06d}.parquet"
+    return inside(folder / SERIES, cell) / f"{seed:06d}.parquet"
 
 
 def write_series(path: Path, series: NDArray[np.float32]) -> None:
@@ -79,6 +81,8 @@ def write_series(path: Path, series: NDArray[np.float32]) -> None:
 def read_series(folder: Path, run: str) -> pl.DataFrame:
     """The series of the run of this name."""
     cell, _, seed = run.rpartition("-")
+    if not (seed.isascii() and seed.isdigit()):
+        raise FileError(f"the ledger of {folder} names a run {run!r:.200}, which has no seed")
     return read_parquet(series_path(folder, cell, int(seed)))[0]
 
 

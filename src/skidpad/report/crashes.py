@@ -8,7 +8,7 @@ from pathlib import Path
 
 import polars as pl
 
-from skidpad.core.run import slug
+from skidpad.core.names import slug
 from skidpad.evidence.drive.collisions import Crash, find_crashes
 from skidpad.evidence.drive.prepared import Drive, prepare
 from skidpad.recording.logfiles import read_log
@@ -89,7 +89,6 @@ def _cell_block(matrix: Matrix, config: str, weather: str, found: list[Found]) -
         return Cards(title, inline)
     name = slug(f"{config}_{weather}") + ".html"
     pages = matrix.folder.path / CARDS
-    pages.mkdir(exist_ok=True)
     section = Section(title, [Cards(title, [crash_card(*item) for item in found], open=True)])
     write_page(Page("Crashes", title, [section]), pages / name)
     total = int(crashed["fatal_collisions"].sum())

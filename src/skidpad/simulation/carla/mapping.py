@@ -5,13 +5,14 @@ from __future__ import annotations
 from pathlib import Path
 
 from skidpad.core.errors import BackendError
+from skidpad.core.names import path_part
 from skidpad.simulation.carla.connection import connect, speaking
 from skidpad.simulation.carla.options import CarlaOptions
 from skidpad.simulation.carla.scene import served_name
 
 
 def fetch_map(options: CarlaOptions, name: str, folder: Path) -> Path:
-    """Write the server's map of that name as `folder`/NAME.xodr; BackendError when it has none."""
+    """Write the server's map of that name into `folder`; BackendError when it has none."""
     connection = connect(options)
     with speaking(options, f"fetching map {name}"):
         client = connection.client
@@ -24,6 +25,6 @@ def fetch_map(options: CarlaOptions, name: str, folder: Path) -> Path:
             )
         text = client.load_world(served).get_map().to_opendrive()
     folder.mkdir(parents=True, exist_ok=True)
-    path = folder / f"{name}.xodr"
+    path = folder / path_part(f"{name}.xodr")
     path.write_text(text, encoding="utf-8")
     return path

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import deepcopy
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -225,7 +226,10 @@ def recovery_settings(s: Settings) -> RecoverySettings:
 def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> StackAtWheel:
     """The stack that drives, built; StackError when it cannot be. kind: its class, if loaded."""
     found, settings = _class_of(spec, stage)
-    stack = GuardedStack(kind or found, stage.setup.specs, stage.map, settings)
+    # our own stack gives the map's arrays to kernels, which know one type of array
+    chosen = kind or found
+    map = stage.map if chosen is AdasStack else stage.map.read_only()
+    stack = GuardedStack(chosen, stage.setup.specs, map, settings)
     return StackAtWheel(stack, Lens(spec.weather, spec.seed) if spec.overlay else None)
 
 
@@ -233,7 +237,7 @@ def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, An
     driver = spec.driver
     match driver:
         case StackDriver():
-            return load_stack(driver.where), driver.options
+            return load_stack(driver.where), deepcopy(driver.options)  # whatever it does to them
         case AgentDriver():
             return load_agent(driver.where), {}
         case Passenger():

@@ -42,7 +42,7 @@ def work(job: Job, warm_up: Callable[[], None] | None) -> Finished:
     worker: Worker = given(getattr(_here, "worker", None), job)
     finished = None
     while finished is None:
-        wait([worker.pipe], worker.patience())
+        wait(worker.signs, worker.patience())
         finished = worker.collect()
     worker.job = None
     _here.worker = worker

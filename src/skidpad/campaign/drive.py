@@ -148,9 +148,9 @@ def loop(
             frame = replace(frame, supervision=phase)
         try:
             command = driver.drive(frame, truth)
+            report = driver.report
         except StackError as failure:
             return failure
-        report = driver.report
         action = supervisor.act(command, report)
         moment = Moment(frame, truth, driver, command, report, action)
         for sink in sinks:

@@ -77,7 +77,10 @@ def _supervise(crew: list[Worker | None], queue: _Queue) -> Iterator[Finished]:
         busy = {place: w for place, w in enumerate(crew) if w is not None and w.job is not None}
         if not busy:
             return
-        wait([w.pipe for w in busy.values()], min(w.patience() for w in busy.values()))
+        wait(
+            [sign for w in busy.values() for sign in w.signs],
+            min(w.patience() for w in busy.values()),
+        )
         for place, worker in busy.items():
             finished = worker.collect()
             if finished is None:

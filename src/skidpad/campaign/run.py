@@ -26,6 +26,7 @@ from skidpad.core.run import (
     StackDriver,
 )
 from skidpad.core.states import ActorTable
+from skidpad.core.told import clean
 from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
@@ -40,6 +41,7 @@ from skidpad.stack.loading import load_stack
 from skidpad.stack.settings import load_profile
 
 DESK_ROOM = 12_000  # ticks of a log at first, as nobody knows how long a person drives
+LONGEST_STORY = 20_000  # characters of a traceback
 
 
 @dataclass(frozen=True, slots=True)
@@ -239,4 +241,5 @@ def off_road(log: RunLog, map: RoadMap) -> NDArray[np.bool_]:
 def story(error: StackError) -> str:
     """The traceback of a stack that failed."""
     cause = error.__cause__ or error
-    return "".join(traceback.format_exception(cause)) + f"\n{error}"
+    told = clean("".join(traceback.format_exception(cause)), LONGEST_STORY)
+    return f"{told}\n{error}"

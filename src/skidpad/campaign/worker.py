@@ -9,13 +9,18 @@ import threading
 import time
 import traceback
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
 from typing import Any
 
 from skidpad.core.errors import SkidpadError
+from skidpad.core.told import clean, told
 from skidpad.core.vocabulary import Outcome
 
+LONGEST_STORY = 20_000  # characters of a traceback
+ENDING = 5.0  # s that a process has to be gone once its pipe has ended
 SPARE = 0.01  # s after a deadline until it is looked at
 CONTEXT = multiprocessing.get_context("spawn")
 
@@ -45,13 +50,24 @@ class Finished:
 Runner = Callable[[Iterable[Job]], Iterator[Finished]]
 
 
+@dataclass(frozen=True, slots=True)
+class _Answer:
+    """What a worker says: of which job, from which process, and what."""
+
+    key: str
+    process: int
+    value: Any
+    error: str
+
+
 class Worker:
-    """A process that does one job at a time and can be killed at any moment."""
+    """A process that does one job at a time and can be killed at any moment, with its children."""
 
     def __init__(self) -> None:
         self.pipe, there = CONTEXT.Pipe()
         self.process = CONTEXT.Process(target=_work, args=(there,), daemon=True)
         self.process.start()
+        self._end = _end_of(self.process)
         there.close()
         self.job: Job | None = None
         self.started = 0.0
@@ -72,26 +88,52 @@ class Worker:
         assert job is not None
         wall = time.monotonic() - self.started
         finished = Finished(job, wall_s=wall)
-        if self.pipe.poll():  # also at its end
-            try:
-                value, error = self.pipe.recv()
-            except (EOFError, OSError):
-                self.process.join(timeout=5)
-                error = f"the worker process ended with exit code {self.process.exitcode}"
-                return replace(finished, failure=Outcome.CRASHED, detail=error)
-            if error:
-                return replace(finished, failure=Outcome.CRASHED, detail=error)
-            return replace(finished, value=value)
+        ended = bool(wait([self._end], 0.0))  # asked first: its last word may be in the pipe still
+        try:
+            answer = self._answer(job)
+        except Exception:  # the end of the pipe, or what is no message
+            answer, ended = None, True
+        if answer is not None:
+            if answer.error:
+                return replace(finished, failure=Outcome.CRASHED, detail=answer.error)
+            return replace(finished, value=answer.value)
+        if ended:
+            wait([self._end], ENDING)
+            _kill_group(self.process.pid)
+            self.process.join(ENDING)
+            error = f"the worker process ended with exit code {self.process.exitcode}"
+            return replace(finished, failure=Outcome.CRASHED, detail=error)
         if wall > job.deadline_s:
             detail = f"no end after {job.deadline_s:g} s"
             return replace(finished, failure=Outcome.TIMEOUT, detail=detail)
         return None
 
+    def _answer(self, job: Job) -> _Answer | None:
+        """What our process says of this job; words of others, such as its children, are no answer."""
+        while self.pipe.poll():  # also at its end
+            answer = self.pipe.recv()
+            if (
+                isinstance(answer, _Answer)
+                and answer.key == job.key
+                and answer.process == self.process.pid
+            ):
+                return answer
+        return None
+
+    @property
+    def signs(self) -> tuple[Any, ...]:
+        """What becomes ready when there is something to collect: its pipe, and its end."""
+        return self.pipe, self._end
+
     def dismiss(self) -> None:
-        """Kill it, whatever it does."""
+        """Kill it and what it started, whatever they do."""
         self.pipe.close()
+        _kill_group(self.process.pid)
         self.process.kill()
         self.process.join()
+        if self._end != self.process.sentinel:
+            os.close(self._end)
+            self._end = self.process.sentinel
 
 
 def given(worker: Worker | None, job: Job) -> Worker:
@@ -108,25 +150,61 @@ def given(worker: Worker | None, job: Job) -> Worker:
     return worker
 
 
+def _end_of(process: SpawnProcess) -> int:
+    """A descriptor that is ready when the process has ended, even if a child of it lives on."""
+    assert process.pid is not None
+    if hasattr(os, "pidfd_open"):
+        with suppress(OSError):
+            return os.pidfd_open(process.pid)
+    return process.sentinel
+
+
+def _kill_group(leader: int | None) -> None:
+    """Kill all processes of a worker's group, if it has come to lead one."""
+    if leader is None or not hasattr(os, "killpg"):
+        return
+    with suppress(OSError):
+        if os.getpgid(leader) == leader:
+            os.killpg(leader, signal.SIGKILL)
+
+
 def _work(pipe: Connection) -> None:
     """The worker process: jobs in, values out, until the parent is gone."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
+    if hasattr(os, "setpgid"):
+        os.setpgid(0, 0)  # so that what a stack starts can be ended with it
     die_with_parent()
-    me = os.getpid()
+    me, home = os.getpid(), os.getcwd()
     while True:
         try:
             job: Job = pipe.recv()
         except (EOFError, OSError):
             return
-        try:
-            answer: tuple[Any, str] = (job.work(job.argument), "")
-        except SkidpadError as error:  # one sentence for a person; where it arose says no more
-            answer = (None, str(error))
-        except Exception:
-            answer = (None, traceback.format_exc())
+        os.chdir(home)  # wherever the last job's stack went
+        value, error = _done(job)
         if os.getpid() != me:  # a stack forked: its child must neither answer nor take the next job
             os._exit(0)
+        _send(pipe, _Answer(job.key, me, value, error))
+
+
+def _done(job: Job) -> tuple[Any, str]:
+    """The value of a job, or what it failed of; no foreign code ends the worker by an exception."""
+    try:
+        return job.work(job.argument), ""
+    except SkidpadError as error:  # one sentence for a person; where it arose says no more
+        return None, clean(str(error))
+    except BaseException:  # also SystemExit and KeyboardInterrupt: no signal raises them here
+        return None, clean(traceback.format_exc(), LONGEST_STORY)
+
+
+def _send(pipe: Connection, answer: _Answer) -> None:
+    """Answer; a value that cannot be sent is the job's failure."""
+    try:
         pipe.send(answer)
+    except (EOFError, OSError):  # the parent is gone
+        os._exit(1)
+    except Exception as error:
+        pipe.send(replace(answer, value=None, error=f"its result cannot be sent: {told(error)}"))
 
 
 def die_with_parent() -> None:
@@ -136,6 +214,7 @@ def die_with_parent() -> None:
 
     def watch() -> None:
         wait([parent.sentinel])
+        _kill_group(os.getpid())  # with what it started
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()

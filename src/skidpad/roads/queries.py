@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import ceil, nan
+from typing import Any, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
@@ -16,6 +21,8 @@ from skidpad.roads.edge import RoadEdge
 from skidpad.roads.lanes import LaneSamples, LaneTable, SignalKind, SignalTable
 from skidpad.roads.packing import lane_arrays
 from skidpad.roads.roadside import Roadside
+
+Table = TypeVar("Table", LaneSamples, LaneTable, SignalTable, kernels.LaneArrays)
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,13 +80,29 @@ class RoadMap:
         self.roadside = baked.roadside
         self.geo_reference, self.ego_start = baked.geo_reference, baked.ego_start
         self.content_hash = baked.content_hash()
-        self.arrays = lane_arrays(baked)
+        self.arrays = self._arrays = lane_arrays(baked)
         self._names = list(zip(self.lanes.road.tolist(), self.lanes.lane_id.tolist(), strict=True))
 
     @cached_property
     def held(self) -> Held[kernels.LaneArrays]:
         """`arrays` for entry kernels; made when asked, as who only names a map runs no kernel."""
-        return hold(self.arrays)
+        return hold(self._arrays)
+
+    def read_only(self) -> RoadMap:
+        """The same map for others to read: writing into its arrays raises.
+
+        Kernels go on with the arrays behind it, so that they see one type of array.
+        """
+        shown = copy(self)
+        shown.samples, shown.lanes = locked(self.samples), locked(self.lanes)
+        shown.signals, shown.arrays = locked(self.signals), locked(self._arrays)
+        side = self.roadside
+        shown.roadside = replace(
+            side,
+            barriers=tuple(replace(b, points=_locked(b.points)) for b in side.barriers),
+            crosswalks=tuple(_locked(c) for c in side.crosswalks),
+        )
+        return shown
 
     @cached_property
     def edge(self) -> RoadEdge:
@@ -161,7 +184,7 @@ class RoadMap:
     def _beside(self, point: LanePoint, lane: int) -> LanePoint | None:
         if lane < 0:
             return None
-        return self.at(lane, kernels.neighbour_s(self.arrays, point.lane, lane, point.s))
+        return self.at(lane, kernels.neighbour_s(self._arrays, point.lane, lane, point.s))
 
     def shifted(self, point: LanePoint, lanes_left: int) -> LanePoint | None:
         """The place `lanes_left` lanes to the left (negative: right) of it; None when one is missing."""
@@ -174,7 +197,7 @@ class RoadMap:
 
     def s_road(self, point: LanePoint) -> float:
         """OpenDRIVE s of a place."""
-        return float(kernels.s_road_kernel(self.arrays, point.lane, point.s))
+        return float(kernels.s_road_kernel(self._arrays, point.lane, point.s))
 
     def limit(self, point: LanePoint) -> float | None:
         """Speed limit in m/s; None where the map gives none."""
@@ -189,7 +212,7 @@ class RoadMap:
             first = self.lanes.first[lane]
             ends = self.samples.s_road[[first, first + self.lanes.size[lane] - 1]]
             if ends.min() - 1e-3 <= s_road <= ends.max() + 1e-3:
-                return self.at(lane, kernels.lane_s_kernel(self.arrays, int(lane), float(s_road)))
+                return self.at(lane, kernels.lane_s_kernel(self._arrays, int(lane), float(s_road)))
             spans.append(f"{ends.min():.1f} to {ends.max():.1f}")
         has = f"s from {', '.join(spans)}" if spans else "no such lane"
         raise ConfigError(
@@ -215,8 +238,21 @@ class RoadMap:
         roads = {start.road}
         lane, s = start.lane, start.s
         for _ in range(ceil(distance / step)):
-            lane, s = kernels.advance_kernel(self.arrays, lane, s, step)
+            lane, s = kernels.advance_kernel(self._arrays, lane, s, step)
             if lane < 0:
                 break
             roads.add(int(self.lanes.road[lane]))
         return frozenset(roads)
+
+
+def locked(table: Table) -> Table:
+    """The same columns; its arrays are shared and cannot be written through it."""
+    kind: Any = type(table)
+    shown: Table = kind._make(_locked(c) if isinstance(c, np.ndarray) else c for c in table)
+    return shown
+
+
+def _locked(array: NDArray[Any]) -> NDArray[Any]:
+    view: NDArray[Any] = array.view()
+    view.flags.writeable = False
+    return view

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import os
 import sys
-from collections.abc import Collection, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
+from dataclasses import fields
 from importlib import import_module
 from importlib.util import module_from_spec, spec_from_file_location
 from math import isfinite
+from numbers import Real
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import Any, TypeVar
+
+import numpy as np
 
 from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.frames import SensorFrame
@@ -24,9 +29,16 @@ from skidpad.core.specs import (
     SensorSpec,
 )
 from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.core.told import clean, told
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.interface import Stack
 
+T = TypeVar("T")
+FOREIGN = (Exception, SystemExit)  # what foreign code may raise; Ctrl-C remains the user's
+SWITCHES = (bool, np.bool_)
+REPORTED = tuple(field.name for field in fields(StackReport))
+INT_MAX = 2**31 - 1  # the log's whole numbers have 32 bits
+LONGEST_MODE = 200  # characters
 NO_REPORT = StackReport()
 ASKABLE = (CameraSpec, LidarSpec, PointSensorSpec)  # there is one radar, and every stack has it
 ASKABLE_KINDS = (GNSS, IMU, SPEEDOMETER)
@@ -45,11 +57,25 @@ def import_class(where: str, what: str) -> type[Any]:
     place, colon, name = where.rpartition(":")
     if not colon or not place or not name.isidentifier():
         raise ConfigError(f"a {what} is given as module:Class or file.py:Class, got {where!r}")
-    module = _from_file(Path(place), what) if place.endswith(".py") else _from_module(place, what)
+    with _kept_home():
+        from_file = place.endswith(".py")
+        module = _from_file(Path(place), what) if from_file else _from_module(place, what)
     found = getattr(module, name, None)
     if not isinstance(found, type):
         raise ConfigError(f"{what} {where!r}: {place} has no class {name}")
     return found
+
+
+@contextmanager
+def _kept_home() -> Iterator[None]:
+    """What foreign code does to the working folder is undone; a child that it forks ends here."""
+    process, home = os.getpid(), _folder()
+    try:
+        yield
+    finally:
+        if os.getpid() != process:
+            os._exit(0)
+        _enter(home)
 
 
 def _from_file(path: Path, what: str) -> ModuleType:
@@ -63,20 +89,24 @@ def _from_file(path: Path, what: str) -> ModuleType:
     sys.modules[name] = module  # dataclasses and pickling look a class up by its module
     try:
         spec.loader.exec_module(module)
-    except Exception as error:
-        raise ConfigError(f"{what} file {str(path)!r} cannot be imported: {error!r}") from error
+    except FOREIGN as error:
+        raise ConfigError(f"{what} file {str(path)!r} cannot be imported: {told(error)}") from error
     return module
 
 
 def _from_module(name: str, what: str) -> ModuleType:
     try:
         return import_module(name)
-    except Exception as error:  # an import runs foreign code: anything can happen
-        raise ConfigError(f"{what} module {name!r} cannot be imported: {error!r}") from error
+    except FOREIGN as error:  # an import runs foreign code: anything can happen
+        raise ConfigError(f"{what} module {name!r} cannot be imported: {told(error)}") from error
 
 
 class GuardedStack:
-    """Runs a stack; whatever it does wrong becomes a StackError, the outcome of its run."""
+    """Runs a stack; whatever it does wrong becomes a StackError, the outcome of its run.
+
+    A folder that it changes to is its own alone, and a child that it forks ends where it would
+    return to us.
+    """
 
     def __init__(
         self,
@@ -86,20 +116,23 @@ class GuardedStack:
         settings: Mapping[str, Any],
     ) -> None:
         self.name = kind.__name__
+        self._tick = -1  # the last one
         self._taken = frozenset(spec.id for spec in specs)
+        self._process, self._folder = os.getpid(), _folder()
         try:
-            self.stack = kind(specs, map, settings)
+            self.stack = self._call(kind, specs, map, settings)
         except (StackError, ConfigError):
             raise
-        except Exception as error:
-            raise StackError(f"{self.name} could not be built: {error!r}") from error
+        except FOREIGN as error:
+            raise StackError(f"{self.name} could not be built: {told(error)}") from error
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
         """The stack's command, checked."""
+        self._tick = frame.tick
         try:
-            command = self.stack.tick(frame)
-        except Exception as error:
-            raise StackError(f"{self.name} raised in tick {frame.tick}: {error!r}") from error
+            command = self._call(self.stack.tick, frame)
+        except FOREIGN as error:
+            raise StackError(f"{self.name} raised in tick {frame.tick}: {told(error)}") from error
         if not isinstance(command, VehicleCommand):
             raise StackError(
                 f"{self.name} must return a VehicleCommand, got {type(command).__name__} "
@@ -110,46 +143,108 @@ class GuardedStack:
 
     def close(self) -> None:
         """The run is over; what a stack does wrong here no longer matters to it."""
-        close = getattr(self.stack, "close", None)
-        if callable(close):
-            with suppress(Exception):
-                close()
+        with suppress(*FOREIGN):
+            close = getattr(self.stack, "close", None)
+            if callable(close):
+                self._call(close)
 
     @property
     def report(self) -> StackReport:
         """What the stack says about its last tick; empty for a stack that says nothing."""
-        report = getattr(self.stack, "report", NO_REPORT)
-        return report if isinstance(report, StackReport) else NO_REPORT
+        try:
+            report = self._call(getattr, self.stack, "report", NO_REPORT)
+        except FOREIGN as error:
+            raise StackError(
+                f"{self.name}.report raised in tick {self._tick}: {told(error)}"
+            ) from error
+        if not isinstance(report, StackReport):
+            return NO_REPORT
+        _check_report(self.name, report, self._tick)
+        return report
 
     @property
     def mode(self) -> str:
         """The mode of the last tick in the stack's words; empty for one that has none."""
-        mode = getattr(self.stack, "mode", "")
-        return mode if isinstance(mode, str) else ""
+        with suppress(*FOREIGN):
+            mode = self._call(getattr, self.stack, "mode", "")
+            return clean(mode, LONGEST_MODE) if isinstance(mode, str) else ""
+        return ""
 
     def sensors(self) -> tuple[SensorSpec, ...]:
         """The further sensors that the stack asks for."""
-        ask = getattr(self.stack, "sensors", None)
-        if ask is None:
-            return ()
         try:
-            wanted = tuple(ask())
-        except Exception as error:
-            raise StackError(f"{self.name}.sensors() raised: {error!r}") from error
+            wanted = self._call(_sensors_of, self.stack)
+        except FOREIGN as error:
+            raise StackError(f"{self.name}.sensors() raised: {told(error)}") from error
         _check_sensors(self.name, wanted, self._taken)
         return wanted
 
+    def _call(self, function: Callable[..., T], *arguments: Any) -> T:
+        """Call foreign code in the folder that it last chose."""
+        home = _folder()
+        if self._folder != home:
+            _enter(self._folder)
+        try:
+            return function(*arguments)
+        finally:
+            if os.getpid() != self._process:  # a child that it forked
+                os._exit(0)
+            self._folder = _folder()
+            if self._folder != home:
+                _enter(home)
+
+
+def _sensors_of(stack: Stack) -> tuple[Any, ...]:
+    ask = getattr(stack, "sensors", None)
+    return () if ask is None else tuple(ask())
+
+
+def _folder() -> str:
+    try:
+        return os.getcwd()
+    except OSError:  # it was removed
+        return ""
+
+
+def _enter(folder: str) -> None:
+    with suppress(OSError):
+        os.chdir(folder)
+
 
 def _check(name: str, command: VehicleCommand, tick: int) -> None:
-    ranges = (
+    ranges: tuple[tuple[str, Any, float], ...] = (
         ("throttle", command.throttle, 0.0),
         ("brake", command.brake, 0.0),
         ("steer", command.steer, -1.0),
     )
     for what, value, low in ranges:
-        if not isfinite(value) or not low <= value <= 1.0:
+        if not _is_number(value) or not isfinite(value) or not low <= value <= 1.0:
             raise StackError(
-                f"{name}: {what} must be between {low:g} and 1, got {value!r} in tick {tick}"
+                f"{name}: {what} must be between {low:g} and 1, "
+                f"got {told(value, 100)} in tick {tick}"
+            )
+    for what, switch in (("handbrake", command.handbrake), ("reverse", command.reverse)):
+        if not isinstance(switch, SWITCHES):
+            raise StackError(
+                f"{name}: {what} must be true or false, got {told(switch, 100)} in tick {tick}"
+            )
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real)
+
+
+def _check_report(name: str, report: StackReport, tick: int) -> None:
+    """Its values can be recorded."""
+    for field in REPORTED:
+        value: Any = getattr(report, field)
+        if value is None:
+            continue
+        whole = isinstance(value, int)
+        if not _is_number(value) or (whole and abs(value) > INT_MAX):
+            raise StackError(
+                f"{name}: report.{field} must be a number or None, "
+                f"got {told(value, 100)} in tick {tick}"
             )
 
 
@@ -157,7 +252,7 @@ def _check_sensors(name: str, wanted: Sequence[SensorSpec], taken: Collection[st
     for k, spec in enumerate(wanted):
         if not isinstance(spec, ASKABLE):
             raise StackError(
-                f"{name}.sensors() must name cameras, lidars and point sensors, got {spec!r}"
+                f"{name}.sensors() must name cameras, lidars and point sensors, got {told(spec)}"
             )
         if spec.id in taken or spec.id in {other.id for other in wanted[:k]}:
             raise StackError(f"{name}.sensors(): there is a sensor {spec.id!r} already")

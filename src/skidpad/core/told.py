@@ -1,0 +1,22 @@
+"""Foreign words as text that can be printed, encoded and stored, however they are made."""
+
+from __future__ import annotations
+
+LONGEST = 2000  # characters of a sentence about somebody's error
+CUT = " [...] "
+
+
+def clean(text: str, longest: int = LONGEST) -> str:
+    """`text` without surrogates, which no encoding takes, and not longer than `longest`."""
+    if len(text) > longest:
+        half = (longest - len(CUT)) // 2
+        text = text[:half] + CUT + text[-half:]
+    return text.encode("utf-8", "backslashreplace").decode("utf-8")
+
+
+def told(value: object, longest: int = LONGEST) -> str:
+    """`repr(value)`, cleaned; the name of its type where that raises."""
+    try:
+        return clean(repr(value), longest)
+    except Exception:  # foreign code: anything can happen
+        return f"<{type(value).__name__}>"

@@ -24,7 +24,16 @@ from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.statistics import clopper_pearson
 from skidpad.recording.fingerprint import fingerprint
-from skidpad.recording.ledger import RETRIED, Entry, K, Ledger, fingerprints, latest
+from skidpad.recording.ledger import (
+    DAMAGED,
+    LEDGER,
+    RETRIED,
+    Entry,
+    K,
+    Ledger,
+    fingerprints,
+    latest,
+)
 from skidpad.recording.results import Timing
 
 BATCH = 20  # runs per cell after which a stopping rule looks again (decision G-8)
@@ -42,9 +51,15 @@ class Summary:
     failed: int  # crashed or timed out
     content_hash: str
     mixed_machines: bool  # byte equality is not promised across this campaign (X-2)
+    damaged: int = 0  # lines of the ledger that were set aside; their runs were driven again
 
     def warnings(self) -> Iterator[str]:
         """What a reader of the report should know first."""
+        if self.damaged:
+            yield (
+                f"{self.damaged} damaged lines of {LEDGER} were set aside in {DAMAGED}, and their "
+                "runs were driven again"
+            )
         if self.mixed_machines:
             yield "runs of different machines or versions: bytes may differ"
         if self.failed:
@@ -151,7 +166,8 @@ class Campaign(Generic[T, K, M]):
         digest = self.recipe.columns.write(out, rows, timing, csv=csv)
         self.recipe.finish(self.tasks, out, runner)
         failed = sum(Outcome(e.key.outcome) in RETRIED for e in entries)
-        return Summary(out, len(entries), driven, failed, digest, len(fingerprints(entries)) > 1)
+        mixed = len(fingerprints(entries)) > 1
+        return Summary(out, len(entries), driven, failed, digest, mixed, len(ledger.damaged))
 
     def _wanted(self, batch: Sequence[T], entries: Sequence[Entry[K, M]]) -> Sequence[T]:
         """The runs of a batch whose cells are uncertain after the batches before it."""

@@ -6,21 +6,27 @@ from __future__ import annotations
 
 import errno
 import os
+import re
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, Protocol, TypeVar
+from zlib import crc32
 
 import msgspec
 
 from skidpad.core.errors import FileError, OutputError
+from skidpad.core.names import inside
+from skidpad.core.told import clean
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.files import output_error, write_bytes
 from skidpad.recording.results import Timing
 
 LEDGER, CAMPAIGN = "ledger.jsonl", "campaign.json"
+SUM = re.compile(rb',"sum":"([0-9a-f]{8})"}$')
+DAMAGED = "ledger.damaged"  # lines that were set aside
 RETRIED = frozenset({Outcome.CRASHED, Outcome.TIMEOUT})  # by resume (decision L-7)
 
 
@@ -77,7 +83,8 @@ class Ledger(Generic[E]):
             _lock(self._file, folder)
             if not (folder / CAMPAIGN).exists():
                 write_bytes(folder / CAMPAIGN, encode_identity(identity))
-            self.entries: list[E] = read_ledger(folder, kind)
+            self.entries: list[E]
+            self.entries, self.damaged = _entries(self.path, kind)
             self._heal()
         except BaseException:
             self.close()
@@ -95,14 +102,28 @@ class Ledger(Generic[E]):
             )
 
     def _heal(self) -> None:
-        """Cut off what a kill left of a line, so that the next line stands alone."""
-        whole = self.path.read_bytes().rfind(b"\n") + 1
-        if whole != self.path.stat().st_size:
+        """Cut off what a kill left of a line; set damaged lines aside, so that they are driven again."""
+        content = self.path.read_bytes()
+        whole = content.rfind(b"\n") + 1
+        if whole != len(content):
             os.truncate(self._file, whole)
+        if not self.damaged:
+            return
+        lines = content[:whole].split(b"\n")[:-1]
+        broken = {d.number for d in self.damaged}
+        bad = [line for number, line in enumerate(lines, start=1) if number in broken]
+        good = [line for number, line in enumerate(lines, start=1) if number not in broken]
+        aside = self.folder / DAMAGED
+        earlier = aside.read_bytes() if aside.is_file() else b""
+        write_bytes(aside, earlier + b"".join(line + b"\n" for line in bad))
+        write_bytes(self.path, b"".join(line + b"\n" for line in good))
+        os.close(self._file)  # of the file that was replaced
+        self._file = os.open(self.path, os.O_RDWR | os.O_APPEND)
+        _lock(self._file, self.folder)
 
     def append(self, entry: E) -> None:
         """Record a finished run; when this returns, the line is on the disk."""
-        line = msgspec.json.encode(entry) + b"\n"
+        line = _signed(msgspec.json.encode(entry)) + b"\n"
         size = os.fstat(self._file).st_size
         try:
             written = os.write(self._file, line)
@@ -137,20 +158,63 @@ class Ledger(Generic[E]):
         self.close()
 
 
+@dataclass(frozen=True, slots=True)
+class Damage:
+    """A line of a ledger that cannot be read."""
+
+    number: int  # from 1
+    why: str
+
+
 def read_ledger(folder: Path, kind: type[E]) -> list[E]:
     """All entries, oldest first. A torn last line is passed over; any other damage is a FileError."""
     path = folder / LEDGER
-    try:
-        lines = path.read_bytes().split(b"\n")
-    except FileNotFoundError:
-        return []
-    entries = []
-    for number, line in enumerate(lines[:-1], start=1):  # what follows the last newline is torn
-        try:
-            entries.append(msgspec.json.decode(line, type=kind))
-        except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-            raise FileError(f"{path}, line {number} is damaged: {error}") from error
+    entries, damaged = _entries(path, kind)
+    if damaged:
+        first = damaged[0]
+        raise FileError(
+            f"{path}, line {first.number} is damaged: {first.why}; --resume sets it aside and "
+            "drives its run again"
+        )
     return entries
+
+
+def _entries(path: Path, kind: type[E]) -> tuple[list[E], list[Damage]]:
+    """What can be read of a ledger, and what cannot; what follows the last newline is torn."""
+    try:
+        lines = path.read_bytes().split(b"\n")[:-1]
+    except FileNotFoundError:
+        return [], []
+    except OSError as error:
+        raise FileError(f"cannot read {path}: {error.strerror}") from error
+    entries: list[E] = []
+    damaged = []
+    for number, line in enumerate(lines, start=1):
+        try:
+            entry = msgspec.json.decode(line, type=kind)
+            _check_sum(line)
+            Outcome(entry.key.outcome)
+            inside(path.parent, entry.run)
+            entries.append(entry)
+        except (
+            msgspec.MsgspecError,
+            ValueError,
+            RecursionError,
+        ) as error:  # also UnicodeDecodeError
+            damaged.append(Damage(number, clean(str(error), 300)))
+    return entries, damaged
+
+
+def _signed(line: bytes) -> bytes:
+    """A JSON object with a checksum as its last member, so that a flipped bit is no new value."""
+    return line[:-1] + b',"sum":"%08x"}' % crc32(line)
+
+
+def _check_sum(line: bytes) -> None:
+    """ValueError for a line that is not what was written; lines of old versions have no checksum."""
+    found = SUM.search(line)
+    if found and crc32(line[: found.start()] + b"}") != int(found[1], 16):
+        raise ValueError("its checksum is another")
 
 
 def latest(entries: Iterable[E]) -> list[E]:
@@ -178,11 +242,18 @@ def folder_state(folder: Path, identity: dict[str, Any]) -> FolderState:
         return FolderState.EMPTY
     if not folder.is_dir():
         return FolderState.OTHER
-    if not any(f for f in folder.iterdir() if f.name != LEDGER or f.stat().st_size > 0):
-        return FolderState.EMPTY  # a kill between the first two files leaves an empty ledger
+    if all(_is_rest(f) for f in folder.iterdir()):
+        return FolderState.EMPTY
     campaign = folder / CAMPAIGN
     same = campaign.is_file() and campaign.read_bytes() == encode_identity(identity)
     return FolderState.SAME if same else FolderState.OTHER
+
+
+def _is_rest(file: Path) -> bool:
+    """What a kill at the very beginning leaves: an empty ledger, a part of a file."""
+    if file.name.startswith(".") and file.name.endswith(".part"):
+        return True
+    return file.name == LEDGER and file.is_file() and file.stat().st_size == 0
 
 
 def read_identity(folder: Path) -> dict[str, Any]:
@@ -192,8 +263,10 @@ def read_identity(folder: Path) -> dict[str, Any]:
         return {}
     try:
         return msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
-    except msgspec.MsgspecError as error:
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
         raise FileError(f"{path} is damaged: {error}") from error
+    except OSError as error:
+        raise FileError(f"cannot read {path}: {error.strerror}") from error
 
 
 def campaign_command(folder: Path) -> str:

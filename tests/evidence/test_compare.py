@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import polars as pl
 import pytest
 from lxml import etree
@@ -83,3 +85,47 @@ def test_surely_needs_the_whole_interval(tmp_path):
     rule = parse_rule("fatal_collisions > 0")
     assert rule.broken_by(by(changes)["", "fatal_collisions"], surely=False)
     assert not rule.broken_by(by(changes)["", "fatal_collisions"], surely=True)
+
+
+def told(tmp_path, before, after, *more):
+    """Exit code of the gate, and the names of JUnit's cases with their failures."""
+    MATRIX.write(tmp_path / "a", before)
+    MATRIX.write(tmp_path / "b", after)
+    call = ["compare", str(tmp_path / "a"), str(tmp_path / "b"), "--junit", str(tmp_path / "j.xml")]
+    ended = CliRunner().invoke(app, [*call, "--fail-if", "fatal_collisions > 0.5", *more])
+    cases = etree.parse(tmp_path / "j.xml").getroot()
+    return ended.exit_code, {c.get("name"): len(c) for c in cases}
+
+
+def emptied(rows, config):
+    return [(k, Metrics() if k.config == config else m) for k, m in rows]
+
+
+def crashed(rows, n):
+    return [
+        (replace(k, outcome="crashed"), None) if i < n else (k, m) for i, (k, m) in enumerate(rows)
+    ]
+
+
+@pytest.mark.parametrize(
+    ("after", "flaw"),
+    [
+        (crashed(rows(), 5), "crashed"),
+        (crashed(rows(), 16), "crashed"),
+        (rows()[1:], "missing"),
+        (emptied(rows(), "2"), "empty"),
+    ],
+)
+def test_the_gate_is_red_on_what_was_not_driven_unless_allowed(tmp_path, after, flaw):
+    code, cases = told(tmp_path, rows(), after)
+    assert code == 1
+    assert cases[f"data: {flaw}"] == 1
+    allowed = [flaw, "empty"]  # where all crashed there is nothing to compare either
+    code, cases = told(tmp_path, rows(), after, *(w for f in allowed for w in ("--allow", f)))
+    assert code == 0
+    assert cases[f"data: {flaw}"] == 0
+
+
+def test_a_rule_without_a_number_is_one_sentence():
+    with pytest.raises(ConfigError, match=r"'1\.2\.3' is no number"):
+        parse_rule("fatal_collisions > 1.2.3")

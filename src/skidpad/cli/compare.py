@@ -2,13 +2,23 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from skidpad.evidence.compare import Change, Rule
+    from skidpad.evidence.compare import Change
+
+
+class Flaws(str, Enum):
+    """Choices of --allow."""
+
+    missing = "missing"
+    crashed = "crashed"
+    empty = "empty"
+
 
 SHOWN = (
     "fatal_collisions",
@@ -34,29 +44,52 @@ def compare(
         bool, typer.Option("--surely", help="Only when the whole 95 % interval says so.")
     ] = False,
     junit: Annotated[Path | None, typer.Option(help="Write the rules as JUnit XML.")] = None,
+    allow: Annotated[
+        list[Flaws] | None,
+        typer.Option(help="Data that --fail-if would not pass; may be repeated."),
+    ] = None,
 ) -> None:
-    """Pair two campaigns by configuration, weather and seed; exit 1 on a regression."""
-    from skidpad.evidence.compare import compare_campaigns, parse_rule
+    """Pair two campaigns by configuration, weather and seed; exit 1 on a regression.
+
+    Rules also fail on runs that are missing or crashed and on columns without values.
+    """
+    from skidpad.core.errors import ConfigError
+    from skidpad.evidence.compare import compare_campaigns, flaws, parse_rule
+    from skidpad.recording.matrix import MATRIX
     from skidpad.recording.results import read_results
 
     rules = [parse_rule(text) for text in fail_if or []]
+    if (junit is not None or allow) and not rules:
+        raise ConfigError("--junit and --allow are about the rules of --fail-if, and none is given")
     wanted = list(dict.fromkeys([*SHOWN, *(r.column for r in rules)]))
-    changes, alone_a, alone_b = compare_campaigns(read_results(a), read_results(b), wanted)
+    before, after = (read_results(folder, MATRIX) for folder in (a, b))
+    changes, alone_a, alone_b = compare_campaigns(before, after, wanted)
     _print(changes)
     if alone_a or alone_b:
         typer.echo(f"without a partner: {alone_a} runs of {a}, {alone_b} of {b}")
-    broken = {
-        rule.text: [c for c in changes if c.column == rule.column and rule.broken_by(c, surely)]
+    failures = {
+        rule.text: [
+            _told(c) for c in changes if c.column == rule.column and rule.broken_by(c, surely)
+        ]
         for rule in rules
     }
+    passed = {flaw.value for flaw in allow or []}
+    failures |= {
+        f"data: {flaw.value}": [] if flaw.value in passed else [sentence]
+        for flaw, sentence in (flaws(before, after, rules) if rules else {}).items()
+    }
     if junit is not None:
-        _write_junit(junit, rules, broken)
-    for text, by in broken.items():
-        for c in by:
-            who = f"configuration {c.config}" if c.config else "all"
-            typer.echo(f"regression ({text}): {who}, {c.comparison.mean:+.3g}", err=True)
-    if any(broken.values()):
+        _write_junit(junit, failures)
+    for text, by in failures.items():
+        for sentence in by:
+            typer.echo(f"regression ({text}): {sentence}", err=True)
+    if any(failures.values()):
         raise typer.Exit(1)
+
+
+def _told(change: Change) -> str:
+    who = f"configuration {change.config}" if change.config else "all"
+    return f"{who}, {change.comparison.mean:+.3g}"
 
 
 def _print(changes: list[Change]) -> None:
@@ -79,16 +112,17 @@ def _print(changes: list[Change]) -> None:
     Console().print(table)
 
 
-def _write_junit(path: Path, rules: list[Rule], broken: dict[str, list[Change]]) -> None:
+def _write_junit(path: Path, failures: dict[str, list[str]]) -> None:
     from lxml import etree
 
-    failures = sum(bool(broken[r.text]) for r in rules)
+    from skidpad.recording.files import write_bytes
+
+    failed = str(sum(bool(by) for by in failures.values()))
     suite = etree.Element(
-        "testsuite", name="skidpad compare", tests=str(len(rules)), failures=str(failures)
+        "testsuite", name="skidpad compare", tests=str(len(failures)), failures=failed
     )
-    for rule in rules:
-        case = etree.SubElement(suite, "testcase", classname="skidpad.compare", name=rule.text)
-        for change in broken[rule.text]:
-            told = f"{change.config or 'all'}: {change.comparison.mean:+.3g}"
-            etree.SubElement(case, "failure", message=told)
-    path.write_bytes(etree.tostring(suite, xml_declaration=True, encoding="utf-8"))
+    for name, by in failures.items():
+        case = etree.SubElement(suite, "testcase", classname="skidpad.compare", name=name)
+        for sentence in by:
+            etree.SubElement(case, "failure", message=sentence)
+    write_bytes(path, etree.tostring(suite, xml_declaration=True, encoding="utf-8"))

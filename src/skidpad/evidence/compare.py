@@ -6,6 +6,7 @@ import operator
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import polars as pl
 
@@ -51,6 +52,48 @@ class Rule:
         return all(self.compare(v, self.limit) for v in values)
 
 
+class Flaw(str, Enum):
+    """Why a gate cannot be trusted; each fails it unless it is allowed by name."""
+
+    MISSING = "missing"  # a run of one campaign is not in the other
+    CRASHED = "crashed"  # a run crashed, timed out, or its stack failed
+    EMPTY = "empty"  # what a rule judges has no values in both
+
+
+def flaws(a: pl.DataFrame, b: pl.DataFrame, rules: Sequence[Rule]) -> dict[Flaw, str]:
+    """What is wrong with the data that the rules judge, each with a sentence."""
+    found = {}
+    by = list(PAIRED_BY)
+    alone = [len(x.join(y, on=by, how="anti", nulls_equal=True)) for x, y in ((a, b), (b, a))]
+    if any(alone):
+        found[Flaw.MISSING] = f"without a partner: {alone[0]} runs of A, {alone[1]} of B"
+    crashed = [int(t["outcome"].is_in(NOT_RUN).sum()) for t in (a, b)]
+    if any(crashed):
+        found[Flaw.CRASHED] = (
+            f"crashed, timed out or failed: {crashed[0]} runs of A, {crashed[1]} of B"
+        )
+    empty = sorted({who for rule in rules for who in _empty(a, b, rule.column)})
+    if empty:
+        found[Flaw.EMPTY] = f"without values to compare: {', '.join(empty)}"
+    return found
+
+
+def _empty(a: pl.DataFrame, b: pl.DataFrame, column: str) -> list[str]:
+    """Where a column cannot be judged: for all drivers, or for one that had values before."""
+    pairs = _pairs(a, b)
+    whole = pairs.drop_nulls([column, f"{column}_b"])
+    if not len(whole):
+        return [column]
+    had = set(pairs.drop_nulls([column])["config"]) - set(whole["config"])
+    return [f"{column} of configuration {config}" for config in had]
+
+
+def _pairs(a: pl.DataFrame, b: pl.DataFrame) -> pl.DataFrame:
+    """Runs of both that were driven to their end, side by side."""
+    a, b = (t.filter(~pl.col("outcome").is_in(NOT_RUN)) for t in (a, b))
+    return a.join(b, on=list(PAIRED_BY), suffix="_b")
+
+
 def parse_rule(text: str) -> Rule:
     """`fatal_collisions > 0.1`: column, one of > >= < <=, number; about the mean difference."""
     match = RULE.match(text)
@@ -58,7 +101,11 @@ def parse_rule(text: str) -> Rule:
         raise ConfigError(f"--fail-if takes COLUMN > NUMBER (or >=, <, <=), got {text!r}")
     column, sign, number = match.groups()
     require_choice("column", column, columns())
-    return Rule(text, column, OPERATORS[sign], float(number))
+    try:
+        limit = float(number)
+    except ValueError:
+        raise ConfigError(f"--fail-if: {number!r} is no number, in {text!r}") from None
+    return Rule(text, column, OPERATORS[sign], limit)
 
 
 def columns() -> list[str]:
@@ -71,12 +118,12 @@ def compare_campaigns(
 ) -> tuple[list[Change], int, int]:
     """Changes per column, over all drivers and per driver; and the runs without a partner in each.
 
-    ConfigError when no run of one has a partner in the other.
+    ConfigError when no run of one is in the other; crashed ones are in it and are not compared.
     """
-    a, b = (t.filter(~pl.col("outcome").is_in(NOT_RUN)) for t in (a, b))
-    pairs = a.join(b, on=list(PAIRED_BY), suffix="_b")
-    if not len(pairs):
+    if not len(a.join(b, on=list(PAIRED_BY))):
         raise ConfigError("the two campaigns share no run: same configuration, weather and seed")
+    pairs = _pairs(a, b)
+    a, b = (t.filter(~pl.col("outcome").is_in(NOT_RUN)) for t in (a, b))
     changes = []
     for config in ["", *sorted(pairs["config"].unique().to_list())]:
         runs = pairs if config == "" else pairs.filter(pl.col("config") == config)

@@ -77,6 +77,23 @@ class Columns(Generic[K, M]):
                 write_atomically((folder / name).with_suffix(".csv"), content.write_csv)
         return self.hash(table)
 
+    def checked(self, table: pl.DataFrame, path: Path) -> pl.DataFrame:
+        """The table with every column; FileError when it is one of another kind.
+
+        Metrics of versions that did not have them yet are null.
+        """
+        wanted = schema(self.key, self.metrics)
+        needed = schema(self.key)
+        for name, kind in wanted.items():
+            if name in needed and name not in table.columns:
+                raise FileError(f"{path} has no column {name!r}: it is of another kind of campaign")
+            if name in table.columns and table.schema[name] not in (kind, pl.Null):
+                raise FileError(f"{path}: column {name!r} holds {table.schema[name]}, not {kind}")
+        return table.with_columns(
+            pl.col(name).cast(kind) if name in table.columns else pl.lit(None, kind).alias(name)
+            for name, kind in wanted.items()
+        )
+
     def hash(self, table: pl.DataFrame) -> str:
         """Content hash of results; the order of rows does not matter (decision X-1)."""
         return content_hash([table.sort(self.sort)])
@@ -95,11 +112,12 @@ def schema(*rows: type[Any]) -> dict[str, Any]:
     }
 
 
-def read_results(folder: Path) -> pl.DataFrame:
-    """results.parquet of a campaign; FileError when there is none."""
+def read_results(folder: Path, columns: Columns[Any, Any] | None = None) -> pl.DataFrame:
+    """results.parquet of a campaign; FileError when there is none, or it has other columns."""
     if (folder / "ledger.jsonl").is_file() and not (folder / RESULTS).is_file():
         raise FileError(f"{folder} holds a campaign that is not finished: finish it with --resume")
-    return read_parquet(folder / RESULTS)[0]
+    table = read_parquet(folder / RESULTS)[0]
+    return table if columns is None else columns.checked(table, folder / RESULTS)
 
 
 def definitions_of(rows: type[Any]) -> list[tuple[str, str, str]]:

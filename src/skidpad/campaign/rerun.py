@@ -5,13 +5,17 @@ The run is deterministic, so the second drive is the first one: the logs are com
 
 from __future__ import annotations
 
+import os
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
 import cv2
 import numpy as np
+from numpy.typing import NDArray
 from PIL import Image
 
 from skidpad.campaign.backends import keep_server
@@ -26,6 +30,7 @@ from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import StackReport
 from skidpad.recording.channel_hash import recording_hash
+from skidpad.recording.files import output_error, write_atomically
 from skidpad.recording.inputs import read_inputs
 from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.recording.runlog import RunLog
@@ -58,6 +63,7 @@ def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None 
     try:
         ticks = round(end_s / DT)
         again = drive_again(spec, sinks=(closely,), ticks=ticks, desk=desk_of(run, spec)).log
+        closely.finish()
     finally:
         closely.close()
     n = len(again)
@@ -114,7 +120,7 @@ class Closely(Sink):
         self.pictures: list[Path] = []
         self.trace: list[str] = []
         self._before: tuple[Any, Any] | None = None
-        self._film = None if film is None else open_film(film)
+        self._film = None if film is None else Film(film)
 
     def see(self, moment: Moment) -> None:
         """Keep this moment if it lies in the stretch."""
@@ -125,9 +131,9 @@ class Closely(Sink):
         if self._film is not None:
             self._film.write(np.ascontiguousarray(twelve_views(moment, DT)[..., ::-1]))
         elif moment.frame.tick % self.every == 0:
-            self.out.mkdir(parents=True, exist_ok=True)
             path = self.out / f"{t:07.2f}s.png"
-            Image.fromarray(twelve_views(moment, DT)).save(path)
+            picture = Image.fromarray(twelve_views(moment, DT))
+            write_atomically(path, partial(picture.save, format="PNG"))
             self.pictures.append(path)
 
     def _trace(self, t: float, report: StackReport, mode: str) -> None:
@@ -139,19 +145,47 @@ class Closely(Sink):
         distance = f", {report.distance:.1f} m" if report.distance is not None else ""
         self.trace.append(f"{t:7.2f} s  {mode or tier:<36} {status}{distance}")
 
-    def close(self) -> None:
-        """Finish the film."""
+    def finish(self) -> None:
+        """The stretch is over: put the film in place."""
         if self._film is not None:
-            self._film.release()
+            self._film.finish()
+
+    def close(self) -> None:
+        """Leave nothing of a film that was not finished."""
+        if self._film is not None:
+            self._film.close()
 
 
-def open_film(path: Path) -> cv2.VideoWriter:
-    """A film at 20 pictures per second; OutputError when it cannot be written."""
-    if path.suffix != ".mp4":
-        raise ConfigError(f"--video takes a file that ends in .mp4, got {path}")
-    path.parent.mkdir(parents=True, exist_ok=True)
-    code = cv2.VideoWriter.fourcc(*"mp4v")
-    writer = cv2.VideoWriter(str(path), code, 1.0 / DT, (SIZE[1], SIZE[0]))
-    if not writer.isOpened():
-        raise OutputError(f"cannot write the film {path}")
-    return writer
+class Film:
+    """A film at 20 pictures per second, in place when it is finished; OutputError if it cannot be."""
+
+    def __init__(self, path: Path) -> None:
+        if path.suffix != ".mp4":
+            raise ConfigError(f"--video takes a file that ends in .mp4, got {path}")
+        self.path, self.part = path, path.with_name(f".{path.stem}.{os.getpid()}.part.mp4")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise output_error(path, error) from error
+        code = cv2.VideoWriter.fourcc(*"mp4v")
+        self._writer = cv2.VideoWriter(str(self.part), code, 1.0 / DT, (SIZE[1], SIZE[0]))
+        if not self._writer.isOpened():
+            raise OutputError(f"cannot write the film {path}")
+
+    def write(self, picture: NDArray[np.uint8]) -> None:
+        """One more picture (H, W, 3), blue first."""
+        self._writer.write(picture)
+
+    def finish(self) -> None:
+        """Put it in place."""
+        self._writer.release()
+        try:
+            os.replace(self.part, self.path)
+        except OSError as error:
+            raise output_error(self.path, error) from error
+
+    def close(self) -> None:
+        """Remove what is not in place."""
+        self._writer.release()
+        with suppress(OSError):
+            self.part.unlink(missing_ok=True)

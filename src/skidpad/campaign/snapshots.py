@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +10,10 @@ from PIL import Image
 
 from skidpad.campaign.drive import Moment, Sink
 from skidpad.core.frames import SensorFrame
-from skidpad.core.run import slug
+from skidpad.core.names import path_part, slug
 from skidpad.core.vocabulary import RelocationReason
 from skidpad.recording.campaigns import SNAPSHOTS
-from skidpad.recording.files import output_error
+from skidpad.recording.files import write_atomically
 
 FRONT, TOP = "rgb_front", "rgb_top"
 MARGIN = 12  # px
@@ -24,7 +25,7 @@ class Snapshots(Sink):
 
     def __init__(self, folder: Path | None, driver: str, weather: str, dt: float) -> None:
         self.folder = None if folder is None else folder / SNAPSHOTS
-        self.stem, self.dt = f"{slug(driver)}_{weather}", dt
+        self.stem, self.dt = path_part(f"{slug(driver)}_{weather}"), dt
         self.paths: list[Path] = []
 
     def see(self, moment: Moment) -> None:
@@ -45,12 +46,12 @@ class Snapshots(Sink):
         if TOP in frame.images and (top := frame.images[TOP].rgb) is not None:
             _inset(picture, top)
         path = self.folder / f"{self.stem}_{frame.tick * self.dt:07.2f}s.png"
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            Image.fromarray(picture).save(path, optimize=False, compress_level=3)
-        except OSError as error:
-            raise output_error(path, error) from error
+        write_atomically(path, partial(_save, Image.fromarray(picture)))
         self.paths.append(path)
+
+
+def _save(picture: Image.Image, path: Path) -> None:
+    picture.save(path, format="PNG", optimize=False, compress_level=3)
 
 
 def _inset(picture: np.ndarray, small: np.ndarray) -> None:

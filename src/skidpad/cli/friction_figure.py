@@ -8,7 +8,7 @@ from typing import Any
 import matplotlib as mpl
 import numpy as np
 
-from skidpad.core.errors import OutputError
+from skidpad.cli.pictures import format_of, write_picture
 from skidpad.core.geometry import mps_from_kmh
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
@@ -59,6 +59,7 @@ def _speeds(axes: Any, mu_ref: float) -> None:
 
 def draw(path: Path, mu_ref: float) -> None:
     """Write the figure; the suffix chooses the format."""
+    format_of(path)
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
@@ -67,8 +68,6 @@ def draw(path: Path, mu_ref: float) -> None:
     _surface(figure.add_subplot(1, 3, 2, projection="3d"))
     _speeds(figure.add_subplot(1, 3, 3), mu_ref)
     try:
-        figure.savefig(path, dpi=80)
-    except (OSError, ValueError) as error:
-        raise OutputError(f"cannot write {path}: {error}") from error
+        write_picture(path, lambda part, kind: figure.savefig(part, dpi=80, format=kind))
     finally:
         plt.close(figure)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -38,9 +39,12 @@ def info(
     png: Path | None = PNG,
 ) -> None:
     """Print roads, lanes, signals, limits, and the grip that bends ask for."""
+    from skidpad.cli.pictures import format_of, write_picture
     from skidpad.roads.bundled import load_map
     from skidpad.roads.summary import summarise
 
+    if png is not None:
+        format_of(png)  # before work
     loaded = load_map(map)
     summary = summarise(loaded)
     for line in _facts(loaded, summary):
@@ -53,7 +57,7 @@ def info(
     if png is not None:
         from skidpad.roads.plan_view import draw
 
-        draw(loaded, png)
+        write_picture(png, partial(draw, loaded))
         typer.echo(f"picture: {png}")
 
 
@@ -63,11 +67,12 @@ def bake(
     out: Path | None = OUT,
 ) -> None:
     """Turn an OpenDRIVE file into a baked map, which loads in milliseconds."""
+    from skidpad.recording.files import write_atomically
     from skidpad.roads.bundled import bake_file
 
     baked = bake_file(file)
     target = out or file.with_suffix(".npz")
-    baked.save(target)
+    write_atomically(target, baked.save)
     typer.echo(f"{target}: {len(baked.samples.x)} samples, content hash {baked.content_hash()}")
 
 

@@ -83,8 +83,8 @@ def monitor(
     from skidpad.evidence.channels.indicators.settings import IndicatorSettings
     from skidpad.evidence.channels.monitor import MonitorSettings
     from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
-    from skidpad.live.watch import Timer, watch
-    from skidpad.recording.sources import open_channels
+    from skidpad.live.watch import Timer, watch_whole
+    from skidpad.recording.sources import file_hash, open_channels
     from skidpad.report.channels import write_drive_report
 
     wanted = {name: _rule(name) for name in fail_if or []}
@@ -102,7 +102,7 @@ def monitor(
         detectors={} if identifier is Identifier.rules else load_model(model).identifier(),
     )
     timer = Timer(time.thread_time_ns) if timing else None
-    found = watch(source, out, settings, timer)
+    found = watch_whole(source, out, settings, timer, file_hash(file))
     write_drive_report(out)
     _print(found, out)
     if timer is not None:

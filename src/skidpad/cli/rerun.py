@@ -66,6 +66,7 @@ def study(
     from rich.progress import Progress
 
     from skidpad.campaign.study import run_study
+    from skidpad.recording.files import write_atomically
 
     with Progress(console=Console(stderr=True)) as progress:
         task = progress.add_task(id)
@@ -74,5 +75,5 @@ def study(
         )
     typer.echo(f"{verdict.finding.id}: {verdict.finding.claim}\n{verdict.text}")
     if out is not None:
-        table.write_csv(out)
+        write_atomically(out, table.write_csv)
         typer.echo(str(out))

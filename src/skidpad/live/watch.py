@@ -11,7 +11,7 @@ from typing import TextIO
 import polars as pl
 
 from skidpad.core.channels import Context, Cycle
-from skidpad.core.errors import FileError
+from skidpad.core.errors import FileError, OutputError
 from skidpad.evidence.channels.indicators.panel import no_lap
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.evidence.channels.recorder import CycleEvidence
@@ -19,10 +19,19 @@ from skidpad.evidence.channels.summary import Watched, columns, watched
 from skidpad.evidence.channels.timing import MODULES
 from skidpad.recording.channels import ChannelSource, Losses, Message
 from skidpad.recording.cycles import cycles
-from skidpad.recording.hazards import HazardWriter
+from skidpad.recording.folders import ResultKind, require_kind, staged
+from skidpad.recording.hazards import INDEX_FILE, TEXT_FILE, HazardWriter
+from skidpad.recording.indicators import FILE as INDICATORS
 from skidpad.recording.indicators import IndicatorLog
-from skidpad.recording.monitored import write_summary, write_timing
+from skidpad.recording.monitored import (
+    SUMMARY,
+    TIMING,
+    read_summary,
+    write_summary,
+    write_timing,
+)
 
+FILES = (INDICATORS, TEXT_FILE, INDEX_FILE, TIMING, SUMMARY)
 WARM_CYCLES = 20
 Clock = Callable[[], int]  # ns
 
@@ -93,6 +102,30 @@ def watch(
     if timer:
         write_timing(folder, timer.table())
     return found
+
+
+def watch_whole(
+    source: ChannelSource,
+    folder: Path,
+    settings: MonitorSettings,
+    timer: Timer | None = None,
+    recording: str = "",
+) -> Watched:
+    """The same of a recording with this hash, in `folder` when all is complete, or as it was.
+
+    OutputError when it holds a result of another kind or of another recording.
+    """
+    require_kind(folder, ResultKind.MONITORED)
+    earlier = read_summary(folder).get("recording", "") if (folder / SUMMARY).exists() else ""
+    if earlier and recording and earlier != recording:
+        raise OutputError(
+            f"{folder} holds what was found in another recording; choose another --out"
+        )
+    with staged(folder, FILES) as part:
+        found = watch(source, part, settings, timer)
+        if recording:
+            write_summary(part, found.summary | {"recording": recording})
+        return found
 
 
 class Alarms:

@@ -6,12 +6,15 @@ import errno
 import hashlib
 import os
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 import polars as pl
 
 from skidpad.core.errors import FileError, OutputError
+
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # disk, quota, limit on the size of a file
 
 
 def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
@@ -27,10 +30,11 @@ def write_atomically(path: Path, write: Callable[[Path], None]) -> None:
         with open(temporary, "rb") as file:
             os.fsync(file.fileno())
         os.replace(temporary, path)
-    except OSError as error:
+    except (OSError, pl.exceptions.PolarsError) as error:
         raise output_error(path, error) from error
     finally:
-        temporary.unlink(missing_ok=True)
+        with suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def write_bytes(path: Path, content: bytes) -> None:
@@ -59,11 +63,13 @@ def read_parquet(path: Path) -> tuple[pl.DataFrame, dict[str, str]]:
         raise FileError(f"{path} is not a readable Parquet file: {error}") from error
 
 
-def output_error(path: Path, error: OSError) -> OutputError:
+def output_error(path: Path, error: Exception) -> OutputError:
     """One sentence for a person; a full disk is named as such."""
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+    number = getattr(error, "errno", None)
+    full = number in FULL or any(os.strerror(n) in str(error) for n in FULL)
+    if full:
         return OutputError(f"the disk is full: {path} was not written, everything before it was")
-    return OutputError(f"cannot write {path}: {error.strerror or error}")
+    return OutputError(f"cannot write {path}: {getattr(error, 'strerror', None) or error}")
 
 
 def content_hash(tables: Iterable[pl.DataFrame], text: bytes = b"") -> str:

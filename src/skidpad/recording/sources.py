@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from hashlib import sha256
 from pathlib import Path
 
 from skidpad.core.errors import FileError
 from skidpad.recording.channels import ChannelSource, McapRecording
+
+BLOCK = 2**20  # bytes
 
 
 def open_channels(path: Path, mapping: Path | None = None, truth: bool = True) -> ChannelSource:
@@ -19,6 +22,22 @@ def open_channels(path: Path, mapping: Path | None = None, truth: bool = True) -
     if not path.exists():
         raise FileError(f"{path}: no such file")
     return McapRecording(path, truth)
+
+
+def file_hash(path: Path) -> str:
+    """SHA-256 over the bytes of a recording: of the file, or of all files of a folder by name."""
+    digest = sha256()
+    for file in sorted(path.rglob("*")) if path.is_dir() else [path]:
+        if not file.is_file():
+            continue
+        digest.update(file.relative_to(path).as_posix().encode(errors="surrogateescape"))
+        try:
+            with file.open("rb") as stream:
+                while block := stream.read(BLOCK):
+                    digest.update(block)
+        except OSError as error:
+            raise FileError(f"{file}: cannot be read ({error.strerror})") from error
+    return digest.hexdigest()
 
 
 def recordings_below(folder: Path) -> list[Path]:

@@ -17,6 +17,8 @@ import jinja2
 import msgspec
 from markupsafe import Markup, escape
 
+from skidpad.recording.files import write_bytes
+
 REPORT = "report.html"
 
 
@@ -271,13 +273,12 @@ def write_report_page(page: Page, folder: Path) -> Path:
 
 def write_page(page: Page, path: Path) -> None:
     """Render to `path`; an earlier report is replaced only by a complete one."""
-    partial = path.with_suffix(".partial")
-    partial.write_text(render(page), encoding="utf-8")
-    partial.replace(path)
+    write_bytes(path, render(page).encode("utf-8", "backslashreplace"))
 
 
 def _script_json(value: Any) -> str:
-    return msgspec.json.encode(value).decode().replace("</", "<\\/")
+    """JSON that stays inside its <script>, whatever its words are: no "<" leaves it."""
+    return msgspec.json.encode(value).decode().replace("<", "\\u003c")
 
 
 def _asset(name: str) -> str:

@@ -22,8 +22,8 @@ COLOURS = {
 SIGNALS = {SignalKind.LIGHT: "#d62728", SignalKind.STOP: "#9467bd", SignalKind.YIELD: "#ff7f0e"}
 
 
-def draw(map: RoadMap, path: Path) -> None:
-    """Write a picture of lanes, roadside objects, signals and the ego's start."""
+def draw(map: RoadMap, path: Path, kind: str) -> None:
+    """Write a picture of lanes, roadside objects, signals and the ego's start in a format."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(14, 10), layout="constrained")
@@ -50,7 +50,7 @@ def draw(map: RoadMap, path: Path) -> None:
     axes.set_xlabel("x in m")
     axes.set_ylabel("y in m")
     axes.set_title(map.name)
-    figure.savefig(path, dpi=110)
+    figure.savefig(path, dpi=110, format=kind)
 
 
 def _lane(axes: Any, map: RoadMap, lane: int) -> None:

@@ -17,8 +17,10 @@ from xml.etree import ElementTree
 
 from scenariogeneration import xodr, xosc
 
-from skidpad.core.errors import ConfigError, InputError, OutputError
+from skidpad.core.errors import ConfigError, InputError
+from skidpad.core.names import path_part
 from skidpad.core.vocabulary import SemanticClass
+from skidpad.recording.files import write_bytes
 from skidpad.recording.hazards import HazardRecord
 from skidpad.scenarios.tracks import Track, tracks
 
@@ -76,18 +78,15 @@ def export_hazard(
     if not any(track.is_ego for track in entities):
         raise InputError(f"hazard {record.id}: no world with an ego to export")
     old = version is OscVersion.V1_0
-    stem = f"{record.id}-{record.type.value}{'_1.0' if old else ''}"
+    stem = path_part(f"{record.id}-{record.type.value}{'_1.0' if old else ''}")
     t_end = max(track.t[-1] for track in entities)
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        road_file = folder / f"{stem}.xodr"
-        parking = _write_road(entities, stem, road_file)
-        root = _scenario(record, entities, road_file.name, version, t_end, parking)
-        scenario_file = folder / f"{stem}.xosc"
-        ElementTree.indent(root, " ")
-        ElementTree.ElementTree(root).write(scenario_file, encoding="utf-8", xml_declaration=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot be written ({error.strerror})") from error
+    road_file, scenario_file = folder / f"{stem}.xodr", folder / f"{stem}.xosc"
+    road, parking = _road(entities, stem)
+    root = _scenario(record, entities, road_file.name, version, t_end, parking)
+    for path, element in ((road_file, road), (scenario_file, root)):
+        ElementTree.indent(element, " ")
+        text = ElementTree.tostring(element, encoding="utf-8", xml_declaration=True)
+        write_bytes(path, text)
     return scenario_file, road_file
 
 
@@ -102,8 +101,10 @@ def _channels(record: HazardRecord, version: OscVersion, world: str | None) -> t
     return record.channels if world is None else (world,)
 
 
-def _write_road(entities: list[Track], name: str, path: Path) -> tuple[float, float, float]:
-    """A straight road under every position; returns a place beside it and its heading."""
+def _road(
+    entities: list[Track], name: str
+) -> tuple[ElementTree.Element, tuple[float, float, float]]:
+    """A straight road under every position; a place beside it and its heading."""
     ego = entities[0]
     dx, dy = ego.x[-1] - ego.x[0], ego.y[-1] - ego.y[0]
     h = atan2(dy, dx) if hypot(dx, dy) > 5.0 else ego.heading[0]
@@ -129,12 +130,10 @@ def _write_road(entities: list[Track], name: str, path: Path) -> tuple[float, fl
     odr = xodr.OpenDrive(name, "1", "7")
     odr.add_road(road)
     odr.adjust_roads_and_lanes()
-    root = odr.get_element()
-    root.find("header").set("date", "1970-01-01T00:00:00")
-    ElementTree.indent(root, " ")
-    ElementTree.ElementTree(root).write(path, encoding="utf-8", xml_declaration=True)
+    root: ElementTree.Element = odr.get_element()
+    root.find("header").set("date", "1970-01-01T00:00:00")  # type: ignore[union-attr]
     side = half + 30.0
-    return ox + start * c - side * s, oy + start * s + side * c, h
+    return root, (ox + start * c - side * s, oy + start * s + side * c, h)
 
 
 def _scenario(

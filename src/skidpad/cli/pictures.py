@@ -1,0 +1,22 @@
+"""Pictures that commands write: whole or not at all, in a format that their ending names."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+from skidpad.core.errors import require_choice
+from skidpad.recording.files import write_atomically
+
+FORMATS = ("png", "svg", "pdf", "jpg", "webp")
+
+
+def format_of(path: Path) -> str:
+    """The format that the ending of a picture's name asks for; ConfigError for no such format."""
+    return require_choice("ending of a picture", path.suffix.removeprefix(".").lower(), FORMATS)
+
+
+def write_picture(path: Path, draw: Callable[[Path, str], None]) -> None:
+    """Let `draw` write the file it is given, in the format it is given, and put it in place."""
+    kind = format_of(path)
+    write_atomically(path, lambda part: draw(part, kind))

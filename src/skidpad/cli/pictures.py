@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from pathlib import Path
 
-from skidpad.core.errors import require_choice
+from skidpad.core.errors import OutputError, require_choice
 from skidpad.recording.files import write_atomically
 
 FORMATS = ("png", "svg", "pdf", "jpg", "webp")
@@ -17,6 +17,11 @@ def format_of(path: Path) -> str:
 
 
 def write_picture(path: Path, draw: Callable[[Path, str], None]) -> None:
-    """Let `draw` write the file it is given, in the format it is given, and put it in place."""
+    """Let `draw` write the file it is given, in the format it is given, and put it in place.
+
+    The folder must be there: a picture is no reason to make one.
+    """
     kind = format_of(path)
+    if not path.parent.is_dir():
+        raise OutputError(f"cannot write {path}: there is no folder {path.parent}")
     write_atomically(path, lambda part: draw(part, kind))

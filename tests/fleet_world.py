@@ -41,7 +41,7 @@ def record(
 ) -> HazardRecord:
     """A car ahead that the ego closes in on, as two channels saw it for two seconds."""
     x, y = place
-    closing = 2.0 + 0.01 * number
+    closing = 6.0 + 0.01 * number
     worlds = []
     for k in range(20):
         t = k * 0.1

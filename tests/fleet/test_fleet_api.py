@@ -52,11 +52,27 @@ def filled(path: str, ids: dict[str, str]) -> str:
     return path
 
 
+def others(world) -> tuple[str, str, str]:
+    """An alert, an order and a cluster of the red operator's vehicles."""
+    scene = {"map": "town", "ego": {"x": 0.0, "y": 0.0, "heading": 0.0}, "v": 1.0}
+    text = json.dumps({"kind": "fault", "text": "t", "scene": scene})
+    headers = {"Idempotency-Key": "alert-key-1"}
+    alert = world.post("red-1", "/api/v1/alerts", content=text, headers=headers).json()["alert"]
+    order = world.post("red teleoperator", f"/api/v1/alerts/{alert}/stop").json()["order"]
+    more = packed(*(record(k, (100.0 + k, 0.0)) for k in range(5, 9)))
+    assert world.send("red-2", more).status_code == 200
+    world.post("axle", "/api/v1/analyses")
+    return alert, order, world.get("axle", "/api/v1/clusters").json()[0]["id"]
+
+
 @pytest.mark.req("C-195")
 def test_every_route_for_every_role_and_foreign_id(lite):
     """No credential: 401. A role without the right: 403. Another tenant's id: 404, as if absent."""
     (hazard,) = lite.send("red-1", packed(record(1))).json()["ids"]
-    ids = {"hazard": hazard, "kind": "hazards"}
+    alert, order, cluster = others(lite)
+    ids = {"hazard": hazard, "alert": alert, "order": order, "cluster": cluster}
+    words = {"kind": "hazards", "what": "obeyed"}
+    asked = {"challenge": "0" * 32}
     people = {
         Role.MANUFACTURER: "bolt", Role.OPERATOR: "blue operator", Role.VEHICLE: "blue-1",
         Role.TELEOPERATOR: "blue teleoperator", Role.AUTHORITY: "authority",
@@ -65,19 +81,19 @@ def test_every_route_for_every_role_and_foreign_id(lite):
     for method, path, needs in routes(lite.client.app):
         if path in OPEN:
             continue
-        target = filled(path, ids)
+        target = filled(path, ids | words)
         nobody = lite.client.request(method, target)
         assert nobody.status_code == 401, (method, path)
         wrong = lite.client.request(method, target, headers={"Authorization": "Bearer skidpad-x"})
         assert wrong.status_code == 401, (method, path)
         for role, name in people.items():
             lite.clock.now += 10.0
-            answer = lite.client.request(method, target, headers=lite.headers(name))
+            answer = lite.client.request(method, target, headers=lite.headers(name), params=asked)
             if role not in RIGHTS[needs[0]]:
                 assert answer.status_code == 403, (method, path, role)
-            elif "{hazard}" in path:
+            elif any("{" + name + "}" in path for name in ids):
                 assert answer.status_code == 404, (method, path, role)
-            assert hazard not in answer.text, (method, path, role)
+            assert not any(id in answer.text for id in ids.values()), (method, path, role)
             assert answer.status_code < 500, (method, path, role)
 
 

@@ -12,7 +12,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -46,6 +46,7 @@ WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
 TRUTH_REACH = 120.0  # m around the ego within which the true world is recorded
 MINIMAL_RISK_BRAKE = 0.4  # of full brake, about 4 m/s^2 (UN R157 5.1.6: at most 4 m/s^2)
 NO_REPORT = StackReport()
+StopOrder = Callable[[float], bool]  # asked at each cycle's time, s: is the vehicle to stop?
 LABEL_OF = np.array([LABEL_OF_KIND[kind] for kind in ActorKind], dtype=np.int64)
 
 
@@ -54,8 +55,9 @@ class Crew:
 
     report = NO_REPORT
 
-    def __init__(self, spec: RunSpec, segment: Segment) -> None:
+    def __init__(self, spec: RunSpec, segment: Segment, stop: StopOrder | None = None) -> None:
         self.spec, self.crew, self.segment = spec, crew_of(spec), segment
+        self.stop = stop
         names = self.crew.channels
         self.channels = [
             Channel(name, settings_of(name), segment.car, segment.map, segment.route)
@@ -108,6 +110,8 @@ class Crew:
             choice = self.arbiter.update(t, self.frames, scores, progress)
         else:
             choice = Choice(names.index(drive_by), Reason.KEPT)
+        if self.stop is not None and self.stop(t):
+            choice = Choice(None, Reason.ORDERED)
         self.driving = choice.driving
         name = "" if choice.driving is None else names[choice.driving]
         self.decision = Decision(t, name, choice.reason.value, tuple(scores))
@@ -175,11 +179,13 @@ class Street:
         return self.crew.segment.crowd.commands(self.crew.cycle * CYCLE, truth)
 
 
-def drive_segment(spec: RunSpec, path: Path, links: Links | None = None) -> DriveOutcome:
+def drive_segment(
+    spec: RunSpec, path: Path, links: Links | None = None, stop: StopOrder | None = None
+) -> DriveOutcome:
     """Drive a segment and write its recording to `path`, which appears only when complete."""
     links = links or Links()
     segment = segment_of(spec)
-    crew = Crew(spec, segment)
+    crew = Crew(spec, segment, stop)
     keep_server(spec.backend)
     backend = make_backend(spec.backend, WATCHDOG)
     part = path.with_suffix(".part")

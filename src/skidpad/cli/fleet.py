@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    from skidpad.fleet.alerting.relays import Relay
     from skidpad.fleet.service import Places
 
 fleet = typer.Typer(
@@ -58,6 +59,14 @@ def serve(
         Path | None, typer.Option(help="PEM of the server; with --key serves HTTPS.")
     ] = None,
     key: Annotated[Path | None, typer.Option(help="PEM of its private key.")] = None,
+    webhook: Annotated[
+        list[str] | None, typer.Option(help="TENANT=URL that this operator's alerts are sent to.")
+    ] = None,
+    webhook_host: Annotated[
+        list[str] | None, typer.Option(help="A host that webhooks may lead to.")
+    ] = None,
+    mqtt: Annotated[str | None, typer.Option(help="HOST[:PORT] of an MQTT 5 broker.")] = None,
+    mqtt_ca: Annotated[Path | None, typer.Option(help="PEM of the broker's authority.")] = None,
 ) -> None:
     """Serve the fleet; nothing listens beyond this machine unless --host says so."""
     from skidpad.core.errors import ConfigError
@@ -72,11 +81,41 @@ def serve(
     if host not in ("127.0.0.1", "::1", "localhost") and certificate is None:
         raise ConfigError(f"--host {host} leaves this machine and needs --certificate and --key")
     places = _places(data, database, blobs)
-    service = open_fleet(places, exporter=export_hazard)
+    relays = _relays(places, webhook or [], webhook_host or [], mqtt, mqtt_ca)
+    service = open_fleet(places, exporter=export_hazard, relays=relays)
     try:
         run(service, Listen(host, port, certificate, key), typer.echo)
     finally:
         service.close()
+
+
+def _relays(
+    places: Places, webhooks: list[str], hosts: list[str], mqtt: str | None, ca: Path | None
+) -> list[Relay]:
+    """Where alerts are relayed to; ConfigError for what must not be."""
+    import time
+
+    from skidpad.core.errors import ConfigError
+    from skidpad.fleet.alerting.relays import Broker, Mqtt, Webhook
+    from skidpad.fleet.service import open_store
+    from skidpad.fleet.store.accounts import tenant_id
+
+    found: list[Relay] = []
+    if webhooks:
+        engine = open_store(places)
+        with engine.begin() as connection:
+            for text in webhooks:
+                tenant, equals, url = text.partition("=")
+                if not equals:
+                    raise ConfigError(f"--webhook must read TENANT=URL, got {text!r}")
+                found.append(Webhook(tenant_id(connection, tenant, time.time()), url, hosts))
+        engine.dispose()
+    if mqtt is not None:
+        host, _, port = mqtt.rpartition(":") if ":" in mqtt else (mqtt, "", "1883")
+        if not port.isdigit():
+            raise ConfigError(f"--mqtt must read HOST[:PORT], got {mqtt!r}")
+        found.append(Mqtt(Broker(host=host, port=int(port), ca=ca)))
+    return found
 
 
 @fleet.command()

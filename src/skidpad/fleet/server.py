@@ -46,5 +46,6 @@ def run(fleet: Fleet, listen: Listen, say: Callable[[str], None]) -> None:
     scheme = "https" if listen.certificate else "http"
     host = f"[{listen.host}]" if ":" in listen.host else listen.host
     say(f"the fleet is at {scheme}://{host}:{port}")
+    fleet.dispatcher.start()
     with one:
         server_of(fleet, listen).run(sockets=[one])

@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from sqlalchemy import Engine
 
 from skidpad.core.errors import OutputError
+from skidpad.fleet.alerting.dispatcher import Dispatcher
+from skidpad.fleet.alerting.hub import Hub
+from skidpad.fleet.alerting.orders import Signer
+from skidpad.fleet.alerting.relays import Relay
 from skidpad.fleet.blobs import Blobs
 from skidpad.fleet.store.engine import migrate, open_engine, sqlite_url
 from skidpad.fleet.store.intake import Intake
@@ -37,12 +41,16 @@ class Fleet:
     blobs: Blobs
     intake: Intake
     clock: Clock
+    hub: Hub
+    dispatcher: Dispatcher
+    signer: Signer
     limits: Limits = field(default_factory=Limits)
     exporter: Exporter | None = None  # handed in: this house knows no scenarios
     owners: dict[str, tuple[str, str]] = field(default_factory=dict)  # tenants of a vehicle: facts
 
     def close(self) -> None:
         """Commit what was submitted and let go of everything."""
+        self.dispatcher.close()
         self.intake.close()
         self.engine.dispose()
 
@@ -52,11 +60,23 @@ def open_fleet(
     clock: Clock = time.time,
     limits: Limits | None = None,
     exporter: Exporter | None = None,
+    relays: Sequence[Relay] = (),
 ) -> Fleet:
     """Open the store at `places`, made or brought to this version where needed."""
     engine = open_store(places)
     blobs = Blobs(places.blobs or str(places.data.absolute() / "blobs"))
-    return Fleet(engine, blobs, Intake(engine, blobs, clock), clock, limits or Limits(), exporter)
+    hub = Hub()
+    return Fleet(
+        engine=engine,
+        blobs=blobs,
+        intake=Intake(engine, blobs, clock),
+        clock=clock,
+        hub=hub,
+        dispatcher=Dispatcher(engine, hub, clock, relays),
+        signer=Signer(places.data / "keys"),
+        limits=limits or Limits(),
+        exporter=exporter,
+    )
 
 
 def open_store(places: Places) -> Engine:

@@ -26,6 +26,7 @@ class Action(str, Enum):
     READ_HAZARDS = "read hazards"  # rows and records of own vehicles
     EXPORT_SCENARIO = "export scenario"  # OpenSCENARIO in the stakeholder's own environment
     READ_TRENDS = "read trends"
+    ANALYSE = "analyse"  # look for recurring hazards now
     READ_ALERTS = "read alerts"
     ANSWER_ALERTS = "answer alerts"
     ORDER_STOP = "order stop"
@@ -44,6 +45,7 @@ RIGHTS: dict[Action, frozenset[Role]] = {
     Action.READ_HAZARDS: frozenset({_M, _O, _V}),
     Action.EXPORT_SCENARIO: frozenset({_M, _O}),
     Action.READ_TRENDS: frozenset({_M, _O}),
+    Action.ANALYSE: frozenset({_M, _O}),
     Action.READ_ALERTS: frozenset({_O, _T}),
     Action.ANSWER_ALERTS: frozenset({_O, _T}),
     Action.ORDER_STOP: frozenset({_T}),

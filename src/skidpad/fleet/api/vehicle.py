@@ -67,7 +67,7 @@ def _checked(
 ) -> Batch:
     content = unpack(body, fleet.limits)
     key, drive, vehicle_time = told
-    operator, manufacturer = _tenants(fleet, str(who.vehicle))
+    operator, manufacturer = owners_of(fleet, str(who.vehicle))
     readers: dict[Kind, Callable[[], dict[str, Any]]] = {
         Kind.HAZARDS: lambda: {"found": hazards_of(content, fleet.limits)},
         Kind.DRIVE: lambda: {
@@ -88,7 +88,8 @@ def _checked(
     )
 
 
-def _tenants(fleet: Fleet, vehicle: str) -> tuple[str, str]:
+def owners_of(fleet: Fleet, vehicle: str) -> tuple[str, str]:
+    """Operator and manufacturer of a vehicle, which never change."""
     known = fleet.owners.get(vehicle)
     if known is None:
         with fleet.engine.connect() as connection:

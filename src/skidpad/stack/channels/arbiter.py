@@ -23,6 +23,7 @@ class Reason(str, Enum):
     FAILOVER = "the driving channel is silent"
     MINIMAL_RISK = "no channel is safe: minimal-risk stop"
     ALL_SILENT = "all channels are silent: minimal-risk stop"
+    ORDERED = "a teleoperator ordered a minimal-risk stop"
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

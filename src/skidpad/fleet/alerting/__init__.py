@@ -1,0 +1,1 @@
+"""Alerts of vehicles, relayed at once, and stop orders back to them (C-175)."""

@@ -1,0 +1,99 @@
+"""Relays alerts as they come, tries again what failed, and escalates what nobody took up."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Sequence
+
+from sqlalchemy import Engine
+
+from skidpad.core.errors import BackendError
+from skidpad.fleet.alerting.hub import Hub
+from skidpad.fleet.alerting.keeping import SUBJECT, Alert, What, alerts_since, overdue
+from skidpad.fleet.alerting.relays import Relay
+from skidpad.fleet.store.events import add_event
+
+DAY = 86400.0  # s that an alert is looked after
+LOOK_S = 1.0  # between two looks when nothing comes
+TRIES = 8
+SERVICE = "dispatcher"
+log = logging.getLogger(__name__)
+
+
+class Dispatcher:
+    """One thread; `work` is one round of it, and tests call it themselves."""
+
+    def __init__(
+        self, engine: Engine, hub: Hub, clock: Callable[[], float], relays: Sequence[Relay] = ()
+    ) -> None:
+        self.engine, self.hub, self.clock, self.relays = engine, hub, clock, tuple(relays)
+        self._wake, self._ended = threading.Event(), threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin to look after alerts."""
+        self._thread = threading.Thread(target=self._run, name="fleet-dispatcher")
+        self._thread.start()
+
+    def wake(self) -> None:
+        """There is something new."""
+        self._wake.set()
+
+    def close(self) -> None:
+        """End the thread; safe to call twice."""
+        self._ended.set()
+        self._wake.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        while not self._ended.is_set():
+            try:
+                self.work()
+            except Exception:  # the next round tries again; alerts must not end with one failure
+                log.exception("the dispatcher failed")
+            self._wake.wait(LOOK_S)
+            self._wake.clear()
+
+    def work(self) -> None:
+        """Escalate what is overdue, then relay what is not relayed at its level."""
+        now = self.clock()
+        with self.engine.begin() as connection:
+            for alert in alerts_since(connection, now - DAY):
+                if overdue(alert, now):
+                    add_event(
+                        connection, (SUBJECT, alert.row.id), What.ESCALATED.value, (SERVICE, now)
+                    )
+                    self.hub.tell(f"alerts {alert.row.operator}")
+        with self.engine.connect() as connection:
+            known = alerts_since(connection, now - DAY)
+        for alert in known:
+            for relay in self.relays:
+                if relay.wants(alert.row.operator) and _is_due(alert, relay.name, now):
+                    self._send(alert, relay)
+
+    def _send(self, alert: Alert, relay: Relay) -> None:
+        what, reason = What.RELAYED, ""
+        try:
+            relay.send(alert.plain())
+        except BackendError as error:
+            what, reason = What.FAILED, str(error)
+        at = self.clock()
+        with self.engine.begin() as connection:
+            add_event(
+                connection, (SUBJECT, alert.row.id), what.value, (SERVICE, at),
+                relay=relay.name, level=alert.level, reason=reason,
+            )  # fmt: skip
+
+
+def _is_due(alert: Alert, relay: str, now: float) -> bool:
+    """Not relayed at this level, and not tried a moment ago: 1, 2, 4, ... s between tries."""
+    mine = [
+        e
+        for e in alert.events
+        if e.detail.get("relay") == relay and e.detail.get("level") == alert.level
+    ]
+    if any(e.what == What.RELAYED.value for e in mine) or alert.closed or len(mine) >= TRIES:
+        return False
+    return not mine or now - mine[-1].at >= 2.0 ** (len(mine) - 1)

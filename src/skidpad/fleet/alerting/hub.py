@@ -1,0 +1,34 @@
+"""Who waits is woken: a count per topic that only grows, for long polls and pages."""
+
+from __future__ import annotations
+
+import asyncio
+from collections import Counter
+from threading import Lock
+
+STEP_S = 0.02  # between two looks at a count
+
+
+class Hub:
+    """Counts of what happened, by topic; safe between threads."""
+
+    def __init__(self) -> None:
+        self._counts: Counter[str] = Counter()
+        self._lock = Lock()
+
+    def tell(self, topic: str) -> None:
+        """Something happened."""
+        with self._lock:
+            self._counts[topic] += 1
+
+    def count(self, topic: str) -> int:
+        """How often something happened so far."""
+        return self._counts[topic]
+
+    async def changed(self, topic: str, seen: int, wait_s: float) -> int:
+        """The count once it is no longer `seen`, or after `wait_s`."""
+        for _ in range(round(wait_s / STEP_S)):
+            if self.count(topic) != seen:
+                break
+            await asyncio.sleep(STEP_S)
+        return self.count(topic)

@@ -1,0 +1,133 @@
+"""Stop orders: signed, for one vehicle, good once and for 2 s, bound to that vehicle's question.
+
+Clocks of vehicles are not trusted, so an order does not say a time of day: a vehicle asks with a
+random challenge, the order repeats it, and the vehicle counts the 2 s from its own question.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from sqlalchemy import Connection, select
+from sqlalchemy.exc import IntegrityError
+
+from skidpad.core.errors import FileError
+from skidpad.fleet.alerting.keeping import alert_of
+from skidpad.fleet.identity import new_id
+from skidpad.fleet.store.events import add_event
+from skidpad.fleet.store.later import deliveries, orders
+from skidpad.fleet.store.rights import visible
+from skidpad.fleet.words import Principal, absent
+from skidpad.recording.files import write_bytes
+
+VALID_S = 2.0
+STOP = "minimal-risk stop"
+SUBJECT = "order"
+
+
+class Signer:
+    """The fleet's key for orders, in its data folder; vehicles know the public half."""
+
+    def __init__(self, folder: Path) -> None:
+        """Reads the key, or makes one; FileError when it cannot be used."""
+        path = folder / "orders.key"
+        if not path.exists():
+            folder.mkdir(parents=True, exist_ok=True)
+            _write_secret(path, Ed25519PrivateKey.generate())
+        try:
+            key = serialization.load_pem_private_key(path.read_bytes(), None)
+        except (OSError, ValueError, TypeError) as error:
+            raise FileError(f"{path}: is not a private key ({error})") from error
+        if not isinstance(key, Ed25519PrivateKey):
+            raise FileError(f"{path}: is not an Ed25519 key")
+        self._key = key
+        self.public = key.public_key().public_bytes_raw()
+        write_bytes(folder / "orders.pub", self.public.hex().encode() + b"\n")
+
+    def sign(self, order: dict[str, Any]) -> dict[str, str]:
+        """The order as it is sent: its text and the signature of exactly that text."""
+        text = json.dumps(order, sort_keys=True, separators=(",", ":"))
+        return {"order": text, "signature": self._key.sign(text.encode()).hex()}
+
+
+def _write_secret(path: Path, key: Ed25519PrivateKey) -> None:
+    content = key.private_bytes(
+        serialization.Encoding.PEM,
+        serialization.PrivateFormat.PKCS8,
+        serialization.NoEncryption(),
+    )
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        file.write(content)
+
+
+@dataclass(frozen=True, slots=True)
+class Ordered:
+    """An order that waits for its vehicle to ask."""
+
+    id: str
+    vehicle: str
+    expires: float  # s, server
+
+
+def order_stop(connection: Connection, who: Principal, alert: str, at: float) -> Ordered:
+    """Order the vehicle of an alert to stop; Refused (404) when `who` may not see the alert."""
+    row = alert_of(connection, who, alert).row
+    order = Ordered(new_id(), row.vehicle, at + VALID_S)
+    connection.execute(
+        orders.insert(),
+        {
+            "id": order.id, "operator": row.operator, "manufacturer": row.manufacturer,
+            "vehicle": row.vehicle, "alert": alert, "what": STOP, "actor": who.id,
+            "expires": order.expires, "at": at,
+        },
+    )  # fmt: skip
+    add_event(connection, ("alert", alert), "stop ordered", (who.id, at), order=order.id)
+    return order
+
+
+def hand_out(
+    connection: Connection, signer: Signer, vehicle: str, challenge: str, at: float
+) -> list[dict[str, str]]:
+    """The orders that wait for `vehicle`, each handed out once, signed with its challenge."""
+    rows = connection.execute(
+        select(orders)
+        .outerjoin(deliveries, deliveries.c.order == orders.c.id)
+        .where(orders.c.vehicle == vehicle, orders.c.expires > at, deliveries.c.order.is_(None))
+        .order_by(orders.c.at)
+    ).all()
+    out = []
+    for row in rows:
+        try:
+            with connection.begin_nested():
+                connection.execute(
+                    deliveries.insert(), {"order": row.id, "challenge": challenge, "at": at}
+                )
+        except IntegrityError:
+            continue  # handed out to another request at this moment
+        out.append(
+            signer.sign(
+                {
+                    "order": row.id, "vehicle": vehicle, "what": row.what,
+                    "challenge": challenge, "valid_s": VALID_S,
+                }
+            )
+        )  # fmt: skip
+    return out
+
+
+def note_answer(connection: Connection, who: Principal, order: str, what: str, at: float) -> str:
+    """Keep what the vehicle did with its order; the id of the alert that led to it."""
+    row = connection.execute(
+        select(orders).where(orders.c.id == order, visible(who, orders))
+    ).first()
+    if row is None:
+        raise absent()
+    add_event(connection, (SUBJECT, order), what, (who.id, at))
+    add_event(connection, ("alert", row.alert), what, (who.id, at), order=order)
+    return str(row.alert)

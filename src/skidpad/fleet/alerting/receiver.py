@@ -1,0 +1,60 @@
+"""The vehicle's side of a stop order: obeyed only when it answers a question just asked."""
+
+from __future__ import annotations
+
+import json
+import secrets
+from collections.abc import Callable
+from enum import Enum
+
+from cryptography.exceptions import InvalidSignature
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
+
+from skidpad.fleet.alerting.orders import STOP, VALID_S
+
+OPEN_MAX = 8  # questions that may be open at once
+
+
+class Verdict(str, Enum):
+    """What came of an order; only `OBEYED` stops the vehicle."""
+
+    OBEYED = "obeyed"
+    FORGED = "forged"  # not signed by the fleet's key
+    FOREIGN = "foreign"  # for another vehicle, or not an order
+    REPLAYED = "replayed"  # answers no open question
+    EXPIRED = "expired"
+
+
+class Receiver:
+    """Checks orders against the pinned key and the vehicle's own monotonic clock."""
+
+    def __init__(self, public: bytes, vehicle: str, clock: Callable[[], float]) -> None:
+        self._key = Ed25519PublicKey.from_public_bytes(public)
+        self.vehicle, self.clock = vehicle, clock
+        self._asked: dict[str, float] = {}
+        self.stopped = False
+
+    def challenge(self) -> str:
+        """A fresh question; of old ones the last few stay open."""
+        while len(self._asked) >= OPEN_MAX:
+            del self._asked[next(iter(self._asked))]
+        name = secrets.token_hex(16)
+        self._asked[name] = self.clock()
+        return name
+
+    def receive(self, text: str, signature: str) -> Verdict:
+        """Judge an order; a good one stops the vehicle for good."""
+        try:
+            self._key.verify(bytes.fromhex(signature), text.encode())
+        except (InvalidSignature, ValueError):
+            return Verdict.FORGED
+        order = json.loads(text)
+        if order["vehicle"] != self.vehicle or order["what"] != STOP:
+            return Verdict.FOREIGN
+        asked = self._asked.pop(order["challenge"], None)
+        if asked is None:
+            return Verdict.REPLAYED
+        if not 0.0 <= self.clock() - asked <= VALID_S:
+            return Verdict.EXPIRED
+        self.stopped = True
+        return Verdict.OBEYED

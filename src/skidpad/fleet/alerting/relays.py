@@ -1,0 +1,111 @@
+"""Where alerts are relayed to: an operator's webhook, MQTT 5. None of them is trusted to answer."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import ssl
+from collections.abc import Collection
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+from urllib.parse import urlsplit
+
+import httpx
+
+from skidpad.core.errors import BackendError, ConfigError, MissingExtra
+from skidpad.pages.server import is_local
+
+TIMEOUT_S = 5.0  # of a webhook and of a broker
+
+
+class Relay(Protocol):
+    """Somewhere to relay alerts to."""
+
+    name: str
+
+    def wants(self, operator: str) -> bool:
+        """Whether it takes alerts of that operator."""
+
+    def send(self, alert: dict[str, Any]) -> None:
+        """Relay one alert; BackendError when it was not taken."""
+
+
+class Webhook:
+    """A POST to an operator's own server; no other host, no redirect, no proxy."""
+
+    def __init__(self, operator: str, url: str, hosts: Collection[str]) -> None:
+        """ConfigError unless the host is allow-listed and, beyond this machine, the scheme https."""
+        parts = urlsplit(url)
+        host = parts.hostname or ""
+        if host not in hosts:
+            raise ConfigError(f"--webhook {url!r}: its host is not among --webhook-host")
+        if parts.username or parts.password:
+            raise ConfigError(f"--webhook: an address with a password is not taken ({host})")
+        if parts.scheme != "https" and not (parts.scheme == "http" and is_local(host)):
+            raise ConfigError(f"--webhook {url!r} must be https")
+        self.operator, self.url = operator, url
+        self.name = f"webhook {host}"
+
+    def wants(self, operator: str) -> bool:
+        """Only its own operator's alerts."""
+        return operator == self.operator
+
+    def send(self, alert: dict[str, Any]) -> None:
+        """One POST of JSON."""
+        try:
+            with httpx.Client(timeout=TIMEOUT_S, follow_redirects=False, trust_env=False) as client:
+                answer = client.post(self.url, json=alert)
+        except httpx.HTTPError as error:
+            raise BackendError(f"{self.name}: {type(error).__name__}") from error
+        if not 200 <= answer.status_code < 300:
+            raise BackendError(f"{self.name}: answered {answer.status_code}")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Broker:
+    """An MQTT broker."""
+
+    host: str
+    port: int = 1883
+    user: str | None = None
+    password: str | None = None
+    ca: Path | None = None  # PEM; given: TLS
+
+    def __post_init__(self) -> None:
+        if self.ca is None and not is_local(self.host):
+            raise ConfigError(f"--mqtt {self.host} leaves this machine and needs --mqtt-ca")
+
+
+class Mqtt:
+    """Publishes to skidpad/<operator>/alerts, at least once (QoS 1)."""
+
+    def __init__(self, broker: Broker) -> None:
+        """MissingExtra without aiomqtt."""
+        try:
+            import aiomqtt
+        except ImportError as error:
+            raise MissingExtra("--mqtt", "fleet") from error
+        self._library, self.broker = aiomqtt, broker
+        self.name = "mqtt"
+
+    def wants(self, operator: str) -> bool:
+        """Every operator has a topic."""
+        return bool(operator)
+
+    def send(self, alert: dict[str, Any]) -> None:
+        """Connect, publish, and wait for the broker's word."""
+        try:
+            asyncio.run(self._publish(alert))
+        except (self._library.MqttError, OSError, TimeoutError) as error:
+            raise BackendError(f"mqtt: {error}") from error
+
+    async def _publish(self, alert: dict[str, Any]) -> None:
+        b, library = self.broker, self._library
+        tls = None if b.ca is None else ssl.create_default_context(cafile=str(b.ca))
+        async with library.Client(
+            b.host, b.port, username=b.user, password=b.password, timeout=TIMEOUT_S,
+            protocol=library.ProtocolVersion.V5, tls_context=tls,
+        ) as client:  # fmt: skip
+            topic = f"skidpad/{alert['operator']}/alerts"
+            await client.publish(topic, json.dumps(alert), qos=1)

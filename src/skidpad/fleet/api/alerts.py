@@ -1,0 +1,111 @@
+"""Alerts: raised by vehicles, pushed to whoever waits, answered by operators (C-175)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Depends, Query, Request
+from starlette.concurrency import run_in_threadpool
+
+from skidpad.fleet.alerting.keeping import (
+    AlertText,
+    What,
+    alert_of,
+    answer,
+    keep_alert,
+    newest_alerts,
+    parse_alert,
+)
+from skidpad.fleet.alerting.orders import order_stop
+from skidpad.fleet.api.guard import Needs, fleet_of
+from skidpad.fleet.api.vehicle import Key, Reporter, VehicleTime, owners_of, read_body
+from skidpad.fleet.service import Fleet
+from skidpad.fleet.words import Action, Principal
+
+Reader = Annotated[Principal, Depends(Needs(Action.READ_ALERTS))]
+Answerer = Annotated[Principal, Depends(Needs(Action.ANSWER_ALERTS))]
+Teleoperator = Annotated[Principal, Depends(Needs(Action.ORDER_STOP))]
+Wait = Annotated[float, Query(ge=0.0, le=30.0, allow_inf_nan=False)]
+router = APIRouter(prefix="/api/v1/alerts", tags=["alerts"])
+
+
+@router.post("")
+async def raise_alert(
+    request: Request, who: Reporter, key: Key, vehicle_time: VehicleTime = None
+) -> dict[str, Any]:
+    """Keep an alert and relay it at once."""
+    fleet = fleet_of(request)
+    alert = parse_alert(await read_body(request, fleet.limits))
+    return await run_in_threadpool(_keep, fleet, who, key, alert, vehicle_time)
+
+
+def _keep(
+    fleet: Fleet, who: Principal, key: str, alert: AlertText, vehicle_time: float | None
+) -> dict[str, Any]:
+    vehicle = str(who.vehicle)
+    operator, manufacturer = owners_of(fleet, vehicle)
+    owned = {"vehicle": vehicle, "operator": operator, "manufacturer": manufacturer}
+    with fleet.engine.begin() as connection:
+        id, new = keep_alert(connection, owned, key, alert, (fleet.clock(), vehicle_time))
+    if new:
+        fleet.hub.tell(f"alerts {operator}")
+        fleet.dispatcher.wake()
+    return {"alert": id, "known": not new}
+
+
+@router.get("")
+async def list_alerts(
+    request: Request, who: Reader, seen: int = -1, wait: Wait = 0.0
+) -> dict[str, Any]:
+    """The newest alerts; with `seen` of the last answer it waits until there is something new."""
+    fleet = fleet_of(request)
+    count = await fleet.hub.changed(f"alerts {who.tenant}", seen, wait)
+
+    def read() -> list[dict[str, Any]]:
+        with fleet.engine.connect() as connection:
+            return [alert.plain() for alert in newest_alerts(connection, who)]
+
+    return {"seen": count, "alerts": await run_in_threadpool(read)}
+
+
+@router.post("/{alert}/acknowledge")
+def acknowledge(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
+    """Take it up."""
+    return answered(fleet_of(request), who, alert, What.ACKNOWLEDGED)
+
+
+@router.post("/{alert}/escalate")
+def escalate(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
+    """Hand it one level up; it is relayed again."""
+    return answered(fleet_of(request), who, alert, What.ESCALATED)
+
+
+@router.post("/{alert}/close")
+def close(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
+    """Nothing more is to be done."""
+    return answered(fleet_of(request), who, alert, What.CLOSED)
+
+
+def answered(fleet: Fleet, who: Principal, alert: str, what: What) -> dict[str, Any]:
+    """Keep an answer to an alert and tell whoever waits; the alert as it is now."""
+    with fleet.engine.begin() as connection:
+        answer(connection, alert_of(connection, who, alert), what, who, fleet.clock())
+    with fleet.engine.connect() as connection:
+        now = alert_of(connection, who, alert)
+    fleet.hub.tell(f"alerts {now.row.operator}")
+    fleet.dispatcher.wake()
+    return now.plain()
+
+
+@router.post("/{alert}/stop")
+def stop(request: Request, who: Teleoperator, alert: str) -> dict[str, Any]:
+    """Order the vehicle to a minimal-risk stop; the order is void unless it is fetched within 2 s."""
+    return ordered(fleet_of(request), who, alert)
+
+
+def ordered(fleet: Fleet, who: Principal, alert: str) -> dict[str, Any]:
+    """Order a stop and tell the vehicle that waits."""
+    with fleet.engine.begin() as connection:
+        order = order_stop(connection, who, alert, fleet.clock())
+    fleet.hub.tell(f"orders {order.vehicle}")
+    return {"order": order.id, "expires": order.expires}

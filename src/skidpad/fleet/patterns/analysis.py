@@ -1,0 +1,152 @@
+"""An analysis of a tenant's hazards: kept with its settings, so that it can be read and repeated."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import msgspec
+from sqlalchemy import Connection, select
+
+from skidpad.core.errors import FileError
+from skidpad.fleet.identity import new_id
+from skidpad.fleet.patterns.clusters import (
+    STANDARD,
+    Case,
+    Cluster,
+    ClusterSettings,
+    find_clusters,
+    recurring,
+)
+from skidpad.fleet.patterns.series import VERSION, Floats, from_plain, series_of, to_plain
+from skidpad.fleet.service import Fleet
+from skidpad.fleet.store.events import add_event
+from skidpad.fleet.store.later import analyses, clusters, series
+from skidpad.fleet.store.reading import record_of
+from skidpad.fleet.store.rights import visible
+from skidpad.fleet.store.tables import hazards
+from skidpad.fleet.words import Principal, absent
+
+HAZARDS_MAX = 20_000  # newest hazards that one analysis looks at
+SERVICE = "analysis"  # actor of what nobody asked for
+
+
+@dataclass(frozen=True, slots=True)
+class Analysed:
+    """What an analysis found."""
+
+    id: str
+    hazards: int
+    unreadable: int  # records that could not be decoded
+    clusters: list[Cluster]
+
+
+def analyse(fleet: Fleet, who: Principal, settings: ClusterSettings = STANDARD) -> Analysed:
+    """Look at the newest hazards that `who` may see, and keep what was found."""
+    cases, unreadable = gather(fleet, who)
+    found = find_clusters(cases, settings)
+    at, id = fleet.clock(), new_id()
+    often = recurring(cases, settings)
+    with fleet.engine.begin() as connection:
+        kept = json.dumps(asdict(settings), sort_keys=True)
+        row = {
+            "id": id, "tenant": who.tenant, "actor": who.id, "settings": kept,
+            "hazards": len(cases), "at": at,
+        }  # fmt: skip
+        connection.execute(analyses.insert(), row)
+        for rank, cluster in enumerate(found):
+            connection.execute(
+                clusters.insert(),
+                {
+                    "id": new_id(), "tenant": who.tenant, "analysis": id, "rank": rank,
+                    "representative": cluster.representative,
+                    "content": msgspec.json.encode(cluster).decode(),
+                },
+            )  # fmt: skip
+        keys = [{"key": list(key), "hazards": ids} for key, ids in list(often.items())[:200]]
+        told = {"unreadable": unreadable, "recurring": keys}
+        add_event(connection, ("analysis", id), "analysed", (who.id, at), **told)
+    return Analysed(id, len(cases), unreadable, found)
+
+
+def gather(fleet: Fleet, who: Principal) -> tuple[list[Case], int]:
+    """The newest visible hazards with their series, and how many could not be read."""
+    with fleet.engine.connect() as connection:
+        query = select(hazards).where(visible(who, hazards)).order_by(hazards.c.at.desc())
+        rows = connection.execute(query.limit(HAZARDS_MAX)).all()
+    cases, unreadable = [], 0
+    for row in rows:
+        try:
+            course = _series(fleet, row)
+        except FileError:
+            unreadable += 1
+            continue
+        cases.append(
+            Case(
+                row.id,
+                row.digest,
+                row.vehicle,
+                row.type,
+                row.map,
+                row.weather,
+                row.x,
+                row.y,
+                course,
+            )
+        )
+    return cases, unreadable
+
+
+def _series(fleet: Fleet, row: Any) -> Floats:
+    """The series of a hazard, computed once."""
+    with fleet.engine.connect() as connection:
+        kept = connection.execute(
+            select(series.c.content).where(
+                series.c.digest == row.digest, series.c.version == VERSION
+            )
+        ).first()
+        if kept is not None:
+            return from_plain(json.loads(kept.content))
+        plain = to_plain(series_of(record_of(connection, fleet.blobs, row.id)))
+    with fleet.engine.begin() as connection:
+        there = select(series.c.digest).where(
+            series.c.digest == row.digest, series.c.version == VERSION
+        )
+        if connection.execute(there).first() is None:
+            content = json.dumps(plain)
+            connection.execute(
+                series.insert(),
+                {"digest": row.digest, "version": VERSION, "content": content, "at": fleet.clock()},
+            )
+    return from_plain(plain)
+
+
+def newest_clusters(connection: Connection, who: Principal) -> list[dict[str, Any]]:
+    """The clusters of the tenant's newest analysis, largest first."""
+    last = connection.execute(
+        select(analyses.c.id, analyses.c.at)
+        .where(analyses.c.tenant == who.tenant)
+        .order_by(analyses.c.at.desc(), analyses.c.id)
+        .limit(1)
+    ).first()
+    if last is None:
+        return []
+    rows = connection.execute(
+        select(clusters).where(clusters.c.analysis == last.id).order_by(clusters.c.rank)
+    )
+    return [
+        {"id": row.id, "analysis": row.analysis, "at": last.at} | json.loads(row.content)
+        for row in rows
+    ]
+
+
+def cluster_row(connection: Connection, who: Principal, cluster: str) -> dict[str, Any]:
+    """One cluster of the tenant's own; Refused (404) otherwise."""
+    row = connection.execute(
+        select(clusters).where(clusters.c.id == cluster, clusters.c.tenant == who.tenant)
+    ).first()
+    if row is None:
+        raise absent()
+    content: dict[str, Any] = json.loads(row.content)
+    return {"id": row.id, "analysis": row.analysis} | content

@@ -18,7 +18,7 @@ from skidpad.campaign.run import run as run_spec
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import Frame, Segments, SensorFrame
 from skidpad.core.geometry import Pose
-from skidpad.core.run import RunSpec
+from skidpad.core.run import Edges, Roads, RunSpec
 from skidpad.core.setup import ActorCommand
 from skidpad.core.specs import CameraSpec, LidarSpec, Modality, PointSensorSpec, SensorSpec
 from skidpad.core.states import ContactEvent, VehicleCommand, WorldTruth
@@ -235,6 +235,13 @@ def test_on_a_town_without_barriers_leaving_the_road_counts(tmp_path: Path) -> N
         run.log.actors.x[:, 0], run.log.actors.y[:, 0], run.log.actors.z[:, 0]
     )
     assert street.max() < 8.0  # m
+
+
+def test_rails_along_the_edges_end_what_would_be_a_departure(tmp_path: Path) -> None:
+    course = Roads(map=str(written(tmp_path)), vehicles=0, edges=Edges.RAIL)
+    run = run_spec(adas_run(0, duration=14.0, course=course))
+    assert {c.static for c in run.log.contacts} == {"guardrail"}
+    assert {r.reason for r in run.log.relocations} <= {RelocationReason.COLLISION}
 
 
 @pytest.mark.req("A-257", "R-6")

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import time
 from collections import Counter, defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -18,6 +18,7 @@ from typing import Any, Generic
 
 import msgspec
 
+from skidpad.campaign.keeping import keep_files
 from skidpad.campaign.recipe import Driven, M, Recipe, T, cell_of
 from skidpad.campaign.worker import Finished, Job, Runner
 from skidpad.core.errors import ConfigError, require_range
@@ -85,12 +86,14 @@ class Campaign(Generic[T, K, M]):
 
     alone: they need a simulator that drives one run at a time.
     until_halfwidth: leave a cell once its share of successes is known to +- this.
+    files: what the folder keeps of the user's own, by its name there.
     """
 
     recipe: Recipe[T, K, M]
     tasks: Sequence[T]
     alone: bool = False
     until_halfwidth: float | None = None
+    files: Mapping[str, Path] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         twice = [name for name, n in Counter(t.name for t in self.tasks).items() if n > 1]
@@ -147,6 +150,7 @@ class Campaign(Generic[T, K, M]):
         """
         driven, earlier = 0, set[str]()
         with Ledger(out, self.recipe.entry, self.identity(), resume) as ledger:
+            keep_files(out, self.files)
             done = ledger.done()
             for entry in latest(ledger.entries):
                 if entry.run in done:
@@ -213,6 +217,7 @@ class Campaign(Generic[T, K, M]):
         self.recipe.warm_up()
         probes, began, spent = 0, time.process_time(), 0.0
         with TemporaryDirectory() as folder:
+            keep_files(Path(folder), self.files)
             for task in sample:
                 self.recipe.drive(Path(folder), task)
                 probes, spent = probes + 1, time.process_time() - began

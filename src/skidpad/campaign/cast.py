@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from skidpad.campaign.drive import Script, Supervising, Timer, Unsupervised
+from skidpad.campaign.keeping import road_file
 from skidpad.campaign.starts import start_of
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import SensorFrame
@@ -140,7 +141,8 @@ def stage_of(spec: RunSpec) -> Stage:
 
 def _roads(spec: RunSpec, course: Roads) -> Stage:
     s = settings_of(spec)
-    map = load_map(course.map)
+    file = road_file(course)
+    map = load_map(file)
     ego = ActorSetup(name="ego", type=EGO_TYPE, place=start_of(map), driver=Control.SCRIPTED)
     traffic = TrafficSetup(
         mode=course.traffic,
@@ -150,7 +152,7 @@ def _roads(spec: RunSpec, course: Roads) -> Stage:
         initial_limit_kmh=s.initial_limit_kmh,
         slow_in_weather=s.drivers,
     )
-    setup = replace(setup_of(spec, course.map, ego), traffic=traffic)
+    setup = replace(setup_of(spec, file, ego), traffic=traffic)
     supervisor = Supervisor(map, recovery_settings(s), setup.dt)
     return Stage(map, setup, supervisor, Timer(round(spec.duration / setup.dt)))
 

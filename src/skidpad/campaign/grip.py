@@ -13,6 +13,7 @@ from pathlib import Path
 from skidpad import __version__
 from skidpad.campaign.grip_cells import Cross, cross, scenario_of, template
 from skidpad.campaign.grip_shown import CELL, shown, write_stopping
+from skidpad.campaign.keeping import keep_road
 from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.campaign.runfolder import (
     Stopwatch,
@@ -72,6 +73,7 @@ def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey
     if keep or driven.error:
         write_config(folder, cell.to_plain())
         write_run(folder, driven.log, driven.error)
+        keep_road(out, driven.road)
     return Driven(
         key=grip_key(cell, driven.outcome, log_hash(driven.log)),
         metrics=metrics,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from skidpad import __version__
+from skidpad.campaign.keeping import housed, road_file
 from skidpad.campaign.pace import Pace
 from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.campaign.runfolder import Stopwatch, fresh_folder, last_line, write_config, write_run
@@ -15,6 +16,7 @@ from skidpad.core.vocabulary import Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import LeadDefinition, MetricSettings
 from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics, RunKey
+from skidpad.roads.bundled import map_name
 from skidpad.stack.settings import LaneTruth, settings_of
 
 TIMES_OF_DAY = ("sunrise", "noon", "night")
@@ -60,12 +62,15 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
     watch, pace = Stopwatch(), Pace(DT)
     keep_server(cell.backend)
     backend = make_backend(cell.backend, WATCHDOG)
-    driven = run(cell, backend=backend, folder=folder, sinks=(pace,))
+    here = housed(cell, out)
+    driven = run(here, backend=backend, folder=folder, sinks=(pace,))
     timing = watch.timing(len(driven.log) * DT, pace.slow_pct)
     digest = write_run(folder, driven.log, driven.error)
     metrics = Metrics()
     if len(driven.log):  # a stack may fail before it has answered once
-        metrics = run_metrics(driven.log, load_map(roads_of(cell).map), metric_settings(cell))
+        metrics = run_metrics(
+            driven.log, load_map(road_file(roads_of(here))), metric_settings(cell)
+        )
     return Driven(
         key=run_key(cell, driven.outcome, digest),
         metrics=metrics,
@@ -92,7 +97,7 @@ def run_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> Run
         time_of_day=time_of_day(cell.weather),
         seed=cell.seed,
         profile=cell.profile,
-        map=roads_of(cell).map,
+        map=map_name(roads_of(cell).map),
         sensors=cell.sensors.value,
         grip=settings.grip.value,
         range=settings.range.value,

@@ -22,6 +22,7 @@ from skidpad.campaign.backends import keep_server
 from skidpad.campaign.channel_drive import drive_segment
 from skidpad.campaign.desk import Desk, Recorded
 from skidpad.campaign.drive import Moment, Sink
+from skidpad.campaign.keeping import housed
 from skidpad.campaign.run import run as drive_again
 from skidpad.campaign.stored import read_run, read_segment
 from skidpad.campaign.views import SIZE, twelve_views
@@ -51,7 +52,7 @@ class Rerun:
 def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None = None) -> Rerun:
     """Drive the run in folder `run` again up to `end_s`, keeping what happens from `begin_s` on."""
     stored = read_log(run)
-    spec = read_run(run)
+    spec = housed(read_run(run), run.resolve().parents[1])
     last = float(stored.t[-1])
     if not 0.0 <= begin_s < end_s:
         raise ConfigError(f"--from {begin_s:g} must be >= 0 and below --to {end_s:g}")
@@ -80,7 +81,7 @@ def desk_of(run: Path, spec: RunSpec) -> Desk | None:
 
 def same_segment(recording: Path) -> bool:
     """Drive the segment of a recording of channels again, all of it; the contents are the same."""
-    spec = read_segment(recording)
+    spec = housed(read_segment(recording), recording.resolve().parents[1])
     with TemporaryDirectory() as folder:
         again = Path(folder) / "again.mcap"
         drive_segment(spec, again)

@@ -55,6 +55,7 @@ class Run:
     triggered: bool = True  # every event of the scenario has begun, where one is played
     route_length: float | None = None  # m, of the ego's route where the scenario names one
     off_road: NDArray[np.bool_] | None = None  # (T,) ticks with all wheels off every lane
+    road: str = ""  # the map's name or file
 
 
 def drive(
@@ -188,6 +189,7 @@ def run(
         stage.triggered,
         stage.route_length,
         off_road(finished, stage.map),
+        str(stage.setup.map),
     )
 
 

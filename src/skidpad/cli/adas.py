@@ -34,6 +34,7 @@ def adas(
 ) -> None:
     """Drive configurations x weathers x seeds; prints the path of the report."""
     from skidpad.campaign.campaign import Campaign
+    from skidpad.campaign.keeping import found_again, kept
     from skidpad.campaign.matrix import RECIPE
     from skidpad.cli.adas_plan import plan
     from skidpad.cli.carla_backend import checked, drives_alone
@@ -41,8 +42,9 @@ def adas(
 
     run = tuned.resolve(run, grip=grip, range=range)
     run = structs.replace(run, course=roads, backend=checked(backend))
-    cells = plan(run, drivers, climate, seeds)
-    how(Campaign(RECIPE, cells, alone=drives_alone(run.backend)), write_report)
+    run = found_again(run, how.folder)
+    cells, files = kept(plan(run, drivers, climate, seeds))
+    how(Campaign(RECIPE, cells, alone=drives_alone(run.backend), files=files), write_report)
 
 
 def report(folder: Annotated[Path, typer.Argument(help="A campaign's folder.")]) -> None:

@@ -41,6 +41,11 @@ class Drive(Driving, frozen=True, kw_only=True):
 
     out: Annotated[Path, Meta(description="Folder for results and report.")]
 
+    @property
+    def folder(self) -> Path | None:
+        """Where an earlier part of the campaign may lie."""
+        return self.out
+
     def __call__(
         self, campaign: Campaign[Any, Any, Any], report: Callable[[Path], object]
     ) -> Summary:
@@ -84,6 +89,11 @@ class Estimate(Struct, frozen=True, kw_only=True):
     """How long a campaign would take, instead of driving it."""
 
     workers: Workers = CORES
+
+    @property
+    def folder(self) -> Path | None:
+        """Nowhere."""
+        return None
 
     def __call__(self, campaign: Campaign[Any, Any, Any], report: Callable[[Path], object]) -> None:
         """Drive a few of its runs and print one sentence."""

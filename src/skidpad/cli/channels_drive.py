@@ -38,6 +38,7 @@ def drive(
     from skidpad.campaign.channel_routes import chosen_routes
     from skidpad.campaign.channel_world import route_of
     from skidpad.campaign.channels import linked, segments
+    from skidpad.campaign.keeping import found_again, kept
     from skidpad.cli.carla_backend import checked, drives_alone
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.channel_presets import senses_of
@@ -45,12 +46,13 @@ def drive(
     for name in crew.channels:
         senses_of(name)
     routes = chosen_routes(route, map)
+    routes = [found_again(chosen, how.folder) for chosen in routes]
     for chosen in routes:
         load_map(route_of(chosen).map)
     template = structs.replace(routes[0], driver=crew, seed=seed, backend=checked(backend))
-    campaign = Campaign(
-        linked(links), segments(routes, hours, template), alone=drives_alone(template.backend)
-    )
+    tasks, files = kept(segments(routes, hours, template))
+    alone = drives_alone(template.backend)
+    campaign = Campaign(linked(links), tasks, alone=alone, files=files)
     summary = how(campaign, totals)
     if summary is not None and summary.failed:
         raise typer.Exit(1)

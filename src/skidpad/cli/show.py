@@ -15,13 +15,13 @@ from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.recording.matrix import Metrics
 from skidpad.recording.results import definitions_of
 from skidpad.report.cards import chain, headline
-from skidpad.roads.bundled import load_map
+from skidpad.roads.bundled import kept_map
 
 
 def show(run: Path) -> None:
     """Print it."""
     log = read_log(run)
-    road_map = load_map(log.header.map)
+    road_map = kept_map(run.resolve().parents[1], log.header.map, log.header.map_hash)
     console = Console()
     console.print(f"[bold]{run.name}[/] on {log.header.map}, {len(log) * log.header.dt:g} s")
     for name, value in log.header.about.items():

@@ -123,6 +123,13 @@ class ActorMode(str, Enum):
     IDEAL = "ideal"  # it is exactly where it should be
 
 
+class Edges(str, Enum):
+    """What stands along roads whose file draws nothing beside them."""
+
+    NONE = "none"
+    RAIL = "rail"
+
+
 class Roads(Struct, frozen=True, kw_only=True, tag="roads", forbid_unknown_fields=True):
     """A map with background traffic, from its ego's place on."""
 
@@ -132,6 +139,9 @@ class Roads(Struct, frozen=True, kw_only=True, tag="roads", forbid_unknown_field
     )
     vehicles: Annotated[int, Meta(ge=0, le=80, description="Background vehicles, 0 to 80.")] = 20
     allow_fewer: bool = False  # A-208
+    edges: Annotated[
+        Edges, Meta(description="rail: guard rails along the roads of a map without barriers.")
+    ] = Edges.NONE
 
 
 class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown_fields=True):

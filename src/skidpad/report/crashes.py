@@ -15,7 +15,7 @@ from skidpad.recording.logfiles import read_log
 from skidpad.report.cards import crash_card, severity
 from skidpad.report.matrix_data import Matrix, config_title, weather_title
 from skidpad.report.page import Block, Cards, Page, Section, Text, write_page
-from skidpad.roads.bundled import load_map
+from skidpad.roads.bundled import kept_map
 from skidpad.roads.queries import RoadMap
 
 CARDS = "cards"
@@ -76,7 +76,7 @@ def _crashes(matrix: Matrix, name: str) -> Iterator[Found]:
     run = matrix.folder.log(name)
     if run is not None:
         log = read_log(run)
-        road_map = load_map(log.header.map)
+        road_map = kept_map(matrix.folder.path, log.header.map, log.header.map_hash)
         drive = prepare(log, road_map)
         yield from ((crash, drive, road_map, run) for crash in find_crashes(drive))
 

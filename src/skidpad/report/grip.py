@@ -30,7 +30,7 @@ from skidpad.report.page import (
 )
 from skidpad.report.replay import replay
 from skidpad.report.verdicts import seeds_text, tally_text, verdict_blocks
-from skidpad.roads.bundled import load_map
+from skidpad.roads.bundled import kept_map
 
 ALPHA = 0.05
 LEAD = """Every run was driven twice with the same seed: once with the weather only seen, and once with \
@@ -186,6 +186,7 @@ def _card(campaign: GripCampaign, run: pl.DataFrame, role: str) -> list[Card]:
     if folder is None:
         return []
     log = read_log(folder)
+    road_map = kept_map(campaign.folder.path, log.header.map, log.header.map_hash)
     x, y = log.actors.x, log.actors.y
     gaps = np.hypot(x[:, 1:] - x[:, :1], y[:, 1:] - y[:, :1]).min(axis=1)
     at = len(log) - 1 if log.contacts else int(np.argmin(gaps))
@@ -197,6 +198,6 @@ def _card(campaign: GripCampaign, run: pl.DataFrame, role: str) -> list[Card]:
             title=f"{row['friction']} friction, {role} run: {row['outcome']}",
             subtitle=f"{name}, around {log.t[at]:.1f} s",
             facts=facts,
-            replay=replay(log, load_map(log.header.map), at),
+            replay=replay(log, road_map, at),
         )
     ]

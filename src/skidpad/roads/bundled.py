@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from functools import lru_cache
+from glob import escape
+from hashlib import sha256
 from pathlib import Path
 
 from skidpad.core.errors import ConfigError, FileError
@@ -10,6 +12,7 @@ from skidpad.roads.baked import BakedMap, load_baked
 from skidpad.roads.queries import RoadMap
 
 FOLDER = Path(__file__).parent / "maps"
+KEPT = "maps"  # in a campaign's folder: maps/<content>/<name>.xodr
 
 
 def bundled_maps() -> list[str]:
@@ -30,6 +33,23 @@ def map_file(map: str | Path) -> Path:
     raise ConfigError(
         f"unknown map {name!r}; choose one of: {', '.join(bundled_maps())}, or a file"
     )
+
+
+def map_name(map: str) -> str:
+    """The name of a bundled map, or of a file without folders and ending."""
+    return map if map in bundled_maps() else Path(map).stem
+
+
+def kept_name(file: Path) -> str:
+    """Where a campaign's folder keeps a file: by its content, under its own name."""
+    return f"{KEPT}/{sha256(file.read_bytes()).hexdigest()[:16]}/{file.name}"
+
+
+def kept_map(folder: Path, name: str, content_hash: str) -> RoadMap:
+    """The map of a drive: the file that the campaign's folder keeps of it, else a bundled one."""
+    kept = [load_map(file) for file in sorted((folder / KEPT).glob(f"*/{escape(name)}.*"))]
+    same = [map for map in kept if map.content_hash == content_hash]
+    return (same or kept or [load_map(name)])[0]
 
 
 def bake_file(path: Path) -> BakedMap:

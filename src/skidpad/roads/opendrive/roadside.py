@@ -112,10 +112,11 @@ def _repeated_line(read: Reader, road: RoadRecord, repeat: Node) -> Floats:
 def _points(road: RoadRecord, s: Floats, t: Floats, up: Floats) -> Floats:
     line = road.line.at(s)
     roll = road.superelevation.at(s)[0]
+    across = t * np.cos(roll)  # seen from above
     return np.column_stack(
         [
-            line.x - t * np.sin(line.heading),
-            line.y + t * np.cos(line.heading),
+            line.x - across * np.sin(line.heading),
+            line.y + across * np.cos(line.heading),
             road.elevation.at(s)[0] + t * np.sin(roll) + up,
         ]
     )

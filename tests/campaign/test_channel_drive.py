@@ -24,6 +24,7 @@ from skidpad.recording.channel_hash import recording_hash
 from skidpad.recording.channels import McapRecording
 from skidpad.recording.ledger import LEDGER
 from skidpad.recording.results import read_results
+from skidpad.stack.channels.arbiter import Reason
 
 BOTH = ("lav_like", "tfuse_like")
 
@@ -131,3 +132,25 @@ def test_a_campaign_that_was_killed_goes_on_to_the_same_results(tmp_path):
     whole.run(tmp_path / "whole", local(1))
     assert done < 6 == len(ledger.read_bytes().splitlines())
     assert read_results(tmp_path / "part").equals(read_results(tmp_path / "whole"))
+
+
+@pytest.mark.req("C-9", "C-010")
+@pytest.mark.parametrize("route", ["route-1", "route-2"])
+def test_the_arbiter_runs_no_more_red_lights_than_the_channel_that_sees_them(tmp_path, route):
+    """The preferred channel cannot see lights: alone it runs one here."""
+    blind_first = ("tfuse_like", "lav_like")
+
+    def driven(by):
+        crew = ChannelCrew(channels=blind_first, drive_by=by)
+        return drive_segment(segment_run(route, crew, duration=90.0), tmp_path / f"{by}.mcap")
+
+    blind, seeing, arbiter = driven("tfuse_like"), driven("lav_like"), driven("arbiter")
+    assert blind.red_lights_run > 0
+    assert arbiter.red_lights_run <= seeing.red_lights_run
+    assert arbiter.driving_s["tfuse_like"] > 10.0  # it drives where there is no light ahead
+    reasons = [
+        m.item.reason
+        for m in McapRecording(tmp_path / "arbiter.mcap").messages()
+        if isinstance(m.item, Decision)
+    ]
+    assert Reason.LIGHTS.value in reasons

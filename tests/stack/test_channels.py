@@ -183,6 +183,29 @@ class TestArbiter:
         assert chosen[:30] == [0] * 30
         assert chosen[-1] == 1
 
+    def test_a_driver_that_cannot_see_the_light_is_relieved_at_once_and_comes_back(self):
+        arbiter = self.arbiter()
+        alive, scores, progress = [object(), object()], (0.9, 0.5), (9.0, 5.0)
+
+        def chosen(since, until, abstaining):
+            times = [0.1 * k for k in range(since, until)]
+            return [arbiter.update(t, alive, scores, progress, abstaining) for t in times]
+
+        assert {c.driving for c in chosen(0, 3, ())} == {0}
+        relieved = chosen(3, 30, (0,))  # within the dwell, and although the other is less safe
+        assert {c.driving for c in relieved} == {1}
+        assert relieved[0].reason is Reason.LIGHTS
+        assert chosen(30, 60, ())[-1].driving == 0
+        assert {c.driving for c in chosen(60, 70, (0, 1))} == {0}, "all abstain: as ever"
+
+    def test_a_channel_that_abstains_drives_where_no_other_is_alive(self):
+        arbiter = self.arbiter()
+        choices = [
+            arbiter.update(0.1 * k, [object(), None], (0.9, np.nan), (9.0, 0.0), (0,))
+            for k in range(10)
+        ]
+        assert choices[-1].driving == 0
+
     def test_without_preference_the_most_progressing(self):
         assert self.run(self.arbiter(None), [(0.0, 0.9, 0.85)])[0].driving == 1
 

@@ -107,7 +107,8 @@ class Crew:
         names, drive_by = self.crew.channels, self.crew.drive_by
         if drive_by == ARBITER:
             progress = [c.v_planned for c in self.channels]
-            choice = self.arbiter.update(t, self.frames, scores, progress)
+            unsure = [i for i, c in enumerate(self.channels) if c.abstains]
+            choice = self.arbiter.update(t, self.frames, scores, progress, unsure)
         else:
             choice = Choice(names.index(drive_by), Reason.KEPT)
         if self.stop is not None and self.stop(t):

@@ -1,4 +1,4 @@
-"""Oriented boxes in motion: when two of them meet, and how nearly they do not (C-091, C-092)."""
+"""Oriented boxes in motion along plans and predictions, sampled (C-091)."""
 
 from __future__ import annotations
 
@@ -13,11 +13,9 @@ from skidpad.evidence.channels.paths import sample_path, sample_plan
 
 Floats = NDArray[np.float64]
 HORIZON = 4.0  # s, also the time to collision without risk (C-094)
-STEP = 0.1  # s between samples; at 40 m/s closing a step is shorter than a car
+STEP = 0.1  # s between samples; between them boxes go straight on
 SAMPLES = round(HORIZON / STEP) + 1
-PET_SAFE = 2.0  # s, the post-encroachment time without risk (C-094)
 V_STANDING = 0.5  # m/s, slower motion does not turn the heading
-BISECTIONS = 8
 
 
 class Movers(NamedTuple):
@@ -95,101 +93,6 @@ def _move_objects(
     for i in range(objects.shape[0]):
         sample_path(prediction_t, predictions[i], objects[i], 0.0, STEP, points)
         _oriented(points, objects[i, 2], polygons[i], size[i], movers, i)
-
-
-@kernel
-def boxes_overlap(
-    ax: float, ay: float, ac: float, as_: float, al: float, aw: float,
-    bx: float, by: float, bc: float, bs: float, bl: float, bw: float,
-) -> bool:  # fmt: skip
-    """Whether two oriented boxes (centre, cos, sin, half length, half width) overlap.
-
-    By separating axes: the four edge normals of both boxes.
-    """
-    dx, dy = bx - ax, by - ay
-    cc = abs(ac * bc + as_ * bs)
-    cs = abs(as_ * bc - ac * bs)
-    if abs(dx * ac + dy * as_) > al + bl * cc + bw * cs:
-        return False
-    if abs(dy * ac - dx * as_) > aw + bl * cs + bw * cc:
-        return False
-    if abs(dx * bc + dy * bs) > bl + al * cc + aw * cs:
-        return False
-    return abs(dy * bc - dx * bs) <= bw + al * cs + aw * cc
-
-
-@kernel
-def _meet(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> bool:
-    """Whether two boxes meet: rows (4,) of `Movers.motion` and halves (2,)."""
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    reach = half_a[0] + half_a[1] + half_b[0] + half_b[1]
-    if dx * dx + dy * dy > reach * reach:
-        return False
-    return boxes_overlap(
-        a[0], a[1], a[2], a[3], half_a[0], half_a[1], b[0], b[1], b[2], b[3], half_b[0], half_b[1]
-    )
-
-
-@kernel
-def _between(a: Floats, b: Floats, f: float, out: Floats) -> None:
-    """Pose a fraction f of the way from row a to row b; the heading of the nearer one."""
-    out[0] = a[0] + f * (b[0] - a[0])
-    out[1] = a[1] + f * (b[1] - a[1])
-    near = a if f < 0.5 else b
-    out[2], out[3] = near[2], near[3]
-
-
-@kernel
-def first_overlap(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> float:
-    """Time in s of the first overlap of two motions (SAMPLES, 4); inf when they never meet."""
-    for k in range(a.shape[0]):
-        if not _meet(a[k], half_a, b[k], half_b):
-            continue
-        if k == 0:
-            return 0.0
-        low, high = 0.0, 1.0
-        row_a, row_b = np.empty(4), np.empty(4)
-        for _ in range(BISECTIONS):
-            f = 0.5 * (low + high)
-            _between(a[k - 1], a[k], f, row_a)
-            _between(b[k - 1], b[k], f, row_b)
-            if _meet(row_a, half_a, row_b, half_b):
-                high = f
-            else:
-                low = f
-        return (k - 1 + high) * STEP
-    return np.inf
-
-
-@kernel
-def encroachment(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> float:
-    """Smallest shift in s that makes two motions (SAMPLES, 4) touch; inf above PET_SAFE."""
-    n = a.shape[0]
-    row = np.empty(4)
-    for shift in range(1, round(PET_SAFE / STEP) + 1):
-        best = np.inf
-        for k in range(n - shift):
-            for swap in range(2):
-                early, late = (k, k + shift) if swap == 0 else (k + shift, k)
-                if not _meet(a[early], half_a, b[late], half_b):
-                    continue
-                low, high = 0.0, 1.0  # of the last step of the shift
-                for _ in range(BISECTIONS):
-                    f = 0.5 * (low + high)
-                    if swap == 0:
-                        _between(b[k + shift - 1], b[k + shift], f, row)
-                        met = _meet(a[k], half_a, row, half_b)
-                    else:
-                        _between(a[k + shift - 1], a[k + shift], f, row)
-                        met = _meet(row, half_a, b[k], half_b)
-                    if met:
-                        high = f
-                    else:
-                        low = f
-                best = min(best, (shift - 1 + high) * STEP)
-        if best < np.inf:
-            return best
-    return np.inf
 
 
 def ego_movers(frame: ChannelFrame | None) -> Movers | None:

@@ -37,7 +37,7 @@ from skidpad.evidence.channels.indicators.layout import Place, Readings
 from skidpad.evidence.channels.indicators.panel import IndicatorPanel, Lap, no_lap
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.recorder import CycleEvidence, Recorder
-from skidpad.evidence.channels.risk import RiskMatrix, risk_matrix
+from skidpad.evidence.channels.risk import RiskForm, RiskMatrix, risk_matrix
 from skidpad.evidence.channels.timefilter import Event, TimeFilter
 from skidpad.recording.hazards import HazardRecord
 
@@ -86,6 +86,8 @@ class Monitor:
         self.settings = settings = settings or MonitorSettings()
         self.rules = settings.rules or load_rules(settings.profile)
         self.thresholds = settings.thresholds
+        printed = settings.profile is Profile.AS_PRINTED
+        self.risk_form = RiskForm.AS_PRINTED if printed else RiskForm.RECOMMENDED
         self.panel = IndicatorPanel(self.channels, settings.indicators)
         self.layout = self.panel.layout
         self.reader = SignalReader(self.layout)
@@ -118,7 +120,7 @@ class Monitor:
         self._count_unusable(kept)
         readings = self.panel.update(kept, lap)
         self.ghosts.update(frames, readings.shared_rows())
-        risk = risk_matrix(frames)
+        risk = risk_matrix(frames, form=self.risk_form)
         readings[Indicator.SAFETY_SCORE][:] = risk.safety_scores
         readings[Indicator.RISK_BEHIND_SHARE][:] = risk.behind_share
         lap("risk")

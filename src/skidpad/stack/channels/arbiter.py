@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -21,6 +21,7 @@ class Reason(str, Enum):
     SAFER = "higher safety score"
     PROGRESS = "most progressing of the safe channels"
     FAILOVER = "the driving channel is silent"
+    LIGHTS = "the driving channel cannot see the light ahead"
     MINIMAL_RISK = "no channel is safe: minimal-risk stop"
     ALL_SILENT = "all channels are silent: minimal-risk stop"
     ORDERED = "a teleoperator ordered a minimal-risk stop"
@@ -72,25 +73,28 @@ class Arbiter:
         frames: Sequence[ChannelFrame | None],
         scores: Sequence[float],
         progress: Sequence[float],
+        abstaining: Collection[int] = (),
     ) -> Choice:
         """frames: this cycle's messages, None: nothing came; scores NaN: not evaluated;
-        progress: m/s at the end of each plan."""
+        progress: m/s at the end of each plan; abstaining: channels that say they cannot judge what
+        lies ahead, chosen only where all that are alive say so."""
         for i, frame in enumerate(frames):
             if frame is not None:
                 self.heard_at[i] = t
         dead_after = self.settings.dead_after - 1e-9
         alive = [i for i, heard in enumerate(self.heard_at) if t - heard < dead_after]
-        wanted = self._wanted(alive, scores, progress)
+        able = [i for i in alive if i not in abstaining] or alive
+        wanted = self._wanted(able, scores, progress)
         if wanted.driving != self.wanted_since[0]:
             self.wanted_since = (wanted.driving, t)
         if wanted.driving == self.driving and self.started:
             return Choice(self.driving, wanted.reason if self.driving is None else Reason.KEPT)
-        lost = self.driving is not None and self.driving not in alive
+        lost = self.driving is not None and self.driving not in able
         if self.started and not (wanted.driving is None or lost) and not self._settled(t, scores):
             return Choice(self.driving, Reason.KEPT)
         reason = Reason.START if not self.started else wanted.reason
         if lost and wanted.driving is not None:
-            reason = Reason.FAILOVER
+            reason = Reason.LIGHTS if self.driving in alive else Reason.FAILOVER
         self.driving, self.changed_at, self.started = wanted.driving, t, True
         return Choice(self.driving, reason)
 
@@ -104,14 +108,14 @@ class Arbiter:
         return t - self.wanted_since[1] >= s.settle - 1e-9
 
     def _wanted(
-        self, alive: Sequence[int], scores: Sequence[float], progress: Sequence[float]
+        self, able: Sequence[int], scores: Sequence[float], progress: Sequence[float]
     ) -> Choice:
         s = self.settings
-        if not alive:
+        if not able:
             return Choice(None, Reason.ALL_SILENT)
-        known = {i: float(scores[i]) for i in alive if scores[i] == scores[i]}
+        known = {i: float(scores[i]) for i in able if scores[i] == scores[i]}
         if not known:
-            return Choice(self.driving if self.driving in alive else alive[0], Reason.KEPT)
+            return Choice(self.driving if self.driving in able else able[0], Reason.KEPT)
         safe = [i for i, score in known.items() if score >= s.safe]
         if safe:
             return self._among_safe(safe, progress)

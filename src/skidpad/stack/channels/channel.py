@@ -30,6 +30,7 @@ HALT_REACH = 4.0  # m between front and line in which a stop counts
 YIELD_SPEED = 4.0  # m/s at a yield line before the road is seen to be free
 CLEAR_REACH = 45.0  # m around a line in which other vehicles matter
 CLEAR_TIME = 5.0  # s, critical gap of minor streets (HCM 2010, 4.1 to 7.1 s)
+RELIEF = 1.5  # s for a change of driver before a light: dwell 1 s and the next one's own reaction
 PATIENCE = 12.0  # s after which a driver who waited goes when others stand
 CORNERS = 4
 
@@ -62,6 +63,7 @@ class Channel:
         self.waiting = 0.0  # s at that line
         self.command = VehicleCommand()
         self.v_planned = 0.0  # m/s that the plan reaches at its end: how much it progresses
+        self.abstains = False  # it cannot see the light that it comes to
 
     def update(self, view: ChannelView) -> ChannelFrame:
         """What this channel says; `command` is then what it would do."""
@@ -85,6 +87,7 @@ class Channel:
             predictions,
         )
         plan = self._plan(view, offset, objects, sizes, predictions)
+        self.abstains = self._comes_to_a_light_unseen(v)
         pose = (x, y, heading)
         self.command = self.controller.update(path, self.at, pose, v, rate, self.a_planned)
         return ChannelFrame(
@@ -136,6 +139,20 @@ class Channel:
             if self._must_stop(line, gap, view, objects, v):
                 return line.s - self.at * STEP
         return inf
+
+    def _comes_to_a_light_unseen(self, v: float) -> bool:
+        """Whether a light, which this channel cannot see, is within the way that stopping takes.
+
+        From where another channel can still take over and brake comfortably, to the line itself.
+        """
+        if self.settings.reads_lights:
+            return False
+        front = self.at * STEP + 0.5 * self.car.length
+        way = v * RELIEF + v * v / (2.0 * self.settings.b_comfort) + HALT_REACH
+        return any(
+            line.kind is SignalKind.LIGHT and -1.0 <= line.s - front <= way
+            for line in self.route.lines
+        )
 
     def _must_stop(
         self, line: Line, gap: float, view: ChannelView, objects: Floats, v: float

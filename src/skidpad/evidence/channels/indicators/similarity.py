@@ -9,6 +9,7 @@ from math import hypot
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
 
 from skidpad.core.jit import kernel
 
@@ -88,6 +89,25 @@ def pair_points(a: Floats, b: Floats, max_distance: float) -> Counts:
             pairs[k, 0], pairs[k, 1] = i, j
             k += 1
     return pairs[:k]
+
+
+def paired(a: Floats, b: Floats, max_distance: float) -> Counts:
+    """`pair_points`, or the best assignment where taking the nearest first leaves a pair out."""
+    pairs: Counts = pair_points(a, b, max_distance)
+    if len(pairs) == min(len(a), len(b)):
+        return pairs
+    squares = ((a[:, None, :2] - b[None, :, :2]) ** 2).sum(axis=2)
+    far = squares > max_distance * max_distance
+    if min((~far).any(axis=0).sum(), (~far).any(axis=1).sum()) == len(pairs):
+        return pairs
+    cost = np.where(far, max_distance * max_distance * (len(a) + len(b) + 1.0), squares)
+    rows, columns = linear_sum_assignment(cost)
+    best: Counts = np.column_stack([rows, columns])[~far[rows, columns]].astype(np.int64)
+    if len(best) <= len(pairs):
+        return pairs
+    order = np.argsort(squares[best[:, 0], best[:, 1]], kind="stable")
+    ordered: Counts = best[order]
+    return ordered
 
 
 @kernel

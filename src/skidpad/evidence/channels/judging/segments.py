@@ -17,6 +17,8 @@ from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.panel import no_lap
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.judging.causes import ego_motion, false_cause, missed_cause
+from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
+from skidpad.evidence.channels.judging.ceiling import ceiling
 from skidpad.evidence.channels.judging.facts import Observer, times_of
 from skidpad.evidence.channels.judging.truth.marks import TrueHazard
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
@@ -102,6 +104,8 @@ def judge(
         printed.update(cycle)
     detected[Profile.AS_PRINTED.value] = _scored(_found(printed.hazards, begin))
     found, unseen, unseen_found = _truths(channels, cycles, truths, begin, detected)
+    if "sim" in found:
+        detected[CEILING] = tuple(s for s in ceiling(cycles, channels) if s.t_end >= begin)
     if model is not None and cycles:
         for truth in sorted({t_ for t_, _ in model.detectors}):
             detectors = model.identifier(truth, route)

@@ -1,4 +1,9 @@
-"""Truth in the world that the channels report, ghosts included (C-212, C-218, decision C-4)."""
+"""Truth in the world that the channels report, ghosts included (C-212, C-218, decisions C-4, R-9).
+
+A vehicle is a hazard while a channel's plan and the prediction of the object sweep into each other
+within 3 s, the object being on the plan's path: inside its corridor, heading along it. Positions
+are one when two channels differ by more than both their alert limits. All of it for half a second.
+"""
 
 from __future__ import annotations
 
@@ -11,50 +16,74 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.judging.truth.marks import Mark, TrueHazard, World, merged, offsets
+from skidpad.evidence.channels.judging.truth.corridor import Corridor, Trail
+from skidpad.evidence.channels.judging.truth.marks import (
+    Mark,
+    TrueHazard,
+    World,
+    lasting,
+    merged,
+)
 
 Floats = NDArray[np.float64]
 SWEEP_TIME = 3.0  # s, decision C-4
 SWEEP_STEP = 0.25  # s; the hull of two steps tells where to look closer
 SUBSTEPS = 5  # of a step, 0.05 s apart: hulls alone would join cars that follow each other closely
+PERSISTENCE = 0.5  # s, decision R-9
+# m, alert limits of localisation on freeways, the wider ones (Reid et al. 2019, SAE 12-02-03-0012).
+# Two channels that are both within theirs differ by less than twice as much.
+ALERT_ACROSS, ALERT_ALONG = 0.57, 1.40
 
 
 def world_model_truth(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[TrueHazard]:
     """Hazards in the union of all channels' worlds, ghosts included (C-218)."""
     marks: list[Mark] = []
+    trails = [Trail() for _ in channels]
     for cycle in cycles:
-        for frame in cycle.frames:
-            if frame is not None and len(frame.plan) >= 2 and np.isfinite(frame.ego).all():
-                marks.extend(_sweeps(cycle, frame, channels))
+        for trail, frame in zip(trails, cycle.frames, strict=True):
+            if frame is not None and np.isfinite(frame.ego).all():
+                trail.add(frame.ego)
+                if len(frame.plan) >= 2:
+                    marks.extend(_sweeps(cycle, frame, trail, channels))
+        marks.extend(_apart(cycle, channels))
+    return merged(lasting(marks, PERSISTENCE), World.CHANNELS)
+
+
+def _apart(cycle: Cycle, channels: Sequence[str]) -> list[Mark]:
+    """Pairs of channels of which at least one is beyond an alert limit."""
+    marks = []
     for a in range(len(channels)):
         for b in range(a + 1, len(channels)):
-            rows = [
-                (cycle.t, *(one.ego[:2] - two.ego[:2]))
-                for cycle in cycles
-                if (one := cycle.frames[a]) is not None and (two := cycle.frames[b]) is not None
-            ]
-            marks.extend(offsets(np.array(rows).reshape(-1, 3), f"{channels[a]}+{channels[b]}"))
-    return merged(marks, World.CHANNELS)
+            one, two = cycle.frames[a], cycle.frames[b]
+            if one is None or two is None:
+                continue
+            dx, dy = (two.ego[:2] - one.ego[:2]).tolist()
+            c, s = np.cos(one.ego[2]), np.sin(one.ego[2])
+            along, across = abs(c * dx + s * dy), abs(c * dy - s * dx)
+            if along > 2.0 * ALERT_ALONG or across > 2.0 * ALERT_ACROSS:  # never with NaN
+                name = f"{channels[a]}+{channels[b]}"
+                marks.append(Mark(HazardType.INCONSISTENT_LOCALISATION, cycle.t, name, "apart"))
+    return marks
 
 
-def _sweeps(cycle: Cycle, ego: ChannelFrame, channels: Sequence[str]) -> list[Mark]:
-    """Objects of any channel that the plan of `ego` and their prediction bring together."""
+def _sweeps(cycle: Cycle, ego: ChannelFrame, trail: Trail, channels: Sequence[str]) -> list[Mark]:
+    """Objects of any channel on the path of `ego` that its plan and their prediction bring together."""
     plan = ego.plan[np.isfinite(ego.plan).all(axis=1)]
     plan_t = np.concatenate([[0.0], plan[:, 2]])
     plan_xy = np.vstack([ego.ego[:2], plan[:, :2]])
+    corridor = Corridor(trail.points, ego.ego, plan[:, :2], ego.ego_polygon)
+    times = np.arange(0.0, min(SWEEP_TIME, plan_t[-1]) + 1e-9, SWEEP_STEP)
+    whole = _along(times, plan_t, plan_xy)
+    ego_reach = _radius(ego.ego_polygon) + _stride(whole)
     marks = []
     for b, frame in enumerate(cycle.frames):
         if frame is None or len(frame.objects) == 0:
             continue
-        times = np.arange(0.0, min(SWEEP_TIME, plan_t[-1]) + 1e-9, SWEEP_STEP)
-        whole = _along(times, plan_t, plan_xy)
-        ego_reach = _radius(ego.ego_polygon) + _stride(whole)
-        for i, state in enumerate(frame.objects):
-            if not np.isfinite(state).all():
-                continue
-            said = np.isfinite(frame.predictions[i]).all(
-                axis=1
-            )  # an object's own end may be earlier
+        on_path, ahead = corridor.places(frame.objects, frame.polygons)
+        for i in np.flatnonzero(on_path):
+            state = frame.objects[i]
+            # an object's own end may be earlier
+            said = np.isfinite(frame.predictions[i]).all(axis=1)
             p_t = np.concatenate([[0.0], frame.prediction_t[said]])
             n = int(np.searchsorted(times, p_t[-1] + 1e-9, side="right"))
             theirs = _along(times[:n], p_t, np.vstack([state[:2], frame.predictions[i, said]]))
@@ -62,15 +91,11 @@ def _sweeps(cycle: Cycle, ego: ChannelFrame, channels: Sequence[str]) -> list[Ma
             shape = frame.polygons[i, : frame.polygon_size[i]]
             reach = ego_reach + _radius(shape) + _stride(theirs)
             near = np.flatnonzero(np.hypot(*(mine - theirs).T) < reach)
-            if near.size == 0:
-                continue
-            if _meet(
+            if near.size and _meet(
                 _Sweep.of(ego.ego_polygon, ego.ego, mine), _Sweep.of(shape, state, theirs), near
             ):
-                offset = state[:2] - ego.ego[:2]
-                behind = offset @ [np.cos(ego.ego[2]), np.sin(ego.ego[2])] < 0.0
-                hazard = HazardType.EGO_TAILGATED if behind else HazardType.EGO_TAILGATING
-                marks.append(Mark(hazard, cycle.t, _object_name(channels[b], frame, i)))
+                hazard = HazardType.EGO_TAILGATING if ahead[i] else HazardType.EGO_TAILGATED
+                marks.append(Mark(hazard, cycle.t, _object_name(channels[b], frame, int(i))))
     return marks
 
 

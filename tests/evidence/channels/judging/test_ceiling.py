@@ -1,0 +1,55 @@
+"""The ceiling: perfect eyes reach 100 / 100, noise and blindness lower it, hindsight heals gaps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from channel_worlds import Eyes, World, drive
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.judging.ceiling import NAME, ceiling, smoothed
+from skidpad.evidence.channels.judging.segments import judge
+from skidpad.evidence.channels.matching import tally
+from skidpad.recording.cycles import cycles
+
+TAILGATED = HazardType.EGO_TAILGATED
+CLOSE = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-12.0, 0, 0, 15.0, 0), (60.0, 3.5, 0, 15, 0)]))
+
+
+def judged(eyes):
+    rows = list(cycles(drive(CLOSE, eyes, 8.0)))
+    return judge("s", "town", [e.name for e in eyes], rows)
+
+
+def counts(segment):
+    row = tally(segment.detected[NAME], segment.truths["sim"], segment.hours)[TAILGATED]
+    return row.tp, row.fp, row.fn
+
+
+@pytest.mark.req("C-214")
+def test_perfect_eyes_reach_it_all_and_blind_ones_nothing():
+    assert counts(judged((Eyes("a"), Eyes("b")))) == (1, 0, 0)
+    assert counts(judged((Eyes("a", 0.3, 0.1), Eyes("b", blind=(0, 1))))) == (1, 0, 0)
+    assert counts(judged((Eyes("a", blind=(0,)), Eyes("b", blind=(0,))))) == (0, 0, 1)
+
+
+def test_no_truth_no_ceiling():
+    rows = list(cycles(drive(CLOSE, (Eyes("a"), Eyes("b")), 3.0, with_truth=False)))
+    assert NAME not in judge("s", "town", ["a", "b"], rows).detected
+    assert ceiling(rows, ["a", "b"]) == ()
+
+
+def test_a_line_is_smoothed_to_itself_and_noise_shrinks():
+    t = np.arange(60) * 0.1
+    line = np.column_stack([3.0 + 2.0 * t, 1.0 - t, 0.3 + 0.0 * t, 2.0 + 0.0 * t, -1.0 + 0.0 * t])
+    assert smoothed(t, line) == pytest.approx(line)
+    rng = np.random.default_rng(1)
+    noisy = line.copy()
+    noisy[:, :2] += rng.normal(0.0, 0.3, (60, 2))
+    noisy[20:24] = np.nan  # four cycles without it
+    out = smoothed(t, noisy)
+    assert np.isfinite(out[10:50]).all()
+    assert np.abs(out[10:50, :2] - line[10:50, :2]).std() < 0.12
+    lone = np.full((60, 5), np.nan)
+    lone[30] = line[30]
+    assert np.isnan(smoothed(t, lone)).all()

@@ -65,13 +65,24 @@ def others(world) -> tuple[str, str, str]:
     return alert, order, world.get("axle", "/api/v1/clusters").json()[0]["id"]
 
 
+def released(world, folder, hazard: str) -> tuple[str, str]:
+    """A change of the red vehicles' maker, and its release."""
+    from test_fleet_updates import CONTENT, NAME, Maker
+
+    maker = Maker(world, folder)
+    change = maker.change(CONTENT, [hazard]).json()["change"]
+    return change, maker.release(change, maker.signed(NAME, CONTENT)).json()["release"]
+
+
 @pytest.mark.req("C-195")
-def test_every_route_for_every_role_and_foreign_id(lite):
+def test_every_route_for_every_role_and_foreign_id(lite, tmp_path):
     """No credential: 401. A role without the right: 403. Another tenant's id: 404, as if absent."""
     (hazard,) = lite.send("red-1", packed(record(1))).json()["ids"]
     alert, order, cluster = others(lite)
-    ids = {"hazard": hazard, "alert": alert, "order": order, "cluster": cluster}
-    words = {"kind": "hazards", "what": "obeyed"}
+    change, release = released(lite, tmp_path, hazard)
+    ids = {"hazard": hazard, "alert": alert, "order": order, "cluster": cluster,
+           "change": change, "release": release}  # fmt: skip
+    words = {"kind": "hazards", "what": "obeyed", "name": "timestamp.json"}
     asked = {"challenge": "0" * 32}
     people = {
         Role.MANUFACTURER: "bolt", Role.OPERATOR: "blue operator", Role.VEHICLE: "blue-1",

@@ -194,6 +194,67 @@ def upload(
 
 
 @fleet.command()
+def keys(
+    data: Data,
+    manufacturer: Annotated[str, typer.Option(help="Whose updates these keys sign.")],
+    out: Annotated[Path, typer.Option(help="Folder of the keys, off line, never below --data.")],
+    database: Database = None,
+) -> None:
+    """Begin a maker's updates: three keys each for root and list, two of which must sign."""
+    import time
+
+    with _extra():
+        from skidpad.fleet.service import open_fleet
+        from skidpad.fleet.store.accounts import tenant_id
+        from skidpad.fleet.updates import signing
+    from skidpad.recording.files import write_bytes
+
+    service = open_fleet(_places(data, database, None))
+    try:
+        with service.engine.begin() as connection:
+            tenant = tenant_id(connection, manufacturer, time.time())
+        signers = signing.make_offline_keys(out, data)
+        online = signing.new_key(service.online_key(tenant))
+        root = signing.make_root(signers, online, time.time())
+        first = signing.empty_targets(signers["targets"][: signing.THRESHOLD], time.time())
+        service.repository(tenant).begin(root, first)
+    finally:
+        service.close()
+    write_bytes(out / "root.json", root)
+    typer.echo(f"{out / 'root.json'} is what vehicles pin; keep the keys beside it off line")
+
+
+@fleet.command()
+def sign(
+    payload: Annotated[Path, typer.Argument(help="Rules, thresholds or a model.")],
+    kind: Annotated[str, typer.Option(help="rules, thresholds or model.")],
+    list_: Annotated[Path, typer.Option("--list", help="The current list of updates.")],
+    key: Annotated[list[Path], typer.Option(help="A key of the list; two are needed.")],
+    out: Annotated[Path, typer.Option(help="The next list, signed.")],
+) -> None:
+    """Off line: check an update, add it to the list of updates and sign that."""
+    import time
+
+    from skidpad.core.errors import FileError, require_choice
+
+    with _extra():
+        from skidpad.fleet.updates import signing
+        from skidpad.fleet.updates.payloads import PayloadKind, payload_name, settings_of_content
+    from skidpad.recording.files import write_bytes
+
+    known = PayloadKind(require_choice("kind", kind, [k.value for k in PayloadKind]))
+    try:
+        content, current = payload.read_bytes(), list_.read_bytes()
+    except OSError as error:
+        raise FileError(f"{error.filename}: cannot be read ({error.strerror})") from error
+    settings_of_content(known, content)
+    name = payload_name(known, content)
+    signers = [signing.load_key(path) for path in key]
+    write_bytes(out, signing.add_target(current, (name, content), {}, signers, time.time()))
+    typer.echo(f"{name} is in {out}")
+
+
+@fleet.command()
 def certificate(
     out: Annotated[Path, typer.Option(help="Folder for ca.pem, server.pem and server.key.")],
     host: Annotated[list[str], typer.Option(help="Name or address of the server.")] = ["127.0.0.1"],  # noqa: B006

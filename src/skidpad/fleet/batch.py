@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any
 
 import msgspec
 
@@ -66,6 +66,16 @@ class Found:
     y: float
 
 
+Count = Annotated[int, msgspec.Meta(ge=0, le=1_000_000)]
+
+
+class Judged(msgspec.Struct, frozen=True):
+    """Errors of the monitor in a drive: under the update, and under what the vehicle had before."""
+
+    errors: Count
+    before: Count
+
+
 class Drive(msgspec.Struct, frozen=True):
     """What is read of a drive's summary (`evidence.channels.summary.watched`)."""
 
@@ -73,6 +83,7 @@ class Drive(msgspec.Struct, frozen=True):
     cycles: int
     context: dict[str, str]
     release: str = ""
+    judged: Judged | None = None
 
 
 class IndicatorRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):

@@ -21,12 +21,17 @@ BYTES = 4 * 1024 * 1024  # of a batch of hazards before it is packed
 MINUTE = 60.0  # s
 
 
-def spool_folder(spool: Spool, folder: Path, release: str = "") -> list[str]:
+def spool_folder(
+    spool: Spool, folder: Path, release: str = "", judged: tuple[int, int] | None = None
+) -> list[str]:
     """Spool what `skidpad monitor` wrote into `folder`; returns the keys of its batches.
 
-    release: the update under which the vehicle drove, "" for what it came with.
+    release: the update under which the vehicle drove, "" for what it came with. judged: errors in
+    the drive under it, and under what the vehicle had before.
     """
     summary = monitored.read_summary(folder) | {"release": release}
+    if judged is not None:
+        summary["judged"] = {"errors": judged[0], "before": judged[1]}
     content = json.dumps(summary, sort_keys=True).encode()
     drive = digest(content)[:32]
     keys = [spool.put(Kind.HAZARDS, batch, drive) for batch in hazard_batches(folder)]

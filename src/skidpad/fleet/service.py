@@ -17,6 +17,7 @@ from skidpad.fleet.alerting.relays import Relay
 from skidpad.fleet.blobs import Blobs
 from skidpad.fleet.store.engine import migrate, open_engine, sqlite_url
 from skidpad.fleet.store.intake import Intake
+from skidpad.fleet.updates.repository import Repository
 from skidpad.fleet.words import Limits
 from skidpad.recording.hazards import HazardRecord
 
@@ -37,6 +38,7 @@ class Places:
 class Fleet:
     """Everything that requests are answered from."""
 
+    data: Path
     engine: Engine
     blobs: Blobs
     intake: Intake
@@ -47,6 +49,14 @@ class Fleet:
     limits: Limits = field(default_factory=Limits)
     exporter: Exporter | None = None  # handed in: this house knows no scenarios
     owners: dict[str, tuple[str, str]] = field(default_factory=dict)  # tenants of a vehicle: facts
+
+    def repository(self, tenant: str) -> Repository:
+        """The updates of a maker."""
+        return Repository(self.data / "updates" / tenant, self.online_key(tenant), self.clock)
+
+    def online_key(self, tenant: str) -> Path:
+        """Where the key lies that signs when a maker's updates were current."""
+        return self.data / "keys" / f"updates-{tenant}.key"
 
     def close(self) -> None:
         """Commit what was submitted and let go of everything."""
@@ -67,6 +77,7 @@ def open_fleet(
     blobs = Blobs(places.blobs or str(places.data.absolute() / "blobs"))
     hub = Hub()
     return Fleet(
+        data=places.data,
         engine=engine,
         blobs=blobs,
         intake=Intake(engine, blobs, clock),

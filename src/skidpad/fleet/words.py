@@ -52,7 +52,7 @@ RIGHTS: dict[Action, frozenset[Role]] = {
     Action.RECEIVE_ORDERS: frozenset({_V}),
     Action.RECEIVE_UPDATES: frozenset({_V}),
     Action.CHANGE: frozenset({_M}),
-    Action.READ_CHANGES: frozenset({_M, _O}),
+    Action.READ_CHANGES: frozenset({_M}),
     Action.READ_PLACES: frozenset({_M, _O, Role.AUTHORITY}),
     Action.READ_RESEARCH: frozenset({Role.RESEARCHER}),
     Action.READ_SAFETY_CASE: frozenset({_M, _O, Role.AUTHORITY}),

@@ -7,13 +7,14 @@ from fastapi.responses import JSONResponse
 
 import skidpad
 from skidpad.core.errors import SkidpadError
-from skidpad.fleet.api import alerts, hazards, orders, patterns, vehicle
+from skidpad.fleet.api import alerts, changes, hazards, orders, patterns, updates, vehicle
 from skidpad.fleet.api.guard import Guard
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.words import Refused
 
 ROUTERS = (
     vehicle.router, hazards.router, patterns.router, alerts.router, orders.router,
+    updates.router, changes.router,
 )  # fmt: skip
 
 

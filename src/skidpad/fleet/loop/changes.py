@@ -1,0 +1,118 @@
+"""A change with the scenes that led to it, and what it does to those very scenes."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+from sqlalchemy import Connection, select
+
+from skidpad.core.vocabulary import HazardType
+from skidpad.fleet.identity import new_id
+from skidpad.fleet.loop.judging import errors_of
+from skidpad.fleet.patterns.analysis import cluster_row
+from skidpad.fleet.service import Fleet
+from skidpad.fleet.store.events import add_event
+from skidpad.fleet.store.loop import changes, evaluations
+from skidpad.fleet.store.reading import hazard_row, record_of
+from skidpad.fleet.updates.payloads import PayloadKind, payload_name, settings_of_content
+from skidpad.fleet.words import Principal, Refused, absent
+
+SCENES_MAX = 200
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Proposal:
+    """A change that somebody proposes."""
+
+    kind: PayloadKind
+    content: bytes
+    reason: str
+    hazards: tuple[str, ...]
+    cluster: str | None = None
+
+
+def propose(fleet: Fleet, who: Principal, proposal: Proposal) -> str:
+    """Keep a change; its id. Refused when the payload is not valid or a scene is not visible."""
+    if not 1 <= len(proposal.hazards) <= SCENES_MAX:
+        raise Refused(422, f"a change names 1 to {SCENES_MAX} hazards that led to it")
+    settings_of_content(proposal.kind, proposal.content)
+    with fleet.engine.connect() as connection:
+        for hazard in proposal.hazards:
+            hazard_row(connection, who, hazard)
+        if proposal.cluster is not None:
+            cluster_row(connection, who, proposal.cluster)
+    row = {
+        "id": new_id(), "tenant": who.tenant, "cluster": proposal.cluster,
+        "kind": proposal.kind.value, "name": payload_name(proposal.kind, proposal.content),
+        "payload": fleet.blobs.put(proposal.content),
+        "hazards": json.dumps(list(proposal.hazards)), "reason": proposal.reason,
+        "actor": who.id, "at": fleet.clock(),
+    }  # fmt: skip
+    with fleet.engine.begin() as connection:
+        connection.execute(changes.insert(), row)
+        add_event(connection, ("change", str(row["id"])), "proposed", (who.id, fleet.clock()))
+    return str(row["id"])
+
+
+def change_row(connection: Connection, who: Principal, change: str) -> Any:
+    """A change of the tenant's own; Refused (404) otherwise."""
+    row = connection.execute(
+        select(changes).where(changes.c.id == change, changes.c.tenant == who.tenant)
+    ).first()
+    if row is None:
+        raise absent()
+    return row
+
+
+def payload_of(fleet: Fleet, who: Principal, change: str) -> tuple[PayloadKind, str, bytes]:
+    """Kind, name and content of a change's payload."""
+    with fleet.engine.connect() as connection:
+        row = change_row(connection, who, change)
+    return PayloadKind(row.kind), row.name, fleet.blobs.get(row.payload)
+
+
+def re_evaluate(
+    fleet: Fleet, who: Principal, change: str, before: tuple[PayloadKind, bytes]
+) -> list[dict[str, Any]]:
+    """Judge the scenes that led to a change again: errors under what was, and under the change."""
+    kind, _, content = payload_of(fleet, who, change)
+    settings = [settings_of_content(*before), settings_of_content(kind, content)]
+    with fleet.engine.connect() as connection:
+        scenes = json.loads(change_row(connection, who, change).hazards)
+        known = {row["hazard"] for row in evaluations_of(connection, change)}
+    for hazard in scenes:
+        if hazard in known:
+            continue
+        with fleet.engine.connect() as connection:
+            type_ = HazardType(hazard_row(connection, who, hazard)["type"])
+            record = record_of(connection, fleet.blobs, hazard)
+        old, new = errors_of(record.worlds, record.channels, settings)
+        with fleet.engine.begin() as connection:
+            connection.execute(
+                evaluations.insert(),
+                {
+                    "id": new_id(), "change": change, "hazard": hazard,
+                    "errors_before": old.total, "errors_after": new.total,
+                    "found_after": int(type_ in new.found), "at": fleet.clock(),
+                },
+            )  # fmt: skip
+    with fleet.engine.begin() as connection:
+        add_event(connection, ("change", change), "re-evaluated", (who.id, fleet.clock()))
+    with fleet.engine.connect() as connection:
+        return evaluations_of(connection, change)
+
+
+def evaluations_of(connection: Connection, change: str) -> list[dict[str, Any]]:
+    """What a change does to its scenes, by hazard."""
+    rows = connection.execute(
+        select(evaluations).where(evaluations.c.change == change).order_by(evaluations.c.hazard)
+    )
+    return [
+        {
+            "hazard": r.hazard, "errors_before": r.errors_before, "errors_after": r.errors_after,
+            "found_after": bool(r.found_after), "at": r.at,
+        }
+        for r in rows
+    ]  # fmt: skip

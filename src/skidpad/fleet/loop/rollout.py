@@ -1,0 +1,184 @@
+"""A release on its way through the stages: who runs it, when it is looked at, how it ends."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import Any
+
+import msgspec
+from sqlalchemy import Connection, select
+
+from skidpad.fleet.identity import new_id
+from skidpad.fleet.loop.changes import change_row, evaluations_of, payload_of
+from skidpad.fleet.loop.plan import Decision, Finding, Plan, is_chosen, look
+from skidpad.fleet.service import Fleet
+from skidpad.fleet.store.events import Event, add_event, events_of
+from skidpad.fleet.store.loop import changes, releases
+from skidpad.fleet.store.tables import drives
+from skidpad.fleet.words import Principal, Refused, absent
+
+SUBJECT = "release"
+COMPLETED, REVERTED, LOOKED, STAGE = "completed", "reverted", "looked", "stage"
+
+
+@dataclass(frozen=True, slots=True)
+class Rollout:
+    """A release as it stands."""
+
+    row: Any
+    name: str  # of the payload
+    plan: Plan
+    events: tuple[Event, ...]
+
+    @property
+    def ended(self) -> str | None:
+        """`completed`, `reverted`, or None while it goes on."""
+        return next((e.what for e in self.events if e.what in (COMPLETED, REVERTED)), None)
+
+    @property
+    def stage(self) -> int:
+        """Index of the stage that it has reached."""
+        return max(int(e.detail["stage"]) for e in self.events if e.what == STAGE)
+
+    @property
+    def share(self) -> float:
+        """Of vehicles that run it."""
+        return self.plan.stages[self.stage]
+
+    def plain(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "release": self.row.id, "change": self.row.change, "payload": self.name,
+            "before": self.row.before, "plan": msgspec.to_builtins(self.plan), "at": self.row.at,
+            "stage": self.stage, "share": self.share, "ended": self.ended,
+            "events": [
+                {"what": e.what, "actor": e.actor, "at": e.at, "detail": e.detail}
+                for e in self.events
+            ],
+        }  # fmt: skip
+
+
+def release(fleet: Fleet, who: Principal, change: str, targets: bytes, plan: Plan) -> str:
+    """Publish a change that was signed off line and begin its first stage; the release's id."""
+    _, name, content = payload_of(fleet, who, change)
+    with fleet.engine.connect() as connection:
+        running = [r for r in rollouts(connection, who.tenant) if r.ended is None]
+        before = standing(connection, who.tenant)
+    if running:
+        raise Refused(409, "another release is on its way; it ends first")
+    fleet.repository(who.tenant).publish(targets, name, content)
+    id, by = new_id(), (who.id, fleet.clock())
+    row = {
+        "id": id, "tenant": who.tenant, "change": change, "before": before,
+        "plan": msgspec.json.encode(plan).decode(), "actor": by[0], "at": by[1],
+    }  # fmt: skip
+    with fleet.engine.begin() as connection:
+        connection.execute(releases.insert(), row)
+        add_event(connection, (SUBJECT, id), STAGE, by, stage=0)
+        add_event(connection, ("change", change), "released", by, release=id)
+    return id
+
+
+def rollouts(connection: Connection, tenant: str) -> list[Rollout]:
+    """The releases of a tenant, oldest first."""
+    rows = connection.execute(
+        select(releases, changes.c.name)
+        .join(changes, changes.c.id == releases.c.change)
+        .where(releases.c.tenant == tenant)
+        .order_by(releases.c.at, releases.c.id)
+    ).all()
+    return [
+        Rollout(
+            r, r.name, msgspec.json.decode(r.plan, type=Plan), tuple(events_of(connection, [r.id]))
+        )
+        for r in rows
+    ]
+
+
+def rollout_of(connection: Connection, tenant: str, id: str) -> Rollout:
+    """A release of a tenant; Refused (404) otherwise."""
+    found = next((r for r in rollouts(connection, tenant) if r.row.id == id), None)
+    if found is None:
+        raise absent()
+    return found
+
+
+def standing(connection: Connection, tenant: str) -> str:
+    """Name of the payload that every vehicle may run: of the last completed release; "" for none."""
+    done = [r.name for r in rollouts(connection, tenant) if r.ended == COMPLETED]
+    return done[-1] if done else ""
+
+
+def assignment(connection: Connection, tenant: str, vehicle: str) -> dict[str, str]:
+    """What a vehicle is to run: the release under way if it is chosen, else what stands."""
+    stands = standing(connection, tenant)
+    for one in rollouts(connection, tenant):
+        if one.ended is None and is_chosen(one.row.id, vehicle, one.share):
+            return {"release": one.row.id, "payload": one.name, "before": stands}
+    return {"release": "", "payload": stands, "before": stands}
+
+
+def look_at(fleet: Fleet, who: Principal, id: str) -> Finding | None:
+    """Look at a release, and advance, revert or wait; None while too little was driven."""
+    with fleet.engine.begin() as connection:
+        one = rollout_of(connection, who.tenant, id)
+        if one.ended is not None:
+            raise Refused(409, f"this release was {one.ended} already")
+        differences, hours = _driven(connection, one)
+        looks = [e for e in one.events if e.what == LOOKED]
+        seen = sum(int(e.detail["new_drives"]) for e in looks)
+        new = len(differences) - seen
+        if new < one.plan.least_drives or hours < one.plan.least_hours * (one.stage + 1):
+            return None
+        here = sum(e.detail["stage"] == one.stage for e in looks)
+        finding = look(differences, one.plan, one.plan.looks - here - 1)
+        by = (who.id, fleet.clock())
+        told = msgspec.to_builtins(finding) | {"stage": one.stage, "new_drives": new}
+        add_event(connection, (SUBJECT, id), LOOKED, by, **told)
+        _conclude(connection, one, finding, by)
+        return finding
+
+
+def _conclude(
+    connection: Connection, one: Rollout, finding: Finding, by: tuple[str, float]
+) -> None:
+    subject = (SUBJECT, one.row.id)
+    if finding.decision is Decision.REVERT:
+        add_event(connection, subject, REVERTED, by, reason=finding.reason, to=one.row.before)
+    elif finding.decision is Decision.ADVANCE and one.stage + 1 == len(one.plan.stages):
+        add_event(connection, subject, COMPLETED, by)
+    elif finding.decision is Decision.ADVANCE:
+        add_event(connection, subject, STAGE, by, stage=one.stage + 1)
+
+
+def _driven(connection: Connection, one: Rollout) -> tuple[list[float], float]:
+    """Differences of errors of the drives under a release, of chosen vehicles, and their hours."""
+    rows = connection.execute(
+        select(drives.c.vehicle, drives.c.seconds, drives.c.summary)
+        .where(drives.c.release == one.row.id, drives.c.manufacturer == one.row.tenant)
+        .order_by(drives.c.at, drives.c.drive)
+    )
+    differences, seconds = [], 0.0
+    for row in rows:
+        judged = json.loads(row.summary).get("judged")
+        if judged is not None and is_chosen(one.row.id, row.vehicle, one.share):
+            differences.append(float(judged["errors"] - judged["before"]))
+            seconds += row.seconds
+    return differences, seconds / 3600.0
+
+
+def trace(connection: Connection, who: Principal, change: str) -> dict[str, Any]:
+    """One record from the hazards to the re-evaluation (C-178)."""
+    row = change_row(connection, who, change)
+    hazards = json.loads(row.hazards)
+    released = [r.plain() for r in rollouts(connection, who.tenant) if r.row.change == change]
+    return {
+        "change": row.id, "hazards": hazards, "cluster": row.cluster, "kind": row.kind,
+        "payload": row.name, "digest": row.payload, "reason": row.reason, "actor": row.actor,
+        "at": row.at, "evaluations": evaluations_of(connection, change), "releases": released,
+        "events": [
+            {"what": e.what, "actor": e.actor, "at": e.at, "detail": e.detail}
+            for e in events_of(connection, [change])
+        ],
+    }  # fmt: skip

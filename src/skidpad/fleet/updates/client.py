@@ -1,0 +1,91 @@
+"""The vehicle's side of updates: a pinned root, and nothing older than what it has seen."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from tuf.api.exceptions import DownloadError, DownloadHTTPError, RepositoryError
+from tuf.api.metadata import Metadata, Timestamp
+from tuf.ngclient import FetcherInterface, Updater, UpdaterConfig
+
+from skidpad.core.errors import BackendError
+from skidpad.fleet.updates.payloads import PAYLOAD_MAX
+from skidpad.fleet.updates.repository import SIGNED_AT
+from skidpad.recording.files import write_bytes
+
+SKEW_S = 300.0  # that a vehicle's clock may be behind the server's
+METADATA, TARGETS = "/api/v1/updates/metadata/", "/api/v1/updates/targets/"
+Get = Callable[[str], Any]  # answers a path with `status_code` and `content`, as httpx does
+
+
+class UpdateRefused(BackendError):
+    """An update that is not what it should be; nothing of it was installed."""
+
+
+class _Fetcher(FetcherInterface):
+    def __init__(self, get: Get) -> None:
+        self._get = get
+
+    def _fetch(self, url: str) -> Iterator[bytes]:
+        answer = self._get(url)
+        if answer.status_code != 200:
+            raise DownloadHTTPError(f"{url}: {answer.status_code}", answer.status_code)
+        return iter([bytes(answer.content)])
+
+
+class UpdateClient:
+    """Fetches updates into a folder of the vehicle."""
+
+    def __init__(
+        self, folder: Path, root: bytes, get: Get, clock: Callable[[], float] = time.time
+    ) -> None:
+        self.folder, self.root, self.get, self.clock = folder, root, get, clock
+        for part in ("metadata", "targets"):
+            (folder / part).mkdir(parents=True, exist_ok=True)
+
+    def fetch(self, name: str) -> Path:
+        """The update of that name, checked; UpdateRefused when anything is wrong."""
+        self._check_clock()
+        config = UpdaterConfig(
+            timestamp_max_length=65536, snapshot_max_length=1024 * 1024,
+            targets_max_length=16 * 1024 * 1024, root_max_length=1024 * 1024,
+        )  # fmt: skip
+        try:
+            updater = Updater(
+                str(self.folder / "metadata"), METADATA, str(self.folder / "targets"), TARGETS,
+                _Fetcher(self.get), config, bootstrap=self.root,
+            )  # fmt: skip
+            updater.refresh()
+            self._note_time()
+            target = updater.get_targetinfo(name)
+            if target is None or target.length > PAYLOAD_MAX:
+                raise UpdateRefused(f"no update {name!r} was signed")
+            return Path(updater.find_cached_target(target) or updater.download_target(target))
+        except (RepositoryError, DownloadError, ValueError) as error:
+            raise UpdateRefused(
+                f"the update is refused: {type(error).__name__}: {error}"
+            ) from error
+
+    @property
+    def _trusted(self) -> Path:
+        return self.folder / "trusted_time"
+
+    def _check_clock(self) -> None:
+        """A clock set back would let expired metadata pass."""
+        trusted = float(self._trusted.read_text()) if self._trusted.exists() else 0.0
+        if self.clock() + SKEW_S < trusted:
+            raise UpdateRefused(
+                f"the clock is {trusted - self.clock():.0f} s behind the last signed time it saw"
+            )
+
+    def _note_time(self) -> None:
+        stamp: Metadata[Timestamp] = Metadata.from_bytes(
+            (self.folder / "metadata" / "timestamp.json").read_bytes()
+        )
+        signed = float(stamp.signed.unrecognized_fields.get(SIGNED_AT, 0.0))
+        before = float(self._trusted.read_text()) if self._trusted.exists() else 0.0
+        write_bytes(self._trusted, repr(max(before, signed)).encode())
+        self._check_clock()

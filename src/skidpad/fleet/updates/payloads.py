@@ -1,0 +1,62 @@
+"""What an update may hold: data that a vehicle's monitor reads, checked by the reader it is for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from enum import Enum
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from skidpad.core.errors import InputError
+from skidpad.evidence.channels.hazards import Profile, load_rules
+from skidpad.evidence.channels.identifier.model import Identify, load_model
+from skidpad.evidence.channels.indicators.catalogue import load_thresholds
+from skidpad.evidence.channels.monitor import MonitorSettings
+from skidpad.fleet.identity import digest
+from skidpad.fleet.words import Refused
+
+PAYLOAD_MAX = 64 * 1024 * 1024  # bytes
+
+
+class PayloadKind(str, Enum):
+    """Kinds of data; code and pickles are none."""
+
+    RULES = "rules"  # hazard rules (YAML)
+    THRESHOLDS = "thresholds"  # of the indicators (YAML)
+    MODEL = "model"  # of the learned identifier (.npz, arrays and JSON)
+
+
+SUFFIX = {PayloadKind.RULES: "yaml", PayloadKind.THRESHOLDS: "yaml", PayloadKind.MODEL: "npz"}
+_READERS: dict[PayloadKind, Callable[[Path], dict[str, Any]]] = {
+    PayloadKind.RULES: lambda path: {"rules": load_rules(Profile.PRACTICAL, path)},
+    PayloadKind.THRESHOLDS: lambda path: {"thresholds": load_thresholds(path)},
+    PayloadKind.MODEL: lambda path: {
+        "identify": Identify.BOTH, "detectors": load_model(path).identifier(),
+    },
+}  # fmt: skip
+
+
+def payload_name(kind: PayloadKind, content: bytes) -> str:
+    """The name of an update: kind and digest, so that two different ones never share it."""
+    return f"{kind.value}-{digest(content)[:24]}.{SUFFIX[kind]}"
+
+
+def settings_of(kind: PayloadKind, path: Path) -> MonitorSettings:
+    """How a monitor judges under the update at `path`; FileError or ConfigError when it is none."""
+    return MonitorSettings(**_READERS[kind](path))
+
+
+def settings_of_content(kind: PayloadKind, content: bytes) -> MonitorSettings:
+    """As `settings_of`; Refused (422) for anything that the vehicle's reader would not take."""
+    if len(content) > PAYLOAD_MAX:
+        raise Refused(413, f"an update may have {PAYLOAD_MAX} bytes")
+    if kind is not PayloadKind.MODEL and b"&" in content:
+        raise Refused(422, "an update in YAML may not use anchors")
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / f"payload.{SUFFIX[kind]}"
+        path.write_bytes(content)
+        try:
+            return settings_of(kind, path)
+        except InputError as error:
+            raise Refused(422, f"the update is not valid: {error}") from error

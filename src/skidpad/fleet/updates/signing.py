@@ -1,0 +1,107 @@
+"""What is signed off line: the root of trust and the list of updates, each by two of three keys.
+
+Source: The Update Framework specification 1.0, in the form of python-tuf.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from datetime import datetime, timedelta, timezone
+from pathlib import Path
+from typing import Any
+
+from cryptography.hazmat.primitives import serialization
+from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
+from securesystemslib.signer import CryptoSigner
+from tuf.api.metadata import Metadata, Root, TargetFile, Targets
+
+from skidpad.core.errors import ConfigError, FileError, OutputError
+from skidpad.recording.files import write_bytes
+
+KEYS, THRESHOLD = 3, 2
+ROOT_VALID = timedelta(days=365)
+TARGETS_VALID = timedelta(days=180)
+ROLES = ("root", "targets")
+
+
+def instant(seconds: float) -> datetime:
+    """Seconds since 1970 as TUF writes them."""
+    return datetime.fromtimestamp(int(seconds), timezone.utc)
+
+
+def new_key(path: Path) -> CryptoSigner:
+    """A fresh Ed25519 key, kept at `path`; OutputError when one is there already."""
+    if path.exists():
+        raise OutputError(f"{path} exists, and a key is never replaced")
+    key = Ed25519PrivateKey.generate()
+    content = key.private_bytes(
+        serialization.Encoding.PEM,
+        serialization.PrivateFormat.PKCS8,
+        serialization.NoEncryption(),
+    )
+    write_bytes(path, content)
+    path.chmod(0o600)
+    return CryptoSigner(key)
+
+
+def load_key(path: Path) -> CryptoSigner:
+    """The key at `path`; FileError when it is none."""
+    try:
+        key = serialization.load_pem_private_key(path.read_bytes(), None)
+    except (OSError, ValueError, TypeError) as error:
+        raise FileError(f"{path}: is not a private key ({error})") from error
+    if not isinstance(key, Ed25519PrivateKey):
+        raise FileError(f"{path}: is not an Ed25519 key")
+    return CryptoSigner(key)
+
+
+def make_offline_keys(folder: Path, data: Path) -> dict[str, list[CryptoSigner]]:
+    """Three keys each for root and targets; ConfigError for a folder below the data folder."""
+    inside = folder.resolve().is_relative_to(data.resolve())
+    if inside or data.resolve().is_relative_to(folder.resolve()):
+        raise ConfigError(f"--out {folder}: keys that sign must never lie with the data ({data})")
+    return {
+        role: [new_key(folder / f"{role}-{k}.key") for k in range(1, KEYS + 1)] for role in ROLES
+    }
+
+
+def make_root(signers: dict[str, list[CryptoSigner]], online: CryptoSigner, now: float) -> bytes:
+    """The first root: who may sign what; vehicles pin it."""
+    root = Root(version=1, expires=instant(now) + ROOT_VALID, consistent_snapshot=True)
+    for role in ROLES:
+        for signer in signers[role]:
+            root.add_key(signer.public_key, role)
+        root.roles[role].threshold = THRESHOLD
+    for role in ("snapshot", "timestamp"):
+        root.add_key(online.public_key, role)
+    return _signed(Metadata(root), signers["root"][:THRESHOLD])
+
+
+def empty_targets(signers: Sequence[CryptoSigner], now: float) -> bytes:
+    """The first list of updates, which names none."""
+    return _signed(Metadata(Targets(version=1, expires=instant(now) + TARGETS_VALID)), signers)
+
+
+def add_target(
+    current: bytes,
+    payload: tuple[str, bytes],
+    custom: dict[str, Any],
+    signers: Sequence[CryptoSigner],
+    now: float,
+) -> bytes:
+    """The next list of updates: the current one and `payload` (name, content), signed anew."""  # fmt: skip
+    metadata: Metadata[Targets] = Metadata.from_bytes(current)
+    targets = metadata.signed
+    name, content = payload
+    target = TargetFile.from_data(name, content, ["sha256"])
+    target.unrecognized_fields["custom"] = custom
+    targets.targets[name] = target
+    targets.version += 1
+    targets.expires = instant(now) + TARGETS_VALID
+    return _signed(Metadata(targets), signers)
+
+
+def _signed(metadata: Metadata[Any], signers: Sequence[CryptoSigner]) -> bytes:
+    for signer in signers:
+        metadata.sign(signer, append=True)
+    return metadata.to_bytes()

@@ -6,8 +6,9 @@ BIN := $(VENV)/bin
 OUT ?= out/adas
 RUN_ARGS ?=
 TEST_ARGS ?=
+DRIVE_ARGS ?=
 
-.PHONY: run test check wheel-check bench refs data figures clean
+.PHONY: cockpit run test check wheel-check bench refs data figures clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next $(RUN_ARGS)
@@ -27,6 +28,11 @@ wheel-check: $(BIN)/python
 
 bench: $(VENV)/.installed
 	$(BIN)/skidpad bench
+
+# drive in a browser: prints an address
+cockpit: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --prefer-binary -e '.[cockpit]'
+	$(BIN)/skidpad drive $(DRIVE_ARGS)
 
 refs: $(VENV)/.tested-with
 	$(BIN)/python -m pytest tests/references -s --rewrite-references

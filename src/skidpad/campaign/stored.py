@@ -27,7 +27,7 @@ def read_run(folder: Path) -> RunSpec:
     except OSError as error:
         raise FileError(f"cannot read {path}: {error.strerror}") from error
     except yaml.YAMLError as error:
-        raise FileError(f"{path} is not YAML: {error}") from error
+        raise FileError(f"{path} is not YAML: {' '.join(str(error).split())}") from error
     if not isinstance(plain, dict):
         raise FileError(f"{path} does not describe a run")
     if "version" in plain:

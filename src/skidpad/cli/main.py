@@ -11,6 +11,8 @@ from skidpad.cli.campaigns import Drive, Estimate
 from skidpad.cli.channels import channels
 from skidpad.cli.channels_drive import drive, outcomes
 from skidpad.cli.channels_evaluate import evaluate, train
+from skidpad.cli.cockpit import drive as cockpit_drive
+from skidpad.cli.cockpit import replay, watch
 from skidpad.cli.compare import compare
 from skidpad.cli.fleet import fleet
 from skidpad.cli.friction import friction
@@ -81,6 +83,9 @@ app.add_typer(campaign)
 app.command()(monitor)
 app.command("safety-case")(safety_case)
 app.command()(view)
+app.command("drive")(cockpit_drive)
+app.command()(replay)
+app.command()(watch)
 
 
 @app.command()

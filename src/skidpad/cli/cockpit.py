@@ -1,0 +1,132 @@
+"""`skidpad drive`, `replay` and `watch`: the cockpit in a browser (extra `cockpit`)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from msgspec import Meta, Struct, structs
+
+from skidpad.cli.asked import Drivers, Tuned
+from skidpad.cli.spread import spread
+from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.run import BackendChoice, Roads, RunSpec
+
+if TYPE_CHECKING:
+    from skidpad.pages.server import Place
+
+
+class Pages(Struct, frozen=True, kw_only=True):
+    """Where the page is served."""
+
+    page_port: Annotated[int, Meta(ge=0, le=65535, description="Of the page; 0: any free one.")] = 0
+    page_host: Annotated[
+        str, Meta(description="Address of the page; others than 127.0.0.1 let others in.")
+    ] = "127.0.0.1"
+    no_browser: Annotated[bool, Meta(description="Print the address, open nothing.")] = False
+
+
+@spread(duration=3600.0)
+def drive(
+    drivers: Drivers,
+    run: RunSpec,
+    roads: Roads,
+    tuned: Tuned,
+    backend: BackendChoice,
+    pages: Pages,
+    weather: Annotated[str, typer.Option(help="A preset or a YAML file.")] = "clear-noon",
+    seed: Annotated[int, typer.Option(help="Of traffic and noise.")] = 1,
+    rate: Annotated[float, typer.Option(help="Times real time; 0: as fast as it can.")] = 1.0,
+    paused: Annotated[bool, typer.Option("--paused", help="Begin standing.")] = False,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the run; default: out/drives/<name>, numbered.")
+    ] = None,
+) -> None:
+    """Drive in a browser: watch the stack, take over, change weather and grip; keeps a run."""
+    from skidpad.campaign.desk_run import require_free
+    from skidpad.cli.carla_backend import checked
+    from skidpad.cockpit.driving import about, drive_job
+    from skidpad.cockpit.producer import Producer
+    from skidpad.cockpit.serving import serve
+    from skidpad.physics.presets import find_weather
+
+    chosen = drivers.chosen() if drivers != Drivers() else Drivers(configs="3").chosen()
+    if len(chosen) != 1:
+        raise ConfigError(f"one driver at a time, got {len(chosen)}")
+    spec = structs.replace(
+        tuned.resolve(run),
+        driver=chosen[0],
+        course=roads,
+        weather=find_weather(weather),
+        seed=seed,
+        backend=checked(backend),
+    )
+    folder = next_free(Path("out/drives") / spec.name) if out is None else require_free(out)
+    producer = Producer(drive_job, about(spec, folder, rate, paused))
+    typer.echo(serve(producer, "drive", place_of(pages), typer.echo, browser=not pages.no_browser))
+
+
+@spread()
+def replay(
+    run: Annotated[Path, typer.Argument(help="A run's folder.")],
+    pages: Pages,
+    film: Annotated[
+        Path | None, typer.Option(help="Write a film (.mp4 or .webp) instead of a page.")
+    ] = None,
+    begin: Annotated[float, typer.Option("--from", help="s, of the film.")] = 0.0,
+    end: Annotated[float, typer.Option("--to", help="s, of the film.")] = 10.0,
+    view: Annotated[
+        str, typer.Option(help="driver, follow or top, and every small view.")
+    ] = "follow",
+) -> None:
+    """Scrub through a run in a browser: its pictures are drawn again from what was logged."""
+    from skidpad.cockpit.film import stretch_of, write_film
+    from skidpad.cockpit.producer import Producer
+    from skidpad.cockpit.replay import Recording
+    from skidpad.cockpit.replaying import replay_job
+    from skidpad.cockpit.serving import serve
+    from skidpad.cockpit.studio import View
+    from skidpad.core.errors import require_choice
+
+    recording = Recording(run)
+    if film is not None:
+        seen = View(require_choice("--view", view, [v.value for v in View]))
+        typer.echo(write_film(recording, stretch_of(recording, begin, end), seen, film))
+        return
+    producer = Producer(replay_job, {"folder": str(run)})
+    shown = recording.timeline()
+    browser = not pages.no_browser
+    typer.echo(serve(producer, "replay", place_of(pages), typer.echo, shown, browser))
+
+
+@spread()
+def watch(
+    folder: Annotated[Path, typer.Argument(help="A campaign's folder, running or finished.")],
+    pages: Pages,
+    once: Annotated[bool, typer.Option("--once", help="Print how it stands and end.")] = False,
+) -> None:
+    """Watch a campaign while it runs: progress, results so far with intervals, the last crash."""
+    from skidpad.cockpit.watching import lines, serve_watch, standing
+
+    if not folder.is_dir():
+        raise FileError(f"{folder} is not the folder of a campaign")
+    if once:
+        typer.echo("\n".join(lines(standing(folder))))
+        return
+    serve_watch(folder, place_of(pages), typer.echo, browser=not pages.no_browser)
+
+
+def place_of(pages: Pages) -> Place:
+    """Where to serve."""
+    from skidpad.pages.server import Place
+
+    return Place(host=pages.page_host, port=pages.page_port)
+
+
+def next_free(folder: Path) -> Path:
+    """`folder`, or the first of folder-2, folder-3, ... where nothing is yet."""
+    from itertools import count
+
+    names = (folder if n == 1 else folder.with_name(f"{folder.name}-{n}") for n in count(1))
+    return next(path for path in names if not path.exists())

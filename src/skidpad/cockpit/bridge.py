@@ -1,0 +1,188 @@
+"""Between tabs and producer: who may say what, and what a tab's messages mean. It knows no web."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from time import monotonic
+from typing import Any
+
+import msgspec
+
+from skidpad.cockpit.pictures import Encoder
+from skidpad.cockpit.producer import Producer
+from skidpad.cockpit.studio import MAIN, View
+from skidpad.cockpit.tabs import DeadMan, Tabs
+from skidpad.cockpit.words import Do, End, Film, Pace, Pause, Seek, Show, Step, Word
+from skidpad.core.errors import ConfigError
+from skidpad.core.inputs import (
+    Functions,
+    Input,
+    Lamps,
+    LampSwitch,
+    Pedals,
+    Sky,
+    Wheel,
+)
+from skidpad.core.run import Function
+from skidpad.core.vocabulary import GripModel, RangeModel
+from skidpad.core.weather import Weather
+from skidpad.physics.presets import preset, preset_groups
+
+LAMP_ORDER = (LampSwitch.AUTO, LampSwitch.LOW, LampSwitch.HIGH, LampSwitch.OFF)
+CUSTOM = "-custom"  # behind the name of a preset of which something was changed
+FILM_SECONDS = 10.0
+HIDEABLE = (View.DEPTH, View.SEMANTIC, View.TOP)
+
+
+class Bridge:
+    """One producer, several tabs; the state that words are relative to is the last picture's."""
+
+    def __init__(self, producer: Producer, clock: Callable[[], float] = monotonic) -> None:
+        self.producer, self.tabs, self.encoder = producer, Tabs(), Encoder()
+        self.pedals = Pedals()  # as they were said last
+        self.dead_man = DeadMan(self._release, clock)
+        self.told: dict[str, Any] = {}  # of the newest picture
+        self.main, self.hidden = View.DRIVER, set[View]()
+        self.sky: Weather | None = None  # set, but perhaps not yet shown
+
+    # --- pictures
+
+    def newest(self, after: int) -> tuple[int, bytes] | None:
+        """The newest picture as a message, if it is not number `after`."""
+        if self.producer.feed.last == after:
+            return None
+        packet = self.producer.feed.take()
+        if packet is None or packet.number == after:
+            return None
+        message = self.encoder.message(packet)
+        self.told = msgspec.json.decode(packet.told)
+        return packet.number, message
+
+    # --- tabs
+
+    def leave(self, tab: str) -> None:
+        """A tab is gone; the pedals of one that drove are released."""
+        if self.tabs.driver == tab:
+            self._release()
+        self.tabs.go(tab)
+
+    def may(self, tab: str) -> bool:
+        """Whether this tab's words count."""
+        return self.tabs.driver == tab
+
+    def say(self, tab: str, word: str, value: Any = None) -> str | None:
+        """A word of a tab; what was wrong with it, or None."""
+        if not self.may(tab):
+            return "another tab drives: this one watches"
+        try:
+            self._obey(word, value)
+        except (ConfigError, ValueError, TypeError, KeyError, msgspec.ValidationError) as error:
+            return f"{word}: {error}"
+        return None
+
+    # --- words
+
+    def _obey(self, word: str, value: Any) -> None:
+        simple: Mapping[str, Callable[[], Word]] = {
+            "pause": lambda: Pause(not self.told.get("paused", False)),
+            "play": lambda: Pause(False),
+            "step": lambda: Step(int(value or 1)),
+            "rate": lambda: Pace(float(value)),
+            "seek": lambda: Seek(int(value)),
+            "film": lambda: Film(float(value or FILM_SECONDS)),
+            "end": End,
+        }
+        acts: Mapping[str, Callable[[Any], Input]] = {
+            "take": lambda _: Wheel(not self._seat("manual", False)),
+            "lamps": self._lamps,
+            "toggle": self._toggle,
+            "weather": self._weather,
+            "sky": self._change,
+            "grip": lambda v: self._acting(grip=GripModel(v)),
+            "range": lambda v: self._acting(range=RangeModel(v)),
+        }
+        if word in simple:
+            self.producer.say(simple[word]())
+        elif word == "pedals":
+            self._pedals(value)
+        elif word == "main":
+            self._show(View(value) if value else self._next_main())
+        elif word == "hide":
+            self.hidden ^= {View(value)} & set(HIDEABLE)
+            self._show(self.main)
+        elif word in acts:
+            self._do(acts[word](value))
+        else:
+            raise ConfigError(f"there is no word {word!r}")
+
+    def _do(self, one: Input) -> None:
+        self.producer.say(Do(one))
+
+    def _seat(self, name: str, otherwise: Any) -> Any:
+        value = self.told.get("seat", {}).get(name)
+        return otherwise if value is None else value
+
+    def _pedals(self, value: Mapping[str, Any]) -> None:
+        pedals = msgspec.convert(dict(value), Pedals)
+        still = Pedals(method=pedals.method) == pedals
+        self.dead_man.heard(not still)
+        self._move(pedals)
+
+    def _move(self, pedals: Pedals) -> None:
+        """Say how the pedals stand, if they stand otherwise than before."""
+        if pedals != self.pedals:
+            self.pedals = pedals
+            self._do(pedals)
+
+    def _release(self) -> None:
+        self._move(Pedals(method=self.pedals.method))
+
+    def _show(self, main: View) -> None:
+        self.main = main
+        self.producer.say(Show(main, tuple(sorted(self.hidden))))
+
+    def _next_main(self) -> View:
+        return MAIN[(MAIN.index(self.main) + 1) % len(MAIN)] if self.main in MAIN else MAIN[0]
+
+    def _lamps(self, value: Any) -> Lamps:
+        if value is not None:
+            return Lamps(LampSwitch(value))
+        now = self._seat("lamps", "auto")
+        at = LAMP_ORDER.index(LampSwitch(now)) if now != "sun" else 0
+        return Lamps(LAMP_ORDER[(at + 1) % len(LAMP_ORDER)])
+
+    def _toggle(self, value: Any) -> Functions:
+        on = {Function(name) for name in self._seat("functions", [])}
+        return Functions(tuple(sorted(on ^ {Function(value)}, key=lambda f: f.value)))
+
+    def _weather(self, value: Any) -> Sky:
+        """A preset by name; None: the next one (A-217)."""
+        names = [name for group in preset_groups().values() for name in group]
+        if value is None:
+            now = str(self._seat("weather", names[0])).removesuffix(CUSTOM)
+            at = names.index(now) if now in names else -1
+            value = names[(at + 1) % len(names)]
+        self.sky = preset(value)
+        return self._acting()
+
+    def _change(self, value: Mapping[str, float]) -> Sky:
+        """Single fields of the present weather."""
+        now = self._present()
+        name = now.name if now.name.endswith(CUSTOM) else now.name + CUSTOM
+        fields = {k: float(v) for k, v in value.items() if k in now.values()}
+        self.sky = replace(now, name=name, title="", **fields)
+        return self._acting()
+
+    def _present(self) -> Weather:
+        if self.sky is None:
+            name = str(self._seat("weather", "clear-noon"))
+            self.sky = Weather(name=name, **self._seat("sky", {}))
+        return self.sky
+
+    def _acting(self, grip: GripModel | None = None, range: RangeModel | None = None) -> Sky:
+        return Sky(
+            self._present(),
+            GripModel(self._seat("grip", "physical")) if grip is None else grip,
+            RangeModel(self._seat("range", "physical")) if range is None else range,
+        )

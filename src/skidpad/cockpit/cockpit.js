@@ -1,0 +1,208 @@
+// The canvases of the cockpit: pictures come by websocket and are acknowledged when they are drawn.
+const TIERS = ["No action", "Hard stop", "Stopped too close", "Emergency", "Stopped behind car", "Approach",
+  "ACC hold", "ACC open", "ACC close", "Light stop", "Holding at line", "Coast", "Cruise"];
+const SMALL = ["left", "rear", "right", "top", "depth", "semantic"];
+const TITLES = { left: "left mirror", rear: "rear", right: "right mirror", top: "top (U)", depth: "depth (T)",
+  semantic: "classes (Y)", driver: "driver", follow: "follow" };
+const WORDS = { KeyM: ["take"], KeyL: ["lamps"], KeyN: ["weather"], KeyP: ["pause"], KeyC: ["main"],
+  KeyT: ["hide", "depth"], KeyY: ["hide", "semantic"], KeyU: ["hide", "top"], Period: ["step", 1],
+  Digit1: ["toggle", "acc"], Digit2: ["toggle", "lca"], Digit3: ["toggle", "tla"],
+  Digit4: ["toggle", "resume"], Digit5: ["toggle", "limiter"], Digit6: ["toggle", "aeb"] };
+const PEDALS = { KeyW: "up", ArrowUp: "up", KeyS: "down", ArrowDown: "down", KeyA: "left", ArrowLeft: "left",
+  KeyD: "right", ArrowRight: "right", Space: "hand" };
+const HEARTBEAT = 100;  // ms between two words of the pedals while they are pressed
+const STRIP_SECONDS = 30;
+
+export default {
+  props: { tab: String, kind: String, timeline: Object },
+  template: `
+<div class="cockpit" :class="kind">
+  <div class="bar"><span ref="bar" class="said">connecting ...</span><span ref="wrong" class="wrong"></span></div>
+  <div class="mirrors">
+    <figure v-for="v in ['left', 'rear', 'right']" :key="v" @click="say('main', v)"><canvas :ref="v"></canvas>
+      <figcaption>{{ title(v) }}</figcaption></figure>
+  </div>
+  <div class="stage"><canvas ref="main"></canvas>
+    <div class="hud">
+      <div class="speed"><b ref="speed">-</b> km/h <span ref="gear" class="gear"></span></div>
+      <div ref="mode" class="mode"></div>
+      <div class="pedals"><i ref="throttle" class="throttle"></i><i ref="brake" class="brake"></i>
+        <span class="steer"><i ref="steer"></i></span></div>
+    </div>
+    <div class="lamp" ref="lamp"></div>
+    <div class="alert" ref="alert"></div>
+  </div>
+  <div class="side">
+    <figure v-for="v in ['top', 'depth', 'semantic']" :key="v" @click="say('main', v)"><canvas :ref="v"></canvas>
+      <figcaption>{{ title(v) }}</figcaption></figure>
+    <figure><canvas ref="radar" width="240" height="180"></canvas><figcaption>radar, orange closing</figcaption></figure>
+  </div>
+  <div class="facts"><dl ref="facts"></dl>
+    <ol ref="tiers" class="tiers"></ol>
+    <div class="grip"><svg viewBox="0 0 60 84"><rect x="18" y="8" width="24" height="68" rx="7"/>
+      <g v-for="(w, i) in wheels" :key="i"><rect :ref="'w' + i" :x="w[0]" :y="w[1]" width="11" height="20" rx="3"/>
+      <text :ref="'m' + i" :x="w[0] + 5.5" :y="w[1] + 29"></text></g></svg><small>friction</small></div>
+    <ul ref="events" class="events"></ul></div>
+  <div class="strips"><canvas ref="strip" width="900" height="120"></canvas></div>
+  <div class="line" v-if="timeline"><canvas ref="line" width="1200" height="70" @pointerdown="seek"
+    @pointermove="$event.buttons && seek($event)"></canvas></div>
+</div>`,
+  data: () => ({ wheels: [[4, 10], [45, 10], [4, 48], [45, 48]] }),
+  mounted() {
+    this.keys = {}; this.history = []; this.pressed = false; this.shownAt = []; this.waiting = {};
+    for (const name of TIERS) this.$refs.tiers.append(Object.assign(document.createElement("li"), { textContent: name }));
+    this.down = (e) => this.key(e, true); this.up = (e) => this.key(e, false);
+    this.away = () => { this.keys = {}; this.beat(); };
+    document.addEventListener("keydown", this.down); document.addEventListener("keyup", this.up);
+    window.addEventListener("blur", this.away); document.addEventListener("visibilitychange", this.away);
+    this.beating = setInterval(() => this.beat(), HEARTBEAT);
+    this.open();
+  },
+  unmounted() {
+    this.gone = true; clearInterval(this.beating); this.socket.close();
+    document.removeEventListener("keydown", this.down); document.removeEventListener("keyup", this.up);
+    window.removeEventListener("blur", this.away); document.removeEventListener("visibilitychange", this.away);
+  },
+  methods: {
+    title(v) { return TITLES[v]; },
+    open() {
+      const scheme = location.protocol === "https:" ? "wss" : "ws";
+      this.socket = new WebSocket(`${scheme}://${location.host}/stream?tab=${this.tab}`);
+      this.socket.binaryType = "arraybuffer";
+      this.socket.onmessage = (e) => typeof e.data === "string" ? this.told(JSON.parse(e.data)) : this.picture(e.data);
+      this.socket.onclose = () => { if (this.gone || this.ended) return; this.$refs.bar.textContent = "the connection is lost, trying again ...";
+        setTimeout(() => this.open(), 1000); };
+    },
+    say(word, value = null) {
+      if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ word, value }));
+    },
+    told(message) {
+      if ("drives" in message) { this.drives = message.drives;
+        this.$refs.bar.textContent = message.drives ? "this tab drives" : "another tab drives: this one watches";
+        this.$el.classList.toggle("watches", !message.drives); }
+      if (message.wrong) { this.$refs.wrong.textContent = message.wrong; setTimeout(() => { this.$refs.wrong.textContent = ""; }, 4000); }
+      if (message.ended) { this.ended = true; this.$refs.alert.textContent = message.ended; this.$el.classList.add("over"); }
+    },
+    async picture(data) {
+      const length = new DataView(data).getUint32(0, true);
+      const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
+      let at = 4 + length;
+      const jobs = head.views.map(([name, size]) => {
+        const blob = new Blob([new Uint8Array(data, at, size)], { type: "image/jpeg" }); at += size;
+        return createImageBitmap(blob).then((bitmap) => this.draw(name === head.main ? "main" : name, bitmap));
+      });
+      const shown = new Set(head.views.map(([name]) => name));
+      for (const name of SMALL) this.figure(name, shown.has(name) && name !== head.main);
+      try { await Promise.all(jobs); } finally {
+        if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ ack: head.number }));
+      }
+      this.show(head);
+    },
+    figure(name, on) { const c = this.$refs[name]; const f = (Array.isArray(c) ? c[0] : c).parentElement; f.style.display = on ? "" : "none"; },
+    draw(name, bitmap) {
+      let canvas = this.$refs[name]; if (Array.isArray(canvas)) canvas = canvas[0];
+      if (!canvas) return;
+      if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) { canvas.width = bitmap.width; canvas.height = bitmap.height; }
+      canvas.getContext("2d").drawImage(bitmap, 0, 0); bitmap.close();
+    },
+    show(h) {
+      const r = this.$refs, m = h.motion, s = h.stack, seat = h.seat; this.head = h;
+      r.speed.textContent = Math.round(Math.abs(m.speed_kmh));
+      r.gear.textContent = m.reverse ? "R" : m.gear > 0 ? `D${m.gear}` : "N";
+      r.mode.textContent = s.mode || ""; this.$el.classList.toggle("manual", !!seat.manual);
+      r.throttle.style.height = `${100 * (m.throttle || 0)}%`; r.brake.style.height = `${100 * (m.brake || 0)}%`;
+      r.steer.style.left = `${50 - 50 * (m.steer || 0)}%`;
+      r.lamp.textContent = (seat.beam ? `lamps ${seat.beam}` : "") + (seat.lamps && seat.lamps !== "sun" ? ` (${seat.lamps})` : "") + (m.handbrake ? "  handbrake" : "");
+      const last = h.events.length ? h.events[h.events.length - 1] : null;
+      r.alert.textContent = this.ended ? r.alert.textContent : last && h.t - last[0] < 2 && h.t >= last[0] ? last[1] : h.paused ? "paused" : "";
+      this.now = performance.now(); this.shownAt.push(this.now); this.shownAt = this.shownAt.filter((t) => this.now - t < 1000);
+      const unit = (v, u) => v === null || v === undefined ? "-" : `${v} ${u}`;
+      this.list([["time", `${h.t.toFixed(2)} s`], ["status", s.status || "-"], ["distance", unit(s.distance, "m")],
+        ["time gap", unit(s.time_gap, "s")], ["bumper, roof", `${unit(s.bumper, "")} ${unit(s.roof, "m")}`],
+        ["radar", unit(s.radar, "m")], ["radar limit", unit(s.radar_limit, "m/s")],
+        ["light", s.light ? `${s.light} at ${s.light_at} m` : "-"], ["weather", seat.weather],
+        ["grip", seat.grip || ""], ["collisions", h.collisions], ["real time", h.rtf ? `${h.rtf.toFixed(2)} x` : h.kind === "replay" ? `${h.rate} x` : "-"],
+        ["pictures", `${this.shownAt.length}/s, ${h.dropped} dropped`], ["drives", seat.manual ? `you, by ${seat.method}` : "the stack"],
+        ["on", seat.functions ? seat.functions.join(" ") || "nothing" : "-"]]);
+      [...r.tiers.children].forEach((li, i) => li.classList.toggle("lit", i === s.tier));
+      m.mu.forEach((v, i) => { const w = r[`w${i}`][0], t = r[`m${i}`][0]; t.textContent = v === null ? "" : v.toFixed(2);
+        w.style.fill = v === null ? "#555" : `hsl(${Math.max(0, Math.min(1, (v - 0.1) / 0.8)) * 130}, 70%, 48%)`; });
+      r.events.replaceChildren(...h.events.slice(-5).reverse().map(([t, text]) =>
+        Object.assign(document.createElement("li"), { textContent: `${t.toFixed(1)} s  ${text}` })));
+      if (h.note && h.note !== this.note) { this.note = h.note; r.bar.textContent = h.note; }
+      this.radar(h.radar); this.strip(h); if (this.timeline) this.line(h);
+    },
+    list(rows) {
+      const dl = this.$refs.facts;
+      if (dl.children.length !== 2 * rows.length) dl.replaceChildren(...rows.flatMap(() => [document.createElement("dt"), document.createElement("dd")]));
+      rows.forEach(([k, v], i) => { dl.children[2 * i].textContent = k; dl.children[2 * i + 1].textContent = v; });
+    },
+    radar(points) {
+      const c = this.$refs.radar, g = c.getContext("2d"), k = c.height / 85; g.fillStyle = "#10141a"; g.fillRect(0, 0, c.width, c.height);
+      g.strokeStyle = "#303944"; g.fillStyle = "#6b7682"; g.font = "10px sans-serif";
+      for (const d of [20, 40, 60, 80]) { g.beginPath(); g.arc(c.width / 2, c.height - 6, d * k, 1.17 * Math.PI, 1.83 * Math.PI); g.stroke(); g.fillText(d, c.width / 2 + 3, c.height - 8 - d * k); }
+      for (const [x, y, v] of points) { g.fillStyle = v < -1 ? "#ff8552" : "#e8eaed"; g.fillRect(c.width / 2 - y * k - 1.5, c.height - 6 - x * k - 1.5, 3, 3); }
+    },
+    strip(h) {
+      const H = this.history; if (H.length && (h.t < H[H.length - 1][0] || h.t - H[H.length - 1][0] > 5)) H.length = 0;
+      H.push([h.t, h.motion.speed_kmh, h.stack.distance]); while (H.length && h.t - H[0][0] > STRIP_SECONDS) H.shift();
+      const c = this.$refs.strip, g = c.getContext("2d"), w = c.width, half = c.height / 2;
+      g.clearRect(0, 0, w, c.height); g.font = "12px sans-serif";
+      const curve = (i, most, top, ink, name) => { g.strokeStyle = "#303944"; g.strokeRect(0.5, top + 0.5, w - 1, half - 4);
+        g.strokeStyle = ink; g.lineWidth = 1.6; g.beginPath(); let pen = false;
+        for (const row of H) { const v = row[i]; if (v === null) { pen = false; continue; }
+          const x = w - (h.t - row[0]) / STRIP_SECONDS * w, y = top + (half - 6) * (1 - Math.min(v / most, 1)) + 1;
+          if (pen) g.lineTo(x, y); else g.moveTo(x, y); pen = true; }
+        g.stroke(); g.lineWidth = 1; g.fillStyle = ink; g.fillText(name, 6, top + 14); };
+      curve(1, 160, 0, "#4d9dff", "speed, 0 to 160 km/h"); curve(2, 80, half, "#4fce7f", "distance, 0 to 80 m");
+    },
+    line(h) {
+      const c = this.$refs.line, g = c.getContext("2d"), T = this.timeline, n = Math.max(T.last - T.first, 1);
+      const x = (tick) => (tick - T.first) / n * c.width; g.clearRect(0, 0, c.width, c.height);
+      g.fillStyle = "#1d232b"; g.fillRect(0, 0, c.width, c.height); g.strokeStyle = "#4d9dff"; g.beginPath();
+      const most = Math.max(...T.speed, 1); T.speed.forEach((v, i) => g.lineTo(i / Math.max(T.speed.length - 1, 1) * c.width, 48 - 40 * v / most)); g.stroke();
+      T.tier.forEach((v, i) => { if (v === null) return; g.fillStyle = `hsl(${v * 27}, 60%, 50%)`; g.fillRect(i / T.tier.length * c.width, 52, c.width / T.tier.length + 1, 6); });
+      const inks = { crash: "#ff5b52", "put back": "#f2b441", marking: "#b58cff", notice: "#9aa5b1" };
+      for (const [tick, kind] of T.events) { g.fillStyle = inks[kind] || "#fff"; g.fillRect(x(tick) - 1.5, kind === "crash" ? 0 : 30, 3, kind === "crash" ? 62 : 22); }
+      g.fillStyle = "#fff"; g.fillRect(x(h.tick) - 1, 0, 2, c.height);
+    },
+    seek(e) {
+      const box = e.target.getBoundingClientRect(), T = this.timeline;
+      this.say("seek", Math.round(T.first + (e.clientX - box.left) / box.width * (T.last - T.first)));
+    },
+    key(e, down) {
+      const focus = document.activeElement, tag = focus ? focus.tagName : "";
+      if (e.ctrlKey || e.metaKey || e.altKey || (tag === "INPUT" && focus.type !== "checkbox") || tag === "TEXTAREA") return;
+      if (e.code in PEDALS && this.kind === "drive") { e.preventDefault(); if (!!this.keys[PEDALS[e.code]] !== down) { this.keys[PEDALS[e.code]] = down; this.beat(true); } return; }
+      if (!down) return;
+      if (this.kind === "replay") {
+        if (e.code === "Space") { e.preventDefault(); return this.say("pause"); }
+        if (e.code === "ArrowLeft" || e.code === "ArrowRight") { e.preventDefault();
+          const by = (e.shiftKey ? 100 : 1) * (e.code === "ArrowLeft" ? -1 : 1); return this.say("seek", (this.head ? this.head.tick : 0) + by); }
+      }
+      if (e.code in WORDS && !e.repeat) this.say(...WORDS[e.code]);
+    },
+    beat(now = false) {
+      if (this.kind !== "drive" || !this.socket) return;
+      const pedals = this.gamepad() || this.keyboard(), pressed = pedals.throttle > 0 || pedals.brake > 0 || Math.abs(pedals.steer) > 0 || pedals.handbrake;
+      if (pressed || this.pressed || now) this.say("pedals", pedals);
+      this.pressed = pressed;
+    },
+    keyboard() {
+      const k = this.keys, n = (v) => v ? 1 : 0;
+      return { throttle: n(k.up), brake: n(k.down), steer: n(k.left) - n(k.right), handbrake: !!k.hand, method: "keyboard" };
+    },
+    gamepad() {
+      const pad = navigator.getGamepads ? [...navigator.getGamepads()].find((p) => p && p.connected) : null; if (!pad) return null;
+      const b = (i) => pad.buttons[i] ? pad.buttons[i].value : 0, dead = (v) => Math.abs(v) < 0.06 ? 0 : v, r = (v) => Math.round(v * 100) / 100;
+      const wheel = /wheel|g29|g920|t150|t300/i.test(pad.id);
+      const p = wheel
+        ? { throttle: r(Math.max(0, (1 - (pad.axes[2] ?? 1)) / 2)), brake: r(Math.max(0, (1 - (pad.axes[5] ?? pad.axes[3] ?? 1)) / 2)) }
+        : { throttle: r(b(7)), brake: r(b(6)) };
+      Object.assign(p, { steer: r(-dead(pad.axes[0] || 0)), handbrake: b(0) > 0.5, method: wheel ? "wheel" : "gamepad" });
+      const used = p.throttle > 0.02 || p.brake > 0.02 || p.steer !== 0 || p.handbrake;
+      if (used) this.padded = performance.now();
+      return used || performance.now() - (this.padded || -1e9) < 1000 ? p : null;
+    },
+  },
+};

@@ -1,0 +1,64 @@
+"""A live drive as a producer: the one loop, with a desk, a screen and real time."""
+
+from __future__ import annotations
+
+from multiprocessing.connection import Connection
+from pathlib import Path
+from typing import Any
+
+from skidpad.campaign.cast import stage_of
+from skidpad.campaign.desk import Desk
+from skidpad.campaign.desk_run import drive_at_desk
+from skidpad.cockpit import hud
+from skidpad.cockpit.feed import Feed
+from skidpad.cockpit.realtime import RealTime
+from skidpad.cockpit.screen import Screen, Shown
+from skidpad.cockpit.words import Link, Live, Pace, Pause
+from skidpad.core.inputs import Functions
+from skidpad.core.run import AdasDriver, RunSpec, run_from_plain
+from skidpad.stack.settings import settings_of
+
+
+def about(spec: RunSpec, folder: Path, rate: float = 1.0, paused: bool = False) -> dict[str, Any]:
+    """What `drive_job` is given."""
+    return {"spec": spec.to_plain(), "folder": str(folder), "rate": rate, "paused": paused}
+
+
+def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
+    """Drive a run and write its folder; the sentence of its end."""
+    spec, folder = run_from_plain(about["spec"], "the drive"), Path(about["folder"])
+    feed, link = Feed(feed_name), Link(pipe)
+    link.rate, link.paused = Pace(about["rate"]).rate, Pause(about["paused"]).on
+    desk = Desk(Live(link), spec)
+
+    def shown() -> Shown:
+        told = {
+            "kind": "drive",
+            "seat": {**hud.seat(desk), "functions": functions_on(spec, desk)},
+            "rtf": hud.rounded(time.rtf),
+            "slow_pct": hud.rounded(100.0 * time.slow / max(time.ticks, 1), 1),
+            "rate": link.rate,
+            "paused": link.paused,
+        }
+        return Shown(desk.outside, told)
+
+    screen = Screen(feed, link, stage_of(spec).map, shown, spec.seed)
+    time = RealTime(link, screen.show)
+    try:
+        driven = drive_at_desk(spec, desk, folder, (screen, time))
+    finally:
+        time.end()
+        feed.close()
+    n = len(driven.log)
+    mean = f", {screen.shown} pictures shown, {screen.dropped} dropped"
+    return f"{driven.outcome.value} after {n} ticks{mean}: {folder}"
+
+
+def functions_on(spec: RunSpec, desk: Desk) -> list[str] | None:
+    """The functions of our stack that are on; None: another stack drives, which has no switches."""
+    if not isinstance(spec.driver, AdasDriver):
+        return None
+    on = spec.driver.functions if desk.functions is None else desk.functions
+    if desk.functions is None and settings_of(spec).aeb_without_acc and "acc" not in on:
+        return sorted({*(f.value for f in on), "aeb"})
+    return sorted(f.value for f in Functions(tuple(on)).on)

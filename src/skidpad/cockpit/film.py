@@ -1,0 +1,147 @@
+"""A stretch of a stored run as a film: the same pictures and marks as on the page, without one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import cv2
+import msgspec
+import numpy as np
+from PIL import Image
+
+from skidpad.cockpit import hud
+from skidpad.cockpit.marks import marks_of
+from skidpad.cockpit.pictures import Picture, colours, draw
+from skidpad.cockpit.replay import Recording
+from skidpad.cockpit.studio import Studio, View, plane
+from skidpad.core.errors import ConfigError, OutputError
+from skidpad.core.setup import DT
+from skidpad.simulation.world.world import BRAKING
+
+INK, DIM, ACCENT = (240, 240, 240), (190, 180, 170), (82, 133, 255)  # blue, green, red
+INSETS = ((View.LEFT, 0.2), (View.REAR, 0.3), (View.RIGHT, 0.2))  # shares of the width, on top
+MARGIN = 8  # px
+WEBP_QUALITY = 55
+SUFFIXES = (".mp4", ".webp")
+
+
+def stretch_of(recording: Recording, begin_s: float, end_s: float) -> range:
+    """The moments between two times; ConfigError for a stretch that is not in the run."""
+    first, last = float(recording.log.t[0]), float(recording.log.t[-1])
+    if not first <= begin_s < end_s:
+        raise ConfigError(f"--from {begin_s:g} must be >= {first:g} and below --to {end_s:g}")
+    if begin_s > last:
+        raise ConfigError(f"--from {begin_s:g} lies after the end of the run at {last:g} s")
+    k = [round((t - first) / DT) for t in (begin_s, min(end_s, last))]
+    return range(k[0], k[1] + 1)
+
+
+def write_film(recording: Recording, moments: range, view: View, path: Path) -> Path:
+    """Write the film, .mp4 or .webp, with every moment at 20 pictures per second."""
+    if path.suffix not in SUFFIXES:
+        raise ConfigError(f"a film's file ends in {' or '.join(SUFFIXES)}, got {path}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise OutputError(f"cannot write the film {path}: {error.strerror}") from error
+    if path.suffix == ".webp":
+        _webp(frames(recording, moments, view), path)
+    else:
+        _mp4(frames(recording, moments, view), path)
+    return path
+
+
+def frames(recording: Recording, moments: Sequence[int], view: View) -> Iterator[Picture]:
+    """Pictures of these moments: the view, mirrors in it, and what is said."""
+    first = recording.seat(moments[0]).outside
+    studio = Studio(recording.map, recording.table, first, recording.spec.seed)
+    camera = studio.suite.cameras[view.value]
+    for k in moments:
+        moment = recording.moment(k)
+        studio.change(recording.seat(k).outside)
+        truth = moment.truth
+        braking = truth.commands[:, 1] > BRAKING
+        images = studio.look(truth.tick, truth.states, truth.lights, braking)
+        picture = colours(plane(images[view.value]))
+        marks = msgspec.to_builtins(marks_of(camera, moment.frame.radar, moment.report))
+        draw(picture, *marks)
+        _inset(picture, {v: colours(plane(images[v.value])) for v, _ in INSETS})
+        _say(
+            picture,
+            hud.motion(moment),
+            hud.opinion(moment),
+            moment.truth.tick,
+            hud.happened(moment),
+        )
+        yield picture
+
+
+def _inset(picture: Picture, small: dict[View, Picture]) -> None:
+    width = picture.shape[1]
+    x = (width - round(sum(s for _, s in INSETS) * width) - 2 * MARGIN) // 2
+    for view, share in INSETS:
+        w, h = round(share * width), round(0.16 * width * 0.75)
+        source = small[view]
+        rows = min(source.shape[0], round(source.shape[1] * h / w))
+        top = (source.shape[0] - rows) // 2
+        cut = cv2.resize(source[top : top + rows], (w, h), interpolation=cv2.INTER_AREA)
+        picture[MARGIN : MARGIN + h, x : x + w] = cut
+        cv2.rectangle(picture, (x, MARGIN), (x + w, MARGIN + h), (40, 40, 40), 1)
+        x += w + MARGIN
+
+
+def _say(
+    picture: Picture, motion: dict[str, Any], stack: dict[str, Any], tick: int, events: list[str]
+) -> None:
+    height = picture.shape[0]
+    _write(picture, f"{abs(motion['speed_kmh']):.0f} km/h", 16, height - 44, INK, 1.1, 2)
+    mu = [v for v in motion["mu"] if v is not None]
+    grip = f"   grip {min(mu):.2f}" if mu else ""
+    _write(picture, f"{tick * DT:6.2f} s{grip}   {stack['mode']}", 16, height - 16, DIM, 0.55, 1)
+    _write(picture, ", ".join(events), 16, height - 80, ACCENT, 0.6, 2)
+
+
+def _write(
+    picture: Picture, text: str, x: int, y: int, ink: tuple[int, int, int], size: float, bold: int
+) -> None:
+    for colour, width in (((0, 0, 0), bold + 2), (ink, bold)):
+        cv2.putText(
+            picture, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, size, colour, width, cv2.LINE_AA
+        )
+
+
+def _mp4(pictures: Iterator[Picture], path: Path) -> None:
+    writer: cv2.VideoWriter | None = None
+    try:
+        for picture in pictures:
+            if writer is None:
+                size = (picture.shape[1], picture.shape[0])
+                writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 1.0 / DT, size)
+                if not writer.isOpened():
+                    raise OutputError(f"cannot write the film {path}")
+            writer.write(np.ascontiguousarray(picture))
+    finally:
+        if writer is not None:
+            writer.release()
+
+
+def _webp(pictures: Iterator[Picture], path: Path) -> None:
+    """An animation that a page shows by itself: half the size, 10 pictures per second."""
+    shown = [
+        Image.fromarray(
+            np.ascontiguousarray(
+                cv2.resize(p, None, fx=0.6, fy=0.6, interpolation=cv2.INTER_AREA)[..., ::-1]
+            )
+        )
+        for n, p in enumerate(pictures)
+        if n % 2 == 0
+    ]
+    try:
+        shown[0].save(
+            path, save_all=True, append_images=shown[1:], duration=round(2000 * DT), loop=0,
+            quality=WEBP_QUALITY, method=4,
+        )  # fmt: skip
+    except OSError as error:
+        raise OutputError(f"cannot write the film {path}: {error}") from error

@@ -1,0 +1,97 @@
+"""What is said beside the pictures, as plain data for the page (A-272)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from skidpad.campaign.desk import Desk
+from skidpad.campaign.drive import Moment
+from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.inputs import Beam
+from skidpad.core.vocabulary import Supervision, Tier
+from skidpad.stack.perception.radar import velocity_limit
+
+TIERS = tuple(tier.name.replace("_", " ").capitalize() for tier in Tier)
+
+
+def rounded(value: float | None, digits: int = 2) -> float | None:
+    """A number for the page; None stays None, and NaN is None."""
+    if value is None or value != value:
+        return None
+    return round(float(value), digits)
+
+
+def motion(moment: Moment) -> dict[str, Any]:
+    """How the ego moves and what moves it."""
+    ego, truth = moment.frame.ego, moment.truth
+    throttle, brake, steer, handbrake, reverse = truth.commands[0].tolist()
+    return {
+        "speed_kmh": rounded(kmh_from_mps(ego.speed), 1),
+        "gear": ego.gear,
+        "throttle": rounded(throttle),
+        "brake": rounded(brake),
+        "steer": rounded(steer, 3),
+        "handbrake": bool(handbrake),
+        "reverse": bool(reverse),
+        "mu": [rounded(v) for v in truth.mu[0].tolist()],
+        "x": rounded(float(truth.states.x[0])),
+        "y": rounded(float(truth.states.y[0])),
+    }
+
+
+def opinion(moment: Moment) -> dict[str, Any]:
+    """What the stack says."""
+    r = moment.report
+    return {
+        "mode": moment.driver.mode,
+        "tier": None if r.tier is None else int(r.tier),
+        "status": None if r.status is None else r.status.name.replace("_", " ").lower(),
+        "distance": rounded(r.distance, 1),
+        "time_gap": rounded(r.time_gap, 1),
+        "bumper": rounded(r.bumper, 1),
+        "roof": rounded(r.roof, 1),
+        "radar": rounded(r.radar_lane, 1),
+        "radar_limit": rounded(velocity_limit(moment.frame.ego.speed), 1),
+        "light": None if r.light_state is None else r.light_state.name.lower(),
+        "light_at": rounded(r.light_distance, 0),
+    }
+
+
+def radar(moment: Moment) -> list[list[float]]:
+    """Radar returns as x forward, y left (m) and range rate (m/s)."""
+    p = moment.frame.radar
+    x, y = p.range * np.cos(p.azimuth), p.range * np.sin(p.azimuth)
+    points: list[list[float]] = np.stack([x, y, p.velocity], axis=1).round(1).tolist()
+    return points
+
+
+def seat(desk: Desk) -> dict[str, Any]:
+    """What the person has set."""
+    beam = desk.outside.beam
+    return {
+        "manual": desk.manual,
+        "method": desk.pedals.method.value,
+        "pressed_s": rounded(desk.hands.pressed),
+        "functions": None if desk.functions is None else sorted(f.value for f in desk.functions),
+        "lamps": "sun" if desk.switch is None else desk.switch.value,
+        "beam": None if beam is None else Beam(beam).name.lower(),
+        "weather": desk.outside.weather.name,
+        "sky": desk.outside.weather.values(),
+        "grip": desk.outside.grip.value,
+        "range": desk.outside.range_model.value,
+    }
+
+
+def happened(moment: Moment) -> list[str]:
+    """Events of this tick in words."""
+    truth, frame = moment.truth, moment.frame
+    told = [f"contact with {c.static or truth.table.names[c.actor]}" for c in truth.contacts]
+    told += [f"{i.marking} marking crossed" for i in truth.invasions]
+    if moment.action.relocate is not None and moment.action.relocate.moved is not None:
+        reason = moment.action.relocate.moved.reason.name.lower().replace("_", " ")
+        told.append(f"put back after: {reason}")
+    if frame.supervision is not Supervision.NONE:
+        told.append(f"recovery: {frame.supervision.name.lower().replace('_', ' ')}")
+    return told

@@ -1,0 +1,223 @@
+"""The page: the canvases, and beside them what can be set. Built by NiceGUI, one object per tab."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from enum import Enum
+from importlib import resources
+from typing import Any
+from uuid import uuid4
+
+from nicegui import ui
+from nicegui.element import Element
+from nicegui.events import GenericEventArguments
+
+from skidpad.cockpit.bridge import LAMP_ORDER, Bridge
+from skidpad.core.run import Function
+from skidpad.core.vocabulary import GripModel, RangeModel
+from skidpad.core.weather import RANGES
+from skidpad.physics.presets import preset_groups
+
+STYLE = resources.files("skidpad.cockpit").joinpath("cockpit.css").read_text(encoding="utf-8")
+SYNC = 0.3  # s between two looks at how things really stand
+SETTLES = 1.2  # s after a change by hand in which that look leaves a control alone
+SLIDERS = {
+    "precipitation": "rain",
+    "fog_density": "fog",
+    "wetness": "wetness",
+    "precipitation_deposits": "water on the road",
+    "ice_thickness": "ice",
+    "snow_depth_mm": "snow, mm",
+    "sun_altitude_deg": "sun, deg",
+}
+SHOWN_RANGES = {"snow_depth_mm": (0.0, 100.0)}
+TITLES = {
+    Function.ACC: "ACC (1)",
+    Function.LCA: "lane centring (2)",
+    Function.TLA: "light assist (3)",
+    Function.RESUME: "resume (4)",
+    Function.LIMITER: "limiter (5)",
+    Function.AEB: "emergency braking (6)",
+}
+RATES = {0.25: "0.25 x", 0.5: "0.5 x", 1.0: "1 x", 2.0: "2 x", 4.0: "4 x", 0.0: "as fast as it can"}
+HELP = (
+    "W S A D or arrows: pedals and wheel (hold the brake at standstill to reverse), space: handbrake, "
+    "M: take over and hand back, L: headlights, N: next weather, C: camera, T Y U: hide depth, classes, "
+    "top, P: pause, full stop: one tick further"
+)
+HELP_REPLAY = (
+    "space or P: play and pause, arrows: one tick (with shift: 5 s), full stop: one tick further, "
+    "C: camera, T Y U: hide views; click a small view or the time line"
+)
+
+
+class Canvases(Element, component="cockpit.js"):
+    """Pictures, heads-up display and keys."""
+
+    def __init__(self, tab: str, kind: str, timeline: dict[str, Any] | None) -> None:
+        super().__init__()
+        self._props["tab"] = tab
+        self._props["kind"] = kind
+        self._props["timeline"] = timeline
+
+
+class Panel:
+    """The controls of one tab; they follow what is really the case."""
+
+    def __init__(self, bridge: Bridge, tab: str) -> None:
+        self.bridge, self.tab = bridge, tab
+        self.syncing: list[Callable[[dict[str, Any]], None]] = []
+        self.touched: dict[str, float] = {}
+        self.elements: list[Any] = []
+
+    def say(self, word: str, value: Any = None) -> None:
+        """Say a word as this tab."""
+        wrong = self.bridge.say(self.tab, word, value)
+        if wrong is not None:
+            ui.notify(wrong, type="warning")
+
+    def button(self, text: str, word: str, value: Any = None, icon: str | None = None) -> None:
+        """A button that says a word."""
+        made = ui.button(text, icon=icon, on_click=lambda: self.say(word, value))
+        self.elements.append(made.props("dense no-caps unelevated").classes(f"say-{word}"))
+
+    def follow(self, name: str, element: Any, read: Callable[[dict[str, Any]], Any]) -> Any:
+        """Let an element show what `read` finds in the seat, unless it was just moved by hand."""
+
+        def sync(seat: dict[str, Any]) -> None:
+            value = read(seat)
+            if time.monotonic() - self.touched.get(name, -SETTLES) < SETTLES or value is None:
+                return
+            if element.value != value:
+                element.value = value
+
+        self.syncing.append(sync)
+        self.elements.append(element)
+        return element
+
+    def changed(self, name: str, now: Any, word: str, value: Any) -> None:
+        """A control was moved, by hand or by the look at what is the case."""
+        seat = self.bridge.told.get("seat", {})
+        if now == self._real(name, seat):
+            return
+        self.touched[name] = time.monotonic()
+        self.say(word, value)
+
+    def _real(self, name: str, seat: dict[str, Any]) -> Any:
+        if name in SLIDERS:
+            return seat.get("sky", {}).get(name)
+        if name in {f.value for f in Function}:
+            return name in (seat.get("functions") or ())
+        return seat.get(name)
+
+    def sync(self) -> None:
+        """Look at how things stand."""
+        seat = self.bridge.told.get("seat", {})
+        for one in self.syncing:
+            one(seat)
+        may = self.bridge.may(self.tab)
+        for element in self.elements:
+            element.set_enabled(may)
+
+
+def build(bridge: Bridge, kind: str, timeline: dict[str, Any] | None) -> Callable[[], None]:
+    """The builder of the page."""
+
+    def page() -> None:
+        tab = uuid4().hex
+        panel = Panel(bridge, tab)
+        with ui.element("main").classes("whole"):
+            Canvases(tab, kind, timeline)
+            with ui.element("aside").classes("panel"):
+                time_controls(panel, kind)
+                if kind == "drive":
+                    drive_controls(panel)
+                    weather_controls(panel)
+                ui.label(HELP if kind == "drive" else HELP_REPLAY).classes("help")
+        ui.timer(SYNC, panel.sync)
+
+    return page
+
+
+def time_controls(panel: Panel, kind: str) -> None:
+    """Pause, rate, camera, end."""
+    with ui.element("div").classes("row"):
+        if kind == "drive":
+            panel.button("take over / hand back", "take", icon="swap_horiz")
+        panel.button("pause", "pause", icon="pause")
+        panel.button("step", "step", 1, icon="skip_next")
+        panel.button("camera", "main", icon="videocam")
+        if kind == "replay":
+            panel.button("film of 10 s", "film", icon="movie")
+        panel.button("end", "end", icon="stop")
+    rate = ui.select(
+        RATES, value=1.0, label="speed", on_change=lambda e: panel.say("rate", e.value)
+    )
+    panel.elements.append(rate.props("dense outlined options-dense"))
+
+
+def drive_controls(panel: Panel) -> None:
+    """Functions of our stack, and the headlights."""
+    with ui.element("div").classes("switches"):
+        for function, title in TITLES.items():
+            function_switch(panel, function.value, title)
+    lamps = ui.toggle(
+        [switch.value for switch in LAMP_ORDER],
+        on_change=lambda e: panel.changed("lamps", e.value, "lamps", e.value),
+    ).props("dense no-caps unelevated")
+    panel.follow("lamps", lamps, lambda seat: seat.get("lamps"))
+
+
+def function_switch(panel: Panel, name: str, title: str) -> None:
+    """One function of our stack."""
+    switch = ui.switch(title, on_change=lambda e: panel.changed(name, e.value, "toggle", name))
+    panel.follow(name, switch.props("dense"), lambda seat: _has(seat.get("functions"), name))
+
+
+def _has(names: list[str] | None, name: str) -> bool | None:
+    return None if names is None else name in names
+
+
+def weather_controls(panel: Panel) -> None:
+    """Weather by name and by slider, and how it acts."""
+    names = [name for group in preset_groups().values() for name in group]
+    with ui.element("div").classes("selects"):
+        weather = ui.select(
+            names,
+            label="weather (N)",
+            on_change=lambda e: panel.changed("weather", e.value, "weather", e.value),
+        ).props("dense outlined options-dense")
+        panel.follow("weather", weather, lambda seat: _known(seat.get("weather"), names))
+        acting_select(panel, "grip", GripModel)
+        acting_select(panel, "range", RangeModel)
+    with ui.element("div").classes("sliders"):
+        for field, title in SLIDERS.items():
+            weather_slider(panel, field, title)
+
+
+def acting_select(panel: Panel, word: str, kinds: type[Enum]) -> None:
+    """How weather acts: on tyres, or on sight."""
+    select = ui.select(
+        [k.value for k in kinds],
+        label=word,
+        on_change=lambda e: panel.changed(word, e.value, word, e.value),
+    )
+    panel.follow(word, select.props("dense outlined options-dense"), lambda seat: seat.get(word))
+
+
+def weather_slider(panel: Panel, field: str, title: str) -> None:
+    """One field of the weather, which acts while it is moved."""
+    low, high = SHOWN_RANGES.get(field, RANGES[field])
+    ui.label(title)
+    slider = ui.slider(min=low, max=high, step=1).props("label dense")
+
+    def moved(event: GenericEventArguments) -> None:
+        panel.changed(field, event.args, "sky", {field: event.args})
+
+    slider.on("update:model-value", moved, throttle=0.15)
+    panel.follow(field, slider, lambda seat: seat.get("sky", {}).get(field))
+
+
+def _known(name: str | None, names: list[str]) -> str | None:
+    return name if name in names else None

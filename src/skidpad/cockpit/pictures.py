@@ -1,0 +1,82 @@
+"""From a packet to what a browser shows, and to a picture of a film: marks are drawn here, once."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+import cv2
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.cockpit.feed import Array, Packet
+from skidpad.sensors.encodings import cityscapes_colours
+
+Picture = NDArray[np.uint8]  # (H, W, 3) blue, green, red, as OpenCV wants it
+QUALITY = 80  # of JPEG
+CLOSING, STEADY, LEAD = (82, 133, 255), (235, 235, 235), (127, 206, 79)  # blue, green, red
+
+
+def colours(array: Array) -> Picture:
+    """The plane of a view in colours."""
+    if array.dtype == np.uint32:
+        rgba = array.view(np.uint8).reshape(*array.shape, 4)
+        return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2BGR), dtype=np.uint8)
+    return np.asarray(cv2.cvtColor(array, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+
+
+def views_of(packet: Packet, told: Mapping[str, Any]) -> dict[str, Picture]:
+    """All views of a packet in colours, with the marks in them."""
+    marks = told.get("marks", {})
+    found = {}
+    for name, array in packet.views.items():
+        if name == "semantic":
+            picture = np.ascontiguousarray(cityscapes_colours(array.astype(np.uint8))[..., ::-1])
+        else:
+            picture = colours(array)
+        if name in marks:
+            draw(picture, *marks[name])
+        found[name] = picture
+    return found
+
+
+def draw(picture: Picture, points: list[list[int]], lead: list[int] | None, label: str) -> None:
+    """Radar points and the bracket at the measured distance, in place."""
+    for u, v, closing in points:
+        cv2.circle(picture, (u, v), 3, CLOSING if closing else STEADY, -1, cv2.LINE_AA)
+    if lead is None:
+        return
+    left, top, right, bottom = lead
+    arm = max(4, (right - left) // 4)
+    for x, turn in ((left, 1), (right, -1)):
+        for y, down in ((top, 1), (bottom, -1)):
+            cv2.line(picture, (x, y), (x + turn * arm, y), LEAD, 2, cv2.LINE_AA)
+            cv2.line(picture, (x, y), (x, y + down * arm), LEAD, 2, cv2.LINE_AA)
+    at = (left, max(top - 8, 14))
+    cv2.putText(picture, label, at, cv2.FONT_HERSHEY_SIMPLEX, 0.5, LEAD, 1, cv2.LINE_AA)
+
+
+class Encoder:
+    """Packets as messages: each is encoded once, however many tabs look."""
+
+    def __init__(self) -> None:
+        self._number, self._message = 0, b""
+
+    def message(self, packet: Packet) -> bytes:
+        """Length of the head, the head (JSON), and the pictures (JPEG) one after the other."""
+        if packet.number == self._number:
+            return self._message
+        told = msgspec.json.decode(packet.told)
+        pictures = [
+            (name, cv2.imencode(".jpg", view, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])[1].tobytes())
+            for name, view in views_of(packet, told).items()
+        ]
+        told["number"] = packet.number
+        told["views"] = [[name, len(data)] for name, data in pictures]
+        del told["marks"]
+        head = msgspec.json.encode(told)
+        parts = [struct.pack("<I", len(head)), head, *(data for _, data in pictures)]
+        self._number, self._message = packet.number, b"".join(parts)
+        return self._message

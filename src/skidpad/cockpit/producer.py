@@ -1,0 +1,92 @@
+"""The process that makes the pictures, as the page's process sees it."""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from typing import Any
+
+from skidpad.cockpit.feed import Feed
+from skidpad.cockpit.words import End, Word, encode
+from skidpad.core.errors import SkidpadError
+
+ENDS_WITHIN = 120.0  # s to write the run's folder
+Job = Callable[[str, Connection, dict[str, Any]], str]
+
+
+class Producer:
+    """Runs a job in a process of its own, from `start` to `stop`.
+
+    A job is given the feed's name, the pipe and plain data; what it returns is said at the end.
+    """
+
+    def __init__(self, job: Job, about: dict[str, Any]) -> None:
+        self.feed = Feed()
+        context = multiprocessing.get_context("spawn")
+        self._pipe, self._theirs = context.Pipe()
+        told = (job, self.feed.name, self._theirs, about)
+        self._process = context.Process(target=_work, args=told, name="cockpit")
+        self._said: tuple[str, str] | None = None
+
+    def start(self) -> None:
+        """Begin."""
+        self._process.start()
+        self._theirs.close()
+
+    def say(self, word: Word) -> None:
+        """Say a word; one that comes too late is lost."""
+        try:
+            self._pipe.send_bytes(encode(word))
+        except (BrokenPipeError, OSError):
+            return
+
+    @property
+    def result(self) -> tuple[str, str] | None:
+        """("done" or "failed", a sentence) once it has ended; None: it still works."""
+        if self._said is None and self._pipe.poll():
+            try:
+                self._said = self._pipe.recv()
+            except (EOFError, OSError):
+                self._said = ("failed", "the simulator's process ended without a word")
+        return self._said
+
+    def wait(self, seconds: float) -> bool:
+        """Wait for the end at most so long; True when it has ended."""
+        if self.result is None:
+            self._pipe.poll(seconds)
+        return self.result is not None
+
+    def stop(self) -> None:
+        """End it and let go of everything; safe to call twice."""
+        self.say(End())
+        if self._process.is_alive():
+            self.wait(ENDS_WITHIN)
+            self._process.join(ENDS_WITHIN)
+            if self._process.is_alive():
+                self._process.kill()
+                self._process.join()
+        self.feed.close()
+
+    def outcome(self) -> str:
+        """The sentence of its end; SkidpadError when it failed."""
+        kind, text = self.result or ("failed", "the drive was not ended")
+        if kind == "failed":
+            raise SkidpadError(text)
+        return text
+
+
+def _work(job: Job, name: str, pipe: Connection, about: dict[str, Any]) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the page's process hears it, and says so
+    feed_name = name
+    try:
+        said = ("done", job(feed_name, pipe, about))
+    except SkidpadError as error:
+        said = ("failed", str(error))
+    except Exception as error:  # whatever it is, the page must hear of it
+        said = ("failed", f"the simulator failed: {error!r}")
+    try:
+        pipe.send(said)
+    except (BrokenPipeError, OSError):
+        return

@@ -1,0 +1,89 @@
+"""Real time as a sink: waits for the wall clock after every tick, and collects garbage meanwhile.
+
+It decides when a tick is simulated, never what: a paused drive gives the same bytes.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable
+from time import perf_counter, sleep
+
+from skidpad.campaign.drive import Moment, Sink
+from skidpad.cockpit.words import Link
+from skidpad.core.setup import DT
+from skidpad.core.states import ActorTable
+
+PAUSE_FOR_GC = 0.005  # s that a collection of the youngest objects fits into
+COLLECT_EVERY = 200  # ticks between collections of everything
+PATIENCE = 0.05  # s between two looks at the words while it stands
+WINDOW = 20  # ticks over which the real-time factor is measured
+SLOW = 0.9  # real-time factor below which a tick is slow (A-246)
+
+
+class RealTime(Sink):
+    """Holds a run at so many times real time, pauses it, and lets it go tick by tick."""
+
+    def __init__(
+        self,
+        link: Link,
+        again: Callable[[Moment], None],
+        clock: Callable[[], float] = perf_counter,
+        wait: Callable[[float], None] = sleep,
+    ) -> None:
+        """again: shows a moment once more, as views are changed while it stands."""
+        self.link, self.again, self.clock, self.wait = link, again, clock, wait
+        self.ticks = self.slow = 0
+        self._due = self._last = self._window = 0.0
+        self.rtf: float | None = None
+
+    def begin(self, table: ActorTable) -> None:
+        """The clock starts now; garbage is collected here only (A-267)."""
+        del table
+        gc.collect()
+        gc.disable()
+        self._due = self._last = self._window = self.clock()
+
+    def end(self) -> None:
+        """Garbage is collected as ever."""
+        gc.enable()
+
+    def see(self, moment: Moment) -> None:
+        """A tick is done: wait for its time (A-262)."""
+        self._count()
+        self.link.drain()
+        if self.link.paused and not self.link.ended:
+            self._stand(moment)
+        if self.link.rate <= 0.0:  # as fast as it can
+            self._due = self.clock()
+            return
+        self._due += DT / self.link.rate
+        left = self._due - self.clock()
+        if left > PAUSE_FOR_GC or self.ticks % COLLECT_EVERY == 0:
+            gc.collect(0 if self.ticks % COLLECT_EVERY else 2)
+            left = self._due - self.clock()
+        if left > 0.0:
+            self.wait(left)
+        elif left < -DT:  # a late tick does not make the next ones hurry
+            self._due = self.clock()
+
+    def _count(self) -> None:
+        now = self.clock()
+        self.ticks += 1
+        self.slow += SLOW * (now - self._last) > DT
+        self._last = now
+        if self.ticks % WINDOW == 0:
+            self.rtf = WINDOW * DT / max(now - self._window, 1e-9)
+            self._window = now
+
+    def _stand(self, moment: Moment) -> None:
+        self.again(moment)
+        while self.link.paused and not self.link.ended and self.link.steps == 0:
+            if self.link.pipe is None:
+                break
+            self.link.drain(PATIENCE)
+            if self.link.reshown:
+                self.link.reshown = False
+                self.again(moment)
+        self.link.steps = max(self.link.steps - 1, 0)
+        self._due = self._last = self._window = self.clock()

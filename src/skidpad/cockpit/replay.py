@@ -1,0 +1,263 @@
+"""A stored run as moments again: what was logged, with pictures drawn anew from the poses.
+
+Replay and live drive show moments through the same screen. What a log does not hold is absent:
+radar points, pitch and roll, brake lamps of others (they are told from their deceleration).
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from dataclasses import dataclass, fields
+from math import isnan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from skidpad.campaign.desk import beam_of
+from skidpad.campaign.drive import Moment
+from skidpad.campaign.stored import read_run
+from skidpad.core.errors import FileError
+from skidpad.core.frames import RadarPoints, SensorFrame
+from skidpad.core.geometry import Pose
+from skidpad.core.inputs import Functions, Lamps, LampSwitch, Outside, Pedals, Sky, Timed, Wheel
+from skidpad.core.run import AdasDriver, Function, RunSpec
+from skidpad.core.states import (
+    ActorStates,
+    ActorTable,
+    ContactEvent,
+    EgoEstimate,
+    LaneInvasion,
+    StackReport,
+    VehicleCommand,
+    WorldTruth,
+)
+from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Supervision, Tier
+from skidpad.recording.events import LightChange, Notice, Relocation
+from skidpad.recording.inputs import read_inputs
+from skidpad.recording.logfiles import TICKS, read_log
+from skidpad.recording.runlog import RunLog
+from skidpad.roads.bundled import load_map
+from skidpad.roads.queries import RoadMap
+from skidpad.simulation.recovery import Action, Moved, Relocate
+from skidpad.stack.control.text import mode_text
+from skidpad.stack.settings import grip_of, settings_of
+
+RECORDING = ".mcap"
+BRAKING_AX = -1.5  # m/s^2, below which the brake lamps of others are shown lit; our choice
+WORDS: dict[str, type[Any]] = {
+    "status": DetectionStatus,
+    "tier": Tier,
+    "light_state": LightState,
+    "light_source": LightSource,
+    "hsv": LightState,
+    "detected": bool,
+    "light_stop": bool,
+    "radar_points": int,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Seat:
+    """How the desk stood in a tick."""
+
+    tick: int  # from which on
+    outside: Outside
+    manual: bool
+    method: str
+    functions: tuple[Function, ...] | None
+    lamps: LampSwitch | None
+
+
+class Said:
+    """What drove then, as far as it was logged."""
+
+    def __init__(self, report: StackReport, mode: str) -> None:
+        self.report, self.mode = report, mode
+
+    def begin(self, table: ActorTable) -> None:
+        """Nothing begins."""
+
+    def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
+        """Nothing is driven."""
+        raise NotImplementedError
+
+
+class Recording:
+    """A run's folder, moment by moment in any order."""
+
+    def __init__(self, folder: Path) -> None:
+        """FileError for a folder that holds no run, or a damaged one."""
+        self.folder, self.log, self.spec = folder, *read_folder(folder)
+        self.map: RoadMap = load_map(self.log.header.map)
+        if self.map.content_hash != self.log.header.map_hash:
+            raise FileError(f"{folder}: the map {self.log.header.map} is another one today")
+        self.seats = seats_of(self.spec, read_inputs(folder, self.spec.inputs))
+        self._seat_ticks = [s.tick for s in self.seats]
+        self._lights = [e for e in self.log.events if isinstance(e, LightChange)]
+        self._light_ticks = [e.tick for e in self._lights]
+        self._first = int(self.log.tick[0])
+        told = ((e.tick, told_of(e)) for e in self.log.events)
+        self.marks = [(tick, *words) for tick, words in told if words is not None]
+
+    @property
+    def table(self) -> ActorTable:
+        """Who takes part."""
+        return self.log.table
+
+    @property
+    def ticks(self) -> int:
+        """How many moments there are."""
+        return len(self.log)
+
+    def seat(self, k: int) -> Seat:
+        """How the desk stood in moment k."""
+        tick = int(self.log.tick[k])
+        return self.seats[max(bisect_right(self._seat_ticks, tick) - 1, 0)]
+
+    def moment(self, k: int) -> Moment:
+        """Moment k, 0 <= k < ticks."""
+        log, tick = self.log, int(self.log.tick[k])
+        truth = self._truth(k, tick)
+        ego = EgoEstimate(
+            pose=Pose(float(log.ego.x[k]), float(log.ego.y[k]), yaw=float(log.ego.yaw[k])),
+            speed=float(log.ego.speed[k]),
+            yaw_rate=float(log.ego.yaw_rate[k]),
+            ax=float(log.ego.ax[k]),
+            ay=float(log.ego.ay[k]),
+            wheel_speeds=(float("nan"),) * 4,
+            gear=int(log.ego.gear[k]),
+        )
+        frame = SensorFrame(
+            tick, ego, {}, {}, RadarPoints.none(), truth.lights, truth.contacts, truth.invasions,
+            Supervision(int(log.supervision[k])),
+        )  # fmt: skip
+        report = report_of(log, k)
+        seat = self.seat(k)
+        lca = seat.functions is not None and Function.LCA in seat.functions
+        mode = f"MANUAL [{seat.method}]" if seat.manual else mode_text(report, lca)
+        command = _command(log.requested, k)
+        action = Action(command, self._relocation(tick))
+        return Moment(frame, truth, Said(report, mode), command, report, action)
+
+    def _truth(self, k: int, tick: int) -> WorldTruth:
+        log = self.log
+        a = log.actors
+        n = len(log.table)
+        level = np.zeros(n)
+        row = {f: getattr(a, f)[k].astype(np.float64) for f in a._fields}
+        states = ActorStates(
+            **row, pitch=level, roll=level, present=log.present[k].astype(np.bool_)
+        )
+        commands = np.zeros((n, 5))
+        commands[:, 1] = row["ax"] < BRAKING_AX
+        commands[0] = [getattr(log.applied, f)[k] for f in log.applied._fields]
+        here = [e for e in log.events if e.tick == tick]
+        return WorldTruth(
+            tick,
+            log.table,
+            states,
+            log.mu[k].astype(np.float64),
+            commands,
+            {e.signal: e.state for e in self._lights[: bisect_right(self._light_ticks, tick)]},
+            tuple(e for e in here if isinstance(e, ContactEvent)),
+            tuple(e for e in here if isinstance(e, LaneInvasion)),
+        )
+
+    def _relocation(self, tick: int) -> Relocate | None:
+        for e in self.log.relocations:
+            if e.tick == tick:
+                return Relocate(e.new, 0.0, Moved(e.reason, e.shift, e.old, e.new, True))
+        return None
+
+    def timeline(self) -> dict[str, Any]:
+        """What the page draws along the time: speed, events, tiers."""
+        log = self.log
+        step = max(1, len(log) // 1000)
+        return {
+            "first": self._first,
+            "last": int(log.tick[-1]),
+            "dt": log.header.dt,
+            "speed": np.round(log.v_ego[::step] * 3.6, 1).tolist(),
+            "tier": [None if isnan(v) else int(v) for v in log.report.tier[::step].tolist()],
+            "events": self.marks,
+        }
+
+
+def told_of(event: Any) -> tuple[str, str] | None:
+    """Kind and text of an event worth a mark."""
+    match event:
+        case ContactEvent():
+            return "crash", f"contact with {event.static or 'a vehicle'}"
+        case Relocation():
+            return "put back", event.reason.name.lower().replace("_", " ")
+        case LaneInvasion() if event.marking == "solid":
+            return "marking", "solid marking crossed"
+        case Notice():
+            return "notice", event.text
+    return None
+
+
+def read_folder(folder: Path) -> tuple[RunLog, RunSpec]:
+    """Log and description of a run; FileError in one sentence for anything else."""
+    if folder.suffix == RECORDING:
+        raise FileError(
+            f"{folder} is a recording of channels: `skidpad view` shows it, `rerun` drives it again"
+        )
+    if not (folder / TICKS).is_file():
+        raise FileError(f"{folder} is not the folder of a run: it has no {TICKS}")
+    log = read_log(folder)
+    if not len(log):
+        raise FileError(f"{folder} holds a run that ended before its first tick")
+    return log, read_run(folder)
+
+
+def seats_of(spec: RunSpec, inputs: tuple[Timed, ...]) -> list[Seat]:
+    """How the desk stood from which tick on, in order; the first one is how the run began."""
+    functions = tuple(spec.driver.functions) if isinstance(spec.driver, AdasDriver) else None
+    outside = Outside(weather=spec.weather, grip=grip_of(spec), range_model=settings_of(spec).range)
+    now = Seat(-1, outside, False, "keyboard", functions, None)
+    seats = [now]
+    for timed in inputs:
+        now = _after(now, timed)
+        seats.append(now)
+    return seats
+
+
+def _after(now: Seat, timed: Timed) -> Seat:
+    one, tick = timed.input, timed.tick
+    outside, manual, method = now.outside, now.manual, now.method
+    functions, lamps = now.functions, now.lamps
+    match one:
+        case Wheel():
+            manual = one.manual
+        case Pedals():
+            method = one.method.value
+        case Functions():
+            functions = one.on
+        case Lamps():
+            lamps = one.switch
+        case Sky():
+            outside = Outside(weather=one.weather, grip=one.grip, range_model=one.range)
+    if lamps is not None:
+        beam = beam_of(lamps, outside.weather)
+        outside = Outside(
+            weather=outside.weather, grip=outside.grip, range_model=outside.range_model, beam=beam
+        )
+    return Seat(tick, outside, manual, method, functions, lamps)
+
+
+def report_of(log: RunLog, k: int) -> StackReport:
+    """What the stack said in moment k."""
+    values: dict[str, Any] = {}
+    for field in fields(StackReport):
+        value = float(getattr(log.report, field.name)[k])
+        if not isnan(value):
+            kind = WORDS.get(field.name)
+            values[field.name] = value if kind is None else kind(int(value))
+    return StackReport(**values)
+
+
+def _command(series: Any, k: int) -> VehicleCommand:
+    throttle, brake, steer, handbrake, reverse = (float(v[k]) for v in series)
+    return VehicleCommand(throttle, brake, steer, bool(handbrake), bool(reverse))

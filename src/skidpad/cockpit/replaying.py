@@ -1,0 +1,140 @@
+"""A stored run as a producer: the same screen, with a time that goes in any direction."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+from skidpad.cockpit.feed import Feed
+from skidpad.cockpit.film import write_film
+from skidpad.cockpit.replay import Recording
+from skidpad.cockpit.screen import Screen, Shown
+from skidpad.cockpit.studio import MAIN, View
+from skidpad.cockpit.words import Link
+from skidpad.core.errors import OutputError
+from skidpad.core.inputs import Beam
+from skidpad.core.setup import DT
+
+PATIENCE = 0.02  # s between two looks at the words
+FILMS = "films"  # folder within the run's
+FASTEST = 10.0  # times real time, when no rate is given
+TAKES_WITHIN = 0.25  # s that the page is given to take a picture before the next is drawn anyway
+
+
+def replay_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
+    """Show a run until the page ends it."""
+    recording = Recording(Path(about["folder"]))
+    feed, link = Feed(feed_name), Link(pipe)
+    try:
+        Replayer(recording, feed, link).run()
+    finally:
+        feed.close()
+    return f"replayed {recording.folder}"
+
+
+class Replayer:
+    """State: the moment that is shown, and when that was."""
+
+    def __init__(
+        self, recording: Recording, feed: Feed, link: Link,
+        clock: Callable[[], float] = perf_counter,
+    ) -> None:  # fmt: skip
+        self.recording, self.link, self.clock = recording, link, clock
+        self.k = 0
+        self.note = ""  # what the page is told beside everything else
+        self.screen = Screen(feed, link, recording.map, self._shown, recording.spec.seed)
+        self.screen.begin(recording.table)
+        self._base, self._since, self._rate = 0, clock(), 1.0  # moment from which it plays, ...
+        self._shown_k, self._shown_at = -1, 0.0
+
+    def run(self) -> None:
+        """Until the page ends it."""
+        self._show()
+        while not self.link.ended:
+            heard = self.link.drain(PATIENCE)
+            if self.link.film is not None:
+                self._film(self.link.film)
+            self.turn()
+            if heard or (self.k != self._shown_k and self._is_taken()):
+                self._show()
+
+    def turn(self) -> None:
+        """Go on as far as words and clock say."""
+        link, last = self.link, self.recording.ticks - 1
+        if link.seek is not None:
+            first = int(self.recording.log.tick[0])
+            self._from(min(max(link.seek - first, 0), last))
+            link.seek = None
+        elif link.paused:
+            self._from(min(self.k + link.steps, last))
+            link.steps = 0
+        else:
+            rate = link.rate if link.rate > 0.0 else FASTEST
+            if rate != self._rate:
+                self._from(self.k)
+                self._rate = rate
+            done = int((self.clock() - self._since) * rate / DT)
+            self.k = min(self._base + done, last)
+
+    def _film(self, seconds: float) -> None:
+        """Write a film from here on, beside the run; the page waits meanwhile."""
+        self.link.film = None
+        last = min(self.k + max(round(seconds / DT), 1), self.recording.ticks - 1)
+        view = self.link.main if self.link.main in MAIN else View.FOLLOW
+        t = self.recording.log.t[self.k]
+        path = self.recording.folder / FILMS / f"{view.value}-{t:07.2f}s.mp4"
+        try:
+            write_film(self.recording, range(self.k, last + 1), view, path)
+            self.note = f"film: {path}"
+        except OutputError as error:
+            self.note = str(error)
+        self._from(self.k)
+
+    def _is_taken(self) -> bool:
+        """The page has the picture before, or is too slow to be waited for."""
+        feed = self.screen.feed
+        return feed.taken >= feed.last or self.clock() - self._shown_at > TAKES_WITHIN
+
+    def _from(self, k: int) -> None:
+        self.k = self._base = k
+        self._since = self.clock()
+
+    def _show(self) -> None:
+        self.screen.show(self.recording.moment(self.k))
+        self._shown_k, self._shown_at = self.k, self.clock()
+
+    def _shown(self) -> Shown:
+        seat, link = self.recording.seat(self.k), self.link
+        beam = seat.outside.beam
+        told = {
+            "kind": "replay",
+            "seat": {
+                "manual": seat.manual,
+                "method": seat.method,
+                "functions": None
+                if seat.functions is None
+                else sorted(f.value for f in seat.functions),
+                "lamps": "sun" if seat.lamps is None else seat.lamps.value,
+                "beam": None if beam is None else Beam(beam).name.lower(),
+                "weather": seat.outside.weather.name,
+            },
+            "rate": link.rate,
+            "paused": link.paused,
+            "note": self.note,
+            "events": self._events(),
+            "collisions": self._collisions(),
+        }
+        return Shown(seat.outside, told)
+
+    def _events(self) -> list[tuple[float, str]]:
+        """The last ones before this moment."""
+        tick = int(self.recording.log.tick[self.k])
+        marks = [e for e in self.recording.marks if e[0] <= tick]
+        return [(round(t * DT, 2), text) for t, _, text in marks[-12:]]
+
+    def _collisions(self) -> int:
+        tick = int(self.recording.log.tick[self.k])
+        return sum(1 for c in self.recording.log.contacts if c.tick <= tick)

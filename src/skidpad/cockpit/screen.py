@@ -1,0 +1,103 @@
+"""The sink that shows a run: the latest moment goes to the feed, and the loop is never held back."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Mapping
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import msgspec
+
+from skidpad.campaign.drive import Moment, Sink
+from skidpad.cockpit import hud
+from skidpad.cockpit.feed import Feed
+from skidpad.cockpit.marks import marks_of
+from skidpad.cockpit.studio import MAIN, Studio, View, plane
+from skidpad.cockpit.words import Link
+from skidpad.core.inputs import Outside
+from skidpad.core.setup import DT
+from skidpad.core.states import ActorTable
+from skidpad.roads.queries import RoadMap
+from skidpad.simulation.world.world import BRAKING
+
+MOST_PER_SECOND = 30.0  # pictures, of wall time
+TOLD_EVENTS = 40
+MARKED = (View.DRIVER, View.FOLLOW)
+
+
+class Shown(NamedTuple):
+    """What a screen asks its producer at every picture."""
+
+    outside: Outside
+    told: Mapping[str, Any]  # goes to the page as it is
+
+
+class Screen(Sink):
+    """Draws the views that are looked at, when the page has taken the picture before."""
+
+    def __init__(
+        self, feed: Feed, link: Link, map: RoadMap, ask: Callable[[], Shown], seed: int = 0
+    ) -> None:
+        self.feed, self.link, self.map, self.ask, self.seed = feed, link, map, ask, seed
+        self.shown = self.dropped = self.collisions = 0
+        self.events: deque[tuple[float, str]] = deque(maxlen=TOLD_EVENTS)
+        self._at = 0.0
+
+    def begin(self, table: ActorTable) -> None:
+        """The run begins, with these actors."""
+        self.studio = Studio(self.map, table, self.ask().outside, self.seed)
+        self.cameras = self.studio.suite.cameras
+
+    def see(self, moment: Moment) -> None:
+        """Show it, or drop it: a page that is slow, or not there, costs nothing."""
+        t = round(moment.truth.tick * DT, 2)
+        self.collisions += len(moment.truth.contacts)
+        self.events.extend((t, text) for text in hud.happened(moment))
+        if perf_counter() - self._at < 1.0 / MOST_PER_SECOND:
+            return
+        if self.feed.taken < self.feed.last:
+            self.dropped += self.feed.taken > 0  # before the first page there is nobody to miss it
+            return
+        self.show(moment)
+
+    def show(self, moment: Moment) -> None:
+        """Draw the views and hand them on."""
+        shown, truth = self.ask(), moment.truth
+        self.studio.change(shown.outside)
+        braking = truth.commands[:, 1] > BRAKING
+        images = self.studio.look(truth.tick, truth.states, truth.lights, braking)
+        views = [v for v in View if self._wanted(v)]
+        planes: dict[str, Any] = {v.value: plane(images[v.value]) for v in views}
+        self.shown += 1
+        self._at = perf_counter()
+        self.feed.put(msgspec.json.encode(self._told(moment, shown)), planes)
+
+    def _wanted(self, view: View) -> bool:
+        """The main view, and all small ones that are not hidden."""
+        if view is self.link.main:
+            return True
+        return view not in self.link.hidden and (view not in MAIN or view is View.TOP)
+
+    def _told(self, moment: Moment, shown: Shown) -> dict[str, Any]:
+        frame = moment.frame
+        marks = {
+            v.value: marks_of(self.cameras[v.value], frame.radar, moment.report)
+            for v in MARKED
+            if v is self.link.main
+        }
+        return {
+            "tick": frame.tick,
+            "t": round(frame.tick * DT, 2),
+            "motion": hud.motion(moment),
+            "stack": hud.opinion(moment),
+            "radar": hud.radar(moment),
+            "marks": marks,
+            "main": self.link.main.value,
+            "hidden": sorted(v.value for v in self.link.hidden),
+            "events": list(self.events),
+            "collisions": self.collisions,
+            "shown": self.shown,
+            "dropped": self.dropped,
+            **shown.told,
+        }

@@ -1,0 +1,94 @@
+"""The websocket of a tab: pictures out as fast as they are acknowledged, words in."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from contextlib import suppress
+from typing import Any
+
+from fastapi import FastAPI, WebSocket, WebSocketDisconnect
+
+from skidpad.cockpit.bridge import Bridge
+
+POLL = 0.006  # s between two looks for a new picture
+CHECK = 0.05  # s between two looks at the dead man's switch
+LOST_AFTER = 2.0  # s without an acknowledgement after which the next picture is sent anyway
+
+
+class Stream:
+    """One tab: what was sent and what was taken."""
+
+    def __init__(self, socket: WebSocket, bridge: Bridge, tab: str) -> None:
+        self.socket, self.bridge, self.tab = socket, bridge, tab
+        self.sent = self.taken = 0
+        self.role: bool | None = None
+
+    async def run(self) -> None:
+        """Until the tab is closed."""
+        await self.socket.accept()
+        self.bridge.tabs.come(self.tab)
+        tasks = [asyncio.ensure_future(part()) for part in (self._send, self._receive, self._check)]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+            for task in done:
+                with suppress(WebSocketDisconnect, RuntimeError):  # it was closed while sending
+                    task.result()
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+            self.bridge.leave(self.tab)
+
+    async def _send(self) -> None:
+        waited = 0.0
+        while True:
+            await self._tell_role()
+            if self.taken >= self.sent or waited > LOST_AFTER:
+                newest = self.bridge.newest(self.sent)
+                if newest is not None:
+                    self.sent, message = newest
+                    waited = 0.0
+                    await self.socket.send_bytes(message)
+            said = self.bridge.producer.result
+            if said is not None:
+                await self._tell(ended=said[1])
+                return
+            await asyncio.sleep(POLL)
+            waited += POLL
+
+    async def _tell_role(self) -> None:
+        role = self.bridge.may(self.tab)
+        if role is not self.role:
+            self.role = role
+            await self._tell(drives=role, tabs=len(self.bridge.tabs))
+
+    async def _tell(self, **what: Any) -> None:
+        await self.socket.send_text(json.dumps(what))
+
+    async def _receive(self) -> None:
+        while True:
+            message = await self.socket.receive_text()
+            with suppress(ValueError, AttributeError):  # not a message of ours
+                await self._take(json.loads(message))
+
+    async def _take(self, message: dict[str, Any]) -> None:
+        if "ack" in message:
+            self.taken = int(message["ack"])
+            return
+        wrong = self.bridge.say(self.tab, str(message.get("word")), message.get("value"))
+        if wrong is not None:
+            await self._tell(wrong=wrong)
+
+    async def _check(self) -> None:
+        while True:
+            await asyncio.sleep(CHECK)
+            self.bridge.dead_man.check()
+
+
+def add_stream(app: FastAPI, bridge: Bridge) -> None:
+    """The route of the websocket."""
+
+    @app.websocket("/stream")
+    async def stream(socket: WebSocket, tab: str) -> None:
+        await Stream(socket, bridge, tab).run()

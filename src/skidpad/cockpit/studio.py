@@ -1,0 +1,110 @@
+"""Cameras for people: every view of the cockpit, drawn from where everybody is (A-271, A-275).
+
+They look at the same scene as the ego's sensors, but are cameras of their own: what the stack reads
+is never touched, a log can be drawn as well as a live drive, and so can a drive without images.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from enum import Enum
+from math import radians
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.frames import CameraImage
+from skidpad.core.geometry import Pose
+from skidpad.core.inputs import Outside
+from skidpad.core.specs import CameraSpec, Modality, SensorSpec
+from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.vocabulary import LightState
+from skidpad.roads.queries import RoadMap
+from skidpad.sensors.suite import PixelSettings, PixelSuite
+from skidpad.sensors.twelve import twelve_sensors
+
+THINNED = 2  # depth and classes are shown at every second pixel
+DEPTH_SHOWN = 80.0  # m, white to black
+
+
+class View(str, Enum):
+    """What can be looked at."""
+
+    DRIVER = "driver"
+    FOLLOW = "follow"
+    TOP = "top"
+    LEFT = "left"
+    REAR = "rear"
+    RIGHT = "right"
+    DEPTH = "depth"
+    SEMANTIC = "semantic"
+
+
+MAIN = (View.DRIVER, View.FOLLOW, View.TOP)  # of which one fills the page
+SENSOR = {  # the published camera behind a view
+    View.DRIVER: "rgb_front",
+    View.LEFT: "rgb_mirror_left",
+    View.REAR: "rgb_rear",
+    View.RIGHT: "rgb_mirror_right",
+    View.DEPTH: "depth_roof",
+    View.SEMANTIC: "semantic_roof",
+}
+FOLLOW = CameraSpec(
+    "follow", Modality.RGB, 800, 600, 75.0, Pose(-8.5, 0.0, 3.4, 0.0, radians(9.0), 0.0), True
+)
+TOP = CameraSpec(
+    "top", Modality.RGB, 400, 400, 70.0, Pose(4.0, 0.0, 26.0, 0.0, radians(90.0), 0.0), True
+)
+OWN = {View.FOLLOW: FOLLOW, View.TOP: TOP}
+
+
+def cameras() -> tuple[SensorSpec, ...]:
+    """All cameras of the studio; ids are the words of `View`."""
+    by_id = {s.id: s for s in twelve_sensors() if isinstance(s, CameraSpec)}
+    found = []
+    for view in View:
+        spec = OWN[view] if view in OWN else by_id[SENSOR[view]]
+        found.append(replace(spec, id=view.value))
+    return tuple(found)
+
+
+class Studio:
+    """Looks at one run."""
+
+    def __init__(self, map: RoadMap, table: ActorTable, outside: Outside, seed: int) -> None:
+        settings = PixelSettings(range_model=outside.range_model, seed=seed)
+        self.suite = PixelSuite(map, table, cameras(), outside.weather, settings)
+        self.outside = outside
+        self.suite.change(outside)
+
+    def change(self, outside: Outside) -> None:
+        """Weather and headlights are others."""
+        if outside != self.outside:
+            self.outside = outside
+            self.suite.change(outside)
+
+    def look(
+        self,
+        tick: int,
+        states: ActorStates,
+        lights: Mapping[int, LightState],
+        braking: NDArray[np.bool_],
+    ) -> Mapping[str, CameraImage]:
+        """The views of this moment by their word, each drawn when it is read."""
+        return self.suite.observe(tick, states, lights, braking).images
+
+
+def plane(image: CameraImage) -> NDArray[Any]:
+    """What of an image goes to the page: packed colours, classes, or depth as bytes."""
+    if image.packed is not None:
+        return image.packed
+    if image.labels is not None:
+        return np.ascontiguousarray(image.labels[::THINNED, ::THINNED])
+    assert image.inverse_depth is not None, "views show colours, classes or depth"
+    inverse = image.inverse_depth[::THINNED, ::THINNED]
+    with np.errstate(divide="ignore"):
+        near = 1.0 - np.minimum(1.0 / (inverse * np.float32(DEPTH_SHOWN)), 1.0)
+    shown: NDArray[np.uint8] = (255.0 * near).astype(np.uint8)
+    return shown

@@ -1,0 +1,178 @@
+"""How a campaign stands while it runs: read from its ledger, which is whole up to its last line."""
+
+from __future__ import annotations
+
+import time
+import webbrowser
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from skidpad.campaign.recipe import cell_of
+from skidpad.cockpit.serving import has_screen
+from skidpad.core.errors import FileError
+from skidpad.core.vocabulary import Outcome
+from skidpad.evidence.statistics import clopper_pearson
+from skidpad.pages.server import Place, Server
+from skidpad.pages.site import nicegui, site
+from skidpad.recording.ledger import CAMPAIGN, LEDGER, latest, read_identity, read_ledger
+
+GOOD = "without a crash"
+REFRESH = 2.0  # s
+FATAL = (
+    "fatal_collisions",
+    "collisions",
+    "contacts",
+)  # columns that count crashes, first one there
+LEFT_OUT = (Outcome.CRASHED.value, Outcome.TIMEOUT.value, Outcome.AGENT_ERROR.value)
+
+
+class Line(msgspec.Struct, frozen=True):
+    """A line of any campaign's ledger."""
+
+    run: str
+    key: dict[str, Any]
+    metrics: dict[str, Any] | None = None
+    error: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Cell:
+    """The runs of a cell so far."""
+
+    name: str
+    runs: int
+    good: int
+    low: float  # share of good ones, 95 % interval (Clopper and Pearson)
+    high: float
+
+
+@dataclass(frozen=True, slots=True)
+class Standing:
+    """How it stands."""
+
+    command: str
+    done: int
+    planned: int | None  # None: the campaign does not say
+    outcomes: dict[str, int]
+    cells: tuple[Cell, ...]
+    last_crash: str  # name of the run; "": none yet
+
+
+def standing(folder: Path) -> Standing:
+    """How the campaign in `folder` stands; FileError when there is none."""
+    if not (folder / CAMPAIGN).is_file() and not (folder / LEDGER).is_file():
+        raise FileError(f"{folder} is not the folder of a campaign: it has no {LEDGER}")
+    identity = read_identity(folder)
+    in_order = read_ledger(folder, Line)  # type: ignore[type-var]
+    lines: list[Line] = latest(in_order)  # type: ignore[type-var]
+    counted = [one for one in lines if one.key.get("outcome") not in LEFT_OUT]
+    cells: dict[str, list[bool]] = {}
+    for one in counted:
+        cells.setdefault(cell_of(one.run), []).append(not crashed(one))
+    crashes = [one.run for one in in_order if crashed(one)]
+    return Standing(
+        command=str(identity.get("command", "adas")),
+        done=len(lines),
+        planned=identity.get("runs"),
+        outcomes=dict(sorted(Counter(str(one.key.get("outcome")) for one in lines).items())),
+        cells=tuple(_cell(name, good) for name, good in sorted(cells.items())),
+        last_crash=crashes[-1] if crashes else "",
+    )
+
+
+def crashed(line: Line) -> bool:
+    """The ego hit something."""
+    if line.key.get("outcome") == Outcome.COLLISION.value:
+        return True
+    metrics = line.metrics or {}
+    counts = [metrics[name] for name in FATAL if metrics.get(name) is not None]
+    return bool(counts) and counts[0] > 0
+
+
+def _cell(name: str, good: list[bool]) -> Cell:
+    interval = clopper_pearson(sum(good), len(good))
+    return Cell(name, len(good), sum(good), float(interval.low), float(interval.high))
+
+
+def lines(now: Standing) -> list[str]:
+    """The same as text."""
+    planned = "" if now.planned is None else f" of {now.planned}"
+    told = [f"{now.command}: {now.done}{planned} runs done"]
+    told.append(", ".join(f"{n} {outcome}" for outcome, n in now.outcomes.items()) or "none yet")
+    told += [
+        f"{c.name}: {c.good} of {c.runs} {GOOD}, 95 % {c.low:.2f} to {c.high:.2f}"
+        for c in now.cells
+    ]
+    told.append(f"last crash: {now.last_crash or 'none'}")
+    return told
+
+
+COLUMNS: list[dict[str, Any]] = [
+    {"name": "name", "label": "cell", "field": "name", "align": "left", "sortable": True},
+    {"name": "runs", "label": "runs", "field": "runs", "sortable": True},
+    {"name": "good", "label": GOOD, "field": "good", "sortable": True},
+    {"name": "interval", "label": "95 % interval of the share", "field": "interval"},
+]
+
+
+def build(folder: Path) -> Callable[[], None]:
+    """The builder of the page."""
+
+    def page() -> None:
+        from nicegui import ui
+
+        ui.label(str(folder)).style("font-size: 18px; font-weight: 600")
+        bar = ui.linear_progress(value=0.0, show_value=False).props("size=14px rounded")
+        said = ui.label()
+        table = ui.table(columns=COLUMNS, rows=[], row_key="name").props("dense flat dark")
+        table.style("width: 100%")
+        crash = ui.label()
+
+        def refresh() -> None:
+            try:
+                now = standing(folder)
+            except FileError as error:
+                said.text = str(error)
+                return
+            head = lines(now)
+            said.text = f"{head[0]}; {head[1]}"
+            crash.text = head[-1] + (
+                f"  (skidpad replay {folder / 'runs' / now.last_crash})" if now.last_crash else ""
+            )
+            bar.value = now.done / now.planned if now.planned else 0.0
+            table.rows = [
+                {
+                    "name": c.name,
+                    "runs": c.runs,
+                    "good": c.good,
+                    "interval": f"{c.low:.2f} to {c.high:.2f}",
+                }
+                for c in now.cells
+            ]
+            table.update()
+
+        refresh()
+        ui.timer(REFRESH, refresh)
+
+    return page
+
+
+def serve_watch(folder: Path, place: Place, say: Callable[[str], None], browser: bool) -> None:
+    """Serve the page until Ctrl-C."""
+    standing(folder)
+    nicegui()
+    with Server(site("Skidpad watch", {"/": build(folder)}), place) as server:
+        address = server.address()
+        say(f"watch: {address}  (Ctrl-C ends it)")
+        if browser and has_screen():
+            webbrowser.open(address)
+        try:
+            while True:
+                time.sleep(REFRESH)
+        except KeyboardInterrupt:
+            say("ended")

@@ -1,0 +1,158 @@
+"""What the page says to whoever makes its pictures, and the state that this leads to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from multiprocessing.connection import Connection
+from typing import Any
+
+import msgspec
+from msgspec import Struct
+
+from skidpad.cockpit.studio import View
+from skidpad.core.errors import require_range
+from skidpad.core.inputs import Functions, Input, Lamps, LampSwitch, Pedals, Sky
+
+RATES = (0.1, 20.0)  # times real time
+
+
+class Do(Struct, frozen=True, tag="do"):
+    """The person does something in the drive."""
+
+    input: Input
+
+
+class Pace(Struct, frozen=True, tag="pace"):
+    """How fast it goes on: times real time; 0: as fast as it can."""
+
+    rate: float = 1.0
+
+    def __post_init__(self) -> None:
+        if self.rate:
+            require_range("rate", self.rate, *RATES)
+
+
+class Pause(Struct, frozen=True, tag="pause"):
+    """Stop and go."""
+
+    on: bool
+
+
+class Step(Struct, frozen=True, tag="step"):
+    """So many ticks further, while it stands."""
+
+    ticks: int = 1
+
+
+class Seek(Struct, frozen=True, tag="seek"):
+    """To a tick of a replay."""
+
+    tick: int
+
+
+class Show(Struct, frozen=True, tag="show"):
+    """Which view fills the page, and which are hidden to save time (A-271)."""
+
+    main: View
+    hidden: tuple[View, ...] = ()
+
+
+class Film(Struct, frozen=True, tag="film"):
+    """Write a film of so many seconds from here on."""
+
+    seconds: float = 10.0
+
+
+class End(Struct, frozen=True, tag="end"):
+    """It is over."""
+
+
+Word = Do | Pace | Pause | Step | Seek | Show | Film | End
+
+
+def encode(word: Word) -> bytes:
+    """As it goes through the pipe."""
+    return msgspec.json.encode(word)
+
+
+class Link:
+    """The producer's end: what was said so far. Asked often, it never waits unless told to."""
+
+    def __init__(self, pipe: Connection | None) -> None:
+        """pipe: None: nobody says anything."""
+        self.pipe = pipe
+        self.inputs: list[Input] = []
+        self.rate = 1.0
+        self.paused = self.ended = False
+        self.steps = 0
+        self.seek: int | None = None
+        self.film: float | None = None  # s of a film that is to be written
+        self.main, self.hidden = View.DRIVER, frozenset[View]()
+        self.reshown = False  # another view is asked for
+
+    def drain(self, patience: float = 0.0) -> bool:
+        """Take what was said; wait at most `patience` s for a first word. True: there was one."""
+        if self.pipe is None:
+            return False
+        heard = False
+        try:
+            while self.pipe.poll(0.0 if heard else patience):
+                self._take(msgspec.json.decode(self.pipe.recv_bytes(), type=Word))
+                heard = True
+        except (EOFError, OSError):  # the page's process has ended: so does the drive
+            self.ended, self.pipe = True, None
+        return heard
+
+    def _take(self, word: Word) -> None:
+        match word:
+            case Do():
+                self.inputs.append(word.input)
+            case Pace():
+                self.rate = word.rate
+            case Pause():
+                self.paused, self.steps = word.on, 0
+            case Step():
+                self.steps += max(word.ticks, 0)
+            case Seek():
+                self.seek = word.tick
+            case Film():
+                self.film = word.seconds
+            case Show():
+                self.main, self.hidden = word.main, frozenset(word.hidden)
+                self.reshown = True
+            case End():
+                self.ended = True
+
+
+class Live:
+    """Inputs as they come, at most one of a kind in a tick where only the last one counts."""
+
+    def __init__(self, link: Link, first: Sequence[Input] = (Lamps(LampSwitch.AUTO),)) -> None:
+        """first: what is done in the first tick."""
+        self.link = link
+        link.inputs[:0] = first
+
+    @property
+    def ended(self) -> bool:
+        """The person has ended the drive."""
+        return self.link.ended
+
+    def at(self, tick: int) -> Sequence[Input]:
+        """What was done since the last tick."""
+        del tick
+        self.link.drain()
+        inputs, self.link.inputs = self.link.inputs, []
+        return settled(inputs)
+
+
+LAST_COUNTS = (Pedals, Sky, Lamps, Functions)
+
+
+def settled(inputs: Sequence[Input]) -> list[Input]:
+    """The inputs without those that a later one of the same kind makes void."""
+    kept: list[Any] = []
+    for one in inputs:
+        if isinstance(one, LAST_COUNTS):
+            kept = [other for other in kept if type(other) is not type(one)]
+        kept.append(one)
+    return kept

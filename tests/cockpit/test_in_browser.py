@@ -1,0 +1,155 @@
+"""The cockpit in a real browser: keys, switches, taking over, two tabs, replay."""
+
+import pytest
+
+from conftest import PATIENCE, running
+from runs import adas_run
+from skidpad.campaign.desk import Desk, Recorded
+from skidpad.campaign.desk_run import drive_at_desk
+from skidpad.campaign.rerun import desk_of, first_ticks
+from skidpad.campaign.run import run
+from skidpad.campaign.stored import read_run
+from skidpad.core.inputs import Functions, Lamps, Pedals, Sky, Timed, Wheel
+from skidpad.core.run import Function
+from skidpad.core.vocabulary import GripModel, RangeModel
+from skidpad.physics.presets import preset
+from skidpad.recording.inputs import read_inputs
+from skidpad.recording.logfiles import log_hash, read_log
+
+WAIT = 1000.0 * PATIENCE  # ms
+FACT = """name => [...document.querySelectorAll('.cockpit dt')]
+    .find(dt => dt.textContent === name)?.nextElementSibling.textContent"""
+
+
+def until(page, script, value=None):
+    """Wait for a condition, however busy the machine is."""
+    page.wait_for_function(script, arg=value, timeout=WAIT)
+
+
+def until_fact(page, name, wanted):
+    until(page, f"([name, wanted]) => ({FACT})(name)?.includes(wanted)", [name, wanted])
+
+
+def opened(browser, address, errors):
+    context = browser.new_context(viewport={"width": 1280, "height": 900})
+    context.set_default_timeout(WAIT)
+    page = context.new_page()
+    page.on("pageerror", lambda error: errors.append(str(error)))
+    page.goto(address)
+    until(page, "() => document.querySelector('.stage canvas')?.width === 800")
+    return context, page
+
+
+def picture_of(page, selector=".stage canvas"):
+    """Mean brightness and spread of a canvas: something is on it."""
+    return page.evaluate(
+        """selector => { const c = document.querySelector(selector);
+        const d = c.getContext('2d').getImageData(0, 0, c.width, c.height).data; let s = 0, q = 0, n = 0;
+        for (let i = 0; i < d.length; i += 4 * 97) { s += d[i]; q += d[i] * d[i]; n++; }
+        return [s / n, Math.sqrt(q / n - (s / n) ** 2)]; }""",
+        selector,
+    )
+
+
+@pytest.mark.req("A-271", "A-272", "A-273", "A-274")
+def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, tmp_path):
+    folder, errors = tmp_path / "run", []
+    words = ["drive", "--no-browser", "--out", folder, "--vehicles", "6", "--sensors", "objects"]
+    with running(*words, cwd=tmp_path) as command:
+        context, page = opened(browser, command.address(), errors)
+        assert "token" not in page.url
+        until_fact(page, "drives", "the stack")
+        assert picture_of(page)[1] > 10.0
+        # keys T, Y, U hide and show views
+        depth = "() => document.querySelectorAll('.side figure')[1].style.display"
+        page.keyboard.press("t")
+        until(page, f"() => ({depth})() === 'none'")
+        page.keyboard.press("t")
+        until(page, f"() => ({depth})() === ''")
+        # a second tab watches, and its words do not count
+        watcher = context.new_page()
+        watcher.goto(page.url)
+        until(watcher, "() => document.querySelector('.bar').textContent.includes('watches')")
+        watcher.keyboard.press("m")
+        until(watcher, "() => document.querySelector('.wrong').textContent.includes('another tab')")
+        watcher.close()
+        page.bring_to_front()
+        # take over and drive by keys
+        page.keyboard.press("m")
+        until_fact(page, "drives", "you, by keyboard")
+        page.keyboard.down("w")
+        until(page, "() => +document.querySelector('.speed b').textContent > 3")
+        page.keyboard.down("a")
+        until(page, "() => parseFloat(document.querySelector('.steer i').style.left) < 49.9")
+        page.keyboard.up("a")
+        page.keyboard.up("w")
+        # headlights, weather, functions by keys and by switches
+        page.keyboard.press("l")
+        until(page, "() => document.querySelector('.lamp').textContent.includes('low')")
+        page.keyboard.press("n")
+        until_fact(page, "weather", "clear-night")
+        page.get_by_role("switch", name="limiter (5)").click()
+        until_fact(page, "on", "limiter")
+        page.keyboard.press("m")
+        until_fact(page, "drives", "the stack")
+        page.set_viewport_size({"width": 390, "height": 844})
+        width = page.evaluate("document.documentElement.scrollWidth")
+        assert width <= 390, "the page is wider than a phone"
+        page.get_by_role("button", name="end").click()
+        status, said = command.ended()
+        context.close()
+    assert status == 0, said
+    assert "completed after" in said
+    assert errors == []
+    spec = read_run(folder)
+    done = [timed.input for timed in read_inputs(folder, spec.inputs)]
+    assert {Wheel(True), Wheel(False)} <= set(done)
+    kinds = {type(one) for one in done}
+    assert {Pedals, Lamps, Sky, Functions} <= kinds
+    last = next(one for one in reversed(done) if isinstance(one, Functions))
+    assert Function.LIMITER in last.on
+    stored = read_log(folder)
+    again = run(spec, ticks=len(stored), desk=desk_of(folder, spec)).log
+    n = len(stored)
+    assert log_hash(first_ticks(again, n)) == log_hash(first_ticks(stored, n))
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory):
+    """Six seconds on objects, in which a person takes over and night falls."""
+    folder = tmp_path_factory.mktemp("replay") / "run"
+    wanted = adas_run(3, "clear-noon", duration=6.0, seed=4, vehicles=6)
+    night = Sky(preset("clear-night"), GripModel.PHYSICAL, RangeModel.PHYSICAL)
+    inputs = [Timed(40, Wheel(True)), Timed(60, night), Timed(80, Wheel(False))]
+    drive_at_desk(wanted, Desk(Recorded(inputs), wanted), folder)
+    return folder
+
+
+@pytest.mark.req("A-271", "A-275")
+def test_a_run_is_scrubbed_through_in_a_browser(browser, stored, tmp_path):
+    errors = []
+    with running("replay", stored, "--no-browser", cwd=tmp_path) as command:
+        context, page = opened(browser, command.address(), errors)
+        page.keyboard.press("p")
+        until(page, "() => document.querySelector('.alert').textContent === 'paused'")
+        line = page.locator(".line canvas")
+        line.scroll_into_view_if_needed()
+        box = line.bounding_box()
+        page.mouse.click(box["x"] + 0.25 * box["width"], box["y"] + 20)
+        until_fact(page, "time", "1.50 s")
+        day = picture_of(page)[0]
+        page.keyboard.press("ArrowRight")
+        until_fact(page, "time", "1.55 s")
+        page.mouse.click(box["x"] + 0.6 * box["width"], box["y"] + 20)
+        until_fact(page, "drives", "you")
+        until_fact(page, "weather", "clear-night")
+        assert picture_of(page)[0] < 0.6 * day
+        page.keyboard.press("c")  # another camera sees another picture
+        before = picture_of(page)
+        until(page, "() => true")
+        page.get_by_role("button", name="end").click()
+        status, said = command.ended()
+        context.close()
+    assert before[1] > 3.0
+    assert status == 0, said
+    assert errors == []

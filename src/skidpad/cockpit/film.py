@@ -20,6 +20,7 @@ from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
 from skidpad.simulation.world.world import BRAKING
 
+SHADOW = (0, 0, 0)
 INK, DIM, ACCENT = (240, 240, 240), (190, 180, 170), (82, 133, 255)  # blue, green, red
 INSETS = ((View.LEFT, 0.2), (View.REAR, 0.3), (View.RIGHT, 0.2))  # shares of the width, on top
 MARGIN = 8  # px
@@ -106,10 +107,9 @@ def _say(
 def _write(
     picture: Picture, text: str, x: int, y: int, ink: tuple[int, int, int], size: float, bold: int
 ) -> None:
-    for colour, width in (((0, 0, 0), bold + 2), (ink, bold)):
-        cv2.putText(
-            picture, text, (x, y), cv2.FONT_HERSHEY_SIMPLEX, size, colour, width, cv2.LINE_AA
-        )
+    for colour, shift in ((SHADOW, 1), (ink, 0)):
+        at = (x + shift, y + shift)
+        cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, colour, bold, cv2.LINE_AA)
 
 
 def _mp4(pictures: Iterator[Picture], path: Path) -> None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.words import End, Word, encode
-from skidpad.core.errors import SkidpadError
+from skidpad.core.errors import InputError, SkidpadError
 
 ENDS_WITHIN = 120.0  # s to write the run's folder
 Job = Callable[[str, Connection, dict[str, Any]], str]
@@ -44,7 +44,7 @@ class Producer:
 
     @property
     def result(self) -> tuple[str, str] | None:
-        """("done" or "failed", a sentence) once it has ended; None: it still works."""
+        """("done", "refused" or "failed", a sentence) once it has ended; None: it still works."""
         if self._said is None and self._pipe.poll():
             try:
                 self._said = self._pipe.recv()
@@ -72,6 +72,8 @@ class Producer:
     def outcome(self) -> str:
         """The sentence of its end; SkidpadError when it failed."""
         kind, text = self.result or ("failed", "the drive was not ended")
+        if kind == "refused":
+            raise InputError(text)
         if kind == "failed":
             raise SkidpadError(text)
         return text
@@ -82,6 +84,8 @@ def _work(job: Job, name: str, pipe: Connection, about: dict[str, Any]) -> None:
     feed_name = name
     try:
         said = ("done", job(feed_name, pipe, about))
+    except InputError as error:
+        said = ("refused", str(error))
     except SkidpadError as error:
         said = ("failed", str(error))
     except Exception as error:  # whatever it is, the page must hear of it

@@ -1,7 +1,8 @@
 """A stored run as moments again: what was logged, with pictures drawn anew from the poses.
 
 Replay and live drive show moments through the same screen. What a log does not hold is absent:
-radar points, pitch and roll, brake lamps of others (they are told from their deceleration).
+radar points and roll; pitch is told from acceleration and the road, brake lamps of others from
+their deceleration.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.campaign.desk import beam_of
 from skidpad.campaign.drive import Moment
@@ -33,6 +35,7 @@ from skidpad.core.states import (
     WorldTruth,
 )
 from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Supervision, Tier
+from skidpad.physics.types import vehicle_types
 from skidpad.recording.events import LightChange, Notice, Relocation
 from skidpad.recording.inputs import read_inputs
 from skidpad.recording.logfiles import TICKS, read_log
@@ -44,6 +47,8 @@ from skidpad.stack.control.text import mode_text
 from skidpad.stack.settings import grip_of, settings_of
 
 RECORDING = ".mcap"
+LEAST_WAY, MOST_WAY = 0.3, 12.0  # m in two ticks, between which a grade can be told
+Floats = NDArray[np.float64]
 BRAKING_AX = -1.5  # m/s^2, below which the brake lamps of others are shown lit; our choice
 WORDS: dict[str, type[Any]] = {
     "status": DetectionStatus,
@@ -97,6 +102,10 @@ class Recording:
         self._lights = [e for e in self.log.events if isinstance(e, LightChange)]
         self._light_ticks = [e.tick for e in self._lights]
         self._first = int(self.log.tick[0])
+        bodies = vehicle_types()
+        self._pitch_gradient = np.array(
+            [bodies[t].pitch_gradient if t in bodies else 0.0 for t in self.log.table.types]
+        )
         told = ((e.tick, told_of(e)) for e in self.log.events)
         self.marks = [(tick, *words) for tick, words in told if words is not None]
 
@@ -144,10 +153,9 @@ class Recording:
         log = self.log
         a = log.actors
         n = len(log.table)
-        level = np.zeros(n)
         row = {f: getattr(a, f)[k].astype(np.float64) for f in a._fields}
         states = ActorStates(
-            **row, pitch=level, roll=level, present=log.present[k].astype(np.bool_)
+            **row, pitch=self._pitch(k), roll=np.zeros(n), present=log.present[k].astype(np.bool_)
         )
         commands = np.zeros((n, 5))
         commands[:, 1] = row["ax"] < BRAKING_AX
@@ -163,6 +171,17 @@ class Recording:
             tuple(e for e in here if isinstance(e, ContactEvent)),
             tuple(e for e in here if isinstance(e, LaneInvasion)),
         )
+
+    def _pitch(self, k: int) -> Floats:
+        """(n,) rad: the road's grade from the way before and after, and the body's own by ax."""
+        a = self.log.actors
+        before, after = max(k - 1, 0), min(k + 1, self.ticks - 1)
+        dx, dy, dz = (v[after] - v[before] for v in (a.x, a.y, a.z))
+        along = dx * np.cos(a.yaw[k]) + dy * np.sin(a.yaw[k])
+        known = (np.abs(along) > LEAST_WAY) & (np.abs(along) < MOST_WAY)
+        grade = np.divide(dz, along, out=np.zeros(len(dz)), where=known)
+        pitch: Floats = -grade - self._pitch_gradient * a.ax[k]
+        return pitch
 
     def _relocation(self, tick: int) -> Relocate | None:
         for e in self.log.relocations:

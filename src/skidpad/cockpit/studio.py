@@ -74,7 +74,7 @@ class Studio:
     """Looks at one run."""
 
     def __init__(self, map: RoadMap, table: ActorTable, outside: Outside, seed: int) -> None:
-        settings = PixelSettings(range_model=outside.range_model, seed=seed)
+        settings = PixelSettings(range_model=outside.range_model, seed=seed, in_cockpit=False)
         self.suite = PixelSuite(map, table, cameras(), outside.weather, settings)
         self.outside = outside
         self.suite.change(outside)

@@ -31,11 +31,17 @@ FATAL = (
 LEFT_OUT = (Outcome.CRASHED.value, Outcome.TIMEOUT.value, Outcome.AGENT_ERROR.value)
 
 
+class Key(msgspec.Struct, frozen=True):
+    """What every campaign's key has."""
+
+    outcome: str
+
+
 class Line(msgspec.Struct, frozen=True):
     """A line of any campaign's ledger."""
 
     run: str
-    key: dict[str, Any]
+    key: Key
     metrics: dict[str, Any] | None = None
     error: str = ""
 
@@ -70,7 +76,7 @@ def standing(folder: Path) -> Standing:
     identity = read_identity(folder)
     in_order = read_ledger(folder, Line)  # type: ignore[type-var]
     lines: list[Line] = latest(in_order)  # type: ignore[type-var]
-    counted = [one for one in lines if one.key.get("outcome") not in LEFT_OUT]
+    counted = [one for one in lines if one.key.outcome not in LEFT_OUT]
     cells: dict[str, list[bool]] = {}
     for one in counted:
         cells.setdefault(cell_of(one.run), []).append(not crashed(one))
@@ -79,7 +85,7 @@ def standing(folder: Path) -> Standing:
         command=str(identity.get("command", "adas")),
         done=len(lines),
         planned=identity.get("runs"),
-        outcomes=dict(sorted(Counter(str(one.key.get("outcome")) for one in lines).items())),
+        outcomes=dict(sorted(Counter(one.key.outcome for one in lines).items())),
         cells=tuple(_cell(name, good) for name, good in sorted(cells.items())),
         last_crash=crashes[-1] if crashes else "",
     )
@@ -87,7 +93,7 @@ def standing(folder: Path) -> Standing:
 
 def crashed(line: Line) -> bool:
     """The ego hit something."""
-    if line.key.get("outcome") == Outcome.COLLISION.value:
+    if line.key.outcome == Outcome.COLLISION.value:
         return True
     metrics = line.metrics or {}
     counts = [metrics[name] for name in FATAL if metrics.get(name) is not None]

@@ -39,6 +39,7 @@ class Degradation:
     night: bool
     streaks: float  # 0 .. 1
     pillar: bool = True  # D-097
+    glass: bool = True  # a cockpit hides the lowest rows (A-226); False: the camera is outside
 
     @property
     def any(self) -> bool:
@@ -74,6 +75,14 @@ def glass_mask(height: int, width: int, pillar: bool) -> NDArray[np.int32]:
     return first
 
 
+@lru_cache(maxsize=8)
+def open_view(height: int) -> NDArray[np.int32]:
+    """(H,) the same of a camera outside of any cockpit: weather is everywhere."""
+    first = np.zeros(height, dtype=np.int32)
+    first.setflags(write=False)
+    return first
+
+
 def clear_of_weather(height: int, width: int, pillar: bool = True) -> NDArray[np.bool_]:
     """(H, W) True where the picture stays clean: cockpit and pillar."""
     return np.arange(width) < glass_mask(height, width, pillar)[:, None]
@@ -101,7 +110,7 @@ class CameraNoise:
             return
         height, width = image.shape
         rows = range(height) if rows is None else rows
-        mask = glass_mask(height, width, s.pillar)
+        mask = glass_mask(height, width, s.pillar) if s.glass else open_view(height)
         if s.streaks > 0.0:
             count = int(STREAKS * s.streaks * height * width / 480_000.0)
             draw_streaks(self._keys[2], tick, count, s.night, mask, rows.start, rows.stop, image)

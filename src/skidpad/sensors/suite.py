@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -47,6 +47,7 @@ class PixelSettings:
 
     range_model: RangeModel = RangeModel.NONE
     camera_effect: bool = True  # degrade RGB images
+    in_cockpit: bool = True  # weather spares what the published windscreen mask hides
     exclusive_stages: bool = False  # rain switches the night stage off (D-094)
     perception_noise: PerceptionNoise = NO_NOISE
     seed: int = 0
@@ -105,6 +106,7 @@ class PixelSuite:
             key = (camera.view, eye)
             self._pass_of[camera.id] = self._passes.setdefault(key, Pass(camera, eye))
         effect = degradation(weather, exclusive=settings.exclusive_stages)
+        effect = replace(effect, glass=settings.in_cockpit)
         self._degraded = (
             {id: CameraNoise(id, seed, effect) for id in self._rgb}
             if settings.camera_effect

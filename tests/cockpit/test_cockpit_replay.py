@@ -1,5 +1,6 @@
 """A stored run as moments again, as films, and the sentences for folders that are none."""
 
+import re
 import shutil
 
 import cv2
@@ -111,9 +112,9 @@ def test_pictures_are_drawn_again_from_the_poses(driven):
         live = plane(studio.look(tick, states, lights, nobody)[view.value]).copy()
         logged = recording.moment(20).truth
         again = plane(studio.look(tick, logged.states, logged.lights, nobody)[view.value])
-        # pitch and roll of the bodies are not logged: they move the picture by a few pixels
+        # the bodies' pitch is told from what is logged, their roll is not there
         if view is View.SEMANTIC:
-            assert np.mean(live == again) > 0.93
+            assert np.mean(live == again) > 0.99
         else:
             assert np.abs(colours(live).astype(float) - colours(again)).mean() < 4.0, view
 
@@ -218,7 +219,8 @@ def test_how_a_campaign_stands(tmp_path):
     assert done.output.splitlines() == lines(now)
     ledger = tmp_path / "ledger.jsonl"
     text = ledger.read_text()
-    first = text.splitlines()[0].replace('"fatal_collisions":0', '"fatal_collisions":1')
+    first = re.sub(',"sum":"[0-9a-f]+"', "", text.splitlines()[0])  # as older versions wrote
+    first = first.replace('"fatal_collisions":0', '"fatal_collisions":1')
     ledger.write_text(text + first.replace("-001", "-003") + "\n" + '{"torn')
     now = standing(tmp_path)
     assert (now.done, now.last_crash) == (3, "2_clear-noon-003")

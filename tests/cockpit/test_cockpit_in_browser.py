@@ -1,8 +1,8 @@
 """The cockpit in a real browser: keys, switches, taking over, two tabs, replay."""
 
 import pytest
+from commands import PATIENCE, running
 
-from conftest import PATIENCE, running
 from runs import adas_run
 from skidpad.campaign.desk import Desk, Recorded
 from skidpad.campaign.desk_run import drive_at_desk

@@ -34,7 +34,7 @@ from skidpad.cockpit.words import (
     encode,
     settled,
 )
-from skidpad.core.errors import SkidpadError
+from skidpad.core.errors import ConfigError, InputError, SkidpadError
 from skidpad.core.frames import RadarPoints
 from skidpad.core.inputs import Functions, Lamps, LampSwitch, Method, Pedals, Sky, Wheel
 from skidpad.core.run import Function
@@ -417,6 +417,10 @@ def broken(feed_name, pipe, about):
     raise SkidpadError("no such thing")
 
 
+def refused(feed_name, pipe, about):
+    raise ConfigError("not so many")
+
+
 def lost(feed_name, pipe, about):
     raise SystemExit(3)
 
@@ -431,12 +435,16 @@ def test_a_producer_works_until_it_is_told_to_end():
     producer.say(End())  # too late, and no harm
 
 
-@pytest.mark.parametrize(("job", "told"), [(broken, "no such thing"), (lost, "without a word")])
+@pytest.mark.parametrize(
+    ("job", "told"),
+    [(broken, "no such thing"), (refused, "not so many"), (lost, "without a word")],
+)
 def test_a_producer_that_fails_says_why(job, told):
     producer = Producer(job, {})
     producer.start()
     while not producer.wait(60.0):
         pass
     producer.stop()
-    with pytest.raises(SkidpadError, match=told):
+    with pytest.raises(SkidpadError, match=told) as caught:
         producer.outcome()
+    assert isinstance(caught.value, InputError) == (job is refused)

@@ -5,10 +5,15 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from mapmaker import figure8, straight, town
+from mapmaker import figure8, motorway, straight, town
 from skidpad.roads.bundled import FOLDER, bake_file
 
-MAPS = {"figure8": figure8.network, "straight": straight.network, "town": town.network}
+MAPS = {
+    "figure8": figure8.network,
+    "motorway": motorway.network,
+    "straight": straight.network,
+    "town": town.network,
+}
 
 
 def write(folder: Path) -> None:

@@ -24,16 +24,30 @@ class Numbers:
 
 def guardrail(road: RoadSpec, ids: Numbers, t: float, s_from: float, s_to: float) -> None:
     """A rail parallel to the axis."""
+    barrier(road, ids, (t, t), s_from, s_to - s_from)
+
+
+def barrier(
+    road: RoadSpec,
+    ids: Numbers,
+    t: tuple[float, float],
+    s: float,
+    length: float,
+    *,
+    subtype: str = "guardRail",
+    height: float = RAIL_HEIGHT,
+) -> None:
+    """A rail or wall from s on; t: at its two ends."""
     rail = xodr.Object(
-        s_from,
-        t,
+        s,
+        t[0],
         Type=xodr.ObjectType.barrier,
-        subtype="guardRail",
+        subtype=subtype,
         id=ids.take(),
-        name="guardRail",
-        height=RAIL_HEIGHT,
+        name=subtype,
+        height=height,
     )
-    rail.repeat(s_to - s_from, 0.0, s_from, t, t, RAIL_HEIGHT, RAIL_HEIGHT, 0.0, 0.0)
+    rail.repeat(length, 0.0, s, *t, height, height, 0.0, 0.0)
     road.objects.append(rail)
 
 

@@ -10,7 +10,7 @@ from xml.etree.ElementTree import tostring
 from lxml import etree
 from scenariogeneration import xodr
 
-from mapmaker.paths import Heights, cut
+from mapmaker.paths import Banks, Heights, cut
 from skidpad.roads.opendrive.reference_line import Clothoid, Element
 
 GEO_REFERENCE = (
@@ -40,6 +40,7 @@ class RoadSpec:
     left: Sequence[LaneSpec] = ()
     right: Sequence[LaneSpec] = ()
     heights: Sequence[tuple[float, ...]] = ()
+    rolls: Sequence[tuple[float, ...]] = ()  # superelevation records
     centre_mark: xodr.RoadMarkType = Mark.solid
     lane_offset: float = 0.0  # m, shifts all lanes; half a lane's width puts the axis in its centre
     limits_kmh: Sequence[tuple[float, float]] = ()  # (s, limit) as road type records
@@ -63,6 +64,7 @@ class Connection:
     incoming: int
     connecting: int
     lanes: tuple[tuple[int, int], ...]
+    at_end: bool = False  # the way runs against the connecting road's axis
 
 
 @dataclass(slots=True)
@@ -120,6 +122,8 @@ def _road(spec: RoadSpec, junctions: dict[int, list[Connection]]) -> xodr.Road:
         road.add_type(spec.kind, s, speed=limit, speed_unit="km/h")
     for record in spec.heights:
         road.add_elevation(*record)
+    for record in spec.rolls:
+        road.add_superelevation(*record)
     for link, add in (
         (spec.predecessor, road.add_predecessor),
         (spec.successor, road.add_successor),
@@ -163,9 +167,8 @@ def _lanes(spec: RoadSpec) -> xodr.Lanes:
 def _junction(id: int, connections: list[Connection]) -> xodr.Junction:
     junction = xodr.Junction(f"junction {id}", id)
     for number, connection in enumerate(connections):
-        written = xodr.Connection(
-            connection.incoming, connection.connecting, xodr.ContactPoint.start, number
-        )
+        contact = xodr.ContactPoint.end if connection.at_end else xodr.ContactPoint.start
+        written = xodr.Connection(connection.incoming, connection.connecting, contact, number)
         for from_, to in connection.lanes:
             written.add_lanelink(from_, to)
         junction.add_connection(written)
@@ -173,7 +176,16 @@ def _junction(id: int, connections: list[Connection]) -> xodr.Junction:
 
 
 def stretch(
-    id: int, axis: tuple[Element, ...], heights: Heights, s_from: float, s_to: float, **rest: Any
+    id: int,
+    axis: tuple[Element, ...],
+    heights: Heights,
+    s_from: float,
+    s_to: float,
+    *,
+    banks: Banks | None = None,
+    **rest: Any,
 ) -> RoadSpec:
     """The road between two places of a long axis."""
-    return RoadSpec(id, cut(axis, s_from, s_to), heights=heights.records(s_from, s_to), **rest)
+    rolls = [] if banks is None else banks.records(s_from, s_to)
+    rise = heights.records(s_from, s_to)
+    return RoadSpec(id, cut(axis, s_from, s_to), heights=rise, rolls=rolls, **rest)

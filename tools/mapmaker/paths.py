@@ -169,3 +169,24 @@ class Heights:
         """Height at s."""
         _, a, *_ = self.records(s, s + 1.0)[0]
         return a
+
+
+@dataclass(frozen=True, slots=True)
+class Banks:
+    """Superelevation through knots (s, roll), straight between them; left side up positive."""
+
+    knots: tuple[tuple[float, float], ...]
+
+    def records(self, s_from: float, s_to: float) -> list[tuple[float, ...]]:
+        """Superelevation records (s, a, b, c, d) of the stretch, s relative to its start."""
+        out: list[tuple[float, ...]] = []
+        for (s0, r0), (s1, r1) in zip(self.knots[:-1], self.knots[1:], strict=True):
+            begin, stop = max(s0, s_from), min(s1, s_to)
+            if stop - begin < 1e-6:
+                continue
+            slope = (r1 - r0) / (s1 - s0)
+            first = r0 + slope * (begin - s0)
+            out.append(
+                (round(begin - s_from, DIGITS), round(first, 15), round(slope, 15), 0.0, 0.0)
+            )
+        return out

@@ -119,6 +119,13 @@ def test_what_follows_a_contact_is_no_loss_of_control():
     assert not metrics(log, Outcome.COLLISION).loss_of_control_npc
 
 
+def test_who_is_not_there_touches_nobody():
+    log = drive(3, lambda k: [going(100.0), going(), going(1.0)])
+    assert npc_contact_row(log) == 0
+    log.present[:2, 2] = False
+    assert npc_contact_row(log) == 2
+
+
 @pytest.mark.parametrize("seed", range(30))
 def test_touching_boxes_are_those_that_shapely_finds_close(seed):
     rng = np.random.default_rng(seed)

@@ -193,7 +193,7 @@ def _touching_row(log: RunLog, i: int, j: int) -> int | None:
     """Separating axes of two boxes, for all rows at once."""
     a, t = log.actors, log.table
     dx, dy = a.x[:, j] - a.x[:, i], a.y[:, j] - a.y[:, i]
-    apart = np.zeros(len(log), dtype=np.bool_)
+    apart = ~(log.present[:, i] & log.present[:, j])
     for own, other in ((i, j), (j, i)):
         for quarter, half in ((0.0, t.length[own]), (np.pi / 2.0, t.width[own])):
             axis = a.yaw[:, own] + quarter

@@ -64,7 +64,8 @@ def export(
 ) -> None:
     """Write each hazard as .xosc and .xodr into DIR/scenarios."""
     from skidpad.recording.hazards import read_hazards
-    from skidpad.scenarios.hazard_export import OscVersion, export_hazard
+    from skidpad.scenarios.hazard_export import export_hazard
+    from skidpad.scenarios.writer import OscVersion
 
     records = {record.id: record for record in read_hazards(folder)}
     for record in _chosen(records, id):

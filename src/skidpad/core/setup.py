@@ -34,6 +34,7 @@ class ActorSetup:
     speed: float = 0.0  # m/s
     driver: Control = Control.AUTOPILOT
     rgb: tuple[int, int, int] | None = None  # None: by index from the type's palette
+    collides: bool = True  # False: it is seen and touches nothing (embedded backend)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

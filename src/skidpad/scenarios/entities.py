@@ -24,6 +24,7 @@ WHEELED = {
     "train": ActorKind.BUS,
     "tram": ActorKind.BUS,
 }
+GHOST = "ghost"  # property of what is seen and touches nothing
 TWO_WHEELED = ("bicycle", "motorbike", "standup_scooter", "wheelchair")
 PROPS = (("cone", 0.6), ("box", 1.5), ("barrier", inf))  # backend's props by largest size, m
 
@@ -72,6 +73,11 @@ class Entity:
     def is_marked_ego(self) -> bool:
         """The file says that this is the ego, as ScenarioRunner wants it said."""
         return self.properties.get("type") == "ego_vehicle"
+
+    @property
+    def is_ghost(self) -> bool:
+        """It is seen and touches nothing."""
+        return self.properties.get(GHOST, "").lower() in ("true", "1")
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,6 +43,7 @@ def setups(scenario: Scenario) -> tuple[ActorSetup, tuple[ActorSetup, ...]]:
             place=place,
             speed=begin.speed,
             driver=Control.SCRIPTED,
+            collides=not entity.is_ghost,
         )
     return made.pop(scenario.ego), tuple(made.values())
 

@@ -225,7 +225,7 @@ class Scene:
         if (a == self.ego and b in self.contacts) or (b == self.ego and a in self.contacts):
             return True
         one, other = self.actors[a], self.actors[b]
-        if not (one.present and other.present):
+        if not (one.present and other.present) or one.entity.is_ghost or other.entity.is_ghost:
             return False
         reach = one.entity.box.length + other.entity.box.length + 2.0
         if hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y) > reach:

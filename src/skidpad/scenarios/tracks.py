@@ -34,6 +34,15 @@ class Track:
     heading: list[float] = field(default_factory=list)
     v: list[float] = field(default_factory=list)
     id: int = -1
+    z: list[float] = field(default_factory=list)  # empty: on flat ground
+    height: float = 0.0  # m; 0: that of its class
+    colour: str = "#FFFFFF"
+    ghost: bool = False  # it touches nothing
+
+    def stretches(self) -> list[tuple[int, int]]:
+        """First index and index after the last one of each time that it is there."""
+        breaks = (np.flatnonzero(np.diff(self.t) > GAP_MAX) + 1).tolist()
+        return list(zip([0, *breaks], [*breaks, len(self.t)], strict=True))
 
     def add(self, t: float, state: list[float]) -> None:
         """Append a state x, y, heading, vx, vy."""

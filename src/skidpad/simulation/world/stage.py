@@ -32,6 +32,7 @@ def staged(setup: Setup, seed: int) -> World:
     ids = world.enter([role.newcomer(i) for i, role in enumerate(roles)])
     world.book = ContactBook(world.obstacles.names, setup.dt)
     for id, role in zip(ids, roles, strict=True):
+        world.set_collides(id, role.actor.collides)
         if role.late:
             drivers.await_room(id, role.factor)
         else:

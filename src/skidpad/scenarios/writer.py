@@ -1,0 +1,260 @@
+"""Recorded motion as OpenSCENARIO XML: entities, their trajectories, and when they come and go.
+
+1.2 is for esmini and everyone else, 1.0 for CARLA ScenarioRunner, which can take nobody out of a
+running world: there who is away waits beside the road.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from enum import Enum
+from math import cos, sin
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+from scenariogeneration import xosc
+
+from skidpad.core.vocabulary import SemanticClass
+from skidpad.recording.files import write_bytes
+from skidpad.scenarios.entities import GHOST
+from skidpad.scenarios.pieces import Vertex, pieces
+from skidpad.scenarios.tracks import Track
+
+HEIGHTS = {SemanticClass.TRUCK: 3.5, SemanticClass.BUS: 3.2, SemanticClass.PEDESTRIAN: 1.75}
+EARLY = 0.005  # s that triggers fire before their time, so that rounding delays none
+LINGER = 0.05  # s that who vanishes is still there
+SIDE_STEP = 0.3  # m; who waits moves by it, as near vertices would be merged
+
+
+class OscVersion(str, Enum):
+    """Which profile of OpenSCENARIO XML is written."""
+
+    V1_2 = "1.2"
+    V1_0 = "1.0"
+
+    @property
+    def minor(self) -> int:
+        """Minor revision for the file header."""
+        return int(self.value.split(".")[1])
+
+
+@dataclass(frozen=True, slots=True)
+class _Kind:
+    """How a class of objects appears in the file."""
+
+    category: Any
+    blueprint: str  # CARLA's name for something like it
+
+
+_KINDS = {
+    SemanticClass.CAR: _Kind(xosc.VehicleCategory.car, "vehicle.tesla.model3"),
+    SemanticClass.TRUCK: _Kind(xosc.VehicleCategory.truck, "vehicle.carlamotors.carlacola"),
+    SemanticClass.BUS: _Kind(xosc.VehicleCategory.bus, "vehicle.mitsubishi.fusorosa"),
+    SemanticClass.MOTORCYCLE: _Kind(xosc.VehicleCategory.motorbike, "vehicle.yamaha.yzf"),
+    SemanticClass.BICYCLE: _Kind(xosc.VehicleCategory.bicycle, "vehicle.bh.crossbike"),
+    SemanticClass.RIDER: _Kind(xosc.VehicleCategory.bicycle, "vehicle.bh.crossbike"),
+}
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Sheet:
+    """What a file says besides motion. parking: where a row of those who are away begins."""
+
+    title: str
+    date: datetime
+    road_file: str
+    t_end: float  # s
+    parking: tuple[float, float, float] = (0.0, 0.0, 0.0)  # x, y in m, heading in rad
+    version: OscVersion = OscVersion.V1_2
+    sparse: bool = False  # leave out every vertex that says nothing new
+
+    @property
+    def old(self) -> bool:
+        """1.0."""
+        return self.version is OscVersion.V1_0
+
+    def parked(self, k: int) -> tuple[float, float, float]:
+        """A parking place of its own for entity k."""
+        x, y, h = self.parking
+        return x + 8.0 * k * cos(h), y + 8.0 * k * sin(h), h
+
+
+def write_scenario(path: Path, entities: Sequence[Track], sheet: Sheet) -> None:
+    """Write the file."""
+    write_element(path, _scenario(entities, sheet))
+
+
+def write_element(path: Path, element: ElementTree.Element) -> None:
+    """Write an element as an XML file."""
+    ElementTree.indent(element, " ")
+    write_bytes(path, ElementTree.tostring(element, encoding="utf-8", xml_declaration=True))
+
+
+def _scenario(entities: Sequence[Track], sheet: Sheet) -> ElementTree.Element:
+    xosc.VersionBase().setVersion(minor=sheet.version.minor)  # of the whole library
+    objects, init = xosc.Entities(), xosc.Init()
+    act = xosc.Act("Act", _after(0.0, sheet))
+    for k, track in enumerate(entities):
+        objects.add_scenario_object(track.name, _entity(track, sheet))
+        _initial(init, track, sheet, k)
+        act.add_maneuver_group(_motion(track, sheet, k))
+    storyboard = xosc.StoryBoard(init, _after(sheet.t_end, sheet, "stop"))
+    story = xosc.Story("Story")
+    story.add_act(act)
+    storyboard.add_story(story)
+    scenario = xosc.Scenario(
+        sheet.title,
+        "Skidpad",
+        xosc.ParameterDeclarations(),
+        objects,
+        storyboard,
+        xosc.RoadNetwork(sheet.road_file),
+        xosc.Catalog(),
+        osc_minor_version=sheet.version.minor,
+        creation_date=sheet.date,
+    )
+    root: ElementTree.Element = scenario.get_element()
+    return root
+
+
+def _entity(track: Track, sheet: Sheet) -> Any:
+    length, width, cx, cy = track.box
+    label = SemanticClass(track.label) if track.label >= 0 else SemanticClass.CAR
+    height = track.height or HEIGHTS.get(label, 1.5)
+    box = xosc.BoundingBox(width, length, height, cx, cy, height / 2.0)
+    if label is SemanticClass.PEDESTRIAN and not track.is_ego:
+        entity: Any = xosc.Pedestrian(
+            "walker.pedestrian.0001", 75.0, xosc.PedestrianCategory.pedestrian, box,
+            "walker.pedestrian.0001",
+        )  # fmt: skip
+    elif label is SemanticClass.DYNAMIC:
+        entity = xosc.MiscObject(
+            "static.prop.box01", 50.0, xosc.MiscObjectCategory.obstacle, box, "static.prop.box01"
+        )
+    else:
+        kind = _KINDS.get(label, _KINDS[SemanticClass.CAR])
+        mass = {} if sheet.old else {"mass": 1500.0}
+        entity = xosc.Vehicle(
+            kind.blueprint, kind.category, box,
+            xosc.Axle(0.5, 0.6, 0.9 * width, 0.6 * length, 0.3),
+            xosc.Axle(0.0, 0.6, 0.9 * width, 0.0, 0.3),
+            70.0, 12.0, 12.0, **mass,
+        )  # fmt: skip
+    entity.add_property("color", _rgb(track.colour) if sheet.old else track.colour)
+    if track.channel:
+        entity.add_property("channel", track.channel)
+    entity.add_property("type", "ego_vehicle" if track.is_ego else "simulation")
+    if track.ghost:
+        entity.add_property(GHOST, "true")
+    return entity
+
+
+def _rgb(colour: str) -> str:
+    """As CARLA's blueprints want it: red, green and blue from 0 to 255."""
+    return ",".join(str(int(colour[k : k + 2], 16)) for k in (1, 3, 5))
+
+
+def _initial(init: Any, track: Track, sheet: Sheet, k: int) -> None:
+    """Place and speed at the start; what is not there yet is taken out of the world."""
+    late = track.t[0] > 1e-6
+    first, speed = _vertices(track)[0], track.v[0]
+    if late and sheet.old:
+        first, speed = _waiting(0.0, sheet, k), 0.0
+    init.add_init_action(track.name, xosc.TeleportAction(_position(first)))
+    step = xosc.TransitionDynamics(xosc.DynamicsShapes.step, xosc.DynamicsDimension.time, 0)
+    init.add_init_action(track.name, xosc.AbsoluteSpeedAction(speed, step))
+    if late and not sheet.old:
+        init.add_global_action(xosc.DeleteEntityAction(track.name))
+
+
+def _vertices(track: Track) -> list[Vertex]:
+    heights = track.z or [0.0] * len(track.t)
+    rows = zip(track.t, track.x, track.y, heights, track.heading, strict=True)
+    return [
+        Vertex(round(t, 3), round(x, 3), round(y, 3), round(z, 3), round(h, 4))
+        for t, x, y, z, h in rows
+    ]
+
+
+def _waiting(t: float, sheet: Sheet, k: int, further: float = 0.0) -> Vertex:
+    x, y, h = sheet.parked(k)
+    x, y = x + further * cos(h), y + further * sin(h)
+    return Vertex(round(t, 3), round(x, 3), round(y, 3), 0.0, round(h, 4))
+
+
+def _motion(track: Track, sheet: Sheet, k: int) -> Any:
+    """The manoeuvre group of one entity: appear, follow trajectories, vanish, appear again."""
+    manoeuvre = xosc.Maneuver(f"{track.name}_manoeuvre")
+    stretches = [_vertices(track)[a:b] for a, b in track.stretches()]
+    if sheet.old:
+        _lead(manoeuvre, track.name, _with_waits(stretches, sheet, k), sheet, "moves")
+    else:
+        for n, rows in enumerate(stretches):
+            _stay(manoeuvre, track.name, rows, sheet, "" if n == 0 else f"_{n + 1}")
+    group = xosc.ManeuverGroup(f"{track.name}_group")
+    group.add_actor(track.name)
+    group.add_maneuver(manoeuvre)
+    return group
+
+
+def _with_waits(stretches: Sequence[Sequence[Vertex]], sheet: Sheet, k: int) -> list[Vertex]:
+    """All stretches, with waits beside the road before, between and after them."""
+    rows: list[Vertex] = []
+    for stretch in stretches:
+        begin = stretch[0].t
+        away = rows[-1].t + 0.001 if rows else 0.0
+        if begin > away + 0.001:
+            rows += [_waiting(away, sheet, k), _waiting(begin - 0.001, sheet, k, SIDE_STEP)]
+        rows += stretch
+    away = rows[-1].t + 0.001
+    if sheet.t_end > away:
+        rows += [_waiting(away, sheet, k), _waiting(sheet.t_end, sheet, k, SIDE_STEP)]
+    return rows
+
+
+def _stay(manoeuvre: Any, name: str, rows: Sequence[Vertex], sheet: Sheet, suffix: str) -> None:
+    """One stretch of being there."""
+    if rows[0].t > 1e-6:
+        add = xosc.AddEntityAction(name, _position(rows[0]))
+        manoeuvre.add_event(_event(f"{name}_appears{suffix}", add, rows[0].t, sheet))
+    _lead(manoeuvre, name, rows, sheet, f"moves{suffix}")
+    if rows[-1].t < sheet.t_end - 1e-6:
+        gone = xosc.DeleteEntityAction(name)
+        manoeuvre.add_event(_event(f"{name}_vanishes{suffix}", gone, rows[-1].t + LINGER, sheet))
+
+
+def _lead(manoeuvre: Any, name: str, rows: Sequence[Vertex], sheet: Sheet, word: str) -> None:
+    """The trajectories of a stretch, one event each; the last vertex is held for a second."""
+    held = [*rows, rows[-1]._replace(t=round(rows[-1].t + 1.0, 3))]  # no controller takes over
+    for n, piece in enumerate(pieces(held, sheet.sparse)):
+        label = f"{name}_{word}" if n == 0 else f"{name}_{word}_p{n + 1}"
+        trajectory = xosc.Trajectory(f"{label}_trajectory", False)
+        trajectory.add_shape(xosc.Polyline([v.t for v in piece], [_position(v) for v in piece]))
+        follow = xosc.FollowTrajectoryAction(
+            trajectory, xosc.FollowingMode.position, xosc.ReferenceContext.absolute, 1, 0
+        )
+        begin = 0.0 if n == 0 and sheet.old else piece[0].t
+        manoeuvre.add_event(_event(label, follow, begin, sheet, takes_over=n > 0))
+
+
+def _event(name: str, action: Any, t: float, sheet: Sheet, *, takes_over: bool = False) -> Any:
+    priority = xosc.Priority.override if takes_over else xosc.Priority.parallel
+    event = xosc.Event(name, xosc.Priority.overwrite if sheet.old else priority)
+    event.add_action(f"{name}_action", action)
+    event.add_trigger(_after(t, sheet))
+    return event
+
+
+def _position(v: Vertex) -> Any:
+    return xosc.WorldPosition(v.x, v.y, v.z, v.h, 0, 0)
+
+
+def _after(t: float, sheet: Sheet, point: str = "start") -> Any:
+    """At simulation time `t`; OpenSCENARIO 1.0 knows no `greaterOrEqual`."""
+    rule = xosc.Rule.greaterThan if sheet.old else xosc.Rule.greaterOrEqual
+    value = round(t - EARLY, 3) if t > 0.0 or sheet.old else 0.0
+    condition = xosc.SimulationTimeCondition(value, rule)
+    return xosc.ValueTrigger(point, 0, xosc.ConditionEdge.none, condition, point)

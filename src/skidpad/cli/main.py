@@ -14,6 +14,7 @@ from skidpad.cli.channels_evaluate import evaluate, train
 from skidpad.cli.cockpit import drive as cockpit_drive
 from skidpad.cli.cockpit import replay, watch
 from skidpad.cli.compare import compare
+from skidpad.cli.export import export
 from skidpad.cli.fleet import fleet
 from skidpad.cli.friction import friction
 from skidpad.cli.grip import grip
@@ -70,6 +71,7 @@ app.command()(rerun)
 app.command()(study)
 app.command()(bench)
 app.command()(show)
+app.command()(export)
 app.add_typer(profiles)
 app.add_typer(maps)
 for reader in (outcomes, evaluate, train):

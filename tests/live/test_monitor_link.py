@@ -17,7 +17,7 @@ from runs import segment_run
 from skidpad.campaign.channel_drive import drive_segment
 from skidpad.core.channels import ChannelFrame, Context
 from skidpad.evidence.channels.monitor import MonitorSettings
-from skidpad.evidence.channels.timing import late_cycles
+from skidpad.evidence.channels.timing import delay_sentence, late_cycles
 from skidpad.live import links as live_links
 from skidpad.live.child import ALARMS
 from skidpad.live.monitor_link import MonitorLink
@@ -214,6 +214,10 @@ def test_late_cycles_have_their_cause():
         "no processor was free", "behind an earlier late cycle", "own work",
         "behind an earlier late cycle", "behind an earlier late cycle",
     ]  # fmt: skip
+    said = delay_sentence(rows)
+    assert said.endswith(
+        "later than 25 ms: 3 behind an earlier late cycle, 1 no processor was free, 1 own work"
+    )
     alone = late_cycles(rows.filter(pl.col("cycle").is_in([0, 5])))
     assert alone["cause"].to_list() == ["page faults"]
 

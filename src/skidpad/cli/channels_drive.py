@@ -51,7 +51,8 @@ def drive(
         load_map(route_of(chosen).map)
     template = structs.replace(routes[0], driver=crew, seed=seed, backend=checked(backend))
     tasks, files = kept(segments(routes, hours, template))
-    alone = drives_alone(template.backend)
+    # topics and the scene's port are one drive's at a time
+    alone = drives_alone(template.backend) or bool(links.publish)
     campaign = Campaign(linked(links), tasks, alone=alone, files=files)
     summary = how(campaign, totals)
     if summary is not None and summary.failed:
@@ -62,20 +63,28 @@ def totals(folder: Path) -> str:
     """What a folder of driven segments came to, in one line."""
     import polars as pl
 
-    from skidpad.live.outcome import LINK, read_outcome
+    from skidpad.live.outcome import LINK
     from skidpad.recording.results import read_results
 
     driven = read_results(folder).drop_nulls("driven_s")
     sums = driven.select(pl.col(pl.Float64, pl.Int64).sum()).row(0, named=True)
-    watched = "".join(
-        f"\nmonitor of {link.parent.name}: {read_outcome(link.parent).sentence}"
-        for link in sorted(folder.glob(f"*/*/{LINK}"))
-    )
+    watched = "".join(f"\n{_watched(link.parent)}" for link in sorted(folder.glob(f"*/*/{LINK}")))
     return (
         f"{folder}: {len(driven)} segments, {sums['driven_s'] / 3600.0:.2f} h, "
         f"{sums['distance_m'] / 1000.0:.1f} km, {sums['collisions']} collisions, "
         f"{sums['red_lights_run']} red lights run, {sums['stalls']} stalls{watched}"
     )
+
+
+def _watched(folder: Path) -> str:
+    """What became of a monitor beside its drive, in one line."""
+    from skidpad.evidence.channels.timing import delay_sentence
+    from skidpad.live.outcome import read_outcome
+    from skidpad.recording.monitored import read_timing
+
+    times = read_timing(folder)
+    delay = "" if times is None else f"; {delay_sentence(times)}"
+    return f"{folder.name}: {read_outcome(folder).sentence}{delay}"
 
 
 def outcomes(folders: list[Path] = FOLDERS) -> None:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from skidpad.core.vocabulary import HazardType
     from skidpad.evidence.channels.indicators.catalogue import Indicator
     from skidpad.evidence.channels.summary import Watched
+    from skidpad.recording.channels import ChannelSource
 
 
 class Rules(str, Enum):
@@ -19,6 +20,7 @@ class Rules(str, Enum):
 
     practical = "practical"
     as_printed = "as_printed"
+    tracked = "tracked"
 
 
 class Forms(str, Enum):
@@ -37,10 +39,18 @@ class Identifier(str, Enum):
     both = "both"
 
 
-FILE = typer.Argument(help="A channel recording (.mcap), or a ROS 2 bag with --mapping.")
+class Wire(str, Enum):
+    """Choices of --listen."""
+
+    ros2 = "ros2"
+
+
+FILE = typer.Argument(None, help="A channel recording (.mcap), or a ROS 2 bag with --mapping.")
 OUT = typer.Option(..., help="Folder for indicators, hazards and the summary.")
 MAPPING = typer.Option(None, help="YAML that says which topics of a ROS 2 bag are what.")
-RULES = typer.Option(Rules.practical, help="Hazard rules: corrected, or as published.")
+RULES = typer.Option(
+    Rules.practical, help="Hazard rules: corrected, as published, or by safe distances of tracks."
+)
 FORMS = typer.Option(
     None, help="Formulas of the indicators; default: corrected, with as_printed rules completed."
 )
@@ -55,11 +65,14 @@ FAIL_IF = typer.Option(
     None, help="Exit with 1 when this hazard or indicator violation occurs; may be repeated."
 )
 JUNIT = typer.Option(None, help="Also write the verdicts of --fail-if as JUnit XML.")
+LISTEN = typer.Option(None, help="ros2: watch topics over DDS as they come, named by --mapping.")
+DOMAIN = typer.Option(0, min=0, max=232, help="DDS domain of --listen (ROS_DOMAIN_ID).")
+WAIT = typer.Option(60.0, min=0.0, help="Seconds that --listen waits for writers, and in silence.")
 DIR = typer.Argument(help="Output folder of `skidpad monitor`.")
 
 
 def monitor(
-    file: Path = FILE,
+    file: Path | None = FILE,
     out: Path = OUT,
     mapping: Path | None = MAPPING,
     rules: Rules = RULES,
@@ -71,8 +84,12 @@ def monitor(
     timing: bool = TIMING,
     fail_if: list[str] = FAIL_IF,
     junit: Path | None = JUNIT,
+    listen: Wire | None = LISTEN,
+    domain: int = DOMAIN,
+    wait: float = WAIT,
 ) -> None:
     """Watch what driving channels say: indicators, violations, hazardous scenes."""
+    import sys
     import time
 
     from skidpad.core.errors import ConfigError
@@ -83,15 +100,15 @@ def monitor(
     from skidpad.evidence.channels.indicators.settings import IndicatorSettings
     from skidpad.evidence.channels.monitor import MonitorSettings
     from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
-    from skidpad.live.watch import Timer, watch_whole
-    from skidpad.recording.sources import file_hash, open_channels
+    from skidpad.live.watch import Alarms, Timer, watch_whole
+    from skidpad.recording.sources import file_hash
     from skidpad.report.channels import write_drive_report
 
     wanted = {name: _rule(name) for name in fail_if or []}
     if junit is not None and not wanted:
         raise ConfigError("--junit writes the verdicts of --fail-if, and none is given")
     default = Form.COMPLETED if rules is Rules.as_printed else Form.CORRECTED
-    source = open_channels(file, mapping, truth=False)
+    source = _source(file, mapping, listen, domain, wait)
     profile = Profile(rules.value)
     settings = MonitorSettings(
         indicators=IndicatorSettings(form=Form(forms.value) if forms else default),
@@ -102,7 +119,8 @@ def monitor(
         detectors={} if identifier is Identifier.rules else load_model(model).identifier(),
     )
     timer = Timer(time.thread_time_ns) if timing else None
-    found = watch_whole(source, out, settings, timer, file_hash(file))
+    told, digest = (Alarms(sys.stdout), "") if file is None else (None, file_hash(file))
+    found = watch_whole(source, out, settings, timer, digest, told)
     write_drive_report(out)
     _print(found, out)
     if timer is not None:
@@ -111,6 +129,25 @@ def monitor(
         _print_table(time_by_objects(times))
     if wanted:
         _gate({name: _events(found, rule) for name, rule in wanted.items()}, junit)
+
+
+def _source(
+    file: Path | None, mapping: Path | None, listen: Wire | None, domain: int, wait: float
+) -> ChannelSource:
+    """The recording, or the topics."""
+    from skidpad.core.errors import ConfigError
+    from skidpad.recording.sources import open_channels
+
+    if (file is None) is (listen is None):
+        raise ConfigError("monitor takes a FILE or --listen ros2, and one of them")
+    if file is not None:
+        return open_channels(file, mapping, truth=False)
+    if mapping is None:
+        raise ConfigError("--listen needs --mapping FILE, which says which topics are what")
+    from skidpad.live.ros2.listener import RosTopics
+    from skidpad.recording.rosbag import load_mapping
+
+    return RosTopics(load_mapping(mapping), domain, patience=wait, silence=wait)
 
 
 def _rule(name: str) -> HazardType | Indicator:

@@ -113,6 +113,7 @@ class HazardType(str, Enum):
     CROSSING_OBJECT = "crossing_object"
     CONFLICTING_PATHS = "conflicting_paths"
     STUCK_VEHICLE = "stuck_vehicle"
+    UNSEEN_BY_A_CHANNEL = "unseen_by_a_channel"
 
 
 class ActorKind(IntEnum):

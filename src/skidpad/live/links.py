@@ -22,4 +22,17 @@ def opened(links: Links, channels: Sequence[str], recording: Path) -> Iterator[l
             settings = MonitorLinkSettings(flow=links.flow, pin=links.pin)
             listeners.append(MonitorLink(channels, recording.with_suffix(MONITORED), settings))
             stack.callback(listeners[-1].close)
+        for name in links.publish:
+            listeners.append(_publisher(name, links, channels, recording))
+            stack.callback(listeners[-1].close)
         yield listeners
+
+
+def _publisher(name: str, links: Links, channels: Sequence[str], recording: Path) -> Listener:
+    if name == "ros2":
+        from skidpad.live.ros2.publisher import RosPublisher
+
+        return RosPublisher(channels, recording, links.flow, links.domain)
+    from skidpad.live.scene import ScenePublisher
+
+    return ScenePublisher(channels, recording, links.scene_port)

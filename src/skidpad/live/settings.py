@@ -7,7 +7,9 @@ from typing import Annotated
 
 from msgspec import Meta, Struct
 
-from skidpad.core.errors import ConfigError
+from skidpad.core.errors import ConfigError, require_choice
+
+PUBLISHERS = ("ros2", "foxglove")
 
 
 class Flow(str, Enum):
@@ -28,11 +30,21 @@ class Links(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         bool,
         Meta(description="Hold drives at real time; what a listener is too slow for is dropped."),
     ] = False
+    publish: Annotated[
+        tuple[str, ...],
+        Meta(description="ros2: topics over DDS; foxglove: a live scene.", extra={"parted": True}),
+    ] = ()
+    domain: Annotated[int, Meta(ge=0, le=232, description="DDS domain (ROS_DOMAIN_ID).")] = 0
+    scene_port: Annotated[
+        int, Meta(ge=0, le=65535, description="Of the live scene for Foxglove; 0: any free one.")
+    ] = 8765
     pin: Annotated[
         int | None, Meta(ge=0, description="Processor for the monitor, at highest priority.")
     ] = None
 
     def __post_init__(self) -> None:
+        for name in self.publish:
+            require_choice("--publish", name, PUBLISHERS)
         if self.pin is not None and not self.monitor:
             raise ConfigError("--pin gives the monitor a processor and needs --monitor")
 

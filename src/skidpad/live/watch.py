@@ -110,6 +110,7 @@ def watch_whole(
     settings: MonitorSettings,
     timer: Timer | None = None,
     recording: str = "",
+    alarms: Alarms | None = None,
 ) -> Watched:
     """The same of a recording with this hash, in `folder` when all is complete, or as it was.
 
@@ -122,7 +123,7 @@ def watch_whole(
             f"{folder} holds what was found in another recording; choose another --out"
         )
     with staged(folder, FILES) as part:
-        found = watch(source, part, settings, timer)
+        found = watch(source, part, settings, timer, alarms)
         if recording:
             write_summary(part, found.summary | {"recording": recording})
         return found

@@ -167,6 +167,27 @@ class _Assembler:
         return ahead
 
 
+class RosFrames:
+    """Messages of topics put together to frames, whether from a bag or from the wire."""
+
+    def __init__(self, mapping: Mapping) -> None:
+        self.assemblers = [_Assembler(topics) for topics in mapping.channels.values()]
+        self.roles = _roles(mapping)
+
+    def take(self, topic: str, t: float, content: Any, kind: str) -> Iterator[Message]:
+        """Frames that a message of type `kind` at t s completes; ValueError and the like if odd."""
+        for c, role in self.roles[topic]:
+            one = self.assemblers[c]
+            if role == "objects":
+                one.objects = (t, _objects(content, kind))
+            elif role == "plan" and one.topics.plan is not None:
+                one.plan = (t, _plan(content, one.topics.plan))
+            elif role == "ego":
+                frame = one.frame(t, content)
+                if frame is not None:
+                    yield Message(c, t, frame)
+
+
 class RosRecording:
     """A ROS 2 bag read as channels."""
 
@@ -208,10 +229,9 @@ class RosRecording:
     def messages(self) -> Iterator[Message]:
         """Frames of all channels in the order of arrival of their ego poses."""
         self.losses = Losses()
-        assemblers = [_Assembler(topics) for topics in self.mapping.channels.values()]
-        roles = _roles(self.mapping)
+        frames = RosFrames(self.mapping)
         with self._reader() as reader:
-            wanted = [c for c in reader.connections if c.topic in roles]
+            wanted = [c for c in reader.connections if c.topic in frames.roles]
             stream = reader.messages(wanted)
             while True:
                 try:
@@ -223,31 +243,10 @@ class RosRecording:
                     return
                 try:
                     content = reader.deserialize(raw, connection.msgtype)
-                    t = received / NS if self.mapping.clock is Clock.RECEIVE else _stamp(content)
-                    yield from self._taken(
-                        roles[connection.topic], assemblers, t, content, connection.msgtype
-                    )
+                    t = received / NS if self.mapping.clock is Clock.RECEIVE else stamp_of(content)
+                    yield from frames.take(connection.topic, t, content, connection.msgtype)
                 except (FileError, ValueError, KeyError, IndexError, AttributeError, TypeError):
                     self.losses.malformed += 1
-
-    def _taken(
-        self,
-        roles: list[tuple[int, str]],
-        assemblers: list[_Assembler],
-        t: float,
-        content: Any,
-        kind: str,
-    ) -> Iterator[Message]:
-        for c, role in roles:
-            one = assemblers[c]
-            if role == "objects":
-                one.objects = (t, _objects(content, kind))
-            elif role == "plan" and one.topics.plan is not None:
-                one.plan = (t, _plan(content, one.topics.plan))
-            elif role == "ego":
-                frame = one.frame(t, content)
-                if frame is not None:
-                    yield Message(c, t, frame)
 
 
 class _Opened:
@@ -276,7 +275,8 @@ def _roles(mapping: Mapping) -> dict[str, list[tuple[int, str]]]:
     return roles
 
 
-def _stamp(content: Any) -> float:
+def stamp_of(content: Any) -> float:
+    """Time in s of a message's header."""
     stamp = content.header.stamp
     return float(stamp.sec + stamp.nanosec / NS)
 
@@ -305,10 +305,10 @@ def _plan(content: Any, topic: PlanTopic) -> Floats:
             for p in content.points
         ]
     else:
-        t0 = _stamp(content)
+        t0 = stamp_of(content)
         rows = []
         for i, p in enumerate(content.poses):
-            t = _stamp(p) - t0 if topic.step is None else i * topic.step
+            t = stamp_of(p) - t0 if topic.step is None else i * topic.step
             rows.append((p.pose.position.x, p.pose.position.y, t))
     return np.array(rows, dtype=np.float64).reshape(-1, 3)
 

@@ -44,6 +44,7 @@ MEANING = {
     HazardType.CROSSING_OBJECT: "plans change at once while a conflict is predicted",
     HazardType.CONFLICTING_PATHS: "the channels want to drive different ways",
     HazardType.STUCK_VEHICLE: "hardly anything changes for long",
+    HazardType.UNSEEN_BY_A_CHANNEL: "a vehicle too near, which another channel does not report",
 }
 
 

@@ -32,6 +32,7 @@ NAMES = {
     HazardType.CROSSING_OBJECT: "Crossing object (candidate)",
     HazardType.CONFLICTING_PATHS: "Conflicting paths (candidate)",
     HazardType.STUCK_VEHICLE: "Stuck vehicle (candidate)",
+    HazardType.UNSEEN_BY_A_CHANNEL: "Unseen by a channel",
 }
 
 CHALLENGED, SUPPORTED, SILENT = "challenged", "supported", "no evidence"

@@ -36,6 +36,7 @@ class Profile(str, Enum):
 
     AS_PRINTED = "as_printed"
     PRACTICAL = "practical"
+    TRACKED = "tracked"  # decision R-9
 
 
 class Signal(str, Enum):
@@ -61,8 +62,21 @@ class Signal(str, Enum):
     CROSS_PATH_DIPS = "cross_path_dips"  # in those 20 s
     SCORE_RANGE = "score_range"  # of the safety score, in those 20 s
     COUNT_RANGE = "count_range"  # of the object count similarity
+    # of the profile tracked alone, see tracked/vote.py
+    REAR_DEFICIT = "rear_deficit"  # m that the gap behind is surely shorter than the safe one
+    FRONT_DEFICIT = "front_deficit"  # m
+    UNSEEN_DEFICIT = "unseen_deficit"  # m, of an object that another channel does not report
+    OFFSET_CHI2 = "offset_chi2"  # of positions, greatest over pairs
+    PLANS_APART = "plans_apart"  # s until two plans share no ground, least over pairs
 
 
+NOT_TRACKED = dict.fromkeys(
+    (
+        Signal.REAR_DEFICIT, Signal.FRONT_DEFICIT, Signal.UNSEEN_DEFICIT, Signal.OFFSET_CHI2,
+        Signal.PLANS_APART,
+    ),
+    float("nan"),
+)  # fmt: skip
 _UNSTEADY = {
     Indicator.CROSS_PATH,
     Indicator.CROSS_PATH_VARIANCE,
@@ -222,6 +236,7 @@ class SignalReader:
             Signal.CROSS_PATH_VARIANCE: _greatest(readings[Indicator.CROSS_PATH_VARIANCE]),
             Signal.CHANNEL_PATH_VARIANCE: _greatest(readings[Indicator.CHANNEL_PATH_VARIANCE]),
             Signal.EGO_TRAJECTORY: _least(readings[Indicator.EGO_TRAJECTORY]),
+            **NOT_TRACKED,
         }
         values.update(self.steadiness.update(t, readings, values))
         return SignalReadings(values, pair, assumed, driving)

@@ -39,6 +39,7 @@ from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.recorder import CycleEvidence, Recorder
 from skidpad.evidence.channels.risk import RiskForm, RiskMatrix, risk_matrix
 from skidpad.evidence.channels.timefilter import Event, TimeFilter
+from skidpad.evidence.channels.tracked.vote import Tracked
 from skidpad.recording.hazards import HazardRecord
 
 Floats = NDArray[np.float64]
@@ -110,6 +111,7 @@ class Monitor:
             if settings.keep_worlds
             else None
         )
+        self.tracked = Tracked(self.channels) if settings.profile is Profile.TRACKED else None
         self._low, self._high = self._bounds()
         self._missing, self._violated = np.zeros((2, len(self.layout.places)), dtype=np.int64)
 
@@ -125,6 +127,8 @@ class Monitor:
         readings[Indicator.RISK_BEHIND_SHARE][:] = risk.behind_share
         lap("risk")
         signals = self.reader.read(cycle.t, readings, risk, cycle.driving)
+        if self.tracked is not None:
+            signals.values.update(self.tracked.update(cycle.t, frames))
         evidence = self._apply_rules(cycle, readings, risk, signals)
         self._count_violations(cycle.t, readings)
         if self._recorder:

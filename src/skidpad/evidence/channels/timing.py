@@ -95,3 +95,15 @@ def late_cycles(timing: pl.DataFrame) -> pl.DataFrame:
     )
     columns = ("cycle", "wall_ms", "total", "waited_ms", "faults", "cause")
     return timing.with_columns(cause=cause).filter(late).select(columns)
+
+
+def delay_sentence(timing: pl.DataFrame) -> str:
+    """How long after its last word a cycle was judged, and why some came late."""
+    wall = timing["wall_ms"].to_numpy()
+    causes = late_cycles(timing)["cause"].value_counts(sort=True).rows()
+    late = ", ".join(f"{n} {cause}" for cause, n in sorted(causes, key=lambda c: (-c[1], c[0])))
+    return (
+        f"judged {np.median(wall):.2f} ms after the last word (99.9 %: "
+        f"{np.percentile(wall, 99.9):.1f}, most: {wall.max():.1f}), own work "
+        f"{np.median(timing['total'].to_numpy()):.2f} ms; later than {BUDGET_MS:g} ms: {late or 'none'}"
+    )

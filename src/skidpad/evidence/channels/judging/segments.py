@@ -30,7 +30,11 @@ from skidpad.evidence.channels.timing import Stopwatch
 
 Floats = NDArray[np.float64]
 Signals = Sequence[tuple[float, dict[Signal, float]]]
-FORMS = {Profile.PRACTICAL: Form.CORRECTED, Profile.AS_PRINTED: Form.COMPLETED}  # decision C-16
+FORMS = {  # decision C-16
+    Profile.PRACTICAL: Form.CORRECTED,
+    Profile.AS_PRINTED: Form.COMPLETED,
+    Profile.TRACKED: Form.CORRECTED,
+}
 CURVE_FACTORS = (0.5, 0.67, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
 WARM_UP = 2.0  # s at the start of a segment that are not evaluated (decision C-12)
 LEARNED = "learned on {} truth"
@@ -99,10 +103,11 @@ def judge(
     t = np.array([c.t for c in cycles])
     detected: dict[str, tuple[Span, ...]] = {}
     seen, candidates, detected[Profile.PRACTICAL.value] = _practical(channels, cycles, begin, timer)
-    printed = Monitor(channels, _settings(Profile.AS_PRINTED))
-    for cycle in cycles:
-        printed.update(cycle)
-    detected[Profile.AS_PRINTED.value] = _scored(_found(printed.hazards, begin))
+    for profile in (Profile.AS_PRINTED, Profile.TRACKED):
+        monitor = Monitor(channels, _settings(profile))
+        for cycle in cycles:
+            monitor.update(cycle)
+        detected[profile.value] = _scored(_found(monitor.hazards, begin))
     found, unseen, unseen_found = _truths(channels, cycles, truths, begin, detected)
     if "sim" in found:
         detected[CEILING] = tuple(s for s in ceiling(cycles, channels) if s.t_end >= begin)

@@ -1,0 +1,164 @@
+"""One channel's tracks of who is on its path: gap and speed by a Kalman filter, and an alarm."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import hypot, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.channels import ChannelFrame
+from skidpad.core.vocabulary import SemanticClass
+from skidpad.evidence.channels.tracked.distance import SafeDistance
+from skidpad.evidence.channels.tracked.way import Line, Way
+
+Floats = NDArray[np.float64]
+# Measurement and motion noise are assumptions of the order of the channels' sensors.
+SIGMA_GAP, SIGMA_V = 0.5, 0.7  # m, m/s of one report
+SIGMA_A = 2.0  # m/s^2 by which an object's speed may change unseen
+SURE = 2.0  # standard deviations by which a gap must be short
+CONFIRM = 0.5  # s
+COAST = 0.5  # s without a report after which a track ends
+TURN_MOST = np.radians(45.0)
+SPARE = 0.3  # m beside the path within which a track that was on it stays on it
+V_LEAST = 2.0  # m/s of the ego
+NEAR = 4.0  # m between reports of an object without identity
+VEHICLES = {
+    int(c)
+    for c in (
+        SemanticClass.CAR, SemanticClass.TRUCK, SemanticClass.BUS, SemanticClass.TRAIN,
+        SemanticClass.MOTORCYCLE, SemanticClass.BICYCLE, SemanticClass.RIDER,
+    )
+} | {-1}  # fmt: skip
+
+
+@dataclass(slots=True)
+class Track:
+    """An object on the path of a channel."""
+
+    behind: bool
+    gap: float  # m, bumper to bumper
+    v: float  # m/s along the path
+    p: tuple[float, float, float]  # variances of gap and v, and their covariance
+    t: float  # s of the last report
+    place: Floats  # (2,) in the channel's world
+    deficit: float = 0.0  # m that the gap is shorter than the safe one
+    sigma: float = 0.0  # m of the deficit
+    since: float | None = None  # s from when on it has been surely short
+    alarm: bool = False
+    alone: float | None = None  # s since when another channel has not had it
+
+    def predict(self, dt: float, v_ego: float) -> None:
+        """Both move on; the ego's speed is its own word."""
+        rate = (v_ego - self.v) if self.behind else (self.v - v_ego)
+        sign = -1.0 if self.behind else 1.0
+        self.gap += rate * dt
+        a, b, c = self.p
+        q = SIGMA_A * SIGMA_A
+        self.p = (
+            a + 2.0 * sign * dt * c + dt * dt * b + 0.25 * q * dt**4,
+            b + q * dt * dt,
+            c + sign * dt * b + 0.5 * sign * q * dt**3,
+        )
+
+    def correct(self, gap: float, v: float) -> None:
+        """A report of both, one after the other."""
+        a, b, c = self.p
+        s = a + SIGMA_GAP**2
+        k, m = a / s, c / s
+        miss = gap - self.gap
+        self.gap, self.v = self.gap + k * miss, self.v + m * miss
+        a, b, c = (1.0 - k) * a, b - m * c, (1.0 - k) * c
+        s = b + SIGMA_V**2
+        k, m = c / s, b / s
+        miss = v - self.v
+        self.gap, self.v = self.gap + k * miss, self.v + m * miss
+        self.p = (a - k * c, (1.0 - m) * b, (1.0 - m) * c)
+
+    def judge(self, t: float, v_ego: float, safe: SafeDistance) -> None:
+        """Compare the gap with the safe one; alarm when surely short for long, off when surely not."""
+        pair = (self.v, v_ego) if self.behind else (v_ego, self.v)
+        need, h = safe.of(*pair), 0.25
+        other = (self.v + h, v_ego) if self.behind else (v_ego, self.v + h)
+        slope = (safe.of(*other) - need) / h
+        a, b, c = self.p
+        self.deficit = need - max(self.gap, 0.0)
+        self.sigma = sqrt(max(a + slope * slope * b - 2.0 * slope * c, 0.0))
+        margin = -SURE * self.sigma if self.alarm else SURE * self.sigma
+        if v_ego < V_LEAST or self.deficit <= margin:
+            self.since, self.alarm = None, False
+            return
+        self.since = t if self.since is None else self.since
+        self.alarm = self.alarm or t - self.since >= CONFIRM - 1e-6
+
+
+class Tracks:
+    """Call `update` for every message of the channel."""
+
+    def __init__(self, safe: SafeDistance) -> None:
+        self.safe, self.way = safe, Way()
+        self.tracks: dict[int, Track] = {}
+        self.number = -1  # of tracks without identity, downwards
+
+    def __iter__(self) -> Iterator[Track]:
+        return iter(self.tracks.values())
+
+    def update(self, t: float, frame: ChannelFrame | None) -> None:
+        """One cycle; without a message tracks wait for their end."""
+        if frame is not None and Way.usable(frame):
+            line, v_ego = self.way.update(frame), hypot(*frame.ego[3:].tolist())
+            x, y = frame.ego_polygon[:, 0], frame.ego_polygon[:, 1]
+            body = (float(x.max()), float(-x.min()), float(np.abs(y).max()))
+            for i, label in enumerate(frame.classes.tolist()):
+                if label in VEHICLES:
+                    self._report(t, frame, i, line, v_ego, body)
+            for track in self:
+                track.judge(t, v_ego, self.safe)
+        for key in [k for k, track in self.tracks.items() if t - track.t > COAST + 1e-6]:
+            del self.tracks[key]
+
+    def _report(
+        self,
+        t: float,
+        frame: ChannelFrame,
+        i: int,
+        line: Line,
+        v_ego: float,
+        body: tuple[float, float, float],
+    ) -> None:
+        state = frame.objects[i]
+        if hypot(*(state[:2] - frame.ego[:2]).tolist()) > 75.0:
+            return
+        s, offset, turn, v = line.place(state)
+        shape = frame.polygons[i, : frame.polygon_size[i]]
+        half_l, half_w = np.abs(shape).max(axis=0, initial=0.0).tolist()
+        key = self._key(frame, i, state)
+        known = self.tracks.get(key)
+        room = body[2] + half_w + (SPARE if known is not None else 0.0)
+        if abs(offset) > room or abs(turn) > TURN_MOST:
+            return
+        behind = s < 0.0
+        gap = (-s - body[1] if behind else s - body[0]) - half_l
+        if known is None or known.behind is not behind:
+            start = (SIGMA_GAP**2, SIGMA_V**2, 0.0)
+            self.tracks[key] = Track(behind, gap, v, start, t, state[:2].copy())
+            return
+        known.predict(max(t - known.t, 0.0), v_ego)
+        known.correct(gap, v)
+        known.t, known.place = t, state[:2].copy()
+
+    def _key(self, frame: ChannelFrame, i: int, state: Floats) -> int:
+        """The object's identity, or that of the nearest track where the channel gives none."""
+        if frame.ids[i] >= 0:
+            return int(frame.ids[i])
+        near = [
+            (d, key)
+            for key, track in self.tracks.items()
+            if (d := hypot(*(track.place - state[:2]).tolist())) < NEAR
+        ]
+        if near:
+            return min(near)[1]
+        self.number -= 1
+        return self.number

@@ -1,0 +1,127 @@
+"""What the channels' tracks, places and plans say together: the signals of the profile `tracked`."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from itertools import combinations
+from math import cos, hypot, inf, log, nan, sin
+
+import numpy as np
+
+from skidpad.core.channels import ChannelFrame
+from skidpad.evidence.channels.hazards import Signal
+from skidpad.evidence.channels.tracked.distance import SafeDistance
+from skidpad.evidence.channels.tracked.tracks import CONFIRM, Track, Tracks
+
+SAME = 4.0  # m between two channels' reports of one object
+SIGMA_PLACE = 0.27  # m per axis: 0.10 m of jitter and 0.25 m of drift, as docs/channels.md states
+UNLIKELY = 1e-6  # share of cycles with right positions that may look wrong (assumption)
+CHI2_LIMIT = -2.0 * log(UNLIKELY)  # of two degrees of freedom: 27.6
+PLAN_STEP = 0.5  # s
+
+
+class Tracked:
+    """Call `update` once per cycle with usable frames; None: the channel is silent."""
+
+    def __init__(self, channels: Sequence[str], safe: SafeDistance | None = None) -> None:
+        self.tracks = [Tracks(safe or SafeDistance()) for _ in channels]
+        self.pairs = tuple(combinations(range(len(channels)), 2))
+        self.offsets: list[deque[tuple[float, float, float]]] = [deque() for _ in self.pairs]
+        self.apart: list[deque[tuple[float, float]]] = [deque() for _ in self.pairs]
+
+    def update(self, t: float, frames: Sequence[ChannelFrame | None]) -> dict[Signal, float]:
+        """The signals at t: metres of gap that are missing, chi-square, s until plans part."""
+        for tracks, frame in zip(self.tracks, frames, strict=True):
+            tracks.update(t, frame)
+        out = {
+            Signal.REAR_DEFICIT: 0.0,
+            Signal.FRONT_DEFICIT: 0.0,
+            Signal.UNSEEN_DEFICIT: 0.0,
+            Signal.OFFSET_CHI2: self._offset(t, frames),
+            Signal.PLANS_APART: self._plans(t, frames),
+        }
+        for c, tracks in enumerate(self.tracks):
+            for track in tracks:
+                if not track.alarm:
+                    continue
+                others = [
+                    self._same(o, track)
+                    for o in range(len(frames))
+                    if o != c and frames[o] is not None
+                ]
+                agree = sum(o is not None and o.deficit > 0.0 for o in others) + 1
+                against = sum(o is not None and o.deficit <= 0.0 for o in others)
+                if agree >= against:
+                    side = Signal.REAR_DEFICIT if track.behind else Signal.FRONT_DEFICIT
+                    out[side] = max(out[side], track.deficit)
+                if None not in others:
+                    track.alone = None
+                elif track.alone is None:
+                    track.alone = t
+                elif t - track.alone >= CONFIRM - 1e-6:
+                    out[Signal.UNSEEN_DEFICIT] = max(out[Signal.UNSEEN_DEFICIT], track.deficit)
+        return out
+
+    def _same(self, channel: int, track: Track) -> Track | None:
+        """The same object as another channel has it."""
+        for other in self.tracks[channel]:
+            near = hypot(*(other.place - track.place).tolist()) < SAME
+            if near and other.behind is track.behind:
+                return other
+        return None
+
+    def _offset(self, t: float, frames: Sequence[ChannelFrame | None]) -> float:
+        """Greatest chi-square over pairs of the mean offset of 0.5 s; NaN without a full window."""
+        worst = nan
+        for (a, b), window in zip(self.pairs, self.offsets, strict=True):
+            one, two = frames[a], frames[b]
+            if one is None or two is None or not np.isfinite([*one.ego[:3], *two.ego[:3]]).all():
+                window.clear()
+                continue
+            dx, dy = (two.ego[:2] - one.ego[:2]).tolist()
+            window.append((t, dx, dy))
+            while t - window[0][0] > CONFIRM + 1e-6:
+                window.popleft()
+            if t - window[0][0] < CONFIRM - 1e-6:
+                continue
+            mean_x, mean_y = (sum(row[k] for row in window) / len(window) for k in (1, 2))
+            chi2 = 0.5 * (mean_x * mean_x + mean_y * mean_y) / (SIGMA_PLACE * SIGMA_PLACE)
+            worst = chi2 if worst != worst else max(worst, chi2)
+        return worst
+
+    def _plans(self, t: float, frames: Sequence[ChannelFrame | None]) -> float:
+        """Least over pairs of the s until both plans' footprints share no ground, held for 0.5 s."""
+        least = nan
+        for (a, b), window in zip(self.pairs, self.apart, strict=True):
+            one, two = frames[a], frames[b]
+            if one is None or two is None or len(one.plan) < 2 or len(two.plan) < 2:
+                window.clear()
+                continue
+            window.append((t, parting(one, two)))
+            while t - window[0][0] > CONFIRM + 1e-6:
+                window.popleft()
+            if t - window[0][0] >= CONFIRM - 1e-6:
+                held = max(value for _, value in window)
+                least = held if least != least else min(least, held)
+        return least
+
+
+def parting(one: ChannelFrame, two: ChannelFrame) -> float:
+    """Time in s after which the ego on one plan and on the other would stand side by side or apart.
+
+    Each plan is taken from its own channel's ego, so that an offset of positions parts no plans.
+    """
+    length = float(np.ptp(one.ego_polygon[:, 0]))
+    width = float(np.ptp(one.ego_polygon[:, 1]))
+    end = min(float(one.plan[-1, 2]), float(two.plan[-1, 2]))
+    times = np.arange(PLAN_STEP, end + 1e-9, PLAN_STEP)
+    ways = [
+        np.column_stack([np.interp(times, f.plan[:, 2], f.plan[:, k]) - f.ego[k] for k in (0, 1)])
+        for f in (one, two)
+    ]
+    c, s = cos(one.ego[2]), sin(one.ego[2])
+    d = ways[1] - ways[0]
+    along, across = np.abs(c * d[:, 0] + s * d[:, 1]), np.abs(c * d[:, 1] - s * d[:, 0])
+    apart = np.flatnonzero((along > length) | (across > width))
+    return float(times[apart[0]]) if apart.size else inf

@@ -1,0 +1,90 @@
+"""Path coordinates of one channel: where it came from, where it is, where it plans to go."""
+
+from __future__ import annotations
+
+from collections import deque
+from math import cos, dist, isfinite, sin
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.channels import ChannelFrame
+
+Floats = NDArray[np.float64]
+STEP = 1.0  # m between points
+BEHIND = AHEAD = 80.0  # m
+FAR = 1e7  # m from the origin: what lies beyond is no place of a car
+LEAP = 4.0  # m of a position from one cycle to the next: what lay behind is forgotten
+
+
+class Way:
+    """Remembers where the channel's ego came from; it must be `usable`."""
+
+    def __init__(self) -> None:
+        self.past: deque[tuple[float, float]] = deque(maxlen=round(BEHIND / STEP))
+
+    @staticmethod
+    def usable(frame: ChannelFrame) -> bool:
+        """Whether the ego has a place."""
+        x, y, *rest = frame.ego.tolist()
+        return abs(x) + abs(y) < FAR and all(map(isfinite, rest))
+
+    def update(self, frame: ChannelFrame) -> Line:
+        """The line of this cycle."""
+        place = (float(frame.ego[0]), float(frame.ego[1]))
+        moved = dist(place, self.past[-1]) if self.past else STEP
+        if moved > LEAP:
+            self.past.clear()
+        if moved >= STEP:
+            self.past.append(place)
+        return Line(list(self.past), frame)
+
+
+class Line:
+    """Points a metre apart from behind the ego to the end of its plan and straight on."""
+
+    def __init__(self, past: list[tuple[float, float]], frame: ChannelFrame) -> None:
+        x, y, h = frame.ego[:3].tolist()
+        place, forward = (x, y), (cos(h), sin(h))
+        behind = past[:-1] if past and dist(past[-1], place) <= STEP else past
+        ahead: list[tuple[float, float]] = []
+        for px, py, t in frame.plan.tolist():
+            near = abs(px) + abs(py) < FAR and isfinite(t)  # never with NaN
+            if near and dist((px, py), ahead[-1] if ahead else place) > STEP:
+                ahead.append((px, py))
+        first = _unit(behind[0], behind[1] if len(behind) > 1 else place) if behind else forward
+        last = _unit(ahead[-2] if len(ahead) > 1 else place, ahead[-1]) if ahead else forward
+        start, end = (behind or [place])[0], (ahead or [place])[-1]
+        knots = np.array(
+            [
+                (start[0] - BEHIND * first[0], start[1] - BEHIND * first[1]),
+                *behind,
+                place,
+                *ahead,
+                (end[0] + AHEAD * last[0], end[1] + AHEAD * last[1]),
+            ]
+        )
+        steps = np.diff(knots, axis=0)
+        s = np.concatenate([[0.0], np.cumsum(np.hypot(steps[:, 0], steps[:, 1]))])
+        self.ego = float(s[len(behind) + 1])
+        low, high = max(self.ego - BEHIND, 0.0), min(self.ego + AHEAD, s[-1])
+        self.s = np.arange(low, high, STEP)
+        self.points = np.column_stack([np.interp(self.s, s, knots[:, k]) for k in (0, 1)])
+        ways = np.gradient(self.points, axis=0)
+        self.heading = np.arctan2(ways[:, 1], ways[:, 0])
+
+    def place(self, state: Floats) -> tuple[float, float, float, float]:
+        """Of a state (5,): s along the way from the ego, offset to the left, turn, speed along."""
+        k = int(np.argmin(((self.points - state[:2]) ** 2).sum(axis=1)))
+        h = float(self.heading[k])
+        c, sn = cos(h), sin(h)
+        dx, dy = (state[:2] - self.points[k]).tolist()
+        turn = (float(state[2]) - h + np.pi) % (2.0 * np.pi) - np.pi
+        speed = float(c * state[3] + sn * state[4])
+        return float(self.s[k] + c * dx + sn * dy - self.ego), c * dy - sn * dx, turn, speed
+
+
+def _unit(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:
+    """The direction from a to b, which are more than STEP apart."""
+    d = max(dist(a, b), 1e-9)
+    return (b[0] - a[0]) / d, (b[1] - a[1]) / d

@@ -1,0 +1,139 @@
+"""Channels on ROS 2 topics while they drive: /skidpad/NAME/odom, /plan and /objects."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from skidpad.core.channels import ChannelFrame
+from skidpad.core.errors import MissingExtra
+from skidpad.live.outcome import LinkOutcome
+from skidpad.live.ros2.messages import Messages
+from skidpad.live.ros2.network import BLOCKING, participant, qos
+from skidpad.live.ros2.types import OBJECTS, ODOMETRY, PATH, Types
+from skidpad.live.settings import Flow
+from skidpad.recording.channels import Item
+from skidpad.recording.files import write_bytes
+from skidpad.recording.rosbag import ChannelTopics, EgoTopic, Mapping, ObjectTopic, PlanTopic
+
+try:
+    from cyclonedds.core import DDSException
+    from cyclonedds.pub import DataWriter
+    from cyclonedds.topic import Topic
+    from cyclonedds.util import duration
+except ImportError as error:
+    raise MissingExtra("ROS 2 topics", "live") from error
+
+KINDS = {"odom": ODOMETRY, "plan": PATH, "objects": OBJECTS}
+POLL = 0.02  # s
+
+
+def topic_of(channel: str, part: str) -> str:
+    """The name of a channel's topic, as ROS knows it."""
+    return f"/skidpad/{channel}/{part}"
+
+
+def mapping_of(channels: Sequence[str], length: float = 4.7, width: float = 1.9) -> Mapping:
+    """How our own topics are read back."""
+    return Mapping(
+        channels={
+            name: ChannelTopics(
+                ego=EgoTopic(topic_of(name, "odom"), length=length, width=width),
+                plan=PlanTopic(topic_of(name, "plan")),
+                objects=ObjectTopic(topic_of(name, "objects")),
+            )
+            for name in channels
+        }
+    )
+
+
+class RosPublisher:
+    """A `Listener` that writes to DDS. Lossless: it waits for a reader, and for its room."""
+
+    def __init__(
+        self,
+        channels: Sequence[str],
+        recording: Path,
+        flow: Flow,
+        domain: int = 0,
+        patience: float = BLOCKING,
+    ) -> None:
+        self.channels, self.recording, self.flow = tuple(channels), recording, flow
+        self.types = Types()
+        self.messages = Messages(self.types)
+        self.participant = participant(domain)
+        self.writers = {
+            (c, part): self._writer(topic_of(name, part), kind)
+            for c, name in enumerate(channels)
+            for part, kind in KINDS.items()
+        }
+        self.said: list[Any] = []
+        self.cycles, self.missing, self.ended = 0, list[int](), ""
+        self.described = False
+        if flow is Flow.LOSSLESS:
+            self._await_readers(patience)
+
+    def _writer(self, topic: str, kind: str) -> Any:
+        wanted = qos(self.flow, self.types.announced(kind))
+        rt = Topic(self.participant, f"rt{topic}", self.types.cls(kind), qos=wanted)
+        return DataWriter(self.participant, rt, qos=wanted)
+
+    def _await_readers(self, patience: float) -> None:
+        deadline = time.monotonic() + patience
+        while any(not w.get_matched_subscriptions() for w in self.writers.values()):
+            if time.monotonic() > deadline:
+                self.ended = f"nobody listened to all topics within {patience:g} s"
+                return
+            time.sleep(POLL)
+
+    def hear(self, channel: int | None, item: Item) -> None:
+        """Write what a channel says; objects and plan before the pose that completes a frame."""
+        if channel is None or not isinstance(item, ChannelFrame) or self.ended:
+            return
+        if not self.described:
+            self._describe(item)
+        if not np.isfinite(item.ego).all():
+            return  # a pose that is no number cannot be said in a quaternion: the channel is silent
+        usable = item._replace(plan=item.plan[np.isfinite(item.plan).all(axis=1)])
+        parts = [("objects", self.messages.objects)]
+        if len(usable.plan):
+            parts.append(("plan", self.messages.path))
+        for part, make in [*parts, ("odom", self.messages.odometry)]:
+            try:
+                self.writers[channel, part].write(make(usable), round(item.t * 1e9))
+            except DDSException as error:
+                self.ended = f"a reader took nothing ({error.msg}), after {self.cycles} cycles"
+                return
+
+    def cycle_over(self, k: int, t: float) -> None:
+        """Count it."""
+        del t
+        self.cycles += 1
+        if self.ended:
+            self.missing.append(k)
+
+    def close(self) -> None:
+        """Wait until readers have it all, and leave the domain."""
+        if self.flow is Flow.LOSSLESS and not self.ended:
+            for writer in self.writers.values():
+                if not writer.wait_for_acks(duration(seconds=BLOCKING)):
+                    self.ended = f"a reader did not take everything within {BLOCKING:g} s"
+        self.writers.clear()
+        del self.participant
+        ended = self.ended or "complete"
+        outcome = LinkOutcome(flow=self.flow, cycles=self.cycles, missing=self.missing, ended=ended)
+        text = msgspec.json.format(msgspec.json.encode(outcome), indent=1)
+        write_bytes(self.recording.with_suffix(".ros2.json"), text)
+
+    def _describe(self, frame: ChannelFrame) -> None:
+        """The mapping file that reads these topics, with the ego's true size."""
+        length, width = np.ptp(frame.ego_polygon, axis=0).tolist()
+        mapping = mapping_of(self.channels, round(length, 3), round(width, 3))
+        plain = msgspec.to_builtins(mapping)
+        write_bytes(self.recording.with_suffix(".ros2.yaml"), msgspec.yaml.encode(plain))
+        self.described = True

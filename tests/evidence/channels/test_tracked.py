@@ -1,0 +1,173 @@
+"""The profile `tracked`: safe distances against stopping simulated, filters, votes, positions."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from channel_worlds import Eyes, World, drive, frame
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.hazards import Profile, Signal
+from skidpad.evidence.channels.judging.truth.simulator import would_hit
+from skidpad.evidence.channels.monitor import Monitor, MonitorSettings, drive_events
+from skidpad.evidence.channels.tracked.distance import SafeDistance
+from skidpad.evidence.channels.tracked.tracks import Tracks
+from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, Tracked, parting
+from skidpad.recording.cycles import cycles
+
+TAILGATED, TAILGATING = HazardType.EGO_TAILGATED, HazardType.EGO_TAILGATING
+LOCALISATION, UNSEEN = HazardType.INCONSISTENT_LOCALISATION, HazardType.UNSEEN_BY_A_CHANNEL
+EGO = (0.0, 0.0, 0.0, 15.0, 0.0)
+
+
+@given(v_follower=st.floats(0.5, 45.0), v_leader=st.floats(0.0, 45.0))
+@settings(max_examples=150, derandomize=True)
+def test_the_safe_distance_is_the_least_that_stopping_step_by_step_needs(v_follower, v_leader):
+    need = SafeDistance().of(v_follower, v_leader)
+    assert need >= 0.0
+    assert not would_hit(need + 0.05, v_leader, 0.9, v_follower, 0.9)
+    if need > 0.1:
+        assert would_hit(need - 0.05, v_leader, 0.9, v_follower, 0.9)
+
+
+def test_the_published_case_follows_the_published_formula():
+    rss = SafeDistance(response=1.0, a_response=3.5, b_follower=4.0, b_leader=8.0)
+    expected = 20.0 + 1.75 + 23.5**2 / 8.0 - 20.0**2 / 16.0  # v rho + a rho^2/2 + ...
+    assert rss.of(20.0, 20.0) == pytest.approx(expected)
+    assert rss.of(5.0, 40.0) == 0.0
+
+
+def test_a_track_finds_gap_and_speed_through_noise():
+    rng = np.random.default_rng(2)
+    tracks, misses = Tracks(SafeDistance()), []
+    for k in range(100):
+        t = 0.1 * k
+        x = -30.0 + 1.0 * t  # closes at 1 m/s
+        row = (15 * t + x + rng.normal(0, 0.4), rng.normal(0, 0.2), 0.0, 16 + rng.normal(0, 0.5), 0)
+        tracks.update(t, frame(t, (15 * t, 0, 0, 15.0, 0), [row], ids=[4]))
+        (track,) = tracks
+        misses.append((track.gap - (-x - 4.5), track.v - 16.0))
+    late = np.array(misses[30:])
+    assert track.behind
+    assert (np.abs(late.mean(axis=0)) < 0.2).all()
+    assert late[:, 0].std() < 0.3
+
+
+SHARP = (Eyes("a"), Eyes("b"))
+
+
+def found(objects, eyes=SHARP, duration=6.0, ego=EGO):
+    world = World(ego, np.array(objects, dtype=float).reshape(-1, 5))
+    monitor = Monitor(
+        [e.name for e in eyes], MonitorSettings(profile=Profile.TRACKED, keep_worlds=False)
+    )
+    for cycle in cycles(drive(world, eyes, duration)):
+        monitor.update(cycle)
+    return {e.key: e for e in drive_events(monitor)[0]}
+
+
+@pytest.mark.req("C-120", "C-122", "C-123")
+@pytest.mark.parametrize(
+    ("objects", "expected"),
+    [
+        ([(-11.0, 0, 0, 15.0, 0)], {TAILGATED}),  # 6.5 m; 9.0 m are safe at 54 km/h
+        ([(-16.0, 0, 0, 15.0, 0)], set()),  # 11.5 m
+        ([(11.0, 0, 0, 15.0, 0)], {TAILGATING}),
+        ([(16.0, 0, 0, 15.0, 0)], set()),
+        ([(11.0, 0, 0, 22.0, 0)], set()),  # it draws away
+        ([(-11.0, 3.5, 0, 15.0, 0), (11.0, -3.5, 0, 15.0, 0)], set()),  # other lanes
+        ([(40.0, 0, np.pi, -15.0, 0)], set()),  # oncoming
+        ([(20.0, -20.0, np.pi / 2, 0, 10.0)], set()),  # crossing
+    ],
+)
+def test_who_is_too_near_on_the_same_way_is_found(objects, expected):
+    events = found(objects)
+    assert set(events) == expected
+    assert all(e.t_start <= 1.0 for e in events.values())
+
+
+@pytest.mark.req("C-122", "C-123")
+def test_a_channel_that_does_not_see_it_is_a_hazard_of_its_own():
+    follower = [(-11.0, 0, 0, 15.0, 0)]
+    blind = (Eyes("a", 0.1), Eyes("b", 0.1, blind=(0,)))
+    assert set(found(follower, blind)) == {TAILGATED, UNSEEN}
+    assert set(found(follower, (Eyes("a", 0.1), Eyes("b", 0.1)))) == {TAILGATED}
+
+
+def cycle_frames(tracked, rows, count, ids=(1,)):
+    """Feed `count` cycles in which channel i reports its object at rows[i]; None: nothing."""
+    for k in range(count):
+        t = 0.1 * k
+        frames = [
+            frame(t, EGO, [] if row is None else [row], ids=[] if row is None else list(ids))
+            for row in rows
+        ]
+        signals = tracked.update(t, frames)
+    return signals
+
+
+@pytest.mark.req("C-023")
+def test_the_channels_vote():
+    near, far = (-11.0, 0, 0, 15.0, 0), (-14.5, 0, 0, 15.0, 0)
+    assert cycle_frames(Tracked("abc"), [near, far, far], 20)[Signal.REAR_DEFICIT] == 0.0
+    assert cycle_frames(Tracked("abc"), [near, near, far], 20)[Signal.REAR_DEFICIT] > 0.0
+    alone = cycle_frames(Tracked("abc"), [near, None, None], 20)
+    assert alone[Signal.REAR_DEFICIT] > 0.0  # who does not see it says nothing about it
+    assert alone[Signal.UNSEEN_DEFICIT] > 0.0
+
+
+def test_it_is_confirmed_for_half_a_second_and_ends_when_the_gap_is_surely_long():
+    near = (-11.0, 0, 0, 15.0, 0)
+    assert cycle_frames(Tracked("ab"), [near, near], 4)[Signal.REAR_DEFICIT] == 0.0
+    tracked, seen = Tracked("ab"), []
+    for k in range(160):
+        t = 0.1 * k
+        row = (-10.0 - 0.4 * t, 0, 0, 14.6, 0)  # it falls back
+        f = frame(t, EGO, [row], ids=[1])
+        seen.append(tracked.update(t, [f, f])[Signal.REAR_DEFICIT] > 0.0)
+    changes = np.flatnonzero(np.diff(np.array(seen, dtype=int)))
+    assert len(changes) == 2  # on once, off once: no flicker at the limit
+
+
+@pytest.mark.req("C-121")
+@pytest.mark.parametrize(
+    ("offset", "alarms"), [((0.0, 0.0), 0), ((1.5, 0.0), 0), ((0.0, 2.5), 1), ((2.5, 0.0), 1)]
+)
+def test_positions_are_inconsistent_beyond_what_their_accuracy_explains(offset, alarms):
+    eyes = (Eyes("a", ego_noise=0.1), Eyes("b", ego_noise=0.1, ego_offset={5.0: offset}))
+    events = found([], eyes, duration=60.0)
+    assert len(events) == alarms
+    if alarms:
+        assert 5.0 <= events[LOCALISATION].t_start <= 5.6
+    assert pytest.approx(27.63, abs=0.01) == CHI2_LIMIT
+
+
+@pytest.mark.req("C-128")
+def test_plans_part_where_their_footprints_share_no_ground():
+    straight = frame(0.0, EGO)  # 15 m/s, 4.5 m long: a standing plan is left behind after 0.3 s
+    t = np.arange(16) * 0.2
+    stops = frame(0.0, EGO, plan=np.column_stack([0 * t, 0 * t, t]))
+    left = frame(0.0, EGO, plan=np.column_stack([15 * t, 0.9 * t, t]))
+    assert parting(straight, straight) == np.inf
+    assert parting(straight, stops) == 0.5
+    assert parting(straight, left) == 2.5  # 1.8 m after 2 s, seen at the next half second
+    shifted = frame(0.0, (0.0, 5.0, 0.0, 15.0, 0.0))
+    assert parting(straight, shifted) == np.inf  # places differ, plans do not
+
+
+def test_nothing_and_nonsense_are_survived():
+    tracked = Tracked("ab")
+    nan = frame(0.0, (np.nan,) * 5)
+    for k, frames in enumerate([[None, None], [nan, None], [nan, nan], [frame(0.3, EGO), nan]]):
+        signals = tracked.update(0.1 * k, frames)
+    assert signals[Signal.REAR_DEFICIT] == signals[Signal.FRONT_DEFICIT] == 0.0
+    assert np.isnan(signals[Signal.OFFSET_CHI2])
+    standing = frame(0.4, (3.0, 1.0, 0.5, 0.0, 0.0))._replace(plan=np.tile([3.0, 1.0, 0.0], (9, 1)))
+    for k in range(4, 9):
+        tracked.update(0.1 * k, [standing, standing])
+    other = Monitor(["a", "b"])
+    evidence = next(iter(cycles(drive(World(), (Eyes("a"), Eyes("b")), 0.2))))
+    values = other.update(evidence).signals.values
+    assert np.isnan(values[Signal.REAR_DEFICIT])  # other profiles do not track

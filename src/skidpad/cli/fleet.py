@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
+    import httpx
+
     from skidpad.fleet.alerting.relays import Relay
     from skidpad.fleet.service import Places
 
@@ -67,6 +70,9 @@ def serve(
     ] = None,
     mqtt: Annotated[str | None, typer.Option(help="HOST[:PORT] of an MQTT 5 broker.")] = None,
     mqtt_ca: Annotated[Path | None, typer.Option(help="PEM of the broker's authority.")] = None,
+    name: Annotated[
+        list[str] | None, typer.Option(help="What browsers call this host besides --host.")
+    ] = None,
 ) -> None:
     """Serve the fleet; nothing listens beyond this machine unless --host says so."""
     from skidpad.core.errors import ConfigError
@@ -84,7 +90,8 @@ def serve(
     relays = _relays(places, webhook or [], webhook_host or [], mqtt, mqtt_ca)
     service = open_fleet(places, exporter=export_hazard, relays=relays)
     try:
-        run(service, Listen(host, port, certificate, key), typer.echo)
+        listen = Listen(host, port, certificate, key, tuple(name or ()))
+        run(service, listen, map_lines, typer.echo)
     finally:
         service.close()
 
@@ -152,6 +159,64 @@ def enrol(
     typer.echo(account.token)
 
 
+def _client(to: str, token_file: Path, ca: Path | None) -> httpx.Client:
+    """A client with a credential; one sentence for an address or file that cannot be used."""
+    import ssl
+
+    from skidpad.core.errors import ConfigError, FileError
+
+    with _extra():
+        import httpx
+
+        from skidpad.fleet.uploader import TIMEOUT_S
+    if not to.startswith(("https://", "http://127.0.0.1", "http://localhost")):
+        raise ConfigError(f"--to must be https://, or http:// on this machine, got {to!r}")
+    try:
+        token = token_file.read_text(encoding="ascii").strip()
+        verify = ssl.create_default_context(cafile=str(ca) if ca else None)
+    except (OSError, UnicodeDecodeError) as error:
+        raise FileError(f"{token_file} or {ca}: cannot be read ({error})") from error
+    headers = {"Authorization": f"Bearer {token}"}
+    return httpx.Client(
+        base_url=to, headers=headers, verify=verify, timeout=TIMEOUT_S, trust_env=False
+    )
+
+
+@cache
+def map_lines(name: str) -> list[list[tuple[float, float]]]:
+    """Middles of the lanes of a bundled map, every third point; nothing for another map."""
+    from skidpad.core.errors import InputError
+    from skidpad.roads.bundled import bundled_maps, load_map
+
+    try:
+        map = load_map(name) if name in bundled_maps() else None
+    except InputError:
+        map = None
+    if map is None:
+        return []
+    found = []
+    for first, size in zip(map.lanes.first.tolist(), map.lanes.size.tolist(), strict=True):
+        rows = [*range(first, first + size, 3), first + size - 1]
+        found.append([(float(map.samples.x[i]), float(map.samples.y[i])) for i in rows])
+    return found
+
+
+@fleet.command("open")
+def open_pages(
+    to: Annotated[str, typer.Option(help="Address of the fleet.")],
+    token_file: TokenFile,
+    ca: Annotated[Path | None, typer.Option(help="PEM of the authority that is trusted.")] = None,
+) -> None:
+    """Print an address that opens the pages once, as whose credential it is."""
+    from skidpad.core.errors import BackendError
+
+    with _client(to, token_file, ca) as client:
+        answer = client.post("/api/v1/session")
+    if answer.status_code != 200:
+        raise BackendError(f"the fleet gives no session: {answer.text}")
+    typer.echo(to.rstrip("/") + answer.json()["path"])
+
+
 @fleet.command()
 def upload(
     spool: Annotated[Path, typer.Option(help="Folder that holds what is not acknowledged.")],
@@ -165,30 +230,14 @@ def upload(
     wait: Annotated[float, typer.Option(help="Seconds to go on trying when nobody answers.")] = 0.0,
 ) -> None:
     """Send hazards, drives and indicators; what is not acknowledged waits in the spool."""
-    import ssl
-
-    from skidpad.core.errors import ConfigError, FileError
-
     with _extra():
-        import httpx
-
         from skidpad.fleet.monitored import spool_folder
         from skidpad.fleet.spool import Spool
-        from skidpad.fleet.uploader import TIMEOUT_S, poster, send_all
-    if not to.startswith(("https://", "http://127.0.0.1", "http://localhost")):
-        raise ConfigError(f"--to must be https://, or http:// on this machine, got {to!r}")
-    try:
-        token = token_file.read_text(encoding="ascii").strip()
-        verify = ssl.create_default_context(cafile=str(ca) if ca else None)
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{token_file} or {ca}: cannot be read ({error})") from error
-    kept = Spool(spool)
-    for folder in folders or []:
-        spool_folder(kept, folder, release)
-    headers = {"Authorization": f"Bearer {token}"}
-    with httpx.Client(
-        base_url=to, headers=headers, verify=verify, timeout=TIMEOUT_S, trust_env=False
-    ) as client:
+        from skidpad.fleet.uploader import poster, send_all
+    with _client(to, token_file, ca) as client:
+        kept = Spool(spool)
+        for folder in folders or []:
+            spool_folder(kept, folder, release)
         sent = send_all(kept, poster(client), wait)
     typer.echo(f"{sent.acknowledged} acknowledged, {sent.refused} refused, {sent.waiting} waiting")
 

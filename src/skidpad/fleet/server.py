@@ -1,51 +1,62 @@
-"""Serving the fleet with uvicorn."""
+"""Serving the fleet with uvicorn: the interface and the pages behind one guard."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 
-from skidpad.fleet.api.app import make_app
 from skidpad.fleet.service import Fleet
-from skidpad.pages.server import bound
+from skidpad.fleet.site.build import make_site
+from skidpad.fleet.site.dashboard import MapLines
+from skidpad.pages.guard import Door, Guard
+from skidpad.pages.server import bound, host_headers
+from skidpad.pages.sessions import Sessions
 
 CLOSING_S = 10  # s that open requests get when the server ends
+FREE = ("/api/",)  # paths that check credentials of their own
 
 
 @dataclass(frozen=True, slots=True)
 class Listen:
-    """Where to listen, and with which certificate."""
+    """Where to listen, with which certificate, and what browsers call this host besides."""
 
     host: str
     port: int
     certificate: Path | None = None
     key: Path | None = None
+    names: tuple[str, ...] = ()
 
 
-def server_of(fleet: Fleet, listen: Listen) -> uvicorn.Server:
-    """A server that has not begun."""
-    config = uvicorn.Config(
-        make_app(fleet),
-        log_level="warning",
+def run(fleet: Fleet, listen: Listen, lines: MapLines, say: Callable[[str], None]) -> None:
+    """Serve until a signal ends it."""
+    one = bound(listen.host, listen.port)
+    port = int(one.getsockname()[1])
+    sessions = Sessions()
+    door = Door(
+        hosts=host_headers(listen.host, port, listen.names),
+        cookie=f"skidpad-{port}",
+        sessions=sessions,
+        secure=listen.certificate is not None,
+        free=FREE,
+    )
+    config: Any = uvicorn.Config(
+        Guard(make_site(fleet, lines, sessions), door),
+        ws="wsproto",
+        ws_per_message_deflate=False,
+        log_level="error",
         access_log=False,
         server_header=False,
         timeout_graceful_shutdown=CLOSING_S,
         ssl_certfile=listen.certificate,
         ssl_keyfile=listen.key,
     )
-    return uvicorn.Server(config)
-
-
-def run(fleet: Fleet, listen: Listen, say: Callable[[str], None]) -> None:
-    """Serve until a signal ends it."""
-    one = bound(listen.host, listen.port)
-    port = one.getsockname()[1]
     scheme = "https" if listen.certificate else "http"
     host = f"[{listen.host}]" if ":" in listen.host else listen.host
     say(f"the fleet is at {scheme}://{host}:{port}")
     fleet.dispatcher.start()
     with one:
-        server_of(fleet, listen).run(sockets=[one])
+        uvicorn.Server(config).run(sockets=[one])

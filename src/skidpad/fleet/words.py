@@ -37,6 +37,7 @@ class Action(str, Enum):
     READ_PLACES = "read places"  # places x hazard x weather, without vehicles
     READ_RESEARCH = "read research"  # the anonymised export
     READ_SAFETY_CASE = "read safety case"
+    VISIT = "visit"  # open the pages
 
 
 _M, _O, _T, _V = Role.MANUFACTURER, Role.OPERATOR, Role.TELEOPERATOR, Role.VEHICLE
@@ -56,6 +57,7 @@ RIGHTS: dict[Action, frozenset[Role]] = {
     Action.READ_PLACES: frozenset({_M, _O, Role.AUTHORITY}),
     Action.READ_RESEARCH: frozenset({Role.RESEARCHER}),
     Action.READ_SAFETY_CASE: frozenset({_M, _O, Role.AUTHORITY}),
+    Action.VISIT: frozenset({_M, _O, _T, Role.AUTHORITY}),
 }
 
 

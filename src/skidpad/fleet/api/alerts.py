@@ -108,4 +108,5 @@ def ordered(fleet: Fleet, who: Principal, alert: str) -> dict[str, Any]:
     with fleet.engine.begin() as connection:
         order = order_stop(connection, who, alert, fleet.clock())
     fleet.hub.tell(f"orders {order.vehicle}")
+    fleet.hub.tell(f"alerts {who.tenant}")
     return {"order": order.id, "expires": order.expires}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, select
+from sqlalchemy import ColumnElement, Connection, select
 
 from skidpad.core.errors import ConfigError
 from skidpad.fleet.identity import new_id, new_token, token_hash
@@ -81,17 +81,22 @@ def _add(
 
 def principal_of(connection: Connection, token: str, at: float) -> Principal | None:
     """Whose credential `token` is; None when it is nobody's, expired or ended."""
+    return _principal(connection, credentials.c.token_hash == token_hash(token), at)
+
+
+def principal_by_id(connection: Connection, id: str, at: float) -> Principal | None:
+    """Someone who still has a credential; None otherwise."""
+    return _principal(connection, principals.c.id == id, at)
+
+
+def _principal(connection: Connection, which: ColumnElement[bool], at: float) -> Principal | None:
     ended = select(events.c.number).where(
         events.c.subject == credentials.c.id, events.c.what == ENDED
     )
     row = connection.execute(
         select(principals)
         .join(credentials, credentials.c.principal == principals.c.id)
-        .where(
-            credentials.c.token_hash == token_hash(token),
-            credentials.c.expires > at,
-            ~ended.exists(),
-        )
+        .where(which, credentials.c.expires > at, ~ended.exists())
     ).first()
     if row is None:
         return None

@@ -1,0 +1,52 @@
+"""What a click may do: who clicked is looked up anew, and asked for the right, at every click."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from starlette.requests import Request
+
+from skidpad.fleet.alerting.keeping import What
+from skidpad.fleet.api.alerts import answered, ordered
+from skidpad.fleet.patterns.analysis import analyse
+from skidpad.fleet.service import Fleet
+from skidpad.fleet.store.accounts import principal_by_id
+from skidpad.fleet.words import Action, Principal, Refused
+from skidpad.pages.guard import WHO
+
+
+def visitor(fleet: Fleet, request: Request) -> Principal:
+    """Whose session a page was opened in; Refused (401) when their credentials have ended."""
+    return person(fleet, str(request.scope.get(WHO)))
+
+
+def person(fleet: Fleet, id: str) -> Principal:
+    """Someone with a credential that still holds; Refused (401) otherwise."""
+    with fleet.engine.connect() as connection:
+        who = principal_by_id(connection, id, fleet.clock())
+    if who is None:
+        raise Refused(401, "this session's credential has ended")
+    return who
+
+
+def granted(fleet: Fleet, id: str, action: Action) -> Principal:
+    """The person, if their role may; Refused (401, 403) otherwise."""
+    who = person(fleet, id)
+    if not who.may(action):
+        raise Refused(403, f"the role {who.role.value} may not {action.value}")
+    return who
+
+
+def click_answer(fleet: Fleet, id: str, alert: str, what: What) -> dict[str, Any]:
+    """Acknowledge, escalate or close an alert."""
+    return answered(fleet, granted(fleet, id, Action.ANSWER_ALERTS), alert, what)
+
+
+def click_stop(fleet: Fleet, id: str, alert: str) -> dict[str, Any]:
+    """Order the vehicle of an alert to stop."""
+    return ordered(fleet, granted(fleet, id, Action.ORDER_STOP), alert)
+
+
+def click_analyse(fleet: Fleet, id: str) -> int:
+    """Look for recurring hazards; how many clusters were found."""
+    return len(analyse(fleet, granted(fleet, id, Action.ANALYSE)).clusters)

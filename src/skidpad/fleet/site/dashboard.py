@@ -1,0 +1,126 @@
+"""The dashboard: hazards per hour, trends with intervals, the map, clusters, replay of a hazard."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+from starlette.requests import Request
+
+from skidpad.evidence.statistics import interval_text
+from skidpad.fleet.insight.trends import Trend, hazard_rates, trends
+from skidpad.fleet.patterns.analysis import newest_clusters
+from skidpad.fleet.service import Fleet
+from skidpad.fleet.site.acting import click_analyse
+from skidpad.fleet.site.drawing import Dot, Line, map_svg, replay_svg, trend_svg
+from skidpad.fleet.site.frame import say, table
+from skidpad.fleet.store.reading import Wanted, hazard_row, hazard_rows, record_of
+from skidpad.fleet.words import Principal
+
+MapLines = Callable[[str], Sequence[Line]]  # roads of a map by its name, m
+SHOWN = 6  # trends
+PLAY_S = 0.1
+
+
+def fill_dashboard(fleet: Fleet, lines: MapLines, ui: Any, who: Principal) -> None:
+    """Everything that a manufacturer or operator sees at once."""
+    found = trends(fleet, who)
+    with fleet.engine.connect() as connection:
+        rates, clusters = hazard_rates(connection, who), newest_clusters(connection, who)
+        newest = hazard_rows(connection, who, Wanted())
+    with ui.element("section"):
+        ui.label("Hazards per hour").classes("h2")
+        rows = [
+            [r.type.replace("_", " "), str(r.events), f"{r.hours:.2f}", f"{r.rate:.3g}",
+             interval_text(r.interval)]
+            for r in rates
+        ]  # fmt: skip
+        table(ui, ["hazard", "events", "hours", "per hour", "interval"], rows)
+    _trends(ui, found)
+    _map(ui, lines, newest, clusters)
+    _clusters(fleet, ui, who, clusters)
+
+
+def _trends(ui: Any, found: list[Trend]) -> None:
+    by_name: dict[str, list[Trend]] = {}
+    for trend in found:
+        by_name.setdefault(trend.indicator, []).append(trend)
+    worst = sorted(by_name, key=lambda n: (-max(t.share for t in by_name[n]), n))[:SHOWN]
+    with ui.element("section"):
+        ui.label("Indicators beyond their bound, share of cycles per day").classes("h2")
+        with ui.element("div").classes("few"):
+            for name in worst:
+                with ui.element("div"):
+                    last = by_name[name][-1]
+                    ui.label(name.replace("_", " "))
+                    ui.html(trend_svg(by_name[name], name), sanitize=False)
+                    text = f"{100 * last.share:.2f} %, {interval_text(last.interval)}"
+                    ui.label(f"{text}, {last.vehicles} vehicles").classes("dim")
+        if not worst:
+            ui.label("No indicator was sent yet.").classes("dim")
+
+
+def _map(
+    ui: Any, lines: MapLines, newest: list[dict[str, Any]], clusters: list[dict[str, Any]]
+) -> None:
+    names = list(dict.fromkeys(row["map"] for row in newest if row["map"]))
+    with ui.element("section"):
+        ui.label("Where").classes("h2")
+        for name in names[:3]:
+            dots = [
+                Dot(r["x"], r["y"], r["type"], 3.0, r["type"]) for r in newest if r["map"] == name
+            ]
+            dots += [
+                Dot(
+                    c["x"], c["y"], c["type"], 6.0 + len(c["members"]), f"{len(c['members'])} alike"
+                )
+                for c in clusters
+                if c["map"] == name
+            ]
+            ui.label(f"{name}: {len(dots)} marks")
+            ui.html(map_svg(lines(name), dots, f"map {name}"), sanitize=False)
+        if not names:
+            ui.label("No hazard has come in yet.").classes("dim")
+
+
+def _clusters(fleet: Fleet, ui: Any, who: Principal, clusters: list[dict[str, Any]]) -> None:
+    with ui.element("section"):
+        ui.label("Recurring hazards").classes("h2")
+
+        def look() -> None:
+            say(ui, lambda: click_analyse(fleet, who.id), "looked; reload to see the clusters")
+
+        ui.button("Look for recurring hazards", on_click=look)
+        for cluster in clusters[:20]:
+            with ui.element("div"):
+                text = f"{len(cluster['members'])} x {cluster['type'].replace('_', ' ')}"
+                where = f"{cluster['map']} at {cluster['x']:.0f}, {cluster['y']:.0f} m"
+                ui.label(f"{text}, {cluster['vehicles']} vehicles, {where}")
+                ui.link("replay the representative", f"/replay/{cluster['representative']}")
+        if not clusters:
+            ui.label("Nothing was found to recur.").classes("dim")
+
+
+def fill_replay(fleet: Fleet, ui: Any, who: Principal, request: Request) -> None:
+    """One hazard, cycle by cycle, as every channel saw it."""
+    hazard = str(request.path_params["hazard"])
+    with fleet.engine.connect() as connection:
+        row = hazard_row(connection, who, hazard)
+        record = record_of(connection, fleet.blobs, hazard)
+    ui.label(f"{row['type'].replace('_', ' ')}, {row['map']}, {row['weather']}")
+    if not record.worlds:
+        ui.label("This record holds no worlds.")
+        return
+    picture = ui.html(replay_svg(record, 0), sanitize=False)
+    last = len(record.worlds) - 1
+
+    def show(event: Any) -> None:
+        picture.set_content(replay_svg(record, min(int(event.value), last)))
+
+    slider = ui.slider(min=0, max=last, value=0, on_change=show)
+
+    def step() -> None:
+        slider.set_value(0 if slider.value >= last else slider.value + 1)
+
+    timer = ui.timer(PLAY_S, step, active=False)
+    ui.button("Play or pause", on_click=lambda: setattr(timer, "active", not timer.active))

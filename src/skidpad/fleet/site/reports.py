@@ -1,0 +1,75 @@
+"""Pages that are read: places for the road authority, the safety case, changes and their roll-out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from skidpad.evidence.statistics import interval_text
+from skidpad.fleet.insight.places import places
+from skidpad.fleet.insight.safety import claims
+from skidpad.fleet.insight.trends import trends
+from skidpad.fleet.loop.rollout import Rollout, rollouts
+from skidpad.fleet.service import Fleet
+from skidpad.fleet.site.frame import table
+from skidpad.fleet.words import Principal
+
+
+def fill_places(fleet: Fleet, ui: Any, who: Principal) -> None:
+    """Places x hazard x weather."""
+    with fleet.engine.connect() as connection:
+        found = places(connection, who)
+    ui.label(
+        f"{sum(r.count for r in found)} hazards; places of fewer than 3 vehicles are left out."
+    )
+    heads = ["map", "x, y in m", "hazard", "weather", "count", "vehicles", "what to look at"]
+    rows = [
+        [r.map, f"{r.x:.0f}, {r.y:.0f}", r.hazard.replace("_", " "), r.weather, str(r.count),
+         str(r.vehicles), r.advice]
+        for r in found
+    ]  # fmt: skip
+    table(ui, heads, rows)
+    ui.label("As HTML and PDF: /api/v1/places.html and /api/v1/places.pdf").classes("dim")
+
+
+def fill_case(fleet: Fleet, ui: Any, who: Principal) -> None:
+    """The safety case with current evidence."""
+    last = ""
+    for claim in claims(trends(fleet, who)):
+        if claim.argument != last:
+            last = claim.argument
+            ui.label(claim.argument).style("font-size: 16px")
+        with ui.element("div").classes("card"):
+            ui.label(f"{claim.id} {claim.claim}: {claim.verdict}")
+            if claim.share is not None and claim.interval is not None:
+                share = f"worst indicator beyond its bound in {100 * claim.share:.2f} % of cycles"
+                text = f"{share} ({interval_text(claim.interval)}, {claim.vehicles} vehicles)"
+                ui.label(text).classes("dim")
+
+
+def fill_changes(fleet: Fleet, ui: Any, who: Principal) -> None:
+    """Releases, newest first, with every look."""
+    with fleet.engine.connect() as connection:
+        found = rollouts(connection, who.tenant)
+    if not found:
+        ui.label("Nothing was released yet.").classes("dim")
+    for one in reversed(found):
+        _release(ui, one)
+
+
+def _release(ui: Any, one: Rollout) -> None:
+    with ui.element("div").classes("card"):
+        state = one.ended or f"stage {one.stage + 1} of {len(one.plan.stages)}"
+        ui.label(f"{one.name}: {state}")
+        ui.label(f"in place of {one.row.before or 'what vehicles came with'}").classes("dim")
+        rows = [
+            [e.what, str(e.detail.get("decision", e.detail.get("reason", ""))),
+             str(e.detail.get("drives", "")), _number(e.detail.get("mean")),
+             _number(e.detail.get("p_worse")), _number(e.detail.get("p_no_worse"))]
+            for e in one.events
+        ]  # fmt: skip
+        heads = ["what", "decision", "drives", "errors per drive", "p worse", "p no worse"]
+        table(ui, heads, rows)
+
+
+def _number(value: Any) -> str:
+    return f"{value:.3g}" if isinstance(value, float) else ""

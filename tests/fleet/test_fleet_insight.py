@@ -1,0 +1,185 @@
+"""What readers get: trends with intervals, places, research that names nobody, the safety case."""
+
+from __future__ import annotations
+
+import gzip
+import itertools
+import json
+
+import numpy as np
+import pytest
+
+from fleet_world import NOW, World, make_world, packed, record
+from skidpad.core.vocabulary import HazardType
+from skidpad.fleet.insight.research import HOUR, K, export
+from skidpad.fleet.insight.trends import compact
+from skidpad.fleet.store.accounts import add_vehicle
+
+
+def row(minute=0, violated=0, n=600, indicator="ego_location_similarity", mean=0.9) -> dict:
+    return {"minute": minute, "subject": "a+b", "indicator": indicator, "n": n,
+            "violated": violated, "mean": mean, "least": 0.1, "greatest": 1.0}  # fmt: skip
+
+
+def send_rows(world: World, vehicle: str, key: str, *rows: dict) -> None:
+    body = gzip.compress("\n".join(map(json.dumps, rows)).encode())
+    assert world.send(vehicle, body, key, "indicators").status_code == 200
+
+
+@pytest.mark.req("C-194")
+def test_trends_hold_what_was_sent_and_no_more_than_ones_own(world):
+    send_rows(world, "red-1", "key-aaaa-1", row(0, 60), row(1, 0, mean=0.5))
+    send_rows(world, "red-2", "key-aaaa-2", row(0, 240))
+    send_rows(world, "blue-1", "key-aaaa-3", row(0, 600))
+    assert compact(world.fleet) == 3
+    assert compact(world.fleet) == 0
+    (trend,) = world.get("red operator", "/api/v1/trends").json()["indicators"]
+    assert (trend["share"], trend["vehicles"], trend["cycles"]) == (300 / 1800, 2, 1800)
+    assert trend["mean"] == pytest.approx((0.9 * 600 + 0.5 * 600 + 0.9 * 600) / 1800)
+    low, high = trend["interval"]
+    assert low <= trend["share"] <= high
+    (blue,) = world.get("bolt", "/api/v1/trends").json()["indicators"]
+    assert blue["share"] == 1.0
+    world.clock.now += 3 * 86400.0
+    send_rows(world, "red-1", "key-aaaa-4", row(0, 0))
+    later = world.get("axle", "/api/v1/trends").json()["indicators"]
+    assert [t["share"] for t in later] == [300 / 1800, 0.0]
+
+
+def test_a_kill_between_file_and_event_counts_nothing_twice(lite, monkeypatch):
+    send_rows(lite, "red-1", "key-aaaa-1", row(0, 60))
+    monkeypatch.setattr("skidpad.fleet.insight.trends.add_event", lambda *a, **k: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        compact(lite.fleet)
+    monkeypatch.undo()
+    (trend,) = lite.get("axle", "/api/v1/trends").json()["indicators"]
+    assert trend["cycles"] == 600
+
+
+def test_hazards_per_hour_count_the_drives_without_any(world):
+    for k in range(3):
+        summary = {"seconds": 1800.0, "cycles": 1, "context": {}}
+        headers = {"X-Skidpad-Drive": f"{k:032x}"}
+        body = gzip.compress(json.dumps(summary | {"k": k}).encode())
+        assert world.send("red-1", body, f"drive-key-{k}", "drive", **headers).status_code == 200
+    world.send(
+        "red-1", packed(record(1), record(2)), "hazard-key", **{"X-Skidpad-Drive": f"{0:032x}"}
+    )
+    (rate,) = world.get("axle", "/api/v1/trends").json()["hazards"]
+    assert (rate["events"], rate["hours"], rate["rate"]) == (2, 1.5, 2 / 1.5)
+    assert world.get("bolt", "/api/v1/trends").json()["hazards"] == []
+
+
+@pytest.mark.req("C-174")
+def test_an_authority_learns_places_and_no_vehicle(world):
+    vehicles = ("red-1", "red-2", "blue-1")
+    for k, vehicle in enumerate(vehicles):
+        hazards = [record(10 * k + i, (110.0 + i, 20.0)) for i in range(2)]
+        hazards.append(
+            record(10 * k + 5, (9000.0, 0.0), HazardType.STUCK_VEHICLE, precipitation="80")
+        )
+        if k:  # a place of two vehicles only
+            hazards.append(record(10 * k + 7, (5000.0, 5000.0)))
+        assert world.send(vehicle, packed(*hazards), f"batch-key-{k}").status_code == 200
+    answer = world.get("authority", "/api/v1/places")
+    assert [(p["x"], p["y"], p["hazard"], p["weather"], p["count"]) for p in answer.json()] == [
+        (150.0, 50.0, "ego_tailgating", "day, dry", 6),
+        (9050.0, 50.0, "stuck_vehicle", "day, heavy rain", 3),
+    ]
+    page = world.get("authority", "/api/v1/places.html").text
+    assert "sight distance" in page
+    pdf = world.get("authority", "/api/v1/places.pdf").content
+    assert pdf.startswith(b"%PDF")
+    for name in vehicles:
+        who = world.accounts[name].principal
+        for secret in (who.vehicle, who.tenant, who.id, name):
+            assert secret not in answer.text + page
+    assert world.get("red operator", "/api/v1/places").json() == []  # two of one's own are too few
+    assert world.get("researcher", "/api/v1/places").status_code == 403
+
+
+def crowd(tmp_path, n: int) -> World:
+    one = make_world(tmp_path / "data", None)
+    with one.fleet.engine.begin() as connection:
+        for k in range(n):
+            one.accounts[f"car-{k}"] = add_vehicle(connection, "red", "axle", f"car-{k}", NOW)
+    return one
+
+
+@pytest.mark.req("C-177")
+def test_nobody_is_found_again_in_the_research_export(tmp_path):
+    """An attacker sees every export, knows all other vehicles' hazards, and asks about one of them."""
+    world = crowd(tmp_path, 9)
+    rng = np.random.default_rng(3)
+    hour = int(NOW // HOUR)
+    told: dict[tuple, set[str]] = {}
+    seen: list[list[dict]] = []
+    for step in range(12):
+        world.clock.now = (hour + step) * HOUR + 10.0
+        for k in range(9):
+            for i in range(int(rng.integers(0, 3))):
+                place = (float(rng.integers(0, 2)) * 500.0 + 250.0, 250.0)
+                world.clock.now += 1.0
+                one = record(1000 * step + 10 * k + i, place)
+                body = packed(one)
+                assert world.send(f"car-{k}", body, f"{step}-{k}-{i}-key").status_code == 200
+                told.setdefault((hour + step, place[0]), set()).add(f"car-{k}")
+        seen.append(export(world.fleet))
+    assert seen[-1] == []  # nothing younger than a day
+    for step in range(12):
+        world.clock.now = (hour + step + 25) * HOUR + 1.0
+        late = record(900_000 + step, (250.0, 250.0))
+        assert world.send("car-0", packed(late), f"late-{step}-key").status_code == 200
+        seen.append(export(world.fleet))
+    final = seen[-1]
+    assert final
+    expected = {key for key, cars in told.items() if len(cars) >= K}
+    assert {(r["hour"], r["x"]) for r in final} == expected
+    for before, after in itertools.pairwise(seen):  # differences are whole hours
+        assert after[: len(before)] == before
+        new = after[len(before) :]
+        assert not {r["hour"] for r in new} & {r["hour"] for r in before}
+        for r in new:
+            assert len(told[r["hour"], r["x"]]) >= K
+            assert r["hazards_at_least"] % K == 0
+    text = json.dumps(final)
+    for account in world.accounts.values():
+        assert account.principal.id not in text
+        assert (account.principal.vehicle or "none") not in text
+    assert set(final[0]) == {"hour", "map", "x", "y", "hazard", "weather", "hazards_at_least"}
+    assert world.get("researcher", "/api/v1/research").json() == final
+    world.close()
+
+
+def test_an_export_with_one_vehicle_less_differs_by_whole_rows_only(tmp_path):
+    """The differencing attack: the fleet with and without one car, all else equal."""
+    exports = []
+    for n, without in ((7, None), (7, "car-6")):
+        world = crowd(tmp_path / f"{without}", n)
+        hour = int(NOW // HOUR)
+        world.clock.now = hour * HOUR
+        for k in range(n):
+            if f"car-{k}" != without:
+                body = packed(record(k, (250.0, 250.0)))
+                assert world.send(f"car-{k}", body, f"car-key-{k}").status_code == 200
+        world.clock.now += 26 * HOUR
+        exports.append(export(world.fleet))
+        world.close()
+    assert exports[0] == exports[1]  # 7 and 6 hazards both read "at least 5"
+
+
+def test_the_safety_case_says_what_is_known_and_how_sure(lite):
+    assert {c["verdict"] for c in lite.get("axle", "/api/v1/safety-case").json()} == {"no evidence"}
+    for k in range(2):
+        send_rows(
+            lite,
+            f"red-{k + 1}",
+            "key-aaaa-1",
+            row(0, 300),
+            row(0, 0, indicator="object_location_similarity"),
+        )
+    found = {c["id"]: c for c in lite.get("axle", "/api/v1/safety-case").json()}
+    assert (found["S1"]["verdict"], found["S1"]["share"]) == ("challenged", 0.5)
+    assert found["S4"]["verdict"] == "open"  # two vehicles prove nothing
+    assert found["S2"]["verdict"] == "no evidence"
+    assert {c["id"] for c in lite.get("authority", "/api/v1/safety-case").json()} == set(found)

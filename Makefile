@@ -8,7 +8,7 @@ RUN_ARGS ?=
 TEST_ARGS ?=
 DRIVE_ARGS ?=
 
-.PHONY: cockpit run test check wheel-check bench refs data figures clean
+.PHONY: cockpit run test check wheel-check bench fuzz refs data figures clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next $(RUN_ARGS)
@@ -25,6 +25,11 @@ check: $(VENV)/.checked-with
 
 wheel-check: $(BIN)/python
 	PYTHON=$(BIN)/python .ci/wheel
+
+# damaged files for every reader; what CI tries are the first 500
+FUZZ ?= 10000
+fuzz: $(VENV)/.tested-with
+	$(BIN)/python -m pytest -n 2 tests/faults/test_readers.py --fuzz $(FUZZ) --durations=0
 
 bench: $(VENV)/.installed
 	$(BIN)/skidpad bench

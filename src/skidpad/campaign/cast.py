@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping
 from copy import deepcopy
 from dataclasses import dataclass, replace
+from math import isfinite, nan
 from pathlib import Path
 from typing import Any
 
 from skidpad.campaign.drive import Script, Supervising, Timer, Unsupervised
 from skidpad.campaign.keeping import road_file
 from skidpad.campaign.starts import start_of
-from skidpad.core.errors import ConfigError
+from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.run import (
@@ -28,6 +29,7 @@ from skidpad.core.run import (
 )
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
+from skidpad.core.told import told
 from skidpad.core.vocabulary import Control, Outcome
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
@@ -107,7 +109,8 @@ class Stage:
             return None
         played = self.player.scenario
         first = played.start.entities[played.ego].speed
-        return max(kmh_from_mps(float(played.ego_entity.properties.get(CRUISE, first))), 1.0)
+        speed = _number_of(played, CRUISE)
+        return max(kmh_from_mps(first if speed is None else speed), 1.0)
 
     @property
     def triggered(self) -> bool:
@@ -119,8 +122,7 @@ class Stage:
         """m, of the ego's route where the scenario names one."""
         if self.player is None:
             return None
-        length = self.player.scenario.ego_entity.properties.get(ROUTE_LENGTH)
-        return None if length is None else float(length)
+        return _number_of(self.player.scenario, ROUTE_LENGTH)
 
     @property
     def outcome(self) -> Outcome:
@@ -128,6 +130,20 @@ class Stage:
         if self.player is not None and self.player.hit:
             return Outcome.COLLISION
         return Outcome.COMPLETED if self.triggered else Outcome.NOT_TRIGGERED
+
+
+def _number_of(played: scenarios.Scenario, name: str) -> float | None:
+    """A property of the ego that is a number; None where it has none of this name."""
+    text = played.ego_entity.properties.get(name)
+    if text is None:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = nan
+    if not isfinite(value):
+        raise FileError(f"property {name} of the ego must be a number, got {told(text, 100)}")
+    return value
 
 
 def stage_of(spec: RunSpec) -> Stage:

@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import isfinite
 
 from msgspec import structs
 
 from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.run import AdasDriver, DriverSpec, RunSpec
+from skidpad.core.told import told
 from skidpad.core.weather import RANGES, Weather
 from skidpad.stack.configurations import CONFIGURATIONS, functions_of
 
+SWEEP_MAX = 10_000  # values of one sweep
 FIRST_SEED = 1  # seeds that reports use count up from here
 TUNING_SEEDS = range(900_000, 1_000_000)  # seeds for choosing parameters, never reported
 
@@ -22,9 +25,12 @@ def published_drivers(numbers: str) -> list[AdasDriver]:
         return [AdasDriver(label=str(n), functions=f) for n, f in CONFIGURATIONS.items()]
     drivers = []
     for text in numbers.split(","):
-        if not text.strip().isdigit():
+        known = {str(n) for n in CONFIGURATIONS}
+        if text.strip() not in known:
             allowed = ", ".join(map(str, CONFIGURATIONS))
-            raise ConfigError(f"unknown configuration {text.strip()!r}; choose among: {allowed}")
+            raise ConfigError(
+                f"unknown configuration {told(text.strip(), 100)}; choose among: {allowed}"
+            )
         drivers.append(AdasDriver(label=text.strip(), functions=functions_of(int(text))))
     return drivers
 
@@ -34,16 +40,21 @@ def sweep(weather: Sequence[Weather], text: str) -> list[Weather]:
     name, equals, span = text.partition("=")
     if not equals or name not in RANGES:
         raise ConfigError(
-            f"--sweep takes FIELD=FROM:TO:STEP with a weather field ({', '.join(RANGES)}), got {text!r}"
+            f"--sweep takes FIELD=FROM:TO:STEP with a weather field ({', '.join(RANGES)}), "
+            f"got {told(text, 100)}"
         )
     try:
         start, stop, step = (float(part) for part in span.split(":"))
     except ValueError:
         raise ConfigError(
-            f"--sweep {name} takes three numbers FROM:TO:STEP, got {span!r}"
+            f"--sweep {name} takes three numbers FROM:TO:STEP, got {told(span, 100)}"
         ) from None
-    if step <= 0.0 or stop < start:
-        raise ConfigError(f"--sweep {name} needs A <= B and STEP > 0, got {span!r}")
+    if not (step > 0.0 and start <= stop and isfinite(stop - start)):
+        raise ConfigError(f"--sweep {name} needs A <= B and STEP > 0, got {told(span, 100)}")
+    if (stop - start) / step > SWEEP_MAX:
+        raise ConfigError(
+            f"--sweep {name} makes more than {SWEEP_MAX} values, got {told(span, 100)}"
+        )
     values = [start + k * step for k in range(int((stop - start) / step + 1e-9) + 1)]
     for value in values:
         require_range(f"weather.{name}", value, *RANGES[name])

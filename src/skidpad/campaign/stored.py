@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import msgspec
-import yaml
 
 from skidpad.campaign.grip_cells import DURATION, drawn_course
 from skidpad.campaign.runfolder import CONFIG
 from skidpad.core.errors import FileError
+from skidpad.core.reading import UNUSABLE, decode_yaml, read_bytes
 from skidpad.core.run import VERSION, RunSpec, run_from_plain
+from skidpad.core.told import told
 from skidpad.recording.channel_drives import read_record
 from skidpad.scenarios.variation import CutIn
 from skidpad.stack.configurations import functions_of
@@ -22,20 +24,10 @@ Plain = dict[str, Any]
 def read_run(folder: Path) -> RunSpec:
     """The run that a folder's config.yaml describes; FileError when it cannot be told."""
     path = folder / CONFIG
-    try:
-        plain = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FileError(f"cannot read {path}: {error.strerror}") from error
-    except yaml.YAMLError as error:
-        raise FileError(f"{path} is not YAML: {' '.join(str(error).split())}") from error
+    plain = decode_yaml(read_bytes(path, "run"), str(path))
     if not isinstance(plain, dict):
         raise FileError(f"{path} does not describe a run")
-    if "version" in plain:
-        return run_from_plain(plain, str(path))
-    try:
-        return run_from_plain(from_version_1(plain), str(path))
-    except (KeyError, TypeError, AttributeError) as error:
-        raise FileError(f"{path} does not describe a run: {error!r}") from error
+    return _described(plain, from_version_1, path)
 
 
 def read_segment(recording: Path) -> RunSpec:
@@ -44,12 +36,17 @@ def read_segment(recording: Path) -> RunSpec:
     record = read_record(path)
     if record is None:
         raise FileError(f"{path} does not describe a driven segment")
-    if "version" in record.plan:
-        return run_from_plain(record.plan, str(path))
+    return _described(record.plan, _segment_1, path)
+
+
+def _described(plain: Plain, older: Callable[[Plain], Plain], path: Path) -> RunSpec:
+    """The run of a description of this version, or of one that `older` turns into it."""
     try:
-        return run_from_plain(_segment_1(record.plan), str(path))
-    except (KeyError, TypeError, AttributeError) as error:
-        raise FileError(f"{path} does not describe a driven segment: {error!r}") from error
+        return run_from_plain(plain if "version" in plain else older(plain), str(path))
+    except FileError:
+        raise
+    except UNUSABLE as error:
+        raise FileError(f"{path} does not describe a run: {told(error, 400)}") from None
 
 
 def from_version_1(plain: Plain) -> Plain:

@@ -9,6 +9,7 @@ from pathlib import Path
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.jit import user_cache
 from skidpad.core.names import path_part
+from skidpad.core.reading import is_file
 from skidpad.core.run import BackendChoice, BackendKind
 from skidpad.roads.bundled import bundled_maps
 
@@ -31,7 +32,7 @@ def checked(choice: BackendChoice) -> BackendChoice:
 
 def map_of(map: str, choice: BackendChoice) -> str:
     """A bundled map or a file as it is; a CARLA server's own map is fetched and kept as a file."""
-    named = map in bundled_maps() or Path(map).is_file() or Path(map).suffix
+    named = map in bundled_maps() or is_file(Path(map)) or Path(map).suffix
     if choice.backend is BackendKind.EMBEDDED or named:
         return map
     folder = user_cache() / "carla-maps"

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from enum import Enum
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import typer
 
@@ -32,15 +33,20 @@ def list_(folder: Path = DIR) -> None:
     """One line per hazard."""
     from skidpad.recording.hazards import read_index
 
-    rows = read_index(folder)
+    for line in lines(read_index(folder)):
+        typer.echo(line)
+
+
+def lines(rows: list[dict[str, Any]]) -> Iterator[str]:
+    """A line of text per row of an index."""
     for row in rows:
         flags = f" [{', '.join(row['flags'])}]" if row["flags"] else ""
-        typer.echo(
+        yield (
             f"{row['id']}  {row['type']:<26} {row['t_start']:.1f} to {row['t_end']:.1f} s  "
             f"{row['count']} cycles  {', '.join(row['involved'])}{flags}"
         )
     if not rows:
-        typer.echo("no hazard was found")
+        yield "no hazard was found"
 
 
 @hazards.command()

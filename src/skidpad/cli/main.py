@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import signal
+import threading
+from collections.abc import Callable
+from typing import NoReturn
+
 import typer
 
 import skidpad
@@ -27,6 +32,9 @@ from skidpad.cli.rerun import rerun, study
 from skidpad.cli.spread import spread
 from skidpad.cli.view import view
 from skidpad.core.errors import InputError, SkidpadError
+from skidpad.core.told import clean
+
+LONGEST = 100_000  # characters of what is wrong
 
 app = typer.Typer(
     name="skidpad",
@@ -110,13 +118,28 @@ def carla_server(context: typer.Context) -> None:
     command(context.args)
 
 
+def _terminated(number: int, frame: object) -> NoReturn:
+    del frame
+    raise SystemExit(128 + number)
+
+
 def main() -> None:
-    """Run the command line; input that cannot be used ends with one sentence and exit code 2."""
+    """Run the command line."""
+    guarded(app)
+
+
+def guarded(command: Callable[[], object]) -> None:
+    """Run a command; input that cannot be used ends with one sentence and exit code 2.
+
+    SIGTERM ends it as Ctrl-C does: what is under way is dropped, what is done is kept.
+    """
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, _terminated)
     try:
-        app()
+        command()
     except InputError as error:
-        typer.echo(f"skidpad: {error}", err=True)
+        typer.echo(f"skidpad: {clean(str(error), LONGEST)}", err=True)
         raise SystemExit(2) from None
     except SkidpadError as error:
-        typer.echo(f"skidpad: {error}", err=True)
+        typer.echo(f"skidpad: {clean(str(error), LONGEST)}", err=True)
         raise SystemExit(1) from None

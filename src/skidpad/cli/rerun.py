@@ -22,14 +22,22 @@ def rerun(
     begin: Annotated[float, typer.Option("--from", help="s of simulated time.")] = 0.0,
     end: Annotated[float, typer.Option("--to", help="s of simulated time.")] = 10.0,
     video: Annotated[Path | None, typer.Option(help="Write a film to this .mp4 file.")] = None,
+    yes: Annotated[
+        bool, typer.Option("--yes", help="Run the code that the folder names without asking.")
+    ] = False,
 ) -> None:
     """Drive a stored run again: all twelve views and the tier trace of a stretch, hash-checked.
 
     Channels are driven again as a whole, without views.
     """
     from skidpad.campaign import rerun as again
+    from skidpad.campaign.stored import read_run, read_segment
 
-    if run.suffix == RECORDING:
+    is_segment = run.suffix == RECORDING
+    for foreign in (read_segment if is_segment else read_run)(run).foreign_code:
+        if not yes:
+            typer.confirm(f"{run} names {foreign}, which would be run; go on?", abort=True)
+    if is_segment:
         same = again.same_segment(run)
     else:
         result = again.rerun(run, begin, end, run / "rerun", video)
@@ -66,7 +74,7 @@ def study(
     from rich.progress import Progress
 
     from skidpad.campaign.study import run_study
-    from skidpad.recording.files import write_atomically
+    from skidpad.recording.files import write_csv
 
     with Progress(console=Console(stderr=True)) as progress:
         task = progress.add_task(id)
@@ -75,5 +83,5 @@ def study(
         )
     typer.echo(f"{verdict.finding.id}: {verdict.finding.claim}\n{verdict.text}")
     if out is not None:
-        write_atomically(out, table.write_csv)
+        write_csv(out, table)
         typer.echo(str(out))

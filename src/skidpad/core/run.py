@@ -285,6 +285,19 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return f"{self.cell}-{self.seed:0{_DIGITS[type(self.course)]}d}"
 
     @property
+    def foreign_code(self) -> tuple[str, ...]:
+        """What of somebody else's a drive of this run would execute, in words."""
+        driver = self.driver
+        found = []
+        if isinstance(driver, (StackDriver, AgentDriver)) and not driver.where.startswith(OURS):
+            found.append(
+                f"the {'stack' if isinstance(driver, StackDriver) else 'agent'} {driver.where!r}"
+            )
+        if self.backend.server_command:
+            found.append(f"the command {self.backend.server_command!r}")
+        return tuple(found)
+
+    @property
     def deadline_s(self) -> float:
         """Wall time after which the run counts as hanging."""
         return DEADLINE_BASE_S + DEADLINE_PER_SIMULATED_S * self.duration
@@ -299,6 +312,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return {"version": VERSION, **plain}
 
 
+OURS = "skidpad."  # stacks of this package are no foreign code
 _DIGITS: dict[type[Struct], int] = {Roads: 3, Scenario: 6, Route: 5}  # of the seed in a name
 
 

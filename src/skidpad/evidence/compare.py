@@ -11,6 +11,7 @@ from enum import Enum
 import polars as pl
 
 from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.told import told
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.evidence.statistics import Comparison, compare_pairs
 from skidpad.recording.matrix import Metrics
@@ -98,13 +99,15 @@ def parse_rule(text: str) -> Rule:
     """`fatal_collisions > 0.1`: column, one of > >= < <=, number; about the mean difference."""
     match = RULE.match(text)
     if not match:
-        raise ConfigError(f"--fail-if takes COLUMN > NUMBER (or >=, <, <=), got {text!r}")
+        raise ConfigError(f"--fail-if takes COLUMN > NUMBER (or >=, <, <=), got {told(text, 200)}")
     column, sign, number = match.groups()
     require_choice("column", column, columns())
     try:
         limit = float(number)
     except ValueError:
-        raise ConfigError(f"--fail-if: {number!r} is no number, in {text!r}") from None
+        raise ConfigError(
+            f"--fail-if: {told(number, 100)} is no number, in {told(text, 200)}"
+        ) from None
     return Rule(text, column, OPERATORS[sign], limit)
 
 

@@ -10,7 +10,8 @@ from typing import Any
 
 import msgspec
 
-from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.errors import ConfigError
+from skidpad.core.reading import converted, decode_yaml, read_bytes
 from skidpad.core.weather import Weather
 
 MATRIX, GRIP = "matrix", "grip"
@@ -20,15 +21,17 @@ SNOW = "snow"  # the one preset that only the physical grip model knows
 def _weather(fields: Any, where: str) -> Weather:
     """A Weather from a mapping; an unknown key is an error."""
     if not isinstance(fields, dict):
-        raise ConfigError(f"{where} must be a mapping of weather fields, got {fields!r}")
+        raise ConfigError(
+            f"{where} must be a mapping of weather fields, got one of type {type(fields).__name__}"
+        )
     known = Weather.__dataclass_fields__
     unknown = sorted(str(key) for key in fields if key not in known)
     if unknown:
-        raise ConfigError(f"{where}: unknown field {unknown[0]!r}; known are {', '.join(known)}")
-    try:
-        return msgspec.convert(fields, Weather)
-    except msgspec.ValidationError as error:
-        raise ConfigError(f"{where}: {error}") from error
+        raise ConfigError(
+            f"{where}: unknown field {unknown[0]!r:.100}; known are {', '.join(known)}"
+        )
+    weather: Weather = converted(fields, Weather, where)
+    return weather
 
 
 @lru_cache(maxsize=1)
@@ -66,12 +69,7 @@ def preset(name: str) -> Weather:
 
 def load_weather(path: Path) -> Weather:
     """Weather from a YAML file of fields; its name is the file's unless it gives one."""
-    try:
-        fields = msgspec.yaml.decode(path.read_bytes())
-    except OSError as error:
-        raise FileError(f"cannot read weather file {path}: {error.strerror}") from error
-    except msgspec.DecodeError as error:
-        raise FileError(f"weather file {path} is not YAML: {error}") from error
+    fields = decode_yaml(read_bytes(path, "weather file"), f"weather file {path}")
     weather = _weather(fields, f"weather file {path}")
     return weather if weather.name else replace(weather, name=path.stem)
 

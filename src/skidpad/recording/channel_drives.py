@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from skidpad.core.reading import UNUSABLE
 from skidpad.recording.ledger import Entry
 from skidpad.recording.results import Columns
 
@@ -81,7 +82,7 @@ def read_record(path: Path) -> DriveRecord | None:
     """A record; None when there is none, or something else."""
     try:
         return msgspec.json.decode(path.read_bytes(), type=DriveRecord)
-    except (msgspec.DecodeError, OSError):
+    except (*UNUSABLE, OSError):
         return None
 
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import msgspec
 
-from skidpad.core.errors import FileError
 from skidpad.core.geometry import Pose
+from skidpad.core.reading import UNUSABLE, unusable
 from skidpad.core.states import ContactEvent, LaneInvasion
 from skidpad.core.vocabulary import LightState, RelocationReason
 
@@ -76,8 +76,8 @@ def decode_events(text: bytes, name: str = "events.jsonl") -> tuple[Event, ...]:
         try:
             fields = msgspec.json.decode(line)
             events.append(msgspec.convert(fields, KINDS[fields.pop("event")]))
-        except (msgspec.MsgspecError, KeyError, TypeError, AttributeError) as error:
-            raise FileError(f"{name}, line {number} is not an event: {error}") from error
+        except UNUSABLE as error:
+            raise unusable(f"{name}, line {number}", "an event", error) from error
     return tuple(events)
 
 

@@ -5,15 +5,21 @@ from __future__ import annotations
 import errno
 import hashlib
 import os
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
 
 from skidpad.core.errors import FileError, OutputError
+from skidpad.core.reading import UNUSABLE, is_file, read_bytes, unusable
 
+SUM, NO_SUM = "skidpad.sum", "0" * 64  # of a file's bytes, with zeros in place of itself
+PARQUET_MAX = 4 * 1024**3  # bytes of a file
+VALUES_MAX = 1_000_000_000  # of a Parquet file
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)  # disk, quota, limit on the size of a file
 
 
@@ -48,19 +54,60 @@ def _fill(path: Path, content: bytes) -> None:
 
 def write_parquet(path: Path, table: pl.DataFrame, metadata: dict[str, str] | None = None) -> None:
     """Write `table` as zstd Parquet, atomically, with `metadata` in its footer."""
-    write_atomically(
-        path, lambda part: table.write_parquet(part, compression="zstd", metadata=metadata or {})
-    )
+    buffer = BytesIO()  # polars takes no path that is not UTF-8
+    table.write_parquet(buffer, compression="zstd", metadata=(metadata or {}) | {SUM: NO_SUM})
+    content = buffer.getvalue()
+    at = content.rindex(NO_SUM.encode())
+    digest = hashlib.sha256(content).hexdigest().encode()
+    write_bytes(path, content[:at] + digest + content[at + len(digest) :])
+
+
+def _require_sum(content: bytes, path: Path) -> None:
+    """FileError for a table of ours that is not what was written.
+
+    Polars can end the whole process over a damaged page, so damage is found before it reads. Files
+    of versions before this one have no checksum and are read as they are.
+    """
+    found = content.rfind(SUM.encode())
+    if found < 0:
+        return
+    at = found + len(SUM) + 2  # Thrift's compact protocol: a byte for the type, one for the length
+    plain = content[:at] + NO_SUM.encode() + content[at + len(NO_SUM) :]
+    if hashlib.sha256(plain).hexdigest().encode() != content[at : at + len(NO_SUM)]:
+        raise FileError(f"{path} is not a readable Parquet file: its checksum is another")
+
+
+def write_csv(path: Path, table: pl.DataFrame) -> None:
+    """Write `table` as CSV, atomically."""
+    write_bytes(path, table.write_csv().encode())
 
 
 def read_parquet(path: Path) -> tuple[pl.DataFrame, dict[str, str]]:
     """The table at `path` and the metadata in its footer; FileError when it is not Parquet."""
+    if not is_file(path):
+        raise FileError(f"there is no file {path}")
+    content = read_bytes(path, "table", PARQUET_MAX)
+    _require_sum(content, path)
     try:
-        return pl.read_parquet(path), dict(pl.read_parquet_metadata(path))
-    except FileNotFoundError as error:
-        raise FileError(f"there is no file {path}") from error
-    except (pl.exceptions.PolarsError, OSError) as error:
-        raise FileError(f"{path} is not a readable Parquet file: {error}") from error
+        rows = pl.scan_parquet(BytesIO(content)).select(pl.len()).collect().item()
+        if rows * max(len(pl.read_parquet_schema(BytesIO(content))), 1) > VALUES_MAX:
+            raise FileError(f"{path} holds more than {VALUES_MAX} values")
+        about = dict(pl.read_parquet_metadata(BytesIO(content)))
+        return pl.read_parquet(BytesIO(content)), about
+    except FileError:
+        raise
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException, OSError, *UNUSABLE) as error:
+        raise unusable(str(path), "a readable Parquet file", error) from error
+
+
+def require_columns(table: pl.DataFrame, wanted: Mapping[str, Any], path: Path) -> pl.DataFrame:
+    """The table with these columns in these types; FileError for one that is not there or another."""
+    for name, kind in wanted.items():
+        if name not in table.columns:
+            raise FileError(f"{path} has no column {name!r}: it is another kind of table")
+        if table.schema[name] not in (kind, pl.Null):
+            raise FileError(f"{path}: column {name!r} holds {table.schema[name]}, not {kind}")
+    return table.with_columns(pl.col(name).cast(kind) for name, kind in wanted.items())
 
 
 def output_error(path: Path, error: Exception) -> OutputError:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.errors import FileError
 from skidpad.core.names import inside
-from skidpad.recording.files import read_parquet, write_parquet
+from skidpad.recording.files import read_parquet, require_columns, write_parquet
 from skidpad.recording.ledger import Entry
 from skidpad.recording.results import Columns, metric
 
@@ -83,7 +83,8 @@ def read_series(folder: Path, run: str) -> pl.DataFrame:
     cell, _, seed = run.rpartition("-")
     if not (seed.isascii() and seed.isdigit()):
         raise FileError(f"the ledger of {folder} names a run {run!r:.200}, which has no seed")
-    return read_parquet(series_path(folder, cell, int(seed)))[0]
+    path = series_path(folder, cell, int(seed))
+    return require_columns(read_parquet(path)[0], dict.fromkeys(COLUMNS, pl.Float32), path)
 
 
 def read_stopping(folder: Path) -> pl.DataFrame:

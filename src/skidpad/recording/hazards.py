@@ -14,6 +14,7 @@ from typing import Any
 
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import FileError, OutputError
+from skidpad.core.reading import UNUSABLE, decode_json, read_bytes, unusable
 from skidpad.core.vocabulary import HazardType
 from skidpad.recording.hazard_text import HEADER, encode_worlds
 from skidpad.recording.hazard_text_reader import decode_worlds
@@ -22,6 +23,7 @@ TEXT_FILE = "hazards.txt"
 INDEX_FILE = "hazards.jsonl"
 RECORD_LIMIT = 32 * 1024 * 1024  # bytes of one record
 FILE_LIMIT = 1024 * 1024 * 1024
+INDEX_LIMIT = 256 * 1024 * 1024
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,14 +134,7 @@ def decode_record(text: str) -> HazardRecord:
     try:
         row = json.loads(lines[0][2:])
         record, expected = _record(row), int(row["cycles"])
-    except (
-        ValueError,
-        KeyError,
-        TypeError,
-        AttributeError,
-        OverflowError,
-        RecursionError,
-    ) as error:
+    except UNUSABLE as error:
         raise FileError(f"a hazard record has an unreadable head ({error})") from error
     worlds = decode_worlds(lines[1:-2], len(record.channels))
     if len(worlds) != expected:
@@ -219,11 +214,13 @@ def _records(stream: Iterator[str]) -> Iterator[HazardRecord]:
 def read_index(folder: Path) -> list[dict[str, Any]]:
     """The rows of the index file."""
     path = folder / INDEX_FILE
-    try:
-        return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
-    except OSError as error:
-        raise FileError(
-            f"{path}: cannot be read ({error.strerror}); `skidpad monitor` writes it"
-        ) from error
-    except ValueError as error:
-        raise FileError(f"{path}: holds a line that is not JSON ({error})") from error
+    lines = read_bytes(path, "`skidpad monitor` writes the index", INDEX_LIMIT).splitlines()
+    rows = []
+    for number, line in enumerate(lines, start=1):
+        where = f"{path}, line {number}"
+        row = decode_json(line, where, dict[str, Any])
+        try:
+            rows.append(row | index_row(_record(row)) | {"cycles": int(row["cycles"])})
+        except UNUSABLE as error:
+            raise unusable(where, "a hazard of an index", error) from None
+    return rows

@@ -10,10 +10,21 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from skidpad.recording.files import read_parquet, write_parquet
+from skidpad.recording.files import read_parquet, require_columns, write_parquet
 
 Floats = NDArray[np.float64]
 FILE = "indicators.parquet"
+TYPES = {
+    "cycle": pl.Int64,
+    "t": pl.Float64,
+    "subject": pl.String,
+    "indicator": pl.String,
+    "value": pl.Float64,
+    "evaluated": pl.Boolean,
+    "threshold": pl.Float64,
+    "violated": pl.Boolean,
+    "claim": pl.String,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +81,7 @@ class IndicatorLog:
 
 def read_indicators(folder: Path) -> pl.DataFrame:
     """The table in a monitor's output folder."""
-    return read_parquet(folder / FILE)[0]
+    return require_columns(read_parquet(folder / FILE)[0], TYPES, folder / FILE)
 
 
 def _bound(column: Column, upper: bool) -> float:

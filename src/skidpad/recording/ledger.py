@@ -19,6 +19,7 @@ import msgspec
 
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.names import inside
+from skidpad.core.reading import decode_json, read_bytes
 from skidpad.core.told import clean
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.files import output_error, write_bytes
@@ -26,6 +27,7 @@ from skidpad.recording.results import Timing
 
 LEDGER, CAMPAIGN = "ledger.jsonl", "campaign.json"
 SUM = re.compile(rb',"sum":"([0-9a-f]{8})"}$')
+IDENTITY_MAX = 256 * 1024**2  # bytes: version 0.1 wrote every run
 DAMAGED = "ledger.damaged"  # lines that were set aside
 RETRIED = frozenset({Outcome.CRASHED, Outcome.TIMEOUT})  # by resume (decision L-7)
 
@@ -261,12 +263,10 @@ def read_identity(folder: Path) -> dict[str, Any]:
     path = folder / CAMPAIGN
     if not path.is_file():
         return {}
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=dict[str, Any])
-    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
-        raise FileError(f"{path} is damaged: {error}") from error
-    except OSError as error:
-        raise FileError(f"cannot read {path}: {error.strerror}") from error
+    identity: dict[str, Any] = decode_json(
+        read_bytes(path, "campaign", IDENTITY_MAX), str(path), dict[str, Any]
+    )
+    return identity
 
 
 def campaign_command(folder: Path) -> str:
@@ -277,10 +277,13 @@ def campaign_command(folder: Path) -> str:
 def common_configuration(folder: Path) -> dict[str, Any]:
     """What all runs of a campaign have in common."""
     identity = read_identity(folder)
+    common = identity.get("common", {})
     if "cells" in identity:  # written by version 0.1: a template, or every cell in full
-        common: dict[str, Any] = identity.get("template") or identity["cells"][0]
-        return common
-    return dict(identity.get("common", {}))
+        common = identity.get("template") or (identity["cells"] or [{}])
+        common = common[0] if isinstance(common, list) else common
+    if not isinstance(common, dict):
+        raise FileError(f"{folder / CAMPAIGN} does not describe a campaign")
+    return dict(common)
 
 
 def encode_identity(identity: dict[str, Any]) -> bytes:

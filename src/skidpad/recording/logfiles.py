@@ -11,8 +11,10 @@ import polars as pl
 from numpy.typing import NDArray
 
 from skidpad.core.errors import FileError
-from skidpad.core.states import ActorTable
-from skidpad.recording.events import decode_events, encode_events
+from skidpad.core.reading import UNUSABLE, decode_json, read_bytes, unusable
+from skidpad.core.states import ActorTable, ContactEvent
+from skidpad.core.vocabulary import Supervision
+from skidpad.recording.events import Event, decode_events, encode_events
 from skidpad.recording.files import content_hash, read_parquet, write_bytes, write_parquet
 from skidpad.recording.runlog import (
     ActorSeries,
@@ -25,6 +27,7 @@ from skidpad.recording.runlog import (
 
 TICKS, EVENTS = "ticks.parquet", "events.jsonl"
 SCHEMA_VERSION = "1"
+EVENTS_MAX = 1024**3  # bytes
 KEY = "skidpad"
 BOOLEANS = {
     "applied_handbrake",
@@ -101,26 +104,55 @@ def write_log(folder: Path, log: RunLog) -> str:
     return _hash(log, table)
 
 
+class _Actors(msgspec.Struct, frozen=True):
+    """The table of actors in the head of a log."""
+
+    names: tuple[str, ...]
+    types: tuple[str, ...]
+    kind: list[int]
+    length: list[float]
+    width: list[float]
+    height: list[float]
+    rgb: list[tuple[int, int, int]]
+
+
+class _Kept(msgspec.Struct, frozen=True):
+    """The head of a log."""
+
+    schema: str
+    header: LogHeader
+    weathers: tuple[str, ...]
+    actors: _Actors
+
+
 def read_log(folder: Path) -> RunLog:
     """The log in `folder`; FileError names what is missing or not a log."""
     table, metadata = read_parquet(folder / TICKS)
+    where = str(folder / TICKS)
     if KEY not in metadata:
-        raise FileError(f"{folder / TICKS} is a Parquet file, but not a tick log")
-    head = msgspec.json.decode(metadata[KEY])
-    if head["schema"] != SCHEMA_VERSION:
+        raise FileError(f"{where} is a Parquet file, but not a tick log")
+    plain = decode_json(metadata[KEY], f"the head of {where}", dict[str, Any])
+    if plain.get("schema") != SCHEMA_VERSION:
         raise FileError(
-            f"{folder / TICKS} has schema {head['schema']}, this version reads {SCHEMA_VERSION}"
+            f"{where} has schema {plain.get('schema')!r:.50}, this version reads {SCHEMA_VERSION}"
         )
+    text = read_bytes(folder / EVENTS, "events", EVENTS_MAX)
+    events = decode_events(text, str(folder / EVENTS))
     try:
-        text = (folder / EVENTS).read_bytes()
-    except OSError as error:
-        raise FileError(f"cannot read {folder / EVENTS}: {error.strerror}") from error
-    actors = _table_from(head["actors"])
+        log = _log(table, msgspec.convert(plain, _Kept), events)
+        _require_indices(log)
+    except (*UNUSABLE, pl.exceptions.PolarsError) as error:
+        raise unusable(where, "a tick log", error) from None
+    return log
+
+
+def _log(table: pl.DataFrame, head: _Kept, events: tuple[Event, ...]) -> RunLog:
+    actors = _table_from(head.actors)
     n = len(actors)
     return RunLog(
-        header=msgspec.convert(head["header"], LogHeader),
+        header=head.header,
         table=actors,
-        tick=table["tick"].to_numpy(),
+        tick=_whole(table, "tick"),
         actors=ActorSeries(*(_matrix(table, f, n) for f in ActorSeries._fields)),
         present=_matrix(table, "present", n).astype(np.bool_),
         mu=_matrix(table, "mu", 4 * n).reshape(-1, n, 4),
@@ -128,11 +160,34 @@ def read_log(folder: Path) -> RunLog:
         applied=_series(table, "applied_", CommandSeries),
         requested=_series(table, "requested_", CommandSeries),
         report=_series(table, "stack_", ReportSeries),
-        supervision=table["supervision"].to_numpy().astype(np.int64),
-        weather=table["weather"].to_numpy().astype(np.int64),
-        weathers=tuple(head["weathers"]),
-        events=decode_events(text, str(folder / EVENTS)),
+        supervision=_whole(table, "supervision"),
+        weather=_whole(table, "weather"),
+        weathers=head.weathers,
+        events=events,
     )
+
+
+def _require_indices(log: RunLog) -> None:
+    """ValueError unless ticks rise and what counts something points into it."""
+    n = len(log.table)
+    if (np.diff(log.tick) <= 0).any() or (log.tick < 0).any():
+        raise ValueError("ticks must rise")
+    if len(log) and (int(log.weather.min()) < 0 or int(log.weather.max()) >= len(log.weathers)):
+        raise ValueError("weather is none of its weathers")
+    if not set(log.supervision.tolist()) <= set(Supervision):
+        raise ValueError("supervision is no phase")
+    if not n or not 0.0 < log.header.dt < 10.0:
+        raise ValueError("there must be an ego and a time step")
+    if any(not -1 <= e.actor < n for e in log.events if isinstance(e, ContactEvent)):
+        raise ValueError("a contact with an actor that is not there")
+
+
+def _whole(table: pl.DataFrame, name: str) -> NDArray[np.int64]:
+    column = table[name]
+    if not column.dtype.is_integer() or column.null_count():
+        raise ValueError(f"column {name} must hold whole numbers")
+    values: NDArray[np.int64] = column.cast(pl.Int64).to_numpy()
+    return values
 
 
 def _matrix(table: pl.DataFrame, name: str, width: int) -> NDArray[Any]:
@@ -163,13 +218,15 @@ def _head(log: RunLog) -> dict[str, Any]:
     }
 
 
-def _table_from(head: dict[str, Any]) -> ActorTable:
+def _table_from(head: _Actors) -> ActorTable:
+    if len({len(getattr(head, name)) for name in head.__struct_fields__}) != 1:
+        raise ValueError("the columns of actors differ in length")
     return ActorTable(
-        names=tuple(head["names"]),
-        types=tuple(head["types"]),
-        kind=np.array(head["kind"], dtype=np.uint8),
-        length=np.array(head["length"], dtype=np.float64),
-        width=np.array(head["width"], dtype=np.float64),
-        height=np.array(head["height"], dtype=np.float64),
-        rgb=np.array(head["rgb"], dtype=np.uint8).reshape(-1, 3),
+        names=head.names,
+        types=head.types,
+        kind=np.array(head.kind, dtype=np.uint8),
+        length=np.array(head.length, dtype=np.float64),
+        width=np.array(head.width, dtype=np.float64),
+        height=np.array(head.height, dtype=np.float64),
+        rgb=np.array(head.rgb, dtype=np.uint8).reshape(-1, 3),
     )

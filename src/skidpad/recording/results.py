@@ -18,7 +18,8 @@ from skidpad.core.errors import FileError
 from skidpad.recording.files import (
     content_hash,
     read_parquet,
-    write_atomically,
+    require_columns,
+    write_csv,
     write_parquet,
 )
 
@@ -74,7 +75,7 @@ class Columns(Generic[K, M]):
         for name, content in ((RESULTS, table), (TIMING, walls_table)):
             write_parquet(folder / name, content)
             if csv:
-                write_atomically((folder / name).with_suffix(".csv"), content.write_csv)
+                write_csv((folder / name).with_suffix(".csv"), content)
         return self.hash(table)
 
     def checked(self, table: pl.DataFrame, path: Path) -> pl.DataFrame:
@@ -82,17 +83,9 @@ class Columns(Generic[K, M]):
 
         Metrics of versions that did not have them yet are null.
         """
-        wanted = schema(self.key, self.metrics)
-        needed = schema(self.key)
-        for name, kind in wanted.items():
-            if name in needed and name not in table.columns:
-                raise FileError(f"{path} has no column {name!r}: it is of another kind of campaign")
-            if name in table.columns and table.schema[name] not in (kind, pl.Null):
-                raise FileError(f"{path}: column {name!r} holds {table.schema[name]}, not {kind}")
-        return table.with_columns(
-            pl.col(name).cast(kind) if name in table.columns else pl.lit(None, kind).alias(name)
-            for name, kind in wanted.items()
-        )
+        later = {n: k for n, k in schema(self.metrics).items() if n not in table.columns}
+        table = table.with_columns(pl.lit(None, kind).alias(name) for name, kind in later.items())
+        return require_columns(table, schema(self.key, self.metrics), path)
 
     def hash(self, table: pl.DataFrame) -> str:
         """Content hash of results; the order of rows does not matter (decision X-1)."""

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame
 from skidpad.core.errors import ConfigError, FileError, MissingExtra
+from skidpad.core.reading import decode_yaml, read_bytes
 from skidpad.recording.channels import Losses, Message
 from skidpad.recording.ros_objects import OBJECT_READERS, RosObjects, empty_objects, yaw_of
 
@@ -102,12 +103,7 @@ class Mapping(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def load_mapping(path: Path) -> Mapping:
     """Read and check a mapping file."""
-    try:
-        mapping = msgspec.yaml.decode(path.read_bytes(), type=Mapping)
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror})") from error
-    except msgspec.MsgspecError as error:
-        raise ConfigError(f"{path}: {error}") from error
+    mapping: Mapping = decode_yaml(read_bytes(path, "mapping"), str(path), Mapping)
     if not mapping.channels:
         raise ConfigError(f"{path}: names no channels")
     return mapping

@@ -13,7 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import FileError
+from skidpad.core.reading import UNUSABLE, read_arrays, read_bytes, unusable
 from skidpad.core.setup import LanePosition
+from skidpad.roads.checked import EXTENT, check_arrays
 from skidpad.roads.lanes import LaneSamples, LaneTable, SignalTable
 from skidpad.roads.roadside import (
     Barrier,
@@ -24,6 +26,8 @@ from skidpad.roads.roadside import (
     SignalHead,
 )
 
+SIZE_MAX = 512 * 1024**2  # bytes of a baked file
+BAKED = "a baked map"
 FORMAT = 2  # of the baked file; raise it when columns change
 
 
@@ -80,26 +84,32 @@ class BakedMap:
 
 def load_baked(path: Path) -> BakedMap:
     """Read what `BakedMap.save` wrote; FileError for anything else."""
+    where = f"baked map {path}"
+    arrays = read_arrays(read_bytes(path, "baked map", SIZE_MAX), where, BAKED)
     try:
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = dict(stored)
         about = json.loads(str(arrays.pop("about")))
         if about["format"] != FORMAT:
-            raise FileError(f"{path}: baked in format {about['format']}, need {FORMAT}")
+            raise FileError(f"{where}: baked in format {about['format']}, need {FORMAT}")
         start = about["ego_start"]
-        return BakedMap(
-            name=about["name"],
+        baked = BakedMap(
+            name=str(about["name"]),
             samples=LaneSamples(*(arrays[f"samples.{c}"] for c in LaneSamples._fields)),
             lanes=LaneTable(*(arrays[f"lanes.{c}"] for c in LaneTable._fields)),
             signals=SignalTable(*(arrays[f"signals.{c}"] for c in SignalTable._fields)),
             roadside=_roadside(arrays),
-            geo_reference=about["geo_reference"],
-            ego_start=None if start is None else LanePosition(*start),
+            geo_reference=str(about["geo_reference"]),
+            ego_start=None if start is None else _start(*start),
         )
-    except (OSError, ValueError, KeyError, EOFError) as error:
-        if isinstance(error, FileError):
-            raise
-        raise FileError(f"{path}: not a baked map: {error}") from None
+        check_arrays(baked.samples, baked.lanes, baked.signals, where)
+    except FileError:
+        raise
+    except UNUSABLE as error:
+        raise unusable(where, BAKED, error) from None
+    return baked
+
+
+def _start(road: int, lane: int, s: float) -> LanePosition:
+    return LanePosition(int(road), int(lane), float(s))
 
 
 def _roadside_arrays(roadside: Roadside) -> dict[str, NDArray[Any]]:
@@ -130,8 +140,21 @@ def _roadside_arrays(roadside: Roadside) -> dict[str, NDArray[Any]]:
 
 
 def _split(arrays: dict[str, NDArray[Any]], name: str) -> list[NDArray[np.float64]]:
-    sizes = arrays[f"{name}.sizes"]
-    return np.split(arrays[f"{name}.points"], np.cumsum(sizes)[:-1]) if len(sizes) else []
+    points, sizes = _rows(arrays, f"{name}.points", 3), arrays[f"{name}.sizes"]
+    if sizes.dtype.kind not in "iu" or sizes.ndim != 1 or (sizes < 0).any():
+        raise ValueError(f"{name}.sizes must hold numbers of points")
+    if int(sizes.sum(dtype=np.int64)) != len(points):
+        raise ValueError(f"{name}.sizes must add up to {len(points)} points")
+    return np.split(points, np.cumsum(sizes)[:-1]) if len(sizes) else []
+
+
+def _rows(arrays: dict[str, NDArray[Any]], name: str, width: int) -> NDArray[np.float64]:
+    table = arrays[name]
+    if table.dtype.kind not in "iuf" or table.ndim != 2 or table.shape[1] != width:
+        raise ValueError(f"{name} must hold rows of {width} numbers")
+    if not (np.abs(table) <= EXTENT).all():
+        raise ValueError(f"{name} holds what is no number of use")
+    return np.asarray(table, dtype=np.float64)
 
 
 def _roadside(arrays: dict[str, NDArray[Any]]) -> Roadside:
@@ -139,16 +162,16 @@ def _roadside(arrays: dict[str, NDArray[Any]]) -> Roadside:
         barriers=tuple(
             Barrier(BarrierKind(int(kind)), points, float(height))
             for (kind, height), points in zip(
-                arrays["barriers.about"], _split(arrays, "barriers"), strict=True
+                _rows(arrays, "barriers.about", 2), _split(arrays, "barriers"), strict=True
             )
         ),
-        boxes=tuple(_box(*row) for row in arrays["boxes"].tolist()),
+        boxes=tuple(_box(*row) for row in _rows(arrays, "boxes", 12).tolist()),
         heads=tuple(
             SignalHead(int(signal), x, y, z, heading, diameter)
-            for signal, x, y, z, heading, diameter in arrays["heads"].tolist()
+            for signal, x, y, z, heading, diameter in _rows(arrays, "heads", 6).tolist()
         ),
         crosswalks=tuple(_split(arrays, "crosswalks")),
-        parking=tuple(ParkingSpace(*row) for row in arrays["parking"].tolist()),
+        parking=tuple(ParkingSpace(*row) for row in _rows(arrays, "parking", 6).tolist()),
     )
 
 

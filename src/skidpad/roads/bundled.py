@@ -8,6 +8,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.reading import is_file, read_bytes
 from skidpad.roads.baked import BakedMap, load_baked
 from skidpad.roads.queries import RoadMap
 
@@ -26,7 +27,7 @@ def map_file(map: str | Path) -> Path:
     if name in bundled_maps():
         return FOLDER / f"{name}.xodr"
     path = Path(map)
-    if path.is_file():
+    if is_file(path):
         return path
     if path.suffix or len(path.parts) > 1:
         raise FileError(f"map {name}: there is no such file")
@@ -55,12 +56,9 @@ def kept_map(folder: Path, name: str, content_hash: str) -> RoadMap:
 def bake_file(path: Path) -> BakedMap:
     """The baked map of an OpenDRIVE file; the name is the file's."""
     from skidpad.roads.opendrive.bake import bake  # lxml and scipy are needed for baking only
+    from skidpad.roads.opendrive.document import SIZE_MAX
 
-    try:
-        text = path.read_bytes()
-    except OSError as error:
-        raise FileError(f"map {path}: cannot be read: {error.strerror}") from None
-    return bake(text, path.stem, str(path))
+    return bake(read_bytes(path, "map", SIZE_MAX), path.stem, str(path))
 
 
 def load_map(map: str | Path) -> RoadMap:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.reading import is_file
 from skidpad.roads.bundled import bundled_maps, load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.actions.controllers import Activate, Several
@@ -204,7 +205,7 @@ def _network(root: Node, maps: Sequence[Path]) -> Network:
     name = logic.text("filepath").replace("\\", "/")
     beside = root.file.parent / name
     elsewhere = [folder / f"{Path(name).stem}.xodr" for folder in maps]
-    found = [p for p in (beside, *elsewhere) if p.is_file()]
+    found = [p for p in (beside, *elsewhere) if is_file(p)]
     if found and not _is_bundled(root.file, name):
         path = str(found[0])
     elif _bare(name) in bundled_maps():

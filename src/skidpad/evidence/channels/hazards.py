@@ -14,7 +14,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.errors import ConfigError
+from skidpad.core.reading import decode_yaml, read_bytes
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.indicators.layout import Layout, Readings
@@ -168,18 +169,9 @@ class Rule:
 def load_rules(profile: Profile, path: Path | None = None) -> tuple[Rule, ...]:
     """The rules of `profile`: the built-in ones, or those of the file at `path`."""
     name = str(path) if path else "hazard_rules.yaml"
-    try:
-        data = (
-            path.read_bytes()
-            if path
-            else files("skidpad.evidence.channels").joinpath("hazard_rules.yaml").read_bytes()
-        )
-    except OSError as error:
-        raise FileError(f"{name}: cannot be read ({error.strerror})") from error
-    try:
-        tables = msgspec.yaml.decode(data, type=dict[Profile, dict[HazardType, _RuleText]])
-    except msgspec.MsgspecError as error:
-        raise ConfigError(f"{name}: {error}") from error
+    built_in = files("skidpad.evidence.channels").joinpath("hazard_rules.yaml")
+    data = read_bytes(path, "hazard rules") if path else built_in.read_bytes()
+    tables = decode_yaml(data, name, dict[Profile, dict[HazardType, _RuleText]])
     if profile not in tables:
         raise ConfigError(f"{name}: holds no profile {profile.value}")
     return tuple(

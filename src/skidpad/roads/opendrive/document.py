@@ -197,7 +197,7 @@ def parse(text: bytes, file: str) -> Document:
     try:
         root = etree.fromstring(text, parser)
     except etree.XMLSyntaxError as error:
-        raise FileError(f"{file}: not XML: {error}") from None
+        raise FileError(f"{file}: not XML: {' '.join(str(error).split())}") from None
     if root.tag != "OpenDRIVE":
         raise FileError(f"{file}: not OpenDRIVE, its root element is <{root.tag}>")
     if root.getroottree().docinfo.internalDTD is not None:

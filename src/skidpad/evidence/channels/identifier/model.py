@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 import json
-import zipfile
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -15,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.reading import UNUSABLE, read_arrays, read_bytes, unusable
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.identifier.features import FEATURE_NAMES, FeatureHistory, features_at
 from skidpad.evidence.channels.identifier.forest import Forest, check_forest, probabilities
@@ -24,6 +24,7 @@ Floats = NDArray[np.float64]
 VERSION = 1
 ALL_ROUTES = "all"
 BLOCK = 4096  # cycles judged at once
+MODEL = "a model of the identifier"
 SIZE_LIMIT = 64 * 1024 * 1024  # bytes of a model file
 BUNDLED = "bundled"  # the model that comes with Skidpad; its card lies beside it
 
@@ -147,29 +148,13 @@ def load_model(path: Path | None) -> Model:
     """The model at `path`; None or the word `bundled`: the one that comes with Skidpad."""
     name = BUNDLED if path is None else str(path)
     file = Path(__file__).parent / "models" / "hazards.npz" if name == BUNDLED else Path(name)
+    data = read_bytes(file, "model", SIZE_LIMIT)
     try:
-        data = file.read_bytes()
-    except OSError as error:
-        raise FileError(
-            f"{name}: cannot be read ({error.strerror}); `skidpad channels train` writes a model"
-        ) from error
-    if len(data) > SIZE_LIMIT:
-        raise FileError(f"{name}: is larger than {SIZE_LIMIT} bytes")
-    try:
-        with np.load(io.BytesIO(data), allow_pickle=False) as arrays:
-            return _model({key: arrays[key] for key in arrays.files})
+        return _model(read_arrays(data, name, MODEL))
     except FileError as error:
         raise FileError(f"{name}: {error}") from error
-    except (
-        ValueError,
-        KeyError,
-        TypeError,
-        OSError,
-        EOFError,
-        zipfile.BadZipFile,
-        AttributeError,
-    ) as error:
-        raise FileError(f"{name}: is not a model of the identifier ({error})") from error
+    except UNUSABLE as error:
+        raise unusable(name, MODEL, error) from None
 
 
 def _model(arrays: dict[str, Any]) -> Model:

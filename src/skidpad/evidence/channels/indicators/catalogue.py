@@ -12,7 +12,8 @@ from pathlib import Path
 
 import msgspec
 
-from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.errors import ConfigError
+from skidpad.core.reading import decode_yaml, read_bytes
 
 
 class Scope(str, Enum):
@@ -98,14 +99,8 @@ class Threshold(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def load_thresholds(path: Path | None = None) -> dict[Indicator, Threshold]:
     """Thresholds of all indicators: the built-in ones, or those of the file at `path`."""
     name = str(path) if path else "thresholds.yaml"
-    try:
-        data = path.read_bytes() if path else _built_in("thresholds.yaml")
-    except OSError as error:
-        raise FileError(f"{name}: cannot be read ({error.strerror})") from error
-    try:
-        table = msgspec.yaml.decode(data, type=dict[Indicator, Threshold])
-    except msgspec.MsgspecError as error:
-        raise ConfigError(f"{name}: {error}") from error
+    data = read_bytes(path, "thresholds") if path else _built_in("thresholds.yaml")
+    table: dict[Indicator, Threshold] = decode_yaml(data, name, dict[Indicator, Threshold])
     missing = [i.value for i in Indicator if i not in table]
     if missing:
         raise ConfigError(f"{name}: no entry for {', '.join(missing)}")

@@ -1,0 +1,463 @@
+"""Every reader of foreign files, with files that it reads, for tests that damage them."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import msgspec
+import mutation
+import numpy as np
+import yaml
+from lxml import etree
+
+import runs
+from channel_worlds import Eyes, World, drive
+from skidpad.campaign.cells import published_drivers, sweep
+from skidpad.campaign.stored import read_run, read_segment
+from skidpad.campaign.worker import Finished
+from skidpad.core.weather import Weather
+from toy_campaign import RECIPE as TOY
+from toy_campaign import campaign as toy_campaign
+
+Mutate = Callable[[random.Random, bytes], bytes]
+ROADS = 6  # of the town that stay in the map that is damaged
+
+
+@dataclass(frozen=True)
+class Reader:
+    """read: what is given the damaged file. share: of the inputs, where reading one takes long."""
+
+    file: str  # its name
+    seeds: Callable[[], list[bytes]]
+    read: Callable[[Path], object]
+    mutations: tuple[Mutate, ...] = (mutation.mutated,)
+    share: float = 1.0
+
+
+def here(jobs: Any) -> Any:
+    """Runs jobs in this process."""
+    for job in jobs:
+        yield Finished(job, value=job.work(job.argument))
+
+
+def built_in(package: str, name: str) -> bytes:
+    return resources.files(package).joinpath(name).read_bytes()
+
+
+# --- YAML and JSON
+
+
+def weather_files() -> list[bytes]:
+    plain = {"title": "Wet", "wetness": 40.0, "precipitation": 10, "fog_density": 1e1}
+    return [yaml.safe_dump(plain).encode(), b"wetness: &a 3\nprecipitation: *a\n"]
+
+
+def read_weather(path: Path) -> object:
+    from skidpad.physics.presets import load_weather
+
+    return load_weather(path).values()
+
+
+def run_files() -> list[bytes]:
+    described = [runs.adas_run(), runs.scenario_run("ghost_cut_in"), runs.segment_run()]
+    return [yaml.safe_dump(run.to_plain(), sort_keys=False).encode() for run in described] + [
+        (
+            b"stack: null\ndriver: '2'\nfunctions: [acc]\noptions: {}\nmap: figure8\ntraffic: fixed\n"
+            b"vehicles: 2\nallow_fewer: false\nduration: 5.0\nsensors: objects\nrender: needed\n"
+            b"weather: {name: a}\nseed: 1\nprofile: recommended\nsettings: {}\nbackend: {kind: embedded}\n"
+        )
+    ]
+
+
+def read_stored(path: Path) -> object:
+    from skidpad.stack.settings import settings_of
+
+    run = read_run(path.parent)
+    return run.name, run.resolved(), settings_of(run)
+
+
+def records() -> list[bytes]:
+    from skidpad.recording.channel_drives import DriveOutcome, DriveRecord, Ending
+
+    outcome = DriveOutcome(
+        driven_s=1.0, distance_m=2.0, collisions=0, collisions_struck=0, red_lights_run=0,
+        stalls=0, ended=Ending.TIME, switches=0, minimal_risk_s=0.0, route="r", seed=1,
+        drive_by="arbiter", driving_s={"a": 1.0},
+    )  # fmt: skip
+    return [msgspec.json.encode(DriveRecord(runs.segment_run().to_plain(), outcome))]
+
+
+def rules() -> list[bytes]:
+    return [built_in("skidpad.evidence.channels", "hazard_rules.yaml")]
+
+
+def read_rules(path: Path) -> object:
+    from skidpad.evidence.channels.hazards import Profile, load_rules
+
+    return load_rules(Profile("practical"), path)
+
+
+def thresholds() -> list[bytes]:
+    return [built_in("skidpad.evidence.channels.indicators", "thresholds.yaml")]
+
+
+def read_thresholds(path: Path) -> object:
+    from skidpad.evidence.channels.indicators.catalogue import load_thresholds
+
+    return load_thresholds(path)
+
+
+def mappings() -> list[bytes]:
+    return [
+        (
+            b"clock: header\nchannels:\n  a:\n    ego: {topic: /odom, length: 4.5, width: 1.8}\n"
+            b"    plan: {topic: /plan, frame: ego}\n    objects: {topic: /objects}\n"
+        )
+    ]
+
+
+def read_mapping(path: Path) -> object:
+    from skidpad.recording.rosbag import load_mapping
+
+    return load_mapping(path)
+
+
+def labels() -> list[bytes]:
+    return [
+        (
+            b"hazard,start_s,end_s,world,annotator,note,recording\n"
+            b'ego_tailgated,1.0,2.5,sim,me,,a\nstuck_vehicle,3,4,channels,me,"so, so",\n'
+        )
+    ]
+
+
+def read_labels(path: Path) -> object:
+    from skidpad.evidence.channels.judging.evaluation import read_labels
+
+    return read_labels(path)
+
+
+# --- what a campaign and a run leave
+
+
+@cache
+def toy_files() -> dict[str, bytes]:
+    with TemporaryDirectory() as folder:
+        toy_campaign(2).run(Path(folder), here)
+        return {p.name: p.read_bytes() for p in Path(folder).iterdir()}
+
+
+def read_identity(path: Path) -> object:
+    from skidpad.recording.ledger import campaign_command, common_configuration
+
+    return campaign_command(path.parent), common_configuration(path.parent)
+
+
+def identities() -> list[bytes]:
+    return [toy_files()["campaign.json"], b'{"cells": [{"a": 1}], "command": "adas"}']
+
+
+def read_toy_ledger(path: Path) -> object:
+    from skidpad.recording.ledger import latest, read_ledger
+
+    return latest(read_ledger(path.parent, TOY.entry))
+
+
+def read_toy_results(path: Path) -> object:
+    from skidpad.recording.results import read_results
+
+    return read_results(path.parent, TOY.columns)
+
+
+@cache
+def run_folder() -> dict[str, bytes]:
+    from skidpad.campaign.run import run
+    from skidpad.recording.logfiles import write_log
+
+    driven = run(runs.adas_run(duration=2.0, vehicles=2))
+    with TemporaryDirectory() as folder:
+        write_log(Path(folder), driven.log)
+        return {p.name: p.read_bytes() for p in Path(folder).iterdir()}
+
+
+def read_drive(path: Path) -> object:
+    """The log, and what `skidpad show` makes of it."""
+    from skidpad.evidence.drive.collisions import find_crashes
+    from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
+    from skidpad.evidence.drive.prepared import prepare
+    from skidpad.recording.logfiles import log_hash, read_log
+    from skidpad.roads.bundled import load_map
+
+    for name, content in run_folder().items():
+        if name != path.name:
+            (path.parent / name).write_bytes(content)
+    log = read_log(path.parent)
+    road_map = load_map("figure8")
+    with np.errstate(all="ignore"):
+        found = run_metrics(log, road_map), weather_metrics(log, road_map)
+        return log_hash(log), found, list(find_crashes(prepare(log, road_map)))
+
+
+# --- maps, models, scenarios
+
+
+@cache
+def small_town() -> bytes:
+    root = etree.fromstring(built_in("skidpad.roads", "maps/town.xodr"))
+    for surplus in root.findall("road")[ROADS:]:
+        root.remove(surplus)
+    return etree.tostring(root)
+
+
+@cache
+def baked_town() -> bytes:
+    from skidpad.roads.opendrive.bake import bake
+
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "town.npz"
+        bake(small_town(), "town", "town").save(path)
+        return path.read_bytes()
+
+
+def read_map(path: Path) -> object:
+    from skidpad.roads.bundled import load_map
+    from skidpad.roads.summary import summarise
+
+    with np.errstate(all="ignore"):
+        road_map = load_map(path)
+        road_map.project(1.0, 2.0, 0.0)
+        return summarise(road_map)
+
+
+def models() -> list[bytes]:
+    return [built_in("skidpad.evidence.channels.identifier", "models/hazards.npz")]
+
+
+def read_model(path: Path) -> object:
+    from skidpad.evidence.channels.identifier.model import load_model
+
+    model = load_model(path)
+    return model.identifier(), model.trained_on()
+
+
+@cache
+def scenarios() -> list[bytes]:
+    from skidpad.scenarios.shipped import NAMES, scenario_file
+
+    return [scenario_file(name).read_bytes() for name in sorted(NAMES)]
+
+
+def beside(path: Path) -> None:
+    road = path.parent / "straight.xodr"
+    if not road.exists():
+        road.write_bytes(built_in("skidpad.scenarios", "catalogue/straight.xodr"))
+
+
+def read_scenario(path: Path) -> object:
+    from skidpad.campaign.cast import check_scenario
+    from skidpad.core.run import Scenario
+
+    beside(path)
+    return check_scenario(Scenario(file=str(path))).findings
+
+
+def play_scenario(path: Path) -> object:
+    from skidpad.campaign.run import run
+
+    beside(path)
+    with np.errstate(all="ignore"):
+        return run(runs.scenario_run(path, duration=0.5)).outcome
+
+
+# --- channels
+
+
+@cache
+def recording() -> bytes:
+    from skidpad.recording.channels import ChannelWriter
+
+    world = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(50.0, 3.5, 0, 15, 0), (-9, 0, 0, 16, 0)]))
+    listed = drive(world, (Eyes("left", 0.03), Eyes("right", 0.03)), 1.5)
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "a.mcap"
+        with ChannelWriter(path, listed.channels) as writer:
+            for channel, item in listed.rows:
+                if channel is not None:
+                    writer.write(listed.channels[channel], item)
+                else:
+                    writer.write_truth(item)
+        return path.read_bytes()
+
+
+def read_recording(path: Path) -> object:
+    """A recording through the whole monitor."""
+    from skidpad.evidence.channels.monitor import MonitorSettings
+    from skidpad.live.watch import watch
+    from skidpad.recording.sources import open_channels
+
+    out = path.parent / "watched"
+    with np.errstate(all="ignore"):
+        return watch(open_channels(path, truth=False), out, MonitorSettings())
+
+
+def mutated_messages(rng: random.Random, data: bytes) -> bytes:
+    """A recording with other numbers in its messages, well packed."""
+    import io
+
+    from mcap.reader import make_reader
+    from mcap.writer import Writer
+
+    from skidpad.recording import channels_pb2 as pb
+
+    out = io.BytesIO()
+    writer = Writer(out)
+    writer.start()
+    schemas: dict[str, int] = {}
+    topics: dict[str, int] = {}
+    reader = make_reader(io.BytesIO(data))
+    found = list(reader.iter_messages())
+    harmed = {rng.randrange(len(found)) for _ in range(rng.choice((1, 3, len(found))))}
+    for k, (schema, channel, message) in enumerate(found):
+        if schema.name not in schemas:
+            schemas[schema.name] = writer.register_schema(schema.name, schema.encoding, schema.data)
+        if channel.topic not in topics:
+            topics[channel.topic] = writer.register_channel(
+                channel.topic, channel.message_encoding, schemas[schema.name]
+            )
+        body = message.data
+        if k in harmed:
+            parsed = getattr(pb, schema.name.removeprefix("skidpad.")).FromString(body)
+            _harm(rng, parsed)
+            body = parsed.SerializeToString()
+        writer.add_message(topics[channel.topic], message.log_time, body, message.publish_time)
+    writer.finish()
+    return out.getvalue()
+
+
+def _harm(rng: random.Random, message: Any) -> None:
+    field = rng.choice(message.DESCRIPTOR.fields)
+    value = getattr(message, field.name)
+    if hasattr(value, "extend"):
+        if value and rng.random() < 0.7:
+            _put(rng, field, value, rng.randrange(len(value)))
+        elif rng.random() < 0.5:
+            del value[:]
+        else:
+            value.extend(list(value))
+    elif field.message_type is None and not hasattr(value, "update"):
+        number = rng.choice(mutation.NUMBERS)
+        if field.cpp_type == field.CPPTYPE_DOUBLE:
+            setattr(message, field.name, number)
+
+
+def _put(rng: random.Random, field: Any, values: Any, i: int) -> None:
+    if field.cpp_type in (field.CPPTYPE_DOUBLE, field.CPPTYPE_FLOAT):
+        values[i] = rng.choice(mutation.NUMBERS)
+    elif field.cpp_type != field.CPPTYPE_STRING:
+        values[i] = rng.choice((0, 1, 3, 63, 64, 2**31 - 1))
+
+
+@cache
+def watched() -> dict[str, bytes]:
+    from skidpad.evidence.channels.monitor import MonitorSettings
+    from skidpad.live.watch import watch
+
+    others = np.array([(-11.0, 0, 0, 15.5, 0), (50.0, 3.5, 0, 15, 0)])
+    world = World((0.0, 0.0, 0.0, 15.0, 0.0), others)
+    with TemporaryDirectory() as folder:
+        out = Path(folder) / "out"
+        eyes = (Eyes("lav", 0.03), Eyes("tfuse", 0.03, blind=(0,)))
+        watch(drive(world, eyes, 12.0), out, MonitorSettings())
+        return {p.name: p.read_bytes() for p in out.iterdir()}
+
+
+def read_indicators(path: Path) -> object:
+    from skidpad.evidence.channels.case import evidence_lines
+    from skidpad.recording.indicators import read_indicators
+
+    return list(evidence_lines(read_indicators(path.parent)))
+
+
+def read_hazards(path: Path) -> object:
+    from skidpad.recording.hazards import read_hazards
+    from skidpad.scenarios.hazard_export import export_hazard
+
+    return [export_hazard(r, path.parent / "scenarios") for r in read_hazards(path.parent)]
+
+
+def list_hazards(path: Path) -> object:
+    from skidpad.cli.hazards import lines
+    from skidpad.recording.hazards import read_index
+
+    return list(lines(read_index(path.parent)))
+
+
+# --- words of a command line
+
+
+def words(path: Path) -> object:
+    from skidpad.evidence.compare import parse_rule
+    from skidpad.stack.settings import parse_assignments
+
+    kind, _, text = path.read_bytes().decode("utf-8", "replace").partition(" ")
+    readers: dict[str, Callable[[str], object]] = {
+        "drivers": published_drivers,
+        "sweep": lambda t: sweep([Weather()], t),
+        "rule": parse_rule,
+        "set": lambda t: parse_assignments([t]),
+    }
+    return readers.get(kind, len)(text)
+
+
+def sentences() -> list[bytes]:
+    return [
+        b"drivers 0,1,4",
+        b"sweep wetness=0:100:20",
+        b"rule fatal_collisions > 0.5",
+        b"set mu_ref=0.8",
+    ]
+
+
+BYTES_OR_VALUES = (mutation.mutated, mutation.mutated_npz, mutation.mutated_npz)
+READERS = {
+    "weather": Reader("weather.yaml", weather_files, read_weather),
+    "run": Reader("config.yaml", run_files, read_stored),
+    "segment": Reader("a.json", records, lambda p: read_segment(p.with_suffix(".mcap"))),
+    "rules": Reader("rules.yaml", rules, read_rules),
+    "thresholds": Reader("thresholds.yaml", thresholds, read_thresholds),
+    "mapping": Reader("mapping.yaml", mappings, read_mapping),
+    "labels": Reader("labels.csv", labels, read_labels),
+    "words": Reader("words.txt", sentences, words),
+    "campaign": Reader("campaign.json", identities, read_identity),
+    "ledger": Reader("ledger.jsonl", lambda: [toy_files()["ledger.jsonl"]], read_toy_ledger),
+    "results": Reader(
+        "results.parquet", lambda: [toy_files()["results.parquet"]], read_toy_results,
+        (mutation.mutated, mutation.mutated_parquet),
+    ),
+    "ticks": Reader(
+        "ticks.parquet", lambda: [run_folder()["ticks.parquet"]], read_drive,
+        (mutation.mutated, mutation.mutated_parquet, mutation.mutated_parquet)),
+    "events": Reader("events.jsonl", lambda: [run_folder()["events.jsonl"]], read_drive),
+    "opendrive": Reader(
+        "map.xodr", lambda: [small_town()], read_map, (mutation.mutated_xml, mutation.mutated)),
+    "baked": Reader("map.npz", lambda: [baked_town()], read_map, BYTES_OR_VALUES),
+    "model": Reader("model.npz", models, read_model, BYTES_OR_VALUES, share=0.1),
+    "openscenario": Reader(
+        "a.xosc", scenarios, read_scenario, (mutation.mutated_xml, mutation.mutated)),
+    "played": Reader("a.xosc", scenarios, play_scenario, (mutation.mutated_xml,)),
+    "recording": Reader(
+        "a.mcap", lambda: [recording()], read_recording,
+        (mutation.mutated, mutated_messages, mutated_messages)),
+    "indicators": Reader(
+        "indicators.parquet", lambda: [watched()["indicators.parquet"]], read_indicators,
+        (mutation.mutated, mutation.mutated_parquet)),
+    "hazards": Reader("hazards.txt", lambda: [watched()["hazards.txt"]], read_hazards),
+    "index": Reader("hazards.jsonl", lambda: [watched()["hazards.jsonl"]], list_hazards),
+}  # fmt: skip

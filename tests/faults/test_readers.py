@@ -1,0 +1,86 @@
+"""No file that somebody damaged gives more than one sentence (item 6): seeded mutations of every reader."""
+
+import random
+import signal
+import traceback
+import warnings
+import zlib
+
+import pytest
+from readers import READERS
+
+from skidpad.core.errors import InputError
+
+LISTS = ("openscenario", "played")  # name all that is wrong, a line each
+LONGEST = 50_000  # characters
+FAULTS_SHOWN = 12
+CPU_S = 60  # of one input; thousands of times what one takes
+
+
+class TooLong(BaseException):
+    """An input took its processor time."""
+
+
+def stop(signum, frame):
+    raise TooLong
+
+
+def inputs(name, count, first=0):
+    """Damaged files of a reader, each from its own seed."""
+    reader = READERS[name]
+    seeds = reader.seeds()
+    for number in range(first, first + max(1, round(count * reader.share))):
+        rng = random.Random(zlib.crc32(name.encode()) + number)
+        yield number, rng.choice(reader.mutations)(rng, rng.choice(seeds))
+
+
+def refused(reader, path):
+    """The sentence that refuses a file, "" when it is read."""
+    signal.setitimer(signal.ITIMER_PROF, CPU_S)
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            reader.read(path)
+    except InputError as error:
+        return str(error)
+    finally:
+        signal.setitimer(signal.ITIMER_PROF, 0)
+    return ""
+
+
+@pytest.fixture
+def stopwatch():
+    before = signal.signal(signal.SIGPROF, stop)
+    yield
+    signal.signal(signal.SIGPROF, before)
+
+
+@pytest.mark.parametrize("name", READERS)
+def test_damaged_files_are_read_or_refused_in_a_sentence(name, tmp_path, request, stopwatch):
+    reader = READERS[name]
+    path = tmp_path / reader.file
+    for seed in reader.seeds():  # what is whole is read
+        path.write_bytes(seed)
+        assert not refused(reader, path)
+    first, faults = request.config.getoption("--fuzz-from"), []
+    for number, data in inputs(name, request.config.getoption("--fuzz"), first):
+        path.write_bytes(data)
+        try:
+            said = refused(reader, path)
+        except KeyboardInterrupt:
+            raise
+        except BaseException as error:  # also what libraries call a panic
+            faults.append(f"input {number}: {error!r:.300} in {_place(error)}")
+            if len(faults) >= FAULTS_SHOWN:
+                break
+            continue
+        said.encode()
+        if len(said) > LONGEST or ("\n" in said.strip() and name not in LISTS):
+            faults.append(f"input {number}: says {said!r:.300}")
+    assert not faults, "\n".join(faults)
+
+
+def _place(error):
+    frames = traceback.extract_tb(error.__traceback__)
+    ours = [f for f in frames if "skidpad" in f.filename] or frames
+    return f"{ours[-1].filename}:{ours[-1].lineno}"

@@ -16,6 +16,17 @@ from skidpad.core.errors import BackendError
 
 MAX_MESSAGE = 32 * 1024 * 1024  # bytes; the largest real one is an OpenDRIVE text
 MAX_ITEMS = 100_000  # in one array; the largest real one is a batch of commands
+LIMITS: dict[str, Any] = {
+    "raw": False,
+    "unicode_errors": "replace",
+    "use_list": True,
+    "strict_map_key": True,
+    "max_str_len": MAX_MESSAGE,
+    "max_bin_len": MAX_MESSAGE,
+    "max_array_len": MAX_ITEMS,
+    "max_map_len": 64,
+    "max_ext_len": 0,
+}
 REQUEST = 0
 ANSWER = 1
 NOTIFICATION = 2
@@ -36,30 +47,37 @@ class Request:
 
 
 class Decoder:
-    """Bytes in, requests out, for one connection."""
+    """Bytes in, requests out, for one connection.
+
+    A message is unpacked when it is complete: the head of an array says how much memory to take, and
+    a few bytes could ask for gigabytes that never come.
+    """
 
     def __init__(self) -> None:
-        self._unpacker = msgpack.Unpacker(
-            raw=False,
-            unicode_errors="replace",
-            use_list=True,
-            strict_map_key=True,
-            max_buffer_size=MAX_MESSAGE,
-            max_str_len=MAX_MESSAGE,
-            max_bin_len=MAX_MESSAGE,
-            max_array_len=MAX_ITEMS,
-            max_map_len=64,
-            max_ext_len=0,
-        )
+        self._scanner = msgpack.Unpacker(max_buffer_size=MAX_MESSAGE)
+        self._held = bytearray()  # what is not unpacked yet
+        self._begin = 0  # of it, among all bytes of the connection
 
     def feed(self, data: bytes) -> Iterator[Request]:
         """The requests that `data` completes; ProtocolError ends the connection."""
         try:
-            self._unpacker.feed(data)
-            for message in self._unpacker:
-                yield parse_request(message)
+            self._scanner.feed(data)
+            self._held += data
+            while (message := self._next()) is not None:
+                yield parse_request(msgpack.unpackb(message, **LIMITS))
         except (msgpack.exceptions.UnpackException, ValueError, TypeError, RecursionError) as error:
             raise ProtocolError(f"not a msgpack-rpc request: {error}") from error
+
+    def _next(self) -> bytes | None:
+        try:
+            self._scanner.skip()
+        except msgpack.exceptions.OutOfData:
+            return None
+        length = self._scanner.tell() - self._begin
+        message = bytes(self._held[:length])
+        del self._held[:length]
+        self._begin += length
+        return message
 
 
 def parse_request(message: Any) -> Request:

@@ -16,6 +16,12 @@ from skidpad.core.errors import BackendError
 
 MAX_MESSAGE = 32 * 1024 * 1024  # bytes; the largest real one is an OpenDRIVE text
 MAX_ITEMS = 100_000  # in one array; the largest real one is a batch of commands
+# how an array of three or four may begin, also where its length has not arrived
+HEADS = (
+    b"\x93",
+    b"\x94",
+    *(h + bytes([n]) for h in (b"\xdc\x00", b"\xdd\x00\x00\x00") for n in (3, 4)),
+)
 LIMITS: dict[str, Any] = {
     "raw": False,
     "unicode_errors": "replace",
@@ -72,12 +78,19 @@ class Decoder:
         try:
             self._scanner.skip()
         except msgpack.exceptions.OutOfData:
+            if self._held and not _begins(bytes(self._held[:5])):
+                raise ProtocolError("a request is an array of four") from None
             return None
         length = self._scanner.tell() - self._begin
         message = bytes(self._held[:length])
         del self._held[:length]
         self._begin += length
         return message
+
+
+def _begins(data: bytes) -> bool:
+    """Whether these first bytes are of an array of three or four."""
+    return any(head.startswith(data) or data.startswith(head) for head in HEADS)
 
 
 def parse_request(message: Any) -> Request:

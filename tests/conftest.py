@@ -21,7 +21,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--rewrite-references", action="store_true", help="write reference recordings anew"
     )
-    parser.addoption("--fuzz", type=int, default=500, help="damaged files per reader")
+    parser.addoption("--fuzz", type=int, default=None, help="damaged files per reader")
     parser.addoption("--fuzz-from", type=int, default=0, help="number of the first of them")
 
 

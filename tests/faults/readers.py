@@ -32,7 +32,7 @@ ROADS = 6  # of the town that stay in the map that is damaged
 
 @dataclass(frozen=True)
 class Reader:
-    """read: what is given the damaged file. share: of the inputs, where reading one takes long."""
+    """read: what is given the damaged file. share: of CI's inputs, where reading takes long."""
 
     file: str  # its name
     seeds: Callable[[], list[bytes]]
@@ -443,21 +443,21 @@ READERS = {
     ),
     "ticks": Reader(
         "ticks.parquet", lambda: [run_folder()["ticks.parquet"]], read_drive,
-        (mutation.mutated, mutation.mutated_parquet, mutation.mutated_parquet)),
-    "events": Reader("events.jsonl", lambda: [run_folder()["events.jsonl"]], read_drive),
+        (mutation.mutated, mutation.mutated_parquet, mutation.mutated_parquet), share=0.5),
+    "events": Reader("events.jsonl", lambda: [run_folder()["events.jsonl"]], read_drive, share=0.5),
     "opendrive": Reader(
-        "map.xodr", lambda: [small_town()], read_map, (mutation.mutated_xml, mutation.mutated)),
-    "baked": Reader("map.npz", lambda: [baked_town()], read_map, BYTES_OR_VALUES),
+        "map.xodr", lambda: [small_town()], read_map, (mutation.mutated_xml, mutation.mutated), share=0.5),
+    "baked": Reader("map.npz", lambda: [baked_town()], read_map, BYTES_OR_VALUES, share=0.5),
     "model": Reader("model.npz", models, read_model, BYTES_OR_VALUES, share=0.1),
     "openscenario": Reader(
         "a.xosc", scenarios, read_scenario, (mutation.mutated_xml, mutation.mutated)),
-    "played": Reader("a.xosc", scenarios, play_scenario, (mutation.mutated_xml,)),
+    "played": Reader("a.xosc", scenarios, play_scenario, (mutation.mutated_xml,), share=0.1),
     "recording": Reader(
         "a.mcap", lambda: [recording()], read_recording,
-        (mutation.mutated, mutated_messages, mutated_messages)),
+        (mutation.mutated, mutated_messages, mutated_messages), share=0.3),
     "indicators": Reader(
         "indicators.parquet", lambda: [watched()["indicators.parquet"]], read_indicators,
-        (mutation.mutated, mutation.mutated_parquet)),
-    "hazards": Reader("hazards.txt", lambda: [watched()["hazards.txt"]], read_hazards),
+        (mutation.mutated, mutation.mutated_parquet), share=0.5),
+    "hazards": Reader("hazards.txt", lambda: [watched()["hazards.txt"]], read_hazards, share=0.3),
     "index": Reader("hazards.jsonl", lambda: [watched()["hazards.jsonl"]], list_hazards),
 }  # fmt: skip

@@ -8,6 +8,7 @@ from __future__ import annotations
 import zipfile
 from io import BytesIO
 from pathlib import Path
+from tokenize import TokenError
 from typing import Any
 from zlib import error as zlib_error
 
@@ -151,7 +152,7 @@ def read_arrays(data: bytes, where: str, kind: str = "an .npz file") -> dict[str
             return {m.filename.removesuffix(".npy"): _array(packed, m, where) for m in members}
     except FileError:
         raise
-    except (*UNUSABLE, OSError, zlib_error) as error:
+    except (*UNUSABLE, OSError, zlib_error, SyntaxError, TokenError) as error:
         raise unusable(where, kind, error) from None
 
 

@@ -29,7 +29,9 @@ def check_arrays(samples: LaneSamples, lanes: LaneTable, signals: SignalTable, w
         _columns(signals, k, "signals")
         _within(lanes.size, 2, n, "lanes.size")
         _within(lanes.first, 0, n - 1, "lanes.first")
-        _within(lanes.first.astype(np.int64) + lanes.size, 2, n, "the end of a lane")
+        ends = np.cumsum(lanes.size, dtype=np.int64)
+        _require(int(ends[-1]) == n, "lanes have other samples than there are")
+        _require(bool((lanes.first == ends - lanes.size).all()), "lanes overlap or leave gaps")
         for name in ("left", "right", "opposite"):
             _within(getattr(lanes, name), -1, m - 1, f"lanes.{name}")
         for start, lane in (

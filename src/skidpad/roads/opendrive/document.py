@@ -19,6 +19,7 @@ from skidpad.roads.opendrive.reference_line import (
     ReferenceLine,
 )
 
+LARGEST = 1.0e15  # of any number in a file: its square and cube can be computed with
 SIZE_MAX = 64 * 2**20  # bytes; the largest town that we know has 3.4 MB
 NAMED = 2**30  # ids that are no numbers count from here, away from all usual numbers
 Node = Any  # lxml's element
@@ -136,7 +137,7 @@ class Reader:
         return FileError(f"{self.file}, line {node.sourceline}: <{node.tag}{named}> {problem}")
 
     def number(self, node: Node, name: str, default: float | None = None) -> float:
-        """A finite number; FileError when it is missing (without default) or is none."""
+        """A number that a road may have; FileError when it is missing (without default) or is none."""
         text = node.get(name)
         if text is None and default is not None:
             return default
@@ -146,6 +147,8 @@ class Reader:
             raise self.fail(node, f"needs a number {name}, got {text!r}") from None
         if not isfinite(value):
             raise self.fail(node, f"needs a finite {name}, got {text!r}")
+        if abs(value) > LARGEST:
+            raise self.fail(node, f"needs {name} up to {LARGEST:g}, got {text!r}")
         return value
 
     def integer(self, node: Node, name: str, default: int | None = None) -> int:

@@ -14,6 +14,7 @@ import pytest
 import slow_campaign
 import yaml
 from readers import here
+from waiting import PATIENCE, waited
 
 import runs
 from skidpad.campaign.campaign import Campaign
@@ -25,18 +26,7 @@ from skidpad.recording.logfiles import log_hash, read_log
 from toy_campaign import campaign as toy_campaign
 
 TESTS = Path(__file__).parents[1]
-PATIENCE = 120.0  # s, until something that must happen has happened
 TOSSES = 12
-
-
-def waited(condition):
-    """Whether it came true; a test does not ask how long it took."""
-    end = time.monotonic() + PATIENCE
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.01)
-    return False
 
 
 def lines(out):

@@ -163,8 +163,14 @@ def _kill_group(leader: int | None) -> None:
     """Kill all processes of a worker's group, if it has come to lead one."""
     if leader is None or not hasattr(os, "killpg"):
         return
-    with suppress(OSError):
-        if os.getpgid(leader) == leader:
+    try:
+        leads = os.getpgid(leader) == leader
+    except (
+        ProcessLookupError
+    ):  # it is gone; its group keeps its number while there is somebody in it
+        leads = True
+    if leads:
+        with suppress(OSError):
             os.killpg(leader, signal.SIGKILL)
 
 

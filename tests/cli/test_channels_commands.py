@@ -16,6 +16,7 @@ from typer.testing import CliRunner
 from channel_worlds import Eyes, World, drive
 from skidpad.cli.main import app, main
 from skidpad.core.channels import Context
+from skidpad.core.errors import ConfigError
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
 from skidpad.recording.channels import ChannelWriter
@@ -216,3 +217,39 @@ def test_outcomes_of_a_folder_without_drives_are_refused(tmp_path, monkeypatch, 
     code, said = failing(monkeypatch, capsys, "channels", "outcomes", tmp_path)
     assert code == 2
     assert f"no driven segments below {tmp_path}" in " ".join(said.split())
+
+
+@pytest.mark.req("C-001", "C-004")
+def test_a_drive_with_its_monitor_says_what_it_found_how_late_and_draws_it(tmp_path):
+    out = tmp_path / "driven"
+    words = ("--route", "route-4", "--hours", 2.0 / 3600.0, "--workers", 1, "--out", out)
+    done = invoke("channels", "drive", *words, "--monitor")
+    assert done.exit_code == 0, done.output
+    said = done.output.replace("\n", " ")
+    assert re.search(r"route-4-00000\.monitor: 20 cycles; complete; judged [\d.]+ ms after", said)
+    (page,) = out.glob("*/*.monitor/report.html")
+    assert "<html" in page.read_text(encoding="utf-8")
+    refused = invoke_failing(tmp_path)
+    assert refused == {
+        "--pin gives the monitor a processor and needs --monitor",
+        "unknown --publish 'ros1'; choose one of: ros2, foxglove",
+        "--listen needs --mapping FILE, which says which topics are what",
+        "monitor takes a FILE or --listen ros2, and one of them",
+    }
+
+
+def invoke_failing(folder):
+    """The sentences of commands that ask for what does not go together."""
+    calls = (
+        ("channels", "drive", "--pin", 0),
+        ("channels", "drive", "--publish", "ros1"),
+        ("monitor", "--listen", "ros2"),
+        ("monitor",),
+    )
+    sentences = set()
+    for call in calls:
+        with pytest.raises(ConfigError) as refused:
+            invoke(*call, "--out", folder / "never")
+        sentences.add(str(refused.value))
+    assert not (folder / "never").exists()
+    return sentences

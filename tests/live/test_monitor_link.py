@@ -33,7 +33,7 @@ from skidpad.recording.monitored import read_summary, read_timing
 
 FOLLOWED = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-30.0, 0.0, 0.0, 16.5, 0.0)]))
 BLIND_BEHIND = (Eyes("lav", 0.02), Eyes("tfuse", 0.02, blind=(0,)))
-PATIENCE = 120.0  # s for what another process does
+PATIENCE = 600.0  # s for what another process does
 
 
 def tell(link, source):

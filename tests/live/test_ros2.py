@@ -21,6 +21,7 @@ from skidpad.campaign.channel_drive import drive_segment  # noqa: E402
 from skidpad.core.channels import ChannelFrame  # noqa: E402
 from skidpad.core.errors import FileError  # noqa: E402
 from skidpad.evidence.channels.monitor import MonitorSettings  # noqa: E402
+from skidpad.live.ros2 import publisher as ros2_publisher  # noqa: E402
 from skidpad.live.ros2.listener import RosTopics  # noqa: E402
 from skidpad.live.ros2.messages import Messages  # noqa: E402
 from skidpad.live.ros2.publisher import RosPublisher, mapping_of  # noqa: E402
@@ -32,7 +33,7 @@ from skidpad.recording.indicators import read_indicators  # noqa: E402
 from skidpad.recording.rosbag import Mapping  # noqa: E402
 
 DOMAIN = 1 + os.getpid() % 99  # one per process of the tests; ports below those given at random
-PATIENCE = 120.0
+PATIENCE = 900.0  # s; kernels may have to be compiled first
 WORLD = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-12.0, 0.0, 0.0, 15.6, 0.0)]))
 EYES = (Eyes("lav", 0.02), Eyes("tfuse", 0.02, blind=(0,)))
 
@@ -118,14 +119,24 @@ def test_a_slower_and_a_faster_replay_give_the_same_hazards(tmp_path):
 
 
 @pytest.mark.req("C-200", "C-202")
-def test_a_drive_is_heard_by_a_monitor_of_its_own_command(tmp_path):
+def test_a_drive_is_heard_by_a_monitor_of_its_own_command(tmp_path, monkeypatch):
+    monkeypatch.setattr(ros2_publisher, "LISTENERS", PATIENCE)
     mapping = tmp_path / "map.yaml"
     mapping.write_bytes(
         msgspec.yaml.encode(msgspec.to_builtins(mapping_of(("lav_like", "tfuse_like"))))
     )
     root = Path(__file__).parents[2]
     words = ["monitor", "--listen", "ros2", "--mapping", mapping, "--out", tmp_path / "heard"]
-    call = [sys.executable, "-m", "skidpad", *map(str, words), "--domain", str(DOMAIN)]
+    call = [
+        sys.executable,
+        "-m",
+        "skidpad",
+        *map(str, words),
+        "--domain",
+        str(DOMAIN),
+        "--wait",
+        str(PATIENCE),
+    ]
     environment = {**os.environ, "PYTHONPATH": str(root / "src")}
     monitor = subprocess.Popen(
         call, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True

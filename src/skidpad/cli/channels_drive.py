@@ -66,6 +66,7 @@ def totals(folder: Path) -> str:
     from skidpad.live.outcome import LINK
     from skidpad.recording.results import read_results
 
+    _write_pages(folder)
     driven = read_results(folder).drop_nulls("driven_s")
     sums = driven.select(pl.col(pl.Float64, pl.Int64).sum()).row(0, named=True)
     watched = "".join(f"\n{_watched(link.parent)}" for link in sorted(folder.glob(f"*/*/{LINK}")))
@@ -74,6 +75,16 @@ def totals(folder: Path) -> str:
         f"{sums['distance_m'] / 1000.0:.1f} km, {sums['collisions']} collisions, "
         f"{sums['red_lights_run']} red lights run, {sums['stalls']} stalls{watched}"
     )
+
+
+def _write_pages(folder: Path) -> None:
+    """The page of every drive whose monitor came to its end."""
+    from skidpad.recording.monitored import SUMMARY
+
+    for summary in sorted(folder.glob(f"*/*.monitor/{SUMMARY}")):
+        from skidpad.report.channels import write_drive_report
+
+        write_drive_report(summary.parent)
 
 
 def _watched(folder: Path) -> str:

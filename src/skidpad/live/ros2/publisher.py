@@ -31,6 +31,7 @@ except ImportError as error:
 
 KINDS = {"odom": ODOMETRY, "plan": PATH, "objects": OBJECTS}
 POLL = 0.02  # s
+LISTENERS = 120.0  # s that a lossless drive waits for its listeners
 
 
 def topic_of(channel: str, part: str) -> str:
@@ -61,7 +62,6 @@ class RosPublisher:
         recording: Path,
         flow: Flow,
         domain: int = 0,
-        patience: float = BLOCKING,
     ) -> None:
         self.channels, self.recording, self.flow = tuple(channels), recording, flow
         self.types = Types()
@@ -76,18 +76,18 @@ class RosPublisher:
         self.cycles, self.missing, self.ended = 0, list[int](), ""
         self.described = False
         if flow is Flow.LOSSLESS:
-            self._await_readers(patience)
+            self._await_readers()
 
     def _writer(self, topic: str, kind: str) -> Any:
         wanted = qos(self.flow, self.types.announced(kind))
         rt = Topic(self.participant, f"rt{topic}", self.types.cls(kind), qos=wanted)
         return DataWriter(self.participant, rt, qos=wanted)
 
-    def _await_readers(self, patience: float) -> None:
-        deadline = time.monotonic() + patience
+    def _await_readers(self) -> None:
+        deadline = time.monotonic() + LISTENERS
         while any(not w.get_matched_subscriptions() for w in self.writers.values()):
             if time.monotonic() > deadline:
-                self.ended = f"nobody listened to all topics within {patience:g} s"
+                self.ended = f"nobody listened to all topics within {LISTENERS:g} s"
                 return
             time.sleep(POLL)
 

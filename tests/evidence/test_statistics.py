@@ -9,7 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import stats
 
+from skidpad.core.randomness import stream
 from skidpad.evidence.statistics import (
+    Interval,
     Method,
     bootstrap_interval,
     clopper_pearson,
@@ -18,9 +20,11 @@ from skidpad.evidence.statistics import (
     event_rate,
     holm,
     mcnemar,
+    median_time,
     p_text,
     pairs_needed,
     poisson_interval,
+    seeds_for_verdict,
 )
 
 
@@ -158,3 +162,30 @@ def test_words() -> None:
     assert event_rate([1, 0, 2, 0, 0, 0]).too_few
     assert not event_rate([60, 61]).too_few
     assert (p_text(0.2539), p_text(2e-6)) == ("p = 0.25", "p < 0.001")
+
+
+@pytest.mark.req("R-7")
+@pytest.mark.parametrize("n", [6, 7, 12, 25])
+@pytest.mark.parametrize("end", [2.0, 0.4, 10.0])
+def test_the_interval_of_a_censored_median_covers_it(n, end):
+    rng = stream(5, "test", "median", n)
+    true = float(np.log(2.0))  # of a unit exponential
+    hits = 0
+    for _ in range(2000):
+        low, high = median_time(rng.exponential(1.0, n), end)[1]
+        hits += min(low, end) <= true <= high  # inf is: beyond the end
+    assert hits / 2000 >= 0.94
+
+
+@pytest.mark.req("R-7")
+def test_a_median_beyond_the_end_is_said_to_be_there():
+    assert median_time([3.0, np.inf, np.nan], 500.0)[0] == np.inf
+    assert median_time([3.0, 5.0, np.inf], 500.0) == (5.0, Interval(0.0, np.inf))
+    assert median_time([1.0, 2.0, 4.0, 600.0], 500.0)[0] == 3.0
+
+
+@pytest.mark.req("R-7")
+def test_the_least_seeds_are_those_with_which_a_claim_can_be_shown():
+    for claims in range(1, 60):
+        n = seeds_for_verdict(claims)
+        assert 2.0 ** (1 - n) < 0.05 / claims <= 2.0 ** (2 - n)

@@ -1,8 +1,10 @@
 import re
 
 import numpy as np
+import polars as pl
 import pytest
 
+from skidpad.recording.files import write_parquet
 from skidpad.recording.matrix import MATRIX, Metrics, RunKey
 from skidpad.recording.results import Timing
 from skidpad.report.matrix import build_page, write_report
@@ -40,6 +42,11 @@ def campaign(folder, seeds=3, **changes):
                 values = {
                     "fatal_collisions": n,
                     "collisions_vehicle": n,
+                    "crashes_vehicle": n,
+                    "road_departures": 0,
+                    "off_road": 0,
+                    "fatal_first": min(n, 1),
+                    "first_fatal_s": 400.0 / n if n else None,
                     "collisions_static": 0,
                     "wrong_way": 0,
                     "contacts": n,
@@ -151,3 +158,40 @@ def test_metrics_are_named_in_words_with_their_units(tmp_path):
         "headway variance, m²",
     ):
         assert f">{name}<" in page
+
+
+@pytest.mark.req("R-6", "R-7")
+def test_crashes_departures_and_the_time_to_the_first_lead_the_page(tmp_path):
+    campaign(tmp_path, seeds=7)
+    blocks = build_page(load_matrix(tmp_path)).sections[0].blocks
+    numbers = next(b for b in blocks if b.kind == "numbers").items
+    assert [n.label for n in numbers[:2]] == ["crashes with vehicles", "departures from the road"]
+    assert "first of a chain" in numbers[2].note
+    head = next(b for b in blocks if "What happened" in getattr(b, "caption", ""))
+    assert head.columns[0][0] == "configuration"
+    safest, time = head.rows[-1], head.rows[-1][-1]
+    assert safest[1].text == "0.00"
+    assert time.text == "> 500"  # no run of configuration 4 had one: censored at its end
+    per_run, per_100 = head.rows[0][1].sort, head.rows[0][2].sort
+    assert per_100 == pytest.approx(per_run / 7.0 * 100.0)
+
+
+@pytest.mark.req("R-7")
+def test_the_page_says_how_many_seeds_a_verdict_takes(tmp_path):
+    told = answers_of(tmp_path, seeds=3)["How sure is that?"]
+    tested, least = (
+        int(w) for w in re.findall(r"With (\d+) claims .* at least (\d+) seeds", told)[0]
+    )
+    assert 2.0 ** (1 - least) < 0.05 / tested <= 2.0 ** (2 - least)
+
+
+def test_a_campaign_of_an_older_version_can_still_be_shown(tmp_path):
+    campaign(tmp_path)
+    path = tmp_path / "results.parquet"
+    new = ["crashes_vehicle", "road_departures", "off_road", "fatal_first", "first_fatal_s"]
+    old = pl.read_parquet(path).drop(*new, "off_lanes_pct")
+    write_parquet(path, old)
+    matrix = load_matrix(tmp_path)
+    assert matrix.results["crashes_vehicle"].sum() == old["collisions_vehicle"].sum()
+    assert matrix.results["off_road"].null_count() == len(old)
+    assert "What happened, by configuration" in write_report(tmp_path).read_text()

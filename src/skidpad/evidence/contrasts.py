@@ -23,6 +23,7 @@ from skidpad.evidence.statistics import Interval, compare_pairs, pairs_needed, p
 NOT_RUN = frozenset(  # leave every denominator (L-7)
     {Outcome.AGENT_ERROR.value, Outcome.CRASHED.value, Outcome.TIMEOUT.value}
 )
+DRIVES_APART = ("config", "variant", "controller", "friction", "seed")  # not of the same run
 RUNS_WITHOUT_EVENT = 3.7  # / limit: runs without an event that bound a rate, -ln(0.025)
 SIGNS = "sign changes of the means per seed, exact up to 12"
 SEGMENTS = "sign changes, exact up to 12"
@@ -222,6 +223,7 @@ class Mean:
         where = pl.lit(True) if self.where is None else self.where
         if not _has(table, self.value, where):
             return None
+        table = distinct(table)
         rows = table.sort([c for c in self.by if c in table.columns]) if self.by else table
         rows = rows.with_columns(shown=self.value.cast(pl.Float64), counts=where)
         rows = rows.filter("counts").drop_nulls("shown")
@@ -256,7 +258,7 @@ class RateBelow:
         where = pl.lit(True) if self.where is None else self.where
         if not _has(table, self.events, self.exposure, given, where):
             return None
-        rows = table.filter(where)
+        rows = distinct(table.filter(where))
         events, exposure, known = rows.select(e=self.events, x=self.exposure, g=given).row(0)
         if not len(rows) or not known:
             return None
@@ -299,6 +301,14 @@ def finished(table: pl.DataFrame) -> pl.DataFrame:
     return table.filter(~pl.col("outcome").is_in(NOT_RUN)) if "outcome" in table.columns else table
 
 
+def distinct(table: pl.DataFrame) -> pl.DataFrame:
+    """Each drive once: equal logs of one driver and seed are one drive, whatever weather it was."""
+    if "log_hash" not in table.columns or table["log_hash"].has_nulls():
+        return table
+    apart = [c for c in DRIVES_APART if c in table.columns]
+    return table.unique([*apart, "log_hash"], keep="first", maintain_order=True)
+
+
 def per_seed(rows: pl.DataFrame, value: pl.Expr) -> pl.Series:
     """Mean of `value` per seed: what shares a seed is not independent, so seeds are the units."""
     rows = rows.with_columns(shown=value)
@@ -314,7 +324,8 @@ def paired_runs(
 ) -> tuple[pl.DataFrame, bool]:
     """`difference` of `column` between the rows of `more` and of `less` that agree in `by`.
 
-    Several rows of one side that agree are averaged. Also whether all pairs are equal drives.
+    Several rows of one side that agree are averaged, and of one seed the same two drives are one
+    pair, in how many weathers ever they were driven. Also whether all pairs are equal drives.
     """
     keys = [k for k in by if k in table.columns]
     hashes = pl.col("log_hash").sort() if "log_hash" in table.columns else pl.lit(None)
@@ -326,6 +337,9 @@ def paired_runs(
     both = both.sort(keys)
     known = "log_hash" in table.columns and not table["log_hash"].has_nulls()
     same = known and len(both) > 0 and bool((both["hashes"] == both["hashes_less"]).all())
+    if known and "seed" in keys:
+        once = ["seed", "hashes", "hashes_less"]
+        both = both.unique(once, keep="first", maintain_order=True)
     return both.with_columns(difference=pl.col("value") - pl.col("value_less")), same
 
 

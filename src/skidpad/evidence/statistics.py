@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
 from itertools import product
-from math import ceil
+from math import ceil, floor, log2
 from typing import NamedTuple
 
 import numpy as np
@@ -205,6 +205,30 @@ def clopper_pearson(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:
         return Interval(0.0, 1.0)
     limits = stats.binomtest(k, n).proportion_ci(confidence, method="exact")
     return Interval(float(limits.low), float(limits.high))
+
+
+def median_time(times: ArrayLike, end: float) -> tuple[float, Interval]:
+    """Median of times that were watched until `end`, and its exact 95 % interval; inf: beyond it.
+
+    times (n,), n >= 1: inf or NaN where nothing happened. The limits are order statistics, so that
+    no form of the distribution is assumed; too few times have the limits 0 and inf. Source: Thompson
+    (1936), Ann. Math. Stat. 7, confidence ranges for the median.
+    """
+    t = np.asarray(times, dtype=np.float64)
+    if t.size == 0:
+        raise ValueError("a median needs at least one time")
+    t = np.sort(np.where(t <= end, t, np.inf))
+    middle = float(t[(t.size - 1) // 2]), float(t[t.size // 2])
+    median = 0.5 * sum(middle) if np.isfinite(middle[1]) else middle[1]
+    below = int(stats.binom.ppf((1.0 - CONFIDENCE) / 2.0, t.size, 0.5))
+    if below == 0:
+        return median, Interval(0.0, np.inf)
+    return median, Interval(float(t[below - 1]), float(t[t.size - below]))
+
+
+def seeds_for_verdict(claims: int, alpha: float = 0.05) -> int:
+    """Least seeds with which a sign-change test can show any of so many claims, Holm-adjusted."""
+    return floor(1.0 + log2(max(claims, 1) / alpha)) + 1
 
 
 def holm(p_values: Sequence[float]) -> list[float]:

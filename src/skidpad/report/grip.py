@@ -29,7 +29,7 @@ from skidpad.report.page import (
     write_report_page,
 )
 from skidpad.report.replay import replay
-from skidpad.report.verdicts import seeds_text, tally_text, verdict_blocks
+from skidpad.report.verdicts import least_seeds_text, seeds_text, tally_text, verdict_blocks
 from skidpad.roads.bundled import kept_map
 
 ALPHA = 0.05
@@ -122,7 +122,9 @@ def _answers(campaign: GripCampaign, judged: Sequence[Judgement]) -> Answers:
         )
         items.append(("Where most?", text))
     seeds = campaign.plain["seed"].n_unique()
-    items.append(("How sure is that?", f"{seeds_text(seeds)} {tally_text(judged)}"))
+    items.append(
+        ("How sure is that?", f"{seeds_text(seeds)} {tally_text(judged)}{least_seeds_text(judged)}")
+    )
     return Answers(items)
 
 

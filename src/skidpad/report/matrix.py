@@ -12,6 +12,7 @@ from skidpad.report import matrix_figures, matrix_tables
 from skidpad.report.crashes import crash_sections, found_crashes, worst_of_each
 from skidpad.report.matrix_answers import answers, speed_figure
 from skidpad.report.matrix_data import Matrix, load_matrix
+from skidpad.report.matrix_headline import headline_table
 from skidpad.report.page import Block, Number, Numbers, Page, Section, Text, write_report_page
 from skidpad.report.verdicts import verdict_blocks
 
@@ -44,6 +45,7 @@ def build_page(matrix: Matrix) -> Page:
                 *_warnings(matrix),
                 answers(matrix, judged),
                 _headline(matrix),
+                headline_table(matrix),
                 speed_figure(matrix),
                 *worst_of_each(crashes),
                 Text(LEAD),
@@ -82,9 +84,19 @@ def _warnings(matrix: Matrix) -> list[Block]:
 def _headline(matrix: Matrix) -> Numbers:
     t = matrix.counted
     km = float(t["distance_km"].sum())
-    fatal = int(t["fatal_collisions"].sum())
+    fatal, hits, left, first = (
+        int(t[c].sum())
+        for c in ("fatal_collisions", "crashes_vehicle", "road_departures", "fatal_first")
+    )
+
+    def per_100_km(events: int) -> str:
+        return f"{100 * events / km:.1f} per 100 km" if km else ""
+
     return Numbers(
         [
+            Number(f"{hits}", "crashes with vehicles", per_100_km(hits)),
+            Number(f"{left}", "departures from the road", per_100_km(left)),
+            Number(f"{fatal}", "fatal events", f"{first} of them first of a chain"),
             Number(
                 f"{len(matrix.results)}",
                 "runs",
@@ -94,19 +106,6 @@ def _headline(matrix: Matrix) -> Numbers:
                 f"{km:,.0f} km",
                 "driven",
                 f"{float(t['duration_s'].sum()) / 3600:.1f} h of simulated time",
-            ),
-            Number(
-                f"{fatal}", "fatal collisions", f"{100 * fatal / km:.1f} per 100 km" if km else ""
-            ),
-            Number(
-                f"{int(t['collisions_vehicle'].sum())}",
-                "with vehicles",
-                f"{int(t['rear_ended'].sum())} of them struck from behind",
-            ),
-            Number(
-                f"{int(t['collisions_static'].sum())}",
-                "with barriers",
-                f"{int(t['bend_exits'].sum())} in bends without a lead",
             ),
         ]
     )

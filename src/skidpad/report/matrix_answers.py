@@ -12,7 +12,7 @@ from skidpad.evidence.verdicts import Judgement
 from skidpad.report.figures import POINTS, Chart, Curve, curves
 from skidpad.report.matrix_data import Matrix, config_title, weather_title
 from skidpad.report.page import Answers, Figure
-from skidpad.report.verdicts import seeds_text, tally_text
+from skidpad.report.verdicts import least_seeds_text, seeds_text, tally_text
 
 FATAL = "fatal_collisions"
 ALPHA = 0.05
@@ -33,9 +33,13 @@ def answers(matrix: Matrix, judged: Sequence[Judgement]) -> Answers:
                 "Which weather is the worst?",
                 _extremes(matrix, "weather", weathers, {w: weather_title(w) for w in weathers}),
             ),
-            ("How sure is that?", f"{seeds_text(seeds)} {tally_text(judged)}"),
+            ("How sure is that?", _sure(seeds, judged)),
         ]
     )
+
+
+def _sure(seeds: int, judged: Sequence[Judgement]) -> str:
+    return f"{seeds_text(seeds)} {tally_text(judged)}{least_seeds_text(judged)}"
 
 
 def _in_weather(matrix: Matrix, weather: str) -> Rate | None:

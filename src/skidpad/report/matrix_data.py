@@ -10,7 +10,8 @@ import polars as pl
 
 from skidpad.evidence.statistics import Rate, event_rate
 from skidpad.recording.campaigns import CampaignFolder
-from skidpad.recording.matrix import MATRIX, MatrixEntry
+from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics
+from skidpad.recording.results import schema
 from skidpad.report.campaign import CampaignView
 from skidpad.report.published import Source, published, published_matrix
 
@@ -37,6 +38,19 @@ class Matrix(CampaignView[MatrixEntry]):
 
     columns = MATRIX
     common = ("profile", "grip", "range", "version")
+
+    @property
+    def results(self) -> pl.DataFrame:
+        """Every run; what an older version did not count is derived where it can be, else null."""
+        found = self.folder.results
+        kinds = schema(Metrics)
+        gone = [name for name in kinds if name not in found.columns]
+        known = {
+            "crashes_vehicle": pl.col("collisions_vehicle"),
+            "road_departures": pl.col("collisions_static") + pl.col("wrong_way"),
+        }
+        null = {name: pl.lit(None, kinds[name]) for name in gone}
+        return found.with_columns(**(null | {k: v for k, v in known.items() if k in gone}))
 
     @cached_property
     def configs(self) -> list[str]:

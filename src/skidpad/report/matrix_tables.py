@@ -49,8 +49,10 @@ KINDS = (
 def collisions(matrix: Matrix) -> list[Block]:
     """Fatal collisions, and what they were."""
     return [
-        count_table(matrix, "fatal_collisions", "Fatal collisions per run"),
-        count_table(matrix, "collisions_vehicle", "Of these with vehicles, per run"),
+        count_table(matrix, "crashes_vehicle", "Crashes with vehicles per run"),
+        count_table(matrix, "road_departures", "Departures from the road per run"),
+        count_table(matrix, "fatal_collisions", "Both: fatal events per run"),
+        count_table(matrix, "fatal_first", "Of these the first of their chain, per run"),
         kinds_table(matrix),
     ]
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+from skidpad.evidence.statistics import seeds_for_verdict
 from skidpad.evidence.verdicts import Judgement
 from skidpad.evidence.verdicts import Verdict as Outcome
 from skidpad.report.page import Verdict
@@ -54,6 +55,16 @@ def tally_text(judged: Sequence[Judgement]) -> str:
     counts = Counter(j.verdict for j in judged)
     told = ", ".join(f"{counts[v]} {v.value}" for v in Outcome if counts[v])
     return f"Of the sources' {len(judged)} claims: {told}."
+
+
+def least_seeds_text(judged: Sequence[Judgement]) -> str:
+    """With how many seeds any claim of this report can be judged at all; empty: none is tested."""
+    silent = (Outcome.NOT_TESTABLE, Outcome.REFUSED, Outcome.BY_CONSTRUCTION)
+    tested = sum(j.verdict not in silent for j in judged)
+    if not tested:
+        return ""
+    least = seeds_for_verdict(tested)
+    return f" With {tested} claims tested at once a verdict takes at least {least} seeds per cell."
 
 
 def seeds_text(seeds: int) -> str:

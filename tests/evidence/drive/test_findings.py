@@ -9,7 +9,16 @@ import numpy as np
 import polars as pl
 import pytest
 
-from skidpad.evidence.contrasts import Amount, Contrast, paired, rate_below
+from skidpad.evidence.contrasts import (
+    Amount,
+    Contrast,
+    RateBelow,
+    distinct,
+    paired,
+    paired_runs,
+    per_seed,
+    rate_below,
+)
 from skidpad.evidence.drive.findings import FINDINGS
 from skidpad.evidence.verdicts import Finding, Verdict, judge
 
@@ -264,3 +273,46 @@ def test_every_finding_is_written_out_before_results_are_seen() -> None:
     for f in FINDINGS:
         assert all((f.claim, f.estimand, f.needs, f.test, f.margin)), f.id
     assert {f.id for f in FINDINGS if f.study} == {"F-08", "F-17", "F-21", "F-25"}
+
+
+def weathers_alike(seed: int, counts: dict[str, int]) -> list[Row]:
+    """Runs of two configurations; the clear weathers are one drive, for weather cannot act there."""
+    return [
+        {
+            "config": config,
+            "weather": weather,
+            "seed": seed,
+            "fatal_collisions": n * int(config == "2"),
+            "log_hash": f"{config} {seed} {weather if 'rain' in weather else 'clear'}",
+        }
+        for config in ("1", "2")
+        for weather, n in counts.items()
+    ]
+
+
+@pytest.mark.req("R-7")
+def test_the_same_two_drives_are_one_pair_however_many_weathers_they_stand_for() -> None:
+    clear = {w: 1 for w in WEATHERS if w.startswith("clear")}
+    table = pl.DataFrame(weathers_alike(1, clear | {"rain-noon": 5}))
+    sides = (pl.col("config") == "2", pl.col("config") == "1")
+    pairs, same = paired_runs(table, *sides, ("weather", "seed"), "fatal_collisions")
+    assert not same
+    assert sorted(pairs["difference"].to_list()) == [1.0, 5.0]
+    assert per_seed(pairs, pl.col("difference")).to_list() == [3.0]  # not 8 / 4
+    unknown = table.with_columns(log_hash=pl.lit(None, pl.String))
+    assert len(paired_runs(unknown, *sides, ("weather", "seed"), "fatal_collisions")[0]) == 4
+
+
+@pytest.mark.req("R-7")
+def test_rates_count_each_drive_once() -> None:
+    table = pl.DataFrame(
+        [row for seed in (1, 2) for row in weathers_alike(seed, dict.fromkeys(WEATHERS[:3], 2))]
+    )
+    assert len(distinct(table)) == 4
+    rate = RateBelow(
+        what="all", events=pl.col("fatal_collisions").sum(), limit=Amount(5.0),
+        where=pl.col("config") == "2",
+    )  # fmt: skip
+    found = rate.draw(table)
+    assert found is not None
+    assert (found.mean, found.units) == (3.0, 2)  # two a run, and two runs

@@ -53,7 +53,7 @@ def retain(
     for i in range(len(points.range)):
         r = float(points.range[i])
         altitude = float(points.altitude[i])
-        if not (ranges[0] < r < ranges[1]) or not (altitudes[0] <= altitude <= altitudes[1]):
+        if not (ranges[0] < r < ranges[1]) or not (altitudes[0] < altitude < altitudes[1]):
             continue
         lateral = r * np.sin(float(points.azimuth[i]) + yaw_error) - kappa * r * r
         if abs(lateral) >= half_width:

@@ -1,4 +1,4 @@
-"""A campaign of trifles that takes a moment per run, so that there is something to kill."""
+"""A campaign of trifles that waits at a gate, so that there is something to kill."""
 
 import sys
 import time
@@ -8,11 +8,20 @@ from pathlib import Path
 import toy_campaign
 from skidpad.campaign.campaign import Campaign
 
-MOMENT = 0.05  # s
+GATE = "gate"  # beside the folder: as many tosses may be made; without it, all
+
+
+def closed(out):
+    """Whether nothing more may be tossed."""
+    gate, runs = out.parent / GATE, out / "runs"
+    if not gate.exists():
+        return False
+    return runs.exists() and len(list(runs.iterdir())) >= int(gate.read_text())
 
 
 def toss(out, task):
-    time.sleep(MOMENT)
+    while closed(out):
+        time.sleep(0.01)
     folder = out / "runs" / task.name
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "log.txt").write_text(task.name)

@@ -48,8 +48,11 @@ def started(out):
 def test_a_campaign_that_is_ended_again_and_again_comes_to_the_same_results(tmp_path):
     whole = slow_campaign.campaign(TOSSES).run(tmp_path / "whole", here)
     out, rng, said = tmp_path / "out", random.Random(11), []
+    gate = tmp_path / slow_campaign.GATE
     for how in (signal.SIGKILL, signal.SIGINT, signal.SIGTERM, signal.SIGKILL):
-        process, more = started(out), lines(out) + rng.randint(1, 4)
+        more = lines(out) + rng.randint(1, 4)
+        gate.write_text(str(more + 2))  # it is under way when it is ended, however late we are
+        process = started(out)
         assert waited(lambda wanted=more: lines(out) >= wanted), said
         process.send_signal(how)
         said.append(process.communicate(timeout=PATIENCE)[0])
@@ -57,6 +60,7 @@ def test_a_campaign_that_is_ended_again_and_again_comes_to_the_same_results(tmp_
         done = (out / LEDGER).read_bytes()
         assert done.count(b"\n") >= more  # nothing that was done is lost
     assert "interrupted; what is done is kept" in said[1]
+    gate.unlink()
     process = started(out)
     said.append(process.communicate(timeout=PATIENCE)[0])
     assert process.returncode == 0, said

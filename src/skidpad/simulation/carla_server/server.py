@@ -24,6 +24,7 @@ from skidpad.simulation.carla_server.rpc import Dispatcher
 from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.streams import StreamHub
+from skidpad.simulation.carla_server.waker import Waker, rouse
 
 log = logging.getLogger("skidpad.carla_server")
 MAX_CLIENTS = 512
@@ -39,11 +40,14 @@ class RpcConnection(asyncio.Protocol):
         self._decoder = Decoder()
         self._queue: deque[Request] = deque()
         self._transport: asyncio.Transport | None = None
+        self._rousing: set[asyncio.Task[None]] = set()
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client connected."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
+        loop = asyncio.get_running_loop()
+        self._waker = Waker(loop.call_later, self._rouse)
         if not self._server.admit(self):
             transport.close()
 
@@ -78,7 +82,10 @@ class RpcConnection(asyncio.Protocol):
             self.resume_writing()
 
     def _answer(self, transport: asyncio.Transport, request: Request) -> None:
+        known = len(self._server.served.managers.by_port)
         answer = self._server.answer(request)
+        accepted = len(self._server.served.managers.by_port) > known
+        self._waker.asked(request.method, request.arguments, accepted)
         rest = self._server.rest_before(request)
         if rest > 0.0:
             asyncio.get_running_loop().call_later(rest, transport.write, answer)
@@ -100,7 +107,17 @@ class RpcConnection(asyncio.Protocol):
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  asyncio's name
         """The client went away."""
+        self._waker.stop()
         self._server.release(self)
+
+    def _rouse(self, port: int) -> None:
+        """Wake the client's Traffic Manager at this port of its machine."""
+        assert self._transport is not None
+        peer = self._transport.get_extra_info("peername")
+        if peer:
+            task = asyncio.get_running_loop().create_task(rouse(peer[0], port))
+            self._rousing.add(task)
+            task.add_done_callback(self._rousing.discard)
 
 
 def ticks(request: Request) -> bool:

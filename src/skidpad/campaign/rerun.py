@@ -26,7 +26,7 @@ from skidpad.campaign.keeping import housed
 from skidpad.campaign.run import run as drive_again
 from skidpad.campaign.stored import read_run, read_segment
 from skidpad.campaign.views import SIZE, twelve_views
-from skidpad.core.errors import ConfigError, OutputError
+from skidpad.core.errors import ConfigError, FileError, OutputError
 from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import StackReport
@@ -53,6 +53,8 @@ def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None 
     """Drive the run in folder `run` again up to `end_s`, keeping what happens from `begin_s` on."""
     stored = read_log(run)
     spec = housed(read_run(run), run.resolve().parents[1])
+    if not len(stored):
+        raise FileError(f"{run} holds a run that ended before its first tick")
     last = float(stored.t[-1])
     if not 0.0 <= begin_s < end_s:
         raise ConfigError(f"--from {begin_s:g} must be >= 0 and below --to {end_s:g}")

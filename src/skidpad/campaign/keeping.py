@@ -13,6 +13,7 @@ from msgspec import structs
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.jit import user_cache
+from skidpad.core.reading import is_file
 from skidpad.core.run import Edges, Roads, Route, RunSpec
 from skidpad.recording.files import write_bytes
 from skidpad.roads.bundled import KEPT, bundled_maps, kept_name, load_map, map_file
@@ -70,7 +71,7 @@ def keep_road(folder: Path, road: str) -> None:
 
 def housed(run: RunSpec, folder: Path) -> RunSpec:
     """The run with the map that the campaign in `folder` keeps of it."""
-    if not isinstance(run.course, (Roads, Route)) or not (folder / run.course.map).is_file():
+    if not isinstance(run.course, (Roads, Route)) or not is_file(folder / run.course.map):
         return run
     return _on(run, str(folder / run.course.map))
 
@@ -81,7 +82,7 @@ def found_again(run: RunSpec, folder: Path | None) -> RunSpec:
     if folder is None or not isinstance(course, (Roads, Route)):
         return run
     file = Path(course.map)
-    if course.map in bundled_maps() or file.is_file() or not file.suffix:
+    if course.map in bundled_maps() or is_file(file) or not file.suffix:
         return run
     there = sorted((folder / KEPT).glob(f"*/{file.name}"))
     return _on(run, str(there[0])) if len(there) == 1 else run

@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from traceability import DOC, marks, render, states, summaries
+from traceability import DOC, marks, proof, render, states, summaries
 
 DECISION = re.compile(r"[XLMGCKR]-[1-9]\d?")  # the project's settled questions; not listed
 
@@ -21,6 +21,18 @@ def test_states_name_requirements_and_exclude_each_other():
 
 def test_what_is_not_yet_there_has_no_test_that_claims_it():
     assert not set(states()["not_yet"]) & set(marks())
+
+
+@pytest.mark.parametrize(
+    ("tests", "how"),
+    [
+        (["report/test_channels_architecture.py::test_the_page_says_what"], "by document"),
+        (["report/test_matrix_report.py::test_a", "test_readme.py::test_b"], "by page"),
+        (["report/test_matrix_report.py::test_a", "physics/test_grip.py::test_b"], ""),
+    ],
+)
+def test_what_only_words_prove_is_said_to_be_proved_by_words(tests, how):
+    assert proof(tests) == how
 
 
 def test_files_of_tests_have_names_of_their_own():

@@ -16,10 +16,32 @@ HEAD = """# Requirements
 
 Every requirement of the three specifications, its state, and the tests that prove it. Ids: A is ADAS
 in weather, B grip in weather, C channels. Written by `python tests/traceability.py`; a test checks
-that this page, the marks in the tests and the states agree.
+that this page, the marks in the tests and the states agree. A row that is simply done is proved by
+behaviour: something was run and did what is asked. *Done by page* is shown by what a report or page of
+the program says, *done by document* by words or names in a text of the project, and by nothing that ran.
 
 """
+WORDS = ("done", "done by page", "done by document", "differs", "not yet")
 PARTS = {"A": "ADAS in weather", "B": "Grip in weather", "C": "Channels"}
+
+
+PAGES = ("report/", "fleet/test_fleet_pages.py")  # tests that read what the program shows
+DOCUMENTS = (  # tests that read texts of the project
+    "report/test_channels_architecture.py",
+    "test_readme.py",
+    "test_container.py",
+    "scenarios/test_shipped_scenarios.py::test_the_files_are_what_their_source_writes",
+    "scenarios/test_shipped_scenarios.py::test_the_asam_checkers_accept",
+)
+
+
+def proof(tests: list[str]) -> str:
+    """How a requirement with these tests is proved, by the strongest of them; "" is behaviour."""
+    kinds = {
+        "by document" if t.startswith(DOCUMENTS) else "by page" if t.startswith(PAGES) else ""
+        for t in tests
+    }
+    return min(kinds, key=("", "by page", "by document").index)
 
 
 def summaries() -> dict[str, str]:
@@ -82,12 +104,14 @@ def render() -> str:
             word, note = "differs", state["differs"][i]
         else:
             word, note = ("done", "") if proved.get(i) else ("not yet", "no test carries it")
+        if word == "done":
+            word = f"done {proof(proved[i])}".strip()
         counts[i[0]][word] += 1
         tests = "<br>".join(f"`{t}`" for t in proved.get(i, [])[:3])
         tables[i[0]].append(f"| {i} | {word} | {summary} | {tests} | {note} |")
     text = HEAD
     for part, title in PARTS.items():
-        said = ", ".join(f"{counts[part][w]} {w}" for w in ("done", "differs", "not yet"))
+        said = ", ".join(f"{counts[part][w]} {w}" for w in WORDS if counts[part][w])
         text += f"## {title}: {said}\n\n| id | state | summary | proved by | note |\n|---|---|---|---|---|\n"
         text += "\n".join(tables[part]) + "\n\n"
     return text.rstrip() + "\n"

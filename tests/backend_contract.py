@@ -11,10 +11,11 @@ import pytest
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.frames import Frame
 from skidpad.core.geometry import Pose
+from skidpad.core.inputs import Outside
 from skidpad.core.setup import ActorCommand, ActorSetup, Setup
 from skidpad.core.specs import CameraSpec, LidarSpec, PointSensorSpec
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import Control, SemanticClass, SensorLevel
+from skidpad.core.vocabulary import Control, GripModel, RangeModel, SemanticClass, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
@@ -263,6 +264,19 @@ def lidar_in_box(backend: Backend, frame: Frame, setup: Setup, mount: Pose, acto
     return int(named.sum())
 
 
+def goes_on_in_another_weather(make: Make) -> None:
+    backend = make()
+    backend.reset(ALONE, 0)
+    for k in range(1, 21):
+        if k == 10:
+            night = replace(Weather(), sun_altitude_deg=-30.0, precipitation=60.0, wetness=80.0)
+            backend.change(Outside(weather=night, grip=GripModel.NONE, range_model=RangeModel.NONE))
+        frame = backend.step(VehicleCommand(throttle=0.6))
+        assert frame.tick == k
+    assert frame.ego.speed > 1.0
+    backend.close()
+
+
 CHECKS: tuple[Callable[[Make], None], ...] = (
     must_be_reset_and_closes_twice,
     begins_at_its_place_and_follows_commands,
@@ -274,4 +288,5 @@ CHECKS: tuple[Callable[[Make], None], ...] = (
     delivers_the_twelve_sensors,
     keeps_no_frame_beyond_its_tick,
     gives_the_stack_what_it_asked_for,
+    goes_on_in_another_weather,
 )

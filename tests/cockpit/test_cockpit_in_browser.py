@@ -9,13 +9,15 @@ from skidpad.campaign.desk_run import drive_at_desk
 from skidpad.campaign.rerun import desk_of, first_ticks
 from skidpad.campaign.run import run
 from skidpad.campaign.stored import read_run
-from skidpad.core.inputs import Functions, Lamps, Pedals, Sky, Timed, Wheel
+from skidpad.core.inputs import Functions, Lamps, Method, Pedals, Sky, Timed, Wheel
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.physics.presets import preset
 from skidpad.recording.inputs import read_inputs
 from skidpad.recording.logfiles import log_hash, read_log
 
+GAMEPAD = """navigator.getGamepads = () => [{ connected: true, id: "pad", axes: [0.5, 0, 0, 0],
+    buttons: Array.from({ length: 16 }, (_, i) => ({ value: i === 7 ? 0.4 : 0 })) }]"""
 WAIT = 1000.0 * PATIENCE  # ms
 FACT = """name => [...document.querySelectorAll('.cockpit dt')]
     .find(dt => dt.textContent === name)?.nextElementSibling.textContent"""
@@ -83,6 +85,10 @@ def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, t
         until(page, "() => parseFloat(document.querySelector('.steer i').style.left) < 49.9")
         page.keyboard.up("a")
         page.keyboard.up("w")
+        # a gamepad is noticed by itself, and says so
+        page.evaluate(GAMEPAD)
+        until_fact(page, "drives", "you, by gamepad")
+        page.evaluate("navigator.getGamepads = () => []")
         # headlights, weather, functions by keys and by switches
         page.keyboard.press("l")
         until(page, "() => document.querySelector('.lamp').textContent.includes('low')")
@@ -106,6 +112,7 @@ def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, t
     assert {Wheel(True), Wheel(False)} <= set(done)
     kinds = {type(one) for one in done}
     assert {Pedals, Lamps, Sky, Functions} <= kinds
+    assert Pedals(throttle=0.4, steer=-0.5, method=Method.GAMEPAD) in done
     last = next(one for one in reversed(done) if isinstance(one, Functions))
     assert Function.LIMITER in last.on
     stored = read_log(folder)

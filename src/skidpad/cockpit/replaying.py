@@ -52,14 +52,14 @@ class Replayer:
 
     def run(self) -> None:
         """Until the page ends it."""
-        self._show()
+        self.show()
         while not self.link.ended:
             heard = self.link.drain(PATIENCE)
             if self.link.film is not None:
                 self._film(self.link.film)
             self.turn()
             if heard or (self.k != self._shown_k and self._is_taken()):
-                self._show()
+                self.show()
 
     def turn(self) -> None:
         """Go on as far as words and clock say."""
@@ -102,7 +102,8 @@ class Replayer:
         self.k = self._base = k
         self._since = self.clock()
 
-    def _show(self) -> None:
+    def show(self) -> None:
+        """Show the present moment."""
         self.screen.show(self.recording.moment(self.k))
         self._shown_k, self._shown_at = self.k, self.clock()
 

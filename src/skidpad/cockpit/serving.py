@@ -7,12 +7,15 @@ import sys
 import time
 import webbrowser
 from collections.abc import Callable
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from skidpad.cockpit.bridge import Bridge
 from skidpad.cockpit.producer import Producer
 from skidpad.pages.server import Place, Server
 from skidpad.pages.site import nicegui, site
+
+if TYPE_CHECKING:
+    from fastapi import FastAPI
 
 PATIENCE = 0.5  # s between two looks at the keyboard's Ctrl-C
 LAST_WORD = 1.5  # s in which the page shows how it ended
@@ -42,14 +45,10 @@ def _serve(
     timeline: dict[str, Any] | None,
     browser: bool,
 ) -> None:
-    nicegui()
-    from skidpad.cockpit.page import STYLE, build
-    from skidpad.cockpit.stream import add_stream
-
     bridge = Bridge(producer)
-    pages = {"/": build(bridge, kind, timeline)}
-    app = site(f"Skidpad {kind}", pages, routes=lambda a: add_stream(a, bridge), style=STYLE)
-    with Server(app, place) as server:  # a port in use is said before anything is driven
+    with Server(
+        application(bridge, kind, timeline), place
+    ) as server:  # first, as a port may be in use
         producer.start()
         address = server.address()
         say(f"{kind}: {address}  (Ctrl-C ends it)")
@@ -62,6 +61,16 @@ def _serve(
                 time.sleep(LAST_WORD)
         except KeyboardInterrupt:
             say("ending ...")
+
+
+def application(bridge: Bridge, kind: str, timeline: dict[str, Any] | None) -> FastAPI:
+    """The page and its stream."""
+    nicegui()
+    from skidpad.cockpit.page import STYLE, build
+    from skidpad.cockpit.stream import add_stream
+
+    pages = {"/": build(bridge, kind, timeline)}
+    return site(f"Skidpad {kind}", pages, routes=lambda a: add_stream(a, bridge), style=STYLE)
 
 
 def has_screen() -> bool:

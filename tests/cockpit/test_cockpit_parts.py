@@ -289,6 +289,8 @@ def test_what_the_words_of_a_tab_mean():
         assert b.producer.words[-1] == meant
     assert b.say("a", "hide", "depth") is None
     assert b.producer.words[-1] == Show(View.FOLLOW, (View.SEMANTIC,))
+    assert b.say("a", "plain") is None
+    assert b.producer.words[-1] == Show(View.FOLLOW, (View.SEMANTIC,), plain=True)
     b.say("a", "sky", {"ice_thickness": 30.0})
     b.say("a", "sky", {"fog_density": 20.0})
     sky = b.producer.words[-1].input

@@ -44,6 +44,7 @@ class Bridge:
         self.dead_man = DeadMan(self._release, clock)
         self.told: dict[str, Any] = {}  # of the newest picture
         self.main, self.hidden = View.DRIVER, set[View]()
+        self.plain = False
         self.sky: Weather | None = None  # set, but perhaps not yet shown
 
     # --- pictures
@@ -111,6 +112,9 @@ class Bridge:
         elif word == "hide":
             self.hidden ^= {View(value)} & set(HIDEABLE)
             self._show(self.main)
+        elif word == "plain":
+            self.plain = not self.plain
+            self._show(self.main)
         elif word in acts:
             self._do(acts[word](value))
         else:
@@ -140,7 +144,7 @@ class Bridge:
 
     def _show(self, main: View) -> None:
         self.main = main
-        self.producer.say(Show(main, tuple(sorted(self.hidden))))
+        self.producer.say(Show(main, tuple(sorted(self.hidden)), self.plain))
 
     def _next_main(self) -> View:
         return MAIN[(MAIN.index(self.main) + 1) % len(MAIN)] if self.main in MAIN else MAIN[0]

@@ -44,11 +44,11 @@ RATES = {0.25: "0.25 x", 0.5: "0.5 x", 1.0: "1 x", 2.0: "2 x", 4.0: "4 x", 0.0: 
 HELP = (
     "W S A D or arrows: pedals and wheel (hold the brake at standstill to reverse), space: handbrake, "
     "M: take over and hand back, L: headlights, N: next weather, C: camera, T Y U: hide depth, classes, "
-    "top, P: pause, full stop: one tick further"
+    "top, G: shadows, P: pause, full stop: one tick further"
 )
 HELP_REPLAY = (
     "space or P: play and pause, arrows: one tick (with shift: 5 s), full stop: one tick further, "
-    "C: camera, T Y U: hide views; click a small view or the time line"
+    "C: camera, T Y U: hide views, G: shadows; click a small view or the time line"
 )
 
 

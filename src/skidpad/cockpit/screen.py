@@ -65,6 +65,7 @@ class Screen(Sink):
         """Draw the views and hand them on."""
         shown, truth = self.ask(), moment.truth
         self.studio.change(shown.outside)
+        self.studio.shade(not self.link.plain)
         braking = truth.commands[:, 1] > BRAKING
         images = self.studio.look(truth.tick, truth.states, truth.lights, braking)
         views = [v for v in View if self._wanted(v)]

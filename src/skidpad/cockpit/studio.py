@@ -74,7 +74,9 @@ class Studio:
     """Looks at one run."""
 
     def __init__(self, map: RoadMap, table: ActorTable, outside: Outside, seed: int) -> None:
-        settings = PixelSettings(range_model=outside.range_model, seed=seed, in_cockpit=False)
+        settings = PixelSettings(
+            range_model=outside.range_model, seed=seed, in_cockpit=False, shadows=True
+        )
         self.suite = PixelSuite(map, table, cameras(), outside.weather, settings)
         self.outside = outside
         self.suite.change(outside)
@@ -84,6 +86,11 @@ class Studio:
         if outside != self.outside:
             self.outside = outside
             self.suite.change(outside)
+
+    def shade(self, on: bool) -> None:
+        """Draw shadows, or the plain picture as a stack would read it."""
+        if on != self.suite.settings.shadows:
+            self.suite.settings = replace(self.suite.settings, shadows=on)
 
     def look(
         self,

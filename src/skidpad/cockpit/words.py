@@ -55,6 +55,7 @@ class Show(Struct, frozen=True, tag="show"):
 
     main: View
     hidden: tuple[View, ...] = ()
+    plain: bool = False  # without what is added for people: shadows
 
 
 class Film(Struct, frozen=True, tag="film"):
@@ -88,6 +89,7 @@ class Link:
         self.seek: int | None = None
         self.film: float | None = None  # s of a film that is to be written
         self.main, self.hidden = View.DRIVER, frozenset[View]()
+        self.plain = False
         self.reshown = False  # another view is asked for
 
     def drain(self, patience: float = 0.0) -> bool:
@@ -119,6 +121,7 @@ class Link:
                 self.film = word.seconds
             case Show():
                 self.main, self.hidden = word.main, frozenset(word.hidden)
+                self.plain = word.plain
                 self.reshown = True
             case End():
                 self.ended = True

@@ -28,6 +28,7 @@ from skidpad.sensors.perception_noise import PerceptionNoise
 from skidpad.sensors.radar import Radar
 from skidpad.sensors.rasteriser import AUTO_LEVEL
 from skidpad.sensors.shading import Shading
+from skidpad.sensors.shadows import GROUND_MASK, bodies_of, cast_shadows, shade_of
 from skidpad.sensors.view import View, camera_view
 
 EGO = 0
@@ -48,6 +49,7 @@ class PixelSettings:
     range_model: RangeModel = RangeModel.NONE
     camera_effect: bool = True  # degrade RGB images (A-222, A-223)
     in_cockpit: bool = True  # weather spares what the published windscreen mask hides (A-226)
+    shadows: bool = False  # under and beside vehicles, in colour images: for people (R-13)
     exclusive_stages: bool = False  # rain switches the night stage off (D-094)
     perception_noise: PerceptionNoise = NO_NOISE
     seed: int = 0
@@ -99,6 +101,7 @@ class PixelSuite:
         sight = Sight(depth_range(weather), labels) if limited else UNLIMITED
         light = lighting(weather, beam)
         self.shading = Shading(self.scene.static.palette, self._table, light)
+        self._shade = shade_of(light)
         self._passes: dict[tuple[object, Sight], Pass] = {}
         self._pass_of: dict[str, Pass] = {}
         for camera in self.cameras.values():
@@ -127,7 +130,7 @@ class PixelSuite:
     ) -> Observation:
         """What the sensors see of this state. braking: (n,) whose brake lamps are lit."""
         self.tick = tick
-        self._ego = states.pose(EGO)
+        self._ego, self._states = states.pose(EGO), states
         self.scene.place(states, self.settings.dt)
         self.scene.show(lights)
         if braking is not None:
@@ -177,6 +180,9 @@ class PixelSuite:
         """The rows of a view as a colour image."""
         packed = self._rgb[id]
         self.shading.paint(view, self._ego, one.inverse, one.key, packed)
+        if self.settings.shadows:
+            bodies = bodies_of(self._table, self._states)
+            cast_shadows(view, bodies, self._shade, GROUND_MASK, one.inverse, one.key, packed)
         if id in self._degraded:
             self._degraded[id].apply(self.tick, packed, range(view.top, view.height))
         rgb = packed.view(np.uint8).reshape(*packed.shape, 4)[..., :3]

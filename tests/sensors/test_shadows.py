@@ -1,0 +1,77 @@
+"""Shadows for people: where they fall, and that nothing else changes."""
+
+import numpy as np
+import pytest
+from worlds import states_at, straight, table_of
+
+from skidpad.core.geometry import Pose
+from skidpad.core.specs import CameraSpec, Modality
+from skidpad.core.vocabulary import ActorKind
+from skidpad.core.weather import Weather
+from skidpad.physics.presets import preset
+from skidpad.sensors.suite import PixelSettings, PixelSuite
+
+# from straight above, 20 m over the road: 400 px show 2 * 20 m, so 10 px are a metre
+ABOVE = Pose(0.0, 0.0, 20.0, 0.0, np.pi / 2, 0.0)
+PX = 10
+
+
+def seen(weather, shadows, view=ABOVE):
+    """Colour, inverse depth and classes of a bus ahead; the ego is far behind."""
+    cameras = [
+        CameraSpec(m.value, m, 400, 400, 90.0, view, True)
+        for m in (Modality.RGB, Modality.DEPTH, Modality.SEMANTIC)
+    ]
+    settings = PixelSettings(camera_effect=False, shadows=shadows)
+    world = straight(300, rails=False)
+    suite = PixelSuite(world, table_of([ActorKind.CAR]), cameras, weather, settings)
+    states = states_at([(100.0, -8.75, 0.0, 0.0), (108.0, -8.75, 0.0, 0.0)])
+    images = suite.observe(0, states, {}).images
+    return (
+        images["rgb"].rgb.astype(float).mean(axis=2),
+        images["depth"].inverse_depth.copy(),
+        images["semantic"].labels.copy(),
+        suite,
+    )
+
+
+def test_only_the_ground_about_a_body_is_darker():
+    plain, depth, labels, _ = seen(preset("clear-noon"), False)
+    shaded, same_depth, same_labels, suite = seen(preset("clear-noon"), True)
+    assert np.array_equal(depth, same_depth)
+    assert np.array_equal(labels, same_labels)
+    darker = shaded < plain - 1.0
+    assert (shaded <= plain + 1e-9).all()
+    length = suite._table.length[1]
+    rows, columns = np.nonzero(darker)
+    # forward is up in the picture: the car ahead is 8 m above the middle
+    ahead = (200 - rows) / PX
+    assert darker.sum() > 200
+    near_ahead = np.abs(ahead - 8.0) < 0.5 * length + 1.5
+    near_ego = np.abs(ahead) < 0.5 * suite._table.length[0] + 1.5
+    assert (near_ahead | near_ego).all()
+    assert (np.abs(columns - 200) / PX < 3.0).all()
+
+
+@pytest.mark.parametrize(("azimuth", "side"), [(90.0, 1.0), (270.0, -1.0)])
+def test_a_low_sun_throws_long_shadows_away_from_it(azimuth, side):
+    low = Weather(sun_altitude_deg=20.0, sun_azimuth_deg=azimuth)
+    plain, *_ = seen(low, False)
+    shaded, *_, suite = seen(low, True)
+    _, columns = np.nonzero(shaded < plain - 3.0)
+    left = (200 - columns) / PX
+    # azimuth is CARLA-handed: at 90 deg the sun stands to the right, so shadows fall to the left
+    half = 0.5 * suite._table.width.max()
+    assert (side * left).max() > half + 2.0
+    assert (-side * left).max() < half + 1.0
+
+
+def test_without_sun_there_is_no_edge_but_still_contact():
+    plain, *_ = seen(preset("clear-night"), False)
+    shaded, *_ = seen(preset("clear-night"), True)
+    assert (shaded <= plain).all()
+    overcast = Weather(cloudiness=100.0, sun_altitude_deg=20.0, sun_azimuth_deg=90.0)
+    dull = seen(overcast, False)[0] - seen(overcast, True)[0]
+    sharp = Weather(sun_altitude_deg=20.0, sun_azimuth_deg=90.0)
+    bright = seen(sharp, False)[0] - seen(sharp, True)[0]
+    assert (dull > 3.0).sum() < 0.7 * (bright > 3.0).sum()

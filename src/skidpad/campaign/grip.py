@@ -20,6 +20,7 @@ from skidpad.campaign.runfolder import (
     fresh_folder,
     last_line,
     write_config,
+    write_played,
     write_run,
 )
 from skidpad.campaign.worker import Job, Runner
@@ -73,6 +74,7 @@ def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey
     if keep or driven.error:
         write_config(folder, cell.to_plain())
         write_run(folder, driven.log, driven.error)
+        write_played(folder, driven)
         keep_road(out, driven.road)
     return Driven(
         key=grip_key(cell, driven.outcome, log_hash(driven.log)),

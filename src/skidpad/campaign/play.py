@@ -9,7 +9,7 @@ from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
 from skidpad.campaign.cast import load_scenario
 from skidpad.campaign.pool import run_jobs
 from skidpad.campaign.run import Run, run
-from skidpad.campaign.runfolder import write_config, write_run
+from skidpad.campaign.runfolder import write_config, write_played, write_run
 from skidpad.campaign.worker import Job
 from skidpad.core.errors import BackendError, OutputError
 from skidpad.core.run import BackendKind, RunSpec, Scenario
@@ -49,4 +49,5 @@ def run_task(task: Task) -> Run:
     driven = run(task.run, backend=backend, folder=task.out)
     write_config(task.out, task.run.to_plain())
     write_run(task.out, driven.log, driven.error)
+    write_played(task.out, driven)
     return driven

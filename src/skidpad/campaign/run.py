@@ -34,6 +34,7 @@ from skidpad.recording.events import NoticeSource, Relocation
 from skidpad.recording.runlog import LogHeader, RunLog
 from skidpad.recording.ticks import TickLog
 from skidpad.roads.queries import RoadMap
+from skidpad.scenarios.player import Played
 from skidpad.simulation.backend import Backend
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.interface import Stack
@@ -56,6 +57,7 @@ class Run:
     route_length: float | None = None  # m, of the ego's route where the scenario names one
     off_road: NDArray[np.bool_] | None = None  # (T,) ticks with all wheels off every lane
     road: str = ""  # the map's name or file
+    played: Played | None = None  # the story of a scenario
 
 
 def drive(
@@ -190,6 +192,7 @@ def run(
         stage.route_length,
         off_road(finished, stage.map),
         str(stage.setup.map),
+        None if stage.player is None else stage.player.played,
     )
 
 

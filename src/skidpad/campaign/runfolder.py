@@ -2,21 +2,28 @@
 
 from __future__ import annotations
 
+import csv
+import io
 import shutil
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
 from skidpad.core.names import inside
+from skidpad.evidence.pairs import Pair, pairs
 from skidpad.recording.campaigns import RUNS
 from skidpad.recording.files import output_error, write_bytes
 from skidpad.recording.logfiles import write_log
 from skidpad.recording.results import Timing
 from skidpad.recording.runlog import RunLog
+from skidpad.scenarios.results import write_results
 
-CONFIG, ERROR = "config.yaml", "error.txt"
+if TYPE_CHECKING:
+    from skidpad.campaign.run import Run
+
+CONFIG, ERROR, PAIRS = "config.yaml", "error.txt", "pairs.csv"
 
 
 class Stopwatch:
@@ -59,6 +66,20 @@ def write_run(folder: Path, log: RunLog, error: str) -> str:
     if error:
         write_bytes(folder / ERROR, error.encode())
     return digest
+
+
+def write_played(folder: Path, driven: Run) -> None:
+    """What a scenario leaves besides: trajectories, its story, how critical each pair became."""
+    if driven.played is None:
+        return
+    write_results(folder, driven.log, driven.played)
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(Pair._fields)
+    for pair in pairs(driven.log):
+        numbers = ("" if v is None else f"{v:.4f}" for v in pair[1:])
+        writer.writerow((pair.other, *numbers))
+    write_bytes(folder / PAIRS, text.getvalue().encode())
 
 
 def last_line(error: str) -> str:

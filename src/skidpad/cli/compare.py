@@ -79,7 +79,9 @@ def compare(
         for flaw, sentence in (flaws(before, after, rules) if rules else {}).items()
     }
     if junit is not None:
-        _write_junit(junit, failures)
+        from skidpad.cli.junit import write_junit
+
+        write_junit(junit, "skidpad compare", failures)
     for text, by in failures.items():
         for sentence in by:
             typer.echo(f"regression ({text}): {sentence}", err=True)
@@ -110,19 +112,3 @@ def _print(changes: list[Change]) -> None:
             str(c.same),
         )
     Console().print(table)
-
-
-def _write_junit(path: Path, failures: dict[str, list[str]]) -> None:
-    from lxml import etree
-
-    from skidpad.recording.files import write_bytes
-
-    failed = str(sum(bool(by) for by in failures.values()))
-    suite = etree.Element(
-        "testsuite", name="skidpad compare", tests=str(len(failures)), failures=failed
-    )
-    for name, by in failures.items():
-        case = etree.SubElement(suite, "testcase", classname="skidpad.compare", name=name)
-        for sentence in by:
-            etree.SubElement(case, "failure", message=sentence)
-    write_bytes(path, etree.tostring(suite, xml_declaration=True, encoding="utf-8"))

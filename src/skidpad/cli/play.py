@@ -11,6 +11,7 @@ from msgspec import structs
 
 from skidpad.cli.asked import Controller, PlayCross, Tuned
 from skidpad.cli.campaigns import Drive, Driving, How, Seeds
+from skidpad.cli.expected import Expected
 from skidpad.cli.spread import spread
 from skidpad.core.run import BackendChoice, RunSpec, Scenario
 from skidpad.core.vocabulary import SensorLevel
@@ -51,6 +52,7 @@ def play(
     tuned: Tuned,
     backend: BackendChoice,
     driving: Driving,
+    expected: Expected,
     seeds: Seeds = 1,
     out: Annotated[Path | None, typer.Option(help="Folder for the run, or for the runs.")] = None,
     check: Annotated[
@@ -60,6 +62,7 @@ def play(
     """Play a scenario, or as a campaign all of a folder; prints how it ended and where logs lie."""
     from skidpad.core.errors import ConfigError
 
+    expected.rules()  # what cannot be read is said before anything is driven
     if check:
         _check(file, structs.replace(scenario, parameters=cross.parameters()))
         return
@@ -70,8 +73,9 @@ def play(
 
     template = _template(cross, controller, run, scenario, tuned, backend)
     if file.is_dir() or is_distribution(file):
-        how = Drive(out=out, **structs.asdict(driving))
-        how(_campaign(template, cross, file, seeds), table)
+        _drive_all(
+            Drive(out=out, **structs.asdict(driving)), template, cross, file, seeds, expected
+        )
         return
     runs = _runs(template, cross, [file], seeds)
     if len(runs) > 1:
@@ -82,6 +86,30 @@ def play(
     typer.echo(f"{driven.outcome.value} after {seconds:.2f} s; log in {out}")
     if driven.error:
         typer.echo(driven.error.strip().split("\n")[-1], err=True)
+    expected.judge({runs[0].name: out})
+
+
+def _drive_all(
+    how: Drive, template: RunSpec, cross: PlayCross, file: Path, seeds: int, expected: Expected
+) -> None:
+    """The campaign of a folder, its crash cards, and what was expected of its runs."""
+    from skidpad.recording.campaigns import RUNS
+
+    campaign = _campaign(template, cross, file, seeds)
+    folders: list[Path] = []
+
+    def told(folder: Path) -> str:
+        from skidpad.report.play import write_crashes
+
+        folders.append(folder)
+        page = write_crashes(folder)
+        return table(folder) + ("" if page is None else f"\ncrash cards in {page}")
+
+    how(campaign, told)
+    runs = {run.name: folders[0] / RUNS / run.name for run in campaign.tasks}
+    if how.until_halfwidth is not None:  # which leaves runs out on purpose
+        runs = {name: run for name, run in runs.items() if run.exists()}
+    expected.judge(runs)
 
 
 def table(folder: Path) -> str:

@@ -97,18 +97,25 @@ def _pairs(a: pl.DataFrame, b: pl.DataFrame) -> pl.DataFrame:
 
 def parse_rule(text: str) -> Rule:
     """`fatal_collisions > 0.1`: column, one of > >= < <=, number; about the mean difference."""
+    return Rule(text, *parse_comparison("--fail-if", text, columns()))
+
+
+def parse_comparison(
+    option: str, text: str, known: list[str] | tuple[str, ...]
+) -> tuple[str, Callable[[float, float], bool], float]:
+    """A name among `known`, a comparison and a number; ConfigError says what `option` takes."""
     match = RULE.match(text)
     if not match:
-        raise ConfigError(f"--fail-if takes COLUMN > NUMBER (or >=, <, <=), got {told(text, 200)}")
+        raise ConfigError(f"{option} takes COLUMN > NUMBER (or >=, <, <=), got {told(text, 200)}")
     column, sign, number = match.groups()
-    require_choice("column", column, columns())
+    require_choice("column", column, known)
     try:
         limit = float(number)
     except ValueError:
         raise ConfigError(
-            f"--fail-if: {told(number, 100)} is no number, in {told(text, 200)}"
+            f"{option}: {told(number, 100)} is no number, in {told(text, 200)}"
         ) from None
-    return Rule(text, column, OPERATORS[sign], limit)
+    return column, OPERATORS[sign], limit
 
 
 def columns() -> list[str]:

@@ -11,10 +11,11 @@ from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand, ActorSetup
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Control
+from skidpad.scenarios.entities import Box
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Place
 from skidpad.scenarios.scenario import Scenario
-from skidpad.scenarios.scene import Actor, Running, Scene
+from skidpad.scenarios.scene import Actor, Happening, Running, Scene
 from skidpad.scenarios.telling import Telling
 from skidpad.simulation.scripted import ActorDriver, Motion
 
@@ -28,6 +29,14 @@ class Begun:
 
     name: str
     t: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """What is left of a scenario that was played: its story, and the boxes of its entities."""
+
+    story: tuple[Happening, ...]
+    boxes: Mapping[str, Box]
 
 
 def setups(scenario: Scenario) -> tuple[ActorSetup, tuple[ActorSetup, ...]]:
@@ -87,6 +96,12 @@ class Player:
     def events(self) -> list[Begun]:
         """All events, with the times of their first begin."""
         return [Begun("::".join(e.path), e.happened_at) for e in self.telling.events]
+
+    @property
+    def played(self) -> Played:
+        """As a value."""
+        boxes = {name: entity.box for name, entity in self.scenario.entities.items()}
+        return Played(tuple(self.scene.story), boxes)
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
         """Look at the moment, go on with the story, say what actors do until the next."""

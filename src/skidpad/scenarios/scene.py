@@ -41,6 +41,15 @@ class Move(str, Enum):
     SKIP = "skipTransition"
 
 
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """Something of the storyboard that happened at t, s: a transition, or what a condition says."""
+
+    t: float
+    path: Path
+    what: str
+
+
 class Running(Protocol):
     """An action under way."""
 
@@ -201,6 +210,12 @@ class Scene:
     contacts: set[str] = field(default_factory=set)  # names that touch the ego in this tick
     ego: str = ""
     notices: list[str] = field(default_factory=list)  # what could not be done, for the log
+    story: list[Happening] = field(default_factory=list)
+
+    def moved(self, path: Path, move: Move) -> None:
+        """An element of the storyboard goes through a transition."""
+        self.moves.append((path, move))
+        self.story.append(Happening(self.t, path, move.value))
 
     def observe(self, truth: WorldTruth) -> None:
         """Take over positions and velocities of a tick."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from math import cos, hypot, sin
 
@@ -57,13 +57,18 @@ class Told:
 
     def csv(self) -> str:
         """With the columns time,id,name,x,y,z,h,speed."""
-        text = io.StringIO()
-        writer = csv.writer(text, lineterminator="\n")
-        writer.writerow(Row.__dataclass_fields__)
-        for r in self.rows:
-            numbers = (f"{v:.4f}" for v in (r.x, r.y, r.z, r.h, r.speed))
-            writer.writerow((f"{r.time:.3f}", r.id, r.name, *numbers))
-        return text.getvalue()
+        return rows_csv(self.rows)
+
+
+def rows_csv(rows: Iterable[Row]) -> str:
+    """With the columns time,id,name,x,y,z,h,speed."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(Row.__dataclass_fields__)
+    for r in rows:
+        numbers = (f"{v:.4f}" for v in (r.x, r.y, r.z, r.h, r.speed))
+        writer.writerow((f"{r.time:.3f}", r.id, r.name, *numbers))
+    return text.getvalue()
 
 
 class Stage:

@@ -32,7 +32,7 @@ class Told:
         """Into another state."""
         self.state = state
         scene.states[self.path] = state
-        scene.moves.append((self.path, move))
+        scene.moved(self.path, move)
 
     @property
     def running(self) -> bool:
@@ -51,7 +51,7 @@ class ToldEvent(Told):
     def __init__(self, event: Event, actors: Sequence[str]) -> None:
         super().__init__(event.path)
         self.event, self.actors, self.left = event, actors, event.count
-        self.watch = Watch(event.start)
+        self.watch = Watch(event.start, event.path)
         self.going: list[tuple[Path, list[Running]]] = []
         self.happened_at: float | None = None  # s, the first time
 
@@ -78,7 +78,7 @@ class ToldEvent(Told):
         self.going = []
         for action in self.event.actions:
             scene.states[action.path] = State.RUNNING
-            scene.moves.append((action.path, Move.START))
+            scene.moved(action.path, Move.START)
             self.going.append((action.path, list(_begun(action, self.actors, scene))))
 
     def step(self, scene: Scene) -> None:
@@ -92,7 +92,7 @@ class ToldEvent(Told):
                 still.append((path, runs))
             else:
                 scene.states[path] = State.COMPLETE
-                scene.moves.append((path, Move.END))
+                scene.moved(path, Move.END)
         self.going = still
         if not still:
             self.turn(scene, State.STANDBY if self.left > 0 else State.COMPLETE, Move.END)
@@ -103,7 +103,7 @@ class ToldEvent(Told):
             return
         for path, _ in self.going:
             scene.states[path] = State.COMPLETE
-            scene.moves.append((path, Move.STOP))
+            scene.moved(path, Move.STOP)
         self.going = []
         self.turn(scene, State.COMPLETE, Move.STOP)
 
@@ -189,7 +189,7 @@ class ToldGroup(ToldParent):
         if self.left <= 0:
             self.turn(scene, State.COMPLETE, Move.END)
             return
-        scene.moves.append((self.path, Move.END))
+        scene.moved(self.path, Move.END)
         self.manoeuvres = [ToldManoeuvre(m, self.group.actors) for m in self.group.manoeuvres]
         self.children = self.manoeuvres
         self.start(scene)
@@ -201,7 +201,7 @@ class ToldAct(ToldParent):
     def __init__(self, act: Act) -> None:
         self.groups = [ToldGroup(g) for g in act.groups]
         super().__init__(act.path, self.groups)
-        self.begin, self.halt = Watch(act.start), Watch(act.stop)
+        self.begin, self.halt = Watch(act.start, act.path), Watch(act.stop, act.path)
 
     def look(self, scene: Scene) -> None:
         """Begin or stop by its triggers, then look inside."""

@@ -13,7 +13,7 @@ from skidpad.scenarios.conditions.by_value import BY_VALUE, Never
 from skidpad.scenarios.conditions.distances import DISTANCES
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
-from skidpad.scenarios.scene import Scene
+from skidpad.scenarios.scene import Happening, Path, Scene
 
 ENTITY_CONDITIONS = {**BY_ENTITY, **DISTANCES}
 
@@ -72,13 +72,22 @@ EMPTY = Trigger(())
 class Watched:
     """A condition as one run sees it."""
 
-    def __init__(self, timed: Timed) -> None:
-        self.timed, self.probe = timed, timed.condition.probe()
+    def __init__(self, timed: Timed, path: Path) -> None:
+        self.timed, self.probe, self.path = timed, timed.condition.probe(), path
+        self.said = False
         self.before: bool | None = None
         self.past: deque[tuple[float, bool]] = deque()
 
     def holds(self, scene: Scene) -> bool:
-        """The result of `delay` s ago."""
+        """The result of `delay` s ago; the story tells when it changes."""
+        result = self._result(scene)
+        if result is not self.said:
+            self.said = result
+            what = f"condition {self.timed.name} {'holds' if result else 'ends'}"
+            scene.story.append(Happening(scene.t, self.path, what))
+        return result
+
+    def _result(self, scene: Scene) -> bool:
         now = self.probe(scene)
         before, self.before = self.before, now
         edge = self.timed.edge
@@ -96,8 +105,8 @@ class Watched:
 class Watch:
     """A trigger as one run sees it."""
 
-    def __init__(self, trigger: Trigger) -> None:
-        self.groups = [[Watched(c) for c in group] for group in trigger.groups]
+    def __init__(self, trigger: Trigger, path: Path = ()) -> None:
+        self.groups = [[Watched(c, path) for c in group] for group in trigger.groups]
 
     def __bool__(self) -> bool:
         return bool(self.groups)

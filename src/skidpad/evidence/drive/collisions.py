@@ -105,6 +105,14 @@ def find_crashes(drive: Drive) -> tuple[Crash, ...]:
     return tuple(sorted(crashes, key=lambda c: c.tick))
 
 
+def contact_crashes(drive: Drive) -> tuple[Crash, ...]:
+    """The first contact with each other body, for drives that nobody supervises."""
+    first: dict[tuple[int, str], ContactEvent] = {}
+    for contact in drive.log.contacts:
+        first.setdefault((contact.actor, contact.static), contact)
+    return tuple(_crash(drive, drive.row(c.tick), c) for c in first.values())
+
+
 def _culprit(log: RunLog, row: int) -> ContactEvent | None:
     """The hardest contact just before a recovery began."""
     tick, lag = int(log.tick[row]), RECOVERY_LAG / log.header.dt

@@ -1,0 +1,52 @@
+"""What a user expects of a run: `no-collision`, or a comparison of one of its numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from math import inf
+
+from skidpad.evidence.compare import parse_comparison
+from skidpad.evidence.pairs import Pair, pairs
+from skidpad.recording.runlog import RunLog
+
+NO_COLLISION = "no-collision"
+LEAST = tuple(name for name in Pair._fields if name.startswith("min_"))
+MOST = tuple(name for name in Pair._fields if name.startswith("max_"))
+NAMES = ("collisions", "duration_s", *LEAST, *MOST)
+
+
+@dataclass(frozen=True, slots=True)
+class Expectation:
+    """One number of a run compares so with `limit`."""
+
+    text: str
+    name: str
+    compare: Callable[[float, float], bool]
+    limit: float
+
+    def disappointed(self, values: dict[str, float]) -> str:
+        """What is wrong; "" when it is as expected."""
+        value = values[self.name]
+        return "" if self.compare(value, self.limit) else f"{self.name} is {value:.4g}"
+
+
+def parse_expectation(text: str) -> Expectation:
+    """`no-collision`, or `min_ttc_s > 1.5`: one of NAMES, one of > >= < <=, number."""
+    plain = "collisions <= 0" if text.strip() == NO_COLLISION else text
+    name, compare, limit = parse_comparison("--expect", plain, NAMES)
+    return Expectation(text, name, compare, limit)
+
+
+def run_values(log: RunLog, found: Iterable[Pair] | None = None) -> dict[str, float]:
+    """The numbers by name, over all pairs; inf or 0 where there never was a conflict."""
+    known = list(pairs(log) if found is None else found)
+    seconds = float(log.t[-1] - log.t[0]) if len(log) else 0.0
+    values = {"collisions": float(len(log.contacts)), "duration_s": seconds}
+    values |= {
+        n: min((v for p in known if (v := getattr(p, n)) is not None), default=inf) for n in LEAST
+    }
+    values |= {
+        n: max((v for p in known if (v := getattr(p, n)) is not None), default=0.0) for n in MOST
+    }
+    return values

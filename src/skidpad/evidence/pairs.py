@@ -1,0 +1,152 @@
+"""How critical it became between the ego and each other actor of a run."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.evidence.channels.boxes import STEP
+from skidpad.evidence.channels.conflicts import encroachment
+from skidpad.evidence.drive.conflict import (
+    GAP_MIN,
+    deceleration_to_avoid_crash,
+    least,
+    time_to_collision,
+)
+from skidpad.recording.runlog import RunLog
+
+Floats = NDArray[np.float64]
+EGO = 0
+V_HEADWAY = 1.0  # m/s, below there is no headway
+
+
+class Pair(NamedTuple):
+    """The ego and another actor, whichever of them follows; None where it never applied."""
+
+    other: str
+    min_gap_m: float | None  # bumper to bumper, while one is in the other's way
+    min_ttc_s: float | None
+    min_thw_s: float | None
+    max_drac_mps2: float | None
+    max_required_mps2: float | None
+    min_pet_s: float | None  # up to 2 s
+
+
+class Body(NamedTuple):
+    """One actor over time, arrays (T,): m, rad, m/s, m/s^2 in its own axes."""
+
+    x: Floats
+    y: Floats
+    yaw: Floats
+    vx: Floats  # world
+    vy: Floats
+    ax: Floats  # body
+    ay: Floats
+    length: float
+    width: float
+
+
+class Following(NamedTuple):
+    """One behind another, arrays (T,); gap is NaN where the other is not in the way ahead."""
+
+    gap: Floats
+    v_closing: Floats
+    v: Floats  # of the one behind
+    a_lead: Floats  # of the one ahead, along the axis of the one behind
+
+
+def pairs(log: RunLog) -> tuple[Pair, ...]:
+    """Every actor that was there together with the ego."""
+    ego = body(log, EGO)
+    found = []
+    for i, name in enumerate(log.table.names):
+        both = log.present[:, EGO] & log.present[:, i]
+        if i != EGO and both.any():
+            found.append(pair_of(name, ego, body(log, i), both, log.header.dt))
+    return tuple(found)
+
+
+def body(log: RunLog, i: int) -> Body:
+    """An actor's columns of the log."""
+    a = log.actors
+    x, y, yaw, vx, vy, ax, ay = (
+        v[:, i].astype(np.float64) for v in (a.x, a.y, a.yaw, a.vx, a.vy, a.ax, a.ay)
+    )
+    length, width = float(log.table.length[i]), float(log.table.width[i])
+    return Body(x, y, yaw, vx, vy, ax, ay, length, width)
+
+
+def pair_of(name: str, ego: Body, other: Body, both: NDArray[np.bool_], dt: float) -> Pair:
+    """Their numbers over the ticks in which both are there."""
+    ways = [following(ego, other), following(other, ego)]
+    use = [both & ~np.isnan(w.gap) for w in ways]
+    cut = [Following(*(column[u] for column in w)) for w, u in zip(ways, use, strict=True)]
+    f = Following(*(np.concatenate(columns) for columns in zip(*cut, strict=True)))
+    drac = deceleration_to_avoid_crash(f.gap, f.v_closing)
+    headway = time_to_collision(f.gap, np.where(f.v > V_HEADWAY, f.v, 0.0))
+    return Pair(
+        other=name,
+        min_gap_m=least(f.gap),
+        min_ttc_s=least(time_to_collision(f.gap, f.v_closing)),
+        min_thw_s=least(headway),
+        max_drac_mps2=_most(drac),
+        max_required_mps2=_most(required_deceleration(f.gap, f.v_closing, f.a_lead)),
+        min_pet_s=post_encroachment(ego, other, both, dt),
+    )
+
+
+def following(behind: Body, ahead: Body) -> Following:
+    """What the one has in its way, as boxes; both keep their directions."""
+    c, s = np.cos(behind.yaw), np.sin(behind.yaw)
+    dx, dy = ahead.x - behind.x, ahead.y - behind.y
+    forward, left = dx * c + dy * s, dy * c - dx * s
+    turn = ahead.yaw - behind.yaw
+    tc, ts = np.abs(np.cos(turn)), np.abs(np.sin(turn))
+    long = 0.5 * (behind.length + ahead.length * tc + ahead.width * ts)
+    wide = 0.5 * (behind.width + ahead.length * ts + ahead.width * tc)
+    in_the_way = (forward > 0.0) & (np.abs(left) < wide)
+    v = behind.vx * c + behind.vy * s
+    closing = v - (ahead.vx * c + ahead.vy * s)
+    a_lead = ahead.ax * np.cos(turn) - ahead.ay * np.sin(turn)
+    gap = np.where(in_the_way, np.maximum(forward - long, 0.0), np.nan)
+    return Following(gap, closing, v, a_lead)
+
+
+def required_deceleration(gap: Floats, v_closing: Floats, a_lead: Floats) -> Floats:
+    """Constant deceleration behind a lead that keeps its own, without contact; >= 0.
+
+    Source: a_long,req for constant accelerations, Jansson (2005), as in
+    criticality-metrics.readthedocs.io, "Required Longitudinal Acceleration".
+    """
+    needed = np.maximum(v_closing, 0.0) ** 2 / (2.0 * np.maximum(gap, GAP_MIN)) - a_lead
+    out: Floats = np.maximum(needed, 0.0)
+    return out
+
+
+def post_encroachment(a: Body, b: Body, both: NDArray[np.bool_], dt: float) -> float | None:
+    """Least time between one leaving a place and the other coming there, s; None above 2 s."""
+    stride = max(1, round(STEP / dt))
+    rows = np.flatnonzero(both)
+    breaks = np.flatnonzero(np.diff(rows) > 1) + 1
+    best = np.inf
+    for stretch in np.split(rows, breaks):
+        chosen = stretch[::stride]
+        if len(chosen) > 1:
+            time, _ = encroachment(_motion(a, chosen), _half(a), _motion(b, chosen), _half(b))
+            best = min(best, time)
+    return float(best) if np.isfinite(best) else None
+
+
+def _motion(one: Body, rows: NDArray[np.int64]) -> Floats:
+    columns = (one.x, one.y, np.cos(one.yaw), np.sin(one.yaw))
+    return np.ascontiguousarray(np.column_stack([c[rows] for c in columns]))
+
+
+def _half(one: Body) -> Floats:
+    return np.array([0.5 * one.length, 0.5 * one.width])
+
+
+def _most(values: Floats) -> float | None:
+    return float(values.max()) if len(values) else None

@@ -1,0 +1,49 @@
+"""What a played scenario leaves besides its log: trajectories and the story, as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Iterator, Mapping
+from math import cos, hypot, sin
+from pathlib import Path
+
+from skidpad.recording.files import write_bytes
+from skidpad.recording.runlog import RunLog
+from skidpad.scenarios.entities import Box
+from skidpad.scenarios.player import Played
+from skidpad.scenarios.scene import Happening
+from skidpad.scenarios.stage import Row, rows_csv
+
+TRAJECTORIES, STORY = "trajectories.csv", "storyboard.csv"
+
+
+def write_results(folder: Path, log: RunLog, played: Played) -> None:
+    """Write both files."""
+    rows = rows_csv(log_rows(log, played.boxes))
+    write_bytes(folder / TRAJECTORIES, rows.encode())
+    write_bytes(folder / STORY, story_csv(played.story).encode())
+
+
+def log_rows(log: RunLog, boxes: Mapping[str, Box]) -> Iterator[Row]:
+    """Places of reference points, as the file means them, of whoever is there."""
+    a, times = log.actors, log.t.tolist()
+    columns = [v.tolist() for v in (a.x, a.y, a.z, a.yaw, a.vx, a.vy, log.present)]
+    for k, t in enumerate(times):
+        for i, name in enumerate(log.table.names):
+            x, y, z, yaw, vx, vy, there = (column[k][i] for column in columns)
+            if not there:
+                continue
+            box = boxes.get(name, Box())
+            x -= box.forward * cos(yaw) - box.left * sin(yaw)
+            y -= box.forward * sin(yaw) + box.left * cos(yaw)
+            yield Row(t, i, name, x, y, z, yaw, hypot(vx, vy))
+
+
+def story_csv(story: Iterable[Happening]) -> str:
+    """With the columns time,element,what."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("time", "element", "what"))
+    writer.writerows((f"{h.t:.3f}", "::".join(h.path), h.what) for h in story)
+    return text.getvalue()

@@ -15,6 +15,8 @@ import pytest
 
 pytest.importorskip("cyclonedds", reason="cyclonedds is not installed")
 rosbags = pytest.importorskip("rosbags.typesys", reason="rosbags is not installed")
+from cyclonedds.core import DDSException  # noqa: E402
+
 from channel_worlds import Eyes, World, drive, frame  # noqa: E402
 from runs import segment_run  # noqa: E402
 from skidpad.campaign.channel_drive import drive_segment  # noqa: E402
@@ -190,3 +192,37 @@ def test_frames_come_back_from_the_wire_as_they_went():
         assert getattr(back, name) == pytest.approx(getattr(f, name), abs=1e-8), name
     assert back.ego_polygon == pytest.approx(f.ego_polygon)
     assert back.polygons == pytest.approx(f.polygons, abs=1e-6)
+
+
+class Full:
+    """A writer whose reader has no room in one cycle."""
+
+    def __init__(self, writer, full_at):
+        self.writer, self.full_at = writer, full_at
+
+    def write(self, message, stamp):
+        if stamp == self.full_at:
+            raise DDSException(DDSException.DDS_RETCODE_TIMEOUT, "full")
+        self.writer.write(message, stamp)
+
+    def wait_for_acks(self, limit):
+        return True
+
+
+@pytest.mark.req("C-005")
+@pytest.mark.parametrize(("flow", "missing"), [(Flow.LIVE, [2]), (Flow.LOSSLESS, [2, 3, 4])])
+def test_a_reader_without_room_costs_a_cycle_and_the_drive_nothing(
+    tmp_path, monkeypatch, flow, missing
+):
+    monkeypatch.setattr(ros2_publisher, "LISTENERS", 0.0)
+    publisher = RosPublisher(("full",), tmp_path / "a.mcap", flow, DOMAIN)
+    publisher.ended = ""  # nobody listens, as is said; here somebody is slow
+    part = (0, "plan")
+    publisher.writers[part] = Full(publisher.writers[part], 200_000_000)
+    for k in range(5):
+        publisher.hear(0, frame(0.1 * k, (1.5 * k, 0.0, 0.0, 15.0, 0.0)))
+        publisher.cycle_over(k, 0.1 * k)
+    publisher.close()
+    assert publisher.missing == missing
+    said = (tmp_path / "a.ros2.json").read_text()
+    assert ("complete" in said) is (flow is Flow.LIVE)

@@ -75,6 +75,7 @@ class RosPublisher:
         self.said: list[Any] = []
         self.cycles, self.missing, self.ended = 0, list[int](), ""
         self.described = False
+        self.cut = False  # a reader had no room for all of this cycle
         if flow is Flow.LOSSLESS:
             self._await_readers()
 
@@ -93,7 +94,7 @@ class RosPublisher:
 
     def hear(self, channel: int | None, item: Item) -> None:
         """Write what a channel says; objects and plan before the pose that completes a frame."""
-        if channel is None or not isinstance(item, ChannelFrame) or self.ended:
+        if channel is None or not isinstance(item, ChannelFrame) or self.ended or self.cut:
             return
         if not self.described:
             self._describe(item)
@@ -107,15 +108,18 @@ class RosPublisher:
             try:
                 self.writers[channel, part].write(make(usable), round(item.t * 1e9))
             except DDSException as error:
-                self.ended = f"a reader took nothing ({error.msg}), after {self.cycles} cycles"
+                self.cut = True  # a live drive drops the rest of this cycle and goes on
+                if self.flow is Flow.LOSSLESS:
+                    self.ended = f"a reader took nothing ({error.msg}), after {self.cycles} cycles"
                 return
 
     def cycle_over(self, k: int, t: float) -> None:
         """Count it."""
         del t
         self.cycles += 1
-        if self.ended:
+        if self.ended or self.cut:
             self.missing.append(k)
+        self.cut = False
 
     def close(self) -> None:
         """Wait until readers have it all, and leave the domain."""

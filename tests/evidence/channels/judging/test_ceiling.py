@@ -13,6 +13,7 @@ from skidpad.evidence.channels.matching import tally
 from skidpad.recording.cycles import cycles
 
 TAILGATED = HazardType.EGO_TAILGATED
+LOCALISATION = HazardType.INCONSISTENT_LOCALISATION
 CLOSE = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-12.0, 0, 0, 15.0, 0), (60.0, 3.5, 0, 15, 0)]))
 
 
@@ -31,6 +32,16 @@ def test_perfect_eyes_reach_it_all_and_blind_ones_nothing():
     assert counts(judged((Eyes("a"), Eyes("b")))) == (1, 0, 0)
     assert counts(judged((Eyes("a", 0.3, 0.1), Eyes("b", blind=(0, 1))))) == (1, 0, 0)
     assert counts(judged((Eyes("a", blind=(0,)), Eyes("b", blind=(0,))))) == (0, 0, 1)
+
+
+@pytest.mark.req("C-121")
+@pytest.mark.parametrize(("offset", "found"), [((0.0, 0.0), 0), ((0.6, 0.0), 0), ((1.5, 0.0), 1)])
+def test_positions_that_jump_are_found_as_the_truth_finds_them(offset, found):
+    eyes = (Eyes("a", ego_noise=0.08), Eyes("b", ego_noise=0.08, ego_offset={4.0: offset}))
+    rows = list(cycles(drive(World(), eyes, 8.0)))
+    spans = [s for s in ceiling(rows, ["a", "b"]) if s.hazard is LOCALISATION]
+    assert len(spans) == found
+    assert all(s.t_start == pytest.approx(4.0, abs=0.15) for s in spans)
 
 
 def test_no_truth_no_ceiling():

@@ -4,37 +4,37 @@ Every channel's objects are given to the actors that they really are (true assoc
 with hindsight over the whole drive, and judged by the rule of simulator truth. No identifier that
 reads the same channels can be expected to do better, for it lacks the association, the hindsight
 and the rule. What this one misses or finds too much is noise, occlusion and range.
+
+For localisation it is a reference and no bound: no channel knows its own error, so the rule's limits
+are laid on the offset of two channels, and other limits trade misses for false alarms.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.channels import ChannelFrame, Cycle, TruthFrame
-from skidpad.core.vocabulary import HazardType
+from skidpad.core.channels import Cycle, TruthFrame
+from skidpad.evidence.channels.judging.truth.marks import World, offsets
+from skidpad.evidence.channels.judging.truth.marks import merged as hazards_of
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
-from skidpad.evidence.channels.judging.truth.worldmodel import world_model_truth
 from skidpad.evidence.channels.matching import Span, merged
 
 Floats = NDArray[np.float64]
 NEAR = 3.0  # m between an object and the actor that it is
 WINDOW = 10  # cycles before and after: 1 s each way
 LEAST = 5  # cycles seen in the window, else the actor is not known
-NAME = "ceiling"
+MEDIAN = 3  # cycles before and after: a jump stays one, noise of single cycles goes
+NAME = "ceiling of simulator truth"
 
 
 def ceiling(cycles: Sequence[Cycle], channels: Sequence[str]) -> tuple[Span, ...]:
-    """Hazards by simulator truth's rule on each channel's smoothed world, all channels together.
-
-    Localisation: where smoothed positions of two channels are too far apart; no channel knows its own
-    error.
-    """
+    """Hazards by simulator truth's rule on each channel's smoothed world, all channels together."""
     known = [c for c in cycles if c.truth is not None]
     found: list[Span] = []
-    smooth: list[list[ChannelFrame | None]] = []
     for c in range(len(channels)):
         egos = _smoothed_egos(known, c)
         perceived = _perceived(known, c, egos)
@@ -43,21 +43,28 @@ def ceiling(cycles: Sequence[Cycle], channels: Sequence[str]) -> tuple[Span, ...
             Span(h.hazard, h.t_start, h.t_end)
             for h in simulator_truth([r for r in rows if r.truth is not None], ())
         ]
-        smooth.append([_at(k.frames[c], e) for k, e in zip(known, egos, strict=True)])
-    together = [k._replace(frames=tuple(f)) for k, *f in zip(known, *smooth, strict=True)]
-    found += [
-        Span(h.hazard, h.t_start, h.t_end)
-        for h in world_model_truth(together, channels)
-        if h.hazard is HazardType.INCONSISTENT_LOCALISATION
+    marks = [
+        mark
+        for a, b in combinations(range(len(channels)), 2)
+        for mark in offsets(_offset(known, a, b), f"{channels[a]}+{channels[b]}")
     ]
+    found += [Span(h.hazard, h.t_start, h.t_end) for h in hazards_of(marks, World.SIM)]
     return tuple(sorted(merged(found), key=lambda s: s.t_start))
 
 
-def _at(frame: ChannelFrame | None, ego: Floats) -> ChannelFrame | None:
-    """The frame with the smoothed ego, without objects and plan: only its place is judged."""
-    if frame is None:
-        return None
-    return frame._replace(ego=ego, plan=np.zeros((0, 3)))
+def _offset(cycles: Sequence[Cycle], a: int, b: int) -> Floats:
+    """Rows t, dx, dy (k, 3) from channel a to b: medians of what both say around each cycle."""
+    rows = [
+        (k.t, *(two.ego[:2] - one.ego[:2]))
+        for k in cycles
+        if (one := k.frames[a]) is not None and (two := k.frames[b]) is not None
+    ]
+    raw: Floats = np.array(rows, dtype=np.float64).reshape(-1, 3)
+    raw = raw[np.isfinite(raw).all(axis=1)]
+    out: Floats = raw.copy()
+    for k in range(len(raw)):
+        out[k, 1:] = np.median(raw[max(k - MEDIAN, 0) : k + MEDIAN + 1, 1:], axis=0)
+    return out
 
 
 def _smoothed_egos(cycles: Sequence[Cycle], c: int) -> Floats:

@@ -8,7 +8,7 @@ RUN_ARGS ?=
 TEST_ARGS ?=
 DRIVE_ARGS ?=
 
-.PHONY: cockpit run test check wheel-check bench fuzz refs data figures clean
+.PHONY: cockpit run test check wheel-check bench fuzz refs data fleet fleet-load figures clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next $(RUN_ARGS)
@@ -46,6 +46,14 @@ refs: $(VENV)/.tested-with
 data: $(VENV)/.tested-with
 	PYTHONPATH=tools $(BIN)/python -m mapmaker
 	$(BIN)/python tools/scenario_catalogue.py
+
+# vehicles drive, report, get a good and a bad update; ends with the dashboard's address
+fleet: $(VENV)/.tested-with
+	$(BIN)/skidpad fleet demo --out out/fleet
+
+fleet-load: $(VENV)/.tested-with
+	$(BIN)/python tools/fleet_load.py --records 20000
+	$(BIN)/python tools/fleet_load.py --records 20000 --kills 20
 
 figures: $(VENV)/.tested-with
 	$(BIN)/python tools/vehicle_validation.py docs/img

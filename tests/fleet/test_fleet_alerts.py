@@ -182,10 +182,10 @@ def http_server(answer: int, location: str | None = None):
 
 def test_a_webhook_goes_to_its_host_and_nowhere_else():
     with http_server(200) as (good, got), http_server(302, good) as (redirects, asked):
-        Webhook("red", good, ["127.0.0.1"]).send({"id": "a"})
+        Webhook("red", good, ["127.0.0.1"], 120.0).send({"id": "a"})
         assert got == [{"id": "a"}]
         with pytest.raises(BackendError, match="302"):
-            Webhook("red", redirects, ["127.0.0.1"]).send({"id": "b"})
+            Webhook("red", redirects, ["127.0.0.1"], 120.0).send({"id": "b"})
         assert (len(asked), len(got)) == (1, 1)
     with pytest.raises(BackendError):
         Webhook("red", good, ["127.0.0.1"]).send({"id": "c"})  # nobody there
@@ -237,18 +237,16 @@ def mosquitto(folder):
 def test_mqtt_carries_an_alert_to_whoever_subscribed(tmp_path):
     aiomqtt = pytest.importorskip("aiomqtt", reason="aiomqtt, for mosquitto, is not installed")
     with mosquitto(tmp_path) as port:
-        relay = Mqtt(Broker(host="127.0.0.1", port=port))
+        relay = Mqtt(Broker(host="127.0.0.1", port=port), 120.0)
 
         async def through() -> tuple[str, dict]:
             async with aiomqtt.Client(
-                "127.0.0.1", port, protocol=aiomqtt.ProtocolVersion.V5
+                "127.0.0.1", port, protocol=aiomqtt.ProtocolVersion.V5, timeout=120
             ) as client:
                 await client.subscribe("skidpad/red/alerts", qos=1)
                 await asyncio.to_thread(relay.send, {"id": "a", "operator": "red"})
-                async with asyncio.timeout(120):
-                    async for message in client.messages:
-                        return str(message.topic), json.loads(message.payload)
-            raise AssertionError
+                message = await asyncio.wait_for(anext(aiter(client.messages)), 120)
+                return str(message.topic), json.loads(message.payload)
 
         assert asyncio.run(through()) == ("skidpad/red/alerts", {"id": "a", "operator": "red"})
     with pytest.raises(BackendError):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import itertools
 import json
+from contextlib import closing, contextmanager
 
 import numpy as np
 import pytest
@@ -98,18 +99,24 @@ def test_an_authority_learns_places_and_no_vehicle(world):
     assert world.get("researcher", "/api/v1/places").status_code == 403
 
 
-def crowd(tmp_path, n: int) -> World:
+@contextmanager
+def crowd(tmp_path, n: int):
     one = make_world(tmp_path / "data", None)
     with one.fleet.engine.begin() as connection:
         for k in range(n):
             one.accounts[f"car-{k}"] = add_vehicle(connection, "red", "axle", f"car-{k}", NOW)
-    return one
+    with closing(one):
+        yield one
 
 
 @pytest.mark.req("C-177")
 def test_nobody_is_found_again_in_the_research_export(tmp_path):
     """An attacker sees every export, knows all other vehicles' hazards, and asks about one of them."""
-    world = crowd(tmp_path, 9)
+    with crowd(tmp_path, 9) as world:
+        attack(world)
+
+
+def attack(world: World) -> None:
     rng = np.random.default_rng(3)
     hour = int(NOW // HOUR)
     told: dict[tuple, set[str]] = {}
@@ -148,23 +155,20 @@ def test_nobody_is_found_again_in_the_research_export(tmp_path):
         assert (account.principal.vehicle or "none") not in text
     assert set(final[0]) == {"hour", "map", "x", "y", "hazard", "weather", "hazards_at_least"}
     assert world.get("researcher", "/api/v1/research").json() == final
-    world.close()
 
 
 def test_an_export_with_one_vehicle_less_differs_by_whole_rows_only(tmp_path):
     """The differencing attack: the fleet with and without one car, all else equal."""
     exports = []
     for n, without in ((7, None), (7, "car-6")):
-        world = crowd(tmp_path / f"{without}", n)
-        hour = int(NOW // HOUR)
-        world.clock.now = hour * HOUR
-        for k in range(n):
-            if f"car-{k}" != without:
-                body = packed(record(k, (250.0, 250.0)))
-                assert world.send(f"car-{k}", body, f"car-key-{k}").status_code == 200
-        world.clock.now += 26 * HOUR
-        exports.append(export(world.fleet))
-        world.close()
+        with crowd(tmp_path / f"{without}", n) as world:
+            world.clock.now = NOW // HOUR * HOUR
+            for k in range(n):
+                if f"car-{k}" != without:
+                    body = packed(record(k, (250.0, 250.0)))
+                    assert world.send(f"car-{k}", body, f"car-key-{k}").status_code == 200
+            world.clock.now += 26 * HOUR
+            exports.append(export(world.fleet))
     assert exports[0] == exports[1]  # 7 and 6 hazards both read "at least 5"
 
 

@@ -201,7 +201,7 @@ def test_a_server_killed_at_any_moment_keeps_what_it_acknowledged(tmp_path):
                 said = invoke(
                     "upload", *folders[first : first + 2], "--to", address,
                     "--spool", str(tmp_path / "spool"), "--token-file", str(token),
-                    "--ca", str(tls / "ca.pem"),
+                    "--ca", str(tls / "ca.pem"), "--wait", "600",
                 )  # fmt: skip
                 assert said == "6 acknowledged, 0 refused, 0 waiting"
             finally:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -313,3 +314,33 @@ def certificate(
         from skidpad.fleet.certificates import make_certificates
     for path in make_certificates(out, host):
         typer.echo(str(path))
+
+
+@fleet.command()
+def demo(
+    out: Annotated[Path, typer.Option(help="A new folder for everything that the demo makes.")],
+    vehicles: Annotated[int, typer.Option(min=3, max=1000, help="How many vehicles.")] = 50,
+    seconds: Annotated[float, typer.Option(min=5.0, max=600.0, help="Of each drive.")] = 25.0,
+    workers: Annotated[int, typer.Option(min=1, max=256, help="Drives at once.")] = 2,
+    port: Annotated[int, typer.Option(help="Of the dashboard; 0: any free one.")] = 0,
+    stay: Annotated[bool, typer.Option(help="Go on serving the dashboard at the end.")] = True,
+) -> None:
+    """Vehicles drive, report, and get a good and a bad update; ends with the dashboard's address."""
+    from skidpad.core.errors import OutputError
+
+    with _extra():
+        from skidpad.cli.fleet_demo import Demo, enrolled, play, pool, serving
+    if out.exists() and any(out.iterdir()):
+        raise OutputError(f"--out {out} is not empty; give a new folder")
+    maker, operator, cars = enrolled(out, vehicles)
+    with serving(out / "data", port) as address, pool(workers) as drives:
+        story = Demo(out, address, maker, cars, seconds, drives, typer.echo)
+        for one in play(story):
+            typer.echo(f"{one['payload']}: {one['ended']}")
+        for who, token in (("manufacturer", maker), ("operator", operator)):
+            path = story.call(token, "POST", "/api/v1/session").json()["path"]
+            typer.echo(f"dashboard of the {who}: {address}{path}")
+        if stay:
+            typer.echo("Ctrl-C ends it")
+            with suppress(KeyboardInterrupt):
+                threading.Event().wait()

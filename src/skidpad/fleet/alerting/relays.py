@@ -34,7 +34,9 @@ class Relay(Protocol):
 class Webhook:
     """A POST to an operator's own server; no other host, no redirect, no proxy."""
 
-    def __init__(self, operator: str, url: str, hosts: Collection[str]) -> None:
+    def __init__(
+        self, operator: str, url: str, hosts: Collection[str], timeout_s: float = TIMEOUT_S
+    ) -> None:
         """ConfigError unless the host is allow-listed and, beyond this machine, the scheme https."""
         parts = urlsplit(url)
         host = parts.hostname or ""
@@ -44,7 +46,7 @@ class Webhook:
             raise ConfigError(f"--webhook: an address with a password is not taken ({host})")
         if parts.scheme != "https" and not (parts.scheme == "http" and is_local(host)):
             raise ConfigError(f"--webhook {url!r} must be https")
-        self.operator, self.url = operator, url
+        self.operator, self.url, self.timeout_s = operator, url, timeout_s
         self.name = f"webhook {host}"
 
     def wants(self, operator: str) -> bool:
@@ -54,7 +56,9 @@ class Webhook:
     def send(self, alert: dict[str, Any]) -> None:
         """One POST of JSON."""
         try:
-            with httpx.Client(timeout=TIMEOUT_S, follow_redirects=False, trust_env=False) as client:
+            with httpx.Client(
+                timeout=self.timeout_s, follow_redirects=False, trust_env=False
+            ) as client:
                 answer = client.post(self.url, json=alert)
         except httpx.HTTPError as error:
             raise BackendError(f"{self.name}: {type(error).__name__}") from error
@@ -80,13 +84,13 @@ class Broker:
 class Mqtt:
     """Publishes to skidpad/<operator>/alerts, at least once (QoS 1)."""
 
-    def __init__(self, broker: Broker) -> None:
+    def __init__(self, broker: Broker, timeout_s: float = TIMEOUT_S) -> None:
         """MissingExtra without aiomqtt."""
         try:
             import aiomqtt
         except ImportError as error:
             raise MissingExtra("--mqtt", "fleet") from error
-        self._library, self.broker = aiomqtt, broker
+        self._library, self.broker, self.timeout_s = aiomqtt, broker, timeout_s
         self.name = "mqtt"
 
     def wants(self, operator: str) -> bool:
@@ -104,7 +108,7 @@ class Mqtt:
         b, library = self.broker, self._library
         tls = None if b.ca is None else ssl.create_default_context(cafile=str(b.ca))
         async with library.Client(
-            b.host, b.port, username=b.user, password=b.password, timeout=TIMEOUT_S,
+            b.host, b.port, username=b.user, password=b.password, timeout=self.timeout_s,
             protocol=library.ProtocolVersion.V5, tls_context=tls,
         ) as client:  # fmt: skip
             topic = f"skidpad/{alert['operator']}/alerts"

@@ -10,7 +10,7 @@ below alpha however often it is looked (Bonferroni).
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from enum import Enum
 
 import msgspec
@@ -89,7 +89,16 @@ def look(differences: Sequence[float], plan: Plan, looks_left: int) -> Finding:
     return Finding(decision, d.size, seen.mean, low, high, seen.p_greater, shifted.p_less, reason)
 
 
-def is_chosen(release: str, vehicle: str, share: float) -> bool:
-    """Whether a vehicle is among the share of a stage: by a hash, so stages hold earlier ones."""
+def chosen(release: str, vehicles: Iterable[str], share: float) -> frozenset[str]:
+    """Those vehicles that are among the share of a stage: by a hash, so stages hold earlier ones.
+
+    However small the share, at least one vehicle is.
+    """
+    ranks = {vehicle: _rank(release, vehicle) for vehicle in vehicles}
+    first = min(ranks, key=lambda vehicle: ranks[vehicle], default=None)
+    return frozenset(v for v, rank in ranks.items() if rank < share * 2.0**64 or v == first)
+
+
+def _rank(release: str, vehicle: str) -> int:
     word = hashlib.sha256(f"{release}/{vehicle}".encode()).digest()
-    return int.from_bytes(word[:8], "big") < share * 2.0**64
+    return int.from_bytes(word[:8], "big")

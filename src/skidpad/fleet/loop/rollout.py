@@ -11,11 +11,11 @@ from sqlalchemy import Connection, select
 
 from skidpad.fleet.identity import new_id
 from skidpad.fleet.loop.changes import change_row, evaluations_of, payload_of
-from skidpad.fleet.loop.plan import Decision, Finding, Plan, is_chosen, look
+from skidpad.fleet.loop.plan import Decision, Finding, Plan, chosen, look
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.events import Event, add_event, events_of
 from skidpad.fleet.store.loop import changes, releases
-from skidpad.fleet.store.tables import drives
+from skidpad.fleet.store.tables import drives, vehicles
 from skidpad.fleet.words import Principal, Refused, absent
 
 SUBJECT = "release"
@@ -114,9 +114,17 @@ def assignment(connection: Connection, tenant: str, vehicle: str) -> dict[str, s
     """What a vehicle is to run: the release under way if it is chosen, else what stands."""
     stands = standing(connection, tenant)
     for one in rollouts(connection, tenant):
-        if one.ended is None and is_chosen(one.row.id, vehicle, one.share):
+        if one.ended is None and vehicle in running_on(connection, one):
             return {"release": one.row.id, "payload": one.name, "before": stands}
     return {"release": "", "payload": stands, "before": stands}
+
+
+def running_on(connection: Connection, one: Rollout) -> frozenset[str]:
+    """The vehicles that run a release at its stage."""
+    ids = connection.execute(
+        select(vehicles.c.id).where(vehicles.c.manufacturer == one.row.tenant)
+    ).scalars()
+    return chosen(one.row.id, ids, one.share)
 
 
 def look_at(fleet: Fleet, who: Principal, id: str) -> Finding | None:
@@ -160,9 +168,10 @@ def _driven(connection: Connection, one: Rollout) -> tuple[list[float], float]:
         .order_by(drives.c.at, drives.c.drive)
     )
     differences, seconds = [], 0.0
+    on = running_on(connection, one)
     for row in rows:
         judged = json.loads(row.summary).get("judged")
-        if judged is not None and is_chosen(one.row.id, row.vehicle, one.share):
+        if judged is not None and row.vehicle in on:
             differences.append(float(judged["errors"] - judged["before"]))
             seconds += row.seconds
     return differences, seconds / 3600.0

@@ -1,0 +1,308 @@
+"""The demo of the fleet: simulated vehicles drive, report, and get a good and a bad update.
+
+Everything goes through the service as it would from a road: enrolment, spool, upload, off-line keys,
+signed updates, stages and looks. Nothing is scripted: what each rule set finds is computed from what
+the channels reported on seeds that no earlier step has seen, and the looks decide.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import os
+import re
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+from msgspec import structs
+
+from skidpad.core.errors import BackendError
+from skidpad.evidence.channels import hazards as rules_module
+
+OPERATORS = ("Red Cabs", "Blue Vans")
+MAKER = "Axle"
+ROUTES = ("route-1", "route-3", "route-5")
+SEED = 7000  # of the first drive; every later drive has the next one
+PLAN = {"stages": [0.34, 1.0], "least_drives": 6, "looks": 1, "margin": 0.25}
+ROUNDS_MAX = 40
+LOOSER = (
+    ("ttc_ahead < 3.2", "ttc_ahead < 9"), ("safety_score < 0.8", "safety_score < 0.99"),
+    ("gap > 0.3", "gap > 0.02"), ("location_variance > 0.05", "location_variance > 0.002"),
+)  # fmt: skip
+
+
+def rule_sets() -> dict[str, bytes]:
+    """What vehicles come with (the published rules), and two changes of it."""
+    source = Path(rules_module.__file__).with_name("hazard_rules.yaml")
+    table = yaml.safe_load(source.read_text(encoding="utf-8"))
+    corrected = json.dumps({"practical": table["practical"]})
+    looser = corrected
+    for old, new in LOOSER:
+        looser = looser.replace(old, new)
+    published = json.dumps({"practical": table["as_printed"]})
+    return {
+        "published": published.encode(),
+        "corrected": corrected.encode(),
+        "looser": looser.encode(),
+    }
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One drive of one vehicle."""
+
+    folder: Path
+    route: str
+    seed: int
+    seconds: float
+    active: bytes  # rules that it runs
+    before: bytes  # rules that it would run otherwise
+
+
+def drive(job: Job) -> tuple[int, int]:
+    """In a worker: drive, monitor under the active rules, and count errors under both."""
+    from skidpad.campaign.channel_drive import drive_segment
+    from skidpad.campaign.channel_routes import driven_routes
+    from skidpad.fleet.loop.judging import errors_of
+    from skidpad.fleet.updates.payloads import PayloadKind, settings_of_content
+    from skidpad.live.watch import watch
+    from skidpad.recording.cycles import cycles
+    from skidpad.recording.sources import open_channels
+
+    job.folder.mkdir(parents=True)
+    recording = job.folder / "drive.mcap"
+    spec = structs.replace(driven_routes()[job.route], duration=job.seconds, seed=job.seed)
+    drive_segment(spec, recording)
+    active = settings_of_content(PayloadKind.RULES, job.active)
+    before = settings_of_content(PayloadKind.RULES, job.before)
+    watch(open_channels(recording, None, truth=False), job.folder, active)
+    source = open_channels(recording, None, truth=False)
+    new, old = errors_of(list(cycles(source)), source.channels, [active, before])
+    recording.unlink()
+    return new.total, old.total
+
+
+@dataclass(slots=True)
+class Car:
+    """A vehicle with its credential, spool and installed updates."""
+
+    name: str
+    token: str
+    folder: Path
+    drives: int = 0
+
+
+@dataclass(slots=True)
+class Demo:
+    """The fleet of the demo and everybody in it."""
+
+    out: Path
+    address: str
+    maker: str  # the manufacturer's credential
+    cars: list[Car]
+    seconds: float
+    drives: Callable[[list[Job]], list[tuple[int, int]]]  # drives jobs, in workers or here
+    say: Callable[[str], None]
+    next_seed: int = SEED
+    payloads: dict[str, bytes] = field(default_factory=dict)  # by name, "": what cars come with
+
+    def call(self, token: str, method: str, path: str, body: Any = None) -> Any:
+        """One request; BackendError unless it is granted."""
+        import httpx
+
+        answer = httpx.request(
+            method, self.address + path, headers={"Authorization": f"Bearer {token}"},
+            content=None if body is None else json.dumps(body), timeout=600.0, trust_env=False,
+        )  # fmt: skip
+        if answer.status_code != 200:
+            raise BackendError(f"{method} {path}: {answer.status_code} {answer.text}")
+        return answer
+
+    def round(self, release: str = "") -> list[tuple[int, int]]:
+        """Vehicles drive once and report; with a release only those that run it. Errors by drive."""
+        jobs: list[tuple[Car, str, Job]] = []
+        for k, car in enumerate(self.cars):
+            told = self.call(car.token, "GET", "/api/v1/updates/assignment").json()
+            if release and told["release"] != release:
+                continue
+            if told["payload"]:
+                self.install(car, told["payload"])
+            job = Job(
+                car.folder / f"drive-{car.drives}", ROUTES[k % len(ROUTES)], self.next_seed,
+                self.seconds, self.payloads[told["payload"]], self.payloads[told["before"]],
+            )  # fmt: skip
+            jobs.append((car, told["release"], job))
+            car.drives, self.next_seed = car.drives + 1, self.next_seed + 1
+        errors = self.drives([job for _, _, job in jobs])
+        for (car, under, job), found in zip(jobs, errors, strict=True):
+            self.report(car, job.folder, under, found if under else None)
+        return errors
+
+    def install(self, car: Car, name: str) -> None:
+        """Fetch an update as a vehicle does: by the pinned root, checked."""
+        import httpx
+
+        from skidpad.fleet.updates.client import UpdateClient
+
+        headers = {"Authorization": f"Bearer {car.token}"}
+        root = (self.out / "offline" / "root.json").read_bytes()
+        with httpx.Client(base_url=self.address, headers=headers, trust_env=False) as client:
+            path = UpdateClient(car.folder / "updates", root, client.get).fetch(name)
+        if path.read_bytes() != self.payloads[name]:
+            raise BackendError(f"{car.name} fetched another update than was signed")
+
+    def report(self, car: Car, folder: Path, release: str, judged: tuple[int, int] | None) -> None:
+        """Spool and send what the monitor wrote."""
+        import httpx
+
+        from skidpad.fleet.monitored import spool_folder
+        from skidpad.fleet.spool import Spool
+        from skidpad.fleet.uploader import TIMEOUT_S, poster, send
+
+        spool = Spool(car.folder / "spool")
+        spool_folder(spool, folder, release, judged)
+        headers = {"Authorization": f"Bearer {car.token}"}
+        with httpx.Client(
+            base_url=self.address, headers=headers, trust_env=False, timeout=TIMEOUT_S
+        ) as client:
+            sent = send(spool, poster(client))
+        if sent.waiting or sent.refused:
+            raise BackendError(f"{car.name}: {sent.waiting} batches wait, {sent.refused} refused")
+
+    def roll_out(self, title: str, content: bytes, hazards: Sequence[str]) -> dict[str, Any]:
+        """Propose, sign off line, release, drive on unseen seeds until the looks have decided."""
+        import base64
+
+        from skidpad.fleet.updates.payloads import PayloadKind, payload_name
+
+        text = {
+            "kind": "rules", "payload": base64.b64encode(content).decode(), "reason": title,
+            "hazards": list(hazards),
+        }  # fmt: skip
+        change = self.call(self.maker, "POST", "/api/v1/changes", text).json()["change"]
+        targets = base64.b64encode(self.signed(content)).decode()
+        order = {"change": change, "targets": targets, "plan": PLAN}
+        release = self.call(self.maker, "POST", "/api/v1/releases", order).json()["release"]
+        self.payloads[payload_name(PayloadKind.RULES, content)] = content
+        before = self.payloads[self.releases()[-1]["before"]]
+        for _ in range(ROUNDS_MAX):
+            self.round(release)
+            told = self.call(self.maker, "POST", f"/api/v1/releases/{release}/look").json()
+            if told["finding"] is not None:
+                self.say(f"  {title}: {_finding(told)}")
+            if told["now"]["ended"]:
+                break
+        old = {"kind": "rules", "payload": base64.b64encode(before).decode()}
+        scenes = self.call(self.maker, "POST", f"/api/v1/changes/{change}/evaluate", old).json()
+        then, now = (sum(s[k] for s in scenes) for k in ("errors_before", "errors_after"))
+        self.say(
+            f"  {title}: on the {len(scenes)} scenes behind it {then} errors before, {now} after"
+        )
+        ended: dict[str, Any] = told["now"]
+        return ended
+
+    def signed(self, content: bytes) -> bytes:
+        """Off line: two of the three keys sign the list with the new update."""
+        import time
+
+        from skidpad.fleet.updates import signing
+        from skidpad.fleet.updates.payloads import PayloadKind, payload_name
+
+        current = self.call(self.maker, "GET", "/api/v1/update-list").content
+        keys = [signing.load_key(self.out / "offline" / f"targets-{k}.key") for k in (1, 3)]
+        name = payload_name(PayloadKind.RULES, content)
+        return signing.add_target(current, (name, content), {}, keys, time.time())
+
+    def releases(self) -> list[dict[str, Any]]:
+        """All releases so far."""
+        found: list[dict[str, Any]] = self.call(self.maker, "GET", "/api/v1/releases").json()
+        return found
+
+
+@contextmanager
+def pool(workers: int) -> Iterator[Callable[[list[Job]], list[tuple[int, int]]]]:
+    """Drives jobs in processes of their own."""
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(workers, mp_context=context) as running:
+        yield lambda jobs: list(running.map(drive, jobs))
+
+
+def _finding(told: dict[str, Any]) -> str:
+    f = told["finding"]
+    return (
+        f"{f['decision']} after {f['drives']} drives, {f['mean']:+.2f} errors per drive, "
+        f"p worse {f['p_worse']:.2g}, p no worse {f['p_no_worse']:.2g} ({f['reason']})"
+    )
+
+
+def enrolled(out: Path, n: int) -> tuple[str, str, list[Car]]:
+    """Make the store, the off-line keys and n vehicles; credentials of maker and operator."""
+    import time
+
+    from skidpad.fleet.service import Places, open_fleet
+    from skidpad.fleet.store.accounts import add_person, add_vehicle
+    from skidpad.fleet.updates import signing
+    from skidpad.fleet.words import Role
+    from skidpad.recording.files import write_bytes
+
+    fleet = open_fleet(Places(data=out / "data"))
+    now = time.time()
+    try:
+        with fleet.engine.begin() as connection:
+            maker = add_person(connection, MAKER, Role.MANUFACTURER, "Mia", now)
+            operator = add_person(connection, OPERATORS[0], Role.OPERATOR, "Ann", now)
+            cars = [
+                add_vehicle(connection, OPERATORS[k % 2], MAKER, f"V{k + 1}", now) for k in range(n)
+            ]
+        tenant = maker.principal.tenant
+        keys = signing.make_offline_keys(out / "offline", out / "data")
+        online = signing.new_key(fleet.online_key(tenant))
+        root = signing.make_root(keys, online, now)
+        fleet.repository(tenant).begin(root, signing.empty_targets(keys["targets"][:2], now))
+    finally:
+        fleet.close()
+    write_bytes(out / "offline" / "root.json", root)
+    made = [Car(c.principal.name, c.token, out / "vehicles" / c.principal.name) for c in cars]
+    return maker.token, operator.token, made
+
+
+@contextmanager
+def serving(data: Path, port: int) -> Iterator[str]:
+    """`skidpad fleet serve` as a process of its own; its address."""
+    words = ["fleet", "serve", "--data", str(data), "--port", str(port)]
+    with subprocess.Popen(
+        [sys.executable, "-m", "skidpad", *words], stdout=subprocess.PIPE, text=True
+    ) as child:
+        try:
+            line = child.stdout.readline() if child.stdout else ""
+            found = re.search(r"https?://\S+", line)
+            if found is None:
+                raise BackendError("the fleet's server did not start")
+            yield found.group(0)
+        finally:
+            os.kill(child.pid, signal.SIGTERM)
+
+
+def play(demo: Demo) -> list[dict[str, Any]]:
+    """The whole story; the releases as they ended."""
+    rules = rule_sets()
+    demo.payloads[""] = rules["published"]
+    demo.say(f"{len(demo.cars)} vehicles drive {demo.seconds:g} s each under the published rules")
+    demo.round()
+    told = demo.call(demo.maker, "POST", "/api/v1/analyses").json()
+    demo.say(f"  {told['hazards']} hazards came in, {told['clusters']} of them recur together")
+    rows = demo.call(demo.maker, "GET", "/api/v1/hazards").json()
+    behind = [row["id"] for row in rows[:20]]
+    demo.say("a change: corrected rules")
+    demo.roll_out("corrected", rules["corrected"], behind)
+    demo.say("another change: looser limits, so that nothing is missed")
+    demo.roll_out("looser", rules["looser"], behind)
+    return demo.releases()

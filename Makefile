@@ -8,7 +8,7 @@ RUN_ARGS ?=
 TEST_ARGS ?=
 DRIVE_ARGS ?=
 
-.PHONY: cockpit run test check wheel-check bench fuzz refs data fleet fleet-load figures clean
+.PHONY: cockpit run test check wheel-check bench fuzz refs data fleet fleet-load figures arm64 clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next $(RUN_ARGS)
@@ -54,6 +54,10 @@ fleet: $(VENV)/.tested-with
 fleet-load: $(VENV)/.tested-with
 	$(BIN)/python tools/fleet_load.py --records 20000
 	$(BIN)/python tools/fleet_load.py --records 20000 --kills 20
+
+# whether the channels monitor's kernels compile for ARM64
+arm64: $(VENV)/.tested-with
+	PYTHONPATH=src $(BIN)/python tools/arm64_check.py
 
 figures: $(VENV)/.tested-with
 	$(BIN)/python tools/vehicle_validation.py docs/img

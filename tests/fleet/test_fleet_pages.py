@@ -22,9 +22,14 @@ from skidpad.fleet.words import Refused
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 WAIT_MS = 120_000
-CALL = httpx.Client(timeout=WAIT_MS / 1000, trust_env=False)  # a busy machine is no fault
 SCENE = {"map": "town", "ego": {"x": 1.0, "y": 2.0, "heading": 0.1}, "v": 8.0}
 ALERT = {"kind": "hazard", "text": "<b>car</b> ahead stopped", "scene": SCENE}
+
+
+def call(method: str, url: str, **rest) -> httpx.Response:
+    """One request with patience: a busy machine is no fault."""
+    with httpx.Client(timeout=WAIT_MS / 1000, trust_env=False) as client:
+        return client.request(method, url, **rest)
 
 
 def test_every_click_for_every_role_and_foreign_id(world):
@@ -73,7 +78,7 @@ def filled(data: Path) -> dict[str, str]:
 
 
 def opened(address: str, token: str) -> str:
-    answer = CALL.post(f"{address}/api/v1/session", headers={"Authorization": f"Bearer {token}"})
+    answer = call("POST", f"{address}/api/v1/session", headers={"Authorization": f"Bearer {token}"})
     assert answer.status_code == 200, answer.text
     return address + answer.json()["path"]
 
@@ -147,8 +152,11 @@ def teleoperator(browser, address, tokens) -> None:
     page.goto(f"{address}/alerts")
     page.get_by_text("0 open alerts").wait_for()
     vehicle = {"Authorization": f"Bearer {tokens['red-1']}"}
-    raised = CALL.post(
-        f"{address}/api/v1/alerts", headers=vehicle | {"Idempotency-Key": "alert-key-1"}, json=ALERT
+    raised = call(
+        "POST",
+        f"{address}/api/v1/alerts",
+        headers=vehicle | {"Idempotency-Key": "alert-key-1"},
+        json=ALERT,
     )
     assert raised.status_code == 200
     page.get_by_text("1 open alerts").wait_for()
@@ -176,9 +184,10 @@ def strangers(browser, address, tokens) -> None:
     assert "this page needs the address" in page.content()
     page.context.close()
     socket = f"{address}/_nicegui_ws/socket.io/?EIO=4&transport=polling"
-    assert CALL.get(socket).status_code == 403
+    assert call("GET", socket).status_code == 403
     assert (
-        CALL.get(f"{address}/api/v1/hazards", headers={"Host": "evil.example"}).status_code == 403
+        call("GET", f"{address}/api/v1/hazards", headers={"Host": "evil.example"}).status_code
+        == 403
     )
     cross = {"Authorization": f"Bearer {tokens['axle']}", "Origin": "https://evil.example"}
-    assert CALL.get(f"{address}/api/v1/hazards", headers=cross).status_code == 403
+    assert call("GET", f"{address}/api/v1/hazards", headers=cross).status_code == 403

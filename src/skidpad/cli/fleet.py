@@ -76,17 +76,12 @@ def serve(
     ] = None,
 ) -> None:
     """Serve the fleet; nothing listens beyond this machine unless --host says so."""
-    from skidpad.core.errors import ConfigError
-
     with _extra():
         from skidpad.fleet.server import Listen, run
         from skidpad.fleet.service import open_fleet
     from skidpad.scenarios.hazard_export import export_hazard
 
-    if (certificate is None) is not (key is None):
-        raise ConfigError("--certificate and --key go together")
-    if host not in ("127.0.0.1", "::1", "localhost") and certificate is None:
-        raise ConfigError(f"--host {host} leaves this machine and needs --certificate and --key")
+    _check_exposure(host, certificate, key)
     places = _places(data, database, blobs)
     relays = _relays(places, webhook or [], webhook_host or [], mqtt, mqtt_ca)
     service = open_fleet(places, exporter=export_hazard, relays=relays)
@@ -95,6 +90,17 @@ def serve(
         run(service, listen, map_lines, typer.echo)
     finally:
         service.close()
+
+
+def _check_exposure(host: str, certificate: Path | None, key: Path | None) -> None:
+    """ConfigError for a service that others could reach without HTTPS."""
+    from skidpad.core.errors import ConfigError
+    from skidpad.pages.server import is_local
+
+    if (certificate is None) is not (key is None):
+        raise ConfigError("--certificate and --key go together")
+    if not is_local(host) and certificate is None:
+        raise ConfigError(f"--host {host} leaves this machine and needs --certificate and --key")
 
 
 def _relays(

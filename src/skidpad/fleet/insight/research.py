@@ -10,6 +10,7 @@ Five false vehicles of an attacker count as five: who may enrol vehicles is trus
 
 from __future__ import annotations
 
+import json
 from math import floor
 from typing import Any
 
@@ -42,8 +43,6 @@ def export(fleet: Fleet) -> list[dict[str, Any]]:
 
 
 def _decode(text: str) -> list[dict[str, Any]]:
-    import json
-
     rows: list[dict[str, Any]] = json.loads(text)["rows"]
     return rows
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from html import escape
 from typing import Any
 
 from starlette.requests import Request
@@ -72,8 +73,6 @@ def head(ui: Any, who: Principal, title: str) -> None:
 
 def table(ui: Any, heads: list[str], rows: list[list[str]]) -> None:
     """A table of plain text that scrolls by itself on a phone."""
-    from html import escape
-
     top = "".join(f"<th>{escape(h)}</th>" for h in heads)
     body = "".join(
         "<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in rows

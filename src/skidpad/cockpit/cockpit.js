@@ -80,7 +80,7 @@ export default {
       if ("drives" in message) { this.drives = message.drives;
         this.$refs.bar.textContent = message.drives ? "this tab drives" : "another tab drives: this one watches";
         this.$el.classList.toggle("watches", !message.drives); }
-      if (message.wrong) { this.$refs.wrong.textContent = message.wrong; setTimeout(() => { this.$refs.wrong.textContent = ""; }, 4000); }
+      if (message.wrong) { this.$el.dataset.wrong = message.wrong; this.$refs.wrong.textContent = message.wrong; setTimeout(() => { this.$refs.wrong.textContent = ""; }, 4000); }
       if (message.ended) { this.ended = true; this.$refs.alert.textContent = message.ended; this.$el.classList.add("over"); }
     },
     async picture(data) {
@@ -106,7 +106,7 @@ export default {
       canvas.getContext("2d").drawImage(bitmap, 0, 0); bitmap.close();
     },
     show(h) {
-      const r = this.$refs, m = h.motion, s = h.stack, seat = h.seat; this.head = h;
+      const r = this.$refs, m = h.motion, s = h.stack, seat = h.seat; this.head = h; this.$el.dataset.paused = h.paused;
       r.speed.textContent = Math.round(Math.abs(m.speed_kmh));
       r.gear.textContent = m.reverse ? "R" : m.gear > 0 ? `D${m.gear}` : "N";
       r.mode.textContent = s.mode || ""; this.$el.classList.toggle("manual", !!seat.manual);

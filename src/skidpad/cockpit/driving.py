@@ -13,14 +13,15 @@ from skidpad.cockpit import hud
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.realtime import RealTime
 from skidpad.cockpit.screen import Screen, Shown
-from skidpad.cockpit.words import Link, Live, Pace, Pause
+from skidpad.cockpit.words import Link, Live, Pace
 from skidpad.core.inputs import Functions
 from skidpad.core.run import AdasDriver, RunSpec, run_from_plain
 from skidpad.stack.settings import settings_of
 
 
 def about(spec: RunSpec, folder: Path, rate: float = 1.0, paused: bool = False) -> dict[str, Any]:
-    """What `drive_job` is given."""
+    """What `drive_job` is given; ConfigError for a rate out of range."""
+    rate = Pace(rate).rate
     return {"spec": spec.to_plain(), "folder": str(folder), "rate": rate, "paused": paused}
 
 
@@ -28,7 +29,7 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
     """Drive a run and write its folder; the sentence of its end."""
     spec, folder = run_from_plain(about["spec"], "the drive"), Path(about["folder"])
     feed, link = Feed(feed_name), Link(pipe)
-    link.rate, link.paused = Pace(about["rate"]).rate, Pause(about["paused"]).on
+    link.rate, link.paused = about["rate"], about["paused"]
     desk = Desk(Live(link), spec)
 
     def shown() -> Shown:

@@ -121,6 +121,7 @@ class Replayer:
                 "lamps": "sun" if seat.lamps is None else seat.lamps.value,
                 "beam": None if beam is None else Beam(beam).name.lower(),
                 "weather": seat.outside.weather.name,
+                "grip": seat.outside.grip.value,
             },
             "rate": link.rate,
             "paused": link.paused,

@@ -122,7 +122,7 @@ COLUMNS: list[dict[str, Any]] = [
     {"name": "name", "label": "cell", "field": "name", "align": "left", "sortable": True},
     {"name": "runs", "label": "runs", "field": "runs", "sortable": True},
     {"name": "good", "label": GOOD, "field": "good", "sortable": True},
-    {"name": "interval", "label": "95 % interval of the share", "field": "interval"},
+    {"name": "interval", "label": "95 %", "field": "interval"},
 ]
 
 

@@ -58,21 +58,21 @@ def test_ctrl_c_remains_the_users():
         run(driven_by("Interrupting"))
 
 
-CAMPAIGN = (
-    "Stack",
+CAMPAIGN = (  # forks first, so that what they leave behind would meet the others
     "Forking",
     "ForkingAtStart",
+    "Stack",
     "Exiting",
-    "ExitingHard",
-    "Interrupting",
     "Chatty",
+    "Interrupting",
+    "ExitingHard",
 )
 
 
 def test_in_a_campaign_every_run_is_told_once_and_none_falls_on_another(tmp_path):
     drivers = [StackDriver(f"{HERE}:{kind}", name=kind) for kind in CAMPAIGN]
     template = driven_by("Stack")
-    tasks = cross(drivers, [template.weather], 2, template)
+    tasks = cross(drivers, [template.weather], 1, template)
     alone = run(template).log
     Campaign(RECIPE, tasks).run(tmp_path / "out", local(2))
     entries = read_ledger(tmp_path / "out", MatrixEntry)

@@ -19,7 +19,7 @@ from numpy.lib import format as npy
 from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.told import clean
+from skidpad.core.told import clean, on_a_line
 
 TEXT_MAX = 16 * 1024**2  # bytes of a YAML or JSON file
 DEPTH_MAX = 60  # of nested collections
@@ -69,12 +69,7 @@ def read_bytes(path: Path, what: str, limit: int = TEXT_MAX) -> bytes:
 
 def unusable(where: str, kind: str, error: BaseException) -> FileError:
     """One sentence for content that is not what it should be."""
-    return FileError(f"{where} is not {kind}: {_words(error)}")
-
-
-def _words(error: BaseException) -> str:
-    """What an exception says, on one line."""
-    return clean(" ".join(str(error).split()) or type(error).__name__, 400)
+    return FileError(f"{where} is not {kind}: {on_a_line(error, 400)}")
 
 
 def decode_yaml(data: bytes, where: str, kind: Any = None) -> Any:
@@ -97,7 +92,7 @@ def converted(plain: Any, kind: Any, where: str) -> Any:
     try:
         return msgspec.convert(plain, kind)
     except UNUSABLE as error:
-        raise ConfigError(f"{where}: {_words(error)}") from None
+        raise ConfigError(f"{where}: {on_a_line(error, 400)}") from None
 
 
 def measure_yaml(data: bytes, where: str) -> None:
@@ -137,7 +132,7 @@ def decode_json(data: bytes | str, where: str, kind: Any = Any) -> Any:
     try:
         return msgspec.json.decode(data, type=kind)
     except UNUSABLE as error:
-        raise FileError(f"{where} is damaged: {_words(error)}") from None
+        raise FileError(f"{where} is damaged: {on_a_line(error, 400)}") from None
 
 
 def read_arrays(data: bytes, where: str, kind: str = "an .npz file") -> dict[str, NDArray[Any]]:

@@ -14,6 +14,7 @@ from msgspec import Meta, Struct
 
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.names import path_part, slug
+from skidpad.core.told import on_a_line
 from skidpad.core.vocabulary import SensorLevel, TrafficStart
 from skidpad.core.weather import Weather
 
@@ -324,4 +325,4 @@ def run_from_plain(plain: dict[str, Any], where: str) -> RunSpec:
     try:
         return msgspec.convert({k: v for k, v in plain.items() if k != "version"}, RunSpec)
     except msgspec.ValidationError as error:
-        raise FileError(f"{where} does not describe a run: {error}") from error
+        raise FileError(f"{where} does not describe a run: {on_a_line(error)}") from error

@@ -14,6 +14,11 @@ def clean(text: str, longest: int = LONGEST) -> str:
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
+def on_a_line(error: BaseException, longest: int = LONGEST) -> str:
+    """What an exception says, cleaned and on one line; the name of its type where it says nothing."""
+    return clean(" ".join(str(error).split()) or type(error).__name__, longest)
+
+
 def told(value: object, longest: int = LONGEST) -> str:
     """`repr(value)`, cleaned; the name of its type where that raises."""
     try:

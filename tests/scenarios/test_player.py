@@ -13,6 +13,7 @@ from skidpad.campaign.run import run
 from skidpad.core.errors import FileError
 from skidpad.core.run import ActorMode, Passenger, Scenario, StackDriver
 from skidpad.core.vocabulary import Outcome
+from skidpad.evidence.grip.scores import npc_contact_row
 from skidpad.physics.presets import preset
 from skidpad.scenarios.findings import HARMLESS, Kind
 from skidpad.scenarios.motion import Shape, Transition
@@ -286,3 +287,28 @@ def test_reduced_friction_reaches_ego_and_others_alike():
     spec = scenario_run("lead_slowdown", "statistical", weather=preset("icy_70"), duration=2.0)
     mu = run(spec).log.mu
     assert mu[-1] == pytest.approx(np.full((2, 4), 0.9 * 0.156082), abs=1e-4)
+
+
+@pytest.mark.req("B-090", "B-091", "B-092")
+@pytest.mark.parametrize(
+    ("file", "came_from", "others_meet"),
+    [
+        ("ghost_cut_in", -1.75, False),  # from the lane on the ego's left
+        ("lead_slowdown", -5.25, False),
+        ("front_accident", -5.25, True),
+    ],
+)
+def test_what_is_ahead_slows_or_meets_another_and_the_ego_brakes_in_time(
+    file: str, came_from: float, others_meet: bool
+) -> None:
+    log = run(scenario_run(file)).log
+    a = log.actors
+    v = np.hypot(a.vx, a.vy)
+    assert a.y[0, 1] == pytest.approx(came_from, abs=0.01)
+    assert a.y[-1, 1] == pytest.approx(a.y[-1, 0], abs=0.3)  # in the ego's lane, ahead of it
+    assert a.x[-1, 1] > a.x[-1, 0]
+    assert v[-1, 1] < 5.0 < v[0, 1]
+    assert (npc_contact_row(log) is not None) is others_meet
+    assert log.contacts == ()
+    assert v[-1, 0] < 5.0 < v[:, 0].max()
+    assert log.applied.brake.max() > 0.3

@@ -200,7 +200,7 @@ OTHERS: dict[str, Scenario] = {
     "mu_ref": Scenario(0.3, short_drive("clear-noon")),
     "camera": Scenario(False, lambda s: pictures(s, "rain-noon", "rgb_front")),
     "night_rain": Scenario("rain_only", lambda s: pictures(s, "rain-night", "rgb_front")),
-    "drivers": Scenario(True, short_drive("rain-noon")),
+    "drivers": Scenario(False, short_drive("rain-noon")),
     "initial_limit_kmh": Scenario(30.0, short_drive("clear-noon")),
     "traffic_positions": Scenario("table", short_drive("clear-noon")),
     "relocation": Scenario("standing", recovery),

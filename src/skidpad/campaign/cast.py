@@ -167,6 +167,7 @@ def _roads(spec: RunSpec, course: Roads) -> Stage:
         variant=s.traffic_positions.value,
         initial_limit_kmh=s.initial_limit_kmh,
         slow_in_weather=s.drivers,
+        variety=s.drivers,
     )
     setup = replace(setup_of(spec, file, ego), traffic=traffic)
     supervisor = Supervisor(map, recovery_settings(s), setup.dt)

@@ -20,6 +20,7 @@ from skidpad.core.errors import StackError, require_choice
 from skidpad.core.run import (
     AdasDriver,
     BackendChoice,
+    BackendKind,
     DriverSpec,
     Roads,
     RunSpec,
@@ -29,6 +30,7 @@ from skidpad.core.states import ActorTable
 from skidpad.core.told import clean
 from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
 from skidpad.core.weather import Weather
+from skidpad.evidence.drive.background import UNSEEN
 from skidpad.physics.presets import find_weather
 from skidpad.recording.events import NoticeSource, Relocation
 from skidpad.recording.runlog import LogHeader, RunLog
@@ -228,6 +230,8 @@ def log_of(spec: RunSpec, stage: Stage, desk: Desk | None = None) -> Log:
         "profile": spec.profile,
         "sensors": spec.sensors.value,
     }
+    if spec.backend.backend is BackendKind.CARLA:  # it tells contacts of the ego alone
+        about["traffic"] = UNSEEN
     dt = stage.setup.dt
     header = LogHeader(map=stage.map.name, map_hash=stage.map.content_hash, dt=dt, about=about)
     room = round(spec.duration / dt) + 1

@@ -12,6 +12,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from skidpad.campaign.traffic_asked import TrafficBench
+from skidpad.cli.spread import spread
+
 if TYPE_CHECKING:
     from skidpad.campaign.bench import Row
 
@@ -23,9 +26,12 @@ class Subject(str, Enum):
     SENSORS = "sensors"
     PHYSICS = "physics"
     MATRIX = "matrix"
+    TRAFFIC = "traffic"
 
 
+@spread()
 def bench(
+    traffic: TrafficBench,
     subject: Annotated[Subject, typer.Argument(help="What to measure.")] = Subject.TICK,
     seconds: Annotated[
         float, typer.Option(min=1.0, help="Simulated seconds per measured drive.")
@@ -35,12 +41,13 @@ def bench(
         bool, typer.Option("--run", help="matrix: drive all 30 runs instead of estimating.")
     ] = False,
 ) -> None:
-    """Measure CPU time: per tick against the targets, per sensor, per vehicle, of the matrix."""
+    """Measure CPU time: per tick, per sensor, per vehicle, of the matrix; or what traffic does."""
     measure = {
         Subject.TICK: lambda: _tick(seconds, json),
         Subject.SENSORS: lambda: _sensors(json),
         Subject.PHYSICS: lambda: _physics(json),
         Subject.MATRIX: lambda: _matrix(seconds, run, json),
+        Subject.TRAFFIC: lambda: _traffic(traffic, json),
     }
     figures = measure[subject]()
     about = {"subject": subject.value, "machine": machine(), "cores": os.cpu_count()}
@@ -115,3 +122,34 @@ def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
             f"({how}); target {matrix.TARGET:g} min"
         )
     return {"unit": "min", "minutes": minutes, "how": how, "target": matrix.TARGET}
+
+
+def _traffic(asked: TrafficBench, quiet: bool) -> dict[str, Any]:
+    from skidpad.campaign.bench_traffic import measure
+
+    rows = []
+    if not quiet:
+        typer.echo(
+            "weather          km  contacts  per 100 km [95 %]     km/h  changes/km  off road  put back"
+        )
+    for weather in asked.weather:
+        row = measure(asked, weather)
+        low, high = row.interval.low, row.interval.high
+        changes = row.changes / row.km
+        rows.append(
+            {
+                **asdict(row),
+                "per_100_km": row.per_100_km,
+                "low": low,
+                "high": high,
+                "mean_speed_kmh": row.mean_speed_kmh,
+                "changes_per_km": changes,
+            }
+        )
+        if not quiet:
+            rate = f"{row.per_100_km:.2f} [{low:.2f}, {high:.2f}]"
+            typer.echo(
+                f"{weather:<12} {row.km:6.0f} {row.contacts:9} {rate:>20} "
+                f"{row.mean_speed_kmh:8.1f} {changes:11.2f} {row.static:9} {row.put_back:9}"
+            )
+    return {"map": asked.map, "vehicles": asked.vehicles, "rows": rows}

@@ -46,7 +46,7 @@ class TrafficSetup:
     allow_fewer: bool = False
     variant: str = "listing"  # or "table": which published positions (D-085, D-086)
     initial_limit_kmh: float | None = None  # None: the map's limit at the place (decision M-6)
-    slow_in_weather: bool = False  # the switch `drivers` (decision M-1)
+    slow_in_weather: bool = False  # the switch `drivers` (decisions M-1, R-5)
     put_wrecks_back: bool = True  # decision M-7
     variety: bool = False  # drivers differ in speed, headway and acceleration (decision C-11)
 

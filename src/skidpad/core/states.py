@@ -111,6 +111,16 @@ class ContactEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class TrafficContact:
+    """A contact of a background actor, not of the ego, that began in a tick."""
+
+    tick: int
+    actor: int
+    other: int  # -1: something that stands
+    v_closing: float  # m/s, positive when closing
+
+
+@dataclass(frozen=True, slots=True)
 class LaneInvasion:
     """The ego's outline crossed a lane marking (A-030)."""
 
@@ -162,4 +172,6 @@ class WorldTruth:
     lights: dict[int, LightState]  # by signal id of the map
     contacts: tuple[ContactEvent, ...]  # of the ego, that began in this tick
     invasions: tuple[LaneInvasion, ...]
+    background: tuple[TrafficContact, ...] = ()  # of all others, that began in this tick
+    put_back: tuple[int, ...] = ()  # actors of the background, stuck or astray (decision M-7)
     notices: tuple[str, ...] = ()  # what else happened in this tick: a wreck was put back, ...

@@ -122,6 +122,12 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         """Share of the drive force at the front axle."""
         return {Drive.FRONT: 1.0, Drive.REAR: 0.0, Drive.ALL: 0.5}[self.drive]
 
+    @property
+    def weight_driven(self) -> float:
+        """Share of the weight at rest on the driven wheels."""
+        rear = 1.0 - self.front_share
+        return {Drive.FRONT: self.front_share, Drive.REAR: rear, Drive.ALL: 1.0}[self.drive]
+
 
 EGO_TYPE = "mini_cooper_s"
 

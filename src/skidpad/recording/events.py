@@ -11,7 +11,7 @@ import msgspec
 
 from skidpad.core.geometry import Pose
 from skidpad.core.reading import UNUSABLE, unusable
-from skidpad.core.states import ContactEvent, LaneInvasion
+from skidpad.core.states import ContactEvent, LaneInvasion, TrafficContact
 from skidpad.core.vocabulary import LightState, RelocationReason
 
 
@@ -35,6 +35,14 @@ class LightChange:
     state: LightState
 
 
+@dataclass(frozen=True, slots=True)
+class PutBack:
+    """A vehicle of the background stood without a cause or off its lane and was put elsewhere (M-7)."""
+
+    tick: int
+    actor: int
+
+
 class NoticeSource(str, Enum):
     """Who has something to say."""
 
@@ -52,13 +60,15 @@ class Notice:
     text: str
 
 
-Event = ContactEvent | LaneInvasion | Relocation | LightChange | Notice
+Event = ContactEvent | LaneInvasion | Relocation | LightChange | Notice | TrafficContact | PutBack
 KINDS: dict[str, type[Event]] = {
     "contact": ContactEvent,
     "lane_invasion": LaneInvasion,
     "relocation": Relocation,
     "light": LightChange,
     "notice": Notice,
+    "traffic_contact": TrafficContact,
+    "put_back": PutBack,
 }
 NAMES = {kind: name for name, kind in KINDS.items()}
 

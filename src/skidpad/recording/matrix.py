@@ -95,6 +95,12 @@ class Metrics:
     crashes_vehicle_per_100_km: float | None = metric("crashes with vehicles per 100 km", "R-6")
     road_departures_per_100_km: float | None = metric("departures from the road per 100 km", "R-6")
     off_lanes_pct: float | None = metric("ticks off all lanes, less counted departures", "R-6")
+    # the background
+    traffic_contacts: int | None = metric("contacts among background vehicles", "R-5")
+    traffic_contacts_after_ego: int | None = metric("those within 20 s of an ego contact", "R-5")
+    traffic_put_back: int | None = metric("background vehicles stuck and put back", "M-7")
+    traffic_km: float | None = metric("distance of all background vehicles", "R-5")
+    traffic_contacts_per_100_km: float | None = metric("such contacts per 100 km", "R-5")
     # ticks
     samples: int | None = metric("ticks that count for perception", "A-250")
     skipped_supervised: int | None = metric("ticks under the supervisor", "A-250")

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.states import ActorTable, ContactEvent, LaneInvasion
-from skidpad.recording.events import Event, LightChange, Notice, Relocation
+from skidpad.core.states import ActorTable, ContactEvent, LaneInvasion, TrafficContact
+from skidpad.recording.events import Event, LightChange, Notice, PutBack, Relocation
 
 Floats = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -131,6 +131,16 @@ class RunLog:
     def contacts(self) -> tuple[ContactEvent, ...]:
         """Contacts of the ego."""
         return tuple(e for e in self.events if isinstance(e, ContactEvent))
+
+    @property
+    def background(self) -> tuple[TrafficContact, ...]:
+        """Contacts of all others."""
+        return tuple(e for e in self.events if isinstance(e, TrafficContact))
+
+    @property
+    def put_back(self) -> tuple[PutBack, ...]:
+        """Vehicles of the background that were put elsewhere."""
+        return tuple(e for e in self.events if isinstance(e, PutBack))
 
     @property
     def invasions(self) -> tuple[LaneInvasion, ...]:

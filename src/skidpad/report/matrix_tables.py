@@ -8,7 +8,13 @@ from functools import partial
 import polars as pl
 
 from skidpad.evidence.contrasts import paired_runs, per_seed
-from skidpad.evidence.statistics import Rate, bootstrap_interval, compare_pairs, p_text
+from skidpad.evidence.statistics import (
+    Rate,
+    bootstrap_interval,
+    compare_pairs,
+    p_text,
+    poisson_interval,
+)
 from skidpad.recording.matrix import Metrics
 from skidpad.report.campaign import Metric, metrics_of
 from skidpad.report.matrix_data import Matrix, config_title, published_value, weather_title
@@ -46,6 +52,13 @@ KINDS = (
 )
 
 
+BACKGROUND = (
+    ("traffic_contacts", "contacts", "of two background vehicles, first touch"),
+    ("traffic_contacts_after_ego", "soon after the ego's", "within 20 s of a contact of the ego"),
+    ("traffic_put_back", "put back", "stood without a cause or left the lane for 10 s"),
+)
+
+
 def collisions(matrix: Matrix) -> list[Block]:
     """Fatal collisions, and what they were."""
     return [
@@ -54,6 +67,7 @@ def collisions(matrix: Matrix) -> list[Block]:
         count_table(matrix, "fatal_collisions", "Both: fatal events per run"),
         count_table(matrix, "fatal_first", "Of these the first of their chain, per run"),
         kinds_table(matrix),
+        background_table(matrix),
     ]
 
 
@@ -155,6 +169,32 @@ def kinds_table(matrix: Matrix) -> Table:
         ),
     ]
     return table(columns, matrix.configs, "What the collisions were: counts over all runs")
+
+
+def background_table(matrix: Matrix) -> Table:
+    """How whole the background stayed in each weather, over all configurations."""
+
+    def total(column: str, weather: str) -> float:
+        return float(sum(matrix.cell(c, weather)[column].sum() for c in matrix.configs))
+
+    def rate(weather: str) -> Quantity:
+        km, contacts = total("traffic_km", weather), int(total("traffic_contacts", weather))
+        if km <= 0.0:
+            return Quantity(value=None)
+        return Quantity(
+            value=100.0 * contacts / km, interval=poisson_interval(contacts, km / 100.0)
+        )
+
+    columns = [
+        Column[str]("weather", weather_title),
+        Column[str]("distance", partial(total, "traffic_km"), "of all of them", "km"),
+        *(
+            Column[str](title, partial(total, column), note, format=Format(".0f"))
+            for column, title, note in BACKGROUND
+        ),
+        Column[str]("per 100 km", rate, "of the contacts, exact 95 % interval"),
+    ]
+    return table(columns, matrix.weathers, "Contacts among background vehicles")
 
 
 def pairs(matrix: Matrix) -> list[Block]:

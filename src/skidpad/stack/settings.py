@@ -156,7 +156,9 @@ class Settings:
         0.9, "M-1", "physics", "friction of a dry road at CARLA's tire_friction 3.5"
     )
     camera: bool = _setting(True, "M-4", "sensors", "weather acts on RGB images")
-    drivers: bool = _setting(False, "M-1", "simulation", "background drivers slow down in weather")
+    drivers: bool = _setting(
+        True, "M-1, R-5", "simulation", "background drivers differ and mind grip and sight"
+    )
     initial_limit_kmh: float | None = _setting(
         None, "M-6", "simulation", "limit of background drivers up to the first sign"
     )

@@ -8,6 +8,7 @@ from dataclasses import fields
 import numpy as np
 
 from skidpad.core.vocabulary import RelocationReason
+from skidpad.evidence.drive.background import background
 from skidpad.evidence.drive.collisions import BEND_RADIUS, Crash, CrashKind, find_crashes
 from skidpad.evidence.drive.conflict import conflicts, true_conflicts
 from skidpad.evidence.drive.lateral import count_invasions, lateral_offset
@@ -70,6 +71,7 @@ def summarise(
         _radar(drive, where),
         _distances(drive, where),
         _driving(drive, here, where),
+        background(drive, where),
         _ticks(drive, where),
     )
 

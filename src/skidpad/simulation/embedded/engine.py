@@ -72,6 +72,8 @@ class EmbeddedBackend:
             lights=w.lights.by_id,
             contacts=w.contacts,
             invasions=w.invasions,
+            background=w.background,
+            put_back=w.put_back,
             notices=w.notices,
         )
 

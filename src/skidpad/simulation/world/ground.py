@@ -86,7 +86,7 @@ def settle(lanes: LaneArrays, rows: Rows, noise: float, driving: bool, tick: int
             place.lane = -1
             continue
         x, y, yaw = states.x[i], states.y[i], states.yaw[i]
-        place.x, place.y, place.yaw = x, y, yaw
+        place.x, place.y, place.yaw, place.yaw_rate = x, y, yaw, states.yaw_rate[i]
         place.vx, place.vy, place.ax = states.vx[i], states.vy[i], states.ax[i]
         place.speed = states.vx[i] * cos(yaw) + states.vy[i] * sin(yaw)
         lane, s, offset = still_on_lane(lanes, place.lane, place.sample, x, y, states.z[i])

@@ -15,6 +15,7 @@ PLACE = np.dtype(
         ("vx", "f8"),
         ("vy", "f8"),
         ("speed", "f8"),  # m/s along the body
+        ("yaw_rate", "f8"),
         ("ax", "f8"),  # m/s^2 along the body
         ("s", "f8"),  # m along the lane
         ("offset", "f8"),  # m left of its centre

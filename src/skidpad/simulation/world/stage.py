@@ -5,12 +5,13 @@ from __future__ import annotations
 from skidpad.core.errors import ConfigError
 from skidpad.core.setup import Setup, TrafficSetup
 from skidpad.core.vocabulary import Control
-from skidpad.physics.grip import friction_ratio, grip_params
+from skidpad.physics.grip import grip_params
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.actors import Role, cast_of, place_of
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.patches import Patches
 from skidpad.simulation.world.touch import ContactBook
+from skidpad.simulation.world.traffic.care import care_of
 from skidpad.simulation.world.traffic.manager import Traffic
 from skidpad.simulation.world.world import EGO, Conditions, World
 
@@ -24,8 +25,7 @@ def staged(setup: Setup, seed: int) -> World:
         map, Lights.pretimed(map, seed, setup.dt), Conditions(seed=seed, dt=setup.dt, grip=grip)
     )
     traffic = setup.traffic or TrafficSetup(vehicles=0)
-    ratio = friction_ratio(setup.weather, setup.grip)
-    drivers = Traffic(map, traffic, seed, ratio)
+    drivers = Traffic(map, traffic, seed, care_of(setup, traffic.slow_in_weather))
     world.let_drive(drivers)
     if setup.patches:
         world.patches = Patches(map, setup.patches)

@@ -22,6 +22,7 @@ from skidpad.roads.kernels import LaneArrays
 from skidpad.simulation.world.ground import settle
 from skidpad.simulation.world.rows import Rows
 from skidpad.simulation.world.touch import Markings, cross_markings
+from skidpad.simulation.world.traffic.care import Care
 from skidpad.simulation.world.traffic.driver import drive_all
 from skidpad.simulation.world.traffic.occupancy import Occupancy
 from skidpad.simulation.world.traffic.path import wrapped
@@ -75,6 +76,7 @@ class Now(NamedTuple):
     grip: GripParams
     law: ContactLaw
     free_choice: bool  # drivers draw branches instead of taking the straightest
+    care: Care  # what drivers know of weather
     road_noise: float  # rad
     driving_only: bool
 
@@ -87,7 +89,7 @@ def advance(arena: Held[Arena], now: Now) -> tuple[int, int]:
     if now.stages & DECIDE:
         note_walkers(a.streets, rows.placed)
         view = View(a.streets, a.occupancy, rows.placed, now.lights, now.tick, now.dt,
-                    now.free_choice)  # fmt: skip
+                    now.free_choice, now.care)  # fmt: skip
         drive_all(view, a.drivers, rows.commands)
     touches = crossed = 0
     if now.stages & MOVE:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
-from skidpad.core.states import ContactEvent, LaneInvasion
+from skidpad.core.states import ContactEvent, LaneInvasion, TrafficContact
 from skidpad.physics.contact import Contacts
 from skidpad.roads.kernels import WIDTH, LaneArrays
 from skidpad.roads.lanes import Marking
@@ -22,6 +22,13 @@ EGO = 0
 LEFT, RIGHT = 1, 2  # bits of crossed markings
 
 
+class Touches(NamedTuple):
+    """Contacts that began in a tick."""
+
+    ego: tuple[ContactEvent, ...] = ()
+    others: tuple[TrafficContact, ...] = ()
+
+
 class ContactBook:
     """Which contacts are new: a pair (or the ego and a kind of obstacle) begins once (A-029)."""
 
@@ -29,7 +36,6 @@ class ContactBook:
         self.names = names
         self.hold = round(HOLD / dt)
         self.last: dict[tuple[int, int | str], int] = {}
-        self.background = 0  # contacts among the others that began so far
 
     def arrange(self, rows: Mapping[int, int]) -> None:
         """The actors have other rows; rows: the new one by the old one of those who stay."""
@@ -39,9 +45,10 @@ class ContactBook:
             if i in rows and (isinstance(j, str) or j in rows)
         }
 
-    def update(self, tick: int, contacts: Contacts, count: int) -> tuple[ContactEvent, ...]:
-        """Contacts of the ego that began in this tick; the largest impulse speaks for each."""
+    def update(self, tick: int, contacts: Contacts, count: int) -> Touches:
+        """Contacts that began in this tick; for the ego's the largest impulse speaks."""
         events: dict[tuple[int, int | str], ContactEvent] = {}
+        others: list[TrafficContact] = []
         touched: set[tuple[int, int | str]] = set()
         for k in range(count):
             if contacts.impulse[k] <= 0.0:
@@ -51,7 +58,8 @@ class ContactBook:
             pair: tuple[int, int | str] = (i, static if j < 0 else j)
             began = tick - self.last.get(pair, -self.hold - 1) > self.hold
             if i != EGO:
-                self.background += int(began and pair not in touched)
+                if began and pair not in touched:
+                    others.append(TrafficContact(tick, i, j, float(contacts.v_closing[k])))
             elif began and (pair not in events or contacts.impulse[k] > events[pair].impulse):
                 events[pair] = ContactEvent(
                     tick,
@@ -65,7 +73,7 @@ class ContactBook:
             touched.add(pair)
         for pair in touched:
             self.last[pair] = tick
-        return tuple(events.values())
+        return Touches(tuple(events.values()), tuple(others))
 
 
 class Markings(NamedTuple):

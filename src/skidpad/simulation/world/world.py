@@ -17,7 +17,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.jit import hold
 from skidpad.core.setup import DT, ActorCommand
-from skidpad.core.states import ContactEvent, LaneInvasion, VehicleCommand
+from skidpad.core.states import LaneInvasion, VehicleCommand
 from skidpad.physics.contact import CONTACT_LAW, Contacts
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import GripParams
@@ -38,11 +38,13 @@ from skidpad.simulation.world.step import (
     advance,
     feel_grip,
 )
-from skidpad.simulation.world.touch import ContactBook, forget, invasions, markings_of
+from skidpad.simulation.world.touch import ContactBook, Touches, forget, invasions, markings_of
+from skidpad.simulation.world.traffic.care import careless
 from skidpad.simulation.world.traffic.manager import CHECK_PERIOD, Traffic, no_streets
 from skidpad.simulation.world.traffic.occupancy import occupancy
 from skidpad.simulation.world.traffic.state import drivers
 
+CARELESS = careless()
 EGO = 0  # row and id of the first actor of a run
 BRAKING = 0.05  # pedal at which the brake lamps light up
 
@@ -74,7 +76,8 @@ class World:
         self.patches: Patches | None = None
         self.book: ContactBook | None = None
         self.markings = markings_of(map)
-        self.contacts: tuple[ContactEvent, ...] = ()
+        self.contacts, self.background = Touches()
+        self.put_back: tuple[int, ...] = ()
         self.invasions: tuple[LaneInvasion, ...] = ()
         self.notices: tuple[str, ...] = ()
         self._next_id = 0
@@ -288,7 +291,7 @@ class World:
             for word in words:
                 self._obey(word)
         self._feel_road()
-        self.notices = ()
+        self.notices, self.put_back = (), ()
         if self.traffic is not None and self.tick % CHECK_PERIOD == 0:
             self._advance(stages & ~SETTLE)
             self._put_vehicles(self.traffic)
@@ -297,9 +300,9 @@ class World:
         if words:
             self.moved[:] = False
         if self.book is not None:
-            self.contacts = (
-                self.book.update(self.tick, self.touching, self.touches) if self.touches else ()
-            )
+            book, touching, count = self.book, self.touching, self.touches
+            found = book.update(self.tick, touching, count) if count else Touches()
+            self.contacts, self.background = found
         self.lights.advance(self.dt)
 
     def _advance(self, stages: int) -> None:
@@ -313,6 +316,7 @@ class World:
             self.grip,
             CONTACT_LAW,
             self.traffic is not None and self.traffic.free_choice,
+            CARELESS if self.traffic is None else self.traffic.care,
             c.road_noise,
             not c.all_lanes,
         )
@@ -395,12 +399,13 @@ class World:
 
     def _put_vehicles(self, traffic: Traffic) -> None:
         """Traffic that enters, is respawned, or is put back as a wreck (decision M-7)."""
-        notes = []
+        notes, back = [], []
         for move in traffic.moves(self.states, self.tick):
             self.put(move.actor, move.pose, move.v)
             if move.wreck:
+                back.append(move.actor)
                 notes.append(
                     f"{self.table.names[move.actor]} stood without a cause or off its lane and was "
                     f"put back at ({move.pose.x:.1f}, {move.pose.y:.1f})"
                 )
-        self.notices = tuple(notes)
+        self.notices, self.put_back = tuple(notes), tuple(back)

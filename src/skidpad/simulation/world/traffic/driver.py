@@ -9,10 +9,15 @@ from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
 from skidpad.simulation.world.traffic import occupancy as occ_
-from skidpad.simulation.world.traffic.idm import idm
+from skidpad.simulation.world.traffic.care import (
+    braking,
+    change_pace,
+    character,
+    firm_braking,
+)
+from skidpad.simulation.world.traffic.idm import Character, idm
 from skidpad.simulation.world.traffic.mobil import (
-    A_THRESHOLD,
-    RANDOM_RATE,
+    B_SAFE,
     incentive,
     is_safe,
 )
@@ -51,7 +56,7 @@ LEFT_BEHIND = 0.6  # of a change, after which the leader on the old lane no long
 HEADWAY_STOP = 0.5  # s kept to a stop line
 STUCK_SPEED = 0.5  # m/s
 TOO_FAST_TIME = 0.7  # s in which too much speed before a bend or limit is taken off
-TOO_FAST_BRAKE = -4.0  # m/s^2
+TOO_FAST_BRAKE = 4.0  # m/s^2
 CAUSE_GAP = 12.0  # m: a leader or stop line this near explains standing
 STRAYED = 1.0  # m beyond the lane's edge
 WRONG_WAY = -0.5  # cosine of 120 deg
@@ -101,7 +106,8 @@ def acceleration_along(
     leader, gap = occ_.find_ahead(view.streets.net, view.occ, view.placed, path, s, i, REACH_AHEAD)
     v_lead = view.placed[leader].v if leader != NOBODY else 0.0
     v, trait = view.placed[i].speed, d.trait[i]
-    return idm(v, v_desired, gap, v_lead, trait.headway, trait.a_max), gap
+    c = character(view.care, v, trait.headway, trait.a_max)
+    return idm(v, v_desired, gap, v_lead, c), gap
 
 
 @kernel
@@ -110,7 +116,8 @@ def follower_acceleration(view: View, d: Drivers, j: int, gap: float, v_lead: fl
     if j == NOBODY:
         return 0.0
     v, trait = max(view.placed[j].v, 0.0), d.trait[j]
-    return idm(v, max(v, 1.0), gap, v_lead, trait.headway, trait.a_max)
+    c = character(view.care, v, trait.headway, trait.a_max)
+    return idm(v, max(v, 1.0), gap, v_lead, c)
 
 
 @kernel
@@ -124,7 +131,8 @@ def change_gain(view: View, d: Drivers, i: int, lane: int, a_now: float, v_desir
         view.streets.net, view.occ, view.placed, lane, s, i, REACH_BEHIND
     )
     a_behind = follower_acceleration(view, d, behind, gap_behind, v)
-    if not is_safe(a_new, a_behind, gap_ahead, gap_behind):
+    b_safe = min(B_SAFE, braking(view.care, v))
+    if not is_safe(a_new, a_behind, gap_ahead, gap_behind, b_safe):
         return -np.inf
     old, gap_old = occ_.find_behind(
         view.streets.net, view.occ, view.placed, d.path[i, 0], me.s, i, REACH_BEHIND
@@ -143,8 +151,11 @@ def may_enter(view: View, d: Drivers, i: int, lane: int, left: bool) -> bool:
 
 
 @kernel
-def consider_change(view: View, d: Drivers, i: int, a_now: float, v_desired: float) -> None:
-    """Begin a lane change when MOBIL, a draw or the lane's end says so."""
+def consider_change(
+    view: View, d: Drivers, i: int, a_now: float, v_desired: float, gap_stop: float
+) -> None:
+    """Begin a lane change when MOBIL, a draw or the lane's end says so; not on the way to a line
+    where one has to stop."""
     me = d.state[i]
     if me.change < CHANGE_TIME + CHANGE_COOLDOWN or view.placed[i].speed < CHANGE_MIN_SPEED:
         return
@@ -152,10 +163,13 @@ def consider_change(view: View, d: Drivers, i: int, a_now: float, v_desired: flo
     if (view.tick + 3 * i) % CHANGE_PERIOD != 0 or bend > CHANGE_MAX_CURVE:
         return
     must = end_gap(view, d, i) < END_MARGIN
-    drawn = uniform(me.key, view.tick, 2) < RANDOM_RATE * CHANGE_PERIOD * view.dt
+    if view.care.on and gap_stop < np.inf and not must:
+        return
+    way = view.placed[i].speed * CHANGE_PERIOD * view.dt
+    drawn = uniform(me.key, view.tick, 2) < view.care.drawn * way
     drawn_left = uniform(me.key, view.tick, 3) < 0.5
     lane_now = view.streets.net.lane[d.path[i, 0]]
-    best, best_gain = -1, A_THRESHOLD
+    best, best_gain = -1, view.care.a_change
     for left in (True, False):
         lane = lane_now.left if left else lane_now.right
         if not may_enter(view, d, i, lane, left):
@@ -174,8 +188,9 @@ def plan(view: View, d: Drivers, i: int) -> None:
     """Choose lane and acceleration of driver i; note how long it has been out of order."""
     me, trait, body = d.state[i], d.trait[i], view.placed[i]
     if (view.tick + i) % LOOK_PERIOD == 0 or me.v_desired == 0.0:
-        me.v_desired = desired_speed(view, d, i)
+        me.v_desired = desired_speed(view.streets.net, me, trait, d.path[i], body.speed, view.care)
     v, v_desired = body.speed, me.v_desired
+    c = character(view.care, v, trait.headway, trait.a_max)
     a, gap = acceleration_along(view, d, i, d.path[i], me.s, v_desired)
     if body.lane >= 0 and body.lane != d.path[i, 0] and me.change < LEFT_BEHIND * CHANGE_TIME:
         straight_path(view.streets.net, body.lane, d.aside)
@@ -184,15 +199,17 @@ def plan(view: View, d: Drivers, i: int) -> None:
     merging, gap_merge = merge_gap(view, d, i)
     if merging != NOBODY:
         v_merging = view.placed[merging].v
-        a = min(a, idm(v, v_desired, gap_merge, v_merging, trait.headway, trait.a_max))
+        a = min(a, idm(v, v_desired, gap_merge, v_merging, c))
     gap_stop = min(stop_gap(view, d, i), end_gap(view, d, i))
     gap_stop = min(gap_stop, right_of_way_gap(view, d, i), zebra_gap(view, d, i))
     if gap_stop < np.inf:
-        a = min(a, idm(v, v_desired, gap_stop, 0.0, HEADWAY_STOP, trait.a_max))
+        stop = Character(HEADWAY_STOP, c.a_max, c.b, c.a_min)
+        a = min(a, idm(v, v_desired, gap_stop, 0.0, stop))
     if v > v_desired:  # the profile ahead is comfortable: falling behind it is not an option
-        a = min(a, max((v_desired - v) / TOO_FAST_TIME, TOO_FAST_BRAKE))
+        firm = firm_braking(view.care, v, TOO_FAST_BRAKE)
+        a = min(a, max((v_desired - v) / TOO_FAST_TIME, -firm))
     me.target = a
-    consider_change(view, d, i, a, v_desired)
+    consider_change(view, d, i, a, v_desired, gap_stop)
     strayed = abs(me.offset) > view.streets.net.point[me.at].half_width + STRAYED
     standing = v < STUCK_SPEED and min(gap, gap_stop, gap_merge) > CAUSE_GAP
     wrong_way = cos(body.yaw - me.heading) < WRONG_WAY
@@ -219,7 +236,7 @@ def drive_all(view: View, d: Drivers, commands: Floats) -> None:
     occ_.fill(view.streets.net, view.placed, view.occ)
     for i in range(len(d.state)):
         if d.state[i].active and view.placed[i].present:
-            d.state[i].change += view.dt
+            d.state[i].change += view.dt * change_pace(view.care, view.placed[i].speed)
             follow_path(view, d, i)
             keep_lane_if_pushed(view, d, i)
             occ_.add(view.occ, i, d.path[i, 0], d.state[i].s)

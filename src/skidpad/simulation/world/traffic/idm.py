@@ -8,6 +8,7 @@ Source: Treiber and Kesting (2013), Traffic Flow Dynamics, eqs. 11.14, 11.15 (ID
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
@@ -23,17 +24,24 @@ A_EMERGENCY = -8.0  # m/s^2, the hardest braking that is asked of a car
 A_CURVE = 3.5
 
 
+class Character(NamedTuple):
+    """How somebody follows."""
+
+    headway: float = T_HEADWAY  # s
+    a_max: float = A_MAX  # m/s^2
+    b: float = B_COMFORT  # m/s^2, comfortable braking
+    a_min: float = A_EMERGENCY  # m/s^2, the hardest braking
+
+
 @kernel
-def idm(
-    v: float, v_desired: float, gap: float, v_lead: float, headway: float, a_max: float
-) -> float:
-    """Acceleration in m/s^2 in [A_EMERGENCY, a_max]; gap inf: no leader."""
+def idm(v: float, v_desired: float, gap: float, v_lead: float, c: Character) -> float:
+    """Acceleration in m/s^2 in [c.a_min, c.a_max]; gap inf: no leader."""
     if v <= v_desired:
-        free = a_max * (1.0 - (v / max(v_desired, 0.1)) ** 4)
+        free = c.a_max * (1.0 - (v / max(v_desired, 0.1)) ** 4)
     else:
-        free = -B_COMFORT * (1.0 - (v_desired / v) ** (4.0 * a_max / B_COMFORT))
+        free = -c.b * (1.0 - (v_desired / v) ** (4.0 * c.a_max / c.b))
     if gap == np.inf:
         return free
-    wanted = GAP_MIN + max(0.0, v * headway + v * (v - v_lead) / (2.0 * sqrt(a_max * B_COMFORT)))
-    interaction = a_max * (wanted / max(gap, 0.1)) ** 2
-    return max(A_EMERGENCY, free - interaction)
+    wanted = GAP_MIN + max(0.0, v * c.headway + v * (v - v_lead) / (2.0 * sqrt(c.a_max * c.b)))
+    interaction = c.a_max * (wanted / max(gap, 0.1)) ** 2
+    return max(c.a_min, free - interaction)

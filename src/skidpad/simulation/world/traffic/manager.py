@@ -19,11 +19,19 @@ from skidpad.core.vocabulary import ActorKind, TrafficStart
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.rows import Member, Shape
+from skidpad.simulation.world.traffic.care import (
+    FIRM_SHARE,
+    REACTION,
+    STOP_MARGIN,
+    Care,
+    grip_at,
+)
 from skidpad.simulation.world.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
 from skidpad.simulation.world.traffic.network import LANE, POINT, STOP, Network, network
 from skidpad.simulation.world.traffic.occupancy import occupancy
-from skidpad.simulation.world.traffic.path import begin
-from skidpad.simulation.world.traffic.places import FreePlaces
+from skidpad.simulation.world.traffic.outlook import desired_speed
+from skidpad.simulation.world.traffic.path import PATH, begin, straight_path
+from skidpad.simulation.world.traffic.places import CLEARANCE, FreePlaces
 from skidpad.simulation.world.traffic.priority import CONFLICT, ENTRY, ZEBRA, bake_priority
 from skidpad.simulation.world.traffic.state import TRAIT, Streets, drivers
 from skidpad.simulation.world.traffic.variety import vary
@@ -80,14 +88,13 @@ class Move:
 class Traffic:
     """Drivers of those actors that have one."""
 
-    def __init__(self, map: RoadMap, setup: TrafficSetup, seed: int, grip: float) -> None:
-        """grip: friction over dry, in (0, 1]."""
-        self.net, self.setup, self.seed = network_of(map), setup, seed
-        self.caution = grip if setup.slow_in_weather else 1.0
+    def __init__(self, map: RoadMap, setup: TrafficSetup, seed: int, care: Care) -> None:
+        self.net, self.setup, self.seed, self.care = network_of(map), setup, seed, care
         self.drivers, self.occupancy = drivers(0), occupancy(0, 0)
         self.streets = streets_of(map)
         self.places = FreePlaces(map, self.net, stream(seed, "traffic", "places"))
         self.row: dict[int, int] = {}  # by id
+        self._way = np.full(PATH, -1, dtype=np.int32)  # room for a way through the map
         self.waiting: list[int] = []  # ids of those who enter when there is room
 
     def arrange(self, members: Sequence[Member], source: Mapping[int, int]) -> None:
@@ -95,7 +102,7 @@ class Traffic:
         old, ids = self.drivers, [m.id for m in members]
         self.drivers = drivers(len(ids))
         self.drivers.state["key"] = [stream_key(self.seed, "traffic", "driver", id) for id in ids]
-        self.drivers.trait[:] = _traits([m.actor.body for m in members], self.caution)
+        self.drivers.trait[:] = _traits([m.actor.body for m in members])
         if self.setup.variety:
             vary(self.drivers.trait, ids, self.seed)
         for new, before in source.items():
@@ -159,10 +166,13 @@ class Traffic:
     def _put(
         self, i: int, states: ActorStates, nearest: float, farthest: float, wreck: bool
     ) -> Iterator[Move]:
-        at = self.places.draw(states, nearest, farthest)
+        at = self.places.draw(
+            states, nearest, farthest, lambda at: room(self.care, self._speed_at(i, at), states)
+        )
         if at is None:
             return
         point, me = self.net.point[at], self.drivers.state[i]
+        v = self._speed_at(i, at)
         begin(self.drivers.path[i], self.places.lane[at])
         me["at"], me["s"] = at, point["s"]
         me["change"] = me["cap"] = np.inf
@@ -173,17 +183,39 @@ class Traffic:
             float(self.places.z[at]),
             yaw=float(point["heading"]),
         )
-        v = PUT_BACK_SPEED * float(point["limit"] * self.drivers.trait["factor"][i])
         yield Move(i, pose, v, wreck)
 
+    def _speed_at(self, i: int, at: int) -> float:
+        """m/s at which driver i passes sample `at`: as traffic does there."""
+        point, trait = self.net.point[at], self.drivers.trait[i]
+        v = PUT_BACK_SPEED * float(point["limit"] * trait["factor"])
+        if not self.care.on:
+            return v
+        me = drivers(1).state[0]
+        me["at"], me["s"] = at, point["s"]
+        straight_path(self.net, int(self.places.lane[at]), self._way)
+        return min(v, float(desired_speed(self.net, me, trait, self._way, v, self.care)))
 
-def _traits(bodies: Sequence[VehicleType | Shape], caution: float) -> NDArray[np.void]:
-    """Drivers know their vehicles; `caution` in (0, 1] slows those who mind the weather."""
+
+def room(care: Care, v: float, states: ActorStates) -> NDArray[np.float64]:
+    """(n,) m that somebody put on the road with speed v keeps to every actor, so that either can
+    brake for the other."""
+    clear = np.full(len(states.x), CLEARANCE)
+    if not care.on:
+        return clear
+    other = np.hypot(states.vx, states.vy)
+    faster = np.maximum(other, v)
+    way = np.abs(faster**2 - np.minimum(other, v) ** 2) / (2.0 * FIRM_SHARE * grip_at(care, v))
+    return np.asarray(np.maximum(clear, STOP_MARGIN + REACTION * faster + way))
+
+
+def _traits(bodies: Sequence[VehicleType | Shape]) -> NDArray[np.void]:
+    """Drivers know their vehicles."""
     traits = np.zeros(len(bodies), dtype=TRAIT)
-    traits["factor"] = _speed_choice(caution)
-    traits["headway"] = T_HEADWAY / caution
+    traits["factor"] = 1.0
+    traits["headway"] = T_HEADWAY
     traits["a_max"] = A_MAX
-    traits["a_curve"] = A_CURVE * caution
+    traits["a_curve"] = A_CURVE
     for trait, t in zip(traits, bodies, strict=True):
         if isinstance(t, Shape):
             continue
@@ -191,18 +223,10 @@ def _traits(bodies: Sequence[VehicleType | Shape], caution: float) -> NDArray[np
         trait["steer_angle"] = t.steer_max
         trait["understeer"] = t.understeer
         trait["a_drive"] = t.a_drive
+        trait["carried"] = t.weight_driven
         trait["p_drive"] = t.power / t.mass
         trait["a_brake"] = t.a_brake
+        trait["engine_drag"] = t.engine_drag
         trait["drag"] = 0.5 * AIR_DENSITY * t.drag_area / t.mass
         trait["rolling"] = t.rolling_resistance * G + t.engine_drag
     return traits
-
-
-def _speed_choice(grip: float) -> float:
-    """Desired speed on a road with this friction over that on a dry one.
-
-    Source: SUMO's friction-dependent speed factor, vehicle class car.
-    """
-    if grip >= 1.0:
-        return 1.0
-    return -0.3491 * grip * grip + 0.8922 * grip + 0.4493

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import cos, sin
 from typing import NamedTuple
 
 import numpy as np
@@ -74,12 +75,14 @@ def fill(net: Network, placed: Places, occ: Occupancy) -> None:
             continue
         s = placed[i].s
         half_lane = net.point[net.lane[lane].first].half_width
-        if abs(placed[i].offset) - placed[i].half_width > half_lane:
+        turn = placed[i].yaw - placed[i].heading
+        wide = placed[i].half_width * abs(cos(turn)) + placed[i].half_length * abs(sin(turn))
+        if abs(placed[i].offset) - wide > half_lane:
             continue  # parked or walking beside the road
         add(occ, i, lane, s)
-        if placed[i].offset + placed[i].half_width > half_lane and net.lane[lane].left >= 0:
+        if placed[i].offset + wide > half_lane and net.lane[lane].left >= 0:
             add(occ, i, net.lane[lane].left, beside(net, lane, s, net.lane[lane].left))
-        if placed[i].offset - placed[i].half_width < -half_lane and net.lane[lane].right >= 0:
+        if placed[i].offset - wide < -half_lane and net.lane[lane].right >= 0:
             add(occ, i, net.lane[lane].right, beside(net, lane, s, net.lane[lane].right))
 
 
@@ -113,27 +116,40 @@ def find_ahead(
 
 
 @kernel
+def last_on(occ: Occupancy, lane: int, start: float, me: int) -> tuple[int, float]:
+    """The actor on `lane` least behind `start` m along it, and by how much; NOBODY, inf: none."""
+    nearest, distance = NOBODY, np.inf
+    if lane < 0:
+        return nearest, distance
+    entry = occ.head[lane]
+    while entry != NOBODY:
+        other = entry // SLOTS
+        d = start - occ.s[entry]
+        if other != me and 0.0 < d < distance:
+            nearest, distance = other, d
+        entry = occ.next[entry]
+    return nearest, distance
+
+
+@kernel
 def find_behind(
     net: Network, occ: Occupancy, placed: Places, lane: int, s: float, me: int, reach: float
 ) -> tuple[int, float]:
-    """Nearest actor behind along the straightest predecessors; as `find_ahead`."""
+    """Nearest actor behind along the straightest predecessors and what joins them; as `find_ahead`."""
     start = s
+    nearest, distance = last_on(occ, lane, start, me)
     for _ in range(8):
-        if lane < 0 or start - net.lane[lane].length > reach:
+        if nearest != NOBODY or lane < 0 or start > reach:
             break
-        nearest, distance = NOBODY, np.inf
-        entry = occ.head[lane]
-        while entry != NOBODY:
-            other = entry // SLOTS
-            d = start - occ.s[entry]
-            if other != me and 0.0 < d < distance:
+        row = net.lane[lane]
+        for p in range(row.prev_first, row.prev_first + row.prevs):
+            joining = net.prev_lane[p]
+            other, d = last_on(occ, joining, start + net.lane[joining].length, me)
+            if d < distance:
                 nearest, distance = other, d
-            entry = occ.next[entry]
-        if nearest != NOBODY:
-            if distance > reach:
-                break
-            return nearest, distance - placed[me].half_length - placed[nearest].half_length
-        lane = net.lane[lane].behind
+        lane = row.behind
         if lane >= 0:
             start += net.lane[lane].length
-    return NOBODY, np.inf
+    if nearest == NOBODY or distance > reach:
+        return NOBODY, np.inf
+    return nearest, distance - placed[me].half_length - placed[nearest].half_length

@@ -3,11 +3,22 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
-from skidpad.simulation.world.traffic.idm import B_COMFORT
+from skidpad.simulation.world.traffic.care import (
+    Care,
+    bend_speed_sq,
+    braking,
+    firm_braking,
+    reach,
+    sight_speed,
+    speed_choice,
+)
+from skidpad.simulation.world.traffic.network import Network
 from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS
 from skidpad.simulation.world.traffic.path import PATH
 from skidpad.simulation.world.traffic.state import Drivers, View
@@ -17,32 +28,39 @@ MERGE_REACH = 60.0  # m before a merge within which the streams watch each other
 YELLOW_BRAKE = 3.0  # m/s^2, drivers stop at yellow if this is enough
 STOP_MARGIN = 1.0  # m kept to a stop line, beside the IDM's standstill gap
 PREVIEW_STEP = 5.0  # m between two looks at limit and bend
+STRAIGHT = 1.0e-5  # 1/m, less is no bend
 V_PREVIEW = 10.0  # m/s, look at least this far beyond the comfortable braking distance, in m
 
 
 @kernel
-def desired_speed(view: View, d: Drivers, i: int) -> float:
-    """Speed in m/s that limits and bends ahead allow, each reached by comfortable braking."""
-    net, me, trait = view.streets.net, d.state[i], d.trait[i]
-    v = view.placed[i].speed
-    reach = v * v / (2.0 * B_COMFORT) + V_PREVIEW
-    best_sq = (min(net.point[me.at].limit, me.cap) * trait.factor) ** 2
+def desired_speed(
+    net: Network, me: Any, trait: Any, path: NDArray[np.int32], v: float, care: Care
+) -> float:
+    """Speed in m/s that limits and bends ahead along `path` allow, each reached by comfortable
+    braking from the present speed v, and from which one can stop within sight.
+
+    me, trait: rows of DRIVER and TRAIT.
+    """
+    b = braking(care, v)
+    known = v * v / (2.0 * b) + V_PREVIEW
+    factor = trait.factor * speed_choice(care, v)
+    best_sq = min(min(net.point[me.at].limit, me.cap) * factor, sight_speed(care, v)) ** 2
     start = -me.s
     for k in range(PATH):
-        if d.path[i, k] < 0 or start > reach:
+        if path[k] < 0 or start > known:
             break
-        lane = net.lane[d.path[i, k]]
+        lane = net.lane[path[k]]
         spacing = lane.length / (lane.size - 1)
         step = max(1, int(PREVIEW_STEP / spacing))
         for j in range(me.at - lane.first if k == 0 else 0, lane.size, step):
             distance = start + j * spacing
-            if distance > reach:
+            if distance > known:
                 break
             point = net.point[lane.first + j]
-            cap_sq = (min(point.limit, me.cap) * trait.factor) ** 2
-            if abs(point.curvature) * cap_sq > trait.a_curve:
-                cap_sq = trait.a_curve / abs(point.curvature)
-            best_sq = min(best_sq, cap_sq + 2.0 * B_COMFORT * max(distance, 0.0))
+            cap_sq = (min(point.limit, me.cap) * factor) ** 2
+            if abs(point.curvature) > STRAIGHT:
+                cap_sq = min(cap_sq, bend_speed_sq(care, point.curvature, trait.a_curve))
+            best_sq = min(best_sq, cap_sq + 2.0 * b * max(distance, 0.0))
         start += lane.length
     return sqrt(best_sq)
 
@@ -51,6 +69,7 @@ def desired_speed(view: View, d: Drivers, i: int) -> float:
 def stop_gap(view: View, d: Drivers, i: int) -> float:
     """Metres from the front bumper to the next line at which driver i has to stop; inf: none."""
     net, v = view.streets.net, view.placed[i].speed
+    b = firm_braking(view.care, v, YELLOW_BRAKE)
     start = -d.state[i].s - view.placed[i].half_length
     for k in range(PATH):
         if d.path[i, k] < 0 or start > REACH_LIGHT:
@@ -61,7 +80,7 @@ def stop_gap(view: View, d: Drivers, i: int) -> float:
             light = view.lights[net.stop[row].row]
             if gap < -STOP_MARGIN or gap > REACH_LIGHT or light > 1:
                 continue  # passed, too far, or neither LightState.RED nor YELLOW
-            if light == 0 or v * v <= 2.0 * YELLOW_BRAKE * max(gap, 0.0):
+            if light == 0 or v * v <= 2.0 * b * max(gap, 0.0):
                 return float(max(gap, 0.1))
         start += lane.length
     return np.inf
@@ -84,9 +103,10 @@ def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
     """Who arrives at a merge ahead just before driver i on another branch, and the gap to it."""
     net, occ = view.streets.net, view.occ
     start = net.lane[d.path[i, 0]].length - d.state[i].s
+    far = reach(view.care, view.placed[i].speed, MERGE_REACH)
     best, best_gap = NOBODY, np.inf
     for k in range(1, PATH):
-        if d.path[i, k] < 0 or start > MERGE_REACH:
+        if d.path[i, k] < 0 or start > far:
             break
         lane = net.lane[d.path[i, k]]
         for p in range(lane.prev_first, lane.prev_first + lane.prevs):
@@ -97,7 +117,7 @@ def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
             while entry != NOBODY:
                 distance = net.lane[other_lane].length - occ.s[entry]
                 gap = start - distance
-                if entry // SLOTS != i and distance < MERGE_REACH and 0.0 < gap < best_gap:
+                if entry // SLOTS != i and distance < far and 0.0 < gap < best_gap:
                     best, best_gap = entry // SLOTS, gap
                 entry = occ.next[entry]
         start += lane.length

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -34,15 +36,25 @@ class FreePlaces:
         self.net = net
         self.rng = rng
 
-    def draw(self, states: ActorStates, nearest: float, farthest: float) -> int | None:
-        """A sample between `nearest` and `farthest` m from the ego, clear of all; None: not found."""
+    def draw(
+        self,
+        states: ActorStates,
+        nearest: float,
+        farthest: float,
+        room: Callable[[int], NDArray[np.float64]],
+    ) -> int | None:
+        """A sample between `nearest` and `farthest` m from the ego, clear of all; None: not found.
+
+        room: m to keep to every actor at a sample, (n,).
+        """
         point = self.net.point
         if not len(self.candidates):
             return None
         for index in self.rng.integers(0, len(self.candidates), TRIES):
             at = int(self.candidates[index])
             d = np.hypot(states.x - point["x"][at], states.y - point["y"][at])
-            near = states.present & (d < CLEARANCE)
-            if nearest <= d[0] <= farthest and not near.any():
+            if not nearest <= d[0] <= farthest:
+                continue
+            if not (states.present & (d < room(at))).any():
                 return at
         return None

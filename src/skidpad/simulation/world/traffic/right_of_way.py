@@ -13,6 +13,7 @@ import numpy as np
 
 from skidpad.core.jit import kernel
 from skidpad.simulation.world.placed import Places
+from skidpad.simulation.world.traffic.care import drive_limit, reach
 from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, find_ahead
 from skidpad.simulation.world.traffic.path import PATH
 from skidpad.simulation.world.traffic.priority import LIGHT, STOP, YIELD
@@ -23,6 +24,7 @@ DECIDE = 25.0  # m before it from which gaps are judged; before, a driver is onl
 V_THROUGH = 8.0  # m/s through a junction
 GAP_MARGIN = 1.0  # s beyond leaving the shared area: critical gaps near 4 to 7 s (HCM 2010)
 JOIN_MARGIN = 2.5  # s, who joins must not be caught up at once
+V_COMING = 15.0  # m/s, of those who come, where they are not looked at one by one
 WATCH = 70.0  # m before the shared area in which others matter
 HALTED = 0.5  # m/s
 HALT_GAP = 4.5  # m to the line within which standing counts as a stop
@@ -41,9 +43,10 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
     """m from the front bumper to where driver i has to wait for others; inf: nowhere."""
     body, me = view.placed[i], d.state[i]
     start = -me.s - body.half_length  # from the front to the beginning of path[k]
+    far = reach(view.care, body.speed, REACH)
     for k in range(PATH):
         lane = d.path[i, k]
-        if lane < 0 or start > REACH:
+        if lane < 0 or start > far:
             break
         entry = view.streets.entry[lane]
         if entry.size > 0:
@@ -79,7 +82,7 @@ def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, co
             me.halted = lane
         else:
             return True
-    if line > DECIDE:
+    if line > reach(view.care, body.speed, DECIDE):
         return control == YIELD and body.speed > V_THROUGH
     if _queue_behind(view, d, i, k, start):
         return True
@@ -92,7 +95,8 @@ def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, co
             continue
         margin = JOIN_MARGIN if conflict.joins else GAP_MARGIN
         way = max(start + conflict.end + 2.0 * body.half_length, 1.0)
-        clear = _travel_time(max(body.speed, 0.0), way, d.trait[i].a_max, V_THROUGH) + margin
+        a_max = drive_limit(view.care, body.speed, d.trait[i].a_max)
+        clear = _travel_time(max(body.speed, 0.0), way, a_max, V_THROUGH) + margin
         if _is_coming(view, d, i, conflict.other, conflict.other_start, clear):
             return True
     return False
@@ -164,7 +168,7 @@ def _is_coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: fl
         way = zone + view.streets.net.lane[first].length
         if _arrives(view, d, i, first, lane, way, clear):
             return True
-        if way > WATCH:
+        if way > _watched(view, V_COMING, clear):
             continue
         row_2 = view.streets.net.lane[first]
         for q in range(row_2.prev_first, row_2.prev_first + row_2.prevs):
@@ -174,6 +178,12 @@ def _is_coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: fl
             ):
                 return True
     return False
+
+
+@kernel
+def _watched(view: View, v: float, clear: float) -> float:
+    """m before the shared area in which somebody at speed v matters for `clear` s."""
+    return max(WATCH, v * clear) if view.care.on else WATCH
 
 
 @kernel
@@ -194,7 +204,8 @@ def _arrives(
         distance = way - view.occ.s[entry] - view.placed[j].half_length
         v = max(view.placed[j].v, 0.0)
         entry_now, entry = entry, view.occ.next[entry]
-        if j == i or distance > WATCH or distance < -2.0 * view.placed[j].half_length:
+        far = distance > _watched(view, v, clear)
+        if j == i or far or distance < -2.0 * view.placed[j].half_length:
             continue
         if v < HALTED and (distance > QUEUE_REACH or d.state[i].waited > PATIENCE):
             continue
@@ -238,9 +249,10 @@ def zebra_gap(view: View, d: Drivers, i: int) -> float:
     """m from the front bumper to a zebra on which somebody walks; inf: none within reach."""
     body = view.placed[i]
     start = -d.state[i].s - body.half_length
+    far = reach(view.care, body.speed, REACH)
     for k in range(PATH):
         lane = d.path[i, k]
-        if lane < 0 or start > REACH:
+        if lane < 0 or start > far:
             break
         entry = view.streets.entry[lane]
         for row in range(entry.zebra_first, entry.zebra_first + entry.zebras):

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.simulation.world.placed import Places
+from skidpad.simulation.world.traffic.care import Care
 from skidpad.simulation.world.traffic.network import Network
 from skidpad.simulation.world.traffic.occupancy import Occupancy
 from skidpad.simulation.world.traffic.path import PATH
@@ -47,10 +48,12 @@ TRAIT = np.dtype(
         ("wheelbase", "f8"),  # m
         ("steer_angle", "f8"),  # rad at the road wheels for steer 1
         ("understeer", "f8"),  # s^2/m, extra wheel angle per lateral acceleration
+        ("carried", "f8"),  # share of the weight on the driven wheels
         ("a_drive", "f8"),  # m/s^2 at full throttle, low speed
         ("p_drive", "f8"),  # W/kg
         ("a_brake", "f8"),  # m/s^2 at full brake
         ("drag", "f8"),  # 1/m, air drag over mass
+        ("engine_drag", "f8"),  # m/s^2 at closed throttle
         ("rolling", "f8"),  # m/s^2, rolling and engine drag
     ],
     align=True,
@@ -88,6 +91,7 @@ class View(NamedTuple):
     tick: int
     dt: float
     free_choice: bool  # branches are drawn instead of taking the straightest
+    care: Care  # what drivers know of weather
 
 
 def drivers(n: int) -> Drivers:

@@ -6,14 +6,14 @@ from math import atan, cos, sin
 
 from skidpad.core.constants import G
 from skidpad.core.jit import kernel
-from skidpad.physics.vehicle import steer_share
+from skidpad.physics.vehicle import V_CLUTCH, steer_share
+from skidpad.simulation.world.traffic.care import change_pace, steering_limit, traction_limit
 from skidpad.simulation.world.traffic.path import PATH
 from skidpad.simulation.world.traffic.state import CHANGE_TIME, Drivers, View
 
 OMEGA, ZETA = 1.0, 0.9  # rad/s and damping of the lateral control: half the yaw response's
 PREVIEW_TIME = 0.25  # s by which the curvature is anticipated: steering and yaw lag
 V_LATERAL_MIN = 4.0  # m/s, keeps gains finite at walking speed
-A_LATERAL_MAX = 7.0  # m/s^2, the most that a driver steers for
 THROTTLE_MAX = 0.85  # CARLA's Traffic Manager
 PEDAL_GAIN = 0.5  # 1/s, integral on the acceleration error
 TRIM_MAX = 1.0  # m/s^2
@@ -32,15 +32,16 @@ def steer(view: View, d: Drivers, i: int) -> float:
     v = max(body.speed, V_LATERAL_MIN)
     tau = min(me.change / CHANGE_TIME, 1.0)
     blend = tau * tau * tau * (10.0 + tau * (6.0 * tau - 15.0))
-    blend_rate = 30.0 * (tau * (1.0 - tau)) ** 2 / CHANGE_TIME
-    blend_bend = 60.0 * tau * (1.0 - tau) * (1.0 - 2.0 * tau) / CHANGE_TIME**2
+    rate = change_pace(view.care, body.speed) / CHANGE_TIME
+    blend_rate = 30.0 * (tau * (1.0 - tau)) ** 2 * rate
+    blend_bend = 60.0 * tau * (1.0 - tau) * (1.0 - 2.0 * tau) * rate**2
     error = me.offset - me.shift * (1.0 - blend)
     drift = body.vy * cos(me.heading) - body.vx * sin(me.heading)
     error_rate = drift + me.shift * blend_rate
     kappa = curvature_ahead(view, d, i, v * PREVIEW_TIME)
     a_lateral = -me.shift * blend_bend - OMEGA * OMEGA * error - 2.0 * ZETA * OMEGA * error_rate
     kappa += a_lateral / (v * v)
-    most = A_LATERAL_MAX / (v * v)
+    most = steering_limit(view.care, v) / (v * v)
     kappa = min(max(kappa, -most), most)
     angle = atan(trait.wheelbase * kappa) + trait.understeer * v * v * kappa
     return float(min(max(angle / (trait.steer_angle * steer_share(v)), -1.0), 1.0))
@@ -71,8 +72,13 @@ def pedals(view: View, d: Drivers, i: int) -> tuple[float, float]:
         return 0.0, BRAKE_STANDING
     grade = view.streets.net.point[me.at].grade
     wanted = a + G * grade + trait.drag * v * v + trait.rolling + me.trim
+    sideways = body.vy * cos(body.yaw) - body.vx * sin(body.yaw)
+    slide = (sideways - 0.5 * trait.wheelbase * body.yaw_rate) / max(v, 2.0)
     if wanted >= 0.0:
-        throttle, brake = wanted / min(trait.a_drive, trait.p_drive / max(v, 1.0)), 0.0
+        force = min(trait.a_drive, trait.p_drive / max(v, 1.0))
+        drag = trait.engine_drag * min(v / V_CLUTCH, 1.0)
+        most = (traction_limit(view.care, v, trait.carried, slide) + drag) / (force + drag)
+        throttle, brake = min(wanted / force, most), 0.0
     else:
         throttle, brake = 0.0, -wanted / trait.a_brake
     if throttle < THROTTLE_MAX and brake < 1.0:

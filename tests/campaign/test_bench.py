@@ -6,6 +6,8 @@ import pytest
 
 from skidpad.campaign import bench, bench_matrix
 from skidpad.campaign.bench import TickCost, bench_run, tick_cost
+from skidpad.campaign.bench_traffic import measure
+from skidpad.campaign.traffic_asked import TrafficBench
 from skidpad.core.vocabulary import SensorLevel
 
 
@@ -33,3 +35,15 @@ def test_the_matrix_is_estimated_for_two_cores(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(bench_matrix, "warm_cost", lambda *_: cost)
     # 30 runs of 10 000 ticks of 3 ms: 900 s on one core.
     assert bench_matrix.estimated_minutes() == pytest.approx(7.5)
+
+
+def test_traffic_is_measured_until_the_distance_is_driven() -> None:
+    asked = TrafficBench(km=3.0, vehicles=20)
+    row = measure(asked, "rain-noon")
+    assert 3.0 <= row.km < 3.1
+    assert (row.contacts, row.static) == (0, 0)
+    assert row.interval.low == 0.0
+    assert row.interval.high == pytest.approx(
+        3.689 / row.km * 100.0, rel=1e-3
+    )  # Garwood, none seen
+    assert row.mean_speed_kmh == pytest.approx(row.km / row.hours)

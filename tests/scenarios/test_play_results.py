@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from files import at, event, private, speed, story, time, to, write
 from lxml import etree
+from tests.scenarios.files import at, event, private, speed, story, time, to, write
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app

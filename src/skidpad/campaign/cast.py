@@ -188,7 +188,7 @@ def _scenario(spec: RunSpec, course: Scenario) -> Stage:
     ego, actors = setups(compiled)
     setup = replace(setup_of(spec, compiled.map_name, ego), actors=actors)
     environment = compiled.start.environment
-    if environment is not None:  # of its weather the run's own stands; its road is scaled
+    if environment is not None and environment.friction_scale is not None:
         setup = replace(setup, mu_ref=setup.mu_ref * environment.friction_scale)
     return Stage(compiled.map, setup, Unsupervised(), played, played)
 

@@ -13,8 +13,8 @@ from typing import Protocol
 from skidpad.campaign.cast import StackAtWheel
 from skidpad.campaign.drive import Script, Supervising
 from skidpad.campaign.hands import Hands
-from skidpad.core.frames import Frame, SensorFrame
-from skidpad.core.geometry import Pose
+from skidpad.campaign.outdoors import ChangedBackend
+from skidpad.core.frames import SensorFrame
 from skidpad.core.inputs import (
     Beam,
     Functions,
@@ -28,7 +28,7 @@ from skidpad.core.inputs import (
     Wheel,
 )
 from skidpad.core.run import Function, RunSpec
-from skidpad.core.setup import DT, ActorCommand, Setup
+from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Supervision
 from skidpad.core.weather import Weather
@@ -187,37 +187,11 @@ class DeskSupervisor:
         return Action(command) if self.desk.manual else self.inner.act(command, report)
 
 
-class DeskBackend:
-    """The backend, which is told of changes outside before the step in which they act."""
+class DeskBackend(ChangedBackend):
+    """The backend, which is told of the person's changes."""
 
     def __init__(self, inner: Backend, desk: Desk) -> None:
-        self.inner, self.desk = inner, desk
-
-    def reset(self, setup: Setup, seed: int) -> Frame:
-        """Begin a run."""
-        return self.inner.reset(setup, seed)
-
-    def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
-        """Apply the commands for one step."""
-        if self.desk.changed:
-            self.inner.change(self.desk.outside)
-        return self.inner.step(command, actor_commands)
-
-    def truth(self) -> WorldTruth:
-        """Ground truth of the moment."""
-        return self.inner.truth()
-
-    def relocate(self, pose: Pose, v: float) -> None:
-        """Put the ego somewhere else."""
-        self.inner.relocate(pose, v)
-
-    def change(self, outside: Outside) -> None:
-        """The surroundings are others from the next step on."""
-        self.inner.change(outside)
-
-    def close(self) -> None:
-        """Release everything."""
-        self.inner.close()
+        super().__init__(inner, lambda: desk.outside if desk.changed else None)
 
 
 class UntilEnded:

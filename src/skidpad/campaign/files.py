@@ -11,8 +11,10 @@ from pathlib import Path
 
 from msgspec import structs
 
+from skidpad.campaign.cast import load_scenario
 from skidpad.campaign.grip import recipe
 from skidpad.campaign.grip_cells import scenario_of
+from skidpad.campaign.outdoors import in_weather_of_file
 from skidpad.campaign.recipe import nothing_else
 from skidpad.core.errors import FileError
 from skidpad.core.run import Friction, RunSpec, Scenario
@@ -48,16 +50,29 @@ def courses_of(course: Scenario, file: Path) -> list[Scenario]:
 def runs_of(
     template: RunSpec,
     files: Sequence[Path],
-    weathers: Sequence[Weather],
+    weathers: Sequence[Weather | None],
     frictions: Sequence[Friction],
     seeds: Iterable[int],
 ) -> list[RunSpec]:
-    """Every combination; the rest as in `template`, whose course is a scenario."""
+    """Every combination; the rest as in `template`, whose course is a scenario.
+
+    A weather None is that of the file, and of the template what the file leaves open.
+    """
     courses = [course for file in files for course in courses_of(scenario_of(template), file)]
-    return [
-        structs.replace(template, course=course, weather=weather, friction=friction, seed=seed)
-        for seed in seeds
+    played = [
+        _in_weather(structs.replace(template, course=course), weather)
         for course in courses
         for weather in weathers
+    ]
+    return [
+        structs.replace(run, friction=friction, seed=seed)
+        for seed in seeds
+        for run in played
         for friction in frictions
     ]
+
+
+def _in_weather(run: RunSpec, weather: Weather | None) -> RunSpec:
+    if weather is not None:
+        return structs.replace(run, weather=weather)
+    return in_weather_of_file(run, load_scenario(scenario_of(run)).start.environment)

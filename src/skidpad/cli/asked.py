@@ -20,6 +20,7 @@ from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 
 OURS, IDEAL, AGENT = "stack", "ideal", "agent:"
+OF_FILE = "file"  # the weather that a scenario describes
 
 
 class Drivers(Struct, frozen=True):
@@ -124,9 +125,9 @@ class Tuned(Struct, frozen=True):
 class PlayCross(Struct, frozen=True):
     """How a scenario is played; a folder of scenarios in every combination."""
 
-    weather: Annotated[str, Meta(description="Presets or YAML files, parted by commas.")] = (
-        "clear-noon"
-    )
+    weather: Annotated[
+        str, Meta(description="file (as it says, else clear-noon), presets or YAML files.")
+    ] = OF_FILE
     grip: Annotated[
         str, Meta(description="none, statistical or physical; none and one other by a comma.")
     ] = "physical"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from msgspec import structs
 
-from skidpad.cli.asked import Controller, PlayCross, Tuned
+from skidpad.cli.asked import OF_FILE, Controller, PlayCross, Tuned
 from skidpad.cli.campaigns import Drive, Driving, How, Seeds
 from skidpad.cli.expected import Expected
 from skidpad.cli.spread import spread
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from skidpad.campaign.campaign import Campaign
     from skidpad.recording.grip import GripKey, GripMetrics
 
+PLAIN = "clear-noon"  # what a file leaves open of the weather
 scenario_options = spread(sensors=SensorLevel.OBJECTS, duration=120.0)
 
 
@@ -137,12 +138,14 @@ def _template(
     backend: BackendChoice,
 ) -> RunSpec:
     from skidpad.cli.carla_backend import checked
+    from skidpad.physics.presets import find_weather
 
     return structs.replace(
         tuned.resolve(run, grip=cross.frictions()[1]),
         driver=controller.chosen(),
         course=structs.replace(scenario, parameters=cross.parameters()),
         backend=checked(backend),
+        weather=find_weather(PLAIN),
     )
 
 
@@ -163,7 +166,8 @@ def _runs(template: RunSpec, cross: PlayCross, files: Sequence[Path], seeds: int
     from skidpad.campaign.files import runs_of
     from skidpad.physics.presets import find_weather
 
-    weathers = [find_weather(part.strip()) for part in cross.weather.split(",")]
+    words = [part.strip() for part in cross.weather.split(",")]
+    weathers = [None if word == OF_FILE else find_weather(word) for word in words]
     first = range(cross.seed, cross.seed + seeds)
     return runs_of(template, files, weathers, cross.frictions()[0], first)
 

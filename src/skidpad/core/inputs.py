@@ -102,3 +102,4 @@ class Outside:
     grip: GripModel
     range_model: RangeModel
     beam: Beam | None = None  # None: low beam by night
+    mu_ref: float | None = None  # on a dry road; None: as it was (embedded backend)

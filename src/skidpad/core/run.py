@@ -156,6 +156,7 @@ class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown
     actors: Annotated[
         ActorMode, Meta(description="physical: tyres decide; ideal: as the file says.")
     ] = ActorMode.PHYSICAL
+    weather_of_file: bool = False  # it changes when the file says so
     end_on_collision: Annotated[
         bool, Meta(description="A contact of the ego ends the run; else the file alone decides.")
     ] = False

@@ -34,7 +34,7 @@ INSIDE = frozenset(  # understood where they stand inside others
 )  # fmt: skip
 PARTIAL: Mapping[str, str] = MappingProxyType(
     {
-        "EnvironmentAction": "in <Init>, where its friction scale counts; the weather is the run's",
+        "EnvironmentAction": "falling snow counts by its sight, wind not at all",
         "TrafficSignalStateAction": "conditions see it, the lights of the road do not",
         "TrafficSignalControllerAction": "conditions see it, the lights of the road do not",
         "TrafficSignalCondition": "sees states that the file has set",

@@ -50,7 +50,7 @@ class Environment:
     temperature_c: float | None = None
     wind: float = 0.0  # m/s
     wetness: Wetness | None = None
-    friction_scale: float = 1.0  # of what the road has otherwise
+    friction_scale: float | None = None  # of what the road has otherwise
     time_of_day: str = ""  # ISO 8601
 
     @property
@@ -58,7 +58,15 @@ class Environment:
         """It names something of the sky or the water on the road."""
         return any(
             value is not None
-            for value in (self.clouds, self.sun_elevation_deg, self.visual_range, self.wetness)
+            for value in (
+                self.clouds,
+                self.sun_elevation_deg,
+                self.visual_range,
+                self.wetness,
+                self.temperature_c,
+                self.time_of_day or None,
+                self.fall_mm_h or None,
+            )
         )
 
 
@@ -67,7 +75,7 @@ def compile_environment(node: Node) -> Environment:
     if node.tag != "Environment":
         raise node.error("needs an <Environment>")
     weather, road, time = (node.find(t) for t in ("Weather", "RoadCondition", "TimeOfDay"))
-    wetness, scale = None, 1.0
+    wetness, scale = None, None
     if road is not None:
         scale = road.number("frictionScaleFactor", 1.0)
         if scale < 0.0:

@@ -13,6 +13,7 @@ from skidpad.core.run import ActorMode
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import WorldTruth
 from skidpad.scenarios.entities import Entity
+from skidpad.scenarios.environment import Environment
 from skidpad.scenarios.measures import Point, corners, overlap
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Network, Place
@@ -210,6 +211,7 @@ class Scene:
     contacts: set[str] = field(default_factory=set)  # names that touch the ego in this tick
     ego: str = ""
     notices: list[str] = field(default_factory=list)  # what could not be done, for the log
+    environments: list[Environment] = field(default_factory=list)  # of events, in their order
     story: list[Happening] = field(default_factory=list)
 
     def moved(self, path: Path, move: Move) -> None:

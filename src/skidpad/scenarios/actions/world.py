@@ -113,13 +113,13 @@ def _infrastructure(node: Node, ctx: Context) -> GlobalAction:
 
 @dataclass(frozen=True, slots=True)
 class SetEnvironment:
-    """Weather, time of day and road. A run has one: that of <Init>."""
+    """Weather, time of day and road; that of <Init> is there from the begin."""
 
     environment: Environment
 
     def happen(self, scene: Scene) -> None:
-        """Later ones are noted."""
-        scene.notice("an <EnvironmentAction> after the begin has no effect")
+        """From the next step on."""
+        scene.environments.append(self.environment)
 
 
 def _environment(node: Node, ctx: Context) -> GlobalAction:

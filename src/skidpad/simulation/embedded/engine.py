@@ -87,9 +87,11 @@ class EmbeddedBackend:
         Drivers of the background keep the caution that they began with.
         """
         weather, range_model = outside.weather, outside.range_model
-        self.world.grip = grip_params(weather, outside.grip, self._setup.mu_ref)
+        mu_ref = self._setup.mu_ref if outside.mu_ref is None else outside.mu_ref
+        self.world.grip = grip_params(weather, outside.grip, mu_ref)
         self.sensing.change(outside)
-        self._setup = replace(self._setup, weather=weather, range_model=range_model)
+        changed = replace(self._setup, weather=weather, range_model=range_model, mu_ref=mu_ref)
+        self._setup = changed
         if self._asked is not None:
             self._asked = AskedSensors(self.map, self.world.table, self._setup)
 

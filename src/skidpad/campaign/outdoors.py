@@ -1,0 +1,161 @@
+"""Changes outside while a run is driven: told to the backend before the step in which they act."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from math import asin, atan2, cos, degrees, log, pi, radians, sin
+
+from msgspec import structs
+
+from skidpad.core.errors import FileError
+from skidpad.core.frames import Frame
+from skidpad.core.geometry import Pose
+from skidpad.core.inputs import Outside
+from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.setup import ActorCommand, Setup
+from skidpad.core.states import VehicleCommand, WorldTruth
+from skidpad.core.weather import RANGES, Weather
+from skidpad.physics.grip import RAIN_FULL
+from skidpad.physics.optics import V_CLEAR, V_FOG
+from skidpad.scenarios.environment import Environment, Fall, Wetness
+from skidpad.scenarios.player import Player
+from skidpad.simulation.backend import Backend
+from skidpad.stack.settings import grip_of, settings_of
+
+NAME = "file"  # of the weather that a file describes
+LATITUDE = radians(45.0)  # of the sun where a file says the time only, at an equinox; assumption
+WATER = {  # wetness and standing water in percent by the words of the standard; our assumption
+    Wetness.DRY: (0.0, 0.0),
+    Wetness.MOIST: (50.0, 0.0),
+    Wetness.PUDDLES: (100.0, 50.0),
+    Wetness.LOW_FLOODED: (100.0, 80.0),
+    Wetness.HIGH_FLOODED: (100.0, 100.0),
+}
+
+
+class ChangedBackend:
+    """A backend that is told what `news` says before each step; None: nothing has changed."""
+
+    def __init__(self, inner: Backend, news: Callable[[], Outside | None]) -> None:
+        self.inner, self.news = inner, news
+
+    def reset(self, setup: Setup, seed: int) -> Frame:
+        """Begin a run."""
+        return self.inner.reset(setup, seed)
+
+    def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
+        """Apply the commands for one step."""
+        outside = self.news()
+        if outside is not None:
+            self.inner.change(outside)
+        return self.inner.step(command, actor_commands)
+
+    def truth(self) -> WorldTruth:
+        """Ground truth of the moment."""
+        return self.inner.truth()
+
+    def relocate(self, pose: Pose, v: float) -> None:
+        """Put the ego somewhere else."""
+        self.inner.relocate(pose, v)
+
+    def change(self, outside: Outside) -> None:
+        """The surroundings are others from the next step on."""
+        self.inner.change(outside)
+
+    def close(self) -> None:
+        """Release everything."""
+        self.inner.close()
+
+
+class FileSky:
+    """What the <EnvironmentAction>s of a file that is played make of the weather and the road."""
+
+    def __init__(self, player: Player, spec: RunSpec) -> None:
+        self.player, self.done = player, 0
+        settings = settings_of(spec)
+        assert isinstance(spec.course, Scenario)
+        self.follows, self.mu_ref = spec.course.weather_of_file, settings.mu_ref
+        self.outside = Outside(weather=spec.weather, grip=grip_of(spec), range_model=settings.range)
+
+    @property
+    def weather(self) -> Weather:
+        """Of the moment."""
+        return self.outside.weather
+
+    def news(self) -> Outside | None:
+        """What has changed since it was asked last."""
+        fresh = self.player.scene.environments[self.done :]
+        for environment in fresh:
+            self.done += 1
+            if self.follows:
+                weather = weather_of(environment, self.weather, f"{NAME}-{self.done + 1}")
+                self.outside = replace(self.outside, weather=weather)
+            if environment.friction_scale is not None:
+                mu_ref = self.mu_ref * environment.friction_scale
+                self.outside = replace(self.outside, mu_ref=mu_ref)
+        return self.outside if fresh else None
+
+
+def in_weather_of_file(run: RunSpec, environment: Environment | None) -> RunSpec:
+    """The run in the weather that its file describes; what it leaves open is as the run has it."""
+    assert isinstance(run.course, Scenario)
+    course = structs.replace(run.course, weather_of_file=True)
+    weather = run.weather if environment is None else weather_of(environment, run.weather, NAME)
+    return structs.replace(run, course=course, weather=weather)
+
+
+def weather_of(environment: Environment, base: Weather, name: str) -> Weather:
+    """`base` with what an environment says; `base` itself where it says nothing of the weather."""
+    if not environment.says_weather:
+        return base
+    found = {**_sky(environment), **_water(environment), **_air(environment)}
+    within = {k: min(max(v, RANGES[k][0]), RANGES[k][1]) for k, v in found.items()}
+    return replace(base, name=name, title=environment.name, **within)
+
+
+def _sky(e: Environment) -> dict[str, float]:
+    found = {} if e.clouds is None else {"cloudiness": 100.0 * e.clouds}
+    if e.sun_elevation_deg is not None:
+        found["sun_altitude_deg"] = e.sun_elevation_deg
+        found["sun_azimuth_deg"] = e.sun_azimuth_deg or 0.0
+    elif e.time_of_day:
+        found["sun_altitude_deg"], found["sun_azimuth_deg"] = sun_at(e.time_of_day)
+    return found
+
+
+def sun_at(time: str) -> tuple[float, float]:
+    """Elevation and azimuth (from north, clockwise) in degrees at an ISO 8601 time."""
+    try:
+        hour, minute = (int(part) for part in time.partition("T")[2].split(":")[:2])
+    except ValueError:
+        raise FileError(f"TimeOfDay: dateTime must be an ISO 8601 time, got {time!r}") from None
+    turn = (hour + minute / 60.0 - 12.0) * pi / 12.0
+    elevation = asin(cos(LATITUDE) * cos(turn))
+    azimuth = atan2(sin(turn), sin(LATITUDE) * cos(turn)) + pi
+    return degrees(elevation), degrees(azimuth) % 360.0
+
+
+def _water(e: Environment) -> dict[str, float]:
+    """Falling snow is not modelled: it counts by the sight that the file gives for it."""
+    found = {}
+    if e.fall is Fall.RAIN:
+        found["precipitation"] = 100.0 * e.fall_mm_h / RAIN_FULL
+    elif e.clouds is not None or e.visual_range is not None:
+        found["precipitation"] = 0.0
+    if e.wetness is not None:
+        found["wetness"], found["precipitation_deposits"] = WATER[e.wetness]
+    elif e.fall is Fall.RAIN and e.fall_mm_h > 0.0:
+        found["wetness"] = 100.0
+    return found
+
+
+def _air(e: Environment) -> dict[str, float]:
+    found = {}
+    if e.visual_range is not None:
+        sight = min(max(e.visual_range, 1.0), V_CLEAR)
+        found["fog_density"] = 100.0 * log(V_CLEAR / sight) / log(V_CLEAR / V_FOG)
+        found["fog_distance"] = 0.0
+    if e.temperature_c is not None:  # of the road too; assumption
+        found["air_temperature_c"] = found["road_temperature_c"] = e.temperature_c
+    return found

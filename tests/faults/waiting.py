@@ -2,7 +2,7 @@
 
 import time
 
-PATIENCE = 120.0  # s
+PATIENCE = 300.0  # s
 
 
 def waited(condition):

@@ -108,7 +108,8 @@ def test_friction_is_applied_once_to_every_wheel(serve: Serve, program: Program)
     assert bare["ice"]["stop"] > bare["rain"]["stop"] > 2.0 * bare["dry"]["stop"]
 
 
-# min_ttc_s is the least of some ten thousand values: one reading that comes a tick late moves it.
+# min_ttc_s and lateral_max_m are extremes of thousands of values, which a single tick decides: the
+# latter is reached where the lane moves aside by 8 to 10 cm per tick, and the two differ by 2.5 cm.
 # So does a contact with all that comes after it: of a drive with contacts only counts are compared.
 CLOSED = {
     "empty 2": (
@@ -117,7 +118,6 @@ CLOSED = {
     ),
     "empty 4": (
         "mean_speed_kmh", "max_speed_kmh", "p95_speed_kmh", "distance_km", "lateral_std_m",
-        "lateral_max_m",
     ),
     "contacts": (),
     "lead": ("distance_m", "duration_s", "route_completion"),

@@ -18,7 +18,7 @@ STOP_LIMIT = 10.0  # s
 class ServerProcess:
     """`skidpad carla-server` on a free port of 127.0.0.1; a context manager."""
 
-    def __init__(self, options: Sequence[str] = (), start_limit: float = 180.0) -> None:
+    def __init__(self, options: Sequence[str] = (), start_limit: float = 600.0) -> None:
         """options: as on the command line. start_limit: s, the first start compiles kernels."""
         command = [sys.executable, "-m", "skidpad", "carla-server", "--port", "0", *options]
         self._process = subprocess.Popen(

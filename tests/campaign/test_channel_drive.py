@@ -120,14 +120,14 @@ def test_a_campaign_that_was_killed_goes_on_to_the_same_results(tmp_path):
     call += ["--workers", "1", "--out", str(tmp_path / "part")]
     parent = subprocess.Popen(call, env=environment, stderr=subprocess.DEVNULL)
     ledger = tmp_path / "part" / LEDGER
-    deadline = time.monotonic() + 240.0
+    deadline = time.monotonic() + 900.0
     while not (ledger.exists() and b"\n" in ledger.read_bytes()):
         assert time.monotonic() < deadline
         time.sleep(0.05)
     parent.send_signal(signal.SIGKILL)
     parent.wait()
     done = len(ledger.read_bytes().splitlines())
-    subprocess.run([*call, "--resume"], check=True, env=environment, timeout=300)
+    subprocess.run([*call, "--resume"], check=True, env=environment, timeout=900)
     whole = Campaign(RECIPE, segments(chosen_routes("all"), float(hours), segment_run(seed=0)))
     whole.run(tmp_path / "whole", local(1))
     assert done < 6 == len(ledger.read_bytes().splitlines())

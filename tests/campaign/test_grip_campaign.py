@@ -125,7 +125,7 @@ def _killing(runner: Runner) -> Runner:
         begun = threading.Event()
 
         def kill():
-            begun.wait(120.0)
+            begun.wait(600.0)
             mine = Path(f"/proc/{os.getpid()}/task/{os.getpid()}/children").read_text().split()
             workers = [p for p in mine if b"spawn_main" in Path(f"/proc/{p}/cmdline").read_bytes()]
             os.kill(int(workers[-1]), signal.SIGKILL)
@@ -170,7 +170,7 @@ def test_a_dask_worker_killed_during_a_run_loses_nothing(tmp_path):
         pids = set(client.run(os.getpid).values())
 
         def kill():
-            begun.wait(120.0)
+            begun.wait(600.0)
             os.kill(min(pids), signal.SIGKILL)
 
         thread = threading.Thread(target=kill)

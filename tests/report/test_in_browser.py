@@ -36,7 +36,7 @@ def test_the_script_of_the_page_runs(tmp_path, size):
         [CHROMIUM, *FLAGS, *where, "--dump-dom", f"file://{path}"],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=True,
     ).stdout
     assert 'aria-sort="ascending"' in dom

@@ -63,7 +63,7 @@ def hash_elsewhere(**environment: str) -> str:
         capture_output=True,
         text=True,
         check=True,
-        timeout=300,
+        timeout=900,
         env={**os.environ, **environment},
     )
     return other.stdout.strip()

@@ -29,7 +29,7 @@ pytest.importorskip("carla")
 Serve = Callable[..., ServerProcess]
 Program = Callable[..., Any]
 HERE_INSTEAD = BackendChoice()
-LIMIT = 170.0  # s
+LIMIT = 600.0  # s
 
 
 @pytest.fixture(scope="module")

@@ -16,7 +16,7 @@ from skidpad.simulation.carla_server.process import ServerProcess
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.streams import StreamHub
 
-CLIENT_LIMIT = 120.0  # s
+CLIENT_LIMIT = 600.0  # s
 
 
 class Server(ServerProcess):

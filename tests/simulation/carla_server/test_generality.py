@@ -96,7 +96,7 @@ act_tick()
 assert frames == list(range(frames[0], frames[0] + len(frames)))
 for camera, size, heard in sensors:
     while True:
-        image = heard.get(timeout=10.0)
+        image = heard.get(timeout=120.0)
         assert (image.width, image.height) == size
         assert len(image.raw_data) == 4 * size[0] * size[1]
         if image.frame == frames[-1]:

@@ -34,7 +34,7 @@ def tick(times=1):
 
 def at(sensor, frame):
     while True:
-        data = heard[sensor.id].get(timeout=20.0)
+        data = heard[sensor.id].get(timeout=120.0)
         if data.frame >= frame:
             assert data.frame == frame
             return data
@@ -150,7 +150,7 @@ frame = tick(20)
 assert at(imu, frame).accelerometer.x > 1.0
 tick(80)
 time.sleep(0.5)
-hit = heard[collision.id].get(timeout=10.0)
+hit = heard[collision.id].get(timeout=120.0)
 assert hit.actor.id == ego.id and hit.other_actor.id == lead.id
 push = hit.normal_impulse
 assert push.x * forward.x + push.y * forward.y < -1000.0, push  # N s, backwards
@@ -174,7 +174,7 @@ turning = at(imu, frame)
 assert turning.gyroscope.z > 0.02, turning.gyroscope
 assert turning.accelerometer.y > 0.3, turning.accelerometer
 tick(20)
-crossed = heard[lane.id].get(timeout=10.0)
+crossed = heard[lane.id].get(timeout=120.0)
 assert crossed.crossed_lane_markings
 """
     )
@@ -258,7 +258,7 @@ for turn in range(20):
     sensors = [listen("sensor.other." + kind) for kind in kinds]
     frame = tick()
     for sensor in sensors:
-        assert heard[sensor.id].get(timeout=10.0).frame == frame, (turn, sensor.type_id)
+        assert heard[sensor.id].get(timeout=120.0).frame == frame, (turn, sensor.type_id)
         sensor.destroy()
 """
     )

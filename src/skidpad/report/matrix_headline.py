@@ -6,7 +6,7 @@ from functools import partial
 
 import numpy as np
 
-from skidpad.evidence.statistics import Interval, Rate, event_rate, median_time
+from skidpad.evidence.statistics import event_rate, median_time
 from skidpad.report.matrix_data import Matrix, config_title
 from skidpad.report.page import Cell, Table
 from skidpad.report.tables import Column, Format, Quantity, table
@@ -22,20 +22,17 @@ COUNTS = (
 
 def headline_table(matrix: Matrix) -> Table:
     """One row per configuration, every drive once."""
-    columns = [
-        Column[str]("configuration", config_title),
-        *(
-            Column[str](f"{title} {per}", partial(_count, matrix, name, km), meaning, format=RATE)
-            for name, title, meaning in COUNTS
-            for per, km in (("per run", False), ("per 100 km", True))
-        ),
-        Column[str](
-            "time to the first, median",
-            partial(_first, matrix),
-            "of runs; a run without one counts as longer than every run",
-            "s",
-        ),
+    counts = [
+        Column[str](f"{title} per run", partial(_count, matrix, name), meaning, format=RATE)
+        for name, title, meaning in COUNTS
     ]
+    first = Column[str](
+        "time to the first, median",
+        partial(_first, matrix),
+        "of runs; a run without one counts as longer than every run",
+        "s",
+    )
+    columns = [Column[str]("configuration", config_title), *counts[:2], first, *counts[2:]]
     note = (
         "Every drive once. Small: 95 % interval; per 100 km it is that of the count, the way taken "
         "as given; of the median exact by order statistics, from six runs on."
@@ -43,22 +40,20 @@ def headline_table(matrix: Matrix) -> Table:
     return table(columns, matrix.configs, "What happened, by configuration", note)
 
 
-def _count(matrix: Matrix, column: str, per_100_km: bool, config: str) -> Quantity:
+def _count(matrix: Matrix, column: str, config: str) -> Quantity:
     runs = matrix.cell(config).drop_nulls([column, "distance_km"])
     km = float(runs["distance_km"].sum())
     if not len(runs) or not km:
         return Quantity(value=None)
     rate = event_rate(runs[column].to_list())
-    factor = 100.0 * len(runs) / km if per_100_km else 1.0
+    scale = 100.0 * len(runs) / km
+    value, low, high = (scale * v for v in (rate.rate, *rate.interval))
     return Quantity(
-        value=factor * rate.rate,
-        interval=_scaled(rate, factor),
+        value=rate.rate,
+        interval=rate.interval,
+        lines=(f"per 100 km {value:.1f}: {low:.1f} to {high:.1f}",),
         hint=f"{rate.events} events in {rate.runs} runs, {km:,.0f} km, {rate.method.value}",
     )
-
-
-def _scaled(rate: Rate, factor: float) -> Interval:
-    return Interval(factor * rate.interval.low, factor * rate.interval.high)
 
 
 def _first(matrix: Matrix, config: str) -> Cell:

@@ -64,7 +64,10 @@ def least_seeds_text(judged: Sequence[Judgement]) -> str:
     if not tested:
         return ""
     least = seeds_for_verdict(tested)
-    return f" With {tested} claims tested at once a verdict takes at least {least} seeds per cell."
+    return (
+        f" With {tested} claims tested at once, a paired comparison takes at least {least} seeds per "
+        "cell to decide one."
+    )
 
 
 def seeds_text(seeds: int) -> str:

@@ -14,6 +14,7 @@ from typing import Any
 import msgspec
 import mutation
 import numpy as np
+import scenario_mutation
 import yaml
 from lxml import etree
 
@@ -276,6 +277,22 @@ def play_scenario(path: Path) -> object:
         return run(runs.scenario_run(path, duration=0.5)).outcome
 
 
+def story_of(path: Path) -> Any:
+    from skidpad.scenarios.scenario import check
+
+    return check(path)
+
+
+def tell_story(path: Path) -> object:
+    """A hundred ticks of everything as the file says, where it compiles."""
+    from skidpad.scenarios.stage import played
+
+    beside(path)
+    scenario = story_of(path).scenario
+    with np.errstate(all="ignore"):
+        return scenario and played(scenario, 5.0).csv()
+
+
 # --- channels
 
 
@@ -452,6 +469,8 @@ READERS = {
     "openscenario": Reader(
         "a.xosc", scenarios, read_scenario, (mutation.mutated_xml, mutation.mutated)),
     "played": Reader("a.xosc", scenarios, play_scenario, (mutation.mutated_xml,), share=0.1),
+    "storyboard": Reader(
+        "a.xosc", scenario_mutation.seeds, tell_story, (scenario_mutation.mutated_story,)),
     "recording": Reader(
         "a.mcap", lambda: [recording()], read_recording,
         (mutation.mutated, mutated_messages, mutated_messages), share=0.3),

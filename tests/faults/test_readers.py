@@ -11,7 +11,7 @@ from readers import READERS
 
 from skidpad.core.errors import InputError
 
-LISTS = ("openscenario", "played")  # name all that is wrong, a line each
+LISTS = ("openscenario", "played", "storyboard")  # name all that is wrong, a line each
 LONGEST = 50_000  # characters
 IN_CI = 500  # inputs of a reader
 FAULTS_SHOWN = 12

@@ -298,7 +298,7 @@ def play(demo: Demo) -> list[dict[str, Any]]:
     demo.say(f"{len(demo.cars)} vehicles drive {demo.seconds:g} s each under the published rules")
     demo.round()
     told = demo.call(demo.maker, "POST", "/api/v1/analyses").json()
-    demo.say(f"  {told['hazards']} hazards came in, {told['clusters']} of them recur together")
+    demo.say(f"  {told['hazards']} hazards came in, clusters that recur: {told['clusters']}")
     rows = demo.call(demo.maker, "GET", "/api/v1/hazards").json()
     behind = [row["id"] for row in rows[:20]]
     demo.say("a change: corrected rules")

@@ -15,7 +15,7 @@ LISTS = ("openscenario", "played", "storyboard")  # name all that is wrong, a li
 LONGEST = 50_000  # characters
 IN_CI = 500  # inputs of a reader
 FAULTS_SHOWN = 12
-CPU_S = 60  # of one input; thousands of times what one takes
+CPU_S = 300  # of one input; thousands of times what one takes
 
 
 class TooLong(BaseException):
@@ -60,9 +60,11 @@ def stopwatch():
 def test_damaged_files_are_read_or_refused_in_a_sentence(name, tmp_path, request, stopwatch):
     reader = READERS[name]
     path = tmp_path / reader.file
-    for seed in reader.seeds():  # what is whole is read
+    for (
+        seed
+    ) in reader.seeds():  # what is whole is read, and kernels are compiled by no input's clock
         path.write_bytes(seed)
-        assert not refused(reader, path)
+        reader.read(path)
     first, faults = request.config.getoption("--fuzz-from"), []
     for number, data in inputs(name, request.config.getoption("--fuzz"), first):
         path.write_bytes(data)

@@ -197,7 +197,8 @@ RECIPE = Recipe(
 
 def summary(results: pl.DataFrame) -> pl.DataFrame:
     """What the seeds made of each candidate: shares, medians, and the least distance of all."""
-    of_candidate = results.group_by("scenario", "number", "cutin", "values").agg(
+    candidate = ("scenario", "number", "cutin", "values")
+    of_candidate = results.group_by(candidate, maintain_order=True).agg(
         pl.col("completed", "triggered", "npc_contact").mean(),
         pl.col("hardest", "way_m").median(),
         pl.col("nearest_m").min(),

@@ -16,7 +16,9 @@ INVASIONS_MAX = Amount(2.0, "markings per run")  # in configurations 2 to 4 (A-2
 
 def broken_cells(table: pl.DataFrame) -> tuple[int, int]:
     """Cells of configuration 0 without or of 4 with a collision, and all of both."""
-    cells = table.group_by("config", "weather").agg(pl.col("fatal_collisions").sum())
+    cells = table.group_by("config", "weather", maintain_order=True).agg(
+        pl.col("fatal_collisions").sum()
+    )
     judged = cells.filter(pl.col("config").is_in(["0", "4"]))
     if judged["config"].n_unique() < 2:
         return 0, 0

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from skidpad.core import jit
 from skidpad.core.jit import imported, kernel_hash
 
 FILES = {
@@ -77,3 +78,16 @@ def test_an_edited_callee_is_compiled_into_its_caller(tmp_path: Path) -> None:
     assert answer("x + 1.0") == "3.0 0"
     assert answer("x + 1.0") == "3.0 1"
     assert answer("x + 5.0") == "7.0 0"
+
+
+def test_nobody_else_may_write_into_the_cache(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    before = os.umask(0)
+    try:
+        folder = Path(jit._cache_of.__wrapped__(Path(jit.__file__).resolve()))
+    finally:
+        os.umask(before)
+    assert folder.is_dir()
+    assert jit.kernel_cache().stat().st_mode & 0o777 == 0o700

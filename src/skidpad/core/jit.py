@@ -76,6 +76,8 @@ def _cache_of(file: Path) -> str:
     parent = kernel_cache() / ".".join(file.relative_to(PACKAGE).with_suffix("").parts)
     folder = parent / kernel_hash(file)
     try:
+        kernel_cache().mkdir(parents=True, exist_ok=True)
+        kernel_cache().chmod(0o700)  # whoever may write machine code here may run it as this user
         folder.mkdir(parents=True, exist_ok=True)
         os.utime(folder)
         by_age = sorted(parent.iterdir(), key=lambda p: p.stat().st_mtime, reverse=True)

@@ -25,6 +25,7 @@ from skidpad.evidence.statistics import (
     pairs_needed,
     poisson_interval,
     seeds_for_verdict,
+    share_text,
 )
 
 
@@ -189,3 +190,8 @@ def test_the_least_seeds_are_those_with_which_a_claim_can_be_shown():
     for claims in range(1, 60):
         n = seeds_for_verdict(claims)
         assert 2.0 ** (1 - n) < 0.05 / claims <= 2.0 ** (2 - n)
+
+
+def test_a_share_and_its_interval_are_told_in_one_unit() -> None:
+    assert share_text(0.05, Interval(0.001, 0.1456)) == "5.00 %, 95 % 0.1 to 14.6 %"
+    assert share_text(0.05, Interval(-np.inf, np.inf)) == "5.00 %, 95 % unbounded"

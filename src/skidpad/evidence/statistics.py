@@ -248,6 +248,13 @@ def interval_text(interval: Interval) -> str:
     return f"95 % {interval.low:.3g} to {interval.high:.3g}"
 
 
+def share_text(share: float, interval: Interval) -> str:
+    """`5.00 %, 95 % 0.1 to 14.6 %` of shares from 0 to 1."""
+    percent = Interval(100.0 * interval.low, 100.0 * interval.high)
+    unit = " %" if np.isfinite(percent).any() else ""
+    return f"{100.0 * share:.2f} %, {interval_text(percent)}{unit}"
+
+
 def p_text(p: float) -> str:
     """`p = 0.25`, `p < 0.001`."""
     return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"

@@ -7,7 +7,7 @@ from typing import Any
 
 from starlette.requests import Request
 
-from skidpad.evidence.statistics import interval_text
+from skidpad.evidence.statistics import interval_text, share_text
 from skidpad.fleet.insight.trends import Trend, hazard_rates, trends
 from skidpad.fleet.patterns.analysis import newest_clusters
 from skidpad.fleet.service import Fleet
@@ -54,7 +54,7 @@ def _trends(ui: Any, found: list[Trend]) -> None:
                     last = by_name[name][-1]
                     ui.label(name.replace("_", " "))
                     ui.html(trend_svg(by_name[name], name), sanitize=False)
-                    text = f"{100 * last.share:.2f} %, {interval_text(last.interval)}"
+                    text = share_text(last.share, last.interval)
                     ui.label(f"{text}, {last.vehicles} vehicles").classes("dim")
         if not worst:
             ui.label("No indicator was sent yet.").classes("dim")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from skidpad.evidence.statistics import interval_text
+from skidpad.evidence.statistics import share_text
 from skidpad.fleet.insight.places import places
 from skidpad.fleet.insight.safety import claims
 from skidpad.fleet.insight.trends import trends
@@ -41,9 +41,9 @@ def fill_case(fleet: Fleet, ui: Any, who: Principal) -> None:
         with ui.element("div").classes("card"):
             ui.label(f"{claim.id} {claim.claim}: {claim.verdict}")
             if claim.share is not None and claim.interval is not None:
-                share = f"worst indicator beyond its bound in {100 * claim.share:.2f} % of cycles"
-                text = f"{share} ({interval_text(claim.interval)}, {claim.vehicles} vehicles)"
-                ui.label(text).classes("dim")
+                share = share_text(claim.share, claim.interval)
+                text = f"worst indicator beyond its bound: {share} of cycles"
+                ui.label(f"{text}, {claim.vehicles} vehicles").classes("dim")
 
 
 def fill_changes(fleet: Fleet, ui: Any, who: Principal) -> None:

@@ -206,30 +206,15 @@ def _print_table(table: object) -> None:
 
 def _gate(counts: dict[str, int], junit: Path | None) -> None:
     """Exit with 1 when anything that must not occur did."""
-    if junit is not None:
-        from skidpad.recording.files import write_bytes
+    from skidpad.cli.junit import write_junit
 
-        write_bytes(junit, _junit(counts))
-    failed = [f"{name} occurred {n} times" for name, n in counts.items() if n]
+    wrong = {name: [f"{name} occurred {n} times"] if n else [] for name, n in counts.items()}
+    if junit is not None:
+        write_junit(junit, "skidpad monitor", wrong)
+    failed = [sentence for by in wrong.values() for sentence in by]
     if failed:
         typer.echo("failed: " + "; ".join(failed), err=True)
         raise typer.Exit(1)
-
-
-def _junit(counts: dict[str, int]) -> bytes:
-    from lxml import etree
-
-    suite = etree.Element(
-        "testsuite",
-        name="skidpad monitor",
-        tests=str(len(counts)),
-        failures=str(sum(n > 0 for n in counts.values())),
-    )
-    for name, n in counts.items():
-        case = etree.SubElement(suite, "testcase", classname="skidpad.monitor", name=name)
-        if n:
-            etree.SubElement(case, "failure", message=f"{name} occurred {n} times")
-    return etree.tostring(suite, xml_declaration=True, encoding="utf-8", pretty_print=True)
 
 
 def safety_case(folder: Path = DIR) -> None:

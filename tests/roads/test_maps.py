@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import cos, hypot, pi, sin
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -207,3 +208,13 @@ def test_in_the_roundabout_traffic_turns_left() -> None:
         if map.lanes.junction[lane] < 0 and map.lanes.length[lane] < 20.0:
             place = map.at(lane, 1.0)
             assert place.curvature == pytest.approx(1.0 / 18.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("name", MAPS)
+def test_records_of_every_road_begin_where_it_begins(name: str) -> None:
+    """A first record at 0.3 um ended CARLA's client."""
+    for road in ElementTree.parse(FOLDER / f"{name}.xodr").getroot().iter("road"):
+        for path in ("planView/geometry", "lanes/laneSection", "elevationProfile/elevation",
+                     "lateralProfile/superelevation"):  # fmt: skip
+            first = road.find(path)
+            assert first is None or float(first.attrib["s"]) == 0.0, (road.attrib["id"], path)

@@ -11,6 +11,7 @@ import numpy as np
 from skidpad.roads.opendrive.reference_line import Clothoid, Element, ReferenceLine
 
 DIGITS = 9  # of written coordinates: a nanometre
+SHORTEST = 1e-6  # m, of a record; CARLA's reader ends the process where none begins at s = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,16 +107,16 @@ def _clothoids(piece: Piece) -> list[tuple[float, float, float]]:
     if arc < 0.0:
         raise ValueError(f"spirals of {piece} turn by more than the bend")
     parts = [(piece.spiral, 0.0, k), (arc, k, k), (piece.spiral, k, 0.0)]
-    return [part for part in parts if part[0] > 1e-6]
+    return [part for part in parts if part[0] > SHORTEST]
 
 
 def cut(chain: Sequence[Element], s_from: float, s_to: float) -> tuple[Element, ...]:
     """The stretch of an axis between two places, as records of its own that begin at s = 0."""
     line = ReferenceLine(chain)
-    out = []
+    out: list[Element] = []
     for element in chain:
         s0, s1 = max(element.s, s_from), min(element.s + element.length, s_to)
-        if s1 - s0 < 1e-6:
+        if s1 - s0 < SHORTEST:
             continue
         assert isinstance(element.shape, Clothoid)
         at = line.at(np.array([s0]))
@@ -129,7 +130,7 @@ def cut(chain: Sequence[Element], s_from: float, s_to: float) -> tuple[Element, 
         )
         out.append(
             Element(
-                round(s0 - s_from, DIGITS),
+                round(s0 - s_from, DIGITS) if out else 0.0,
                 round(x, DIGITS),
                 round(y, DIGITS),
                 round(h, DIGITS),
@@ -151,7 +152,7 @@ class Heights:
         out: list[tuple[float, ...]] = []
         for (s0, z0), (s1, z1) in zip(self.knots[:-1], self.knots[1:], strict=True):
             begin, stop = max(s0, s_from), min(s1, s_to)
-            if stop - begin < 1e-6:
+            if stop - begin < SHORTEST:
                 continue
             rise, span = z1 - z0, s1 - s0
             c, d = 3.0 * rise / span**2, -2.0 * rise / span**3
@@ -162,7 +163,8 @@ class Heights:
                 c + 3.0 * d * u,
                 d,
             )
-            out.append((round(begin - s_from, DIGITS), *(round(v, 15) for v in shifted)))
+            s = round(begin - s_from, DIGITS) if out else 0.0
+            out.append((s, *(round(v, 15) for v in shifted)))
         return out
 
     def at(self, s: float) -> float:
@@ -182,11 +184,10 @@ class Banks:
         out: list[tuple[float, ...]] = []
         for (s0, r0), (s1, r1) in zip(self.knots[:-1], self.knots[1:], strict=True):
             begin, stop = max(s0, s_from), min(s1, s_to)
-            if stop - begin < 1e-6:
+            if stop - begin < SHORTEST:
                 continue
             slope = (r1 - r0) / (s1 - s0)
             first = r0 + slope * (begin - s0)
-            out.append(
-                (round(begin - s_from, DIGITS), round(first, 15), round(slope, 15), 0.0, 0.0)
-            )
+            s = round(begin - s_from, DIGITS) if out else 0.0
+            out.append((s, round(first, 15), round(slope, 15), 0.0, 0.0))
         return out

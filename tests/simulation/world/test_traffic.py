@@ -59,7 +59,7 @@ def test_positions_are_the_published_ones() -> None:
     name = "shared/reference/adas/traffic_spawn_positions.csv"
     path = next((p / name for p in Path(__file__).parents if (p / name).is_file()), None)
     if path is None:
-        pytest.skip("the reference tables are not here")
+        pytest.skip("the published tables are not here")
     with path.open() as file:
         rows = list(csv.DictReader(file))
     for variant in ("listing", "table"):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import gzip
 import json
 import os
-import shutil
 import signal
 import time
 from pathlib import Path
@@ -15,12 +14,12 @@ import pytest
 from test_fleet_insight import row
 from test_fleet_upload import served
 
+from chromium import CHROMIUM, FLAGS
 from fleet_world import make_world, packed, record
 from skidpad.fleet.alerting.keeping import What
 from skidpad.fleet.site.acting import click_analyse, click_answer, click_stop
 from skidpad.fleet.words import Refused
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 WAIT_MS = 120_000
 SCENE = {"map": "town", "ego": {"x": 1.0, "y": 2.0, "heading": 0.1}, "v": 8.0}
 ALERT = {"kind": "hazard", "text": "<b>car</b> ahead stopped", "scene": SCENE}
@@ -94,9 +93,7 @@ def test_the_pages_in_a_browser(tmp_path):
     child, address = served(tmp_path / "data")
     with child, playwright.sync_playwright() as driver:
         try:
-            browser = driver.chromium.launch(
-                executable_path=CHROMIUM, args=["--no-sandbox", "--disable-gpu"], timeout=WAIT_MS
-            )
+            browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS, timeout=WAIT_MS)
             asked = []
             for size in ({"width": 1280, "height": 900}, {"width": 390, "height": 844}):
                 dashboard(browser, address, tokens["red operator"], size, asked)

@@ -1,25 +1,12 @@
 """The page in a real browser: its script runs, tables sort, replays get their controls."""
 
-import shutil
 import subprocess
 
 import pytest
 from test_page import page
 
+from chromium import CHROMIUM, FLAGS
 from skidpad.report.page import write_page
-
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
-FLAGS = [
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--virtual-time-budget=2000",
-]
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
@@ -33,7 +20,15 @@ def test_the_script_of_the_page_runs(tmp_path, size):
     path.write_text(clicked)
     where = [f"--user-data-dir={tmp_path / 'profile'}", f"--window-size={size}"]
     dom = subprocess.run(
-        [CHROMIUM, *FLAGS, *where, "--dump-dom", f"file://{path}"],
+        [
+            CHROMIUM,
+            "--headless",
+            *FLAGS,
+            *where,
+            "--virtual-time-budget=2000",
+            "--dump-dom",
+            f"file://{path}",
+        ],
         capture_output=True,
         text=True,
         timeout=600,

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from time import perf_counter, sleep
 
 from skidpad.campaign.drive import Moment, Sink
+from skidpad.campaign.pace import SLOW
 from skidpad.cockpit.words import Link
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable
@@ -18,7 +19,6 @@ PAUSE_FOR_GC = 0.005  # s that a collection of the youngest objects fits into
 COLLECT_EVERY = 200  # ticks between collections of everything
 PATIENCE = 0.05  # s between two looks at the words while it stands
 WINDOW = 20  # ticks over which the real-time factor is measured
-SLOW = 0.9  # real-time factor below which a tick is slow
 
 
 class RealTime(Sink):

@@ -30,9 +30,7 @@ LEVEL = 4.0  # m: whatever is farther above or below is on another road (decisio
 REACH = 8.0  # m beyond the road up to which distances are told
 NOWHERE = 1e12  # m, for places that are no numbers
 SLACK = 0.05  # m along a lane by which pieces overlap, so that bends have no seams
-AXLE = (
-    0.3  # of a car's length, from its middle to each axle; assumption, wheelbase 0.6 of the length
-)
+AXLE = 0.3  # of a car's length, from its middle to each axle; assumption
 TRACK = 0.42  # of its width, from its middle to each wheel's centre; assumption
 
 

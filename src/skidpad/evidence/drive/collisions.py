@@ -18,10 +18,8 @@ LOOK_BACK = 10.0  # s of history in the chain of causes
 JUST_BEFORE = 2.0  # s, for bend, lead and brake
 RECOVERY_LAG = 0.25  # s within which a contact has started a recovery
 BEHIND = -0.5  # cosine of the direction to the other car: it stands behind
-CHAIN_TIME, CHAIN_WAY = (
-    8.0,
-    100.0,
-)  # s and m from a relocation: what happens there follows on
+CHAIN_TIME = 8.0  # s after a relocation within which what happens follows on,
+CHAIN_WAY = 100.0  # m from where the ego was put, likewise
 
 
 class CrashKind(str, Enum):

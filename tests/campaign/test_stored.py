@@ -20,7 +20,7 @@ from skidpad.campaign.matrix import RECIPE as MATRIX
 from skidpad.campaign.play import run_to
 from skidpad.campaign.run import run
 from skidpad.campaign.stored import read_run, read_segment
-from skidpad.campaign.study import speed_and_dropout
+from skidpad.campaign.study_arms import speed_and_dropout
 from skidpad.campaign.tuning import Candidate, tuning_run
 from skidpad.campaign.worker import Finished, Job
 from skidpad.cli.main import app

@@ -439,3 +439,22 @@ def test_a_changed_constant_is_noticed(
         except AssertionError:
             noticed += 1
     assert noticed
+
+
+def test_without_a_clearance_test_the_nearest_place_is_taken() -> None:
+    s = supervisor(clearance=Clearance.NONE)
+    rows = play(s, 53, beside(0.0), [beside(10.0)], contact=True)
+    moved = next(a.relocate.moved for _, a in rows if a.relocate is not None)
+    assert moved is not None
+    assert (moved.shift, moved.clear) == (0.0, False)
+
+
+@pytest.mark.req("A-188")
+@pytest.mark.parametrize("grace", [8.0, 0.0])
+def test_the_grace_puts_the_stuck_detector_off(grace: float) -> None:
+    s = supervisor(grace=grace)
+    play(s, 65, beside(0.0), contact=True)
+    rows = play(s, 400, beside(0.0), v=0.0)
+    stuck = next(k for k, (phase, _) in enumerate(rows, 65) if phase is Supervision.WARM_UP)
+    after = stuck * DT - 2.55  # since it was put back
+    assert after == pytest.approx(10.0 + max(grace, 0.5), abs=0.25)

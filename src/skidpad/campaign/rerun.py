@@ -19,9 +19,10 @@ from numpy.typing import NDArray
 from PIL import Image
 
 from skidpad.campaign.backends import keep_server
+from skidpad.campaign.cast import stage_of
 from skidpad.campaign.channel_drive import drive_segment
 from skidpad.campaign.desk import Desk, Recorded
-from skidpad.campaign.drive import Moment, Sink
+from skidpad.campaign.drive import Moment, Sink, Timer
 from skidpad.campaign.keeping import housed
 from skidpad.campaign.run import run as drive_again
 from skidpad.campaign.stored import read_run, read_segment
@@ -64,8 +65,9 @@ def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None 
     closely = Closely(begin_s, end_s, out, film)
     keep_server(spec.backend)
     try:
-        ticks = round(end_s / DT)
-        again = drive_again(spec, sinks=(closely,), ticks=ticks, desk=desk_of(run, spec)).log
+        stage = stage_of(spec)
+        stage = replace(stage, script=Timer(round(end_s / DT), stage.script))
+        again = drive_again(spec, stage=stage, sinks=(closely,), desk=desk_of(run, spec)).log
         closely.finish()
     finally:
         closely.close()

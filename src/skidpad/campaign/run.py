@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from skidpad.campaign.backends import make_backend
 from skidpad.campaign.cast import Stage, driver_of, stage_of, with_sensors
 from skidpad.campaign.desk import Desk, DeskBackend, DeskDriver, DeskSupervisor, UntilEnded
-from skidpad.campaign.drive import Moment, Sink, Timer, loop
+from skidpad.campaign.drive import Moment, Sink, loop
 from skidpad.campaign.outdoors import ChangedBackend, FileSky
 from skidpad.campaign.snapshots import Snapshots
 from skidpad.core.errors import StackError, require_choice
@@ -160,21 +160,19 @@ def run(
     spec: RunSpec,
     kind: type[Stack] | None = None,
     *,
+    stage: Stage | None = None,
     backend: Backend | None = None,
     folder: Path | None = None,
     sinks: Sequence[Sink] = (),
-    ticks: int | None = None,
     desk: Desk | None = None,
 ) -> Run:
     """Drive a run on roads or in a scenario; a stack that fails is an outcome.
 
-    kind: the stack's class, if it is loaded. backend: by default a fresh one of the run's choice.
-    folder: where snapshots of collisions go. sinks: who else looks on. ticks: end
-    it after so many at the latest. desk: where a person sits, or sat.
+    kind: the stack's class, if it is loaded. stage: the run's own by default. backend: by default a
+    fresh one of the run's choice. folder: where snapshots of collisions go. sinks: who else looks on.
+    desk: where a person sits, or sat.
     """
-    stage = stage_of(spec)
-    if ticks is not None:
-        stage = replace(stage, script=Timer(ticks, stage.script))
+    stage = stage_of(spec) if stage is None else stage
     backend = make_backend(spec.backend) if backend is None else backend
     sky = None if stage.player is None else FileSky(stage.player, spec)
     if sky is not None:

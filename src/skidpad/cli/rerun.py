@@ -62,7 +62,9 @@ def _show(result: Rerun) -> None:
 
 
 def study(
-    id: Annotated[str, typer.Argument(help="F-08, F-17, F-21, F-25 or A-278.")],
+    id: Annotated[
+        str, typer.Argument(help="F-08, F-17 to F-19, F-21, F-25, F-29, F-30, noise or A-278.")
+    ],
     seeds: Annotated[int, typer.Option(min=1, help="Seeds per arm.")] = 6,
     workers: Annotated[
         int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
@@ -78,10 +80,11 @@ def study(
 
     with Progress(console=Console(stderr=True)) as progress:
         task = progress.add_task(id)
-        verdict, table = run_study(
+        verdicts, table = run_study(
             id, seeds, workers, lambda done, n: progress.update(task, completed=done, total=n)
         )
-    typer.echo(f"{verdict.finding.id}: {verdict.finding.claim}\n{verdict.text}")
+    for v in verdicts:
+        typer.echo(f"{v.finding.id}: {v.finding.claim}\n{v.text}")
     if out is not None:
         write_csv(out, table)
         typer.echo(str(out))

@@ -80,6 +80,7 @@ class Clearance(str, Enum):
     """How a free place is searched for an ego that is put back (D-080)."""
 
     OTHERS = "others"  # the ego is no obstacle, and the last place is checked too
+    NONE = "none"  # no search: the nearest place is taken, free or not (F-30)
     LISTING = "listing"  # as printed: the ego counts, and after four shifts the place is taken
 
 

@@ -48,6 +48,7 @@ class Metrics:
     bend_exits: int | None = metric("static or off the road: in a bend without a lead", "M-6")
     stuck_relocations: int | None = metric("relocations of a stuck ego, not fatal", "A-253")
     max_impact_kmh: float | None = metric("largest closing speed at a collision", "A-249")
+    max_impact_vehicle_kmh: float | None = metric("the same, with a vehicle", "F-05")
     # lanes
     lane_invasions: int | None = metric("solid markings crossed", "A-030, A-248")
     lane_invasions_all: int | None = metric("markings crossed, of any kind", "A-248")

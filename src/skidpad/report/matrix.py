@@ -16,6 +16,7 @@ from skidpad.report.matrix_headline import headline_table
 from skidpad.report.page import Block, Number, Numbers, Page, Section, Text, write_report_page
 from skidpad.report.verdicts import verdict_blocks
 
+CLAIMS = (*FINDINGS, *ACCEPTANCE)
 LEAD = """Each row below is a set of driving functions, each column a weather. A cell was driven with \
 every seed; seeds are common to all cells, so differences between cells are paired. A fatal collision \
 is a contact that started the recovery supervisor, a departure from the road (all wheels off every lane \
@@ -34,9 +35,8 @@ def write_report(folder: Path) -> Path:
 
 def build_page(matrix: Matrix) -> Page:
     """All sections in the order in which a reader asks."""
-    claims = (*FINDINGS, *ACCEPTANCE)
-    tables = [None if f.study else matrix.results for f in claims]
-    judged = judge(claims, tables, astray(matrix.results))
+    claims = [f for f in CLAIMS if not f.study]
+    judged = judge(claims, [matrix.results] * len(claims), astray(matrix.results))
     crashes = found_crashes(matrix)
     sections = [
         Section(
@@ -117,7 +117,9 @@ def _verdicts(judged: Sequence[Judgement]) -> list[Block]:
         "seen. One rule is not blind: that a margin comes before significance, so that a difference "
         "below its margin supports nothing, is shared by all reports and was settled after results "
         "of the friction campaign had been seen. "
-        "A claim whose two sides are the same drive is marked by construction; one that needs runs "
-        "of its own can be tested with `skidpad study ID`."
+        "A claim whose two sides are the same drive is marked by construction. A v behind an id: the "
+        "same claim for crashes with vehicles alone."
     )
-    return [intro, *verdict_blocks(judged)]
+    own = ", ".join(f.id for f in CLAIMS if f.study)
+    rest = Text(f"Claims that need runs of their own are judged by `skidpad study`: {own}.")
+    return [intro, *verdict_blocks(judged), rest]

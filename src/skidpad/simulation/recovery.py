@@ -61,12 +61,14 @@ class RecoverySettings:
     warm_up: float = 0.5  # s with brakes held; 1.5 as listed (D-076)
     release_speed: float = 5.5  # m/s given at its end; 0 as listed (D-077)
     clearance: Clearance = Clearance.OTHERS  # D-080
+    grace: float = GRACE  # s, A-188
     stuck_time: float = 10.0  # s, A-200
     stuck_speed: float = mps_from_kmh(1.0)  # m/s, A-200
 
     def __post_init__(self) -> None:
         require_range("recovery.warm_up", self.warm_up, 0.05, 10.0)
         require_range("recovery.release_speed", self.release_speed, 0.0, 30.0)
+        require_range("recovery.grace", self.grace, 0.0, 60.0)
         require_range("recovery.stuck_time", self.stuck_time, 1.0, 3600.0)
         require_range("recovery.stuck_speed", self.stuck_speed, 0.0, 5.0)
 
@@ -198,7 +200,7 @@ class Supervisor:
         new = replace(place.pose, z=place.z + LIFT)
         moved = Moved(self.reason, shift, states.pose(0), new, clear)
         self.cool_down = round(COOL_DOWN / self.dt)
-        self.grace = round(GRACE / self.dt)
+        self.grace = round(self.settings.grace / self.dt)
         self._begin(Supervision.WARM_UP, self.settings.warm_up, self.reason)
         notice = "" if clear else "no free place found, the ego was put near another vehicle"
         if self.reason is RelocationReason.ROAD_END:
@@ -216,6 +218,8 @@ class Supervisor:
     def _clear_place(self, nearest: LanePoint) -> tuple[LanePoint, float, bool]:
         """The place, the distance moved back to it, and whether it is clear (A-184, D-080)."""
         place, shift = nearest, 0.0
+        if self.settings.clearance is Clearance.NONE:
+            return place, shift, self._is_clear(place)
         for candidate in self._candidates(nearest):
             place, shift = candidate
             if self._is_clear(place):

@@ -29,6 +29,8 @@ Effect = Callable[[Row], dict[str, float]]
 
 NEUTRAL = {
     "fatal_collisions": 3.0,
+    "crashes_vehicle": 3.0,
+    "max_impact_vehicle_kmh": 40.0,
     "lane_invasions": 5.0,
     "bend_speed_kmh": 90.0,
     "mean_speed_kmh": 50.0,
@@ -42,8 +44,19 @@ NEUTRAL = {
     "min_ttc_s": 0.1,
     "ttc_below_1_5_s": 10.0,
     "phantom_brakings": 3.0,
+    "surges": 3.0,
+    "mode_changes_per_min": 6.0,
+    "jerk_rms": 5.0,
+    "spins": 3.0,
+    "hits_in_cool_down": 3.0,
+    "chained": 3.0,
 }
 NOISE = {"min_ttc_s": 0.01}
+COUNTS = (
+    *("fatal_collisions", "crashes_vehicle", "lane_invasions"),
+    *("surges", "spins", "hits_in_cool_down", "chained"),
+)
+RARE = ("F-07", "F-07v", "F-18", "F-29", "F-30")  # claims that a rate is next to nothing
 
 
 def is_config(row: Row, name: str) -> int:
@@ -100,7 +113,40 @@ TRUE: dict[str, Effect] = {
     ),
     "F-26": shifts(ttc_below_1_5_s=lambda r: 9 * is_config(r, "3")),
 }
-VARIANTS = {"F-17": ("cascade", "safety_persist"), "F-21": ("map_matched", "corridor")}
+
+
+def among_vehicles(effect: Effect) -> Effect:
+    """The same of crashes with vehicles, while the others stay as they are."""
+
+    def moved(row: Row) -> dict[str, float]:
+        claimed = effect(row)
+        return {c.replace("fatal_collisions", "crashes_vehicle"): v for c, v in claimed.items()}
+
+    return moved
+
+
+TRUE |= {f"{id}v": among_vehicles(TRUE[id]) for id in ("F-01", "F-04", "F-07", "F-13")}
+TRUE["F-05v"] = shifts(max_impact_vehicle_kmh=lambda r: 9 * is_config(r, "2"))
+TRUE |= {
+    "F-12n": shifts(dropout_pct=variant("night")),
+    "F-13nv": shifts(crashes_vehicle=variant("rain")),
+    "F-18": lambda r: {"surges": 0.0 if r["variant"] == "coast" else 4.0},
+    "F-19": shifts(mode_changes_per_min=variant("one_pid"), jerk_rms=variant("one_pid")),
+    "F-29": lambda r: {"spins": 0.0 if r["variant"] == "released" else 4.0},
+    "F-30": lambda r: {"hits_in_cool_down": 0.0},
+    "F-30a": shifts(chained=variant("no_clearance")),
+}
+VARIANTS = {
+    "F-12n": ("exact", "night"),
+    "F-13nv": ("exact", "rain"),
+    "F-18": ("coast", "no_coast"),
+    "F-19": ("zones", "one_pid"),
+    "F-29": ("released", "engaged"),
+    "F-30": ("whole",),
+    "F-30a": ("whole", "no_clearance"),
+    "F-17": ("cascade", "safety_persist"),
+    "F-21": ("map_matched", "corridor"),
+}
 
 
 def campaign(
@@ -125,14 +171,13 @@ def campaign(
         for column, neutral in NEUTRAL.items():
             value = neutral + size * (claimed.get(column, neutral) - neutral)
             value += rng.normal(0.0, NOISE.get(column, noise))
-            is_count = column in ("fatal_collisions", "lane_invasions")
-            row[column] = max(round(value), 0) if is_count else value
+            row[column] = max(round(value), 0) if column in COUNTS else value
         rows.append(row)
     return pl.DataFrame(rows)
 
 
 def clear_campaign(id: str, size: float) -> pl.DataFrame:
-    return campaign(id, TRUE[id], size, noise=0.15 if id == "F-07" else 0.6)
+    return campaign(id, TRUE[id], size, noise=0.15 if id in RARE else 0.6)
 
 
 def verdict(id: str, table: pl.DataFrame | None) -> Verdict:
@@ -181,16 +226,23 @@ def study(speed: float, dropout: float) -> pl.DataFrame:
             "target_kmh": float(v),
             "dropout_injected": d,
             "seed": seed,
-            "fatal_collisions": max(
-                round(5 + speed * (v - 100) / 20 + dropout * (d - 0.2) * 10 + rng.normal(0, 0.5)), 0
+            "fatal_collisions": (
+                n := max(
+                    round(
+                        5 + speed * (v - 100) / 20 + dropout * (d - 0.2) * 10 + rng.normal(0, 0.5)
+                    ),
+                    0,
+                )
             ),
+            "crashes_vehicle": n,
         }
         for v, d, seed in product((60, 100, 150), (0.0, 0.2, 0.4), range(12))
     )
 
 
-def test_speed_against_dropout() -> None:
-    f = [BY_ID["F-08"]]
+@pytest.mark.parametrize("id", ["F-08", "F-08v"])
+def test_speed_against_dropout(id: str) -> None:
+    f = [BY_ID[id]]
     assert judge(f, [study(2.0, 0.1)])[0].verdict is Verdict.SUPPORTED
     assert judge(f, [study(0.0, 2.0)])[0].verdict is Verdict.CONTRADICTED
     assert judge(f, [None])[0].verdict is Verdict.NOT_TESTABLE
@@ -269,10 +321,37 @@ def test_a_rate_is_bounded_exactly() -> None:
 
 def test_every_finding_is_written_out_before_results_are_seen() -> None:
     headline = {1, 4, 5, 7, 8, 10, 11, 12, 13, 16, 17, 21, 25, 26}
-    assert {f.id for f in FINDINGS} == {f"F-{n:02}" for n in headline}
+    vehicles = {1, 4, 5, 7, 8, 13}
+    ids = [f"F-{n:02}" for n in headline] + [f"F-{n:02}v" for n in vehicles]
+    studies = ["F-18", "F-19", "F-29", "F-30", "F-30a", "F-30b", "F-30c"]
+    noise = ["F-12n", "F-12nv", "F-13n", "F-13nv"]
+    assert [f.id for f in FINDINGS] == sorted(ids + studies + noise)
     for f in FINDINGS:
         assert all((f.claim, f.estimand, f.needs, f.test, f.margin)), f.id
-    assert {f.id for f in FINDINGS if f.study} == {"F-08", "F-17", "F-21", "F-25"}
+    studied = {"F-08", "F-08v", "F-17", "F-21", "F-25", *studies, *noise}
+    assert {f.id for f in FINDINGS if f.study} == studied
+
+
+@pytest.mark.parametrize("id", ["F-01", "F-04", "F-07", "F-13"])
+def test_crashes_with_vehicles_are_judged_apart_from_barriers(id: str) -> None:
+    barriers_alone = clear_campaign(id, 1.0)
+    assert verdict(id, barriers_alone) is Verdict.SUPPORTED
+    assert verdict(f"{id}v", barriers_alone) is not Verdict.SUPPORTED
+    vehicles_alone = clear_campaign(f"{id}v", 1.0)
+    assert verdict(f"{id}v", vehicles_alone) is Verdict.SUPPORTED
+    assert verdict(id, vehicles_alone) is not Verdict.SUPPORTED
+
+
+def test_speeds_of_impact_are_compared_where_both_sides_hit_a_vehicle() -> None:
+    table = campaign("F-05v", TRUE["F-05v"], 1.0)
+    rare = table.with_columns(
+        max_impact_vehicle_kmh=pl.when((pl.col("config") == "1") & (pl.col("seed") > 2))
+        .then(None)
+        .otherwise("max_impact_vehicle_kmh")
+    )
+    (contrast,) = BY_ID["F-05v"].contrasts(rare)
+    assert contrast.units == 3
+    assert verdict("F-05v", rare.filter(pl.col("seed") > 2)) is Verdict.NOT_TESTABLE
 
 
 def weathers_alike(seed: int, counts: dict[str, int]) -> list[Row]:

@@ -358,7 +358,7 @@ def test_driving_into_a_car_is_one_vehicle_collision_with_its_causes() -> None:
     m = metrics(log)
     assert (m.fatal_collisions, m.collisions_vehicle, m.collisions_static) == (1, 1, 0)
     assert (m.rear_ended, m.wrong_way, m.contacts) == (0, 0, 1)
-    assert m.max_impact_kmh == pytest.approx(54.0)
+    assert m.max_impact_kmh == m.max_impact_vehicle_kmh == pytest.approx(54.0)
     (c,) = find_crashes(prepare(log, straight_map()))
     assert (c.kind, c.other, c.striker) == (CrashKind.VEHICLE, "car 1", Striker.EGO)
     assert (c.t, c.v_ego, c.v_other) == (pytest.approx(0.6), 20.0, 5.0)

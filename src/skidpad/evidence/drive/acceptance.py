@@ -8,7 +8,7 @@ from __future__ import annotations
 import polars as pl
 
 from skidpad.evidence.contrasts import Amount, Never, RateBelow
-from skidpad.evidence.drive.findings import INVASIONS, POINT, config, configs, variants
+from skidpad.evidence.drive.sides import INVASIONS, POINT, config, configs, variants
 from skidpad.evidence.verdicts import Finding
 
 INVASIONS_MAX = Amount(2.0, "markings per run")  # in configurations 2 to 4

@@ -90,7 +90,7 @@ def _among(drive: Drive, events: Iterable[Event], where: Mask) -> int:
 def _collisions(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
     log = drive.log
     kinds, first = [c.kind for c in here], [c.kind for c in here if not c.follows]
-    impacts = [c.v_closing * KMH for c in here if c.v_closing is not None]
+    impacts = [(c.kind, c.v_closing * KMH) for c in here if c.v_closing is not None]
     stuck = [r for r in log.relocations if r.reason is RelocationReason.STUCK]
     return Metrics(
         fatal_collisions=len(here),
@@ -108,7 +108,10 @@ def _collisions(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
         rear_ended=sum(c.rear_ended for c in here),
         bend_exits=sum(c.bend_exit for c in here),
         stuck_relocations=_among(drive, stuck, where),
-        max_impact_kmh=max(impacts, default=None),
+        max_impact_kmh=max((v for _, v in impacts), default=None),
+        max_impact_vehicle_kmh=max(
+            (v for kind, v in impacts if kind is CrashKind.VEHICLE), default=None
+        ),
     )
 
 

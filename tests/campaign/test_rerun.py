@@ -1,14 +1,10 @@
 import re
-from dataclasses import replace
 
-import numpy as np
 import polars as pl
 import pytest
-from msgspec import structs
 from typer.testing import CliRunner
 
 from runs import adas_run
-from skidpad.campaign import study
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.drive import Sink
 from skidpad.campaign.matrix import RECIPE
@@ -18,13 +14,8 @@ from skidpad.campaign.run import run
 from skidpad.campaign.stored import read_run
 from skidpad.campaign.views import SIZE, twelve_views
 from skidpad.cli.main import app
-from skidpad.core.run import StackDriver
 from skidpad.core.vocabulary import SensorLevel
-from skidpad.evidence.drive.findings import FINDINGS
-from skidpad.evidence.verdicts import judge
-from skidpad.recording.logfiles import log_hash
 from skidpad.recording.results import read_results
-from skidpad.sensors.twelve import twelve_sensors
 
 
 def cell(sensors=SensorLevel.OBJECTS, duration=6.0, **changes):
@@ -110,38 +101,3 @@ def test_the_picture_of_a_moment_has_all_views():
     assert picture.shape == (*SIZE, 3)
     assert picture[300:560, 20:780].std() > 10.0  # the front camera
     assert picture[200:440, 1220:1580].std() > 10.0  # classes
-
-
-@pytest.mark.req("A-002", "A-099")
-def test_pace_changes_no_byte():
-    plain = study.pace(1)
-    short = [replace(v, run=structs.replace(v.run, duration=5.0)) for v in plain]
-    rows = [study.drive_variant(v) for v in short]
-    assert rows[0]["log_hash"] == rows[1]["log_hash"]
-    finding = next(f for f in FINDINGS if f.id == "F-25")
-    assert judge([finding], [pl.DataFrame(rows)])[0].verdict.value != "contradicted"
-
-
-def test_injected_dropout_blinds_about_its_share_of_time():
-    options = {"configuration": 2, "dropout": 0.2, "seed": 1}
-    driver = StackDriver("skidpad.campaign.study:Blinking", options, name="2")
-    blinking = run(cell(driver=driver, duration=30.0))
-    assert np.isfinite(blinking.log.report.tier).all()
-    blind = study.Blinking(twelve_sensors(), study.load_map("figure8"), options).blind
-    assert blind.mean() == pytest.approx(0.2, abs=0.03)
-    sighted = structs.replace(driver, options={**options, "dropout": 0.0})
-    assert log_hash(blinking.log) != log_hash(run(cell(driver=sighted, duration=30.0)).log)
-
-
-def test_every_arm_of_every_study_has_common_seeds():
-    for make in study.STUDIES.values():
-        arms = {}
-        for v in make(3):
-            arms.setdefault(tuple(v.labels.values()), set()).add(v.run.seed)
-        assert len(set(map(frozenset, arms.values()))) == 1
-        assert len(arms) >= 2
-
-
-def test_an_unknown_study_is_refused():
-    done = CliRunner().invoke(app, ["study", "F-99"])
-    assert "F-08" in str(done.exception)

@@ -6,9 +6,11 @@ Every run leaves its series; whole logs are kept of those that the report shows 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import partial
 from operator import attrgetter
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from skidpad import __version__
 from skidpad.campaign.grip_cells import Cross, cross, scenario_of, template
@@ -36,9 +38,12 @@ from skidpad.recording.grip import (
     write_series,
 )
 from skidpad.recording.logfiles import TICKS, log_hash
-from skidpad.recording.results import read_results
+from skidpad.recording.results import Timing, read_results
 from skidpad.scenarios.variation import CutIn
 from skidpad.stack.settings import grip_of, settings_of
+
+if TYPE_CHECKING:
+    from skidpad.campaign.run import Run
 
 
 def warm_up() -> None:
@@ -51,11 +56,21 @@ def warm_up() -> None:
         run(cell)
 
 
-def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey, GripMetrics]:
-    """In a worker: drive a cell and write its series, with `keep` its log too."""
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A drive, and what its log says."""
+
+    driven: Run
+    metrics: GripMetrics
+    log_hash: str
+    timing: Timing
+
+
+def judged(out: Path, cell: RunSpec, keep: bool = False) -> Judged:
+    """In a worker: drive a run of the catalogue; with `keep`, or when it failed, into its folder."""
     from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.run import run
-    from skidpad.evidence.grip.scores import grip_metrics, grip_series
+    from skidpad.evidence.grip.scores import grip_metrics
     from skidpad.physics.grip import friction_ratio
 
     folder, watch = fresh_folder(out, cell.name), Stopwatch()
@@ -70,17 +85,25 @@ def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey
         ratio=friction_ratio(cell.weather, grip_of(cell)),
         off_road=driven.off_road,
     )
-    write_series(series_path(out, cell.cell, cell.seed), grip_series(driven.log))
     if keep or driven.error:
         write_config(folder, cell.to_plain())
         write_run(folder, driven.log, driven.error)
         write_played(folder, driven)
         keep_road(out, driven.road)
+    return Judged(driven, metrics, log_hash(driven.log), watch.timing())
+
+
+def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey, GripMetrics]:
+    """In a worker: drive a cell and write its series, with `keep` its log too."""
+    from skidpad.evidence.grip.scores import grip_series
+
+    found = judged(out, cell, keep)
+    write_series(series_path(out, cell.cell, cell.seed), grip_series(found.driven.log))
     return Driven(
-        key=grip_key(cell, driven.outcome, log_hash(driven.log)),
-        metrics=metrics,
-        timing=watch.timing(),
-        error=last_line(driven.error),
+        key=grip_key(cell, found.driven.outcome, found.log_hash),
+        metrics=found.metrics,
+        timing=found.timing,
+        error=last_line(found.driven.error),
     )
 
 

@@ -54,10 +54,12 @@ def report(folder: Annotated[Path, typer.Argument(help="A campaign's folder.")])
     from skidpad.recording.ledger import campaign_command
     from skidpad.report.grip import write_grip_report
     from skidpad.report.matrix import write_report
+    from skidpad.report.threshold import write_threshold_report
 
     reports: dict[str, Callable[[Path], object]] = {
         "adas": write_report,
         "grip": write_grip_report,
+        "grip-threshold": write_threshold_report,
         "channels": totals,
         "play": table,
     }

@@ -176,3 +176,20 @@ class GripCross(Struct, frozen=True):
     four_cells: Annotated[
         bool, Meta(description="Each run without and with drops, to part both effects.")
     ] = False
+
+
+class MapAsked(Struct, frozen=True):
+    """What a threshold map varies; without `map_of` it is none."""
+
+    map_of: Annotated[
+        str | None,
+        Meta(description="threshold: the friction at which following a braking lead fails."),
+    ] = None
+    drivers: Annotated[str, Meta(description="Of the map: acc,aeb.")] = "acc,aeb"
+    headways: Annotated[
+        str, Meta(description="Of the map: s at 80 km/h, or 25m: the public challenge's start.")
+    ] = "0.6,1,1.5,2,2.5,25m"
+    decelerations: Annotated[str, Meta(description="Of the map's lead, m/s2.")] = "2,4,6,8"
+    levels: Annotated[
+        str | None, Meta(description="Of the map: shares of dry friction, 1 among them.")
+    ] = None

@@ -8,11 +8,13 @@ from typing import Annotated
 import typer
 from msgspec import structs
 
-from skidpad.cli.asked import Controller, GripCross, Tuned
-from skidpad.cli.campaigns import How, Seeds
+from skidpad.cli.asked import Controller, GripCross, MapAsked, Tuned
+from skidpad.cli.campaigns import How
 from skidpad.cli.spread import spread
 from skidpad.core.run import BackendChoice, RunSpec, Scenario
 from skidpad.core.vocabulary import SensorLevel
+
+REPEATS = 100  # the study's
 
 
 class Keep(str, Enum):
@@ -26,31 +28,43 @@ class Keep(str, Enum):
 def grip(
     how: How,
     cross: GripCross,
+    map: MapAsked,
     controller: Controller,
     run: RunSpec,
     scenario: Scenario,
     tuned: Tuned,
     backend: BackendChoice,
-    seeds: Seeds = 100,
+    seeds: Annotated[
+        int | None,
+        typer.Option(
+            "--seeds", "--repeats", min=1, help="Runs per cell; default 100, of the map 20."
+        ),
+    ] = None,
     keep: Annotated[
         Keep, typer.Option(help="shown: logs of runs in the report; all: of every run.")
     ] = Keep.SHOWN,
 ) -> None:
     """Drive scenarios x weathers x frictions x seeds; prints the path of the report."""
     from skidpad.campaign.campaign import Campaign
-    from skidpad.campaign.grip import recipe
     from skidpad.cli.carla_backend import checked, drives_alone
+
+    run = structs.replace(run, backend=checked(backend))
+    alone, keep_all = drives_alone(run.backend), keep is Keep.ALL
+    if map.map_of is not None:
+        from skidpad.campaign import threshold
+        from skidpad.cli import threshold_plan
+        from skidpad.report.threshold import write_threshold_report
+
+        run = tuned.resolve(run)
+        repeats = seeds or threshold_plan.REPEATS
+        levels = threshold_plan.plan_map(map, cross, controller, run, repeats)
+        how(Campaign(threshold.recipe(keep_all), levels, alone=alone), write_threshold_report)
+        return
+    from skidpad.campaign.grip import recipe
     from skidpad.cli.grip_plan import plan_grip, with_model
     from skidpad.report.grip import write_grip_report
 
-    run = structs.replace(
-        with_model(run, tuned, cross.model),
-        driver=controller.chosen(),
-        course=scenario,
-        backend=checked(backend),
-    )
-    cells = plan_grip(cross, run, seeds)
-    how(
-        Campaign(recipe(keep is Keep.ALL), cells, alone=drives_alone(run.backend)),
-        write_grip_report,
-    )
+    run = with_model(run, tuned, cross.model)
+    run = structs.replace(run, driver=controller.chosen(), course=scenario)
+    cells = plan_grip(cross, run, seeds or REPEATS)
+    how(Campaign(recipe(keep_all), cells, alone=alone), write_grip_report)

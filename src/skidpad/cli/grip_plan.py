@@ -37,7 +37,7 @@ def _varied(ask: GripCross, run: RunSpec) -> Cross:
         raise ConfigError("--four-cells drives with and without drops: leave --overlay away")
     if (run.overlay or ask.four_cells) and run.sensors is not SensorLevel.PIXELS:
         raise ConfigError("--overlay and --four-cells draw on images: they need --sensors pixels")
-    chosen = list(NAMES) if ask.scenarios == "all" else _parted(ask.scenarios)
+    chosen = list(NAMES) if ask.scenarios == "all" else parted(ask.scenarios)
     for name in chosen:
         require_choice("scenario", name, NAMES)
     frictions = _choices("--friction", ask.friction, Friction)
@@ -52,7 +52,8 @@ def _varied(ask: GripCross, run: RunSpec) -> Cross:
     )
 
 
-def _parted(text: str) -> list[str]:
+def parted(text: str) -> list[str]:
+    """Different words parted by commas; ConfigError for the same twice, or none."""
     parts = [part.strip() for part in text.split(",") if part.strip()]
     if len(set(parts)) != len(parts) or not parts:
         raise ConfigError(f"need different names parted by commas, got {text!r}")
@@ -61,11 +62,11 @@ def _parted(text: str) -> list[str]:
 
 def _choices(option: str, text: str, kind: type[Choice]) -> list[Choice]:
     allowed = [member.value for member in kind]
-    return [kind(require_choice(option, part, allowed)) for part in _parted(text)]
+    return [kind(require_choice(option, part, allowed)) for part in parted(text)]
 
 
 def grip_weathers(text: str) -> list[Weather]:
     """`all` is the eleven published presets; else names or YAML files, parted by commas."""
     if text == "all":
         return [w for w in preset_groups()[GRIP].values() if w.name != SNOW]
-    return [find_weather(part) for part in _parted(text)]
+    return [find_weather(part) for part in parted(text)]

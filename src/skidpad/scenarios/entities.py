@@ -197,6 +197,17 @@ def _properties(node: Node) -> dict[str, str]:
     return {p.text("name"): p.text("value") for p in found.children("Property")}
 
 
+def spectator(entities: Mapping[str, Entity]) -> Entity | None:
+    """Where a file has no vehicle that can be the ego: a parked car that nobody can touch."""
+    if any(e.wheels for e in entities.values()):
+        return None
+    name = "spectator"
+    while name in entities:
+        name += "_"
+    type = nearest_type(ActorKind.CAR, Box().length, Box().width, Box().height)
+    return Entity(name, Body.PROP, type, True, Box(), properties={GHOST: "true"})
+
+
 def choose_ego(root: Node, entities: Mapping[str, Entity], wanted: str | None) -> str:
     """The ego: as asked for, as marked, by name, else the first vehicle."""
     node = root.child("Entities")

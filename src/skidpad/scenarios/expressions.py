@@ -65,6 +65,8 @@ INFIX: Mapping[str, tuple[int, Callable[[float, float], Value]]] = {
     "%": (6, math.fmod),
 }
 COMPARES_ANYTHING = ("==", "!=")
+BARE = re.compile(r"[A-Za-z_]\w*(?:\s+(?!and\b|or\b|not\b)\w+)*")
+PIECE = re.compile(rf"\$[A-Za-z_]\w*|[\d.]+|{BARE.pattern}")
 
 
 @lru_cache(maxsize=4096)
@@ -92,6 +94,9 @@ def literal(text: str) -> Value:
 
 def evaluate(text: str, scope: Scope) -> str:
     """The value of an expression as an attribute's text; ExpressionError says what is wrong."""
+    words = [part.strip() for part in text.split("+")]
+    if any(_is_text(word, scope) for word in words) and all(PIECE.fullmatch(w) for w in words):
+        return "".join(_word(word, scope) for word in words)
     try:
         reader = _Reader(_tokens(text), scope)
         value = reader.value(0)
@@ -99,6 +104,21 @@ def evaluate(text: str, scope: Scope) -> str:
     except (ArithmeticError, ValueError, TypeError) as error:
         raise ExpressionError(str(error)) from None
     return as_text(value)
+
+
+def _is_text(part: str, scope: Scope) -> bool:
+    """Several words, or a parameter whose value is no number."""
+    value = scope.get(part.removeprefix("$"), 0.0)
+    return " " in part or isinstance(literal(str(value)), str)
+
+
+def _word(part: str, scope: Scope) -> str:
+    """A piece of a text that is put together by `+`, as esmini does it."""
+    if not part.startswith("$"):
+        return scope.get(part, part)
+    if part[1:] not in scope:
+        raise ExpressionError(f"parameter {part!r} is not declared")
+    return scope[part[1:]]
 
 
 def as_text(value: Value) -> str:

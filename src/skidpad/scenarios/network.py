@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
-from math import cos, sin
+from math import atan, cos, sin
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from skidpad.roads.opendrive.signals import road_place
 from skidpad.roads.queries import LanePoint, RoadMap
 
 ON_LANE = 1.0  # m beyond a lane's edge that still is on it
+SLOPE_STEP = 0.5  # m to either side, over which a slope is taken
 END_SLACK = 0.5  # m beyond the end of a road that still is its end
 
 
@@ -96,6 +97,19 @@ class Network:
         dx, dy = pose.x - at.x, pose.y - at.y
         t = dy * cos(at.heading) - dx * sin(at.heading)
         return RoadCoordinates(point.road, s, t, wrap_angle(pose.yaw - at.heading))
+
+    def slopes(self, pose: Pose) -> tuple[float, float]:
+        """Pitch (nose down) and roll (left side up) of a body on the road there, rad; 0 off it."""
+        at = self.coordinates(pose)
+        if at is None:
+            return 0.0, 0.0
+        road = self.roads[at.road]
+        s = min(max(at.s, SLOPE_STEP), max(road.length - SLOPE_STEP, SLOPE_STEP))
+        low, high = (road_place(road, s + d, at.t).z for d in (-SLOPE_STEP, SLOPE_STEP))
+        right, left = (road_place(road, s, at.t + d).z for d in (-SLOPE_STEP, SLOPE_STEP))
+        along, across = (high - low) / (2.0 * SLOPE_STEP), (left - right) / (2.0 * SLOPE_STEP)
+        c, d = cos(at.turn), sin(at.turn)
+        return -atan(along * c + across * d), atan(across * c - along * d)
 
     def forward(self, point: LanePoint) -> bool:
         """Traffic of this lane runs with increasing road s."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from datetime import datetime
 
 from skidpad.core.errors import FileError
 from skidpad.scenarios.document import Node
@@ -20,11 +21,21 @@ RULES: Mapping[str, Callable[[float | str, float | str], bool]] = {
 
 
 def compared(rule: str, left: str, right: str) -> bool:
-    """Texts by a rule: as numbers where both are, else letter by letter."""
-    try:
-        return RULES[rule](float(left), float(right))
-    except ValueError:
-        return RULES[rule](left, right)
+    """Texts by a rule: as numbers or moments where both are, else letter by letter."""
+    for read in (float, _moment):
+        try:
+            return RULES[rule](read(left), read(right))
+        except ValueError:
+            continue
+    return RULES[rule](left, right)
+
+
+def _moment(text: str) -> float:
+    """Seconds of a date with time and zone; those without a zone are no moments."""
+    moment = datetime.fromisoformat(text)
+    if moment.tzinfo is None:
+        raise ValueError(text)
+    return moment.timestamp()
 
 
 def root_values(root: Node, given: Mapping[str, float | str]) -> dict[str, str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -13,6 +13,8 @@ from skidpad.scenarios.document import Node
 from skidpad.scenarios.network import Network, Place
 from skidpad.scenarios.positions import Fixed, Orientation, Position, orientation, position
 from skidpad.scenarios.scene import Scene
+
+ROADS_MAX = 200  # of a way that nobody has planned
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +59,23 @@ def roads_through(network: Network, points: Sequence[LanePoint]) -> tuple[int, .
         for road in found:
             if not roads or roads[-1] != road:
                 roads.append(road)
+    return tuple(roads)
+
+
+def random_roads(
+    network: Network, start: LanePoint, forward: bool, choose: Callable[[Sequence[int]], int]
+) -> tuple[int, ...]:
+    """Roads from lane to lane as `choose` has it, each once; ROADS_MAX at most."""
+    lanes, lane = network.map.lanes, start.lane
+    roads = [start.road]
+    while len(roads) < ROADS_MAX:
+        step = network.map.successors if forward else network.map.predecessors
+        further = [i for i in map(int, step(lane)) if int(lanes.road[i]) not in roads[:-1]]
+        if not further:
+            break
+        lane = choose(sorted(further))
+        if int(lanes.road[lane]) != roads[-1]:
+            roads.append(int(lanes.road[lane]))
     return tuple(roads)
 
 

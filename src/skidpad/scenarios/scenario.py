@@ -14,7 +14,7 @@ from skidpad.scenarios.actions.controllers import Activate, Several
 from skidpad.scenarios.catalogs import Catalogs
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node, parse
-from skidpad.scenarios.entities import Entity, choose_ego, compile_entities
+from skidpad.scenarios.entities import Entity, choose_ego, compile_entities, spectator
 from skidpad.scenarios.findings import HARMLESS, Fault, Finding, Kind, ScenarioError
 from skidpad.scenarios.network import Network, network_of
 from skidpad.scenarios.parameters import root_values, variables
@@ -125,7 +125,8 @@ def _minor_revision(root: Node) -> str:
     if root.find("Catalog") is not None:
         raise root.unsupported("a catalog holds no scenario")
     header = root.child("FileHeader")
-    header = header.scoped(root_values(root, {}))
+    if any("$" in str(value) for value in header.element.attrib.values()):
+        header = header.scoped(root_values(root, {}))
     major, minor = header.whole("revMajor"), header.whole("revMinor")
     if (major, minor) == (0, 9):
         return ""
@@ -154,8 +155,14 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
     catalogs = Catalogs(root)
     entities = compile_entities(root, catalogs)
     findings += entities.findings
+    watching = spectator(entities.by_name)
+    by_name = dict(entities.by_name)
+    if watching is not None:
+        by_name[watching.name] = watching
+        what = f"no vehicle can be the ego: {watching.name!r} stands at the origin"
+        findings.append(root.child("Entities").finding(what, Kind.NOTE))
     ctx = Context(
-        network, catalogs, entities.by_name, entities.groups, values, variables(root),
+        network, catalogs, by_name, entities.groups, values, variables(root),
         findings=findings, further_positions=FURTHER_POSITIONS,
     )  # fmt: skip
     board = root.child("Storyboard")
@@ -163,7 +170,7 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
     start = compile_start(board.child("Init"), ctx)
     storyboard = compile_storyboard(board, ctx)
     faulty = any(f.kind not in wish.allowed for f in findings)
-    chosen = None if faulty else ctx.attempt(lambda: choose_ego(root, entities.by_name, wish.ego))
+    chosen = None if faulty else ctx.attempt(lambda: choose_ego(root, by_name, wish.ego))
     if chosen is None:
         return None
     if start.entities[chosen].place is None:
@@ -172,8 +179,9 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
         )
         return None
     later = not start.handed.get(chosen, False) and any(_activations(storyboard, chosen))
+    later = later or watching is not None
     return Scenario(
-        root.file, network, entities.by_name, chosen, start, storyboard, values, ctx.variables,
+        root.file, network, by_name, chosen, start, storyboard, values, ctx.variables,
         later, tuple(findings),
     )  # fmt: skip
 

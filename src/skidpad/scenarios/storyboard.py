@@ -13,7 +13,7 @@ from skidpad.scenarios.actions.private import private_action
 from skidpad.scenarios.actions.world import global_action, user_defined
 from skidpad.scenarios.context import Context, Path
 from skidpad.scenarios.document import Node
-from skidpad.scenarios.findings import Fault
+from skidpad.scenarios.findings import Fault, Kind
 from skidpad.scenarios.parameters import inner
 from skidpad.scenarios.triggers import Trigger, compile_trigger
 
@@ -57,12 +57,16 @@ class Manoeuvre:
 
 @dataclass(frozen=True, slots=True)
 class Group:
-    """Manoeuvres of the same actors, done `count` times."""
+    """Manoeuvres of the same actors, done `count` times.
+
+    by_trigger: entities for which an event's trigger holds take part in that event too.
+    """
 
     path: Path
     count: int
     actors: tuple[str, ...]
     manoeuvres: tuple[Manoeuvre, ...]
+    by_trigger: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +130,8 @@ def element_paths(board: Node, ctx: Context) -> list[tuple[str, Path]]:
             except Fault:
                 return  # reported where the manoeuvre is compiled
         level = LEVELS[node.tag]
-        path = (*above, node.element.get("name", ""))
+        node = ctx.attempt(partial(inner, node)) or node
+        path = (*above, node.label())
         found.append((level.type, path))
         inside = (
             (level.inside, "CatalogReference") if level.inside == "Maneuver" else (level.inside,)
@@ -147,12 +152,12 @@ def compile_storyboard(board: Node, ctx: Context) -> Storyboard:
 
 
 def _story(node: Node, ctx: Context) -> Story:
-    path = (node.element.get("name", ""),)
+    path = (node.label(),)
     return Story(path, tuple(_act(a, path, ctx) for a in node.children("Act")))
 
 
 def _act(node: Node, above: Path, ctx: Context) -> Act:
-    path = (*above, node.element.get("name", ""))
+    path = (*above, node.label())
     groups = [ctx.attempt(partial(_group, g, path, ctx)) for g in node.children("ManeuverGroup")]
     return Act(
         path,
@@ -163,27 +168,25 @@ def _act(node: Node, above: Path, ctx: Context) -> Act:
 
 
 def _group(node: Node, above: Path, ctx: Context) -> Group:
-    path = (*above, node.element.get("name", ""))
+    path = (*above, node.label())
     found = node.child("Actors")
-    if found.flag("selectTriggeringEntities", default=False):
-        fault = found.unsupported("selectTriggeringEntities is not supported")
-        ctx.findings.append(fault.finding)
+    by_trigger = found.flag("selectTriggeringEntities", default=False)
     actors = ctx.attempt(lambda: ctx.actors(found.children("EntityRef"))) or ()
     count = node.whole("maximumExecutionCount", 1)
     nodes = node.children("Maneuver", "CatalogReference")
     made = [ctx.attempt(partial(_manoeuvre, m, path, ctx)) for m in nodes]
-    return Group(path, count, actors, tuple(m for m in made if m is not None))
+    return Group(path, count, actors, tuple(m for m in made if m is not None), by_trigger)
 
 
 def _manoeuvre(node: Node, above: Path, ctx: Context) -> Manoeuvre:
     node = ctx.catalogs.resolved(node)
-    path = (*above, node.element.get("name", ""))
+    path = (*above, node.label())
     events = [ctx.attempt(partial(_event, e, path, ctx)) for e in node.children("Event")]
     return Manoeuvre(path, tuple(e for e in events if e is not None))
 
 
 def _event(node: Node, above: Path, ctx: Context) -> Event:
-    path = (*above, node.element.get("name", ""))
+    path = (*above, node.label())
     start = compile_trigger(node.find("StartTrigger"), ctx)
     actions = [ctx.attempt(partial(_action, a, path, ctx)) for a in node.children("Action")]
     return Event(
@@ -196,7 +199,10 @@ def _event(node: Node, above: Path, ctx: Context) -> Event:
 
 
 def _action(node: Node, above: Path, ctx: Context) -> NamedAction:
-    path = (*above, node.element.get("name", ""))
+    path = (*above, node.label())
+    if next(node.children(), None) is None:
+        ctx.findings.append(node.finding("holds no action: over as it begins", Kind.NOTE))
+        return NamedAction(path, None, None)
     what = node.only()
     if what.tag == "PrivateAction":
         return NamedAction(path, private_action(what, ctx), None)

@@ -48,9 +48,9 @@ class Told:
 class ToldEvent(Told):
     """An event of a run, with its actions under way."""
 
-    def __init__(self, event: Event, actors: Sequence[str]) -> None:
+    def __init__(self, event: Event, group: Group) -> None:
         super().__init__(event.path)
-        self.event, self.actors, self.left = event, actors, event.count
+        self.event, self.group, self.left = event, group, event.count
         self.watch = Watch(event.start, event.path)
         self.going: list[tuple[Path, list[Running]]] = []
         self.happened_at: float | None = None  # s, the first time
@@ -76,10 +76,12 @@ class ToldEvent(Told):
             self.happened_at = scene.t
         self.turn(scene, State.RUNNING, Move.START)
         self.going = []
+        chosen = self.watch.triggering(scene) if self.group.by_trigger else []
+        actors = dict.fromkeys((*self.group.actors, *chosen))
         for action in self.event.actions:
             scene.states[action.path] = State.RUNNING
             scene.moved(action.path, Move.START)
-            self.going.append((action.path, list(_begun(action, self.actors, scene))))
+            self.going.append((action.path, list(_begun(action, actors, scene))))
 
     def step(self, scene: Scene) -> None:
         """Go on with the actions under way."""
@@ -108,7 +110,7 @@ class ToldEvent(Told):
         self.turn(scene, State.COMPLETE, Move.STOP)
 
 
-def _begun(action: NamedAction, actors: Sequence[str], scene: Scene) -> Iterable[Running]:
+def _begun(action: NamedAction, actors: Iterable[str], scene: Scene) -> Iterable[Running]:
     if action.worldwide is not None:
         action.worldwide.happen(scene)
         yield DONE
@@ -162,8 +164,8 @@ class ToldParent(Told):
 class ToldManoeuvre(ToldParent):
     """Events, which begin by their triggers."""
 
-    def __init__(self, manoeuvre: Manoeuvre, actors: Sequence[str]) -> None:
-        self.events = [ToldEvent(e, actors) for e in manoeuvre.events]
+    def __init__(self, manoeuvre: Manoeuvre, group: Group) -> None:
+        self.events = [ToldEvent(e, group) for e in manoeuvre.events]
         super().__init__(manoeuvre.path, self.events)
 
     def look(self, scene: Scene) -> None:
@@ -180,7 +182,7 @@ class ToldGroup(ToldParent):
 
     def __init__(self, group: Group) -> None:
         self.group, self.left = group, group.count
-        self.manoeuvres = [ToldManoeuvre(m, group.actors) for m in group.manoeuvres]
+        self.manoeuvres = [ToldManoeuvre(m, group) for m in group.manoeuvres]
         super().__init__(group.path, self.manoeuvres)
 
     def end(self, scene: Scene) -> None:
@@ -190,7 +192,7 @@ class ToldGroup(ToldParent):
             self.turn(scene, State.COMPLETE, Move.END)
             return
         scene.moved(self.path, Move.END)
-        self.manoeuvres = [ToldManoeuvre(m, self.group.actors) for m in self.group.manoeuvres]
+        self.manoeuvres = [ToldManoeuvre(m, self.group) for m in self.group.manoeuvres]
         self.children = self.manoeuvres
         self.start(scene)
 

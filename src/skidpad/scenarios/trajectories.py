@@ -17,6 +17,7 @@ from skidpad.scenarios.positions import Fixed, Orientation, Position, orientatio
 from skidpad.scenarios.scene import Scene
 
 Shape = Callable[[Sequence[Pose]], list[Vertex]]
+ORIGIN = Pose(0.0, 0.0)
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,12 +29,14 @@ class Trajectory:
     line: Line | None
     places: tuple[Position, ...] = ()
     shape: Shape | None = None
+    from_here: bool = False  # it begins where the entity is that follows it
 
-    def traced(self, scene: Scene) -> Line:
-        """The line as things are now."""
+    def traced(self, scene: Scene, here: Pose = ORIGIN) -> Line:
+        """The line as things are now, for an entity that is here."""
         if self.line is not None or self.shape is None:
             return self.line or Line([Vertex(0.0, 0.0, 0.0)])
-        return Line(self.shape([p.place(scene).pose for p in self.places]))
+        poses = [p.place(scene).pose for p in self.places]
+        return Line(self.shape([here, *poses] if self.from_here else poses))
 
 
 def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
@@ -54,9 +57,10 @@ def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
     nodes, make = SHAPES[shape.tag](shape, closed)
     places = tuple(position(n, ctx) for n in nodes)
     fixed = [p.fixed.pose for p in places if isinstance(p, Fixed)]
-    if len(fixed) == len(places):
+    from_here = shape.tag == "ClothoidSpline" and not _begins(next(shape.children()))
+    if len(fixed) == len(places) and not from_here:
         return Trajectory(name, closed, Line(make(fixed)))
-    return Trajectory(name, closed, None, places, make)
+    return Trajectory(name, closed, None, places, make, from_here)
 
 
 def _checked(shape: Node, vertices: list[Vertex], closed: bool) -> list[Vertex]:
@@ -138,17 +142,20 @@ def _spline(shape: Node, closed: bool) -> tuple[list[Node], Shape]:
         raise shape.error("needs a <ClothoidSplineSegment>")
     starts = [n.number("timeStart") if n.has("timeStart") else None for n in nodes]
     end = shape.number("timeEnd") if shape.has("timeEnd") else None
-    segments = []
+    segments: list[Segment] = []
     for node, t0, t1 in zip(nodes, starts, [*starts[1:], end], strict=True):
         curvatures = node.number("curvatureStart"), node.number("curvatureEnd")
         times = None if t0 is None or t1 is None else (t0, t1)
-        begins = node.find("PositionStart") is not None
+        begins = not segments or _begins(node)
         turn, length = node.number("hOffset", 0.0), node.number("length")
         segments.append(Segment(begins, turn, curvatures, length, times))
-    if not segments[0].begins:
-        raise nodes[0].error("the first one needs <PositionStart>")
     places = [p for n in nodes if (p := n.find("PositionStart")) is not None]
     return places, lambda poses: list(_joined(segments, poses))
+
+
+def _begins(segment: Node) -> bool:
+    """A piece has a place of its own; the first one else begins where the entity is, as in esmini."""
+    return segment.find("PositionStart") is not None
 
 
 def _joined(segments: Sequence[Segment], poses: Sequence[Pose]) -> Iterator[Vertex]:

@@ -39,6 +39,11 @@ class AnyEntity:
         """By the rule `any` or `all`."""
         return self._holds
 
+    def holding(self, scene: Scene) -> list[str]:
+        """The entities for which it holds now."""
+        names = (n for n in self.names if scene.actors[n].present)
+        return [n for n in names if self.condition.holds(scene, n)]
+
     def _holds(self, scene: Scene) -> bool:
         found = (
             scene.actors[name].present and self.condition.holds(scene, name) for name in self.names
@@ -107,6 +112,7 @@ class Watch:
 
     def __init__(self, trigger: Trigger, path: Path = ()) -> None:
         self.groups = [[Watched(c, path) for c in group] for group in trigger.groups]
+        self.fired: list[list[Watched]] = []  # the groups that hold, when it was looked at last
 
     def __bool__(self) -> bool:
         return bool(self.groups)
@@ -114,7 +120,14 @@ class Watch:
     def fires(self, scene: Scene) -> bool:
         """Every condition is looked at in every step, so that delays and edges stay true."""
         results = [[c.holds(scene) for c in group] for group in self.groups]
-        return any(all(group) for group in results)
+        self.fired = [g for g, said in zip(self.groups, results, strict=True) if all(said)]
+        return bool(self.fired)
+
+    def triggering(self, scene: Scene) -> list[str]:
+        """The entities that made it fire just now."""
+        conditions = (c.timed.condition for group in self.fired for c in group)
+        asked = [c for c in conditions if isinstance(c, AnyEntity)]
+        return list(dict.fromkeys(n for c in asked for n in c.holding(scene)))
 
 
 def compile_trigger(node: Node | None, ctx: Context) -> Trigger:

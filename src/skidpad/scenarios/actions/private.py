@@ -16,6 +16,7 @@ from skidpad.scenarios.actions.routing import (
     compile_acquire,
     compile_assign_route,
     compile_follow,
+    compile_random_route,
     compile_teleport,
 )
 from skidpad.scenarios.actions.speed import compile_profile, compile_speed
@@ -35,6 +36,7 @@ PRIVATE: Mapping[str, Compile] = {
     "LateralDistanceAction": compile_lateral_distance,
     "AssignRouteAction": compile_assign_route,
     "AcquirePositionAction": compile_acquire,
+    "RandomRouteAction": compile_random_route,
     "FollowTrajectoryAction": compile_follow,
     "ControllerAction": controllers.compile_controller,
     **controllers.TABLE,  # where they stood before 1.1, and may stand since

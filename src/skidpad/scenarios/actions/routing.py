@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from random import Random
 
 from skidpad.core.geometry import Pose
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.network import Network
 from skidpad.scenarios.positions import Position, position
-from skidpad.scenarios.routes import Route, compile_route, roads_through
+from skidpad.scenarios.routes import Route, compile_route, random_roads, roads_through
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 from skidpad.scenarios.tracking import PacedTrack, TimedTrack, Track
 from skidpad.scenarios.trajectories import Trajectory, compile_trajectory
@@ -48,6 +49,28 @@ class AssignRoute:
 def compile_assign_route(node: Node, ctx: Context) -> AssignRoute:
     """An <AssignRouteAction>."""
     return AssignRoute(compile_route(node.only(), ctx))
+
+
+@dataclass(frozen=True, slots=True)
+class RandomRoute:
+    """Take any way at forks from now on: drawn by the entity's name, the same in every run."""
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """At once; it matters at the next fork."""
+        here = actor.guide.base
+        if here is None:
+            scene.notice(f"{actor.name} takes no random route: it is on no road")
+        else:
+            draw = Random(actor.name)
+            forward = actor.guide.along > 0.0
+            actor.guide.roads = random_roads(scene.network, here, forward, draw.choice)
+        return DONE
+
+
+def compile_random_route(node: Node, ctx: Context) -> RandomRoute:
+    """A <RandomRouteAction>."""
+    del node, ctx
+    return RandomRoute()
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,7 +127,7 @@ class FollowTrajectory:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """Absolute times count from the begin of the scenario."""
-        line = self.trajectory.traced(scene)
+        line = self.trajectory.traced(scene, actor.pose)
         guide = actor.guide
         track: Track
         if self.timing is None or line.t is None:

@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from enum import Enum
 from math import hypot, inf
 
-from skidpad.core.geometry import wrap_angle
+from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.scenarios.conditions.base import EntityCondition, Rule, rule
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Body
+from skidpad.scenarios.measures import Axes
 from skidpad.scenarios.network import next_lane_id
 from skidpad.scenarios.positions import Position, position
 from skidpad.scenarios.scene import Actor, Scene
@@ -140,30 +141,66 @@ def _collision(node: Node, ctx: Context) -> EntityCondition:
     return Collision(tuple(n for n, e in ctx.entities.items() if e.body is body))
 
 
+class Turn(Enum):
+    """About which axis an angle turns."""
+
+    HEADING = "heading"
+    PITCH = "pitch"
+    ROLL = "roll"
+
+
 @dataclass(frozen=True, slots=True)
 class Angle:
-    """Heading against another entity's, or against the lane, within a tolerance."""
+    """An angle of an entity within a tolerance; all lie on the road, so that it has their slopes.
 
+    other: against its angle; else against the lane, the road or the world.
+    """
+
+    turn: Turn
     angle: float
     tolerance: float
+    axes: Axes
     other: str | None
 
     def holds(self, scene: Scene, actor: str) -> bool:
         """As it is now."""
         here = scene.actors[actor].pose
         if self.other is not None:
-            base = scene.actors[self.other].pose.yaw
+            value = self._of(scene, here) - self._of(scene, scene.actors[self.other].pose)
         else:
-            lane = scene.network.place_of(here).lane
-            base = 0.0 if lane is None else lane.heading
-        return abs(wrap_angle(here.yaw - base - self.angle)) <= self.tolerance
+            value = self._against(scene, here)
+        return abs(wrap_angle(value - self.angle)) <= self.tolerance
+
+    def _of(self, scene: Scene, pose: Pose) -> float:
+        """In the world, rad."""
+        if self.turn is Turn.HEADING:
+            return pose.yaw
+        pitch, roll = scene.network.slopes(pose)
+        return pitch if self.turn is Turn.PITCH else roll
+
+    def _against(self, scene: Scene, pose: Pose) -> float:
+        if self.axes is Axes.WORLD:
+            return self._of(scene, pose)
+        if self.turn is not Turn.HEADING or self.axes is Axes.ENTITY:
+            return 0.0
+        if self.axes is Axes.ROAD:
+            at = scene.network.coordinates(pose)
+            return pose.yaw if at is None else at.turn
+        lane = scene.network.place_of(pose).lane
+        return pose.yaw if lane is None else pose.yaw - lane.heading
 
 
 def _angle(node: Node, ctx: Context) -> EntityCondition:
-    if node.text("angleType") != "heading":
-        raise node.unsupported("only angleType heading is supported")
-    other = ctx.entity(node) if node.tag == "RelativeAngleCondition" else None
-    return Angle(node.number("angle"), node.number("angleTolerance"), other)
+    axes = node.choice("coordinateSystem", Axes, Axes.LANE)
+    if axes is Axes.TRAJECTORY:
+        raise node.unsupported("angles against a trajectory are not supported")
+    return Angle(
+        node.choice("angleType", Turn),
+        node.number("angle"),
+        node.number("angleTolerance"),
+        axes,
+        ctx.entity(node) if node.tag == "RelativeAngleCondition" else None,
+    )
 
 
 @dataclass(frozen=True, slots=True)

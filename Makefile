@@ -11,7 +11,7 @@ DRIVE_ARGS ?=
 .PHONY: cockpit run test check wheel-check bench fuzz refs data fleet fleet-load figures arm64 clean
 
 run: $(VENV)/.installed
-	$(BIN)/skidpad adas --out $(OUT) --resume --or-next $(RUN_ARGS)
+	$(BIN)/skidpad adas --out $(OUT) --resume --or-next --traffic pack $(RUN_ARGS)
 
 test: $(VENV)/.tested-with
 	$(BIN)/python -m pytest -n 2 $(TEST_ARGS)

@@ -7,7 +7,8 @@ const TITLES = { left: "left mirror", rear: "rear", right: "right mirror", top: 
 const WORDS = { KeyM: ["take"], KeyL: ["lamps"], KeyN: ["weather"], KeyP: ["pause"], KeyC: ["main"], KeyG: ["plain"],
   KeyT: ["hide", "depth"], KeyY: ["hide", "semantic"], KeyU: ["hide", "top"], Period: ["step", 1],
   Digit1: ["toggle", "acc"], Digit2: ["toggle", "lca"], Digit3: ["toggle", "tla"],
-  Digit4: ["toggle", "resume"], Digit5: ["toggle", "limiter"], Digit6: ["toggle", "aeb"] };
+  Digit4: ["toggle", "resume"], Digit5: ["toggle", "limiter"], Digit6: ["toggle", "aeb"],
+  Digit7: ["toggle", "bend"] };
 const PEDALS = { KeyW: "up", ArrowUp: "up", KeyS: "down", ArrowDown: "down", KeyA: "left", ArrowLeft: "left",
   KeyD: "right", ArrowRight: "right", Space: "hand" };
 const HEARTBEAT = 100;  // ms between two words of the pedals while they are pressed

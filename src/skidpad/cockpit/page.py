@@ -39,6 +39,7 @@ TITLES = {
     Function.RESUME: "resume (4)",
     Function.LIMITER: "limiter (5)",
     Function.AEB: "emergency braking (6)",
+    Function.BEND: "slow in bends (7)",
 }
 RATES = {0.25: "0.25 x", 0.5: "0.5 x", 1.0: "1 x", 2.0: "2 x", 4.0: "4 x", 0.0: "as fast as it can"}
 HELP = (

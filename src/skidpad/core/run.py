@@ -41,6 +41,7 @@ class Function(str, Enum):
     TLA = "tla"  # traffic-light assist
     RESUME = "resume"  # post-stop resume protocol
     LIMITER = "limiter"
+    BEND = "bend"  # slowing for bends; ours, in no published configuration
 
 
 class AdasDriver(Struct, frozen=True, kw_only=True, tag="adas", forbid_unknown_fields=True):
@@ -135,9 +136,13 @@ class Roads(Struct, frozen=True, kw_only=True, tag="roads", forbid_unknown_field
     """A map with background traffic, from its ego's place on."""
 
     map: Annotated[str, Meta(description="A bundled map's name, or an OpenDRIVE file.")] = "figure8"
-    traffic: Annotated[TrafficStart, Meta(description="Where background vehicles start.")] = (
-        TrafficStart.FIXED
-    )
+    traffic: Annotated[
+        TrafficStart,
+        Meta(
+            description="fixed: start at the published places; random: anywhere within 500 m; "
+            "pack: stay within 250 m, slower than the ego would drive."
+        ),
+    ] = TrafficStart.FIXED
     vehicles: Annotated[int, Meta(ge=0, le=80, description="Background vehicles, 0 to 80.")] = 20
     allow_fewer: bool = False  # A-208
     edges: Annotated[
@@ -267,6 +272,8 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def __post_init__(self) -> None:
         if isinstance(self.driver, ChannelCrew) is not isinstance(self.course, Route):
             raise ConfigError("channels drive routes, and only channels do")
+        if _pack_on_carla(self.course, self.backend):
+            raise ConfigError("traffic pack is kept together by the embedded simulator alone")
         if isinstance(self.driver, Passenger) and not isinstance(self.course, Scenario):
             raise ConfigError("only a scenario moves the ego itself")
 
@@ -312,6 +319,11 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         """The whole value as plain data, as it stands in config.yaml."""
         plain: dict[str, Any] = msgspec.to_builtins(self, order="deterministic")
         return {"version": VERSION, **plain}
+
+
+def _pack_on_carla(course: Course, backend: BackendChoice) -> bool:
+    packed = isinstance(course, Roads) and course.traffic is TrafficStart.PACK
+    return packed and backend.backend is BackendKind.CARLA
 
 
 OURS = "skidpad."  # stacks of this package are no foreign code

@@ -31,6 +31,7 @@ class Tier(IntEnum):
     HOLDING_AT_LINE = 10  # tier 6, standing
     COAST = 11  # tier 7
     CRUISE = 12  # tier 7
+    BEND = 13  # slower than any tier asks for, as the road bends
 
 
 class LightState(IntEnum):
@@ -67,6 +68,7 @@ class TrafficStart(str, Enum):
 
     FIXED = "fixed"
     RANDOM = "random"
+    PACK = "pack"  # ours: around the ego, which mostly follows
 
 
 class Control(str, Enum):

@@ -34,6 +34,7 @@ TIERS = {
     Tier.HOLDING_AT_LINE: "holding at the line",
     Tier.COAST: "coasting",
     Tier.CRUISE: "cruising",
+    Tier.BEND: "slowing for a bend",
 }
 STATUS = {
     DetectionStatus.NO_TARGET: "no target",

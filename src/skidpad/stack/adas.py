@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from math import inf
 from typing import Any
 
 from skidpad.core.errors import require_choice, require_range
@@ -22,6 +23,7 @@ from skidpad.stack.configurations import (
     functions_of,
     parse_functions,
 )
+from skidpad.stack.control.bends import BendSpeed, slowed
 from skidpad.stack.control.resume import ResumeProtocol, SpeedCaps
 from skidpad.stack.control.steering import NoSmoothing, Smoothing, steering_of
 from skidpad.stack.control.text import mode_text
@@ -120,6 +122,7 @@ class AdasStack:
         self.hierarchy = Hierarchy(functions, c.settings, c.dt)
         self.steering = steering_of(functions, c.settings)
         self.caps = SpeedCaps(functions, c.cruise_kmh, c.limiter_kmh, c.settings.cap_scope)
+        self.bends = BendSpeed(c.dt) if Function.BEND in functions else None
         self.front.switch(functions)
 
     def relocated(self) -> None:
@@ -128,6 +131,8 @@ class AdasStack:
         self.hierarchy.reset()
         self.lock.reset()
         self.smoothing.reset()
+        if self.bends is not None:
+            self.bends.reset()
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
         """Sense, decide, actuate (A-010)."""
@@ -141,8 +146,13 @@ class AdasStack:
         lane_curvature = view.ego.curvature if view.ego is not None else 0.0
         self.resume.update(stop is not None, kmh_from_mps(v), lane_curvature)
         situation, sight = self._situation(frame, v, view, sight, stop_distance)
+        v_bends = self._speed_for_bends(frame, v, view)
+        slower_kmh = min(situation.cruise_kmh, kmh_from_mps(v_bends))
+        situation = situation._replace(cruise_kmh=slower_kmh)
         supervised = frame.supervision is not Supervision.NONE
-        request = Request(Tier.NONE) if supervised else self.hierarchy.decide(situation)
+        request = Request(Tier.NONE)
+        if not supervised:
+            request = slowed(self.hierarchy.decide(situation), v, v_bends)
         self.front.conclude(sight, stop is not None)
         self.report = self._report(view, sight, situation, request.tier, light, hsv)
         if supervised:
@@ -169,6 +179,17 @@ class AdasStack:
         if light.signal is None:
             return light, None
         return light, self.lamps.look(frame.images)
+
+    def _speed_for_bends(self, frame: SensorFrame, v: float, view: LaneView) -> float:
+        """m/s that bends ahead allow; inf without the function."""
+        if self.bends is None:
+            return inf
+
+        def curvature(distance: float) -> float:
+            place = self.tracker.ahead(view, distance, frame.ego.pose.yaw)
+            return 0.0 if place is None else place.curvature
+
+        return self.bends.update(v, curvature)
 
     def _situation(
         self,

@@ -15,6 +15,7 @@ from skidpad.simulation.world.traffic.placement import (
     RANDOM_MAX,
     Spawn,
     fixed_spawns,
+    pack_spawns,
     random_factors,
     type_of,
 )
@@ -89,7 +90,8 @@ def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
         factors = random_factors(traffic.vehicles, seed)
         spawns = [Spawn(None, float(f)) for f in factors]
     else:
-        spawns = fixed_spawns(map, _ego_point(map, setup), traffic, seed)
+        around = pack_spawns if traffic.mode is TrafficStart.PACK else fixed_spawns
+        spawns = around(map, _ego_point(map, setup), traffic, seed)
     assert len(spawns) <= RANDOM_MAX
     types = traffic_types()
     roles = []

@@ -400,7 +400,7 @@ class World:
     def _put_vehicles(self, traffic: Traffic) -> None:
         """Traffic that enters, is respawned, or is put back as a wreck (decision M-7)."""
         notes, back = [], []
-        for move in traffic.moves(self.states, self.tick):
+        for move in traffic.moves(self.states, self.placed, self.tick):
             self.put(move.actor, move.pose, move.v)
             if move.wreck:
                 back.append(move.actor)

@@ -19,6 +19,7 @@ LABELS = {
     Tier.HOLDING_AT_LINE: "HOLDING AT LINE",
     Tier.COAST: "CRUISE (COAST)",
     Tier.CRUISE: "CRUISE",
+    Tier.BEND: "BEND",
 }
 BY_GAP = frozenset({Tier.EMERGENCY, Tier.ACC_HOLD, Tier.ACC_OPEN, Tier.ACC_CLOSE})
 BY_DISTANCE = frozenset({Tier.HARD_STOP, Tier.STOPPED_TOO_CLOSE, Tier.STOPPED_BEHIND_CAR})

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from math import hypot
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from skidpad.core.states import ActorStates
 from skidpad.core.vocabulary import ActorKind, TrafficStart
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
+from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.rows import Member, Shape
 from skidpad.simulation.world.traffic.care import (
     FIRM_SHARE,
@@ -30,6 +32,7 @@ from skidpad.simulation.world.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
 from skidpad.simulation.world.traffic.network import LANE, POINT, STOP, Network, network
 from skidpad.simulation.world.traffic.occupancy import occupancy
 from skidpad.simulation.world.traffic.outlook import desired_speed
+from skidpad.simulation.world.traffic.pack import RADIUS, UNSEEN, Pack
 from skidpad.simulation.world.traffic.path import PATH, begin, straight_path
 from skidpad.simulation.world.traffic.places import CLEARANCE, FreePlaces
 from skidpad.simulation.world.traffic.priority import CONFLICT, ENTRY, ZEBRA, bake_priority
@@ -41,7 +44,6 @@ STUCK_TIME = 10.0  # s, decision M-7
 PUT_BACK_NEAREST = 100.0  # m from the ego, decision M-7
 PUT_BACK_SPEED = 0.8  # of the desired speed there
 BUBBLE = 500.0  # m, random traffic lives within this distance of the ego (A-209)
-BUBBLE_NEAREST = 150.0  # m, respawns stay out of the ego's sight
 CHECK_PERIOD = 20  # ticks between two looks at wrecks and the bubble
 
 
@@ -83,6 +85,14 @@ class Move:
     pose: Pose
     v: float
     wreck: bool
+
+
+class Area(NamedTuple):
+    """Where somebody may be put: m from the ego, and on which samples."""
+
+    nearest: float
+    farthest: float
+    among: NDArray[np.intp] | None = None  # None: anywhere
 
 
 class Traffic:
@@ -139,7 +149,7 @@ class Traffic:
         """Actor i is moved by commands from here on."""
         self.drivers.state["active"][i] = False
 
-    def moves(self, states: ActorStates, tick: int) -> Iterator[Move]:
+    def moves(self, states: ActorStates, placed: Places, tick: int) -> Iterator[Move]:
         """Vehicles to put somewhere in this tick; apply each before asking for the next."""
         if tick % CHECK_PERIOD:
             return
@@ -147,27 +157,45 @@ class Traffic:
         if self.setup.put_wrecks_back:
             wrecks = np.flatnonzero(driver["active"] & (driver["stuck"] > STUCK_TIME))
             for i in wrecks.tolist():
-                yield from self._put(i, states, PUT_BACK_NEAREST, np.inf, True)
+                yield from self._put(i, states, Area(PUT_BACK_NEAREST, np.inf), True)
         if self.free_choice:
             yield from self._keep_bubble(states)
+        elif self.setup.mode is TrafficStart.PACK and placed["lane"][0] >= 0:
+            yield from self._keep_pack(states, Pack(self.net, placed[0], self.places.lane))
 
-    def _keep_bubble(self, states: ActorStates) -> Iterator[Move]:
+    def _keep_pack(self, states: ActorStates, pack: Pack) -> Iterator[Move]:
+        def area(*sides: bool) -> Area:
+            found = [pack.entrances(self.places.candidates, ahead) for ahead in sides]
+            return Area(UNSEEN, RADIUS, np.concatenate(found))
+
+        if self.waiting:
+            yield from self._let_in(states, area(True, False))
+        for i, ahead in pack.lost(self.drivers, states):
+            yield from self._put(i, states, area(ahead), False)
+
+    def _let_in(self, states: ActorStates, area: Area) -> Iterator[Move]:
         for id in list(self.waiting):
-            for move in self._put(self.row[id], states, BUBBLE_NEAREST, BUBBLE, False):
+            for move in self._put(self.row[id], states, area, False):
                 self.waiting.remove(id)
                 self.drivers.state["active"][move.actor] = True
                 yield move
+
+    def _keep_bubble(self, states: ActorStates) -> Iterator[Move]:
+        area = Area(UNSEEN, BUBBLE)
+        yield from self._let_in(states, area)
         x, y = float(states.x[0]), float(states.y[0])
         driving = self.drivers.state["active"] & states.present
         for i in np.flatnonzero(driving).tolist():
             if hypot(states.x[i] - x, states.y[i] - y) > 1.2 * BUBBLE:
-                yield from self._put(i, states, BUBBLE_NEAREST, BUBBLE, False)
+                yield from self._put(i, states, area, False)
 
-    def _put(
-        self, i: int, states: ActorStates, nearest: float, farthest: float, wreck: bool
-    ) -> Iterator[Move]:
+    def _put(self, i: int, states: ActorStates, area: Area, wreck: bool) -> Iterator[Move]:
         at = self.places.draw(
-            states, nearest, farthest, lambda at: room(self.care, self._speed_at(i, at), states)
+            states,
+            area.nearest,
+            area.farthest,
+            lambda at: room(self.care, self._speed_at(i, at), states),
+            area.among,
         )
         if at is None:
             return
@@ -188,7 +216,8 @@ class Traffic:
     def _speed_at(self, i: int, at: int) -> float:
         """m/s at which driver i passes sample `at`: as traffic does there."""
         point, trait = self.net.point[at], self.drivers.trait[i]
-        v = PUT_BACK_SPEED * float(point["limit"] * trait["factor"])
+        share = 1.0 if self.setup.mode is TrafficStart.PACK else PUT_BACK_SPEED
+        v = share * float(point["limit"] * trait["factor"])
         if not self.care.on:
             return v
         me = drivers(1).state[0]

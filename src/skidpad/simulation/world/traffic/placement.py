@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib import resources
 
 import numpy as np
@@ -22,6 +22,8 @@ SHARE_AHEAD = 0.75
 FACTOR_AHEAD, FACTOR_BEHIND = 0.90, 1.05  # of the limit: Traffic Manager's +10 % and -5 % (A-207)
 GAP_SPREAD = 3.0  # m, uniform (decision M-2)
 SPEED_SPREAD = 0.03  # standard deviation of desired speeds (decision M-2)
+PACK_AHEAD, PACK_BEHIND = 240.0 / 900.0, 240.0 / 400.0  # of the published distances: within 250 m
+PACK_FACTOR = 0.75  # of the limit: chosen by speed and by ticks with a target (docs/traffic.md)
 RANDOM_SPEED_SPREAD = 0.10  # random mode (A-209); the size is not published
 RANDOM_MAX = 80  # A-209
 
@@ -71,20 +73,14 @@ def chosen_positions(vehicles: int, variant: str) -> list[Position]:
 
 def fixed_spawns(map: RoadMap, ego: LanePoint, setup: TrafficSetup, seed: int) -> list[Spawn]:
     """Vehicles at the published distances from the ego (A-202 to A-205), gaps and speeds varied."""
-    spawns = []
-    missing = []
+    spawns, missing = [], []
     for position in chosen_positions(setup.vehicles, setup.variant):
-        name = f"{position.group} {position.index}"
-        gap = position.distance + stream(seed, "traffic", "gap", name).uniform(
-            -GAP_SPREAD, GAP_SPREAD
-        )
-        place = _place(map, ego, gap, position.lanes_left)
-        if place is None:
-            missing.append(f"{name} ({position.distance:g} m)")
-            continue
         mean = FACTOR_AHEAD if position.group == "ahead" else FACTOR_BEHIND
-        spread = stream(seed, "traffic", "speed", name).normal(0.0, SPEED_SPREAD)
-        spawns.append(Spawn(place, mean * (1.0 + spread)))
+        spawn = _spawn(map, ego, position, mean, seed)
+        if spawn is None:
+            missing.append(f"{position.group} {position.index} ({position.distance:g} m)")
+        else:
+            spawns.append(spawn)
     if len(spawns) < setup.vehicles and not setup.allow_fewer:
         raise ConfigError(
             f"traffic: map {map.name} holds {len(spawns)} of {setup.vehicles} vehicles around the "
@@ -92,6 +88,30 @@ def fixed_spawns(map: RoadMap, ego: LanePoint, setup: TrafficSetup, seed: int) -
             "choose fewer vehicles or allow fewer"
         )
     return spawns
+
+
+def pack_spawns(map: RoadMap, ego: LanePoint, setup: TrafficSetup, seed: int) -> list[Spawn]:
+    """The published places drawn together around the ego; who finds none there enters later."""
+    spawns = []
+    for position in chosen_positions(setup.vehicles, setup.variant):
+        share = PACK_AHEAD if position.group == "ahead" else PACK_BEHIND
+        near = replace(position, distance=share * position.distance)
+        spawn = _spawn(map, ego, near, PACK_FACTOR, seed)
+        spawns.append(Spawn(None, PACK_FACTOR) if spawn is None else spawn)
+    return spawns + [Spawn(None, PACK_FACTOR)] * (setup.vehicles - len(spawns))
+
+
+def _spawn(
+    map: RoadMap, ego: LanePoint, position: Position, mean: float, seed: int
+) -> Spawn | None:
+    """A vehicle at a position, its gap and its speed varied by the seed; None: no lane is there."""
+    name = f"{position.group} {position.index}"
+    gap = stream(seed, "traffic", "gap", name).uniform(-GAP_SPREAD, GAP_SPREAD)
+    place = _place(map, ego, position.distance + gap, position.lanes_left)
+    if place is None:
+        return None
+    spread = stream(seed, "traffic", "speed", name).normal(0.0, SPEED_SPREAD)
+    return Spawn(place, mean * (1.0 + spread))
 
 
 def _place(map: RoadMap, ego: LanePoint, distance: float, lanes_left: int) -> LanePoint | None:

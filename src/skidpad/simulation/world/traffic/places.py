@@ -42,16 +42,18 @@ class FreePlaces:
         nearest: float,
         farthest: float,
         room: Callable[[int], NDArray[np.float64]],
+        among: NDArray[np.intp] | None = None,
     ) -> int | None:
         """A sample between `nearest` and `farthest` m from the ego, clear of all; None: not found.
 
-        room: m to keep to every actor at a sample, (n,).
+        room: m to keep to every actor at a sample, (n,). among: candidates, None: all.
         """
         point = self.net.point
-        if not len(self.candidates):
+        among = self.candidates if among is None else among
+        if not len(among):
             return None
-        for index in self.rng.integers(0, len(self.candidates), TRIES):
-            at = int(self.candidates[index])
+        for index in self.rng.integers(0, len(among), TRIES):
+            at = int(among[index])
             d = np.hypot(states.x - point["x"][at], states.y - point["y"][at])
             if not nearest <= d[0] <= farthest:
                 continue

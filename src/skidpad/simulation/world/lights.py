@@ -1,7 +1,7 @@
 """Traffic lights: groups whose phases take turns, each green, then yellow, then red for all.
 
-A group is a junction. Its lights that look along one axis share a phase, so crossing streams never
-have green together.
+A group is a junction. Its phases are those of the file's controllers, else of its arms, so crossing
+streams never have green together.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from skidpad.roads.queries import RoadMap
 
 GREEN_S, YELLOW_S, RED_S = 10.0, 3.0, 2.0  # CARLA's default times; red: for all, before the next
 CYCLE_S = 45.0  # of a pretimed group: green, yellow and 32 s of red as measured by the publication
-AXIS = pi / 4.0  # headings this close belong to one axis
+SECTOR = pi / 4.0  # headings this close belong to one arm
 ROUNDING = 1e-6  # s by which summed steps may fall short
 
 
@@ -110,14 +110,15 @@ class Lights:
         """Groups with the published cycle whose position is part of the seed (decision M-2)."""
         lights = cls(map)
         for group in lights.groups.values():
-            share = CYCLE_S / len(group.phases)
+            n = len(group.phases)
+            share = max(CYCLE_S / n, GREEN_S + YELLOW_S + RED_S)  # four arms need a longer cycle
             for light in group.lights():
                 light.red = max(share - GREEN_S - YELLOW_S, 0.0)
             alone = group.id < 0
             name = f"signal {group.phases[0][0].signal}" if alone else f"group {group.id}"
-            at = stream(seed, "lights", name).uniform(0.0, CYCLE_S)
-            ticks = round(at / dt) % round(CYCLE_S / dt)
-            turn = min(int(ticks * dt / share + ROUNDING), len(group.phases) - 1)
+            at = stream(seed, "lights", name).uniform(0.0, n * share)
+            ticks = round(at / dt) % round(n * share / dt)
+            turn = min(int(ticks * dt / share + ROUNDING), n - 1)
             _set_clock(group, turn, ticks * dt - turn * share)
         lights._show()
         return lights
@@ -176,32 +177,34 @@ def _set_clock(group: Group, turn: int, elapsed: float) -> None:
 
 
 def _groups(map: RoadMap, rows: NDArray[np.intp]) -> dict[int, Group]:
-    """Lights by junction, those along one axis in one phase; a light without one is alone."""
+    """Lights by junction, in phases; a light without a junction is with those of its controller."""
     signals = map.signals
     by_id: dict[int, list[int]] = {}
     for row in rows.tolist():
         by_id.setdefault(int(signals.id[row]), []).append(row)
-    axes: dict[int, dict[int, list[Light]]] = {}
+    phases: dict[int, dict[tuple[bool, int], list[Light]]] = {}
     for id, governed in by_id.items():
-        group = _junction(map, governed[0])
+        row = governed[0]
+        junction, controller = _junction(map, row), int(signals.group[row])
+        group = junction if junction >= 0 else controller
         light = Light(id, tuple(governed), group if group >= 0 else -1 - id)
-        axis = round((float(signals.heading[governed[0]]) % pi) / AXIS) % 4
-        axes.setdefault(light.group, {}).setdefault(axis, []).append(light)
-    return {
-        id: Group(
-            id, [phases[axis] for axis in sorted(phases, key=lambda a: (a > min(phases), -a))]
-        )
-        for id, phases in axes.items()
-    }
+        phase = _phase(junction, controller, float(signals.heading[row]))
+        phases.setdefault(light.group, {}).setdefault(phase, []).append(light)
+    return {id: Group(id, [found[key] for key in sorted(found)]) for id, found in phases.items()}
+
+
+def _phase(junction: int, controller: int, heading: float) -> tuple[bool, int]:
+    """What lights of one junction share whose green comes together: the controller that the file
+    names; without one the arm, as left-turners of facing arms would block each other. Away from
+    junctions nobody crosses: one phase per axis."""
+    if junction >= 0 and controller >= 0 and controller != junction:
+        return False, controller
+    turn = pi if junction < 0 else 2.0 * pi
+    return True, round((heading % turn) / SECTOR) % round(turn / SECTOR)
 
 
 def _junction(map: RoadMap, row: int) -> int:
-    """The junction behind a signal's lane, else the signal's own group."""
-    signals, lanes = map.signals, map.lanes
-    lane = int(signals.lane[row])
-    first = lanes.next_start[lane]
-    if first < lanes.next_start[lane + 1]:
-        junction = int(lanes.junction[lanes.next_lane[first]])
-        if junction >= 0:
-            return junction
-    return int(signals.group[row])
+    """The junction in which a signal's lane lies, or into which it leads; -1: none."""
+    lanes, lane = map.lanes, int(map.signals.lane[row])
+    following = map.successors(lane)[:1]
+    return next((j for j in lanes.junction[[lane, *following]].tolist() if j >= 0), -1)

@@ -63,9 +63,20 @@ class _Bake:
         for row in range(len(signals.id)):
             control = kinds.get(SignalKind(int(signals.kind[row])))
             if control is not None:
-                at = self.entry[signals.lane[row]]
-                at["control"], at["line"] = control, signals.s[row]
-                at["signal"] = row if control == LIGHT else -1
+                self.control(row, control)
+
+    def control(self, row: int, control: int) -> None:
+        """Note where one waits for a signal; one on a junction's lane holds at the lanes before it."""
+        lane = int(self.signals.lane[row])
+        within = int(self.lanes.junction[lane])
+        waiting = [lane]
+        if within >= 0:
+            waiting = [p for p in self.before(lane) if self.lanes.junction[p] != within]
+        for place in waiting:
+            at = self.entry[place]
+            at["control"], at["signal"] = control, row if control == LIGHT else -1
+            if within < 0:
+                at["line"] = self.signals.s[row]
 
     def points(self, lane: int) -> tuple[Floats, Floats]:
         """(k, 2) places and (k,) s of a lane."""

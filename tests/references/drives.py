@@ -69,7 +69,8 @@ def scenario(folder: Path, name: str, grip: str) -> Columns:
 
 def segment(folder: Path, route: str) -> Columns:
     """A segment of a route, driven by two channels and watched by the monitor."""
-    command("channels", "drive", "--route", route, "--hours", SEGMENT_HOURS, "--out", folder)
+    words = ("--route", route, "--hours", SEGMENT_HOURS, "--no-mind-weather", "--out", folder)
+    command("channels", "drive", *words)
     (recording,) = folder.glob("*/*.mcap")
     command("monitor", recording, "--out", folder / "monitor")
     indicators = pl.read_parquet(folder / "monitor" / "indicators.parquet")

@@ -127,6 +127,23 @@ def test_red_stops_only_channels_that_read_lights():
         assert (s + 1.9 < line.s) == stops
 
 
+@pytest.mark.req("C-9", "C-024")
+@pytest.mark.parametrize(
+    ("kind", "lanes"), [(SignalKind.STOP, (18, 71, 30)), (SignalKind.LIGHT, (0, 40, 9))]
+)
+def test_who_does_not_obey_a_line_abstains_from_where_another_can_stop_to_the_line(kind, lanes):
+    for settings, abstains in ((LAV, False), (TFUSE, True)):
+        channel, route = town_channel(settings, lanes)
+        line = next(x for x in route.lines if x.kind is kind)
+        for before, inside in ((60.0, False), (22.0, True), (2.0, True), (-8.0, False)):
+            if line.s - before < 1.0:
+                continue
+            channel.reset()
+            channel.at = int(line.s - before)
+            channel.update(view(0.0, pose_at(route, line.s - before, 8.0)))
+            assert channel.abstains is (abstains and inside), (kind, before)
+
+
 @pytest.mark.req("C-026")
 def test_keeps_clear_of_a_leader_and_of_who_crosses():
     channel, route = town_channel(LAV)

@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -20,7 +21,7 @@ import numpy as np
 from skidpad import __version__
 from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
 from skidpad.campaign.channel_outcomes import Referee
-from skidpad.campaign.channel_world import Segment, crew_of, route_of, segment_of
+from skidpad.campaign.channel_world import TRAFFIC, Segment, crew_of, route_of, segment_of
 from skidpad.campaign.drive import Moment, Sink, Unsupervised, loop
 from skidpad.campaign.pace import RealTime
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
@@ -28,7 +29,7 @@ from skidpad.core.frames import SensorFrame
 from skidpad.core.run import ARBITER, RunSpec
 from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
-from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind
+from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind, Stratum
 from skidpad.evidence.channels.risk import safety_scores
 from skidpad.live.links import opened
 from skidpad.live.listener import Listener
@@ -37,6 +38,7 @@ from skidpad.recording.channel_drives import DriveOutcome
 from skidpad.recording.channels import ChannelWriter, Item
 from skidpad.sensors.channel_presets import senses_of
 from skidpad.sensors.channel_suite import CYCLE, ChannelSuite
+from skidpad.simulation.world.traffic.variety import risky_character
 from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Choice, Reason
 from skidpad.stack.channels.channel import Channel
 from skidpad.stack.channels.settings import settings_of
@@ -133,8 +135,8 @@ class Recording(Sink):
 
     def begin(self, table: ActorTable) -> None:
         """Say what is recorded."""
-        del table
-        self._say(Context(0.0, _about(self.crew.spec, self.crew.segment)))
+        about = _about(self.crew.spec, self.crew.segment)
+        self._say(Context(0.0, about | weights_of(self.crew.spec, table)))
 
     def see(self, moment: Moment) -> None:
         """The contacts of the step that led here; at the begin of a cycle what is said and true."""
@@ -231,10 +233,20 @@ def truth_frame(t: float, truth: WorldTruth) -> TruthFrame:
     )
 
 
+def weights_of(spec: RunSpec, table: ActorTable) -> dict[str, str]:
+    """Of the stratum of risky drivers: by which each counts, by his row in the true world."""
+    if route_of(spec).stratum is not Stratum.RISKY:
+        return {}
+    drivers = [i for i, name in enumerate(table.names) if name.startswith(TRAFFIC)]
+    found = {str(i): risky_character(spec.seed, i) for i in drivers}
+    weights = {i: [round(c.of_headway, 6), round(c.of_gap, 6)] for i, c in found.items()}
+    return {"weights": json.dumps(weights, separators=(",", ":"))}
+
+
 def _about(spec: RunSpec, segment: Segment) -> dict[str, str]:
     course, crew = route_of(spec), crew_of(spec)
     return {
-        "route": course.name,
+        "route": course.place,
         "title": course.title,
         "map": segment.map.name,
         "map_hash": segment.map.content_hash,
@@ -244,4 +256,14 @@ def _about(spec: RunSpec, segment: Segment) -> dict[str, str]:
         "version": __version__,
         "sun_altitude_deg": f"{spec.weather.sun_altitude_deg:g}",
         "precipitation": f"{spec.weather.precipitation:g}",
+        **_variant(spec),
     }
+
+
+def _variant(spec: RunSpec) -> dict[str, str]:
+    """In what it differs from the route as published, where it does."""
+    course = route_of(spec)
+    if not course.base:
+        return {}
+    words = {"variant": course.name, "weather": spec.weather.name}
+    return words | {"stratum": course.stratum.value}

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
+from enum import Enum
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
@@ -11,8 +13,33 @@ from msgspec import Struct, structs, yaml
 
 from skidpad.core.errors import require_choice
 from skidpad.core.run import ChannelCrew, Route, RunSpec
-from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.vocabulary import SensorLevel, Stratum
 from skidpad.core.weather import Weather
+
+
+class Condition(str, Enum):
+    """In which weather and light a route is driven."""
+
+    OWN = "own"  # of the route, as published (C-210)
+    DAY = "day"
+    NIGHT = "night"
+    RAIN = "rain"
+
+
+# CARLA's units. Day and rain have the sun of a forenoon; rain is that of the published mid rain.
+CONDITIONS = {
+    Condition.DAY: Weather(name="day", cloudiness=20.0, sun_altitude_deg=45.0),
+    Condition.NIGHT: Weather(name="night", cloudiness=20.0, sun_altitude_deg=-30.0),
+    Condition.RAIN: Weather(
+        name="rain",
+        cloudiness=80.0,
+        precipitation=60.0,
+        precipitation_deposits=60.0,
+        wetness=80.0,
+        wind_intensity=40.0,
+        sun_altitude_deg=45.0,
+    ),
+}
 
 
 class _Row(Struct, frozen=True, forbid_unknown_fields=True):
@@ -44,11 +71,42 @@ def driven_routes() -> dict[str, RunSpec]:
     return {name: row.run(name) for name, row in rows.items()}
 
 
-def chosen_routes(name: str, map: str | Path | None = None) -> list[RunSpec]:
-    """The route with this name, or `all`; on another map if one is given."""
+def chosen_routes(
+    name: str,
+    map: str | Path | None = None,
+    conditions: Iterable[Condition] = (Condition.OWN,),
+    strata: Iterable[Stratum] = (Stratum.NATURAL,),
+    drivers_mind_weather: bool = True,
+) -> list[RunSpec]:
+    """The route with this name, or `all`, in each condition and stratum; on another map if given."""
     routes = driven_routes()
     require_choice("route", name, ["all", *routes])
     chosen = list(routes.values()) if name == "all" else [routes[name]]
-    if map is None:
-        return chosen
-    return [structs.replace(r, course=structs.replace(r.course, map=str(map))) for r in chosen]
+    return [
+        _variant(run, condition, stratum, map, drivers_mind_weather)
+        for stratum in dict.fromkeys(strata)
+        for condition in dict.fromkeys(conditions)
+        for run in chosen
+    ]
+
+
+def _variant(
+    run: RunSpec, condition: Condition, stratum: Stratum, map: str | Path | None, minds: bool
+) -> RunSpec:
+    """The run under other circumstances, with a name of its own where they differ."""
+    course = run.course
+    assert isinstance(course, Route)
+    words = [condition.value] * (condition is not Condition.OWN)
+    words += [stratum.value] * (stratum is not Stratum.NATURAL)
+    return structs.replace(
+        run,
+        weather=CONDITIONS.get(condition, run.weather),
+        course=structs.replace(
+            course,
+            name="_".join([course.name, *words]),
+            base=course.name if words else "",
+            map=course.map if map is None else str(map),
+            stratum=stratum,
+            drivers_mind_weather=minds,
+        ),
+    )

@@ -22,6 +22,7 @@ from skidpad.simulation.crowd import Crowd
 from skidpad.stack.channels.route import RoutePath, draw_route, route_path
 from skidpad.stack.channels.settings import CarModel
 
+TRAFFIC = "traffic_"  # names of background vehicles begin with this
 CLEARANCE = 25.0  # m between vehicles at the start
 FIRST_S = 25.0  # m from the beginning of its lane where the ego starts
 PARKED_WIDTH = 1.95  # m, wider vehicles would stand on the lane
@@ -69,7 +70,7 @@ def segment_of(spec: RunSpec) -> Segment:
     places = _places(map, route.vehicles, start.pose, stream(seed, "channels", "places"))
     types = traffic_types()
     traffic = [
-        ActorSetup(name=f"traffic_{i + 1:02d}", type=types[i % len(types)], place=p)
+        ActorSetup(name=f"{TRAFFIC}{i + 1:02d}", type=types[i % len(types)], place=p)
         for i, p in enumerate(places)
     ]
     spaces = map.roadside.parking[: route.parked]
@@ -88,7 +89,13 @@ def segment_of(spec: RunSpec) -> Segment:
         setup_of(spec, route.map, ego),
         specs=(),  # channels bring their own
         actors=(*traffic, *parked, *crowd.actors()),
-        traffic=TrafficSetup(mode=TrafficStart.RANDOM, vehicles=0, variety=True),
+        traffic=TrafficSetup(
+            mode=TrafficStart.RANDOM,
+            vehicles=0,
+            variety=True,
+            slow_in_weather=route.drivers_mind_weather,
+            stratum=route.stratum,
+        ),
     )
     return Segment(map, setup, crowd, path, car_model())
 

@@ -15,7 +15,7 @@ from msgspec import Meta, Struct
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.names import path_part, slug
 from skidpad.core.told import on_a_line
-from skidpad.core.vocabulary import SensorLevel, TrafficStart
+from skidpad.core.vocabulary import SensorLevel, Stratum, TrafficStart
 from skidpad.core.weather import Weather
 
 VERSION = 2  # of config.yaml; folders without the word were written before there was one value
@@ -183,6 +183,14 @@ class Route(Struct, frozen=True, kw_only=True, tag="route", forbid_unknown_field
     parked: Annotated[int, Meta(ge=0, le=80)]
     pedestrians: Annotated[int, Meta(ge=0, le=80)]
     cyclists: Annotated[int, Meta(ge=0, le=80)]
+    base: str = ""  # the route of which this is another weather or stratum; "": of none
+    stratum: Stratum = Stratum.NATURAL
+    drivers_mind_weather: bool = True  # decision R-5
+
+    @property
+    def place(self) -> str:
+        """The route by whose name results are kept apart."""
+        return self.base or self.name
 
 
 Course = Roads | Scenario | Route

@@ -8,7 +8,14 @@ from pathlib import Path
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import Control, GripModel, RangeModel, SensorLevel, TrafficStart
+from skidpad.core.vocabulary import (
+    Control,
+    GripModel,
+    RangeModel,
+    SensorLevel,
+    Stratum,
+    TrafficStart,
+)
 from skidpad.core.weather import Weather
 
 DT = 0.05  # s, the fixed step of the published runs; time is a count of these
@@ -49,6 +56,7 @@ class TrafficSetup:
     slow_in_weather: bool = False  # the switch `drivers` (decisions M-1, R-5)
     put_wrecks_back: bool = True  # decision M-7
     variety: bool = False  # drivers differ in speed, headway and acceleration (decision C-11)
+    stratum: Stratum = Stratum.NATURAL  # risky: with variety, tails are oversampled
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -71,6 +71,13 @@ class TrafficStart(str, Enum):
     PACK = "pack"  # ours: around the ego, which mostly follows
 
 
+class Stratum(str, Enum):
+    """Which background drivers one meets."""
+
+    NATURAL = "natural"  # as they are: how often a hazard is, how often an alarm is right
+    RISKY = "risky"  # the tails of how they drive, oversampled: what is missed
+
+
 class Control(str, Enum):
     """What drives an actor."""
 

@@ -15,6 +15,7 @@ from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import channels_scores as scores
 from skidpad.report.channels_redundancy import redundancy
 from skidpad.report.channels_scores import FEW, HAZARDS, TRUTHS, Row, headline, ratio_text, short
+from skidpad.report.channels_strata import headline_of_risky, precision_recall, strata
 from skidpad.report.figures import Chart, Curve, curves
 from skidpad.report.page import (
     Answers,
@@ -62,6 +63,8 @@ def evaluation_page(evaluation: Row, folder: Path) -> Page:
                 "What came out", [_answers(evaluation, judged), _numbers(evaluation), Text(LEAD)]
             ),
             *[Section(f"Against the {short(t)}", [scores.results(evaluation, t)]) for t in truths],
+            Section("Natural and risky drivers", strata(evaluation)),
+            Section("Precision against recall", precision_recall(evaluation)),
             Section("By route", [scores.routes(evaluation, t) for t in truths]),
             Section("Findings of the source, judged", verdicts(judged)),
             Section("Why it errs", [scores.causes(evaluation)]),
@@ -89,6 +92,8 @@ def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:
     few = ", too few to say much" if true < FEW else ""
     sure = f"{evaluation['segments']} drive segments with {true} true hazards{few}. "
     sure += tally_text(judged)
+    risky = headline_of_risky(evaluation)
+    items += [("What is missed?", risky)] if risky else []
     return Answers([*items, ("How sure is that?", sure)])
 
 

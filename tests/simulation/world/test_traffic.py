@@ -24,7 +24,7 @@ from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.lights import CYCLE_S, Lights
 from skidpad.simulation.world.stage import staged
 from skidpad.simulation.world.traffic.idm import A_EMERGENCY, Character, idm
-from skidpad.simulation.world.traffic.mobil import incentive, is_safe
+from skidpad.simulation.world.traffic.mobil import GAP_CLEAR, incentive, is_safe
 from skidpad.simulation.world.traffic.placement import (
     chosen_positions,
     fixed_spawns,
@@ -136,7 +136,7 @@ def test_idm_settles_at_the_equilibrium_gap() -> None:
 def test_a_change_that_makes_anyone_brake_hard_is_not_safe(
     a_self: float, a_follower: float, ahead: float, behind: float, safe: bool
 ) -> None:
-    assert is_safe(a_self, a_follower, ahead, behind, 2.0) == safe
+    assert is_safe(a_self, a_follower, ahead, behind, 2.0, GAP_CLEAR) == safe
 
 
 def test_politeness_weighs_what_others_lose() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal
+from typing import NamedTuple
 
 import numpy as np
 from scipy.sparse import csr_matrix
@@ -18,12 +19,16 @@ TOLERANCES = (1.0, 0.5, 2.0)  # s by which intervals are dilated; the first is t
 
 @dataclass(frozen=True, slots=True)
 class Span:
-    """A hazard from t_start to t_end, in s; `about` names objects where they are known."""
+    """A hazard from t_start to t_end, in s; `about` names objects where they are known.
+
+    weight: of a true one, how much it counts (importance sampling; 1: as it occurs).
+    """
 
     hazard: HazardType
     t_start: float
     t_end: float
     about: frozenset[str] = frozenset()
+    weight: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +65,24 @@ def _compatible(d: Span, h: Span, tolerance: float) -> bool:
     return not apart and (not d.about or not h.about or bool(d.about & h.about))
 
 
+class Weighed(NamedTuple):
+    """True hazards by their weights."""
+
+    found: float = 0.0  # sum of the weights of those found
+    true: float = 0.0  # of all
+    squares: float = 0.0  # of the weights' squares
+
+    @property
+    def recall(self) -> float | None:
+        """Share found, each counted as often as it occurs; None without a true hazard."""
+        return self.found / self.true if self.true > 0.0 else None
+
+    @property
+    def size(self) -> float:
+        """Effective sample size: so many equally weighted hazards say as much (Kish 1965)."""
+        return self.true * self.true / self.squares if self.squares > 0.0 else 0.0
+
+
 @dataclass(frozen=True, slots=True)
 class Tally:
     """Counts of one hazard in one segment of driving."""
@@ -69,6 +92,7 @@ class Tally:
     fn: int = 0
     hours: float = 0.0
     lead_times: tuple[float, ...] = ()  # s, positive: detected before it was true
+    weighed: Weighed = Weighed()
 
     def __add__(self, other: Tally) -> Tally:
         return Tally(
@@ -77,6 +101,7 @@ class Tally:
             self.fn + other.fn,
             self.hours + other.hours,
             self.lead_times + other.lead_times,
+            Weighed(*(a + b for a, b in zip(self.weighed, other.weighed, strict=True))),
         )
 
     @property
@@ -105,7 +130,12 @@ def tally(
         h = [s for s in true if s.hazard is hazard]
         m = match(d, h, tolerance)
         leads = tuple(h[j].t_start - d[i].t_start for i, j in m.pairs)
-        out[hazard] = Tally(len(m.pairs), len(m.false_alarms), len(m.missed), hours, leads)
+        weighed = Weighed(
+            sum(h[j].weight for _, j in m.pairs),
+            sum(s.weight for s in h),
+            sum(s.weight**2 for s in h),
+        )
+        out[hazard] = Tally(len(m.pairs), len(m.false_alarms), len(m.missed), hours, leads, weighed)
     return out
 
 
@@ -116,6 +146,7 @@ class Score:
     total: Tally
     precision: Interval | None
     recall: Interval | None
+    weighed: Interval | None = None  # of the weighted recall
 
 
 def score(segments: Sequence[Tally]) -> Score:
@@ -127,7 +158,19 @@ def score(segments: Sequence[Tally]) -> Score:
         sum(segments, Tally()),
         _interval([(t.tp, t.tp + t.fp) for t in segments]),
         _interval([(t.tp, t.tp + t.fn) for t in segments]),
+        _weighed_interval([t.weighed for t in segments if t.weighed.true > 0.0]),
     )
+
+
+def _weighed_interval(known: Sequence[Weighed]) -> Interval | None:
+    """Limits of the weighted recall; where all or none were found, exact ones of the effective size."""
+    total = Weighed(*(sum(column) for column in zip(*known, strict=True))) if known else Weighed()
+    if total.recall is None:
+        return None
+    if len(known) == 1 or not 0.0 < total.found < total.true:
+        n = max(round(total.size), 1)
+        return clopper_pearson(round(total.recall * n), n)
+    return bootstrap_interval([w.found for w in known], [w.true for w in known])
 
 
 def _interval(counts: Sequence[tuple[int, int]]) -> Interval | None:

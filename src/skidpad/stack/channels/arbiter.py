@@ -21,7 +21,7 @@ class Reason(str, Enum):
     SAFER = "higher safety score"
     PROGRESS = "most progressing of the safe channels"
     FAILOVER = "the driving channel is silent"
-    LIGHTS = "the driving channel cannot see the light ahead"
+    LIGHTS = "the driving channel does not see the light or line ahead"
     MINIMAL_RISK = "no channel is safe: minimal-risk stop"
     ALL_SILENT = "all channels are silent: minimal-risk stop"
     ORDERED = "a teleoperator ordered a minimal-risk stop"

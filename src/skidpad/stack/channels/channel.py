@@ -63,7 +63,7 @@ class Channel:
         self.waiting = 0.0  # s at that line
         self.command = VehicleCommand()
         self.v_planned = 0.0  # m/s that the plan reaches at its end: how much it progresses
-        self.abstains = False  # it cannot see the light that it comes to
+        self.abstains = False  # it does not know the line that it comes to
 
     def update(self, view: ChannelView) -> ChannelFrame:
         """What this channel says; `command` is then what it would do."""
@@ -87,7 +87,7 @@ class Channel:
             predictions,
         )
         plan = self._plan(view, offset, objects, sizes, predictions)
-        self.abstains = self._comes_to_a_light_unseen(v)
+        self.abstains = self._comes_to_a_line_unseen(v)
         pose = (x, y, heading)
         self.command = self.controller.update(path, self.at, pose, v, rate, self.a_planned)
         return ChannelFrame(
@@ -140,17 +140,17 @@ class Channel:
                 return line.s - self.at * STEP
         return inf
 
-    def _comes_to_a_light_unseen(self, v: float) -> bool:
-        """Whether a light, which this channel cannot see, is within the way that stopping takes.
+    def _comes_to_a_line_unseen(self, v: float) -> bool:
+        """Whether a light or a line that this channel does not obey is within the way of stopping.
 
         From where another channel can still take over and brake comfortably, to the line itself.
         """
-        if self.settings.reads_lights:
-            return False
+        c = self.settings
         front = self.at * STEP + 0.5 * self.car.length
-        way = v * RELIEF + v * v / (2.0 * self.settings.b_comfort) + HALT_REACH
+        way = v * RELIEF + v * v / (2.0 * c.b_comfort) + HALT_REACH
         return any(
-            line.kind is SignalKind.LIGHT and -1.0 <= line.s - front <= way
+            -1.0 <= line.s - front <= way
+            and not (c.reads_lights if line.kind is SignalKind.LIGHT else c.reads_stop_lines)
             for line in self.route.lines
         )
 

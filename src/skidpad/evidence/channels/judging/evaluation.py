@@ -11,10 +11,11 @@ from typing import Any
 import polars as pl
 
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.vocabulary import HazardType
+from skidpad.core.vocabulary import HazardType, Stratum
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile
 from skidpad.evidence.channels.judging.causes import EXPLAINED
-from skidpad.evidence.channels.judging.segments import Segment
+from skidpad.evidence.channels.judging.curves import Point
+from skidpad.evidence.channels.judging.segments import Curve, Segment
 from skidpad.evidence.channels.matching import (
     TOLERANCES,
     Score,
@@ -89,7 +90,18 @@ class Evaluation:
         return out
 
     def as_dict(self) -> dict[str, Any]:
-        """Everything, for JSON."""
+        """Everything, for JSON: of natural drivers, and of the risky ones apart (never pooled)."""
+        parts = {
+            stratum: Evaluation([s for s in self.segments if s.stratum is stratum])
+            for stratum in Stratum
+        }
+        first = Stratum.NATURAL if parts[Stratum.NATURAL].segments else Stratum.RISKY
+        return parts[first]._as_dict() | {
+            "stratum": first.value,
+            "strata": {k.value: e._as_dict() for k, e in parts.items() if e.segments},
+        }
+
+    def _as_dict(self) -> dict[str, Any]:
         truths = sorted({name for s in self.segments for name in s.truths})
         return {
             "segments": len(self.segments),
@@ -121,10 +133,26 @@ class Evaluation:
                 }
                 for truth in truths
             },
+            "precision_recall": self._precision_recall(),
             "causes": self._causes(),
             "segment_table": self.segment_table().to_dicts(),
             "truths_agree": {h.value: _row(s) for h, s in self.truths_agree().items()},
         }
+
+    def _precision_recall(self) -> dict[str, dict[str, dict[str, list[list[float]]]]]:
+        """Counts and weights at each limit, by truth, identifier and hazard."""
+        total: dict[Curve, list[Point]] = {}
+        for key in dict.fromkeys(key for s in self.segments for key in s.points):
+            known = [s.points[key] for s in self.segments if key in s.points]
+            total[key] = [
+                Point(at[0].limit, *(sum(column) for column in list(zip(*at, strict=True))[1:]))
+                for at in zip(*known, strict=True)
+            ]
+        out: dict[str, dict[str, dict[str, list[list[float]]]]] = {}
+        for key, rows in total.items():
+            of = out.setdefault(key.truth, {}).setdefault(key.identifier, {})
+            of[key.hazard.value] = [list(row) for row in rows]
+        return out
 
     def _causes(self) -> list[dict[str, Any]]:
         """How often which cause stands behind false alarms and misses (C-215)."""
@@ -191,6 +219,9 @@ def _row(s: Score) -> dict[str, Any]:
         "recall": total.recall,
         "recall_interval": s.recall,
         "false_alarms_per_hour": total.false_alarms_per_hour,
+        "recall_weighted": total.weighed.recall,
+        "recall_weighted_interval": s.weighed,
+        "effective_size": round(total.weighed.size, 1),
         "lead_time_median_s": leads[len(leads) // 2] if leads else None,
     }
 

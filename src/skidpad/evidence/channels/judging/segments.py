@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.channels import Cycle
-from skidpad.core.vocabulary import HazardType
+from skidpad.core.errors import FileError
+from skidpad.core.vocabulary import HazardType, Stratum
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile, Rule, Signal, load_rules
 from skidpad.evidence.channels.identifier.features import feature_row
 from skidpad.evidence.channels.identifier.model import Model, events_of, probability_of
@@ -19,6 +22,18 @@ from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.judging.causes import ego_motion, false_cause, missed_cause
 from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
 from skidpad.evidence.channels.judging.ceiling import ceiling
+from skidpad.evidence.channels.judging.curves import (
+    Point,
+    Sweep,
+    Table,
+    columns,
+    found_by,
+    of_distances,
+    of_learned,
+    of_rules,
+    points,
+    with_limit,
+)
 from skidpad.evidence.channels.judging.facts import Observer, times_of
 from skidpad.evidence.channels.judging.truth.marks import TrueHazard
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
@@ -39,6 +54,14 @@ CURVE_FACTORS = (0.5, 0.67, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
 WARM_UP = 2.0  # s at the start of a segment that are not evaluated (decision C-12)
 LEARNED = "learned on {} truth"
 OTHER = {"sim": "world", "world": "sim"}
+
+
+class Curve(NamedTuple):
+    """Whose limit is varied, against which truth, for which hazard."""
+
+    identifier: str
+    truth: str
+    hazard: HazardType
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,11 +89,17 @@ class Segment:
     candidates: Mapping[HazardType, int]  # candidate hazards, listed and counted (decision C-4)
     unseen: int  # true hazards with an object that no channel reported
     curve: Mapping[float, tuple[Span, ...]]  # practical rules with one threshold scaled
+    points: Mapping[Curve, tuple[Point, ...]]  # precision and recall by limit
     mistakes: tuple[Mistake, ...] = ()
     facts: Mapping[str, float | None] = field(default_factory=dict)  # see drive_facts
     context: Mapping[str, str] = field(default_factory=dict)
     t: Floats = field(default_factory=lambda: np.empty(0))  # (k,) s, and what an identifier sees
     rows: Floats = field(default_factory=lambda: np.empty((0, 0)))  # (k, f)
+
+    @property
+    def stratum(self) -> Stratum:
+        """Whom it was driven among."""
+        return Stratum(self.context.get("stratum", Stratum.NATURAL.value))
 
 
 @dataclass(slots=True)
@@ -103,17 +132,22 @@ def judge(
     t = np.array([c.t for c in cycles])
     detected: dict[str, tuple[Span, ...]] = {}
     seen, candidates, detected[Profile.PRACTICAL.value] = _practical(channels, cycles, begin, timer)
+    table = columns([values for _, values in seen.signals])
+    sweeps = {Profile.PRACTICAL.value: of_rules(Profile.PRACTICAL, t, table, begin)}
     for profile in (Profile.AS_PRINTED, Profile.TRACKED):
         monitor = Monitor(channels, _settings(profile))
-        for cycle in cycles:
-            monitor.update(cycle)
+        rows = [monitor.update(cycle).signals.values for cycle in cycles]
         detected[profile.value] = _scored(_found(monitor.hazards, begin))
-    found, unseen, unseen_found = _truths(channels, cycles, truths, begin, detected)
+        sweeps[profile.value] = of_rules(profile, t, columns(rows), begin)
+    sweeps[Profile.TRACKED.value] |= of_distances(channels, cycles, begin)
+    weights = weights_from((context or {}).get("weights", "{}"))
+    found, unseen, unseen_found = _truths(channels, cycles, truths, begin, detected, weights)
     if "sim" in found:
         detected[CEILING] = tuple(s for s in ceiling(cycles, channels) if s.t_end >= begin)
     if model is not None and cycles:
         for truth in sorted({t_ for t_, _ in model.detectors}):
             detectors = model.identifier(truth, route)
+            sweeps[LEARNED.format(truth)] = of_learned(detectors, t, seen.rows, begin)
             spans = [
                 Span(hazard, a, b)
                 for hazard, d in detectors.items()
@@ -132,7 +166,8 @@ def judge(
         truths=found,
         candidates=candidates,
         unseen=unseen,
-        curve={f: _reapplied(seen.signals, curve, f, begin) for f in CURVE_FACTORS if curve},
+        curve={f: _reapplied(t, table, curve, f, begin) for f in CURVE_FACTORS if curve},
+        points=_points(sweeps, found),
         mistakes=tuple(_mistakes(detected, found, cycles, seen.signals)),
         facts=seen.facts | {"unseen": float(unseen), "unseen_found": float(unseen_found)},
         context=dict(context or {}),
@@ -176,6 +211,7 @@ def _truths(
     wanted: Sequence[str],
     begin: float,
     detected: Mapping[str, tuple[Span, ...]],
+    weights: Mapping[str, tuple[float, float]],
 ) -> tuple[dict[str, tuple[Span, ...]], int, int]:
     """True hazards by truth, how many of the simulator's no channel saw, and how many of those
     the practical rules found all the same."""
@@ -183,12 +219,23 @@ def _truths(
     unseen: list[Span] = []
     if "sim" in wanted and any(c.truth is not None for c in cycles):
         sim = [h for h in simulator_truth(cycles, channels) if h.t_end >= begin]
-        found["sim"] = _spans(sim)
+        found["sim"] = tuple(weighted(h, weights) for h in sim)
         unseen = [Span(h.hazard, h.t_start, h.t_end) for h in sim if not h.seen]
     if "world" in wanted:
         found["world"] = _spans(h for h in world_model_truth(cycles, channels) if h.t_end >= begin)
     hits = len(match(detected[Profile.PRACTICAL.value], unseen).pairs)
     return found, len(unseen), hits
+
+
+def _points(
+    sweeps: Mapping[str, Mapping[HazardType, Sweep]], truths: Mapping[str, tuple[Span, ...]]
+) -> dict[Curve, tuple[Point, ...]]:
+    return {
+        Curve(identifier, truth, hazard): rows
+        for identifier, swept in sweeps.items()
+        for truth, true in truths.items()
+        for hazard, rows in points(swept, true).items()
+    }
 
 
 def _scored(spans: Iterable[Span]) -> tuple[Span, ...]:
@@ -202,26 +249,39 @@ def _found(events: TimeFilter[HazardType], begin: float) -> list[Span]:
 
 
 def _reapplied(
-    signals: Signals, signal: Signal | None, factor: float, begin: float
+    t: Floats, signals: Table, signal: Signal, factor: float, begin: float
 ) -> tuple[Span, ...]:
     """What the practical rules find with every threshold on `signal` times `factor`."""
-    events: TimeFilter[HazardType] = TimeFilter()
-    for rule in load_rules(Profile.PRACTICAL):
-        if rule.hazard not in SCORED_HAZARDS:
-            continue
-        alternatives = tuple(
-            tuple(replace(c, value=c.value * factor) if c.signal is signal else c for c in clauses)
-            for clauses in rule.alternatives
-        )
-        changed = replace(rule, alternatives=alternatives)
-        for t, values in signals:
-            if changed.fires(values):
-                events.add(rule.hazard, t, 0.0, least=True)
-    return tuple(_found(events, begin))
+    rules = (r for r in load_rules(Profile.PRACTICAL) if r.hazard in SCORED_HAZARDS)
+    changed = (with_limit(rule, signal, lambda value: value * factor) for rule in rules)
+    found = (span for rule in changed for span in found_by(rule, t, signals, begin))
+    return tuple(sorted(found, key=lambda s: s.t_start))
 
 
 def _spans(hazards: Iterable[TrueHazard]) -> tuple[Span, ...]:
     return tuple(Span(h.hazard, h.t_start, h.t_end) for h in hazards)
+
+
+def weights_from(text: str) -> dict[str, tuple[float, float]]:
+    """Per driver of the risky stratum the weights of his headway and of his cut-ins, from JSON."""
+    try:
+        rows = json.loads(text)
+        return {f"actor {actor}": (float(a), float(b)) for actor, (a, b) in rows.items()}
+    except (ValueError, TypeError, AttributeError):
+        raise FileError(
+            f"the recording's words `weights` must be JSON of two numbers per actor, got {text[:60]!r}"
+        ) from None
+
+
+def weighted(hazard: TrueHazard, weights: Mapping[str, tuple[float, float]]) -> Span:
+    """A true hazard that counts as the driver whom it is about.
+
+    Who is tailgated has a follower's headway to thank, who tailgates the gap that somebody left him.
+    """
+    column = {HazardType.EGO_TAILGATED: 0, HazardType.EGO_TAILGATING: 1}.get(hazard.hazard)
+    own = [] if column is None else [weights[a][column] for a in hazard.about if a in weights]
+    weight = sum(own) / len(own) if own else 1.0
+    return Span(hazard.hazard, hazard.t_start, hazard.t_end, weight=weight)
 
 
 def _mistakes(

@@ -77,7 +77,7 @@ class Track:
         self.gap, self.v = self.gap + k * miss, self.v + m * miss
         self.p = (a - k * c, (1.0 - m) * b, (1.0 - m) * c)
 
-    def judge(self, t: float, v_ego: float, safe: SafeDistance) -> None:
+    def judge(self, t: float, v_ego: float, safe: SafeDistance, sure: float) -> None:
         """Compare the gap with the safe one; alarm when surely short for long, off when surely not."""
         pair = (self.v, v_ego) if self.behind else (v_ego, self.v)
         need, h = safe.of(*pair), 0.25
@@ -86,7 +86,7 @@ class Track:
         a, b, c = self.p
         self.deficit = need - max(self.gap, 0.0)
         self.sigma = sqrt(max(a + slope * slope * b - 2.0 * slope * c, 0.0))
-        margin = -SURE * self.sigma if self.alarm else SURE * self.sigma
+        margin = -sure * self.sigma if self.alarm else sure * self.sigma
         if v_ego < V_LEAST or self.deficit <= margin:
             self.since, self.alarm = None, False
             return
@@ -97,8 +97,8 @@ class Track:
 class Tracks:
     """Call `update` for every message of the channel."""
 
-    def __init__(self, safe: SafeDistance) -> None:
-        self.safe, self.way = safe, Way()
+    def __init__(self, safe: SafeDistance, sure: float = SURE) -> None:
+        self.safe, self.sure, self.way = safe, sure, Way()
         self.tracks: dict[int, Track] = {}
         self.number = -1  # of tracks without identity, downwards
 
@@ -115,7 +115,7 @@ class Tracks:
                 if label in VEHICLES:
                     self._report(t, frame, i, line, v_ego, body)
             for track in self:
-                track.judge(t, v_ego, self.safe)
+                track.judge(t, v_ego, self.safe, self.sure)
         for key in [k for k, track in self.tracks.items() if t - track.t > COAST + 1e-6]:
             del self.tracks[key]
 

@@ -12,7 +12,7 @@ import numpy as np
 from skidpad.core.channels import ChannelFrame
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.tracked.distance import SafeDistance
-from skidpad.evidence.channels.tracked.tracks import CONFIRM, Track, Tracks
+from skidpad.evidence.channels.tracked.tracks import CONFIRM, SURE, Track, Tracks
 
 SAME = 4.0  # m between two channels' reports of one object
 SIGMA_PLACE = 0.27  # m per axis: 0.10 m of jitter and 0.25 m of drift, as docs/channels.md states
@@ -24,22 +24,29 @@ PLAN_STEP = 0.5  # s
 class Tracked:
     """Call `update` once per cycle with usable frames; None: the channel is silent."""
 
-    def __init__(self, channels: Sequence[str], safe: SafeDistance | None = None) -> None:
-        self.tracks = [Tracks(safe or SafeDistance()) for _ in channels]
+    def __init__(
+        self, channels: Sequence[str], safe: SafeDistance | None = None, sure: float = SURE
+    ) -> None:
+        self.tracks = [Tracks(safe or SafeDistance(), sure) for _ in channels]
         self.pairs = tuple(combinations(range(len(channels)), 2))
         self.offsets: list[deque[tuple[float, float, float]]] = [deque() for _ in self.pairs]
         self.apart: list[deque[tuple[float, float]]] = [deque() for _ in self.pairs]
 
     def update(self, t: float, frames: Sequence[ChannelFrame | None]) -> dict[Signal, float]:
         """The signals at t: metres of gap that are missing, chi-square, s until plans part."""
+        return self.distances(t, frames) | {
+            Signal.OFFSET_CHI2: self._offset(t, frames),
+            Signal.PLANS_APART: self._plans(t, frames),
+        }
+
+    def distances(self, t: float, frames: Sequence[ChannelFrame | None]) -> dict[Signal, float]:
+        """The first of them alone."""
         for tracks, frame in zip(self.tracks, frames, strict=True):
             tracks.update(t, frame)
         out = {
             Signal.REAR_DEFICIT: 0.0,
             Signal.FRONT_DEFICIT: 0.0,
             Signal.UNSEEN_DEFICIT: 0.0,
-            Signal.OFFSET_CHI2: self._offset(t, frames),
-            Signal.PLANS_APART: self._plans(t, frames),
         }
         for c, tracks in enumerate(self.tracks):
             for track in tracks:

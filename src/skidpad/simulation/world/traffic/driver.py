@@ -131,8 +131,9 @@ def change_gain(view: View, d: Drivers, i: int, lane: int, a_now: float, v_desir
         view.streets.net, view.occ, view.placed, lane, s, i, REACH_BEHIND
     )
     a_behind = follower_acceleration(view, d, behind, gap_behind, v)
-    b_safe = min(B_SAFE, braking(view.care, v))
-    if not is_safe(a_new, a_behind, gap_ahead, gap_behind, b_safe):
+    trait = d.trait[i]
+    b_safe = min(trait.imposed, braking(view.care, v) * (trait.imposed / B_SAFE))
+    if not is_safe(a_new, a_behind, gap_ahead, gap_behind, b_safe, trait.room):
         return -np.inf
     old, gap_old = occ_.find_behind(
         view.streets.net, view.occ, view.placed, d.path[i, 0], me.s, i, REACH_BEHIND
@@ -166,7 +167,7 @@ def consider_change(
     if view.care.on and gap_stop < np.inf and not must:
         return
     way = view.placed[i].speed * CHANGE_PERIOD * view.dt
-    drawn = uniform(me.key, view.tick, 2) < view.care.drawn * way
+    drawn = uniform(me.key, view.tick, 2) < view.care.drawn * d.trait[i].eager * way
     drawn_left = uniform(me.key, view.tick, 3) < 0.5
     lane_now = view.streets.net.lane[d.path[i, 0]]
     best, best_gain = -1, view.care.a_change

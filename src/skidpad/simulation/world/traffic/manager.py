@@ -29,6 +29,7 @@ from skidpad.simulation.world.traffic.care import (
     grip_at,
 )
 from skidpad.simulation.world.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
+from skidpad.simulation.world.traffic.mobil import B_SAFE, GAP_CLEAR
 from skidpad.simulation.world.traffic.network import LANE, POINT, STOP, Network, network
 from skidpad.simulation.world.traffic.occupancy import occupancy
 from skidpad.simulation.world.traffic.outlook import desired_speed
@@ -114,7 +115,7 @@ class Traffic:
         self.drivers.state["key"] = [stream_key(self.seed, "traffic", "driver", id) for id in ids]
         self.drivers.trait[:] = _traits([m.actor.body for m in members])
         if self.setup.variety:
-            vary(self.drivers.trait, ids, self.seed)
+            vary(self.drivers.trait, ids, self.seed, self.setup.stratum)
         for new, before in source.items():
             for column, was in zip(self.drivers[:3], old[:3], strict=True):
                 column[new] = was[before]
@@ -245,6 +246,9 @@ def _traits(bodies: Sequence[VehicleType | Shape]) -> NDArray[np.void]:
     traits["headway"] = T_HEADWAY
     traits["a_max"] = A_MAX
     traits["a_curve"] = A_CURVE
+    traits["room"] = GAP_CLEAR
+    traits["imposed"] = B_SAFE
+    traits["eager"] = 1.0
     for trait, t in zip(traits, bodies, strict=True):
         if isinstance(t, Shape):
             continue

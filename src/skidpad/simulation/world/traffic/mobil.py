@@ -10,17 +10,22 @@ from skidpad.core.jit import kernel
 
 POLITENESS = 0.3
 B_SAFE = 2.0  # m/s^2, the hardest braking imposed on the new follower; theirs is 4
-GAP_CLEAR = 4.0  # m to leader and follower on the new lane, whatever the speeds
+GAP_CLEAR = 4.0  # m to leader and, by most, follower on the new lane, whatever the speeds
 
 
 @kernel
 def is_safe(
-    a_self: float, a_new_follower: float, gap_ahead: float, gap_behind: float, b_safe: float
+    a_self: float,
+    a_new_follower: float,
+    gap_ahead: float,
+    gap_behind: float,
+    b_safe: float,
+    room: float,
 ) -> bool:
-    """Nobody has to brake harder than b_safe in m/s^2, and there is room."""
+    """Nobody has to brake harder than b_safe in m/s^2, and there is room, m behind."""
     return (
         gap_ahead > GAP_CLEAR
-        and gap_behind > GAP_CLEAR
+        and gap_behind > room
         and a_new_follower > -b_safe
         and a_self > -b_safe
     )

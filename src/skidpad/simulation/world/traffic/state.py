@@ -45,6 +45,9 @@ TRAIT = np.dtype(
         ("headway", "f8"),  # s
         ("a_max", "f8"),  # m/s^2
         ("a_curve", "f8"),  # m/s^2, lateral acceleration accepted in bends
+        ("room", "f8"),  # m to the new follower with which a lane is entered
+        ("imposed", "f8"),  # m/s^2 of braking that others may have to do for it
+        ("eager", "f8"),  # factor on changes of lane without a reason
         ("wheelbase", "f8"),  # m
         ("steer_angle", "f8"),  # rad at the road wheels for steer 1
         ("understeer", "f8"),  # s^2/m, extra wheel angle per lateral acceleration

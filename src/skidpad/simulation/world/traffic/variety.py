@@ -1,13 +1,22 @@
-"""Drivers differ: desired speed, headway and acceleration, one stream per driver (C-11)."""
+"""Drivers differ: desired speed, headway and acceleration, one stream per driver (C-11).
+
+In the stratum of risky drivers the least of two published distributions is drawn more often than it
+occurs, and each driver has the weight that makes up for it: p / q, by which what happens with him
+counts as often as among natural drivers (importance sampling, which Zhao et al. 2017, IEEE T-ITS,
+10.1109/TITS.2016.2582208, brought to cut-ins).
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from statistics import NormalDist
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.randomness import stream
+from skidpad.core.vocabulary import Stratum
 
 # Taieb-Maimon and Shinar (2001), Human Factors 43(1): at 50 to 100 km/h drivers follow at 0.98 s when
 # told to keep a comfortable distance and at 0.66 s when told to keep the smallest safe one. Log-normal
@@ -19,12 +28,60 @@ SPEED_SIGMA, SPEED_RANGE = 0.10, (0.75, 1.25)
 # Kesting, Treiber and Helbing (2010) vary the IDM's acceleration by 20 to 30 %.
 ACCELERATION_SIGMA, ACCELERATION_RANGE = 0.25, (0.5, 1.6)
 
+# Gaps left to the new follower by 3172 cut-ins between drivers: median 9.57 m, 51.8 % below 10 m
+# (Alhuraish, Wang and Zhou 2026, arXiv 2605.01485, abstract). A log-normal through both has a
+# deviation of ln(10 / 9.57) / 0.0451 = 0.97.
+GAP_MEDIAN, GAP_SIGMA = 9.57, 0.97  # m, of the logarithm
+GAP_RANGE = (1.0, 60.0)  # m
+IMPOSED = 8.0  # m/s^2 that others may have to brake for who cuts in: the hardest (assumed)
+EAGER = 20.0  # times as many changes without a reason, so that there are cut-ins (assumed)
+TAIL, EXTRA = 0.1, 0.5  # the least tenth, and the share of draws that come from it alone
 
-def vary(traits: NDArray[np.void], ids: Sequence[int], seed: int) -> None:
+
+@dataclass(frozen=True, slots=True)
+class Character:
+    """What a risky driver does, as quantiles of the published distributions, and the weights p / q."""
+
+    u_headway: float
+    u_gap: float
+    of_headway: float  # weight of what hangs on how closely he follows
+    of_gap: float  # of what hangs on how closely he cuts in
+
+
+def risky_character(seed: int, id: int) -> Character:
+    """The character of driver `id` in the stratum of risky drivers."""
+    rng = stream(seed, "traffic", "risky", id)
+    draws = rng.random(4).tolist()
+    (u_headway, of_headway), (u_gap, of_gap) = tail_draw(*draws[:2]), tail_draw(*draws[2:])
+    return Character(u_headway, u_gap, of_headway, of_gap)
+
+
+def tail_draw(which: float, where: float) -> tuple[float, float]:
+    """A quantile in [0, 1) from two uniform numbers, and its weight p / q.
+
+    q = (1 - EXTRA) p + EXTRA (p within the least TAIL): no weight exceeds 1 / (1 - EXTRA).
+    """
+    u = where * TAIL if which < EXTRA else where
+    return u, 1.0 / (1.0 - EXTRA + (EXTRA / TAIL if u < TAIL else 0.0))
+
+
+def vary(
+    traits: NDArray[np.void], ids: Sequence[int], seed: int, stratum: Stratum = Stratum.NATURAL
+) -> None:
     """Give every driver (row of TRAIT) a character of its own."""
     for id, trait in zip(ids, traits, strict=True):
         draw = stream(seed, "traffic", "character", id).standard_normal(3).tolist()
+        if stratum is Stratum.RISKY:
+            risky = risky_character(seed, id)
+            draw[0] = _normal(risky.u_headway)
+            gap = GAP_MEDIAN * np.exp(GAP_SIGMA * _normal(risky.u_gap))
+            trait["room"] = np.clip(gap, *GAP_RANGE)
+            trait["imposed"], trait["eager"] = IMPOSED, EAGER
         headway = HEADWAY_MEDIAN * np.exp(HEADWAY_SIGMA * draw[0])
         trait["headway"] = np.clip(headway, *HEADWAY_RANGE)
         trait["factor"] *= np.clip(1.0 + SPEED_SIGMA * draw[1], *SPEED_RANGE)
         trait["a_max"] *= np.clip(1.0 + ACCELERATION_SIGMA * draw[2], *ACCELERATION_RANGE)
+
+
+def _normal(u: float) -> float:
+    return NormalDist().inv_cdf(min(max(u, 1e-9), 1.0 - 1e-9))

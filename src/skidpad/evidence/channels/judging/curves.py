@@ -1,0 +1,147 @@
+"""Precision against recall: what an identifier would find with another limit (C-105).
+
+Of a rule the limit of one leading clause is varied, all others stay; of `tracked` also the standard
+deviations by which a gap must be short; of a learned identifier the limit of its probability.
+"""
+
+from __future__ import annotations
+
+import operator
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.channels import Cycle
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.frames import usable
+from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile, Rule, Signal, load_rules
+from skidpad.evidence.channels.identifier.model import Detector, events_of, probability_of
+from skidpad.evidence.channels.matching import Span, tally
+from skidpad.evidence.channels.tracked.vote import Tracked
+
+Floats = NDArray[np.float64]
+Table = Mapping[Signal, Floats]  # of a drive, (k,) each; NaN: not evaluated
+Sweep = Mapping[float, Sequence[Span]]  # what is found, by limit
+LIMITS = tuple(np.round(np.arange(0.05, 0.96, 0.05), 2).tolist())  # of a probability
+SURES = (0.0, 0.5, 1.0, 2.0, 3.0, 4.0)  # standard deviations
+GAPS = (0.0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.35, 0.4, 0.45, 0.5, 0.6)
+LOCATIONS = (0.1, 0.15, 0.2, 0.25, 0.3, 0.3333, 0.4, 0.5, 0.6)  # 1 / (1 + m between positions)
+CHI2 = (5.0, 9.0, 13.8, 20.0, 27.6, 40.0, 60.0, 100.0, 200.0)
+LEADS: Mapping[Profile, Mapping[HazardType, tuple[Signal, Sequence[float]]]] = {
+    Profile.PRACTICAL: {
+        HazardType.INCONSISTENT_LOCALISATION: (Signal.EGO_LOCATION, LOCATIONS),
+        HazardType.EGO_TAILGATING: (Signal.GAP, GAPS),
+        HazardType.EGO_TAILGATED: (Signal.GAP_SIGNED, GAPS),
+    },
+    Profile.TRACKED: {HazardType.INCONSISTENT_LOCALISATION: (Signal.OFFSET_CHI2, CHI2)},
+}
+SIDES = {
+    HazardType.EGO_TAILGATING: Signal.FRONT_DEFICIT,
+    HazardType.EGO_TAILGATED: Signal.REAR_DEFICIT,
+}
+_OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
+    ">": operator.gt, ">=": operator.ge, "<": operator.lt, "<=": operator.le,
+}  # fmt: skip
+
+
+class Point(NamedTuple):
+    """Counts at one limit."""
+
+    limit: float
+    tp: int
+    fp: int
+    fn: int
+    found: float  # weights of the true hazards found
+    true: float  # of all
+
+
+def columns(signals: Sequence[Mapping[Signal, float]]) -> Table:
+    """The signals of a drive by name."""
+    return {s: np.array([row[s] for row in signals], dtype=np.float64) for s in Signal}
+
+
+def found_by(rule: Rule, t: Floats, table: Table, begin: float) -> tuple[Span, ...]:
+    """What the rule finds from `begin` on, as it does cycle by cycle."""
+    present = np.zeros(t.size)
+    for clauses in rule.alternatives:
+        held = np.ones(t.size, dtype=bool)
+        for c in clauses:
+            held &= _OPERATORS[c.operator](table[c.signal], c.value)  # never with NaN
+        present[held] = 1.0
+    return spans(rule.hazard, t, present, 0.5, 1, begin)
+
+
+def spans(
+    hazard: HazardType, t: Floats, p: Floats, limit: float, confirm: int, begin: float
+) -> tuple[Span, ...]:
+    """Events of a probability over time that reach beyond `begin`."""
+    return tuple(Span(hazard, a, b) for a, b in events_of(t, p, limit, confirm) if b >= begin)
+
+
+def with_limit(rule: Rule, signal: Signal, change: Callable[[float], float]) -> Rule:
+    """The rule with every clause on `signal` changed."""
+    alternatives = tuple(
+        tuple(replace(c, value=change(c.value)) if c.signal is signal else c for c in clauses)
+        for clauses in rule.alternatives
+    )
+    return replace(rule, alternatives=alternatives)
+
+
+def of_rules(profile: Profile, t: Floats, table: Table, begin: float) -> dict[HazardType, Sweep]:
+    """What the profile would find, by limit of each hazard's leading clause."""
+    rules = {r.hazard: r for r in load_rules(profile)}
+    out: dict[HazardType, Sweep] = {}
+    for hazard, (signal, limits) in LEADS.get(profile, {}).items():
+        varied = {to: with_limit(rules[hazard], signal, constant(to)) for to in limits}
+        out[hazard] = {to: found_by(rule, t, table, begin) for to, rule in varied.items()}
+    return out
+
+
+def constant(value: float) -> Callable[[float], float]:
+    """The function that is `value` everywhere."""
+    return lambda _: value
+
+
+def of_distances(
+    channels: Sequence[str], cycles: Sequence[Cycle], begin: float
+) -> dict[HazardType, Sweep]:
+    """What `tracked` would find of both tailgating hazards, by how sure a gap must be short."""
+    found: dict[HazardType, dict[float, tuple[Span, ...]]] = {hazard: {} for hazard in SIDES}
+    t = np.array([c.t for c in cycles])
+    frames = [[None if f is None else usable(f).frame for f in c.frames] for c in cycles]
+    for sure in SURES:
+        tracked = Tracked(channels, sure=sure)
+        rows = [tracked.distances(c.t, f) for c, f in zip(cycles, frames, strict=True)]
+        for hazard, signal in SIDES.items():
+            present = np.array([row[signal] > 0.0 for row in rows], dtype=np.float64)
+            found[hazard][sure] = spans(hazard, t, present, 0.5, 1, begin)
+    return dict(found)
+
+
+def of_learned(
+    detectors: Mapping[HazardType, Detector], t: Floats, rows: Floats, begin: float
+) -> dict[HazardType, Sweep]:
+    """What a learned identifier would find, by limit of probability."""
+    out: dict[HazardType, Sweep] = {}
+    for hazard, d in detectors.items():
+        p = probability_of(d.forest, t, rows)
+        out[hazard] = {limit: spans(hazard, t, p, limit, d.confirm, begin) for limit in LIMITS}
+    return out
+
+
+def points(
+    sweeps: Mapping[HazardType, Sweep], true: Sequence[Span]
+) -> dict[HazardType, tuple[Point, ...]]:
+    """Counts of each sweep against a truth."""
+    out = {}
+    for hazard in (h for h in SCORED_HAZARDS if h in sweeps):
+        here = [s for s in true if s.hazard is hazard]
+        rows = ((limit, tally(found, here, 0.0)[hazard]) for limit, found in sweeps[hazard].items())
+        out[hazard] = tuple(
+            Point(limit, row.tp, row.fp, row.fn, row.weighed.found, row.weighed.true)
+            for limit, row in rows
+        )
+    return out

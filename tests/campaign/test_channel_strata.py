@@ -1,0 +1,81 @@
+"""Routes in other light and weather, and among risky drivers."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+from msgspec import structs
+
+from runs import segment_run
+from skidpad.campaign.channel_drive import drive_segment
+from skidpad.campaign.channel_routes import CONDITIONS, Condition, chosen_routes, driven_routes
+from skidpad.campaign.channel_world import segment_of
+from skidpad.campaign.channels import segments
+from skidpad.core.channels import TruthFrame
+from skidpad.core.run import run_from_plain
+from skidpad.core.vocabulary import Stratum
+from skidpad.recording.channels import McapRecording
+from skidpad.recording.context import context_of
+from skidpad.simulation.world.stage import staged
+from skidpad.simulation.world.traffic.variety import risky_character
+
+
+@pytest.mark.req("C-210")
+def test_every_route_by_day_night_and_rain_and_in_both_strata():
+    runs = chosen_routes("all", None, [*Condition], [*Stratum])
+    assert len(runs) == 6 * 4 * 2
+    assert len({r.name for r in runs}) == len(runs)
+    assert {r.course.place for r in runs} == set(driven_routes())
+    for run in runs:
+        night, rain = run.weather.is_night, run.weather.precipitation > 0.0
+        if run.weather.name in {c.value for c in CONDITIONS}:
+            assert (night, rain) == (run.weather.name == "night", run.weather.name == "rain")
+        assert run_from_plain(run.to_plain(), "it") == run
+    plans = segments(runs, 8.0, segment_run(seed=5))
+    assert sum(p.duration for p in plans) == pytest.approx(8.0 * 3600.0)
+    assert {p.seed for p in plans} == {5000}
+
+
+def test_the_route_as_published_is_what_it_was():
+    """Its name, weather and words in a recording, so that earlier ones stay comparable."""
+    (run,) = chosen_routes("route-4")
+    assert run.course.name == run.course.place == "route-4"
+    assert run == driven_routes()["route-4"]
+
+
+@pytest.mark.req("R-5")
+def test_background_drivers_mind_the_weather_unless_told_not_to():
+    (minding,), (careless,) = (
+        chosen_routes("route-4", drivers_mind_weather=minds) for minds in (True, False)
+    )
+    assert segment_of(minding).setup.traffic.slow_in_weather
+    assert not segment_of(careless).setup.traffic.slow_in_weather
+
+
+@pytest.mark.req("C-2")
+def test_a_recording_of_risky_drivers_says_how_much_each_of_them_counts(tmp_path):
+    (run,) = chosen_routes("route-4", None, [Condition.DAY], [Stratum.RISKY])
+    run = structs.replace(run, seed=3, duration=1.0)
+    drive_segment(run, tmp_path / "a.mcap")
+    recording = McapRecording(tmp_path / "a.mcap")
+    context = context_of(recording)
+    assert (context["route"], context["stratum"]) == ("route-4", "risky")
+    weights = json.loads(context["weights"])
+    world = staged(segment_of(run).setup, run.seed)
+    traits = world.traffic.drivers.trait
+    for row, (of_headway, of_gap) in weights.items():
+        character = risky_character(run.seed, int(row))
+        assert (of_headway, of_gap) == (
+            pytest.approx(character.of_headway, abs=1e-6),
+            pytest.approx(character.of_gap, abs=1e-6),
+        )
+        assert (traits["headway"][int(row)] < 0.587) == (of_headway < 1.0)
+    rows = {
+        int(i)
+        for m in recording.messages()
+        if isinstance(m.item, TruthFrame)
+        for i in m.item.ids[np.hypot(*m.item.actors[:, 3:].T) > 1.0]
+    }
+    assert rows <= {int(row) for row in weights}  # who drives in the true world has a weight

@@ -59,7 +59,8 @@ def first_overlap(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> float
         dx = dy = 0.0
         if k < n - 1:
             dx, dy = b[k + 1, 0] - a[k + 1, 0] - x, b[k + 1, 1] - a[k + 1, 1] - y
-        if np.hypot(x, y) - np.hypot(dx, dy) > reach:
+        room = reach + abs(dx) + abs(dy)
+        if x * x + y * y > room * room:  # an upper bound of the way is enough, and fast
             continue
         _axes(a[k], half_a, b[k], half_b, axes)
         share = _entry(x, y, dx, dy, axes)
@@ -131,6 +132,7 @@ def encroachment(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> tuple[
     steps = a.shape[0] - 1
     axes, room = np.empty((4, 3)), np.empty((2, CORNERS, 2))
     reach = half_a[0] + half_a[1] + half_b[0] + half_b[1] + _stride(a) + _stride(b)
+    reach_sq = reach * reach
     least, nearness = np.inf, 0.0
     for shift in range(round(PET_SAFE / STEP) + 1):
         soonest = max(shift - 1, 0) * STEP
@@ -139,7 +141,8 @@ def encroachment(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> tuple[
         for early in range(steps - shift):
             for swap in range(2 if shift > 0 else 1):
                 i, j = (early, early + shift) if swap == 0 else (early + shift, early)
-                if np.hypot(b[j, 0] - a[i, 0], b[j, 1] - a[i, 1]) > reach:
+                x, y = b[j, 0] - a[i, 0], b[j, 1] - a[i, 1]
+                if x * x + y * y > reach_sq:
                     continue
                 for k in range(_shared(a, i, half_a, b, j, half_b, axes, room)):
                     t_a, t_b = (i + room[0, k, 0]) * STEP, (j + room[0, k, 1]) * STEP

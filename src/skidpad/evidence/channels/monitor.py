@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,13 +192,16 @@ class Monitor:
             if one is None:
                 u.absent[name] += 1
                 continue
-            u.objects[name] += one.unusable
-            u.objects_beyond_limit[name] += one.beyond_limit
-            if not np.isfinite(one.frame.ego).all():
+            if one.unusable or one.beyond_limit:
+                u.objects[name] += one.unusable
+                u.objects_beyond_limit[name] += one.beyond_limit
+            if not all(map(isfinite, one.frame.ego.tolist())):
                 u.poses[name] += 1
             if len(one.frame.plan) == 0:
                 u.plans[name] += 1
-            u.shapes[name] += int((one.frame.polygon_size < 3).sum())
+            flat = [size for size in one.frame.polygon_size.tolist() if size < 3]
+            if flat:
+                u.shapes[name] += len(flat)
 
     def _count_violations(self, t: float, readings: Readings) -> None:
         self._missing += np.isnan(readings.values)

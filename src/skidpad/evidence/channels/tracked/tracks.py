@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skidpad.core.channels import ChannelFrame
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.evidence.channels.tracked.distance import SafeDistance
-from skidpad.evidence.channels.tracked.way import Line, Way
+from skidpad.evidence.channels.tracked.way import Placed, Way
 
 Floats = NDArray[np.float64]
 # Measurement and motion noise are assumptions of the order of the channels' sensors.
@@ -25,6 +25,7 @@ TURN_MOST = np.radians(45.0)
 SPARE = 0.3  # m beside the path within which a track that was on it stays on it
 V_LEAST = 2.0  # m/s of the ego
 NEAR = 4.0  # m between reports of an object without identity
+REACH = 75.0  # m from the ego
 VEHICLES = {
     int(c)
     for c in (
@@ -108,12 +109,13 @@ class Tracks:
     def update(self, t: float, frame: ChannelFrame | None) -> None:
         """One cycle; without a message tracks wait for their end."""
         if frame is not None and Way.usable(frame):
-            line, v_ego = self.way.update(frame), hypot(*frame.ego[3:].tolist())
+            self.way.update(frame)
+            v_ego, rows = hypot(*frame.ego[3:].tolist()), _vehicles_near(frame)
             x, y = frame.ego_polygon[:, 0], frame.ego_polygon[:, 1]
             body = (float(x.max()), float(-x.min()), float(np.abs(y).max()))
-            for i, label in enumerate(frame.classes.tolist()):
-                if label in VEHICLES:
-                    self._report(t, frame, i, line, v_ego, body)
+            places = self.way.line(frame).places(frame.objects[rows]) if len(rows) else ()
+            for i, where in zip(rows.tolist(), places, strict=True):
+                self._report(t, frame, i, where, v_ego, body)
             for track in self:
                 track.judge(t, v_ego, self.safe, self.sure)
         for key in [k for k, track in self.tracks.items() if t - track.t > COAST + 1e-6]:
@@ -124,14 +126,12 @@ class Tracks:
         t: float,
         frame: ChannelFrame,
         i: int,
-        line: Line,
+        where: Placed,
         v_ego: float,
         body: tuple[float, float, float],
     ) -> None:
         state = frame.objects[i]
-        if hypot(*(state[:2] - frame.ego[:2]).tolist()) > 75.0:
-            return
-        s, offset, turn, v = line.place(state)
+        s, offset, turn, v = where
         shape = frame.polygons[i, : frame.polygon_size[i]]
         half_l, half_w = np.abs(shape).max(axis=0, initial=0.0).tolist()
         key = self._key(frame, i, state)
@@ -162,3 +162,12 @@ class Tracks:
             return min(near)[1]
         self.number -= 1
         return self.number
+
+
+def _vehicles_near(frame: ChannelFrame) -> NDArray[np.int64]:
+    """Rows of objects within reach that may tailgate or be tailgated."""
+    labels = frame.classes.tolist()
+    rows = np.array([i for i, label in enumerate(labels) if label in VEHICLES], dtype=np.int64)
+    dx, dy = (frame.objects[rows, :2] - frame.ego[:2]).T
+    near: NDArray[np.int64] = rows[dx * dx + dy * dy <= REACH * REACH]
+    return near

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from math import cos, dist, isfinite, sin
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,15 +30,27 @@ class Way:
         x, y, *rest = frame.ego.tolist()
         return abs(x) + abs(y) < FAR and all(map(isfinite, rest))
 
-    def update(self, frame: ChannelFrame) -> Line:
-        """The line of this cycle."""
+    def update(self, frame: ChannelFrame) -> None:
+        """Where the ego is in this cycle."""
         place = (float(frame.ego[0]), float(frame.ego[1]))
         moved = dist(place, self.past[-1]) if self.past else STEP
         if moved > LEAP:
             self.past.clear()
         if moved >= STEP:
             self.past.append(place)
+
+    def line(self, frame: ChannelFrame) -> Line:
+        """The line of this cycle, after `update`."""
         return Line(list(self.past), frame)
+
+
+class Placed(NamedTuple):
+    """Where on the way something is."""
+
+    s: float  # m along it from the ego
+    offset: float  # m to the left of it
+    turn: float  # rad against its direction
+    v: float  # m/s along it
 
 
 class Line:
@@ -73,15 +86,17 @@ class Line:
         ways = np.gradient(self.points, axis=0)
         self.heading = np.arctan2(ways[:, 1], ways[:, 0])
 
-    def place(self, state: Floats) -> tuple[float, float, float, float]:
-        """Of a state (5,): s along the way from the ego, offset to the left, turn, speed along."""
-        k = int(np.argmin(((self.points - state[:2]) ** 2).sum(axis=1)))
-        h = float(self.heading[k])
-        c, sn = cos(h), sin(h)
-        dx, dy = (state[:2] - self.points[k]).tolist()
-        turn = (float(state[2]) - h + np.pi) % (2.0 * np.pi) - np.pi
-        speed = float(c * state[3] + sn * state[4])
-        return float(self.s[k] + c * dx + sn * dy - self.ego), c * dy - sn * dx, turn, speed
+    def places(self, states: Floats) -> list[Placed]:
+        """Of n > 0 states (n, 5)."""
+        apart = states[:, None, :2] - self.points[None]
+        k = np.argmin(apart[:, :, 0] ** 2 + apart[:, :, 1] ** 2, axis=1)
+        h = self.heading[k]
+        c, s = np.cos(h), np.sin(h)
+        dx, dy = apart[np.arange(len(k)), k].T
+        turn = (states[:, 2] - h + np.pi) % (2.0 * np.pi) - np.pi
+        along = self.s[k] + c * dx + s * dy - self.ego
+        found = [along, c * dy - s * dx, turn, c * states[:, 3] + s * states[:, 4]]
+        return [Placed(*row) for row in np.column_stack(found).tolist()]
 
 
 def _unit(a: tuple[float, float], b: tuple[float, float]) -> tuple[float, float]:

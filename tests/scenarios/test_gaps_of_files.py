@@ -193,3 +193,13 @@ def test_a_document_type_may_hold_short_texts_and_nothing_else(tmp_path):
         file.write_text(f"<!DOCTYPE OpenSCENARIO [ {bad} ]>{text}")
         with pytest.raises(FileError, match="document type"):
             parse(file)
+
+
+def test_a_road_without_a_lane_leaves_a_straight_one(tmp_path):
+    (tmp_path / "empty.xodr").write_text(
+        '<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="4"/></OpenDRIVE>'
+    )
+    place = init("ego", teleport('<WorldPosition x="10" y="0" h="0"/>'))
+    scenario = compiled(tmp_path, road='<LogicFile filepath="empty.xodr"/>', init=place)
+    assert scenario.map_name == "straight"
+    assert any("no driving lane" in str(f) for f in scenario.findings)

@@ -4,6 +4,7 @@ SkidpadError
 ├── InputError        the user gave something that cannot be used; the command exits with 2
 │   ├── ConfigError   a value outside its range, an unknown name or key
 │   ├── FileError     a file that is missing, unreadable, or not what it should be
+│   │   └── NoLaneError  a map on which nothing can be driven
 │   └── OutputError   an output folder that would be overwritten, a full disk
 ├── BackendError      a simulator that does not answer, or answers nonsense
 ├── StackError        the stack under test raised, or returned no command
@@ -27,6 +28,10 @@ class ConfigError(InputError):
 
 class FileError(InputError):
     """A file that is missing, unreadable, or not of the expected kind."""
+
+
+class NoLaneError(FileError):
+    """A map on which nothing can be driven."""
 
 
 class OutputError(InputError):

@@ -14,6 +14,7 @@ from lxml import etree
 from skidpad.core.errors import FileError
 from skidpad.scenarios.expressions import ExpressionError, evaluate
 from skidpad.scenarios.findings import Fault, Finding, Kind
+from skidpad.scenarios.older import renew
 
 SIZE_MAX = 64_000_000  # bytes
 TRUE, FALSE = ("true", "1"), ("false", "0")
@@ -194,4 +195,7 @@ def parse(path: Path) -> Node:
         raise FileError(f"scenario {path}: a document type that names other files or entities")
     if root.tag != "OpenSCENARIO":
         raise FileError(f"scenario {path}: the root is <{root.tag}>, not <OpenSCENARIO>")
+    header = root.find("FileHeader")
+    if header is not None and header.get("revMajor") == "0":
+        renew(root)
     return Node(root, path, {})

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.errors import ConfigError, FileError, NoLaneError
 from skidpad.core.reading import is_file
 from skidpad.roads.bundled import bundled_maps, load_map
 from skidpad.roads.queries import RoadMap
@@ -151,7 +151,7 @@ class _Wish:
 def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | None:
     values = root_values(root, wish.parameters)
     root = root.scoped(values)
-    network = _network(root, wish.maps)
+    network = _network(root, wish.maps, findings)
     catalogs = Catalogs(root)
     entities = compile_entities(root, catalogs)
     findings += entities.findings
@@ -205,7 +205,7 @@ def _activations(board: Storyboard, name: str) -> Iterator[bool]:
                     yield from (True for p in parts if isinstance(p, Activate) and p.says)
 
 
-def _network(root: Node, maps: Sequence[Path]) -> Network:
+def _network(root: Node, maps: Sequence[Path], findings: list[Finding]) -> Network:
     """The road beside the file; a bundled map by its bare name; a straight road where none is named."""
     logic = root.find("RoadNetwork", "LogicFile")
     if logic is None:
@@ -222,6 +222,9 @@ def _network(root: Node, maps: Sequence[Path]) -> Network:
         raise logic.error(f"there is no road file {name!r} beside the scenario")
     try:
         return network_of(load_map(path), path)
+    except NoLaneError as error:
+        findings.append(logic.finding(f"{error}: a straight road is taken", Kind.NOTE))
+        return network_of(load_map(EMPTY_ROAD), EMPTY_ROAD)
     except (FileError, ConfigError) as error:
         raise logic.error(f"the road {name!r} cannot be read: {error}") from None
 

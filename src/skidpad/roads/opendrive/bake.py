@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.errors import FileError
+from skidpad.core.errors import FileError, NoLaneError
 from skidpad.core.setup import LanePosition
 from skidpad.roads.baked import BakedMap
 from skidpad.roads.lanes import LaneSamples, LaneTable
@@ -42,7 +42,7 @@ def bake(text: bytes, name: str, file: str = "") -> BakedMap:
     document = parse(text, file or name)
     shapes = list(lane_shapes(document))
     if not any(shape.kind in DRIVABLE for shape in shapes):
-        raise FileError(f"{document.file}: has no driving lane")
+        raise NoLaneError(f"{document.file}: has no driving lane")
     index = {shape.key: i for i, shape in enumerate(shapes)}
     signals = signal_table(document, shapes, index)
     return BakedMap(

@@ -63,7 +63,8 @@ def _value(node: Node, ctx: Context) -> Condition:
 def _is_criterion(node: Node) -> bool:
     """ScenarioRunner judges by conditions of these names, and reads nothing else of them."""
     named = next(node.element.iterancestors("Condition"), None)
-    return named is not None and str(named.get("name", "")).startswith("criteria_")
+    name = "" if named is None else str(named.get("name", ""))
+    return name.startswith("criteria_") or name.endswith("Test")  # the latter in 2019
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,227 @@
+"""OpenSCENARIO 0.9.1 as 1.0: elements and attributes that have other names since, in place.
+
+By the rules of ASAM's migration from 0.9.1 to 1.0; what is not named here stays as it is, and is
+refused by name where it matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from lxml import etree
+
+Element = etree._Element
+POSITION = {
+    "World": "WorldPosition", "RelativeWorld": "RelativeWorldPosition", "Road": "RoadPosition",
+    "RelativeObject": "RelativeObjectPosition", "RelativeRoad": "RelativeRoadPosition",
+    "Lane": "LanePosition", "RelativeLane": "RelativeLanePosition", "Route": "RoutePosition",
+}  # fmt: skip
+OF_PRIVATE = {
+    "Longitudinal": "LongitudinalAction", "Lateral": "LateralAction", "Routing": "RoutingAction",
+    "Visibility": "VisibilityAction", "Meeting": "SynchronizeAction",
+}  # fmt: skip
+OF_ACTION = {
+    "Private": "PrivateAction", "Global": "GlobalAction", "UserDefined": "UserDefinedAction",
+}  # fmt: skip
+TAGS: Mapping[str, Mapping[str, str]] = {  # by the new name of what they stand in
+    "OpenSCENARIO": {"ParameterDeclaration": "ParameterDeclarations", "Catalogs": "CatalogLocations"},
+    "ParameterDeclarations": {"Parameter": "ParameterDeclaration"},
+    "CatalogLocations": {"DriverCatalog": "ControllerCatalog"},
+    "Catalog": {"Driver": "Controller"},
+    "RoadNetwork": {"Logics": "LogicFile", "SceneGraph": "SceneGraphFile"},
+    "Entities": {"Object": "ScenarioObject", "Selection": "EntitySelection"},
+    "Vehicle": {"ParameterDeclaration": "ParameterDeclarations"},
+    "BoundingBox": {"Dimension": "Dimensions"},
+    "Axles": {"Front": "FrontAxle", "Rear": "RearAxle", "Additional": "AdditionalAxle"},
+    "Storyboard": {"EndConditions": "StopTrigger"},
+    "Actions": {"Global": "GlobalAction", "UserDefined": "UserDefinedAction"},
+    "Private": {"Action": "PrivateAction"},
+    "Action": OF_ACTION,
+    "Act": {"Sequence": "ManeuverGroup", "Start": "StartTrigger", "End": "StopTrigger"},
+    "Actors": {"Entity": "EntityRef"},
+    "TriggeringEntities": {"Entity": "EntityRef"},
+    "TimeToCollisionConditionTarget": {"Entity": "EntityRef"},
+    "CollisionCondition": {"ByEntity": "EntityRef"},
+    "Event": {"StartConditions": "StartTrigger"},
+    "Condition": {
+        "ByEntity": "ByEntityCondition", "ByValue": "ByValueCondition", "ByState": "ByValueCondition",
+    },
+    "ByValueCondition": {
+        "SimulationTime": "SimulationTimeCondition", "Parameter": "ParameterCondition",
+        "AtStart": "StoryboardElementStateCondition",
+        "AfterTermination": "StoryboardElementStateCondition",
+    },
+    "EntityCondition": {
+        name: f"{name}Condition"
+        for name in (
+            "EndOfRoad", "Collision", "Offroad", "TimeHeadway", "TimeToCollision", "Acceleration",
+            "StandStill", "Speed", "RelativeSpeed", "TraveledDistance", "ReachPosition",
+            "Distance", "RelativeDistance",
+        )
+    },
+    "TimeToCollisionCondition": {"Target": "TimeToCollisionConditionTarget"},
+    "PrivateAction": OF_PRIVATE,
+    "LongitudinalAction": {"Speed": "SpeedAction", "Distance": "LongitudinalDistanceAction"},
+    "SpeedAction": {"Dynamics": "SpeedActionDynamics", "Target": "SpeedActionTarget"},
+    "SpeedActionTarget": {"Absolute": "AbsoluteTargetSpeed", "Relative": "RelativeTargetSpeed"},
+    "LongitudinalDistanceAction": {"Dynamics": "DynamicConstraints", "Limited": "DynamicConstraints"},
+    "LateralAction": {
+        "LaneChange": "LaneChangeAction", "LaneOffset": "LaneOffsetAction",
+        "Distance": "LateralDistanceAction",
+    },
+    "LaneChangeAction": {"Dynamics": "LaneChangeActionDynamics", "Target": "LaneChangeTarget"},
+    "LaneChangeTarget": {"Absolute": "AbsoluteTargetLane", "Relative": "RelativeTargetLane"},
+    "LaneOffsetAction": {"Dynamics": "LaneOffsetActionDynamics", "Target": "LaneOffsetTarget"},
+    "LaneOffsetTarget": {
+        "Absolute": "AbsoluteTargetLaneOffset", "Relative": "RelativeTargetLaneOffset",
+    },
+    "RoutingAction": {
+        "FollowRoute": "AssignRouteAction", "FollowTrajectory": "FollowTrajectoryAction",
+        "AcquirePosition": "AcquirePositionAction",
+    },
+    "FollowTrajectoryAction": {
+        "Longitudinal": "TimeReference", "Lateral": "TrajectoryFollowingMode",
+    },
+    "GlobalAction": {"SetEnvironment": "EnvironmentAction", "Entity": "EntityAction"},
+    "EntityAction": {"Add": "AddEntityAction", "Delete": "DeleteEntityAction"},
+    "Position": POSITION,
+}  # fmt: skip
+ATTRIBUTES: Mapping[str, Mapping[str, str]] = {  # by the new name of the element
+    "ParameterDeclaration": {"type": "parameterType"},
+    "Vehicle": {"category": "vehicleCategory"},
+    "Pedestrian": {"category": "pedestrianCategory"},
+    "MiscObject": {"category": "miscObjectCategory"},
+    "Private": {"object": "entityRef"},
+    "ManeuverGroup": {"numberOfExecutions": "maximumExecutionCount"},
+    "EntityRef": {"name": "entityRef"},
+    "Condition": {"edge": "conditionEdge"},
+    "TriggeringEntities": {"rule": "triggeringEntitiesRule"},
+    "ParameterCondition": {"name": "parameterRef"},
+    "RelativeDistanceCondition": {"type": "relativeDistanceType"},
+    "RoadPosition": {"id": "roadId"},
+    "EntityAction": {"name": "entityRef"},
+    "Precipitation": {"type": "precipitationType"},
+    "RoadCondition": {"frictionScale": "frictionScaleFactor"},
+    "RelativeTargetSpeed": {"valueType": "speedTargetValueType"},
+    "SpeedActionDynamics": {"shape": "dynamicsShape"},
+    "LaneChangeActionDynamics": {"shape": "dynamicsShape"},
+    "LaneOffsetActionDynamics": {"shape": "dynamicsShape"},
+    "TrajectoryFollowingMode": {"purpose": "followingMode"},
+    "Timing": {"domain": "domainAbsoluteRelative"},
+}
+WORDS = {
+    "rule": {"greater_than": "greaterThan", "less_than": "lessThan", "equal_to": "equalTo"},
+    "conditionEdge": {"any": "risingOrFalling"},
+    "relativeDistanceType": {"inertial": "cartesianDistance"},
+    "followingMode": {"steering": "follow"},
+}
+DIMENSIONS = ("rate", "time", "distance")
+STATES = {"AtStart": "startTransition", "end": "endTransition", "cancel": "stopTransition"}
+A_MAX = "200"  # m/s^2, as in ASAM's migration; 0.9.1 knows no largest acceleration
+
+
+def renew(root: Element) -> None:
+    """Everything under the root by its newer name."""
+    for element in list(root.iter("*")):
+        parent = element.getparent()
+        inside = "" if parent is None else str(parent.tag)
+        old = str(element.tag)
+        if old == "Conditions" and inside == "Act":
+            _lift(element)
+            continue
+        element.tag = TAGS.get(inside, {}).get(old, old)
+        _rename(element, old)
+        special = SPECIAL.get(str(element.tag))
+        if special is not None:
+            special(element)
+
+
+def _rename(element: Element, old: str) -> None:
+    names = ATTRIBUTES.get(str(element.tag), {})
+    for name, value in list(element.attrib.items()):
+        key = str(name)
+        new = names.get(key, "entityRef" if key in ("object", "entity") else key)
+        if new != key:
+            del element.attrib[key]
+        element.set(new, WORDS.get(new, {}).get(str(value), str(value)))
+    if str(element.tag) == "StoryboardElementStateCondition":
+        kind, name = element.attrib.pop("type", ""), element.attrib.pop("name", "")
+        state = STATES.get(old) or STATES.get(str(element.attrib.pop("rule", "")), "completeState")
+        element.set("storyboardElementType", "maneuver" if kind == "sequence" else str(kind))
+        element.set("storyboardElementRef", str(name))
+        element.set("state", state)
+
+
+def _lift(element: Element) -> None:
+    """The triggers of an act stand in the act itself since."""
+    parent = element.getparent()
+    assert parent is not None
+    for child in list(element):
+        parent.append(child)
+        child.tag = TAGS["Act"].get(str(child.tag), str(child.tag))
+    parent.remove(element)
+
+
+def _dynamics(element: Element) -> None:
+    found = [d for d in DIMENSIONS if element.get(d) is not None]
+    if not found or element.get("value") is not None:
+        return
+    chosen = next((d for d in found if element.get(d) not in ("0", "0.0")), found[0])
+    element.set("dynamicsDimension", chosen)
+    element.set("value", str(element.get(chosen)))
+    for name in found:
+        del element.attrib[name]
+
+
+def _performance(element: Element) -> None:
+    if element.get("maxAcceleration") is None:
+        element.set("maxAcceleration", A_MAX)
+
+
+def _private(element: Element) -> None:
+    """A position as an action is a teleport."""
+    place = element.find("Position")
+    if place is not None:
+        teleport = etree.SubElement(element, "TeleportAction")
+        teleport.sourceline = place.sourceline
+        teleport.append(place)
+
+
+def _actors(element: Element) -> None:
+    chosen = element.find("ByCondition")
+    if chosen is not None:
+        element.set("selectTriggeringEntities", "true")
+        element.remove(chosen)
+
+
+def _time(element: Element) -> None:
+    clock, date = element.find("Time"), element.find("Date")
+    if clock is not None and date is not None:
+        day = "-".join(str(date.get(k, "1")).zfill(2) for k in ("year", "month", "day"))
+        hour, minute = (str(clock.get(k, "0")).zfill(2) for k in ("hour", "min"))
+        element.set("dateTime", f"{day}T{hour}:{minute}:00")
+
+
+def _trajectory(element: Element) -> None:
+    """Its shape stands around the vertices since; only lines from point to point are taken over."""
+    vertices = element.findall("Vertex")
+    if not vertices or any(v.find("Shape/Polyline") is None for v in vertices):
+        return
+    line = etree.SubElement(etree.SubElement(element, "Shape"), "Polyline")
+    for vertex in vertices:
+        vertex.set("time", str(vertex.attrib.pop("reference", "0")))
+        shape = vertex.find("Shape")
+        if shape is not None:
+            vertex.remove(shape)
+        line.append(vertex)
+
+
+SPECIAL: Mapping[str, Callable[[Element], None]] = {
+    "SpeedActionDynamics": _dynamics,
+    "LaneChangeActionDynamics": _dynamics,
+    "Performance": _performance,
+    "PrivateAction": _private,
+    "Actors": _actors,
+    "TimeOfDay": _time,
+    "Trajectory": _trajectory,
+}

@@ -1,0 +1,92 @@
+"""OpenSCENARIO 0.9.1: files with the names of that time play as those of 1.0 do."""
+
+from __future__ import annotations
+
+import pytest
+
+from skidpad.scenarios.scenario import check
+from skidpad.scenarios.stage import played
+
+CAR = """<Object name="{0}"><Vehicle name="v" category="car"><ParameterDeclaration/>
+<Performance maxSpeed="60" maxDeceleration="10" mass="1500"/><BoundingBox><Center x="1.4" y="0"
+z="0.7"/><Dimension width="1.8" length="4.2" height="1.5"/></BoundingBox><Axles><Front
+maxSteering="0.5" wheelDiameter="0.6" trackWidth="1.6" positionX="2.7" positionZ="0.3"/><Rear
+maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" positionX="0" positionZ="0.3"/></Axles>
+<Properties/></Vehicle></Object>"""
+BEGIN = """<Private object="{0}"><Action><Position><Lane roadId="1" laneId="{1}" s="{2}"/></Position>
+</Action><Action><Longitudinal><Speed><Dynamics shape="step"/><Target><Absolute value="$v"/></Target>
+</Speed></Longitudinal></Action></Private>"""
+FILE = """<?xml version="1.0"?><OpenSCENARIO><FileHeader revMajor="0" revMinor="9"
+date="2019-06-25T00:00:00" description="x" author="x"/><ParameterDeclaration><Parameter name="$v"
+type="double" value="10"/></ParameterDeclaration><Catalogs/><RoadNetwork><Logics
+filepath="straight.xodr"/><SceneGraph filepath=""/></RoadNetwork><Entities>{cars}</Entities>
+<Storyboard><Init><Actions><Global><SetEnvironment><Environment name="e"><TimeOfDay
+animation="false"><Time hour="9" min="30" sec="0"/><Date day="5" month="6" year="2019"/></TimeOfDay>
+<Weather cloudState="free"><Sun intensity="1" azimuth="0" elevation="1"/><Fog visualRange="1000"/>
+<Precipitation type="dry" intensity="0"/></Weather><RoadCondition frictionScale="0.5"/></Environment>
+</SetEnvironment></Global>{begin}</Actions></Init><Story name="s" owner="other"><Act name="a">
+<Sequence name="q" numberOfExecutions="1"><Actors><Entity name="other"/></Actors><Maneuver name="m">
+{events}</Maneuver></Sequence><Conditions><Start><ConditionGroup><Condition name="c" delay="0"
+edge="rising"><ByValue><SimulationTime value="1" rule="greater_than"/></ByValue></Condition>
+</ConditionGroup></Start></Conditions></Act></Story><EndConditions><ConditionGroup><Condition
+name="c" delay="0" edge="any"><ByValue><SimulationTime value="8" rule="greater_than"/></ByValue>
+</Condition></ConditionGroup></EndConditions></Storyboard></OpenSCENARIO>"""
+EVENT = """<Event name="{0}" priority="overwrite"><Action name="{0}a"><Private>{1}</Private></Action>
+<StartConditions><ConditionGroup><Condition name="c" delay="0" edge="{3}">{2}</Condition>
+</ConditionGroup></StartConditions></Event>"""
+SLOW = """<Longitudinal><Speed><Dynamics shape="linear" rate="3"/><Target><Relative object="ego"
+value="-6" valueType="delta" continuous="false"/></Target></Speed></Longitudinal>"""
+CHANGE = """<Lateral><LaneChange><Dynamics shape="sinusoidal" time="2"/><Target><Relative
+object="other" value="1"/></Target></LaneChange></Lateral>"""
+NEAR = """<ByEntity><TriggeringEntities rule="any"><Entity name="ego"/></TriggeringEntities>
+<EntityCondition><RelativeDistance entity="other" type="inertial" value="{0}" freespace="false"
+rule="less_than"/></EntityCondition></ByEntity>"""
+AFTER = '<ByState><AfterTermination type="event" name="slow" rule="end"/></ByState>'
+
+
+def played_file(tmp_path, *events, cars=("ego", "other")):
+    text = FILE.format(
+        cars="".join(map(CAR.format, cars)),
+        begin=BEGIN.format("ego", -2, 100) + BEGIN.format("other", -2, 140),
+        events="".join(events),
+    )
+    path = tmp_path / "old.xosc"
+    path.write_text(text)
+    return played(check(path).playable(), 20.0)
+
+
+def test_names_of_0_9_1_are_those_of_later(tmp_path):
+    slow = EVENT.format("slow", SLOW, NEAR.format(41), "none")
+    change = EVENT.format("change", CHANGE, AFTER, "rising")
+    told = played_file(tmp_path, slow, change)
+    rows = told.of("other")
+    begun = {e.name.rsplit("::", 1)[-1]: e.t for e in told.player.events}
+    assert begun["slow"] == pytest.approx(1.05, abs=0.051)  # when its act has begun
+    assert rows[-1].speed == pytest.approx(4.0)
+    assert begun["change"] == pytest.approx(begun["slow"] + 2.0, abs=0.11)
+    assert rows[-1].y - rows[0].y == pytest.approx(3.5, abs=0.05)
+    assert rows[-1].time == pytest.approx(8.0, abs=0.11)
+
+
+def test_weather_and_time_of_0_9_1(tmp_path):
+    environment = played_file(tmp_path).player.scenario.start.environment
+    assert environment.friction_scale == 0.5
+    assert environment.time_of_day == "2019-06-05T09:30:00"
+    assert environment.visual_range == 1000.0
+
+
+LINE = "".join(
+    f"""<Vertex reference="{t}"><Position><World x="{150 + 12 * t}" y="-8.75" h="0"/></Position>
+<Shape><Polyline/></Shape></Vertex>"""
+    for t in range(5)
+)
+FOLLOW = f"""<Routing><FollowTrajectory><Trajectory name="t" closed="false" domain="time">{LINE}
+</Trajectory><Longitudinal><Timing domain="relative" scale="1" offset="0"/></Longitudinal>
+<Lateral purpose="position"/></FollowTrajectory></Routing>"""
+
+
+def test_a_trajectory_of_0_9_1_is_a_line(tmp_path):
+    rows = played_file(tmp_path, EVENT.format("e", FOLLOW, NEAR.format(99), "none")).of("other")
+    k = next(k for k, r in enumerate(rows) if r.y < -8.0)
+    assert rows[k + 40].x - rows[k].x == pytest.approx(24.0, abs=0.7)
+    assert rows[k + 40].speed == pytest.approx(12.0)

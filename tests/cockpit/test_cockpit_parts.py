@@ -44,6 +44,7 @@ from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.physics.presets import preset
 from skidpad.recording.logfiles import log_hash
 from skidpad.roads.bundled import load_map
+from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 
 
 @pytest.fixture
@@ -289,8 +290,14 @@ def test_what_the_words_of_a_tab_mean():
         assert b.producer.words[-1] == meant
     assert b.say("a", "hide", "depth") is None
     assert b.producer.words[-1] == Show(View.FOLLOW, (View.SEMANTIC,))
-    assert b.say("a", "plain") is None
-    assert b.producer.words[-1] == Show(View.FOLLOW, (View.SEMANTIC,), plain=True)
+    assert b.say("a", "extra", "clouds") is None
+    without = tuple(sorted(ALL_EXTRAS - {Extra.CLOUDS}))
+    assert b.producer.words[-1] == Show(View.FOLLOW, (View.SEMANTIC,), without)
+    assert b.say("a", "extra") is None  # all that are left, and all again
+    assert b.producer.words[-1] == Show(View.FOLLOW, (View.SEMANTIC,), ())
+    assert b.say("a", "extra") is None
+    assert b.producer.words[-1] == Show(View.FOLLOW, (View.SEMANTIC,), tuple(sorted(ALL_EXTRAS)))
+    assert "is not a valid Extra" in b.say("a", "extra", "frogs")
     b.say("a", "sky", {"ice_thickness": 30.0})
     b.say("a", "sky", {"fog_density": 20.0})
     sky = b.producer.words[-1].input

@@ -9,6 +9,7 @@ from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.vocabulary import ActorKind
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import preset
+from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
 from skidpad.sensors.suite import PixelSettings, PixelSuite
 
 # from straight above, 20 m over the road: 400 px show 2 * 20 m, so 10 px are a metre
@@ -22,7 +23,9 @@ def seen(weather, shadows, view=ABOVE):
         CameraSpec(m.value, m, 400, 400, 90.0, view, True)
         for m in (Modality.RGB, Modality.DEPTH, Modality.SEMANTIC)
     ]
-    settings = PixelSettings(camera_effect=False, shadows=shadows)
+    settings = PixelSettings(
+        camera_effect=False, extras=frozenset({Extra.SHADOWS}) if shadows else NO_EXTRAS
+    )
     world = straight(300, rails=False)
     suite = PixelSuite(world, table_of([ActorKind.CAR]), cameras, weather, settings)
     states = states_at([(100.0, -8.75, 0.0, 0.0), (108.0, -8.75, 0.0, 0.0)])

@@ -28,6 +28,7 @@ from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import preset, preset_groups
+from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 
 LAMP_ORDER = (LampSwitch.AUTO, LampSwitch.LOW, LampSwitch.HIGH, LampSwitch.OFF)
 CUSTOM = "-custom"  # behind the name of a preset of which something was changed
@@ -44,7 +45,7 @@ class Bridge:
         self.dead_man = DeadMan(self._release, clock)
         self.told: dict[str, Any] = {}  # of the newest picture
         self.main, self.hidden = View.DRIVER, set[View]()
-        self.plain = False
+        self.extras = ALL_EXTRAS
         self.sky: Weather | None = None  # set, but perhaps not yet shown
 
     # --- pictures
@@ -112,8 +113,9 @@ class Bridge:
         elif word == "hide":
             self.hidden ^= {View(value)} & set(HIDEABLE)
             self._show(self.main)
-        elif word == "plain":
-            self.plain = not self.plain
+        elif word == "extra":  # None: all of them, or none
+            chosen = {Extra(value)} if value else self.extras or ALL_EXTRAS
+            self.extras ^= chosen
             self._show(self.main)
         elif word in acts:
             self._do(acts[word](value))
@@ -144,7 +146,7 @@ class Bridge:
 
     def _show(self, main: View) -> None:
         self.main = main
-        self.producer.say(Show(main, tuple(sorted(self.hidden)), self.plain))
+        self.producer.say(Show(main, tuple(sorted(self.hidden)), tuple(sorted(self.extras))))
 
     def _next_main(self) -> View:
         return MAIN[(MAIN.index(self.main) + 1) % len(MAIN)] if self.main in MAIN else MAIN[0]

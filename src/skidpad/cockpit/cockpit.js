@@ -4,7 +4,7 @@ const TIERS = ["No action", "Hard stop", "Stopped too close", "Emergency", "Stop
 const SMALL = ["left", "rear", "right", "top", "depth", "semantic"];
 const TITLES = { left: "left mirror", rear: "rear", right: "right mirror", top: "top (U)", depth: "depth (T)",
   semantic: "classes (Y)", driver: "driver", follow: "follow" };
-const WORDS = { KeyM: ["take"], KeyL: ["lamps"], KeyN: ["weather"], KeyP: ["pause"], KeyC: ["main"], KeyG: ["plain"],
+const WORDS = { KeyM: ["take"], KeyL: ["lamps"], KeyN: ["weather"], KeyP: ["pause"], KeyC: ["main"], KeyG: ["extra"],
   KeyT: ["hide", "depth"], KeyY: ["hide", "semantic"], KeyU: ["hide", "top"], Period: ["step", 1],
   Digit1: ["toggle", "acc"], Digit2: ["toggle", "lca"], Digit3: ["toggle", "tla"],
   Digit4: ["toggle", "resume"], Digit5: ["toggle", "limiter"], Digit6: ["toggle", "aeb"],

@@ -18,6 +18,7 @@ from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.core.weather import RANGES
 from skidpad.physics.presets import preset_groups
+from skidpad.sensors.finish.extras import Extra
 
 STYLE = resources.files("skidpad.cockpit").joinpath("cockpit.css").read_text(encoding="utf-8")
 SYNC = 0.3  # s between two looks at how things really stand
@@ -41,15 +42,25 @@ TITLES = {
     Function.AEB: "emergency braking (6)",
     Function.BEND: "slow in bends (7)",
 }
+PICTURE = "picture "  # before the name of an addition, as lamps have a switch of their own
+EXTRAS = {
+    Extra.SHADOWS: "shadows",
+    Extra.LAMPS: "bloom of lamps",
+    Extra.REFLECTIONS: "lamps on a wet road",
+    Extra.RETRO: "reflective markings and signs",
+    Extra.CLOUDS: "clouds",
+    Extra.SNOW: "snow on the road",
+    Extra.CALM: "less camera noise",
+}
 RATES = {0.25: "0.25 x", 0.5: "0.5 x", 1.0: "1 x", 2.0: "2 x", 4.0: "4 x", 0.0: "as fast as it can"}
 HELP = (
     "W S A D or arrows: pedals and wheel (hold the brake at standstill to reverse), space: handbrake, "
     "M: take over and hand back, L: headlights, N: next weather, C: camera, T Y U: hide depth, classes, "
-    "top, G: shadows, P: pause, full stop: one tick further"
+    "top, G: additions to the pictures, P: pause, full stop: one tick further"
 )
 HELP_REPLAY = (
     "space or P: play and pause, arrows: one tick (with shift: 5 s), full stop: one tick further, "
-    "C: camera, T Y U: hide views, G: shadows; click a small view or the time line"
+    "C: camera, T Y U: hide views, G: additions to the pictures; click a small view or the time line"
 )
 
 
@@ -108,6 +119,8 @@ class Panel:
     def _real(self, name: str, seat: dict[str, Any]) -> Any:
         if name in SLIDERS:
             return seat.get("sky", {}).get(name)
+        if name.startswith(PICTURE):
+            return name.removeprefix(PICTURE) in self.bridge.told.get("extras", ())
         if name in {f.value for f in Function}:
             return name in (seat.get("functions") or ())
         return seat.get(name)
@@ -132,6 +145,7 @@ def build(bridge: Bridge, kind: str, timeline: dict[str, Any] | None) -> Callabl
             Canvases(tab, kind, timeline)
             with ui.element("aside").classes("panel"):
                 time_controls(panel, kind)
+                picture_controls(panel)
                 if kind == "drive":
                     drive_controls(panel)
                     weather_controls(panel)
@@ -156,6 +170,22 @@ def time_controls(panel: Panel, kind: str) -> None:
         RATES, value=1.0, label="speed", on_change=lambda e: panel.say("rate", e.value)
     )
     panel.elements.append(rate.props("dense outlined options-dense"))
+
+
+def picture_controls(panel: Panel) -> None:
+    """What is added to the pictures for people; of this page, not of the run."""
+    with ui.expansion("pictures (G)").props("dense"), ui.element("div").classes("switches"):
+        for extra in Extra:
+            extra_switch(panel, extra)
+
+
+def extra_switch(panel: Panel, extra: Extra) -> None:
+    """One addition."""
+    name, word = PICTURE + extra.value, extra.value
+    switch = ui.switch(
+        EXTRAS[extra], on_change=lambda e: panel.changed(name, e.value, "extra", word)
+    )
+    panel.follow(name, switch.props("dense"), lambda _: _has(panel.bridge.told.get("extras"), word))
 
 
 def drive_controls(panel: Panel) -> None:

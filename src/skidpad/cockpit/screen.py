@@ -64,8 +64,7 @@ class Screen(Sink):
     def show(self, moment: Moment) -> None:
         """Draw the views and hand them on."""
         shown, truth = self.ask(), moment.truth
-        self.studio.change(shown.outside)
-        self.studio.shade(not self.link.plain)
+        self.studio.change(shown.outside, self.link.extras)
         braking = truth.commands[:, 1] > BRAKING
         images = self.studio.look(truth.tick, truth.states, truth.lights, braking)
         views = [v for v in View if self._wanted(v)]
@@ -96,6 +95,7 @@ class Screen(Sink):
             "marks": marks,
             "main": self.link.main.value,
             "hidden": sorted(v.value for v in self.link.hidden),
+            "extras": sorted(e.value for e in self.link.extras),
             "events": list(self.events),
             "collisions": self.collisions,
             "shown": self.shown,

@@ -22,6 +22,7 @@ from skidpad.core.specs import CameraSpec, Modality, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.queries import RoadMap
+from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 from skidpad.sensors.suite import PixelSettings, PixelSuite
 from skidpad.sensors.twelve import twelve_sensors
 
@@ -73,24 +74,27 @@ def cameras() -> tuple[SensorSpec, ...]:
 class Studio:
     """Looks at one run."""
 
-    def __init__(self, map: RoadMap, table: ActorTable, outside: Outside, seed: int) -> None:
+    def __init__(
+        self,
+        map: RoadMap,
+        table: ActorTable,
+        outside: Outside,
+        seed: int,
+        extras: frozenset[Extra] = ALL_EXTRAS,
+    ) -> None:
         settings = PixelSettings(
-            range_model=outside.range_model, seed=seed, in_cockpit=False, shadows=True
+            range_model=outside.range_model, seed=seed, in_cockpit=False, extras=extras
         )
         self.suite = PixelSuite(map, table, cameras(), outside.weather, settings)
         self.outside = outside
         self.suite.change(outside)
 
-    def change(self, outside: Outside) -> None:
-        """Weather and headlights are others."""
-        if outside != self.outside:
+    def change(self, outside: Outside, extras: frozenset[Extra] | None = None) -> None:
+        """Weather, headlights or additions are others; None: the additions stay."""
+        wanted = self.suite.settings.extras if extras is None else extras
+        if outside != self.outside or wanted != self.suite.settings.extras:
             self.outside = outside
-            self.suite.change(outside)
-
-    def shade(self, on: bool) -> None:
-        """Draw shadows, or the plain picture as a stack would read it."""
-        if on != self.suite.settings.shadows:
-            self.suite.settings = replace(self.suite.settings, shadows=on)
+            self.suite.change(outside, wanted)
 
     def look(
         self,

@@ -12,6 +12,7 @@ from msgspec import Struct
 from skidpad.cockpit.studio import View
 from skidpad.core.errors import require_range
 from skidpad.core.inputs import Functions, Input, Lamps, LampSwitch, Pedals, Sky
+from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 
 RATES = (0.1, 20.0)  # times real time
 
@@ -55,7 +56,9 @@ class Show(Struct, frozen=True, tag="show"):
 
     main: View
     hidden: tuple[View, ...] = ()
-    plain: bool = False  # without what is added for people: shadows
+    extras: tuple[Extra, ...] = tuple(
+        sorted(Extra)
+    )  # additions for people; none: the plain picture
 
 
 class Film(Struct, frozen=True, tag="film"):
@@ -89,7 +92,7 @@ class Link:
         self.seek: int | None = None
         self.film: float | None = None  # s of a film that is to be written
         self.main, self.hidden = View.DRIVER, frozenset[View]()
-        self.plain = False
+        self.extras = ALL_EXTRAS
         self.reshown = False  # another view is asked for
 
     def drain(self, patience: float = 0.0) -> bool:
@@ -121,7 +124,7 @@ class Link:
                 self.film = word.seconds
             case Show():
                 self.main, self.hidden = word.main, frozenset(word.hidden)
-                self.plain = word.plain
+                self.extras = frozenset(word.extras)
                 self.reshown = True
             case End():
                 self.ended = True

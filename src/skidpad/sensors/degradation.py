@@ -39,6 +39,7 @@ class Degradation:
     night: bool
     streaks: float  # 0 .. 1
     pillar: bool = True  # D-097
+    share: float = 1.0  # of the whole effect: less is for people only
     glass: bool = True  # a cockpit hides the lowest rows (A-226); False: the camera is outside
 
     @property
@@ -116,8 +117,8 @@ class CameraNoise:
             draw_streaks(self._keys[2], tick, count, s.night, mask, rows.start, rows.stop, image)
         if s.rain_sigma > 0.0 or s.night:
             degrade(
-                self._keys, tick, s.rain_sigma, s.grey, s.night, self._tile, mask,
-                rows.start, rows.stop, image,
+                self._keys, tick, s.share * s.rain_sigma, s.share * s.grey, s.night, s.share,
+                self._tile, mask, rows.start, rows.stop, image,
             )  # fmt: skip
 
 
@@ -138,19 +139,23 @@ def degrade(
     rain_sigma: float,
     grey: float,
     night: bool,
+    share: float,
     tile: NDArray[np.int8],
     first: NDArray[np.int32],
     first_row: int,
     end_row: int,
     image: Packed,
 ) -> None:
-    """Rain: noise, then mix with grey. Night: gain, lift, noise. Clip once at the end (A-228)."""
+    """Rain: noise, then mix with grey. Night: gain, lift, noise. Clip once at the end (A-228).
+
+    share: of the night's effect; that of rain is in `rain_sigma` and `grey`.
+    """
     width = image.shape[1]
     room = np.uint64(tile.size - 3 * width)
     rain_unit = np.float32(rain_sigma / TILE_UNIT)
-    night_unit = np.float32(NIGHT_SIGMA / TILE_UNIT if night else 0.0)
-    gain = np.float32(NIGHT_GAIN if night else 1.0)
-    lift = np.float32(NIGHT_LIFT if night else 0.0)
+    night_unit = np.float32(share * NIGHT_SIGMA / TILE_UNIT if night else 0.0)
+    gain = np.float32(1.0 + share * (NIGHT_GAIN - 1.0) if night else 1.0)
+    lift = np.float32(share * NIGHT_LIFT if night else 0.0)
     share, kept = np.float32(grey), np.float32(1.0 - grey)
     wr, wg, wb = np.float32(0.299), np.float32(0.587), np.float32(0.114)
     for y in range(first_row, end_row):

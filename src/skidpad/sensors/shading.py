@@ -1,4 +1,4 @@
-"""RGB from key and depth: no second raster pass, no textures, no shadows beyond contact.
+"""RGB from key and depth: no second raster pass, no textures, no shadows.
 
 The normal of a surface is read off its inverse depth: on a plane, inverse depth is linear in the
 pixel, and its two slopes are the normal. Light is linear inside and leaves by a square root.
@@ -28,6 +28,8 @@ LANES = 11
 (_R, _G, _B, _L, _T, _S, _U, _W, _GX, _GY, _H) = (np.intp(n * BLOCK) for n in range(LANES))
 ROADLIKE = (Material.ASPHALT, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
 SNOWY = (Material.GRASS, Material.EMBANKMENT, Material.SHOULDER, Material.SIDEWALK, Material.MEDIAN)
+SNOWED = (Material.ASPHALT, Material.MARKING)
+SNOW_LEFT = 0.72  # share of a driven road that packed snow covers; by eye
 GLOSSY = (Material.PAINT, Material.GLASS)
 WET_DARKENING = 0.52  # of asphalt's albedo; Lekner and Dorf (1988) give 0.4 to 0.7
 SNOW = np.array([0.80, 0.83, 0.88], dtype=np.float32)
@@ -38,9 +40,12 @@ HEADLAMP_X, HEADLAMP_Z = 1.75, 0.65  # m, in the ego's frame
 class Shading:
     """Colours of all actors and materials in one weather; `paint` makes a picture."""
 
-    def __init__(self, palette: Float32, table: ActorTable, light: Lighting) -> None:
+    def __init__(
+        self, palette: Float32, table: ActorTable, light: Lighting, snow_on_road: bool = False
+    ) -> None:
+        """snow_on_road: for people; what a stack reads has snow beside the road only."""
         self.light = light
-        self._table = _look_up(palette, table, light)
+        self._table = _look_up(palette, table, light, snow_on_road)
         self._plain_tail = self._table.reshape(-1, MATERIALS, COLUMNS)[0, Material.TAIL_LAMP].copy()
         self._work = np.zeros(LANES * BLOCK, dtype=np.float32)
         self._braking = np.zeros(len(table), dtype=np.bool_)
@@ -85,7 +90,7 @@ class Shading:
         )
 
 
-def _look_up(palette: Float32, table: ActorTable, light: Lighting) -> Float32:
+def _look_up(palette: Float32, table: ActorTable, light: Lighting, snow_on_road: bool) -> Float32:
     """((n + 1) * 256, COLUMNS): colour and behaviour of each material on each actor."""
     n = len(table)
     out = np.zeros((n + 1, MATERIALS, COLUMNS), dtype=np.float32)
@@ -98,6 +103,9 @@ def _look_up(palette: Float32, table: ActorTable, light: Lighting) -> Float32:
     out[:, list(GLOSSY), _GLOSS] = 1.0
     for material in SNOWY:
         out[:, material, :3] += light.snow * (SNOW - out[:, material, :3])
+    if snow_on_road:
+        for material in SNOWED:
+            out[:, material, :3] += SNOW_LEFT * light.snow * (SNOW - out[:, material, :3])
     out[:, Material.HEADLAMP, _GLOW] = 0.9 * light.lamps
     out[:, Material.TAIL_LAMP, _GLOW] = 0.8 * light.lamps
     return out.reshape(-1, COLUMNS)
@@ -188,6 +196,35 @@ def _slopes(
 
 
 @kernel
+def beam_at(
+    px: np.float32,
+    py: np.float32,
+    pz: np.float32,
+    beam: np.float32,
+    slope: np.float32,
+    reach: np.float32,
+) -> np.float32:
+    """Light of the beam at a point in the lamps' frame: a soft cone that falls above its cut-off."""
+    lead = px if px > _NEAR_LAMP else _NEAR_LAMP
+    side = py / (lead + _LAMP_APART)
+    rise = pz / lead * slope
+    rise = rise if rise > _ZERO else _ZERO
+    spread = _ONE + _BEAM_WIDTH * side * side
+    fall = _ONE + (px * px + py * py) * reach
+    lit = beam / (spread * spread * fall * fall * (_ONE + rise * rise))
+    return lit if px > _ZERO else _ZERO
+
+
+@kernel
+def beam_of(light: Lighting) -> tuple[np.float32, np.float32, np.float32]:
+    """Power, slope of the cut-off and reach of the ego's beam."""
+    beam = np.float32(light.headlights) * _BEAM_POWER
+    slope = _HIGH_SLOPE if light.high else _CUT_SLOPE
+    reach = _HIGH_RANGE if light.high else _BEAM_RANGE
+    return beam, slope, reach
+
+
+@kernel
 def _headlights(
     v: np.float32,
     count: int,
@@ -196,10 +233,8 @@ def _headlights(
     offset: Float32,
     work: Float32,
 ) -> None:
-    """Light of the ego's beam on a block: a soft cone, the low one cut off above the lamps."""
-    beam = np.float32(light.headlights) * _BEAM_POWER
-    slope = _HIGH_SLOPE if light.high else _CUT_SLOPE
-    reach = _HIGH_RANGE if light.high else _BEAM_RANGE
+    """Light of the ego's beam on a block."""
+    beam, slope, reach = beam_of(light)
     b00, b01, b02 = to_body[0, 0], to_body[0, 1], to_body[0, 2]
     b10, b11, b12 = to_body[1, 0], to_body[1, 1], to_body[1, 2]
     b20, b21, b22 = to_body[2, 0], to_body[2, 1], to_body[2, 2]
@@ -210,14 +245,7 @@ def _headlights(
         px = z * (b00 * u + b01 * v + b02) + o0
         py = z * (b10 * u + b11 * v + b12) + o1
         pz = z * (b20 * u + b21 * v + b22) + o2
-        lead = px if px > _NEAR_LAMP else _NEAR_LAMP
-        side = py / (lead + _LAMP_APART)
-        rise = pz / lead * slope
-        rise = rise if rise > _ZERO else _ZERO
-        spread = _ONE + _BEAM_WIDTH * side * side
-        fall = _ONE + (px * px + py * py) * reach
-        lit = beam / (spread * spread * fall * fall * (_ONE + rise * rise))
-        work[_H + x] = lit if px > _ZERO else _ZERO
+        work[_H + x] = beam_at(px, py, pz, beam, slope, reach)
 
 
 @kernel

@@ -21,6 +21,8 @@ from skidpad.core.weather import Weather
 from skidpad.physics.optics import depth_range, label_range, radar_range
 from skidpad.sensors.beam import beam_of
 from skidpad.sensors.degradation import CameraNoise, degradation
+from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
+from skidpad.sensors.finish.finish import Finish
 from skidpad.sensors.lighting import lighting
 from skidpad.sensors.live_scene import LiveScene, SceneMap
 from skidpad.sensors.passes import NOTHING, UNLIMITED, Pass, Sight, poison
@@ -28,10 +30,10 @@ from skidpad.sensors.perception_noise import PerceptionNoise
 from skidpad.sensors.radar import Radar
 from skidpad.sensors.rasteriser import AUTO_LEVEL
 from skidpad.sensors.shading import Shading
-from skidpad.sensors.shadows import GROUND_MASK, bodies_of, cast_shadows, shade_of
 from skidpad.sensors.view import View, camera_view
 
 EGO = 0
+CALM = 0.3  # share of the published camera effect in a calm picture for people; by eye
 NO_NOISE = PerceptionNoise()
 
 
@@ -49,7 +51,7 @@ class PixelSettings:
     range_model: RangeModel = RangeModel.NONE
     camera_effect: bool = True  # degrade RGB images (A-222, A-223)
     in_cockpit: bool = True  # weather spares what the published windscreen mask hides (A-226)
-    shadows: bool = False  # under and beside vehicles, in colour images: for people (R-13)
+    extras: frozenset[Extra] = NO_EXTRAS  # additions to colour images, for people only (R-13)
     exclusive_stages: bool = False  # rain switches the night stage off (D-094)
     perception_noise: PerceptionNoise = NO_NOISE
     seed: int = 0
@@ -85,12 +87,15 @@ class PixelSuite:
             for c in self.cameras.values()
             if c.modality is Modality.RGB
         }
+        self._finish = Finish(table, map.roadside, settings.dt)
         self._look_out(weather, settings.range_model, None)
         self._ego = Pose(0.0, 0.0)
         self.tick = -1
 
-    def change(self, outside: Outside) -> None:
-        """Weather and headlights are others from the next observation on."""
+    def change(self, outside: Outside, extras: frozenset[Extra] | None = None) -> None:
+        """Weather and headlights are others from the next observation on; extras, where given, too."""
+        if extras is not None:
+            self.settings = replace(self.settings, extras=extras)
         self._look_out(outside.weather, outside.range_model, outside.beam)
 
     def _look_out(self, weather: Weather, range_model: RangeModel, beam: Beam | None) -> None:
@@ -100,8 +105,10 @@ class PixelSuite:
         labels = label_range(weather, Beam.LOW if beam is None else beam)
         sight = Sight(depth_range(weather), labels) if limited else UNLIMITED
         light = lighting(weather, beam)
-        self.shading = Shading(self.scene.static.palette, self._table, light)
-        self._shade = shade_of(light)
+        snowed = Extra.SNOW in settings.extras
+        self.shading = Shading(self.scene.static.palette, self._table, light, snowed)
+        if settings.extras:
+            self._finish.look_out(weather, light)
         self._passes: dict[tuple[object, Sight], Pass] = {}
         self._pass_of: dict[str, Pass] = {}
         for camera in self.cameras.values():
@@ -109,7 +116,8 @@ class PixelSuite:
             key = (camera.view, eye)
             self._pass_of[camera.id] = self._passes.setdefault(key, Pass(camera, eye))
         effect = degradation(weather, exclusive=settings.exclusive_stages)
-        effect = replace(effect, glass=settings.in_cockpit)
+        share = CALM if Extra.CALM in settings.extras else 1.0
+        effect = replace(effect, glass=settings.in_cockpit, share=share)
         self._degraded = (
             {id: CameraNoise(id, seed, effect) for id in self._rgb}
             if settings.camera_effect
@@ -130,11 +138,14 @@ class PixelSuite:
     ) -> Observation:
         """What the sensors see of this state. braking: (n,) whose brake lamps are lit."""
         self.tick = tick
-        self._ego, self._states = states.pose(EGO), states
+        self._ego = states.pose(EGO)
         self.scene.place(states, self.settings.dt)
         self.scene.show(lights)
         if braking is not None:
             self.shading.set_braking(braking)
+        if self.settings.extras:
+            lit = np.zeros(len(self._table), dtype=np.bool_) if braking is None else braking
+            self._finish.place(tick, states, lights, lit)
         for one in self._passes.values():
             one.drawn = NOTHING
             if self.settings.poison_old:
@@ -180,9 +191,9 @@ class PixelSuite:
         """The rows of a view as a colour image."""
         packed = self._rgb[id]
         self.shading.paint(view, self._ego, one.inverse, one.key, packed)
-        if self.settings.shadows:
-            bodies = bodies_of(self._table, self._states)
-            cast_shadows(view, bodies, self._shade, GROUND_MASK, one.inverse, one.key, packed)
+        if self.settings.extras:
+            own = self.cameras[id].shows_own_body
+            self._finish.add(self.settings.extras, view, own, one, packed)
         if id in self._degraded:
             self._degraded[id].apply(self.tick, packed, range(view.top, view.height))
         rgb = packed.view(np.uint8).reshape(*packed.shape, 4)[..., :3]

@@ -1,0 +1,21 @@
+"""The additions to a picture for people, each with its switch."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+
+class Extra(str, Enum):
+    """One addition; none of them touches depth or classes."""
+
+    SHADOWS = "shadows"  # of vehicles and of what stands beside the road, and where they touch it
+    LAMPS = "lamps"  # bloom of head, tail and brake lamps and of traffic lights
+    REFLECTIONS = "reflections"  # of those lamps on a wet road
+    RETRO = "retro"  # markings, signs and plates send the headlights back
+    CLOUDS = "clouds"
+    SNOW = "snow"  # on the road, not only beside it
+    CALM = "calm"  # less of the published camera effect, so that a night can be read
+
+
+NO_EXTRAS: frozenset[Extra] = frozenset()
+ALL_EXTRAS = frozenset(Extra)

@@ -1,0 +1,93 @@
+"""All additions to the pictures of one run, in one weather at a time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.geometry import Pose
+from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.vocabulary import LightState
+from skidpad.core.weather import Weather
+from skidpad.roads.roadside import Roadside
+from skidpad.sensors.finish.clouds import DRIFT, SIZE, draw_clouds, layer_of
+from skidpad.sensors.finish.extras import Extra
+from skidpad.sensors.finish.glow import shine
+from skidpad.sensors.finish.lamps import Lamps
+from skidpad.sensors.finish.retro import gains, send_back
+from skidpad.sensors.finish.shadows import (
+    GROUND_MASK,
+    REACH,
+    Bodies,
+    bodies_of,
+    cast_shadows,
+    shade_of,
+    standing,
+)
+from skidpad.sensors.lighting import Lighting
+from skidpad.sensors.materials import MATERIALS
+from skidpad.sensors.passes import Pass
+from skidpad.sensors.shading import ROADLIKE
+from skidpad.sensors.view import View
+
+STANDING_REACH = 70.0  # m, of shadows of what stands beside the road
+LEAST_WET = 0.1  # of 1, below which a road mirrors no lamp
+WETTABLE = np.zeros(MATERIALS, dtype=np.bool_)
+WETTABLE[list(ROADLIKE)] = True
+
+
+class Finish:
+    """Lays the chosen additions over pictures; `look_out` in a new weather, `place` every tick."""
+
+    def __init__(self, table: ActorTable, roadside: Roadside, dt: float) -> None:
+        self._table, self._dt = table, dt
+        self._furniture = standing(roadside.boxes)
+        self._lamps = Lamps(table, roadside.heads)
+
+    def look_out(self, weather: Weather, light: Lighting) -> None:
+        """The weather is another one."""
+        self._light = light
+        self._shade = shade_of(light)
+        self._gains = gains(light)
+        self._layer = layer_of(weather, light)
+        self._wet = light.wet * (1.0 - light.snow) if light.wet > LEAST_WET else 0.0
+        self._drift = DRIFT * self._dt * (0.2 + 0.8 * weather.wind_intensity / 100.0)
+
+    def place(
+        self,
+        tick: int,
+        states: ActorStates,
+        lights: Mapping[int, LightState],
+        braking: NDArray[np.bool_],
+    ) -> None:
+        """Where everybody is now, and what shines."""
+        self._tick, self._ego = tick, states.pose(0)
+        self._bodies = bodies_of(self._table, states)
+        self._near = _within(self._furniture, self._ego, STANDING_REACH)
+        self._sources = self._lamps.shining(states, lights, braking, self._light)
+
+    def add(
+        self, extras: frozenset[Extra], view: View, own: bool, one: Pass, out: NDArray[np.uint32]
+    ) -> None:
+        """The additions in the rows of a view's picture. own: the ego's body is seen in it."""
+        inverse, key, light = one.inverse, one.key, self._light
+        if Extra.CLOUDS in extras and self._layer.strength > 0.0:
+            shift = (self._drift * self._tick) % SIZE
+            draw_clouds(view, self._layer, shift, inverse, out)
+        if Extra.SHADOWS in extras:
+            self._bodies.present[0] = own
+            for bodies, reach in ((self._near, STANDING_REACH), (self._bodies, REACH)):
+                cast_shadows(view, bodies, self._shade, reach, GROUND_MASK, inverse, key, out)
+        if Extra.RETRO in extras and light.headlights > 0.0 and light.lamps > 0.0:
+            send_back(view, self._ego, light, self._gains, inverse, key, out)
+        bloom, wet = Extra.LAMPS in extras, self._wet if Extra.REFLECTIONS in extras else 0.0
+        if bloom or wet > 0.0:
+            shine(view, self._sources, bloom, wet, light.extinction, WETTABLE, inverse, key, out)
+
+
+def _within(bodies: Bodies, ego: Pose, reach: float) -> Bodies:
+    """Those whose centre lies within `reach` m."""
+    near = np.hypot(bodies.x - ego.x, bodies.y - ego.y) < reach
+    return Bodies._make(field[near] for field in bodies)

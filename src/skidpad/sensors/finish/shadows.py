@@ -1,0 +1,241 @@
+"""Shadows under and beside vehicles and furniture, over a finished picture: for people only (R-13).
+
+A pixel of the ground knows where it lies: its inverse depth says so. Near a body's outline it gets
+less of the sky, and where the body stands between it and the sun, less of the sun. Depth and
+classes stay as they are. Strengths are chosen by eye.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import kernel
+from skidpad.core.states import ActorStates, ActorTable
+from skidpad.core.vocabulary import ActorKind
+from skidpad.roads.roadside import Box
+from skidpad.sensors.finish.outline import MOST, spans
+from skidpad.sensors.lighting import Lighting
+from skidpad.sensors.materials import MATERIALS, Material
+from skidpad.sensors.view import View
+
+Floats = NDArray[np.float64]
+
+GROUND = (
+    Material.ASPHALT,
+    Material.SHOULDER,
+    Material.MARKING,
+    Material.SIDEWALK,
+    Material.GRASS,
+    Material.EMBANKMENT,
+    Material.MEDIAN,
+)
+REACH = 90.0  # m; farther shadows are a pixel or two
+CONTACT, CONTACT_DARK = 0.5, 0.62  # m around the outline, share of light lost below the body
+EDGE = 0.25  # m, how soft the sun's shadow ends
+LONGEST = 8.0  # m of the sun's shadow beyond the body
+SUN_DARK = 0.85  # share of the sun's light that a body keeps away
+NO_SUN = 0.02  # share of the light below which the sun casts no shadow that is seen
+LEVEL = 1.2  # m above or below, beyond which the ground is another road's
+SLACK, SLOPE = 0.15, 0.05  # m and m per m by which the ground may lie off the body's own height
+STEPS = 4  # copies of the outline between body and the end of its shadow
+
+
+class Bodies(NamedTuple):
+    """What casts shadows: boxes, arrays of shape (n,)."""
+
+    x: Floats
+    y: Floats
+    z: Floats
+    yaw: Floats
+    length: Floats
+    width: Floats
+    height: Floats
+    present: NDArray[np.bool_]
+
+
+class Shade(NamedTuple):
+    """How light falls in one weather."""
+
+    sun_x: float  # m of shadow per m of height, away from the sun
+    sun_y: float
+    sun: float  # share of the light that comes from the sun's direction
+
+
+def bodies_of(table: ActorTable, states: ActorStates) -> Bodies:
+    """The boxes of all who take part."""
+    present = states.present & (table.kind != ActorKind.PROP)
+    return Bodies(
+        states.x, states.y, states.z, states.yaw, table.length, table.width, table.height, present
+    )
+
+
+def standing(boxes: Sequence[Box]) -> Bodies:
+    """What stands beside the road; what hangs over it is too high to darken it."""
+    fields = [
+        np.array([getattr(b, name) for b in boxes], dtype=np.float64)
+        for name in ("x", "y", "z", "yaw", "length", "width", "height")
+    ]
+    return Bodies(*fields, np.ones(len(boxes), dtype=np.bool_))
+
+
+def shade_of(light: Lighting) -> Shade:
+    """Where shadows fall, and how dark they are."""
+    direction, sun, sky = light.sun_direction, float(light.sun.mean()), float(light.sky.mean())
+    up = max(float(direction[2]), 0.05)
+    share = sun * max(float(direction[2]), 0.0) / max(sun * up + sky, 1e-6)
+    return Shade(-float(direction[0]) / up, -float(direction[1]) / up, share)
+
+
+GROUND_MASK = np.zeros(MATERIALS, dtype=np.bool_)  # by material: shadows are seen on it
+GROUND_MASK[list(GROUND)] = True
+
+
+class _Cast(NamedTuple):
+    """One body and the end of its shadow, in the body's axes."""
+
+    c: float
+    s: float
+    half_l: float
+    half_w: float
+    end_x: float
+    end_y: float
+    sun: float  # share of light that the sun's shadow takes away; 0: there is none
+
+
+@kernel
+def _cast_of(bodies: Bodies, i: int, shade: Shade) -> _Cast:
+    c, s = np.cos(bodies.yaw[i]), np.sin(bodies.yaw[i])
+    throw = np.hypot(shade.sun_x, shade.sun_y)
+    tall = bodies.height[i] * min(1.0, LONGEST / max(bodies.height[i] * throw, 1e-6))
+    tx, ty = tall * shade.sun_x, tall * shade.sun_y
+    dark = SUN_DARK * shade.sun if shade.sun > NO_SUN else 0.0
+    half_l, half_w = 0.5 * bodies.length[i], 0.5 * bodies.width[i]
+    return _Cast(c, s, half_l, half_w, c * tx + s * ty, -s * tx + c * ty, dark)
+
+
+@kernel
+def _corners(bodies: Bodies, i: int, cast: _Cast, out: Floats) -> None:
+    """(16, 3) corners of what a shadow can darken: the body's footprint and the shadow's end."""
+    size = cast.half_l + cast.half_w
+    if cast.sun > 0.0:
+        size += np.hypot(cast.end_x, cast.end_y)
+    slack = min(SLACK + SLOPE * size, LEVEL)
+    k = 0
+    for end in range(2):
+        far = float(end) if cast.sun > 0.0 else 0.0
+        for a in (-1.0, 1.0):
+            for b in (-1.0, 1.0):
+                lx = a * (cast.half_l + CONTACT) + far * cast.end_x
+                ly = b * (cast.half_w + CONTACT) + far * cast.end_y
+                for side in (-1.0, 1.0):
+                    out[k, 0] = bodies.x[i] + cast.c * lx - cast.s * ly
+                    out[k, 1] = bodies.y[i] + cast.s * lx + cast.c * ly
+                    out[k, 2] = bodies.z[i] + side * slack
+                    k += 1
+
+
+@kernel
+def _outside(lx: float, ly: float, half_l: float, half_w: float) -> float:
+    """Distance in m to a box's outline, negative inside."""
+    qx, qy = abs(lx) - half_l, abs(ly) - half_w
+    if qx <= 0.0 or qy <= 0.0:
+        return float(max(qx, qy))
+    return float(np.sqrt(qx * qx + qy * qy))
+
+
+@kernel
+def _light_at(cast: _Cast, lx: float, ly: float) -> float:
+    """Share of the light that reaches the ground at (lx, ly) in the body's axes."""
+    light = 1.0
+    near = (CONTACT - _outside(lx, ly, cast.half_l, cast.half_w)) / (1.6 * CONTACT)
+    if near > 0.0:
+        near = min(near, 1.0)
+        light = 1.0 - CONTACT_DARK * near * near
+    if cast.sun > 0.0:
+        dark = 0.0
+        for n in range(1, STEPS + 1):
+            t = n / STEPS
+            small = 1.0 - 0.18 * t  # roofs are smaller than floors
+            px, py = lx - t * cast.end_x, ly - t * cast.end_y
+            d = _outside(px, py, small * cast.half_l, small * cast.half_w)
+            dark = max(dark, min((0.5 * EDGE - d) / EDGE, 1.0))
+        light *= 1.0 - cast.sun * dark
+    return float(light)
+
+
+@kernel
+def _dimmed(p: np.uint32, light: float) -> np.uint32:
+    gain = np.sqrt(light)  # the picture's bytes are square roots of light
+    k = np.int64(p)
+    red, green = int((k & 255) * gain), int(((k >> 8) & 255) * gain)
+    blue = int(((k >> 16) & 255) * gain)
+    return np.uint32(red | green << 8 | blue << 16 | 0xFF000000)
+
+
+@kernel
+def _darken(
+    view: View,
+    bodies: Bodies,
+    i: int,
+    cast: _Cast,
+    rows: tuple[int, int],
+    columns: NDArray[np.int64],
+    ground: NDArray[np.bool_],
+    inverse: NDArray[np.float32],
+    key: NDArray[np.int32],
+    out: NDArray[np.uint32],
+) -> None:
+    """One body's shadow in the spans that it can reach."""
+    r, per = view.rotation, 1.0 / view.focal
+    ox, oy = view.centre[0] - bodies.x[i], view.centre[1] - bodies.y[i]
+    oz = view.centre[2] - bodies.z[i]
+    x0, y0 = cast.c * ox + cast.s * oy, -cast.s * ox + cast.c * oy
+    x_u = (cast.c * r[0, 0] + cast.s * r[0, 1]) * per
+    y_u = (-cast.s * r[0, 0] + cast.c * r[0, 1]) * per
+    z_u = r[0, 2] * per
+    for row in range(rows[0], rows[1]):
+        v = (row + 0.5 - view.cy) * per
+        dx, dy, dz = r[1, 0] * v + r[2, 0], r[1, 1] * v + r[2, 1], r[1, 2] * v + r[2, 2]
+        x_v, y_v = cast.c * dx + cast.s * dy, -cast.s * dx + cast.c * dy
+        for column in range(columns[row, 0], columns[row, 1]):
+            k = key[row, column]
+            if (k >> 16) != 0 or not ground[k & 255]:
+                continue
+            w = inverse[row, column]
+            if w <= 0.0:
+                continue
+            u, z = column + 0.5 - view.cx, 1.0 / w
+            if abs(z * (dz + z_u * u) + oz) > LEVEL:
+                continue
+            light = _light_at(cast, z * (x_v + x_u * u) + x0, z * (y_v + y_u * u) + y0)
+            if light < 0.995:
+                out[row, column] = _dimmed(out[row, column], light)
+
+
+@kernel
+def cast_shadows(
+    view: View,
+    bodies: Bodies,
+    shade: Shade,
+    reach: float,
+    ground: NDArray[np.bool_],
+    inverse: NDArray[np.float32],
+    key: NDArray[np.int32],
+    out: NDArray[np.uint32],
+) -> None:
+    """Darken the ground in the rows of a view's picture, packed as by `shade`; reach in m."""
+    corners, points = np.empty((16, 3)), np.empty((MOST, 2))
+    ring = np.empty(2 * MOST, dtype=np.int64)
+    columns = np.empty((out.shape[0], 2), dtype=np.int64)
+    for i in range(bodies.x.size):
+        far = np.hypot(bodies.x[i] - view.centre[0], bodies.y[i] - view.centre[1]) > reach
+        if far or not bodies.present[i]:
+            continue
+        cast = _cast_of(bodies, i, shade)
+        _corners(bodies, i, cast, corners)
+        rows = spans(view, corners, points, ring, columns)
+        _darken(view, bodies, i, cast, rows, columns, ground, inverse, key, out)

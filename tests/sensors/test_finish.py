@@ -1,0 +1,174 @@
+"""Additions to pictures for people: where each one may change a pixel, and that nothing else changes."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from worlds import states_at, straight, table_of
+
+from skidpad.core.geometry import Pose
+from skidpad.core.inputs import Beam, Outside
+from skidpad.core.specs import CameraSpec, Modality
+from skidpad.core.vocabulary import ActorKind, GripModel, LightState, RangeModel, SemanticClass
+from skidpad.core.weather import Weather
+from skidpad.physics.presets import preset
+from skidpad.roads.roadside import Box, SignalHead
+from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
+from skidpad.sensors.finish.outline import MOST, spans
+from skidpad.sensors.materials import Material
+from skidpad.sensors.suite import PixelSettings, PixelSuite
+from skidpad.sensors.view import camera_view
+
+DRIVER = Pose(0.5, 0.0, 1.4, 0.0, 0.0, 0.0)
+SIGN = Box(SemanticClass.TRAFFIC_SIGN, 130.0, -15.0, 2.0, 0.0, 0.1, 1.5, 1.5, rgb=(200, 200, 210))
+HOUSE = Box(SemanticClass.BUILDING, 140.0, 12.0, 0.0, 0.0, 12.0, 8.0, 9.0, rgb=(150, 120, 100))
+HEAD = SignalHead(7, 140.0, -8.75, 5.2, 0.0)
+MOMENT = [(100.0, -8.75, 0.0, 0.0), (114.0, -5.25, 0.0, 0.0), (130.0, -12.25, 0.0, np.pi)]
+
+
+class Seen:
+    """One moment in colours, and what stands behind each pixel."""
+
+    def __init__(self, weather, extras, moment=MOMENT, beam=None, camera_effect=False):
+        cameras = [
+            CameraSpec(m.value, m, 400, 300, 75.0, DRIVER)
+            for m in (Modality.RGB, Modality.DEPTH, Modality.SEMANTIC)
+        ]
+        settings = PixelSettings(camera_effect=camera_effect, extras=frozenset(extras))
+        world = straight(300, boxes=[SIGN, HOUSE], heads=[HEAD])
+        suite = PixelSuite(world, table_of([ActorKind.CAR] * 2), cameras, weather, settings)
+        if beam is not None:
+            suite.change(Outside(weather=weather, grip=GripModel.PHYSICAL,
+                                 range_model=RangeModel.NONE, beam=beam))  # fmt: skip
+        braking = np.array([False, True, False])
+        images = suite.observe(40, states_at(moment), {7: LightState.RED}, braking).images
+        self.rgb = images["rgb"].rgb.astype(int)
+        self.labels = images["semantic"].labels.copy()
+        self.depth = images["depth"].inverse_depth.copy()
+        self.material = (suite._pass_of["rgb"].key & 255).copy()
+        self.suite = suite
+
+
+def both(weather, extra, **more):
+    """The plain picture and the one with an addition, which changes neither depth nor classes."""
+    plain, added = Seen(weather, NO_EXTRAS, **more), Seen(weather, {extra}, **more)
+    assert np.array_equal(plain.depth, added.depth)
+    assert np.array_equal(plain.labels, added.labels)
+    return plain, added, (plain.rgb != added.rgb).any(axis=2)
+
+
+def test_clouds_change_the_sky_only_and_drift():
+    weather = Weather(cloudiness=50.0, wind_intensity=100.0)
+    plain, _, changed = both(weather, Extra.CLOUDS)
+    sky = plain.labels == SemanticClass.SKY
+    assert changed[sky].mean() > 0.3
+    assert not changed[~sky].any()
+    assert not both(Weather(cloudiness=0.0), Extra.CLOUDS)[2].any()
+
+
+def test_snow_lies_on_the_road_for_people_only():
+    plain, added, changed = both(preset("snow"), Extra.SNOW)
+    asphalt = plain.material == Material.ASPHALT
+    assert changed[asphalt].all()
+    assert not changed[~asphalt & (plain.material != Material.MARKING)].any()
+    assert added.rgb[asphalt].mean() > plain.rgb[asphalt].mean() + 40.0
+    assert not both(preset("clear-noon"), Extra.SNOW)[2].any()
+
+
+def test_markings_signs_and_plates_send_the_headlights_back():
+    plain, added, changed = both(preset("clear-night"), Extra.RETRO)
+    returned = np.isin(plain.labels, [SemanticClass.ROAD_LINE, SemanticClass.TRAFFIC_SIGN])
+    returned |= plain.material == Material.PLATE
+    assert not changed[~returned].any()
+    assert (added.rgb >= plain.rgb).all()
+    sign = plain.labels == SemanticClass.TRAFFIC_SIGN
+    line = plain.labels == SemanticClass.ROAD_LINE
+    assert changed[sign].mean() > 0.9
+    assert changed[line].any()
+    for weather, beam in ((preset("clear-noon"), None), (preset("clear-night"), Beam.OFF)):
+        assert not both(weather, Extra.RETRO, beam=beam)[2].any()
+
+
+def test_lamps_bloom_where_they_are_seen():
+    plain, added, changed = both(preset("clear-night"), Extra.LAMPS)
+    assert (added.rgb >= plain.rgb).all()
+    red = added.rgb[..., 0] - plain.rgb[..., 0]
+    for material in (Material.TAIL_LAMP, Material.HEADLAMP, Material.LAMP_RED):
+        rows, columns = np.nonzero(plain.material == material)
+        assert len(rows), material
+        near = red[rows.min() - 6 : rows.max() + 7, columns.min() - 6 : columns.max() + 7]
+        assert near.max() > 20, material
+    assert changed.mean() < 0.2
+    # a lamp behind another vehicle, and one that looks away, shine on nothing
+    hidden = [MOMENT[0], (106.0, -8.75, 0.0, 0.0), (114.0, -8.75, 0.0, np.pi)]
+    behind = [MOMENT[0], (80.0, -8.75, 0.0, 0.0), (60.0, -8.75, 0.0, 0.0)]
+    _, with_both, _ = both(preset("clear-night"), Extra.LAMPS, moment=hidden)
+    _, alone, _ = both(preset("clear-night"), Extra.LAMPS, moment=[*hidden[:2], behind[2]])
+    visible = with_both.labels == alone.labels
+    assert np.abs(with_both.rgb - alone.rgb)[visible].max() <= 1
+
+
+def test_a_wet_road_mirrors_lamps_below_them():
+    plain, added, changed = both(preset("rain-night"), Extra.REFLECTIONS)
+    road = np.isin(plain.material, [Material.ASPHALT, Material.MARKING, Material.SHOULDER])
+    assert changed.sum() > 50
+    assert not changed[~road].any()
+    tails = np.nonzero((plain.material == Material.TAIL_LAMP) & (plain.rgb[..., 0] > 100))
+    below = changed[tails[0].max() :, tails[1].min() : tails[1].max() + 1]
+    assert below.any()
+    assert (added.rgb >= plain.rgb).all()
+    assert not both(preset("clear-night"), Extra.REFLECTIONS)[2].any()
+
+
+def test_what_stands_beside_the_road_has_a_shadow_too():
+    low = Weather(sun_altitude_deg=30.0, sun_azimuth_deg=270.0)  # from the left
+    plain, added, changed = both(low, Extra.SHADOWS, moment=[MOMENT[0]] + MOMENT[1:2] * 2)
+    left = np.arange(400) < 190
+    grass = np.isin(plain.material, [Material.GRASS, Material.EMBANKMENT, Material.SHOULDER])
+    assert (changed & grass & left).sum() > 20
+    assert (added.rgb <= plain.rgb).all()
+
+
+def test_a_calm_picture_has_less_noise_and_the_streaks():
+    loud = Seen(preset("rain-night"), NO_EXTRAS, camera_effect=True).rgb
+    calm = Seen(preset("rain-night"), {Extra.CALM}, camera_effect=True).rgb
+    assert calm[:100].std() < 0.6 * loud[:100].std()
+    assert (np.abs(calm - Seen(preset("rain-night"), NO_EXTRAS).rgb).max(axis=2) > 20).any()
+
+
+def test_switched_off_again_the_picture_is_the_plain_one():
+    seen, plain = Seen(preset("rain-night"), ALL_EXTRAS), Seen(preset("rain-night"), NO_EXTRAS)
+    assert (seen.rgb != plain.rgb).any()
+    outside = Outside(
+        weather=preset("rain-night"), grip=GripModel.PHYSICAL, range_model=RangeModel.NONE
+    )
+    for extras, wanted in ((NO_EXTRAS, plain.rgb), (ALL_EXTRAS, seen.rgb)):
+        seen.suite.change(outside, extras)
+        braking = np.array([False, True, False])
+        images = seen.suite.observe(40, states_at(MOMENT), {7: LightState.RED}, braking).images
+        assert np.array_equal(images["rgb"].rgb, wanted)
+
+
+@given(
+    st.lists(st.tuples(*[st.floats(-12.0, 12.0)] * 3), min_size=4, max_size=16),
+    st.lists(st.floats(0.0, 1.0), min_size=16, max_size=16),
+    st.floats(-3.1, 3.1),
+)
+@pytest.mark.filterwarnings("error")
+def test_spans_hold_every_point_of_a_volume(corners, weights, yaw):
+    camera = CameraSpec("c", Modality.RGB, 200, 150, 80.0, Pose(0.0, 0.0, 1.0, 0.0, 0.1, yaw))
+    view = camera_view(camera, Pose(0.0, 0.0))
+    points, ring = np.empty((MOST, 2)), np.empty(2 * MOST, dtype=np.int64)
+    columns = np.empty((150, 2), dtype=np.int64)
+    volume = np.array(corners)
+    first, end = spans(view, volume, points, ring, columns)
+    share = np.array(weights[: len(corners)]) + 1e-3
+    inside = [*volume, share @ volume / share.sum()]
+    for point in inside:
+        x, y, z = view.rotation @ (point - view.centre)
+        if z <= 0.31:
+            continue
+        u, v = view.cx + view.focal * x / z, view.cy + view.focal * y / z
+        if 0.01 < u < 199.99 and 0.01 < v < 149.99:
+            assert first <= int(v) < end
+            assert columns[int(v), 0] <= int(u) < columns[int(v), 1]

@@ -1,0 +1,66 @@
+"""A sheet of one moment in the six weathers and snow: the plain picture beside the one for people.
+
+    python tools/cockpit_pictures.py docs/img/pictures-for-people.webp
+
+`docs/rendering.md` shows what it writes; no test compares it, as a film of it may differ by machine.
+"""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import cv2
+import numpy as np
+from PIL import Image
+
+from skidpad.campaign.desk import Desk, Recorded
+from skidpad.campaign.desk_run import drive_at_desk
+from skidpad.cockpit.pictures import Picture, colours
+from skidpad.cockpit.replay import Recording
+from skidpad.cockpit.studio import Studio, View, plane
+from skidpad.core.run import AdasDriver, Roads, RunSpec
+from skidpad.physics.presets import preset
+from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
+from skidpad.simulation.world.world import BRAKING
+from skidpad.stack.configurations import functions_of
+
+WEATHERS = (
+    "clear-sunrise", "clear-noon", "clear-night", "rain-sunrise", "rain-noon", "rain-night", "snow"
+)  # fmt: skip
+TICK = 300  # in which there are vehicles before and behind
+VIEWS = (View.DRIVER, View.FOLLOW)
+SIZE = (320, 240)  # px of one picture in the sheet
+
+
+def picture(recording: Recording, weather: str, view: View, extras: frozenset[Extra]) -> Picture:
+    """The moment in a weather."""
+    outside = replace(recording.seat(TICK).outside, weather=preset(weather))
+    studio = Studio(recording.map, recording.table, outside, recording.spec.seed, extras)
+    truth = recording.moment(TICK).truth
+    braking = truth.commands[:, 1] > BRAKING
+    images = studio.look(truth.tick, truth.states, truth.lights, braking)
+    shown = colours(plane(images[view.value]))
+    return np.asarray(cv2.resize(shown, SIZE, interpolation=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def main() -> None:
+    """Drive and draw."""
+    driver = AdasDriver(label="3", functions=functions_of(3))
+    run = RunSpec(driver=driver, course=Roads(), weather=preset("clear-noon"), duration=16.0)
+    with TemporaryDirectory() as name:
+        folder = Path(name) / "run"
+        drive_at_desk(run, Desk(Recorded([]), run), folder)
+        recording = Recording(folder)
+    rows = [
+        np.hstack([picture(recording, w, v, e) for v in VIEWS for e in (NO_EXTRAS, ALL_EXTRAS)])
+        for w in WEATHERS
+    ]
+    sheet = Image.fromarray(np.ascontiguousarray(np.vstack(rows)[..., ::-1]))
+    sheet.save(sys.argv[1], quality=78, method=6)
+
+
+if __name__ == "__main__":
+    main()

@@ -18,6 +18,7 @@ import msgspec
 
 from skidpad.campaign.desk import Desk, Recorded
 from skidpad.campaign.desk_run import drive_at_desk
+from skidpad.cockpit.about import About
 from skidpad.cockpit.bridge import Bridge
 from skidpad.cockpit.driving import about, drive_job
 from skidpad.cockpit.feed import Feed
@@ -90,7 +91,7 @@ def drive(seconds: float, chromium: str, folder: Path) -> str:
         f"--user-data-dir={folder / 'profile'}",
         "--remote-debugging-port=0",
     ]
-    with Server(application(bridge, "drive", None)) as server:
+    with Server(application(bridge, About("drive"))) as server:
         producer.start()
         browser = subprocess.Popen(
             [*command, server.address()], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL

@@ -36,7 +36,7 @@ from skidpad.cockpit.words import (
 )
 from skidpad.core.errors import ConfigError, InputError, SkidpadError
 from skidpad.core.frames import RadarPoints
-from skidpad.core.inputs import Functions, Lamps, LampSwitch, Method, Pedals, Sky, Wheel
+from skidpad.core.inputs import Crowd, Functions, Lamps, LampSwitch, Method, Pedals, Sky, Wheel
 from skidpad.core.run import Function
 from skidpad.core.setup import DT
 from skidpad.core.states import StackReport
@@ -230,6 +230,17 @@ def bridge(**seat):
     return made
 
 
+def test_a_drive_without_a_page_goes_on_or_pauses():
+    for pauses, said in ((False, []), (True, [Pause(True)])):
+        made = Bridge(Deaf(), pauses)
+        for tab in ("a", "b"):
+            made.tabs.come(tab)
+        made.leave("a")
+        assert made.producer.words == []
+        made.leave("b")
+        assert made.producer.words == said
+
+
 @given(st.lists(st.tuples(st.booleans(), st.sampled_from("abc"))))
 def test_there_is_always_one_driver_among_the_open_tabs(moves):
     tabs, opened = Tabs(), []
@@ -278,6 +289,7 @@ def test_what_the_words_of_a_tab_mean():
         ("toggle", "tla"): Do(Functions((Function.ACC, Function.LCA, Function.TLA))),
         ("lamps", None): Do(Lamps(LampSwitch.HIGH)),
         ("pause", None): Pause(True),
+        ("crowd", 7.0): Do(Crowd(7)),
         ("main", None): Show(View.FOLLOW),
         ("hide", "depth"): Show(View.FOLLOW, (View.DEPTH,)),
         ("hide", "semantic"): Show(View.FOLLOW, (View.DEPTH, View.SEMANTIC)),

@@ -11,12 +11,15 @@ from dataclasses import replace
 from typing import Protocol
 
 from skidpad.campaign.cast import StackAtWheel
+from skidpad.campaign.density import Density
 from skidpad.campaign.drive import Script, Supervising
 from skidpad.campaign.hands import Hands
 from skidpad.campaign.outdoors import ChangedBackend
+from skidpad.core.errors import ConfigError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.inputs import (
     Beam,
+    Crowd,
     Functions,
     Input,
     Lamps,
@@ -27,7 +30,7 @@ from skidpad.core.inputs import (
     Timed,
     Wheel,
 )
-from skidpad.core.run import Function, RunSpec
+from skidpad.core.run import Function, Roads, RunSpec
 from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Supervision
@@ -83,7 +86,8 @@ class Desk:
     """State: who drives, what is switched on, what is outside, and all inputs so far."""
 
     def __init__(self, source: InputSource, spec: RunSpec, dt: float = DT) -> None:
-        self.source, self.hands = source, Hands(dt)
+        self.source, self.hands, self.course = source, Hands(dt), spec.course
+        self.density = Density()
         settings = settings_of(spec)
         self.outside = Outside(weather=spec.weather, grip=grip_of(spec), range_model=settings.range)
         self.manual = False
@@ -122,6 +126,10 @@ class Desk:
                     weather=one.weather, grip=one.grip, range_model=one.range, beam=beam
                 )
                 self.changed = True
+            case Crowd():
+                if not isinstance(self.course, Roads):
+                    raise ConfigError("only on roads with background traffic can vehicles leave")
+                self.density.wanted = one.vehicles
             case Lamps():
                 self.switch = one.switch
                 beam = beam_of(one.switch, self.outside.weather)
@@ -194,8 +202,8 @@ class DeskBackend(ChangedBackend):
         super().__init__(inner, lambda: desk.outside if desk.changed else None)
 
 
-class UntilEnded:
-    """A script that also ends when the person ends the drive."""
+class DeskScript:
+    """A script that also ends when the person ends the drive, and thins out the traffic."""
 
     def __init__(self, inner: Script, desk: Desk) -> None:
         self.inner, self.desk = inner, desk
@@ -207,4 +215,4 @@ class UntilEnded:
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
         """Words to actors for the coming step."""
-        return self.inner.step(truth)
+        return [*self.inner.step(truth), *self.desk.density.words(truth)]

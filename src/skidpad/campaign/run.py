@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from skidpad.campaign.backends import make_backend
 from skidpad.campaign.cast import Stage, driver_of, stage_of, with_sensors
-from skidpad.campaign.desk import Desk, DeskBackend, DeskDriver, DeskSupervisor, UntilEnded
+from skidpad.campaign.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
 from skidpad.campaign.drive import Moment, Sink, loop
 from skidpad.campaign.outdoors import ChangedBackend, FileSky
 from skidpad.campaign.snapshots import Snapshots
@@ -179,7 +179,7 @@ def run(
         backend = ChangedBackend(backend, sky.news)
     if desk is not None:
         backend = DeskBackend(backend, desk)
-        script = UntilEnded(stage.script, desk)
+        script = DeskScript(stage.script, desk)
         stage = replace(stage, supervisor=DeskSupervisor(stage.supervisor, desk), script=script)
     log = log_of(spec, stage, desk)
     log.sky = sky

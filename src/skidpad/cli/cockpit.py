@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -27,6 +28,13 @@ class Pages(Struct, frozen=True, kw_only=True):
     no_browser: Annotated[bool, Meta(description="Print the address, open nothing.")] = False
 
 
+class OnClose(str, Enum):
+    """Choices of --on-close."""
+
+    GO_ON = "go-on"
+    PAUSE = "pause"
+
+
 @spread(duration=3600.0)
 def drive(
     drivers: Drivers,
@@ -39,6 +47,9 @@ def drive(
     seed: Annotated[int, typer.Option(help="Of traffic and noise.")] = 1,
     rate: Annotated[float, typer.Option(help="Times real time; 0: as fast as it can.")] = 1.0,
     paused: Annotated[bool, typer.Option("--paused", help="Begin standing.")] = False,
+    on_close: Annotated[
+        OnClose, typer.Option(help="What the drive does when the page is closed.")
+    ] = OnClose.GO_ON,
     out: Annotated[
         Path | None, typer.Option(help="Folder of the run; default: out/drives/<name>, numbered.")
     ] = None,
@@ -46,6 +57,7 @@ def drive(
     """Drive in a browser: watch the stack, take over, change weather and grip; keeps a run."""
     from skidpad.campaign.desk_run import require_free
     from skidpad.cli.carla_backend import checked
+    from skidpad.cockpit.about import About
     from skidpad.cockpit.driving import about, drive_job
     from skidpad.cockpit.producer import Producer
     from skidpad.cockpit.serving import serve
@@ -64,7 +76,8 @@ def drive(
     )
     folder = next_free(Path("out/drives") / spec.name) if out is None else require_free(out)
     producer = Producer(drive_job, about(spec, folder, rate, paused))
-    typer.echo(serve(producer, "drive", place_of(pages), typer.echo, browser=not pages.no_browser))
+    shown = About("drive", vehicles=roads.vehicles, pauses=on_close is OnClose.PAUSE)
+    typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
 
 
 @spread()
@@ -81,6 +94,7 @@ def replay(
     ] = "follow",
 ) -> None:
     """Scrub through a run in a browser: its pictures are drawn again from what was logged."""
+    from skidpad.cockpit.about import About
     from skidpad.cockpit.film import stretch_of, write_film
     from skidpad.cockpit.producer import Producer
     from skidpad.cockpit.replay import Recording
@@ -95,9 +109,8 @@ def replay(
         typer.echo(write_film(recording, stretch_of(recording, begin, end), seen, film))
         return
     producer = Producer(replay_job, {"folder": str(run)})
-    shown = recording.timeline()
-    browser = not pages.no_browser
-    typer.echo(serve(producer, "replay", place_of(pages), typer.echo, shown, browser))
+    shown = About("replay", recording.timeline())
+    typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
 
 
 @spread()

@@ -16,6 +16,7 @@ from skidpad.cockpit.tabs import DeadMan, Tabs
 from skidpad.cockpit.words import Do, End, Film, Pace, Pause, Seek, Show, Step, Word
 from skidpad.core.errors import ConfigError
 from skidpad.core.inputs import (
+    Crowd,
     Functions,
     Input,
     Lamps,
@@ -39,7 +40,11 @@ HIDEABLE = (View.DEPTH, View.SEMANTIC, View.TOP)
 class Bridge:
     """One producer, several tabs; the state that words are relative to is the last picture's."""
 
-    def __init__(self, producer: Producer, clock: Callable[[], float] = monotonic) -> None:
+    def __init__(
+        self, producer: Producer, pauses: bool = False, clock: Callable[[], float] = monotonic
+    ) -> None:
+        """pauses: while no tab is open, after one was."""
+        self.pauses = pauses
         self.producer, self.tabs, self.encoder = producer, Tabs(), Encoder()
         self.pedals = Pedals()  # as they were said last
         self.dead_man = DeadMan(self._release, clock)
@@ -68,6 +73,8 @@ class Bridge:
         if self.tabs.driver == tab:
             self._release()
         self.tabs.go(tab)
+        if self.pauses and not len(self.tabs):
+            self.producer.say(Pause(True))
 
     def may(self, tab: str) -> bool:
         """Whether this tab's words count."""
@@ -99,6 +106,7 @@ class Bridge:
             "take": lambda _: Wheel(not self._seat("manual", False)),
             "lamps": self._lamps,
             "toggle": self._toggle,
+            "crowd": lambda v: Crowd(int(v)),
             "weather": self._weather,
             "sky": self._change,
             "grip": lambda v: self._acting(grip=GripModel(v)),

@@ -15,7 +15,7 @@ from skidpad.cockpit.realtime import RealTime
 from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.words import Link, Live, Pace
 from skidpad.core.inputs import Functions
-from skidpad.core.run import AdasDriver, RunSpec, run_from_plain
+from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
 from skidpad.stack.settings import settings_of
 
 
@@ -35,7 +35,11 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
     def shown() -> Shown:
         told = {
             "kind": "drive",
-            "seat": {**hud.seat(desk), "functions": functions_on(spec, desk)},
+            "seat": {
+                **hud.seat(desk),
+                "functions": functions_on(spec, desk),
+                "crowd": crowd(spec, desk),
+            },
             "rtf": hud.rounded(time.rtf),
             "slow_pct": hud.rounded(100.0 * time.slow / max(time.ticks, 1), 1),
             "rate": link.rate,
@@ -53,6 +57,13 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
     n = len(driven.log)
     mean = f", {screen.shown} pictures shown, {screen.dropped} dropped"
     return f"{driven.outcome.value} after {n} ticks{mean}: {folder}"
+
+
+def crowd(spec: RunSpec, desk: Desk) -> int | None:
+    """Background vehicles that are wanted; None: this course has none that could leave."""
+    if not isinstance(spec.course, Roads):
+        return None
+    return spec.course.vehicles if desk.density.wanted is None else desk.density.wanted
 
 
 def functions_on(spec: RunSpec, desk: Desk) -> list[str] | None:

@@ -13,6 +13,7 @@ from nicegui import ui
 from nicegui.element import Element
 from nicegui.events import GenericEventArguments
 
+from skidpad.cockpit.about import About
 from skidpad.cockpit.bridge import LAMP_ORDER, Bridge
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
@@ -77,8 +78,9 @@ class Canvases(Element, component="cockpit.js"):
 class Panel:
     """The controls of one tab; they follow what is really the case."""
 
-    def __init__(self, bridge: Bridge, tab: str) -> None:
-        self.bridge, self.tab = bridge, tab
+    def __init__(self, bridge: Bridge, tab: str, vehicles: int = 0) -> None:
+        """vehicles: in the background as the run began; 0: there is nothing to choose."""
+        self.bridge, self.tab, self.vehicles = bridge, tab, vehicles
         self.syncing: list[Callable[[dict[str, Any]], None]] = []
         self.touched: dict[str, float] = {}
         self.elements: list[Any] = []
@@ -135,14 +137,15 @@ class Panel:
             element.set_enabled(may)
 
 
-def build(bridge: Bridge, kind: str, timeline: dict[str, Any] | None) -> Callable[[], None]:
+def build(bridge: Bridge, about: About) -> Callable[[], None]:
     """The builder of the page."""
+    kind = about.kind
 
     def page() -> None:
         tab = uuid4().hex
-        panel = Panel(bridge, tab)
+        panel = Panel(bridge, tab, about.vehicles)
         with ui.element("main").classes("whole"):
-            Canvases(tab, kind, timeline)
+            Canvases(tab, kind, about.timeline)
             with ui.element("aside").classes("panel"):
                 time_controls(panel, kind)
                 picture_controls(panel)
@@ -223,6 +226,8 @@ def weather_controls(panel: Panel) -> None:
         acting_select(panel, "grip", GripModel)
         acting_select(panel, "range", RangeModel)
     with ui.element("div").classes("sliders"):
+        if panel.vehicles:
+            crowd_slider(panel)
         for field, title in SLIDERS.items():
             weather_slider(panel, field, title)
 
@@ -248,6 +253,18 @@ def weather_slider(panel: Panel, field: str, title: str) -> None:
 
     slider.on("update:model-value", moved, throttle=0.15)
     panel.follow(field, slider, lambda seat: seat.get("sky", {}).get(field))
+
+
+def crowd_slider(panel: Panel) -> None:
+    """How many background vehicles are on the road."""
+    ui.label("vehicles")
+    slider = ui.slider(min=0, max=panel.vehicles, step=1).props("label dense")
+
+    def moved(event: GenericEventArguments) -> None:
+        panel.changed("crowd", event.args, "crowd", event.args)
+
+    slider.on("update:model-value", moved, throttle=0.15)
+    panel.follow("crowd", slider, lambda seat: seat.get("crowd"))
 
 
 def _known(name: str | None, names: list[str]) -> str | None:

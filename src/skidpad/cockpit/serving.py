@@ -7,8 +7,9 @@ import sys
 import time
 import webbrowser
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from skidpad.cockpit.about import About
 from skidpad.cockpit.bridge import Bridge
 from skidpad.cockpit.producer import Producer
 from skidpad.pages.server import Place, Server
@@ -23,15 +24,14 @@ LAST_WORD = 1.5  # s in which the page shows how it ended
 
 def serve(
     producer: Producer,
-    kind: str,
+    about: About,
     place: Place,
     say: Callable[[str], None],
-    timeline: dict[str, Any] | None = None,
     browser: bool = True,
 ) -> str:
-    """Serve until the end and return its sentence. kind: drive or replay."""
+    """Serve until the end and return its sentence."""
     try:
-        _serve(producer, kind, place, say, timeline, browser)
+        _serve(producer, about, place, say, browser)
     finally:
         producer.stop()
     return producer.outcome()
@@ -39,19 +39,16 @@ def serve(
 
 def _serve(
     producer: Producer,
-    kind: str,
+    about: About,
     place: Place,
     say: Callable[[str], None],
-    timeline: dict[str, Any] | None,
     browser: bool,
 ) -> None:
-    bridge = Bridge(producer)
-    with Server(
-        application(bridge, kind, timeline), place
-    ) as server:  # first, as a port may be in use
+    bridge = Bridge(producer, about.pauses)
+    with Server(application(bridge, about), place) as server:  # first, as a port may be in use
         producer.start()
         address = server.address()
-        say(f"{kind}: {address}  (Ctrl-C ends it)")
+        say(f"{about.kind}: {address}  (Ctrl-C ends it)")
         if browser and has_screen():
             webbrowser.open(address)
         try:
@@ -63,14 +60,14 @@ def _serve(
             say("ending ...")
 
 
-def application(bridge: Bridge, kind: str, timeline: dict[str, Any] | None) -> FastAPI:
+def application(bridge: Bridge, about: About) -> FastAPI:
     """The page and its stream."""
     nicegui()
     from skidpad.cockpit.page import STYLE, build
     from skidpad.cockpit.stream import add_stream
 
-    pages = {"/": build(bridge, kind, timeline)}
-    return site(f"Skidpad {kind}", pages, routes=lambda a: add_stream(a, bridge), style=STYLE)
+    pages = {"/": build(bridge, about)}
+    return site(f"Skidpad {about.kind}", pages, routes=lambda a: add_stream(a, bridge), style=STYLE)
 
 
 def has_screen() -> bool:

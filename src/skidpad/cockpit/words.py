@@ -11,7 +11,7 @@ from msgspec import Struct
 
 from skidpad.cockpit.studio import View
 from skidpad.core.errors import require_range
-from skidpad.core.inputs import Functions, Input, Lamps, LampSwitch, Pedals, Sky
+from skidpad.core.inputs import Crowd, Functions, Input, Lamps, LampSwitch, Pedals, Sky
 from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 
 RATES = (0.1, 20.0)  # times real time
@@ -151,7 +151,7 @@ class Live:
         return settled(inputs)
 
 
-LAST_COUNTS = (Pedals, Sky, Lamps, Functions)
+LAST_COUNTS = (Pedals, Sky, Lamps, Functions, Crowd)
 
 
 def settled(inputs: Sequence[Input]) -> list[Input]:

@@ -83,7 +83,16 @@ class Lamps(Struct, frozen=True, tag="lamps", forbid_unknown_fields=True):
     switch: LampSwitch
 
 
-Input = Wheel | Pedals | Functions | Sky | Lamps
+class Crowd(Struct, frozen=True, tag="crowd", forbid_unknown_fields=True):
+    """So many background vehicles on the road from now on, at most as many as the run began with."""
+
+    vehicles: int
+
+    def __post_init__(self) -> None:
+        require_range("vehicles", self.vehicles, 0, 80)
+
+
+Input = Wheel | Pedals | Functions | Sky | Lamps | Crowd
 
 
 @dataclass(frozen=True, slots=True)

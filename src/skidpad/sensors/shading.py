@@ -211,7 +211,7 @@ def beam_at(
     rise = rise if rise > _ZERO else _ZERO
     spread = _ONE + _BEAM_WIDTH * side * side
     fall = _ONE + (px * px + py * py) * reach
-    lit = beam / (spread * spread * fall * fall * (_ONE + rise * rise))
+    lit: np.float32 = beam / (spread * spread * fall * fall * (_ONE + rise * rise))
     return lit if px > _ZERO else _ZERO
 
 

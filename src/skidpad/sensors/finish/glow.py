@@ -27,7 +27,8 @@ def add_light(p: np.uint32, r: float, g: float, b: float) -> np.uint32:
     red = min(np.sqrt(red * red + 65025.0 * r), 255.0)
     green = min(np.sqrt(green * green + 65025.0 * g), 255.0)
     blue = min(np.sqrt(blue * blue + 65025.0 * b), 255.0)
-    return np.uint32(int(red) | int(green) << 8 | int(blue) << 16 | 0xFF000000)
+    packed: np.uint32 = np.uint32(int(red) | int(green) << 8 | int(blue) << 16 | 0xFF000000)
+    return packed
 
 
 @kernel

@@ -75,11 +75,14 @@ def bodies_of(table: ActorTable, states: ActorStates) -> Bodies:
 
 def standing(boxes: Sequence[Box]) -> Bodies:
     """What stands beside the road; what hangs over it is too high to darken it."""
-    fields = [
-        np.array([getattr(b, name) for b in boxes], dtype=np.float64)
-        for name in ("x", "y", "z", "yaw", "length", "width", "height")
-    ]
-    return Bodies(*fields, np.ones(len(boxes), dtype=np.bool_))
+
+    def each(name: str) -> Floats:
+        return np.array([getattr(b, name) for b in boxes], dtype=np.float64)
+
+    return Bodies(
+        each("x"), each("y"), each("z"), each("yaw"), each("length"), each("width"),
+        each("height"), np.ones(len(boxes), dtype=np.bool_),
+    )  # fmt: skip
 
 
 def shade_of(light: Lighting) -> Shade:
@@ -173,7 +176,8 @@ def _dimmed(p: np.uint32, light: float) -> np.uint32:
     k = np.int64(p)
     red, green = int((k & 255) * gain), int(((k >> 8) & 255) * gain)
     blue = int(((k >> 16) & 255) * gain)
-    return np.uint32(red | green << 8 | blue << 16 | 0xFF000000)
+    packed: np.uint32 = np.uint32(red | green << 8 | blue << 16 | 0xFF000000)
+    return packed
 
 
 @kernel

@@ -1,0 +1,46 @@
+"""How many background vehicles are on the road, changed while a run is driven.
+
+Who leaves and who comes back follows from the moment alone, so the same inputs at the same ticks
+give the same run. Vehicles come back where they left, as soon as there is room.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skidpad.core.setup import ActorCommand
+from skidpad.core.states import WorldTruth
+
+ROOM = 25.0  # m to everybody, which a vehicle needs to come back
+FROM_EGO = 60.0  # m to the ego, so that nobody appears before its bumper
+
+
+class Density:
+    """State: how many are wanted (None: as the run has them), and who was sent away."""
+
+    def __init__(self) -> None:
+        self.wanted: int | None = None
+        self.away: set[int] = set()
+
+    def words(self, truth: WorldTruth) -> list[ActorCommand]:
+        """What actors are told in this tick: the farthest leave first, the nearest come first."""
+        if self.wanted is None:
+            return []
+        states, names = truth.states, truth.table.names
+        here = [i for i in np.flatnonzero(states.present).tolist() if i > 0]
+        from_ego = np.hypot(states.x - states.x[0], states.y - states.y[0])
+        if len(here) > self.wanted:
+            leaving = sorted(here, key=lambda i: (-from_ego[i], i))[: len(here) - self.wanted]
+            self.away.update(leaving)
+            return [ActorCommand(names[i], present=False) for i in leaving]
+        coming: list[int] = []
+        for i in sorted(self.away, key=lambda i: (from_ego[i], i)):
+            if len(here) == self.wanted:
+                break
+            others = [0, *here]
+            near = np.hypot(states.x[others] - states.x[i], states.y[others] - states.y[i])
+            if near.min() > ROOM and from_ego[i] > FROM_EGO:
+                coming.append(i)
+                here.append(i)
+        self.away.difference_update(coming)
+        return [ActorCommand(names[i], present=True) for i in coming]

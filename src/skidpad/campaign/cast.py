@@ -20,6 +20,7 @@ from skidpad.core.run import (
     AdasDriver,
     AgentDriver,
     BackendKind,
+    CameraDriver,
     Passenger,
     Render,
     Roads,
@@ -254,6 +255,7 @@ def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> S
 
 def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, Any]]:
     driver = spec.driver
+    cruise = {} if stage.cruise_kmh is None else {"cruise_kmh": stage.cruise_kmh}
     match driver:
         case StackDriver():
             return load_stack(driver.where), deepcopy(driver.options)  # whatever it does to them
@@ -261,8 +263,11 @@ def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, An
             return load_agent(driver.where), {}
         case Passenger():
             return Seated, {}
+        case CameraDriver():
+            from skidpad.stack.camera import driver as camera  # its network is read with it
+
+            return camera.CameraDriver, cruise
         case AdasDriver():
-            cruise = {} if stage.cruise_kmh is None else {"cruise_kmh": stage.cruise_kmh}
             return AdasStack, {
                 "functions": sorted(f.value for f in driver.functions),
                 "profile": spec.profile,

@@ -10,6 +10,7 @@ from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import (
     AdasDriver,
     AgentDriver,
+    CameraDriver,
     DriverSpec,
     Friction,
     Passenger,
@@ -19,7 +20,7 @@ from skidpad.core.run import (
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 
-OURS, IDEAL, AGENT = "stack", "ideal", "agent:"
+OURS, IDEAL, CAMERA, AGENT = "stack", "ideal", "camera", "agent:"
 OF_FILE = "file"  # the weather that a scenario describes
 
 
@@ -59,7 +60,10 @@ class Controller(Struct, frozen=True):
     """Who drives a scenario."""
 
     controller: Annotated[
-        str, Meta(description="stack, ideal (as the file says), module:Class, agent:PATH:CLASS.")
+        str,
+        Meta(
+            description="stack, camera, ideal (as the file says), module:Class, agent:PATH:CLASS."
+        ),
     ] = OURS
     config: Annotated[int, Meta(ge=0, le=4, description="Configuration of our stack.")] = 2
 
@@ -73,6 +77,8 @@ class Controller(Struct, frozen=True):
             return AdasDriver(label=OURS, functions=functions_of(self.config))
         if self.controller == IDEAL:
             return Passenger()
+        if self.controller == CAMERA:
+            return CameraDriver()
         if self.controller.startswith(AGENT):
             where = self.controller.removeprefix(AGENT)
             load_agent(where)
@@ -185,7 +191,7 @@ class MapAsked(Struct, frozen=True):
         str | None,
         Meta(description="threshold: the friction at which following a braking lead fails."),
     ] = None
-    drivers: Annotated[str, Meta(description="Of the map: acc,aeb.")] = "acc,aeb"
+    drivers: Annotated[str, Meta(description="Of the map: acc,aeb,camera.")] = "acc,aeb"
     headways: Annotated[
         str, Meta(description="Of the map: s at 80 km/h, or 25m: the public challenge's start.")
     ] = "0.6,1,1.5,2,2.5,25m"

@@ -19,6 +19,7 @@ from skidpad.cli.channels_evaluate import evaluate, train
 from skidpad.cli.cockpit import drive as cockpit_drive
 from skidpad.cli.cockpit import replay, watch
 from skidpad.cli.compare import compare
+from skidpad.cli.dataset import export_dataset
 from skidpad.cli.export import export
 from skidpad.cli.fleet import fleet
 from skidpad.cli.friction import friction
@@ -80,6 +81,7 @@ app.command()(study)
 app.command()(bench)
 app.command()(show)
 app.command()(export)
+app.command("export-dataset")(export_dataset)
 app.add_typer(profiles)
 app.add_typer(maps)
 for reader in (outcomes, evaluate, train):

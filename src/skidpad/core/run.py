@@ -75,6 +75,15 @@ class AgentDriver(Struct, frozen=True, tag="agent", forbid_unknown_fields=True):
         return f"agent:{self.where}"
 
 
+class CameraDriver(Struct, frozen=True, tag="camera", forbid_unknown_fields=True):
+    """A frozen network that sees three images (B-121)."""
+
+    @property
+    def label(self) -> str:
+        """What results call it."""
+        return "camera"
+
+
 class Passenger(Struct, frozen=True, tag="ideal", forbid_unknown_fields=True):
     """Nobody: the scenario moves the ego."""
 
@@ -112,7 +121,7 @@ class ChannelCrew(Struct, frozen=True, kw_only=True, tag="channels", forbid_unkn
         return self.drive_by
 
 
-DriverSpec = AdasDriver | StackDriver | AgentDriver | Passenger | ChannelCrew
+DriverSpec = AdasDriver | StackDriver | AgentDriver | CameraDriver | Passenger | ChannelCrew
 
 
 # --- where, and among whom
@@ -282,6 +291,8 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise ConfigError("channels drive routes, and only channels do")
         if _pack_on_carla(self.course, self.backend):
             raise ConfigError("traffic pack is kept together by the embedded simulator alone")
+        if isinstance(self.driver, CameraDriver) and self.sensors is not SensorLevel.PIXELS:
+            raise ConfigError("the camera driver sees images: it needs --sensors pixels")
         if isinstance(self.driver, Passenger) and not isinstance(self.course, Scenario):
             raise ConfigError("only a scenario moves the ego itself")
 

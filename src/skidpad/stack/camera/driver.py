@@ -1,0 +1,125 @@
+"""A driver that sees: `--controller camera`. Three forward cameras and the speedometer, nothing else.
+
+The network says where the lane runs and who is in it; controllers of our stack do the rest: lane
+centring by a point ahead, cruise, following and emergency braking by the seven tiers. It reads
+neither map nor pose, knows no limits, signs or lights, and stays in its lane.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from math import atan2
+from statistics import median
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import require_choice, require_range
+from skidpad.core.frames import SensorFrame
+from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.run import Function
+from skidpad.core.setup import DT
+from skidpad.core.specs import SensorSpec
+from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.roads.queries import RoadMap
+from skidpad.stack.camera.codes import AHEAD, Label, mosaic
+from skidpad.stack.camera.eyes import CAMERAS, images_of
+from skidpad.stack.camera.network import seen
+from skidpad.stack.control.bends import bend_speed, slowed
+from skidpad.stack.control.steering import Smoothing, lookahead_distance, steer_command
+from skidpad.stack.control.tiers import Hierarchy, Lead, Situation, time_gap
+from skidpad.stack.settings import load_profile
+
+CRUISE_KMH = 80.0
+SAMPLES = 5  # of which the median counts, as in the published fusion (A-061)
+CONFIRMED = 3  # of them that must hold somebody
+NEARER = 0.5  # of lane centring's look-ahead, which cuts bends by 0.5 m; a path is surest near
+REST = 0.2  # share of the old path that remains: 0.03 s at 20 Hz
+Floats = NDArray[np.float64]
+Picture = NDArray[np.uint8]
+FUNCTIONS = frozenset({Function.ACC, Function.LCA})
+
+
+class CameraDriver:
+    """Deterministic: its commands depend on the images and speeds that it was given alone."""
+
+    report: StackReport
+
+    def __init__(
+        self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
+    ) -> None:
+        """settings: `cruise_kmh` alone, optional."""
+        del specs, map
+        for key in settings:
+            require_choice("camera driver option", key, ("cruise_kmh",))
+        self.cruise_kmh = float(settings.get("cruise_kmh", CRUISE_KMH))
+        require_range("cruise_kmh", self.cruise_kmh, 1.0, 400.0)
+        self.hierarchy = Hierarchy(FUNCTIONS, load_profile("recommended"), DT)
+        self.smoothing = Smoothing(DT)
+        self.gaps: deque[float | None] = deque(maxlen=SAMPLES)
+        self.offsets: Floats | None = None
+        self.report = StackReport()
+
+    @property
+    def mode(self) -> str:
+        """The winner of the tiers."""
+        return "" if self.report.tier is None else self.report.tier.name.lower()
+
+    def sensors(self) -> tuple[SensorSpec, ...]:
+        """Its three cameras."""
+        return CAMERAS
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        """See, decide, actuate."""
+        label = seen(self.picture(frame))
+        v = frame.ego.speed
+        offsets, gap = self._path(label), self._gap(label)
+        bend = curvature(offsets)
+        allowed = bend_speed(bend)
+        cruise = min(self.cruise_kmh, kmh_from_mps(allowed))
+        lead = None if gap is None else Lead(gap, time_gap(gap, v), confirmed=True)
+        request = self.hierarchy.decide(
+            Situation(v, kmh_from_mps(v), lead, None, cruise_kmh=cruise, follow_cap_kmh=cruise)
+        )
+        request = slowed(request, v, allowed)
+        self.report = StackReport(
+            tier=request.tier,
+            detected=gap is not None,
+            distance=gap,
+            time_gap=None if lead is None else lead.gap,
+            v_target=cruise / 3.6,
+            curvature=bend,
+        )
+        steer = self.smoothing.update(steer_of(offsets, v))
+        return VehicleCommand(request.throttle, request.brake, steer, request.handbrake)
+
+    def picture(self, frame: SensorFrame) -> Picture:
+        """What the network is shown."""
+        return mosaic(images_of(frame.extra))
+
+    def _path(self, label: Label) -> Floats:
+        """Offsets of the lane ahead, a little smoothed."""
+        fresh = np.array(label.offsets)
+        self.offsets = fresh if self.offsets is None else REST * self.offsets + (1 - REST) * fresh
+        return self.offsets
+
+    def _gap(self, label: Label) -> float | None:
+        """The median of the last gaps, once enough of them are there."""
+        self.gaps.append(label.gap)
+        known = [gap for gap in self.gaps if gap is not None]
+        return median(known) if len(known) >= CONFIRMED else None
+
+
+def steer_of(offsets: Floats, v: float) -> float:
+    """Steer towards the lane's middle, by the law of lane centring (A-142 to A-146)."""
+    v_kmh = kmh_from_mps(v)
+    distance = min(NEARER * lookahead_distance(v_kmh), AHEAD[-1])
+    left = float(np.interp(distance, AHEAD, offsets))
+    return steer_command(atan2(left, distance), v_kmh)
+
+
+def curvature(offsets: Floats) -> float:
+    """1/m of the parabola through the offsets, by least squares; left positive."""
+    return 2.0 * float(np.polyfit(AHEAD, offsets, 2)[0])

@@ -1,0 +1,30 @@
+"""The frozen network of the camera driver, run by OpenCV on one thread."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.resources import as_file, files
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.stack.camera.codes import Floats, Label, decoded, network_input
+
+WEIGHTS = "weights.onnx"
+
+
+@cache
+def _network() -> Any:
+    cv2.setNumThreads(1)  # decision X-10; also the order of sums
+    with as_file(files("skidpad.stack.camera") / WEIGHTS) as path:
+        return cv2.dnn.readNetFromONNX(str(path))
+
+
+def seen(picture: NDArray[np.uint8]) -> Label:
+    """What the network makes of a mosaic of the three images."""
+    net = _network()
+    net.setInput(network_input(picture))
+    output: Floats = np.asarray(net.forward(), dtype=np.float32).reshape(-1)
+    return decoded(output)

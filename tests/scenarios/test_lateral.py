@@ -131,3 +131,15 @@ freespace="false" continuous="true" displacement="leftToReferencedEntity">
     rows = changed(tmp_path, keep)
     assert rows[-1].y == pytest.approx(-8.75 + 2.5, abs=1e-3)
     assert max(abs(b.y - a.y) for a, b in itertools.pairwise(rows)) <= 0.05 + 1e-6
+
+
+def test_a_speed_changed_after_a_lane_change_in_a_step_moves_it_a_step_later(tmp_path):
+    """As in esmini: the lane change, first in the file, goes on at the speed of the step before."""
+    change = event("a", lane_change(absolute(-2), value=3), time(1.0))
+    brake = event("b", private(speed(to(0), "linear", 5, "rate")), time(2.0))
+
+    def length(*events):
+        return way(told(tmp_path, stories=story(*events), end=4.0).of("other"))
+
+    assert length(change, brake) - length(brake) == pytest.approx(2.0 * 5.0 * 0.05, abs=0.03)
+    assert length(brake, change) - length(brake) == pytest.approx(0.0, abs=0.03)

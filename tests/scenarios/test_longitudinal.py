@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import itertools
+
 import pytest
 from tests.scenarios.files import at, event, on_lane, private, speed, story, time, to, told
 
@@ -110,3 +112,40 @@ targetToleranceMaster="0.5"><TargetPositionMaster>{on_lane(-3, 250)}</TargetPosi
     assert result.of("other")[k].x == pytest.approx(240.0, abs=1.5)
     if final:
         assert result.of("other")[k].speed == pytest.approx(8.0, abs=0.3)
+
+
+def test_a_steady_last_stretch_is_driven_at_the_final_speed(tmp_path):
+    meet = private(f"""<SynchronizeAction masterEntityRef="ego"><TargetPositionMaster>
+{on_lane(-3, 250)}</TargetPositionMaster><TargetPosition>{on_lane(-1, 240)}</TargetPosition>
+<FinalSpeed><AbsoluteSpeed value="6"><TargetDistanceSteadyState distance="24"/></AbsoluteSpeed>
+</FinalSpeed></SynchronizeAction>""")
+    result = told(
+        tmp_path, stories=story(event("e", meet, time(1.0))), end=15.0,
+        init=at("ego", -3, 100) + at("other", -1, 160, 5),
+    )  # fmt: skip
+    rows = result.of("other")
+    assert all(r.speed == pytest.approx(6.0, abs=0.01) for r in rows if 217.0 < r.x < 239.0)
+    k = next(k for k, r in enumerate(result.of("ego")) if r.x >= 250.0)
+    assert rows[k].x == pytest.approx(240.0, abs=0.5)
+
+
+def test_the_course_to_a_final_speed_is_two_straight_pieces_of_one_rate(tmp_path):
+    """From 5 m/s to 8 m/s over 80 m in 14 s: slower to w = 4.02 m/s, then faster, at 0.354 m/s^2.
+
+    By hand: 14 = x + y, 80 = (5 + w) x / 2 + (8 + w) y / 2 and (5 - w) / x = (8 - w) / y.
+    """
+    meet = private(f"""<SynchronizeAction masterEntityRef="ego"><TargetPositionMaster>
+{on_lane(-3, 250)}</TargetPositionMaster><TargetPosition>{on_lane(-1, 240)}</TargetPosition>
+<FinalSpeed><AbsoluteSpeed value="8"/></FinalSpeed></SynchronizeAction>""")
+    result = told(
+        tmp_path, stories=story(event("e", meet, time(1.0))), end=16.0,
+        init=at("ego", -3, 100) + at("other", -1, 155, 5),
+    )  # fmt: skip
+    rows = result.of("other")
+    speeds = [r.speed for r in rows if 1.1 < r.time < 14.5]
+    assert min(speeds) == pytest.approx(4.02, abs=0.06)
+    steps = sorted(b - a for a, b in itertools.pairwise(speeds))
+    assert steps[10] == pytest.approx(-0.354 * 0.05, rel=0.02)
+    assert steps[-20] == pytest.approx(0.354 * 0.05, rel=0.02)
+    assert rows[300].x == pytest.approx(240.0, abs=0.6)
+    assert rows[299].speed == pytest.approx(8.0, abs=0.2)

@@ -247,3 +247,22 @@ def test_all_conditions_of_a_group_and_any_group(tmp_path):
     probe = event("probe", STOP, time(0)).replace(condition(time(0)), both + condition(time(5.0)))
     result = told(tmp_path, stories=story(probe))
     assert result.player.events[0].t == pytest.approx(3.0, abs=0.01)
+
+
+def test_no_lane_is_no_clearance(tmp_path):
+    body = """<RelativeClearanceCondition distanceForward="30" distanceBackward="10"
+freeSpace="false" oppositeLanes="{}"><RelativeLaneRange from="{}" to="{}"/>
+</RelativeClearanceCondition>"""
+    begin = at("ego", -1, 100) + at("other", -3, 500)
+    assert fired(tmp_path, by_entity(body.format("false", -1, -1)), init=begin) == 0.0
+    assert fired(tmp_path, by_entity(body.format("false", -8, -8)), init=begin) is None
+    assert fired(tmp_path, by_entity(body.format("false", 1, 1)), init=begin) is None  # opposite
+
+
+def test_an_event_of_the_first_step_takes_over_before_init_goes_on(tmp_path):
+    begin = at("ego", -3, 100) + init(
+        "other", teleport(on_lane(-1, 120)), speed(to(20), "linear", 5, "rate")
+    )
+    change = story(event("e", private(speed(to(30), "linear", 5, "rate")), time(0.1)))
+    rows = told(tmp_path, init=begin, stories=change, end=2.0).of("other")
+    assert [round(r.speed, 6) for r in rows[:6]] == [0.0, 0.25, 0.5, 0.75, 1.0, 1.25]

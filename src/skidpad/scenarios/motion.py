@@ -78,6 +78,7 @@ class Guide:
         self.network, self.base = network, point
         self.free = pose  # where there is no lane: straight on
         self.v, self.a = v, 0.0
+        self.pace: float | None = None  # speed of this step's way, where it is not v
         self.offset = 0.0 if point is None else point.offset
         self.offset_rate = self.offset_bend = 0.0
         self.roads: tuple[int, ...] = ()
@@ -133,7 +134,8 @@ class Guide:
 
     def ideal(self, dt: float) -> Pose:
         """The pose of an actor that does exactly as demanded, one step on."""
-        way = self.v * dt
+        v, self.pace = self.v if self.pace is None else self.pace, None
+        way = v * dt
         if self.base is None:
             self.free = self.free.moved(forward=way)
             return self.free

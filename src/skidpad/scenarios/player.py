@@ -112,6 +112,7 @@ class Player:
         if first:
             self._begin()
         self.hit = self.hit or bool(truth.contacts)
+        self.telling.look(self.scene)
         self.going = [action for action in self.going if not action.step(self.scene)]
         self.telling.step(self.scene)
         t = self.scene.t

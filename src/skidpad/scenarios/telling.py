@@ -242,8 +242,8 @@ class Telling:
         acts = [a for s in self.stories for a in s.acts]
         return [e for a in acts for g in a.groups for m in g.manoeuvres for e in m.events]
 
-    def step(self, scene: Scene) -> None:
-        """One step of everything."""
+    def look(self, scene: Scene) -> None:
+        """Look at all triggers."""
         if not self.begun:
             self.begun = True
             for story in self.stories:
@@ -252,6 +252,9 @@ class Telling:
             self.ended = True
         for story in self.stories:
             story.look(scene)
+
+    def step(self, scene: Scene) -> None:
+        """Go on with what is under way."""
         for story in self.stories:
             story.step(scene)
         acts = [a for s in self.stories for a in s.acts]

@@ -1,4 +1,4 @@
-"""Keeping a distance to another entity, and arriving somewhere together with it."""
+"""Keeping a distance to another entity along the road."""
 
 from __future__ import annotations
 
@@ -9,14 +9,11 @@ from math import copysign, inf, sqrt
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Performance
-from skidpad.scenarios.measures import Axes, along_road, way
-from skidpad.scenarios.positions import Position, position
+from skidpad.scenarios.measures import Axes, along_road
 from skidpad.scenarios.scene import Actor, Running, Scene
 
 SPRING = 0.4  # 1/m, of the controller that closes a gap (esmini's, so that files play alike)
 REACHED = 0.1  # m
-ARRIVED = 0.3  # m, where a file gives no tolerance
-V_LEAST = 0.1  # m/s
 
 
 class Displacement(Enum):
@@ -142,77 +139,3 @@ def compile_gap(node: Node, ctx: Context) -> KeepGap:
 
 
 _LIMITS = ("maxAcceleration", "maxDeceleration", "maxSpeed")
-
-
-@dataclass(frozen=True, slots=True)
-class Synchronize:
-    """Be at a place when another entity is at its own; v_end: speed then, perhaps relative."""
-
-    other: str
-    other_goal: Position
-    goal: Position
-    tolerance: float
-    other_tolerance: float
-    v_end: float | None
-    relative: bool
-
-    def begin(self, scene: Scene, actor: Actor) -> Running:
-        """From now on."""
-        del scene
-        actor.longitudinal = Synchronized(self, actor)
-        return actor.longitudinal
-
-
-class Synchronized:
-    """On the way: the speed follows a curve that is planned anew in each step."""
-
-    def __init__(self, action: Synchronize, actor: Actor) -> None:
-        self.action, self.actor = action, actor
-        self.before = inf
-
-    def step(self, scene: Scene) -> bool:
-        """Demand the speed of the end of this step."""
-        if self.actor.longitudinal is not self:
-            return True
-        action, guide, network = self.action, self.actor.guide, scene.network
-        other = scene.actors[action.other]
-        own_way = way(network, self.actor.pose, action.goal.place(scene).pose)
-        its_way = way(network, other.pose, action.other_goal.place(scene).pose)
-        passed = its_way > self.before + 1e-6
-        self.before = its_way
-        if own_way <= action.tolerance or its_way <= action.other_tolerance or passed:
-            return True
-        if abs(other.guide.v) < V_LEAST:
-            return False
-        time = max(its_way / abs(other.guide.v), scene.dt)
-        if action.v_end is None:
-            guide.v, guide.a = own_way / time, 0.0
-            return False
-        v_end = action.v_end + (other.guide.v if action.relative else 0.0)
-        # v(t) = v + a t + c t^2 that is v_end after `time` and has covered the way then
-        c = 6.0 * ((guide.v + v_end) * time / 2.0 - own_way) / time**3
-        guide.a = (v_end - guide.v - c * time * time) / time
-        guide.v = max(guide.v + guide.a * scene.dt, 0.0)
-        return False
-
-
-def compile_synchronize(node: Node, ctx: Context) -> Synchronize:
-    """A <SynchronizeAction>."""
-    v_end, relative = None, False
-    found = node.find("FinalSpeed")
-    if found is not None:
-        speed = found.only()
-        relative = speed.tag == "RelativeSpeedToMaster"
-        if not relative and speed.tag != "AbsoluteSpeed":
-            raise speed.unsupported()
-        v_end = speed.number("value")
-    master = "masterEntityRef" if node.has("masterEntityRef") else "entityRef"
-    return Synchronize(
-        ctx.entity(node, master),
-        position(node.child("TargetPositionMaster"), ctx),
-        position(node.child("TargetPosition"), ctx),
-        node.number("targetTolerance", ARRIVED),
-        node.number("targetToleranceMaster", ARRIVED),
-        v_end,
-        relative,
-    )

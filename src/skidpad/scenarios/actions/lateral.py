@@ -17,10 +17,17 @@ A_LATERAL = 1.0  # m/s^2, of a change of offset for which the file gives no limi
 
 
 class ChangeOfOffset:
-    """A sideways motion under way; by_way: its shape runs over distance instead of time."""
+    """A sideways motion under way; by_way: its shape runs over distance instead of time.
 
-    def __init__(self, actor: Actor, change: Transition, by_way: bool = False) -> None:
+    to_lane: the entity goes on at the speed that it has when this action's turn comes in a step,
+    so that a change of speed later in the file acts a step later; as in esmini.
+    """
+
+    def __init__(
+        self, actor: Actor, change: Transition, *, by_way: bool = False, to_lane: bool = False
+    ) -> None:
         self.actor, self.change, self.by_way, self.done = actor, change, by_way, 0.0
+        self.to_lane = to_lane
 
     def step(self, scene: Scene) -> bool:
         """Demand the offset of the end of this step; an actor that stands does not move aside."""
@@ -31,6 +38,8 @@ class ChangeOfOffset:
         if v < SLOW and not self.change.over(self.done):
             guide.offset_rate = guide.offset_bend = 0.0
             return False
+        if self.to_lane:
+            guide.pace = guide.v
         _, slope, _ = self.change.at(self.done)
         pace = v / sqrt(1.0 + slope * slope) if self.by_way else 1.0
         if not self.by_way and abs(slope) > v:
@@ -70,7 +79,7 @@ class LaneChange:
         span = self.dynamics.span(end - guide.offset)
         change = Transition(guide.offset, end, span, self.dynamics.shape)
         by_way = self.dynamics.dimension is Dimension.DISTANCE
-        actor.lateral = ChangeOfOffset(actor, change, by_way)
+        actor.lateral = ChangeOfOffset(actor, change, by_way=by_way, to_lane=True)
         return actor.lateral
 
     def target(self, scene: Scene) -> int | None:

@@ -8,6 +8,7 @@ from enum import Enum
 from math import hypot, inf
 
 from skidpad.core.geometry import Pose, wrap_angle
+from skidpad.roads.queries import LanePoint
 from skidpad.scenarios.conditions.base import EntityCondition, Rule, rule
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
@@ -222,19 +223,31 @@ class Clearance:
         if base is None:
             return True
         sign = 1 if scene.network.forward(base) == (here.guide.along > 0.0) else -1
+        if not self._has_lane(scene, base, sign):
+            return False
         return not any(self._inside(scene, here, base.lane_id, sign, n) for n in others)
+
+    def _wanted(self, lane: int, sign: int) -> set[int]:
+        """Ids of the lanes that are asked for."""
+        return {
+            next_lane_id(lane, sign * k) if k else lane
+            for low, high in self.lanes
+            for k in range(int(max(low, -9)), int(min(high, 9)) + 1)
+        }
+
+    def _has_lane(self, scene: Scene, base: LanePoint, sign: int) -> bool:
+        """Beside the entity there is a lane of those that are asked for: no lane is no room."""
+        wanted = self._wanted(base.lane_id, sign) or {base.lane_id}
+        if not self.opposite:
+            wanted = {i for i in wanted if (i > 0) == (base.lane_id > 0)}
+        return any(i == base.lane_id or scene.network.beside(base, i) for i in wanted)
 
     def _inside(self, scene: Scene, here: Actor, lane: int, sign: int, other: str) -> bool:
         it = scene.actors[other]
         there = scene.network.place_of(it.pose).lane
         if there is None:
             return False
-        wanted = {
-            next_lane_id(lane, sign * k) if k else lane
-            for low, high in self.lanes
-            for k in range(int(max(low, -9)), int(min(high, 9)) + 1)
-        }
-        if self.lanes and there.lane_id not in wanted:
+        if self.lanes and there.lane_id not in self._wanted(lane, sign):
             return False
         if self.opposite and abs(wrap_angle(it.pose.yaw - here.pose.yaw)) < 1.57:
             return False

@@ -1,0 +1,193 @@
+"""Arriving somewhere together with another entity: the courses of speed are those of esmini.
+
+Without a final speed the acceleration is the one that arrives in time. With one, the speed goes
+straight to it, or first away from it and then straight (both at the same rate), or to a stop first.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import Enum, auto
+from math import inf, sqrt
+
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.measures import way
+from skidpad.scenarios.positions import Position, position
+from skidpad.scenarios.scene import Actor, Running, Scene
+
+ARRIVED = 0.0  # m, where a file gives no tolerance
+V_LEAST = 1e-6  # m/s
+NEAR_LINE = 0.1  # m/s from the straight course that is on it
+B_STOP = 8.0  # m/s^2, where there is not half of the way left to stop in
+LEAST = 1e-6  # m
+
+
+@dataclass(frozen=True, slots=True)
+class Steady:
+    """A last stretch at the final speed: its length in m, or its duration in s."""
+
+    distance: float = 0.0
+    time: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Synchronize:
+    """Be at a place when another entity is at its own; v_end: speed then, perhaps relative."""
+
+    other: str
+    other_goal: Position
+    goal: Position
+    tolerance: float
+    other_tolerance: float
+    v_end: float | None
+    relative: bool
+    steady: Steady = Steady()
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """From now on."""
+        del scene
+        actor.longitudinal = Synchronized(self, actor)
+        return actor.longitudinal
+
+
+class Phase(Enum):
+    """Where on its course the speed is."""
+
+    BEGIN = auto()
+    AWAY = auto()  # faster or slower than the straight course, to come onto it
+    STRAIGHT = auto()
+    STOPPING = auto()
+    STANDING = auto()
+    WAITING = auto()  # for the other one to move
+    STEADY = auto()
+
+
+class Synchronized:
+    """On the way."""
+
+    def __init__(self, action: Synchronize, actor: Actor) -> None:
+        self.action, self.actor = action, actor
+        self.before = inf, inf
+        self.phase, self.rising = Phase.BEGIN, False
+
+    def step(self, scene: Scene) -> bool:
+        """Demand the speed of the end of this step."""
+        if self.actor.longitudinal is not self:
+            return True
+        action, guide, dt = self.action, self.actor.guide, scene.dt
+        other = scene.actors[action.other]
+        own = way(scene.network, self.actor.pose, action.goal.place(scene).pose)
+        its = way(scene.network, other.pose, action.other_goal.place(scene).pose)
+        over = own < action.tolerance + LEAST or its < action.other_tolerance + LEAST
+        over = over or own > self.before[0] + LEAST or its > self.before[1] + LEAST
+        self.before = own, its
+        own, its = max(own - action.tolerance, LEAST), max(its - action.other_tolerance, LEAST)
+        pace = abs(other.guide.v)
+        v_end = action.v_end
+        if v_end is not None and action.relative:
+            v_end += other.guide.v
+        if over or (pace > V_LEAST and its / pace < dt):
+            guide.v, guide.a = guide.v if v_end is None else v_end, 0.0
+            return True
+        if pace <= V_LEAST:
+            self.phase, guide.v, guide.a = Phase.WAITING, 0.0, 0.0
+        elif v_end is None:
+            guide.a = 2.0 * (own * pace / its - guide.v) / (its / pace)
+            guide.v += guide.a * dt
+        else:
+            v = max(self._speed(guide.v, own, its / pace, v_end, dt), 0.0)
+            guide.a, guide.v = (v - guide.v) / dt, v
+        return False
+
+    def _speed(self, v: float, own: float, time: float, v_end: float, dt: float) -> float:
+        """At the end of this step, on the way to v_end `own` m and `time` s from now."""
+        steady = self.action.steady
+        last = max(steady.distance, steady.time * v_end)
+        if last > 0.0 and v_end > 0.0:
+            if self.phase is Phase.STEADY or own <= last or time <= last / v_end:
+                self.phase = Phase.STEADY
+                return v_end
+            own, time = own - last, time - last / v_end
+        if self.phase is Phase.STOPPING:
+            self.phase = Phase.STANDING if v - B_STOP * dt < 0.0 else Phase.STOPPING
+            return v - B_STOP * dt
+        if self.phase is Phase.STANDING:
+            if v_end <= 0.0 or time >= 2.0 * own / v_end:
+                return 0.0
+            self.phase = Phase.STRAIGHT
+        line = 2.0 * own / time - v_end  # the speed now of the straight course
+        if self.phase is Phase.STRAIGHT:
+            return line
+        if self.phase is Phase.AWAY and abs(v - line) < NEAR_LINE:
+            self.phase = Phase.STRAIGHT
+            return v
+        if self.phase in (Phase.BEGIN, Phase.WAITING):
+            self.phase, self.rising = Phase.AWAY, 0.5 * (v_end + v) < own / time
+        a, turn = away(v, v_end, own, time)
+        if (a < 0.0) is self.rising and a != 0.0:
+            self.phase = Phase.STRAIGHT
+            return v
+        return self._stopping(v, own, v_end, dt) if turn < 0.0 else v + a * dt
+
+    def _stopping(self, v: float, own: float, v_end: float, dt: float) -> float:
+        """The course would go backwards: stop on the way instead, then go on."""
+        time = 2.0 * v * own / (v * v + v_end * v_end)
+        if time * v / 2.0 > own / 2.0:
+            self.phase = Phase.STOPPING
+            return v - B_STOP * dt
+        slower = v - (v / time if time > LEAST else 0.0) * dt
+        if slower < 0.0:
+            self.phase = Phase.STANDING
+        return slower
+
+
+def away(v: float, v_end: float, own: float, time: float) -> tuple[float, float]:
+    """Acceleration of a course that goes away from the straight one and back at the same rate.
+
+    Returns it with the speed at the turn, so that `own` m take `time` s and end at v_end.
+    """
+    if abs(v_end - v) < LEAST:
+        turn = 2.0 * own / time - v
+        return (turn - v) / (time / 2.0), turn
+    inside = 2.0 * own * own - 2.0 * (v_end + v) * time * own + (v_end**2 + v**2) * time * time
+    root = sqrt(2.0) * sqrt(max(inside, 0.0))
+    for sign in (1.0, -1.0):
+        x = -(sign * root + 2.0 * own - 2.0 * v_end * time) / (2.0 * (v_end - v))
+        if 0.0 < x < time:
+            turn = (2.0 * own - sign * root) / (2.0 * time)
+            return (turn - v) / x, turn
+    return 0.0, 0.0
+
+
+def compile_synchronize(node: Node, ctx: Context) -> Synchronize:
+    """A <SynchronizeAction>."""
+    v_end, relative, steady = None, False, Steady()
+    found = node.find("FinalSpeed")
+    if found is not None:
+        speed = found.only()
+        relative = speed.tag == "RelativeSpeedToMaster"
+        if not relative and speed.tag != "AbsoluteSpeed":
+            raise speed.unsupported()
+        v_end = speed.number("value")
+        steady = _steady(speed)
+    master = "masterEntityRef" if node.has("masterEntityRef") else "entityRef"
+    return Synchronize(
+        ctx.entity(node, master),
+        position(node.child("TargetPositionMaster"), ctx),
+        position(node.child("TargetPosition"), ctx),
+        node.number("targetTolerance", ARRIVED),
+        node.number("targetToleranceMaster", ARRIVED),
+        v_end,
+        relative,
+        steady,
+    )
+
+
+def _steady(speed: Node) -> Steady:
+    for name in ("distance", "time"):
+        found = speed.find(f"Target{name.title()}SteadyState")
+        if found is not None:
+            value = found.number(name)
+            return Steady(distance=value) if name == "distance" else Steady(time=value)
+    return Steady()

@@ -172,18 +172,23 @@ def test_an_export_with_one_vehicle_less_differs_by_whole_rows_only(tmp_path):
     assert exports[0] == exports[1]  # 7 and 6 hazards both read "at least 5"
 
 
+HALF = row(0, 300), row(0, 0, indicator="object_location_similarity")  # of 600 cycles each
+
+
 def test_the_safety_case_says_what_is_known_and_how_sure(lite):
     assert {c["verdict"] for c in lite.get("axle", "/api/v1/safety-case").json()} == {"no evidence"}
     for k in range(2):
-        send_rows(
-            lite,
-            f"red-{k + 1}",
-            "key-aaaa-1",
-            row(0, 300),
-            row(0, 0, indicator="object_location_similarity"),
-        )
+        send_rows(lite, f"red-{k + 1}", "key-aaaa-1", *HALF)
     found = {c["id"]: c for c in lite.get("axle", "/api/v1/safety-case").json()}
-    assert (found["S1"]["verdict"], found["S1"]["share"]) == ("challenged", 0.5)
+    assert (found["S1"]["verdict"], found["S1"]["share"]) == ("open", 0.5)
     assert found["S4"]["verdict"] == "open"  # two vehicles prove nothing
     assert found["S2"]["verdict"] == "no evidence"
     assert {c["id"] for c in lite.get("authority", "/api/v1/safety-case").json()} == set(found)
+
+
+def test_six_vehicles_that_agree_challenge_a_claim(tmp_path):
+    with crowd(tmp_path, 6) as many:
+        for k in range(6):
+            send_rows(many, f"car-{k}", f"car-key-{k}", *HALF)
+        found = {c["id"]: c for c in many.get("axle", "/api/v1/safety-case").json()}
+        assert (found["S1"]["verdict"], found["S4"]["verdict"]) == ("challenged", "open")

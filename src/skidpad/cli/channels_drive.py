@@ -119,6 +119,7 @@ def outcomes(folders: list[Path] = FOLDERS) -> None:
     """Compare drivers over the seeds that all have driven: does redundancy pay?"""
     from skidpad.core.errors import FileError
     from skidpad.evidence.channels.redundancy import compare_drivers
+    from skidpad.evidence.statistics import interval_text
     from skidpad.recording.channel_drives import read_outcomes
 
     driven = read_outcomes(folders)
@@ -127,8 +128,5 @@ def outcomes(folders: list[Path] = FOLDERS) -> None:
     for row in compare_drivers(driven):
         typer.echo(f"{row.drive_by}: {row.segments} segments, {row.hours:.2f} h, {row.km:.1f} km")
         for event, rate in row.rates.items():
-            few = ", too few for a verdict" if rate.too_few else ""
-            typer.echo(
-                f"  {event}: {rate.events}, {rate.rate:.2f} per h "
-                f"({rate.interval.low:.2f} to {rate.interval.high:.2f}){few}"
-            )
+            told = interval_text(rate.interval)
+            typer.echo(f"  {event}: {rate.events}, {rate.rate:.2f} per h ({told})")

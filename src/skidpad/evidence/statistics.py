@@ -1,7 +1,8 @@
-"""Intervals, comparisons and corrections (decision X-9). Every number in a report passes here.
+"""Intervals, comparisons and corrections (decisions X-9, R-7). Every number in a report passes here.
 
-Counts of crashes are small: exact methods where they exist, resampling over seeds where runs are
-more alike or more different than Poisson, and the words "too few" where nothing helps.
+Counts of crashes are small and clump: exact methods where they exist, else those that hold 94 % in
+simulation (tests/evidence/test_coverage.py says where), and None, "too few", where nothing does.
+Nothing is resampled below 30 units.
 """
 
 from __future__ import annotations
@@ -23,9 +24,12 @@ from skidpad.core.randomness import stream
 Floats = NDArray[np.float64]
 
 CONFIDENCE = 0.95
-DISPERSION_MAX = 1.2  # above, counts vary more than Poisson: bootstrap (X-9)
-SEEDS_FOR_BOOTSTRAP = 10
-FEW_EVENTS = 100  # below, say so
+DISPERSION_MAX = 1.2  # above, counts vary more than Poisson (X-9)
+CLUMPED_EVENTS = 25  # fewer of counts that vary more than Poisson: too few
+BOOTSTRAP_FROM = 30  # units
+MEAN_FROM = 6  # values
+SKEW_MAX = 1.0  # of fewer than 30 values
+SKEW_WIDENS = 1.5
 RESAMPLES = 4000
 EVER_SIGNIFICANT = 6  # fewer pairs cannot give p < 0.05: 2 / 2^5 > 0.05
 EXACT_PAIRS = 12  # up to here all 2^n sign changes are tried
@@ -42,7 +46,7 @@ class Method(str, Enum):
     """How an interval was made."""
 
     POISSON = "exact Poisson"
-    BOOTSTRAP = "bootstrap over runs"
+    SCORE = "score limits with the spread of runs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,14 +57,9 @@ class Rate:
     runs: int
     exposure: float  # runs, km, hours
     rate: float
-    interval: Interval
+    interval: Interval | None  # None: too few
     method: Method
     dispersion: float | None  # variance / mean of the counts, None: not defined
-
-    @property
-    def too_few(self) -> bool:
-        """Too few events to say more than the interval does."""
-        return self.events < FEW_EVENTS
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,12 +92,18 @@ def poisson_interval(count: int, exposure: float = 1.0, confidence: float = CONF
     return Interval(float(low) / exposure, float(high) / exposure)
 
 
-def dispersion_index(counts: ArrayLike) -> float | None:
-    """Variance over mean of counts, 1 for Poisson; None below two runs or without events."""
+def dispersion_index(counts: ArrayLike, exposures: ArrayLike | None = None) -> float | None:
+    """Variance over mean of counts, 1 for Poisson; None below two runs or without events.
+
+    Of unequal exposures it is Pearson's: squared deviations over expectations, per run but one.
+    """
     c = np.asarray(counts, dtype=np.float64)
-    if c.size < 2 or c.mean() == 0.0:
+    e = np.ones_like(c) if exposures is None else np.asarray(exposures, dtype=np.float64)
+    use = e > 0.0
+    if c.size < 2 or c.sum() == 0.0 or not use.any():
         return None
-    return float(c.var(ddof=1) / c.mean())
+    expected = c.sum() * e[use] / e.sum()
+    return float(np.sum((c[use] - expected) ** 2 / expected) / (c.size - 1))
 
 
 def bootstrap_interval(
@@ -118,21 +123,72 @@ def bootstrap_interval(
 
 
 def event_rate(counts: Sequence[int], exposures: Sequence[float] | None = None) -> Rate:
-    """Rate of events over runs: exact Poisson, or bootstrap when X-9 asks for it.
+    """Rate of events over runs: exact Poisson of a single run, else score limits.
 
-    Without any event the bootstrap knows nothing, so the exact limit stands.
+    Score limits take the variance of a count as its mean times the dispersion index of these runs (at
+    least 1, widened for its own error), and Student's quantile. In simulation they hold 94.5 % or more
+    from two runs on, for Poisson counts and for negative binomial ones with a dispersion of up to 3 and
+    a mean of 1 or up to 20 and a mean of 5. Fewer than 25 events that clump have no interval.
     """
     c = np.asarray(counts, dtype=np.int64)
     e = np.ones(c.size) if exposures is None else np.asarray(exposures, dtype=np.float64)
     if c.size == 0 or e.sum() <= 0.0:
         raise ValueError("a rate needs at least one run with exposure > 0")
-    total, exposure, dispersion = int(c.sum()), float(e.sum()), dispersion_index(c)
-    spread = c.size >= SEEDS_FOR_BOOTSTRAP or (dispersion or 0.0) > DISPERSION_MAX
-    if spread and total:
-        interval, method = bootstrap_interval(c, e), Method.BOOTSTRAP
-    else:
-        interval, method = poisson_interval(total, exposure), Method.POISSON
-    return Rate(total, c.size, exposure, total / exposure, interval, method, dispersion)
+    total, exposure = int(c.sum()), float(e.sum())
+    if c.size == 1:
+        limits = poisson_interval(total, exposure)
+        return Rate(total, 1, exposure, total / exposure, limits, Method.POISSON, None)
+    spread = dispersion_index(c, e)
+    few = total < CLUMPED_EVENTS and (spread or 0.0) > DISPERSION_MAX
+    interval = None if few else _score_limits(total, exposure, c.size, spread)
+    return Rate(total, c.size, exposure, total / exposure, interval, Method.SCORE, spread)
+
+
+def _score_limits(total: int, exposure: float, runs: int, spread: float | None) -> Interval:
+    """Rates whose distance from the one seen is at most Student's quantile times its deviation."""
+    over = max((spread or 0.0) - 1.0, 0.0) * (1.0 + np.sqrt(2.0 / (runs - 1)))
+    width = stats.t.ppf(1.0 - (1.0 - CONFIDENCE) / 2.0, runs - 1) ** 2 * (1.0 + over)
+    middle = total + width / 2.0
+    half = float(np.sqrt(width * total + width**2 / 4.0))
+    return Interval(max(middle - half, 0.0) / exposure, (middle + half) / exposure)
+
+
+def mean_limits(values: ArrayLike) -> Interval | None:
+    """Limits of the mean of values (n,) that are not counts; None: too few, or too skew for so few.
+
+    Student's limits, widened by the skewness seen. In simulation they hold 94 % or more for
+    normal, uniform, beta and exponential values and log-normal ones with a sigma of 0.5.
+    """
+    v = np.asarray(values, dtype=np.float64)
+    n = v.size
+    spread = float(v.std(ddof=1)) if n > 1 else 0.0
+    if n < MEAN_FROM:
+        return None
+    if spread <= 1e-12 * max(1.0, float(np.abs(v).max())):
+        return Interval(float(v[0]), float(v[0]))
+    skew = abs(float(stats.skew(v, bias=False)))
+    if n < BOOTSTRAP_FROM and skew > SKEW_MAX:
+        return None
+    half = stats.t.ppf(1.0 - (1.0 - CONFIDENCE) / 2.0, n - 1) * spread / np.sqrt(n)
+    half *= 1.0 + skew / (SKEW_WIDENS * np.sqrt(n))
+    return Interval(float(v.mean() - half), float(v.mean() + half))
+
+
+def ratio_limits(values: ArrayLike, weights: ArrayLike) -> Interval | None:
+    """Limits of sum(values) / sum(weights) over units (n,); None: fewer than six.
+
+    Resampled from 30 units on, else Student's limits by leaving out one unit after the other.
+    """
+    v, w = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
+    if v.size >= BOOTSTRAP_FROM:
+        return bootstrap_interval(v, w)
+    if v.size < MEAN_FROM:
+        return None
+    ratio = v.sum() / w.sum()
+    off = (v - ratio * w) / (1.0 - w / w.sum()) * v.size / w.sum()
+    half = stats.t.ppf(1.0 - (1.0 - CONFIDENCE) / 2.0, v.size - 1) * off.std(ddof=1)
+    half /= np.sqrt(v.size)
+    return Interval(float(ratio - half), float(ratio + half))
 
 
 def compare_pairs(differences: ArrayLike) -> Comparison:
@@ -241,15 +297,19 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return [float(v) for v in adjusted]
 
 
-def interval_text(interval: Interval) -> str:
-    """`95 % 0.1 to 1.46`, `95 % unbounded`."""
+def interval_text(interval: Interval | None) -> str:
+    """`95 % 0.1 to 1.46`, `95 % unbounded`, `too few for an interval`."""
+    if interval is None:
+        return "too few for an interval"
     if not np.isfinite(interval).any():
         return "95 % unbounded"
     return f"95 % {interval.low:.3g} to {interval.high:.3g}"
 
 
-def share_text(share: float, interval: Interval) -> str:
+def share_text(share: float, interval: Interval | None) -> str:
     """`5.00 %, 95 % 0.1 to 14.6 %` of shares from 0 to 1."""
+    if interval is None:
+        return f"{100.0 * share:.2f} %, {interval_text(None)}"
     percent = Interval(100.0 * interval.low, 100.0 * interval.high)
     unit = " %" if np.isfinite(percent).any() else ""
     return f"{100.0 * share:.2f} %, {interval_text(percent)}{unit}"

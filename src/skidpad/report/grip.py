@@ -39,9 +39,9 @@ differences are paired.
 
 Completion is the share of runs without an accident of the ego. Runs in which the scenario never happened \
 count in it, as in the published numbers, and are left out in the columns "if triggered". Intervals are \
-95 %: exact for shares, bootstrap over runs for means. Published numbers stand beside ours in small print; \
-they come from another simulator, another driver and other scenario files, and nothing here was tuned to \
-meet them."""
+95 %: exact for shares, Student's, widened where values are skew, for means. Published numbers stand \
+beside ours in small print; they come from another simulator, another driver and other scenario files, \
+and nothing here was tuned to meet them."""
 MODEL = """The statistical ratio of the study multiplies the friction of a dry road, 0.9. It puts heavy \
 rain at 0.27, below packed snow (0.34) and far below what braking tests measure on wet roads (0.63 to \
 0.72); `--model physical` follows measurements."""

@@ -22,10 +22,10 @@ every seed; seeds are common to all cells, so differences between cells are pair
 is a contact that started the recovery supervisor, a departure from the road (all wheels off every lane \
 for 1 s, or more than 3 m beyond the edge), or a wrong-way correction.
 
-Intervals are 95 %: exact Poisson for counts, or a bootstrap over runs where counts vary more than \
-Poisson or there are ten or more seeds. Published numbers stand beside ours in italics. They come from \
-one run per cell on another simulator and another map: they are there to compare, and nothing here was \
-tuned to meet them."""
+Intervals are 95 %: of counts score limits that take the spread of the runs into account, of means \
+Student's, widened where values are skew; where neither holds its coverage it says too few. Published \
+numbers stand beside ours in italics. They come from one run per cell on another simulator and another \
+map: they are there to compare, and nothing here was tuned to meet them."""
 
 
 def write_report(folder: Path) -> Path:

@@ -84,8 +84,8 @@ def _rates(name: str, rates: Sequence[Rate | None], published: Sequence[float | 
     return Series(
         name,
         [r.rate if r else None for r in rates],
-        [r.interval.low if r else None for r in rates],
-        [r.interval.high if r else None for r in rates],
+        [r.interval.low if r and r.interval else None for r in rates],
+        [r.interval.high if r and r.interval else None for r in rates],
         published,
     )
 

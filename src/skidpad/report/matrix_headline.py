@@ -8,6 +8,7 @@ import numpy as np
 
 from skidpad.evidence.statistics import event_rate, median_time
 from skidpad.report.matrix_data import Matrix, config_title
+from skidpad.report.matrix_tables import TOO_FEW
 from skidpad.report.page import Cell, Table
 from skidpad.report.tables import Column, Format, Quantity, table
 
@@ -47,11 +48,15 @@ def _count(matrix: Matrix, column: str, config: str) -> Quantity:
         return Quantity(value=None)
     rate = event_rate(runs[column].to_list())
     scale = 100.0 * len(runs) / km
-    value, low, high = (scale * v for v in (rate.rate, *rate.interval))
+    told = f"per 100 km {scale * rate.rate:.1f}"
+    if rate.interval is not None:
+        low, high = (scale * end for end in rate.interval)
+        told += f": {low:.1f} to {high:.1f}"
     return Quantity(
         value=rate.rate,
         interval=rate.interval,
-        lines=(f"per 100 km {value:.1f}: {low:.1f} to {high:.1f}",),
+        remark=TOO_FEW if rate.interval is None else "",
+        lines=(told,),
         hint=f"{rate.events} events in {rate.runs} runs, {km:,.0f} km, {rate.method.value}",
     )
 

@@ -10,8 +10,8 @@ import polars as pl
 from skidpad.evidence.contrasts import paired_runs, per_seed
 from skidpad.evidence.statistics import (
     Rate,
-    bootstrap_interval,
     compare_pairs,
+    mean_limits,
     p_text,
     poisson_interval,
 )
@@ -31,6 +31,7 @@ STEP_COLUMNS = (
     "ttc_below_1_5_s",
 )
 BY_RUN = ("weather", "seed")
+TOO_FEW = "too few"
 RATE = Format(".2f", absent="no run")
 MEANS = (
     ("dropout_pct", "Dropout: ticks without a target or persisting, %"),
@@ -122,6 +123,7 @@ def rate_quantity(
     return Quantity(
         value=rate.rate,
         interval=rate.interval,
+        remark=TOO_FEW if rate.interval is None else "",
         published=published,
         heat=None if top is None else (rate.rate / top) ** 0.5,
         hint=f"{rate.events} events in {rate.runs} runs, {rate.method.value}",
@@ -129,7 +131,7 @@ def rate_quantity(
 
 
 def mean_table(matrix: Matrix, column: str, caption: str) -> Table:
-    """Means over seeds with bootstrap intervals."""
+    """Means over seeds with intervals."""
 
     def of(weather: str | None, config: str) -> Quantity:
         said = None if weather is None else published_value(column, config, weather)
@@ -142,9 +144,11 @@ def mean_table(matrix: Matrix, column: str, caption: str) -> Table:
 def mean_quantity(values: pl.Series, published: float | None = None) -> Quantity:
     """Mean over runs; one run has no interval."""
     known = values.drop_nulls().cast(pl.Float64).to_numpy()
+    limits = mean_limits(known)
     return Quantity(
         value=float(known.mean()) if known.size else None,
-        interval=bootstrap_interval(known) if known.size > 1 else None,
+        interval=limits,
+        remark=TOO_FEW if limits is None and known.size > 1 else "",
         published=published,
         hint=f"{known.size} runs" if known.size else "",
     )

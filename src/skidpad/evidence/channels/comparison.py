@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import polars as pl
 
 from skidpad.core.errors import InputError
-from skidpad.evidence.statistics import bootstrap_interval, interval_text
+from skidpad.evidence.statistics import interval_text, ratio_limits
 
 BLOCK = 100  # cycles that are resampled together, since neighbours are not independent
 
@@ -30,6 +30,6 @@ def compare_drives(a: pl.DataFrame, b: pl.DataFrame) -> Iterator[str]:
         d, n = blocks["d"].to_numpy(), blocks["n"].to_numpy()
         mean = d.sum() / n.sum()
         yield (
-            f"{label}: {mean:+.4f} {interval_text(bootstrap_interval(d, n))} over {len(known)} "
+            f"{label}: {mean:+.4f} {interval_text(ratio_limits(d, n))} over {len(known)} "
             f"cycles; violated in {known['violated'].sum()} and {known['violated_b'].sum()}"
         )

@@ -12,7 +12,7 @@ from scipy.sparse import csr_matrix
 from scipy.sparse.csgraph import maximum_bipartite_matching
 
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.statistics import Interval, bootstrap_interval, clopper_pearson
+from skidpad.evidence.statistics import Interval, clopper_pearson, ratio_limits
 
 TOLERANCES = (1.0, 0.5, 2.0)  # s by which intervals are dilated; the first is the headline
 
@@ -181,7 +181,8 @@ def _interval(counts: Sequence[tuple[int, int]]) -> Interval | None:
     hits, cases = (sum(column) for column in zip(*known, strict=True))
     if len(known) == 1 or hits in (0, cases):  # resampling cannot show what was never seen
         return clopper_pearson(hits, cases)
-    return bootstrap_interval([k for k, _ in known], [n for _, n in known])
+    limits = ratio_limits([k for k, _ in known], [n for _, n in known])
+    return None if limits is None else Interval(max(limits.low, 0.0), min(limits.high, 1.0))
 
 
 def macro(scores: Mapping[HazardType, Score]) -> tuple[float | None, float | None]:

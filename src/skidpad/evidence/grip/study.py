@@ -25,10 +25,10 @@ from skidpad.evidence.grip.series import (
 from skidpad.evidence.statistics import (
     Comparison,
     Interval,
-    bootstrap_interval,
     clopper_pearson,
     compare_pairs,
     mcnemar,
+    mean_limits,
 )
 from skidpad.recording.grip import COLUMNS
 
@@ -119,12 +119,12 @@ def changed_outcome(pair: Pair) -> Share:
     return Share(int((both["completion"] != both["completion_reduced"]).sum()), len(both))
 
 
-def mean_interval(values: pl.Series) -> tuple[float, Interval] | None:
-    """Mean with bootstrap limits over runs."""
+def mean_interval(values: pl.Series) -> tuple[float, Interval | None] | None:
+    """Mean over runs with its limits; None where there are too few."""
     known = values.drop_nulls().to_numpy()
     if not known.size:
         return None
-    return float(known.mean()), bootstrap_interval(known)
+    return float(known.mean()), mean_limits(known)
 
 
 def compared(pair: Pair, column: str) -> Comparison | None:

@@ -13,7 +13,7 @@ import msgspec
 import polars as pl
 from sqlalchemy import Connection, func, select
 
-from skidpad.evidence.statistics import Interval, bootstrap_interval, event_rate
+from skidpad.evidence.statistics import Interval, event_rate, ratio_limits
 from skidpad.fleet.batch import IndicatorRow, rows_of
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.events import add_event
@@ -56,7 +56,7 @@ class HazardRate:
     events: int
     hours: float
     rate: float
-    interval: Interval
+    interval: Interval | None
 
 
 def compact(fleet: Fleet) -> int:
@@ -145,10 +145,17 @@ def _trend(indicator: str, at: float, group: pl.DataFrame) -> Trend:
         at=at,
         mean=float(group["total"].sum()) / max(cycles, 1),
         share=float(violated.sum()) / max(cycles, 1),
-        interval=bootstrap_interval(violated, n) if cycles else Interval(0.0, 1.0),
+        interval=_within(ratio_limits(violated, n) if cycles else None),
         vehicles=len(group),
         cycles=cycles,
     )
+
+
+def _within(limits: Interval | None) -> Interval:
+    """Limits of a share; all of it where there are none."""
+    if limits is None:
+        return Interval(0.0, 1.0)
+    return Interval(max(limits.low, 0.0), min(limits.high, 1.0))
 
 
 def hazard_rates(connection: Connection, who: Principal) -> list[HazardRate]:

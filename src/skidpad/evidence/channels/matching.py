@@ -170,7 +170,7 @@ def _weighed_interval(known: Sequence[Weighed]) -> Interval | None:
     if len(known) == 1 or not 0.0 < total.found < total.true:
         n = max(round(total.size), 1)
         return clopper_pearson(round(total.recall * n), n)
-    return bootstrap_interval([w.found for w in known], [w.true for w in known])
+    return _share_limits([w.found for w in known], [w.true for w in known])
 
 
 def _interval(counts: Sequence[tuple[int, int]]) -> Interval | None:
@@ -181,7 +181,12 @@ def _interval(counts: Sequence[tuple[int, int]]) -> Interval | None:
     hits, cases = (sum(column) for column in zip(*known, strict=True))
     if len(known) == 1 or hits in (0, cases):  # resampling cannot show what was never seen
         return clopper_pearson(hits, cases)
-    limits = ratio_limits([k for k, _ in known], [n for _, n in known])
+    return _share_limits([k for k, _ in known], [n for _, n in known])
+
+
+def _share_limits(hits: Sequence[float], cases: Sequence[float]) -> Interval | None:
+    """Of a share of sums over segments; None below six segments."""
+    limits = ratio_limits(hits, cases)
     return None if limits is None else Interval(max(limits.low, 0.0), min(limits.high, 1.0))
 
 

@@ -22,7 +22,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
         "--rewrite-references", action="store_true", help="write reference recordings anew"
     )
     parser.addoption("--fuzz", type=int, default=None, help="damaged files per reader")
-    parser.addoption("--draws", type=int, default=2000, help="draws per case of test_coverage")
+    parser.addoption("--draws", type=int, default=2000, help="draws per case of test_promises")
     parser.addoption("--fuzz-from", type=int, default=0, help="number of the first of them")
 
 

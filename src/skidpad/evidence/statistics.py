@@ -1,7 +1,7 @@
 """Intervals, comparisons and corrections (decisions X-9, R-7). Every number in a report passes here.
 
 Counts of crashes are small and clump: exact methods where they exist, else those that hold 94 % in
-simulation (tests/evidence/test_coverage.py says where), and None, "too few", where nothing does.
+simulation (tests/evidence/test_promises.py says where), and None, "too few", where nothing does.
 Nothing is resampled below 30 units.
 """
 

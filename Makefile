@@ -7,8 +7,9 @@ OUT ?= out/adas
 RUN_ARGS ?=
 TEST_ARGS ?=
 DRIVE_ARGS ?=
+NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run test check wheel-check bench fuzz refs data fleet fleet-load figures arm64 clean
+.PHONY: cockpit run test check wheel-check bench fuzz nightly soak refs data fleet fleet-load figures arm64 clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next --traffic pack $(RUN_ARGS)
@@ -30,6 +31,14 @@ wheel-check: $(BIN)/python
 FUZZ ?= 10000
 fuzz: $(VENV)/.tested-with
 	$(BIN)/python -m pytest -n 2 tests/faults/test_readers.py --fuzz $(FUZZ) --durations=0
+
+# proofs too long for every change, each with a dated line; NIGHTLY_ARGS="--only fuzz" drives one
+nightly: $(VENV)/.tested-with
+	$(BIN)/python tools/nightly.py $(NIGHTLY_ARGS)
+
+# the CARLA server and a worker for hours; goes on where it was stopped
+soak: $(VENV)/.tested-with
+	$(BIN)/python tools/nightly.py --only soak-server soak-worker $(NIGHTLY_ARGS)
 
 bench: $(VENV)/.installed
 	$(BIN)/skidpad bench

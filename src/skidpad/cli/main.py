@@ -13,6 +13,7 @@ import skidpad
 from skidpad.cli.adas import adas, report, show
 from skidpad.cli.bench import bench
 from skidpad.cli.campaigns import Drive, Estimate
+from skidpad.cli.carla_launcher import carla_launcher, translated
 from skidpad.cli.channels import channels
 from skidpad.cli.channels_drive import drive, outcomes
 from skidpad.cli.channels_evaluate import evaluate, train
@@ -98,6 +99,7 @@ app.command()(view)
 app.command("drive")(cockpit_drive)
 app.command()(replay)
 app.command()(watch)
+app.command()(carla_launcher)
 
 
 @app.command()
@@ -118,6 +120,19 @@ def carla_server(context: typer.Context) -> None:
     from skidpad.cli.carla_server import command
 
     command(context.args)
+
+
+@app.command(
+    "carla-unreal",
+    context_settings={"allow_extra_args": True, "ignore_unknown_options": True},
+    add_help_option=False,
+    hidden=True,
+)
+def carla_unreal(context: typer.Context) -> None:
+    """Serve CARLA's clients with Unreal's options: what CarlaUE4.sh of carla-launcher runs."""
+    from skidpad.cli.carla_server import command
+
+    command(translated(context.args))
 
 
 def _terminated(number: int, frame: object) -> NoReturn:

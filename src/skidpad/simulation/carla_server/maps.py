@@ -20,6 +20,7 @@ from skidpad.simulation.carla_server.rpc import CallError
 
 log = logging.getLogger("skidpad.carla_server")
 PREFIX = "Carla/Maps/"
+LAYERED = "_Opt"  # CARLA offers most maps twice: those with layers end like this
 OPENDRIVE_MAP = "OpenDriveMap"  # the name under which a client's own text is loaded
 MAX_XODR = 24 * 1024 * 1024  # characters
 SPACING = 25.0  # m between recommended spawn points along a lane
@@ -84,7 +85,11 @@ class MapStore:
         self._text: str | None = None  # from copy_opendrive_to_file
 
     def names(self) -> list[str]:
-        """All that can be loaded, bundled ones first."""
+        """All that can be loaded, bundled ones first; each also under its layered name."""
+        plain = self._plain_names()
+        return [*plain, *(n + LAYERED for n in plain if n + LAYERED not in plain)]
+
+    def _plain_names(self) -> list[str]:
         own = sorted(p.stem for p in self.folder.glob("*.xodr")) if self.folder else []
         return [*bundled_maps(), *(n for n in own if n not in bundled_maps())]
 
@@ -107,7 +112,10 @@ class MapStore:
         return _served(short, load_map(path), path.read_text(encoding="utf-8", errors="replace"))
 
     def _path(self, name: str) -> Path | None:
-        if self.folder is not None and name in self.names():
+        names = self._plain_names()
+        if name not in names:
+            name = name.removesuffix(LAYERED)
+        if self.folder is not None and name in names:
             own = self.folder / f"{name}.xodr"
             if own.is_file():
                 return own

@@ -56,7 +56,8 @@ def result(worker: Worker, k: int) -> tuple[str, str]:
 
 def soak(runs: int, out: Path) -> list[str]:
     """Drive them all; the faults."""
-    worker, hashes = Worker(), {}
+    worker = Worker()
+    hashes: dict[int, str] = {}
     process = worker.process.pid
     assert process is not None
     seen: list[tuple[float, int]] = []

@@ -34,8 +34,11 @@ def carla_server(options: ServerOptions) -> None:
             f"streams on {ports.streaming}, map {server.served.episode.map.name}"
         )
 
+    def say(words: str) -> None:
+        typer.echo(f"skidpad carla-server: {words}", err=True)
+
     with suppress(KeyboardInterrupt):
-        asyncio.run(server.run(ready))
+        asyncio.run(server.run(ready, say))
     if options.strict and server.complaints():
         typer.echo("\n".join(server.complaints()), err=True)
         raise typer.Exit(1)

@@ -88,6 +88,14 @@ def _cache_of(file: Path) -> str:
     return str(folder)
 
 
+def is_kept(compiled: Any) -> bool:
+    """Whether machine code of this kernel's present text is on the disk; then it only has to load."""
+    code = compiled.py_func.__code__
+    own = os.environ.get("NUMBA_CACHE_DIR")
+    folder = Path(own or _cache_of(Path(code.co_filename).resolve()) or os.devnull)
+    return folder.is_dir() and any(folder.rglob(f"*.{compiled.py_func.__name__}-*.nbi"))
+
+
 def kernel(function: F) -> F:
     """Compile with numba: cached on disk, without the GIL, and without fast-math.
 

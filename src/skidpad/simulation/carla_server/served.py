@@ -35,6 +35,7 @@ class Served:
         self.replayer = Replayer()
         self.managers = TrafficManagers()
         self.platform_time: Callable[[], float] = lambda: 0.0
+        self.before_sensing: Callable[[], None] | None = None  # once, before the first reading
         self.last_snapshot: bytes | None = None
         self._map_changed = True  # until the first snapshot of the episode has been sent
         self._lights_told: dict[int, LightState] = {}
@@ -75,6 +76,9 @@ class Served:
         self._publish_snapshot()
         episode.vehicles.let_go()
         self.recorder.tick(clock, episode.actors, episode.moving)
+        if self.before_sensing is not None and episode.sensors.heard(self.hub):
+            self.before_sensing()
+            self.before_sensing = None
         episode.sensors.produce(episode.surroundings, clock, self.hub)
         return clock.frame
 

@@ -12,19 +12,15 @@ from dataclasses import dataclass
 from typing import IO, Any
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.geometry import Pose
-from skidpad.simulation.carla_server.actors import Attachment
-from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.codec import Decoder, ProtocolError, Request
-from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.methods import TABLES
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.pacer import MANAGER_REST, Pacer
 from skidpad.simulation.carla_server.rpc import Dispatcher
-from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.streams import StreamHub
 from skidpad.simulation.carla_server.waker import Waker, rouse
+from skidpad.simulation.carla_server.warming import warm_up
 
 log = logging.getLogger("skidpad.carla_server")
 MAX_CLIENTS = 512
@@ -197,11 +193,13 @@ class CarlaServer:
             return ports
         raise ConfigError(f"no free port pair on {host} at {self.options.port}")
 
-    async def run(self, ready: Callable[[Ports], Any]) -> None:
-        """Serve until cancelled or idle for too long."""
+    async def run(self, ready: Callable[[Ports], Any], say: Callable[[str], Any]) -> None:
+        """Serve until cancelled or idle for too long. say: what a first start is at."""
         if self.options.record_calls is not None:
             self._calls = self.options.record_calls.open("w", encoding="utf-8")
-        warm_up(self.options)
+        helper = warm_up(self.options, say)
+        if helper is not None:
+            self.served.before_sensing = helper.finish
         try:
             ready(await self.open())
             await self.pacer.run(self.options.idle_exit)
@@ -220,26 +218,6 @@ class CarlaServer:
     def complaints(self) -> list[str]:
         """Unknown calls and how often they came, for --strict."""
         return [f"unknown call {n} ({k} times)" for n, k in self.dispatcher.unknown.items()]
-
-
-class EverybodyListens(StreamHub):
-    """Streams to nobody that are all produced."""
-
-    def wanted(self, stream: int) -> bool:
-        """Always."""
-        return self.exists(stream)
-
-
-def warm_up(options: ServerOptions) -> None:
-    """Compile or load all kernels before clients wait, by a tick of a world that is thrown away."""
-    served = Served(options, EverybodyListens())
-    episode = served.episode
-    name = next(id for id, b in served.stock.catalogue.items() if b.family is Family.VEHICLE)
-    car = episode.spawn(Wanted(name, {}), episode.map.spawn_points[0])
-    small = {"image_size_x": "64", "image_size_y": "48"}
-    for kind in PRODUCERS:
-        episode.attach(Wanted(kind, small), Pose(0.0, 0.0, 2.0), car.id, Attachment.RIGID)
-    served.tick()
 
 
 def _bound(host: str, port: int) -> socket.socket:

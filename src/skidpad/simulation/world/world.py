@@ -36,6 +36,7 @@ from skidpad.simulation.world.step import (
     Now,
     Wheeled,
     advance,
+    advance_undriven,
     feel_grip,
 )
 from skidpad.simulation.world.touch import ContactBook, Touches, forget, invasions, markings_of
@@ -320,7 +321,8 @@ class World:
             c.road_noise,
             not c.all_lanes,
         )
-        touches, crossed = advance(self.arena, now)
+        step = advance_undriven if self.traffic is None else advance
+        touches, crossed = step(self.arena, now)
         if stages & MOVE:
             self.touches = touches
         if stages & SETTLE:

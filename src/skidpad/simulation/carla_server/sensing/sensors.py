@@ -43,6 +43,11 @@ class SensorSet:
         """It is gone."""
         self._sensors.pop(id, None)
 
+    def heard(self, hub: StreamHub) -> bool:
+        """Whether anybody listens to any of them."""
+        streams = (sensor.actor.stream for sensor in self._sensors.values())
+        return any(s is not None and hub.wanted(s) for s in streams)
+
     def produce(self, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
         """One tick of every sensor that is due and listened to."""
         time = clock.elapsed

@@ -1,0 +1,103 @@
+"""Kernels before clients wait: loaded from the disk, or compiled when this machine has none yet.
+
+At a first start two processes compile: this one what a tick needs, a child what takes longest in it
+and then the sensors. The server is ready when ticks are; who listens to a sensor before the child has
+ended waits for it.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import signal
+from collections.abc import Callable
+from contextlib import suppress
+from multiprocessing.connection import Connection
+
+from skidpad.core.geometry import Pose
+from skidpad.core.jit import is_kept, kernel_cache
+from skidpad.sensors import rays
+from skidpad.simulation.carla_server.actors import Attachment
+from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.episode import Wanted
+from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
+from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.carla_server.streams import StreamHub
+from skidpad.simulation.world import step
+from skidpad.simulation.world.ahead import compile_parts
+
+CONTEXT = multiprocessing.get_context("spawn")
+LIMIT = 600.0  # s that the child may take
+Say = Callable[[str], object]
+
+
+class EverybodyListens(StreamHub):
+    """Streams to nobody that are all produced."""
+
+    def wanted(self, stream: int) -> bool:
+        """Always."""
+        return self.exists(stream)
+
+
+def warm_up(options: ServerOptions, say: Say) -> Helper | None:
+    """Make ticks ready; who still compiles sensors, None when these are ready too."""
+    if is_kept(step.advance_undriven) and is_kept(rays.cast):
+        a_tick(options, sensors=True)
+        return None
+    say(f"first start: compiling, which is kept in {kernel_cache()}")
+    helper = Helper(options)
+    a_tick(options, sensors=False, before_step=helper.hear)
+    helper.tell()
+    say("ticks are compiled; sensors are being compiled beside the first of them")
+    return helper
+
+
+def a_tick(
+    options: ServerOptions, sensors: bool, before_step: Callable[[], object] = lambda: None
+) -> None:
+    """A tick of a world that is thrown away, with a car and, if asked, every sensor on it."""
+    served = Served(options, EverybodyListens())
+    episode = served.episode
+    name = next(id for id, b in served.stock.catalogue.items() if b.family is Family.VEHICLE)
+    before_step()
+    car = episode.spawn(Wanted(name, {}), episode.map.spawn_points[0])
+    small = {"image_size_x": "64", "image_size_y": "48"}
+    for kind in PRODUCERS if sensors else ():
+        episode.attach(Wanted(kind, small), Pose(0.0, 0.0, 2.0), car.id, Attachment.RIGID)
+    served.tick()
+
+
+class Helper:
+    """The child that compiles; whatever becomes of it, the server can do without."""
+
+    def __init__(self, options: ServerOptions) -> None:
+        self._pipe, there = CONTEXT.Pipe()
+        self._process = CONTEXT.Process(target=_help, args=(there, options), daemon=True)
+        self._process.start()
+        there.close()
+
+    def hear(self) -> None:
+        """Wait until the parts of a step are on the disk."""
+        with suppress(EOFError, OSError):
+            if self._pipe.poll(LIMIT):
+                self._pipe.recv()
+
+    def tell(self) -> None:
+        """The rest of a tick is on the disk."""
+        with suppress(OSError):
+            self._pipe.send(None)
+
+    def finish(self) -> None:
+        """Wait for the sensors."""
+        self._process.join(LIMIT)
+
+
+def _help(pipe: Connection, options: ServerOptions) -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the server's
+    compile_parts()
+    pipe.send(None)
+    try:
+        pipe.recv()
+    except EOFError:  # the server is gone
+        return
+    a_tick(options, sensors=True)

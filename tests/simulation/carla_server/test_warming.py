@@ -1,0 +1,89 @@
+"""A first start: what is compiled by whom, and that clients do not notice."""
+
+from __future__ import annotations
+
+import numba
+import pytest
+
+from skidpad.core.geometry import Pose
+from skidpad.core.jit import is_kept
+from skidpad.simulation.carla_server import warming
+from skidpad.simulation.carla_server.episode import Wanted
+from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.carla_server.warming import EverybodyListens
+from skidpad.simulation.world import step
+from skidpad.simulation.world.ahead import contacts_of_nobody, vehicles_of_nobody
+
+
+def types(*values):
+    return [numba.typeof(v) for v in values]
+
+
+def test_parts_are_compiled_for_the_types_of_a_step(served: Served) -> None:
+    """Else the machine code of the child would be of no use to the server."""
+    world = served.episode.moving
+    states, bodies, segments, _law, dt, touching = contacts_of_nobody()
+    assert types(states, bodies, segments, touching) == types(
+        world.states, world.bodies, world.obstacles.segments, world.touching
+    )
+    states, wheels, params, commands, mu, grade, bank, active, dt, substeps = vehicles_of_nobody()
+    assert types(wheels, params, commands, mu, grade, bank, active) == types(
+        world.fleet.wheels,
+        world.fleet.params,
+        world.rows.commands,
+        world.on_wheels.felt,
+        world.rows.grade,
+        world.rows.bank,
+        world.on_wheels.active,
+    )
+    assert types(dt, substeps) == [numba.float64, numba.int64]
+
+
+class Child:
+    """Stands in for the helper."""
+
+    def __init__(self, options: ServerOptions) -> None:
+        self.heard: list[str] = []
+
+    def hear(self) -> None:
+        self.heard.append("parts")
+
+    def tell(self) -> None:
+        self.heard.append("tick")
+
+    def finish(self) -> None:
+        self.heard.append("sensors")
+
+
+def test_a_first_start_is_told_and_shared(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(warming, "is_kept", lambda kernel: False)
+    monkeypatch.setattr(warming, "Helper", Child)
+    said: list[str] = []
+    helper = warming.warm_up(ServerOptions(map="straight"), said.append)
+    assert helper is not None
+    assert helper.heard == ["parts", "tick"]
+    assert "first start" in said[0]
+    assert len(said) == 2
+
+
+def test_a_later_start_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(warming, "is_kept", lambda kernel: True)
+    assert warming.warm_up(ServerOptions(map="straight"), pytest.fail) is None
+
+
+def test_sensors_wait_for_the_child_once() -> None:
+    served = Served(ServerOptions(map="straight"), EverybodyListens())
+    calls: list[int] = []
+    served.before_sensing = lambda: calls.append(1)
+    served.tick()
+    assert not calls  # nobody listens
+    served.episode.spawn(Wanted("sensor.other.gnss", {}), Pose(0.0, 0.0))
+    served.tick()
+    served.tick()
+    assert calls == [1]
+
+
+def test_what_has_run_is_kept(served: Served) -> None:
+    served.tick()
+    assert is_kept(step.advance_undriven)

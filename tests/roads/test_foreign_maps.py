@@ -82,3 +82,20 @@ linkedRoad="2" contactPoint="start"><laneLink from="-1" to="-1"/></connection></
     text = road(1, 10, there) + road(2, 110, back) + junction
     map = RoadMap(bake(f"<OpenDRIVE><header/>{text}</OpenDRIVE>".encode(), "m", "m.xodr"))
     assert map.ahead(map.on_lane(1, -1, 90.0), 30.0).road == 2
+
+
+def test_a_building_given_by_its_corners_alone_has_their_size():
+    corners = "".join(
+        f'<cornerLocal u="{u}" v="{v}" z="0" height="9"/>'
+        for u, v in ((8, 3), (-8, 3), (-8, -3), (8, -3))
+    )
+    building = (
+        f'<object id="1" type="building" s="50" t="20" zOffset="0" hdg="0.5"><outline>{corners}'
+        "</outline></object>"
+    )
+    (box,) = world(objects=building).roadside.boxes
+    assert (box.x, box.y, box.z) == pytest.approx((60.0, 40.0, 1.0), abs=1e-4)
+    assert sorted((box.length, box.width)) == pytest.approx([6.0, 16.0], abs=1e-4)
+    assert box.height == 9.0
+    along = box.yaw if box.length > box.width else box.yaw + pi / 2.0
+    assert abs(sin(along - 0.5)) == pytest.approx(0.0, abs=1e-4)

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from math import cos, sin
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from skidpad.core.vocabulary import SemanticClass
@@ -142,7 +143,7 @@ def _outlines(read: Reader, road: RoadRecord, node: Node) -> Iterator[Floats]:
         road, read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
     )
     yaw = place.heading + read.number(node, "hdg", 0.0)
-    outlines = [*node.findall("outline"), *node.findall("outlines/outline")]
+    outlines = _outline_nodes(node)
     for outline in outlines:
         local = [
             [read.number(c, "u"), read.number(c, "v"), read.number(c, "z", 0.0)]
@@ -163,6 +164,10 @@ def _outlines(read: Reader, road: RoadRecord, node: Node) -> Iterator[Floats]:
         yield _turned(corners * (length / 2, width / 2, 1.0), place[:3], yaw)
 
 
+def _outline_nodes(node: Node) -> list[Node]:
+    return [*node.findall("outline"), *node.findall("outlines/outline")]
+
+
 def _turned(points: Floats, origin: tuple[float, ...], yaw: float) -> Floats:
     c, s = cos(yaw), sin(yaw)
     out: Floats = points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + np.array(origin)
@@ -177,6 +182,9 @@ def _boxes(read: Reader, road: RoadRecord, node: Node, type_: str) -> list[Box]:
     length = read.number(node, "length", 0.0) or 2.0 * radius or THICKNESS
     width = read.number(node, "width", 0.0) or 2.0 * radius or THICKNESS
     height = read.number(node, "height", 0.0) or 1.0
+    if _is_outlined(node):
+        height = read.number(node, "height", 0.0) or max(_heights(read, node), default=1.0)
+        return [_around(o, height, int(label), rgb) for o in _outlines(read, road, node)]
     boxes = []
     for s, t, up in _places(read, node):
         place = road_place(road, s, t, up)
@@ -184,6 +192,38 @@ def _boxes(read: Reader, road: RoadRecord, node: Node, type_: str) -> list[Box]:
         x, y, z, yaw = (round(v, 5) for v in (place.x, place.y, place.z, yaw))
         boxes.append(Box(int(label), x, y, z, yaw, length, width, height, rgb=rgb))
     return boxes
+
+
+def _is_outlined(node: Node) -> bool:
+    """Whether corners alone say how large it is, as editors write buildings."""
+    sized = any(node.get(name) for name in ("length", "width", "radius"))
+    return not sized and not node.findall("repeat") and len(_outline_nodes(node)) > 0
+
+
+def _heights(read: Reader, node: Node) -> list[float]:
+    """Heights of the corners above their feet, where these are given."""
+    corners = [
+        c
+        for o in _outline_nodes(node)
+        for c in [*o.findall("cornerLocal"), *o.findall("cornerRoad")]
+    ]
+    return [h for c in corners if (h := read.number(c, "height", 0.0)) > 0.0]
+
+
+def _around(corners: Floats, height: float, label: int, rgb: tuple[int, int, int]) -> Box:
+    """The smallest upright box around an outline."""
+    turned = shapely.oriented_envelope(shapely.MultiPoint(corners[:, :2]))
+    ring = shapely.get_coordinates(turned)
+    if len(ring) < 4:  # all corners on a line
+        ring = shapely.get_coordinates(
+            shapely.MultiPoint(corners[:, :2]).buffer(THICKNESS / 2.0).envelope
+        )
+    along, across = ring[1] - ring[0], ring[2] - ring[1]
+    x, y = ring[:4].mean(axis=0)
+    numbers = (x, y, corners[:, 2].min(), np.arctan2(along[1], along[0]))
+    x, y, z, yaw = (round(float(v), 5) for v in numbers)
+    length, width = (max(float(np.hypot(*side)), THICKNESS) for side in (along, across))
+    return Box(label, x, y, z, yaw, length, width, height, rgb=rgb)
 
 
 def _parking(read: Reader, road: RoadRecord, node: Node) -> ParkingSpace:

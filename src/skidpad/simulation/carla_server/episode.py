@@ -14,6 +14,7 @@ from skidpad.simulation.carla_server.catalogue import Blueprint, Family, chosen,
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.debug import DebugShapes
 from skidpad.simulation.carla_server.effects import Remarks
+from skidpad.simulation.carla_server.landscape import ALL_LAYERS, Landscape
 from skidpad.simulation.carla_server.map_actors import (
     light_actor,
     sign_actor,
@@ -34,6 +35,7 @@ from skidpad.simulation.carla_server.walkers import WalkerControl
 from skidpad.simulation.carla_server.weather import Sky
 from skidpad.simulation.world.ground import ground_height
 from skidpad.simulation.world.lights import Lights
+from skidpad.simulation.world.obstacles import obstacles
 from skidpad.simulation.world.patches import FrictionZone
 from skidpad.simulation.world.world import Conditions, World
 
@@ -74,11 +76,14 @@ class Stock:
 class Episode:
     """The moving world of one map with its actors."""
 
-    def __init__(self, map: ServedMap, stock: Stock, clock: Clock) -> None:
+    def __init__(
+        self, map: ServedMap, stock: Stock, clock: Clock, layers: int = ALL_LAYERS
+    ) -> None:
         """Everything that takes long is made here, so that a failure leaves the old episode."""
         self.map, self.stock = map, stock
         map.prepare()
-        scene_of(map.roads)  # triangles now, not in the first picture's tick
+        self.landscape = Landscape(map.roads, map.layered, layers)
+        scene_of(self.landscape.roads)  # triangles now, not in the first picture's tick
         self.sky = stock.sky()
         seed = stock.options.seed
         conditions = Conditions(
@@ -91,7 +96,10 @@ class Episode:
         self.walkers: dict[int, WalkerControl] = {}
         self.debug = DebugShapes()
         self.posts = Posts(self.moving.lights)
-        self.surroundings = Surroundings(map, self.actors, self.vehicles, self.sky, clock)
+        self.surroundings = Surroundings(
+            map, self.landscape, self.actors, self.vehicles, self.sky, clock
+        )
+        self.relandscape()
         self.sensors = SensorSet(PRODUCERS, seed)
         self._place_map_actors()
         self.spectator = spectator(self.actors.new_id(), map.spawn_points[0])
@@ -242,6 +250,10 @@ class Episode:
         if actor.body is not None and actor.family is not Family.PROP:
             self.moving.set_simulated(actor.body, on)
             self.moving.set_grounded(actor.body, on)
+
+    def relandscape(self) -> None:
+        """Vehicles meet what is there at present."""
+        self.moving.stand_among(obstacles(self.landscape.roads))
 
     def move(self, dt: float) -> None:
         """One tick of driving and walking."""

@@ -49,6 +49,11 @@ class ServedMap:
         """As clients see it."""
         return PREFIX + self.name
 
+    @property
+    def layered(self) -> bool:
+        """Whether clients may take layers away."""
+        return self.name.endswith(LAYERED)
+
     def prepare(self) -> None:
         """Make the navigation mesh now: a client's first call does not wait for seconds."""
         _ = self.navigation

@@ -9,6 +9,7 @@ from skidpad.core.vocabulary import LightState
 from skidpad.simulation.carla_server import snapshot
 from skidpad.simulation.carla_server.clock import Clock, EpisodeSettings
 from skidpad.simulation.carla_server.episode import Episode, Stock
+from skidpad.simulation.carla_server.landscape import ALL_LAYERS
 from skidpad.simulation.carla_server.maps import MapStore
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.recorder import Recorder
@@ -47,10 +48,10 @@ class Served:
         """A second client in synchronous mode gets the newest snapshot at once."""
         return self.last_snapshot if stream == EPISODE_STREAM else None
 
-    def load(self, name: str, reset_settings: bool) -> None:
+    def load(self, name: str, reset_settings: bool, layers: int = ALL_LAYERS) -> None:
         """Another map, or with "" the same one anew; a map that cannot be served changes nothing."""
         map = self.episode.map if name == "" else self.maps.load(name)
-        episode = Episode(map, self.stock, self.clock)
+        episode = Episode(map, self.stock, self.clock, layers)
         self.hub.hold(EPISODE_STREAM)
         self.replayer.release()
         self.episode.end()

@@ -25,7 +25,7 @@ from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.ground import ROAD_NOISE, RoadSigns, read_signs
 from skidpad.simulation.world.lights import Lights
-from skidpad.simulation.world.obstacles import obstacles
+from skidpad.simulation.world.obstacles import Obstacles, obstacles
 from skidpad.simulation.world.patches import FrictionZone, Patches, in_zone
 from skidpad.simulation.world.rows import Member, Newcomer, Rows, bodies_of, table_of
 from skidpad.simulation.world.step import (
@@ -189,6 +189,11 @@ class World:
         self._arrange(self.members)
 
     # --- control from outside
+
+    def stand_among(self, found: Obstacles) -> None:
+        """From now on these are what stands beside the road."""
+        self.obstacles = found
+        self._outfit()
 
     def command(self, id: int, c: VehicleCommand) -> None:
         """Pedals and steer of a vehicle from now on."""

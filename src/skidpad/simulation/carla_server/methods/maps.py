@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.landscape import ALL_LAYERS
 from skidpad.simulation.carla_server.maps import MAX_XODR, PREFIX
 from skidpad.simulation.carla_server.recorder import safe_path
 from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
@@ -13,7 +14,6 @@ from skidpad.simulation.carla_server.served import Served
 TABLE = Table("maps")
 MAX_FILE = 16 * 1024 * 1024
 NAVIGATION = "Nav"  # folder
-NO_LAYERS = "maps have no layers"
 
 
 @TABLE.method("get_available_maps")
@@ -38,10 +38,13 @@ def get_map_data(served: Served) -> str:
 
 
 @TABLE.method("load_new_episode", Shape.VOID)
-def load_new_episode(served: Served, name: Any, reset: Any, layers: Any = 0) -> None:
+def load_new_episode(served: Served, name: Any, reset: Any, layers: Any = ALL_LAYERS) -> None:
     """Another map; "" loads the current one anew."""
-    wire.integer(layers, "map layers")
-    served.load(wire.text(name, "map name"), wire.flag(reset, "reset_settings"))
+    served.load(
+        wire.text(name, "map name"),
+        wire.flag(reset, "reset_settings"),
+        wire.integer(layers, "map layers", 0, ALL_LAYERS),
+    )
 
 
 @TABLE.method("copy_opendrive_to_file", Shape.VOID)
@@ -80,13 +83,18 @@ def get_navigation_mesh(served: Served) -> bytes:
     return b"" if navigation is None else navigation[1]
 
 
-@TABLE.method("load_map_layer", Shape.VOID, without_effect=NO_LAYERS)
-def load_map_layer(_: Served, layers: Any) -> None:
-    """Accepted."""
-    wire.integer(layers, "map layers")
+@TABLE.method("load_map_layer", Shape.VOID)
+def load_map_layer(served: Served, layers: Any) -> None:
+    """Objects of these layers come back, on maps with a layered name."""
+    _layer(served, layers, on=True)
 
 
-@TABLE.method("unload_map_layer", Shape.VOID, without_effect=NO_LAYERS)
-def unload_map_layer(_: Served, layers: Any) -> None:
-    """Accepted."""
-    wire.integer(layers, "map layers")
+@TABLE.method("unload_map_layer", Shape.VOID)
+def unload_map_layer(served: Served, layers: Any) -> None:
+    """They are there for nobody."""
+    _layer(served, layers, on=False)
+
+
+def _layer(served: Served, layers: Any, on: bool) -> None:
+    served.episode.landscape.load(wire.integer(layers, "map layers", 0, ALL_LAYERS), on)
+    served.episode.relandscape()

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from skidpad.simulation.carla_server import scenery, wire
+from skidpad.simulation.carla_server.landscape import EnvironmentObject, objects
 from skidpad.simulation.carla_server.rpc import Shape, Table
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.wire import Vector
@@ -32,39 +33,39 @@ def clear_debug_string(served: Served) -> None:
     served.episode.debug.clear(texts=True)
 
 
+def _tagged(served: Served, tag: Any) -> list[EnvironmentObject]:
+    label = wire.integer(tag, "tag", 0, ANY)
+    return [o for o in objects(served.episode.map.roads) if label in (ANY, o.label)]
+
+
 @TABLE.method("get_all_level_BBs")
 def get_all_level_bbs(served: Served, tag: Any) -> list[Any]:
     """Boxes of what belongs to the map, by tag."""
-    label = wire.integer(tag, "tag", 0, ANY)
-    return [o.box() for o in scenery.objects(served.episode.map.roads) if label in (ANY, o.label)]
+    return [o.box() for o in _tagged(served, tag)]
 
 
 @TABLE.method("get_environment_objects")
 def get_environment_objects(served: Served, tag: Any) -> list[Any]:
     """What belongs to the map, by tag."""
-    label = wire.integer(tag, "tag", 0, ANY)
-    return [
-        o.packed() for o in scenery.objects(served.episode.map.roads) if label in (ANY, o.label)
-    ]
+    return [o.packed() for o in _tagged(served, tag)]
 
 
-@TABLE.method(
-    "enable_environment_objects", Shape.VOID, without_effect="the map's objects stay where they are"
-)
-def enable_environment_objects(_: Served, ids: Any, enable: Any) -> None:
-    """Accepted."""
-    wire.items(ids, "ids")
-    wire.flag(enable, "enable")
+@TABLE.method("enable_environment_objects", Shape.VOID)
+def enable_environment_objects(served: Served, ids: Any, enable: Any) -> None:
+    """Objects come back, or are there for nobody; ids that are not known change nothing."""
+    known = [wire.integer(id, "id") for id in wire.items(ids, "ids")]
+    served.episode.landscape.toggle(known, wire.flag(enable, "enable"))
+    served.episode.relandscape()
 
 
 @TABLE.method("get_names_of_all_objects")
 def get_names_of_all_objects(served: Served) -> list[str]:
     """Names of what belongs to the map."""
-    return [o.name for o in scenery.objects(served.episode.map.roads)]
+    return [o.name for o in objects(served.episode.map.roads)]
 
 
 def _cast(served: Served, start: Vector, way: Vector, reach: float) -> list[scenery.Hit]:
-    return scenery.cast(served.episode.map.roads, served.episode.actors, start, way, reach)
+    return scenery.cast(served.episode.landscape, served.episode.actors, start, way, reach)
 
 
 @TABLE.method("project_point")

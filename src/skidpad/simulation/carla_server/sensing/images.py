@@ -32,6 +32,9 @@ MODALITIES = {
     "sensor.camera.depth": Modality.DEPTH,
     "sensor.camera.semantic_segmentation": Modality.SEMANTIC,
     "sensor.camera.instance_segmentation": Modality.INSTANCE,
+    "sensor.camera.optical_flow": Modality.DEPTH,
+    "sensor.camera.normals": Modality.DEPTH,
+    "sensor.camera.dvs": Modality.RGB,
 }
 
 

@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from skidpad.simulation.carla_server.sensing import events, images, inertial, points
+from skidpad.simulation.carla_server.sensing import (
+    events,
+    events_camera,
+    flow,
+    images,
+    inertial,
+    normals,
+    points,
+)
 from skidpad.simulation.carla_server.sensing.sensor import Producer
 from skidpad.simulation.carla_server.snapshot import SensorType
 
@@ -14,6 +22,13 @@ PRODUCERS = {
     ),
     "sensor.camera.instance_segmentation": Producer(
         SensorType.INSTANCE, images.image, images.make_camera
+    ),
+    "sensor.camera.optical_flow": Producer(
+        SensorType.OPTICAL_FLOW, flow.optical_flow, flow.make_flow_camera
+    ),
+    "sensor.camera.normals": Producer(SensorType.NORMALS, normals.normals, images.make_camera),
+    "sensor.camera.dvs": Producer(
+        SensorType.DVS, events_camera.dynamic_vision, events_camera.make_retina
     ),
     "sensor.other.radar": Producer(SensorType.RADAR, points.radar, points.make_radar),
     "sensor.lidar.ray_cast": Producer(SensorType.LIDAR, points.plain_lidar, points.make_lidar),

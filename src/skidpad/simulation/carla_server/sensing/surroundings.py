@@ -12,11 +12,13 @@ from skidpad.core.geometry import Pose
 from skidpad.core.states import ActorStates
 from skidpad.core.states import ActorTable as Bodies
 from skidpad.core.weather import Weather
+from skidpad.roads.queries import RoadMap
 from skidpad.sensors.lighting import lighting
 from skidpad.sensors.live_scene import LiveScene
 from skidpad.sensors.shading import Shading
 from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable
 from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.landscape import Landscape
 from skidpad.simulation.carla_server.maps import ServedMap
 from skidpad.simulation.carla_server.vehicles import Vehicles
 from skidpad.simulation.carla_server.weather import Sky
@@ -29,12 +31,12 @@ SKIN = 0.1  # m around a body within which a camera counts as inside
 class Pictured:
     """Map and actors with a body for rays and cameras, in the state of one frame."""
 
-    def __init__(self, map: ServedMap, members: list[Actor]) -> None:
-        self.members = members
+    def __init__(self, roads: RoadMap, members: list[Actor]) -> None:
+        self.roads, self.members = roads, members
         self.rows = {a.id: i for i, a in enumerate(members)}
         self.ids = np.array([0, *(a.id for a in members)], dtype=np.int64)  # by instance
         self.bodies = _bodies(members)
-        self.live = LiveScene(map.roads, self.bodies, WIDEST)
+        self.live = LiveScene(roads, self.bodies, WIDEST)
         self.weather: Weather | None = None
         self.elapsed = -np.inf
 
@@ -49,9 +51,16 @@ class Surroundings:
     """The world as sensors may see it."""
 
     def __init__(
-        self, map: ServedMap, actors: ActorTable, vehicles: Vehicles, sky: Sky, clock: Clock
+        self,
+        map: ServedMap,
+        landscape: Landscape,
+        actors: ActorTable,
+        vehicles: Vehicles,
+        sky: Sky,
+        clock: Clock,
     ) -> None:
         self.map, self.actors, self.moving = map, actors, vehicles.moving
+        self._landscape = landscape
         self.gravity = G  # m/s^2, as set by clients
         self._vehicles, self._sky, self._clock = vehicles, sky, clock
         self._pictured: Pictured | None = None
@@ -59,9 +68,9 @@ class Surroundings:
     def picture(self) -> Pictured:
         """Everything with a body as it is now; brought up to date once per frame."""
         members = [a for a in self.actors if a.family in SOLID]
-        seen = self._pictured
-        if seen is None or seen.members != members:
-            self._pictured = seen = Pictured(self.map, members)
+        seen, roads = self._pictured, self._landscape.roads
+        if seen is None or seen.members != members or seen.roads is not roads:
+            self._pictured = seen = Pictured(roads, members)
         now = self._clock.elapsed
         if seen.elapsed != now:
             seen.live.place(self._states(members), now - seen.elapsed)

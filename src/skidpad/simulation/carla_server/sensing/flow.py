@@ -1,0 +1,97 @@
+"""Optical flow: how far each surface moved on the picture since the sensor's last reading.
+
+Two 32-bit floats per pixel, right and up, as shares of half the picture's width and height: to get
+pixels multiply by half the width, and by minus half the height (carla-simulator/carla#4795). It is
+now minus before, so it leads from the last picture to this one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.sensors.rasteriser import AUTO_LEVEL
+from skidpad.sensors.view import View, camera_view
+from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.sensing.images import Camera, make_camera
+from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
+from skidpad.simulation.carla_server.sensing.surroundings import Pictured, Surroundings
+
+Floats = NDArray[np.float64]
+NEAREST = 1e-3  # share of a pixel's depth before which it lay beside the last picture's plane
+
+
+@dataclass(slots=True, eq=False)
+class FlowCamera:
+    """A camera, and what it saw of whom at its last reading."""
+
+    camera: Camera
+    view: View | None = None
+    bodies: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)  # by actor
+
+
+def make_flow_camera(actor: Actor, seed: int) -> FlowCamera:
+    """From an actor's attributes."""
+    return FlowCamera(make_camera(actor, seed))
+
+
+def optical_flow(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
+    """One picture; the first one shows no motion."""
+    make: FlowCamera = sensor.equipment
+    camera, scene = make.camera, around.picture()
+    view = camera_view(camera.spec, around.actors.pose(sensor.actor))
+    scene.live.draw(view, around.hidden_for(sensor.actor), AUTO_LEVEL, camera.drawn)
+    out = np.zeros((camera.spec.height, camera.spec.width, 2), dtype=np.float32)
+    if make.view is not None:
+        inverse, instances = camera.drawn.inverse, camera.drawn.instances
+        out[:] = moved(view, make.view, np.eye(3), np.zeros(3), inverse)
+        for row, actor in enumerate(scene.members):
+            before = make.bodies.get(actor.id)
+            mine = instances == row + 1
+            if before is not None and mine.any():
+                turn = before[0] @ scene.live.actors.rotation[row].T
+                shift = before[1] - turn @ scene.live.actors.position[row]
+                out[mine] = moved(view, make.view, turn, shift, inverse)[mine]
+    make.view, make.bodies = view, _bodies(scene)
+    return [(camera.head, out.tobytes())]
+
+
+def _bodies(scene: Pictured) -> dict[int, tuple[Floats, Floats]]:
+    actors = scene.live.actors
+    return {
+        actor.id: (actors.rotation[row].copy(), actors.position[row].copy())
+        for row, actor in enumerate(scene.members)
+    }
+
+
+def moved(
+    now: View, before: View, turn: Floats, shift: Floats, inverse: NDArray[np.float32]
+) -> NDArray[np.float32]:
+    """(H, W, 2) flow of pixels at inverse depth (1/m), 0 being as far as one can see.
+
+    turn, shift: a point p of the world now was at turn p + shift before.
+    """
+    across = (np.arange(now.width) + 0.5 - now.cx) / now.focal
+    down = (np.arange(now.height) + 0.5 - now.cy) / now.focal
+    whole = before.rotation @ turn @ now.rotation.T
+    near = before.rotation @ (turn @ now.centre + shift - before.centre)
+    x, y, z = (
+        whole[k, 0] * across[None, :]
+        + whole[k, 1] * down[:, None]
+        + whole[k, 2]
+        + near[k] * inverse
+        for k in range(3)
+    )
+    seen = z > NEAREST
+    z = np.where(seen, z, 1.0)
+    flow = np.stack(
+        (
+            (across[None, :] - x / z) * (2.0 * now.focal / now.width),
+            (y / z - down[:, None]) * (2.0 * now.focal / now.height),
+        ),
+        axis=-1,
+    )
+    return np.where(seen[..., None], flow, 0.0).astype(np.float32)

@@ -1,0 +1,116 @@
+"""What the unmodified client sees of cameras that tell motion and shape, and of the map's own objects."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from test_real_sensors import STAGE
+
+Serve = Callable[..., Any]
+
+
+def test_flow_normals_and_events(serve: Serve) -> None:
+    """Each against positions that the client itself knows, by CARLA's public projection."""
+    serve().client(
+        STAGE
+        + """
+place = carla.Transform(carla.Location(x=0.5, z=1.8))
+size = dict(image_size_x=400, image_size_y=300, fov=90)
+flow = listen("sensor.camera.optical_flow", place, **size)
+shape = listen("sensor.camera.normals", place, **size)
+ids = listen("sensor.camera.instance_segmentation", place, **size)
+events = listen("sensor.camera.dvs", place, use_log=True, **size)
+
+def pixels(sensor, frame, kind, channels):
+    image = at(sensor, frame)
+    return np.frombuffer(image.raw_data, kind).reshape(image.height, image.width, channels)
+
+def mine(frame, actor):
+    seen = pixels(ids, frame, np.uint8, 4).astype(int)
+    return seen[..., 1] + 256 * seen[..., 0] == actor.id
+
+def on_screen(actor):
+    p = seen_from(flow.get_transform(), actor)
+    return 200.0 + 200.0 * p[1] / p[0], 150.0 - 200.0 * p[2] / p[0]
+
+frame = tick(3)
+assert np.abs(pixels(flow, frame, np.float32, 2)).max() < 1e-5  # nobody moves
+assert heard[events.id].empty()
+seen = pixels(shape, frame, np.uint8, 4).astype(float)[..., 2::-1] / 127.5 - 1.0
+ground = seen[280:295, 150:250].reshape(-1, 3).mean(axis=0)
+assert np.allclose(ground, (0.0, 0.0, 1.0), atol=0.02), ground
+ahead = ego.get_transform().get_forward_vector()
+rear = np.median(seen[mine(frame, lead)], axis=0)
+assert rear @ np.array([ahead.x, ahead.y, ahead.z]) < -0.7, rear
+sideways = first.transform.get_right_vector() * 6.0
+lead.set_simulate_physics(False)
+before = on_screen(lead)
+point = lead.get_transform()
+point.location += first.transform.get_right_vector() * 0.4
+lead.set_transform(point)
+frame = tick()
+after = on_screen(lead)
+moved = pixels(flow, frame, np.float32, 2)
+body = mine(frame, lead)
+mean = np.median(moved[body], axis=0) * np.array([200.0, -150.0])
+assert abs(mean[0] - (after[0] - before[0])) < 0.3, (mean, before, after)
+assert mean[0] > 2.0 and abs(mean[1]) < 0.3, mean
+assert np.abs(moved[250:, :]).max() < 1e-5  # the road stands still
+told = at(events, frame)
+assert len(told) > 20 and all(0 <= e.x < 400 and 0 <= e.y < 300 for e in told)
+assert {e.pol for e in told} == {True, False}
+times = [e.t for e in told]
+assert times == sorted(times) and frame * 0.0 <= times[0]
+columns = np.nonzero(body.any(axis=0))[0]
+near = [columns.min() - 12 <= e.x <= columns.max() + 12 for e in told]
+assert sum(near) > 0.95 * len(near), (sum(near), len(near))
+"""
+    )
+
+
+def test_objects_of_the_map_can_be_hidden(serve: Serve) -> None:
+    serve("--map", "town_Opt").client("""
+    import numpy as np
+    synchronous()
+    assert world.get_map().name.endswith("town_Opt")
+    assert "/Game/Carla/Maps/town_Opt" in client.get_available_maps()
+    label = carla.CityObjectLabel
+    buildings = world.get_environment_objects(label.Buildings)
+    assert len(buildings) >= 10
+    assert len(world.get_environment_objects(label.GuardRail)) > 5
+    assert len(world.get_level_bbs(label.Buildings)) == len(buildings)
+    one = buildings[0]
+    forward = one.transform.get_right_vector()
+    eye = one.transform.location - forward * (one.bounding_box.extent.y + 8.0)
+    sensor = carla.Transform(eye, carla.Rotation(yaw=one.transform.rotation.yaw + 90.0))
+    library = world.get_blueprint_library()
+    camera = library.find("sensor.camera.semantic_segmentation")
+    camera.set_attribute("image_size_x", "64")
+    camera.set_attribute("image_size_y", "48")
+    camera = world.spawn_actor(camera, sensor)
+    seen = queue.Queue()
+    camera.listen(seen.put)
+
+    def tag():
+        frame = world.tick()
+        while True:
+            image = seen.get(timeout=120.0)
+            if image.frame == frame:
+                return np.frombuffer(image.raw_data, np.uint8).reshape(48, 64, 4)[24, 32, 2]
+
+    def met():
+        return label.Buildings in [h.label for h in world.cast_ray(eye, eye + forward * 9.0)]
+
+    assert tag() == 3 and met()
+    world.enable_environment_objects({one.id}, False)
+    assert tag() != 3 and not met()
+    world.enable_environment_objects({one.id}, True)
+    assert tag() == 3 and met()
+    world.unload_map_layer(carla.MapLayer.Buildings)
+    assert tag() != 3 and not met()
+    world.load_map_layer(carla.MapLayer.Buildings)
+    assert tag() == 3 and met()
+    world = client.load_world("town_Opt", False, carla.MapLayer.Walls)
+    assert not met()
+    """)

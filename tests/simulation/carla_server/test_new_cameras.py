@@ -4,12 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from test_served import Kept
 
 from skidpad.core.geometry import Pose
 from skidpad.sensors.view import View, world_to_camera
+from skidpad.simulation.carla_server.actors import Attachment
+from skidpad.simulation.carla_server.episode import Wanted
+from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.sensing.events_camera import EVENT, Retina, crossings
 from skidpad.simulation.carla_server.sensing.flow import moved
 from skidpad.simulation.carla_server.sensing.normals import world_normals
+from skidpad.simulation.carla_server.served import Served
 
 
 def view(pose: Pose) -> View:
@@ -101,3 +106,34 @@ def test_a_pixel_rests_after_an_event():
     crossings(r, light, 0, RNG)
     assert crossings(r, light + 1.0, 1000, RNG)["t"].tolist() == pytest.approx([300, 900], abs=1)
     assert np.dtype(EVENT).names == ("x", "y", "t", "polarity")
+
+
+def test_all_three_send_as_others_do(tmp_path):
+    """Sizes of what travels; the first picture shows no motion and no events."""
+    hub = Kept()
+    served = Served(ServerOptions(map="straight"), hub)
+    size = {"image_size_x": "64", "image_size_y": "48"}
+    kinds = ("optical_flow", "normals", "dvs")
+    episode = served.episode
+    car = episode.spawn(Wanted("vehicle.tesla.model3", {}), episode.map.spawn_points[0])
+    streams = []
+    for kind in kinds:
+        wanted = Wanted(f"sensor.camera.{kind}", size)
+        pose = Pose(0.5, 0.0, 1.8)
+        streams.append(episode.attach(wanted, pose, car.id, Attachment.RIGID).stream)
+    served.tick()
+    yaw = episode.map.spawn_points[0].yaw
+    episode.vehicles.set_velocity(car.id, (8.0 * np.cos(yaw), 8.0 * np.sin(yaw), 0.0))
+    for _ in range(3):
+        served.tick()
+    flow, shape, events = (hub.told.get(s, []) for s in streams)
+    assert [len(m) for m in flow] == [48 + 12 + 64 * 48 * 8] * 4
+    assert [len(m) for m in shape] == [48 + 12 + 64 * 48 * 4] * 4
+    assert events
+    assert all((len(m) - 60) % 13 == 0 for m in events)
+    pictures = [np.frombuffer(m[60:], "<f4").reshape(48, 64, 2) for m in flow]
+    assert np.abs(pictures[0]).max() == 0.0
+    assert pictures[-1][30, 32, 1] < -0.005  # the road comes towards the camera: down the picture
+    bgra = np.frombuffer(shape[0][60:], np.uint8).reshape(48, 64, 4)
+    up = bgra[30, 32].astype(int) - (255, 128, 128, 255)  # the road's normal
+    assert np.abs(up).max() <= 2

@@ -27,10 +27,8 @@ def normals(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
     view = camera_view(camera.spec, around.actors.pose(sensor.actor))
     around.picture().live.draw(view, around.hidden_for(sensor.actor), AUTO_LEVEL, camera.drawn)
     found = world_normals(view, camera.drawn.inverse.astype(np.float64))
-    for channel, axis in zip(
-        (2, 1, 0), vectors_to_carla(*np.moveaxis(found, -1, 0)).T, strict=True
-    ):
-        camera.bgra[..., channel] = np.rint(HALF + HALF * axis.T)
+    turned = vectors_to_carla(*found.reshape(-1, 3).T).reshape(found.shape)
+    camera.bgra[..., 2::-1] = np.rint(HALF + HALF * turned)
     camera.bgra[..., 3] = 255
     return [(camera.head, camera.bgra.tobytes())]
 

@@ -116,6 +116,14 @@ def test_evaluate_and_compare(folder, monitored):
     curve = table["curve"]["sim"]
     assert curve["1.0"]["ego_tailgated"] == [1, 0, 0]
     assert curve["2.0"]["ego_tailgated"] == [0, 0, 1]  # one unseen vehicle gives at most 0.5
+    kept = folder / "one.judged"
+    first = kept.stat().st_mtime_ns
+    again = invoke("channels", "evaluate", folder, "--curve", "gap_signed", "--model", "bundled")
+    assert again.exit_code == 0
+    assert kept.stat().st_mtime_ns == first  # judged once
+    table = json.loads((folder / "evaluation.json").read_text())
+    assert {r["rules"] for r in table["results"]} >= {"practical", "learned on world truth"}
+    assert table["model"]["hours"] > 1.0
     done = invoke("channels", "compare", monitored, monitored)
     assert "ego_location_similarity (lav+tfuse): +0.0000" in done.output
 

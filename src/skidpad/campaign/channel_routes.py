@@ -16,6 +16,8 @@ from skidpad.core.run import ChannelCrew, Route, RunSpec
 from skidpad.core.vocabulary import SensorLevel, Stratum
 from skidpad.core.weather import Weather
 
+PACK = 20  # vehicles at least that stay around the ego in the stratum of risky drivers
+
 
 class Condition(str, Enum):
     """In which weather and light a route is driven."""
@@ -106,6 +108,7 @@ def _variant(
             name="_".join([course.name, *words]),
             base=course.name if words else "",
             map=course.map if map is None else str(map),
+            vehicles=max(course.vehicles, PACK * (stratum is Stratum.RISKY)),
             stratum=stratum,
             drivers_mind_weather=minds,
         ),

@@ -13,7 +13,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.randomness import stream
 from skidpad.core.run import ChannelCrew, Route, RunSpec
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
-from skidpad.core.vocabulary import Control, TrafficStart
+from skidpad.core.vocabulary import Control, Stratum, TrafficStart
 from skidpad.physics.types import EGO_TYPE, traffic_types, vehicle_type
 from skidpad.roads.bundled import load_map
 from skidpad.roads.lanes import LaneKind
@@ -90,7 +90,7 @@ def segment_of(spec: RunSpec) -> Segment:
         specs=(),  # channels bring their own
         actors=(*traffic, *parked, *crowd.actors()),
         traffic=TrafficSetup(
-            mode=TrafficStart.RANDOM,
+            mode=TrafficStart.PACK if route.stratum is Stratum.RISKY else TrafficStart.RANDOM,
             vehicles=0,
             variety=True,
             slow_in_weather=route.drivers_mind_weather,

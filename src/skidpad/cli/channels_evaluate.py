@@ -68,7 +68,7 @@ def evaluate(
     evaluation = Evaluation(_segments(tasks, workers))
     if model is not None:
         _refuse_training_drives(model, evaluation.segments)
-    table = evaluation.as_dict()
+    table = evaluation.as_dict() | {"model": None if model is None else _about_model(model)}
     out = out or folder
     out.mkdir(parents=True, exist_ok=True)
     write_bytes(out / "evaluation.json", json.dumps(table, indent=1, allow_nan=False).encode())
@@ -90,7 +90,8 @@ def train(folder: Path = DIR, out: Path = MODEL_OUT, workers: int = WORKERS) -> 
 
     require_learning()
     tasks = [
-        _Task(path, folder, ("sim", "world"), (), None, None) for path in recordings_below(folder)
+        _Task(path, folder, ("sim", "world"), (), None, None, rows=True)
+        for path in recordings_below(folder)
     ]
     drives = [
         TrainingDrive(s.route, s.context.get("seed", s.name), s.t, s.rows, s.truths, s.hours)
@@ -112,13 +113,53 @@ class _Task:
     labels: tuple[Span, ...]
     curve: Signal | None
     model: Path | None
+    rows: bool = False  # keep what an identifier sees
+
+    def made_by(self) -> dict[str, str]:
+        """What the findings hang on beside the model."""
+        from skidpad.evidence.channels.judging.kept import code_hash
+
+        about = self.path.stat()
+        return {
+            "code": code_hash(),
+            "recording": f"{about.st_size} bytes of {about.st_mtime_ns}",
+            "truths": ",".join(self.truths),
+            "labels": repr(self.labels),
+            "curve": "" if self.curve is None else self.curve.value,
+        }
 
 
 def judge_one(task: _Task) -> Segment:
-    """In a worker: read and judge one recording."""
+    """In a worker: one recording judged, or what was found of it before by the same code.
+
+    The file beside the recording (.judged) keeps what was found.
+    """
+    from dataclasses import replace
+
+    import numpy as np
+
+    from skidpad.core.reading import is_file
+    from skidpad.evidence.channels.identifier.model import load_model
+    from skidpad.evidence.channels.judging.kept import segment_bytes, segment_from
+    from skidpad.evidence.channels.judging.learned import with_model
+    from skidpad.recording.files import write_bytes
+
+    made_by, kept = task.made_by(), task.path.with_suffix(".judged")
+    segment = segment_from(kept.read_bytes(), made_by) if is_file(kept) else None
+    if segment is None:
+        segment = _judged(task)
+        write_bytes(kept, segment_bytes(segment, made_by))
+    segment = replace(segment, name=str(task.path.relative_to(task.folder)))
+    if task.model is not None:
+        segment = with_model(segment, load_model(task.model))
+    if task.rows:
+        return segment
+    return replace(segment, rows=np.empty((0, 0)), motion=np.empty((0, 3)))
+
+
+def _judged(task: _Task) -> Segment:
     import time
 
-    from skidpad.evidence.channels.identifier.model import load_model
     from skidpad.evidence.channels.judging.segments import judge
     from skidpad.live.watch import Timer
     from skidpad.recording.channels import McapRecording
@@ -128,14 +169,13 @@ def judge_one(task: _Task) -> Segment:
     source = McapRecording(task.path)
     context = context_of(source)
     return judge(
-        str(task.path.relative_to(task.folder)),
+        task.path.name,
         context.get("route") or task.path.parent.name,
         source.channels,
         list(cycles(source)),
         task.labels,
         task.truths,
         task.curve,
-        load_model(task.model) if task.model else None,
         context,
         Timer(time.thread_time_ns),
     )
@@ -162,6 +202,19 @@ def _told(segments: Iterable[Segment]) -> Iterator[Segment]:
 
 def _labels_of(path: Path, marked: dict[str, list[Span]]) -> tuple[Span, ...]:
     return (*marked.get("", []), *marked.get(path.stem, []))
+
+
+def _about_model(path: Path) -> dict[str, object]:
+    """What a reader must know of the learned identifier."""
+    from skidpad.evidence.channels.identifier.model import load_model
+
+    model = load_model(path)
+    return {
+        "file": path.name,
+        "sees_labels": model.sees_labels,
+        "hours": model.card["hours"],
+        "recordings": len(model.card["recordings"]),
+    }
 
 
 def _refuse_training_drives(path: Path, segments: list[Segment]) -> None:

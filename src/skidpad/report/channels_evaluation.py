@@ -60,7 +60,13 @@ def evaluation_page(evaluation: Row, folder: Path) -> Page:
         facts=[("Skidpad", __version__)],
         sections=[
             Section(
-                "What came out", [_answers(evaluation, judged), _numbers(evaluation), Text(LEAD)]
+                "What came out",
+                [
+                    _answers(evaluation, judged),
+                    _numbers(evaluation),
+                    Text(LEAD),
+                    *_about_model(evaluation),
+                ],
             ),
             *[Section(f"Against the {short(t)}", [scores.results(evaluation, t)]) for t in truths],
             Section("Natural and risky drivers", strata(evaluation)),
@@ -74,6 +80,23 @@ def evaluation_page(evaluation: Row, folder: Path) -> Page:
             Section("Segments", [scores.segments(evaluation)]),
         ],
     )
+
+
+def _about_model(evaluation: Row) -> list[Block]:
+    """What the learned identifier was trained on, where there is one."""
+    model = evaluation.get("model")
+    if not model:
+        return []
+    text = (
+        f"The learned identifier was trained on {model['recordings']} other drives "
+        f"({model['hours']:.2f} h)."
+    )
+    if model["sees_labels"]:
+        text += (
+            " It sees times to collision, which nearly are the labels of world-model truth: its "
+            "scores against that truth say little."
+        )
+    return [Text(text, tone="note")]
 
 
 def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:

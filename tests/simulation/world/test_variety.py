@@ -11,8 +11,8 @@ from skidpad.core.vocabulary import Stratum
 from skidpad.simulation.world.traffic.mobil import B_SAFE, GAP_CLEAR, is_safe
 from skidpad.simulation.world.traffic.state import TRAIT
 from skidpad.simulation.world.traffic.variety import (
-    EXTRA,
-    TAIL,
+    GAP_LAYERS,
+    HEADWAY_LAYERS,
     risky_character,
     tail_draw,
     vary,
@@ -29,12 +29,17 @@ def traits(stratum: Stratum) -> np.ndarray:
     return found
 
 
+TAIL = 0.1
+
+
+@pytest.mark.parametrize("layers", [HEADWAY_LAYERS, GAP_LAYERS])
 @given(which=floats(0.0, 1.0, exclude_max=True), where=floats(0.0, 1.0, exclude_max=True))
-def test_no_weight_exceeds_what_the_share_of_natural_draws_allows(which: float, where: float):
-    u, weight = tail_draw(which, where)
+def test_no_weight_exceeds_what_the_share_of_natural_draws_allows(layers, which, where):
+    u, weight = tail_draw(layers, which, where)
     assert 0.0 <= u < 1.0
-    assert 0.0 < weight <= 1.0 / (1.0 - EXTRA)
+    assert 0.0 < weight <= 2.0
     assert (weight < 1.0) == (u < TAIL)
+    assert sum(share for _, share in layers) == 1.0
 
 
 @pytest.mark.req("C-2")
@@ -46,7 +51,7 @@ def test_weighted_risky_drivers_are_natural_ones():
     assert weights.mean() == pytest.approx(1.0, abs=0.06)
     short = [np.mean(t["headway"] < 0.587) for t in (natural, risky)]  # a tenth of the natural
     assert short[0] == pytest.approx(TAIL, abs=0.02)
-    assert short[1] == pytest.approx(TAIL * (1 - EXTRA) + EXTRA, abs=0.03)
+    assert short[1] == pytest.approx(0.5 * TAIL + 0.5, abs=0.03)
     mean = np.average(risky["headway"], weights=weights)
     assert mean == pytest.approx(natural["headway"].mean(), abs=0.03)
     assert np.average(risky["headway"] < 0.587, weights=weights) == pytest.approx(TAIL, abs=0.02)

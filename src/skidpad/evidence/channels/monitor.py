@@ -19,7 +19,6 @@ from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.frames import Usable, usable
 from skidpad.evidence.channels.ghosts import GhostCue
 from skidpad.evidence.channels.hazards import (
-    SCORED_HAZARDS,
     Profile,
     Rule,
     SignalReader,
@@ -144,7 +143,11 @@ class Monitor:
         learned = self._learned(cycle.t, readings, risk, signals)
         for rule in self.rules:
             verdict = rule.fires(signals.values)
-            if self.settings.identify is Identify.LEARNED and rule.hazard in SCORED_HAZARDS:
+            # what was not learned stays with its rule
+            if (
+                self.settings.identify is Identify.LEARNED
+                and rule.hazard in self.settings.detectors
+            ):
                 verdict = rule.hazard in learned
             elif rule.hazard in learned:
                 verdict = True

@@ -17,6 +17,7 @@ from skidpad.evidence.channels.identifier.features import (
 from skidpad.evidence.channels.identifier.forest import Forest, check_forest, probabilities
 from skidpad.evidence.channels.identifier.model import (
     ALL_ROUTES,
+    Detector,
     Identify,
     LearnedIdentifier,
     events_of,
@@ -24,6 +25,7 @@ from skidpad.evidence.channels.identifier.model import (
     model_bytes,
     probability_of,
 )
+from skidpad.evidence.channels.judging.learned import with_model
 from skidpad.evidence.channels.judging.segments import judge
 from skidpad.evidence.channels.matching import Span
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
@@ -78,6 +80,51 @@ def test_no_feature_is_about_route_weather_place_time_or_truth():
     assert not words & {"route", "weather", "x", "y", "position", "time", "t", "truth", "seed"}
 
 
+@pytest.mark.req("C-15", "R-9")
+def test_nothing_is_trained_on_what_nearly_is_the_label(trained):
+    model, _ = trained
+    words = {w for name in model.features for w in name.split("_")}
+    assert not words & {"ttc", "pet", "risk", "safety", "score"}
+    assert not model.sees_labels
+    asked = {
+        FEATURE_NAMES[i]
+        for detectors in model.detectors.values()
+        for d in detectors.values()
+        for i in d.forest.feature[d.forest.feature >= 0].tolist()
+    }
+    assert asked
+    assert asked <= set(model.features)
+    learned = {(truth, h) for (truth, _), ds in model.detectors.items() for h in ds}
+    assert ("world", HazardType.INCONSISTENT_LOCALISATION) not in learned
+
+
+@pytest.mark.req("C-15")
+def test_a_model_file_names_its_own_features_and_means_the_same_when_read(trained, tmp_path):
+    model, drives = trained
+    (tmp_path / "m.npz").write_bytes(model_bytes(model))
+    again = load_model(tmp_path / "m.npz")
+    assert again.features == model.features
+    for key, detectors in model.detectors.items():
+        for hazard, d in detectors.items():
+            np.testing.assert_array_equal(
+                probability_of(d.forest, drives[0].t, drives[0].rows),
+                probability_of(again.detectors[key][hazard].forest, drives[0].t, drives[0].rows),
+            )
+
+
+@pytest.mark.req("C-15")
+def test_what_was_not_learned_stays_with_its_rule():
+    """A model of tailgating alone leaves positions that jump to the rule."""
+    apart = Eyes("b", ego_offset={2.0: (6.0, 0.0)})
+    source = drive(World(), (Eyes("a"), apart), 6.0)
+    never = {TAILGATED: Detector(stump(), 2.0, 1)}
+    settings = MonitorSettings(identify=Identify.LEARNED, detectors=never, keep_worlds=False)
+    monitor = Monitor(source.channels, settings)
+    for cycle in cycles(source):
+        monitor.update(cycle)
+    assert {e.key for e in monitor.hazards.finish()} == {HazardType.INCONSISTENT_LOCALISATION}
+
+
 def stump(feature=0, threshold=0.0, missing_left=1):
     return Forest(
         roots=np.array([0]),
@@ -126,11 +173,14 @@ def test_events_need_confirmation_and_merge_within_two_seconds():
 
 
 def tailgated_drive(seed, gap):
-    """A follower who closes in from `gap` m and whom one channel does not see."""
+    """A follower who closes in from `gap` m; from near, one channel does not see him.
+
+    Nothing tells a learned identifier how far he is, only that the channels disagree.
+    """
     world = World(
         (0, 0, 0, 15.0, 0), np.array([(-gap - 4.5, 0, 0, 17.0, 0), (60.0, 3.5, 0, 15, 0)])
     )
-    eyes = (Eyes("a", 0.02 + 0.001 * seed), Eyes("b", 0.02, blind=(0,)))
+    eyes = (Eyes("a", 0.02 + 0.001 * seed), Eyes("b", 0.02, blind=(0,) if gap < 40.0 else ()))
     return drive(world, eyes, 12.0)
 
 
@@ -156,7 +206,7 @@ def test_a_trained_model_finds_tailgating_on_a_route_it_never_saw(trained):
     assert detectors is not model.identifier("world", ALL_ROUTES)
     for gap, expected in ((20.0, 1), (60.0, 0)):
         source = tailgated_drive(99, gap)
-        s = judge("new", "route-1", source.channels, list(cycles(source)), model=model)
+        s = with_model(judge("new", "route-1", source.channels, list(cycles(source))), model)
         found = [x for x in s.detected["learned on world truth"] if x.hazard is TAILGATED]
         assert len(found) == expected
 

@@ -20,7 +20,7 @@ from skidpad.evidence.channels.judging.curves import (
     with_limit,
 )
 from skidpad.evidence.channels.judging.evaluation import Evaluation
-from skidpad.evidence.channels.judging.segments import Curve, judge, weights_from
+from skidpad.evidence.channels.judging.segments import judge, weights_from
 from skidpad.evidence.channels.matching import Span, Weighed, score, tally
 from skidpad.evidence.channels.timefilter import TimeFilter
 from skidpad.recording.cycles import cycles
@@ -122,7 +122,8 @@ def test_every_identifier_has_a_curve_with_the_counts_that_results_have():
     base = {h: tally(s.detected["tracked"], s.truths["sim"], s.hours)[h] for h in (TAILGATED,)}[
         TAILGATED
     ]
-    points = {p.limit: p for p in s.points[Curve("tracked", "sim", TAILGATED)]}
+    (curve,) = [c.points for c in s.points if c[:3] == ("tracked", "sim", TAILGATED)]
+    points = {p.limit: p for p in curve}
     assert tuple(points) == SURES
     assert (points[2.0].tp, points[2.0].fp, points[2.0].fn) == (base.tp, base.fp, base.fn)
     assert {c.identifier for c in s.points} == {"practical", "tracked"}

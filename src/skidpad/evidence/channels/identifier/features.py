@@ -46,6 +46,11 @@ ROW_NAMES = (
     "gap_signed",
 )
 FEATURE_NAMES = tuple(f"{row}_{over}" for over in OVER_TIME for row in ROW_NAMES)
+# Hits and misses of plans and predictions, and what is made of them: world-model truth asks nearly the
+# same question of the same footprints, so they would hand the label over (decision R-9). Nothing is
+# trained on them; what was trained on them before can still be read.
+_NEARLY_LABELS = (Indicator.SAFETY_SCORE.value, Indicator.RISK_BEHIND_SHARE.value, "risk_")
+TRAINED_ON = tuple(name for name in FEATURE_NAMES if not name.startswith(_NEARLY_LABELS))
 _UPPER = np.array([i in GREATEST for i in PAIR_INDICATORS])
 
 

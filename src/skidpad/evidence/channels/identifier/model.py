@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
@@ -16,12 +16,18 @@ from numpy.typing import NDArray
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.reading import UNUSABLE, read_arrays, read_bytes, unusable
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.identifier.features import FEATURE_NAMES, FeatureHistory, features_at
+from skidpad.evidence.channels.identifier.features import (
+    FEATURE_NAMES,
+    TRAINED_ON,
+    FeatureHistory,
+    features_at,
+)
 from skidpad.evidence.channels.identifier.forest import Forest, check_forest, probabilities
 from skidpad.evidence.channels.timefilter import PAUSE, SAME_TIME
 
 Floats = NDArray[np.float64]
-VERSION = 1
+VERSION = 2  # of a file; the forests' features are rows of the card's own list
+KNOWN_VERSIONS = (1, 2)  # in the first the list was always the whole one
 ALL_ROUTES = "all"
 BLOCK = 4096  # cycles judged at once
 MODEL = "a model of the identifier"
@@ -63,6 +69,16 @@ class Model:
                 f"the model was trained on {', '.join(sorted(known))} truth, not {truth}"
             )
         return self.detectors.get((truth, route), self.detectors[truth, ALL_ROUTES])
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """What it was given to learn from."""
+        return tuple(self.card.get("features", FEATURE_NAMES))
+
+    @property
+    def sees_labels(self) -> bool:
+        """Whether among these are some that nearly are its labels."""
+        return not set(self.features) <= set(TRAINED_ON)
 
     def trained_on(self) -> set[tuple[str, str]]:
         """Route and seed of each recording that it was trained on."""
@@ -129,12 +145,13 @@ def model_bytes(model: Model) -> bytes:
                     "confirm": detector.confirm,
                 }
             )
-            for name, array in detector.forest._asdict().items():
+            own = placed(detector.forest, _places_in(model.features))
+            for name, array in own._asdict().items():
                 arrays[f"{number}_{name}"] = array
     routes = sorted({f"{t}/{r}" for t, r in model.detectors})
     card = model.card | {
         "version": VERSION,
-        "features": list(FEATURE_NAMES),
+        "features": list(model.features),
         "detectors": index,
         "models": routes,
     }
@@ -142,6 +159,19 @@ def model_bytes(model: Model) -> bytes:
     buffer = io.BytesIO()
     np.savez_compressed(buffer, **arrays)
     return buffer.getvalue()
+
+
+def placed(forest: Forest, places: NDArray[np.int64]) -> Forest:
+    """The forest with its features counted elsewhere: feature i is at places[i]."""
+    inner = forest.feature >= 0
+    feature = np.where(inner, places[np.maximum(forest.feature, 0)], forest.feature)
+    return forest._replace(feature=feature.astype(np.int64))
+
+
+def _places_in(features: Sequence[str]) -> NDArray[np.int64]:
+    """Where each feature stands in this list; 0 for those that no forest of it asks for."""
+    own = {name: i for i, name in enumerate(features)}
+    return np.array([own.get(name, 0) for name in FEATURE_NAMES], dtype=np.int64)
 
 
 def load_model(path: Path | None) -> Model:
@@ -159,8 +189,10 @@ def load_model(path: Path | None) -> Model:
 
 def _model(arrays: dict[str, Any]) -> Model:
     card = json.loads(arrays["card"].tobytes())
-    if card["version"] != VERSION or card["features"] != list(FEATURE_NAMES):
+    known = {name: i for i, name in enumerate(FEATURE_NAMES)}
+    if card["version"] not in KNOWN_VERSIONS or not set(card["features"]) <= set(known):
         raise FileError("the model was made by another version; train it again")
+    places = np.array([known[name] for name in card["features"]], dtype=np.int64)
     detectors: dict[tuple[str, str], dict[HazardType, Detector]] = {}
     for entry in card["models"]:
         truth, route = str(entry).split("/", 1)
@@ -174,7 +206,9 @@ def _model(arrays: dict[str, Any]) -> Model:
         )
         key = str(entry["truth"]), str(entry["without_route"])
         detectors[key][HazardType(entry["hazard"])] = Detector(
-            check_forest(forest, len(FEATURE_NAMES)), float(entry["limit"]), int(entry["confirm"])
+            placed(check_forest(forest, len(places)), places),
+            float(entry["limit"]),
+            int(entry["confirm"]),
         )
     if any((truth, ALL_ROUTES) not in detectors for truth, _ in detectors) or not detectors:
         raise FileError("the model lacks the detectors of all routes")

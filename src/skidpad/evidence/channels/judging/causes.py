@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.channels import Cycle
+from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import Rule, Signal
-from skidpad.evidence.channels.matching import Span
+from skidpad.evidence.channels.matching import Span, match
 
 Floats = NDArray[np.float64]
 REACH = 1.0  # s around a hazard that is looked at
@@ -85,6 +87,52 @@ def missed_cause(
                 fewest = held, text
     assert fewest is not None
     return fewest[1] if fewest[0] < len(near) else "clauses held, never together"
+
+
+@dataclass(frozen=True, slots=True)
+class Mistake:
+    """A false alarm or a missed hazard, and why."""
+
+    identifier: str
+    truth: str
+    hazard: HazardType
+    missed: bool  # else false
+    t_start: float
+    t_end: float
+    cause: str
+
+
+NO_RULE = "probability below its limit"
+OTHER = {"sim": "world", "world": "sim"}
+
+
+def moments(cycles: Sequence[Cycle], safety: Sequence[float]) -> Floats:
+    """(k, 3) speed and yaw rate of the ego and the least safety score, for causes."""
+    motion = ego_motion(cycles)
+    out: Floats = np.column_stack([motion["v"], motion["yaw_rate"], np.array(safety, np.float64)])
+    return out
+
+
+def mistakes(
+    detected: Mapping[str, Sequence[Span]],
+    truths: Mapping[str, Sequence[Span]],
+    t: Floats,
+    motion: Floats,
+    why_missed: Callable[[str, Span], str],
+) -> Iterator[Mistake]:
+    """Every surplus detection and every missed hazard, with its cause; motion: of `moments`."""
+    moving = {"t": t, "v": motion[:, 0], "yaw_rate": motion[:, 1]}
+    for identifier, spans in detected.items():
+        for truth, true in truths.items():
+            other = truths.get(OTHER.get(truth, ""), ())
+            matching = match(spans, true)
+            for i in matching.false_alarms:
+                s = spans[i]
+                cause = false_cause(s, true, other, moving, motion[:, 2]).value
+                yield Mistake(identifier, truth, s.hazard, False, s.t_start, s.t_end, cause)
+            for i in matching.missed:
+                s, cause = true[i], why_missed(identifier, true[i])
+                yield Mistake(identifier, truth, s.hazard, True, s.t_start, s.t_end, cause)
 
 
 def ego_motion(cycles: Sequence[Cycle]) -> dict[str, Floats]:

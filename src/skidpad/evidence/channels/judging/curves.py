@@ -7,7 +7,7 @@ deviations by which a gap must be short; of a learned identifier the limit of it
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -56,6 +56,25 @@ class Point(NamedTuple):
     fn: int
     found: float  # weights of the true hazards found
     true: float  # of all
+
+
+class Swept(NamedTuple):
+    """Whose limit is varied, against which truth, for which hazard, and what comes of it."""
+
+    identifier: str
+    truth: str
+    hazard: HazardType
+    points: tuple[Point, ...]
+
+
+def swept(
+    sweeps: Mapping[str, Mapping[HazardType, Sweep]], truths: Mapping[str, Sequence[Span]]
+) -> Iterator[Swept]:
+    """The curves of all identifiers against all truths."""
+    for identifier, of in sweeps.items():
+        for truth, true in truths.items():
+            for hazard, rows in points(of, true).items():
+                yield Swept(identifier, truth, hazard, rows)
 
 
 def columns(signals: Sequence[Mapping[Signal, float]]) -> Table:

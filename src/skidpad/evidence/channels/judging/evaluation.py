@@ -15,7 +15,7 @@ from skidpad.core.vocabulary import HazardType, Stratum
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile
 from skidpad.evidence.channels.judging.causes import EXPLAINED
 from skidpad.evidence.channels.judging.curves import Point
-from skidpad.evidence.channels.judging.segments import Curve, Segment
+from skidpad.evidence.channels.judging.segments import Segment
 from skidpad.evidence.channels.matching import (
     TOLERANCES,
     Score,
@@ -141,17 +141,17 @@ class Evaluation:
 
     def _precision_recall(self) -> dict[str, dict[str, dict[str, list[list[float]]]]]:
         """Counts and weights at each limit, by truth, identifier and hazard."""
-        total: dict[Curve, list[Point]] = {}
-        for key in dict.fromkeys(key for s in self.segments for key in s.points):
-            known = [s.points[key] for s in self.segments if key in s.points]
-            total[key] = [
-                Point(at[0].limit, *(sum(column) for column in list(zip(*at, strict=True))[1:]))
+        curves: dict[tuple[str, str, str], list[tuple[Point, ...]]] = {}
+        for s in self.segments:
+            for c in s.points:
+                curves.setdefault((c.truth, c.identifier, c.hazard.value), []).append(c.points)
+        out: dict[str, dict[str, dict[str, list[list[float]]]]] = {}
+        for (truth, identifier, hazard), known in curves.items():
+            of = out.setdefault(truth, {}).setdefault(identifier, {})
+            of[hazard] = [
+                [at[0].limit, *(sum(column) for column in list(zip(*at, strict=True))[1:])]
                 for at in zip(*known, strict=True)
             ]
-        out: dict[str, dict[str, dict[str, list[list[float]]]]] = {}
-        for key, rows in total.items():
-            of = out.setdefault(key.truth, {}).setdefault(key.identifier, {})
-            of[key.hazard.value] = [list(row) for row in rows]
         return out
 
     def _causes(self) -> list[dict[str, Any]]:

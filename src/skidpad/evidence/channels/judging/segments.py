@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,25 +13,29 @@ from numpy.typing import NDArray
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType, Stratum
-from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile, Rule, Signal, load_rules
+from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile, Signal, load_rules
 from skidpad.evidence.channels.identifier.features import feature_row
-from skidpad.evidence.channels.identifier.model import Model, events_of, probability_of
 from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.panel import no_lap
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
-from skidpad.evidence.channels.judging.causes import ego_motion, false_cause, missed_cause
+from skidpad.evidence.channels.judging.causes import (
+    NO_RULE,
+    Mistake,
+    ego_motion,
+    missed_cause,
+    mistakes,
+    moments,
+)
 from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
 from skidpad.evidence.channels.judging.ceiling import ceiling
 from skidpad.evidence.channels.judging.curves import (
-    Point,
-    Sweep,
+    Swept,
     Table,
     columns,
     found_by,
     of_distances,
-    of_learned,
     of_rules,
-    points,
+    swept,
     with_limit,
 )
 from skidpad.evidence.channels.judging.facts import Observer, times_of
@@ -52,29 +56,6 @@ FORMS = {  # decision C-16
 }
 CURVE_FACTORS = (0.5, 0.67, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
 WARM_UP = 2.0  # s at the start of a segment that are not evaluated (decision C-12)
-LEARNED = "learned on {} truth"
-OTHER = {"sim": "world", "world": "sim"}
-
-
-class Curve(NamedTuple):
-    """Whose limit is varied, against which truth, for which hazard."""
-
-    identifier: str
-    truth: str
-    hazard: HazardType
-
-
-@dataclass(frozen=True, slots=True)
-class Mistake:
-    """A false alarm or a missed hazard, and why."""
-
-    identifier: str
-    truth: str
-    hazard: HazardType
-    missed: bool  # else false
-    t_start: float
-    t_end: float
-    cause: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,12 +70,13 @@ class Segment:
     candidates: Mapping[HazardType, int]  # candidate hazards, listed and counted (decision C-4)
     unseen: int  # true hazards with an object that no channel reported
     curve: Mapping[float, tuple[Span, ...]]  # practical rules with one threshold scaled
-    points: Mapping[Curve, tuple[Point, ...]]  # precision and recall by limit
+    points: tuple[Swept, ...]  # precision and recall by limit
     mistakes: tuple[Mistake, ...] = ()
     facts: Mapping[str, float | None] = field(default_factory=dict)  # see drive_facts
     context: Mapping[str, str] = field(default_factory=dict)
     t: Floats = field(default_factory=lambda: np.empty(0))  # (k,) s, and what an identifier sees
     rows: Floats = field(default_factory=lambda: np.empty((0, 0)))  # (k, f)
+    motion: Floats = field(default_factory=lambda: np.empty((0, 3)))  # (k, 3) see causes.moments
 
     @property
     def stratum(self) -> Stratum:
@@ -119,17 +101,16 @@ def judge(
     labels: Iterable[Span] = (),
     truths: Sequence[str] = ("sim", "world"),
     curve: Signal | None = None,
-    model: Model | None = None,
     context: Mapping[str, str] | None = None,
     timer: Stopwatch | None = None,
 ) -> Segment:
     """Run all identifiers and the truths over a recording's cycles.
 
     With `curve` the practical rules are applied again with each clause on that signal scaled by
-    CURVE_FACTORS (C-105). A `model` judges by the detectors that never saw this route.
+    CURVE_FACTORS (C-105).
     """
-    begin = cycles[0].t + WARM_UP if cycles else 0.0
     t = np.array([c.t for c in cycles])
+    begin = evaluated_from(t)
     detected: dict[str, tuple[Span, ...]] = {}
     seen, candidates, detected[Profile.PRACTICAL.value] = _practical(channels, cycles, begin, timer)
     table = columns([values for _, values in seen.signals])
@@ -144,20 +125,11 @@ def judge(
     found, unseen, unseen_found = _truths(channels, cycles, truths, begin, detected, weights)
     if "sim" in found:
         detected[CEILING] = tuple(s for s in ceiling(cycles, channels) if s.t_end >= begin)
-    if model is not None and cycles:
-        for truth in sorted({t_ for t_, _ in model.detectors}):
-            detectors = model.identifier(truth, route)
-            sweeps[LEARNED.format(truth)] = of_learned(detectors, t, seen.rows, begin)
-            spans = [
-                Span(hazard, a, b)
-                for hazard, d in detectors.items()
-                for a, b in events_of(t, probability_of(d.forest, t, seen.rows), d.limit, d.confirm)
-                if b >= begin
-            ]
-            detected[LEARNED.format(truth)] = tuple(sorted(spans, key=lambda s: s.t_start))
     if marked := tuple(labels):
         found["labels"] = tuple(merged(marked))
     duration = cycles[-1].t - begin if cycles else 0.0
+    motion = moments(cycles, [values[Signal.SAFETY_SCORE] for _, values in seen.signals])
+    why = partial(_why_missed, signals=seen.signals)
     return Segment(
         name=name,
         route=route,
@@ -167,13 +139,19 @@ def judge(
         candidates=candidates,
         unseen=unseen,
         curve={f: _reapplied(t, table, curve, f, begin) for f in CURVE_FACTORS if curve},
-        points=_points(sweeps, found),
-        mistakes=tuple(_mistakes(detected, found, cycles, seen.signals)),
+        points=tuple(swept(sweeps, found)),
+        mistakes=tuple(mistakes(detected, found, t, motion, why)),
         facts=seen.facts | {"unseen": float(unseen), "unseen_found": float(unseen_found)},
         context=dict(context or {}),
         t=t,
         rows=seen.rows,
+        motion=motion,
     )
+
+
+def evaluated_from(t: Floats) -> float:
+    """s from which on a drive with cycles at t (k,) is evaluated (decision C-12)."""
+    return float(t[0]) + WARM_UP if t.size else 0.0
 
 
 def _settings(profile: Profile) -> MonitorSettings:
@@ -227,15 +205,13 @@ def _truths(
     return found, len(unseen), hits
 
 
-def _points(
-    sweeps: Mapping[str, Mapping[HazardType, Sweep]], truths: Mapping[str, tuple[Span, ...]]
-) -> dict[Curve, tuple[Point, ...]]:
-    return {
-        Curve(identifier, truth, hazard): rows
-        for identifier, swept in sweeps.items()
-        for truth, true in truths.items()
-        for hazard, rows in points(swept, true).items()
-    }
+def _why_missed(identifier: str, missed: Span, signals: Signals) -> str:
+    """The clause that kept a profile from firing; nothing of who is no profile."""
+    if identifier not in {p.value for p in Profile}:
+        return NO_RULE
+    rules = {r.hazard: r for r in load_rules(Profile(identifier))}
+    rule = rules.get(missed.hazard)
+    return NO_RULE if rule is None else missed_cause(missed, rule, signals)
 
 
 def _scored(spans: Iterable[Span]) -> tuple[Span, ...]:
@@ -282,34 +258,3 @@ def weighted(hazard: TrueHazard, weights: Mapping[str, tuple[float, float]]) -> 
     own = [] if column is None else [weights[a][column] for a in hazard.about if a in weights]
     weight = sum(own) / len(own) if own else 1.0
     return Span(hazard.hazard, hazard.t_start, hazard.t_end, weight=weight)
-
-
-def _mistakes(
-    detected: Mapping[str, tuple[Span, ...]],
-    truths: Mapping[str, tuple[Span, ...]],
-    cycles: Sequence[Cycle],
-    signals: Signals,
-) -> Iterable[Mistake]:
-    """Every surplus detection and every missed hazard, with its cause."""
-    motion = ego_motion(cycles)
-    safety = np.array([values[Signal.SAFETY_SCORE] for _, values in signals])
-    for identifier, spans in detected.items():
-        profile = Profile(identifier) if identifier in {p.value for p in Profile} else None
-        rules: dict[HazardType, Rule] = (
-            {r.hazard: r for r in load_rules(profile)} if profile else {}
-        )
-        for truth, true in truths.items():
-            other = truths.get(OTHER.get(truth, ""), ())
-            matching = match(spans, true)
-            for i in matching.false_alarms:
-                s = spans[i]
-                cause = false_cause(s, true, other, motion, safety).value
-                yield Mistake(identifier, truth, s.hazard, False, s.t_start, s.t_end, cause)
-            for i in matching.missed:
-                s = true[i]
-                cause = (
-                    missed_cause(s, rules[s.hazard], signals)
-                    if s.hazard in rules
-                    else "probability below its limit"
-                )
-                yield Mistake(identifier, truth, s.hazard, True, s.t_start, s.t_end, cause)

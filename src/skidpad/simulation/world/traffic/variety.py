@@ -35,7 +35,12 @@ GAP_MEDIAN, GAP_SIGMA = 9.57, 0.97  # m, of the logarithm
 GAP_RANGE = (1.0, 60.0)  # m
 IMPOSED = 8.0  # m/s^2 that others may have to brake for who cuts in: the hardest (assumed)
 EAGER = 20.0  # times as many changes without a reason, so that there are cut-ins (assumed)
-TAIL, EXTRA = 0.1, 0.5  # the least tenth, and the share of draws that come from it alone
+# Layers of the proposal: a share of draws from the least part of the distribution. Weights are 2 in
+# the body, 1/3 in the least tenth (gaps: 2/11) and 1/28 in the least hundredth.
+Layers = tuple[tuple[float, float], ...]  # part, share
+HEADWAY_LAYERS: Layers = ((1.0, 0.5), (0.1, 0.25), (0.01, 0.25))
+GAP_LAYERS: Layers = ((1.0, 0.5), (0.1, 0.5))  # a hundredth of all gaps lies below 1 m: contacts
+HEADWAY_LEAST = 0.25  # s, of risky drivers; the least hundredth lies below 0.39 s
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,17 +57,25 @@ def risky_character(seed: int, id: int) -> Character:
     """The character of driver `id` in the stratum of risky drivers."""
     rng = stream(seed, "traffic", "risky", id)
     draws = rng.random(4).tolist()
-    (u_headway, of_headway), (u_gap, of_gap) = tail_draw(*draws[:2]), tail_draw(*draws[2:])
+    u_headway, of_headway = tail_draw(HEADWAY_LAYERS, *draws[:2])
+    u_gap, of_gap = tail_draw(GAP_LAYERS, *draws[2:])
     return Character(u_headway, u_gap, of_headway, of_gap)
 
 
-def tail_draw(which: float, where: float) -> tuple[float, float]:
+def tail_draw(layers: Layers, which: float, where: float) -> tuple[float, float]:
     """A quantile in [0, 1) from two uniform numbers, and its weight p / q.
 
-    q = (1 - EXTRA) p + EXTRA (p within the least TAIL): no weight exceeds 1 / (1 - EXTRA).
+    q is the mixture of p within each layer's part by the layers' shares: no weight exceeds one over
+    the share of the whole.
     """
-    u = where * TAIL if which < EXTRA else where
-    return u, 1.0 / (1.0 - EXTRA + (EXTRA / TAIL if u < TAIL else 0.0))
+    part, until = layers[-1][0], 0.0
+    for layer, share in layers:
+        until += share
+        if which < until:
+            part = layer
+            break
+    u = where * part
+    return u, 1.0 / sum(share / layer for layer, share in layers if u < layer)
 
 
 def vary(
@@ -77,8 +90,9 @@ def vary(
             gap = GAP_MEDIAN * np.exp(GAP_SIGMA * _normal(risky.u_gap))
             trait["room"] = np.clip(gap, *GAP_RANGE)
             trait["imposed"], trait["eager"] = IMPOSED, EAGER
+        least = HEADWAY_LEAST if stratum is Stratum.RISKY else HEADWAY_RANGE[0]
         headway = HEADWAY_MEDIAN * np.exp(HEADWAY_SIGMA * draw[0])
-        trait["headway"] = np.clip(headway, *HEADWAY_RANGE)
+        trait["headway"] = np.clip(headway, least, HEADWAY_RANGE[1])
         trait["factor"] *= np.clip(1.0 + SPEED_SIGMA * draw[1], *SPEED_RANGE)
         trait["a_max"] *= np.clip(1.0 + ACCELERATION_SIGMA * draw[2], *ACCELERATION_RANGE)
 

@@ -84,7 +84,7 @@ def threshold_key(task: Task, outcome: Outcome, log_hash: str | None = None) -> 
 
 def finish(driven: Sequence[Task], out: Path, runner: Runner) -> None:
     """Keep the log of the first accident of each situation, coming from dry road."""
-    crashed = read_results(out).filter(pl.col("outcome") == Outcome.COLLISION.value)
+    crashed = read_results(out).filter(~pl.col("completion"))
     first = crashed.sort("road_mu", "seed", descending=[True, False]).unique(
         SITUATION, keep="first", maintain_order=True
     )

@@ -41,7 +41,9 @@ class GripMetrics:
     """What the log of one run says; None where there is nothing to say (decision X-3)."""
 
     triggered: bool | None = metric("every event of the scenario began", "G-2")
-    completion: bool | None = metric("no accident", "B-104")
+    completion: bool | None = metric(
+        "no accident: no contact, and never off the road", "B-104, B-106"
+    )
     score: float | None = metric("route completion times penalties, 0 to 100", "B-105")
     route_completion: float | None = metric("share of the route driven, percent", "BD-07")
     off_lanes_pct: float | None = metric("share of the way off all lanes", "B-106")

@@ -37,11 +37,11 @@ LEAD = """Every run was driven twice with the same seed: once with the weather o
 tyres that feel it, those of the ego and of every other vehicle. Seeds are common to all cells, so that \
 differences are paired.
 
-Completion is the share of runs without an accident of the ego. Runs in which the scenario never happened \
-count in it, as in the published numbers, and are left out in the columns "if triggered". Intervals are \
-95 %: exact for shares, Student's, widened where values are skew, for means. Published numbers stand \
-beside ours in small print; they come from another simulator, another driver and other scenario files, \
-and nothing here was tuned to meet them."""
+Completion is the share of runs without an accident of the ego: a contact, or all wheels off the road. \
+Runs in which the scenario never happened count in it, as in the published numbers, and are left out in \
+the columns "if triggered". Intervals are 95 %: exact for shares, Student's, widened where values are \
+skew, for means. Published numbers stand beside ours in small print; they come from another simulator, \
+another driver and other scenario files, and nothing here was tuned to meet them."""
 MODEL = """The statistical ratio of the study multiplies the friction of a dry road, 0.9. It puts heavy \
 rain at 0.27, below packed snow (0.34) and far below what braking tests measure on wet roads (0.63 to \
 0.72); `--model physical` follows measurements."""

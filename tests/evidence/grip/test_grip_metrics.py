@@ -79,6 +79,14 @@ def test_a_share_of_the_way_off_all_lanes_multiplies_by_what_remains():
     assert with_both.score == pytest.approx(50.0 * 0.65 * 0.7)
 
 
+@pytest.mark.req("B-104", "B-106")
+def test_whoever_leaves_the_road_has_not_completed_even_without_a_contact():
+    log = drive(11, lambda k: [going(2.0 * k), going(60.0)])
+    assert metrics(log, off_road=np.zeros(11, dtype=bool)).completion is True
+    assert metrics(log, off_road=np.arange(11) == 5).completion is False
+    assert metrics(log).completion is True
+
+
 def test_a_failed_agent_has_driven_nothing_and_a_crash_no_more_than_the_route():
     assert route_share(Outcome.AGENT_ERROR, 50.0, 100.0) == 0.0
     assert route_share(Outcome.COLLISION, 150.0, 100.0) == 100.0

@@ -100,10 +100,11 @@ def grip_metrics(
     )
     route = route_share(outcome, distance, route_length)
     crashed = outcome is Outcome.COLLISION
+    departed = off_road is not None and bool(off_road.any())
     nearest = centre_distance(log).min()
     return GripMetrics(
         triggered=triggered,
-        completion=not crashed,
+        completion=not crashed and not departed,
         score=None if route is None else score(route, log, contacts, strayed),
         route_completion=route,
         off_lanes_pct=100.0 * strayed,

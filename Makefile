@@ -9,7 +9,7 @@ TEST_ARGS ?=
 DRIVE_ARGS ?=
 NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run test check wheel-check bench fuzz nightly soak refs data fleet fleet-load figures arm64 clean
+.PHONY: cockpit run test check wheel-check bench fuzz nightly soak refs data fleet fleet-load figures arm64 channels clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next --traffic pack $(RUN_ARGS)
@@ -63,6 +63,11 @@ fleet: $(VENV)/.tested-with
 fleet-load: $(VENV)/.tested-with
 	$(BIN)/python tools/fleet_load.py --records 20000
 	$(BIN)/python tools/fleet_load.py --records 20000 --kills 20
+
+# the evaluation of the channels, whole, and the tables of its page: about 3 h; goes on where it stopped
+HOURS ?= 50
+channels: $(VENV)/.tested-with
+	PYTHONPATH=src $(BIN)/python tools/channels_campaign.py --out out/channels --hours $(HOURS) --publish
 
 # whether the channels monitor's kernels compile for ARM64
 arm64: $(VENV)/.tested-with

@@ -51,6 +51,11 @@ PROOFS = (
         ("tools/soak_worker.py", "--out", "out/nightly/soak"),
         "1000 runs in one worker: memory and open files stay, results equal those of a fresh worker",
     ),
+    Proof(
+        "channels",
+        ("tools/channels_campaign.py", "--out", "out/nightly/channels", "--hours", "50"),
+        "the evaluation of the channels whole: driven, trained, validated and reported on seeds of its own",
+    ),
 )
 
 

@@ -83,7 +83,9 @@ def test_monitor_writes_every_indicator_of_every_cycle(monitored):
     assert [h["name"] for h in summary["hazards"]] == ["ego_tailgated"]
 
 
+@pytest.mark.req("C-009")
 def test_hazards_are_listed_shown_and_exported(monitored):
+    """From unknown to known: what was met becomes a scenario that can be tested again."""
     assert "ego_tailgated" in invoke("hazards", "list", monitored).output
     shown = json.loads(invoke("hazards", "show", monitored, "--id", "h0001").output)
     assert shown["context"] == {"route": "ring"}

@@ -286,7 +286,7 @@ def hash_of(release: str, drive: int) -> int:
 PLAN = {"stages": [0.999999, 1.0], "least_drives": 9, "looks": 2, "margin": 0.25}
 
 
-@pytest.mark.req("C-176", "C-178", "C-197")
+@pytest.mark.req("C-003", "C-176", "C-178", "C-197")
 def test_the_loop_from_hazard_to_re_evaluation_is_one_record(lite, tmp_path):
     """A good change is completed, a bad one is reverted, by what vehicles reported; all traced."""
     maker = Maker(lite, tmp_path)

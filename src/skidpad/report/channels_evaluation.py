@@ -11,6 +11,7 @@ import polars as pl
 from skidpad import __version__
 from skidpad.core.errors import FileError
 from skidpad.evidence.channels.findings import FINDINGS
+from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import channels_scores as scores
 from skidpad.report.channels_redundancy import redundancy
@@ -101,15 +102,12 @@ def _about_model(evaluation: Row) -> list[Block]:
 
 def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:
     """Who finds hazards, and how sure."""
-    judged_by = [r for r in headline(evaluation) if r["truth"] == "world"]
+    judged_by, of = _deciding(evaluation)
     items = []
     for result in judged_by:
         precision, recall = map(ratio_text, result["micro"])
-        sentence = (
-            f"They find {recall} % of the hazards that the channels' own reports hold, and "
-            f"{precision} % of what they find is one."
-        )
-        items.append((f"How good are the {words(result['rules'])} rules?", sentence))
+        sentence = f"{recall} % of {of} are found, and {precision} % of what is found is one."
+        items.append((f"How good is {words(result['rules'])}?", sentence))
     rows = [row for result in judged_by[:1] for row in result["hazards"].values()]
     true = sum(row["tp"] + row["fn"] for row in rows)
     few = ", too few to say much" if true < FEW else ""
@@ -120,9 +118,18 @@ def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:
     return Answers([*items, ("How sure is that?", sure)])
 
 
+def _deciding(evaluation: Row) -> tuple[list[Row], str]:
+    """What identifiers came to by the truth that decides (C-3), and of what."""
+    rows = [r for r in headline(evaluation) if r["rules"] != CEILING]
+    if any(r["truth"] == "sim" for r in rows):
+        return [r for r in rows if r["truth"] == "sim"], "the hazards that were really there"
+    world = [r for r in rows if r["truth"] == "world"]
+    return world, "the hazards that the channels' own reports hold"
+
+
 def _numbers(evaluation: Row) -> Numbers:
     hours, unseen = evaluation["hours"], evaluation["unseen_by_all_channels"]
-    judged = [r for r in headline(evaluation) if r["truth"] == "world"]
+    judged, _ = _deciding(evaluation)
     return Numbers(
         [
             Number(f"{hours:.2f} h", "evaluated", f"{evaluation['segments']} segments"),
@@ -130,7 +137,7 @@ def _numbers(evaluation: Row) -> Numbers:
                 Number(
                     " / ".join(map(ratio_text, result["micro"])),
                     "precision / recall, %",
-                    f"{words(result['rules'])}, world-model truth, all hazards",
+                    f"{words(result['rules'])}, {short(result['truth'])}, all hazards",
                 )
                 for result in judged
             ),

@@ -10,8 +10,9 @@ from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
 from skidpad.report.channels_scores import FEW, HAZARDS, Row, count, headline, ratio, ratio_text
 from skidpad.report.figures import Chart, Curve, curves
 from skidpad.report.page import Block, Cell, Figure, Text, words
-from skidpad.report.tables import Column, Format, table
+from skidpad.report.tables import Column, table
 
+SHARE = (-0.03, 1.03)  # of axes
 STRATA = {
     "natural": "Natural drivers",
     "risky": "Risky drivers",
@@ -37,6 +38,7 @@ def strata(evaluation: Row) -> list[Block]:
         for result in headline(part)
         if result["truth"] == "sim"
         for hazard, row in result["hazards"].items()
+        if row["tp"] + row["fn"]
     ]
     caption = "What is found of the simulator's hazards, by stratum"
     return [Text(EXPLAINED), table(_columns(), rows, caption)]
@@ -51,21 +53,11 @@ def _columns() -> list[Column[Row]]:
         Column("found", partial(count, "tp")),
         Column("recall", _recall, "weighted among risky drivers; 95 % interval below", "%"),
         Column("effective size", _size, "of the true hazards with their weights"),
-        Column("precision", _precision, "of natural drivers alone", "%"),
-        Column("false per hour", _false, "of natural drivers alone", format=Format(".2f", absent="")),
     ]  # fmt: skip
 
 
 def _recall(row: Row) -> Cell:
     return ratio("recall_weighted", row)
-
-
-def _precision(row: Row) -> Cell:
-    return ratio("precision", row) if row["stratum"] == "natural" else Cell("")
-
-
-def _false(row: Row) -> float | None:
-    return row["false_alarms_per_hour"] if row["stratum"] == "natural" else None
 
 
 def _size(row: Row) -> Cell:
@@ -84,7 +76,7 @@ def precision_recall(evaluation: Row) -> list[Block]:
         if not drawn:
             continue
         text = (
-            f"{STRATA[stratum]}, {part['hours']:.1f} h, simulator truth: precision against recall while "
+            f"{STRATA[stratum]}, {part['hours']:.2f} h, simulator truth: precision against recall while "
             f"each identifier's limit varies; the star is the ceiling that the sensors set"
         )
         weighted = ", recall weighted" if stratum == "risky" else ""
@@ -114,7 +106,9 @@ def _chart(part: Row, drawn: Row) -> str:
             )
             for r, p in _ceiling(part, hazard)
         ]
-        charts.append(Chart(lines, "recall", "precision", words(hazard), y_range=(-0.03, 1.03)))
+        charts.append(
+            Chart(lines, "recall", "precision", words(hazard), y_range=SHARE, x_range=SHARE)
+        )
     return curves(charts, width=11.0, height=3.6)
 
 

@@ -158,6 +158,7 @@ class Chart:
     title: str = ""
     log: bool = False
     y_range: tuple[float, float] | None = None
+    x_range: tuple[float, float] | None = None
     rules: Sequence[float] = ()  # horizontal dashes at these heights
 
 
@@ -197,6 +198,8 @@ def _draw_curves(axes: Axes, chart: Chart, named: set[str]) -> None:
         axes.set_yscale("log")
     if chart.y_range:
         axes.set_ylim(*chart.y_range)
+    if chart.x_range:
+        axes.set_xlim(*chart.x_range)
 
 
 Named = tuple[str, ArrayLike, ArrayLike]  # name, x, y

@@ -177,7 +177,7 @@ def monitored(source):
     return monitor, evidence, monitor.records() + monitor.finish()
 
 
-@pytest.mark.req("C-001", "C-002", "C-123", "C-124")
+@pytest.mark.req("C-001", "C-002", "C-007", "C-008", "C-123", "C-124")
 def test_a_follower_that_one_channel_cannot_see_is_found_and_recorded():
     source = drive(World(EGO, np.array([FOLLOWER, (60.0, 3.5, 0, 15.0, 0)])), BLIND_BEHIND, 16.0)
     monitor, evidence, records = monitored(source)

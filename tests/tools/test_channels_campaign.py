@@ -1,0 +1,94 @@
+"""The evaluation of the channels as one command, and the tables that are made of its results."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import channels_campaign as campaign
+import channels_tables as tables
+from channel_worlds import Eyes, World, drive
+from skidpad.evidence.channels.judging.evaluation import Evaluation
+from skidpad.evidence.channels.judging.segments import judge
+from skidpad.recording.cycles import cycles
+
+EYES = (Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,)))
+
+
+@pytest.fixture(scope="module")
+def driven(tmp_path_factory):
+    """A folder as a campaign leaves it, of two drives."""
+    out = tmp_path_factory.mktemp("campaign")
+    segments = []
+    for stratum in ("natural", "risky"):
+        world = World((0, 0, 0, 15.0, 0), np.array([(-10.5, 0, 0, 15.7, 0)]))
+        source = drive(world, EYES, 8.0)
+        context = {"stratum": stratum, "weights": json.dumps({"0": [0.25, 1.0]}), "seed": "1"}
+        segments.append(
+            judge("s", "route-1", source.channels, list(cycles(source)), context=context)
+        )
+    table = Evaluation(segments).as_dict() | {"model": None}
+    for name in ("validate", "report"):
+        (out / name).mkdir()
+        (out / name / "evaluation.json").write_text(json.dumps(table, allow_nan=False))
+    return out
+
+
+@pytest.fixture
+def published(driven, tmp_path, monkeypatch):
+    page = tmp_path / "page.md"
+    page.write_text("By hand.\n<!-- table: missed -->\nold\n<!-- end -->\nBy hand too.\n")
+    monkeypatch.setattr(tables, "PAGE", page)
+    monkeypatch.setattr(tables, "RESULTS", tmp_path / "results")
+    campaign.publish(driven, 1.0, tmp_path / "results")
+    return tmp_path / "results"
+
+
+def test_the_committed_page_is_what_is_made_of_the_committed_results():
+    assert tables.main(["--check"]) == 0
+
+
+@pytest.mark.req("C-210", "C-2")
+def test_a_page_is_filled_and_what_is_written_by_hand_stays(published):
+    text = tables.PAGE.read_text()
+    assert text.startswith("By hand.\n")
+    assert text.endswith("<!-- end -->\nBy hand too.\n")
+    (row,) = [x for x in text.splitlines() if x.startswith("| tracked | ego tailgated")]
+    assert row == "| tracked | ego tailgated | 1 | 1 | 100.0 [2.5, 100.0] | 1, too few |"
+    assert tables.main(["--check"]) == 0
+    tables.PAGE.write_text(text.replace("| 1 | 1 |", "| 1 | 2 |"))
+    assert tables.main(["--check"]) == 1
+
+
+def test_every_table_says_what_it_holds(published):
+    said = {name: make(published) for name, make in tables.TABLES.items()}
+    assert "0.00 h among natural drivers (1 segments)" in said["driven"]
+    assert "seeds from 43000" in said["driven"]
+    assert "| tracked | ego tailgated | 1 | 0 | 0 | 100.0 " in said["scores"]
+    assert "| natural | tracked | ego tailgated |" in said["curves"]
+    assert said["redundancy"] == "Not driven.\n"
+
+
+def test_without_results_a_page_stays_as_it_is(tmp_path):
+    assert tables.filled("<!-- table: missed -->\nold\n<!-- end -->", tmp_path).count("old") == 1
+
+
+@pytest.mark.req("C-210")
+def test_parts_share_no_seed_and_are_driven_in_every_condition_and_stratum(monkeypatch, tmp_path):
+    calls = []
+    monkeypatch.setattr(campaign, "_skidpad", lambda *words: calls.append([*map(str, words)]))
+    assert campaign.main(["--out", str(tmp_path), "--hours", "10", "--workers", "1"]) == 0
+    drives = [c for c in calls if c[:2] == ["channels", "drive"]]
+    seeds = {c[c.index("--seed") + 1] for c in drives}
+    assert len(seeds) == 4
+    assert len(drives) == 3 + 3
+    for call in drives[:3]:
+        assert call[call.index("--conditions") + 1] == "own,day,night,rain"
+        assert call[call.index("--strata") + 1] == "natural,risky"
+    hours = [float(c[c.index("--hours") + 1]) for c in drives]
+    assert sum(hours) == pytest.approx(10.0)
+    assert all("--resume" in c for c in drives)
+    order = [c[1] for c in calls]
+    assert order.index("train") < order.index("evaluate")

@@ -1,0 +1,170 @@
+"""The evaluation of the channels, whole: drive, train, validate, report, and the tables of its page.
+
+    python tools/channels_campaign.py --out out/channels --hours 50        # about 3 h on two cores
+    python tools/channels_campaign.py --out out/channels --hours 50 --publish
+
+Three parts on seeds of their own, each on every route in its own weather, by day, by night and in
+rain, among natural and among risky drivers. Trees are fitted on `train`, their limits chosen on
+routes that the fold did not see; `validate` is for looking, `report` is looked at once. Then the
+arbiter and each channel alone drive the same natural drives, for redundancy. What is done is not
+done again, so a campaign that was stopped goes on. `--publish` writes docs/results/channels and the
+tables of docs/channels-evaluation.md, and says what was driven at which commit.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from pathlib import Path
+from typing import Any
+
+import channels_tables
+from skidpad.evidence.channels.redundancy import compare_drivers
+from skidpad.recording.channel_drives import read_outcomes
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "docs" / "results" / "channels"
+CONDITIONS, STRATA = "own,day,night,rain", "natural,risky"
+DRIVERS = ("arbiter", "lav_like", "tfuse_like")
+KEPT = (
+    "hours",
+    "segments",
+    "results",
+    "precision_recall",
+    "truths_agree",
+    "unseen_by_all_channels",
+)
+
+
+@dataclass(frozen=True)
+class Part:
+    """name: its folder. seed: `--seed` of its drives, never used before. share: of all hours."""
+
+    name: str
+    seed: int
+    share: float
+
+
+PARTS = (Part("train", 41, 0.4), Part("validate", 42, 0.15), Part("report", 43, 0.35))
+REDUNDANCY = Part("redundancy", 44, 0.1)
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Everything; the exit code of what failed first."""
+    asked = _asked(words)
+    out: Path = asked.out
+    out.mkdir(parents=True, exist_ok=True)
+    for part in PARTS:
+        _drive(out / part.name, asked, part, strata=STRATA, conditions=CONDITIONS)
+    model = out / "model.npz"
+    if not model.exists():
+        _skidpad("channels", "train", out / "train", "--out", model, "--workers", asked.workers)
+    for name in ("validate", "report"):
+        learned = ("--model", model) if model.exists() else ()
+        _skidpad("channels", "evaluate", out / name, "--workers", asked.workers, *learned)
+    for driver in DRIVERS:
+        folder = out / REDUNDANCY.name / driver
+        _drive(folder, asked, REDUNDANCY, drive_by=driver, each=1.0 / len(DRIVERS))
+    if asked.publish:
+        publish(out, asked.hours)
+    return 0
+
+
+def _asked(words: Sequence[str] | None) -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--out", type=Path, required=True, help="folder of the campaign")
+    parser.add_argument("--hours", type=float, default=50.0, help="simulated hours of all parts")
+    parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--publish", action="store_true", help="write results and page of docs")
+    return parser.parse_args(words)
+
+
+def _drive(
+    folder: Path, asked: argparse.Namespace, part: Part, each: float = 1.0, **options: str
+) -> None:
+    more = [w for name, value in options.items() for w in (f"--{name.replace('_', '-')}", value)]
+    _skidpad(
+        "channels", "drive", "--route", "all", "--seed", part.seed, "--out", folder, "--resume",
+        "--hours", asked.hours * part.share * each, "--workers", asked.workers, *more,
+    )  # fmt: skip
+
+
+def _skidpad(*words: object) -> None:
+    """A command of ours; what it says goes to the terminal."""
+    environment = {**os.environ, "PYTHONPATH": str(ROOT / "src")}
+    call = [sys.executable, "-m", "skidpad", *map(str, words)]
+    done = subprocess.run(call, env=environment, check=False)
+    if done.returncode:
+        sys.exit(done.returncode)
+
+
+def publish(out: Path, hours: float, results: Path = RESULTS) -> None:
+    """Copy what the page needs, and write its tables anew."""
+    results.mkdir(parents=True, exist_ok=True)
+    for name in ("validate", "report"):
+        table = json.loads((out / name / "evaluation.json").read_text(encoding="utf-8"))
+        _write(results / f"{name}.json", {"model": table["model"], "strata": _kept(table)})
+    _write(results / "redundancy.json", _outcomes(out / REDUNDANCY.name))
+    seeds = {p.name: p.seed * 1000 for p in (*PARTS, REDUNDANCY)}
+    about = {"commit": _commit(), "date": datetime.now(timezone.utc).date().isoformat(),
+             "hours_asked": hours, "first_seed": seeds, "processors": os.cpu_count()}  # fmt: skip
+    _write(results / "run.json", about)
+    channels_tables.main([])
+
+
+def _kept(table: dict[str, Any]) -> dict[str, Any]:
+    """Per stratum what the tables are made of, at the tolerance that counts."""
+    out = {}
+    for stratum, part in table["strata"].items():
+        kept = {name: part[name] for name in KEPT}
+        kept["results"] = [r for r in part["results"] if r["tolerance_s"] == 1.0]
+        kept["true_by_route"] = _true_by_route(part["segment_table"])
+        out[stratum] = kept
+    return out
+
+
+def _true_by_route(rows: list[dict[str, Any]]) -> dict[str, dict[str, float]]:
+    out: dict[str, dict[str, float]] = {}
+    for row in rows:
+        total = out.setdefault(row["route"], {"hours": 0.0})
+        total["hours"] += row["hours"]
+        for name in (n for n in row if n.startswith("sim_")):
+            total[name] = total.get(name, 0.0) + row[name]
+    return dict(sorted(out.items()))
+
+
+def _outcomes(folder: Path) -> list[dict[str, Any]]:
+    """Per driver what became of the drives that all have driven."""
+    return [
+        {
+            "drive_by": row.drive_by,
+            "segments": row.segments,
+            "hours": row.hours,
+            "km": row.km,
+            "rates": {
+                event: [rate.events, rate.rate, *(rate.interval or (None, None))]
+                for event, rate in row.rates.items()
+            },
+        }
+        for row in compare_drivers(read_outcomes([folder]))
+    ]
+
+
+def _commit() -> str:
+    call = ["git", "-C", str(ROOT), "describe", "--always", "--dirty", "--exclude=*"]
+    done = subprocess.run(call, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or "unknown"
+
+
+def _write(path: Path, value: Any) -> None:
+    path.write_text(json.dumps(value, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    sys.exit(main())

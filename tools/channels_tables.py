@@ -1,0 +1,173 @@
+"""The tables of docs/channels-evaluation.md, made of docs/results/channels.
+
+    python tools/channels_tables.py            # writes the page anew
+    python tools/channels_tables.py --check    # exit code 1 when it is not what is made
+
+A table stands between `<!-- table: NAME -->` and `<!-- end -->`; all else on the page is written by hand.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+PAGE = ROOT / "docs" / "channels-evaluation.md"
+RESULTS = ROOT / "docs" / "results" / "channels"
+SLOT = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
+HAZARDS = ("inconsistent_localisation", "ego_tailgating", "ego_tailgated")
+FEW = 100  # of the effective size
+Rows = list[list[str]]
+
+
+def main(words: list[str] | None = None) -> int:
+    """Write the page, or say whether it is up to date."""
+    words = sys.argv[1:] if words is None else words
+    before = PAGE.read_text(encoding="utf-8")
+    after = filled(before, RESULTS)
+    if "--check" in words:
+        return int(before != after)
+    PAGE.write_text(after, encoding="utf-8")
+    return 0
+
+
+def filled(page: str, results: Path) -> str:
+    """The page with every table made anew; as it is where there are no results."""
+    if not (results / "run.json").is_file():
+        return page
+    return SLOT.sub(lambda m: m[1] + TABLES[m[2]](results) + m[3], page)
+
+
+def driven(results: Path) -> str:
+    """When, where and how much."""
+    run, report = _read(results, "run"), _read(results, "report")
+    hours = ", ".join(
+        f"{part['hours']:.2f} h among {stratum} drivers ({part['segments']} segments)"
+        for stratum, part in report["strata"].items()
+    )
+    model = report["model"]
+    learned = (
+        "" if model is None
+        else f" The learned identifier was trained on {model['hours']:.2f} h of other drives."
+    )  # fmt: skip
+    seed = run["first_seed"]["report"]
+    return (
+        f"Driven {run['date']} at commit `{run['commit']}` on {run['processors']} processors, seeds from "
+        f"{seed}: {hours}.{learned}\n"
+    )
+
+
+def scores(results: Path) -> str:
+    """Every identifier among natural drivers against the simulator's truth."""
+    part = _read(results, "report")["strata"].get("natural")
+    if part is None:
+        return "No natural drivers were driven among.\n"
+    head = ["identifier", "hazard", "found", "false", "missed", "precision, % [95 %]",
+            "recall, % [95 %]", "false per h"]  # fmt: skip
+    rows = [
+        [
+            _words(r["rules"]), _words(hazard), str(row["tp"]), str(row["fp"]), str(row["fn"]),
+            _share(row, "precision"), _share(row, "recall"), f"{row['false_alarms_per_hour']:.1f}",
+        ]
+        for r, hazard, row in _results(part, "sim")
+    ]  # fmt: skip
+    return _table(head, rows)
+
+
+def missed(results: Path) -> str:
+    """Weighted recall among risky drivers, with the effective size."""
+    part = _read(results, "report")["strata"].get("risky")
+    if part is None:
+        return "No risky drivers were driven among.\n"
+    head = ["identifier", "hazard", "true", "found", "weighted recall, % [95 %]", "effective size"]
+    rows = [
+        [
+            _words(r["rules"]), _words(hazard), str(row["tp"] + row["fn"]), str(row["tp"]),
+            _share(row, "recall_weighted"),
+            f"{row['effective_size']:.0f}" + (", too few" if row["effective_size"] < FEW else ""),
+        ]
+        for r, hazard, row in _results(part, "sim")
+    ]  # fmt: skip
+    return _table(head, rows)
+
+
+def curves(results: Path) -> str:
+    """Best harmonic mean on each curve, and the ceiling."""
+    head = ["drivers", "identifier", "hazard", "limit", "precision, %", "recall, %"]
+    rows: Rows = []
+    for stratum, part in _read(results, "report")["strata"].items():
+        for identifier, by_hazard in part["precision_recall"].get("sim", {}).items():
+            for hazard, points in by_hazard.items():
+                best = max(points, key=lambda p: _harmonic(p[1], p[2], p[3]))
+                limit, tp, fp, _, found, true = best
+                if not tp:
+                    continue
+                precision, recall = 100.0 * tp / (tp + fp), 100.0 * found / true
+                rows.append(
+                    [stratum, _words(identifier), _words(hazard), f"{limit:g}", f"{precision:.0f}",
+                     f"{recall:.0f}"]
+                )  # fmt: skip
+    return _table(head, rows) if rows else "No identifier found anything at any limit.\n"
+
+
+def redundancy(results: Path) -> str:
+    """What became of the drives by driver."""
+    head = ["driven by", "segments", "h", "km", "collisions", "red lights run", "stalls"]
+    rows = [
+        [row["drive_by"], str(row["segments"]), f"{row['hours']:.2f}", f"{row['km']:.1f}"]
+        + [_rate(row["rates"][e]) for e in ("collisions", "red_lights_run", "stalls")]
+        for row in _read(results, "redundancy")
+    ]
+    return _table(head, rows) if rows else "Not driven.\n"
+
+
+TABLES: dict[str, Callable[[Path], str]] = {
+    "driven": driven, "scores": scores, "missed": missed, "curves": curves,
+    "redundancy": redundancy,
+}  # fmt: skip
+
+
+def _results(part: dict[str, Any], truth: str) -> Iterator[tuple[dict[str, Any], str, Any]]:
+    for result in part["results"]:
+        if result["truth"] == truth:
+            for hazard in HAZARDS:
+                yield result, hazard, result["hazards"][hazard]
+
+
+def _share(row: dict[str, Any], name: str) -> str:
+    value, limits = row[name], row.get(f"{name}_interval")
+    if value is None:
+        return "-"
+    said = f"{100.0 * value:.1f}"
+    return said if limits is None else f"{said} [{100.0 * limits[0]:.1f}, {100.0 * limits[1]:.1f}]"
+
+
+def _rate(rate: list[float | None]) -> str:
+    events, per_hour, low, high = rate
+    limits = "" if low is None or high is None else f" [{low:.1f}, {high:.1f}]"
+    return f"{events:.0f}, {per_hour:.1f} per h{limits}"
+
+
+def _harmonic(tp: float, fp: float, fn: float) -> float:
+    return 2.0 * tp / max(2.0 * tp + fp + fn, 1.0)
+
+
+def _words(name: str) -> str:
+    return name.replace("_", " ")
+
+
+def _table(head: list[str], rows: Rows) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+
+
+def _read(results: Path, name: str) -> Any:
+    return json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    sys.exit(main())

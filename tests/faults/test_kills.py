@@ -3,6 +3,7 @@
 import os
 import random
 import resource
+import shutil
 import signal
 import subprocess
 import sys
@@ -102,6 +103,44 @@ def test_a_run_on_a_full_disk_is_driven_again_as_it_was(tmp_path):
             resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
         again = Campaign(RECIPE, [run]).run(out, here, resume=True)
         assert again.content_hash == whole.content_hash
+
+
+@pytest.fixture
+def small_disk(tmp_path):
+    """A file system of its own, of 1 MB."""
+    place = tmp_path / "disk"
+    place.mkdir()
+    mount = ["mount", "-t", "tmpfs", "-o", "size=1m", "tmpfs", str(place)]
+    try:
+        done = subprocess.run(mount, capture_output=True, text=True, check=False)
+    except OSError as error:
+        pytest.skip(f"no file system can be mounted: {error}")
+    if done.returncode:
+        pytest.skip(f"no file system can be mounted: {done.stderr.strip()}")
+    yield place
+    subprocess.run(["umount", str(place)], check=True)
+
+
+def test_a_file_system_that_is_really_full(tmp_path, small_disk):
+    """Free space between nothing and more than enough; then somebody makes room."""
+    whole = toy_campaign(4).run(tmp_path / "whole", here)
+    ballast, said = small_disk / "ballast", []
+    for free in (0, 4, 8, 12, 16, 24, 512):
+        out = small_disk / f"out{free}"
+        ballast.write_bytes(
+            bytes(4096 * ((os.statvfs(small_disk).f_bavail * 4096 // 1024 - free) // 4))
+        )
+        try:
+            toy_campaign(4).run(out, here)
+        except OutputError as error:
+            said.append(str(error))
+        ballast.unlink()
+        again = toy_campaign(4).run(out, here, resume=out.exists())
+        assert again.content_hash == whole.content_hash
+        assert not [p.name for p in out.iterdir() if p.name.endswith(".part")]
+        shutil.rmtree(out)
+    assert len(said) >= 3
+    assert all("the disk is full" in s for s in said), said
 
 
 @pytest.fixture

@@ -6,11 +6,13 @@ import traceback
 import warnings
 import zlib
 
+import more_readers
 import pytest
-from readers import READERS
+import readers
 
 from skidpad.core.errors import InputError
 
+READERS = readers.READERS | more_readers.READERS
 LISTS = ("openscenario", "played", "storyboard")  # name all that is wrong, a line each
 LONGEST = 50_000  # characters
 IN_CI = 500  # inputs of a reader

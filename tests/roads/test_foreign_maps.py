@@ -6,6 +6,7 @@ from math import cos, pi, sin
 
 import pytest
 
+from skidpad.core.errors import FileError
 from skidpad.core.geometry import wrap_angle
 from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.opendrive.document import id_number
@@ -99,3 +100,13 @@ def test_a_building_given_by_its_corners_alone_has_their_size():
     assert box.height == 9.0
     along = box.yaw if box.length > box.width else box.yaw + pi / 2.0
     assert abs(sin(along - 0.5)) == pytest.approx(0.0, abs=1e-4)
+
+
+def test_objects_of_a_map_are_counted_before_they_are_made():
+    many = "".join(
+        f'<object id="{i}" type="pole" s="0" t="8"><repeat s="0" length="90" distance="0.001" tStart="8"'
+        ' tEnd="8" zOffsetStart="0" zOffsetEnd="0"/></object>'
+        for i in range(3)
+    )
+    with pytest.raises(FileError, match=r"<object id=2> brings the map beyond 200000 objects"):
+        world(objects=many)

@@ -134,7 +134,7 @@ def _record(text: bytes, start: int, number: int) -> Found:
         raise Refused(422, f"record {number} does not begin with a head")
     try:
         head = _HEADS.decode(line[2:])
-    except (msgspec.MsgspecError, RecursionError) as error:
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
         raise Refused(422, f"record {number} has an unreadable head ({error})") from error
     _check(head, number)
     x, y = _place(head, text)
@@ -169,7 +169,7 @@ def drive_of(content: bytes) -> Drive:
     """What a drive's summary says; Refused when it is none."""
     try:
         drive = _DRIVES.decode(content)
-    except (msgspec.MsgspecError, RecursionError) as error:
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
         raise Refused(422, f"the drive has an unreadable summary ({error})") from error
     if not 0.0 <= drive.seconds <= 1.0e6 or len(drive.context) > WORDS_MAX:
         raise Refused(422, f"a drive lasts 0 to 1e6 s, this one {drive.seconds:g}")
@@ -182,7 +182,7 @@ def rows_of(content: bytes, limits: Limits) -> list[IndicatorRow]:
     """The rows of a batch of indicators; Refused at the first that is not one."""
     try:
         rows = [_ROWS.decode(line) for line in content.splitlines() if line]
-    except (msgspec.MsgspecError, RecursionError) as error:
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
         raise Refused(422, f"a row of indicators cannot be read ({error})") from error
     if len(rows) > 100 * limits.records:
         raise Refused(413, f"a batch may hold {100 * limits.records} rows of indicators")

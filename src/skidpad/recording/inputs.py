@@ -50,7 +50,7 @@ def decode_inputs(text: bytes, name: str = INPUTS) -> tuple[Timed, ...]:
     for number, line in enumerate(text.splitlines(), start=1):
         try:
             read = msgspec.json.decode(line, type=_Line)
-        except (msgspec.MsgspecError, ConfigError) as error:
+        except (msgspec.MsgspecError, ConfigError, UnicodeError, RecursionError) as error:
             raise FileError(f"{name}, line {number} is not an input: {error}") from error
         if read.tick < (inputs[-1].tick if inputs else 0):
             raise FileError(f"{name}, line {number} goes back in time, to tick {read.tick}")

@@ -38,7 +38,7 @@ frame = tick(3)
 assert np.abs(pixels(flow, frame, np.float32, 2)).max() < 1e-5  # nobody moves
 assert heard[events.id].empty()
 seen = pixels(shape, frame, np.uint8, 4).astype(float)[..., 2::-1] / 127.5 - 1.0
-ground = seen[280:295, 150:250].reshape(-1, 3).mean(axis=0)
+ground = seen[195:205, 40:90].reshape(-1, 3).mean(axis=0)
 assert np.allclose(ground, (0.0, 0.0, 1.0), atol=0.02), ground
 ahead = ego.get_transform().get_forward_vector()
 rear = np.median(seen[mine(frame, lead)], axis=0)

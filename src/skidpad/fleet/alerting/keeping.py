@@ -113,7 +113,7 @@ def parse_alert(body: bytes) -> AlertText:
         raise Refused(413, "an alert may have 65536 bytes")
     try:
         return msgspec.json.decode(body, type=AlertText)
-    except (msgspec.MsgspecError, RecursionError) as error:
+    except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
         raise Refused(422, f"the alert cannot be read ({error})") from error
 
 

@@ -19,6 +19,9 @@ Floats = NDArray[np.float64]
 
 BARRIER_STEP = 2.0  # m between the points of a barrier; 7 mm of chord at R 70
 REPEATS_MAX = 1_000_000  # of one object
+OBJECTS_MAX = (
+    200_000  # boxes, corners and points of barriers of one map, which take 0.3 GB when drawn
+)
 CONTINUOUS = 2.0  # m between the pieces of an object that is repeated without a gap
 THICKNESS = 0.3  # m, of an object for which the file gives no size
 
@@ -58,10 +61,17 @@ def roadside(document: Document, signals: SignalTable) -> Roadside:
     boxes: list[Box] = []
     crosswalks: list[Floats] = []
     parking: list[ParkingSpace] = []
+    count = 0.0
     for road in document.roads.values():
         for node in road.objects:
             type_ = node.get("type", "none")
             barrier = _barrier_kind(node)
+            count += _amount(read, road, node, barrier is not None)
+            if count > OBJECTS_MAX:
+                raise read.fail(
+                    node,
+                    f"brings the map beyond {OBJECTS_MAX} objects and corners beside its roads",
+                )
             if barrier is not None:
                 barriers += _barriers(read, road, node, barrier)
             elif type_ == "crosswalk":
@@ -77,6 +87,18 @@ def roadside(document: Document, signals: SignalTable) -> Roadside:
         tuple(crosswalks),
         tuple(parking),
     )
+
+
+def _amount(read: Reader, road: RoadRecord, node: Node, barrier: bool) -> float:
+    """How many boxes and points an object will make, before any is made."""
+    count = 1.0 + len(node.findall(".//cornerLocal")) + len(node.findall(".//cornerRoad"))
+    for repeat in node.findall("repeat"):
+        length = read.number(repeat, "length")
+        if barrier:
+            count += min(length, road.length) / BARRIER_STEP
+        else:
+            count += length / max(read.number(repeat, "distance") or CONTINUOUS, 1e-9)
+    return count
 
 
 def _barrier_kind(node: Node) -> BarrierKind | None:

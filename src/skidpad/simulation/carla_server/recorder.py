@@ -6,6 +6,8 @@ The format is ours (JSON lines), not CARLA's binary one: files of the two are no
 from __future__ import annotations
 
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Any
 
@@ -94,27 +96,26 @@ class Recorder:
 
     def summary(self, name: str) -> str:
         """What `show_recorder_file_info` prints."""
-        head, ticks = self._read(name)
-        seconds = ticks[-1][1] - _start(head, ticks) if ticks else 0.0
-        return (
-            f"Map: {head.get('map')}\nFrames: {len(ticks)}\nDuration: {seconds:.3f} seconds\n"
-            "Format: Skidpad JSON lines\n"
-        )
+        with _told(name):
+            head, ticks = self._read(name)
+            seconds = ticks[-1][1] - _start(head, ticks) if ticks else 0.0
+            return (
+                f"Map: {head.get('map')!s:.80}\nFrames: {len(ticks)}\n"
+                f"Duration: {seconds:.3f} seconds\nFormat: Skidpad JSON lines\n"
+            )
 
     def collisions(self, name: str) -> str:
         """What `show_recorder_collisions` prints."""
-        head, ticks = self._read(name)
-        start = _start(head, ticks) if ticks else 0.0
-        lines = [f"{t[1] - start:10.3f} {a:6d} {b:6d}" for t in ticks for a, b in t[3]]
+        with _told(name):
+            head, ticks = self._read(name)
+            start = _start(head, ticks) if ticks else 0.0
+            lines = [f"{t[1] - start:10.3f} {a:6d} {b:6d}" for t in ticks for a, b in t[3]]
         return "\n".join(["      Time  actor  other", *lines]) + "\n"
 
     def recording(self, name: str) -> Recording:
         """What can be replayed of a file."""
-        head, ticks = self._read(name)
-        try:
-            return recording(name, head, ticks)
-        except (AttributeError, TypeError, ValueError, wire.WireError) as error:
-            raise CallError(f"{name:.80} is no recording") from error
+        with _told(name):
+            return recording(name, *self._read(name))
 
     def _read(self, name: str) -> tuple[dict[str, Any], list[list[Any]]]:
         path = safe_path(self.folder, name)
@@ -128,6 +129,19 @@ class Recorder:
         except (OSError, ValueError, IndexError) as error:
             raise CallError(f"File {path.name} not found on server, or no recording") from error
         return head, ticks
+
+
+@contextmanager
+def _told(name: str) -> Iterator[None]:
+    """What is no recording is said in one sentence, whatever is wrong with it."""
+    try:
+        yield
+    except CallError:
+        raise
+    except (LookupError, AttributeError, TypeError, ArithmeticError, ValueError) as error:
+        raise CallError(f"{name:.80} is no recording") from error
+    except (RecursionError, wire.WireError) as error:
+        raise CallError(f"{name:.80} is no recording") from error
 
 
 def _start(head: dict[str, Any], ticks: list[list[Any]]) -> float:

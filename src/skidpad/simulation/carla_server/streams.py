@@ -23,9 +23,10 @@ HOLD = 0.05
 # Subscriptions to snapshots from here on up: each client's episode has an id of its own, because the
 # client's table is by id and holds the old episode and the new one for a moment.
 EPISODE_ALIASES = 2**31
-# s that a tick waits at most for a stream whose token was asked for. The client's `listen` returns
+# s that a tick waits at most for a stream whose token was asked for, once (1 s was too little for a
+# machine with a load of 15 on two cores). The client's `listen` returns
 # before its thread has connected, and what the tick sends to nobody is lost.
-PATIENCE = 1.0
+PATIENCE = 5.0
 TCP = 1
 ADDRESS_NOT_SET = 0  # the client then uses the host it was given
 TOKEN = struct.Struct("<IHBB16s")

@@ -29,7 +29,8 @@ INSIDE = frozenset(  # understood where they stand inside others
         "TrafficSignalControllerAction", "TrafficSignalAction", "UserDefinedAction",
         "GlobalAction", "PrivateAction", "Position", "Action", "Condition", "EntityCondition",
         "ByEntityCondition", "ByValueCondition",
-        "TargetPosition", "InRoutePosition", "RoadCondition",
+        "TargetPosition", "InRoutePosition", "RoadCondition", "CustomCommandAction",
+        "ConnectTrailerAction", "DisconnectTrailerAction",
     }
 )  # fmt: skip
 PARTIAL: Mapping[str, str] = MappingProxyType(
@@ -37,8 +38,12 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         "EnvironmentAction": "falling snow counts by its sight, wind not at all",
         "TrafficSignalStateAction": "conditions see it, the lights of the road do not",
         "TrafficSignalControllerAction": "conditions see it, the lights of the road do not",
-        "TrafficSignalCondition": "sees states that the file has set",
-        "TrafficSignalControllerCondition": "sees phases that the file has set",
+        "TrafficSignalCondition": "sees states that the file sets, also by its controllers",
+        "UserDefinedValueCondition": "nobody sets such values: never holds",
+        "CustomCommandAction": "is noted, without effect",
+        "SetMonitorAction": "is noted, without effect",
+        "ConnectTrailerAction": "is noted, without effect",
+        "DisconnectTrailerAction": "is noted, without effect",
         "InfrastructureAction": "conditions see it, the lights of the road do not",
         "AngleCondition": "pitch and roll are those of the road; none against a trajectory",
         "RelativeAngleCondition": "pitch and roll are those of the road",

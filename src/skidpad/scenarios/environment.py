@@ -8,6 +8,7 @@ from math import degrees
 from typing import Any
 
 from skidpad.scenarios.document import Node
+from skidpad.scenarios.moments import moment
 
 CELSIUS = 273.15  # K at 0 deg C
 CLOUDS = {  # share of the sky, by both vocabularies
@@ -52,6 +53,8 @@ class Environment:
     wetness: Wetness | None = None
     friction_scale: float | None = None  # of what the road has otherwise
     time_of_day: str = ""  # ISO 8601
+    moment: float | None = None  # the same in s since 1970
+    clock_runs: bool = False  # the time of day goes on
 
     @property
     def says_weather(self) -> bool:
@@ -87,8 +90,21 @@ def compile_environment(node: Node) -> Environment:
         wetness=wetness,
         friction_scale=scale,
         time_of_day="" if time is None else time.text("dateTime", ""),
+        moment=None if time is None else moment_of(time),
+        clock_runs=time is not None and time.flag("animation", default=False),
         **found,
     )
+
+
+def moment_of(node: Node) -> float | None:
+    """The attribute dateTime in s since 1970, without a zone as that of Greenwich; None without it."""
+    text = node.text("dateTime", "")
+    if not text:
+        return None
+    try:
+        return moment(text)
+    except ValueError:
+        raise node.error(f"dateTime must be an ISO 8601 time, got {text!r}") from None
 
 
 def _weather(node: Node) -> dict[str, Any]:

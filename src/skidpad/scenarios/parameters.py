@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from datetime import datetime
 
 from skidpad.core.errors import FileError
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.expressions import as_text
+from skidpad.scenarios.moments import moment
 
 NUMBERS = ("double", "integer", "int", "unsignedInt", "unsignedShort")
 RULES: Mapping[str, Callable[[float | str, float | str], bool]] = {
@@ -22,20 +22,12 @@ RULES: Mapping[str, Callable[[float | str, float | str], bool]] = {
 
 def compared(rule: str, left: str, right: str) -> bool:
     """Texts by a rule: as numbers or moments where both are, else letter by letter."""
-    for read in (float, _moment):
+    for read in (float, moment):
         try:
             return RULES[rule](read(left), read(right))
         except ValueError:
             continue
     return RULES[rule](left, right)
-
-
-def _moment(text: str) -> float:
-    """Seconds of a date with time and zone; those without a zone are no moments."""
-    moment = datetime.fromisoformat(text)
-    if moment.tzinfo is None:
-        raise ValueError(text)
-    return moment.timestamp()
 
 
 def root_values(root: Node, given: Mapping[str, float | str]) -> dict[str, str]:

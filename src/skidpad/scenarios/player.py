@@ -16,6 +16,7 @@ from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Place
 from skidpad.scenarios.scenario import Scenario
 from skidpad.scenarios.scene import Actor, Happening, Running, Scene
+from skidpad.scenarios.signals import SignalPlan
 from skidpad.scenarios.telling import Telling
 from skidpad.simulation.scripted import ActorDriver, Motion
 
@@ -83,6 +84,7 @@ class Player:
             dict(scenario.variables), ego=scenario.ego,
         )  # fmt: skip
         self.telling = Telling(scenario.storyboard)
+        self.signals = SignalPlan(scenario.signals)
         self.ended = False
         self.going: list[Running] = []  # what <Init> began and is under way
         self.hit = False  # the ego has touched something
@@ -112,6 +114,7 @@ class Player:
         if first:
             self._begin()
         self.hit = self.hit or bool(truth.contacts)
+        self.signals.step(self.scene)
         self.telling.look(self.scene)
         self.going = [action for action in self.going if not action.step(self.scene)]
         self.telling.step(self.scene)
@@ -142,6 +145,8 @@ class Player:
         self.actors[self.scenario.ego].handed = not self.scenario.ego_is_handed_later
 
     def _begin(self) -> None:
+        if self.scenario.start.environment is not None:
+            self.scene.tell_time(self.scenario.start.environment)
         for worldwide in self.scenario.start.actions:
             worldwide.happen(self.scene)
         for name, begin in self.scenario.start.entities.items():

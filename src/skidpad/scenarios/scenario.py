@@ -21,6 +21,7 @@ from skidpad.scenarios.parameters import root_values, variables
 from skidpad.scenarios.routes import route_position
 from skidpad.scenarios.schema import violations
 from skidpad.scenarios.shipped import FOLDER
+from skidpad.scenarios.signals import SignalController, compile_signals
 from skidpad.scenarios.start import Start, compile_start
 from skidpad.scenarios.storyboard import Storyboard, compile_storyboard
 from skidpad.scenarios.trajectories import trajectory_position
@@ -46,6 +47,7 @@ class Scenario:
     parameters: Mapping[str, str]
     variables: Mapping[str, str]
     ego_is_handed_later: bool  # the file drives the ego until it activates its controller
+    signals: tuple[SignalController, ...] = ()
     findings: tuple[Finding, ...] = ()  # of the schema, and what is left out on request
 
     @property
@@ -167,6 +169,7 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
     )  # fmt: skip
     board = root.child("Storyboard")
     ctx.added = _added(board)
+    signals = ctx.attempt(lambda: compile_signals(root.find("RoadNetwork"))) or ()
     start = compile_start(board.child("Init"), ctx)
     storyboard = compile_storyboard(board, ctx)
     faulty = any(f.kind not in wish.allowed for f in findings)
@@ -182,7 +185,7 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
     later = later or watching is not None
     return Scenario(
         root.file, network, by_name, chosen, start, storyboard, values, ctx.variables,
-        later, tuple(findings),
+        later, signals, tuple(findings),
     )  # fmt: skip
 
 

@@ -195,6 +195,19 @@ class Actor:
         self.at_end = self.at_end + dt if self.guide.at_end else 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """The time of day, s since 1970, as it was set at `since` s; runs: it goes on by itself."""
+
+    moment: float
+    since: float
+    runs: bool
+
+    def now(self, t: float) -> float:
+        """At t s."""
+        return self.moment + (t - self.since if self.runs else 0.0)
+
+
 @dataclass
 class Scene:
     """The moment: truth of the world and of the storyboard."""
@@ -212,6 +225,7 @@ class Scene:
     ego: str = ""
     notices: list[str] = field(default_factory=list)  # what could not be done, for the log
     environments: list[Environment] = field(default_factory=list)  # of events, in their order
+    clock: Clock | None = None  # time of day, where the file has said one
     story: list[Happening] = field(default_factory=list)
 
     def moved(self, path: Path, move: Move) -> None:
@@ -248,6 +262,11 @@ class Scene:
         if hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y) > reach:
             return False
         return overlap(one.outline(), other.outline()) <= TOUCHING
+
+    def tell_time(self, environment: Environment) -> None:
+        """Set the clock, where an environment says a time of day."""
+        if environment.moment is not None:
+            self.clock = Clock(environment.moment, self.t, environment.clock_runs)
 
     def notice(self, text: str) -> None:
         """Say once what could not be done."""

@@ -120,10 +120,17 @@ class SetEnvironment:
     def happen(self, scene: Scene) -> None:
         """From the next step on."""
         scene.environments.append(self.environment)
+        scene.tell_time(self.environment)
 
 
 def _environment(node: Node, ctx: Context) -> GlobalAction:
     return SetEnvironment(compile_environment(ctx.catalogs.resolved(node.only())))
+
+
+def user_defined(node: Node, ctx: Context) -> GlobalAction:
+    """For somebody else: a <UserDefinedAction>, a monitor that is set."""
+    del ctx
+    return NoEffect(node.tag)
 
 
 GLOBAL: Mapping[str, Callable[[Node, Context], GlobalAction]] = {
@@ -132,6 +139,7 @@ GLOBAL: Mapping[str, Callable[[Node, Context], GlobalAction]] = {
     "VariableAction": _value,
     "InfrastructureAction": _infrastructure,
     "EnvironmentAction": _environment,
+    "SetMonitorAction": user_defined,
 }
 
 
@@ -141,9 +149,3 @@ def global_action(node: Node, ctx: Context) -> GlobalAction:
     if inner.tag not in GLOBAL:
         raise inner.unsupported()
     return GLOBAL[inner.tag](inner, ctx)
-
-
-def user_defined(node: Node, ctx: Context) -> GlobalAction:
-    """A <UserDefinedAction>: nobody but its author knows what it means."""
-    del ctx
-    return NoEffect(node.tag)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from skidpad.scenarios.conditions.base import Condition, Probe, Rule, rule, rule_name
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
+from skidpad.scenarios.environment import moment_of
 from skidpad.scenarios.findings import Kind
 from skidpad.scenarios.parameters import compared
 from skidpad.scenarios.scene import Move, Path, Scene, State
@@ -130,6 +131,31 @@ class Signal:
         return lambda scene: scene.signals.get(self.name) == self.state
 
 
+@dataclass(frozen=True, slots=True)
+class TimeOfDay:
+    """The time of day against a moment; there is none before the file says one."""
+
+    rule: Rule
+
+    def probe(self) -> Probe:
+        """As it is now."""
+        return lambda s: s.clock is not None and self.rule.met(s.clock.now(s.t))
+
+
+def _time_of_day(node: Node, ctx: Context) -> Condition:
+    del ctx
+    moment = moment_of(node)
+    if moment is None:
+        raise node.error("needs the attribute dateTime")
+    return TimeOfDay(Rule(rule_name(node), moment))
+
+
+def _of_user(node: Node, ctx: Context) -> Condition:
+    what = f"nobody sets the value {node.text('name')!r}: it never holds"
+    ctx.findings.append(node.finding(what, Kind.NOTE))
+    return Never()
+
+
 def _signal(node: Node, ctx: Context) -> Condition:
     del ctx
     if node.tag == "TrafficSignalCondition":
@@ -144,4 +170,6 @@ BY_VALUE: Mapping[str, Callable[[Node, Context], Condition]] = {
     "StoryboardElementStateCondition": _element,
     "TrafficSignalCondition": _signal,
     "TrafficSignalControllerCondition": _signal,
+    "TimeOfDayCondition": _time_of_day,
+    "UserDefinedValueCondition": _of_user,
 }

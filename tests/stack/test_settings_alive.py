@@ -198,6 +198,7 @@ OTHERS: dict[str, Scenario] = {
     "grip": Scenario("none", short_drive("rain-noon")),
     "range": Scenario("none", lambda s: pictures(s, "rain-noon", "depth_roof", "semantic_roof")),
     "mu_ref": Scenario(0.3, short_drive("clear-noon")),
+    "esc": Scenario(False, short_drive("icy_30")),
     "camera": Scenario(False, lambda s: pictures(s, "rain-noon", "rgb_front")),
     "night_rain": Scenario("rain_only", lambda s: pictures(s, "rain-night", "rgb_front")),
     "drivers": Scenario(False, short_drive("rain-noon")),

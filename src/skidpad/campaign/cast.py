@@ -225,6 +225,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         camera_effect=s.camera,
         rain_hides_night=s.night_rain is options.NightRain.RAIN_ONLY,
         mu_ref=s.mu_ref,
+        stability=s.esc,
         level=spec.sensors,
         render_all=spec.render is Render.ALL or _foreign_on_carla(spec),
     )

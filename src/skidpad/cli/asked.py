@@ -176,6 +176,9 @@ class GripCross(Struct, frozen=True):
     model: Annotated[str, Meta(description="Of reduced friction: statistical or physical.")] = (
         "statistical"
     )
+    esc: Annotated[
+        str, Meta(description="Stability control: off, as the study's vehicles had none known; on.")
+    ] = "off"
     cutin: Annotated[
         str, Meta(description="original, unfixed, fixed: spawn delay and merge distance.")
     ] = "fixed"

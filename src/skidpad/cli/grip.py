@@ -64,7 +64,7 @@ def grip(
     from skidpad.cli.grip_plan import plan_grip, with_model
     from skidpad.report.grip import write_grip_report
 
-    run = with_model(run, tuned, cross.model)
+    run = with_model(run, tuned, cross.model, cross.esc)
     run = structs.replace(run, driver=controller.chosen(), course=scenario)
     cells = plan_grip(cross, run, seeds or REPEATS)
     how(Campaign(recipe(keep_all), cells, alone=alone), write_grip_report)

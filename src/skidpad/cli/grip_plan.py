@@ -24,9 +24,13 @@ def plan_grip(ask: GripCross, run: RunSpec, repeats: int) -> list[RunSpec]:
     return cross(run, _varied(ask, run), seeds(0, repeats))
 
 
-def with_model(run: RunSpec, tuned: Tuned, model: str) -> RunSpec:
-    """`run` with its settings written out and this model of reduced friction."""
-    return tuned.resolve(run, grip=require_choice("--model", model, ("statistical", "physical")))
+def with_model(run: RunSpec, tuned: Tuned, model: str, esc: str = "off") -> RunSpec:
+    """`run` with its settings written out, this model of reduced friction, and `esc` on or off."""
+    return tuned.resolve(
+        run,
+        grip=require_choice("--model", model, ("statistical", "physical")),
+        esc=require_choice("--esc", esc, ("on", "off")),
+    )
 
 
 def _varied(ask: GripCross, run: RunSpec) -> Cross:

@@ -87,6 +87,7 @@ class Setup:
     camera_effect: bool = True  # weather acts on RGB images
     rain_hides_night: bool = False  # in rain the camera effect of the night is left out (D-094)
     mu_ref: float = 0.9  # friction at CARLA's tire_friction 3.5 on a dry road
+    stability: bool = False  # all vehicles have stability and traction control (embedded backend)
     level: SensorLevel = SensorLevel.PIXELS
     asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)
     render_all: bool = False  # every image every tick, read or not

@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.states import ActorStates
+from skidpad.physics.params import WheelStates, vehicle_params
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE, VehicleType
-from skidpad.physics.vehicle import WheelStates, step_vehicles, vehicle_params
+from skidpad.physics.vehicle import step_vehicles
 
 Floats = NDArray[np.float64]
 
@@ -34,12 +35,14 @@ class Fleet:
         *,
         states: ActorStates | None = None,
         anti_lock: bool | None = None,
+        stability: bool = False,
         substep: float = SUBSTEP,
     ) -> None:
         """A fleet at rest at the origin.
 
         states: arrays to work on whose first rows are these vehicles; None: own ones.
-        anti_lock: None leaves it to each type. substep: longest inner step, s.
+        anti_lock: None leaves it to each type. stability: stability and traction control and
+        brake-force distribution. substep: longest inner step, s.
         """
         n = len(types)
         self.types = tuple(types)
@@ -50,9 +53,11 @@ class Fleet:
         self.params = vehicle_params(self.types)
         if anti_lock is not None:
             self.params.anti_lock[:] = anti_lock
+        self.params.stability[:] = stability
         self.wheels = WheelStates(
             omega=np.zeros((n, 4)),
             steer=np.zeros(n),
+            slip_y=np.zeros((n, 4)),
             a_load=np.zeros((n, 2)),
             slide=np.zeros((n, 4)),
             load=np.zeros((n, 4)),
@@ -83,6 +88,7 @@ class Fleet:
         s.present[i] = True
         self.wheels.omega[i] = v / self.params.wheel_radius[i]
         self.wheels.steer[i] = 0.0
+        self.wheels.slip_y[i] = 0.0
         self.wheels.a_load[i] = 0.0
         self.wheels.slide[i] = 0.0
 

@@ -51,8 +51,11 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     steer_rate_deg: float = 70.0  # road wheel per s; 1000 deg/s at the wheel over ratio 14.5
     drag_area: float  # m^2, cw * A
     rolling_resistance: float = 0.011  # of the load; ISO 28580 class C
-    stiffness_front: float = 20.0  # tyre force per unit slip over load
-    stiffness_rear: float = 21.0
+    # Lateral force per unit slip over load, of the axle: tyre, steering and suspension together.
+    # Tyres alone have 11.5 (205/60R15) to 17.5 (245/40R18, sources in `tyre`); front axles give way
+    # to the force, rear axles steer with it. Our choice for an understeer of 2 deg/g at 0.1 to 0.4 g.
+    stiffness_front: float = 14.0
+    stiffness_rear: float = 22.0
     roll_share_front: float = 0.55  # of the lateral load transfer
     pitch_gradient: float = 0.0035  # rad per m/s^2
     roll_gradient: float = 0.0075  # rad per m/s^2

@@ -155,6 +155,9 @@ class Settings:
     mu_ref: float = _setting(
         0.9, "M-1", "physics", "friction of a dry road at CARLA's tire_friction 3.5"
     )
+    esc: bool = _setting(
+        True, "M-1, R-5", "physics", "stability and traction control, brake-force distribution"
+    )
     camera: bool = _setting(True, "M-4", "sensors", "weather acts on RGB images")
     drivers: bool = _setting(
         True, "M-1, R-5", "simulation", "background drivers differ and mind grip and sight"

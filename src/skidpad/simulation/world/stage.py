@@ -21,9 +21,8 @@ def staged(setup: Setup, seed: int) -> World:
     map = load_map(setup.map)
     roles = cast_of(map, setup, seed)
     grip = grip_params(setup.weather, setup.grip, setup.mu_ref)
-    world = World(
-        map, Lights.pretimed(map, seed, setup.dt), Conditions(seed=seed, dt=setup.dt, grip=grip)
-    )
+    conditions = Conditions(seed=seed, dt=setup.dt, grip=grip, stability=setup.stability)
+    world = World(map, Lights.pretimed(map, seed, setup.dt), conditions)
     traffic = setup.traffic or TrafficSetup(vehicles=0)
     drivers = Traffic(map, traffic, seed, care_of(setup, traffic.slow_in_weather))
     world.let_drive(drivers)

@@ -15,9 +15,10 @@ from skidpad.core.jit import Held, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.contact import Bodies, ContactLaw, Contacts, resolve_contacts
 from skidpad.physics.grip import GripParams, mu_at
+from skidpad.physics.params import VehicleParams, WheelStates
 from skidpad.physics.segments import Segments
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE
-from skidpad.physics.vehicle import VehicleParams, WheelStates, step_vehicles
+from skidpad.physics.vehicle import step_vehicles
 from skidpad.roads.kernels import LaneArrays
 from skidpad.simulation.world.ground import settle
 from skidpad.simulation.world.rows import Rows

@@ -57,6 +57,7 @@ class Conditions:
     seed: int = 0
     dt: float = DT
     grip: GripParams
+    stability: bool = False  # vehicles have stability and traction control
     road_noise: float = ROAD_NOISE  # rad of cross slope, decision M-11
     all_lanes: bool = False  # actors stand on sidewalks and shoulders too
 
@@ -127,7 +128,7 @@ class World:
         self.rows = Rows.of(members, self.conditions.seed)
         self.states, self.commands, self.mu = self.rows.states, self.rows.commands, self.rows.mu
         self.grade, self.bank, self.placed = self.rows.grade, self.rows.bank, self.rows.placed
-        self.fleet = Fleet(types, self.dt, states=self.states)
+        self.fleet = Fleet(types, self.dt, states=self.states, stability=self.conditions.stability)
         self.tyres = self.fleet.tire_friction.copy()  # (wheeled, 4) outside friction zones
         self.bodies = bodies_of(members)
 

@@ -1,0 +1,95 @@
+"""What the kernels need about vehicles, and what vehicles remember, as arrays of many at once."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.physics.types import VehicleType
+
+Floats = NDArray[np.float64]
+
+AIR_DENSITY = 1.225  # kg/m^3, ISO 2533 at sea level
+
+
+class VehicleParams(NamedTuple):
+    """What the kernels need about n vehicles, arrays of shape (n,) unless noted; see VehicleType."""
+
+    mass: Floats
+    yaw_inertia: Floats
+    x_cog: Floats
+    a: Floats  # centre of gravity to front axle
+    b: Floats  # to rear axle
+    track: Floats
+    cog_height: Floats
+    wheel_radius: Floats
+    wheel_inertia: Floats
+    drive_front: Floats
+    power: Floats
+    force_max: Floats
+    engine_drag: Floats
+    brake_torque: Floats  # (n, 2) per wheel, front and rear
+    handbrake_torque: Floats
+    steer_max: Floats
+    steer_rate: Floats
+    drag: Floats  # 0.5 rho cw A
+    rolling: Floats
+    stiffness: Floats  # (n, 2)
+    roll_front: Floats
+    pitch_gradient: Floats
+    roll_gradient: Floats
+    anti_lock: NDArray[np.bool_]
+    stability: NDArray[np.bool_]  # stability and traction control, brake-force distribution
+
+
+class WheelStates(NamedTuple):
+    """What a vehicle remembers beside its motion, and what it tells about its tyres."""
+
+    omega: Floats  # (n, 4) wheel spin, rad/s: FL, FR, RL, RR
+    steer: Floats  # (n,) road-wheel angle
+    slip_y: Floats  # (n, 4) lateral slip that the tyres feel, behind the contact patch
+    a_load: Floats  # (n, 2) specific force behind the load transfer, low-passed
+    slide: Floats  # (n, 4) slip over the slip of full sliding; beyond 1 the tyre slides
+    load: Floats  # (n, 4) N
+
+
+def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
+    """Parameters of these vehicles, in their order."""
+
+    def column(values: list[float]) -> Floats:
+        return np.array(values, dtype=np.float64)
+
+    return VehicleParams(
+        mass=column([t.mass for t in types]),
+        yaw_inertia=column([t.yaw_inertia for t in types]),
+        x_cog=column([t.x_cog for t in types]),
+        a=column([t.x_front_axle - t.x_cog for t in types]),
+        b=column([t.x_cog - t.x_rear_axle for t in types]),
+        track=column([t.track for t in types]),
+        cog_height=column([t.cog_height for t in types]),
+        wheel_radius=column([t.wheel_radius for t in types]),
+        wheel_inertia=column([t.wheel_inertia for t in types]),
+        drive_front=column([t.drive_share_front for t in types]),
+        power=column([t.power for t in types]),
+        force_max=column([t.force_max for t in types]),
+        engine_drag=column([t.engine_drag for t in types]),
+        brake_torque=np.array(
+            [(t.brake_torque_front, t.brake_torque_rear) for t in types], dtype=np.float64
+        ).reshape(-1, 2),
+        handbrake_torque=column([t.handbrake_torque for t in types]),
+        steer_max=column([t.steer_max for t in types]),
+        steer_rate=np.radians(column([t.steer_rate_deg for t in types])),
+        drag=0.5 * AIR_DENSITY * column([t.drag_area for t in types]),
+        rolling=column([t.rolling_resistance for t in types]),
+        stiffness=np.array(
+            [(t.stiffness_front, t.stiffness_rear) for t in types], dtype=np.float64
+        ).reshape(-1, 2),
+        roll_front=column([t.roll_share_front for t in types]),
+        pitch_gradient=column([t.pitch_gradient for t in types]),
+        roll_gradient=column([t.roll_gradient for t in types]),
+        anti_lock=np.array([t.abs for t in types], dtype=np.bool_),
+        stability=np.zeros(len(types), dtype=np.bool_),
+    )

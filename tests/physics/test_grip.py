@@ -11,11 +11,12 @@ from skidpad.core.weather import Weather
 from skidpad.physics.grip import (
     MU_REF,
     GripParams,
+    RoadSurface,
     fill_mu,
     friction_ratio,
     grip_params,
-    hydroplaning_speed,
     mu_at,
+    physical_params,
     road_surface,
 )
 
@@ -139,7 +140,9 @@ def test_physical_grip_falls_with_water_and_with_speed(w, p, rain_pct, v, step):
     more = replace(weather, wetness=min(w + step, 100), precipitation=min(rain_pct + step, 100))
     here = friction_ratio(weather, PHYSICAL, v)
     assert 0.0 < friction_ratio(more, PHYSICAL, v) <= here <= 1.0
-    assert friction_ratio(weather, PHYSICAL, v + step) <= here
+    assert mu_at(grip_params(weather, PHYSICAL), v + step) <= mu_at(
+        grip_params(weather, PHYSICAL), v
+    )
 
 
 @pytest.mark.parametrize("v", [5.0, 14.0, 25.0])
@@ -152,9 +155,9 @@ def test_dry_wet_snow_ice_in_this_order(v):
 
 
 def test_measured_mu_of_ice_and_snow():
-    assert MU_REF * friction_ratio(ice(100), PHYSICAL) == pytest.approx(0.117, abs=1e-9)
+    assert mu_at(grip_params(ice(100), PHYSICAL), 5.0) == pytest.approx(0.117, abs=1e-9)
     snow = Weather(snow_depth_mm=30, road_temperature_c=-5)
-    assert MU_REF * friction_ratio(snow, PHYSICAL) == pytest.approx(0.34, abs=1e-9)
+    assert mu_at(grip_params(snow, PHYSICAL), 10.0) == pytest.approx(0.34, abs=1e-9)
 
 
 def test_colder_ice_grips_better_and_wet_ice_worse():
@@ -165,10 +168,27 @@ def test_colder_ice_grips_better_and_wet_ice_worse():
     assert len(set(ratios)) == 3
 
 
-def test_hydroplaning_speed_of_deep_water():
-    # Tests at 7 to 8 mm of water let good tyres float between 75 and 95 km/h.
-    assert 75 < hydroplaning_speed(7.0) * 3.6 < 95
-    assert hydroplaning_speed(1.0) > hydroplaning_speed(3.0)
+BOSCH = [  # water in mm, km/h, friction of new tyres: Bosch Automotive Handbook, the table fitted
+    (0.0, 50, 0.85), (0.0, 90, 0.80), (0.0, 130, 0.75),
+    (0.2, 50, 0.65), (0.2, 90, 0.60), (0.2, 130, 0.55),
+    (1.0, 50, 0.55), (1.0, 90, 0.30), (1.0, 130, 0.20),
+    (2.0, 50, 0.50), (2.0, 90, 0.05), (2.0, 130, 0.00),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("film", "kmh", "measured"), BOSCH)
+def test_friction_by_water_and_speed_is_the_table_s(film, kmh, measured):
+    surface = RoadSurface(film, 0.0, 0.0, 0.0, 15.0)
+    params = physical_params(surface, mu_ref=0.832)  # the table's dry tyre at 40 mph
+    assert mu_at(params, kmh / 3.6) == pytest.approx(measured, rel=0.10, abs=0.03)
+
+
+def test_dry_friction_falls_with_speed_and_is_the_reference_at_40_mph():
+    params = grip_params(Weather(), PHYSICAL)
+    assert mu_at(params, 40.0 * 0.44704) == pytest.approx(MU_REF)
+    mus = [mu_at(params, v) for v in (0.0, 15.0, 30.0, 45.0)]
+    assert mus == sorted(mus, reverse=True)
+    assert len(set(mus)) == 4
 
 
 def test_mu_at_many_wheels_is_mu_at_one():
@@ -176,9 +196,11 @@ def test_mu_at_many_wheels_is_mu_at_one():
     assert isinstance(params, GripParams)
     vx, vy, out = np.array([0.0, 12.0, -20.0]), np.array([0.0, 5.0, 0.0]), np.empty((3, 4))
     fill_mu(params, vx, vy, out)
-    expected = [1.5 * friction_ratio(rain(100, 100), PHYSICAL, v) for v in (0.0, 13.0, 20.0)]
+    expected = [mu_at(params, v) for v in (0.0, 13.0, 20.0)]
     assert out == pytest.approx(np.repeat(np.array(expected)[:, None], 4, axis=1))
-    assert mu_at(params, 13.0) == pytest.approx(expected[1])
+    dry = grip_params(Weather(), PHYSICAL, mu_ref=1.5)
+    share = friction_ratio(rain(100, 100), PHYSICAL, 13.0)
+    assert expected[1] == pytest.approx(share * mu_at(dry, 13.0))
 
 
 @pytest.mark.req("B-035", "B-038")

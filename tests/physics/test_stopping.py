@@ -20,8 +20,7 @@ def physical_stop(name, v0):
     ("surface", "v0", "measured"),
     [
         ("dry", 99.8 / 3.6, 43.7),  # What Car? n11594, winter tyres, 62 mph
-        ("rain_40", 80 / 3.6, 37.6),  # ADAC 2018, wet asphalt
-        ("rain_60", 80 / 3.6, 40.0),  # Auto Bild, the cut-off of its wet test
+        ("rain_40", 80 / 3.6, 37.6),  # ADAC 2018, wet asphalt; its water depth is not told
         ("snow", 50 / 3.6, 29.1),  # ADAC 2018, packed snow
         ("icy_30", 12 * 0.44704, 12.5),  # What Car? n11592, sheet ice, 12 mph
     ],

@@ -2,9 +2,13 @@
 
 With `optics`, the only module that turns `Weather` into physical quantities (decision L-1).
 mu = mu_ref * ratio. The statistical ratio is the published one of the friction study; the physical
-one follows measurements, below, and depends on speed. Its parameter set belongs to winter tyres
-with 6 mm of tread at mu_ref 0.9 (dry stop 0.90, What Car? n11594).
-Valid: film up to 3 mm, 0 to 130 km/h, road -20 to 40 C.
+one follows measurements, below, and depends on speed, on a dry road too.
+
+The wet part is fitted to the friction table of the Bosch Automotive Handbook ("Coefficients of
+static friction for pneumatic tires on various surfaces", new tyres, 0.2, 1 and 2 mm of water, 50, 90
+and 130 km/h; read in a transcript, scribd 77622580). It contradicts braking tests of today's tyres,
+whose tracks are said to carry about as much water: docs/physics.md shows both.
+Valid: film up to 2 mm, 0 to 130 km/h, road -20 to 40 C.
 """
 
 from __future__ import annotations
@@ -25,29 +29,34 @@ from skidpad.core.weather import Weather
 MU_REF = 0.9  # dry road at tire_friction 3.5; UN R13-H's nominal test surface (decision M-1)
 
 # --- what lies on the road
-RAIN_FULL = 50.0  # mm/h at precipitation 100: "violent shower", UK Met Office fact sheet 3
-FILM_WET = 0.5  # mm at wetness 100: the least depth of a wet test track, UN R117 annex 5
-FILM_STANDING = 0.5  # mm of mean depth added at deposits 100; our assumption, same source's spread
+RAIN_FULL = 50.0  # mm/h at precipitation 100: our assumption, a violent shower
+FILM_WET = 0.2  # mm at wetness 100: "wet" in the table of Bosch, whose heavy rain means 1 mm
+FILM_STANDING = 0.5  # mm of mean depth added at deposits 100; our assumption
 ICE_FULL_MM = 20.0  # at ice_thickness 100 (B-017)
-TEXTURE_MM = (
-    0.8  # mean texture depth of dense asphalt, Anderson et al., NCHRP web document 16 (1998)
-)
+TEXTURE_MM = 0.8  # mean texture depth of dense asphalt; our assumption
 DRAIN_LENGTH = 7.0  # m, two lanes
-DRAIN_SLOPE = 0.02  # crossfall
+DRAIN_SLOPE = 0.02  # crossfall; our assumption
 
 # --- what grip it leaves
-WET_LOSS = 0.2  # of dry grip on a wetted texture; Kulakowski and Harwood, ASTM STP 1031 (1990)
-WET_FILM = 0.02  # mm that takes 63 % of it; same: 0.025 mm takes 20 to 30 % on smooth surfaces
-FILM_TREAD = 2.5  # mm, film of which 37 % still drains through 6 mm of tread; fit to wet stops
-FLOATING = 0.05  # share of wet grip that a fully floating tyre keeps; our assumption
-TYRE_PRESSURE_PSI = 32.0
-TREAD_32NDS = 8.0  # tread depth in 1/32 inch, 6.4 mm
-SPIN_DOWN_PCT = 10.0  # of the wheel's speed lost at onset of hydroplaning
-ICE_MU = 0.117  # sheet ice at -5 C, winter tyres, What Car? n11592
+V_REFERENCE = 40.0 * 0.44704  # m/s at which mu_ref holds: peak braking coefficients are measured at
+# 40 mph (ASTM E1337, named in 49 CFR 571.126 S6.2.2)
+DRY_FALL = 0.0054  # s/m, share of mu_ref lost per m/s; Bosch: 0.85, 0.80, 0.75 at 50, 90, 130 km/h
+V_FALL = 60.0  # m/s, beyond which it falls no more; keeps the law positive
+WET_LOSS = 0.20  # of dry grip on a wetted texture; fit to Bosch
+WET_FILM = 0.02  # mm that takes 63 % of it: our assumption. Kulakowski and Harwood, ASTM STP 1031
+# (1990), find a significant loss between 0.025 and 0.23 mm
+V_HALF, V_HALF_FILM = 8.0, 17.5  # m/s, m/s mm: speed that halves grip on up to 1 mm, fit to Bosch
+FILM_WEDGE = 1.0  # mm, more water than the tread takes at low speed already; fit to Bosch
+V_WEDGE = 19.8  # m/s at which 1 mm beyond that has halved grip once more; fit to Bosch
+FILM_MAX = 2.0  # mm, deepest water of that table; deeper counts as this
+FLOATING = (
+    0.04  # share of wet grip that a fully floating tyre keeps; our assumption (Bosch: 0 to 0.07)
+)
+ICE_MU = 0.117  # sheet ice, winter tyres: 12.5 m from 12 mph, What Car? n11592; -5 C is assumed
 ICE_MU_REF_C = -5.0
-ICE_MU_PER_C = -0.006  # colder ice grips better; Higgins, Miles and Hay, Wear 265 (2008)
-ICE_MU_RANGE = (0.05, 0.20)  # wet ice at 0 C, and below -19 C
-SNOW_MU = 0.34  # packed snow, ADAC 2018 winter tyre test
+ICE_MU_PER_C = -0.006  # colder ice grips better; our assumption
+ICE_MU_RANGE = (0.05, 0.20)  # wet ice at 0 C, and below -19 C; our assumption
+SNOW_MU = 0.34  # winter tyre on snow: 29.1 m from 50 km/h, ADAC all-season tyre test, 24 April 2018
 SNOW_COVER_MM = 5.0  # depth that hides the road; our assumption
 
 
@@ -63,12 +72,14 @@ class RoadSurface:
 
 
 class GripParams(NamedTuple):
-    """Friction as a function of speed: mu_ref * (firm + wet * max(1 - k v^2, FLOATING))."""
+    """Friction as a function of speed: mu_ref * (firm + bare * dry(v) * afloat(v)), see `ratio_at`."""
 
     mu_ref: float
     firm: float  # part of the ratio that speed does not change
-    wet: float  # part that the water lifts
-    k: float  # (s/m)^2
+    bare: float  # part that it does
+    fall: float = 0.0  # s/m, of the bare part on a dry road
+    lift: float = 0.0  # (s/m)^2, one over the square of the speed that halves grip on thin water
+    wedge: float = 0.0  # (s/m)^2, the same where water is deeper than the tread takes
 
 
 def rain_rate(weather: Weather) -> float:
@@ -79,8 +90,8 @@ def rain_rate(weather: Weather) -> float:
 def runoff_film(rain_mm_h: float) -> float:
     """Depth in mm of rain flowing off the road, above its texture.
 
-    Source: Gallaway, Schiller and Rose, TTI report 138-5 (1971), as used by PAVDRN (NCHRP web
-    document 16): d = 0.01485 T^0.11 L^0.43 I^0.59 / S^0.42 - T.
+    After Gallaway, Schiller and Rose, TTI report 138-5 (1971), which relates these quantities; the
+    numbers in d = 0.01485 T^0.11 L^0.43 I^0.59 / S^0.42 - T were not found in a public text.
     """
     depth = 0.01485 * TEXTURE_MM**0.11 * DRAIN_LENGTH**0.43 * rain_mm_h**0.59 / DRAIN_SLOPE**0.42
     return float(max(depth - TEXTURE_MM, 0.0))
@@ -137,24 +148,6 @@ def statistical_ratio(weather: Weather) -> float:
     return ice_ratio(weather) if weather.ice_thickness > 0.0 else rain_ratio(weather)
 
 
-def hydroplaning_speed(film_mm: float) -> float:
-    """Speed in m/s at which a rolling tyre floats on this film; inf without one.
-
-    Source: Gallaway et al., FHWA-RD-79-31 (1979), fitted to 2.5 to 25 mm; used below that for the
-    trend only, weighted by the share that the tread cannot drain.
-    """
-    if film_mm <= 0.0:
-        return float("inf")
-    depth_in = film_mm / 25.4
-    texture_in = TEXTURE_MM / 25.4
-    a = max(
-        10.409 / depth_in**0.06 + 3.507,
-        (28.952 / depth_in**0.06 - 7.817) * texture_in**0.14,
-    )
-    mph = SPIN_DOWN_PCT**0.04 * TYRE_PRESSURE_PSI**0.3 * (TREAD_32NDS + 1.0) ** 0.06 * a
-    return float(mph * 0.44704)
-
-
 def ice_mu(road_temperature_c: float, wet: bool) -> float:
     """Friction of sheet ice; water on it makes it as slippery as at the melting point."""
     temperature = 0.0 if wet else min(road_temperature_c, 0.0)
@@ -165,28 +158,28 @@ def ice_mu(road_temperature_c: float, wet: bool) -> float:
 def physical_params(surface: RoadSurface, mu_ref: float = MU_REF) -> GripParams:
     """Grip of a surface from measurements.
 
-    Wet: a loss that saturates with the film; then the water wedge lifts a share of the contact that
-    grows with the square of speed, up to floating at the hydroplaning speed (Horne and Dreher,
-    NASA TN D-2056, 1963). Ice covers as it fills the texture; snow hides what is below it.
+    Wet: a loss that saturates with the film; water lifts the contact with the square of speed, and
+    what the tread cannot take does so suddenly. Ice covers as it fills the texture; snow hides what
+    is below it.
     """
-    film = surface.film_mm
-    wet = 1.0 - WET_LOSS * (1.0 - exp(-film / WET_FILM))
-    undrained = 1.0 - exp(-film / FILM_TREAD)
-    k = undrained / hydroplaning_speed(film) ** 2 if film > 0.0 else 0.0
+    film = min(surface.film_mm, FILM_MAX)
+    bare = 1.0 - WET_LOSS * (1.0 - exp(-film / WET_FILM))
     ice_cover = min(surface.ice_mm / TEXTURE_MM, 1.0)
     snow_cover = min(surface.snow_mm / SNOW_COVER_MM, 1.0)
-    bare = (1.0 - ice_cover) * (1.0 - snow_cover)
+    bare *= (1.0 - ice_cover) * (1.0 - snow_cover)
     ice = ice_mu(surface.road_temperature_c, wet=film > 0.0 or surface.rain_mm_h > 0.0) / MU_REF
     firm = ice_cover * (1.0 - snow_cover) * ice + snow_cover * SNOW_MU / MU_REF
-    return GripParams(mu_ref, firm, bare * wet, k)
+    thin, deep = min(film, FILM_WEDGE), max(film - FILM_WEDGE, 0.0)
+    lift = (thin / (V_HALF * thin + V_HALF_FILM)) ** 2
+    return GripParams(mu_ref, firm, bare, DRY_FALL, lift, deep / V_WEDGE**2)
 
 
 def _none(_: Weather, mu_ref: float) -> GripParams:
-    return GripParams(mu_ref, 1.0, 0.0, 0.0)
+    return GripParams(mu_ref, 1.0, 0.0)
 
 
 def _statistical(weather: Weather, mu_ref: float) -> GripParams:
-    return GripParams(mu_ref, statistical_ratio(weather), 0.0, 0.0)
+    return GripParams(mu_ref, statistical_ratio(weather), 0.0)
 
 
 def _physical(weather: Weather, mu_ref: float) -> GripParams:
@@ -207,9 +200,28 @@ def grip_params(weather: Weather, model: GripModel, mu_ref: float = MU_REF) -> G
 
 
 @kernel
+def dry_ratio(params: GripParams, v: float) -> float:
+    """Friction of the same road when dry at speed v in m/s, over mu_ref."""
+    return 1.0 + params.fall * (V_REFERENCE - min(v, V_FALL))
+
+
+@kernel
+def afloat(params: GripParams, v: float) -> float:
+    """Share of its grip that water leaves a tyre at speed v in m/s."""
+    lifted, wedged = params.lift * v * v, params.wedge * v * v
+    return max(1.0 / ((1.0 + lifted) * (1.0 + wedged * wedged * wedged)), FLOATING)
+
+
+@kernel
 def ratio_at(params: GripParams, v: float) -> float:
-    """Share of dry grip left at speed v in m/s."""
-    return params.firm + params.wet * max(1.0 - params.k * v * v, FLOATING)
+    """Friction at speed v in m/s over mu_ref."""
+    return params.firm + params.bare * dry_ratio(params, v) * afloat(params, v)
+
+
+@kernel
+def left_at(params: GripParams, v: float) -> float:
+    """Share that the weather leaves of the friction of the same road when dry, at speed v in m/s."""
+    return ratio_at(params, v) / dry_ratio(params, v)
 
 
 @kernel
@@ -229,4 +241,4 @@ def fill_mu(
 
 def friction_ratio(weather: Weather, model: GripModel, v: float = 0.0) -> float:
     """Share of dry grip that this weather leaves at speed v in m/s; 1 under GripModel.NONE."""
-    return float(ratio_at(grip_params(weather, model), v))
+    return float(left_at(grip_params(weather, model), v))

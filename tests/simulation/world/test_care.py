@@ -14,7 +14,7 @@ from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import ActorStates
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
-from skidpad.physics.grip import mu_at
+from skidpad.physics.grip import left_at, mu_at
 from skidpad.physics.presets import find_weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
@@ -56,9 +56,10 @@ def test_nobody_counts_on_more_than_the_road_has(v: float, weather: Weather) -> 
 def test_a_dry_road_changes_nothing_but_manners(v: float) -> None:
     here, there = minding(DRY), careless()
     follows = care_.character(here, v, 1.5, 1.4)
-    assert follows[:3] == Character()[:3]
-    assert follows.a_min == pytest.approx(-care_.HARDEST_SHARE * 0.9 * G)  # not the tyres' all
-    assert care_.braking(here, v) == care_.braking(there, v)
+    assert follows[:3] == pytest.approx(Character()[:3], rel=0.03)  # at 36 m/s tyres have less
+    # not the tyres' all
+    assert follows.a_min == pytest.approx(-care_.HARDEST_SHARE * G * mu_at(here.grip, v))
+    assert care_.braking(here, v) == pytest.approx(care_.braking(there, v), rel=0.03)
     assert care_.speed_choice(here, v) == 1.0
     assert care_.bend_speed_sq(here, 0.01, A_CURVE) == pytest.approx(A_CURVE / 0.01)
     assert care_.sight_speed(here, v) > 30.0
@@ -80,8 +81,9 @@ def test_bends_take_their_share_of_the_grip_at_that_very_speed(
 ) -> None:
     care = minding(weather)
     v_sq = care_.bend_speed_sq(care, curvature, 100.0)  # no other bound
-    share = v_sq * curvature / (G * mu_at(care.grip, float(np.sqrt(v_sq))))
-    assert share == pytest.approx(care_.CURVE_SHARE, rel=1e-6)
+    left = left_at(care.grip, float(np.sqrt(v_sq))) * care.grip.mu_ref  # of a dry road's
+    share = v_sq * curvature / (G * left)
+    assert 0.85 * care_.CURVE_SHARE < share <= care_.CURVE_SHARE * (1.0 + 1e-9)
 
 
 @given(weather=st.sampled_from([DRY, WET, WHITE, ICY]), v=st.floats(1.0, 30.0))

@@ -17,7 +17,7 @@ from skidpad.core.jit import kernel
 from skidpad.core.setup import Setup
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
-from skidpad.physics.grip import GripParams, grip_params, mu_at, ratio_at
+from skidpad.physics.grip import GripParams, grip_params, left_at, mu_at
 from skidpad.physics.optics import sight
 from skidpad.simulation.world.traffic.idm import (
     A_EMERGENCY,
@@ -37,6 +37,7 @@ SLIDE = (
     0.06,
 )  # rad at the rear axle; drivers begin to lift, and have lifted. Dry bends: 0.017
 CURVE_SHARE = 0.4  # lateral, in bends
+BEND_HALVINGS = 6  # of the range of speeds for a bend
 STEER_SHARE = 0.6  # lateral at most, corrections included
 CHANGE_SHARE = 0.3  # lateral, peak in a change of lane
 CHANGE_PEAK = 0.81  # m/s^2, of a quintic over 3.5 m in CHANGE_TIME
@@ -91,7 +92,7 @@ def character(care: Care, v: float, headway: float, a_max: float) -> Character:
         return Character(headway, a_max, B_COMFORT, A_EMERGENCY)
     g = grip_at(care, v)
     return Character(
-        headway / sqrt(min(ratio_at(care.grip, v), 1.0)),
+        headway / sqrt(min(left_at(care.grip, v), 1.0)),
         min(a_max, DRIVE_SHARE * g),
         min(B_COMFORT, COMFORT_SHARE * g),
         max(A_EMERGENCY, -HARDEST_SHARE * g),
@@ -116,7 +117,7 @@ def speed_choice(care: Care, v: float) -> float:
 
     Source: SUMO's friction device, documentation "Simulation/Friction".
     """
-    grip = ratio_at(care.grip, v) if care.on else 1.0
+    grip = left_at(care.grip, v) if care.on else 1.0
     if grip >= 1.0:
         return 1.0
     return -0.3491 * grip * grip + 0.8922 * grip + 0.4493
@@ -134,17 +135,26 @@ def sight_speed(care: Care, v: float) -> float:
 
 @kernel
 def bend_speed_sq(care: Care, curvature: float, a_curve: float) -> float:
-    """Square of the speed in (m/s)^2 for a bend: v^2 |curvature| <= CURVE_SHARE mu(v) g, closed form.
+    """Square of the speed in (m/s)^2 for a bend: v^2 |curvature| <= CURVE_SHARE mu_ref left(v) g.
 
-    mu(v) = mu_ref (firm + wet (1 - k v^2)); a_curve in m/s^2 bounds it on a dry road.
+    a_curve in m/s^2 bounds it on a dry road. Grip falls with speed: by halving, from below.
     """
     bend = abs(curvature)
     free = a_curve / bend
     if not care.on:
         return free
-    grip = care.grip
-    scale = CURVE_SHARE * G * grip.mu_ref
-    return min(free, scale * (grip.firm + grip.wet) / (bend + scale * grip.wet * grip.k))
+    scale = CURVE_SHARE * G * care.grip.mu_ref / bend
+    low = 0.0
+    high = sqrt(min(free, scale * left_at(care.grip, 0.0)))
+    if high * high <= scale * left_at(care.grip, high):
+        return high * high
+    for _ in range(BEND_HALVINGS):
+        v = 0.5 * (low + high)
+        if v * v <= scale * left_at(care.grip, v):
+            low = v
+        else:
+            high = v
+    return low * low
 
 
 @kernel

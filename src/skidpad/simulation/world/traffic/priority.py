@@ -32,6 +32,7 @@ ENTRY = np.dtype(  # per lane
     [
         ("first", "i4"),  # conflicts are first:first + size
         ("size", "i4"),
+        ("junction", "i4"),  # in which the lane lies, else -1
         ("line", "f8"),  # m along the lane: where one waits before the junction behind its end
         ("control", "i4"),  # of that line: Control
         ("signal", "i4"),  # row of SignalTable for a light, else -1
@@ -58,6 +59,7 @@ class _Bake:
         self.found: dict[int, list[tuple[object, ...]]] = defaultdict(list)
         self.entry = np.zeros(len(lanes.first), dtype=ENTRY)
         self.entry["line"] = lanes.length - WAIT_MARGIN
+        self.entry["junction"] = lanes.junction
         self.entry["signal"] = -1
         kinds = {SignalKind.LIGHT: LIGHT, SignalKind.STOP: STOP, SignalKind.YIELD: YIELD}
         for row in range(len(signals.id)):
@@ -94,20 +96,39 @@ class _Bake:
         start = self.lanes.next_start
         return {int(i) for i in self.lanes.next_lane[start[lane] : start[lane + 1]]}
 
+    def whole(self, lane: int, forward: bool) -> list[int]:
+        """The lane and what goes on from it (else: leads to it) within its junction: files cut
+        one way through a junction into sections."""
+        found = [lane]
+        for here in found:  # which grows meanwhile
+            near = self.after(here) if forward else self.before(here)
+            same = {n for n in near if self.lanes.junction[n] == self.lanes.junction[lane]}
+            found += sorted(same - set(found))
+        return found
+
+    def outside(self, lane: int, forward: bool) -> set[int]:
+        """The lanes behind (else: before) the junction to which the way over `lane` leads."""
+        way = self.whole(lane, forward)
+        near = (self.after(w) if forward else self.before(w) for w in way)
+        return set().union(*near) - set(way)
+
     def standing(self, lane: int) -> tuple[int, int, int]:
         """Sorts lanes of a junction: what is smaller yields."""
-        controls = [int(self.entry["control"][p]) for p in self.before(lane)]
+        controls = [int(self.entry["control"][p]) for p in self.outside(lane, forward=False)]
         major = 0 if any(c in (STOP, YIELD) for c in controls) else 1
-        first = int(self.lanes.first[lane])
-        h = self.samples.heading[[first, first + self.lanes.size[lane] - 1]]
+        first, last = (self.whole(lane, forward)[-1] for forward in (False, True))
+        ends = self.lanes.first[first], self.lanes.first[last] + self.lanes.size[last] - 1
+        h = self.samples.heading[list(ends)]
         turn = float((h[1] - h[0] + np.pi) % (2.0 * np.pi) - np.pi)
         manner = 2 if abs(turn) < STRAIGHT else 1 if turn < 0.0 else 0
         return major, manner, -lane
 
     def pair(self, a: int, b: int) -> None:
         """Note what lanes a and b of one junction share."""
-        forks = bool(self.before(a) & self.before(b))
-        joins = bool(self.after(a) & self.after(b))
+        if b in self.whole(a, True) or b in self.whole(a, False):
+            return  # sections of one way
+        forks = bool(self.outside(a, False) & self.outside(b, False))
+        joins = bool(self.outside(a, True) & self.outside(b, True))
         (pa, sa), (pb, sb) = self.points(a), self.points(b)
         near = np.hypot(*(pa[:, None] - pb[None]).transpose(2, 0, 1)) < (
             CLOSE_FORK if forks else CLOSE

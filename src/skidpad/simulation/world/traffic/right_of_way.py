@@ -44,15 +44,16 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
     body, me = view.placed[i], d.state[i]
     start = -me.s - body.half_length  # from the front to the beginning of path[k]
     far = reach(view.care, body.speed, REACH)
+    before, line = view.streets.entry[d.path[i, 0]], -1.0
     for k in range(PATH):
         lane = d.path[i, k]
         if lane < 0 or start > far:
             break
         entry = view.streets.entry[lane]
+        if k > 0 and view.streets.entry[d.path[i, k - 1]].junction != entry.junction:
+            before = view.streets.entry[d.path[i, k - 1]]
+            line = start - (view.streets.net.lane[d.path[i, k - 1]].length - before.line)
         if entry.size > 0:
-            before = view.streets.entry[d.path[i, k - 1]] if k > 0 else view.streets.entry[lane]
-            length_before = view.streets.net.lane[d.path[i, k - 1]].length if k > 0 else 0.0
-            line = start - (length_before - before.line) if k > 0 else -1.0
             if line > -0.5:
                 if before.control == LIGHT and view.lights[before.signal] <= 1:
                     me.waited = 0.0  # the light is what it waits for
@@ -61,6 +62,7 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
                     me.waited += view.dt
                     return max(line, 0.1)
             else:
+                me.halted = NOBODY if k == 0 else me.halted  # the stop is over
                 blocked = _taken_ahead(view, d, i, k, start)
                 if blocked == np.inf:
                     me.waited = 0.0
@@ -77,9 +79,10 @@ def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, co
     """Whether driver i, not yet past the line before path[k], must be ready to stop there."""
     me, body = d.state[i], view.placed[i]
     lane = d.path[i, k]
-    if control == STOP and me.halted != lane:
+    junction = view.streets.entry[lane].junction
+    if control == STOP and me.halted != junction:
         if line < HALT_GAP and body.speed < HALTED:
-            me.halted = lane
+            me.halted = junction
         else:
             return True
     if line > reach(view.care, body.speed, DECIDE):

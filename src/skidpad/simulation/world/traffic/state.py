@@ -33,7 +33,7 @@ DRIVER = np.dtype(
         ("v_desired", "f8"),  # m/s, that limits and bends ahead allow
         ("target", "f8"),  # m/s^2, acceleration asked for
         ("trim", "f8"),  # m/s^2, integral of the pedal control
-        ("halted", "i4"),  # junction lane before which it has made its stop, -1: none
+        ("halted", "i4"),  # junction before which it has made its stop, -1: none
         ("waited", "f8"),  # s for others at a junction
         ("stuck", "f8"),  # s stopped, off the lane or wrong-way without a cause ahead
     ],

@@ -127,7 +127,7 @@ BAD = {
     "map": (["--map", "moon"], "moon"),
     "function": (["--functions", "acc,fly"], "fly"),
     "stack": (["--stack", "no.such:Thing"], "no.such"),
-    "two drivers": (["--configs", "1", "--functions", "acc"], "--functions"),
+    "two drivers": (["--configs", "1", "--stack", "a:B"], "--stack"),
     "sweep": (["--sweep", "wetness=0:200:50"], "wetness"),
     "vehicles": (["--vehicles", "500"], "500"),
     "duration": (["--duration", "0"], "0"),

@@ -269,6 +269,8 @@ def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, An
 
             return camera.CameraDriver, cruise
         case AdasDriver():
+            if driver.cruise_kmh is not None:
+                cruise = {"cruise_kmh": driver.cruise_kmh}
             return AdasStack, {
                 "functions": sorted(f.value for f in driver.functions),
                 "profile": spec.profile,

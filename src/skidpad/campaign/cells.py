@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from math import isfinite
 
@@ -12,7 +12,13 @@ from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.run import AdasDriver, DriverSpec, RunSpec
 from skidpad.core.told import told
 from skidpad.core.weather import RANGES, Weather
-from skidpad.stack.configurations import CONFIGURATIONS, functions_of
+from skidpad.stack.configurations import (
+    CONFIGURATIONS,
+    CRUISE_RANGE,
+    Functions,
+    functions_of,
+    parse_functions,
+)
 
 SWEEP_MAX = 10_000  # values of one sweep
 FIRST_SEED = 1  # seeds that reports use count up from here
@@ -35,6 +41,30 @@ def published_drivers(numbers: str) -> list[AdasDriver]:
     return drivers
 
 
+def drivers_with(functions: Iterable[str]) -> list[AdasDriver]:
+    """`aeb` and `acc,lca` to a driver each, named after its functions."""
+    chosen = [parse_functions(names) for names in functions]
+    return [AdasDriver(label=named(found) or "none", functions=found) for found in chosen]
+
+
+def named(functions: Functions) -> str:
+    """A set of functions as one word."""
+    return "+".join(sorted(f.value for f in functions))
+
+
+def cruising(drivers: Sequence[AdasDriver], text: str) -> list[AdasDriver]:
+    """Each driver with each cruise target: `110`, or `60:150:10`, ends included, in km/h."""
+    span = text if ":" in text else f"{text}:{text}:1"
+    targets = _steps("--cruise", span)
+    for target in targets:
+        require_range("--cruise", target, *CRUISE_RANGE)
+    return [
+        structs.replace(d, label=f"{d.label} at {v:g} km/h", cruise_kmh=v)
+        for d in drivers
+        for v in targets
+    ]
+
+
 def sweep(weather: Sequence[Weather], text: str) -> list[Weather]:
     """`wetness=0:100:20` to a copy of each weather for each value, ends included."""
     name, equals, span = text.partition("=")
@@ -43,19 +73,7 @@ def sweep(weather: Sequence[Weather], text: str) -> list[Weather]:
             f"--sweep takes FIELD=FROM:TO:STEP with a weather field ({', '.join(RANGES)}), "
             f"got {told(text, 100)}"
         )
-    try:
-        start, stop, step = (float(part) for part in span.split(":"))
-    except ValueError:
-        raise ConfigError(
-            f"--sweep {name} takes three numbers FROM:TO:STEP, got {told(span, 100)}"
-        ) from None
-    if not (step > 0.0 and start <= stop and isfinite(stop - start)):
-        raise ConfigError(f"--sweep {name} needs A <= B and STEP > 0, got {told(span, 100)}")
-    if (stop - start) / step > SWEEP_MAX:
-        raise ConfigError(
-            f"--sweep {name} makes more than {SWEEP_MAX} values, got {told(span, 100)}"
-        )
-    values = [start + k * step for k in range(int((stop - start) / step + 1e-9) + 1)]
+    values = _steps(f"--sweep {name}", span)
     for value in values:
         require_range(f"weather.{name}", value, *RANGES[name])
     return [
@@ -68,6 +86,21 @@ def sweep(weather: Sequence[Weather], text: str) -> list[Weather]:
         for w in weather
         for value in values
     ]
+
+
+def _steps(option: str, span: str) -> list[float]:
+    """FROM:TO:STEP to its values, ends included."""
+    try:
+        start, stop, step = (float(part) for part in span.split(":"))
+    except ValueError:
+        raise ConfigError(
+            f"{option} takes three numbers FROM:TO:STEP, got {told(span, 100)}"
+        ) from None
+    if not (step > 0.0 and start <= stop and isfinite(stop - start)):
+        raise ConfigError(f"{option} needs A <= B and STEP > 0, got {told(span, 100)}")
+    if (stop - start) / step > SWEEP_MAX:
+        raise ConfigError(f"{option} makes more than {SWEEP_MAX} values, got {told(span, 100)}")
+    return [start + k * step for k in range(int((stop - start) / step + 1e-9) + 1)]
 
 
 def seeds(n: int) -> range:

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from math import inf
 from pathlib import Path
 
 from skidpad import __version__
+from skidpad.campaign.cells import named
 from skidpad.campaign.keeping import housed, road_file
 from skidpad.campaign.pace import Pace
 from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.campaign.runfolder import Stopwatch, fresh_folder, last_line, write_config, write_run
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Roads, RunSpec
+from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import LeadDefinition, MetricSettings
 from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics, RunKey
 from skidpad.roads.bundled import map_name
+from skidpad.stack.configurations import V_CRUISE_KMH, V_LIMITER_KMH
 from skidpad.stack.settings import LaneTruth, settings_of
 
 TIMES_OF_DAY = ("sunrise", "noon", "night")
@@ -89,7 +92,8 @@ def metric_settings(cell: RunSpec) -> MetricSettings:
 
 def run_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> RunKey:
     """The identifying columns of a cell's row."""
-    settings = settings_of(cell)
+    settings, driver = settings_of(cell), cell.driver
+    ours = driver if isinstance(driver, AdasDriver) else None
     return RunKey(
         config=cell.driver.label,
         weather=cell.weather.name,
@@ -102,9 +106,18 @@ def run_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> Run
         grip=settings.grip.value,
         range=settings.range.value,
         outcome=outcome.value,
+        functions="" if ours is None else named(ours.functions),
+        cruise_kmh=None if ours is None else cruise_target(ours),
+        traffic=roads_of(cell).traffic.value,
         version=__version__,
         log_hash=log_hash,
     )
+
+
+def cruise_target(driver: AdasDriver) -> float:
+    """km/h at which it cruises where nothing slows it."""
+    limit = V_LIMITER_KMH if Function.LIMITER in driver.functions else inf
+    return min(V_CRUISE_KMH if driver.cruise_kmh is None else driver.cruise_kmh, limit)
 
 
 def roads_of(cell: RunSpec) -> Roads:

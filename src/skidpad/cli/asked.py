@@ -31,7 +31,13 @@ class Drivers(Struct, frozen=True):
         str | None, Meta(description="Published configurations, e.g. 0,1,4; default all five.")
     ] = None
     functions: Annotated[
-        str | None, Meta(description="Any set of aeb,acc,lca,tla,resume,limiter.")
+        tuple[str, ...],
+        Meta(
+            description="A set of aeb,acc,lca,tla,resume,limiter,bend; may be given several times."
+        ),
+    ] = ()
+    cruise: Annotated[
+        str | None, Meta(description="Cruise target in km/h, or several as FROM:TO:STEP.")
     ] = None
     stack: Annotated[
         str | None, Meta(description="Your own stack: module:Class or file.py:Class.")
@@ -39,21 +45,18 @@ class Drivers(Struct, frozen=True):
 
     def chosen(self) -> list[DriverSpec]:
         """The drivers; ConfigError or FileError for what is not there."""
-        from skidpad.campaign.cells import published_drivers
-        from skidpad.stack.configurations import parse_functions
+        from skidpad.campaign.cells import cruising, drivers_with, published_drivers
         from skidpad.stack.loading import load_stack
 
-        given = [v for v in (self.configs, self.functions, self.stack) if v is not None]
-        if len(given) > 1:
-            raise ConfigError("give one of --configs, --functions and --stack, not several")
-        if self.functions is not None:
-            chosen = parse_functions(self.functions)
-            label = "+".join(sorted(f.value for f in chosen)) or "none"
-            return [AdasDriver(label=label, functions=chosen)]
         if self.stack is not None:
+            if self.configs is not None or self.functions or self.cruise is not None:
+                raise ConfigError("--stack goes with none of --configs, --functions and --cruise")
             load_stack(self.stack)  # a stack that is not there is wrong input, no run's outcome
             return [StackDriver(self.stack)]
-        return [*published_drivers(self.configs or "all")]
+        chosen = drivers_with(self.functions)
+        if self.configs is not None or not chosen:
+            chosen = [*published_drivers(self.configs or "all"), *chosen]
+        return [*(chosen if self.cruise is None else cruising(chosen, self.cruise))]
 
 
 class Controller(Struct, frozen=True):

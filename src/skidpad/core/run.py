@@ -49,6 +49,7 @@ class AdasDriver(Struct, frozen=True, kw_only=True, tag="adas", forbid_unknown_f
 
     label: str = "2"  # "0" to "4", "acc+lca", or what a scenario calls its controller
     functions: frozenset[Function] = frozenset({Function.ACC, Function.LCA})
+    cruise_kmh: float | None = None  # of free cruise; None: the scenario's, else as published
 
 
 class StackDriver(Struct, frozen=True, tag="stack", forbid_unknown_fields=True):

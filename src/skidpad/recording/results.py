@@ -8,7 +8,7 @@ every hash (decision X-1). Null means "there was none".
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import MISSING, asdict, dataclass, field, fields
 from pathlib import Path
 from typing import Any, Generic, TypeVar
 
@@ -81,15 +81,24 @@ class Columns(Generic[K, M]):
     def checked(self, table: pl.DataFrame, path: Path) -> pl.DataFrame:
         """The table with every column; FileError when it is one of another kind.
 
-        Metrics of versions that did not have them yet are null.
+        Metrics of versions that did not have them yet are null, factors their default.
         """
-        later = {n: k for n, k in schema(self.metrics).items() if n not in table.columns}
-        table = table.with_columns(pl.lit(None, kind).alias(name) for name, kind in later.items())
+        known = _defaults(self.key)
+        kinds = {n: k for n, k in schema(self.key).items() if n in known} | schema(self.metrics)
+        table = table.with_columns(
+            pl.lit(known.get(name), kind).alias(name)
+            for name, kind in kinds.items()
+            if name not in table.columns
+        )
         return require_columns(table, schema(self.key, self.metrics), path)
 
     def hash(self, table: pl.DataFrame) -> str:
         """Content hash of results; the order of rows does not matter (decision X-1)."""
         return content_hash([table.sort(self.sort)])
+
+
+def _defaults(kind: type[Any]) -> dict[str, Any]:
+    return {f.name: f.default for f in fields(kind) if f.default is not MISSING}
 
 
 def _plain(kind: type[Any], row: Any) -> dict[str, Any]:

@@ -12,6 +12,7 @@ from skidpad.report import matrix_figures, matrix_tables
 from skidpad.report.crashes import crash_sections, found_crashes, worst_of_each
 from skidpad.report.matrix_answers import answers, speed_figure
 from skidpad.report.matrix_data import Matrix, load_matrix
+from skidpad.report.matrix_factors import factors
 from skidpad.report.matrix_headline import headline_table
 from skidpad.report.page import Block, Number, Numbers, Page, Section, Text, write_report_page
 from skidpad.report.verdicts import verdict_blocks
@@ -57,6 +58,7 @@ def build_page(matrix: Matrix) -> Page:
             "Lane keeping and perception",
             matrix_tables.others(matrix) + matrix_figures.others(matrix),
         ),
+        *([Section("Functions and cruise target", varied)] if (varied := factors(matrix)) else []),
         Section("One step at a time", matrix_tables.pairs(matrix)),
         Section("Every crash", crash_sections(matrix, crashes)),
         Section("All metrics", matrix_tables.per_weather(matrix)),

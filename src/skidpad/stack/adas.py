@@ -17,6 +17,7 @@ from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import DetectionStatus, LightState, Supervision, Tier
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.configurations import (
+    CRUISE_RANGE,
     V_CRUISE_KMH,
     V_LIMITER_KMH,
     Functions,
@@ -61,8 +62,8 @@ class AdasConfig:
     dt: float = DT
 
     def __post_init__(self) -> None:
-        require_range("cruise_kmh", self.cruise_kmh, 1.0, 400.0)
-        require_range("limiter_kmh", self.limiter_kmh, 1.0, 400.0)
+        require_range("cruise_kmh", self.cruise_kmh, *CRUISE_RANGE)
+        require_range("limiter_kmh", self.limiter_kmh, *CRUISE_RANGE)
         require_range("dt", self.dt, 1e-3, 1.0)
 
     @classmethod

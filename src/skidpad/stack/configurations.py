@@ -7,6 +7,7 @@ from skidpad.core.run import Function
 
 V_CRUISE_KMH = 150.0  # cruise target without a limiter
 V_LIMITER_KMH = 80.0  # limiter of configuration 4
+CRUISE_RANGE = (1.0, 400.0)  # km/h
 
 
 Functions = frozenset[Function]

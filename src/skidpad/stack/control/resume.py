@@ -60,7 +60,7 @@ class SpeedCaps:
         self, functions: Functions, v_cruise_kmh: float, v_limiter_kmh: float, scope: CapScope
     ) -> None:
         self.limiter = v_limiter_kmh if Function.LIMITER in functions else inf
-        self.v_cruise_kmh = v_limiter_kmh if Function.LIMITER in functions else v_cruise_kmh
+        self.v_cruise_kmh = min(v_cruise_kmh, self.limiter)
         self.resumes = {Function.TLA, Function.RESUME} <= functions
         self.scope = scope
 

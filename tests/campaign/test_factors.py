@@ -1,0 +1,104 @@
+"""Sets of functions and cruise targets as factors of the matrix: cells, columns, report."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from skidpad.campaign.campaign import Campaign
+from skidpad.campaign.cast import stage_of
+from skidpad.campaign.cells import cruising, drivers_with, published_drivers
+from skidpad.campaign.matrix import RECIPE, run_key, warm_up
+from skidpad.campaign.pool import local
+from skidpad.campaign.run import run
+from skidpad.cli.adas_plan import plan
+from skidpad.cli.asked import Climate, Drivers
+from skidpad.core.errors import ConfigError
+from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
+from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
+from skidpad.physics.presets import find_weather
+from skidpad.recording.results import read_results
+from skidpad.report.matrix import write_report
+from skidpad.stack.configurations import functions_of
+from skidpad.stack.control.resume import SpeedCaps
+from skidpad.stack.settings import CapScope
+
+ONE = Climate(weather="clear-noon")
+
+
+def drivers(**asked: object) -> list[AdasDriver]:
+    chosen = Drivers(**asked).chosen()  # type: ignore[arg-type]
+    assert all(isinstance(d, AdasDriver) for d in chosen)
+    return chosen  # type: ignore[return-value]
+
+
+def test_every_set_of_functions_with_every_target() -> None:
+    asked = drivers(configs="2", functions=("aeb", "acc,lca,bend"), cruise="60:150:30")
+    assert len(asked) == 3 * 4
+    assert {d.cruise_kmh for d in asked} == {60.0, 90.0, 120.0, 150.0}
+    assert {d.functions for d in asked} == {
+        functions_of(2),
+        frozenset({Function.AEB}),
+        frozenset({Function.ACC, Function.LCA, Function.BEND}),
+    }
+    assert asked[0].label == "2 at 60 km/h"
+    cells = plan(RunSpec(), Drivers(functions=("aeb",), cruise="80"), ONE, 2)
+    assert [c.driver.label for c in cells] == ["aeb at 80 km/h"] * 2
+
+
+def test_without_factors_all_is_as_published() -> None:
+    assert drivers() == published_drivers("all")
+    assert drivers(functions=("",))[0].label == "none"
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [("fast", "numbers"), ("60:150", "numbers"), ("0:10:5", "between"), ("150:60:10", "A <= B")],
+)
+def test_a_wrong_target_is_named(text: str, word: str) -> None:
+    with pytest.raises(ConfigError, match=word):
+        cruising(published_drivers("1"), text)
+
+
+def test_a_limiter_never_raises_the_target() -> None:
+    for target, limit, expected in ((60.0, 80.0, 60.0), (150.0, 80.0, 80.0)):
+        caps = SpeedCaps(functions_of(4), target, limit, CapScope.GLOBAL)
+        assert caps.cruise_kmh(resume_active=False) == expected
+
+
+def test_the_columns_say_what_was_varied() -> None:
+    (aeb,) = drivers_with(["aeb"])
+    roads = Roads(traffic=TrafficStart.PACK)
+    spec = RunSpec(driver=aeb, course=roads, weather=find_weather("clear-noon"))
+    key = run_key(spec, Outcome.COMPLETED)
+    assert (key.functions, key.cruise_kmh, key.traffic) == ("aeb", 150.0, "pack")
+    (slow,) = cruising(published_drivers("4"), "110")
+    key = run_key(RunSpec(driver=slow), Outcome.COMPLETED)
+    assert (key.functions, key.cruise_kmh) == ("acc+lca+limiter+resume+tla", 80.0)
+
+
+def test_a_car_cruises_at_its_target() -> None:
+    (driver,) = cruising(drivers_with(["acc,lca"]), "60")
+    spec = RunSpec(
+        driver=driver, course=Roads(vehicles=0), sensors=SensorLevel.OBJECTS, duration=20.0
+    )
+    assert stage_of(spec).cruise_kmh is None
+    v = run(spec).log.v_ego
+    assert v[-1] * 3.6 == pytest.approx(60.0, abs=2.0)
+
+
+def test_the_report_shows_factors(tmp_path: Path) -> None:
+    spec = RunSpec(sensors=SensorLevel.OBJECTS, duration=2.0, course=Roads(vehicles=2))
+    cells = plan(spec, Drivers(configs="1", functions=("aeb",), cruise="60:90:30"), ONE)
+    Campaign(RECIPE, cells).run(tmp_path, local(1, warm_up))
+    table = read_results(tmp_path, RECIPE.columns)
+    assert sorted(table.select("functions", "cruise_kmh").rows()) == [
+        ("acc", 60.0),
+        ("acc", 90.0),
+        ("aeb", 60.0),
+        ("aeb", 90.0),
+    ]
+    page = write_report(tmp_path).read_text(encoding="utf-8")
+    assert "By functions and cruise target" in page
+    assert "Fatal collisions against the cruise target" in page

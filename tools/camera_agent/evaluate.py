@@ -1,7 +1,8 @@
 """What the shipped camera driver can do: `python -m camera_agent.evaluate scenarios|road|blank [N]`.
 
 scenarios: the catalogue on dry road with N seeds that training never saw; road: N km of the motorway, a
-map that it never saw, alone and among 20 vehicles; blank: the scenarios again with black images.
+map that it never saw, alone and among 20 vehicles; blank: the scenarios and a kilometre of road with
+black images.
 """
 
 from __future__ import annotations
@@ -41,10 +42,11 @@ def scenarios(n: int, kind: type[driver.CameraDriver] | None = None) -> None:
         low, high = clopper_pearson(done, n)
         astray = max(float(np.ptp(r.log.actors.y[:, 0])) for r in runs)
         told = f"{done} of {n} completed and on the road (95 % {low:.2f} to {high:.2f})"
-        print(f"{name}: {told}, at most {astray:.2f} m sideways", flush=True)
+        far = float(np.mean([way(r) for r in runs]))
+        print(f"{name}: {told}, at most {astray:.2f} m sideways, {far:.0f} m driven", flush=True)
 
 
-def road(km: float) -> None:
+def road(km: float, kind: type[driver.CameraDriver] | None = None) -> None:
     """Departures and contacts on the held-out map."""
     for vehicles in (0, 20):
         spec = RunSpec(
@@ -53,15 +55,19 @@ def road(km: float) -> None:
             duration=1000.0 * km / V,
             seed=1,
         )
-        driven = run(spec)
-        a = driven.log.actors
-        way = float(np.hypot(np.diff(a.x[:, 0]), np.diff(a.y[:, 0])).sum())
+        driven = run(spec, kind)
         print(
-            f"motorway, {vehicles} vehicles: {way / 1000.0:.1f} km, {len(driven.log.contacts)} contacts, "
-            f"{departures(driven)} departures, {len(driven.log.invasions)} markings crossed, "
-            f"{driven.error.strip()[-200:]}",
+            f"motorway, {vehicles} vehicles: {way(driven) / 1000.0:.1f} km, "
+            f"{len(driven.log.contacts)} contacts, {departures(driven)} departures, "
+            f"{len(driven.log.invasions)} markings crossed, {driven.error.strip()[-200:]}",
             flush=True,
         )
+
+
+def way(driven: Run) -> float:
+    """m that the ego drove."""
+    a = driven.log.actors
+    return float(np.hypot(np.diff(a.x[:, 0]), np.diff(a.y[:, 0])).sum())
 
 
 def left(driven: Run) -> bool:
@@ -80,5 +86,8 @@ if __name__ == "__main__":
     what, count = sys.argv[1], float(sys.argv[2]) if len(sys.argv) > 2 else 10
     if what == "road":
         road(count)
+    elif what == "blank":
+        scenarios(int(count), Blind)
+        road(1.0, Blind)
     else:
-        scenarios(int(count), Blind if what == "blank" else None)
+        scenarios(int(count))

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from pathlib import Path
 
-import numpy as np
 import polars as pl
 
 from skidpad.core.errors import FileError
@@ -36,10 +35,10 @@ from skidpad.report.page import (
 from skidpad.report.replay import replay
 from skidpad.report.tables import Column, Format, Quantity, table
 from skidpad.report.threshold_figures import curve_figures, map_figure
-from skidpad.report.verdicts import seeds_text
+from skidpad.report.verdicts import least_seeds_text, seeds_text
 from skidpad.roads.bundled import kept_map
 
-DRIVERS = {"acc": "ACC", "aeb": "AEB alone", "camera": "camera agent"}
+DRIVERS = {"acc": "ACC", "aeb": "AEB alone", "camera": "Camera"}
 SHARE = Format(".0f", ".0f", "no run")
 MU = Format(".2f", ".2f")
 LEAD = """The ego follows a lead at a headway, and the lead brakes to a stop. Each drive is repeated with \
@@ -119,15 +118,15 @@ def _answers(campaign: ThresholdMap) -> Answers:
     items = [("Does friction decide?", asked)]
     if reached:
         most = max(reached, key=lambda s: s.threshold.mu or 0.0)
-        text = f"{title(most).capitalize()}: at friction {most.threshold.text}."
-        items.append(("Where first?", text.replace("Acc", "ACC").replace("Aeb", "AEB")))
+        items.append(("Where first?", f"{title(most)}: at friction {most.threshold.text}."))
     told = [
         f"{DRIVERS.get(driver, driver)} with {actors} actors {n} of {of}"
         for (driver, actors), (n, of) in _tally(campaign).items()
     ]
     items.append(("Who reaches a threshold?", f"{'; '.join(told)} situations."))
     seeds = campaign.results["seed"].n_unique()
-    items.append(("How sure is that?", seeds_text(seeds)))
+    least = least_seeds_text(telling[0].judgements) if telling else ""
+    items.append(("How sure is that?", seeds_text(seeds) + least))
     return Answers(items)
 
 
@@ -263,7 +262,7 @@ def _card(campaign: ThresholdMap, s: Situation, run: pl.DataFrame) -> list[Card]
     facts = [("friction", f"{row['road_mu']:.2g}")]
     if row["impact_kmh"] is not None:
         facts.append(("closing speed", f"{row['impact_kmh']:.0f} km/h"))
-    at = int(np.asarray(log.t).size) - 1
+    at = len(log) - 1
     return [
         Card(title(s), f"{name}, at {log.t[at]:.1f} s", facts=facts, replay=replay(log, road, at))
     ]

@@ -14,7 +14,8 @@ from skidpad.campaign.channel_routes import CONDITIONS, Condition, chosen_routes
 from skidpad.campaign.channel_world import segment_of
 from skidpad.campaign.channels import segments
 from skidpad.core.channels import TruthFrame
-from skidpad.core.run import run_from_plain
+from skidpad.core.errors import ConfigError
+from skidpad.core.run import BackendChoice, BackendKind, run_from_plain
 from skidpad.core.vocabulary import Stratum
 from skidpad.recording.channels import McapRecording
 from skidpad.recording.context import context_of
@@ -43,6 +44,13 @@ def test_the_route_as_published_is_what_it_was():
     (run,) = chosen_routes("route-4")
     assert run.course.name == run.course.place == "route-4"
     assert run == driven_routes()["route-4"]
+
+
+def test_risky_drivers_are_those_of_the_embedded_simulator():
+    """CARLA's traffic manager knows no such drivers, and their weights would say nothing."""
+    (run,) = chosen_routes("route-4", strata=[Stratum.RISKY])
+    with pytest.raises(ConfigError, match="risky drivers"):
+        structs.replace(run, backend=BackendChoice(backend=BackendKind.CARLA))
 
 
 @pytest.mark.req("R-5")

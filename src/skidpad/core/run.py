@@ -291,7 +291,9 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         if isinstance(self.driver, ChannelCrew) is not isinstance(self.course, Route):
             raise ConfigError("channels drive routes, and only channels do")
         if _pack_on_carla(self.course, self.backend):
-            raise ConfigError("traffic pack is kept together by the embedded simulator alone")
+            raise ConfigError(
+                "traffic pack and risky drivers are kept together by the embedded simulator alone"
+            )
         if isinstance(self.driver, CameraDriver) and self.sensors is not SensorLevel.PIXELS:
             raise ConfigError("the camera driver sees images: it needs --sensors pixels")
         if isinstance(self.driver, Passenger) and not isinstance(self.course, Scenario):
@@ -343,7 +345,8 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 def _pack_on_carla(course: Course, backend: BackendChoice) -> bool:
     packed = isinstance(course, Roads) and course.traffic is TrafficStart.PACK
-    return packed and backend.backend is BackendKind.CARLA
+    risky = isinstance(course, Route) and course.stratum is Stratum.RISKY  # drives as one
+    return (packed or risky) and backend.backend is BackendKind.CARLA
 
 
 OURS = "skidpad."  # stacks of this package are no foreign code

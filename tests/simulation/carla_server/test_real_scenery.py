@@ -39,7 +39,7 @@ assert np.abs(pixels(flow, frame, np.float32, 2)).max() < 1e-5  # nobody moves
 assert heard[events.id].empty()
 seen = pixels(shape, frame, np.uint8, 4).astype(float)[..., 2::-1] / 127.5 - 1.0
 ground = seen[195:205, 40:90].reshape(-1, 3).mean(axis=0)
-assert np.allclose(ground, (0.0, 0.0, 1.0), atol=0.02), ground
+assert np.allclose(ground, (0.0, 0.0, 1.0), atol=0.05), ground  # the road climbs
 ahead = ego.get_transform().get_forward_vector()
 rear = np.median(seen[mine(frame, lead)], axis=0)
 assert rear @ np.array([ahead.x, ahead.y, ahead.z]) < -0.7, rear
@@ -113,4 +113,37 @@ def test_objects_of_the_map_can_be_hidden(serve: Serve) -> None:
     assert tag() == 3 and met()
     world = client.load_world("town_Opt", False, carla.MapLayer.Walls)
     assert not met()
+    """)
+
+
+def test_bones_of_a_walker(serve: Serve) -> None:
+    serve("--map", "straight").client("""
+    synchronous()
+    library, roads = world.get_blueprint_library(), world.get_map()
+    place = roads.get_spawn_points()[0]
+    place.location.z += 1.0
+    walker = world.spawn_actor(library.find("walker.pedestrian.0001"), place)
+    world.tick()
+    at = walker.get_transform()
+    bones = {b.name: b for b in walker.get_bones().bone_transforms}
+    assert len(bones) > 60 and {"crl_root", "crl_Head__C", "crl_hand__R"} <= set(bones)
+    foot, head = bones["crl_root"].world.location, bones["crl_Head__C"].world.location
+    assert abs(at.location.z - foot.z - walker.bounding_box.extent.z) < 0.01
+    assert 0.8 < (head.z - foot.z) / (2 * walker.bounding_box.extent.z) < 1.0
+    left, right = (bones["crl_arm__" + s].world.location for s in "LR")
+    aside = at.get_right_vector()
+    assert (right.x - left.x) * aside.x + (right.y - left.y) * aside.y > 0.3
+    raised = carla.Transform(carla.Location(z=0.3))
+    walker.set_bones(carla.WalkerBoneControlIn([("crl_hand__R", raised)]))
+    walker.blend_pose(1.0)
+    world.tick()
+    after = {b.name: b for b in walker.get_bones().bone_transforms}
+    assert abs(after["crl_hand__R"].relative.location.z - 0.3) < 1e-4
+    tips = ("crl_handIndexEnd__R", "crl_handIndexEnd__L")
+    moved = [after[t].world.location.z - bones[t].world.location.z for t in tips]
+    assert moved[0] > 0.4 and abs(moved[1]) < 0.01, moved
+    walker.blend_pose(0.0)
+    world.tick()
+    again = {b.name: b for b in walker.get_bones().bone_transforms}
+    assert abs(again[tips[0]].world.location.z - bones[tips[0]].world.location.z) < 0.01
     """)

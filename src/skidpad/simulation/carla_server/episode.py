@@ -10,6 +10,7 @@ from skidpad.core.geometry import Pose
 from skidpad.sensors.live_scene import scene_of
 from skidpad.simulation.carla_server import filling, shapes
 from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable, Attachment
+from skidpad.simulation.carla_server.bones import Skeleton
 from skidpad.simulation.carla_server.catalogue import Blueprint, Family, chosen, offered
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.debug import DebugShapes
@@ -94,6 +95,7 @@ class Episode:
         self.rows = Rows()
         self.vehicles = Vehicles(self.moving)
         self.walkers: dict[int, WalkerControl] = {}
+        self.skeletons: dict[int, Skeleton] = {}  # of walkers whose bones were asked for
         self.debug = DebugShapes()
         self.posts = Posts(self.moving.lights)
         self.surroundings = Surroundings(
@@ -158,6 +160,7 @@ class Episode:
         if body is not None:
             self.moving.remove(body)
         self.walkers.pop(id, None)
+        self.skeletons.pop(id, None)
         self.sensors.forget(id)
         if actor.stream is not None:
             self.stock.hub.close(actor.stream)

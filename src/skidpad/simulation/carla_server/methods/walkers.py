@@ -5,13 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.bones import Skeleton, parse_bones
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.rpc import Shape, Table
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.walkers import WalkerControl
 
 TABLE = Table("walkers")
-NO_BONES = "walkers are boxes without bones"
 
 
 def parse_control(value: Any) -> WalkerControl:
@@ -34,28 +35,31 @@ def apply_control_to_walker(served: Served, id: Any, control: Any) -> None:
         served.episode.moving.walk(actor.body, *new.velocity())
 
 
-@TABLE.method("get_bones_transform", without_effect=NO_BONES)
+def _skeleton(served: Served, id: Any) -> tuple[Actor, Skeleton]:
+    actor = served.episode.actors.get(id, Family.WALKER)
+    return actor, served.episode.skeletons.setdefault(actor.id, Skeleton())
+
+
+@TABLE.method("get_bones_transform")
 def get_bones_transform(served: Served, id: Any) -> list[Any]:
-    """None."""
-    served.episode.actors.get(id, Family.WALKER)
-    return [[]]
+    """All bones of a walker."""
+    actor, skeleton = _skeleton(served, id)
+    return [skeleton.told(served.episode.actors.pose(actor), 2.0 * actor.half[2])]
 
 
-@TABLE.method("set_bones_transform", Shape.VOID, without_effect=NO_BONES)
+@TABLE.method("set_bones_transform", Shape.VOID)
 def set_bones_transform(served: Served, id: Any, bones: Any) -> None:
-    """Accepted."""
-    served.episode.actors.get(id, Family.WALKER)
-    wire.items(bones, "bones")
+    """Bones of the client's pose; they show as far as it is blended in."""
+    _skeleton(served, id)[1].set(parse_bones(bones))
 
 
-@TABLE.method("blend_pose", Shape.VOID, without_effect=NO_BONES)
+@TABLE.method("blend_pose", Shape.VOID)
 def blend_pose(served: Served, id: Any, blend: Any) -> None:
-    """Accepted."""
-    served.episode.actors.get(id, Family.WALKER)
-    wire.number(blend, "blend")
+    """How much of the client's pose shows, 0 to 1."""
+    _skeleton(served, id)[1].blend = min(max(wire.number(blend, "blend"), 0.0), 1.0)
 
 
-@TABLE.method("get_pose_from_animation", Shape.VOID, without_effect=NO_BONES)
+@TABLE.method("get_pose_from_animation", Shape.VOID)
 def get_pose_from_animation(served: Served, id: Any) -> None:
-    """Accepted."""
-    served.episode.actors.get(id, Family.WALKER)
+    """The client's pose is the animation's."""
+    _skeleton(served, id)[1].take()

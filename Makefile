@@ -9,7 +9,7 @@ TEST_ARGS ?=
 DRIVE_ARGS ?=
 NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run test check wheel-check bench fuzz nightly soak refs data fleet fleet-load figures arm64 channels clean
+.PHONY: cockpit run test check wheel-check bench fuzz nightly soak refs data fleet fleet-load figures arm64 channels campaigns tables clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next --traffic pack $(RUN_ARGS)
@@ -72,6 +72,14 @@ channels: $(VENV)/.tested-with
 # whether the channels monitor's kernels compile for ARM64
 arm64: $(VENV)/.tested-with
 	PYTHONPATH=src $(BIN)/python tools/arm64_check.py
+
+# docs/results/preregistration.yaml says what is driven; goes on where it was left
+campaigns: $(VENV)/.installed
+	$(BIN)/python tools/campaigns.py $(CAMPAIGN_ARGS)
+
+# tables of docs/ from the results that campaigns left in docs/results
+tables: $(VENV)/.installed
+	$(BIN)/python tools/result_tables.py
 
 figures: $(VENV)/.tested-with
 	$(BIN)/python tools/vehicle_validation.py docs/img

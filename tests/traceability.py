@@ -25,7 +25,11 @@ WORDS = ("done", "done by page", "done by document", "differs", "not yet")
 PARTS = {"A": "ADAS in weather", "B": "Grip in weather", "C": "Channels"}
 
 
-PAGES = ("report/", "fleet/test_fleet_pages.py")  # tests that read what the program shows
+PAGES = (  # tests that read what the program shows
+    "report/",
+    "fleet/test_fleet_pages.py",
+    "cli/test_grip_command.py::test_a_small_campaign_from_command_to_page",
+)
 DOCUMENTS = (  # tests that read texts of the project
     "report/test_channels_architecture.py",
     "test_readme.py",

@@ -58,7 +58,7 @@ def test_one_and_two_workers_give_the_same_content(tmp_path):
     assert one.failed == 0
 
 
-@pytest.mark.req("A-256", "A-257", "A-260")
+@pytest.mark.req("A-257", "A-260")
 def test_an_interrupted_campaign_resumes_to_the_same_content(tmp_path):
     whole, part = tmp_path / "whole", tmp_path / "part"
     subprocess.run([*CALL, *CELLS, "--out", str(whole)], check=True, env=environment(), timeout=900)

@@ -52,7 +52,7 @@ KINDS = {
     "adas": adas_run(3, "rain-night", profile="thesis_text", settings={"mu_ref": 0.8}),
     "adas on CARLA": adas_run(3, backend=SERVER),
     "adas with a stack": adas_run(driver=StackDriver("a.b:C", {"gain": [1, 2.5]}, name="x")),
-    "study": speed_and_dropout(1)[1].run,
+    "study": speed_and_dropout([1])[1].run,
     "tuning": tuning_run(Candidate("lead_slowdown", {"Deceleration": 6.0}), 900_001),
     "grip": scenario_run("ghost_cut_in", "statistical", overlay=True),
     "play": scenario_run("/x/y.xosc", course=Scenario(ego="a", actors=ActorMode.IDEAL)),

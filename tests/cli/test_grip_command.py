@@ -78,7 +78,9 @@ def test_batches_of_twenty_with_a_stopping_rule():
 
 
 @pytest.mark.slow
-@pytest.mark.req("B-005", "B-060", "B-124", "B-140", "B-141", "B-143", "B-144", "B-147", "B-148")
+@pytest.mark.req(
+    "B-005", "B-060", "B-124", "B-140", "B-141", "B-143", "B-144", "B-146", "B-147", "B-148"
+)
 def test_a_small_campaign_from_command_to_page(tmp_path):
     out = tmp_path / "out"
     done = CliRunner().invoke(app, ["grip", "--out", str(out), *SMALL], catch_exceptions=False)
@@ -87,7 +89,7 @@ def test_a_small_campaign_from_command_to_page(tmp_path):
     for part in (
         "Completion and score", "published", "Findings of the source", "BF-02", "Distances between",
         "Series over time", "Across weathers", "Replays", "Stopping distances", "other outcome",
-        "corrections",
+        "corrections", "Trajectories of the cut-in",
     ):  # fmt: skip
         assert part in page, part
     assert 'src="http' not in page
@@ -95,7 +97,6 @@ def test_a_small_campaign_from_command_to_page(tmp_path):
     assert (out / "report.html").read_text(encoding="utf-8") == page
 
 
-@pytest.mark.req("B-146")
 def test_play_and_check(tmp_path):
     file = str(FOLDER / "ghost_cut_in.xosc")
     run = [

@@ -1,4 +1,5 @@
 import re
+from dataclasses import fields
 
 import numpy as np
 import polars as pl
@@ -8,7 +9,8 @@ from skidpad.recording.files import write_parquet
 from skidpad.recording.matrix import MATRIX, Metrics, RunKey
 from skidpad.recording.results import Timing
 from skidpad.report.matrix import build_page, write_report
-from skidpad.report.matrix_data import WEATHERS, load_matrix
+from skidpad.report.matrix_data import WEATHERS, load_matrix, weather_title
+from skidpad.report.matrix_tables import per_weather
 
 RATES = {"0": 3.0, "1": 0.5, "2": 1.0, "3": 1.5, "4": 0.0}
 
@@ -158,6 +160,19 @@ def test_metrics_are_named_in_words_with_their_units(tmp_path):
         "headway variance, m²",
     ):
         assert f">{name}<" in page
+
+
+@pytest.mark.req("A-256")
+def test_every_metric_has_a_row_in_a_table_per_configuration_with_all_weathers(tmp_path):
+    campaign(tmp_path)
+    matrix = load_matrix(tmp_path)
+    tables = per_weather(matrix)
+    assert len(tables) == len(matrix.configs)
+    for table in tables:
+        assert len(table.rows) == len(fields(Metrics))
+        assert [title for title, _ in table.columns] == [
+            "metric", *map(weather_title, matrix.weathers)
+        ]  # fmt: skip
 
 
 @pytest.mark.req("R-6", "R-7")

@@ -6,33 +6,18 @@ constants here are read when they are used, so that patching them is enough.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import fields, is_dataclass, replace
-from functools import cache
 from importlib import import_module
-from importlib.util import module_from_spec, spec_from_file_location
-from itertools import product
 from pathlib import Path
-from types import ModuleType
-from typing import Any, NamedTuple
 
 import pytest
 
-HERE = Path(__file__).parent
-TIERS, DETAILS = "control/test_tiers.py", "control/test_tier_details.py"
-CAPS, FUSION = "control/test_lateral_and_caps.py", "perception/test_fusion.py"
-CORRIDOR, RADAR = "perception/test_corridor.py", "perception/test_radar_lane.py"
-MEMORY, SCAN = "perception/test_persistence.py", "perception/test_light_scan.py"
-LAMP = "perception/test_lamp_colour.py"
+from guards import Guard, module_of, run, survivors_of
 
-
-class Guard(NamedTuple):
-    """The test that notices a change of some constants of a module."""
-
-    module: str
-    test: str  # file::function
-    constants: str
-    values: tuple[Any, ...] = ()  # instead of 10 % less and more
+TIERS, DETAILS = "stack/control/test_tiers.py", "stack/control/test_tier_details.py"
+CAPS, FUSION = "stack/control/test_lateral_and_caps.py", "stack/perception/test_fusion.py"
+CORRIDOR, RADAR = "stack/perception/test_corridor.py", "stack/perception/test_radar_lane.py"
+MEMORY, SCAN = "stack/perception/test_persistence.py", "stack/perception/test_light_scan.py"
+LAMP = "stack/perception/test_lamp_colour.py"
 
 
 GUARDS = (
@@ -225,49 +210,6 @@ GUARDS = (
 )  # fmt: skip
 
 
-def mutants(value: Any) -> Iterator[Any]:
-    """`value` with one number in it 10 % smaller or larger; whole numbers stay whole."""
-    if isinstance(value, tuple):
-        for i, part in enumerate(value):
-            for other in mutants(part):
-                yield (*value[:i], other, *value[i + 1 :])
-    elif is_dataclass(value):
-        for f in fields(value):
-            for other in mutants(getattr(value, f.name)):
-                yield replace(value, **{f.name: other})  # type: ignore[type-var]
-    elif isinstance(value, int):
-        step = max(round(0.1 * value), 1)
-        yield from (value - step, value + step)
-    else:
-        yield from (0.9 * value, 1.1 * value)
-
-
-@cache
-def test_module(file: str) -> ModuleType:
-    spec = spec_from_file_location("guard_" + Path(file).stem, HERE / file)
-    module = module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-test_module.__test__ = False
-
-
-def run(test: str) -> None:
-    """Call a test function with all its parameters."""
-    file, _, name = test.partition("::")
-    function = getattr(test_module(file), name)
-    tables = []
-    for mark in getattr(function, "pytestmark", ()):
-        if mark.name == "parametrize":
-            names = mark.args[0]
-            names = [n.strip() for n in names.split(",")] if isinstance(names, str) else names
-            rows = [row if len(names) > 1 else (row,) for row in mark.args[1]]
-            tables.append([dict(zip(names, row, strict=True)) for row in rows])
-    for rows in product(*tables):
-        function(**{name: value for row in rows for name, value in row.items()})
-
-
 CASES = [(g, constant) for g in GUARDS for constant in g.constants.split()]
 
 
@@ -277,21 +219,8 @@ CASES = [(g, constant) for g in GUARDS for constant in g.constants.split()]
     ("guard", "constant"), CASES, ids=[f"{g.module}.{constant}" for g, constant in CASES]
 )
 def test_a_changed_constant_is_noticed(guard, constant, monkeypatch):
-    module = import_module(f"skidpad.stack.{guard.module}")
-    value = getattr(module, constant)
-    run(guard.test)
-    changed = list(guard.values or mutants(value))
-    if constant.endswith("_GAINS"):  # limits of the output are tested with the tiers
-        changed = changed[:6]
-    survivors = []
-    for mutant in changed:
-        monkeypatch.setattr(module, constant, mutant)
-        try:
-            run(guard.test)
-        except AssertionError:
-            continue
-        survivors.append(mutant)
-    assert not survivors, f"{constant} = {value!r}: {guard.test} accepts {survivors}"
+    survivors = survivors_of(guard, constant, monkeypatch, "skidpad.stack.")
+    assert not survivors, f"{constant}: {guard.test} accepts {survivors}"
 
 
 # Functions whose results are scaled, each with a test that reaches them through their users.
@@ -335,7 +264,7 @@ def test_half_the_curvature_is_neither_more_nor_less(factor, monkeypatch):
 def test_guards_are_marked_with_a_requirement():
     for guard in GUARDS:
         file, _, name = guard.test.partition("::")
-        marks = [m for m in getattr(test_module(file), name).pytestmark if m.name == "req"]
+        marks = [m for m in getattr(module_of(file), name).pytestmark if m.name == "req"]
         assert marks, guard.test
 
 

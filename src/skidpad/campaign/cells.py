@@ -103,19 +103,20 @@ def _steps(option: str, span: str) -> list[float]:
     return [start + k * step for k in range(int((stop - start) / step + 1e-9) + 1)]
 
 
-def seeds(n: int) -> range:
-    """The first n reported seeds; common to all drivers and weathers, so comparisons are paired."""
+def seeds(n: int, first: int = FIRST_SEED) -> range:
+    """n reported seeds from `first` on; common to all drivers and weathers: comparisons are paired."""
     require_range("--seeds", n, 1, 100_000)
-    return range(FIRST_SEED, FIRST_SEED + n)
+    require_range("--first-seed", first, 1, TUNING_SEEDS.start - n)
+    return range(first, first + n)
 
 
 def cross(
     drivers: Sequence[DriverSpec], weather: Sequence[Weather], n: int, template: RunSpec
 ) -> list[RunSpec]:
-    """Every driver in every weather with every seed, the rest as in `template`."""
+    """Every driver in every weather with n seeds from the template's on, the rest as there."""
     cells = [
         structs.replace(template, driver=d, weather=w, seed=s)
-        for s in seeds(n)
+        for s in seeds(n, template.seed)
         for w in weather
         for d in drivers
     ]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -75,12 +75,15 @@ def drive_variant(variant: Variant) -> dict[str, Any]:
 
 
 def run_study(
-    id: str, n: int, workers: int, on_run: Callable[[int, int], None] = lambda *_: None
+    id: str,
+    seeds: Sequence[int],
+    workers: int,
+    on_run: Callable[[int, int], None] = lambda *_: None,
 ) -> tuple[list[Judgement], pl.DataFrame]:
-    """Drive a study with n seeds and judge its claims, corrected for all of them."""
+    """Drive a study with these seeds and judge its claims, corrected for all of them."""
     require_choice("study", id, tuple(STUDIES))
     study = STUDIES[id]
-    variants = study.arms(n)
+    variants = study.arms(seeds)
     jobs = [Job(f"{id}-{k}", drive_variant, v, v.run.deadline_s) for k, v in enumerate(variants)]
     rows: dict[str, dict[str, Any]] = {}
     for finished in local(workers, warm_up)(jobs):

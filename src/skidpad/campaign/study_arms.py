@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 from msgspec import structs
 
-from skidpad.campaign.cells import seeds
 from skidpad.campaign.study_stacks import NOISE
 from skidpad.core.run import AdasDriver, RunSpec, StackDriver
 from skidpad.core.vocabulary import Clearance, SensorLevel
@@ -34,9 +33,9 @@ class Variant:
 
 @dataclass(frozen=True, slots=True)
 class Study:
-    """Its arms for so many seeds, and the claims that are judged on their runs."""
+    """Its arms with these seeds, and the claims that are judged on their runs."""
 
-    arms: Callable[[int], list[Variant]]
+    arms: Callable[[Sequence[int]], list[Variant]]
     claims: tuple[str, ...]
 
 
@@ -65,46 +64,48 @@ def changed(stack: str, seed: int, configuration: int, **change: Any) -> RunSpec
 def by_settings(arms: Mapping[str, Mapping[str, Any]], configuration: int = 2) -> Any:
     """Arms that differ in settings alone."""
 
-    def make(n: int) -> list[Variant]:
+    def make(seeds: Sequence[int]) -> list[Variant]:
         return [
             Variant(
                 structs.replace(base_run(configuration, settings=values), seed=seed),
                 {"variant": name},
             )
-            for seed in seeds(n)
+            for seed in seeds
             for name, values in arms.items()
         ]
 
     return make
 
 
-def speed_and_dropout(n: int) -> list[Variant]:
+def speed_and_dropout(seeds: Sequence[int]) -> list[Variant]:
     """F-08: cruise target x share of time without any sensing, configuration 2."""
     return [
         Variant(
             changed("Blinking", seed, 2, cruise_kmh=target, dropout=share),
             {"target_kmh": target, "dropout_injected": share},
         )
-        for seed in seeds(n)
+        for seed in seeds
         for target in TARGETS_KMH
         for share in DROPOUT_SHARES
     ]
 
 
-def by_stacks(arms: Mapping[str, str], configuration: int = 2) -> Callable[[int], list[Variant]]:
+def by_stacks(
+    arms: Mapping[str, str], configuration: int = 2
+) -> Callable[[Sequence[int]], list[Variant]]:
     """Arms that differ in the stack of `study_stacks` that drives."""
 
-    def make(n: int) -> list[Variant]:
+    def make(seeds: Sequence[int]) -> list[Variant]:
         return [
             Variant(changed(stack, seed, configuration), {"variant": name})
-            for seed in seeds(n)
+            for seed in seeds
             for name, stack in arms.items()
         ]
 
     return make
 
 
-def preliminary(n: int) -> list[Variant]:
+def preliminary(seeds: Sequence[int]) -> list[Variant]:
     """A-278: the preliminary profile, against the recommended one with the same grip and sight."""
     same = {"grip": "none", "range": "none", "mu_ref": 1.5, "camera": False}
     return [
@@ -117,22 +118,22 @@ def preliminary(n: int) -> list[Variant]:
             ),
             {"variant": name},
         )
-        for seed in seeds(n)
+        for seed in seeds
         for name, profile in (("preliminary", "preliminary"), ("final", "recommended"))
     ]
 
 
-def pace(n: int) -> list[Variant]:
+def pace(seeds: Sequence[int]) -> list[Variant]:
     """F-25: the same runs, each tick 1 ms slower."""
     base = structs.replace(base_run(4, "rain-night"), duration=100.0)
     return [
         Variant(structs.replace(base, seed=seed), {"variant": name}, slow_s=slow)
-        for seed in seeds(n)
+        for seed in seeds
         for name, slow in (("paced", 0.0), ("slowed", 1e-3))
     ]
 
 
-def recovery(n: int) -> list[Variant]:
+def recovery(seeds: Sequence[int]) -> list[Variant]:
     """F-30: configuration 1 in rain, which is put back often, without one safeguard each."""
     arms: dict[str, dict[str, Any]] = {
         "whole": {},
@@ -146,16 +147,16 @@ def recovery(n: int) -> list[Variant]:
             {"variant": name},
             recovery=values,
         )
-        for seed in seeds(n)
+        for seed in seeds
         for name, values in arms.items()
     ]
 
 
-def noise(n: int) -> list[Variant]:
+def noise(seeds: Sequence[int]) -> list[Variant]:
     """Perception noise of cited sizes, all else a clear noon (A-230)."""
     return [
         Variant(changed("Noisy", seed, 2, noise=asdict(strength)), {"variant": name})
-        for seed in seeds(n)
+        for seed in seeds
         for name, strength in NOISE.items()
     ]
 

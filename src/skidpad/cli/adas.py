@@ -10,7 +10,7 @@ import typer
 from msgspec import structs
 
 from skidpad.cli.asked import Climate, Drivers, Tuned
-from skidpad.cli.campaigns import How, Seeds
+from skidpad.cli.campaigns import FirstSeed, How, Seeds
 from skidpad.cli.spread import spread
 from skidpad.core.run import BackendChoice, Roads, RunSpec
 
@@ -31,6 +31,7 @@ def adas(
         str | None, typer.Option(help="none or physical; default: the profile's.")
     ] = None,
     seeds: Seeds = 1,
+    first_seed: FirstSeed = 1,
 ) -> None:
     """Drive configurations x weathers x seeds; prints the path of the report."""
     from skidpad.campaign.campaign import Campaign
@@ -41,7 +42,7 @@ def adas(
     from skidpad.report.matrix import write_report
 
     run = tuned.resolve(run, grip=grip, range=range)
-    run = structs.replace(run, course=roads, backend=checked(backend))
+    run = structs.replace(run, course=roads, backend=checked(backend), seed=first_seed)
     run = found_again(run, how.folder)
     cells, files = kept(plan(run, drivers, climate, seeds))
     how(Campaign(RECIPE, cells, alone=drives_alone(run.backend), files=files), write_report)

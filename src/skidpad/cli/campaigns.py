@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from skidpad.campaign.worker import Runner
 
 Seeds = Annotated[int, typer.Option("--seeds", "--repeats", min=1, help="Runs per cell.")]
+FirstSeed = Annotated[int, typer.Option("--first-seed", min=1, help="Seeds count up from it.")]
 Workers = Annotated[int, Meta(ge=1, description="Processes; default: one per core.")]
 CORES = os.cpu_count() or 1
 

@@ -9,7 +9,7 @@ import typer
 from msgspec import structs
 
 from skidpad.cli.asked import Controller, GripCross, MapAsked, Tuned
-from skidpad.cli.campaigns import How
+from skidpad.cli.campaigns import FirstSeed, How
 from skidpad.cli.spread import spread
 from skidpad.core.run import BackendChoice, RunSpec, Scenario
 from skidpad.core.vocabulary import SensorLevel
@@ -40,6 +40,7 @@ def grip(
             "--seeds", "--repeats", min=1, help="Runs per cell; default 100, of the map 20."
         ),
     ] = None,
+    first_seed: FirstSeed = 1,
     keep: Annotated[
         Keep, typer.Option(help="shown: logs of runs in the report; all: of every run.")
     ] = Keep.SHOWN,
@@ -48,7 +49,7 @@ def grip(
     from skidpad.campaign.campaign import Campaign
     from skidpad.cli.carla_backend import checked, drives_alone
 
-    run = structs.replace(run, backend=checked(backend))
+    run = structs.replace(run, backend=checked(backend), seed=first_seed)
     alone, keep_all = drives_alone(run.backend), keep is Keep.ALL
     if map.map_of is not None:
         from skidpad.campaign import threshold

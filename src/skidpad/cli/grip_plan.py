@@ -21,7 +21,7 @@ Choice = TypeVar("Choice", Friction, CutIn)
 
 def plan_grip(ask: GripCross, run: RunSpec, repeats: int) -> list[RunSpec]:
     """The runs of a campaign; ConfigError or FileError for what cannot be driven."""
-    return cross(run, _varied(ask, run), seeds(0, repeats))
+    return cross(run, _varied(ask, run), seeds(run.seed - 1, repeats))
 
 
 def with_model(run: RunSpec, tuned: Tuned, model: str, esc: str = "off") -> RunSpec:

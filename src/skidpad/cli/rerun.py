@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from skidpad.cli.campaigns import FirstSeed
+
 if TYPE_CHECKING:
     from skidpad.campaign.rerun import Rerun
 
@@ -69,19 +71,22 @@ def study(
     workers: Annotated[
         int, typer.Option(min=1, help="Processes; default: one per core.", show_default=False)
     ] = os.cpu_count() or 1,
+    first_seed: FirstSeed = 1,
     out: Annotated[Path | None, typer.Option(help="Write the rows to this .csv file.")] = None,
 ) -> None:
     """Drive the experiment that a finding of the sources needs, and judge it."""
     from rich.console import Console
     from rich.progress import Progress
 
+    from skidpad.campaign import cells
     from skidpad.campaign.study import run_study
     from skidpad.recording.files import write_csv
 
     with Progress(console=Console(stderr=True)) as progress:
         task = progress.add_task(id)
+        chosen = cells.seeds(seeds, first_seed)
         verdicts, table = run_study(
-            id, seeds, workers, lambda done, n: progress.update(task, completed=done, total=n)
+            id, chosen, workers, lambda done, n: progress.update(task, completed=done, total=n)
         )
     for v in verdicts:
         typer.echo(f"{v.finding.id}: {v.finding.claim}\n{v.text}")

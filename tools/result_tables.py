@@ -1,0 +1,236 @@
+"""Writes the tables of results in docs/ from committed results: `make tables`.
+
+A page names a table between `<!-- results: CAMPAIGN TABLE -->` and `<!-- end -->`. What stands there is
+made of docs/results/CAMPAIGN/ alone; before a campaign has been driven it says so. A test compares pages
+with what this makes. docs/results/claims.md lists every claim with its test and its margin; the
+pre-registration names its hash, so that a claim cannot change unseen.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import shlex
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+import yaml
+
+from skidpad.evidence.channels.findings import FINDINGS as CHANNELS
+from skidpad.evidence.drive.acceptance import ACCEPTANCE
+from skidpad.evidence.drive.findings import FINDINGS, astray
+from skidpad.evidence.grip.findings import FINDINGS as GRIP
+from skidpad.evidence.statistics import Interval, Rate, clopper_pearson
+from skidpad.evidence.verdicts import Finding, Judgement, judge
+from skidpad.recording.campaigns import CampaignFolder
+from skidpad.recording.matrix import MatrixEntry
+from skidpad.report.matrix_data import Matrix, config_title, weather_title
+from skidpad.report.verdicts import plain
+
+ROOT = Path(__file__).resolve().parents[1]
+RESULTS = ROOT / "docs" / "results"
+PLAN = RESULTS / "preregistration.yaml"
+CLAIMS = RESULTS / "claims.md"
+PAGES = ("docs/matrix.md", "docs/grip.md")
+BLOCK = re.compile(r"(<!-- results: (\S+) (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
+
+
+def plan() -> dict[str, Any]:
+    """The pre-registration."""
+    found: dict[str, Any] = yaml.safe_load(PLAN.read_text(encoding="utf-8"))
+    return found
+
+
+def command_of(name: str) -> list[str]:
+    """The command of a campaign, in words."""
+    return shlex.split(next(c["command"] for c in plan()["campaigns"] if c["name"] == name))
+
+
+def claims_page() -> str:
+    """Every claim, how it is tested, and its margin."""
+    parts = (
+        ("Driver assistance in weather", (*FINDINGS, *ACCEPTANCE)),
+        ("Grip in weather", GRIP),
+        ("Channels", CHANNELS),
+    )
+    text = (
+        "# Claims\n\nWritten by `make tables` from `evidence/`. The hash of this page stands in "
+        "`preregistration.yaml`.\n"
+    )
+    for title, findings in parts:
+        text += f"\n## {title}\n| id | claim | estimand | test | margin | nature |\n"
+        text += "|---|---|---|---|---|---|\n"
+        text += "".join(_claim_row(f) for f in findings)
+    return text
+
+
+def _claim_row(f: Finding) -> str:
+    cells = (f.id, f.claim, f.estimand, f.test, f.margin, f.nature)
+    return "| " + " | ".join(c.replace("|", "\\|") for c in cells) + " |\n"
+
+
+def claims_hash() -> str:
+    """SHA-256 of the page of claims."""
+    return hashlib.sha256(claims_page().encode()).hexdigest()
+
+
+def tables_in(text: str, folder: Path = RESULTS) -> str:
+    """A page with its blocks written anew."""
+
+    def fill(match: re.Match[str]) -> str:
+        opening, name, which, _, closing = match.groups()
+        return f"{opening}{block(name, which, folder / name)}{closing}"
+
+    return BLOCK.sub(fill, text)
+
+
+def block(name: str, which: str, folder: Path) -> str:
+    """One table, or why there is none."""
+    words = command_of(name)
+    if not folder.is_dir():
+        return f"Not driven yet: `skidpad {shlex.join(words)}`\n"
+    tables: dict[str, Callable[[Path], str]] = {
+        "adas headline": headline,
+        "adas fatal": lambda path: by_weather(path, "fatal_collisions"),
+        "adas vehicles": lambda path: by_weather(path, "crashes_vehicle"),
+        "adas claims": matrix_claims,
+        "grip completion": completion,
+        "study claims": lambda path: study_claims(path, words[1]),
+    }
+    return driven(folder) + tables[f"{words[0]} {which}"](folder)
+
+
+def driven(folder: Path) -> str:
+    """When and by what a campaign was driven."""
+    told = json.loads((folder / "driven.json").read_text(encoding="utf-8"))
+    return f"Driven {told['date']} at commit {told['commit']}, {told['machine']}.\n\n"
+
+
+def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A table."""
+    lines = [head, ["---"] * len(head), *rows]
+    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
+
+
+def rated(rate: Rate | None) -> str:
+    """`1.98 [1.57, 2.40]`, or `too few` in place of the limits."""
+    if rate is None:
+        return "no run"
+    return f"{rate.rate:.2f} {limits(rate.interval)}"
+
+
+def limits(interval: Interval | None) -> str:
+    """Limits in brackets."""
+    return "too few" if interval is None else f"[{interval.low:.2f}, {interval.high:.2f}]"
+
+
+def matrix_of(folder: Path) -> Matrix:
+    """The results of a matrix."""
+    return Matrix(CampaignFolder(folder, MatrixEntry))
+
+
+def headline(folder: Path) -> str:
+    """One row per configuration, every drive once."""
+    matrix = matrix_of(folder)
+    columns = ("crashes_vehicle", "road_departures", "fatal_collisions", "fatal_first")
+    head = (
+        "configuration",
+        "runs",
+        "crashes with vehicles",
+        "departures",
+        "fatal",
+        "first of chain",
+    )
+    rows = [
+        [
+            config_title(c),
+            str(len(matrix.cell(c))),
+            *(rated(matrix.rate(name, c)) for name in columns),
+        ]
+        for c in matrix.configs
+    ]
+    return markdown(head, rows)
+
+
+def by_weather(folder: Path, column: str) -> str:
+    """Events per run by configuration and weather."""
+    matrix = matrix_of(folder)
+    head = ["configuration", *map(weather_title, matrix.weathers)]
+    rows = [
+        [config_title(c), *(rated(matrix.rate(column, c, w)) for w in matrix.weathers)]
+        for c in matrix.configs
+    ]
+    return markdown(head, rows)
+
+
+def verdict_rows(judged: Sequence[Judgement]) -> str:
+    """One row per claim: verdict, a plain sentence, the numbers."""
+    rows = [
+        [j.finding.id, j.finding.claim, j.verdict.value, plain(j), j.text.replace("|", "\\|")]
+        for j in judged
+    ]
+    return markdown(("id", "claim", "verdict", "in a sentence", "numbers"), rows)
+
+
+def matrix_claims(folder: Path) -> str:
+    """Every claim that a matrix can judge."""
+    results = matrix_of(folder).results
+    claims = [f for f in (*FINDINGS, *ACCEPTANCE) if not f.study]
+    return verdict_rows(judge(claims, [results] * len(claims), astray(results)))
+
+
+def study_claims(folder: Path, id: str) -> str:
+    """The claims of a study."""
+    from skidpad.campaign.study import BY_ID
+    from skidpad.campaign.study_arms import STUDIES
+
+    rows = pl.read_csv(folder / "rows.csv", infer_schema_length=None)
+    rows = rows.with_columns(pl.col("config", "weather").cast(pl.String))
+    claims = [BY_ID[claim] for claim in STUDIES[id].claims]
+    return verdict_rows(judge(claims, [rows] * len(claims), astray(rows)))
+
+
+def completion(folder: Path) -> str:
+    """Completion in percent, by weather, scenario and friction."""
+    from skidpad.recording.grip import GripEntry
+
+    runs = CampaignFolder(folder, GripEntry).results
+    keys = ["weather", "scenario", "friction"]
+    cells = runs.group_by(keys, maintain_order=True).agg(
+        n=pl.len(), k=pl.col("completion").cast(pl.Int64).sum()
+    )
+    sides = runs.select("scenario", "friction").unique(maintain_order=True).rows()
+    table = {row[:3]: row[3:] for row in cells.rows()}
+
+    def cell(key: tuple[str, str, str]) -> str:
+        if key not in table:
+            return "no run"
+        n, k = table[key]
+        low, high = (100.0 * end for end in clopper_pearson(k, n))
+        return f"{100.0 * k / n:.0f} [{low:.0f}, {high:.0f}]"
+
+    weathers = runs["weather"].unique(maintain_order=True).to_list()
+    head = ["weather", *(f"{s}, {f}" for s, f in sides)]
+    return markdown(head, [[w, *(cell((w, *side)) for side in sides)] for w in weathers])
+
+
+def main() -> None:
+    """Write all pages."""
+    CLAIMS.write_text(claims_page(), encoding="utf-8")
+    for page in PAGES:
+        path = ROOT / page
+        path.write_text(tables_in(path.read_text(encoding="utf-8")), encoding="utf-8")
+    latest = (plan()["later_changes"] or [{}])[-1].get("claims", plan()["claims"])
+    if latest != claims_hash():
+        sys.exit(
+            f"the claims are not those of {PLAN.name}: add an entry to later_changes with "
+            f"claims: {claims_hash()}"
+        )
+
+
+if __name__ == "__main__":
+    main()

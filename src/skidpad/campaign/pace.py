@@ -5,6 +5,8 @@ from __future__ import annotations
 from time import perf_counter, sleep
 
 from skidpad.campaign.drive import Moment, Sink
+from skidpad.core.states import ActorTable
+from skidpad.simulation.pacing import Pacer
 
 SLOW = 0.9  # real-time factor below which a tick counts as slow (A-246)
 
@@ -47,12 +49,14 @@ class RealTime(Sink):
     """Holds a run at real time: no tick is over before its time; what is late is not caught up."""
 
     def __init__(self, dt: float) -> None:
-        self.dt = dt
-        self.due = perf_counter()
+        self.dt, self.pacer = dt, Pacer(own_gc=False)
+
+    def begin(self, table: ActorTable) -> None:
+        """The first tick begins now."""
+        del table
+        self.pacer.begin()
 
     def see(self, moment: Moment) -> None:
         """Wait for the end of the tick."""
         del moment
-        now = perf_counter()
-        self.due = max(self.due + self.dt, now)
-        sleep(self.due - now)
+        self.pacer.tick(self.dt)

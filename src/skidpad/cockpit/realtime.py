@@ -1,11 +1,10 @@
-"""Real time as a sink: waits for the wall clock after every tick, and collects garbage meanwhile.
+"""Real time as a sink that obeys the page: its rate, its pauses, its single ticks.
 
 It decides when a tick is simulated, never what: a paused drive gives the same bytes.
 """
 
 from __future__ import annotations
 
-import gc
 from collections.abc import Callable
 from time import perf_counter, sleep
 
@@ -14,9 +13,8 @@ from skidpad.campaign.pace import SLOW
 from skidpad.cockpit.words import Link
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable
+from skidpad.simulation.pacing import Pacer
 
-PAUSE_FOR_GC = 0.005  # s that a collection of the youngest objects fits into
-COLLECT_EVERY = 200  # ticks between collections of everything
 PATIENCE = 0.05  # s between two looks at the words while it stands
 WINDOW = 20  # ticks over which the real-time factor is measured
 
@@ -32,21 +30,21 @@ class RealTime(Sink):
         wait: Callable[[float], None] = sleep,
     ) -> None:
         """again: shows a moment once more, as views are changed while it stands."""
-        self.link, self.again, self.clock, self.wait = link, again, clock, wait
+        self.link, self.again, self.clock = link, again, clock
+        self.pacer = Pacer(grace=DT, clock=clock, wait=wait)
         self.ticks = self.slow = 0
-        self._due = self._last = self._window = 0.0
+        self._last = self._window = 0.0
         self.rtf: float | None = None
 
     def begin(self, table: ActorTable) -> None:
         """The clock starts now; garbage is collected here only (A-267)."""
         del table
-        gc.collect()
-        gc.disable()
-        self._due = self._last = self._window = self.clock()
+        self.pacer.begin()
+        self._last = self._window = self.clock()
 
     def end(self) -> None:
         """Garbage is collected as ever."""
-        gc.enable()
+        self.pacer.end()
 
     def see(self, moment: Moment) -> None:
         """A tick is done: wait for its time (A-262)."""
@@ -54,18 +52,7 @@ class RealTime(Sink):
         self.link.drain()
         if self.link.paused and not self.link.ended:
             self._stand(moment)
-        if self.link.rate <= 0.0:  # as fast as it can
-            self._due = self.clock()
-            return
-        self._due += DT / self.link.rate
-        left = self._due - self.clock()
-        if left > PAUSE_FOR_GC or self.ticks % COLLECT_EVERY == 0:
-            gc.collect(0 if self.ticks % COLLECT_EVERY else 2)
-            left = self._due - self.clock()
-        if left > 0.0:
-            self.wait(left)
-        elif left < -DT:  # a late tick does not make the next ones hurry
-            self._due = self.clock()
+        self.pacer.tick(DT / self.link.rate if self.link.rate > 0.0 else 0.0)
 
     def _count(self) -> None:
         now = self.clock()
@@ -86,4 +73,5 @@ class RealTime(Sink):
                 self.link.reshown = False
                 self.again(moment)
         self.link.steps = max(self.link.steps - 1, 0)
-        self._due = self._last = self._window = self.clock()
+        self.pacer.restart()
+        self._last = self._window = self.clock()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import socket
 import sys
 from pathlib import Path
@@ -19,7 +18,7 @@ from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.weather import Weather
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.twelve import twelve_sensors
-from skidpad.simulation.carla import decode, pacer
+from skidpad.simulation.carla import decode
 from skidpad.simulation.carla.connection import connect, release
 from skidpad.simulation.carla.events import closing, marking_name
 from skidpad.simulation.carla.keeper import ServerKeeper
@@ -84,36 +83,6 @@ def test_weather_goes_over_field_by_field() -> None:
     assert told["sun_altitude_angle"] == -20.0
     assert told["wetness"] == 80.0
     assert len(told) == 13
-
-
-@pytest.mark.req("A-262", "A-267", "A-268")
-def test_a_paced_loop_waits_and_collects_garbage_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    now, slept, collected = [0.0], [], []
-    monkeypatch.setattr(pacer.time, "perf_counter", lambda: now[0])
-
-    def sleep(seconds: float) -> None:
-        slept.append(seconds)
-        now[0] += seconds
-
-    monkeypatch.setattr(pacer.time, "sleep", sleep)
-    monkeypatch.setattr(pacer.gc, "collect", lambda *g: collected.append(g))
-    one = pacer.Pacer(CarlaOptions(pace=True), 0.05)
-    one.begin()
-    assert not gc.isenabled()
-    for work in (0.01, 0.03, 0.2, 0.01):
-        now[0] += work
-        one.tick()
-    one.end()
-    one.end()
-    assert gc.isenabled()
-    assert slept == pytest.approx([0.04, 0.02, 0.04])
-    assert one.late == 1
-    assert len(collected) == 4  # at the start, and in the three pauses
-    free = pacer.Pacer(CarlaOptions(optimisations=frozenset()), 0.05)
-    free.begin()
-    assert gc.isenabled()
-    free.tick()
-    assert len(slept) == 3
 
 
 @pytest.mark.req("A-268")

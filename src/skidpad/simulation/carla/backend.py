@@ -12,10 +12,11 @@ from skidpad.core.inputs import Outside
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.simulation.carla.connection import connect, speaking
-from skidpad.simulation.carla.options import CarlaOptions
-from skidpad.simulation.carla.pacer import Pacer, Watchdog
+from skidpad.simulation.carla.options import CarlaOptions, Optimisation
 from skidpad.simulation.carla.session import Session
+from skidpad.simulation.carla.watchdog import Watchdog
 from skidpad.simulation.carla.weather import set_weather
+from skidpad.simulation.pacing import Pacer
 
 
 class CarlaBackend:
@@ -26,6 +27,7 @@ class CarlaBackend:
         self.watchdog = Watchdog(self.options.watchdog)
         self._session: Session | None = None
         self._pacer: Pacer | None = None
+        self._period = 0.0  # s of the wall per tick; 0: as fast as it can
 
     @property
     def session(self) -> Session:
@@ -47,7 +49,8 @@ class CarlaBackend:
         except BaseException:
             self.close()
             raise
-        self._pacer = Pacer(self.options, setup.dt)
+        self._pacer = Pacer(self.options.uses(Optimisation.GC_IN_PAUSE))
+        self._period = setup.dt if self.options.pace else 0.0
         self._pacer.begin()
         self.watchdog.feed()
         return frame
@@ -59,7 +62,7 @@ class CarlaBackend:
             session.step(command, actor_commands)
             frame = session.frame()
         assert self._pacer is not None
-        self._pacer.tick()
+        self._pacer.tick(self._period)
         self.watchdog.feed()
         return frame
 

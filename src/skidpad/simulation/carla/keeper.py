@@ -11,7 +11,7 @@ import sys
 from collections.abc import Sequence
 
 from skidpad.core.errors import BackendError
-from skidpad.simulation.carla.pacer import rest
+from skidpad.simulation.carla.watchdog import rest
 
 PATIENCE = 300.0  # s until a new server answers; Unreal loads its first map in that time
 GLANCE = 0.25  # s between two looks

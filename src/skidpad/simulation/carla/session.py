@@ -24,7 +24,6 @@ from skidpad.simulation.carla.grip import prepare_grip
 from skidpad.simulation.carla.lights import Programme, TrafficLights
 from skidpad.simulation.carla.odometry import Odometry
 from skidpad.simulation.carla.options import Optimisation
-from skidpad.simulation.carla.pacer import rest
 from skidpad.simulation.carla.pictures import Pictures
 from skidpad.simulation.carla.ports import free_port
 from skidpad.simulation.carla.reader import Reader
@@ -32,6 +31,7 @@ from skidpad.simulation.carla.scene import load_scene, release, synchronise
 from skidpad.simulation.carla.sensors import Sensors
 from skidpad.simulation.carla.traffic import Traffic, spawn_fixed, spawn_random
 from skidpad.simulation.carla.troupe import EGO, Troupe
+from skidpad.simulation.carla.watchdog import rest
 from skidpad.simulation.carla.weather import set_weather
 
 SETTLE = 8  # ticks in which vehicles fall onto the road and sensors begin to send

@@ -1,8 +1,10 @@
-"""A sheet of one moment in the six weathers and snow: the plain picture beside the one for people.
+"""The pictures of README and docs/rendering.md.
 
-    python tools/cockpit_pictures.py docs/img/pictures-for-people.webp
+    python tools/cockpit_pictures.py docs/img
 
-`docs/rendering.md` shows what it writes; no test compares it, as a film of it may differ by machine.
+`pictures-for-people.webp` is one moment in the six weathers and snow: the plain picture beside the
+one for people. `cockpit.webp` is the README's film: a drive whose weather changes. No test compares
+them: they are for looking at.
 """
 
 from __future__ import annotations
@@ -18,10 +20,13 @@ from PIL import Image
 
 from skidpad.campaign.desk import Desk, Recorded
 from skidpad.campaign.desk_run import drive_at_desk
+from skidpad.cockpit.film import stretch_of, write_film
 from skidpad.cockpit.pictures import Picture, colours
 from skidpad.cockpit.replay import Recording
 from skidpad.cockpit.studio import Studio, View, plane
+from skidpad.core.inputs import Sky, Timed
 from skidpad.core.run import AdasDriver, Roads, RunSpec
+from skidpad.core.vocabulary import GripModel, RangeModel, SensorLevel
 from skidpad.physics.presets import preset
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
 from skidpad.simulation.world.world import BRAKING
@@ -30,6 +35,7 @@ from skidpad.stack.configurations import functions_of
 WEATHERS = (
     "clear-sunrise", "clear-noon", "clear-night", "rain-sunrise", "rain-noon", "rain-night", "snow"
 )  # fmt: skip
+CHANGES = {220: "clear-noon", 300: "rain-noon", 380: "rain-night", 460: "clear-night", 540: "snow"}
 TICK = 300  # in which there are vehicles before and behind
 VIEWS = (View.DRIVER, View.FOLLOW)
 SIZE = (320, 240)  # px of one picture in the sheet
@@ -46,20 +52,32 @@ def picture(recording: Recording, weather: str, view: View, extras: frozenset[Ex
     return np.asarray(cv2.resize(shown, SIZE, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
+def driven(folder: Path, first: str, seconds: float, changes: dict[int, str]) -> Recording:
+    """A drive that begins in one weather; changes: others by tick."""
+    driver = AdasDriver(label="3", functions=functions_of(3))
+    run = RunSpec(driver=driver, course=Roads(), weather=preset(first), duration=seconds,
+                  sensors=SensorLevel.OBJECTS)  # fmt: skip
+    inputs = [
+        Timed(tick, Sky(preset(name), GripModel.PHYSICAL, RangeModel.PHYSICAL))
+        for tick, name in changes.items()
+    ]
+    drive_at_desk(run, Desk(Recorded(inputs), run), folder)
+    return Recording(folder)
+
+
 def main() -> None:
     """Drive and draw."""
-    driver = AdasDriver(label="3", functions=functions_of(3))
-    run = RunSpec(driver=driver, course=Roads(), weather=preset("clear-noon"), duration=16.0)
+    out = Path(sys.argv[1])
     with TemporaryDirectory() as name:
-        folder = Path(name) / "run"
-        drive_at_desk(run, Desk(Recorded([]), run), folder)
-        recording = Recording(folder)
+        recording = driven(Path(name) / "sheet", "clear-noon", 16.0, {})
+        film = driven(Path(name) / "film", "clear-sunrise", 30.0, CHANGES)
+        write_film(film, stretch_of(film, 7.0, 29.0), View.FOLLOW, out / "cockpit.webp")
     rows = [
         np.hstack([picture(recording, w, v, e) for v in VIEWS for e in (NO_EXTRAS, ALL_EXTRAS)])
         for w in WEATHERS
     ]
     sheet = Image.fromarray(np.ascontiguousarray(np.vstack(rows)[..., ::-1]))
-    sheet.save(sys.argv[1], quality=78, method=6)
+    sheet.save(out / "pictures-for-people.webp", quality=78, method=6)
 
 
 if __name__ == "__main__":

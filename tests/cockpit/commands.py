@@ -7,7 +7,11 @@ import signal
 import subprocess
 import sys
 from contextlib import contextmanager
+from pathlib import Path
 
+import skidpad
+
+SOURCE = str(Path(skidpad.__file__).parents[1])  # what is tested, whatever is installed
 PATIENCE = 300.0  # s; a machine may be busy, and kernels may have to be compiled
 
 
@@ -19,7 +23,7 @@ class Command:
         self.process = subprocess.Popen(
             [sys.executable, "-m", "skidpad", *map(str, words)],
             cwd=cwd,
-            env=env | {"PYTHONUNBUFFERED": "1"},
+            env=env | {"PYTHONUNBUFFERED": "1", "PYTHONPATH": SOURCE},
             stdout=subprocess.PIPE,
             stderr=subprocess.STDOUT,
         )

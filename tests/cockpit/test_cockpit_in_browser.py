@@ -137,7 +137,7 @@ def stored(tmp_path_factory):
 @pytest.mark.req("A-271", "A-275")
 def test_a_run_is_scrubbed_through_in_a_browser(browser, stored, tmp_path):
     errors = []
-    with running("replay", stored, "--no-browser", cwd=tmp_path) as command:
+    with running("replay", stored, "--beside", stored, "--no-browser", cwd=tmp_path) as command:
         context, page = opened(browser, command.address(), errors)
         page.keyboard.press("p")
         until(page, "() => document.querySelector('.cockpit').dataset.paused === 'true'")
@@ -154,6 +154,21 @@ def test_a_run_is_scrubbed_through_in_a_browser(browser, stored, tmp_path):
         until_fact(page, "weather", "clear-night")
         assert picture_of(page)[0] < 0.6 * day
         assert picture_of(page)[1] > 3.0
+        # the same run beside it is as old and shows as much; additions go with one key
+        until(page, "() => document.querySelector('.beside canvas').width === 800")
+        assert "clear-night" in page.locator(".beside .mode").text_content()
+        assert picture_of(page, ".beside canvas") == picture_of(page)
+        night = picture_of(page)
+        page.keyboard.press("g")
+        until(page, "() => document.querySelector('.cockpit').dataset.extras === ''")
+        assert picture_of(page) != night
+        page.keyboard.press("g")
+        for _ in range(3):
+            page.keyboard.press("c")
+        until(page, "() => document.querySelector('.cockpit').dataset.main === 'crash'")
+        assert picture_of(page)[1] > 3.0
+        page.set_viewport_size({"width": 390, "height": 844})
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
         page.get_by_role("button", name="end").click()
         status, said = command.ended()
         context.close()

@@ -12,7 +12,7 @@ from msgspec import Meta, Struct, structs
 from skidpad.cli.asked import Drivers, Tuned
 from skidpad.cli.spread import spread
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.run import BackendChoice, Roads, RunSpec
+from skidpad.core.run import BackendChoice, Roads, RunSpec, Scenario
 
 if TYPE_CHECKING:
     from skidpad.pages.server import Place
@@ -45,6 +45,10 @@ def drive(
     pages: Pages,
     weather: Annotated[str, typer.Option(help="A preset or a YAML file.")] = "clear-noon",
     seed: Annotated[int, typer.Option(help="Of traffic and noise.")] = 1,
+    scenario: Annotated[
+        str,
+        typer.Option(help="An OpenSCENARIO file, or a name of the catalogue, instead of roads."),
+    ] = "",
     rate: Annotated[float, typer.Option(help="Times real time; 0: as fast as it can.")] = 1.0,
     paused: Annotated[bool, typer.Option("--paused", help="Begin standing.")] = False,
     on_close: Annotated[
@@ -69,47 +73,63 @@ def drive(
     spec = structs.replace(
         tuned.resolve(run),
         driver=chosen[0],
-        course=roads,
+        course=Scenario(file=scenario) if scenario else roads,
         weather=find_weather(weather),
         seed=seed,
         backend=checked(backend),
     )
     folder = next_free(Path("out/drives") / spec.name) if out is None else require_free(out)
     producer = Producer(drive_job, about(spec, folder, rate, paused))
-    shown = About("drive", vehicles=roads.vehicles, pauses=on_close is OnClose.PAUSE)
+    shown = About(
+        "drive", vehicles=0 if scenario else roads.vehicles, pauses=on_close is OnClose.PAUSE
+    )
     typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
 
 
 @spread()
 def replay(
-    run: Annotated[Path, typer.Argument(help="A run's folder.")],
+    run: Annotated[
+        Path,
+        typer.Argument(
+            help="A run's folder, a recording of channels (.mcap), or a monitor's folder."
+        ),
+    ],
     pages: Pages,
+    beside: Annotated[
+        Path | None, typer.Option(help="Another run, shown beside it in step.")
+    ] = None,
+    hazard: Annotated[
+        str | None, typer.Option("--id", help="Which hazard of a monitor's folder.")
+    ] = None,
     film: Annotated[
         Path | None, typer.Option(help="Write a film (.mp4 or .webp) instead of a page.")
     ] = None,
     begin: Annotated[float, typer.Option("--from", help="s, of the film.")] = 0.0,
     end: Annotated[float, typer.Option("--to", help="s, of the film.")] = 10.0,
     view: Annotated[
-        str, typer.Option(help="driver, follow or top, and every small view.")
+        str, typer.Option(help="driver, follow, top or crash, and every small view.")
     ] = "follow",
 ) -> None:
     """Scrub through a run in a browser: its pictures are drawn again from what was logged."""
     from skidpad.cockpit.about import About
     from skidpad.cockpit.film import stretch_of, write_film
+    from skidpad.cockpit.opening import opened
     from skidpad.cockpit.producer import Producer
-    from skidpad.cockpit.replay import Recording
     from skidpad.cockpit.replaying import replay_job
     from skidpad.cockpit.serving import serve
+    from skidpad.cockpit.source import timeline
     from skidpad.cockpit.studio import View
     from skidpad.core.errors import require_choice
 
-    recording = Recording(run)
+    source = opened(run, hazard)
+    other = None if beside is None else opened(beside)
     if film is not None:
         seen = View(require_choice("--view", view, [v.value for v in View]))
-        typer.echo(write_film(recording, stretch_of(recording, begin, end), seen, film))
+        typer.echo(write_film(source, stretch_of(source, begin, end), seen, film, other))
         return
-    producer = Producer(replay_job, {"folder": str(run)})
-    shown = About("replay", recording.timeline())
+    what = {"path": str(run), "hazard": hazard, "beside": None if beside is None else str(beside)}
+    producer = Producer(replay_job, what)
+    shown = About("replay", timeline(source))
     typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
 
 

@@ -3,7 +3,7 @@ const TIERS = ["No action", "Hard stop", "Stopped too close", "Emergency", "Stop
   "ACC hold", "ACC open", "ACC close", "Light stop", "Holding at line", "Coast", "Cruise"];
 const SMALL = ["left", "rear", "right", "top", "depth", "semantic"];
 const TITLES = { left: "left mirror", rear: "rear", right: "right mirror", top: "top (U)", depth: "depth (T)",
-  semantic: "classes (Y)", driver: "driver", follow: "follow" };
+  semantic: "classes (Y)", driver: "driver", follow: "follow", crash: "crash" };
 const WORDS = { KeyM: ["take"], KeyL: ["lamps"], KeyN: ["weather"], KeyP: ["pause"], KeyC: ["main"], KeyG: ["extra"],
   KeyT: ["hide", "depth"], KeyY: ["hide", "semantic"], KeyU: ["hide", "top"], Period: ["step", 1],
   Digit1: ["toggle", "acc"], Digit2: ["toggle", "lca"], Digit3: ["toggle", "tla"],
@@ -23,7 +23,7 @@ export default {
     <figure v-for="v in ['left', 'rear', 'right']" :key="v" @click="say('main', v)"><canvas :ref="v"></canvas>
       <figcaption>{{ title(v) }}</figcaption></figure>
   </div>
-  <div class="stage"><canvas ref="main"></canvas>
+  <div class="stage"><canvas ref="main"></canvas><div class="beside"><canvas ref="beside"></canvas><div class="hud"><div ref="other" class="mode"></div></div></div>
     <div class="hud">
       <div class="speed"><b ref="speed">-</b> km/h <span ref="gear" class="gear"></span></div>
       <div ref="mode" class="mode"></div>
@@ -107,7 +107,7 @@ export default {
       canvas.getContext("2d").drawImage(bitmap, 0, 0); bitmap.close();
     },
     show(h) {
-      const r = this.$refs, m = h.motion, s = h.stack, seat = h.seat; this.head = h; this.$el.dataset.paused = h.paused;
+      const r = this.$refs, m = h.motion, s = h.stack, seat = h.seat; this.head = h; this.$el.dataset.paused = h.paused; this.$el.dataset.main = h.main; this.$el.dataset.extras = h.extras.join(" ");
       r.speed.textContent = Math.round(Math.abs(m.speed_kmh));
       r.gear.textContent = m.reverse ? "R" : m.gear > 0 ? `D${m.gear}` : "N";
       r.mode.textContent = s.mode || ""; this.$el.classList.toggle("manual", !!seat.manual);
@@ -131,6 +131,8 @@ export default {
       r.events.replaceChildren(...h.events.slice(-5).reverse().map(([t, text]) =>
         Object.assign(document.createElement("li"), { textContent: `${t.toFixed(1)} s  ${text}` })));
       if (h.note && h.note !== this.note) { this.note = h.note; r.bar.textContent = h.note; }
+      this.$el.classList.toggle("pair", !!h.beside);
+      if (h.beside) r.other.textContent = `${Math.round(Math.abs(h.beside.speed_kmh))} km/h  ${h.beside.mode}  ${h.beside.weather}  ${h.beside.collisions} collisions`;
       this.radar(h.radar); this.strip(h); if (this.timeline) this.line(h);
     },
     list(rows) {
@@ -179,7 +181,7 @@ export default {
       if (this.kind === "replay") {
         if (e.code === "Space") { e.preventDefault(); return this.say("pause"); }
         if (e.code === "ArrowLeft" || e.code === "ArrowRight") { e.preventDefault();
-          const by = (e.shiftKey ? 100 : 1) * (e.code === "ArrowLeft" ? -1 : 1); return this.say("seek", (this.head ? this.head.tick : 0) + by); }
+          const by = (e.shiftKey ? 100 : this.timeline.step) * (e.code === "ArrowLeft" ? -1 : 1); return this.say("seek", (this.head ? this.head.tick : 0) + by); }
       }
       if (e.code in WORDS && !e.repeat) this.say(...WORDS[e.code]);
     },

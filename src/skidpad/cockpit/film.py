@@ -11,10 +11,12 @@ import msgspec
 import numpy as np
 from PIL import Image
 
+from skidpad.campaign.drive import Moment
 from skidpad.cockpit import hud
+from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.marks import marks_of
 from skidpad.cockpit.pictures import Picture, colours, draw
-from skidpad.cockpit.replay import Recording
+from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import Studio, View, plane
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
@@ -28,43 +30,50 @@ WEBP_QUALITY = 55
 SUFFIXES = (".mp4", ".webp")
 
 
-def stretch_of(recording: Recording, begin_s: float, end_s: float) -> range:
+def stretch_of(source: Source, begin_s: float, end_s: float) -> range:
     """The moments between two times; ConfigError for a stretch that is not in the run."""
-    first, last = float(recording.log.t[0]), float(recording.log.t[-1])
+    first, last = (source.tick(k) * DT for k in (0, source.ticks - 1))
     if not first <= begin_s < end_s:
         raise ConfigError(f"--from {begin_s:g} must be >= {first:g} and below --to {end_s:g}")
     if begin_s > last:
         raise ConfigError(f"--from {begin_s:g} lies after the end of the run at {last:g} s")
-    k = [round((t - first) / DT) for t in (begin_s, min(end_s, last))]
+    k = [index_at(source, round(t / DT)) for t in (begin_s, min(end_s, last))]
     return range(k[0], k[1] + 1)
 
 
-def write_film(recording: Recording, moments: range, view: View, path: Path) -> Path:
-    """Write the film, .mp4 or .webp, with every moment at 20 pictures per second."""
+def write_film(
+    source: Source, moments: range, view: View, path: Path, other: Source | None = None
+) -> Path:
+    """Write the film, .mp4 or .webp, in its own time. other: a run to be shown beside it."""
     if path.suffix not in SUFFIXES:
         raise ConfigError(f"a film's file ends in {' or '.join(SUFFIXES)}, got {path}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"cannot write the film {path}: {error.strerror}") from error
+    dt = source.step * DT
     if path.suffix == ".webp":
-        _webp(frames(recording, moments, view), path)
+        _webp(frames(source, moments, view, other), path, dt)
     else:
-        _mp4(frames(recording, moments, view), path)
+        _mp4(frames(source, moments, view, other), path, dt)
     return path
 
 
-def frames(recording: Recording, moments: Sequence[int], view: View) -> Iterator[Picture]:
-    """Pictures of these moments: the view, mirrors in it, and what is said."""
-    first = recording.seat(moments[0]).outside
-    studio = Studio(recording.map, recording.table, first, recording.spec.seed)
+def frames(
+    source: Source, moments: Sequence[int], view: View, other: Source | None = None
+) -> Iterator[Picture]:
+    """Pictures of these moments: the view, mirrors in it, what is said, and another run beside it."""
+    first = source.seat(moments[0]).outside
+    studio = Studio(source.map, source.table, first, source.seed)
+    companion = None if other is None else Companion(other, source.tick(0))
     camera = studio.suite.cameras[view.value]
     for k in moments:
-        moment = recording.moment(k)
-        studio.change(recording.seat(k).outside)
+        moment = source.moment(k)
+        studio.change(source.seat(k).outside)
         truth = moment.truth
         braking = truth.commands[:, 1] > BRAKING
-        images = studio.look(truth.tick, truth.states, truth.lights, braking)
+        crash = source.crash(k)
+        images = studio.look(truth.tick, truth.states, truth.lights, braking, crash)
         picture = colours(plane(images[view.value]))
         marks = msgspec.to_builtins(marks_of(camera, moment.frame.radar, moment.report))
         draw(picture, *marks)
@@ -76,7 +85,20 @@ def frames(recording: Recording, moments: Sequence[int], view: View) -> Iterator
             moment.truth.tick,
             hud.happened(moment),
         )
-        yield picture
+        yield (
+            picture if companion is None else np.hstack([picture, _other(companion, moment, view)])
+        )
+
+
+def _other(companion: Companion, moment: Moment, view: View) -> Picture:
+    """The run beside it, with a line of its own."""
+    shown, said = companion(moment, view)
+    picture = colours(shown)
+    height = picture.shape[0]
+    _write(picture, f"{abs(said['speed_kmh']):.0f} km/h", 16, height - 44, INK, 1.1, 2)
+    line = f"{said['t']:6.2f} s   {said['mode']}   {said['weather']}"
+    _write(picture, line, 16, height - 16, DIM, 0.55, 1)
+    return picture
 
 
 def _inset(picture: Picture, small: dict[View, Picture]) -> None:
@@ -112,13 +134,13 @@ def _write(
         cv2.putText(picture, text, at, cv2.FONT_HERSHEY_SIMPLEX, size, colour, bold, cv2.LINE_AA)
 
 
-def _mp4(pictures: Iterator[Picture], path: Path) -> None:
+def _mp4(pictures: Iterator[Picture], path: Path, dt: float) -> None:
     writer: cv2.VideoWriter | None = None
     try:
         for picture in pictures:
             if writer is None:
                 size = (picture.shape[1], picture.shape[0])
-                writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 1.0 / DT, size)
+                writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 1.0 / dt, size)
                 if not writer.isOpened():
                     raise OutputError(f"cannot write the film {path}")
             writer.write(np.ascontiguousarray(picture))
@@ -127,8 +149,8 @@ def _mp4(pictures: Iterator[Picture], path: Path) -> None:
             writer.release()
 
 
-def _webp(pictures: Iterator[Picture], path: Path) -> None:
-    """An animation that a page shows by itself: half the size, 10 pictures per second."""
+def _webp(pictures: Iterator[Picture], path: Path, dt: float) -> None:
+    """An animation that a page shows by itself: smaller, every second moment."""
     shown = [
         Image.fromarray(
             np.ascontiguousarray(
@@ -140,7 +162,7 @@ def _webp(pictures: Iterator[Picture], path: Path) -> None:
     ]
     try:
         shown[0].save(
-            path, save_all=True, append_images=shown[1:], duration=round(2000 * DT), loop=0,
+            path, save_all=True, append_images=shown[1:], duration=round(2000 * dt), loop=0,
             quality=WEBP_QUALITY, method=4,
         )  # fmt: skip
     except OSError as error:

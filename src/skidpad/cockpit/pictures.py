@@ -32,7 +32,7 @@ def views_of(packet: Packet, told: Mapping[str, Any]) -> dict[str, Picture]:
     marks = told.get("marks", {})
     found = {}
     for name, array in packet.views.items():
-        if name == "semantic":
+        if "semantic" in (name, told.get("main") if name == "beside" else None):
             picture = np.ascontiguousarray(cityscapes_colours(array.astype(np.uint8))[..., ::-1])
         else:
             picture = colours(array)

@@ -8,7 +8,7 @@ their deceleration.
 from __future__ import annotations
 
 from bisect import bisect_right
-from dataclasses import dataclass, fields
+from dataclasses import fields
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -16,14 +16,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.campaign.cast import load_scenario
 from skidpad.campaign.desk import beam_of
 from skidpad.campaign.drive import Moment
+from skidpad.campaign.keeping import housed, road_file
 from skidpad.campaign.stored import read_run
+from skidpad.cockpit.source import Said, Seat
 from skidpad.core.errors import FileError
 from skidpad.core.frames import RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
-from skidpad.core.inputs import Functions, Lamps, LampSwitch, Outside, Pedals, Sky, Timed, Wheel
-from skidpad.core.run import AdasDriver, Function, RunSpec
+from skidpad.core.inputs import Functions, Lamps, Outside, Pedals, Sky, Timed, Wheel
+from skidpad.core.run import AdasDriver, Function, Roads, RunSpec, Scenario
 from skidpad.core.states import (
     ActorStates,
     ActorTable,
@@ -46,7 +49,6 @@ from skidpad.simulation.recovery import Action, Moved, Relocate
 from skidpad.stack.control.text import mode_text
 from skidpad.stack.settings import grip_of, settings_of
 
-RECORDING = ".mcap"
 LEAST_WAY, MOST_WAY = 0.3, 12.0  # m in two ticks, between which a grade can be told
 Floats = NDArray[np.float64]
 BRAKING_AX = -1.5  # m/s^2, below which the brake lamps of others are shown lit; our choice
@@ -62,39 +64,13 @@ WORDS: dict[str, type[Any]] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Seat:
-    """How the desk stood in a tick."""
-
-    tick: int  # from which on
-    outside: Outside
-    manual: bool
-    method: str
-    functions: tuple[Function, ...] | None
-    lamps: LampSwitch | None
-
-
-class Said:
-    """What drove then, as far as it was logged."""
-
-    def __init__(self, report: StackReport, mode: str) -> None:
-        self.report, self.mode = report, mode
-
-    def begin(self, table: ActorTable) -> None:
-        """Nothing begins."""
-
-    def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
-        """Nothing is driven."""
-        raise NotImplementedError
-
-
 class Recording:
     """A run's folder, moment by moment in any order."""
 
     def __init__(self, folder: Path) -> None:
         """FileError for a folder that holds no run, or a damaged one."""
         self.folder, self.log, self.spec = folder, *read_folder(folder)
-        self.map: RoadMap = load_map(self.log.header.map)
+        self.map, self.seed, self.step = map_of(self.spec, folder), self.spec.seed, 1
         if self.map.content_hash != self.log.header.map_hash:
             raise FileError(f"{folder}: the map {self.log.header.map} is another one today")
         self.seats = seats_of(self.spec, read_inputs(folder, self.spec.inputs))
@@ -118,6 +94,24 @@ class Recording:
     def ticks(self) -> int:
         """How many moments there are."""
         return len(self.log)
+
+    def tick(self, k: int) -> int:
+        """When moment k was."""
+        return int(self.log.tick[k])
+
+    def crash(self, k: int) -> Pose | None:
+        """Where the ego's crash that is nearest in time happened; None: there was none."""
+        if not self.log.contacts:
+            return None
+        tick = self.tick(k)
+        nearest = min(self.log.contacts, key=lambda c: abs(c.tick - tick)).tick - self._first
+        a = self.log.actors
+        x, y, z, yaw = (float(v[nearest, 0]) for v in (a.x, a.y, a.z, a.yaw))
+        return Pose(x, y, z, yaw=yaw)
+
+    def collisions(self, k: int) -> int:
+        """How many contacts of the ego there were up to moment k."""
+        return sum(1 for c in self.log.contacts if c.tick <= self.tick(k))
 
     def seat(self, k: int) -> Seat:
         """How the desk stood in moment k."""
@@ -189,18 +183,20 @@ class Recording:
                 return Relocate(e.new, 0.0, Moved(e.reason, e.shift, e.old, e.new, True))
         return None
 
-    def timeline(self) -> dict[str, Any]:
-        """What the page draws along the time: speed, events, tiers."""
-        log = self.log
-        step = max(1, len(log) // 1000)
-        return {
-            "first": self._first,
-            "last": int(log.tick[-1]),
-            "dt": log.header.dt,
-            "speed": np.round(log.v_ego[::step] * 3.6, 1).tolist(),
-            "tier": [None if isnan(v) else int(v) for v in log.report.tier[::step].tolist()],
-            "events": self.marks,
-        }
+    def curves(self) -> tuple[list[float], list[int | None]]:
+        """Speed in km/h and acting tier of about a thousand moments."""
+        part = slice(None, None, max(1, len(self.log) // 1000))
+        tiers = [None if isnan(v) else int(v) for v in self.log.report.tier[part].tolist()]
+        return np.round(self.log.v_ego[part] * 3.6, 1).tolist(), tiers
+
+
+def map_of(spec: RunSpec, folder: Path) -> RoadMap:
+    """The map that a stored run was driven on."""
+    if isinstance(spec.course, Scenario):
+        return load_scenario(spec.course).map
+    course = housed(spec, folder.resolve().parents[1]).course
+    assert isinstance(course, Roads), "channels leave recordings, no folders of runs"
+    return load_map(road_file(course))
 
 
 def told_of(event: Any) -> tuple[str, str] | None:
@@ -219,10 +215,6 @@ def told_of(event: Any) -> tuple[str, str] | None:
 
 def read_folder(folder: Path) -> tuple[RunLog, RunSpec]:
     """Log and description of a run; FileError in one sentence for anything else."""
-    if folder.suffix == RECORDING:
-        raise FileError(
-            f"{folder} is a recording of channels: `skidpad view` shows it, `rerun` drives it again"
-        )
     if not (folder / TICKS).is_file():
         raise FileError(f"{folder} is not the folder of a run: it has no {TICKS}")
     log = read_log(folder)

@@ -8,10 +8,12 @@ from pathlib import Path
 from time import perf_counter
 from typing import Any
 
+from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.film import write_film
-from skidpad.cockpit.replay import Recording
+from skidpad.cockpit.opening import opened
 from skidpad.cockpit.screen import Screen, Shown
+from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import MAIN, View
 from skidpad.cockpit.words import Link
 from skidpad.core.errors import OutputError
@@ -25,28 +27,33 @@ TAKES_WITHIN = 0.25  # s that the page is given to take a picture before the nex
 
 
 def replay_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
-    """Show a run until the page ends it."""
-    recording = Recording(Path(about["folder"]))
+    """Show a run, perhaps with another one beside it, until the page ends it."""
+    source = opened(Path(about["path"]), about["hazard"])
+    other = None if about["beside"] is None else opened(Path(about["beside"]))
     feed, link = Feed(feed_name), Link(pipe)
     try:
-        Replayer(recording, feed, link).run()
+        Replayer(source, feed, link, other=other).run()
     finally:
         feed.close()
-    return f"replayed {recording.folder}"
+    return f"replayed {about['path']}"
 
 
 class Replayer:
     """State: the moment that is shown, and when that was."""
 
     def __init__(
-        self, recording: Recording, feed: Feed, link: Link,
-        clock: Callable[[], float] = perf_counter,
+        self, source: Source, feed: Feed, link: Link,
+        clock: Callable[[], float] = perf_counter, other: Source | None = None,
     ) -> None:  # fmt: skip
-        self.recording, self.link, self.clock = recording, link, clock
+        """other: a run that is shown beside this one, at the same time since its begin."""
+        self.source, self.link, self.clock, self.other = source, link, clock, other
         self.k = 0
         self.note = ""  # what the page is told beside everything else
-        self.screen = Screen(feed, link, recording.map, self._shown, recording.spec.seed)
-        self.screen.begin(recording.table)
+        self.dt = source.step * DT
+        self.screen = Screen(feed, link, source.map, self._shown, source.seed)
+        self.screen.begin(source.table)
+        if other is not None:
+            self.screen.beside = Companion(other, source.tick(0))
         self._base, self._since, self._rate = 0, clock(), 1.0  # moment from which it plays, ...
         self._shown_k, self._shown_at = -1, 0.0
 
@@ -63,10 +70,9 @@ class Replayer:
 
     def turn(self) -> None:
         """Go on as far as words and clock say."""
-        link, last = self.link, self.recording.ticks - 1
+        link, last = self.link, self.source.ticks - 1
         if link.seek is not None:
-            first = int(self.recording.log.tick[0])
-            self._from(min(max(link.seek - first, 0), last))
+            self._from(index_at(self.source, link.seek))
             link.seek = None
         elif link.paused:
             self._from(min(self.k + link.steps, last))
@@ -76,18 +82,19 @@ class Replayer:
             if rate != self._rate:
                 self._from(self.k)
                 self._rate = rate
-            done = int((self.clock() - self._since) * rate / DT)
+            done = int((self.clock() - self._since) * rate / self.dt)
             self.k = min(self._base + done, last)
 
     def _film(self, seconds: float) -> None:
         """Write a film from here on, beside the run; the page waits meanwhile."""
         self.link.film = None
-        last = min(self.k + max(round(seconds / DT), 1), self.recording.ticks - 1)
+        source = self.source
+        last = min(self.k + max(round(seconds / self.dt), 1), source.ticks - 1)
         view = self.link.main if self.link.main in MAIN else View.FOLLOW
-        t = self.recording.log.t[self.k]
-        path = self.recording.folder / FILMS / f"{view.value}-{t:07.2f}s.mp4"
+        t = source.tick(self.k) * DT
+        path = source.folder / FILMS / f"{view.value}-{t:07.2f}s.mp4"
         try:
-            write_film(self.recording, range(self.k, last + 1), view, path)
+            write_film(source, range(self.k, last + 1), view, path, self.other)
             self.note = f"film: {path}"
         except OutputError as error:
             self.note = str(error)
@@ -104,11 +111,12 @@ class Replayer:
 
     def show(self) -> None:
         """Show the present moment."""
-        self.screen.show(self.recording.moment(self.k))
+        self.screen.crash = self.source.crash(self.k)
+        self.screen.show(self.source.moment(self.k))
         self._shown_k, self._shown_at = self.k, self.clock()
 
     def _shown(self) -> Shown:
-        seat, link = self.recording.seat(self.k), self.link
+        seat, link = self.source.seat(self.k), self.link
         beam = seat.outside.beam
         told = {
             "kind": "replay",
@@ -127,16 +135,12 @@ class Replayer:
             "paused": link.paused,
             "note": self.note,
             "events": self._events(),
-            "collisions": self._collisions(),
+            "collisions": self.source.collisions(self.k),
         }
         return Shown(seat.outside, told)
 
     def _events(self) -> list[tuple[float, str]]:
         """The last ones before this moment."""
-        tick = int(self.recording.log.tick[self.k])
-        marks = [e for e in self.recording.marks if e[0] <= tick]
+        tick = self.source.tick(self.k)
+        marks = [e for e in self.source.marks if e[0] <= tick]
         return [(round(t * DT, 2), text) for t, _, text in marks[-12:]]
-
-    def _collisions(self) -> int:
-        tick = int(self.recording.log.tick[self.k])
-        return sum(1 for c in self.recording.log.contacts if c.tick <= tick)

@@ -15,10 +15,12 @@ from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.marks import marks_of
 from skidpad.cockpit.studio import MAIN, Studio, View, plane
 from skidpad.cockpit.words import Link
+from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable
 from skidpad.roads.queries import RoadMap
+from skidpad.sensors.finish.extras import Extra
 from skidpad.simulation.world.world import BRAKING
 
 MOST_PER_SECOND = 30.0  # pictures, of wall time
@@ -33,6 +35,10 @@ class Shown(NamedTuple):
     told: Mapping[str, Any]  # goes to the page as it is
 
 
+BESIDE = "beside"  # the word of the other run's picture
+Beside = Callable[[Moment, View, frozenset[Extra]], tuple[Any, Mapping[str, Any]]]
+
+
 class Screen(Sink):
     """Draws the views that are looked at, when the page has taken the picture before."""
 
@@ -43,6 +49,8 @@ class Screen(Sink):
         self.shown = self.dropped = self.collisions = 0
         self.events: deque[tuple[float, str]] = deque(maxlen=TOLD_EVENTS)
         self._at = 0.0
+        self.crash: Pose | None = None  # where the ego's last contact was
+        self.beside: Beside | None = None  # another run in step with this one
 
     def begin(self, table: ActorTable) -> None:
         """The run begins, with these actors."""
@@ -53,6 +61,8 @@ class Screen(Sink):
         """Show it, or drop it: a page that is slow, or not there, costs nothing."""
         t = round(moment.truth.tick * DT, 2)
         self.collisions += len(moment.truth.contacts)
+        if moment.truth.contacts:
+            self.crash = moment.truth.states.pose(0)
         self.events.extend((t, text) for text in hud.happened(moment))
         if perf_counter() - self._at < 1.0 / MOST_PER_SECOND:
             return
@@ -66,9 +76,12 @@ class Screen(Sink):
         shown, truth = self.ask(), moment.truth
         self.studio.change(shown.outside, self.link.extras)
         braking = truth.commands[:, 1] > BRAKING
-        images = self.studio.look(truth.tick, truth.states, truth.lights, braking)
+        images = self.studio.look(truth.tick, truth.states, truth.lights, braking, self.crash)
         views = [v for v in View if self._wanted(v)]
         planes: dict[str, Any] = {v.value: plane(images[v.value]) for v in views}
+        if self.beside is not None:
+            planes[BESIDE], said = self.beside(moment, self.link.main, self.link.extras)
+            shown = Shown(shown.outside, {**shown.told, BESIDE: said})
         self.shown += 1
         self._at = perf_counter()
         self.feed.put(msgspec.json.encode(self._told(moment, shown)), planes)

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 from enum import Enum
-from math import radians
+from math import atan2, hypot, radians
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,7 @@ from skidpad.sensors.suite import PixelSettings, PixelSuite
 from skidpad.sensors.twelve import twelve_sensors
 
 THINNED = 2  # depth and classes are shown at every second pixel
+LOOKED_AT = 0.8  # m, height of what the crash camera looks at
 DEPTH_SHOWN = 80.0  # m, white to black
 
 
@@ -41,9 +42,10 @@ class View(str, Enum):
     RIGHT = "right"
     DEPTH = "depth"
     SEMANTIC = "semantic"
+    CRASH = "crash"
 
 
-MAIN = (View.DRIVER, View.FOLLOW, View.TOP)  # of which one fills the page
+MAIN = (View.DRIVER, View.FOLLOW, View.TOP, View.CRASH)  # of which one fills the page
 SENSOR = {  # the published camera behind a view
     View.DRIVER: "rgb_front",
     View.LEFT: "rgb_mirror_left",
@@ -58,7 +60,9 @@ FOLLOW = CameraSpec(
 TOP = CameraSpec(
     "top", Modality.RGB, 400, 400, 70.0, Pose(4.0, 0.0, 26.0, 0.0, radians(90.0), 0.0), True
 )
-OWN = {View.FOLLOW: FOLLOW, View.TOP: TOP}
+BESIDE = Pose(-9.0, 7.0, 4.5)  # from where the crash camera looks, in the frame of the ego there
+CRASH = CameraSpec("crash", Modality.RGB, 800, 600, 60.0, BESIDE, True)
+OWN = {View.FOLLOW: FOLLOW, View.TOP: TOP, View.CRASH: CRASH}
 
 
 def cameras() -> tuple[SensorSpec, ...]:
@@ -102,9 +106,39 @@ class Studio:
         states: ActorStates,
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_],
+        crash: Pose | None = None,
     ) -> Mapping[str, CameraImage]:
-        """The views of this moment by their word, each drawn when it is read."""
+        """The views of this moment by their word, each drawn when it is read.
+
+        crash: what the crash camera looks at; None: at the ego.
+        """
+        ego = states.pose(0)
+        mount = mount_in(
+            ego, watching(Pose(ego.x, ego.y, ego.z, yaw=ego.yaw) if crash is None else crash)
+        )
+        cameras = self.suite.cameras
+        cameras[View.CRASH.value] = replace(cameras[View.CRASH.value], mount=mount)
         return self.suite.observe(tick, states, lights, braking).images
+
+
+def watching(place: Pose) -> Pose:
+    """A camera that stands behind and beside a place and looks at it."""
+    at = place.moved(BESIDE.x, BESIDE.y, BESIDE.z)
+    dx, dy = place.x - at.x, place.y - at.y
+    return Pose(
+        at.x, at.y, at.z, pitch=atan2(BESIDE.z - LOOKED_AT, hypot(dx, dy)), yaw=atan2(dy, dx)
+    )
+
+
+def mount_in(body: Pose, camera: Pose) -> Pose:
+    """The mounting on a body of a camera that stands in the world."""
+    turn = body.rotation().T
+    x, y, z = turn @ (camera.x - body.x, camera.y - body.y, camera.z - body.z)
+    r = turn @ camera.rotation()
+    pitch = atan2(-r[2, 0], hypot(r[0, 0], r[1, 0]))
+    return Pose(
+        float(x), float(y), float(z), atan2(r[2, 1], r[2, 2]), pitch, atan2(r[1, 0], r[0, 0])
+    )
 
 
 def plane(image: CameraImage) -> NDArray[Any]:

@@ -41,7 +41,7 @@ SUN_DARK = 0.85  # share of the sun's light that a body keeps away
 NO_SUN = 0.02  # share of the light below which the sun casts no shadow that is seen
 LEVEL = 1.2  # m above or below, beyond which the ground is another road's
 SLACK, SLOPE = 0.15, 0.05  # m and m per m by which the ground may lie off the body's own height
-STEPS = 4  # copies of the outline between body and the end of its shadow
+NARROWER = 0.94  # of its box is the outline of a body that casts a shadow: edges are rounded
 
 
 class Bodies(NamedTuple):
@@ -151,6 +151,25 @@ def _outside(lx: float, ly: float, half_l: float, half_w: float) -> float:
 
 
 @kernel
+def _beyond_shadow(cast: _Cast, lx: float, ly: float) -> float:
+    """Distance in m to the outline that the box sweeps to the end of its shadow, negative inside.
+
+    A swept box is bounded by its own two directions and by that of the way; beyond a corner the
+    largest of the three is a little less than the distance.
+    """
+    px, py = lx - 0.5 * cast.end_x, ly - 0.5 * cast.end_y
+    half_l, half_w = NARROWER * cast.half_l, NARROWER * cast.half_w
+    along = abs(px) - half_l - 0.5 * abs(cast.end_x)
+    aside = abs(py) - half_w - 0.5 * abs(cast.end_y)
+    way = np.sqrt(cast.end_x * cast.end_x + cast.end_y * cast.end_y)
+    if way < 1e-6:
+        return float(max(along, aside))
+    nx, ny = -cast.end_y / way, cast.end_x / way
+    across = abs(nx * px + ny * py) - half_l * abs(nx) - half_w * abs(ny)
+    return float(max(along, aside, across))
+
+
+@kernel
 def _light_at(cast: _Cast, lx: float, ly: float) -> float:
     """Share of the light that reaches the ground at (lx, ly) in the body's axes."""
     light = 1.0
@@ -159,14 +178,8 @@ def _light_at(cast: _Cast, lx: float, ly: float) -> float:
         near = min(near, 1.0)
         light = 1.0 - CONTACT_DARK * near * near
     if cast.sun > 0.0:
-        dark = 0.0
-        for n in range(1, STEPS + 1):
-            t = n / STEPS
-            small = 1.0 - 0.18 * t  # roofs are smaller than floors
-            px, py = lx - t * cast.end_x, ly - t * cast.end_y
-            d = _outside(px, py, small * cast.half_l, small * cast.half_w)
-            dark = max(dark, min((0.5 * EDGE - d) / EDGE, 1.0))
-        light *= 1.0 - cast.sun * dark
+        dark = min((0.5 * EDGE - _beyond_shadow(cast, lx, ly)) / EDGE, 1.0)
+        light *= 1.0 - cast.sun * max(dark, 0.0)
     return float(light)
 
 

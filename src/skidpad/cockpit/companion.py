@@ -1,0 +1,46 @@
+"""Another run beside the one that is shown, in step with it: its picture and a line of words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.campaign.drive import Moment
+from skidpad.cockpit import hud
+from skidpad.cockpit.source import Source, index_at
+from skidpad.cockpit.studio import Studio, View, plane
+from skidpad.core.setup import DT
+from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
+from skidpad.simulation.world.world import BRAKING
+
+
+class Companion:
+    """Draws the moment of a run that is as old as the one it is asked for."""
+
+    def __init__(self, source: Source, first: int) -> None:
+        """first: the tick with which the other run begins."""
+        self.source, self.first = source, first
+        self.studio = Studio(source.map, source.table, source.seat(0).outside, source.seed)
+
+    def __call__(
+        self, moment: Moment, view: View, extras: frozenset[Extra] = ALL_EXTRAS
+    ) -> tuple[NDArray[Any], Mapping[str, Any]]:
+        """The plane of a view, and what is said of it."""
+        source = self.source
+        k = index_at(source, moment.truth.tick - self.first + source.tick(0))
+        mine = source.moment(k)
+        truth = mine.truth
+        self.studio.change(source.seat(k).outside, extras)
+        braking = truth.commands[:, 1] > BRAKING
+        images = self.studio.look(truth.tick, truth.states, truth.lights, braking, source.crash(k))
+        said = {
+            "t": round(truth.tick * DT, 2),
+            "speed_kmh": hud.motion(mine)["speed_kmh"],
+            "mode": mine.driver.mode,
+            "weather": source.seat(k).outside.weather.name,
+            "collisions": source.collisions(k),
+        }
+        return np.array(plane(images[view.value])), said

@@ -1,0 +1,59 @@
+"""From a path to what is replayed: a run's folder, a recording of channels, or a hazard."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from skidpad.campaign.play import run_to
+from skidpad.cockpit.channel_source import ChannelSource, weather_of
+from skidpad.cockpit.replay import Recording
+from skidpad.cockpit.source import Source
+from skidpad.core.errors import ConfigError
+from skidpad.core.names import path_part
+from skidpad.core.run import ActorMode, Passenger, RunSpec, Scenario
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.recording.hazards import TEXT_FILE, HazardRecord, read_hazards
+from skidpad.recording.logfiles import TICKS
+from skidpad.scenarios.hazard_export import export_hazard
+from skidpad.scenarios.writer import OscVersion
+
+RECORDING = ".mcap"
+REPLAYS, SCENARIOS = "replays", "scenarios"  # folders within that of the hazards
+
+
+def opened(path: Path, hazard: str | None = None) -> Source:
+    """What lies at a path. hazard: the id of one, in a folder of hazards."""
+    if (path / TEXT_FILE).is_file():
+        return Recording(played(path, hazard))
+    if hazard is not None:
+        raise ConfigError(f"--id names a hazard, and {path} is no folder of hazards")
+    return ChannelSource(path) if path.suffix == RECORDING else Recording(path)
+
+
+def played(folder: Path, id: str | None) -> Path:
+    """The folder of a run in which a hazard's scenario is played; driven if it is not there yet."""
+    records = {record.id: record for record in read_hazards(folder)}
+    if id is None and len(records) == 1:
+        id = next(iter(records))
+    if id not in records:
+        known = ", ".join(records) or "none"
+        asked = "choose one by --id" if id is None else f"there is no hazard {id!r}"
+        raise ConfigError(f"{folder}: {asked}; there are: {known}")
+    record = records[id]
+    out = folder / REPLAYS / path_part(f"{record.id}-{record.type.value}")
+    if not (out / TICKS).is_file():
+        run_to(run_of(record, folder / SCENARIOS), out)
+    return out
+
+
+def run_of(record: HazardRecord, folder: Path) -> RunSpec:
+    """The run that moves everybody as one channel saw them: the driving one, else the first."""
+    scenario, _ = export_hazard(record, folder, OscVersion.V1_0)
+    course = Scenario(file=str(scenario.resolve()), actors=ActorMode.IDEAL)
+    return RunSpec(
+        driver=Passenger(),
+        course=course,
+        weather=weather_of(record.context),
+        sensors=SensorLevel.OBJECTS,
+        duration=60.0,
+    )

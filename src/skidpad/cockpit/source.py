@@ -1,0 +1,106 @@
+"""What can be replayed: moments in any order, whatever file they come from."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+from skidpad.campaign.drive import Moment
+from skidpad.core.frames import SensorFrame
+from skidpad.core.geometry import Pose
+from skidpad.core.inputs import LampSwitch, Outside
+from skidpad.core.run import Function
+from skidpad.core.setup import DT
+from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
+from skidpad.roads.queries import RoadMap
+
+
+@dataclass(frozen=True, slots=True)
+class Seat:
+    """How the desk stood in a tick."""
+
+    tick: int  # from which on
+    outside: Outside
+    manual: bool
+    method: str
+    functions: tuple[Function, ...] | None
+    lamps: LampSwitch | None
+
+
+class Said:
+    """What drove then, as far as it was logged."""
+
+    def __init__(self, report: StackReport, mode: str) -> None:
+        self.report, self.mode = report, mode
+
+    def begin(self, table: ActorTable) -> None:
+        """Nothing begins."""
+
+    def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
+        """Nothing is driven."""
+        raise NotImplementedError
+
+
+class Source(Protocol):
+    """A run that was driven."""
+
+    folder: Path  # beside which films are written
+    map: RoadMap
+    seed: int
+    step: int  # ticks between two moments
+    marks: list[tuple[int, str, str]]  # tick, kind and text of what is worth a mark
+
+    @property
+    def table(self) -> ActorTable:
+        """Who takes part."""
+        ...
+
+    @property
+    def ticks(self) -> int:
+        """How many moments there are."""
+        ...
+
+    def tick(self, k: int) -> int:
+        """When moment k was."""
+        ...
+
+    def moment(self, k: int) -> Moment:
+        """Moment k, 0 <= k < ticks."""
+        ...
+
+    def seat(self, k: int) -> Seat:
+        """How the desk stood in moment k."""
+        ...
+
+    def crash(self, k: int) -> Pose | None:
+        """Where the ego's crash that is nearest in time happened; None: there was none."""
+        ...
+
+    def collisions(self, k: int) -> int:
+        """How many contacts of the ego there were up to moment k."""
+        ...
+
+    def curves(self) -> tuple[list[float], list[int | None]]:
+        """Speed in km/h and acting tier of about a thousand moments."""
+        ...
+
+
+def index_at(source: Source, tick: int) -> int:
+    """The first moment that is not before a tick, or the last one."""
+    return min(bisect_left(range(source.ticks), tick, key=source.tick), source.ticks - 1)
+
+
+def timeline(source: Source) -> dict[str, Any]:
+    """What the page draws along the time: speed, events, tiers."""
+    speed, tier = source.curves()
+    return {
+        "first": source.tick(0),
+        "last": source.tick(source.ticks - 1),
+        "step": source.step,
+        "dt": DT,
+        "speed": speed,
+        "tier": tier,
+        "events": source.marks,
+    }

@@ -1,11 +1,15 @@
 """The cockpit in a real browser: keys, switches, taking over, two tabs, replay."""
 
+from dataclasses import replace
+
 import pytest
 from commands import PATIENCE, running
 
 from runs import adas_run
+from skidpad.campaign.cast import stage_of
 from skidpad.campaign.desk import Desk, Recorded
 from skidpad.campaign.desk_run import drive_at_desk
+from skidpad.campaign.drive import Timer
 from skidpad.campaign.rerun import desk_of, first_ticks
 from skidpad.campaign.run import run
 from skidpad.campaign.stored import read_run
@@ -118,7 +122,9 @@ def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, t
     last = next(one for one in reversed(done) if isinstance(one, Functions))
     assert Function.LIMITER in last.on
     stored = read_log(folder)
-    again = run(spec, ticks=len(stored), desk=desk_of(folder, spec)).log
+    stage = stage_of(spec)
+    stage = replace(stage, script=Timer(len(stored), stage.script))
+    again = run(spec, stage=stage, desk=desk_of(folder, spec)).log
     n = len(stored)
     assert log_hash(first_ticks(again, n)) == log_hash(first_ticks(stored, n))
 

@@ -1,5 +1,6 @@
 """Manoeuvres that show how far the vehicle can be trusted; `python tools/vehicle_validation.py DIR`
-draws the figures of docs/physics.md. The comparison needs commonroad-vehicle-models (extra `test`).
+draws the figures of docs/physics.md and prints its tables of manoeuvres. The comparison needs
+commonroad-vehicle-models (extra `test`).
 """
 
 from __future__ import annotations
@@ -15,10 +16,26 @@ from numpy.typing import NDArray
 from skidpad.core.constants import G
 from skidpad.core.errors import MissingExtra
 from skidpad.core.geometry import Pose, kmh_from_mps, mps_from_kmh
+from skidpad.physics.avoidance import ENDS, Lanes, attempts, highest, through
 from skidpad.physics.fleet import Fleet
 from skidpad.physics.grip import GripParams
+from skidpad.physics.manoeuvres import (
+    DWELL,
+    DWELL_FREQUENCY,
+    DWELL_SPEED,
+    MU,
+    RATIOS,
+    Bench,
+    dwell_steer,
+    dwell_unit,
+    lateral_limit,
+    pedals_in_turn,
+    sine_with_dwell,
+    time_to_speed,
+    understeer,
+)
 from skidpad.physics.stopping import stops
-from skidpad.physics.types import EGO_TYPE, Drive, VehicleType, vehicle_type
+from skidpad.physics.types import EGO_TYPE, Drive, VehicleType, traffic_types, vehicle_type
 from skidpad.physics.vehicle import steer_share
 
 Floats = NDArray[np.float64]
@@ -187,8 +204,96 @@ def _spin_figure(axes: Any) -> None:
     axes.legend(fontsize=8)
 
 
+def _dwell_figure(axes: Any) -> None:
+    kind = vehicle_type(EGO_TYPE)
+    unit, end = dwell_unit(kind), 1.0 / DWELL_FREQUENCY + DWELL
+    for stability, style in ((True, "-"), (False, "--")):
+        bench = Bench([kind] * 3, DWELL_SPEED, stability=stability)
+        amplitudes = np.array([2.0, 5.0, 9.0])
+        while bench.ticks * TICK < end + 2.0:
+            bench.step(unit * amplitudes * dwell_steer(bench.ticks * TICK))
+        t = bench.trace()
+        for i, colour in enumerate(("tab:blue", "tab:orange", "tab:green")):
+            label = f"{amplitudes[i]:g}, {'with' if stability else 'without'} control"
+            axes.plot(t.t, np.degrees(t.yaw_rate[:, i]), style, color=colour, label=label)
+    for after, share in RATIOS:
+        axes.axvline(end + after, color="black", lw=0.6, ls=":")
+        axes.text(end + after, 32.0, f" {share:.0%}", fontsize=8)
+    axes.set(xlabel="time, s", ylabel="yaw rate, deg/s", title="sine with dwell at 80 km/h")
+    axes.grid(alpha=0.25)
+    axes.legend(fontsize=8)
+
+
+def _avoidance_figure(axes: Any) -> None:
+    kind, lanes = vehicle_type(EGO_TYPE), Lanes.of(vehicle_type(EGO_TYPE).width)
+    for k in range(3):
+        for y in (lanes.right[k], lanes.left[k]):
+            axes.plot(ENDS[2 * k : 2 * k + 2], [y, y], color="black")
+    for stability, colour in ((True, "tab:blue"), (False, "tab:orange")):
+        t = attempts(kind, 68.0, stability=stability)
+        passed = through(kind, t)
+        best = (
+            int(np.argmax(passed)) if passed.any() else int(np.argmin(np.abs(t.slip).max(axis=0)))
+        )
+        word = "with" if stability else "without"
+        label = f"{word} control: {int(passed.sum())} of {len(passed)} drivers through"
+        axes.plot(t.x[:, best], t.y[:, best], color=colour, label=label)
+    axes.set(xlabel="x, m", ylabel="y, m", title="obstacle avoidance at 68 km/h", xlim=(-15, 75))
+    axes.grid(alpha=0.25)
+    axes.legend(fontsize=8)
+
+
+def _turn_figure(axes: Any) -> None:
+    shares = (0.4, 0.5, 0.6, 0.7, 0.8)
+    for brake, colour in ((0.0, "tab:blue"), (0.2, "tab:orange"), (1.0, "tab:green")):
+        for stability, style in ((True, "-"), (False, "--")):
+            slip = [
+                pedals_in_turn(vehicle_type(EGO_TYPE), s * MU * G, (brake,), stability=stability)[0]
+                for s in shares
+            ]
+            label = f"pedal {brake:g}, {'with' if stability else 'without'} control"
+            values = [min(float(np.degrees(p.slip)), 60.0) for p in slip]
+            axes.plot(shares, values, style, color=colour, label=label)
+    axes.set(xlabel="lateral acceleration over mu g", ylabel="largest side slip, deg (60: spun)",
+             title="lift-off and brakes on R 100 m")  # fmt: skip
+    axes.grid(alpha=0.25)
+    axes.legend(fontsize=8)
+
+
+def table() -> str:
+    """What the standards' manoeuvres give for every passenger car, as Markdown."""
+    heads = (
+        "car", "understeer, deg/g; characteristic speed", "lateral limit, mu 0.9", "0 to 100 km/h",
+        "sine with dwell passed to, with / without", "obstacle avoidance, with / without",
+    )  # fmt: skip
+    rows = [f"| {' | '.join(heads)} |", "|---" * len(heads) + "|"]
+    for name in traffic_types():
+        kind = vehicle_type(name)
+        gradient = understeer(kind)
+        speed = kmh_from_mps(float(np.sqrt(kind.wheelbase / gradient)))
+        dwell = [_stable_to(kind, stability) for stability in (True, False)]
+        cones = [highest(kind, stability=stability) for stability in (True, False)]
+        rows.append(
+            f"| {kind.title} | {np.degrees(gradient) * G:.1f}; {speed:.0f} km/h "
+            f"| {lateral_limit(kind) / G:.2f} g | {time_to_speed(kind, mps_from_kmh(100.0)):.1f} s "
+            f"| {dwell[0]:g} / {dwell[1]:g} | {cones[0]} / {cones[1]} km/h |"
+        )
+    return "\n".join(rows)
+
+
+def _stable_to(kind: VehicleType, stability: bool) -> float:
+    """Largest amplitude up to 9 below which every sine with dwell is passed."""
+    amplitudes = np.arange(1.5, 9.1, 0.5).tolist()
+    passed = 0.0
+    for done in sine_with_dwell(kind, amplitudes, stability=stability):
+        if not (done.stable and done.responsive):
+            break
+        passed = done.amplitude
+    return passed
+
+
 def main(folder: Path) -> None:
-    """Write the figures into `folder`."""
+    """Write the figures into `folder`, print the table."""
     import matplotlib as mpl
 
     mpl.use("Agg")
@@ -197,6 +302,7 @@ def main(folder: Path) -> None:
     pages = {
         "stopping": (_stopping_figure,),
         "handling": (_step_figure, _brake_figure, _spin_figure),
+        "limits": (_dwell_figure, _turn_figure, _avoidance_figure),
     }
     folder.mkdir(parents=True, exist_ok=True)
     for name, panels in pages.items():
@@ -206,6 +312,7 @@ def main(folder: Path) -> None:
             panel(place)
         figure.savefig(folder / f"physics_{name}.png", dpi=75)
         plt.close(figure)
+    print(table())
 
 
 if __name__ == "__main__":

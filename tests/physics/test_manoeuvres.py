@@ -34,6 +34,11 @@ def test_cars_understeer(kind):
     assert 1.5 < degrees(understeer(kind)) * G < 2.6
 
 
+@pytest.mark.parametrize("kind", CARS, ids=by_title)
+def test_no_car_corners_harder_than_it_has_grip(kind):
+    assert 0.8 * 0.9 * G < lateral_limit(kind) < 0.9 * G
+
+
 @pytest.mark.parametrize("mu", [0.9, 0.3])
 def test_the_circle_s_limit_is_below_friction_and_the_front_axle_s(mu):
     assert 0.8 * mu * G < lateral_limit(EGO, mu) < mu * G

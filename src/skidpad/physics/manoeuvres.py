@@ -168,8 +168,9 @@ def understeer(kind: VehicleType, a_low: float = 1.0, a_high: float = 4.0) -> fl
 def lateral_limit(kind: VehicleType, mu: float = MU) -> float:
     """Largest steady lateral acceleration on the circle in m/s^2."""
     bench, _ = circle(kind, np.linspace(0.6, 1.0, 9) * mu * G, mu)
-    held = np.abs(bench.fleet.slip_angles()) < SPUN
-    return float((bench.fleet.states.yaw_rate * bench.v)[held].max())
+    rate, v = bench.fleet.states.yaw_rate, bench.v
+    held = (np.abs(bench.fleet.slip_angles()) < SPUN) & (rate * RADIUS < 1.05 * v)
+    return float((rate * v)[held].max())
 
 
 def pedals_in_turn(

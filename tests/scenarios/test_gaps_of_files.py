@@ -78,6 +78,21 @@ storyboardElementRef="nothing" state="completeState"/>"""),
     assert begun(told(tmp_path, stories=story(events)), "probe") == pytest.approx(1.0, abs=0.051)
 
 
+def test_a_private_action_that_holds_nothing_does_nothing(tmp_path):
+    empty = "<PrivateAction></PrivateAction>"
+    parts = at("ego", -3, 100).replace("</Private>", f"{empty}</Private>") + at("other", -1, 120)
+    result = told(tmp_path, init=parts, stories=story(event("e", empty, time(1.0))), end=2.0)
+    assert result.of("ego")[-1].speed == 10.0
+    assert begun(result, "e") == pytest.approx(1.0)
+
+
+def test_a_vehicle_without_a_largest_acceleration_has_none(tmp_path):
+    cars = (vehicle("ego") + vehicle("other")).replace(' maxAcceleration="10"', "")
+    jump = story(event("e", private(speed(to(40), "linear", 25, "rate")), time(1.0)))
+    rows = told(tmp_path, entities=cars, stories=jump, end=3.0).of("other")
+    assert rows[40].speed == pytest.approx(35.0)
+
+
 def test_entities_that_trigger_an_event_take_part_in_it(tmp_path):
     near = by_entity(
         f'<ReachPositionCondition tolerance="3"><Position>{on_lane(-1, 150)}</Position>'
@@ -203,3 +218,11 @@ def test_a_road_without_a_lane_leaves_a_straight_one(tmp_path):
     scenario = compiled(tmp_path, road='<LogicFile filepath="empty.xodr"/>', init=place)
     assert scenario.map_name == "straight"
     assert any("no driving lane" in str(f) for f in scenario.findings)
+
+
+def test_a_road_in_a_namespace_is_a_road(tmp_path):
+    text = ROAD.replace("GRADE", "0").replace("<OpenDRIVE>", '<OpenDRIVE xmlns="http://x.org">')
+    (tmp_path / "hill.xodr").write_text(text)
+    place = init("ego", teleport(on_lane(-1, 50)))
+    scenario = compiled(tmp_path, road='<LogicFile filepath="hill.xodr"/>', init=place)
+    assert scenario.start.entities["ego"].place.pose.y == pytest.approx(-1.75)

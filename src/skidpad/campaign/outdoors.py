@@ -159,3 +159,26 @@ def _air(e: Environment) -> dict[str, float]:
     if e.temperature_c is not None:  # of the road too; assumption
         found["air_temperature_c"] = found["road_temperature_c"] = e.temperature_c
     return found
+
+
+def environment_of(weather: Weather) -> Environment:
+    """What a file can say of a weather: `weather_of` makes it of that again, as near as words are.
+
+    The friction scale is 1: grip follows from the weather, and a scale would count twice.
+    """
+    water = weather.wetness, weather.precipitation_deposits
+    nearest = min(
+        WATER, key=lambda w: sum(abs(a - b) for a, b in zip(WATER[w], water, strict=True))
+    )
+    return Environment(
+        name=weather.name,
+        clouds=weather.cloudiness / 100.0,
+        sun_elevation_deg=weather.sun_altitude_deg,
+        sun_azimuth_deg=weather.sun_azimuth_deg,
+        fall=Fall.RAIN if weather.precipitation > 0.0 else Fall.DRY,
+        fall_mm_h=RAIN_FULL * weather.precipitation / 100.0,
+        visual_range=V_CLEAR * (V_FOG / V_CLEAR) ** (weather.fog_density / 100.0),
+        temperature_c=weather.air_temperature_c,
+        wetness=nearest,
+        friction_scale=1.0,
+    )

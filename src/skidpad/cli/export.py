@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from skidpad.cli.hazards import Osc
+
+if TYPE_CHECKING:
+    from skidpad.scenarios.environment import Environment
 
 
 def export(
@@ -25,10 +28,24 @@ def export(
     log = read_log(run)
     folder = run / "scenario" if out is None else out
     name = run.resolve().name
-    scenario, road, known = export_run(log, folder, name, _roads(run), OscVersion(osc.value))
+    scenario, road, known = export_run(
+        log, folder, name, _roads(run), OscVersion(osc.value), _environment(run)
+    )
     typer.echo(f"{scenario} with {road.name}")
     if not known:
         typer.echo(f"the road {log.header.map!r} is not there: a straight one lies under the run")
+
+
+def _environment(run: Path) -> Environment | None:
+    """Weather and road of the run, where its description is there."""
+    from skidpad.campaign.outdoors import environment_of
+    from skidpad.campaign.stored import read_run
+    from skidpad.core.errors import InputError
+
+    try:
+        return environment_of(read_run(run.resolve()).weather)
+    except InputError:
+        return None
 
 
 def _roads(run: Path) -> list[Path]:

@@ -185,7 +185,7 @@ def _performance(node: Node) -> Performance:
     found = node.find("Performance")
     if found is None:
         return Performance()
-    most = (found.limit(k) for k in ("maxSpeed", "maxAcceleration", "maxDeceleration"))
+    most = (found.limit(k, inf) for k in ("maxSpeed", "maxAcceleration", "maxDeceleration"))
     v, a, b = (m if m > 0.0 else inf for m in most)
     return Performance(v, a, b)
 

@@ -14,6 +14,7 @@ from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.recording.files import write_bytes
 from skidpad.recording.runlog import RunLog
 from skidpad.roads.bundled import FOLDER, load_map
+from skidpad.scenarios.environment import Environment
 from skidpad.scenarios.hazard_export import road_under
 from skidpad.scenarios.tracks import Track
 from skidpad.scenarios.writer import OscVersion, Sheet, write_element, write_scenario
@@ -38,9 +39,11 @@ def export_run(
     stem: str,
     roads: Iterable[Path] = (),
     version: OscVersion = OscVersion.V1_2,
+    environment: Environment | None = None,
 ) -> tuple[Path, Path, bool]:
     """Write STEM.xosc and STEM.xodr into `folder`; returns them, and whether the road is the run's.
 
+    environment: weather and road of the run, where they are known.
     roads: files of which one may be the run's road; bundled ones are known. Without it a straight
     road lies under everything. InputError for a log without a moment.
     """
@@ -63,6 +66,7 @@ def export_run(
         parking=parking,
         version=version,
         sparse=True,
+        environment=environment,
     )
     write_scenario(scenario_file, entities, sheet)
     return scenario_file, road_file, road is not None

@@ -20,7 +20,9 @@ from scenariogeneration import xosc
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.recording.files import write_bytes
 from skidpad.scenarios.entities import GHOST
+from skidpad.scenarios.environment import Environment
 from skidpad.scenarios.pieces import Vertex, pieces
+from skidpad.scenarios.sky_writer import environment_action
 from skidpad.scenarios.tracks import Track
 
 HEIGHTS = {SemanticClass.TRUCK: 3.5, SemanticClass.BUS: 3.2, SemanticClass.PEDESTRIAN: 1.75}
@@ -70,6 +72,7 @@ class Sheet:
     parking: tuple[float, float, float] = (0.0, 0.0, 0.0)  # x, y in m, heading in rad
     version: OscVersion = OscVersion.V1_2
     sparse: bool = False  # leave out every vertex that says nothing new
+    environment: Environment | None = None  # weather, time and road; None: not said
 
     @property
     def old(self) -> bool:
@@ -97,6 +100,8 @@ def _scenario(entities: Sequence[Track], sheet: Sheet) -> ElementTree.Element:
     xosc.VersionBase().setVersion(minor=sheet.version.minor)  # of the whole library
     objects, init = xosc.Entities(), xosc.Init()
     act = xosc.Act("Act", _after(0.0, sheet))
+    if sheet.environment is not None:
+        init.add_global_action(environment_action(sheet.environment, old=sheet.old))
     for k, track in enumerate(entities):
         objects.add_scenario_object(track.name, _entity(track, sheet))
         _initial(init, track, sheet, k)

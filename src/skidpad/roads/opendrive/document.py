@@ -192,6 +192,12 @@ class Reader:
         return self.number(node, "max") * factor[unit]
 
 
+def _without_namespace(root: Node) -> None:
+    """Names as the standard has them, where a tool has put them into a namespace."""
+    for element in root.iter("{*}*"):
+        element.tag = etree.QName(element).localname
+
+
 def parse(text: bytes, file: str) -> Document:
     """Records of an OpenDRIVE file; without entities, networks or huge trees."""
     if len(text) > SIZE_MAX:
@@ -201,6 +207,8 @@ def parse(text: bytes, file: str) -> Document:
         root = etree.fromstring(text, parser)
     except etree.XMLSyntaxError as error:
         raise FileError(f"{file}: not XML: {' '.join(str(error).split())}") from None
+    if str(root.tag).endswith("}OpenDRIVE"):
+        _without_namespace(root)
     if root.tag != "OpenDRIVE":
         raise FileError(f"{file}: not OpenDRIVE, its root element is <{root.tag}>")
     if root.getroottree().docinfo.internalDTD is not None:

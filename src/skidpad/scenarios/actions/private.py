@@ -23,6 +23,7 @@ from skidpad.scenarios.actions.routing import (
 from skidpad.scenarios.actions.speed import compile_profile, compile_speed
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
+from skidpad.scenarios.findings import Kind
 
 Compile = Callable[[Node, Context], PrivateAction]
 
@@ -50,7 +51,10 @@ GROUPS = ("LongitudinalAction", "LateralAction", "RoutingAction", "AppearanceAct
 
 
 def private_action(node: Node, ctx: Context) -> PrivateAction:
-    """The action inside a <PrivateAction>."""
+    """The action inside a <PrivateAction>; one that holds none is over as it begins."""
+    if next(node.children(), None) is None:
+        ctx.findings.append(node.finding("holds no action: nothing is done", Kind.NOTE))
+        return controllers.Several(())
     inner = node.only()
     if inner.tag in GROUPS:
         inner = inner.only()

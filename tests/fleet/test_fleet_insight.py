@@ -7,13 +7,17 @@ import itertools
 import json
 from contextlib import closing, contextmanager
 
+import duckdb
 import numpy as np
 import pytest
 
 from fleet_world import NOW, World, make_world, packed, record
 from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.statistics import ratio_interval
 from skidpad.fleet.insight.research import HOUR, K, export
-from skidpad.fleet.insight.trends import compact
+from skidpad.fleet.insight.trends import compact, trends
+from skidpad.fleet.insight.warehouse import TAKE
+from skidpad.fleet.service import Places, open_fleet
 from skidpad.fleet.store.accounts import add_vehicle
 
 
@@ -47,14 +51,37 @@ def test_trends_hold_what_was_sent_and_no_more_than_ones_own(world):
     assert [t["share"] for t in later] == [300 / 1800, 0.0]
 
 
-def test_a_kill_between_file_and_event_counts_nothing_twice(lite, monkeypatch):
+def test_a_kill_while_batches_are_summed_up_counts_nothing_twice(lite, monkeypatch):
     send_rows(lite, "red-1", "key-aaaa-1", row(0, 60))
-    monkeypatch.setattr("skidpad.fleet.insight.trends.add_event", lambda *a, **k: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
+    monkeypatch.setattr("skidpad.fleet.insight.warehouse.TAKE", TAKE + "; SELECT error('killed')")
+    with pytest.raises(duckdb.Error):
         compact(lite.fleet)
     monkeypatch.undo()
     (trend,) = lite.get("axle", "/api/v1/trends").json()["indicators"]
     assert trend["cycles"] == 600
+
+
+def test_without_its_file_the_trends_are_made_again(tmp_path):
+    with closing(make_world(tmp_path / "data", None)) as one:
+        send_rows(one, "red-1", "key-aaaa-1", row(0, 60))
+        before = one.get("axle", "/api/v1/trends").json()
+    (tmp_path / "data" / "trends.duckdb").unlink()
+    with closing(open_fleet(Places(data=tmp_path / "data"))) as fleet:
+        assert compact(fleet) == 1
+        who = one.accounts["axle"].principal
+        assert [t.share for t in trends(fleet, who)] == [t["share"] for t in before["indicators"]]
+        assert compact(fleet) == 0
+
+
+def test_a_batch_from_before_the_clock_went_back_is_found_at_the_next_start(tmp_path):
+    with closing(make_world(tmp_path / "data", None)) as one:
+        send_rows(one, "red-1", "key-aaaa-1", row(0, 60))
+        assert compact(one.fleet) == 1
+        one.clock.now -= 10 * 86400.0
+        send_rows(one, "red-1", "key-aaaa-2", row(0, 60))
+        assert compact(one.fleet) == 0
+    with closing(open_fleet(Places(data=tmp_path / "data"))) as fleet:
+        assert compact(fleet) == 1
 
 
 def test_hazards_per_hour_count_the_drives_without_any(world):
@@ -192,3 +219,24 @@ def test_six_vehicles_that_agree_challenge_a_claim(tmp_path):
             send_rows(many, f"car-{k}", f"car-key-{k}", *HALF)
         found = {c["id"]: c for c in many.get("axle", "/api/v1/safety-case").json()}
         assert (found["S1"]["verdict"], found["S4"]["verdict"]) == ("challenged", "open")
+
+
+def test_an_interval_over_vehicles_holds_the_share_that_they_were_drawn_with():
+    """Shares of vehicles differ (beta), cycles are binomial: 95 % limits from 5 vehicles on."""
+    rng = np.random.default_rng(7)
+    for vehicles in (5, 20, 100):
+        held = 0
+        for _ in range(600):
+            n = rng.integers(300, 900, vehicles).astype(float)
+            y = rng.binomial(n.astype(int), rng.beta(4.0, 12.0, vehicles)).astype(float)
+            products = (float(y @ y), float(n @ y), float(n @ n))
+            limits = ratio_interval(vehicles, (float(y.sum()), float(n.sum())), products)
+            held += limits.low <= 0.25 <= limits.high
+        assert held / 600 >= 0.92, vehicles
+
+
+def test_nothing_seen_in_few_vehicles_is_no_proof():
+    none = ratio_interval(10, (0.0, 6e6), (0.0, 0.0, 3.6e12))
+    assert none.low == 0.0
+    assert none.high == pytest.approx(1.0 - 0.025 ** (1 / 10))
+    assert ratio_interval(1, (5.0, 10.0), (25.0, 50.0, 100.0)) == (0.0, 1.0)

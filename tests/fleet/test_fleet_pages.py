@@ -68,7 +68,7 @@ def filled(data: Path) -> dict[str, str]:
         name = ("red-1", "red-2", "blue-1")[k]
         hazards = [record(10 * k + i, (120.0 + i, 30.0)) for i in range(3)]
         assert world.send(name, packed(*hazards), f"batch-key-{k}").status_code == 200
-        rows = gzip.compress(json.dumps(row(0, 60 * (k + 1))).encode())
+        rows = gzip.compress(json.dumps(row(0, 200 + 20 * k)).encode())
         assert world.send(name, rows, f"rows-key-{k}", "indicators").status_code == 200
     world.post("red operator", "/api/v1/analyses")
     tokens = {name: account.token for name, account in world.accounts.items()}

@@ -157,3 +157,26 @@ def test_an_analysis_on_demand_is_kept_and_read_by_its_own_tenant(world):
         assert world.get(other, "/api/v1/clusters").json() == []
     again = world.post("axle", "/api/v1/analyses").json()
     assert again["clusters"] == 2
+
+
+def test_the_service_looks_by_itself_and_only_when_something_came(world):
+    from skidpad.fleet.upkeep import REST_S, Upkeep
+
+    upkeep = Upkeep(world.fleet)
+    upkeep.work()
+    assert world.get("red operator", "/api/v1/clusters").json() == []
+    hazards = [record(k, (120.0 + k, 30.0)) for k in range(4)]
+    world.send("red-1", packed(*hazards), "batch-key-1")
+    upkeep.work()
+    first = world.get("red operator", "/api/v1/clusters").json()
+    assert [len(c["members"]) for c in first] == [4]
+    assert [len(c["members"]) for c in world.get("axle", "/api/v1/clusters").json()] == [4]
+    assert world.get("blue operator", "/api/v1/clusters").json() == []
+    world.clock.now += 2 * REST_S
+    upkeep.work()
+    again = world.get("red operator", "/api/v1/clusters").json()
+    assert [c["analysis"] for c in again] == [c["analysis"] for c in first]
+    world.send("red-1", packed(record(9, (121.0, 30.0))), "batch-key-2")
+    upkeep.work()
+    (grown,) = world.get("red operator", "/api/v1/clusters").json()
+    assert len(grown["members"]) == 5

@@ -122,6 +122,32 @@ def bootstrap_interval(
     return Interval(float(low), float(high))
 
 
+def ratio_interval(
+    clusters: int,
+    sums: tuple[float, float],
+    products: tuple[float, float, float],
+    confidence: float = CONFIDENCE,
+) -> Interval:
+    """Limits of a share sum(y) / sum(x) of cycles that come in clusters, 0 <= y <= x.
+
+    clusters: how many, say vehicles; sums: of y and x over clusters; products: of y y, x y, x x.
+    By Taylor linearisation, var = k / (k - 1) sum((y - R x)^2) / sum(x)^2, with Student's t. Source:
+    Woodruff (1971), JASA 66, 411-414; SAS/STAT, SURVEYMEANS, Ratio. Where nothing was seen (y = 0
+    everywhere) a cluster counts as one observation: whatever the spread of shares over clusters,
+    none is seen in k of them with a chance of at most (1 - R)^k. A single cluster says nothing.
+    """
+    (y, x), (yy, xy, xx) = sums, products
+    if clusters < 2 or x <= 0.0:
+        return Interval(0.0, 1.0)
+    if y in (0.0, x):
+        return clopper_pearson(0 if y == 0.0 else clusters, clusters, confidence)
+    share = y / x
+    spread = max(yy - 2.0 * share * xy + share * share * xx, 0.0)
+    error = float(np.sqrt(clusters / (clusters - 1) * spread)) / x
+    reach = float(stats.t.ppf(0.5 + 0.5 * confidence, clusters - 1)) * error
+    return Interval(max(share - reach, 0.0), min(share + reach, 1.0))
+
+
 def event_rate(counts: Sequence[int], exposures: Sequence[float] | None = None) -> Rate:
     """Rate of events over runs: exact Poisson of a single run, else score limits.
 

@@ -12,6 +12,7 @@ import uvicorn
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.build import make_site
 from skidpad.fleet.site.dashboard import MapLines
+from skidpad.fleet.upkeep import Upkeep
 from skidpad.pages.guard import Door, Guard
 from skidpad.pages.server import bound, host_headers
 from skidpad.pages.sessions import Sessions
@@ -57,6 +58,11 @@ def run(fleet: Fleet, listen: Listen, lines: MapLines, say: Callable[[str], None
     scheme = "https" if listen.certificate else "http"
     host = f"[{listen.host}]" if ":" in listen.host else listen.host
     say(f"the fleet is at {scheme}://{host}:{port}")
+    upkeep = Upkeep(fleet)
     fleet.dispatcher.start()
-    with one:
-        uvicorn.Server(config).run(sockets=[one])
+    upkeep.start()
+    try:
+        with one:
+            uvicorn.Server(config).run(sockets=[one])
+    finally:
+        upkeep.close()

@@ -15,6 +15,7 @@ from skidpad.fleet.alerting.hub import Hub
 from skidpad.fleet.alerting.orders import Signer
 from skidpad.fleet.alerting.relays import Relay
 from skidpad.fleet.blobs import Blobs
+from skidpad.fleet.insight.warehouse import Warehouse
 from skidpad.fleet.store.engine import migrate, open_engine, sqlite_url
 from skidpad.fleet.store.intake import Intake
 from skidpad.fleet.updates.repository import Repository
@@ -46,6 +47,7 @@ class Fleet:
     hub: Hub
     dispatcher: Dispatcher
     signer: Signer
+    warehouse: Warehouse
     limits: Limits = field(default_factory=Limits)
     exporter: Exporter | None = None  # handed in: this house knows no scenarios
     owners: dict[str, tuple[str, str]] = field(default_factory=dict)  # tenants of a vehicle: facts
@@ -62,6 +64,7 @@ class Fleet:
         """Commit what was submitted and let go of everything."""
         self.dispatcher.close()
         self.intake.close()
+        self.warehouse.close()
         self.engine.dispose()
 
 
@@ -74,6 +77,7 @@ def open_fleet(
 ) -> Fleet:
     """Open the store at `places`, made or brought to this version where needed."""
     engine = open_store(places)
+    warehouse = Warehouse(places.data / "trends.duckdb")  # may refuse, so before any thread begins
     blobs = Blobs(places.blobs or str(places.data.absolute() / "blobs"))
     hub = Hub()
     return Fleet(
@@ -85,6 +89,7 @@ def open_fleet(
         hub=hub,
         dispatcher=Dispatcher(engine, hub, clock, relays),
         signer=Signer(places.data / "keys"),
+        warehouse=warehouse,
         limits=limits or Limits(),
         exporter=exporter,
     )

@@ -20,17 +20,17 @@ PlaceReader = Annotated[Principal, Depends(Needs(Action.READ_PLACES))]
 Researcher = Annotated[Principal, Depends(Needs(Action.READ_RESEARCH))]
 CaseReader = Annotated[Principal, Depends(Needs(Action.READ_SAFETY_CASE))]
 Visitor = Annotated[Principal, Depends(Needs(Action.VISIT))]
-Stretch = Annotated[float, Query(ge=60.0, le=1e8, allow_inf_nan=False)]
+Days = Annotated[int, Query(ge=1, le=3660)]  # of a stretch
 router = APIRouter(prefix="/api/v1", tags=["insight"])
 
 
 @router.get("/trends")
-def read_trends(request: Request, who: Analyst, stretch_s: Stretch = 86400.0) -> dict[str, Any]:
+def read_trends(request: Request, who: Analyst, days: Days = 1) -> dict[str, Any]:
     """Indicators over time with intervals, and hazards per hour."""
     fleet = fleet_of(request)
     with fleet.engine.connect() as connection:
         rates = [asdict(rate) for rate in hazard_rates(connection, who)]
-    return {"indicators": [asdict(t) for t in trends(fleet, who, stretch_s)], "hazards": rates}
+    return {"indicators": [asdict(t) for t in trends(fleet, who, days)], "hazards": rates}
 
 
 @router.get("/places")

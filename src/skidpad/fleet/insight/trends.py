@@ -1,38 +1,30 @@
-"""Indicators of all vehicles over time: batches become Parquet, and DuckDB asks questions of it."""
+"""Indicators of all vehicles over time, with intervals over vehicles, and hazards per hour."""
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-import duckdb
 import msgspec
 import polars as pl
 from sqlalchemy import Connection, func, select
 
-from skidpad.evidence.statistics import Interval, event_rate, ratio_limits
+from skidpad.evidence.statistics import Interval, event_rate, ratio_interval
 from skidpad.fleet.batch import IndicatorRow, rows_of
+from skidpad.fleet.insight.warehouse import DAY, Moments
 from skidpad.fleet.service import Fleet
-from skidpad.fleet.store.events import add_event
 from skidpad.fleet.store.rights import visible
-from skidpad.fleet.store.tables import batches, drives, events, hazards, vehicles
+from skidpad.fleet.store.tables import batches, drives, hazards, vehicles
 from skidpad.fleet.unpacking import unpack
 from skidpad.fleet.words import Kind, Principal, Role
-from skidpad.recording.files import write_parquet
 
-COMPACTED = "compacted"
-SERVICE = "trends"
-GROUP = 500  # batches of one Parquet file
-_LOCK = threading.Lock()
+GROUP = 500  # batches that are taken at once
 SCHEMA = {
-    "manufacturer": pl.String, "operator": pl.String, "vehicle": pl.String, "batch": pl.String,
-    "at": pl.Float64, "minute": pl.Int64, "subject": pl.String, "indicator": pl.String,
-    "n": pl.Int64, "violated": pl.Int64, "mean": pl.Float64, "least": pl.Float64,
-    "greatest": pl.Float64,
+    "manufacturer": pl.String, "operator": pl.String, "vehicle": pl.String, "received": pl.Float64,
+    "indicator": pl.String, "n": pl.Int64, "violated": pl.Int64, "mean": pl.Float64,
 }  # fmt: skip
+READ = ("indicator", "n", "violated", "mean")  # of a row as it was sent
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +35,7 @@ class Trend:
     at: float  # s, beginning of the stretch
     mean: float
     share: float  # of cycles in which it was violated
-    interval: Interval  # of that share, by drawing vehicles anew
+    interval: Interval  # of that share, over vehicles
     vehicles: int
     cycles: int
 
@@ -60,36 +52,29 @@ class HazardRate:
 
 
 def compact(fleet: Fleet) -> int:
-    """Write batches of indicators that are not yet in a Parquet file; how many there were.
-
-    A kill between file and event writes the same file again: its name is that of its first batch.
-    """
-    done = 0
-    with _LOCK:
-        while rows := _pending(fleet):
-            table = pl.concat([_table(fleet, row) for row in rows])
-            write_parquet(folder_of(fleet) / f"{rows[0].id}.parquet", table)
-            at = fleet.clock()
-            with fleet.engine.begin() as connection:
-                for row in rows:
-                    add_event(connection, ("batch", row.id), COMPACTED, (SERVICE, at))
-            done += len(rows)
+    """Sum up the batches of indicators that came since the last time; how many there were."""
+    done, house = 0, fleet.warehouse
+    with house.lock:
+        since, after = house.since(), ""
+        while rows := _batches(fleet, since, after):
+            fresh = house.unknown([row.id for row in rows])
+            new = [row for row in rows if row.id in fresh]
+            if new:
+                table = pl.concat([_table(fleet, row) for row in new])
+                house.take([(row.id, row.at) for row in new], table)
+            done += len(new)
+            since, after = rows[-1].at, rows[-1].id
+        house.complete()
     return done
 
 
-def folder_of(fleet: Fleet) -> Path:
-    """Where the Parquet files lie."""
-    return fleet.data / "trends"
-
-
-def _pending(fleet: Fleet) -> Sequence[Any]:
-    there = select(events.c.number).where(
-        events.c.subject == batches.c.id, events.c.what == COMPACTED
-    )
+def _batches(fleet: Fleet, since: float, after: str) -> Sequence[Any]:
+    """The next batches of indicators in the order of their times and ids."""
+    later = (batches.c.at > since) | ((batches.c.at == since) & (batches.c.id > after))
     query = (
         select(batches, vehicles.c.operator, vehicles.c.manufacturer)
         .join(vehicles, vehicles.c.id == batches.c.vehicle)
-        .where(batches.c.kind == Kind.INDICATORS.value, ~there.exists())
+        .where(batches.c.kind == Kind.INDICATORS.value, batches.c.at >= since, later)
         .order_by(batches.c.at, batches.c.id)
     )
     with fleet.engine.connect() as connection:
@@ -100,54 +85,34 @@ def _table(fleet: Fleet, row: Any) -> pl.DataFrame:
     body = unpack(fleet.blobs.part(row.pack, row.start, row.size), fleet.limits)
     found: list[IndicatorRow] = rows_of(body, fleet.limits)
     plain = [msgspec.structs.asdict(one) | {"indicator": one.indicator.value} for one in found]
-    values = pl.DataFrame(plain, schema={k: v for k, v in SCHEMA.items() if k in _ROW})
+    values = pl.DataFrame(plain, schema={name: SCHEMA[name] for name in READ})
     told = {"manufacturer": row.manufacturer, "operator": row.operator, "vehicle": row.vehicle}
-    more = [pl.lit(v).alias(k) for k, v in (told | {"batch": row.id, "at": row.at}).items()]
+    more = [pl.lit(v).alias(k) for k, v in (told | {"received": row.at}).items()]
     return values.with_columns(more).select(list(SCHEMA))
 
 
-_ROW = frozenset(IndicatorRow.__struct_fields__)
-
-
-def trends(fleet: Fleet, who: Principal, stretch_s: float = 86400.0) -> list[Trend]:
-    """Every indicator by stretches of time, of the vehicles that `who` may see."""
+def trends(fleet: Fleet, who: Principal, days: int = 1) -> list[Trend]:
+    """Every indicator by stretches of `days`, of the vehicles that `who` may see."""
     compact(fleet)
-    if not any(folder_of(fleet).glob("*.parquet")):
-        return []
-    query = f"""
-        SELECT indicator, floor("at" / $stretch) AS slot, vehicle, sum(n)::DOUBLE AS n,
-               sum(violated)::DOUBLE AS violated, sum(mean * n) AS total
-        FROM read_parquet($files) WHERE {_RIGHT.get(who.role, "operator")} = $tenant
-        GROUP BY indicator, slot, vehicle ORDER BY indicator, slot, vehicle
-    """
-    told = {
-        "stretch": stretch_s, "files": str(folder_of(fleet) / "*.parquet"), "tenant": who.tenant,
-    }  # fmt: skip
-    with duckdb.connect() as database:
-        rows = pl.DataFrame(database.execute(query, told).fetchnumpy())
-    return [
-        _trend(str(indicator), float(slot) * stretch_s, group)
-        for (indicator, slot), group in rows.group_by("indicator", "slot", maintain_order=True)
-    ]
+    column = _RIGHT.get(who.role, "operator")
+    return [_trend(m, days) for m in fleet.warehouse.moments(column, who.tenant, days)]
 
 
-_RIGHT = {
+_RIGHT: dict[Role, str | None] = {
     Role.MANUFACTURER: "manufacturer",
-    Role.AUTHORITY: "$tenant",  # all tenants, without vehicles
+    Role.AUTHORITY: None,  # all tenants, without vehicles
 }
 
 
-def _trend(indicator: str, at: float, group: pl.DataFrame) -> Trend:
-    n, violated = group["n"].to_numpy(), group["violated"].to_numpy()
-    cycles = int(n.sum())
+def _trend(m: Moments, days: int) -> Trend:
     return Trend(
-        indicator=indicator,
-        at=at,
-        mean=float(group["total"].sum()) / max(cycles, 1),
-        share=float(violated.sum()) / max(cycles, 1),
-        interval=_within(ratio_limits(violated, n) if cycles else None),
-        vehicles=len(group),
-        cycles=cycles,
+        indicator=m.indicator,
+        at=m.slot * days * DAY,
+        mean=m.total / m.n,
+        share=m.violated / m.n,
+        interval=ratio_interval(m.vehicles, (m.violated, m.n), (m.vv, m.vn, m.nn)),
+        vehicles=m.vehicles,
+        cycles=int(m.n),
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import msgspec
+from starlette.concurrency import run_in_threadpool
 
 from skidpad.fleet.alerting.keeping import Alert, Scene, What, newest_alerts
 from skidpad.fleet.service import Fleet
@@ -22,31 +23,39 @@ ANSWERS = {
 }
 
 
-def fill_alerts(fleet: Fleet, ui: Any, who: Principal) -> None:
+def alerts_of(fleet: Fleet, who: Principal) -> tuple[Principal, list[Alert]]:
+    """Who looks, as long as their credential holds, and the newest alerts that they may see."""
+    now = person(fleet, who.id)
+    with fleet.engine.connect() as connection:
+        return now, newest_alerts(connection, now)
+
+
+def draw_alerts(fleet: Fleet, ui: Any, who: Principal, found: list[Alert]) -> None:
     """The newest alerts; what changes is pushed to the page within half a second."""
-    seen = {"count": -1}
+    topic = f"alerts {who.tenant}"
+    seen = fleet.hub.count(topic)
 
     @ui.refreshable  # type: ignore[untyped-decorator]
-    def cards() -> None:
-        try:
-            now = person(fleet, who.id)
-        except Refused as error:
-            ui.label(str(error))
-            return
-        with fleet.engine.connect() as connection:
-            found = newest_alerts(connection, now)
-        ui.label(f"{sum(not a.closed for a in found)} open alerts")
-        for alert in found[:SHOWN]:
+    def cards(now: Principal, known: list[Alert]) -> None:
+        ui.label(f"{sum(not a.closed for a in known)} open alerts")
+        for alert in known[:SHOWN]:
             _card(fleet, ui, now, alert)
 
-    def look() -> None:
-        count = fleet.hub.count(f"alerts {who.tenant}")
-        if count != seen["count"]:
-            seen["count"] = count
-            cards.refresh()
+    async def look() -> None:
+        nonlocal seen
+        count = fleet.hub.count(topic)
+        if count == seen:
+            return
+        seen = count
+        try:
+            cards.refresh(*await run_in_threadpool(alerts_of, fleet, who))
+        except Refused as error:
+            cards.refresh(who, [])
+            ui.label(str(error))
+            timer.cancel()
 
-    cards()
-    ui.timer(LOOK_S, look)
+    cards(who, found)
+    timer = ui.timer(LOOK_S, look)
 
 
 def _card(fleet: Fleet, ui: Any, who: Principal, alert: Alert) -> None:
@@ -62,16 +71,12 @@ def _card(fleet: Fleet, ui: Any, who: Principal, alert: Alert) -> None:
         ui.label("; ".join(e.what for e in alert.events) or "new").classes("dim")
         if alert.closed:
             return
-        for name, what in (
-            ("Acknowledge", What.ACKNOWLEDGED),
-            ("Escalate", What.ESCALATED),
-            ("Close", What.CLOSED),
-        ):
+        for name, what in ANSWERS.items():
             ui.button(name, on_click=_answering(fleet, ui, who, id, what))
         if who.may(Action.ORDER_STOP):
 
-            def stop() -> None:
-                say(ui, lambda: click_stop(fleet, who.id, id), "stop ordered, good for 2 s")
+            async def stop() -> None:
+                await say(ui, lambda: click_stop(fleet, who.id, id), "stop ordered, good for 2 s")
 
             ui.button("Order to stop", color="red", on_click=stop)
 

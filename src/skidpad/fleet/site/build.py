@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from fastapi import FastAPI
+from starlette.requests import Request
 
 from skidpad.fleet.api.app import add_api
 from skidpad.fleet.service import Fleet
-from skidpad.fleet.site.alerts import fill_alerts
-from skidpad.fleet.site.dashboard import MapLines, fill_dashboard, fill_replay
+from skidpad.fleet.site.alerts import alerts_of, draw_alerts
+from skidpad.fleet.site.dashboard import MapLines, draw_overview, draw_replay, overview, replayed
 from skidpad.fleet.site.frame import STYLE, page
-from skidpad.fleet.site.reports import fill_case, fill_changes, fill_places
-from skidpad.fleet.words import Action
+from skidpad.fleet.site.reports import (
+    case_of,
+    changes_of,
+    draw_case,
+    draw_changes,
+    draw_places,
+    places_of,
+)
+from skidpad.fleet.words import Action, Principal
 from skidpad.pages.sessions import Sessions
 from skidpad.pages.site import site
 
@@ -22,27 +33,24 @@ def make_site(fleet: Fleet, lines: MapLines, sessions: Sessions) -> FastAPI:
         add_api(app, fleet)
         app.state.sessions = sessions
 
+    def read(what: Callable[..., Any]) -> Callable[[Principal, Request], Any]:
+        return lambda who, _: what(fleet, who)
+
     pages = {
         "/": page(
             fleet, Action.READ_TRENDS, "Fleet",
-            lambda ui, who, _: fill_dashboard(fleet, lines, ui, who),
+            lambda who, _: overview(fleet, lines, who), draw_overview,
         ),
         "/replay/{hazard}": page(
             fleet, Action.READ_HAZARDS, "Replay",
-            lambda ui, who, request: fill_replay(fleet, ui, who, request),
+            lambda who, request: replayed(fleet, lines, who, request), draw_replay,
         ),
         "/alerts": page(
-            fleet, Action.READ_ALERTS, "Alerts", lambda ui, who, _: fill_alerts(fleet, ui, who)
+            fleet, Action.READ_ALERTS, "Alerts", read(alerts_of),
+            lambda ui, found: draw_alerts(fleet, ui, *found),
         ),
-        "/places": page(
-            fleet, Action.READ_PLACES, "Places", lambda ui, who, _: fill_places(fleet, ui, who)
-        ),
-        "/case": page(
-            fleet, Action.READ_SAFETY_CASE, "Safety case",
-            lambda ui, who, _: fill_case(fleet, ui, who),
-        ),
-        "/changes": page(
-            fleet, Action.READ_CHANGES, "Changes", lambda ui, who, _: fill_changes(fleet, ui, who)
-        ),
+        "/places": page(fleet, Action.READ_PLACES, "Places", read(places_of), draw_places),
+        "/case": page(fleet, Action.READ_SAFETY_CASE, "Safety case", read(case_of), draw_case),
+        "/changes": page(fleet, Action.READ_CHANGES, "Changes", read(changes_of), draw_changes),
     }  # fmt: skip
     return site("Skidpad fleet", pages, routes=routes, style=STYLE)

@@ -3,42 +3,65 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from starlette.requests import Request
 
 from skidpad.evidence.statistics import interval_text, share_text
-from skidpad.fleet.insight.trends import Trend, hazard_rates, trends
+from skidpad.fleet.insight.trends import HazardRate, Trend, hazard_rates, trends
 from skidpad.fleet.patterns.analysis import newest_clusters
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.acting import click_analyse
-from skidpad.fleet.site.drawing import Dot, Line, map_svg, replay_svg, trend_svg
+from skidpad.fleet.site.drawing import Dot, Line, map_svg, near, replay_svg, trend_svg
 from skidpad.fleet.site.frame import say, table
 from skidpad.fleet.store.reading import Wanted, hazard_row, hazard_rows, record_of
 from skidpad.fleet.words import Principal
+from skidpad.recording.hazards import HazardRecord
 
 MapLines = Callable[[str], Sequence[Line]]  # roads of a map by its name, m
 SHOWN = 6  # trends
+MAPS = 3
+CLUSTERS = 20
 PLAY_S = 0.1
 
 
-def fill_dashboard(fleet: Fleet, lines: MapLines, ui: Any, who: Principal) -> None:
+@dataclass(frozen=True, slots=True)
+class Overview:
+    """What the dashboard shows."""
+
+    trends: list[Trend]
+    rates: list[HazardRate]
+    clusters: list[dict[str, Any]]
+    newest: list[dict[str, Any]]
+    roads: dict[str, Sequence[Line]]  # of the maps of the newest hazards
+    look: Callable[[], int]  # for recurring hazards, as the person who opened the page
+
+
+def overview(fleet: Fleet, lines: MapLines, who: Principal) -> Overview:
     """Everything that a manufacturer or operator sees at once."""
     found = trends(fleet, who)
     with fleet.engine.connect() as connection:
         rates, clusters = hazard_rates(connection, who), newest_clusters(connection, who)
         newest = hazard_rows(connection, who, Wanted())
+    names = list(dict.fromkeys(row["map"] for row in newest if row["map"]))
+    roads = {name: lines(name) for name in names[:MAPS]}
+    return Overview(found, rates, clusters, newest, roads, lambda: click_analyse(fleet, who.id))
+
+
+def draw_overview(ui: Any, found: Overview) -> None:
+    """Hazards per hour, trends, the map, clusters."""
     with ui.element("section"):
         ui.label("Hazards per hour").classes("h2")
         rows = [
             [r.type.replace("_", " "), str(r.events), f"{r.hours:.2f}", f"{r.rate:.3g}",
              interval_text(r.interval)]
-            for r in rates
+            for r in found.rates
         ]  # fmt: skip
         table(ui, ["hazard", "events", "hours", "per hour", "interval"], rows)
-    _trends(ui, found)
-    _map(ui, lines, newest, clusters)
-    _clusters(fleet, ui, who, clusters)
+    _trends(ui, found.trends)
+    _map(ui, found)
+    _clusters(ui, found)
 
 
 def _trends(ui: Any, found: list[Trend]) -> None:
@@ -60,62 +83,69 @@ def _trends(ui: Any, found: list[Trend]) -> None:
             ui.label("No indicator was sent yet.").classes("dim")
 
 
-def _map(
-    ui: Any, lines: MapLines, newest: list[dict[str, Any]], clusters: list[dict[str, Any]]
-) -> None:
-    names = list(dict.fromkeys(row["map"] for row in newest if row["map"]))
+def _map(ui: Any, found: Overview) -> None:
     with ui.element("section"):
         ui.label("Where").classes("h2")
-        for name in names[:3]:
+        for name, roads in found.roads.items():
             dots = [
-                Dot(r["x"], r["y"], r["type"], 3.0, r["type"]) for r in newest if r["map"] == name
+                Dot(r["x"], r["y"], r["type"], 3.0, r["type"])
+                for r in found.newest
+                if r["map"] == name
             ]
             dots += [
                 Dot(
                     c["x"], c["y"], c["type"], 6.0 + len(c["members"]), f"{len(c['members'])} alike"
                 )
-                for c in clusters
+                for c in found.clusters
                 if c["map"] == name
             ]
             ui.label(f"{name}: {len(dots)} marks")
-            ui.html(map_svg(lines(name), dots, f"map {name}"), sanitize=False)
-        if not names:
+            ui.html(map_svg(roads, dots, f"map {name}"), sanitize=False)
+        if not found.roads:
             ui.label("No hazard has come in yet.").classes("dim")
 
 
-def _clusters(fleet: Fleet, ui: Any, who: Principal, clusters: list[dict[str, Any]]) -> None:
+def _clusters(ui: Any, found: Overview) -> None:
     with ui.element("section"):
         ui.label("Recurring hazards").classes("h2")
 
-        def look() -> None:
-            say(ui, lambda: click_analyse(fleet, who.id), "looked; reload to see the clusters")
+        async def look() -> None:
+            await say(ui, found.look, "looked; reload to see the clusters")
 
-        ui.button("Look for recurring hazards", on_click=look)
-        for cluster in clusters[:20]:
+        ui.button("Look for recurring hazards now", on_click=look)
+        for cluster in found.clusters[:CLUSTERS]:
             with ui.element("div"):
                 text = f"{len(cluster['members'])} x {cluster['type'].replace('_', ' ')}"
                 where = f"{cluster['map']} at {cluster['x']:.0f}, {cluster['y']:.0f} m"
                 ui.label(f"{text}, {cluster['vehicles']} vehicles, {where}")
                 ui.link("replay the representative", f"/replay/{cluster['representative']}")
-        if not clusters:
+        if not found.clusters:
             ui.label("Nothing was found to recur.").classes("dim")
 
 
-def fill_replay(fleet: Fleet, ui: Any, who: Principal, request: Request) -> None:
-    """One hazard, cycle by cycle, as every channel saw it."""
+def replayed(
+    fleet: Fleet, lines: MapLines, who: Principal, request: Request
+) -> tuple[dict[str, Any], HazardRecord, Sequence[Line]]:
+    """Row and record of a hazard that `who` may see, and the roads around it."""
     hazard = str(request.path_params["hazard"])
     with fleet.engine.connect() as connection:
         row = hazard_row(connection, who, hazard)
         record = record_of(connection, fleet.blobs, hazard)
+    return row, record, near(lines(row["map"]), row["x"], row["y"])
+
+
+def draw_replay(ui: Any, found: tuple[dict[str, Any], HazardRecord, Sequence[Line]]) -> None:
+    """One hazard, cycle by cycle, as every channel saw it."""
+    row, record, roads = found
     ui.label(f"{row['type'].replace('_', ' ')}, {row['map']}, {row['weather']}")
     if not record.worlds:
         ui.label("This record holds no worlds.")
         return
-    picture = ui.html(replay_svg(record, 0), sanitize=False)
+    picture = ui.html(replay_svg(record, 0, roads), sanitize=False)
     last = len(record.worlds) - 1
 
     def show(event: Any) -> None:
-        picture.set_content(replay_svg(record, min(int(event.value), last)))
+        picture.set_content(replay_svg(record, min(int(event.value), last), roads))
 
     slider = ui.slider(min=0, max=last, value=0, on_change=show)
 

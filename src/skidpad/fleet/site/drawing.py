@@ -19,6 +19,7 @@ KINDS = {
     "crossing_object": "#d98cff", "conflicting_paths": "#4fce7f", "stuck_vehicle": "#ff5b52",
 }  # fmt: skip
 REACH = 60.0  # m around the ego
+AROUND = REACH + 300.0  # m: ten seconds at 30 m/s and what is seen from there
 LINES_MAX = 4000  # of a map
 
 
@@ -47,10 +48,7 @@ def map_svg(lines: Sequence[Line], dots: Sequence[Dot], name: str) -> str:
     points = [p for line in lines for p in line] or [(d.x, d.y) for d in dots] or [(0.0, 0.0)]
     xs, ys = [p[0] for p in points], [p[1] for p in points]
     box = min(xs) - 30, min(ys) - 30, max(xs) - min(xs) + 60, max(ys) - min(ys) + 60
-    roads = "".join(
-        f'<polyline points="{_points(line)}" fill="none" stroke="#39434f" stroke-width="3"/>'
-        for line in lines[:LINES_MAX]
-    )
+    roads = _roads(lines)
     least = max(box[2], box[3]) / 120.0
     marks = "".join(
         f'<circle cx="{d.x:.1f}" cy="{-d.y:.1f}" r="{max(d.size, least):.1f}" fill-opacity=".75" '
@@ -58,6 +56,13 @@ def map_svg(lines: Sequence[Line], dots: Sequence[Dot], name: str) -> str:
         for d in dots
     )
     return _svg(box, roads + marks, name)
+
+
+def _roads(lines: Sequence[Line]) -> str:
+    return "".join(
+        f'<polyline points="{_points(line)}" fill="none" stroke="#39434f" stroke-width="3"/>'
+        for line in lines[:LINES_MAX]
+    )
 
 
 def _points(line: Line) -> str:
@@ -79,14 +84,26 @@ def _body(o: Body, colour: str) -> str:
     return f'<polygon points="{_points(corners)}" fill="{colour}"/>'
 
 
-def replay_svg(record: HazardRecord, k: int) -> str:
-    """Cycle k of a hazard's record, every channel's world over the others."""
+def near(lines: Iterable[Line], x: float, y: float) -> list[Line]:
+    """Those lines that come within sight of a place for as long as a record lasts."""
+    return [
+        line
+        for line in lines
+        if min(px for px, _ in line) < x + AROUND
+        and max(px for px, _ in line) > x - AROUND
+        and min(py for _, py in line) < y + AROUND
+        and max(py for _, py in line) > y - AROUND
+    ]
+
+
+def replay_svg(record: HazardRecord, k: int, roads: Sequence[Line] = ()) -> str:
+    """Cycle k of a hazard's record, every channel's world over the others and over the roads."""
     cycle = record.worlds[k]
     known = [f for f in cycle.frames if f is not None]
     if not known:
         return _svg((0.0, 0.0, 1.0, 1.0), "", "nothing reported")
     x, y = known[0].ego[:2].tolist()
-    body = "".join(
+    body = _roads(roads) + "".join(
         _frame(frame, COLOURS[c % len(COLOURS)])
         for c, frame in enumerate(cycle.frames)
         if frame is not None

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Awaitable, Callable
 from html import escape
-from typing import Any
+from typing import Any, TypeVar
 
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 
 from skidpad.core.errors import SkidpadError
@@ -14,6 +15,7 @@ from skidpad.fleet.site.acting import visitor
 from skidpad.fleet.words import Action, Principal, Refused
 from skidpad.pages.site import nicegui
 
+Found = TypeVar("Found")  # what a page shows
 LINKS = (
     ("Dashboard", "/", Action.READ_TRENDS),
     ("Alerts", "/alerts", Action.READ_ALERTS),
@@ -39,20 +41,24 @@ STYLE = """
 
 
 def page(
-    fleet: Fleet, action: Action, title: str, fill: Callable[[Any, Principal, Request], None]
-) -> Callable[..., None]:
-    """A builder of a page that is filled for whoever may open it."""
+    fleet: Fleet,
+    action: Action,
+    title: str,
+    read: Callable[[Principal, Request], Found],
+    draw: Callable[[Any, Found], None],
+) -> Callable[[Request], Awaitable[None]]:
+    """A builder of a page for whoever may open it: `read` in a thread, then `draw` in the loop."""
 
-    def build(request: Request) -> None:
+    async def build(request: Request) -> None:
         ui = nicegui().ui
         with ui.element("div").classes("fleet"):
             try:
-                who = visitor(fleet, request)
+                who = await run_in_threadpool(visitor, fleet, request)
                 head(ui, who, title)
                 if not who.may(action):
                     ui.label(f"The role {who.role.value} may not {action.value}.")
                     return
-                fill(ui, who, request)
+                draw(ui, await run_in_threadpool(read, who, request))
             except Refused as error:
                 ui.label(str(error))
             except SkidpadError as error:
@@ -81,10 +87,10 @@ def table(ui: Any, heads: list[str], rows: list[list[str]]) -> None:
     ui.html(markup, sanitize=False).classes("scroll")
 
 
-def say(ui: Any, act: Callable[[], Any], done: str) -> None:
-    """Do what a click asks, and tell whether it was granted."""
+async def say(ui: Any, act: Callable[[], Any], done: str) -> None:
+    """Do what a click asks, in a thread, and tell whether it was granted."""
     try:
-        act()
+        await run_in_threadpool(act)
     except SkidpadError as error:
         ui.notify(str(error), type="negative")
     else:

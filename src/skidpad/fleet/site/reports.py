@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 from skidpad.evidence.statistics import share_text
-from skidpad.fleet.insight.places import places
-from skidpad.fleet.insight.safety import claims
+from skidpad.fleet.insight.places import PlaceRow, places
+from skidpad.fleet.insight.safety import Claim, claims
 from skidpad.fleet.insight.trends import trends
 from skidpad.fleet.loop.rollout import Rollout, rollouts
 from skidpad.fleet.service import Fleet
@@ -14,10 +15,14 @@ from skidpad.fleet.site.frame import table
 from skidpad.fleet.words import Principal
 
 
-def fill_places(fleet: Fleet, ui: Any, who: Principal) -> None:
-    """Places x hazard x weather."""
+def places_of(fleet: Fleet, who: Principal) -> list[PlaceRow]:
+    """What the page of places shows."""
     with fleet.engine.connect() as connection:
-        found = places(connection, who)
+        return places(connection, who)
+
+
+def draw_places(ui: Any, found: Sequence[PlaceRow]) -> None:
+    """Places x hazard x weather."""
     ui.label(
         f"{sum(r.count for r in found)} hazards; places of fewer than 3 vehicles are left out."
     )
@@ -31,10 +36,15 @@ def fill_places(fleet: Fleet, ui: Any, who: Principal) -> None:
     ui.label("As HTML and PDF: /api/v1/places.html and /api/v1/places.pdf").classes("dim")
 
 
-def fill_case(fleet: Fleet, ui: Any, who: Principal) -> None:
+def case_of(fleet: Fleet, who: Principal) -> list[Claim]:
+    """What the page of the safety case shows."""
+    return claims(trends(fleet, who))
+
+
+def draw_case(ui: Any, found: Sequence[Claim]) -> None:
     """The safety case with current evidence."""
     last = ""
-    for claim in claims(trends(fleet, who)):
+    for claim in found:
         if claim.argument != last:
             last = claim.argument
             ui.label(claim.argument).style("font-size: 16px")
@@ -46,10 +56,14 @@ def fill_case(fleet: Fleet, ui: Any, who: Principal) -> None:
                 ui.label(f"{text}, {claim.vehicles} vehicles").classes("dim")
 
 
-def fill_changes(fleet: Fleet, ui: Any, who: Principal) -> None:
-    """Releases, newest first, with every look."""
+def changes_of(fleet: Fleet, who: Principal) -> list[Rollout]:
+    """What the page of changes shows."""
     with fleet.engine.connect() as connection:
-        found = rollouts(connection, who.tenant)
+        return rollouts(connection, who.tenant)
+
+
+def draw_changes(ui: Any, found: Sequence[Rollout]) -> None:
+    """Releases, newest first, with every look."""
     if not found:
         ui.label("Nothing was released yet.").classes("dim")
     for one in reversed(found):

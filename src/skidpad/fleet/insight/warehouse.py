@@ -1,0 +1,120 @@
+"""Sums of indicators by day, vehicle and indicator in a DuckDB file, so that a page asks a small table.
+
+All of it follows from the batches in the store: without the file it is made again.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import NamedTuple
+
+import duckdb
+import polars as pl
+
+from skidpad.core.errors import FileError
+
+DAY = 86400.0  # s, in UTC
+LATE_S = 3600.0  # a batch may come to light that long after its time of receipt
+TABLES = """
+    CREATE TABLE IF NOT EXISTS taken (id VARCHAR PRIMARY KEY, received DOUBLE);
+    CREATE TABLE IF NOT EXISTS sums (
+        manufacturer VARCHAR, operator VARCHAR, vehicle VARCHAR, indicator VARCHAR, day BIGINT,
+        n BIGINT, violated BIGINT, total DOUBLE
+    );
+"""
+TAKE = """
+    INSERT INTO sums SELECT manufacturer, operator, vehicle, indicator,
+        CAST(floor(received / 86400) AS BIGINT), sum(n), sum(violated), sum(mean * n)
+    FROM read_parquet($file) GROUP BY ALL ORDER BY ALL
+"""
+MOMENTS = """
+    SELECT indicator, slot, count(*) AS vehicles, sum(n) AS n, sum(violated) AS violated,
+           sum(total) AS total, sum(violated * violated) AS vv, sum(violated * n) AS vn,
+           sum(n * n) AS nn
+    FROM (SELECT indicator, day // $days AS slot, vehicle, sum(n)::DOUBLE AS n,
+                 sum(violated)::DOUBLE AS violated, sum(total) AS total
+          FROM sums WHERE {right} GROUP BY indicator, slot, vehicle HAVING sum(n) > 0)
+    GROUP BY indicator, slot ORDER BY indicator, slot
+"""
+
+
+class Moments(NamedTuple):
+    """An indicator in a stretch of days: sums over vehicles of counts and of their products."""
+
+    indicator: str
+    slot: int  # stretches of days since 1970
+    vehicles: int
+    n: float  # cycles
+    violated: float
+    total: float  # of the indicator's value over cycles
+    vv: float
+    vn: float
+    nn: float
+
+
+class Warehouse:
+    """The file of one service; safe between threads, one at a time."""
+
+    def __init__(self, path: Path) -> None:
+        self.lock = threading.Lock()
+        try:
+            self._database = duckdb.connect(str(path))
+            self._database.execute(TABLES)
+        except duckdb.Error as error:
+            raise FileError(
+                f"{path}: no readable table of trends; delete it, and it is made again ({error})"
+            ) from error
+        self._whole = True  # the first look is at every batch: a clock may have gone back before
+
+    def close(self) -> None:
+        """Let go of the file."""
+        with self.lock:
+            self._database.close()
+
+    def since(self) -> float:
+        """The time of receipt from which on batches may be unknown here, s; call under the lock."""
+        newest = self._database.execute("SELECT max(received) FROM taken").fetchone()
+        if self._whole or newest is None or newest[0] is None:
+            return 0.0
+        return float(newest[0]) - LATE_S
+
+    def unknown(self, ids: Sequence[str]) -> set[str]:
+        """Which of these batches were not taken yet; call under the lock."""
+        rows = self._database.execute(
+            "SELECT id FROM taken WHERE id IN (SELECT unnest($ids))", {"ids": list(ids)}
+        )
+        return set(ids) - {str(row[0]) for row in rows.fetchall()}
+
+    def take(self, batches: Sequence[tuple[str, float]], rows: pl.DataFrame) -> None:
+        """Add the rows of these batches (id, time), all or none; call under the lock."""
+        with TemporaryDirectory() as folder:
+            file = Path(folder) / "rows.parquet"
+            rows.write_parquet(file)
+            self._database.execute("BEGIN")
+            try:
+                self._database.execute(TAKE, {"file": str(file)})
+                self._database.execute(
+                    "INSERT INTO taken SELECT unnest($ids), unnest($received)",
+                    {"ids": [id for id, _ in batches], "received": [at for _, at in batches]},
+                )
+                self._database.execute("COMMIT")
+            except BaseException:
+                self._database.execute("ROLLBACK")
+                raise
+
+    def complete(self) -> None:
+        """Every batch there was has been taken; call under the lock."""
+        self._whole = False
+
+    def moments(self, column: str | None, tenant: str, days: int) -> list[Moments]:
+        """By indicator and stretch of days; column: which must be the tenant's, None: all."""
+        told: dict[str, object] = {"days": days}
+        right = "true"
+        if column is not None:
+            right, told["tenant"] = f"{column} = $tenant", tenant
+        with self.lock:
+            rows = self._database.execute(MOMENTS.format(right=right), told).fetchall()
+        return [Moments(*row) for row in rows]

@@ -1,0 +1,82 @@
+"""What the service does by itself: trends kept current, recurring hazards looked for when some came."""
+
+from __future__ import annotations
+
+import logging
+import threading
+
+from sqlalchemy import select
+
+from skidpad.fleet.insight.trends import compact
+from skidpad.fleet.patterns.analysis import SERVICE, analyse
+from skidpad.fleet.service import Fleet
+from skidpad.fleet.store.later import analyses
+from skidpad.fleet.store.rights import visible
+from skidpad.fleet.store.tables import hazards, vehicles
+from skidpad.fleet.words import Principal, Role
+
+LOOK_S = 5.0  # between two rounds: what came shows within 10 s
+REST_S = 60.0  # at least, from one analysis of a tenant to its next
+OWNERS = ((Role.OPERATOR, vehicles.c.operator), (Role.MANUFACTURER, vehicles.c.manufacturer))
+log = logging.getLogger(__name__)
+
+
+class Upkeep:
+    """One thread; `work` is one round of it, and tests call it themselves."""
+
+    def __init__(self, fleet: Fleet) -> None:
+        self.fleet = fleet
+        self._ended = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread = threading.Thread(target=self._run, name="fleet-upkeep")
+        self._thread.start()
+
+    def close(self) -> None:
+        """End the thread; safe to call twice."""
+        self._ended.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        while not self._ended.is_set():
+            try:
+                self.work()
+            except Exception:  # the next round tries again
+                log.exception("the upkeep failed")
+            self._ended.wait(LOOK_S)
+
+    def work(self) -> None:
+        """Sum up what came; analyse each tenant that has hazards newer than its last analysis."""
+        compact(self.fleet)
+        for who in self._tenants():
+            if self._due(who) and not self._ended.is_set():
+                analyse(self.fleet, who)
+
+    def _tenants(self) -> list[Principal]:
+        """The service in the place of everyone who owns a vehicle."""
+        with self.fleet.engine.connect() as connection:
+            return [
+                Principal(SERVICE, str(tenant), role, SERVICE)
+                for role, column in OWNERS
+                for tenant in connection.execute(
+                    select(column).distinct().order_by(column)
+                ).scalars()
+            ]
+
+    def _due(self, who: Principal) -> bool:
+        with self.fleet.engine.connect() as connection:
+            last = connection.execute(
+                select(analyses.c.at)
+                .where(analyses.c.tenant == who.tenant)
+                .order_by(analyses.c.at.desc())
+                .limit(1)
+            ).scalar()
+            if last is not None and self.fleet.clock() - last < REST_S:
+                return False
+            newest = connection.execute(
+                select(hazards.c.at).where(visible(who, hazards)).order_by(hazards.c.at.desc())
+            ).first()
+        return newest is not None and (last is None or newest.at > last)

@@ -14,10 +14,12 @@ import pytest
 from fleet_world import NOW, World, make_world, packed, record
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.statistics import ratio_interval
+from skidpad.fleet.insight.places import ADVICE
 from skidpad.fleet.insight.research import HOUR, K, export
 from skidpad.fleet.insight.trends import compact, trends
 from skidpad.fleet.insight.warehouse import TAKE
 from skidpad.fleet.service import Places, open_fleet
+from skidpad.fleet.site.drawing import KINDS
 from skidpad.fleet.store.accounts import add_vehicle
 
 
@@ -240,3 +242,8 @@ def test_nothing_seen_in_few_vehicles_is_no_proof():
     assert none.low == 0.0
     assert none.high == pytest.approx(1.0 - 0.025 ** (1 / 10))
     assert ratio_interval(1, (5.0, 10.0), (25.0, 50.0, 100.0)) == (0.0, 1.0)
+
+
+def test_every_kind_of_hazard_has_advice_and_a_colour():
+    assert set(ADVICE) == set(HazardType)
+    assert set(KINDS) == {kind.value for kind in HazardType}

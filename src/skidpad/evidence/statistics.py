@@ -17,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
+from scipy.special import stdtrit
 
 from skidpad.core.errors import require_range
 from skidpad.core.randomness import stream
@@ -127,8 +128,11 @@ def ratio_interval(
     sums: tuple[float, float],
     products: tuple[float, float, float],
     confidence: float = CONFIDENCE,
+    most: float = 1.0,
 ) -> Interval:
-    """Limits of a share sum(y) / sum(x) of cycles that come in clusters, 0 <= y <= x.
+    """Limits of a ratio sum(y) / sum(x) of what comes in clusters, between 0 and `most`.
+
+    A share of cycles has at most 1 (0 <= y <= x), a count y per exposure x has no bound.
 
     clusters: how many, say vehicles; sums: of y and x over clusters; products: of y y, x y, x x.
     By Taylor linearisation, var = k / (k - 1) sum((y - R x)^2) / sum(x)^2, with Student's t. Source:
@@ -138,14 +142,14 @@ def ratio_interval(
     """
     (y, x), (yy, xy, xx) = sums, products
     if clusters < 2 or x <= 0.0:
-        return Interval(0.0, 1.0)
-    if y in (0.0, x):
+        return Interval(0.0, most)
+    if most == 1.0 and y in (0.0, x):
         return clopper_pearson(0 if y == 0.0 else clusters, clusters, confidence)
     share = y / x
     spread = max(yy - 2.0 * share * xy + share * share * xx, 0.0)
     error = float(np.sqrt(clusters / (clusters - 1) * spread)) / x
-    reach = float(stats.t.ppf(0.5 + 0.5 * confidence, clusters - 1)) * error
-    return Interval(max(share - reach, 0.0), min(share + reach, 1.0))
+    reach = float(stdtrit(clusters - 1, 0.5 + 0.5 * confidence)) * error
+    return Interval(max(share - reach, 0.0), min(share + reach, most))
 
 
 def event_rate(counts: Sequence[int], exposures: Sequence[float] | None = None) -> Rate:

@@ -6,10 +6,9 @@ import io
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from html import escape
-from math import floor
 from typing import Any
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, Integer, cast, func, select
 
 from skidpad.core.vocabulary import HazardType
 from skidpad.fleet.store.rights import visible
@@ -24,6 +23,7 @@ ADVICE = {
     HazardType.INCONSISTENT_LOCALISATION: "look at lane markings, landmarks and satellite sight",
     HazardType.CROSSING_OBJECT: "look at crossings, parked cars beside them, lighting",
     HazardType.CONFLICTING_PATHS: "look at lane guidance and markings of the junction",
+    HazardType.UNSEEN_BY_A_CHANNEL: "look at what hides road users: vegetation, signs, walls, glare",
     HazardType.STUCK_VEHICLE: "look at parking, deliveries and blocked lanes",
 }
 
@@ -47,21 +47,20 @@ def places(connection: Connection, who: Principal) -> list[PlaceRow]:
 
     An authority sees all tenants' places, everybody else those of their own vehicles.
     """
-    columns = (hazards.c.map, hazards.c.x, hazards.c.y, hazards.c.type, hazards.c.weather)
-    query = select(*columns, hazards.c.vehicle)
+    cell = [cast(func.floor(axis / CELL), Integer) for axis in (hazards.c.x, hazards.c.y)]
+    group = (hazards.c.map, *cell, hazards.c.type, hazards.c.weather)
+    different = func.count(hazards.c.vehicle.distinct())
+    query = (
+        select(*group, func.count(), different).group_by(*group).having(different >= LEAST_VEHICLES)
+    )
     if who.role is not Role.AUTHORITY:
         query = query.where(visible(who, hazards))
-    table: dict[tuple[str, int, int, str, str], list[str]] = {}
-    for row in connection.execute(query):
-        cell = floor(row.x / CELL), floor(row.y / CELL)
-        table.setdefault((row.map, *cell, row.type, row.weather), []).append(row.vehicle)
     found = [
         PlaceRow(
-            map_, (i + 0.5) * CELL, (j + 0.5) * CELL, type_, weather, len(seen), len(set(seen)),
+            map_, (i + 0.5) * CELL, (j + 0.5) * CELL, type_, weather, count, seen,
             ADVICE[HazardType(type_)],
         )
-        for (map_, i, j, type_, weather), seen in table.items()
-        if len(set(seen)) >= LEAST_VEHICLES
+        for map_, i, j, type_, weather, count, seen in connection.execute(query)
     ]  # fmt: skip
     return sorted(found, key=lambda r: (-r.count, r.map, r.x, r.y, r.hazard, r.weather))
 

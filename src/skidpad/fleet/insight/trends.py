@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import msgspec
+import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 from sqlalchemy import Connection, func, select
 
 from skidpad.evidence.statistics import Interval, event_rate, ratio_interval
@@ -20,6 +22,7 @@ from skidpad.fleet.unpacking import unpack
 from skidpad.fleet.words import Kind, Principal, Role
 
 GROUP = 500  # batches that are taken at once
+MANY = 30  # vehicles
 SCHEMA = {
     "manufacturer": pl.String, "operator": pl.String, "vehicle": pl.String, "received": pl.Float64,
     "indicator": pl.String, "n": pl.Int64, "violated": pl.Int64, "mean": pl.Float64,
@@ -124,24 +127,35 @@ def _within(limits: Interval | None) -> Interval:
 
 
 def hazard_rates(connection: Connection, who: Principal) -> list[HazardRate]:
-    """Hazards per hour by kind, over all drives that `who` may see."""
+    """Hazards per hour by kind, over all vehicles that `who` may see and that told of drives."""
     driven = connection.execute(
-        select(drives.c.vehicle, drives.c.drive, drives.c.seconds)
+        select(drives.c.vehicle, func.sum(drives.c.seconds).label("seconds"))
         .where(visible(who, drives))
-        .order_by(drives.c.at, drives.c.drive)
+        .group_by(drives.c.vehicle)
+        .order_by(drives.c.vehicle)
     ).all()
-    hours = [row.seconds / 3600.0 for row in driven]
-    if sum(hours) <= 0.0:
+    hours = np.array([row.seconds / 3600.0 for row in driven])
+    if hours.sum() <= 0.0:
         return []
     counted = connection.execute(
-        select(hazards.c.type, hazards.c.vehicle, hazards.c.drive, func.count().label("n"))
+        select(hazards.c.type, hazards.c.vehicle, func.count().label("n"))
         .where(visible(who, hazards))
-        .group_by(hazards.c.type, hazards.c.vehicle, hazards.c.drive)
+        .group_by(hazards.c.type, hazards.c.vehicle)
     ).all()
-    table = {(row.type, row.vehicle, row.drive): int(row.n) for row in counted}
-    out = []
-    for type_ in sorted({row.type for row in counted}):
-        counts = [table.get((type_, row.vehicle, row.drive), 0) for row in driven]
-        rate = event_rate(counts, hours)
-        out.append(HazardRate(type_, rate.events, rate.exposure, rate.rate, rate.interval))
-    return out
+    table = {(row.type, row.vehicle): int(row.n) for row in counted}
+    return [
+        _rate(type_, np.array([table.get((type_, row.vehicle), 0) for row in driven]), hours)
+        for type_ in sorted({row.type for row in counted})
+    ]
+
+
+def _rate(type_: str, counts: NDArray[np.int64], hours: NDArray[np.float64]) -> HazardRate:
+    """Over vehicles; by linearisation where there are many, else as everywhere (X-9)."""
+    total, exposure = int(counts.sum()), float(hours.sum())
+    if counts.size < MANY:
+        return HazardRate(
+            type_, total, exposure, total / exposure, event_rate(counts, hours).interval
+        )
+    products = (float(counts @ counts), float(counts @ hours), float(hours @ hours))
+    interval = ratio_interval(counts.size, (float(total), exposure), products, most=np.inf)
+    return HazardRate(type_, total, exposure, total / exposure, interval)

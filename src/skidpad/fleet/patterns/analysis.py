@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ from skidpad.fleet.patterns.clusters import (
     find_clusters,
     recurring,
 )
-from skidpad.fleet.patterns.series import VERSION, Floats, from_plain, series_of, to_plain
+from skidpad.fleet.patterns.series import VERSION, from_plain, series_of, to_plain
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.events import add_event
 from skidpad.fleet.store.later import analyses, clusters, series
@@ -72,54 +73,45 @@ def analyse(fleet: Fleet, who: Principal, settings: ClusterSettings = STANDARD) 
 
 def gather(fleet: Fleet, who: Principal) -> tuple[list[Case], int]:
     """The newest visible hazards with their series, and how many could not be read."""
+    there = (series.c.digest == hazards.c.digest) & (series.c.version == VERSION)
+    query = (
+        select(hazards, series.c.content.label("course"))
+        .outerjoin(series, there)
+        .where(visible(who, hazards))
+        .order_by(hazards.c.at.desc())
+    )
     with fleet.engine.connect() as connection:
-        query = select(hazards).where(visible(who, hazards)).order_by(hazards.c.at.desc())
         rows = connection.execute(query.limit(HAZARDS_MAX)).all()
-    cases, unreadable = [], 0
-    for row in rows:
-        try:
-            course = _series(fleet, row)
-        except FileError:
-            unreadable += 1
-            continue
-        cases.append(
-            Case(
-                row.id,
-                row.digest,
-                row.vehicle,
-                row.type,
-                row.map,
-                row.weather,
-                row.x,
-                row.y,
-                course,
-            )
+        courses = {row.digest: from_plain(json.loads(row.course)) for row in rows if row.course}
+        fresh: dict[str, str] = {}
+        for row in rows:
+            if row.digest not in courses:
+                with suppress(FileError):  # counted as unreadable below
+                    plain = to_plain(series_of(record_of(connection, fleet.blobs, row.id)))
+                    fresh[row.digest], courses[row.digest] = json.dumps(plain), from_plain(plain)
+    _keep(fleet, fresh)
+    cases = [
+        Case(
+            row.id, row.digest, row.vehicle, row.type, row.map, row.weather, row.x, row.y,
+            courses[row.digest],
         )
-    return cases, unreadable
+        for row in rows
+        if row.digest in courses
+    ]  # fmt: skip
+    return cases, len(rows) - len(cases)
 
 
-def _series(fleet: Fleet, row: Any) -> Floats:
-    """The series of a hazard, computed once."""
-    with fleet.engine.connect() as connection:
-        kept = connection.execute(
-            select(series.c.content).where(
-                series.c.digest == row.digest, series.c.version == VERSION
-            )
-        ).first()
-        if kept is not None:
-            return from_plain(json.loads(kept.content))
-        plain = to_plain(series_of(record_of(connection, fleet.blobs, row.id)))
+def _keep(fleet: Fleet, fresh: dict[str, str]) -> None:
+    """Keep series that were computed, as far as nobody else did meanwhile."""
     with fleet.engine.begin() as connection:
-        there = select(series.c.digest).where(
-            series.c.digest == row.digest, series.c.version == VERSION
-        )
-        if connection.execute(there).first() is None:
-            content = json.dumps(plain)
-            connection.execute(
-                series.insert(),
-                {"digest": row.digest, "version": VERSION, "content": content, "at": fleet.clock()},
+        known = connection.execute(
+            select(series.c.digest).where(
+                series.c.digest.in_(list(fresh)), series.c.version == VERSION
             )
-    return from_plain(plain)
+        )
+        for name in sorted(fresh.keys() - set(known.scalars())):
+            row = {"digest": name, "version": VERSION, "content": fresh[name]}
+            connection.execute(series.insert(), row | {"at": fleet.clock()})
 
 
 def newest_clusters(connection: Connection, who: Principal) -> list[dict[str, Any]]:

@@ -17,6 +17,7 @@ COLOURS = ("#ff8552", "#4d9dff", "#4fce7f", "#d98cff")  # of channels
 KINDS = {
     "ego_tailgating": "#ff8552", "ego_tailgated": "#ffd166", "inconsistent_localisation": "#4d9dff",
     "crossing_object": "#d98cff", "conflicting_paths": "#4fce7f", "stuck_vehicle": "#ff5b52",
+    "unseen_by_a_channel": "#8fe3ff",
 }  # fmt: skip
 REACH = 60.0  # m around the ego
 AROUND = REACH + 300.0  # m: ten seconds at 30 m/s and what is seen from there

@@ -50,7 +50,7 @@ def places(connection: Connection, who: Principal) -> list[PlaceRow]:
     cell = [cast(func.floor(axis / CELL), Integer) for axis in (hazards.c.x, hazards.c.y)]
     group = (hazards.c.map, *cell, hazards.c.type, hazards.c.weather)
     different = func.count(hazards.c.vehicle.distinct())
-    query = (
+    query: Any = (
         select(*group, func.count(), different).group_by(*group).having(different >= LEAST_VEHICLES)
     )
     if who.role is not Role.AUTHORITY:

@@ -154,7 +154,11 @@ def _rate(type_: str, counts: NDArray[np.int64], hours: NDArray[np.float64]) -> 
     total, exposure = int(counts.sum()), float(hours.sum())
     if counts.size < MANY:
         return HazardRate(
-            type_, total, exposure, total / exposure, event_rate(counts, hours).interval
+            type_,
+            total,
+            exposure,
+            total / exposure,
+            event_rate(counts.tolist(), hours.tolist()).interval,
         )
     products = (float(counts @ counts), float(counts @ hours), float(hours @ hours))
     interval = ratio_interval(counts.size, (float(total), exposure), products, most=np.inf)

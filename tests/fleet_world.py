@@ -6,9 +6,12 @@ import gzip
 import os
 import pwd
 import shutil
+import socket
 import subprocess
 import tempfile
+import threading
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -177,3 +180,39 @@ __all__ = [
     "record",
     "replace",
 ]
+
+
+@contextmanager
+def mosquitto(folder):
+    """A real broker; the port may be taken between finding and using it, so it is tried again."""
+    program = shutil.which("mosquitto") or "/usr/sbin/mosquitto"
+    try:
+        subprocess.run([program, "-h"], capture_output=True, check=False)
+    except FileNotFoundError:
+        pytest.skip("mosquitto is not installed")
+    for _ in range(5):
+        with socket.socket() as one:
+            one.bind(("127.0.0.1", 0))
+            port = one.getsockname()[1]
+        config = folder / "mosquitto.conf"
+        config.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n")
+        with subprocess.Popen(
+            [program, "-c", str(config), "-v"],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            text=True,
+        ) as child:
+            for line in child.stdout:
+                if "running" in line:
+                    break
+            else:
+                continue  # it ended: the port was taken
+            drain = threading.Thread(target=child.stdout.read)
+            drain.start()
+            try:
+                yield port
+            finally:
+                child.terminate()
+                drain.join()
+            return
+    raise AssertionError("mosquitto did not start")

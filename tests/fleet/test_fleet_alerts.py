@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import shutil
-import socket
-import subprocess
 import threading
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
@@ -16,12 +13,13 @@ import numpy as np
 import pytest
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PrivateKey
 
-from fleet_world import NOW, Clock
+from fleet_world import NOW, Clock, mosquitto
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.fleet.alerting.dispatcher import Dispatcher
 from skidpad.fleet.alerting.hub import Hub
 from skidpad.fleet.alerting.receiver import Receiver, Verdict
-from skidpad.fleet.alerting.relays import Broker, Mqtt, Webhook
+from skidpad.fleet.alerting.relays import Mqtt, Webhook
+from skidpad.fleet.broker import Broker
 
 SCENE = {"map": "town", "ego": {"x": 1.0, "y": 2.0, "heading": 0.1}, "v": 8.0}
 ALERT = {"kind": "hazard", "text": "car ahead stopped", "scene": SCENE}
@@ -196,42 +194,6 @@ def test_a_webhook_goes_to_its_host_and_nowhere_else():
         with pytest.raises(ConfigError):
             Webhook("red", url, ["127.0.0.1", "ops.example"])
     assert not Webhook("red", good, ["127.0.0.1"]).wants("blue")
-
-
-@contextmanager
-def mosquitto(folder):
-    """A real broker; the port may be taken between finding and using it, so it is tried again."""
-    program = shutil.which("mosquitto") or "/usr/sbin/mosquitto"
-    try:
-        subprocess.run([program, "-h"], capture_output=True, check=False)
-    except FileNotFoundError:
-        pytest.skip("mosquitto is not installed")
-    for _ in range(5):
-        with socket.socket() as one:
-            one.bind(("127.0.0.1", 0))
-            port = one.getsockname()[1]
-        config = folder / "mosquitto.conf"
-        config.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n")
-        with subprocess.Popen(
-            [program, "-c", str(config), "-v"],
-            stdout=subprocess.PIPE,
-            stderr=subprocess.STDOUT,
-            text=True,
-        ) as child:
-            for line in child.stdout:
-                if "running" in line:
-                    break
-            else:
-                continue  # it ended: the port was taken
-            drain = threading.Thread(target=child.stdout.read)
-            drain.start()
-            try:
-                yield port
-            finally:
-                child.terminate()
-                drain.join()
-            return
-    raise AssertionError("mosquitto did not start")
 
 
 def test_mqtt_carries_an_alert_to_whoever_subscribed(tmp_path):

@@ -5,6 +5,8 @@ from __future__ import annotations
 import gzip
 import itertools
 import json
+import subprocess
+import sys
 from contextlib import closing, contextmanager
 
 import duckdb
@@ -12,12 +14,13 @@ import numpy as np
 import pytest
 
 from fleet_world import NOW, World, make_world, packed, record
+from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.statistics import ratio_interval
 from skidpad.fleet.insight.places import ADVICE
 from skidpad.fleet.insight.research import HOUR, K, export
 from skidpad.fleet.insight.trends import compact, trends
-from skidpad.fleet.insight.warehouse import TAKE
+from skidpad.fleet.insight.warehouse import TAKE, Warehouse
 from skidpad.fleet.service import Places, open_fleet
 from skidpad.fleet.site.drawing import KINDS
 from skidpad.fleet.store.accounts import add_vehicle
@@ -73,6 +76,26 @@ def test_without_its_file_the_trends_are_made_again(tmp_path):
         who = one.accounts["axle"].principal
         assert [t.share for t in trends(fleet, who)] == [t["share"] for t in before["indicators"]]
         assert compact(fleet) == 0
+
+
+def test_a_damaged_or_taken_file_of_trends_is_one_sentence(tmp_path):
+    path = tmp_path / "trends.duckdb"
+    path.write_bytes(b"nonsense" * 1000)
+    with pytest.raises(FileError, match="delete it"):
+        Warehouse(path).moments(None, "", 1)
+    path.unlink()
+    code = (
+        f"import duckdb, sys; c = duckdb.connect({str(path)!r}); print('up', flush=True);"
+        " sys.stdin.read()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", code], stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as other:
+        assert other.stdout.readline() == b"up\n"
+        with pytest.raises(FileError, match="another process"):
+            Warehouse(path).moments(None, "", 1)
+        other.stdin.close()
+    assert Warehouse(path).moments(None, "", 1) == []
 
 
 def test_a_batch_from_before_the_clock_went_back_is_found_at_the_next_start(tmp_path):

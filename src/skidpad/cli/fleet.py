@@ -3,18 +3,15 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
-from contextlib import contextmanager, suppress
-from functools import cache
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-if TYPE_CHECKING:
-    import httpx
+from skidpad.cli.fleet_links import broker_of, client, fleet_extra, map_lines, relays, token_of
 
-    from skidpad.fleet.alerting.relays import Relay
+if TYPE_CHECKING:
     from skidpad.fleet.service import Places
 
 fleet = typer.Typer(
@@ -33,21 +30,8 @@ BlobUrl = Annotated[
 TokenFile = Annotated[Path, typer.Option(help="File that holds the vehicle's credential.")]
 
 
-@contextmanager
-def _extra() -> Iterator[None]:
-    """One sentence when the optional part is not installed."""
-    from skidpad.core.errors import MissingExtra
-
-    try:
-        yield
-    except MissingExtra:
-        raise
-    except ImportError as error:
-        raise MissingExtra("skidpad fleet", "fleet") from error
-
-
 def _places(data: Path, database: str | None, blobs: str | None) -> Places:
-    with _extra():
+    with fleet_extra():
         from skidpad.fleet.service import Places
     return Places(data=data, database=database, blobs=blobs)
 
@@ -69,26 +53,36 @@ def serve(
     webhook_host: Annotated[
         list[str] | None, typer.Option(help="A host that webhooks may lead to.")
     ] = None,
-    mqtt: Annotated[str | None, typer.Option(help="HOST[:PORT] of an MQTT 5 broker.")] = None,
+    mqtt: Annotated[
+        str | None,
+        typer.Option(help="HOST[:PORT] of an MQTT 5 broker: alerts go out, batches come in."),
+    ] = None,
     mqtt_ca: Annotated[Path | None, typer.Option(help="PEM of the broker's authority.")] = None,
     name: Annotated[
         list[str] | None, typer.Option(help="What browsers call this host besides --host.")
     ] = None,
 ) -> None:
     """Serve the fleet; nothing listens beyond this machine unless --host says so."""
-    with _extra():
+    with fleet_extra():
+        from skidpad.fleet.mqtt import BatchListener
         from skidpad.fleet.server import Listen, run
         from skidpad.fleet.service import open_fleet
     from skidpad.scenarios.hazard_export import export_hazard
 
     _check_exposure(host, certificate, key)
     places = _places(data, database, blobs)
-    relays = _relays(places, webhook or [], webhook_host or [], mqtt, mqtt_ca)
-    service = open_fleet(places, exporter=export_hazard, relays=relays)
+    broker = None if mqtt is None else broker_of(mqtt, mqtt_ca)
+    known = relays(places, webhook or [], webhook_host or [], broker)
+    service = open_fleet(places, exporter=export_hazard, relays=known)
+    batches = None if broker is None else BatchListener(service, broker)
     try:
+        if batches is not None:
+            batches.start()
         listen = Listen(host, port, certificate, key, tuple(name or ()))
         run(service, listen, map_lines, typer.echo)
     finally:
+        if batches is not None:
+            batches.close()
         service.close()
 
 
@@ -101,35 +95,6 @@ def _check_exposure(host: str, certificate: Path | None, key: Path | None) -> No
         raise ConfigError("--certificate and --key go together")
     if not is_local(host) and certificate is None:
         raise ConfigError(f"--host {host} leaves this machine and needs --certificate and --key")
-
-
-def _relays(
-    places: Places, webhooks: list[str], hosts: list[str], mqtt: str | None, ca: Path | None
-) -> list[Relay]:
-    """Where alerts are relayed to; ConfigError for what must not be."""
-    import time
-
-    from skidpad.core.errors import ConfigError
-    from skidpad.fleet.alerting.relays import Broker, Mqtt, Webhook
-    from skidpad.fleet.service import open_store
-    from skidpad.fleet.store.accounts import tenant_id
-
-    found: list[Relay] = []
-    if webhooks:
-        engine = open_store(places)
-        with engine.begin() as connection:
-            for text in webhooks:
-                tenant, equals, url = text.partition("=")
-                if not equals:
-                    raise ConfigError(f"--webhook must read TENANT=URL, got {text!r}")
-                found.append(Webhook(tenant_id(connection, tenant, time.time()), url, hosts))
-        engine.dispose()
-    if mqtt is not None:
-        host, _, port = mqtt.rpartition(":") if ":" in mqtt else (mqtt, "", "1883")
-        if not port.isdigit():
-            raise ConfigError(f"--mqtt must read HOST[:PORT], got {mqtt!r}")
-        found.append(Mqtt(Broker(host=host, port=int(port), ca=ca)))
-    return found
 
 
 @fleet.command()
@@ -146,7 +111,7 @@ def enrol(
 
     from skidpad.core.errors import ConfigError, require_choice
 
-    with _extra():
+    with fleet_extra():
         from skidpad.fleet.service import open_store
         from skidpad.fleet.store.accounts import add_person, add_vehicle
         from skidpad.fleet.words import Role
@@ -166,48 +131,6 @@ def enrol(
     typer.echo(account.token)
 
 
-def _client(to: str, token_file: Path, ca: Path | None) -> httpx.Client:
-    """A client with a credential; one sentence for an address or file that cannot be used."""
-    import ssl
-
-    from skidpad.core.errors import ConfigError, FileError
-
-    with _extra():
-        import httpx
-
-        from skidpad.fleet.uploader import TIMEOUT_S
-    if not to.startswith(("https://", "http://127.0.0.1", "http://localhost")):
-        raise ConfigError(f"--to must be https://, or http:// on this machine, got {to!r}")
-    try:
-        token = token_file.read_text(encoding="ascii").strip()
-        verify = ssl.create_default_context(cafile=str(ca) if ca else None)
-    except (OSError, UnicodeDecodeError) as error:
-        raise FileError(f"{token_file} or {ca}: cannot be read ({error})") from error
-    headers = {"Authorization": f"Bearer {token}"}
-    return httpx.Client(
-        base_url=to, headers=headers, verify=verify, timeout=TIMEOUT_S, trust_env=False
-    )
-
-
-@cache
-def map_lines(name: str) -> list[list[tuple[float, float]]]:
-    """Middles of the lanes of a bundled map, every third point; nothing for another map."""
-    from skidpad.core.errors import InputError
-    from skidpad.roads.bundled import bundled_maps, load_map
-
-    try:
-        map = load_map(name) if name in bundled_maps() else None
-    except InputError:
-        map = None
-    if map is None:
-        return []
-    found = []
-    for first, size in zip(map.lanes.first.tolist(), map.lanes.size.tolist(), strict=True):
-        rows = [*range(first, first + size, 3), first + size - 1]
-        found.append([(float(map.samples.x[i]), float(map.samples.y[i])) for i in rows])
-    return found
-
-
 @fleet.command("open")
 def open_pages(
     to: Annotated[str, typer.Option(help="Address of the fleet.")],
@@ -217,8 +140,8 @@ def open_pages(
     """Print an address that opens the pages once, as whose credential it is."""
     from skidpad.core.errors import BackendError
 
-    with _client(to, token_file, ca) as client:
-        answer = client.post("/api/v1/session")
+    with client(to, token_file, ca) as link:
+        answer = link.post("/api/v1/session")
     if answer.status_code != 200:
         raise BackendError(f"the fleet gives no session: {answer.text}")
     typer.echo(to.rstrip("/") + answer.json()["path"])
@@ -227,25 +150,36 @@ def open_pages(
 @fleet.command()
 def upload(
     spool: Annotated[Path, typer.Option(help="Folder that holds what is not acknowledged.")],
-    to: Annotated[str, typer.Option(help="Address of the fleet.")],
     token_file: TokenFile,
     folders: Annotated[
         list[Path] | None, typer.Argument(help="Output folders of `skidpad monitor` to add.")
+    ] = None,
+    to: Annotated[str | None, typer.Option(help="Address of the fleet.")] = None,
+    mqtt: Annotated[
+        str | None, typer.Option(help="HOST[:PORT] of its MQTT 5 broker, in place of --to.")
     ] = None,
     release: Annotated[str, typer.Option(help="Update under which the vehicle drove.")] = "",
     ca: Annotated[Path | None, typer.Option(help="PEM of the authority that is trusted.")] = None,
     wait: Annotated[float, typer.Option(help="Seconds to go on trying when nobody answers.")] = 0.0,
 ) -> None:
     """Send hazards, drives and indicators; what is not acknowledged waits in the spool."""
-    with _extra():
+    from skidpad.core.errors import ConfigError
+
+    with fleet_extra():
         from skidpad.fleet.monitored import spool_folder
         from skidpad.fleet.spool import Spool
-        from skidpad.fleet.uploader import poster, send_all
-    with _client(to, token_file, ca) as client:
-        kept = Spool(spool)
-        for folder in folders or []:
-            spool_folder(kept, folder, release)
-        sent = send_all(kept, poster(client), wait)
+        from skidpad.fleet.uploader import mqtt_poster, poster, send_all
+    if (to is None) is (mqtt is None):
+        raise ConfigError("give one of --to and --mqtt")
+    broker = None if mqtt is None else broker_of(mqtt, ca)
+    kept = Spool(spool)
+    for folder in folders or []:
+        spool_folder(kept, folder, release)
+    if broker is not None:
+        sent = send_all(kept, mqtt_poster(broker, token_of(token_file)), wait)
+    else:
+        with client(str(to), token_file, ca) as link:
+            sent = send_all(kept, poster(link), wait)
     typer.echo(f"{sent.acknowledged} acknowledged, {sent.refused} refused, {sent.waiting} waiting")
 
 
@@ -259,7 +193,7 @@ def keys(
     """Begin a maker's updates: three keys each for root and list, two of which must sign."""
     import time
 
-    with _extra():
+    with fleet_extra():
         from skidpad.fleet.service import open_fleet
         from skidpad.fleet.store.accounts import tenant_id
         from skidpad.fleet.updates import signing
@@ -293,7 +227,7 @@ def sign(
 
     from skidpad.core.errors import FileError, require_choice
 
-    with _extra():
+    with fleet_extra():
         from skidpad.fleet.updates import signing
         from skidpad.fleet.updates.payloads import PayloadKind, payload_name, settings_of_content
     from skidpad.recording.files import write_bytes
@@ -316,7 +250,7 @@ def certificate(
     host: Annotated[list[str], typer.Option(help="Name or address of the server.")] = ["127.0.0.1"],  # noqa: B006
 ) -> None:
     """Make a certificate authority of one's own and a server's certificate for HTTPS."""
-    with _extra():
+    with fleet_extra():
         from skidpad.fleet.certificates import make_certificates
     for path in make_certificates(out, host):
         typer.echo(str(path))
@@ -334,7 +268,7 @@ def demo(
     """Vehicles drive, report, and get a good and a bad update; ends with the dashboard's address."""
     from skidpad.core.errors import OutputError
 
-    with _extra():
+    with fleet_extra():
         from skidpad.cli.fleet_demo import Demo, enrolled, play, pool, serving
     if out.exists() and any(out.iterdir()):
         raise OutputError(f"--out {out} is not empty; give a new folder")

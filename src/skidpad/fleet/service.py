@@ -77,7 +77,6 @@ def open_fleet(
 ) -> Fleet:
     """Open the store at `places`, made or brought to this version where needed."""
     engine = open_store(places)
-    warehouse = Warehouse(places.data / "trends.duckdb")  # may refuse, so before any thread begins
     blobs = Blobs(places.blobs or str(places.data.absolute() / "blobs"))
     hub = Hub()
     return Fleet(
@@ -89,7 +88,7 @@ def open_fleet(
         hub=hub,
         dispatcher=Dispatcher(engine, hub, clock, relays),
         signer=Signer(places.data / "keys"),
-        warehouse=warehouse,
+        warehouse=Warehouse(places.data / "trends.duckdb"),
         limits=limits or Limits(),
         exporter=exporter,
     )
@@ -97,6 +96,8 @@ def open_fleet(
 
 def open_store(places: Places) -> Engine:
     """The store alone, for commands that do not serve."""
+    if places.data.exists() and not places.data.is_dir():
+        raise OutputError(f"--data {places.data} is a file; the fleet's store is a folder")
     try:
         places.data.mkdir(parents=True, exist_ok=True)
     except OSError as error:

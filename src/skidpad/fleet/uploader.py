@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import json
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,6 +12,8 @@ from typing import Any
 import httpx
 
 from skidpad.core.errors import BackendError
+from skidpad.fleet.broker import ANSWERS, TOPIC, Broker, connected, library, request_properties
+from skidpad.fleet.identity import new_id
 from skidpad.fleet.spool import Spool, Waiting
 
 TIMEOUT_S = 60.0
@@ -42,6 +46,42 @@ def poster(client: httpx.Client, clock: Callable[[], float] = time.time) -> Post
         return client.post(url, content=batch.body, headers=headers)
 
     return post
+
+
+def mqtt_poster(
+    broker: Broker, token: str, clock: Callable[[], float] = time.time, timeout_s: float = TIMEOUT_S
+) -> Post:
+    """Sends a batch through a broker; the answer reads like the one over HTTPS."""
+    library()
+
+    def post(batch: Waiting) -> httpx.Response:
+        told = {
+            "authorization": f"Bearer {token}", "key": batch.key, "drive": batch.drive,
+            "time": f"{clock():.3f}",
+        }  # fmt: skip
+        try:
+            answer = asyncio.run(_through(broker, batch, told, timeout_s))
+            return httpx.Response(int(answer["status"]), json=answer["content"])
+        except (library().MqttError, OSError, TimeoutError) as error:
+            raise httpx.TransportError(f"mqtt: {error}") from error
+        except (ValueError, KeyError, TypeError) as error:
+            raise httpx.TransportError("mqtt: an answer that cannot be read") from error
+
+    return post
+
+
+async def _through(
+    broker: Broker, batch: Waiting, told: dict[str, str], timeout_s: float
+) -> dict[str, Any]:
+    where = f"{ANSWERS}/{new_id()}"
+    async with connected(broker, timeout_s) as client:
+        await client.subscribe(where, qos=1)
+        about = request_properties(where, told)
+        topic = f"{TOPIC}/{batch.kind.value}"
+        await client.publish(topic, batch.body, qos=1, properties=about)
+        message = await asyncio.wait_for(anext(aiter(client.messages)), timeout_s)
+        answer: dict[str, Any] = json.loads(message.payload)
+        return answer
 
 
 def send(spool: Spool, post: Post) -> Sent:

@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import json
-import ssl
 from collections.abc import Collection
-from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Protocol
 from urllib.parse import urlsplit
 
 import httpx
 
-from skidpad.core.errors import BackendError, ConfigError, MissingExtra
+from skidpad.core.errors import BackendError, ConfigError
+from skidpad.fleet.broker import Broker, connected, library
 from skidpad.pages.server import is_local
 
 TIMEOUT_S = 5.0  # of a webhook and of a broker
@@ -66,31 +64,12 @@ class Webhook:
             raise BackendError(f"{self.name}: answered {answer.status_code}")
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Broker:
-    """An MQTT broker."""
-
-    host: str
-    port: int = 1883
-    user: str | None = None
-    password: str | None = None
-    ca: Path | None = None  # PEM; given: TLS
-
-    def __post_init__(self) -> None:
-        if self.ca is None and not is_local(self.host):
-            raise ConfigError(f"--mqtt {self.host} leaves this machine and needs --mqtt-ca")
-
-
 class Mqtt:
     """Publishes to skidpad/<operator>/alerts, at least once (QoS 1)."""
 
     def __init__(self, broker: Broker, timeout_s: float = TIMEOUT_S) -> None:
         """MissingExtra without aiomqtt."""
-        try:
-            import aiomqtt
-        except ImportError as error:
-            raise MissingExtra("--mqtt", "fleet") from error
-        self._library, self.broker, self.timeout_s = aiomqtt, broker, timeout_s
+        self._library, self.broker, self.timeout_s = library(), broker, timeout_s
         self.name = "mqtt"
 
     def wants(self, operator: str) -> bool:
@@ -105,11 +84,6 @@ class Mqtt:
             raise BackendError(f"mqtt: {error}") from error
 
     async def _publish(self, alert: dict[str, Any]) -> None:
-        b, library = self.broker, self._library
-        tls = None if b.ca is None else ssl.create_default_context(cafile=str(b.ca))
-        async with library.Client(
-            b.host, b.port, username=b.user, password=b.password, timeout=self.timeout_s,
-            protocol=library.ProtocolVersion.V5, tls_context=tls,
-        ) as client:  # fmt: skip
+        async with connected(self.broker, self.timeout_s) as client:
             topic = f"skidpad/{alert['operator']}/alerts"
             await client.publish(topic, json.dumps(alert), qos=1)

@@ -18,7 +18,8 @@ from skidpad.fleet.alerting.keeping import (
 )
 from skidpad.fleet.alerting.orders import order_stop
 from skidpad.fleet.api.guard import Needs, fleet_of
-from skidpad.fleet.api.vehicle import Key, Reporter, VehicleTime, owners_of, read_body
+from skidpad.fleet.api.vehicle import Key, Reporter, VehicleTime, read_body
+from skidpad.fleet.checking import owners_of
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.words import Action, Principal
 

@@ -7,7 +7,7 @@ from typing import Annotated
 from fastapi import APIRouter, Depends, Request, Response
 
 from skidpad.fleet.api.guard import Needs, fleet_of
-from skidpad.fleet.api.vehicle import owners_of
+from skidpad.fleet.checking import owners_of
 from skidpad.fleet.loop.rollout import assignment
 from skidpad.fleet.updates.repository import Repository
 from skidpad.fleet.words import Action, Principal

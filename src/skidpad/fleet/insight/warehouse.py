@@ -59,20 +59,30 @@ class Warehouse:
     """The file of one service; safe between threads, one at a time."""
 
     def __init__(self, path: Path) -> None:
-        self.lock = threading.Lock()
-        try:
-            self._database = duckdb.connect(str(path))
-            self._database.execute(TABLES)
-        except duckdb.Error as error:
-            raise FileError(
-                f"{path}: no readable table of trends; delete it, and it is made again ({error})"
-            ) from error
+        """The file is opened when first asked: only who serves asks, and only one process can."""
+        self.path, self.lock = path, threading.Lock()
+        self._opened: duckdb.DuckDBPyConnection | None = None
         self._whole = True  # the first look is at every batch: a clock may have gone back before
+
+    @property
+    def _database(self) -> duckdb.DuckDBPyConnection:
+        if self._opened is None:
+            try:
+                opened = duckdb.connect(str(self.path))
+                opened.execute(TABLES)
+            except duckdb.Error as error:
+                why = "another process serves this folder"
+                if "lock" not in str(error):
+                    why = "no table of trends can be read in it; delete it, and it is made again"
+                raise FileError(f"{self.path}: {why}") from error
+            self._opened = opened
+        return self._opened
 
     def close(self) -> None:
         """Let go of the file."""
         with self.lock:
-            self._database.close()
+            if self._opened is not None:
+                self._opened.close()
 
     def since(self) -> float:
         """The time of receipt from which on batches may be unknown here, s; call under the lock."""

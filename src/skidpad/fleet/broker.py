@@ -1,0 +1,70 @@
+"""An MQTT 5 broker, and what a request over it looks like."""
+
+from __future__ import annotations
+
+import ssl
+from contextlib import AbstractAsyncContextManager
+from dataclasses import dataclass
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+from skidpad.core.errors import ConfigError, MissingExtra
+from skidpad.pages.server import is_local
+
+TOPIC = "skidpad/batches"  # and the kind of a batch
+ANSWERS = "skidpad/answers"  # and a name that the vehicle draws
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Broker:
+    """An MQTT broker."""
+
+    host: str
+    port: int = 1883
+    user: str | None = None
+    password: str | None = None
+    ca: Path | None = None  # PEM; given: TLS
+
+    def __post_init__(self) -> None:
+        if self.ca is None and not is_local(self.host):
+            raise ConfigError(f"--mqtt {self.host} leaves this machine and needs --mqtt-ca")
+
+
+def library() -> ModuleType:
+    """aiomqtt; MissingExtra without it."""
+    try:
+        import aiomqtt
+    except ImportError as error:
+        raise MissingExtra("--mqtt", "fleet") from error
+    return aiomqtt
+
+
+def connected(broker: Broker, timeout_s: float) -> AbstractAsyncContextManager[Any]:
+    """A connection as MQTT 5."""
+    aiomqtt = library()
+    tls = None if broker.ca is None else ssl.create_default_context(cafile=str(broker.ca))
+    client: AbstractAsyncContextManager[Any] = aiomqtt.Client(
+        broker.host, broker.port, username=broker.user, password=broker.password,
+        timeout=timeout_s, protocol=aiomqtt.ProtocolVersion.V5, tls_context=tls,
+    )  # fmt: skip
+    return client
+
+
+def request_properties(answer_to: str, told: dict[str, str]) -> Any:
+    """Properties of a vehicle's message: where it waits for the answer, and what it says."""
+    return properties(
+        ResponseTopic=answer_to, CorrelationData=told["key"].encode(), UserProperty=[*told.items()]
+    )
+
+
+def properties(**values: Any) -> Any:
+    """MQTT 5 properties of a message, by name."""
+    from paho.mqtt.packettypes import PacketTypes
+    from paho.mqtt.properties import Properties
+
+    kind: Any = Properties
+    found = kind(PacketTypes.PUBLISH)
+    for name, value in values.items():
+        setattr(found, name, value)
+    return found

@@ -123,35 +123,6 @@ def bootstrap_interval(
     return Interval(float(low), float(high))
 
 
-def ratio_interval(
-    clusters: int,
-    sums: tuple[float, float],
-    products: tuple[float, float, float],
-    confidence: float = CONFIDENCE,
-    most: float = 1.0,
-) -> Interval:
-    """Limits of a ratio sum(y) / sum(x) of what comes in clusters, between 0 and `most`.
-
-    A share of cycles has at most 1 (0 <= y <= x), a count y per exposure x has no bound.
-
-    clusters: how many, say vehicles; sums: of y and x over clusters; products: of y y, x y, x x.
-    By Taylor linearisation, var = k / (k - 1) sum((y - R x)^2) / sum(x)^2, with Student's t. Source:
-    Woodruff (1971), JASA 66, 411-414; SAS/STAT, SURVEYMEANS, Ratio. Where nothing was seen (y = 0
-    everywhere) a cluster counts as one observation: whatever the spread of shares over clusters,
-    none is seen in k of them with a chance of at most (1 - R)^k. A single cluster says nothing.
-    """
-    (y, x), (yy, xy, xx) = sums, products
-    if clusters < 2 or x <= 0.0:
-        return Interval(0.0, most)
-    if most == 1.0 and y in (0.0, x):
-        return clopper_pearson(0 if y == 0.0 else clusters, clusters, confidence)
-    share = y / x
-    spread = max(yy - 2.0 * share * xy + share * share * xx, 0.0)
-    error = float(np.sqrt(clusters / (clusters - 1) * spread)) / x
-    reach = float(stdtrit(clusters - 1, 0.5 + 0.5 * confidence)) * error
-    return Interval(max(share - reach, 0.0), min(share + reach, most))
-
-
 def event_rate(counts: Sequence[int], exposures: Sequence[float] | None = None) -> Rate:
     """Rate of events over runs: exact Poisson of a single run, else score limits.
 
@@ -219,6 +190,23 @@ def ratio_limits(values: ArrayLike, weights: ArrayLike) -> Interval | None:
     half = stats.t.ppf(1.0 - (1.0 - CONFIDENCE) / 2.0, v.size - 1) * off.std(ddof=1)
     half /= np.sqrt(v.size)
     return Interval(float(ratio - half), float(ratio + half))
+
+
+def linear_ratio_limits(
+    units: int, sums: tuple[float, float], products: tuple[float, float, float]
+) -> Interval:
+    """Limits of sum(y) / sum(x) over 30 units or more, from sums alone.
+
+    sums: of y and x; products: of y y, x y and x x. By Taylor linearisation, var = k / (k - 1)
+    sum((y - R x)^2) / sum(x)^2, with Student's quantile. Source: Woodruff (1971), JASA 66, 411-414;
+    SAS/STAT, The SURVEYMEANS procedure, Ratio.
+    """
+    (y, x), (yy, xy, xx) = sums, products
+    ratio = y / x
+    spread = max(yy - 2.0 * ratio * xy + ratio * ratio * xx, 0.0)
+    half = float(stdtrit(units - 1, 0.5 + 0.5 * CONFIDENCE))
+    half *= float(np.sqrt(units / (units - 1) * spread)) / x
+    return Interval(ratio - half, ratio + half)
 
 
 def compare_pairs(differences: ArrayLike) -> Comparison:

@@ -7,12 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import msgspec
-import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 from sqlalchemy import Connection, func, select
 
-from skidpad.evidence.statistics import Interval, event_rate, ratio_interval
+from skidpad.evidence.statistics import (
+    BOOTSTRAP_FROM,
+    Interval,
+    clopper_pearson,
+    event_rate,
+    linear_ratio_limits,
+    ratio_limits,
+)
 from skidpad.fleet.batch import IndicatorRow, rows_of
 from skidpad.fleet.insight.warehouse import DAY, Moments
 from skidpad.fleet.service import Fleet
@@ -22,7 +27,6 @@ from skidpad.fleet.unpacking import unpack
 from skidpad.fleet.words import Kind, Principal, Role
 
 GROUP = 500  # batches that are taken at once
-MANY = 30  # vehicles
 SCHEMA = {
     "manufacturer": pl.String, "operator": pl.String, "vehicle": pl.String, "received": pl.Float64,
     "indicator": pl.String, "n": pl.Int64, "violated": pl.Int64, "mean": pl.Float64,
@@ -113,14 +117,24 @@ def _trend(m: Moments, days: int) -> Trend:
         at=m.slot * days * DAY,
         mean=m.total / m.n,
         share=m.violated / m.n,
-        interval=ratio_interval(m.vehicles, (m.violated, m.n), (m.vv, m.vn, m.nn)),
+        interval=_limits(m),
         vehicles=m.vehicles,
         cycles=int(m.n),
     )
 
 
-def _within(limits: Interval | None) -> Interval:
-    """Limits of a share; all of it where there are none."""
+def _limits(m: Moments) -> Interval:
+    """Limits of a share over vehicles; all of it where they are too few.
+
+    Where nothing was seen, or nothing else, a vehicle counts as one observation: whatever the spread
+    of shares over vehicles, none is seen in k of them with a chance of at most (1 - share)^k.
+    """
+    if m.violated in (0.0, m.n):
+        return clopper_pearson(m.vehicles if m.violated else 0, m.vehicles)
+    if m.vehicles < BOOTSTRAP_FROM:
+        limits = ratio_limits(m.each_violated, m.each_n)
+    else:
+        limits = linear_ratio_limits(m.vehicles, (m.violated, m.n), (m.vv, m.vn, m.nn))
     if limits is None:
         return Interval(0.0, 1.0)
     return Interval(max(limits.low, 0.0), min(limits.high, 1.0))
@@ -134,8 +148,8 @@ def hazard_rates(connection: Connection, who: Principal) -> list[HazardRate]:
         .group_by(drives.c.vehicle)
         .order_by(drives.c.vehicle)
     ).all()
-    hours = np.array([row.seconds / 3600.0 for row in driven])
-    if hours.sum() <= 0.0:
+    hours = [row.seconds / 3600.0 for row in driven]
+    if sum(hours) <= 0.0:
         return []
     counted = connection.execute(
         select(hazards.c.type, hazards.c.vehicle, func.count().label("n"))
@@ -143,23 +157,9 @@ def hazard_rates(connection: Connection, who: Principal) -> list[HazardRate]:
         .group_by(hazards.c.type, hazards.c.vehicle)
     ).all()
     table = {(row.type, row.vehicle): int(row.n) for row in counted}
-    return [
-        _rate(type_, np.array([table.get((type_, row.vehicle), 0) for row in driven]), hours)
-        for type_ in sorted({row.type for row in counted})
-    ]
-
-
-def _rate(type_: str, counts: NDArray[np.int64], hours: NDArray[np.float64]) -> HazardRate:
-    """Over vehicles; by linearisation where there are many, else as everywhere (X-9)."""
-    total, exposure = int(counts.sum()), float(hours.sum())
-    if counts.size < MANY:
-        return HazardRate(
-            type_,
-            total,
-            exposure,
-            total / exposure,
-            event_rate(counts.tolist(), hours.tolist()).interval,
-        )
-    products = (float(counts @ counts), float(counts @ hours), float(hours @ hours))
-    interval = ratio_interval(counts.size, (float(total), exposure), products, most=np.inf)
-    return HazardRate(type_, total, exposure, total / exposure, interval)
+    out = []
+    for type_ in sorted({row.type for row in counted}):
+        counts = [table.get((type_, row.vehicle), 0) for row in driven]
+        rate = event_rate(counts, hours)
+        out.append(HazardRate(type_, rate.events, rate.exposure, rate.rate, rate.interval))
+    return out

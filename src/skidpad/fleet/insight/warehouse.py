@@ -15,6 +15,7 @@ import duckdb
 import polars as pl
 
 from skidpad.core.errors import FileError
+from skidpad.evidence.statistics import BOOTSTRAP_FROM
 
 DAY = 86400.0  # s, in UTC
 LATE_S = 3600.0  # a batch may come to light that long after its time of receipt
@@ -33,7 +34,9 @@ TAKE = """
 MOMENTS = """
     SELECT indicator, slot, count(*) AS vehicles, sum(n) AS n, sum(violated) AS violated,
            sum(total) AS total, sum(violated * violated) AS vv, sum(violated * n) AS vn,
-           sum(n * n) AS nn
+           sum(n * n) AS nn,
+           CASE WHEN count(*) < {few} THEN list(violated ORDER BY vehicle) ELSE [] END,
+           CASE WHEN count(*) < {few} THEN list(n ORDER BY vehicle) ELSE [] END
     FROM (SELECT indicator, day // $days AS slot, vehicle, sum(n)::DOUBLE AS n,
                  sum(violated)::DOUBLE AS violated, sum(total) AS total
           FROM sums WHERE {right} GROUP BY indicator, slot, vehicle HAVING sum(n) > 0)
@@ -53,6 +56,8 @@ class Moments(NamedTuple):
     vv: float
     vn: float
     nn: float
+    each_violated: list[float]  # of every vehicle, where these are few
+    each_n: list[float]
 
 
 class Warehouse:
@@ -126,5 +131,7 @@ class Warehouse:
         if column is not None:
             right, told["tenant"] = f"{column} = $tenant", tenant
         with self.lock:
-            rows = self._database.execute(MOMENTS.format(right=right), told).fetchall()
+            rows = self._database.execute(
+                MOMENTS.format(right=right, few=BOOTSTRAP_FROM), told
+            ).fetchall()
         return [Moments(*row) for row in rows]

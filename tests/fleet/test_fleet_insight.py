@@ -25,7 +25,6 @@ from skidpad.fleet.service import Places, open_fleet
 from skidpad.fleet.site.drawing import KINDS
 from skidpad.fleet.store.accounts import add_vehicle
 
-
 DRAWS = 2000
 
 

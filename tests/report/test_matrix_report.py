@@ -9,7 +9,7 @@ from skidpad.recording.files import write_parquet
 from skidpad.recording.matrix import MATRIX, Metrics, RunKey
 from skidpad.recording.results import Timing
 from skidpad.report.matrix import build_page, write_report
-from skidpad.report.matrix_data import WEATHERS, load_matrix, weather_title
+from skidpad.report.matrix_data import WEATHERS, load_matrix, rate_by_seed, weather_title
 from skidpad.report.matrix_tables import per_weather
 
 RATES = {"0": 3.0, "1": 0.5, "2": 1.0, "3": 1.5, "4": 0.0}
@@ -160,6 +160,19 @@ def test_metrics_are_named_in_words_with_their_units(tmp_path):
         "headway variance, m²",
     ):
         assert f">{name}<" in page
+
+
+@pytest.mark.req("R-7")
+def test_runs_of_one_seed_are_one_unit_of_a_rate_over_all_weathers():
+    def runs(weathers):
+        rows = [(s, n) for s, n in ((1, 9), (2, 4), (3, 14)) for _ in range(weathers)]
+        return pl.DataFrame(rows, schema=["seed", "hits"], orient="row")
+
+    one, six = (rate_by_seed(runs(k), "hits") for k in (1, 6))
+    assert (one.rate, one.runs) == (six.rate, six.runs) == (9.0, 3)
+    assert one.interval.high - one.interval.low == pytest.approx(
+        six.interval.high - six.interval.low, rel=0.3
+    ), "six copies of a drive tell no more than one"
 
 
 @pytest.mark.req("A-256")

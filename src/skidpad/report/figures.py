@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import io
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -32,6 +32,10 @@ STYLE: dict[Any, Any] = {
     "axes.edgecolor": FRAME,
     "legend.frameon": False,
 }
+
+
+LEGEND_CHARACTERS = 12.0  # of its font, per inch
+LEGEND_MARK = 5  # characters that a mark and its spaces take
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,8 +182,14 @@ def curves(
             if not stacked or axes is all_axes[-1]:
                 axes.set_xlabel(chart.x_label)
         if len(named) > 1:
-            figure.legend(loc="outside upper center", ncols=6)
+            figure.legend(loc="outside upper center", ncols=legend_columns(named, width))
         return svg_of(figure)
+
+
+def legend_columns(names: Iterable[str], width: float) -> int:
+    """Columns of a legend in which the longest name fits; width of the figure in inches."""
+    longest = max(map(len, names)) + LEGEND_MARK
+    return max(1, min(6, int(width * LEGEND_CHARACTERS / longest)))
 
 
 def _draw_curves(axes: Axes, chart: Chart, named: set[str]) -> None:

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import polars as pl
 
 from skidpad.evidence.contrasts import paired_runs, per_seed
-from skidpad.evidence.statistics import Rate, compare_pairs, event_rate, interval_text, p_text
+from skidpad.evidence.statistics import Rate, compare_pairs, interval_text, p_text
 from skidpad.evidence.verdicts import Judgement
 from skidpad.report.figures import POINTS, Chart, Curve, curves
-from skidpad.report.matrix_data import Matrix, config_title, weather_title
+from skidpad.report.matrix_data import Matrix, config_title, rate_by_seed, weather_title
 from skidpad.report.page import Answers, Figure
 from skidpad.report.verdicts import least_seeds_text, seeds_text, tally_text
 
@@ -43,8 +43,7 @@ def _sure(seeds: int, judged: Sequence[Judgement]) -> str:
 
 
 def _in_weather(matrix: Matrix, weather: str) -> Rate | None:
-    counts = matrix.finished.filter(pl.col("weather") == weather)[FATAL].drop_nulls()
-    return event_rate(counts.to_list()) if len(counts) else None
+    return rate_by_seed(matrix.finished.filter(pl.col("weather") == weather), FATAL)
 
 
 def _extremes(matrix: Matrix, factor: str, rates: dict[str, Rate], titles: dict[str, str]) -> str:

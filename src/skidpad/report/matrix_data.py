@@ -90,8 +90,7 @@ class Matrix(CampaignView[MatrixEntry]):
 
     def rate(self, column: str, config: str, weather: str | None = None) -> Rate | None:
         """Events per run of a cell; None without finished runs."""
-        counts = self.cell(config, weather)[column].drop_nulls()
-        return event_rate(counts.to_list()) if len(counts) else None
+        return rate_by_seed(self.cell(config, weather), column)
 
     def mean(self, column: str, config: str, weather: str | None = None) -> float | None:
         """Mean over the runs of a cell."""
@@ -112,6 +111,15 @@ class Matrix(CampaignView[MatrixEntry]):
             f"{self.results['seed'].n_unique()} runs per cell, on {self.values('map')}, "
             f"sensors as {levels}."
         )
+
+
+def rate_by_seed(runs: pl.DataFrame, column: str) -> Rate | None:
+    """Events per run. Runs of one seed share their traffic, so seeds are what the interval is over."""
+    known = runs.drop_nulls(column)
+    if not len(known):
+        return None
+    seeds = known.group_by("seed", maintain_order=True).agg(pl.col(column).sum(), drives=pl.len())
+    return event_rate(seeds[column].to_list(), seeds["drives"].cast(pl.Float64).to_list())
 
 
 def load_matrix(folder: Path) -> Matrix:

@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from skidpad.evidence.statistics import event_rate, median_time
-from skidpad.report.matrix_data import Matrix, config_title
+from skidpad.evidence.statistics import median_time
+from skidpad.report.matrix_data import Matrix, config_title, rate_by_seed
 from skidpad.report.matrix_tables import TOO_FEW
 from skidpad.report.page import Cell, Table
 from skidpad.report.tables import Column, Format, Quantity, table
@@ -46,7 +46,8 @@ def _count(matrix: Matrix, column: str, config: str) -> Quantity:
     km = float(runs["distance_km"].sum())
     if not len(runs) or not km:
         return Quantity(value=None)
-    rate = event_rate(runs[column].to_list())
+    rate = rate_by_seed(runs, column)
+    assert rate is not None
     scale = 100.0 * len(runs) / km
     told = f"per 100 km {scale * rate.rate:.1f}"
     if rate.interval is not None:
@@ -57,7 +58,7 @@ def _count(matrix: Matrix, column: str, config: str) -> Quantity:
         interval=rate.interval,
         remark=TOO_FEW if rate.interval is None else "",
         lines=(told,),
-        hint=f"{rate.events} events in {rate.runs} runs, {km:,.0f} km, {rate.method.value}",
+        hint=f"{rate.events} events, {rate.runs} seeds, {km:,.0f} km, {rate.method.value}",
     )
 
 

@@ -126,7 +126,7 @@ def rate_quantity(
         remark=TOO_FEW if rate.interval is None else "",
         published=published,
         heat=None if top is None else (rate.rate / top) ** 0.5,
-        hint=f"{rate.events} events in {rate.runs} runs, {rate.method.value}",
+        hint=f"{rate.events} events, {rate.runs} seeds, {rate.method.value}",
     )
 
 

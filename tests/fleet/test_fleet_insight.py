@@ -20,10 +20,10 @@ from skidpad.evidence.statistics import linear_ratio_limits
 from skidpad.fleet.insight.places import ADVICE
 from skidpad.fleet.insight.research import HOUR, K, export
 from skidpad.fleet.insight.trends import compact, trends
-from skidpad.fleet.insight.warehouse import TAKE, Warehouse
 from skidpad.fleet.service import Places, open_fleet
 from skidpad.fleet.site.drawing import KINDS
 from skidpad.fleet.store.accounts import add_vehicle
+from skidpad.fleet.warehouse import TAKE, Warehouse
 
 DRAWS = 2000
 
@@ -60,7 +60,7 @@ def test_trends_hold_what_was_sent_and_no_more_than_ones_own(world):
 
 def test_a_kill_while_batches_are_summed_up_counts_nothing_twice(lite, monkeypatch):
     send_rows(lite, "red-1", "key-aaaa-1", row(0, 60))
-    monkeypatch.setattr("skidpad.fleet.insight.warehouse.TAKE", TAKE + "; SELECT error('killed')")
+    monkeypatch.setattr("skidpad.fleet.warehouse.TAKE", TAKE + "; SELECT error('killed')")
     with pytest.raises(duckdb.Error):
         compact(lite.fleet)
     monkeypatch.undo()

@@ -15,10 +15,10 @@ from skidpad.fleet.alerting.hub import Hub
 from skidpad.fleet.alerting.orders import Signer
 from skidpad.fleet.alerting.relays import Relay
 from skidpad.fleet.blobs import Blobs
-from skidpad.fleet.insight.warehouse import Warehouse
 from skidpad.fleet.store.engine import migrate, open_engine, sqlite_url
 from skidpad.fleet.store.intake import Intake
 from skidpad.fleet.updates.repository import Repository
+from skidpad.fleet.warehouse import Warehouse
 from skidpad.fleet.words import Limits
 from skidpad.recording.hazards import HazardRecord
 

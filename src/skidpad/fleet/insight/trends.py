@@ -19,11 +19,11 @@ from skidpad.evidence.statistics import (
     ratio_limits,
 )
 from skidpad.fleet.batch import IndicatorRow, rows_of
-from skidpad.fleet.insight.warehouse import DAY, Moments
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.rights import visible
 from skidpad.fleet.store.tables import batches, drives, hazards, vehicles
 from skidpad.fleet.unpacking import unpack
+from skidpad.fleet.warehouse import DAY, Moments
 from skidpad.fleet.words import Kind, Principal, Role
 
 GROUP = 500  # batches that are taken at once

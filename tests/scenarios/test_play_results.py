@@ -112,3 +112,16 @@ def test_a_folder_has_crash_cards_and_a_verdict_for_each_run(tmp_path):
     for run in (tmp_path / "out" / "runs").iterdir():
         assert (run / "trajectories.csv").is_file()
         assert (run / "pairs.csv").is_file()
+
+
+def test_a_single_run_has_crash_cards_too(tmp_path):
+    (tmp_path / "in").mkdir()
+    file = a_braking_lead(tmp_path / "in", 12.0)
+    done = play(file, "--out", tmp_path / "out", "--controller", "blind:Blind")
+    assert done.exit_code == 0, done.output
+    assert "crashes.html" in done.output
+    assert "One crash" in (tmp_path / "out" / "crashes.html").read_text(encoding="utf-8")
+
+
+def test_a_run_without_a_crash_has_no_cards(out):
+    assert not (out / "crashes.html").exists()

@@ -85,9 +85,21 @@ def play(
     log = driven.log
     seconds = float(log.t[-1]) if len(log) else 0.0
     typer.echo(f"{driven.outcome.value} after {seconds:.2f} s; log in {out}")
+    _cards(runs[0], out)
     if driven.error:
         typer.echo(driven.error.strip().split("\n")[-1], err=True)
     expected.judge({runs[0].name: out})
+
+
+def _cards(run: RunSpec, out: Path) -> None:
+    """The crash cards of one run, where there was a crash."""
+    from skidpad.campaign.cast import load_scenario
+    from skidpad.campaign.grip_cells import scenario_of
+    from skidpad.report.play import write_crashes
+
+    page = write_crashes(out, load_scenario(scenario_of(run)).map)
+    if page is not None:
+        typer.echo(f"crash cards in {page}")
 
 
 def _drive_all(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from enum import Enum
 from math import atan2, cos, pi, sin, sqrt
 
@@ -181,4 +181,4 @@ class Guide:
             lean = min(max(atan2(self.offset_rate, forward), -STEEPEST_TURN), STEEPEST_TURN)
             turn = self.along * (lean if self.v > 0.0 else -lean)
         yaw = pose.yaw + turn if self.along > 0.0 else pose.yaw + pi + turn
-        return replace(pose, yaw=wrap_angle(yaw))
+        return Pose(pose.x, pose.y, pose.z, yaw=wrap_angle(yaw))

@@ -48,7 +48,7 @@ EXTRAS = {
     Extra.SHADOWS: "shadows",
     Extra.LAMPS: "bloom of lamps",
     Extra.REFLECTIONS: "lamps on a wet road",
-    Extra.RETRO: "reflective markings and signs",
+    Extra.RETRO: "reflective signs, lines",
     Extra.CLOUDS: "clouds",
     Extra.SNOW: "snow on the road",
     Extra.CALM: "less camera noise",

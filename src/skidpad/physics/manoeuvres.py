@@ -27,7 +27,8 @@ SETTLE = 8.0  # s to find the circle
 SPUN = 0.35  # rad of side slip beyond which nobody calls it driving
 AFTER = 4.0  # s of watching after a pedal moved
 
-# Sine with dwell: 49 CFR 571.126 (FMVSS 126) S6 and S7, the same in UN Regulation 140, paragraph 9.
+# Sine with dwell: 49 CFR 571.126 (FMVSS 126) S5 to S7, the same in UN Regulation 140, paragraph 9. Its
+# waveform was looked up; shares and displacement below were not read in its text (docs/physics.md).
 DWELL_SPEED = mps_from_kmh(80.0)
 DWELL_FREQUENCY = 0.7  # Hz
 DWELL = 0.5  # s

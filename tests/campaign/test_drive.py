@@ -228,7 +228,8 @@ def test_on_a_town_without_barriers_leaving_the_road_counts(tmp_path: Path) -> N
     assert found.off_road >= 1
     assert found.road_departures == found.fatal_collisions
     assert found.collisions_vehicle == 0
-    assert found.off_lanes_pct == 0.0
+    assert found.off_lanes_pct is not None
+    assert found.off_lanes_pct < 5.0  # who comes back by himself has not left the road
     assert run.off_road is not None
     assert run.off_road.mean() < 0.1
     street = load_map(town).edge.beyond(

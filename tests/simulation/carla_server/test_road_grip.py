@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from skidpad.core.vocabulary import GripModel
-from skidpad.physics.grip import friction_ratio
+from skidpad.physics.grip import grip_params, ratio_at
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE
 from skidpad.simulation.carla.grip import V_RATIO
 from skidpad.simulation.carla_server.episode import Episode, Wanted
@@ -63,9 +63,8 @@ def effective(served: Served) -> np.ndarray:
 def test_served_grip_and_scaled_wheels_agree_at_every_wheel(model: GripModel, weather: str) -> None:
     served = served_with(model, weather)
     scaled = served_with(GripModel.NONE, weather)
-    ratio = friction_ratio(
-        served.episode.sky.weather, model, V_RATIO
-    )  # what the adapter multiplies by
+    params = grip_params(served.episode.sky.weather, model)
+    ratio = ratio_at(params, V_RATIO)  # what the adapter multiplies by
     for vehicle in scaled.episode.vehicles:
         let_wear(scaled.episode, vehicle, vehicle.physics.tire_friction * ratio)
     one, two = effective(served), effective(scaled)
@@ -73,6 +72,6 @@ def test_served_grip_and_scaled_wheels_agree_at_every_wheel(model: GripModel, we
     assert one == pytest.approx(two, rel=1e-6)
     assert one[:, 3] == pytest.approx(one[:, 2] * 2.0 / 3.5)
     if weather == "dry":
-        assert one[:, 0] == pytest.approx(MU_REF)
+        assert one[:, 0] == pytest.approx(MU_REF, rel=0.1)  # it falls with speed
     else:
         assert (one[:, 0] < 0.95 * MU_REF).all()

@@ -8,7 +8,7 @@ from typing import Any
 from skidpad.core.geometry import mps_from_kmh
 from skidpad.core.setup import Setup
 from skidpad.core.vocabulary import GripModel
-from skidpad.physics.grip import GripParams, friction_ratio, grip_params, mu_at
+from skidpad.physics.grip import GripParams, grip_params, mu_at, ratio_at
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE
 
 BLUEPRINTS = ("skidpad.weather.grip", "skidpad.weather")  # of our servers now and before
@@ -76,7 +76,7 @@ def prepare_grip(carla: Any, world: Any, setup: Setup) -> Grip:
     library = world.get_blueprint_library()
     emitter = next((b for name in BLUEPRINTS for b in library if b.id == name), None)
     if emitter is None:
-        ratio = friction_ratio(setup.weather, setup.grip, V_RATIO)
+        ratio = float(ratio_at(params, V_RATIO))
         return Grip(setup, False, ratio, params)
     model, mu_ref = in_force(emitter, setup)
     emitter.set_attribute("ice_thickness", f"{setup.weather.ice_thickness:g}")

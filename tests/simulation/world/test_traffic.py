@@ -286,3 +286,20 @@ def test_drivers_follow_a_lane_through_every_branch_of_the_map() -> None:
         lanes = world.placed["lane"][1:]
         visited |= set(MAP.lanes.road[lanes[lanes >= 0]].tolist())
     assert {50, 102, 104} & visited, "some take the ramp"
+
+
+def test_nobody_changes_lane_for_what_holds_on_every_lane() -> None:
+    """Alone on the road there is nobody to overtake: bends, limits and lights are no reasons."""
+    traffic = TrafficSetup(mode=TrafficStart.RANDOM, vehicles=1, slow_in_weather=True, variety=True)
+    world = world_without_ego(2, replace(SETUP, traffic=traffic))
+    assert world.traffic is not None
+    world.traffic.care = world.traffic.care._replace(drawn=0.0)
+    changes, before, v_max = 0, np.inf, 0.0
+    for _ in range(2400):
+        world.step()
+        change = float(world.traffic.drivers.state["change"][1])
+        changes += change < before
+        before = change
+        v_max = max(v_max, float(world.placed["speed"][1]))
+    assert v_max > 20.0
+    assert changes == 0

@@ -88,6 +88,8 @@ def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
         return []
     if traffic.mode is TrafficStart.RANDOM:
         factors = random_factors(traffic.vehicles, seed)
+        if traffic.variety:  # their characters bring the spread
+            factors[:] = 1.0
         spawns = [Spawn(None, float(f)) for f in factors]
     else:
         around = pack_spawns if traffic.mode is TrafficStart.PACK else fixed_spawns

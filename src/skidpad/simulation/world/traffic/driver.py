@@ -201,6 +201,7 @@ def plan(view: View, d: Drivers, i: int) -> None:
     if merging != NOBODY:
         v_merging = view.placed[merging].v
         a = min(a, idm(v, v_desired, gap_merge, v_merging, c))
+    a_lane = a  # what the lane allows, without what holds on every lane
     gap_stop = min(stop_gap(view, d, i), end_gap(view, d, i))
     gap_stop = min(gap_stop, right_of_way_gap(view, d, i), zebra_gap(view, d, i))
     if gap_stop < np.inf:
@@ -210,7 +211,7 @@ def plan(view: View, d: Drivers, i: int) -> None:
         firm = firm_braking(view.care, v, TOO_FAST_BRAKE)
         a = min(a, max((v_desired - v) / TOO_FAST_TIME, -firm))
     me.target = a
-    consider_change(view, d, i, a, v_desired, gap_stop)
+    consider_change(view, d, i, a_lane, v_desired, gap_stop)
     strayed = abs(me.offset) > view.streets.net.point[me.at].half_width + STRAYED
     standing = v < STUCK_SPEED and min(gap, gap_stop, gap_merge) > CAUSE_GAP
     wrong_way = cos(body.yaw - me.heading) < WRONG_WAY

@@ -229,9 +229,12 @@ def test_on_a_town_without_barriers_leaving_the_road_counts(tmp_path: Path) -> N
     assert found.road_departures == found.fatal_collisions
     assert found.collisions_vehicle == 0
     assert found.off_lanes_pct is not None
-    assert found.off_lanes_pct < 5.0  # who comes back by himself has not left the road
+    assert 0.0 < found.off_lanes_pct < 5.0
     assert run.off_road is not None
-    assert run.off_road.mean() < 0.1
+    edges = np.flatnonzero(np.diff(np.r_[0, run.off_road.astype(int), 0]))
+    assert (
+        np.diff(edges)[::2].max() < 20
+    )  # ticks: who is back within a second has not left the road
     street = load_map(town).edge.beyond(
         run.log.actors.x[:, 0], run.log.actors.y[:, 0], run.log.actors.z[:, 0]
     )

@@ -99,7 +99,7 @@ def again(run: Path) -> str:
 @pytest.mark.req("A-139", "A-260")
 def test_a_folder_of_every_command_is_driven_again(tmp_path: Path) -> None:
     adas = adas_run(2, seed=3, duration=1.0, vehicles=3)
-    blinking = replace(speed_and_dropout(1)[2].run, seed=4, duration=1.0)
+    blinking = replace(speed_and_dropout((1,))[2].run, seed=4, duration=1.0)
     grip = replace(tuning_run(Candidate("lead_slowdown", {}), 1), duration=1.0)
     played = replace(grip, driver=Passenger())
     Campaign(MATRIX, [adas, blinking]).run(tmp_path, here)

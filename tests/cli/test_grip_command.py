@@ -83,7 +83,8 @@ def test_batches_of_twenty_with_a_stopping_rule():
 )
 def test_a_small_campaign_from_command_to_page(tmp_path):
     out = tmp_path / "out"
-    done = CliRunner().invoke(app, ["grip", "--out", str(out), *SMALL], catch_exceptions=False)
+    words = ["grip", "--out", str(out), *SMALL, "--scenarios", "lead_slowdown,ghost_cut_in"]
+    done = CliRunner().invoke(app, words, catch_exceptions=False)
     assert done.exit_code == 0
     page = (out / "report.html").read_text(encoding="utf-8")
     for part in (

@@ -192,20 +192,17 @@ def serious(path, **more):
 
 def test_everything_unknown_and_wrong_is_listed_at_once_with_its_line(tmp_path):
     swarm = """<GlobalAction><TrafficAction><TrafficSwarmAction/></TrafficAction></GlobalAction>"""
-    weird = """<ByValueCondition><UserDefinedValueCondition name='x' value='y' rule='equalTo'/>
-</ByValueCondition>"""
     nobody = AT_2_S.replace("SimulationTime", "Tidal")
     path = scenario(
         tmp_path,
         EVENT.format("one", swarm, 0, AT_2_S),
-        EVENT.format("two", slow_down(shape="ramp"), 0, weird),
+        EVENT.format("two", slow_down(shape="ramp"), 0, AT_2_S),
         EVENT.format("three", slow_down(rate="$Nothing"), 0, nobody),
     )
     found = serious(path)
     assert [(f.element, f.kind) for f in found] == [
         ("TrafficAction", Kind.UNSUPPORTED),
         ("SpeedActionDynamics", Kind.UNSUPPORTED),
-        ("UserDefinedValueCondition", Kind.UNSUPPORTED),
         ("SpeedActionDynamics", Kind.ERROR),
         ("TidalCondition", Kind.UNSUPPORTED),
     ]

@@ -33,6 +33,7 @@ from skidpad.simulation.embedded.engine import EmbeddedBackend
 
 SECONDS = 90.0
 BEFORE_CONTACT = 25.0  # s that configuration 2 drives before it meets the first guardrail
+TWO_CONTACTS = 65.0  # s: guardrails at 27 and 54 s, the next at 77 s
 Numbers = dict[str, Any]
 
 
@@ -45,8 +46,8 @@ class SmoothRoad(EmbeddedBackend):
 
 
 def empty(config: int, seconds: float, backend: Backend) -> Numbers:
-    """Nobody else on figure8."""
-    spec = adas_run(config, vehicles=0, seed=1, duration=seconds)
+    """Nobody else on figure8; no vehicle of a CARLA server has stability control."""
+    spec = adas_run(config, vehicles=0, seed=1, duration=seconds, settings={"esc": False})
     return asdict(run_metrics(run(spec, backend=backend).log, load_map("figure8")))
 
 
@@ -75,7 +76,7 @@ def main(port: int) -> Any:
     return {
         "empty 2": both(lambda b: empty(2, BEFORE_CONTACT, b)),
         "empty 4": both(lambda b: empty(4, SECONDS, b)),
-        "contacts": both(lambda b: empty(2, SECONDS, b)),
+        "contacts": both(lambda b: empty(2, TWO_CONTACTS, b)),
         "lead": both(behind_lead),
     }
 

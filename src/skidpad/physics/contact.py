@@ -2,8 +2,8 @@
 
 Rigid bodies in the plane that share an impulse at the middle of their overlap; height decides who
 can meet at all (decision M-12). Which contacts began in a tick is the engine's business.
-Source of the impulse law: Brach and Brach, Vehicle Accident Analysis and Reconstruction Methods
-(2005), chapter 6 (planar impact mechanics).
+The impulse law is planar impact mechanics, as books on accident reconstruction have it (Brach and
+Brach, 2005, named but not read); it follows from momentum, restitution and friction alone.
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ V_FOG = 50.0  # m, at fog density 100; density 50 then gives 1 km, where fog beg
 RAIN_SIGHT_KM, RAIN_SIGHT_EXPONENT = (
     11.6,
     -0.63,
-)  # sight in rain of R mm/h; Atlas, J. Met. 10 (1953)
+)  # sight in rain of R mm/h; said to be Atlas (1953), not read: an assumption
 RAIN_SIGHT_CONTRAST = 0.02  # the contrast of that formula (Koschmieder, 1924)
 
 RADAR_GHZ = 77.0
@@ -42,7 +42,7 @@ def fog_extinction(weather: Weather) -> float:
 
 
 def rain_extinction(rain_mm_h: float) -> float:
-    """Extinction of rain in 1/m; 0 without rain. Source: Atlas (1953), see RAIN_SIGHT_KM."""
+    """Extinction of rain in 1/m; 0 without rain. See RAIN_SIGHT_KM."""
     if rain_mm_h <= 0.0:
         return 0.0
     sight = 1000.0 * RAIN_SIGHT_KM * rain_mm_h**RAIN_SIGHT_EXPONENT

@@ -7,9 +7,9 @@ wheel, one that turns too little at the inner rear one; where the driver brakes 
 wheel of the axle is released by as much. Ideal in one respect: it is told the friction, which a
 real one estimates. Brake-force distribution: no rear wheel is asked for more of its load than the
 front axle is of its own, nor of more grip than the other one has.
-Sources: yaw rate and its bound 0.85 mu g / v, Rajamani, Vehicle Dynamics and Control (2nd edition
-2012), chapter 8; which wheel is braked, and least speed 20 km/h, UN Regulation 140 paragraph 6.
-Gains and dead bands are ours, chosen on the sine with dwell (docs/physics.md).
+Assumptions: the bound 0.85 mu g / v and the least speed of 20 km/h, which textbooks and UN
+Regulation 140 are said to name but which we have not read there. Gains and dead bands are ours,
+chosen on the sine with dwell (docs/physics.md).
 """
 
 from __future__ import annotations

@@ -56,6 +56,16 @@ PROOFS = (
         ("tools/channels_campaign.py", "--out", "out/nightly/channels", "--hours", "50"),
         "the evaluation of the channels whole: driven, trained, validated and reported on seeds of its own",
     ),
+    Proof(
+        "fleet-kills",
+        ("tools/fleet_load.py", "--records", "20000", "--kills", "20"),
+        "20 kills of the fleet's service at random moments: acknowledged ids are the stored ones",
+    ),
+    Proof(
+        "fleet-pages",
+        ("tools/fleet_pages.py", "--rows", "10000000"),
+        "the fleet's pages over ten million rows of indicators, each request a fresh query",
+    ),
 )
 
 

@@ -77,6 +77,9 @@ class Upkeep:
             if last is not None and self.fleet.clock() - last < REST_S:
                 return False
             newest = connection.execute(
-                select(hazards.c.at).where(visible(who, hazards)).order_by(hazards.c.at.desc())
+                select(hazards.c.at)
+                .where(visible(who, hazards))
+                .order_by(hazards.c.at.desc())
+                .limit(1)
             ).first()
         return newest is not None and (last is None or newest.at > last)

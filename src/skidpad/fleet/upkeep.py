@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import logging
-import threading
-
 from sqlalchemy import select
 
 from skidpad.fleet.insight.trends import compact
 from skidpad.fleet.patterns.analysis import SERVICE, analyse
+from skidpad.fleet.rounds import Rounds
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.later import analyses
 from skidpad.fleet.store.rights import visible
@@ -18,7 +16,6 @@ from skidpad.fleet.words import Principal, Role
 LOOK_S = 5.0  # between two rounds: what came shows within 10 s
 REST_S = 60.0  # at least, from one analysis of a tenant to its next
 OWNERS = ((Role.OPERATOR, vehicles.c.operator), (Role.MANUFACTURER, vehicles.c.manufacturer))
-log = logging.getLogger(__name__)
 
 
 class Upkeep:
@@ -26,33 +23,21 @@ class Upkeep:
 
     def __init__(self, fleet: Fleet) -> None:
         self.fleet = fleet
-        self._ended = threading.Event()
-        self._thread: threading.Thread | None = None
+        self._rounds = Rounds("upkeep", self.work, LOOK_S)
 
     def start(self) -> None:
         """Begin."""
-        self._thread = threading.Thread(target=self._run, name="fleet-upkeep")
-        self._thread.start()
+        self._rounds.start()
 
     def close(self) -> None:
         """End the thread; safe to call twice."""
-        self._ended.set()
-        if self._thread is not None:
-            self._thread.join()
-
-    def _run(self) -> None:
-        while not self._ended.is_set():
-            try:
-                self.work()
-            except Exception:  # the next round tries again
-                log.exception("the upkeep failed")
-            self._ended.wait(LOOK_S)
+        self._rounds.close()
 
     def work(self) -> None:
         """Sum up what came; analyse each tenant that has hazards newer than its last analysis."""
         compact(self.fleet)
         for who in self._tenants():
-            if self._due(who) and not self._ended.is_set():
+            if self._due(who) and not self._rounds.ended.is_set():
                 analyse(self.fleet, who)
 
     def _tenants(self) -> list[Principal]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import logging
-import threading
 from collections.abc import Callable, Sequence
 
 from sqlalchemy import Engine
@@ -12,13 +10,13 @@ from skidpad.core.errors import BackendError
 from skidpad.fleet.alerting.hub import Hub
 from skidpad.fleet.alerting.keeping import SUBJECT, Alert, What, alerts_since, overdue
 from skidpad.fleet.alerting.relays import Relay
+from skidpad.fleet.rounds import Rounds
 from skidpad.fleet.store.events import add_event
 
 DAY = 86400.0  # s that an alert is looked after
 LOOK_S = 1.0  # between two looks when nothing comes
 TRIES = 8
 SERVICE = "dispatcher"
-log = logging.getLogger(__name__)
 
 
 class Dispatcher:
@@ -28,33 +26,19 @@ class Dispatcher:
         self, engine: Engine, hub: Hub, clock: Callable[[], float], relays: Sequence[Relay] = ()
     ) -> None:
         self.engine, self.hub, self.clock, self.relays = engine, hub, clock, tuple(relays)
-        self._wake, self._ended = threading.Event(), threading.Event()
-        self._thread: threading.Thread | None = None
+        self._rounds = Rounds("dispatcher", self.work, LOOK_S)
 
     def start(self) -> None:
         """Begin to look after alerts."""
-        self._thread = threading.Thread(target=self._run, name="fleet-dispatcher")
-        self._thread.start()
+        self._rounds.start()
 
     def wake(self) -> None:
         """There is something new."""
-        self._wake.set()
+        self._rounds.wake()
 
     def close(self) -> None:
         """End the thread; safe to call twice."""
-        self._ended.set()
-        self._wake.set()
-        if self._thread is not None:
-            self._thread.join()
-
-    def _run(self) -> None:
-        while not self._ended.is_set():
-            try:
-                self.work()
-            except Exception:  # the next round tries again; alerts must not end with one failure
-                log.exception("the dispatcher failed")
-            self._wake.wait(LOOK_S)
-            self._wake.clear()
+        self._rounds.close()
 
     def work(self) -> None:
         """Escalate what is overdue, then relay what is not relayed at its level."""

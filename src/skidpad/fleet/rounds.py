@@ -1,0 +1,44 @@
+"""What the service does again and again beside its requests: one thread, ended when it closes."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable
+
+log = logging.getLogger(__name__)
+
+
+class Rounds:
+    """Does `work` every `pause_s` seconds or when woken; a round that fails is followed by the next."""
+
+    def __init__(self, name: str, work: Callable[[], None], pause_s: float) -> None:
+        self.name, self.work, self.pause_s = name, work, pause_s
+        self.ended = threading.Event()
+        self._wake = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def start(self) -> None:
+        """Begin."""
+        self._thread = threading.Thread(target=self._run, name=f"fleet-{self.name}")
+        self._thread.start()
+
+    def wake(self) -> None:
+        """There is something new."""
+        self._wake.set()
+
+    def close(self) -> None:
+        """End the thread; safe to call twice."""
+        self.ended.set()
+        self._wake.set()
+        if self._thread is not None:
+            self._thread.join()
+
+    def _run(self) -> None:
+        while not self.ended.is_set():
+            try:
+                self.work()
+            except Exception:  # the next round tries again; nothing must end with one failure
+                log.exception("the %s failed", self.name)
+            self._wake.wait(self.pause_s)
+            self._wake.clear()

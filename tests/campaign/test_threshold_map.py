@@ -6,6 +6,7 @@ import re
 
 import polars as pl
 import pytest
+from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from skidpad.campaign.grip_cells import template
@@ -41,6 +42,12 @@ def test_seeds_are_common_to_all_levels_so_that_runs_are_paired():
     for task in found:
         by_seed.setdefault(task.run.seed, set()).add(str(task.run.course.parameters))
     assert [len(drawn) for drawn in by_seed.values()] == [1, 1]
+
+
+def test_the_first_seed_is_the_one_asked_for():
+    asked = MapAsked(map_of="threshold", drivers="acc", headways="1", decelerations="4")
+    found = plan_map(asked, GripCross(), Controller(), replace(template(), seed=5501), 3)
+    assert {task.run.seed for task in found} == {5501, 5502, 5503}
 
 
 def test_levels_hold_what_the_weathers_of_the_study_leave():

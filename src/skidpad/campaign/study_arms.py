@@ -134,7 +134,7 @@ def pace(seeds: Sequence[int]) -> list[Variant]:
 
 
 def recovery(seeds: Sequence[int]) -> list[Variant]:
-    """F-30: configuration 1 in rain, which is put back often, without one safeguard each."""
+    """F-30: configuration 0 in rain, which is put back often, without one safeguard each."""
     arms: dict[str, dict[str, Any]] = {
         "whole": {},
         "no_clearance": {"clearance": Clearance.NONE},
@@ -143,7 +143,7 @@ def recovery(seeds: Sequence[int]) -> list[Variant]:
     }
     return [
         Variant(
-            structs.replace(base_run(1, "rain-noon"), seed=seed),
+            structs.replace(base_run(0, "rain-noon"), seed=seed),
             {"variant": name},
             recovery=values,
         )

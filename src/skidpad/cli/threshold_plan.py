@@ -56,4 +56,4 @@ def plan_map(
         shares=shares,
     )
     template = structs.replace(run, weather=find_weather(WEATHER))
-    return tasks(template, levels, seeds(0, repeats))
+    return tasks(template, levels, seeds(run.seed - 1, repeats))

@@ -28,7 +28,8 @@ class Verdict(str, Enum):
     SUPPORTED = "supported"
     CONTRADICTED = "contradicted"
     UNDECIDED = "undecided"
-    BY_CONSTRUCTION = "by construction"  # the two sides are the same drive: nothing to measure
+    BY_CONSTRUCTION = "by construction"  # the two sides must be the same drive
+    SAME_DRIVES = "same drives"  # what differs never came into play: nothing was measured
     NOT_TESTABLE = "not testable"  # the runs that it needs are not there
     REFUSED = "refused"  # the runs are there, but nothing can be said of them
 
@@ -111,20 +112,22 @@ def _sides(contrasts: list[Contrast]) -> tuple[float, float]:
 def _judgement(
     finding: Finding, contrasts: list[Contrast], p: tuple[float, float] | None, seeds: int
 ) -> Judgement:
-    verdict = _verdict(contrasts, p)
+    verdict = _verdict(contrasts, p, built_in=bool(finding.built_in))
     needed = _seeds_needed(contrasts, seeds) if verdict is Verdict.UNDECIDED else None
     least = min(p) if p else None
     text = _text(finding, verdict, contrasts, least, needed)
     return Judgement(finding, verdict, least, tuple(contrasts), needed, text)
 
 
-def _verdict(contrasts: list[Contrast], p: tuple[float, float] | None) -> Verdict:
+def _verdict(
+    contrasts: list[Contrast], p: tuple[float, float] | None, *, built_in: bool
+) -> Verdict:
     """From the adjusted p for and against; against comes first, for what is there may be too
     small to matter however sure it is."""
     if not contrasts:
         return Verdict.NOT_TESTABLE
     if p is None:
-        return Verdict.BY_CONSTRUCTION
+        return Verdict.BY_CONSTRUCTION if built_in else Verdict.SAME_DRIVES
     claimed, against = p
     if against < ALPHA:
         return Verdict.CONTRADICTED
@@ -149,6 +152,8 @@ def _text(
         return f"Not testable: it needs {finding.needs}."
     if verdict is Verdict.BY_CONSTRUCTION:
         return "By construction: both sides are the same drive, so there is nothing to measure."
+    if verdict is Verdict.SAME_DRIVES:
+        return "Not measured: what differs never came into play, both sides are the same drives."
     parts = [f"{c.label} {c.mean:+.3g} ({interval_text(c.interval)})" for c in contrasts]
     text = f"{verdict.value.capitalize()}: {'; '.join(parts)}."
     if p is not None:

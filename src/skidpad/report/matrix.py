@@ -119,8 +119,8 @@ def _verdicts(judged: Sequence[Judgement]) -> list[Block]:
         "seen. One rule is not blind: that a margin comes before significance, so that a difference "
         "below its margin supports nothing, is shared by all reports and was settled after results "
         "of the friction campaign had been seen. "
-        "A claim whose two sides are the same drive is marked by construction. A v behind an id: the "
-        "same claim for crashes with vehicles alone."
+        "By construction: both sides must be the same drive. Same drives: they happened to be, what "
+        "differs never came into play. A v behind an id: the same claim for crashes with vehicles alone."
     )
     own = ", ".join(f.id for f in CLAIMS if f.study)
     rest = Text(f"Claims that need runs of their own are judged by `skidpad study`: {own}.")

@@ -44,6 +44,8 @@ def plain(j: Judgement) -> str:
             return f"These runs cannot tell; it would take {more}."
         case Outcome.BY_CONSTRUCTION:
             return "Both sides are the same drive: there is nothing to measure."
+        case Outcome.SAME_DRIVES:
+            return "What differs never came into play: both sides are the same drives."
         case Outcome.NOT_TESTABLE:
             return f"These runs cannot test it; it needs {j.finding.needs}."
         case Outcome.REFUSED:
@@ -59,8 +61,7 @@ def tally_text(judged: Sequence[Judgement]) -> str:
 
 def least_seeds_text(judged: Sequence[Judgement]) -> str:
     """With how many seeds any claim of this report can be judged at all; empty: none is tested."""
-    silent = (Outcome.NOT_TESTABLE, Outcome.REFUSED, Outcome.BY_CONSTRUCTION)
-    tested = sum(j.verdict not in silent for j in judged)
+    tested = sum(j.p is not None for j in judged)
     if not tested:
         return ""
     least = seeds_for_verdict(tested)

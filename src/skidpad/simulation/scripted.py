@@ -15,7 +15,7 @@ from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import ActorKind
 from skidpad.physics.params import AIR_DENSITY
 from skidpad.physics.types import VehicleType, vehicle_type, vehicle_types
-from skidpad.physics.vehicle import steer_share
+from skidpad.physics.vehicle import V_CLUTCH, steer_share
 
 OMEGA, ZETA = 1.2, 0.9  # rad/s and damping of the lateral control, half the yaw response's
 V_LATERAL_MIN = 4.0  # m/s, keeps gains finite at walking speed
@@ -66,6 +66,7 @@ class ActorDriver:
         self.a_drive, self.p_drive = t.a_drive, t.power / t.mass
         self.drag = 0.5 * AIR_DENSITY * t.drag_area / t.mass
         self.rolling = t.rolling_resistance * G
+        self.engine_drag = t.engine_drag
 
     def command(self, motion: Motion, demand: Demand) -> VehicleCommand:
         """Pedals and steer for the coming step."""
@@ -85,9 +86,11 @@ class ActorDriver:
         if d.v < V_STANDING and v < V_STANDING:
             return 0.0, HOLD_BRAKE
         a = d.a + self.speed_gain * (d.v - v)
-        wanted = a + self.drag * v * v + self.rolling
+        dragged = self.engine_drag * min(abs(v) / V_CLUTCH, 1.0)  # by a closed throttle
+        wanted = a + self.drag * v * v + self.rolling + dragged
         if wanted >= 0.0:
-            return min(wanted / min(self.a_drive, self.p_drive / max(v, 1.0)), 1.0), 0.0
+            most = min(self.a_drive, self.p_drive / max(v, 1.0))
+            return min(wanted / (most + dragged), 1.0), 0.0
         return 0.0, min(-wanted / self.type.a_brake, 1.0)
 
 

@@ -219,6 +219,12 @@ def test_equal_drives_are_by_construction() -> None:
     assert verdict("F-11", same) is Verdict.BY_CONSTRUCTION
 
 
+def test_equal_drives_say_nothing_of_a_claim_that_is_not_built_in() -> None:
+    table = campaign("F-10", TRUE["F-10"], 0.0, noise=0.0)
+    same = table.with_columns(log_hash=pl.col("seed").cast(pl.String))
+    assert verdict("F-10", same) is Verdict.SAME_DRIVES
+
+
 def study(speed: float, dropout: float) -> pl.DataFrame:
     rng = np.random.default_rng(5)
     return pl.DataFrame(

@@ -167,6 +167,7 @@ FINDINGS: tuple[Finding, ...] = (
         "BF-13", "Nothing changes at ratio 1.", "change of completion at rain_0 and icy_0",
         "rain_0 and icy_0",
         (frictions(proper(BASELINE), claim=Claim.EQUAL),),
+        built_in="a ratio of 1 multiplies friction by one",
     ),
     Finding(
         "BF-18", "A spawn delay alone breaks the cut-in, and a shorter merge distance repairs it.",

@@ -126,7 +126,9 @@ def ask(port: int, pid: int, token: str, times: int) -> None:
             wall, before = [], cpu(pid)
             for _ in range(times):
                 begin = time.perf_counter()
-                client.get(page).raise_for_status()
+                answer = client.get(page).raise_for_status()
+                if "could not be read" in answer.text:
+                    raise RuntimeError(f"{page} shows an error")
                 wall.append(1000.0 * (time.perf_counter() - begin))
             each = 1000.0 * (cpu(pid) - before) / times
             median, p95 = np.percentile(wall, [50, 95])

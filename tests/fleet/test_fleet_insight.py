@@ -11,12 +11,13 @@ from contextlib import closing, contextmanager
 
 import duckdb
 import numpy as np
+import polars as pl
 import pytest
 
 from fleet_world import NOW, World, make_world, packed, record
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.statistics import linear_ratio_limits
+from skidpad.evidence.statistics import BOOTSTRAP_FROM, linear_ratio_limits
 from skidpad.fleet.insight.places import ADVICE
 from skidpad.fleet.insight.research import HOUR, K, export
 from skidpad.fleet.insight.trends import compact, trends
@@ -56,6 +57,28 @@ def test_trends_hold_what_was_sent_and_no_more_than_ones_own(world):
     send_rows(world, "red-1", "key-aaaa-4", row(0, 0))
     later = world.get("axle", "/api/v1/trends").json()["indicators"]
     assert [t["share"] for t in later] == [300 / 1800, 0.0]
+
+
+def test_every_vehicle_is_told_of_where_they_are_few_and_only_there(lite):
+    """Sums over 30 vehicles suffice for limits; of fewer each is needed, whatever other days hold."""
+    house, few = lite.fleet.warehouse, [(5, 100), (0, 300), (7, 50)]
+    many = [(k % 4, 100 + k) for k in range(BOOTSTRAP_FROM)]
+    rows = pl.DataFrame(
+        [
+            {"manufacturer": "m", "operator": "o", "vehicle": f"{k:032x}", "received": day * 86400.0,
+             "indicator": "ego_location_similarity", "n": n, "violated": violated, "mean": 0.5}
+            for day, counts in enumerate((few, many))
+            for k, (violated, n) in enumerate(counts)
+        ]
+    )  # fmt: skip
+    with house.lock:
+        house.take([("batch", 0.0)], rows)
+    first, second = house.moments("operator", "o", 1)
+    assert list(zip(first.each_violated, first.each_n, strict=True)) == few
+    assert (second.each_violated, second.each_n) == ([], [])
+    assert second.vn == sum(violated * n for violated, n in many)
+    assert second.vehicles == BOOTSTRAP_FROM
+    assert house.moments("operator", "another", 1) == []
 
 
 def test_a_kill_while_batches_are_summed_up_counts_nothing_twice(lite, monkeypatch):

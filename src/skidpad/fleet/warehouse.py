@@ -32,15 +32,23 @@ TAKE = """
     FROM read_parquet($file) GROUP BY ALL ORDER BY ALL
 """
 MOMENTS = """
-    SELECT indicator, slot, count(*) AS vehicles, sum(n) AS n, sum(violated) AS violated,
-           sum(total) AS total, sum(violated * violated) AS vv, sum(violated * n) AS vn,
-           sum(n * n) AS nn,
-           CASE WHEN count(*) < {few} THEN list(violated ORDER BY vehicle) ELSE [] END,
-           CASE WHEN count(*) < {few} THEN list(n ORDER BY vehicle) ELSE [] END
-    FROM (SELECT indicator, day // $days AS slot, vehicle, sum(n)::DOUBLE AS n,
-                 sum(violated)::DOUBLE AS violated, sum(total) AS total
-          FROM sums WHERE {right} GROUP BY indicator, slot, vehicle HAVING sum(n) > 0)
-    GROUP BY indicator, slot ORDER BY indicator, slot
+    WITH each AS MATERIALIZED (
+        SELECT indicator, day // $days AS slot, vehicle, sum(n)::DOUBLE AS n,
+               sum(violated)::DOUBLE AS violated, sum(total) AS total
+        FROM sums WHERE {right} GROUP BY indicator, slot, vehicle HAVING sum(n) > 0
+    ), moments AS (
+        SELECT indicator, slot, count(*) AS vehicles, sum(n) AS n, sum(violated) AS violated,
+               sum(total) AS total, sum(violated * violated) AS vv, sum(violated * n) AS vn,
+               sum(n * n) AS nn
+        FROM each GROUP BY indicator, slot
+    ), few AS (
+        SELECT indicator, slot, list(violated ORDER BY vehicle) AS each_violated,
+               list(n ORDER BY vehicle) AS each_n
+        FROM each SEMI JOIN (SELECT * FROM moments WHERE vehicles < {few}) USING (indicator, slot)
+        GROUP BY indicator, slot
+    )
+    SELECT moments.*, coalesce(each_violated, []), coalesce(each_n, [])
+    FROM moments LEFT JOIN few USING (indicator, slot) ORDER BY indicator, slot
 """
 
 

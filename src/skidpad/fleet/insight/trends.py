@@ -143,23 +143,22 @@ def _limits(m: Moments) -> Interval:
 def hazard_rates(connection: Connection, who: Principal) -> list[HazardRate]:
     """Hazards per hour by kind, over all vehicles that `who` may see and that told of drives."""
     driven = connection.execute(
-        select(drives.c.vehicle, func.sum(drives.c.seconds).label("seconds"))
+        select(drives.c.vehicle, func.sum(drives.c.seconds))
         .where(visible(who, drives))
         .group_by(drives.c.vehicle)
         .order_by(drives.c.vehicle)
     ).all()
-    hours = [row.seconds / 3600.0 for row in driven]
+    hours = [seconds / 3600.0 for _, seconds in driven]
     if sum(hours) <= 0.0:
         return []
     counted = connection.execute(
-        select(hazards.c.type, hazards.c.vehicle, func.count().label("n"))
+        select(hazards.c.type, hazards.c.vehicle, func.count())
         .where(visible(who, hazards))
         .group_by(hazards.c.type, hazards.c.vehicle)
     ).all()
-    table = {(row.type, row.vehicle): int(row.n) for row in counted}
+    table = {(type_, vehicle): count for type_, vehicle, count in counted}
     out = []
-    for type_ in sorted({row.type for row in counted}):
-        counts = [table.get((type_, row.vehicle), 0) for row in driven]
-        rate = event_rate(counts, hours)
+    for type_ in sorted({type_ for type_, _ in table}):
+        rate = event_rate([table.get((type_, vehicle), 0) for vehicle, _ in driven], hours)
         out.append(HazardRate(type_, rate.events, rate.exposure, rate.rate, rate.interval))
     return out

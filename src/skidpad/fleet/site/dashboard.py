@@ -61,7 +61,7 @@ def draw_overview(ui: Any, found: Overview) -> None:
         table(ui, ["hazard", "events", "hours", "per hour", "interval"], rows)
     _trends(ui, found.trends)
     _map(ui, found)
-    _clusters(ui, found)
+    _clusters(ui, found.clusters, found.look)
 
 
 def _trends(ui: Any, found: list[Trend]) -> None:
@@ -105,21 +105,22 @@ def _map(ui: Any, found: Overview) -> None:
             ui.label("No hazard has come in yet.").classes("dim")
 
 
-def _clusters(ui: Any, found: Overview) -> None:
+def _clusters(ui: Any, found: list[dict[str, Any]], again: Callable[[], int]) -> None:
+    """A click keeps what it needs for as long as the page is open: `again`, not all that was shown."""
     with ui.element("section"):
         ui.label("Recurring hazards").classes("h2")
 
         async def look() -> None:
-            await say(ui, found.look, "looked; reload to see the clusters")
+            await say(ui, again, "looked; reload to see the clusters")
 
         ui.button("Look for recurring hazards now", on_click=look)
-        for cluster in found.clusters[:CLUSTERS]:
+        for cluster in found[:CLUSTERS]:
             with ui.element("div"):
                 text = f"{len(cluster['members'])} x {cluster['type'].replace('_', ' ')}"
                 where = f"{cluster['map']} at {cluster['x']:.0f}, {cluster['y']:.0f} m"
                 ui.label(f"{text}, {cluster['vehicles']} vehicles, {where}")
                 ui.link("replay the representative", f"/replay/{cluster['representative']}")
-        if not found.clusters:
+        if not found:
             ui.label("Nothing was found to recur.").classes("dim")
 
 

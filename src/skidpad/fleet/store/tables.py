@@ -84,7 +84,8 @@ batches = Table(
     UniqueConstraint("vehicle", "key"),
     Index("batches_by_kind", "kind", "at"),
 )
-OWNED = ("operator", "manufacturer", "vehicle")  # columns that row rights are told by
+OWNERS = ("operator", "manufacturer")
+OWNED = (*OWNERS, "vehicle")  # columns that row rights are told by
 
 
 def _owned() -> list[Column[str]]:
@@ -114,6 +115,7 @@ hazards = Table(
     UniqueConstraint("vehicle", "digest"),
     Index("hazards_by_operator", "operator", "at"),
     Index("hazards_by_manufacturer", "manufacturer", "at"),
+    *(Index(f"hazards_counted_by_{owner}", owner, "type", "vehicle") for owner in OWNERS),
 )
 drives = Table(
     "drives",
@@ -130,6 +132,7 @@ drives = Table(
     Column("vehicle_time", Double, nullable=True),
     _time(),
     UniqueConstraint("vehicle", "drive"),
+    *(Index(f"drives_counted_by_{owner}", owner, "vehicle", "seconds") for owner in OWNERS),
 )
 events = Table(
     "events",

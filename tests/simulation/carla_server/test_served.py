@@ -17,6 +17,7 @@ from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.rpc import CallError
 from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.carla_server.snapshot import HEADER
 from skidpad.simulation.carla_server.streams import StreamHub
 
 CAR = "vehicle.tesla.model3"
@@ -119,3 +120,24 @@ def test_a_map_that_cannot_be_served_changes_nothing(served: Served, text: str) 
     assert served.tick() == frame + 1
     assert car.id in served.episode.actors.alive
     assert np.isfinite(served.episode.moving.states.x).all()
+
+
+@pytest.mark.parametrize(
+    ("kind", "noise"),
+    [
+        ("sensor.other.gnss", {"noise_lat_stddev": "1e-4"}),
+        ("sensor.other.radar", {}),
+        ("sensor.lidar.ray_cast", {"noise_stddev": "0.1"}),
+    ],
+)
+def test_noise_follows_from_its_seed_alone(tmp_path, kind, noise):
+    """The same after a reload, when actors have other ids; another seed gives other noise."""
+    hub = Kept()
+    served = Served(ServerOptions(data_dir=tmp_path), hub)
+    said = []
+    for seed in ("5", "5", "6"):
+        served.load("", reset_settings=False)
+        sensor = sensor_on_car(served, kind, noise_seed=seed, **noise)
+        served.tick()
+        said.append(hub.told[sensor.stream][0][HEADER.size :])
+    assert said[0] == said[1] != said[2]

@@ -38,6 +38,8 @@ class SensorType(IntEnum):
     INSTANCE = 15
     COSMOS = 16
     WORLD = 17
+    AWARENESS = 20  # 18 and 19 are the G-buffers
+    CUSTOM_V2X = 21
 
 
 HEADER = struct.Struct("<QQd6f")  # type, frame, timestamp, x, y, z, pitch, yaw, roll

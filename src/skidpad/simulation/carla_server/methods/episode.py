@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.clock import parse_settings
-from skidpad.simulation.carla_server.rpc import CallError, Table
+from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
+from skidpad.simulation.carla_server.sensing.v2x import Station
 from skidpad.simulation.carla_server.served import Served
 
 VERSION = "0.9.16"
@@ -53,9 +55,9 @@ def tick_cue(served: Served) -> int:
     return served.tick() if served.clock.settings.synchronous else served.clock.frame
 
 
-for _name in ("enable_sensor_for_ros", "disable_sensor_for_ros", "send"):
+for _name in ("enable_sensor_for_ros", "disable_sensor_for_ros"):
 
-    @TABLE.method(_name, without_effect="there is no ROS publisher and no radio")
+    @TABLE.method(_name, without_effect="there is no ROS publisher")
     def no_publisher(_: Served, *__: Any) -> None:
         """Accepted."""
 
@@ -64,3 +66,13 @@ for _name in ("enable_sensor_for_ros", "disable_sensor_for_ros", "send"):
 def is_sensor_enabled_for_ros(_: Served, __: Any) -> bool:
     """Never."""
     return False
+
+
+@TABLE.method("send", Shape.VOID)
+def send(served: Served, id: Any, message: Any) -> None:
+    """Radio a text in the next tick, from a sensor of clients' own messages."""
+    actor = served.episode.actors.get(id, Family.SENSOR)
+    sensor = served.episode.sensors.of(actor.id)
+    if sensor is None or not isinstance(sensor.equipment, Station):
+        raise CallError(f"actor {actor.id} has no radio")
+    sensor.equipment.queue.append(wire.text(message, "message").encode())

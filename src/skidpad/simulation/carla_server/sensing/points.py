@@ -36,6 +36,7 @@ class RadarMake:
 
     spec: RadarSpec
     key: np.uint64
+    readings: int = 0
     radar: Radar | None = None  # for the present number of rays per reading
 
     def with_rays(self, n: int) -> Radar:
@@ -64,7 +65,7 @@ def make_radar(actor: Actor, seed: int) -> RadarMake:
     ):
         if not 0.1 <= value <= 170.0:
             raise wire.WireError(f"radar {name} must be between 0.1 and 170 deg, got {value:g}")
-    return RadarMake(spec, np.uint64(stream_key(seed, "radar", a["noise_seed"], actor.id)))
+    return RadarMake(spec, np.uint64(stream_key(seed, "radar", a["noise_seed"])))
 
 
 def radar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
@@ -74,7 +75,8 @@ def radar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
     if n == 0:
         return [(b"",)]
     carrier, pose = around.carrier_row(sensor.actor), around.actors.pose(sensor.actor)
-    seen = make.with_rays(n).measure(clock.frame, pose, around.picture().live, carrier)
+    make.readings += 1
+    seen = make.with_rays(n).measure(make.readings, pose, around.picture().live, carrier)
     azimuth = angles_to_carla(seen.azimuth.astype(np.float64))
     columns = (seen.velocity, azimuth, seen.altitude, seen.range)
     return [(np.column_stack(columns).astype("<f4").tobytes(),)]

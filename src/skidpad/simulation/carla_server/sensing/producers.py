@@ -10,6 +10,7 @@ from skidpad.simulation.carla_server.sensing import (
     inertial,
     normals,
     points,
+    v2x,
 )
 from skidpad.simulation.carla_server.sensing.sensor import Producer
 from skidpad.simulation.carla_server.snapshot import SensorType
@@ -39,4 +40,8 @@ PRODUCERS = {
     "sensor.other.gnss": Producer(SensorType.GNSS, inertial.gnss),
     "sensor.other.collision": Producer(SensorType.COLLISION, events.collision),
     "sensor.other.obstacle": Producer(SensorType.OBSTACLE, events.obstacle),
+    "sensor.other.v2x": Producer(SensorType.AWARENESS, v2x.receive, v2x.make_station, v2x.announce),
+    "sensor.other.v2x_custom": Producer(
+        SensorType.CUSTOM_V2X, v2x.receive, v2x.make_messenger, v2x.pass_on
+    ),
 }

@@ -57,3 +57,5 @@ class Producer:
     produce: Callable[[Surroundings, Clock, Sensor], list[Message]]
     equip: Callable[[Actor, int], Any] = _no_equipment
     """From attributes and the server's seed; WireError when they cannot be used."""
+    speak: Callable[[Surroundings, Clock, Sensor], None] | None = None
+    """What it sends to others of its kind, in every tick and before any of them reads."""

@@ -34,7 +34,7 @@ class SensorSet:
         if producer is None:
             return
         noise_seed = actor.attributes.get("noise_seed", "0")
-        rng = stream(self._seed, "carla_server", actor.blueprint.id, actor.id, noise_seed)
+        rng = stream(self._seed, "carla_server", actor.blueprint.id, noise_seed)
         period = float(actor.attributes.get("sensor_tick", "0"))
         equipment = producer.equip(actor, self._seed)
         self._sensors[actor.id] = Sensor(actor, period, rng, equipment)
@@ -42,6 +42,10 @@ class SensorSet:
     def forget(self, id: int) -> None:
         """It is gone."""
         self._sensors.pop(id, None)
+
+    def of(self, id: int) -> Sensor | None:
+        """The sensor that is this actor; None when it is none that sends something."""
+        return self._sensors.get(id)
 
     def heard(self, hub: StreamHub) -> bool:
         """Whether anybody listens to any of them."""
@@ -51,6 +55,10 @@ class SensorSet:
     def produce(self, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
         """One tick of every sensor that is due and listened to."""
         time = clock.elapsed
+        for sensor in self._sensors.values():
+            speak = self._producers[sensor.actor.blueprint.id].speak
+            if speak is not None:
+                speak(around, clock, sensor)
         for sensor in list(self._sensors.values()):
             number = sensor.actor.stream
             if number is None or not hub.wanted(number) or not sensor.is_due(time):

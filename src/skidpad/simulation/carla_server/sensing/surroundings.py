@@ -16,10 +16,11 @@ from skidpad.roads.queries import RoadMap
 from skidpad.sensors.lighting import lighting
 from skidpad.sensors.live_scene import LiveScene
 from skidpad.sensors.shading import Shading
-from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable
+from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable, Box
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.landscape import Landscape
 from skidpad.simulation.carla_server.maps import ServedMap
+from skidpad.simulation.carla_server.sensing.radio import Air
 from skidpad.simulation.carla_server.vehicles import Vehicles
 from skidpad.simulation.carla_server.weather import Sky
 
@@ -62,6 +63,7 @@ class Surroundings:
         self.map, self.actors, self.moving = map, actors, vehicles.moving
         self._landscape = landscape
         self.gravity = G  # m/s^2, as set by clients
+        self.air = Air()
         self._vehicles, self._sky, self._clock = vehicles, sky, clock
         self._pictured: Pictured | None = None
 
@@ -92,6 +94,14 @@ class Surroundings:
         carrier, mount = self.actors.alive[sensor.parent], sensor.mount
         offsets = zip((mount.x, mount.y, mount.z), carrier.centre, carrier.half, strict=True)
         return row if all(abs(m - c) < h + SKIN for m, c, h in offsets) else -1
+
+    def built(self) -> list[Box]:
+        """Boxes of what stands beside the road at present."""
+        return [Box(o.centre, o.half) for o in self._landscape.present()]
+
+    def lamps(self, vehicle: Actor) -> int:
+        """Flags of VehicleLightState."""
+        return self._vehicles.of(vehicle.id).lights
 
     def _brakes(self, actor: Actor) -> bool:
         return actor.id in self._vehicles and self._vehicles.of(actor.id).control.brake > 0.0

@@ -1,0 +1,178 @@
+"""V2X sensors: stations that send awareness messages, or clients' own ones, and hear each other."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field, replace
+from math import cos, degrees, sin
+
+import numpy as np
+
+from skidpad.core.geodesy import geolocation
+from skidpad.core.geometry import Pose
+from skidpad.core.lefthanded import turn_from_carla, vector_from_carla
+from skidpad.sensors import inertial
+from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.actors import Actor
+from skidpad.simulation.carla_server.catalogue import Family
+from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.sensing import cam
+from skidpad.simulation.carla_server.sensing.radio import (
+    Call,
+    Radio,
+    Way,
+    crossed,
+    loss,
+    make_radio,
+)
+from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
+from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
+
+MOST_QUEUED = 64  # custom messages of one sensor in one tick
+
+
+@dataclass(slots=True, eq=False)
+class Station:
+    """A sensor's radio, and what it is about to send."""
+
+    radio: Radio
+    rhythm: cam.Rhythm | None = None  # None: only clients' own messages
+    queue: deque[bytes] = field(default_factory=lambda: deque(maxlen=MOST_QUEUED))
+
+
+def make_station(actor: Actor, _: int) -> Station:
+    """A sensor of awareness messages, from its attributes."""
+    a = actor.attributes
+    shortest, longest = float(a["gen_cam_min"]), float(a["gen_cam_max"])
+    if not 0.0 <= shortest <= longest:
+        raise wire.WireError(
+            f"v2x: need 0 <= gen_cam_min <= gen_cam_max, got {shortest:g} and {longest:g}"
+        )
+    fixed = a["fixed_rate"].lower() == "true"
+    rhythm = cam.Rhythm(shortest, longest, fixed, drives=bool(actor.parent), period=longest)
+    return Station(make_radio(actor), rhythm)
+
+
+def make_messenger(actor: Actor, _: int) -> Station:
+    """A sensor of clients' own messages."""
+    return Station(make_radio(actor))
+
+
+def _call(around: Surroundings, sensor: Sensor) -> Call:
+    """Where this sensor's antenna is, with nothing to say yet."""
+    actor, carrier = sensor.actor, around.actors.carrier(sensor.actor)
+    pose = around.actors.pose(actor)
+    below = pose.z if carrier is None else around.actors.pose(carrier).z - carrier.lift
+    radio = sensor.equipment.radio
+    place = (pose.x, pose.y, pose.z)
+    return Call(
+        actor.id, actor.blueprint.id, radio.channel, radio.power, place, below, actor.parent, []
+    )
+
+
+def announce(around: Surroundings, clock: Clock, sensor: Sensor) -> None:
+    """Send an awareness message when one is due."""
+    rhythm, carrier = sensor.equipment.rhythm, around.actors.carrier(sensor.actor)
+    drives = carrier is not None and carrier.family is Family.VEHICLE
+    rhythm.drives = drives
+    pose = around.actors.pose(carrier if carrier is not None and drives else sensor.actor)
+    speed = _forward(around, carrier) if carrier is not None and drives else 0.0
+    if not rhythm.due(clock.elapsed, pose, speed):
+        return
+    station = sensor.actor.id if carrier is None else carrier.id
+    type, motion = cam.ROAD_SIDE_UNIT, _place(around, sensor, pose)
+    if carrier is not None and drives:
+        type, motion = _type(carrier), _motion(around, sensor, carrier, motion, speed)
+    lamps = drives and rhythm.tells_lamps(clock.elapsed)
+    message = cam.awareness(station, type, clock.elapsed, motion, lamps)
+    around.air.send(clock.frame, replace(_call(around, sensor), messages=[message]))
+
+
+def pass_on(around: Surroundings, clock: Clock, sensor: Sensor) -> None:
+    """Send what clients have said since the last tick."""
+    queue = sensor.equipment.queue
+    if queue:
+        station = sensor.actor.parent or sensor.actor.id
+        messages = [cam.custom(station, text) for text in queue]
+        queue.clear()
+        around.air.send(clock.frame, replace(_call(around, sensor), messages=messages))
+
+
+def receive(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
+    """All that arrives in this tick in one message; nothing when nothing does."""
+    own, heard = _call(around, sensor), []
+    for call in around.air.heard(clock.frame, own):
+        power = _arriving(around, sensor, own, call)
+        if power is not None:
+            for message in call.messages:
+                copy = message.copy()
+                copy["power"] = power
+                heard.append(copy)
+    return [(np.array(heard).tobytes(),)] if heard else []
+
+
+def _arriving(around: Surroundings, sensor: Sensor, own: Call, call: Call) -> float | None:
+    """dBm; None when it is too far or too weak."""
+    radio = sensor.equipment.radio
+    if sum((a - b) ** 2 for a, b in zip(own.place, call.place, strict=True)) >= radio.reach**2:
+        return None
+    vehicles = (
+        around.actors.box(a)
+        for a in around.actors.of(Family.VEHICLE)
+        if a.id not in (own.carrier, call.carrier)
+    )
+    tops = crossed(vehicles, call.place, own.place)
+    blocked = crossed(around.built(), call.place, own.place)
+    way = Way.BUILDING if blocked else Way.VEHICLE if tops else Way.CLEAR
+    fading = radio.deviation(way) * float(sensor.rng.standard_normal())
+    lost = loss(radio, way, call, own.place, own.ground, tops) + fading
+    power = call.power + radio.gain - lost
+    return power if power >= radio.sensitivity else None
+
+
+def _forward(around: Surroundings, carrier: Actor) -> float:
+    x, y, _ = around.actors.velocity(carrier)
+    yaw = around.actors.pose(carrier).yaw
+    return x * cos(yaw) + y * sin(yaw)
+
+
+def _type(carrier: Actor) -> int:
+    a = carrier.attributes
+    return cam.EMERGENCY if a["special_type"] == "emergency" else cam.STATIONS[a["base_type"]]
+
+
+def _place(around: Surroundings, sensor: Sensor, pose: Pose) -> cam.Motion:
+    x, y, _ = vector_from_carla(pose.x, pose.y, pose.z)
+    noise, n = sensor.rng.standard_normal(3), sensor.number
+    latitude, longitude = geolocation(x, y, *around.map.origin)
+    latitude, longitude, altitude = (
+        float(value + n(f"noise_{name}_bias") + noise[k] * n(f"noise_{name}_stddev"))
+        for k, (name, value) in enumerate((("lat", latitude), ("lon", longitude), ("alt", pose.z)))
+    )
+    return cam.Motion(latitude, longitude, altitude)
+
+
+def _motion(
+    around: Surroundings, sensor: Sensor, carrier: Actor, place: cam.Motion, speed: float
+) -> cam.Motion:
+    """Of a vehicle, felt at its origin, with the sensor's noise."""
+    assert carrier.body is not None
+    row, moving = around.moving.row(carrier.body), around.moving
+    felt = inertial.imu(Pose(0.0, 0.0), moving.states, row, around.gravity)
+    noise, n = sensor.rng.standard_normal(6), sensor.number
+    force = vector_from_carla(*felt.force)
+    x, y, z = (
+        float(force[k] + noise[k] * n(f"noise_accel_stddev_{axis}")) for k, axis in enumerate("xyz")
+    )
+    rate = turn_from_carla(*felt.rate)[2]
+    rate += n("noise_yawrate_bias") + noise[3] * n("noise_yawrate_stddev")
+    heading = degrees(felt.compass) + n("noise_head_bias") + noise[4] * n("noise_head_stddev")
+    return replace(
+        place,
+        heading=float(heading),
+        speed=float(speed + noise[5] * n("noise_vel_stddev_x")),
+        force=(x, y, z),
+        yaw_rate=degrees(rate),
+        size=(2.0 * carrier.half[0], 2.0 * carrier.half[1]),
+        lamps=around.lamps(carrier),
+    )

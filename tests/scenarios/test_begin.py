@@ -135,7 +135,7 @@ def test_a_place_beyond_the_end_of_its_lane_is_moved_there_and_noted(tmp_path):
 
 
 def test_unknown_things_can_be_left_out_on_request(tmp_path):
-    odd = "<GlobalAction><TrafficAction><TrafficStopAction/></TrafficAction></GlobalAction>"
+    odd = "<GlobalAction><NobodyKnowsAction/></GlobalAction>"
     path = write(tmp_path, init=odd + at("ego", -3, 100) + at("other", -1, 120))
     assert check(path).scenario is None
     assert check(path, ignore_unsupported=True).scenario is not None

@@ -191,17 +191,17 @@ def serious(path, **more):
 
 
 def test_everything_unknown_and_wrong_is_listed_at_once_with_its_line(tmp_path):
-    swarm = """<GlobalAction><TrafficAction><TrafficSwarmAction/></TrafficAction></GlobalAction>"""
+    odd = "<GlobalAction><NobodyKnowsAction/></GlobalAction>"
     nobody = AT_2_S.replace("SimulationTime", "Tidal")
     path = scenario(
         tmp_path,
-        EVENT.format("one", swarm, 0, AT_2_S),
+        EVENT.format("one", odd, 0, AT_2_S),
         EVENT.format("two", slow_down(shape="ramp"), 0, AT_2_S),
         EVENT.format("three", slow_down(rate="$Nothing"), 0, nobody),
     )
     found = serious(path)
     assert [(f.element, f.kind) for f in found] == [
-        ("TrafficAction", Kind.UNSUPPORTED),
+        ("NobodyKnowsAction", Kind.UNSUPPORTED),
         ("SpeedActionDynamics", Kind.UNSUPPORTED),
         ("SpeedActionDynamics", Kind.ERROR),
         ("TidalCondition", Kind.UNSUPPORTED),
@@ -209,7 +209,7 @@ def test_everything_unknown_and_wrong_is_listed_at_once_with_its_line(tmp_path):
     lines = path.read_text(encoding="utf-8").splitlines()
     for finding in found:
         assert f"<{finding.element}" in lines[finding.line - 1]
-    with pytest.raises(FileError, match=r"x\.xosc, line \d+, <TrafficAction>"):
+    with pytest.raises(FileError, match=r"x\.xosc, line \d+, <NobodyKnowsAction>"):
         compile_scenario(path)
 
 

@@ -185,6 +185,7 @@ def _scenario(spec: RunSpec, course: Scenario) -> Stage:
         skill=course.skill,
         duration=spec.duration,
         end_on_collision=course.end_on_collision,
+        seed=spec.seed,
     )
     ego, actors = setups(compiled)
     setup = replace(setup_of(spec, compiled.map_name, ego), actors=actors)

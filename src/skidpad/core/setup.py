@@ -42,6 +42,7 @@ class ActorSetup:
     driver: Control = Control.AUTOPILOT
     rgb: tuple[int, int, int] | None = None  # None: by index from the type's palette
     collides: bool = True  # False: it is seen and touches nothing (embedded backend)
+    present: bool = True  # False: it is not there until it is told to appear (embedded backend)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -29,6 +29,7 @@ class Context:
     signals: frozenset[str] = frozenset()
     # places on what is itself made of places: routes and trajectories
     further_positions: Mapping[str, Callable[[Node, Context], Any]] = field(default_factory=dict)
+    hired: dict[str, Entity] = field(default_factory=dict)  # vehicles that traffic may bring
     added: frozenset[str] = frozenset()  # entities that some event adds
     elements: Sequence[tuple[str, Path]] = ()
     findings: list[Finding] = field(default_factory=list)

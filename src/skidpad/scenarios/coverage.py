@@ -11,6 +11,7 @@ from lxml import etree
 
 from skidpad.scenarios.actions.controllers import TABLE as CONTROLLERS
 from skidpad.scenarios.actions.private import GROUPS, PRIVATE
+from skidpad.scenarios.actions.traffic import MOST, TRAFFIC
 from skidpad.scenarios.actions.world import GLOBAL
 from skidpad.scenarios.conditions.by_value import BY_VALUE
 from skidpad.scenarios.positions import POSITIONS
@@ -30,7 +31,7 @@ INSIDE = frozenset(  # understood where they stand inside others
         "GlobalAction", "PrivateAction", "Position", "Action", "Condition", "EntityCondition",
         "ByEntityCondition", "ByValueCondition",
         "TargetPosition", "InRoutePosition", "RoadCondition", "CustomCommandAction",
-        "ConnectTrailerAction", "DisconnectTrailerAction",
+        "ConnectTrailerAction", "DisconnectTrailerAction", "TrafficStopAction",
     }
 )  # fmt: skip
 PARTIAL: Mapping[str, str] = MappingProxyType(
@@ -52,6 +53,10 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         "GeoPosition": "on the plane that touches the earth at the map's origin",
         "AcquirePositionAction": "chooses the way at forks; does not change lanes by itself",
         "AssignRouteAction": "chooses the way at forks; does not change lanes by itself",
+        "TrafficSourceAction": f"at most {MOST} at a time; who drives them is chosen here",
+        "TrafficSinkAction": "takes vehicles of traffic, never entities of the file",
+        "TrafficSwarmAction": f"at most {MOST}; who drives them is chosen here",
+        "TrafficAreaAction": f"at most {MOST}; who drives them is chosen here",
         "UserDefinedAction": "is noted, without effect",
         "OverrideControllerValueAction": "is noted, without effect",
     }
@@ -91,6 +96,7 @@ def known_elements() -> frozenset[str]:
         FURTHER_POSITIONS,
         SHAPES,
         CONTROLLERS,
+        TRAFFIC,
     )
     return INSIDE.union(GROUPS, *tables)
 

@@ -48,6 +48,15 @@ class Box:
     left: float = 0.0
 
 
+BICYCLE = Box(1.8, 0.6, 1.7)
+USUAL = {  # sizes where only the category is known; assumption
+    ActorKind.CAR: Box(),
+    ActorKind.VAN: Box(5.3, 2.0, 2.2),
+    ActorKind.TRUCK: Box(8.0, 2.5, 3.2),
+    ActorKind.BUS: Box(12.0, 2.55, 3.2),
+}
+
+
 @dataclass(frozen=True, slots=True)
 class Performance:
     """What an entity can do at most, SI."""
@@ -97,7 +106,7 @@ def compile_entities(root: Node, catalogs: Catalogs) -> Entities:
     for one in node.children("ScenarioObject"):
         try:
             findings += _controllers(one, catalogs)
-            entity = _entity(one, catalogs)
+            entity = described(one, one.text("name"), catalogs)
             if entity.name in found:
                 raise one.error(f"there are two entities {entity.name!r}")
             found[entity.name] = entity
@@ -126,12 +135,12 @@ def _members(node: Node, known: Mapping[str, Entity]) -> Iterator[str]:
     yield from (name for name, entity in known.items() if entity.body in kinds)
 
 
-def _entity(node: Node, catalogs: Catalogs) -> Entity:
-    described = next((n for n in node.children() if n.tag != "ObjectController"), None)
-    if described is None:
+def described(node: Node, name: str, catalogs: Catalogs) -> Entity:
+    """The vehicle, pedestrian or object inside an element, or that it refers to."""
+    found = next((n for n in node.children() if n.tag != "ObjectController"), None)
+    if found is None:
         raise node.error("needs a <Vehicle>, <Pedestrian>, <MiscObject> or a reference to one")
-    body = catalogs.resolved(described)
-    name = node.text("name")
+    body = catalogs.resolved(found)
     properties = _properties(body)
     if body.tag == "Vehicle":
         return _vehicle(name, body, properties)
@@ -165,6 +174,18 @@ def _vehicle(name: str, node: Node, properties: Mapping[str, str]) -> Entity:
         raise node.unsupported(f"vehicleCategory={category!r} is not supported")
     type = nearest_type(WHEELED[category], box.length, box.width, box.height)
     return Entity(name, Body.VEHICLE, type, True, box, limits, properties)
+
+
+def of_category(node: Node, name: str, category: str) -> Entity:
+    """A vehicle of which no more is said."""
+    if category in TWO_WHEELED:
+        return Entity(name, Body.VEHICLE, "bicycle", False, BICYCLE)
+    if category not in WHEELED:
+        raise node.unsupported(f"category={category!r} is not supported")
+    kind = WHEELED[category]
+    box = USUAL[kind]
+    type = nearest_type(kind, box.length, box.width, box.height)
+    return Entity(name, Body.VEHICLE, type, True, box)
 
 
 def _box(node: Node, default: Box) -> Box:

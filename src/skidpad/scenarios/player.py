@@ -18,6 +18,7 @@ from skidpad.scenarios.scenario import Scenario
 from skidpad.scenarios.scene import Actor, Happening, Running, Scene
 from skidpad.scenarios.signals import SignalPlan
 from skidpad.scenarios.telling import Telling
+from skidpad.scenarios.traffic import drive
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 DURATION_MAX = 3600.0  # s, for files that never end
@@ -54,6 +55,7 @@ def setups(scenario: Scenario) -> tuple[ActorSetup, tuple[ActorSetup, ...]]:
             speed=begin.speed,
             driver=Control.SCRIPTED,
             collides=not entity.is_ghost,
+            present=begin.place is not None,
         )
     return made.pop(scenario.ego), tuple(made.values())
 
@@ -64,6 +66,7 @@ class Player:
     modes: how each actor is moved, None by somebody else; those not named are physical.
     skill: of the drivers, by actor.
     end_on_collision: a contact of the ego ends the run; else the file alone decides.
+    seed: of the traffic that actions bring.
     """
 
     def __init__(
@@ -75,13 +78,14 @@ class Player:
         duration: float = DURATION_MAX,
         end_on_collision: bool = False,
         dt: float = DT,
+        seed: int = 0,
     ) -> None:
         self.scenario, self.duration, self.end_on_collision = scenario, duration, end_on_collision
         self.modes, self.skill = dict(modes or {}), dict(skill or {})
         self.actors: dict[str, Actor] = {}
         self.scene = Scene(
             scenario.network, dt, self.actors, dict(scenario.parameters),
-            dict(scenario.variables), ego=scenario.ego,
+            dict(scenario.variables), ego=scenario.ego, seed=seed,
         )  # fmt: skip
         self.telling = Telling(scenario.storyboard)
         self.signals = SignalPlan(scenario.signals)
@@ -118,6 +122,7 @@ class Player:
         self.telling.look(self.scene)
         self.going = [action for action in self.going if not action.step(self.scene)]
         self.telling.step(self.scene)
+        drive(self.scene)
         t = self.scene.t
         stopped = self.hit and self.end_on_collision
         self.ended = self.telling.ended or stopped or t >= self.duration
@@ -148,7 +153,7 @@ class Player:
         if self.scenario.start.environment is not None:
             self.scene.tell_time(self.scenario.start.environment)
         for worldwide in self.scenario.start.actions:
-            worldwide.happen(self.scene)
+            self.going.append(worldwide.happen(self.scene))
         for name, begin in self.scenario.start.entities.items():
             for action in begin.actions:
                 self.going.append(action.begin(self.scene, self.actors[name]))

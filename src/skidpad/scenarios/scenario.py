@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from skidpad.core.errors import ConfigError, FileError, NoLaneError
@@ -22,7 +22,7 @@ from skidpad.scenarios.routes import route_position
 from skidpad.scenarios.schema import violations
 from skidpad.scenarios.shipped import FOLDER
 from skidpad.scenarios.signals import SignalController, compile_signals
-from skidpad.scenarios.start import Start, compile_start
+from skidpad.scenarios.start import Begin, Start, compile_start
 from skidpad.scenarios.storyboard import Storyboard, compile_storyboard
 from skidpad.scenarios.trajectories import trajectory_position
 
@@ -183,8 +183,10 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
         return None
     later = not start.handed.get(chosen, False) and any(_activations(storyboard, chosen))
     later = later or watching is not None
+    absent = dict.fromkeys(ctx.hired, Begin(None, 0.0))
+    start = replace(start, entities={**start.entities, **absent})
     return Scenario(
-        root.file, network, by_name, chosen, start, storyboard, values, ctx.variables,
+        root.file, network, by_name | ctx.hired, chosen, start, storyboard, values, ctx.variables,
         later, signals, tuple(findings),
     )  # fmt: skip
 

@@ -169,7 +169,7 @@ class Actor:
         self.track = None
         self.present = True
         self.pose = place.pose
-        self.word = ActorCommand(self.name, place=self.centre(place.pose), speed=v)
+        self.word = ActorCommand(self.name, place=self.centre(place.pose), speed=v, present=True)
 
     def follow_road(self, network: Network, v: float) -> None:
         """From where it is, along the lane there at speed v: the default controller."""
@@ -193,6 +193,13 @@ class Actor:
         self.travelled += self.v * dt
         self.stood = self.stood + dt if self.v < STANDING else 0.0
         self.at_end = self.at_end + dt if self.guide.at_end else 0.0
+
+
+class Flow(Protocol):
+    """Traffic that comes or goes until somebody stops it."""
+
+    name: str
+    stopped: bool
 
 
 @dataclass(frozen=True, slots=True)
@@ -227,6 +234,9 @@ class Scene:
     environments: list[Environment] = field(default_factory=list)  # of events, in their order
     clock: Clock | None = None  # time of day, where the file has said one
     story: list[Happening] = field(default_factory=list)
+    seed: int = 0  # of what is drawn
+    flows: list[Flow] = field(default_factory=list)  # of traffic actions
+    cruising: dict[str, float] = field(default_factory=dict)  # m/s that traffic's vehicles want
 
     def moved(self, path: Path, move: Move) -> None:
         """An element of the storyboard goes through a transition."""

@@ -94,6 +94,7 @@ class Stage:
         for actor in actors:
             assert isinstance(actor.place, Pose)
             self._put(ActorCommand(actor.name, place=actor.place, speed=actor.speed))
+            self.states.present[self.index[actor.name]] = actor.present
 
     def _put(self, word: ActorCommand) -> None:
         i, s = self.index[word.actor], self.states
@@ -117,10 +118,11 @@ class Stage:
         return WorldTruth(self.tick, self.table, self.states, self.mu, self.commands, {}, (), ())
 
 
-def played(scenario: Scenario, duration: float, dt: float = DT) -> Told:
+def played(scenario: Scenario, duration: float, dt: float = DT, seed: int = 0) -> Told:
     """The scenario as its file says, everything ideal, until it ends or for `duration` s."""
     stage = Stage(scenario)
-    player = Player(scenario, modes=dict.fromkeys(scenario.entities, ActorMode.IDEAL), dt=dt)
+    modes = dict.fromkeys(scenario.entities, ActorMode.IDEAL)
+    player = Player(scenario, modes=modes, dt=dt, seed=seed)
     rows: list[Row] = []
     for _ in range(round(duration / dt) + 1):
         words = player.step(stage.truth())

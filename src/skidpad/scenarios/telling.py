@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from skidpad.scenarios.scene import DONE, Move, Path, Running, Scene, State
+from skidpad.scenarios.scene import Move, Path, Running, Scene, State
 from skidpad.scenarios.storyboard import (
     Act,
     Event,
@@ -112,8 +112,7 @@ class ToldEvent(Told):
 
 def _begun(action: NamedAction, actors: Iterable[str], scene: Scene) -> Iterable[Running]:
     if action.worldwide is not None:
-        action.worldwide.happen(scene)
-        yield DONE
+        yield action.worldwide.happen(scene)
     if action.private is not None:
         for name in actors:
             yield action.private.begin(scene, scene.actors[name])

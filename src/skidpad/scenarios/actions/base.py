@@ -22,8 +22,8 @@ class PrivateAction(Protocol):
 class GlobalAction(Protocol):
     """Something that happens to the world."""
 
-    def happen(self, scene: Scene) -> None:
-        """At once."""
+    def happen(self, scene: Scene) -> Running:
+        """At once, or from now on."""
         ...
 
 
@@ -38,9 +38,10 @@ class NoEffect:
         scene.notice(f"<{self.what}> of {actor.name} has no effect")
         return DONE
 
-    def happen(self, scene: Scene) -> None:
+    def happen(self, scene: Scene) -> Running:
         """Nothing."""
         scene.notice(f"<{self.what}> has no effect")
+        return DONE
 
 
 class Dimension(Enum):

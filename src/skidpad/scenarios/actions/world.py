@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 from skidpad.core.setup import ActorCommand
 from skidpad.scenarios.actions.base import GlobalAction, NoEffect
+from skidpad.scenarios.actions.traffic import compile_traffic
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.environment import Environment, compile_environment
 from skidpad.scenarios.expressions import as_text
 from skidpad.scenarios.positions import Position, position
-from skidpad.scenarios.scene import Scene
+from skidpad.scenarios.scene import DONE, Running, Scene
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,10 +23,11 @@ class AddEntity:
     name: str
     position: Position
 
-    def happen(self, scene: Scene) -> None:
+    def happen(self, scene: Scene) -> Running:
         """At a place, with the speed demanded so far."""
         actor = scene.actors[self.name]
         actor.put(scene.network, self.position.place(scene), actor.guide.v)
+        return DONE
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,11 +36,12 @@ class DeleteEntity:
 
     name: str
 
-    def happen(self, scene: Scene) -> None:
+    def happen(self, scene: Scene) -> Running:
         """From the next step on."""
         actor = scene.actors[self.name]
         actor.present = False
         actor.word = ActorCommand(self.name, present=False)
+        return DONE
 
 
 def _entity(node: Node, ctx: Context) -> GlobalAction:
@@ -58,10 +61,11 @@ class SetValue:
     variable: bool
     change: Callable[[str], str]
 
-    def happen(self, scene: Scene) -> None:
+    def happen(self, scene: Scene) -> Running:
         """At once."""
         values = scene.variables if self.variable else scene.parameters
         values[self.name] = self.change(values[self.name])
+        return DONE
 
 
 def _value(node: Node, ctx: Context) -> GlobalAction:
@@ -96,9 +100,10 @@ class SetSignal:
     name: str
     state: str
 
-    def happen(self, scene: Scene) -> None:
+    def happen(self, scene: Scene) -> Running:
         """At once."""
         scene.signals[self.name] = self.state
+        return DONE
 
 
 def _infrastructure(node: Node, ctx: Context) -> GlobalAction:
@@ -117,10 +122,11 @@ class SetEnvironment:
 
     environment: Environment
 
-    def happen(self, scene: Scene) -> None:
+    def happen(self, scene: Scene) -> Running:
         """From the next step on."""
         scene.environments.append(self.environment)
         scene.tell_time(self.environment)
+        return DONE
 
 
 def _environment(node: Node, ctx: Context) -> GlobalAction:
@@ -140,6 +146,7 @@ GLOBAL: Mapping[str, Callable[[Node, Context], GlobalAction]] = {
     "InfrastructureAction": _infrastructure,
     "EnvironmentAction": _environment,
     "SetMonitorAction": user_defined,
+    "TrafficAction": compile_traffic,
 }
 
 

@@ -123,13 +123,17 @@ def _reach_position(node: Node, ctx: Context) -> EntityCondition:
 
 @dataclass(frozen=True, slots=True)
 class Collision:
-    """The entity touches another one, or one of a kind."""
+    """The entity touches another one, or one of a kind; others: None for all of the kind."""
 
-    others: tuple[str, ...]
+    others: tuple[str, ...] | None
+    body: Body = Body.VEHICLE
 
     def holds(self, scene: Scene, actor: str) -> bool:
         """Now."""
-        return any(other != actor and scene.touch(actor, other) for other in self.others)
+        others = self.others
+        if others is None:
+            others = tuple(n for n, a in scene.actors.items() if a.entity.body is self.body)
+        return any(other != actor and scene.touch(actor, other) for other in others)
 
 
 def _collision(node: Node, ctx: Context) -> EntityCondition:
@@ -138,8 +142,7 @@ def _collision(node: Node, ctx: Context) -> EntityCondition:
         return Collision(ctx.actors([by]))
     if by.tag != "ByType":
         raise by.unsupported()
-    body = by.choice("type", Body)
-    return Collision(tuple(n for n, e in ctx.entities.items() if e.body is body))
+    return Collision(None, by.choice("type", Body))
 
 
 class Turn(Enum):
@@ -206,7 +209,7 @@ def _angle(node: Node, ctx: Context) -> EntityCondition:
 
 @dataclass(frozen=True, slots=True)
 class Clearance:
-    """No entity within a stretch of lanes beside, before and behind."""
+    """No entity within a stretch of lanes beside, before and behind; others: () for all."""
 
     others: tuple[str, ...]
     ahead: float
@@ -219,7 +222,7 @@ class Clearance:
         """Nothing is there now."""
         here = scene.actors[actor]
         base = scene.network.place_of(here.pose).lane
-        others = (n for n in self.others if n != actor and scene.actors[n].present)
+        others = (n for n in self.others or scene.actors if n != actor and scene.actors[n].present)
         if base is None:
             return True
         sign = 1 if scene.network.forward(base) == (here.guide.along > 0.0) else -1
@@ -262,7 +265,7 @@ def _clearance(node: Node, ctx: Context) -> EntityCondition:
     )
     named = ctx.actors(node.children("EntityRef"))
     return Clearance(
-        named or tuple(ctx.entities),
+        named,
         node.number("distanceForward", 0.0),
         node.number("distanceBackward", 0.0),
         node.flag("freeSpace", default=False),

@@ -35,7 +35,9 @@ def staged(setup: Setup, seed: int) -> World:
         if role.late:
             drivers.await_room(id, role.factor)
         else:
-            world.put(world.row(id), place_of(map, role.actor.place), role.actor.speed)
+            row = world.row(id)
+            world.put(row, place_of(map, role.actor.place), role.actor.speed)
+            world.states.present[row] = role.actor.present
     world.settle()
     for id, role in zip(ids, roles, strict=True):
         if id != EGO and not role.late and role.actor.driver is Control.AUTOPILOT:

@@ -1,0 +1,182 @@
+"""Places on driving lanes where traffic may appear, and the regions that files draw around them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import cos, sin
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.geometry import Pose
+from skidpad.roads.lanes import LaneKind
+from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.scenarios.positions import Position
+from skidpad.scenarios.scene import Actor, Scene
+
+SPACING = 5  # samples, each at most 1 m, from one spot to the next
+ABREAST = 2.0  # m, nearer than this sideways is in the same lane
+Array = NDArray[Any]
+Mask = NDArray[np.bool_]
+
+
+class Spots(NamedTuple):
+    """N places on lanes, in the direction of their traffic; arrays (N,), m and rad."""
+
+    x: Array
+    y: Array
+    heading: Array
+    road: Array
+    lane_id: Array
+    s_road: Array
+    lane: Array
+    s: Array
+
+    def where(self, mask: Mask) -> Spots:
+        """Those of the mask."""
+        return Spots(*(column[mask] for column in self))
+
+    def free(self, actor: Actor, room: float) -> Mask:
+        """Those that keep `room` m from an actor's centre along the lane, or lie in another lane."""
+        dx, dy = actor.pose.x - self.x, actor.pose.y - self.y
+        c, s = np.cos(self.heading), np.sin(self.heading)
+        away: Mask = (np.abs(dx * c + dy * s) >= room) | (np.abs(dy * c - dx * s) > ABREAST)
+        return away
+
+
+def spots_of(map: RoadMap) -> Spots:
+    """Every few metres of all driving lanes outside junctions."""
+    lanes, samples = map.lanes, map.samples
+    usable = (lanes.kind == LaneKind.DRIVING) & (lanes.junction < 0)
+    k = np.flatnonzero(usable[samples.lane])[::SPACING]
+    lane = samples.lane[k].astype(np.int64)
+    return Spots(
+        samples.x[k], samples.y[k], samples.heading[k], lanes.road[lane], lanes.lane_id[lane],
+        samples.s_road[k], lane, samples.s[k],
+    )  # fmt: skip
+
+
+def spot_at(map: RoadMap, point: LanePoint) -> Spots:
+    """One place as spots."""
+    values = (
+        point.x, point.y, point.heading, point.road, point.lane_id, map.s_road(point), point.lane,
+        point.s,
+    )  # fmt: skip
+    return Spots(*(np.array([value]) for value in values))
+
+
+class Region(Protocol):
+    """A part of the world, perhaps around something that moves."""
+
+    def inside(self, scene: Scene, spots: Spots) -> Mask:
+        """Which spots lie in it now."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class Disc:
+    """Within a radius in m of a place."""
+
+    centre: Position
+    radius: float
+
+    def inside(self, scene: Scene, spots: Spots) -> Mask:
+        """By distance."""
+        pose = self.centre.place(scene).pose
+        near: Mask = np.hypot(spots.x - pose.x, spots.y - pose.y) <= self.radius
+        return near
+
+
+@dataclass(frozen=True, slots=True)
+class Oval:
+    """An ellipse around an entity without a disc about it, all in m.
+
+    offset: of the centre along the entity's x axis, which the major axis lies on (the standard does
+    not say); rim: only from this share of the ellipse on.
+    """
+
+    entity: str
+    offset: float
+    major: float
+    minor: float
+    inner: float
+    rim: float = 0.0
+
+    def inside(self, scene: Scene, spots: Spots) -> Mask:
+        """Between the inner disc, or the rim, and the ellipse."""
+        centre = scene.actors[self.entity].pose.moved(forward=self.offset)
+        forward, left = _seen(centre, spots)
+        share = np.hypot(forward / self.major, left / self.minor)
+        far: Mask = (np.hypot(forward, left) >= self.inner) & (share >= self.rim) & (share <= 1.0)
+        return far
+
+
+@dataclass(frozen=True, slots=True)
+class Outline:
+    """Within a polygon of places."""
+
+    corners: tuple[Position, ...]
+
+    def inside(self, scene: Scene, spots: Spots) -> Mask:
+        """By the number of edges that a ray along x crosses (even and odd)."""
+        poses = [corner.place(scene).pose for corner in self.corners]
+        odd = np.zeros(len(spots.x), np.bool_)
+        for a, b in zip(poses, [*poses[1:], poses[0]], strict=True):
+            if a.y == b.y:
+                continue
+            spans = (a.y > spots.y) != (b.y > spots.y)
+            odd ^= spans & (spots.x < a.x + (spots.y - a.y) * (b.x - a.x) / (b.y - a.y))
+        return odd
+
+
+class Stretch(NamedTuple):
+    """Some lanes of a road, or all where none is named, between two places of its s in m."""
+
+    road: int
+    low: float
+    high: float
+    lanes: frozenset[int]
+
+
+@dataclass(frozen=True, slots=True)
+class Stretches:
+    """On stretches of roads."""
+
+    parts: tuple[Stretch, ...]
+
+    def inside(self, scene: Scene, spots: Spots) -> Mask:
+        """By road, lane and s."""
+        del scene
+        found = np.zeros(len(spots.x), np.bool_)
+        for part in self.parts:
+            on = (
+                (spots.road == part.road) & (spots.s_road >= part.low) & (spots.s_road <= part.high)
+            )
+            if part.lanes:
+                on &= np.isin(spots.lane_id, list(part.lanes))
+            found |= on
+        return found
+
+
+def along(pose: Pose, spots: Spots) -> Mask:
+    """Spots whose traffic runs as the pose looks."""
+    same: Mask = np.cos(spots.heading - pose.yaw) > 0.0
+    return same
+
+
+def clear(spots: Spots, actors: Iterable[Actor], room: float) -> Mask:
+    """Spots that keep `room` m, and half of its length, from every actor that is there."""
+    mask = np.ones(len(spots.x), np.bool_)
+    for actor in actors:
+        if actor.present:
+            mask &= spots.free(actor, room + 0.5 * actor.entity.box.length)
+    return mask
+
+
+def _seen(pose: Pose, spots: Spots) -> tuple[Array, Array]:
+    """Spots in the axes of a pose: m forward, m left."""
+    dx, dy = spots.x - pose.x, spots.y - pose.y
+    c, s = cos(pose.yaw), sin(pose.yaw)
+    return dx * c + dy * s, dy * c - dx * s

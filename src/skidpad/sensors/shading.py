@@ -12,20 +12,36 @@ from numpy.typing import NDArray
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
 from skidpad.core.states import ActorTable
+from skidpad.sensors.blocks import (
+    BLOCK,
+    COLUMNS,
+    GLOSS,
+    GLOW,
+    GX,
+    GY,
+    LANES,
+    ONE,
+    WETTABLE,
+    ZERO,
+    B,
+    Float32,
+    G,
+    H,
+    L,
+    R,
+    S,
+    T,
+    U,
+    W,
+    develop,
+    gather,
+    slopes,
+)
 from skidpad.sensors.lighting import Lighting
 from skidpad.sensors.materials import ACTOR_PAINTED, EMISSIVE, MATERIALS, Material
+from skidpad.sensors.sky import disc, sky
 from skidpad.sensors.view import View
 
-Float32 = NDArray[np.float32]
-
-# Columns of the look-up table, one row per (instance, material).
-_RED, _GREEN, _BLUE, _GLOW, _WETTABLE, _GLOSS = range(6)
-COLUMNS = 6
-# The kernel works on blocks of a row. All its intermediate values lie in lanes of one array at
-# constant distances: only then can the compiler prove that they do not overlap, and vectorise.
-BLOCK = 256
-LANES = 11
-(_R, _G, _B, _L, _T, _S, _U, _W, _GX, _GY, _H) = (np.intp(n * BLOCK) for n in range(LANES))
 ROADLIKE = (Material.ASPHALT, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
 SNOWY = (Material.GRASS, Material.EMBANKMENT, Material.SHOULDER, Material.SIDEWALK, Material.MEDIAN)
 SNOWED = (Material.ASPHALT, Material.MARKING)
@@ -34,6 +50,7 @@ GLOSSY = (Material.PAINT, Material.GLASS)
 WET_DARKENING = 0.52  # of asphalt's albedo; Lekner and Dorf (1988) give 0.4 to 0.7
 SNOW = np.array([0.80, 0.83, 0.88], dtype=np.float32)
 BRAKE_GLOW = 1.5  # tail lamp when braking, against its plain colour
+BEHIND_BY = 1e-3  # of a ray's length, so that rounding cannot bring a point before the lamps
 HEADLAMP_X, HEADLAMP_Z = 1.75, 0.65  # m, in the ego's frame
 
 
@@ -58,7 +75,7 @@ class Shading:
         tails = self._table.reshape(-1, MATERIALS, COLUMNS)[1:, Material.TAIL_LAMP]
         tails[:] = self._plain_tail
         tails[braking, :3] = np.array([BRAKE_GLOW, 0.03, 0.03], dtype=np.float32)
-        tails[braking, _GLOW] = 1.0
+        tails[braking, GLOW] = 1.0
 
     def paint(
         self,
@@ -98,23 +115,22 @@ def _look_up(palette: Float32, table: ActorTable, light: Lighting, snow_on_road:
     for material in ACTOR_PAINTED:
         out[1:, material, :3] = np.square(table.rgb.astype(np.float32) / 255.0)[:, None].squeeze(1)
     for material in EMISSIVE:
-        out[:, material, _GLOW] = 1.0
-    out[:, list(ROADLIKE), _WETTABLE] = 1.0
-    out[:, list(GLOSSY), _GLOSS] = 1.0
+        out[:, material, GLOW] = 1.0
+    out[:, list(ROADLIKE), WETTABLE] = 1.0
+    out[:, list(GLOSSY), GLOSS] = 1.0
     for material in SNOWY:
         out[:, material, :3] += light.snow * (SNOW - out[:, material, :3])
     if snow_on_road:
         for material in SNOWED:
             out[:, material, :3] += SNOW_LEFT * light.snow * (SNOW - out[:, material, :3])
-    out[:, Material.HEADLAMP, _GLOW] = 0.9 * light.lamps
-    out[:, Material.TAIL_LAMP, _GLOW] = 0.8 * light.lamps
+    out[:, Material.HEADLAMP, GLOW] = 0.9 * light.lamps
+    out[:, Material.TAIL_LAMP, GLOW] = 0.8 * light.lamps
     return out.reshape(-1, COLUMNS)
 
 
-_ZERO, _HALF, _ONE, _TWO = (np.float32(v) for v in (0.0, 0.5, 1.0, 2.0))
+_HALF = np.float32(0.5)
 _TINY = np.float32(1e-12)
 _SIXTEENTH = np.float32(0.0625)
-_WHITE = np.float32(255.0)
 _GLOSS_SHARE = np.float32(0.35)
 _F0 = np.float32(0.03)  # reflectance of water and glass at normal incidence, about
 _BEAM_WIDTH = np.float32(2.6)  # 1 / tangent squared: half the light at 22 deg to the side
@@ -128,71 +144,8 @@ _BEAM_POWER = np.float32(2.6)
 _DARK = np.float32(1.0 - WET_DARKENING)
 _FILM_SHARE = np.float32(0.8)
 _RETRO = np.float32(0.35)  # rough asphalt sends back much of a grazing beam
-_GLOW_SHARE, _DISC_SHARE = np.float32(0.25), np.float32(3.0)
 _FARTHEST = np.float32(1e-6)
 _NEAR_LAMP, _LAMP_APART = np.float32(0.3), np.float32(1.2)  # m
-
-
-@kernel
-def _gather(
-    key: NDArray[np.int32], y: int, first: int, count: int, table: Float32, work: Float32
-) -> None:
-    """Colour and behaviour of a block's pixels from the table, one read per run of equal keys."""
-    keys = key[y, first : first + count]
-    x = 0
-    while x < count:
-        k = keys[x]
-        end = x + 1
-        while end < count and keys[end] == k:
-            end += 1
-        i = (k >> 16) * MATERIALS + (k & 255)
-        work[_R + x : _R + end] = table[i, 0]
-        work[_G + x : _G + end] = table[i, 1]
-        work[_B + x : _B + end] = table[i, 2]
-        work[_L + x : _L + end] = table[i, 3]
-        work[_T + x : _T + end] = table[i, 4]
-        work[_S + x : _S + end] = table[i, 5]
-        x = end
-
-
-@kernel
-def _slopes(
-    inverse: Float32, y: int, first: int, count: int, view: View, work: Float32
-) -> tuple[bool, bool]:
-    """Viewing direction, inverse depth and its two slopes, of a block's pixels.
-
-    Of the two differences on either side the gentler one counts: the other may cross an edge.
-    Says whether any pixel shows a surface, and whether any shows sky.
-    """
-    height, width = inverse.shape
-    focal = np.float32(view.focal)
-    per_pixel = np.float32(1.0 / view.focal)
-    start = np.float32((first + 0.5 - view.cx) / view.focal)
-    here = inverse[y, first : first + count]
-    above = inverse[max(y - 1, 0), first : first + count]
-    below = inverse[min(y + 1, height - 1), first : first + count]
-    top, bottom = y == 0, y == height - 1
-    solid = 0
-    for x in range(count):
-        w = here[x]
-        a = below[x] - w
-        b = w - above[x]
-        work[_W + x] = w
-        work[_GY + x] = (a if (abs(a) < abs(b) or top) and not bottom else b) * focal
-        work[_U + x] = start + np.float32(x) * per_pixel
-        solid += 1 if w > _ZERO else 0
-    for x in range(1, count - 1):
-        a = here[x + 1] - here[x]
-        b = here[x] - here[x - 1]
-        work[_GX + x] = (a if abs(a) < abs(b) else b) * focal
-    for x in (0, count - 1):
-        left, right = first + x == 0, first + x == width - 1
-        behind = inverse[y, max(first + x - 1, 0)]
-        ahead = inverse[y, min(first + x + 1, width - 1)]
-        a = ahead - here[x]
-        b = here[x] - behind
-        work[_GX + x] = (a if (abs(a) < abs(b) or left) and not right else b) * focal
-    return solid > 0, solid < count
 
 
 @kernel
@@ -208,11 +161,11 @@ def beam_at(
     lead = px if px > _NEAR_LAMP else _NEAR_LAMP
     side = py / (lead + _LAMP_APART)
     rise = pz / lead * slope
-    rise = rise if rise > _ZERO else _ZERO
-    spread = _ONE + _BEAM_WIDTH * side * side
-    fall = _ONE + (px * px + py * py) * reach
-    lit: np.float32 = beam / (spread * spread * fall * fall * (_ONE + rise * rise))
-    return lit if px > _ZERO else _ZERO
+    rise = rise if rise > ZERO else ZERO
+    spread = ONE + _BEAM_WIDTH * side * side
+    fall = ONE + (px * px + py * py) * reach
+    lit: np.float32 = beam / (spread * spread * fall * fall * (ONE + rise * rise))
+    return lit if px > ZERO else ZERO
 
 
 @kernel
@@ -222,6 +175,21 @@ def beam_of(light: Lighting) -> tuple[np.float32, np.float32, np.float32]:
     slope = _HIGH_SLOPE if light.high else _CUT_SLOPE
     reach = _HIGH_RANGE if light.high else _BEAM_RANGE
     return beam, slope, reach
+
+
+@kernel
+def behind_lamps(
+    view: View, v: np.float32, first: int, count: int, to_body: Float32, before: np.float32
+) -> bool:
+    """Whether no point that a block can show lies before the lamps.
+
+    before: m by which the camera stands before them.
+    """
+    ahead = -np.inf
+    for column in (first, first + count):
+        u = (column - view.cx) / view.focal
+        ahead = max(ahead, to_body[0, 0] * u + to_body[0, 1] * v + to_body[0, 2])
+    return bool(ahead < -BEHIND_BY and before < 0.0)
 
 
 @kernel
@@ -240,12 +208,12 @@ def _headlights(
     b20, b21, b22 = to_body[2, 0], to_body[2, 1], to_body[2, 2]
     o0, o1, o2 = offset[0] - _LAMP_X, offset[1], offset[2] - _LAMP_Z
     for x in range(count):
-        u, w = work[_U + x], work[_W + x]
-        z = _ONE / (w if w > _FARTHEST else _FARTHEST)
+        u, w = work[U + x], work[W + x]
+        z = ONE / (w if w > _FARTHEST else _FARTHEST)
         px = z * (b00 * u + b01 * v + b02) + o0
         py = z * (b10 * u + b11 * v + b12) + o1
         pz = z * (b20 * u + b21 * v + b22) + o2
-        work[_H + x] = beam_at(px, py, pz, beam, slope, reach)
+        work[H + x] = beam_at(px, py, pz, beam, slope, reach)
 
 
 @kernel
@@ -262,89 +230,41 @@ def _surfaces(
     up0, up1, up2 = up[0], up[1], up[2]
     sun0, sun1, sun2 = sun[0], sun[1], sun[2]
     for x in range(count):
-        u, w = work[_U + x], work[_W + x]
-        gx, gy = work[_GX + x], work[_GY + x]
-        glow, gloss = work[_L + x], work[_S + x]
+        u, w = work[U + x], work[W + x]
+        gx, gy = work[GX + x], work[GY + x]
+        glow, gloss = work[L + x], work[S + x]
         gz = w - u * gx - v * gy
-        size = _ONE / np.sqrt(gx * gx + gy * gy + gz * gz + _TINY)
-        ray = np.sqrt(u * u + v * v + _ONE)
+        size = ONE / np.sqrt(gx * gx + gy * gy + gz * gz + _TINY)
+        ray = np.sqrt(u * u + v * v + ONE)
         n_up = -(gx * up0 + gy * up1 + gz * up2) * size
         n_sun = -(gx * sun0 + gy * sun1 + gz * sun2) * size
-        n_sun = n_sun if n_sun > _ZERO else _ZERO
+        n_sun = n_sun if n_sun > ZERO else ZERO
         facing = w * size / ray
         tilt = _HALF + _HALF * n_up
-        lit = work[_H + x] * (_RETRO + (_ONE - _RETRO) * facing)
+        lit = work[H + x] * (_RETRO + (ONE - _RETRO) * facing)
 
-        grazing = _ONE - (facing if facing < _ONE else _ONE)
+        grazing = ONE - (facing if facing < ONE else ONE)
         square = grazing * grazing
-        fresnel = _F0 + (_ONE - _F0) * square * square * grazing
-        film = wet * work[_T + x] * (n_up if n_up > _ZERO else _ZERO)
+        fresnel = _F0 + (ONE - _F0) * square * square * grazing
+        film = wet * work[T + x] * (n_up if n_up > ZERO else ZERO)
         mirror = fresnel * (film * _FILM_SHARE + gloss * _GLOSS_SHARE)
-        shown = _ONE - glow
-        dull = shown * (_ONE - film * _DARK) * (_ONE - mirror)
+        shown = ONE - glow
+        dull = shown * (ONE - film * _DARK) * (ONE - mirror)
         depth = ray / (w if w > _FARTHEST else _FARTHEST) - begins
-        depth = (depth if depth > _ZERO else _ZERO) * beta * _SIXTEENTH
-        through = _ONE / (_ONE + depth)
+        depth = (depth if depth > ZERO else ZERO) * beta * _SIXTEENTH
+        through = ONE / (ONE + depth)
         through = through * through
         through = through * through
         through = through * through
         through = through * through
-        veil = mirror * shown * through + (_ONE - through)
+        veil = mirror * shown * through + (ONE - through)
 
         r = glow + dull * (low_r + tilt * span_r + sun_r * n_sun + lit)
         g = glow + dull * (low_g + tilt * span_g + sun_g * n_sun + lit)
         b = glow + dull * (low_b + tilt * span_b + sun_b * n_sun + lit * _BEAM_BLUE)
-        work[_R + x] = work[_R + x] * r * through + veil * hor_r
-        work[_G + x] = work[_G + x] * g * through + veil * hor_g
-        work[_B + x] = work[_B + x] * b * through + veil * hor_b
-
-
-@kernel
-def _sky(
-    v: np.float32, count: int, light: Lighting, sun: Float32, up: Float32, work: Float32
-) -> None:
-    """Sky and sun where a block shows nothing else."""
-    disc = np.float32(light.disc)
-    sun_r, sun_g, sun_b = light.sun[0], light.sun[1], light.sun[2]
-    hor_r, hor_g, hor_b = light.horizon[0], light.horizon[1], light.horizon[2]
-    zen_r, zen_g, zen_b = light.zenith[0] - hor_r, light.zenith[1] - hor_g, light.zenith[2] - hor_b
-    up0, up1, up2 = up[0], up[1], up[2]
-    sun0, sun1, sun2 = sun[0], sun[1], sun[2]
-    for x in range(count):
-        u = work[_U + x]
-        per_ray = _ONE / np.sqrt(u * u + v * v + _ONE)
-        climb = (u * up0 + v * up1 + up2) * per_ray
-        climb = climb if climb > _ZERO else _ZERO
-        climb = climb * (_TWO - climb)
-        halo = (u * sun0 + v * sun1 + sun2) * per_ray
-        halo = halo if halo > _ZERO else _ZERO
-        halo = halo * halo
-        halo = halo * halo
-        halo = halo * halo
-        halo = halo * halo
-        wide = halo
-        halo = halo * halo
-        halo = halo * halo
-        halo = halo * halo
-        halo = halo * halo
-        halo = halo * halo
-        shine = disc * (wide * _GLOW_SHARE + halo * _DISC_SHARE)
-        empty = work[_W + x] <= _ZERO
-        work[_R + x] = hor_r + climb * zen_r + shine * sun_r if empty else work[_R + x]
-        work[_G + x] = hor_g + climb * zen_g + shine * sun_g if empty else work[_G + x]
-        work[_B + x] = hor_b + climb * zen_b + shine * sun_b if empty else work[_B + x]
-
-
-@kernel
-def _develop(count: int, work: Float32, out: NDArray[np.uint32]) -> None:
-    """Linear light to bytes: gamma 2, clipped, packed as red, green, blue, 255."""
-    for x in range(count):
-        r, g, b = work[_R + x], work[_G + x], work[_B + x]
-        r = np.sqrt(r if r < _ONE else _ONE) * _WHITE
-        g = np.sqrt(g if g < _ONE else _ONE) * _WHITE
-        b = np.sqrt(b if b < _ONE else _ONE) * _WHITE
-        packed = np.int32(r) | np.int32(g) << 8 | np.int32(b) << 16
-        out[x] = np.uint32(packed | 0xFF000000)
+        work[R + x] = work[R + x] * r * through + veil * hor_r
+        work[G + x] = work[G + x] * g * through + veil * hor_g
+        work[B + x] = work[B + x] * b * through + veil * hor_b
 
 
 @kernel
@@ -366,17 +286,22 @@ def shade(
     sun, up: (3,) camera axes; to_body, offset: camera to ego frame.
     """
     width = inverse.shape[1]
-    work[_H : _H + BLOCK] = _ZERO
+    work[H : H + BLOCK] = ZERO
     for y in range(view.top, view.height):
         v = np.float32((y + 0.5 - view.cy) / view.focal)
         for first in range(0, width, BLOCK):
             count = min(BLOCK, width - first)
-            solid, empty = _slopes(inverse, y, first, count, view, work)
+            solid, empty = slopes(inverse, y, first, count, view, work)
             if solid:
-                _gather(key, y, first, count, table, work)
+                gather(key, y, first, count, table, work)
                 if light.headlights > 0.0:
-                    _headlights(v, count, light, to_body, offset, work)
+                    if behind_lamps(view, v, first, count, to_body, offset[0] - _LAMP_X):
+                        work[H : H + BLOCK] = ZERO
+                    else:
+                        _headlights(v, count, light, to_body, offset, work)
                 _surfaces(v, count, light, sun, up, work)
             if empty:
-                _sky(v, count, light, sun, up, work)
-            _develop(count, work, out[y, first : first + count])
+                sky(v, count, light, up, work)
+                if light.disc > 0.0:
+                    disc(v, count, light, sun, work)
+            develop(count, work, out[y, first : first + count])

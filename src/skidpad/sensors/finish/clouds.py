@@ -17,6 +17,7 @@ from skidpad.core.jit import kernel
 from skidpad.core.randomness import stream
 from skidpad.core.weather import Weather
 from skidpad.sensors.lighting import Lighting
+from skidpad.sensors.packing import pack, unpack
 from skidpad.sensors.view import View
 
 SIZE = 512  # texels of the texture, which repeats
@@ -140,10 +141,8 @@ def _blend(
     for x in range(width):
         thick = thickness[x]
         share = shares[x] if depths[x] <= none else none
-        k = np.int32(pixels[x] & np.uint32(0xFFFFFF))
-        red, green, blue = np.float32(k & 255), np.float32((k >> 8) & 255), np.float32(k >> 16)
+        red, green, blue = unpack(pixels[x])
         red += share * (r0 + r1 * thick - red)
         green += share * (g0 + g1 * thick - green)
         blue += share * (b0 + b1 * thick - blue)
-        packed = np.int32(red) | np.int32(green) << 8 | np.int32(blue) << 16
-        pixels[x] = np.uint32(packed | 0xFF000000)
+        pixels[x] = pack(red, green, blue)

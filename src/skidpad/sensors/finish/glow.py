@@ -7,11 +7,14 @@ from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
 from skidpad.sensors.finish.lamps import Sources
+from skidpad.sensors.packing import pack, unpack
 from skidpad.sensors.view import View
 
+WHITE = np.float32(65025.0)  # a byte's square, of light 1
 FARTHEST = 350.0  # m
 CLEARANCE = 0.35  # m by which something must stand before a lamp to hide it
 LEAST = 0.004  # light below which nothing is added
+FAINT = 2e-5  # light that a black pixel of a streak does not show: one step of its byte
 BLOOM, BLOOM_MOST = 0.16, 30.0  # m of the core's radius, px of the largest halo
 LENS = 1.2  # px of the core, however far the lamp
 F0 = 0.03  # reflectance of water at normal incidence
@@ -22,13 +25,11 @@ LONGEST = 6.0  # lengths of its fall after which a streak ends
 @kernel
 def add_light(p: np.uint32, r: float, g: float, b: float) -> np.uint32:
     """A packed pixel with more light; its bytes are square roots of light."""
-    k = np.int64(p)
-    red, green, blue = float(k & 255), float((k >> 8) & 255), float((k >> 16) & 255)
-    red = min(np.sqrt(red * red + 65025.0 * r), 255.0)
-    green = min(np.sqrt(green * green + 65025.0 * g), 255.0)
-    blue = min(np.sqrt(blue * blue + 65025.0 * b), 255.0)
-    packed: np.uint32 = np.uint32(int(red) | int(green) << 8 | int(blue) << 16 | 0xFF000000)
-    return packed
+    red, green, blue = unpack(p)
+    red = min(np.sqrt(red * red + WHITE * np.float32(r)), np.float32(255.0))
+    green = min(np.sqrt(green * green + WHITE * np.float32(g)), np.float32(255.0))
+    blue = min(np.sqrt(blue * blue + WHITE * np.float32(b)), np.float32(255.0))
+    return pack(red, green, blue)
 
 
 @kernel
@@ -76,21 +77,21 @@ def _streak(
     """An upright streak on the road: place is column, row of its begin and of its middle, width."""
     u, begin, middle, wide = place
     tall = max(0.6 * (middle - begin), 4.0)
-    reach = 2.6 * wide
+    reach, most = 2.6 * wide, max(light)
+    left, right = max(int(u - reach), 0), min(int(u + reach) + 1, view.width)
     last = min(middle + LONGEST * tall, float(view.height))
+    across = np.exp(-(((np.arange(left, max(left, right)) + 0.5 - u) / wide) ** 2))
     for row in range(max(int(begin), view.top), max(int(last), view.top)):
         off = abs(row + 0.5 - middle) / tall
         fall = np.exp(-off) * max(1.0 - off / LONGEST, 0.0)
-        for column in range(max(int(u - reach), 0), min(int(u + reach) + 1, view.width)):
+        if fall * most < FAINT:
+            continue
+        for column in range(left, right):
+            f = fall * across[column - left]
             k = key[row, column]
-            if (k >> 16) != 0 or not wettable[k & 255]:
+            if f * most < FAINT or (k >> 16) != 0 or not wettable[k & 255]:
                 continue
-            side = (column + 0.5 - u) / wide
-            f = fall * np.exp(-side * side)
-            if f > LEAST:
-                out[row, column] = add_light(
-                    out[row, column], f * light[0], f * light[1], f * light[2]
-                )
+            out[row, column] = add_light(out[row, column], f * light[0], f * light[1], f * light[2])
 
 
 @kernel

@@ -73,33 +73,34 @@ class Lamps:
         dark = max(float(light.lamps), BY_DAY)
         on = self._has & states.present
         head = HEAD_POWER * dark if light.lamps > 0.0 or light.wet > WET_DAY else 0.0
+        ends = [(-1.0, on & braking, np.multiply(BRAKE, BRAKE_POWER * dark))]
+        if head > 0.0:
+            ends.append((1.0, on, np.multiply(HEAD, head)))
+            ends.append((-1.0, on & ~braking, np.multiply(TAIL, TAIL_POWER * dark)))
         parts = [self._of_signals(lights, SIGNAL_POWER * dark)]
-        for side in (-1.0, 1.0):
-            if head > 0.0:
-                lit = np.multiply(HEAD, head)
-                parts.append(self._of_vehicles(states, on, 1.0, side, lit))
-                dim = np.multiply(TAIL, TAIL_POWER * dark)
-                parts.append(self._of_vehicles(states, on & ~braking, -1.0, side, dim))
-            lit = np.multiply(BRAKE, BRAKE_POWER * dark)
-            parts.append(self._of_vehicles(states, on & braking, -1.0, side, lit))
+        parts += [self._of_vehicles(states, *end) for end in ends]
         return _stack(parts)
 
     def _of_vehicles(
-        self, states: ActorStates, on: NDArray[np.bool_], end: float, side: float, lit: Floats
+        self, states: ActorStates, end: float, on: NDArray[np.bool_], lit: Floats
     ) -> Sources:
-        rows = np.flatnonzero(on & ((side > 0.0) | (self._side > 0.0)))
-        c, s = np.cos(states.yaw[rows]), np.sin(states.yaw[rows])
-        along, left = end * self._front[rows], side * self._side[rows]
-        slope = np.sin(states.pitch[rows])
+        """The lamps at one end of those who have them on: on either side, or in the middle."""
+        rows = np.flatnonzero(on)
+        one = np.concatenate([rows, rows[self._side[rows] > 0.0]])
+        side = self._side[one]
+        side[len(rows) :] *= -1.0
+        c, s = np.cos(states.yaw[one]), np.sin(states.yaw[one])
+        along, slope = end * self._front[one], np.sin(states.pitch[one])
+        ground = states.z[one] - slope * along
         return Sources(
-            states.x[rows] + c * along - s * left,
-            states.y[rows] + s * along + c * left,
-            states.z[rows] + self._up[rows] - slope * along,
-            states.z[rows] - slope * along,
+            states.x[one] + c * along - s * side,
+            states.y[one] + s * along + c * side,
+            ground + self._up[one],
+            ground,
             end * c,
             end * s,
-            np.full(len(rows), 0.11),
-            np.tile(lit, (len(rows), 1)),
+            np.full(len(one), 0.11),
+            np.broadcast_to(lit, (len(one), 3)),
         )
 
     def _of_signals(self, lights: Mapping[int, LightState], power: float) -> Sources:

@@ -16,7 +16,7 @@ from skidpad.core.vocabulary import SemanticClass
 from skidpad.sensors.finish.glow import add_light
 from skidpad.sensors.lighting import Lighting
 from skidpad.sensors.materials import MATERIALS, Material
-from skidpad.sensors.shading import HEADLAMP_X, HEADLAMP_Z, beam_at, beam_of
+from skidpad.sensors.shading import HEADLAMP_X, HEADLAMP_Z, beam_at, beam_of, behind_lamps
 from skidpad.sensors.view import View
 
 MARKING_GAIN, SIGN_GAIN, PLATE_GAIN = 0.9, 2.2, 1.6  # of light that comes back, per light there
@@ -26,6 +26,7 @@ WET_SHARE = 0.25  # of a marking's return when water lies over its beads
 CLASSES = 256
 LINE, SIGN = int(SemanticClass.ROAD_LINE), int(SemanticClass.TRAFFIC_SIGN)
 PLATE = int(Material.PLATE)
+LEAST = np.float32(0.003)  # light below which nothing is added
 BLOCK = 64  # px that are looked through at once
 GAIN = np.zeros((CLASSES, MATERIALS), dtype=np.float32)  # by class and material
 GAIN[SemanticClass.ROAD_LINE, Material.MARKING] = MARKING_GAIN
@@ -84,22 +85,27 @@ def _send_back(
     nearest = np.float32(1.0 / FAR)
     for row in range(view.top, view.height):
         v = np.float32(row + 0.5 - view.cy) * per
-        found = False
-        for column in range(key.shape[1]):
-            if column % BLOCK == 0:
-                found = _any(key[row, column : column + BLOCK])
-            if not found:
+        if behind_lamps(view, v, 0, key.shape[1], to_body, offset[0]):
+            continue
+        for first in range(0, key.shape[1], BLOCK):
+            if not _any(key[row, first : first + BLOCK]):
                 continue
-            k = key[row, column]
-            back = gain[(k >> 8) & 255, k & 255]
-            if back <= 0.0 or inverse[row, column] < nearest:
-                continue
-            u, z = np.float32(column + 0.5 - view.cx) * per, np.float32(1.0) / inverse[row, column]
-            px = z * (to_body[0, 0] * u + to_body[0, 1] * v + to_body[0, 2]) + offset[0]
-            py = z * (to_body[1, 0] * u + to_body[1, 1] * v + to_body[1, 2]) + offset[1]
-            pz = z * (to_body[2, 0] * u + to_body[2, 1] * v + to_body[2, 2]) + offset[2]
-            there = beam_at(px, py, pz, beam, slope, reach)
-            there += np.float32(SPILL) * beam_at(px, py, np.float32(0.0), beam, slope, reach)
-            lit = back * there * np.exp(-beta * z)
-            if lit > np.float32(0.003):
-                out[row, column] = add_light(out[row, column], lit, lit, lit * 0.85)
+            for column in range(first, min(first + BLOCK, key.shape[1])):
+                k = key[row, column]
+                back = gain[(k >> 8) & 255, k & 255]
+                if back <= 0.0 or inverse[row, column] < nearest:
+                    continue
+                u, z = (
+                    np.float32(column + 0.5 - view.cx) * per,
+                    np.float32(1.0) / inverse[row, column],
+                )
+                px = z * (to_body[0, 0] * u + to_body[0, 1] * v + to_body[0, 2]) + offset[0]
+                py = z * (to_body[1, 0] * u + to_body[1, 1] * v + to_body[1, 2]) + offset[1]
+                pz = z * (to_body[2, 0] * u + to_body[2, 1] * v + to_body[2, 2]) + offset[2]
+                cone = back * beam_at(px, py, np.float32(0.0), beam, slope, reach)
+                if cone < LEAST:
+                    continue
+                lit = back * beam_at(px, py, pz, beam, slope, reach) + np.float32(SPILL) * cone
+                lit *= np.exp(-beta * z)
+                if lit > LEAST:
+                    out[row, column] = add_light(out[row, column], lit, lit, lit * 0.85)

@@ -20,6 +20,7 @@ from skidpad.roads.roadside import Box
 from skidpad.sensors.finish.outline import MOST, spans
 from skidpad.sensors.lighting import Lighting
 from skidpad.sensors.materials import MATERIALS, Material
+from skidpad.sensors.packing import pack, unpack
 from skidpad.sensors.view import View
 
 Floats = NDArray[np.float64]
@@ -185,12 +186,9 @@ def _light_at(cast: _Cast, lx: float, ly: float) -> float:
 
 @kernel
 def _dimmed(p: np.uint32, light: float) -> np.uint32:
-    gain = np.sqrt(light)  # the picture's bytes are square roots of light
-    k = np.int64(p)
-    red, green = int((k & 255) * gain), int(((k >> 8) & 255) * gain)
-    blue = int(((k >> 16) & 255) * gain)
-    packed: np.uint32 = np.uint32(red | green << 8 | blue << 16 | 0xFF000000)
-    return packed
+    gain = np.float32(np.sqrt(light))  # the picture's bytes are square roots of light
+    red, green, blue = unpack(p)
+    return pack(red * gain, green * gain, blue * gain)
 
 
 @kernel

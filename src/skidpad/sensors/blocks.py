@@ -1,0 +1,119 @@
+"""Blocks of a row of pixels: what every stage of shading works on.
+
+All values between the stages lie in lanes of one array at constant distances: only then can the
+compiler prove that they do not overlap, and vectorise.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import kernel
+from skidpad.sensors.materials import MATERIALS
+from skidpad.sensors.packing import pack
+from skidpad.sensors.view import View
+
+Float32 = NDArray[np.float32]
+
+# Columns of the look-up table, one row per (instance, material).
+RED, GREEN, BLUE, GLOW, WETTABLE, GLOSS = range(6)
+COLUMNS = 6
+BLOCK = 256
+STRIDE = 32  # keys that are compared at once
+LANES = 11
+(R, G, B, L, T, S, U, W, GX, GY, H) = (np.intp(n * BLOCK) for n in range(LANES))
+ZERO, ONE = np.float32(0.0), np.float32(1.0)
+_WHITE = np.float32(255.0)
+
+
+@kernel
+def end_of_run(keys: NDArray[np.int32], x: int) -> int:
+    """Where the run of equal keys that begins at x ends; looked through `STRIDE` at a time."""
+    k, count = keys[x], keys.size
+    end = x + 1
+    while end + STRIDE <= count:
+        ahead, others = keys[end:], 0
+        for n in range(STRIDE):
+            others |= ahead[n] ^ k
+        if others != 0:
+            break
+        end += STRIDE
+    while end < count and keys[end] == k:
+        end += 1
+    return end
+
+
+@kernel
+def gather(
+    key: NDArray[np.int32], y: int, first: int, count: int, table: Float32, work: Float32
+) -> None:
+    """Colour and behaviour of a block's pixels from the table, one read per run of equal keys."""
+    keys = key[y, first : first + count]
+    x = 0
+    while x < count:
+        k = keys[x]
+        end = end_of_run(keys, x)
+        i = (k >> 16) * MATERIALS + (k & 255)
+        red, green, blue = table[i, 0], table[i, 1], table[i, 2]
+        glow, wettable, gloss = table[i, 3], table[i, 4], table[i, 5]
+        run = work[x:]  # one slice for all six lanes: a slice costs more than a short run
+        for n in range(end - x):
+            run[R + n] = red
+            run[G + n] = green
+            run[B + n] = blue
+            run[L + n] = glow
+            run[T + n] = wettable
+            run[S + n] = gloss
+        x = end
+
+
+@kernel
+def slopes(
+    inverse: Float32, y: int, first: int, count: int, view: View, work: Float32
+) -> tuple[bool, bool]:
+    """Viewing direction, inverse depth and its two slopes, of a block's pixels.
+
+    Of the two differences on either side the gentler one counts: the other may cross an edge.
+    Says whether any pixel shows a surface, and whether any shows sky.
+    """
+    height, width = inverse.shape
+    focal = np.float32(view.focal)
+    per_pixel = np.float32(1.0 / view.focal)
+    start = np.float32((first + 0.5 - view.cx) / view.focal)
+    here = inverse[y, first : first + count]
+    above = inverse[max(y - 1, 0), first : first + count]
+    below = inverse[min(y + 1, height - 1), first : first + count]
+    top, bottom = y == 0, y == height - 1
+    solid = 0
+    for x in range(count):
+        w = here[x]
+        a = below[x] - w
+        b = w - above[x]
+        work[W + x] = w
+        work[GY + x] = (a if (abs(a) < abs(b) or top) and not bottom else b) * focal
+        work[U + x] = start + np.float32(x) * per_pixel
+        solid += 1 if w > ZERO else 0
+    for x in range(1, count - 1):
+        a = here[x + 1] - here[x]
+        b = here[x] - here[x - 1]
+        work[GX + x] = (a if abs(a) < abs(b) else b) * focal
+    for x in (0, count - 1):
+        left, right = first + x == 0, first + x == width - 1
+        behind = inverse[y, max(first + x - 1, 0)]
+        ahead = inverse[y, min(first + x + 1, width - 1)]
+        a = ahead - here[x]
+        b = here[x] - behind
+        work[GX + x] = (a if (abs(a) < abs(b) or left) and not right else b) * focal
+    return solid > 0, solid < count
+
+
+@kernel
+def develop(count: int, work: Float32, out: NDArray[np.uint32]) -> None:
+    """Linear light to bytes: gamma 2, clipped, packed as red, green, blue, 255."""
+    for x in range(count):
+        r, g, b = work[R + x], work[G + x], work[B + x]
+        r = np.sqrt(r if r < ONE else ONE) * _WHITE
+        g = np.sqrt(g if g < ONE else ONE) * _WHITE
+        b = np.sqrt(b if b < ONE else ONE) * _WHITE
+        out[x] = pack(r, g, b)

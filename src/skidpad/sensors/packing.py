@@ -1,0 +1,40 @@
+"""Packed pixels: red, green, blue and 255 in the bytes of one word.
+
+All in 32 bits: numba widens mixed integers to 64, and a loop over pixels then takes twice as long.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from skidpad.core.jit import kernel
+
+_BYTE, _G, _B = np.uint32(255), np.uint32(8), np.uint32(16)
+_OPAQUE = np.uint32(0xFF000000)
+_LOW, _HIGH, _HALF = np.float32(0.0), np.float32(255.0), np.float32(0.5)
+
+
+@kernel
+def pack(r: np.float32, g: np.float32, b: np.float32) -> np.uint32:
+    """A pixel of three values within 0 to 255, cut to whole numbers."""
+    red, green, blue = np.uint32(np.int32(r)), np.uint32(np.int32(g)), np.uint32(np.int32(b))
+    packed: np.uint32 = np.uint32(red | np.uint32(green << _G) | np.uint32(blue << _B) | _OPAQUE)
+    return packed
+
+
+@kernel
+def unpack(p: np.uint32) -> tuple[np.float32, np.float32, np.float32]:
+    """Red, green and blue of a pixel."""
+    return (
+        np.float32(np.int32(p & _BYTE)),
+        np.float32(np.int32(np.uint32(p >> _G) & _BYTE)),
+        np.float32(np.int32(np.uint32(p >> _B) & _BYTE)),
+    )
+
+
+@kernel
+def rounded(value: np.float32) -> np.float32:
+    """Clipped to 0 to 255, and so that `pack` rounds it."""
+    v: np.float32 = value + _HALF
+    v = v if v > _LOW else _LOW
+    return v if v < _HIGH else _HIGH

@@ -1,11 +1,15 @@
-"""Load for the fleet's service: records of about 20 kB from many vehicles, with kills at random moments.
+"""Load for the fleet's service: records from many vehicles, with kills at random moments.
 
     python tools/fleet_load.py --records 20000            # records per second, acknowledged
     python tools/fleet_load.py --records 20000 --kills 20 # and nothing acknowledged is lost
+    python tools/fleet_load.py --vehicles 1000 --hz 1 --minutes 10 --bytes 1000 --kills 20
 
-The server is a process of its own on the same machine; a record counts when it was acknowledged, which
-is after its durable commit. With kills the server is ended by SIGKILL and started again on its store;
-at the end the ids that were acknowledged must be exactly those of the store.
+Without --hz batches of records are sent as fast as they are taken. With it each vehicle makes a record
+at that rate, whatever becomes of those before, and sends it by itself; times are then from the moment
+that a record was due until it was acknowledged, outages included. The server is a process of its own
+on the same machine; a record counts when it was acknowledged, which is after its durable commit. With
+kills the server is ended by SIGKILL and started again on its store; at the end the ids that were
+acknowledged must be exactly those of the store.
 """
 
 from __future__ import annotations
@@ -24,6 +28,7 @@ import sys
 import threading
 import time
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -41,30 +46,71 @@ HEAD = {
     "channels": ["a", "b"], "driving": "a", "involved": ["a", "b"], "objects": [], "flags": [],
     "context": {"map": "town"}, "cycles": 0,
 }  # fmt: skip
-BYTES = 20_000  # of a record
-SENDERS = 4
+NOISES = 64  # different worlds: more than a batch holds within reach of its compression
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is sent. hz: records per second of each vehicle, 0: as fast as they are taken."""
+
+    records: int
+    per_batch: int
+    vehicles: int
+    size: int  # bytes of a record
+    senders: int
+    kills: int
+    hz: float
+
+
+@dataclass(frozen=True)
+class Job:
+    """A batch that is sent until it is acknowledged."""
+
+    number: int  # of its first record
+    due: float | None  # s, of time.perf_counter; None: when it is its turn
+    body: bytes
 
 
 @dataclass
 class Load:
-    """What is sent, and what came of it."""
+    """What is to be sent, and what came of it."""
 
     tokens: list[str]
+    per_batch: int
     port: int = 0
-    todo: queue.Queue[tuple[int, bytes]] = field(default_factory=queue.Queue)
+    todo: queue.Queue[Job] = field(default_factory=queue.Queue)
     ids: list[str] = field(default_factory=list)
     times_ms: list[float] = field(default_factory=list)
     up: threading.Event = field(default_factory=threading.Event)
     ended: threading.Event = field(default_factory=threading.Event)
 
 
-def record(number: int) -> bytes:
-    """A record whose worlds are noise of digits, so that it packs as real ones do (about 1:3)."""
+@cache
+def noise(number: int, size: int) -> str:
+    """Lines of digits that pack as real worlds do (about 1:3)."""
     rng = stream(number, "load")
-    digits = " ".join(map(str, rng.integers(-9, 10, BYTES // 3).tolist()))
-    lines = "\n".join("O 0 " + digits[k : k + 90] for k in range(0, len(digits), 90))
+    digits = " ".join(map(str, rng.integers(-9, 10, size // 3).tolist()))
+    return "\n".join("O 0 " + digits[k : k + 90] for k in range(0, len(digits), 90))
+
+
+def record(number: int, size: int) -> bytes:
+    """A record of about `size` bytes that no other number gives."""
     head = json.dumps(HEAD | {"id": f"h{number}"})
-    return f"H {head}\nF 0 0 {number} 0 0 0 0\n{lines}\nZ\n".encode()
+    worlds = noise(number % NOISES, size)
+    return f"H {head}\nF 0 0 {number} 0 0 0 0\n{worlds}\nZ\n".encode()
+
+
+def feed(load: Load, asked: Asked) -> None:
+    """In a thread: make batches, each when it is due."""
+    begin = time.perf_counter()
+    for first in range(0, asked.records, asked.per_batch):
+        text = b"".join(record(first + k, asked.size) for k in range(asked.per_batch))
+        body = gzip.compress(HEADER.encode() + b"\n" + text, 6)
+        due = None
+        if asked.hz:
+            due = begin + first / (asked.vehicles * asked.hz)
+            load.ended.wait(max(0.0, due - time.perf_counter()))
+        load.todo.put(Job(first, due, body))
 
 
 def send(load: Load) -> None:
@@ -72,30 +118,31 @@ def send(load: Load) -> None:
     connection: http.client.HTTPConnection | None = None
     while not load.ended.is_set():
         try:
-            number, body = load.todo.get(timeout=0.1)
+            job = load.todo.get(timeout=0.1)
         except queue.Empty:
             continue
+        batch = job.number // load.per_batch
         headers = {
-            "Authorization": f"Bearer {load.tokens[number % len(load.tokens)]}",
-            "Idempotency-Key": f"load-{number:012d}",
+            "Authorization": f"Bearer {load.tokens[batch % len(load.tokens)]}",
+            "Idempotency-Key": f"load-{job.number:012d}",
         }
-        begin = time.perf_counter()
+        begin = time.perf_counter() if job.due is None else job.due
         try:
             if connection is None:
                 load.up.wait(60.0)
                 connection = http.client.HTTPConnection("127.0.0.1", load.port, timeout=60.0)
-            connection.request("POST", "/api/v1/batches/hazards", body, headers)
+            connection.request("POST", "/api/v1/batches/hazards", job.body, headers)
             answer = connection.getresponse()
             content = answer.read()
         except (OSError, http.client.HTTPException):
             connection = None
-            load.todo.put((number, body))  # the answer was lost: the same key again
+            load.todo.put(job)  # the answer was lost: the same key again
             continue
         if answer.status == 200:
             load.times_ms.append(1000.0 * (time.perf_counter() - begin))
             load.ids.extend(json.loads(content)["ids"])
         elif answer.status in (429, 503):
-            load.todo.put((number, body))
+            load.todo.put(job)
         else:
             raise RuntimeError(f"{answer.status} {content!r}")
 
@@ -113,19 +160,21 @@ def start(data: Path) -> tuple[subprocess.Popen[str], int]:
     return child, int(found.group(1))
 
 
-def drive(load: Load, data: Path, records: int, kills: int) -> float:
+def drive(load: Load, data: Path, asked: Asked) -> float:
     """Serve, send and kill until every record was acknowledged; the seconds that it took."""
     child, load.port = start(data)
     load.up.set()
-    threads = [threading.Thread(target=send, args=(load,)) for _ in range(SENDERS)]
-    rng, begin = random.Random(1), time.perf_counter()
+    threads = [threading.Thread(target=send, args=(load,)) for _ in range(asked.senders)]
+    if asked.hz:
+        threads.append(threading.Thread(target=feed, args=(load, asked)))
+    begin = time.perf_counter()
     for thread in threads:
         thread.start()
-    left = kills
-    while len(load.ids) < records and all(thread.is_alive() for thread in threads):
+    moments = sorted(random.Random(1).sample(range(asked.records), asked.kills))
+    while len(load.ids) < asked.records and all(t.is_alive() for t in threads[: asked.senders]):
         time.sleep(0.02)
-        if left and rng.random() < 0.02:
-            left -= 1
+        if moments and len(load.ids) >= moments[0]:
+            moments.pop(0)
             load.up.clear()
             os.kill(child.pid, signal.SIGKILL)
             child.wait()
@@ -140,28 +189,27 @@ def drive(load: Load, data: Path, records: int, kills: int) -> float:
     return seconds
 
 
-def run(data: Path, records: int, per_batch: int, kills: int) -> dict[str, float]:
+def run(data: Path, asked: Asked) -> dict[str, float]:
     """Send, kill, and compare; the numbers."""
-    engine = open_store(Places(data=data))
+    engine, now = open_store(Places(data=data)), time.time()
     with engine.begin() as connection:
-        accounts = [
-            add_vehicle(connection, "red", "axle", f"V{k}", time.time()) for k in range(200)
-        ]
-    load = Load([account.token for account in accounts])
-    for first in range(0, records, per_batch):
-        text = b"".join(record(first + k) for k in range(per_batch))
-        load.todo.put((first, gzip.compress(HEADER.encode() + b"\n" + text, 6)))
-    seconds = drive(load, data, records, kills)
+        cars = [add_vehicle(connection, "red", "axle", f"V{k}", now) for k in range(asked.vehicles)]
+    load = Load([car.token for car in cars], asked.per_batch)
+    if not asked.hz:
+        feed(load, asked)
+    seconds = drive(load, data, asked)
     with engine.connect() as connection:
         stored = set(connection.execute(select(hazards.c.id)).scalars())
     engine.dispose()
     times = sorted(load.times_ms)
     return {
         "records": len(load.ids),
+        "seconds": seconds,
         "records_per_s": len(load.ids) / seconds,
         "median_ms": times[len(times) // 2],
         "p95_ms": times[int(0.95 * len(times))],
-        "kills": kills,
+        "p999_ms": times[int(0.999 * len(times))],
+        "kills": asked.kills,
         "acknowledged_not_stored": len(set(load.ids) - stored),
         "stored_not_acknowledged": len(stored - set(load.ids)),
     }
@@ -171,13 +219,26 @@ def main() -> None:
     """Read the options, run, print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--records", type=int, default=10_000)
-    parser.add_argument("--per-batch", type=int, default=100)
+    parser.add_argument("--per-batch", type=int)
+    parser.add_argument("--vehicles", type=int, default=200)
+    parser.add_argument("--bytes", type=int, default=20_000, help="of a record")
+    parser.add_argument("--hz", type=float, default=0.0, help="records of each vehicle; 0: no pace")
+    parser.add_argument("--minutes", type=float, default=10.0, help="with --hz")
     parser.add_argument("--kills", type=int, default=0)
-    options = parser.parse_args()
+    told = parser.parse_args()
+    paced = told.hz > 0.0
+    asked = Asked(
+        records=round(told.vehicles * told.hz * 60.0 * told.minutes) if paced else told.records,
+        per_batch=told.per_batch or (1 if paced else 100),
+        vehicles=told.vehicles,
+        size=told.bytes,
+        senders=64 if paced else 4,
+        kills=told.kills,
+        hz=told.hz,
+    )
     with TemporaryDirectory() as folder:
-        found = run(Path(folder), options.records, options.per_batch, options.kills)
-    for name, value in found.items():
-        print(f"{name:<26}{value:.1f}")
+        found = run(Path(folder), asked)
+    print("; ".join(f"{name} {value:.1f}".removesuffix(".0") for name, value in found.items()))
     if found["acknowledged_not_stored"] or found["stored_not_acknowledged"]:
         raise SystemExit(1)
 

@@ -62,6 +62,18 @@ PROOFS = (
         "20 kills of the fleet's service at random moments: acknowledged ids are the stored ones",
     ),
     Proof(
+        "fleet-hertz",
+        (
+            "tools/fleet_load.py",
+            "--vehicles=1000",
+            "--hz=1",
+            "--minutes=10",
+            "--bytes=1000",
+            "--kills=20",
+        ),
+        "1000 vehicles report once a second for 10 min, 20 kills: acknowledged ids are the stored ones",
+    ),
+    Proof(
         "fleet-pages",
         ("tools/fleet_pages.py", "--rows", "10000000"),
         "the fleet's pages over ten million rows of indicators, each request a fresh query",

@@ -236,10 +236,10 @@ class Vehicle:
 def test_a_stop_order_is_good_once(world):
     red, blue = Vehicle(world), Vehicle(world, "red-2")
     id = raised(world)
-    assert world.post("blue teleoperator", f"/api/v1/alerts/{id}/stop").status_code == 404
-    assert world.post("red operator", f"/api/v1/alerts/{id}/stop").status_code == 403
+    assert world.post("blue teleoperator", f"/api/v1/alerts/{id}/order/stop").status_code == 404
+    assert world.post("red operator", f"/api/v1/alerts/{id}/order/stop").status_code == 403
     assert red.obey() == []
-    order = world.post("red teleoperator", f"/api/v1/alerts/{id}/stop").json()["order"]
+    order = world.post("red teleoperator", f"/api/v1/alerts/{id}/order/stop").json()["order"]
     assert blue.obey() == []  # not its order
     (sent,) = red.ask()
     assert red.ask() == []  # handed out once
@@ -254,61 +254,76 @@ def test_a_stop_order_is_good_once(world):
 
 def test_a_stop_order_is_good_for_two_seconds_by_either_clock(lite):
     red, id = Vehicle(lite), raised(lite)
-    lite.post("red teleoperator", f"/api/v1/alerts/{id}/stop")
+    lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/stop")
     lite.clock.now += 2.0
     assert red.ask() == []  # never fetched in time
     for age, verdict in ((2.1, Verdict.EXPIRED), (-0.1, Verdict.EXPIRED), (2.0, Verdict.OBEYED)):
-        lite.post("red teleoperator", f"/api/v1/alerts/{id}/stop")
+        lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/stop")
         (sent,) = red.ask()
-        assert not red.receiver.stopped
+        assert red.receiver.share == 1.0
         red.clock.now += age
         assert red.receiver.receive(sent["order"], sent["signature"]) is verdict
-    assert red.receiver.stopped
+    assert red.receiver.share == 0.0
 
 
 def test_what_the_fleet_did_not_sign_stops_nobody(lite):
     red, id = Vehicle(lite), raised(lite)
-    lite.post("red teleoperator", f"/api/v1/alerts/{id}/stop")
+    lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/stop")
     (sent,) = red.ask()
     other = Ed25519PrivateKey.generate().sign(sent["order"].encode()).hex()
-    changed = sent["order"].replace("minimal-risk stop", "minimal-risk stoP")
+    changed = sent["order"].replace('"what":"stop"', '"what":"slow"')
+    assert changed != sent["order"]
     for text, signature in (
         (sent["order"], other), (changed, sent["signature"]), (sent["order"], "zz"), ("", ""),
         (sent["order"] + " ", sent["signature"]),
     ):  # fmt: skip
         assert red.receiver.receive(text, signature) is Verdict.FORGED
-    assert not red.receiver.stopped
+    assert red.receiver.share == 1.0
     assert red.receiver.receive(sent["order"], sent["signature"]) is Verdict.OBEYED
 
 
+def test_a_vehicle_is_slowed_down_and_let_go_until_it_is_stopped(lite):
+    red, id = Vehicle(lite), raised(lite)
+    for order, verdict, share in (
+        ("slow", Verdict.OBEYED, 0.5), ("resume", Verdict.OBEYED, 1.0),
+        ("stop", Verdict.OBEYED, 0.0), ("resume", Verdict.STANDING, 0.0),
+    ):  # fmt: skip
+        lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/{order}")
+        assert red.obey() == [verdict]
+        assert red.receiver.share == share
+    unknown = lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/fly")
+    assert unknown.status_code == 422
+
+
 @pytest.mark.slow
+@pytest.mark.req("C-175")
 def test_a_simulated_vehicle_obeys(lite, tmp_path):
-    """It drives by its channels, raises an alert after 3 s, and stands 12 s later by order."""
+    """It drives by its channels, raises an alert after 3 s, is slowed down, and stopped after 9 s."""
     from skidpad.campaign.channel_drive import drive_segment
     from skidpad.campaign.channel_routes import driven_routes
     from skidpad.recording.cycles import cycles
     from skidpad.recording.sources import open_channels
 
-    red = Vehicle(lite)
+    red, orders, alert = Vehicle(lite), {30: "slow", 90: "stop"}, []
 
-    def ordered(t: float) -> bool:
+    def guided(t: float) -> float:
         red.clock.now, lite.clock.now = 100.0 + t, NOW + t
-        if abs(t - 3.0) < 0.01:
-            id = raised(lite)
-            lite.post("red teleoperator", f"/api/v1/alerts/{id}/stop")
-        if not red.receiver.stopped and t >= 3.0:
-            red.obey()
-        return red.receiver.stopped
+        if order := orders.get(round(10.0 * t)):
+            alert[:] = alert or [raised(lite)]
+            lite.post("red teleoperator", f"/api/v1/alerts/{alert[0]}/order/{order}")
+            assert red.obey() == [Verdict.OBEYED]
+        return red.receiver.share
 
-    spec = msgspec.structs.replace(driven_routes()["route-1"], duration=12.0, seed=4)
+    spec = msgspec.structs.replace(driven_routes()["route-1"], duration=16.0, seed=4)
 
     def speed(path) -> np.ndarray:
         found = cycles(open_channels(path, None))
         return np.array([np.hypot(*c.truth.ego[3:]) for c in found if c.truth is not None])
 
     drive_segment(spec, tmp_path / "free.mcap")
-    drive_segment(spec, tmp_path / "ordered.mcap", stop=ordered)
-    free, stopped = speed(tmp_path / "free.mcap"), speed(tmp_path / "ordered.mcap")
-    assert np.array_equal(free[:30], stopped[:30])
-    assert stopped[-1] < 0.1
+    drive_segment(spec, tmp_path / "ordered.mcap", guide=guided)
+    free, ordered = speed(tmp_path / "free.mcap"), speed(tmp_path / "ordered.mcap")
+    assert np.array_equal(free[:30], ordered[:30])
+    assert 1.0 < ordered[90] < 0.7 * free[90]
+    assert ordered[-1] < 0.1
     assert free[-1] > 1.0

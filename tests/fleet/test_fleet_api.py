@@ -58,7 +58,7 @@ def others(world) -> tuple[str, str, str]:
     text = json.dumps({"kind": "fault", "text": "t", "scene": scene})
     headers = {"Idempotency-Key": "alert-key-1"}
     alert = world.post("red-1", "/api/v1/alerts", content=text, headers=headers).json()["alert"]
-    order = world.post("red teleoperator", f"/api/v1/alerts/{alert}/stop").json()["order"]
+    order = world.post("red teleoperator", f"/api/v1/alerts/{alert}/order/stop").json()["order"]
     more = packed(*(record(k, (100.0 + k, 0.0)) for k in range(5, 9)))
     assert world.send("red-2", more).status_code == 200
     world.post("axle", "/api/v1/analyses")
@@ -82,7 +82,7 @@ def test_every_route_for_every_role_and_foreign_id(lite, tmp_path):
     change, release = released(lite, tmp_path, hazard)
     ids = {"hazard": hazard, "alert": alert, "order": order, "cluster": cluster,
            "change": change, "release": release}  # fmt: skip
-    words = {"kind": "hazards", "what": "obeyed", "name": "timestamp.json"}
+    words = {"kind": "hazards", "what": "obeyed", "to": "slow", "name": "timestamp.json"}
     asked = {"challenge": "0" * 32}
     people = {
         Role.MANUFACTURER: "bolt", Role.OPERATOR: "blue operator", Role.VEHICLE: "blue-1",

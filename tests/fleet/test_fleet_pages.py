@@ -17,7 +17,8 @@ from test_fleet_upload import served
 from chromium import CHROMIUM, FLAGS
 from fleet_world import make_world, packed, record
 from skidpad.fleet.alerting.keeping import What
-from skidpad.fleet.site.acting import click_analyse, click_answer, click_stop
+from skidpad.fleet.alerting.orders import Order
+from skidpad.fleet.site.acting import click_analyse, click_answer, click_order
 from skidpad.fleet.words import Refused
 
 WAIT_MS = 120_000
@@ -42,7 +43,7 @@ def test_every_click_for_every_role_and_foreign_id(world):
 
     clicks = {
         "answer": (answer, {"operator", "teleoperator"}),
-        "stop": (lambda who: click_stop(world.fleet, who, id), {"teleoperator"}),
+        "order": (lambda who: click_order(world.fleet, who, id, Order.SLOW), {"teleoperator"}),
         "analyse": (lambda who: click_analyse(world.fleet, who), {"operator", "manufacturer"}),
     }
     for name, account in world.accounts.items():
@@ -57,7 +58,7 @@ def test_every_click_for_every_role_and_foreign_id(world):
                 act(who.id)
             assert refused.value.status == (404 if who.role.value in roles else 403), (name, click)
     with pytest.raises(Refused):
-        clicks["stop"][0]("nobody")
+        clicks["order"][0]("nobody")
 
 
 def filled(data: Path) -> dict[str, str]:
@@ -84,7 +85,7 @@ def opened(address: str, token: str) -> str:
 
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-@pytest.mark.req("C-170", "C-195")
+@pytest.mark.req("C-195")
 def test_the_pages_in_a_browser(tmp_path):
     playwright = pytest.importorskip(
         "playwright.sync_api", reason="playwright, for chromium, is not installed"
@@ -142,7 +143,7 @@ def dashboard(browser, address, token, size, asked) -> None:
 
 
 def teleoperator(browser, address, tokens) -> None:
-    """An alert shows while the page is open; a click acknowledges it and another orders a stop."""
+    """An alert shows while the page is open; clicks acknowledge it and order."""
     page = visit(
         browser, opened(address, tokens["red teleoperator"]), {"width": 390, "height": 844}
     )
@@ -162,6 +163,8 @@ def teleoperator(browser, address, tokens) -> None:
     page.get_by_text("8.0 m/s, acknowledged").wait_for()
     page.get_by_role("button", name="Order to stop").click()
     page.get_by_text("acknowledged; stop ordered").wait_for()
+    page.get_by_role("button", name="Slow to half its speed").click()
+    page.get_by_text("stop ordered; slow ordered").wait_for()
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     if picture := os.environ.get("SKIDPAD_PICTURES"):
         page.screenshot(path=f"{picture}/alerts-390.png", full_page=True)

@@ -159,6 +159,7 @@ def test_an_analysis_on_demand_is_kept_and_read_by_its_own_tenant(world):
     assert again["clusters"] == 2
 
 
+@pytest.mark.req("C-173")
 def test_the_service_looks_by_itself_and_only_when_something_came(world):
     from skidpad.fleet.upkeep import REST_S, Upkeep
 

@@ -18,10 +18,10 @@ from typer.testing import CliRunner
 
 from fleet_world import record
 from skidpad.cli.main import app
-from skidpad.fleet.monitored import hazard_batches, indicator_rows, spool_folder
+from skidpad.fleet.monitored import Lookout, hazard_batches, indicator_rows, spool_folder
 from skidpad.fleet.spool import Spool
 from skidpad.fleet.store.tables import drives, hazards
-from skidpad.fleet.uploader import poster, send, send_all
+from skidpad.fleet.uploader import poster, rounds, send, send_all
 from skidpad.fleet.words import Kind
 from skidpad.recording.hazards import HazardWriter
 from skidpad.recording.indicators import Column, IndicatorLog
@@ -49,7 +49,7 @@ def through(world, name="red-1"):
     return poster(world.client, world.clock)
 
 
-@pytest.mark.req("C-151", "C-171")
+@pytest.mark.req("C-151", "C-170", "C-171", "C-194")
 def test_a_monitored_drive_reaches_the_store_whole(world, tmp_path):
     spool = Spool(tmp_path / "spool")
     keys = spool_folder(spool, monitored(tmp_path / "m"), "release-7")
@@ -64,6 +64,23 @@ def test_a_monitored_drive_reaches_the_store_whole(world, tmp_path):
     assert {i for k in keys for i in receipts[k]["ids"]} == {row.id for row in rows}
     assert spool_folder(spool, tmp_path / "m", "release-7") == keys  # again: nothing waits
     assert spool.count() == 0
+
+
+@pytest.mark.req("C-151", "C-171")
+def test_drives_are_sent_periodically_each_once_when_it_is_complete(lite, tmp_path):
+    """Every round: one drive more, and one that its monitor has not finished."""
+    spool, drives, pauses = Spool(tmp_path / "spool"), tmp_path / "drives", []
+    (drives / "unfinished").mkdir(parents=True)
+
+    def pause(seconds):
+        pauses.append(seconds)
+        monitored(drives / f"drive-{len(pauses)}", seed=len(pauses))
+
+    lookout = Lookout([drives])
+    sending = rounds(lambda: lookout.spool(spool), lambda: send(spool, through(lite)), 60.0, pause)
+    sent = [next(sending).acknowledged for _ in range(4)]
+    assert (sent, pauses) == ([0, 3, 3, 3], [60.0] * 3)
+    assert len(lite.get("red operator", "/api/v1/hazards").json()) == 9
 
 
 def test_off_line_everything_waits_and_goes_when_somebody_answers(lite, tmp_path):

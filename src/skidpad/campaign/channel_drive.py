@@ -48,7 +48,7 @@ WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
 TRUTH_REACH = 120.0  # m around the ego within which the true world is recorded
 MINIMAL_RISK_BRAKE = 0.4  # of full brake, about 4 m/s^2 (UN R157 5.1.6: at most 4 m/s^2)
 NO_REPORT = StackReport()
-StopOrder = Callable[[float], bool]  # asked at each cycle's time, s: is the vehicle to stop?
+Guide = Callable[[float], float]  # at a cycle's time, s: share of its own speed, 0: it is to stop
 LABEL_OF = np.array([LABEL_OF_KIND[kind] for kind in ActorKind], dtype=np.int64)
 
 
@@ -57,9 +57,9 @@ class Crew:
 
     report = NO_REPORT
 
-    def __init__(self, spec: RunSpec, segment: Segment, stop: StopOrder | None = None) -> None:
+    def __init__(self, spec: RunSpec, segment: Segment, guide: Guide | None = None) -> None:
         self.spec, self.crew, self.segment = spec, crew_of(spec), segment
-        self.stop = stop
+        self.guide = guide
         names = self.crew.channels
         self.channels = [
             Channel(name, settings_of(name), segment.car, segment.map, segment.route)
@@ -101,6 +101,9 @@ class Crew:
 
     def _think(self, t: float, truth: WorldTruth) -> None:
         """What every channel says at time t, and who drives."""
+        share = 1.0 if self.guide is None else self.guide(t)
+        for channel in self.channels if share else ():
+            channel.slow_to(share)
         self.frames: list[ChannelFrame] = [
             channel.update(suite.observe(t, truth.states, truth.lights))
             for channel, suite in zip(self.channels, self.suites, strict=True)
@@ -113,7 +116,7 @@ class Crew:
             choice = self.arbiter.update(t, self.frames, scores, progress, unsure)
         else:
             choice = Choice(names.index(drive_by), Reason.KEPT)
-        if self.stop is not None and self.stop(t):
+        if not share:
             choice = Choice(None, Reason.ORDERED)
         self.driving = choice.driving
         name = "" if choice.driving is None else names[choice.driving]
@@ -183,12 +186,12 @@ class Street:
 
 
 def drive_segment(
-    spec: RunSpec, path: Path, links: Links | None = None, stop: StopOrder | None = None
+    spec: RunSpec, path: Path, links: Links | None = None, guide: Guide | None = None
 ) -> DriveOutcome:
     """Drive a segment and write its recording to `path`, which appears only when complete."""
     links = links or Links()
     segment = segment_of(spec)
-    crew = Crew(spec, segment, stop)
+    crew = Crew(spec, segment, guide)
     keep_server(spec.backend)
     backend = make_backend(spec.backend, WATCHDOG)
     part = path.with_suffix(".part")

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import threading
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from skidpad.cli.fleet_links import broker_of, client, fleet_extra, map_lines, relays, token_of
+from skidpad.cli.fleet_links import broker_of, client, fleet_extra, map_lines, posting, relays
 
 if TYPE_CHECKING:
     from skidpad.fleet.service import Places
@@ -161,26 +162,29 @@ def upload(
     release: Annotated[str, typer.Option(help="Update under which the vehicle drove.")] = "",
     ca: Annotated[Path | None, typer.Option(help="PEM of the authority that is trusted.")] = None,
     wait: Annotated[float, typer.Option(help="Seconds to go on trying when nobody answers.")] = 0.0,
+    every: Annotated[
+        float, typer.Option(min=0.0, help="Look for new drives and send again after s; 0: once.")
+    ] = 0.0,
 ) -> None:
-    """Send hazards, drives and indicators; what is not acknowledged waits in the spool."""
-    from skidpad.core.errors import ConfigError
+    """Send hazards, drives and indicators; what is not acknowledged waits in the spool.
 
+    With --every also drives in folders within FOLDERS, each as soon as its monitor has finished it.
+    """
     with fleet_extra():
-        from skidpad.fleet.monitored import spool_folder
+        from skidpad.fleet.monitored import Lookout, spool_folder
         from skidpad.fleet.spool import Spool
-        from skidpad.fleet.uploader import mqtt_poster, poster, send_all
-    if (to is None) is (mqtt is None):
-        raise ConfigError("give one of --to and --mqtt")
-    broker = None if mqtt is None else broker_of(mqtt, ca)
-    kept = Spool(spool)
-    for folder in folders or []:
-        spool_folder(kept, folder, release)
-    if broker is not None:
-        sent = send_all(kept, mqtt_poster(broker, token_of(token_file)), wait)
-    else:
-        with client(str(to), token_file, ca) as link:
-            sent = send_all(kept, poster(link), wait)
-    typer.echo(f"{sent.acknowledged} acknowledged, {sent.refused} refused, {sent.waiting} waiting")
+        from skidpad.fleet.uploader import rounds, send_all
+    kept, lookout = Spool(spool), Lookout(folders or [], release)
+    with posting(to, mqtt, token_file, ca) as post, suppress(KeyboardInterrupt):
+        for folder in [] if every else folders or []:
+            spool_folder(kept, folder, release)
+        look = partial(lookout.spool, kept) if every else list
+        for sent in rounds(look, partial(send_all, kept, post, wait), every):
+            typer.echo(
+                f"{sent.acknowledged} acknowledged, {sent.refused} refused, {sent.waiting} waiting"
+            )
+            if not every:
+                break
 
 
 @fleet.command()

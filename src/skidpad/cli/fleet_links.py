@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from skidpad.fleet.alerting.relays import Relay
     from skidpad.fleet.broker import Broker
     from skidpad.fleet.service import Places
+    from skidpad.fleet.uploader import Post
 
 
 @contextmanager
@@ -64,6 +65,21 @@ def broker_of(mqtt: str, ca: Path | None) -> Broker:
     if not port.isdigit():
         raise ConfigError(f"--mqtt must read HOST[:PORT], got {mqtt!r}")
     return Broker(host=host, port=int(port), ca=ca)
+
+
+@contextmanager
+def posting(to: str | None, mqtt: str | None, token_file: Path, ca: Path | None) -> Iterator[Post]:
+    """What sends a batch, by HTTPS or through a broker; ConfigError unless exactly one is told."""
+    from skidpad.core.errors import ConfigError
+    from skidpad.fleet.uploader import mqtt_poster, poster
+
+    if (to is None) is (mqtt is None):
+        raise ConfigError("give one of --to and --mqtt")
+    if mqtt is not None:
+        yield mqtt_poster(broker_of(mqtt, ca), token_of(token_file))
+    else:
+        with client(str(to), token_file, ca) as link:
+            yield poster(link)
 
 
 def client(to: str, token_file: Path, ca: Path | None) -> httpx.Client:

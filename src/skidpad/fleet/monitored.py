@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import polars as pl
@@ -41,6 +41,23 @@ def spool_folder(
         if rows:
             keys.append(spool.put(Kind.INDICATORS, rows, drive))
     return keys
+
+
+class Lookout:
+    """Folders that a monitor writes drives into; `spool` adds each drive once, when it is complete."""
+
+    def __init__(self, folders: Sequence[Path], release: str = "") -> None:
+        self.folders, self.release = folders, release
+        self._known: set[Path] = set()
+
+    def spool(self, spool: Spool) -> int:
+        """Add the drives that were completed since the last time; how many."""
+        inside = [path for folder in self.folders for path in (folder, *sorted(folder.glob("*")))]
+        new = [p for p in inside if p not in self._known and (p / monitored.SUMMARY).exists()]
+        for path in new:
+            spool_folder(spool, path, self.release)
+        self._known.update(new)
+        return len(new)
 
 
 def hazard_batches(folder: Path) -> Iterator[bytes]:

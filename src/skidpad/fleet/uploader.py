@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -122,6 +122,19 @@ def send_all(
         rest = min(pause, patience_s - paused)
         sleep(rest)
         paused += rest
+
+
+def rounds(
+    look: Callable[[], object],
+    send_now: Callable[[], Sent],
+    every_s: float,
+    sleep: Callable[[float], None] = time.sleep,
+) -> Iterator[Sent]:
+    """Look for what is new and send what waits, again and again; what became of it, each time."""
+    while True:
+        look()
+        yield send_now()
+        sleep(every_s)
 
 
 def _detail(answer: httpx.Response) -> Any:

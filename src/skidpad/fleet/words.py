@@ -29,7 +29,7 @@ class Action(str, Enum):
     ANALYSE = "analyse"  # look for recurring hazards now
     READ_ALERTS = "read alerts"
     ANSWER_ALERTS = "answer alerts"
-    ORDER_STOP = "order stop"
+    GUIDE = "guide"  # order vehicles to stop, slow down, go on
     RECEIVE_ORDERS = "receive orders"
     RECEIVE_UPDATES = "receive updates"
     CHANGE = "change"  # propose changes, release updates
@@ -49,7 +49,7 @@ RIGHTS: dict[Action, frozenset[Role]] = {
     Action.ANALYSE: frozenset({_M, _O}),
     Action.READ_ALERTS: frozenset({_O, _T}),
     Action.ANSWER_ALERTS: frozenset({_O, _T}),
-    Action.ORDER_STOP: frozenset({_T}),
+    Action.GUIDE: frozenset({_T}),
     Action.RECEIVE_ORDERS: frozenset({_V}),
     Action.RECEIVE_UPDATES: frozenset({_V}),
     Action.CHANGE: frozenset({_M}),

@@ -1,4 +1,4 @@
-"""Stop orders: signed, for one vehicle, good once and for 2 s, bound to that vehicle's question.
+"""Orders of a teleoperator: signed, for one vehicle, good once and for 2 s, bound to its question.
 
 Clocks of vehicles are not trusted, so an order does not say a time of day: a vehicle asks with a
 random challenge, the order repeats it, and the vehicle counts the 2 s from its own question.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -27,8 +28,15 @@ from skidpad.fleet.words import Principal, absent
 from skidpad.recording.files import write_bytes
 
 VALID_S = 2.0
-STOP = "minimal-risk stop"
 SUBJECT = "order"
+
+
+class Order(str, Enum):
+    """How a vehicle is guided; what it sees, and its own rules, bind it as before."""
+
+    STOP = "stop"  # minimal-risk stop, for good
+    SLOW = "slow"  # go on at no more than half its own speed
+    RESUME = "resume"  # go on at its own speed
 
 
 class Signer:
@@ -75,19 +83,21 @@ class Ordered:
     expires: float  # s, server
 
 
-def order_stop(connection: Connection, who: Principal, alert: str, at: float) -> Ordered:
-    """Order the vehicle of an alert to stop; Refused (404) when `who` may not see the alert."""
+def give_order(
+    connection: Connection, who: Principal, alert: str, what: Order, at: float
+) -> Ordered:
+    """Order something of the vehicle of an alert; Refused (404) when `who` may not see the alert."""
     row = alert_of(connection, who, alert).row
     order = Ordered(new_id(), row.vehicle, at + VALID_S)
     connection.execute(
         orders.insert(),
         {
             "id": order.id, "operator": row.operator, "manufacturer": row.manufacturer,
-            "vehicle": row.vehicle, "alert": alert, "what": STOP, "actor": who.id,
+            "vehicle": row.vehicle, "alert": alert, "what": what.value, "actor": who.id,
             "expires": order.expires, "at": at,
         },
     )  # fmt: skip
-    add_event(connection, ("alert", alert), "stop ordered", (who.id, at), order=order.id)
+    add_event(connection, ("alert", alert), f"{what.value} ordered", (who.id, at), order=order.id)
     return order
 
 

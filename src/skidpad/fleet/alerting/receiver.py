@@ -1,4 +1,4 @@
-"""The vehicle's side of a stop order: obeyed only when it answers a question just asked."""
+"""The vehicle's side of an order: obeyed only when it answers a question just asked."""
 
 from __future__ import annotations
 
@@ -10,15 +10,17 @@ from enum import Enum
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 
-from skidpad.fleet.alerting.orders import STOP, VALID_S
+from skidpad.fleet.alerting.orders import VALID_S, Order
 
 OPEN_MAX = 8  # questions that may be open at once
+SHARES = {Order.STOP: 0.0, Order.SLOW: 0.5, Order.RESUME: 1.0}  # of the vehicle's own speed
 
 
 class Verdict(str, Enum):
-    """What came of an order; only `OBEYED` stops the vehicle."""
+    """What came of an order; only `OBEYED` changes how the vehicle drives."""
 
     OBEYED = "obeyed"
+    STANDING = "standing"  # it was stopped by an order, and goes on by none
     FORGED = "forged"  # not signed by the fleet's key
     FOREIGN = "foreign"  # for another vehicle, or not an order
     REPLAYED = "replayed"  # answers no open question
@@ -32,7 +34,7 @@ class Receiver:
         self._key = Ed25519PublicKey.from_public_bytes(public)
         self.vehicle, self.clock = vehicle, clock
         self._asked: dict[str, float] = {}
-        self.stopped = False
+        self.share = 1.0  # of its own speed; 0: it is in a minimal-risk stop
 
     def challenge(self) -> str:
         """A fresh question; of old ones the last few stay open."""
@@ -43,18 +45,20 @@ class Receiver:
         return name
 
     def receive(self, text: str, signature: str) -> Verdict:
-        """Judge an order; a good one stops the vehicle for good."""
+        """Judge an order; `share` is then what it says. A good order to stop stops for good."""
         try:
             self._key.verify(bytes.fromhex(signature), text.encode())
         except (InvalidSignature, ValueError):
             return Verdict.FORGED
         order = json.loads(text)
-        if order["vehicle"] != self.vehicle or order["what"] != STOP:
+        if order["vehicle"] != self.vehicle or order["what"] not in set(Order):
             return Verdict.FOREIGN
         asked = self._asked.pop(order["challenge"], None)
         if asked is None:
             return Verdict.REPLAYED
         if not 0.0 <= self.clock() - asked <= VALID_S:
             return Verdict.EXPIRED
-        self.stopped = True
+        if self.share == 0.0:
+            return Verdict.STANDING
+        self.share = SHARES[Order(order["what"])]
         return Verdict.OBEYED

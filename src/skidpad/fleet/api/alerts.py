@@ -16,7 +16,7 @@ from skidpad.fleet.alerting.keeping import (
     newest_alerts,
     parse_alert,
 )
-from skidpad.fleet.alerting.orders import order_stop
+from skidpad.fleet.alerting.orders import Order, give_order
 from skidpad.fleet.api.guard import Needs, fleet_of
 from skidpad.fleet.api.vehicle import Key, Reporter, VehicleTime, read_body
 from skidpad.fleet.checking import owners_of
@@ -25,7 +25,7 @@ from skidpad.fleet.words import Action, Principal
 
 Reader = Annotated[Principal, Depends(Needs(Action.READ_ALERTS))]
 Answerer = Annotated[Principal, Depends(Needs(Action.ANSWER_ALERTS))]
-Teleoperator = Annotated[Principal, Depends(Needs(Action.ORDER_STOP))]
+Teleoperator = Annotated[Principal, Depends(Needs(Action.GUIDE))]
 Wait = Annotated[float, Query(ge=0.0, le=30.0, allow_inf_nan=False)]
 router = APIRouter(prefix="/api/v1/alerts", tags=["alerts"])
 
@@ -98,16 +98,16 @@ def answered(fleet: Fleet, who: Principal, alert: str, what: What) -> dict[str, 
     return now.plain()
 
 
-@router.post("/{alert}/stop")
-def stop(request: Request, who: Teleoperator, alert: str) -> dict[str, Any]:
-    """Order the vehicle to a minimal-risk stop; the order is void unless it is fetched within 2 s."""
-    return ordered(fleet_of(request), who, alert)
+@router.post("/{alert}/order/{to}")
+def order(request: Request, who: Teleoperator, alert: str, to: Order) -> dict[str, Any]:
+    """Order the vehicle to stop, slow down or go on; void unless it is fetched within 2 s."""
+    return ordered(fleet_of(request), who, alert, to)
 
 
-def ordered(fleet: Fleet, who: Principal, alert: str) -> dict[str, Any]:
-    """Order a stop and tell the vehicle that waits."""
+def ordered(fleet: Fleet, who: Principal, alert: str, what: Order) -> dict[str, Any]:
+    """Give an order and tell the vehicle that waits."""
     with fleet.engine.begin() as connection:
-        order = order_stop(connection, who, alert, fleet.clock())
+        order = give_order(connection, who, alert, what, fleet.clock())
     fleet.hub.tell(f"orders {order.vehicle}")
     fleet.hub.tell(f"alerts {who.tenant}")
     return {"order": order.id, "expires": order.expires}

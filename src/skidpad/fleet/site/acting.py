@@ -7,6 +7,7 @@ from typing import Any
 from starlette.requests import Request
 
 from skidpad.fleet.alerting.keeping import What
+from skidpad.fleet.alerting.orders import Order
 from skidpad.fleet.api.alerts import answered, ordered
 from skidpad.fleet.patterns.analysis import analyse
 from skidpad.fleet.service import Fleet
@@ -42,9 +43,9 @@ def click_answer(fleet: Fleet, id: str, alert: str, what: What) -> dict[str, Any
     return answered(fleet, granted(fleet, id, Action.ANSWER_ALERTS), alert, what)
 
 
-def click_stop(fleet: Fleet, id: str, alert: str) -> dict[str, Any]:
-    """Order the vehicle of an alert to stop."""
-    return ordered(fleet, granted(fleet, id, Action.ORDER_STOP), alert)
+def click_order(fleet: Fleet, id: str, alert: str, what: Order) -> dict[str, Any]:
+    """Order the vehicle of an alert to stop, slow down or go on."""
+    return ordered(fleet, granted(fleet, id, Action.GUIDE), alert, what)
 
 
 def click_analyse(fleet: Fleet, id: str) -> int:

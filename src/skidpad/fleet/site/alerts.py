@@ -1,4 +1,4 @@
-"""Alerts live: the scene, who took it up, and for a teleoperator the order to stop."""
+"""Alerts live: the scene, who took it up, and for a teleoperator orders to the vehicle."""
 
 from __future__ import annotations
 
@@ -8,8 +8,9 @@ import msgspec
 from starlette.concurrency import run_in_threadpool
 
 from skidpad.fleet.alerting.keeping import Alert, Scene, What, newest_alerts
+from skidpad.fleet.alerting.orders import Order
 from skidpad.fleet.service import Fleet
-from skidpad.fleet.site.acting import click_answer, click_stop, person
+from skidpad.fleet.site.acting import click_answer, click_order, person
 from skidpad.fleet.site.drawing import scene_svg
 from skidpad.fleet.site.frame import say
 from skidpad.fleet.words import Action, Principal, Refused
@@ -20,6 +21,11 @@ ANSWERS = {
     "Acknowledge": What.ACKNOWLEDGED,
     "Escalate": What.ESCALATED,
     "Close": What.CLOSED,
+}
+ORDERS = {
+    "Order to stop": (Order.STOP, "red"),
+    "Slow to half its speed": (Order.SLOW, "primary"),
+    "Its own speed again": (Order.RESUME, "primary"),
 }
 
 
@@ -73,13 +79,14 @@ def _card(fleet: Fleet, ui: Any, who: Principal, alert: Alert) -> None:
             return
         for name, what in ANSWERS.items():
             ui.button(name, on_click=_answering(fleet, ui, who, id, what))
-        if who.may(Action.ORDER_STOP):
-
-            async def stop() -> None:
-                await say(ui, lambda: click_stop(fleet, who.id, id), "stop ordered, good for 2 s")
-
-            ui.button("Order to stop", color="red", on_click=stop)
+        for name, (order, colour) in ORDERS.items() if who.may(Action.GUIDE) else ():
+            ui.button(name, color=colour, on_click=_ordering(fleet, ui, who, id, order))
 
 
 def _answering(fleet: Fleet, ui: Any, who: Principal, alert: str, what: What) -> Any:
     return lambda: say(ui, lambda: click_answer(fleet, who.id, alert, what), what.value)
+
+
+def _ordering(fleet: Fleet, ui: Any, who: Principal, alert: str, order: Order) -> Any:
+    told = f"{order.value} ordered, good for 2 s"
+    return lambda: say(ui, lambda: click_order(fleet, who.id, alert, order), told)

@@ -65,6 +65,10 @@ class Channel:
         self.v_planned = 0.0  # m/s that the plan reaches at its end: how much it progresses
         self.abstains = False  # it does not know the line that it comes to
 
+    def slow_to(self, share: float) -> None:
+        """Plan from now on with that share, in (0, 1], of the speed that it would choose itself."""
+        self._params = self._params._replace(speed_factor=share * self.settings.speed_factor)
+
     def update(self, view: ChannelView) -> ChannelFrame:
         """What this channel says; `command` is then what it would do."""
         self.tracker.update(view)

@@ -7,6 +7,7 @@ import json
 import threading
 from contextlib import contextmanager
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from math import inf
 
 import msgspec
 import numpy as np
@@ -260,10 +261,10 @@ def test_a_stop_order_is_good_for_two_seconds_by_either_clock(lite):
     for age, verdict in ((2.1, Verdict.EXPIRED), (-0.1, Verdict.EXPIRED), (2.0, Verdict.OBEYED)):
         lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/stop")
         (sent,) = red.ask()
-        assert red.receiver.share == 1.0
+        assert red.receiver.v_max == inf
         red.clock.now += age
         assert red.receiver.receive(sent["order"], sent["signature"]) is verdict
-    assert red.receiver.share == 0.0
+    assert red.receiver.v_max == 0.0
 
 
 def test_what_the_fleet_did_not_sign_stops_nobody(lite):
@@ -278,19 +279,19 @@ def test_what_the_fleet_did_not_sign_stops_nobody(lite):
         (sent["order"] + " ", sent["signature"]),
     ):  # fmt: skip
         assert red.receiver.receive(text, signature) is Verdict.FORGED
-    assert red.receiver.share == 1.0
+    assert red.receiver.v_max == inf
     assert red.receiver.receive(sent["order"], sent["signature"]) is Verdict.OBEYED
 
 
 def test_a_vehicle_is_slowed_down_and_let_go_until_it_is_stopped(lite):
     red, id = Vehicle(lite), raised(lite)
-    for order, verdict, share in (
-        ("slow", Verdict.OBEYED, 0.5), ("resume", Verdict.OBEYED, 1.0),
+    for order, verdict, v_max in (
+        ("slow", Verdict.OBEYED, 2.0), ("resume", Verdict.OBEYED, inf),
         ("stop", Verdict.OBEYED, 0.0), ("resume", Verdict.STANDING, 0.0),
     ):  # fmt: skip
         lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/{order}")
         assert red.obey() == [verdict]
-        assert red.receiver.share == share
+        assert red.receiver.v_max == v_max
     unknown = lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/fly")
     assert unknown.status_code == 422
 
@@ -312,7 +313,7 @@ def test_a_simulated_vehicle_obeys(lite, tmp_path):
             alert[:] = alert or [raised(lite)]
             lite.post("red teleoperator", f"/api/v1/alerts/{alert[0]}/order/{order}")
             assert red.obey() == [Verdict.OBEYED]
-        return red.receiver.share
+        return red.receiver.v_max
 
     spec = msgspec.structs.replace(driven_routes()["route-1"], duration=16.0, seed=4)
 
@@ -324,6 +325,7 @@ def test_a_simulated_vehicle_obeys(lite, tmp_path):
     drive_segment(spec, tmp_path / "ordered.mcap", guide=guided)
     free, ordered = speed(tmp_path / "free.mcap"), speed(tmp_path / "ordered.mcap")
     assert np.array_equal(free[:30], ordered[:30])
-    assert 1.0 < ordered[90] < 0.7 * free[90]
+    assert 1.0 < ordered[90] < 2.1  # m/s
+    assert free[90] > 3.0
     assert ordered[-1] < 0.1
     assert free[-1] > 1.0

@@ -163,7 +163,7 @@ def teleoperator(browser, address, tokens) -> None:
     page.get_by_text("8.0 m/s, acknowledged").wait_for()
     page.get_by_role("button", name="Order to stop").click()
     page.get_by_text("acknowledged; stop ordered").wait_for()
-    page.get_by_role("button", name="Slow to half its speed").click()
+    page.get_by_role("button", name="Slow to walking pace").click()
     page.get_by_text("stop ordered; slow ordered").wait_for()
     assert page.evaluate("document.documentElement.scrollWidth") <= 390
     if picture := os.environ.get("SKIDPAD_PICTURES"):

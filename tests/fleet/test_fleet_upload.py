@@ -215,6 +215,11 @@ def test_a_server_killed_at_any_moment_keeps_what_it_acknowledged(tmp_path):
         child, address = served(data, *words)
         with child:
             try:
+                stranger = invoke(
+                    "upload", *folders[:1], "--to", address, "--spool", str(tmp_path / "other"),
+                    "--token-file", str(token),
+                )  # fmt: skip
+                assert stranger.startswith("0 acknowledged, 0 refused")  # whose certificate is it?
                 said = invoke(
                     "upload", *folders[first : first + 2], "--to", address,
                     "--spool", str(tmp_path / "spool"), "--token-file", str(token),

@@ -151,6 +151,7 @@ def test_a_drive_is_heard_by_a_monitor_of_its_own_command(tmp_path, monkeypatch)
         monitor.kill()
         monitor.wait()
     assert monitor.returncode == 0, said
+    assert "all interfaces" in said  # DDS asks nobody who they are: that must be known
     table = read_indicators(tmp_path / "heard")
     watch(McapRecording(tmp_path / "a.mcap", truth=False), tmp_path / "file", MonitorSettings())
     expected = read_indicators(tmp_path / "file")

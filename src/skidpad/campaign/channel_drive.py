@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Sequence
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -48,7 +49,7 @@ WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
 TRUTH_REACH = 120.0  # m around the ego within which the true world is recorded
 MINIMAL_RISK_BRAKE = 0.4  # of full brake, about 4 m/s^2 (UN R157 5.1.6: at most 4 m/s^2)
 NO_REPORT = StackReport()
-Guide = Callable[[float], float]  # at a cycle's time, s: share of its own speed, 0: it is to stop
+Guide = Callable[[float], float]  # at a cycle's time, s: most speed, m/s; 0: it is to stop
 LABEL_OF = np.array([LABEL_OF_KIND[kind] for kind in ActorKind], dtype=np.int64)
 
 
@@ -101,9 +102,10 @@ class Crew:
 
     def _think(self, t: float, truth: WorldTruth) -> None:
         """What every channel says at time t, and who drives."""
-        share = 1.0 if self.guide is None else self.guide(t)
-        for channel in self.channels if share else ():
-            channel.slow_to(share)
+        v_max = inf
+        if self.guide is not None and (v_max := self.guide(t)):
+            for channel in self.channels:
+                channel.keep_below(v_max)
         self.frames: list[ChannelFrame] = [
             channel.update(suite.observe(t, truth.states, truth.lights))
             for channel, suite in zip(self.channels, self.suites, strict=True)
@@ -116,7 +118,7 @@ class Crew:
             choice = self.arbiter.update(t, self.frames, scores, progress, unsure)
         else:
             choice = Choice(names.index(drive_by), Reason.KEPT)
-        if not share:
+        if not v_max:
             choice = Choice(None, Reason.ORDERED)
         self.driving = choice.driving
         name = "" if choice.driving is None else names[choice.driving]

@@ -35,7 +35,7 @@ class Order(str, Enum):
     """How a vehicle is guided; what it sees, and its own rules, bind it as before."""
 
     STOP = "stop"  # minimal-risk stop, for good
-    SLOW = "slow"  # go on at no more than half its own speed
+    SLOW = "slow"  # go on at walking pace
     RESUME = "resume"  # go on at its own speed
 
 

@@ -6,6 +6,7 @@ import json
 import secrets
 from collections.abc import Callable
 from enum import Enum
+from math import inf
 
 from cryptography.exceptions import InvalidSignature
 from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
@@ -13,7 +14,7 @@ from cryptography.hazmat.primitives.asymmetric.ed25519 import Ed25519PublicKey
 from skidpad.fleet.alerting.orders import VALID_S, Order
 
 OPEN_MAX = 8  # questions that may be open at once
-SHARES = {Order.STOP: 0.0, Order.SLOW: 0.5, Order.RESUME: 1.0}  # of the vehicle's own speed
+V_MAX = {Order.STOP: 0.0, Order.SLOW: 2.0, Order.RESUME: inf}  # m/s; 2.0: assumption
 
 
 class Verdict(str, Enum):
@@ -34,7 +35,7 @@ class Receiver:
         self._key = Ed25519PublicKey.from_public_bytes(public)
         self.vehicle, self.clock = vehicle, clock
         self._asked: dict[str, float] = {}
-        self.share = 1.0  # of its own speed; 0: it is in a minimal-risk stop
+        self.v_max = inf  # m/s; 0: it is in a minimal-risk stop
 
     def challenge(self) -> str:
         """A fresh question; of old ones the last few stay open."""
@@ -45,7 +46,7 @@ class Receiver:
         return name
 
     def receive(self, text: str, signature: str) -> Verdict:
-        """Judge an order; `share` is then what it says. A good order to stop stops for good."""
+        """Judge an order; `v_max` is then what it says. A good order to stop stops for good."""
         try:
             self._key.verify(bytes.fromhex(signature), text.encode())
         except (InvalidSignature, ValueError):
@@ -58,7 +59,7 @@ class Receiver:
             return Verdict.REPLAYED
         if not 0.0 <= self.clock() - asked <= VALID_S:
             return Verdict.EXPIRED
-        if self.share == 0.0:
+        if self.v_max == 0.0:
             return Verdict.STANDING
-        self.share = SHARES[Order(order["what"])]
+        self.v_max = V_MAX[Order(order["what"])]
         return Verdict.OBEYED

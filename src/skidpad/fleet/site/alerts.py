@@ -24,7 +24,7 @@ ANSWERS = {
 }
 ORDERS = {
     "Order to stop": (Order.STOP, "red"),
-    "Slow to half its speed": (Order.SLOW, "primary"),
+    "Slow to walking pace": (Order.SLOW, "primary"),
     "Its own speed again": (Order.RESUME, "primary"),
 }
 

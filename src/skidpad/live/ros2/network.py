@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import threading
 from typing import Any
@@ -24,12 +25,18 @@ LOOPBACK = """<CycloneDDS><Domain><General><Interfaces><NetworkInterface name="l
 BLOCKING = 120.0  # s that a lossless writer waits for a reader's room
 _DOMAINS: dict[int, Any] = {}  # a process may configure a domain once
 _LOCK = threading.Lock()
+log = logging.getLogger(__name__)
 
 
 def participant(domain: int) -> Any:
-    """A participant of the domain."""
+    """A participant of the domain; the first one says what that opens."""
     with _LOCK:
         if domain not in _DOMAINS:
+            log.warning(
+                "DDS domain %d: its sockets are bound to all interfaces of this machine, and whoever"
+                " reaches them is believed, unauthenticated",
+                domain,
+            )
             said = os.environ.get("CYCLONEDDS_URI")
             _DOMAINS[domain] = None if said else Domain(domain, LOOPBACK)
         return DomainParticipant(domain)

@@ -65,9 +65,10 @@ class Channel:
         self.v_planned = 0.0  # m/s that the plan reaches at its end: how much it progresses
         self.abstains = False  # it does not know the line that it comes to
 
-    def slow_to(self, share: float) -> None:
-        """Plan from now on with that share, in (0, 1], of the speed that it would choose itself."""
-        self._params = self._params._replace(speed_factor=share * self.settings.speed_factor)
+    def keep_below(self, v_max: float) -> None:
+        """Plan from now on for no more than `v_max` (m/s, > 0); inf: as it would by itself."""
+        factor = min(self.settings.speed_factor, v_max / float(self.route.points.limit.max()))
+        self._params = self._params._replace(speed_factor=factor)
 
     def update(self, view: ChannelView) -> ChannelFrame:
         """What this channel says; `command` is then what it would do."""

@@ -10,6 +10,7 @@ from tests.scenarios.files import (
     by_entity,
     by_value,
     compiled,
+    condition,
     event,
     init,
     on_lane,
@@ -176,6 +177,25 @@ def test_angles_against_world_road_and_lane(tmp_path, kind, axes, angle, lane):
 coordinateSystem="{axes}"/>"""
     assert slope(tmp_path, body.format(angle), place=on_lane(lane, 50)) == 0.0
     assert slope(tmp_path, body.format(angle + 0.05), place=on_lane(lane, 50)) is None
+
+
+@pytest.mark.parametrize(("angle", "met"), [(0.1, True), (0.0, False)])
+def test_an_angle_against_a_trajectory_is_that_to_its_course(tmp_path, angle, met):
+    vertices = "".join(
+        f'<Vertex time="{k}"><Position><WorldPosition x="{200 + 15 * k}" y="-5" h="0.1"/></Position>'
+        "</Vertex>"
+        for k in range(4)
+    )
+    follow = f"""<RoutingAction><FollowTrajectoryAction><Trajectory name="t" closed="false"><Shape>
+<Polyline>{vertices}</Polyline></Shape></Trajectory><TimeReference><Timing
+domainAbsoluteRelative="relative" scale="1" offset="0"/></TimeReference><TrajectoryFollowingMode
+followingMode="position"/></FollowTrajectoryAction></RoutingAction>"""
+    begin = story(event("follow", private(follow), time(1.0)))
+    asked = f"""<AngleCondition angleType="heading" angle="{angle}" angleTolerance="0.01"
+coordinateSystem="trajectory"/>"""
+    result = told(tmp_path, stories=begin, stop=condition(by_entity(asked, "other")), minor=3)
+    end = result.rows[-1].time
+    assert end == pytest.approx(1.1, abs=0.06) if met else end > 10.0
 
 
 @pytest.mark.osc("RandomRouteAction")

@@ -46,7 +46,7 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         "ConnectTrailerAction": "is noted, without effect",
         "DisconnectTrailerAction": "is noted, without effect",
         "InfrastructureAction": "conditions see it, the lights of the road do not",
-        "AngleCondition": "pitch and roll are those of the road; none against a trajectory",
+        "AngleCondition": "pitch and roll are those of the road",
         "RelativeAngleCondition": "pitch and roll are those of the road",
         "AssignControllerAction": "matters for the ego only",
         "ActivateControllerAction": "matters for the ego only",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import cos, sin
+from math import atan2, cos, hypot, sin
 from typing import Protocol
 
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.scenarios.lines import Line
 from skidpad.simulation.scripted import Demand, Motion
+
+NEAR = 1e-6  # m, nothing moves
 
 
 class Track(Protocol):
@@ -68,6 +70,14 @@ class PacedTrack:
             self.s %= self.line.length
             return False
         return self.s >= self.line.length - 1e-6
+
+
+def course(track: Track, t: float, dt: float) -> float:
+    """The way that it runs at time t, rad; where nothing moves, the heading that it asks for."""
+    (a, _, _), (b, _, _) = track.at(t - 0.5 * dt), track.at(t + 0.5 * dt)
+    if hypot(b.x - a.x, b.y - a.y) < NEAR:
+        return track.at(t)[0].yaw
+    return atan2(b.y - a.y, b.x - a.x)
 
 
 def track_demand(

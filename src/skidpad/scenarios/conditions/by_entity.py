@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from math import hypot, inf
+from math import hypot, inf, nan
 
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.queries import LanePoint
@@ -17,6 +17,7 @@ from skidpad.scenarios.measures import Axes
 from skidpad.scenarios.network import next_lane_id
 from skidpad.scenarios.positions import Position, position
 from skidpad.scenarios.scene import Actor, Scene
+from skidpad.scenarios.tracking import Track, course
 
 SOME = 1e-9  # s, what has begun to last
 
@@ -157,7 +158,8 @@ class Turn(Enum):
 class Angle:
     """An angle of an entity within a tolerance; all lie on the road, so that it has their slopes.
 
-    other: against its angle; else against the lane, the road or the world.
+    other: against its angle; else against the lane, the road, the world, or the way that the
+    entity's trajectory runs: without one, never.
     """
 
     turn: Turn
@@ -172,7 +174,7 @@ class Angle:
         if self.other is not None:
             value = self._of(scene, here) - self._of(scene, scene.actors[self.other].pose)
         else:
-            value = self._against(scene, here)
+            value = self._against(scene, here, scene.actors[actor].track)
         return abs(wrap_angle(value - self.angle)) <= self.tolerance
 
     def _of(self, scene: Scene, pose: Pose) -> float:
@@ -182,11 +184,15 @@ class Angle:
         pitch, roll = scene.network.slopes(pose)
         return pitch if self.turn is Turn.PITCH else roll
 
-    def _against(self, scene: Scene, pose: Pose) -> float:
+    def _against(self, scene: Scene, pose: Pose, track: Track | None) -> float:
         if self.axes is Axes.WORLD:
             return self._of(scene, pose)
+        if self.axes is Axes.TRAJECTORY and track is None:
+            return nan
         if self.turn is not Turn.HEADING or self.axes is Axes.ENTITY:
             return 0.0
+        if self.axes is Axes.TRAJECTORY and track is not None:
+            return pose.yaw - course(track, scene.t, scene.dt)
         if self.axes is Axes.ROAD:
             at = scene.network.coordinates(pose)
             return pose.yaw if at is None else at.turn
@@ -195,14 +201,11 @@ class Angle:
 
 
 def _angle(node: Node, ctx: Context) -> EntityCondition:
-    axes = node.choice("coordinateSystem", Axes, Axes.LANE)
-    if axes is Axes.TRAJECTORY:
-        raise node.unsupported("angles against a trajectory are not supported")
     return Angle(
         node.choice("angleType", Turn),
         node.number("angle"),
         node.number("angleTolerance"),
-        axes,
+        node.choice("coordinateSystem", Axes, Axes.LANE),
         ctx.entity(node) if node.tag == "RelativeAngleCondition" else None,
     )
 

@@ -93,6 +93,18 @@ dateTime="2026-01-01T12:00:00"/><Weather fractionalCloudCover="oneOktas"><Sun az
 elevation="0.3" illuminance="1"/><Fog visualRange="500"/><Precipitation precipitationType="rain"
 precipitationIntensity="9"/></Weather><RoadCondition frictionScaleFactor="0.7"/></Environment>
 </EnvironmentAction>""",
+    f"""<TrafficAction trafficName="a"><TrafficSourceAction radius="9" rate="0.5" speed="9">{LANE}
+</TrafficSourceAction></TrafficAction>""",
+    f"""<TrafficAction trafficName="b"><TrafficSinkAction radius="20" rate="1">{LANE}
+</TrafficSinkAction></TrafficAction>""",
+    """<TrafficAction trafficName="c"><TrafficSwarmAction innerRadius="9" semiMajorAxis="150"
+semiMinorAxis="50" numberOfVehicles="6" offset="1"><CentralObject entityRef="ego"/>
+<InitialSpeedRange lowerLimit="4" upperLimit="9"/><DirectionOfTravelDistribution same="2"
+opposite="1"/></TrafficSwarmAction></TrafficAction>""",
+    """<TrafficAction trafficName="d"><TrafficAreaAction numberOfEntities="4" continuous="true">
+<TrafficArea><RoadRange length="200"><RoadCursor roadId="1" s="20"/><RoadCursor roadId="1" s="400"/>
+</RoadRange></TrafficArea></TrafficAreaAction></TrafficAction>""",
+    '<TrafficAction trafficName="c"><TrafficStopAction/></TrafficAction>',
     """<InfrastructureAction><TrafficSignalAction><TrafficSignalStateAction name="1" state="go"/>
 </TrafficSignalAction></InfrastructureAction>""",
 ]

@@ -95,6 +95,7 @@ class ActorTable:
         self.alive: dict[int, Actor] = {}
         self.dead: OrderedDict[int, Actor] = OrderedDict()
         self._by_body: dict[int, Actor] = {}
+        self.rising: dict[int, float] = {}  # m/s upwards, of those in the air
 
     def __iter__(self) -> Iterator[Actor]:
         return iter(self.alive.values())
@@ -162,11 +163,11 @@ class ActorTable:
         return replace(feet, z=feet.z + actor.lift) if actor.lift else feet
 
     def velocity(self, actor: Actor) -> Vector:
-        """m/s in the plane; what has no body stands still."""
+        """m/s; what has no body stands still."""
         if actor.body is None:
             return STILL
         s, i = self._moving.states, self._moving.row(actor.body)
-        return float(s.vx[i]), float(s.vy[i]), 0.0
+        return float(s.vx[i]), float(s.vy[i]), self.rising.get(actor.id, 0.0)
 
     def box(self, actor: Actor) -> Box:
         """Its box in the world."""

@@ -15,6 +15,7 @@ from skidpad.simulation.carla_server.catalogue import Blueprint, Family, chosen,
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.debug import DebugShapes
 from skidpad.simulation.carla_server.effects import Remarks
+from skidpad.simulation.carla_server.falling import DROP, Falling, ground_below
 from skidpad.simulation.carla_server.landscape import ALL_LAYERS, Landscape
 from skidpad.simulation.carla_server.map_actors import (
     light_actor,
@@ -94,6 +95,7 @@ class Episode:
         self.actors = ActorTable(self.moving, stock.ids)
         self.rows = Rows()
         self.vehicles = Vehicles(self.moving)
+        self.falling = Falling(self.moving, map.roads, self.actors, self.vehicles)
         self.walkers: dict[int, WalkerControl] = {}
         self.skeletons: dict[int, Skeleton] = {}  # of walkers whose bones were asked for
         self.debug = DebugShapes()
@@ -125,12 +127,13 @@ class Episode:
     def spawn(self, wanted: Wanted, pose: Pose) -> Actor:
         """A new actor where a client wants it; CallError when something stands there."""
         actor = self._made(wanted, pose)
+        feet = self._feet(actor) if actor.family in SOLID else pose
         if actor.family in SOLID:
-            feet = self._feet(actor)
             if shapes.is_taken(self.moving, feet, actor.half):
                 raise CallError(COLLISION)
             self._embody(actor, feet)
         self._enlist(actor)
+        self.falling.spawned(actor, feet.z)
         return actor
 
     def attach(self, wanted: Wanted, mount: Pose, parent: int, kind: Attachment) -> Actor:
@@ -159,6 +162,7 @@ class Episode:
             self.vehicles.remove(id)
         if body is not None:
             self.moving.remove(body)
+        self.falling.forget(id)
         self.walkers.pop(id, None)
         self.skeletons.pop(id, None)
         self.sensors.forget(id)
@@ -189,11 +193,15 @@ class Episode:
         return actor
 
     def _feet(self, actor: Actor) -> Pose:
-        """Where it stands: what falls, stands on the ground at once."""
+        """Where it stands: what is a little above the ground, stands on it at once."""
         feet = replace(actor.pose, z=actor.pose.z - actor.lift)
         if actor.family is Family.PROP:
             return feet
-        ground = ground_height(self.map.roads, feet.x, feet.y, feet.z)
+        ground = ground_below(self.map.roads, feet.x, feet.y, feet.z)
+        if ground is None:
+            ground = ground_height(self.map.roads, feet.x, feet.y, feet.z)
+        if feet.z - ground > DROP:
+            return feet
         return replace(feet, z=ground, roll=0.0, pitch=0.0)
 
     def _embody(self, actor: Actor, feet: Pose) -> None:
@@ -247,12 +255,14 @@ class Episode:
             actor.pose = pose
         else:
             self.moving.teleport(actor.body, replace(pose, z=pose.z - actor.lift))
+            self.falling.placed(actor)
 
     def simulate(self, actor: Actor, on: bool) -> None:
         """Off: it stays where clients put it."""
         if actor.body is not None and actor.family is not Family.PROP:
             self.moving.set_simulated(actor.body, on)
             self.moving.set_grounded(actor.body, on)
+            self.falling.placed(actor)
 
     def relandscape(self) -> None:
         """Vehicles meet what is there at present."""
@@ -263,6 +273,7 @@ class Episode:
         self.moving.grip = self.sky.grip
         self.vehicles.command(dt)
         self.moving.step()
+        self.falling.tick(dt)
 
     def follow(self) -> None:
         """Children go where their parents went."""

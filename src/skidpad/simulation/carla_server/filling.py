@@ -64,6 +64,8 @@ def fill_vehicles(rows: Rows, actors: ActorTable, vehicles: Vehicles, posts: Pos
     table["pose"][at] = poses_to_carla(s.x, s.y, s.z, s.roll, s.pitch, s.yaw)
     c, sn = np.cos(s.yaw), np.sin(s.yaw)
     climb = (s.vx * c + s.vy * sn) * np.sin(moving.grade[:n])
+    for i, vehicle in enumerate(vehicles) if actors.rising else ():
+        climb[i] = actors.rising.get(vehicle.actor, climb[i])
     table["velocity"][at] = vectors_to_carla(s.vx, s.vy, climb)
     flat = np.zeros(n)
     table["turn"][at] = np.degrees(turns_to_carla(flat, flat, s.yaw_rate))

@@ -64,6 +64,9 @@ def set_actor_target_velocity(served: Served, id: Any, velocity: Any) -> None:
     vehicle = _vehicle(served, id)
     if vehicle is not None:
         served.episode.vehicles.set_velocity(vehicle.actor, v)
+        actors = served.episode.actors
+        rising = actors.rising.get(vehicle.actor, 0.0)
+        served.episode.falling.push(actors.alive[vehicle.actor], v[2] - rising)
 
 
 @TABLE.method("set_actor_target_angular_velocity", Shape.VOID)
@@ -94,7 +97,7 @@ def disable_actor_constant_velocity(served: Served, id: Any) -> None:
 
 @TABLE.method("add_actor_impulse", Shape.VOID)
 def add_actor_impulse(served: Served, id: Any, impulse: Any) -> None:
-    """N s at the centre of gravity; the vertical part is lost."""
+    """N s at the centre of gravity."""
     push(served, id, impulse, None, 1.0)
 
 
@@ -135,6 +138,8 @@ def push(served: Served, id: Any, amount: Any, location: Any | None, seconds: fl
     vehicle = _vehicle(served, id)
     if vehicle is not None:
         served.episode.vehicles.push(vehicle.actor, (x * seconds, y * seconds, z * seconds), point)
+        actor = served.episode.actors.alive[vehicle.actor]
+        served.episode.falling.push(actor, z * seconds / vehicle.type.mass)
 
 
 def twist(served: Served, id: Any, amount: Any, seconds: float) -> None:
@@ -161,14 +166,14 @@ def set_actor_collisions(served: Served, id: Any, enabled: Any) -> None:
         served.episode.moving.set_collides(vehicle.body, on)
 
 
-@TABLE.method("set_actor_enable_gravity", Shape.VOID, without_effect="vehicles stay on the road")
+@TABLE.method("set_actor_enable_gravity", Shape.VOID)
 def set_actor_enable_gravity(served: Served, id: Any, enabled: Any) -> None:
-    """Accepted."""
-    served.episode.actors.get(id)
-    wire.flag(enabled, "enabled")
+    """Off: a vehicle or walker keeps its height."""
+    actor = served.episode.actors.get(id)
+    served.episode.falling.weigh(actor, wire.flag(enabled, "enabled"))
 
 
-@TABLE.method("set_actor_dead", Shape.VOID, without_effect="actors do not fall")
+@TABLE.method("set_actor_dead", Shape.VOID, without_effect="nobody lies down")
 def set_actor_dead(served: Served, id: Any) -> None:
     """Accepted."""
     served.episode.actors.get(id)

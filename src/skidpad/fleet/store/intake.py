@@ -145,11 +145,13 @@ class Intake:
             "vehicle_time": batch.vehicle_time, "at": self.clock(),
         }  # fmt: skip
         connection.execute(batches.insert(), row)
-        new = self._facts(connection, batch, row)
-        return Receipt(row["id"], _ids(connection, batch), known=not new)
+        new, ids = self._facts(connection, batch, row)
+        return Receipt(row["id"], ids, known=not new)
 
-    def _facts(self, connection: Connection, batch: Batch, row: dict[str, Any]) -> bool:
-        """Keep what the batch says; False when all of it was known."""
+    def _facts(
+        self, connection: Connection, batch: Batch, row: dict[str, Any]
+    ) -> tuple[bool, tuple[str, ...]]:
+        """Keep what the batch says; False when all of it was known. Ids of its hazards in order."""
         owned = {
             "operator": batch.operator, "manufacturer": batch.manufacturer,
             "vehicle": batch.vehicle, "batch": row["id"], "drive": batch.drive,
@@ -159,20 +161,21 @@ class Intake:
             words = batch.summary.context
             there = (drives.c.vehicle == batch.vehicle) & (drives.c.drive == batch.drive)
             if connection.execute(select(drives.c.id).where(there)).first() is not None:
-                return False
+                return False, ()
             drive = owned | {
                 "id": new_id(), "seconds": batch.summary.seconds, "map": words.get("map", ""),
                 "weather": weather_class(words), "release": batch.summary.release,
                 "summary": batch.summary_text,
             }  # fmt: skip
             connection.execute(drives.insert(), drive)
-            return True
+            return True, ()
         known = _known(connection, batch)
         fresh = {f.digest: f for f in batch.found if f.digest not in known}
         if fresh:
             rows = [owned | _hazard_row(found) for found in fresh.values()]
             connection.execute(hazards.insert(), rows)
-        return bool(fresh) or not batch.found
+            known |= {row["digest"]: row["id"] for row in rows}
+        return bool(fresh) or not batch.found, tuple(known[f.digest] for f in batch.found)
 
 
 def _hazard_row(found: Found) -> dict[str, Any]:

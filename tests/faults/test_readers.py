@@ -6,14 +6,15 @@ import traceback
 import warnings
 import zlib
 
+import kept_readers
 import more_readers
 import pytest
 import readers
 
 from skidpad.core.errors import InputError
 
-READERS = readers.READERS | more_readers.READERS
-LISTS = ("openscenario", "played", "storyboard")  # name all that is wrong, a line each
+READERS = readers.READERS | more_readers.READERS | kept_readers.READERS
+LISTS = ("openscenario", "played", "storyboard", "catalog")  # name all that is wrong, a line each
 LONGEST = 50_000  # characters
 IN_CI = 500  # inputs of a reader
 FAULTS_SHOWN = 12

@@ -1,6 +1,7 @@
 """A judged recording as arrays and JSON, so that judging is done once and goes on where it stopped.
 
 What was judged by other rules is judged again: the file says which code and which options made it.
+A checksum over all of it tells damage, which is never taken for what was found.
 """
 
 from __future__ import annotations
@@ -40,15 +41,28 @@ def segment_bytes(segment: Segment, made_by: Mapping[str, str]) -> bytes:
     text = msgspec.json.encode({"made_by": dict(made_by), "segment": plain}, enc_hook=_plain)
     buffer = io.BytesIO()
     arrays: dict[str, Any] = {name: getattr(segment, name) for name in ARRAYS}
-    np.savez_compressed(buffer, text=np.frombuffer(text, dtype=np.uint8), **arrays)
+    seal = np.frombuffer(_seal(text, arrays), dtype=np.uint8)
+    np.savez_compressed(buffer, text=np.frombuffer(text, dtype=np.uint8), seal=seal, **arrays)
     return buffer.getvalue()
+
+
+def _seal(text: bytes, arrays: Mapping[str, Any]) -> bytes:
+    """SHA-256 over everything that is kept."""
+    total = hashlib.sha256(text)
+    for name in ARRAYS:
+        total.update(f"{arrays[name].dtype.str} {arrays[name].shape}".encode())
+        total.update(arrays[name].tobytes())
+    return total.digest()
 
 
 def segment_from(data: bytes, made_by: Mapping[str, str]) -> Segment | None:
     """The segment; None when something else made it, or it is damaged."""
     try:
         arrays = read_arrays(data, KIND, KIND)
-        plain = msgspec.json.decode(arrays["text"].tobytes())
+        text = arrays["text"].tobytes()
+        if arrays["seal"].tobytes() != _seal(text, arrays):
+            return None
+        plain = msgspec.json.decode(text)
         if plain["made_by"] != dict(made_by):
             return None
         hints = get_type_hints(Segment)

@@ -165,6 +165,7 @@ def _roads(spec: RunSpec, course: Roads) -> Stage:
         mode=course.traffic,
         vehicles=course.vehicles,
         allow_fewer=course.allow_fewer,
+        reserve=course.reserve,
         variant=s.traffic_positions.value,
         initial_limit_kmh=s.initial_limit_kmh,
         slow_in_weather=s.drivers,

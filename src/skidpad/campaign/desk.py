@@ -87,7 +87,7 @@ class Desk:
 
     def __init__(self, source: InputSource, spec: RunSpec, dt: float = DT) -> None:
         self.source, self.hands, self.course = source, Hands(dt), spec.course
-        self.density = Density()
+        self.density = Density(spec.course.vehicles if isinstance(spec.course, Roads) else 0)
         settings = settings_of(spec)
         self.outside = Outside(weather=spec.weather, grip=grip_of(spec), range_model=settings.range)
         self.manual = False

@@ -12,10 +12,14 @@ from msgspec import Meta, Struct, structs
 from skidpad.cli.asked import Drivers, Tuned
 from skidpad.cli.spread import spread
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.run import BackendChoice, Roads, RunSpec, Scenario
+from skidpad.core.run import BackendChoice, BackendKind, Roads, RunSpec, Scenario
 
 if TYPE_CHECKING:
     from skidpad.pages.server import Place
+
+
+VEHICLES_MAX = 80  # in the background (A-209)
+RESERVE = 20  # vehicles to call in, where nothing else is said
 
 
 class Pages(Struct, frozen=True, kw_only=True):
@@ -49,6 +53,10 @@ def drive(
         str,
         typer.Option(help="An OpenSCENARIO file, or a name of the catalogue, instead of roads."),
     ] = "",
+    more: Annotated[
+        int | None,
+        typer.Option(min=0, max=80, help="Vehicles that can be called in; default: up to 20."),
+    ] = None,
     rate: Annotated[float, typer.Option(help="Times real time; 0: as fast as it can.")] = 1.0,
     paused: Annotated[bool, typer.Option("--paused", help="Begin standing.")] = False,
     on_close: Annotated[
@@ -73,17 +81,31 @@ def drive(
     spec = structs.replace(
         tuned.resolve(run),
         driver=chosen[0],
-        course=Scenario(file=scenario) if scenario else roads,
+        course=Scenario(file=scenario) if scenario else with_reserve(roads, backend, more),
         weather=find_weather(weather),
         seed=seed,
         backend=checked(backend),
     )
     folder = next_free(Path("out/drives") / spec.name) if out is None else require_free(out)
     producer = Producer(drive_job, about(spec, folder, rate, paused))
-    shown = About(
-        "drive", vehicles=0 if scenario else roads.vehicles, pauses=on_close is OnClose.PAUSE
-    )
+    course = spec.course
+    most = course.vehicles + course.reserve if isinstance(course, Roads) else 0
+    shown = About("drive", vehicles=most, pauses=on_close is OnClose.PAUSE)
     typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
+
+
+def with_reserve(roads: Roads, backend: BackendChoice, more: int | None) -> Roads:
+    """The course with vehicles to call in; a CARLA server is asked for none."""
+    room = VEHICLES_MAX - roads.vehicles
+    if more is not None and more > room:
+        raise ConfigError(
+            f"--more must be at most {room} beside {roads.vehicles} vehicles, got {more}"
+        )
+    if backend.backend is BackendKind.CARLA:
+        if more:
+            raise ConfigError(f"--more must be 0 on a CARLA server, got {more}")
+        return roads
+    return structs.replace(roads, reserve=min(room, RESERVE) if more is None else more)
 
 
 @spread()

@@ -84,7 +84,7 @@ class Lamps(Struct, frozen=True, tag="lamps", forbid_unknown_fields=True):
 
 
 class Crowd(Struct, frozen=True, tag="crowd", forbid_unknown_fields=True):
-    """So many background vehicles on the road from now on, at most as many as the run began with."""
+    """So many background vehicles on the road from now on, at most those of the run and its reserve."""
 
     vehicles: int
 

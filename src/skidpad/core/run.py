@@ -155,6 +155,7 @@ class Roads(Struct, frozen=True, kw_only=True, tag="roads", forbid_unknown_field
     ] = TrafficStart.FIXED
     vehicles: Annotated[int, Meta(ge=0, le=80, description="Background vehicles, 0 to 80.")] = 20
     allow_fewer: bool = False
+    reserve: Annotated[int, Meta(ge=0, le=80)] = 0  # further vehicles that a person may call in
     edges: Annotated[
         Edges, Meta(description="rail: guard rails along the roads of a map without barriers.")
     ] = Edges.NONE

@@ -45,6 +45,9 @@ class ActorSetup:
     present: bool = True  # False: it is not there until it is told to appear (embedded backend)
 
 
+RESERVE = "reserve_"  # names of vehicles that wait to be called begin with this
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class TrafficSetup:
     """Background traffic placed by the backend."""
@@ -52,6 +55,7 @@ class TrafficSetup:
     mode: TrafficStart = TrafficStart.FIXED
     vehicles: int = 20
     allow_fewer: bool = False  # A-208
+    reserve: int = 0  # further vehicles, which enter when a command lets them appear
     variant: str = "listing"  # or "table": which published positions (D-085, D-086)
     initial_limit_kmh: float | None = None  # None: the map's limit at the place (decision M-6)
     slow_in_weather: bool = False  # the switch `drivers` (decisions M-1, R-5)

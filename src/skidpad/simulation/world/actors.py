@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.geometry import Pose
-from skidpad.core.setup import ActorSetup, LanePosition, Setup
+from skidpad.core.setup import RESERVE, ActorSetup, LanePosition, Setup, TrafficSetup
 from skidpad.core.vocabulary import ActorKind, TrafficStart
 from skidpad.physics.types import traffic_types, vehicle_type, vehicle_types
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.simulation.world.rows import Newcomer, Shape
 from skidpad.simulation.world.traffic.placement import (
+    PACK_FACTOR,
     RANDOM_MAX,
     Spawn,
     fixed_spawns,
@@ -51,6 +55,7 @@ class Role:
     actor: ActorSetup
     factor: float = 1.0  # desired speed over the limit, for drivers
     late: bool = False  # enters when there is room (A-209)
+    reserve: bool = False  # and not before it is called
 
     def newcomer(self, i: int) -> Newcomer:
         """How it enters as the i-th."""
@@ -84,8 +89,13 @@ def cast_of(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
 
 def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
     traffic = setup.traffic
-    if traffic is None or traffic.vehicles == 0:
+    if traffic is None or traffic.vehicles + traffic.reserve == 0:
         return []
+    if traffic.vehicles + traffic.reserve > RANDOM_MAX:
+        raise ConfigError(
+            f"traffic.reserve must be at most {RANDOM_MAX - traffic.vehicles} beside "
+            f"{traffic.vehicles} vehicles, got {traffic.reserve}"
+        )
     if traffic.mode is TrafficStart.RANDOM:
         factors = random_factors(traffic.vehicles, seed)
         if traffic.variety:  # their characters bring the spread
@@ -101,6 +111,20 @@ def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
         pose = Pose(0.0, 0.0) if spawn.place is None else spawn.place.pose
         actor = ActorSetup(name=f"traffic_{i + 1:02d}", type=type_of(i, types), place=pose)
         roles.append(Role(actor, spawn.factor, spawn.place is None))
+    return roles + _reserve(traffic, types, len(roles), seed)
+
+
+def _reserve(traffic: TrafficSetup, types: Sequence[str], first: int, seed: int) -> list[Role]:
+    """Who waits to be called; they want to go as fast as random traffic does."""
+    total = traffic.vehicles + traffic.reserve
+    factors = np.ones(total) if traffic.variety else random_factors(total, seed)
+    pack = traffic.mode is TrafficStart.PACK
+    roles = []
+    for i in range(traffic.reserve):
+        name, type = f"{RESERVE}{i + 1:02d}", type_of(first + i, types)
+        actor = ActorSetup(name=name, type=type, place=Pose(0.0, 0.0))
+        factor = PACK_FACTOR if pack else float(factors[traffic.vehicles + i])
+        roles.append(Role(actor, factor, reserve=True))
     return roles
 
 

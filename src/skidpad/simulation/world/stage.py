@@ -34,13 +34,15 @@ def staged(setup: Setup, seed: int) -> World:
         world.set_collides(id, role.actor.collides)
         if role.late:
             drivers.await_room(id, role.factor)
+        elif role.reserve:
+            drivers.keep_back(id, role.factor)
         else:
             row = world.row(id)
             world.put(row, place_of(map, role.actor.place), role.actor.speed)
             world.states.present[row] = role.actor.present
     world.settle()
     for id, role in zip(ids, roles, strict=True):
-        if id != EGO and not role.late and role.actor.driver is Control.AUTOPILOT:
+        if id != EGO and not (role.late or role.reserve) and role.actor.driver is Control.AUTOPILOT:
             _engage(world, drivers, id, role)
     world.feel_grip()
     return world

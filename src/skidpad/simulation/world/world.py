@@ -383,6 +383,9 @@ class World:
         i = self.index.get(word.actor)
         if i is None:
             raise ConfigError(f"there is no actor {word.actor!r} in this run")
+        traffic = self.traffic
+        if word.present and traffic is not None and traffic.call(self.members[i].id):
+            return
         if word.present is not None:
             self.states.present[i] = word.present
         if word.command is not None:

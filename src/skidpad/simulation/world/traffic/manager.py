@@ -107,6 +107,7 @@ class Traffic:
         self.row: dict[int, int] = {}  # by id
         self._way = np.full(PATH, -1, dtype=np.int32)  # room for a way through the map
         self.waiting: list[int] = []  # ids of those who enter when there is room
+        self.kept_back: set[int] = set()  # ids of those who do so once they are called
 
     def arrange(self, members: Sequence[Member], source: Mapping[int, int]) -> None:
         """The actors have other rows; source: old row by new row of those who were there."""
@@ -124,6 +125,7 @@ class Traffic:
         self.streets = self.streets._replace(walkers=walkers)
         self.row = {id: i for i, id in enumerate(ids)}
         self.waiting = [id for id in self.waiting if id in self.row]
+        self.kept_back.intersection_update(self.row)
 
     @property
     def free_choice(self) -> bool:
@@ -146,6 +148,19 @@ class Traffic:
         self.drivers.trait["factor"][self.row[id]] *= factor
         self.waiting.append(id)
 
+    def keep_back(self, id: int, factor: float) -> None:
+        """An actor waits for `call` before it waits for room."""
+        self.drivers.trait["factor"][self.row[id]] *= factor
+        self.kept_back.add(id)
+
+    def call(self, id: int) -> bool:
+        """Whether this one was kept back: it enters as soon as there is a free place."""
+        if id not in self.kept_back:
+            return False
+        self.kept_back.remove(id)
+        self.waiting.append(id)
+        return True
+
     def release(self, i: int) -> None:
         """Actor i is moved by commands from here on."""
         self.drivers.state["active"][i] = False
@@ -163,6 +178,8 @@ class Traffic:
             yield from self._keep_bubble(states)
         elif self.setup.mode is TrafficStart.PACK and placed["lane"][0] >= 0:
             yield from self._keep_pack(states, Pack(self.net, placed[0], self.places.lane))
+        elif self.waiting:
+            yield from self._let_in(states, Area(UNSEEN, BUBBLE))
 
     def _keep_pack(self, states: ActorStates, pack: Pack) -> Iterator[Move]:
         def area(*sides: bool) -> Area:

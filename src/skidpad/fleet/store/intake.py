@@ -13,7 +13,7 @@ from concurrent.futures import Future
 from dataclasses import dataclass
 from typing import Any
 
-from sqlalchemy import Connection, Engine, select
+from sqlalchemy import Connection, Engine, bindparam, select
 from sqlalchemy.exc import IntegrityError
 
 from skidpad.fleet.batch import Drive, Found, weather_class
@@ -24,6 +24,14 @@ from skidpad.fleet.words import Kind, Refused
 
 Clock = Callable[[], float]  # s since 1970
 GROUP = 128  # batches of one commit at most
+# Made once: making them anew for every batch cost as much as asking.
+BY_KEY = select(batches.c.id, batches.c.digest).where(
+    batches.c.vehicle == bindparam("vehicle"), batches.c.key == bindparam("key")
+)
+BY_DIGEST = select(hazards.c.digest, hazards.c.id).where(
+    hazards.c.vehicle == bindparam("vehicle"),
+    hazards.c.digest.in_(bindparam("digests", expanding=True)),
+)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -130,11 +138,8 @@ class Intake:
         self, connection: Connection, batch: Batch, pack: str, start: int
     ) -> Receipt | Refused:
         body = digest(batch.body)
-        known = connection.execute(
-            select(batches.c.id, batches.c.digest).where(
-                batches.c.vehicle == batch.vehicle, batches.c.key == batch.key
-            )
-        ).first()
+        about = {"vehicle": batch.vehicle, "key": batch.key}
+        known = connection.execute(BY_KEY, about).first()
         if known is not None:
             if known.digest != body:
                 return Refused(409, "this idempotency key was used for another body")
@@ -193,13 +198,8 @@ def _known(connection: Connection, batch: Batch) -> dict[str, str]:
     asked = [found.digest for found in batch.found]
     known: dict[str, str] = {}
     for first in range(0, len(asked), 500):
-        some = asked[first : first + 500]
-        rows = connection.execute(
-            select(hazards.c.digest, hazards.c.id).where(
-                hazards.c.vehicle == batch.vehicle, hazards.c.digest.in_(some)
-            )
-        )
-        known.update((row.digest, row.id) for row in rows)
+        about = {"vehicle": batch.vehicle, "digests": asked[first : first + 500]}
+        known.update((kept, id) for kept, id in connection.execute(BY_DIGEST, about))
     return known
 
 

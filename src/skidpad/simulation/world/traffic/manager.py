@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from math import hypot
+from math import hypot, inf
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ from skidpad.simulation.world.traffic.care import (
     STOP_MARGIN,
     Care,
     grip_at,
+    speed_to_stop_within,
 )
 from skidpad.simulation.world.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
 from skidpad.simulation.world.traffic.mobil import B_SAFE, GAP_CLEAR
@@ -44,6 +45,7 @@ AIR_DENSITY = 1.204  # kg/m^3 at 20 C
 STUCK_TIME = 10.0  # s, decision M-7
 PUT_BACK_NEAREST = 100.0  # m from the ego, decision M-7
 PUT_BACK_SPEED = 0.8  # of the desired speed there
+NOSE = 5.0  # m from a car's middle to where it stands before a line
 BUBBLE = 500.0  # m, random traffic lives within this distance of the ego (A-209)
 CHECK_PERIOD = 20  # ticks between two looks at wrecks and the bubble
 
@@ -241,7 +243,15 @@ class Traffic:
         me = drivers(1).state[0]
         me["at"], me["s"] = at, point["s"]
         straight_path(self.net, int(self.places.lane[at]), self._way)
-        return min(v, float(desired_speed(self.net, me, trait, self._way, v, self.care)))
+        v = min(v, float(desired_speed(self.net, me, trait, self._way, v, self.care)))
+        return speed_to_stop_within(self.care, self._way_to_line(at), v)
+
+    def _way_to_line(self, at: int) -> float:
+        """m from sample `at` to where one may have to wait for others; inf: the lane leads to none."""
+        lane, entry = int(self.places.lane[at]), self.streets.entry
+        if not entry["size"][self.net.lane["ahead"][lane]]:
+            return inf
+        return max(float(entry["line"][lane] - self.net.point["s"][at]) - NOSE, 0.0)
 
 
 def room(care: Care, v: float, states: ActorStates) -> NDArray[np.float64]:

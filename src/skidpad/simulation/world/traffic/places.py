@@ -46,17 +46,20 @@ class FreePlaces:
     ) -> int | None:
         """A sample between `nearest` and `farthest` m from the ego, clear of all; None: not found.
 
-        room: m to keep to every actor at a sample, (n,). among: candidates, None: all.
+        room: m to keep to every actor at a sample, (n,), at least CLEARANCE. among: candidates, None: all.
         """
         point = self.net.point
         among = self.candidates if among is None else among
         if not len(among):
             return None
-        for index in self.rng.integers(0, len(among), TRIES):
-            at = int(among[index])
+        tried = among[self.rng.integers(0, len(among), TRIES)]
+        x, y = point["x"][tried], point["y"][tried]
+        from_ego = np.hypot(states.x[0] - x, states.y[0] - y)
+        here = states.present
+        near = np.hypot(states.x[here] - x[:, None], states.y[here] - y[:, None]) < CLEARANCE
+        possible = (nearest <= from_ego) & (from_ego <= farthest) & ~near.any(axis=1)
+        for at in tried[possible].tolist():
             d = np.hypot(states.x - point["x"][at], states.y - point["y"][at])
-            if not nearest <= d[0] <= farthest:
-                continue
-            if not (states.present & (d < room(at))).any():
-                return at
+            if not (here & (d < room(at))).any():
+                return int(at)
         return None

@@ -33,6 +33,7 @@ ENTRY = np.dtype(  # per lane
         ("first", "i4"),  # conflicts are first:first + size
         ("size", "i4"),
         ("junction", "i4"),  # in which the lane lies, else -1
+        ("bend", "f8"),  # 1/m, the largest curvature of the lane
         ("line", "f8"),  # m along the lane: where one waits before the junction behind its end
         ("control", "i4"),  # of that line: Control
         ("signal", "i4"),  # row of SignalTable for a light, else -1
@@ -60,6 +61,7 @@ class _Bake:
         self.entry = np.zeros(len(lanes.first), dtype=ENTRY)
         self.entry["line"] = lanes.length - WAIT_MARGIN
         self.entry["junction"] = lanes.junction
+        self.entry["bend"] = np.maximum.reduceat(np.abs(samples.curvature), lanes.first)
         self.entry["signal"] = -1
         kinds = {SignalKind.LIGHT: LIGHT, SignalKind.STOP: STOP, SignalKind.YIELD: YIELD}
         for row in range(len(signals.id)):

@@ -13,7 +13,7 @@ import numpy as np
 
 from skidpad.core.jit import kernel
 from skidpad.simulation.world.placed import Places
-from skidpad.simulation.world.traffic.care import drive_limit, reach
+from skidpad.simulation.world.traffic.care import bend_speed_sq, drive_limit, reach
 from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, find_ahead
 from skidpad.simulation.world.traffic.path import PATH
 from skidpad.simulation.world.traffic.priority import LIGHT, STOP, YIELD
@@ -98,11 +98,21 @@ def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, co
             continue
         margin = JOIN_MARGIN if conflict.joins else GAP_MARGIN
         way = max(start + conflict.end + 2.0 * body.half_length, 1.0)
-        a_max = drive_limit(view.care, body.speed, d.trait[i].a_max)
-        clear = _travel_time(max(body.speed, 0.0), way, a_max, V_THROUGH) + margin
+        clear = _time_through(view, d, i, way, entry.bend) + margin
         if _is_coming(view, d, i, conflict.other, conflict.other_start, clear):
             return True
     return False
+
+
+@kernel
+def _time_through(view: View, d: Drivers, i: int, way: float, bend: float) -> float:
+    """s that driver i takes for `way` m through a junction, no faster than its bend allows."""
+    a_max = drive_limit(view.care, view.placed[i].speed, d.trait[i].a_max)
+    v, v_max = max(view.placed[i].speed, 0.0), V_THROUGH
+    if view.care.on and bend * V_THROUGH * V_THROUGH > 1.0:
+        v_bend = sqrt(bend_speed_sq(view.care, bend, d.trait[i].a_curve))
+        v, v_max = min(v, v_bend), min(v_max, v_bend)
+    return _travel_time(v, way, a_max, v_max)
 
 
 @kernel

@@ -41,7 +41,7 @@ def steer(view: View, d: Drivers, i: int) -> float:
     kappa = curvature_ahead(view, d, i, v * PREVIEW_TIME)
     a_lateral = -me.shift * blend_bend - OMEGA * OMEGA * error - 2.0 * ZETA * OMEGA * error_rate
     kappa += a_lateral / (v * v)
-    most = steering_limit(view.care, v) / (v * v)
+    most = steering_limit(view.care, body.speed) / max(body.speed, V_STANDING) ** 2
     kappa = min(max(kappa, -most), most)
     angle = atan(trait.wheelbase * kappa) + trait.understeer * v * v * kappa
     return float(min(max(angle / (trait.steer_angle * steer_share(v)), -1.0), 1.0))

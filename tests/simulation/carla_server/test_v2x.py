@@ -17,6 +17,7 @@ from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.sensing import cam
 from skidpad.simulation.carla_server.sensing.radio import (
+    Boxes,
     Call,
     Radio,
     Way,
@@ -70,7 +71,10 @@ def test_lines_cross_boxes():
         Box(Pose(40.0, 0.0, 1.0), (1.0, 1.0, 1.0)),  # beyond the end
         Box(Pose(10.0, 0.0, 4.0), (1.0, 1.0, 1.0)),  # above
     ]
-    assert crossed(boxes, (0.0, 0.0, 1.0), (30.0, 0.0, 1.0)) == boxes[:2]
+    among = Boxes.of(enumerate(boxes, start=1))
+    assert crossed(among, (0.0, 0.0, 1.0), (30.0, 0.0, 1.0)) == boxes[:2]
+    assert crossed(among, (0.0, 0.0, 1.0), (30.0, 0.0, 1.0), besides=(1, 4)) == boxes[1:2]
+    assert crossed(Boxes.of([]), (0.0, 0.0, 1.0), (30.0, 0.0, 1.0)) == []
 
 
 def test_a_station_speaks_when_something_changes_and_at_least_every_second():

@@ -17,10 +17,11 @@ from skidpad.sensors.lighting import lighting
 from skidpad.sensors.live_scene import LiveScene
 from skidpad.sensors.shading import Shading
 from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable, Box
+from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.landscape import Landscape
 from skidpad.simulation.carla_server.maps import ServedMap
-from skidpad.simulation.carla_server.sensing.radio import Air
+from skidpad.simulation.carla_server.sensing.radio import Air, Boxes
 from skidpad.simulation.carla_server.vehicles import Vehicles
 from skidpad.simulation.carla_server.weather import Sky
 
@@ -64,6 +65,8 @@ class Surroundings:
         self._landscape = landscape
         self.gravity = G  # m/s^2, as set by clients
         self.air = Air()
+        self._built: tuple[RoadMap, Boxes] | None = None
+        self._cars: tuple[int, Boxes] | None = None
         self._vehicles, self._sky, self._clock = vehicles, sky, clock
         self._pictured: Pictured | None = None
 
@@ -95,9 +98,21 @@ class Surroundings:
         offsets = zip((mount.x, mount.y, mount.z), carrier.centre, carrier.half, strict=True)
         return row if all(abs(m - c) < h + SKIN for m, c, h in offsets) else -1
 
-    def built(self) -> list[Box]:
-        """Boxes of what stands beside the road at present."""
-        return [Box(o.centre, o.half) for o in self._landscape.present()]
+    def built(self) -> Boxes:
+        """What stands beside the road at present."""
+        roads = self._landscape.roads
+        if self._built is None or self._built[0] is not roads:
+            there = ((0, Box(o.centre, o.half)) for o in self._landscape.present())
+            self._built = roads, Boxes.of(there)
+        return self._built[1]
+
+    def cars(self) -> Boxes:
+        """All vehicles as they are in this frame."""
+        frame = self._clock.frame
+        if self._cars is None or self._cars[0] != frame:
+            vehicles = self.actors.of(Family.VEHICLE)
+            self._cars = frame, Boxes.of((a.id, self.actors.box(a)) for a in vehicles)
+        return self._cars[1]
 
     def lamps(self, vehicle: Actor) -> int:
         """Flags of VehicleLightState."""

@@ -116,12 +116,8 @@ def _arriving(around: Surroundings, sensor: Sensor, own: Call, call: Call) -> fl
     radio = sensor.equipment.radio
     if sum((a - b) ** 2 for a, b in zip(own.place, call.place, strict=True)) >= radio.reach**2:
         return None
-    vehicles = (
-        around.actors.box(a)
-        for a in around.actors.of(Family.VEHICLE)
-        if a.id not in (own.carrier, call.carrier)
-    )
-    tops = crossed(vehicles, call.place, own.place)
+    carriers = (own.carrier, call.carrier)
+    tops = crossed(around.cars(), call.place, own.place, carriers)
     blocked = crossed(around.built(), call.place, own.place)
     way = Way.BUILDING if blocked else Way.VEHICLE if tops else Way.CLEAR
     fading = radio.deviation(way) * float(sensor.rng.standard_normal())

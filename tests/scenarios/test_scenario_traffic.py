@@ -49,7 +49,7 @@ def sink(lane=-2, s=400, radius=5):
 def swarm(number=12, inner=20, major=150, minor=60, more=""):
     return (
         f'<TrafficSwarmAction innerRadius="{inner}" semiMajorAxis="{major}" semiMinorAxis="{minor}" '
-        f'numberOfVehicles="{number}" offset="0"><CentralObject entityRef="ego"/>{CARS}{more}'
+        f'numberOfVehicles="{number}" velocity="12" offset="0"><CentralObject entityRef="ego"/>{CARS}{more}'
         "</TrafficSwarmAction>"
     )
 
@@ -191,6 +191,12 @@ def test_a_collision_with_any_vehicle_may_be_one_with_traffic(tmp_path):
     hit = """<ByEntityCondition><TriggeringEntities triggeringEntitiesRule="any"><EntityRef
 entityRef="other"/></TriggeringEntities><EntityCondition><CollisionCondition><ByType
 type="vehicle"/></CollisionCondition></EntityCondition></ByEntityCondition>"""
-    init = at("ego", -3, 100) + at("other", -2, 250, 30) + traffic(source(-2, 300, 1, 0.1, 5))
-    run = told(tmp_path, init=init, stop=condition(hit) + condition(time(10)))
-    assert 1.0 < run.rows[-1].time < 5.0
+    init = at("ego", -3, 100) + at("other", -2, 70, 30) + traffic(source(-2, 300, 1, 0.1, 5))
+    run = told(tmp_path, init=init, stop=condition(hit) + condition(time(20)))
+    assert 5.0 < run.rows[-1].time < 12.0
+
+
+def test_nobody_appears_before_somebody_fast(tmp_path):
+    init = at("ego", -3, 100) + at("other", -2, 240, 30) + traffic(source(-2, 300, 1, 0.5, 10))
+    first = begins(told(tmp_path, init=init))[0]
+    assert first.time > 60.0 / 30.0

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from math import cos, sin
 from typing import Any, NamedTuple, Protocol
@@ -38,11 +37,13 @@ class Spots(NamedTuple):
         """Those of the mask."""
         return Spots(*(column[mask] for column in self))
 
-    def free(self, actor: Actor, room: float) -> Mask:
-        """Those that keep `room` m from an actor's centre along the lane, or lie in another lane."""
+    def free(self, actor: Actor, before: float, behind: float) -> Mask:
+        """Those with room in m, before and behind them, to an actor's centre in their lane."""
         dx, dy = actor.pose.x - self.x, actor.pose.y - self.y
         c, s = np.cos(self.heading), np.sin(self.heading)
-        away: Mask = (np.abs(dx * c + dy * s) >= room) | (np.abs(dy * c - dx * s) > ABREAST)
+        forward = dx * c + dy * s
+        along = (forward < before) & (forward > -behind)
+        away: Mask = ~along | (np.abs(dy * c - dx * s) > ABREAST)
         return away
 
 
@@ -164,15 +165,6 @@ def along(pose: Pose, spots: Spots) -> Mask:
     """Spots whose traffic runs as the pose looks."""
     same: Mask = np.cos(spots.heading - pose.yaw) > 0.0
     return same
-
-
-def clear(spots: Spots, actors: Iterable[Actor], room: float) -> Mask:
-    """Spots that keep `room` m, and half of its length, from every actor that is there."""
-    mask = np.ones(len(spots.x), np.bool_)
-    for actor in actors:
-        if actor.present:
-            mask &= spots.free(actor, room + 0.5 * actor.entity.box.length)
-    return mask
 
 
 def _seen(pose: Pose, spots: Spots) -> tuple[Array, Array]:

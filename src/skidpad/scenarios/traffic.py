@@ -14,13 +14,13 @@ from skidpad.core.setup import ActorCommand
 from skidpad.scenarios.measures import between
 from skidpad.scenarios.network import Place
 from skidpad.scenarios.scene import Actor, Scene
-from skidpad.scenarios.spots import Disc, Mask, Region, Spots, along, clear, spot_at, spots_of
-from skidpad.simulation.world.traffic.idm import Character, idm
+from skidpad.scenarios.spots import Disc, Mask, Region, Spots, along, spot_at, spots_of
+from skidpad.simulation.world.traffic.idm import B_COMFORT, Character, idm
 
 LOOK = 80.0  # m ahead within which somebody may be followed; assumption
 BESIDE = 10.0  # m of the way to another that a bend may hide; assumption
-ROOM_MIN = 4.0  # m kept free before and behind who appears, and the way of:
-ROOM_TIME = 1.0  # s; assumption, at or below what drivers keep
+# kept free before and behind who appears, besides what comfortable braking takes; assumptions
+ROOM_MIN, ROOM_TIME = 4.0, 1.0  # m, s of the speed of the one behind
 AGAIN = 1.0  # s between looks for places, where fewer are there than should be
 END = 3.0  # m before the end of a road where traffic leaves it
 V_UNKNOWN = 50.0 / 3.6  # m/s where neither the file nor the map says a speed; assumption
@@ -64,8 +64,7 @@ class Pool:
         actor = scene.actors[self.rng.choice(away)]
         k = self.rng.randrange(len(spots.x))
         v = min(self.speeds.draw(self.rng, scene, spots, k), actor.entity.performance.v_max)
-        room = ROOM_MIN + ROOM_TIME * v + 0.5 * actor.entity.box.length
-        free = clear(spots, scene.actors.values(), room)
+        free = _free(scene, spots, v, actor.entity.box.length)
         if not free[k]:
             found = np.flatnonzero(free)
             if len(found) == 0:
@@ -82,6 +81,27 @@ def vanish(scene: Scene, actor: Actor) -> None:
     scene.cruising.pop(actor.name, None)
     actor.present = False
     actor.word = ActorCommand(actor.name, present=False)
+
+
+def _free(scene: Scene, spots: Spots, v: float, length: float) -> Mask:
+    """Spots where somebody of this length may appear at v m/s without anybody braking hard."""
+    mask = np.ones(len(spots.x), np.bool_)
+    for actor in scene.actors.values():
+        if actor.present:
+            other = _speed(scene, actor)
+            lengths = 0.5 * (length + actor.entity.box.length)
+            mask &= spots.free(actor, lengths + _room(v, other), lengths + _room(other, v))
+    return mask
+
+
+def _room(v_behind: float, v_ahead: float) -> float:
+    closing = max(v_behind - v_ahead, 0.0)
+    return ROOM_MIN + ROOM_TIME * v_behind + closing**2 / (2.0 * B_COMFORT)
+
+
+def _speed(scene: Scene, actor: Actor) -> float:
+    """m/s; that of who has just appeared is not measured yet."""
+    return actor.guide.v if actor.name in scene.cruising else actor.v
 
 
 class Sourcing:
@@ -223,7 +243,7 @@ def _lead(scene: Scene, actor: Actor) -> tuple[float, float]:
             continue
         forward, left = between(place.pose, other.pose.x, other.pose.y)
         if abs(left) < 0.5 * place.width and abs(forward) < BESIDE:
-            v = other.guide.v if other.name in scene.cruising else other.v
+            v = _speed(scene, other)
             lengths = 0.5 * (actor.entity.box.length + other.entity.box.length)
             return max(distance - lengths, 0.0), v * cos(other.pose.yaw - place.heading)
     return inf, 0.0

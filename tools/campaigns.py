@@ -18,9 +18,11 @@ import subprocess
 import sys
 from pathlib import Path
 
+from result_grip import keep_delays
 from result_tables import RESULTS, ROOT, plan
 
 KEPT = ("results.parquet", "campaign.json")
+MOST = 1_000_000  # bytes of a description; a longer one repeats what the command says
 
 
 def words_of(command: str, maps: Path | None) -> list[str] | None:
@@ -64,7 +66,10 @@ def freeze(name: str, target: Path) -> None:
         shutil.copy(target, part / "rows.csv")
     else:
         for file in KEPT:
-            shutil.copy(target / file, part / file)
+            if file == "results.parquet" or (target / file).stat().st_size <= MOST:
+                shutil.copy(target / file, part / file)
+        if name == "grip":
+            keep_delays(target, part)
     commit = subprocess.run(
         ["git", "describe", "--always", "--dirty"],
         check=True, capture_output=True, text=True, cwd=ROOT,

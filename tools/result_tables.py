@@ -18,18 +18,19 @@ from pathlib import Path
 from typing import Any
 
 import polars as pl
+import result_grip
 import yaml
+from result_texts import limits, markdown, verdict_rows
 
 from skidpad.evidence.channels.findings import FINDINGS as CHANNELS
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.grip.findings import FINDINGS as GRIP
-from skidpad.evidence.statistics import Interval, Rate, clopper_pearson
-from skidpad.evidence.verdicts import Finding, Judgement, judge
+from skidpad.evidence.statistics import Rate
+from skidpad.evidence.verdicts import Finding, judge
 from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.matrix import MatrixEntry
 from skidpad.report.matrix_data import Matrix, config_title, weather_title
-from skidpad.report.verdicts import plain
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "docs" / "results"
@@ -98,7 +99,11 @@ def block(name: str, which: str, folder: Path) -> str:
         "adas fatal": lambda path: by_weather(path, "fatal_collisions"),
         "adas vehicles": lambda path: by_weather(path, "crashes_vehicle"),
         "adas claims": matrix_claims,
-        "grip completion": completion,
+        "grip completion": result_grip.completion,
+        "grip claims": result_grip.claims,
+        "grip thresholds": result_grip.thresholds,
+        "grip threshold-claims": result_grip.threshold_verdicts,
+        "grip rain": result_grip.rain_parted,
         "study claims": lambda path: study_claims(path, words[1]),
     }
     return driven(folder) + tables[f"{words[0]} {which}"](folder)
@@ -110,22 +115,11 @@ def driven(folder: Path) -> str:
     return f"Driven {told['date']} at commit {told['commit']}, {told['machine']}.\n\n"
 
 
-def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A table."""
-    lines = [head, ["---"] * len(head), *rows]
-    return "".join("| " + " | ".join(line) + " |\n" for line in lines)
-
-
 def rated(rate: Rate | None) -> str:
     """`1.98 [1.57, 2.40]`, or `too few` in place of the limits."""
     if rate is None:
         return "no run"
     return f"{rate.rate:.2f} {limits(rate.interval)}"
-
-
-def limits(interval: Interval | None) -> str:
-    """Limits in brackets."""
-    return "too few" if interval is None else f"[{interval.low:.2f}, {interval.high:.2f}]"
 
 
 def matrix_of(folder: Path) -> Matrix:
@@ -167,15 +161,6 @@ def by_weather(folder: Path, column: str) -> str:
     return markdown(head, rows)
 
 
-def verdict_rows(judged: Sequence[Judgement]) -> str:
-    """One row per claim: verdict, a plain sentence, the numbers."""
-    rows = [
-        [j.finding.id, j.finding.claim, j.verdict.value, plain(j), j.text.replace("|", "\\|")]
-        for j in judged
-    ]
-    return markdown(("id", "claim", "verdict", "in a sentence", "numbers"), rows)
-
-
 def matrix_claims(folder: Path) -> str:
     """Every claim that a matrix can judge."""
     results = matrix_of(folder).results
@@ -192,30 +177,6 @@ def study_claims(folder: Path, id: str) -> str:
     rows = rows.with_columns(pl.col("config", "weather").cast(pl.String))
     claims = [BY_ID[claim] for claim in STUDIES[id].claims]
     return verdict_rows(judge(claims, [rows] * len(claims), astray(rows)))
-
-
-def completion(folder: Path) -> str:
-    """Completion in percent, by weather, scenario and friction."""
-    from skidpad.recording.grip import GripEntry
-
-    runs = CampaignFolder(folder, GripEntry).results
-    keys = ["weather", "scenario", "friction"]
-    cells = runs.group_by(keys, maintain_order=True).agg(
-        n=pl.len(), k=pl.col("completion").cast(pl.Int64).sum()
-    )
-    sides = runs.select("scenario", "friction").unique(maintain_order=True).rows()
-    table = {row[:3]: row[3:] for row in cells.rows()}
-
-    def cell(key: tuple[str, str, str]) -> str:
-        if key not in table:
-            return "no run"
-        n, k = table[key]
-        low, high = (100.0 * end for end in clopper_pearson(k, n))
-        return f"{100.0 * k / n:.0f} [{low:.0f}, {high:.0f}]"
-
-    weathers = runs["weather"].unique(maintain_order=True).to_list()
-    head = ["weather", *(f"{s}, {f}" for s, f in sides)]
-    return markdown(head, [[w, *(cell((w, *side)) for side in sides)] for w in weathers])
 
 
 def main() -> None:

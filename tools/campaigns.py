@@ -68,7 +68,7 @@ def freeze(name: str, target: Path) -> None:
         for file in KEPT:
             if file == "results.parquet" or (target / file).stat().st_size <= MOST:
                 shutil.copy(target / file, part / file)
-        if name == "grip":
+        if (target / "series").is_dir():
             keep_delays(target, part)
     commit = subprocess.run(
         ["git", "describe", "--always", "--dirty"],

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import polars as pl
-from result_texts import limits, markdown, verdict_rows
 
+from result_texts import limits, markdown, verdict_rows
 from skidpad.evidence.grip.findings import FINDINGS
 from skidpad.evidence.grip.rain import CELLS, four_cells
 from skidpad.evidence.grip.study import Pair, Share

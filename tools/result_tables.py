@@ -13,15 +13,15 @@ import json
 import re
 import shlex
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import polars as pl
-import result_grip
 import yaml
-from result_texts import limits, markdown, verdict_rows
 
+import result_grip
+from result_texts import limits, markdown, verdict_rows
 from skidpad.evidence.channels.findings import FINDINGS as CHANNELS
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS, astray

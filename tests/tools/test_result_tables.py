@@ -143,3 +143,16 @@ def test_what_a_campaign_left_is_frozen_whole(tmp_path, monkeypatch):
     frozen = tmp_path / "results" / "grip"
     assert sorted(p.name for p in frozen.iterdir()) == sorted([*campaigns.KEPT, "driven.json"])
     assert set(json.loads((frozen / "driven.json").read_text())) == {"commit", "date", "machine"}
+
+
+def test_a_description_that_only_repeats_the_command_is_left_out(tmp_path, monkeypatch):
+    monkeypatch.setattr(campaigns, "RESULTS", tmp_path / "results")
+    monkeypatch.setattr(campaigns, "MOST", 1)
+    (tmp_path / "results").mkdir()
+    left = tmp_path / "out"
+    left.mkdir()
+    for file in campaigns.KEPT:
+        (left / file).write_text("{}")
+    campaigns.freeze("grip-threshold", left)
+    frozen = tmp_path / "results" / "grip-threshold"
+    assert sorted(p.name for p in frozen.iterdir()) == ["driven.json", "results.parquet"]

@@ -16,6 +16,7 @@ from skidpad.physics.manoeuvres import (
     time_to_speed,
     understeer,
 )
+from skidpad.physics.split import split_stop
 from skidpad.physics.types import EGO_TYPE, VehicleType, traffic_types, vehicle_type
 
 EGO = vehicle_type(EGO_TYPE)
@@ -98,6 +99,19 @@ def test_brakes_on_split_friction_pull_less_with_stability_control():
             bench.step(0.0, 0.0, 1.0)
         rates.append(float(bench.fleet.states.yaw_rate[0]))
     assert 0.0 < rates[0] < 0.6 * rates[1]
+
+
+@pytest.mark.parametrize("kind", CARS, ids=by_title)
+def test_a_driver_who_steers_stops_in_lane_on_split_friction(kind):
+    stop = split_stop(kind, 100 / 3.6, steers=True)
+    assert stop.aside < 0.6
+    assert degrees(stop.heading) < 4.0
+    assert degrees(stop.wheel) < 90.0
+    assert 0.6 < stop.utilisation < 1.0
+    assert split_stop(kind, 100 / 3.6, steers=False).aside > 5.0
+    without = split_stop(kind, 100 / 3.6, steers=True, stability=False)
+    assert without.wheel > 2.0 * stop.wheel
+    assert without.aside > 2.0 * stop.aside
 
 
 @pytest.mark.parametrize("stability", [True, False])

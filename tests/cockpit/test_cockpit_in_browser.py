@@ -94,7 +94,9 @@ def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, t
         # a gamepad is noticed by itself, and says so
         page.evaluate(GAMEPAD)
         until_fact(page, "drives", "you, by gamepad")
-        page.evaluate("navigator.getGamepads = () => []")
+        page.evaluate("navigator.getGamepads = () => []")  # unplugged
+        until(page, "() => document.querySelector('.cockpit').dataset.wrong?.includes('unplugged')")
+        until_fact(page, "drives", "you, by keyboard")
         # headlights, weather, functions by keys and by switches
         page.keyboard.press("l")
         until(page, "() => document.querySelector('.lamp').textContent.includes('low')")

@@ -81,7 +81,7 @@ export default {
       if ("drives" in message) { this.drives = message.drives;
         this.$refs.bar.textContent = message.drives ? "this tab drives" : "another tab drives: this one watches";
         this.$el.classList.toggle("watches", !message.drives); }
-      if (message.wrong) { this.$el.dataset.wrong = message.wrong; this.$refs.wrong.textContent = message.wrong; setTimeout(() => { this.$refs.wrong.textContent = ""; }, 4000); }
+      if (message.wrong) this.warn(message.wrong);
       if (message.ended) { this.ended = true; this.$refs.alert.textContent = message.ended; this.$el.classList.add("over"); }
     },
     async picture(data) {
@@ -191,18 +191,26 @@ export default {
       if (pressed || this.pressed || now) this.say("pedals", pedals);
       this.pressed = pressed;
     },
+    warn(text) {
+      this.$el.dataset.wrong = text; this.$refs.wrong.textContent = text;
+      setTimeout(() => { this.$refs.wrong.textContent = ""; }, 4000);
+    },
     keyboard() {
       const k = this.keys, n = (v) => v ? 1 : 0;
       return { throttle: n(k.up), brake: n(k.down), steer: n(k.left) - n(k.right), handbrake: !!k.hand, method: "keyboard" };
     },
     gamepad() {
-      const pad = navigator.getGamepads ? [...navigator.getGamepads()].find((p) => p && p.connected) : null; if (!pad) return null;
+      const pad = navigator.getGamepads ? [...navigator.getGamepads()].find((p) => p && p.connected) : null;
+      if (!pad && this.plugged) this.warn(`the ${this.plugged} is unplugged: pedals are released, the keyboard drives`);
+      this.plugged = pad && this.padded ? (this.plugged || "gamepad") : "";
+      if (!pad) return null;
       const b = (i) => pad.buttons[i] ? pad.buttons[i].value : 0, dead = (v) => Math.abs(v) < 0.06 ? 0 : v, r = (v) => Math.round(v * 100) / 100;
       const wheel = /wheel|g29|g920|t150|t300/i.test(pad.id);
       const p = wheel
         ? { throttle: r(Math.max(0, (1 - (pad.axes[2] ?? 1)) / 2)), brake: r(Math.max(0, (1 - (pad.axes[5] ?? pad.axes[3] ?? 1)) / 2)) }
         : { throttle: r(b(7)), brake: r(b(6)) };
       Object.assign(p, { steer: r(-dead(pad.axes[0] || 0)), handbrake: b(0) > 0.5, method: wheel ? "wheel" : "gamepad" });
+      if (this.plugged) this.plugged = p.method;
       const used = p.throttle > 0.02 || p.brake > 0.02 || p.steer !== 0 || p.handbrake;
       if (used) this.padded = performance.now();
       return used || performance.now() - (this.padded || -1e9) < 1000 ? p : null;

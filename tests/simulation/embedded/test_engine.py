@@ -223,3 +223,21 @@ def test_bad_setups_name_the_field() -> None:
         backend.reset(replace(ALONE, actors=(replace(lead_at(20.0), name="ego"),)), 0)
     with pytest.raises(ConfigError, match="holds 20 of 30"):
         backend.reset(replace(SETUP, traffic=TrafficSetup(vehicles=30)), 0)
+
+
+def test_who_appears_looking_elsewhere_does_not_spin() -> None:
+    backend = EmbeddedBackend()
+    late = ActorSetup(
+        name="late",
+        type=EGO_TYPE,
+        place=START.pose.moved(40.0),
+        driver=Control.SCRIPTED,
+        present=False,
+    )
+    backend.reset(replace(ALONE, actors=(late,)), 0)
+    assert not backend.truth().states.present[1]
+    there = START.pose.moved(60.0)
+    place = replace(there, yaw=there.yaw + 3.0)
+    backend.step(VehicleCommand(), [ActorCommand("late", place=place, speed=20.0, present=True)])
+    assert backend.truth().states.present[1]
+    assert backend.truth().states.yaw_rate[1] == pytest.approx(0.0, abs=1e-6)

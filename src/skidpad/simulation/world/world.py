@@ -383,7 +383,7 @@ class World:
         i = self.index.get(word.actor)
         if i is None:
             raise ConfigError(f"there is no actor {word.actor!r} in this run")
-        traffic = self.traffic
+        traffic, was_there = self.traffic, bool(self.states.present[i])
         if word.present and traffic is not None and traffic.call(self.members[i].id):
             return
         if word.present is not None:
@@ -400,9 +400,11 @@ class World:
         yaw_before = float(self.states.yaw[i])
         v_before = float(np.hypot(self.states.vx[i], self.states.vy[i]))
         self.put(i, word.place, speed)
+        self.moved[i] = True
+        if not was_there:  # who appears has not turned or braked
+            return
         self.states.yaw_rate[i] = wrap_angle(word.place.yaw - yaw_before) / self.dt
         self.states.ax[i] = (speed - v_before) / self.dt
-        self.moved[i] = True
 
     def _release(self, i: int) -> None:
         if self.traffic is not None:

@@ -184,6 +184,11 @@ def test_folders_that_hold_no_run_are_one_sentence(driven, tmp_path):
         text = (cut / file).read_bytes()
         (cut / file).write_bytes(text[: len(text) // 2])
         assert str(cut) in refused(cut)
+    other = shutil.copytree(driven[0], tmp_path / "setting")
+    described = (other / "config.yaml").read_text(encoding="utf-8")
+    assert "cruise: steady" in described
+    (other / "config.yaml").write_text(described.replace("cruise: steady", "cruise: stea"))
+    assert f"{other / 'config.yaml'}: unknown cruise 'stea'" in refused(other)
 
 
 def test_commands_refuse_in_one_sentence(driven, tmp_path):

@@ -10,13 +10,14 @@ import msgspec
 
 from skidpad.campaign.grip_cells import DURATION, drawn_course
 from skidpad.campaign.runfolder import CONFIG
-from skidpad.core.errors import FileError
+from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.reading import UNUSABLE, decode_yaml, read_bytes
 from skidpad.core.run import VERSION, RunSpec, run_from_plain
 from skidpad.core.told import told
 from skidpad.recording.channel_drives import read_record
 from skidpad.scenarios.variation import CutIn
 from skidpad.stack.configurations import functions_of
+from skidpad.stack.settings import settings_of
 
 Plain = dict[str, Any]
 
@@ -42,9 +43,13 @@ def read_segment(recording: Path) -> RunSpec:
 def _described(plain: Plain, older: Callable[[Plain], Plain], path: Path) -> RunSpec:
     """The run of a description of this version, or of one that `older` turns into it."""
     try:
-        return run_from_plain(plain if "version" in plain else older(plain), str(path))
+        run = run_from_plain(plain if "version" in plain else older(plain), str(path))
+        settings_of(run)
+        return run
     except FileError:
         raise
+    except ConfigError as error:
+        raise FileError(f"{path}: {error}") from None
     except UNUSABLE as error:
         raise FileError(f"{path} does not describe a run: {told(error, 400)}") from None
 

@@ -91,7 +91,7 @@ def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
     traffic = setup.traffic
     if traffic is None or traffic.vehicles + traffic.reserve == 0:
         return []
-    if traffic.vehicles + traffic.reserve > RANDOM_MAX:
+    if traffic.vehicles <= RANDOM_MAX < traffic.vehicles + traffic.reserve:
         raise ConfigError(
             f"traffic.reserve must be at most {RANDOM_MAX - traffic.vehicles} beside "
             f"{traffic.vehicles} vehicles, got {traffic.reserve}"

@@ -201,18 +201,19 @@ export default {
     },
     gamepad() {
       const pad = navigator.getGamepads ? [...navigator.getGamepads()].find((p) => p && p.connected) : null;
-      if (!pad && this.plugged) this.warn(`the ${this.plugged} is unplugged: pedals are released, the keyboard drives`);
-      this.plugged = pad && this.padded ? (this.plugged || "gamepad") : "";
-      if (!pad) return null;
+      if (!pad) {
+        if (this.plugged) this.warn(`the ${this.plugged} is unplugged: pedals are released, the keyboard drives`);
+        this.plugged = ""; return null;
+      }
       const b = (i) => pad.buttons[i] ? pad.buttons[i].value : 0, dead = (v) => Math.abs(v) < 0.06 ? 0 : v, r = (v) => Math.round(v * 100) / 100;
       const wheel = /wheel|g29|g920|t150|t300/i.test(pad.id);
       const p = wheel
         ? { throttle: r(Math.max(0, (1 - (pad.axes[2] ?? 1)) / 2)), brake: r(Math.max(0, (1 - (pad.axes[5] ?? pad.axes[3] ?? 1)) / 2)) }
         : { throttle: r(b(7)), brake: r(b(6)) };
       Object.assign(p, { steer: r(-dead(pad.axes[0] || 0)), handbrake: b(0) > 0.5, method: wheel ? "wheel" : "gamepad" });
-      if (this.plugged) this.plugged = p.method;
       const used = p.throttle > 0.02 || p.brake > 0.02 || p.steer !== 0 || p.handbrake;
       if (used) this.padded = performance.now();
+      if (this.padded) this.plugged = p.method;
       return used || performance.now() - (this.padded || -1e9) < 1000 ? p : null;
     },
   },

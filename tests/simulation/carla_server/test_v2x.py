@@ -78,7 +78,7 @@ def test_lines_cross_boxes():
 
 
 def test_a_station_speaks_when_something_changes_and_at_least_every_second():
-    rhythm, pose = cam.Rhythm(0.1, 1.0, fixed=False, drives=True, period=1.0), Pose(0.0, 0.0)
+    rhythm, pose = cam.Rhythm(0.1, 1.0, fixed=False, period=1.0), Pose(0.0, 0.0)
     told = [t for t in range(61) if rhythm.due(0.05 * t, pose, 0.0)]
     assert told == [0, 20, 40, 60]
     assert rhythm.due(3.1, replace(pose, x=4.1), 0.0)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, sin
+
+import numpy as np
 
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.carla_server.actors import SOLID, ActorTable, Box
+from skidpad.simulation.carla_server.boxes import Boxes
 from skidpad.simulation.carla_server.landscape import Landscape
 from skidpad.simulation.carla_server.wire import Vector
 
@@ -33,13 +35,12 @@ def cast(
         return []
     reach = min(max(reach, 0.0), LONGEST_RAY)
     unit = (way[0] / length, way[1] / length, way[2] / length)
-    targets = [(actors.box(a), int(a.blueprint.label)) for a in actors if a.family in SOLID]
-    targets += [(Box(o.centre, o.half), o.label) for o in landscape.present()]
-    hits = []
-    for box, label in targets:
-        distance = _into_box(start, unit, box)
-        if distance is not None and distance <= reach:
-            hits.append(_hit(start, unit, distance, label))
+    targets = [(int(a.blueprint.label), actors.box(a)) for a in actors if a.family in SOLID]
+    targets += [(o.label, Box(o.centre, o.half)) for o in landscape.present()]
+    near, far = Boxes.of(targets).spans(start, unit)
+    near = np.maximum(near, 0.0)  # who begins inside meets it at once
+    met = np.flatnonzero((near <= far) & (near <= reach)).tolist()
+    hits = [_hit(start, unit, float(near[i]), targets[i][0]) for i in met]
     road = _onto_road(landscape.whole, start, unit, reach)
     if road is not None:
         hits.append(_hit(start, unit, road, int(SemanticClass.ROAD)))
@@ -49,26 +50,6 @@ def cast(
 def _hit(start: Vector, unit: Vector, distance: float, label: int) -> Hit:
     place = tuple(s + distance * u for s, u in zip(start, unit, strict=True))
     return Hit(distance, (place[0], place[1], place[2]), label)
-
-
-def _into_box(start: Vector, unit: Vector, box: Box) -> float | None:
-    """Distance at which a ray enters an upright box (slab test); None when it misses."""
-    pose, half = box
-    c, s = cos(pose.yaw), sin(pose.yaw)
-    dx, dy, dz = start[0] - pose.x, start[1] - pose.y, start[2] - pose.z
-    origin = (dx * c + dy * s, dy * c - dx * s, dz)
-    ray = (unit[0] * c + unit[1] * s, unit[1] * c - unit[0] * s, unit[2])
-    near, far = 0.0, LONGEST_RAY
-    for o, r, h in zip(origin, ray, half, strict=True):
-        if abs(r) < 1e-12:
-            if abs(o) > h:
-                return None
-            continue
-        a, b = sorted(((-h - o) / r, (h - o) / r))
-        near, far = max(near, a), min(far, b)
-        if near > far:
-            return None
-    return near
 
 
 def _onto_road(roads: RoadMap, start: Vector, unit: Vector, reach: float) -> float | None:

@@ -114,7 +114,6 @@ class Rhythm:
     shortest: float  # s
     longest: float
     fixed: bool
-    drives: bool
     period: float = 0.0
     low: int = 0  # messages since something happened
     last: float | None = None  # s, of the last message
@@ -122,10 +121,10 @@ class Rhythm:
     pose: Pose = Pose(0.0, 0.0)  # told last
     speed: float = 0.0
 
-    def due(self, time: float, pose: Pose, speed: float) -> bool:
-        """Whether a message goes out now; if so, counts from it."""
+    def due(self, time: float, pose: Pose, speed: float | None) -> bool:
+        """Whether a message goes out now; if so, counts from it. speed: None of who does not drive."""
         waited = self.longest if self.last is None else time - self.last + EARLY
-        if not self.drives:
+        if speed is None:
             going = self.last is None or waited >= ROAD_SIDE
         elif waited < self.shortest:
             going = False
@@ -137,7 +136,7 @@ class Rhythm:
             self.low += going
             self.period = self.longest if self.low >= LOW_DYNAMICS else self.period
         if going:
-            self.last, self.pose, self.speed = time, pose, speed
+            self.last, self.pose, self.speed = time, pose, speed or 0.0
         return going
 
     def _changed(self, pose: Pose, speed: float) -> bool:

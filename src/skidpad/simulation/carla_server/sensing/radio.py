@@ -17,9 +17,9 @@ from numpy.typing import NDArray
 
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.actors import Actor, Box
+from skidpad.simulation.carla_server.boxes import Boxes
 from skidpad.simulation.carla_server.wire import Vector
 
-Floats = NDArray[np.float64]
 LIGHT = 299_792_458.0  # m/s
 PERMITTIVITY = 1.02  # of the ground, relative; CARLA's
 LOWEST = 0.1  # m over the ground, of an antenna (assumed)
@@ -127,42 +127,9 @@ class Air:
         return [c for c in same if c.sensor != own.sensor]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Boxes:
-    """Upright boxes and whose they are, ready to be asked about many lines."""
-
-    boxes: list[Box]
-    owners: list[int]  # actors; 0: the map's
-    pose: Floats  # (n, 4) x, y, z, yaw
-    half: Floats  # (n, 3)
-
-    @classmethod
-    def of(cls, found: Iterable[tuple[int, Box]]) -> Boxes:
-        """From pairs of owner and box."""
-        pairs = list(found)
-        pose = [(p.x, p.y, p.z, p.yaw) for _, (p, _) in pairs]
-        half = [h for _, (_, h) in pairs]
-        return cls(
-            [box for _, box in pairs],
-            [owner for owner, _ in pairs],
-            np.array(pose).reshape(-1, 4),
-            np.array(half).reshape(-1, 3),
-        )
-
-
 def crossed(among: Boxes, a: Vector, b: Vector, besides: tuple[int, ...] = ()) -> list[Box]:
-    """The boxes that the line from a to b goes through (slab test), without those of `besides`."""
-    c, s = np.cos(among.pose[:, 3]), np.sin(among.pose[:, 3])
-
-    def turned(v: Floats) -> Floats:
-        return np.stack((v[:, 0] * c + v[:, 1] * s, v[:, 1] * c - v[:, 0] * s, v[:, 2]), axis=1)
-
-    start = turned(np.array(a) - among.pose[:, :3])
-    along = turned(np.broadcast_to(np.array(b) - np.array(a), start.shape))
-    along = np.where(np.abs(along) < 1e-12, 1e-12, along)
-    one, other = (-among.half - start) / along, (among.half - start) / along
-    near = np.minimum(one, other).max(axis=1)
-    far = np.maximum(one, other).min(axis=1)
+    """The boxes that the line from a to b goes through, without those of `besides`."""
+    near, far = among.spans(a, (b[0] - a[0], b[1] - a[1], b[2] - a[2]))
     hit = np.flatnonzero((near <= far) & (far >= 0.0) & (near <= 1.0)).tolist()
     return [among.boxes[i] for i in hit if among.owners[i] not in besides]
 

@@ -17,11 +17,12 @@ from skidpad.sensors.lighting import lighting
 from skidpad.sensors.live_scene import LiveScene
 from skidpad.sensors.shading import Shading
 from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable, Box
+from skidpad.simulation.carla_server.boxes import Boxes
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.landscape import Landscape
 from skidpad.simulation.carla_server.maps import ServedMap
-from skidpad.simulation.carla_server.sensing.radio import Air, Boxes
+from skidpad.simulation.carla_server.sensing.radio import Air
 from skidpad.simulation.carla_server.vehicles import Vehicles
 from skidpad.simulation.carla_server.weather import Sky
 

@@ -49,8 +49,7 @@ def make_station(actor: Actor, _: int) -> Station:
             f"v2x: need 0 <= gen_cam_min <= gen_cam_max, got {shortest:g} and {longest:g}"
         )
     fixed = a["fixed_rate"].lower() == "true"
-    rhythm = cam.Rhythm(shortest, longest, fixed, drives=bool(actor.parent), period=longest)
-    return Station(make_radio(actor), rhythm)
+    return Station(make_radio(actor), cam.Rhythm(shortest, longest, fixed, period=longest))
 
 
 def make_messenger(actor: Actor, _: int) -> Station:
@@ -73,17 +72,16 @@ def _call(around: Surroundings, sensor: Sensor) -> Call:
 def announce(around: Surroundings, clock: Clock, sensor: Sensor) -> None:
     """Send an awareness message when one is due."""
     rhythm, carrier = sensor.equipment.rhythm, around.actors.carrier(sensor.actor)
-    drives = carrier is not None and carrier.family is Family.VEHICLE
-    rhythm.drives = drives
-    pose = around.actors.pose(carrier if carrier is not None and drives else sensor.actor)
-    speed = _forward(around, carrier) if carrier is not None and drives else 0.0
+    car = carrier if carrier is not None and carrier.family is Family.VEHICLE else None
+    pose = around.actors.pose(sensor.actor if car is None else car)
+    speed = None if car is None else _forward(around, car)
     if not rhythm.due(clock.elapsed, pose, speed):
         return
     station = sensor.actor.id if carrier is None else carrier.id
     type, motion = cam.ROAD_SIDE_UNIT, _place(around, sensor, pose)
-    if carrier is not None and drives:
-        type, motion = _type(carrier), _motion(around, sensor, carrier, motion, speed)
-    lamps = drives and rhythm.tells_lamps(clock.elapsed)
+    if car is not None and speed is not None:
+        type, motion = _type(car), _motion(around, sensor, car, motion, speed)
+    lamps = car is not None and rhythm.tells_lamps(clock.elapsed)
     message = cam.awareness(station, type, clock.elapsed, motion, lamps)
     around.air.send(clock.frame, replace(_call(around, sensor), messages=[message]))
 

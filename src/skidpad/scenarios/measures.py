@@ -6,6 +6,9 @@ from collections.abc import Sequence
 from enum import Enum
 from itertools import product
 from math import cos, hypot, inf, sin
+from typing import Any, TypeVar
+
+from numpy.typing import NDArray
 
 from skidpad.core.geometry import Pose
 from skidpad.roads.routing import shortest_route
@@ -13,6 +16,7 @@ from skidpad.scenarios.entities import Box
 from skidpad.scenarios.network import Network
 
 Point = tuple[float, float]
+Some = TypeVar("Some", float, NDArray[Any])
 
 
 class Axes(Enum):
@@ -43,8 +47,8 @@ def corners(pose: Pose, box: Box) -> list[Point]:
     return found
 
 
-def between(origin: Pose, x: float, y: float) -> Point:
-    """A point in the axes of a pose: m forward, m left."""
+def between(origin: Pose, x: Some, y: Some) -> tuple[Some, Some]:
+    """A point, or arrays of them, in the axes of a pose: m forward, m left."""
     dx, dy = x - origin.x, y - origin.y
     c, s = cos(origin.yaw), sin(origin.yaw)
     return dx * c + dy * s, dy * c - dx * s

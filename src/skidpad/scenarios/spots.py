@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import cos, sin
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -12,6 +11,7 @@ from numpy.typing import NDArray
 from skidpad.core.geometry import Pose
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.scenarios.measures import between
 from skidpad.scenarios.positions import Position
 from skidpad.scenarios.scene import Actor, Scene
 
@@ -108,7 +108,7 @@ class Oval:
     def inside(self, scene: Scene, spots: Spots) -> Mask:
         """Between the inner disc, or the rim, and the ellipse."""
         centre = scene.actors[self.entity].pose.moved(forward=self.offset)
-        forward, left = _seen(centre, spots)
+        forward, left = between(centre, spots.x, spots.y)
         share = np.hypot(forward / self.major, left / self.minor)
         far: Mask = (np.hypot(forward, left) >= self.inner) & (share >= self.rim) & (share <= 1.0)
         return far
@@ -165,10 +165,3 @@ def along(pose: Pose, spots: Spots) -> Mask:
     """Spots whose traffic runs as the pose looks."""
     same: Mask = np.cos(spots.heading - pose.yaw) > 0.0
     return same
-
-
-def _seen(pose: Pose, spots: Spots) -> tuple[Array, Array]:
-    """Spots in the axes of a pose: m forward, m left."""
-    dx, dy = spots.x - pose.x, spots.y - pose.y
-    c, s = cos(pose.yaw), sin(pose.yaw)
-    return dx * c + dy * s, dy * c - dx * s

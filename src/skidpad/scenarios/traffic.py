@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import cos, hypot, inf, isfinite
+from math import cos, hypot, inf
 from random import Random
 from typing import NamedTuple
 
 import numpy as np
 
 from skidpad.core.setup import ActorCommand
+from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.scenarios.measures import between
 from skidpad.scenarios.network import Place
 from skidpad.scenarios.scene import Actor, Scene
@@ -32,16 +33,12 @@ class Speeds(NamedTuple):
     low: float | None = None
     high: float | None = None
 
-    def draw(self, rng: Random, scene: Scene, spots: Spots, k: int) -> float:
-        """For who appears at spot k."""
+    def draw(self, rng: Random, map: RoadMap, point: LanePoint) -> float:
+        """For who appears at a place."""
         if self.low is not None and self.high is not None:
             return rng.uniform(self.low, self.high)
-        lane, samples = int(spots.lane[k]), scene.network.map.samples
-        first = int(scene.network.map.lanes.first[lane])
-        size = int(scene.network.map.lanes.size[lane])
-        i = first + int(np.searchsorted(samples.s[first : first + size - 1], float(spots.s[k])))
-        limit = float(samples.limit[i])
-        return limit if isfinite(limit) else V_UNKNOWN
+        limit = map.limit(point)
+        return V_UNKNOWN if limit is None else limit
 
 
 class Pool:
@@ -63,14 +60,16 @@ class Pool:
             return False
         actor = scene.actors[self.rng.choice(away)]
         k = self.rng.randrange(len(spots.x))
-        v = min(self.speeds.draw(self.rng, scene, spots, k), actor.entity.performance.v_max)
+        map = scene.network.map
+        wanted = self.speeds.draw(self.rng, map, map.at(int(spots.lane[k]), float(spots.s[k])))
+        v = min(wanted, actor.entity.performance.v_max)
         free = _free(scene, spots, v, actor.entity.box.length)
         if not free[k]:
             found = np.flatnonzero(free)
             if len(found) == 0:
                 return False
             k = int(self.rng.choice(found.tolist()))
-        point = scene.network.map.at(int(spots.lane[k]), float(spots.s[k]))
+        point = map.at(int(spots.lane[k]), float(spots.s[k]))
         actor.put(scene.network, Place(point.pose, point), v)
         scene.cruising[actor.name] = v
         return True

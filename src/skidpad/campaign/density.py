@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from skidpad.core.setup import RESERVE, ActorCommand
+from skidpad.core.setup import RESERVE_NAME, ActorCommand
 from skidpad.core.states import WorldTruth
 
 ROOM = 25.0  # m to everybody, which a vehicle needs to come back
@@ -35,7 +35,7 @@ class Density:
     def _call(self, truth: WorldTruth) -> list[ActorCommand]:
         """Those of the reserve who are wanted for the first time; all they need is room."""
         assert self.wanted is not None
-        reserve = [name for name in truth.table.names if name.startswith(RESERVE)]
+        reserve = [name for name in truth.table.names if name.startswith(RESERVE_NAME)]
         first, self.called = self.called, max(self.called, self.wanted - self.vehicles)
         return [ActorCommand(name, present=True) for name in reserve[first : self.called]]
 

@@ -13,12 +13,12 @@ from skidpad.cli.asked import Drivers, Tuned
 from skidpad.cli.spread import spread
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import BackendChoice, BackendKind, Roads, RunSpec, Scenario
+from skidpad.core.setup import VEHICLES_MAX
 
 if TYPE_CHECKING:
     from skidpad.pages.server import Place
 
 
-VEHICLES_MAX = 80  # in the background
 RESERVE = 20  # vehicles to call in, where nothing else is said
 
 
@@ -55,7 +55,9 @@ def drive(
     ] = "",
     more: Annotated[
         int | None,
-        typer.Option(min=0, max=80, help="Vehicles that can be called in; default: up to 20."),
+        typer.Option(
+            min=0, max=VEHICLES_MAX, help="Vehicles that can be called in; default: up to 20."
+        ),
     ] = None,
     rate: Annotated[float, typer.Option(help="Times real time; 0: as fast as it can.")] = 1.0,
     paused: Annotated[bool, typer.Option("--paused", help="Begin standing.")] = False,

@@ -45,7 +45,8 @@ class ActorSetup:
     present: bool = True  # False: it is not there until it is told to appear (embedded backend)
 
 
-RESERVE = "reserve_"  # names of vehicles that wait to be called begin with this
+VEHICLES_MAX = 80  # of the background
+RESERVE_NAME = "reserve_"  # names of vehicles that wait to be called begin with this
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -9,14 +9,20 @@ import numpy as np
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.geometry import Pose
-from skidpad.core.setup import RESERVE, ActorSetup, LanePosition, Setup, TrafficSetup
+from skidpad.core.setup import (
+    RESERVE_NAME,
+    VEHICLES_MAX,
+    ActorSetup,
+    LanePosition,
+    Setup,
+    TrafficSetup,
+)
 from skidpad.core.vocabulary import ActorKind, TrafficStart
 from skidpad.physics.types import traffic_types, vehicle_type, vehicle_types
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.simulation.world.rows import Newcomer, Shape
 from skidpad.simulation.world.traffic.placement import (
     PACK_FACTOR,
-    RANDOM_MAX,
     Spawn,
     fixed_spawns,
     pack_spawns,
@@ -91,9 +97,9 @@ def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
     traffic = setup.traffic
     if traffic is None or traffic.vehicles + traffic.reserve == 0:
         return []
-    if traffic.vehicles <= RANDOM_MAX < traffic.vehicles + traffic.reserve:
+    if traffic.vehicles <= VEHICLES_MAX < traffic.vehicles + traffic.reserve:
         raise ConfigError(
-            f"traffic.reserve must be at most {RANDOM_MAX - traffic.vehicles} beside "
+            f"traffic.reserve must be at most {VEHICLES_MAX - traffic.vehicles} beside "
             f"{traffic.vehicles} vehicles, got {traffic.reserve}"
         )
     if traffic.mode is TrafficStart.RANDOM:
@@ -104,7 +110,7 @@ def _traffic(map: RoadMap, setup: Setup, seed: int) -> list[Role]:
     else:
         around = pack_spawns if traffic.mode is TrafficStart.PACK else fixed_spawns
         spawns = around(map, _ego_point(map, setup), traffic, seed)
-    assert len(spawns) <= RANDOM_MAX
+    assert len(spawns) <= VEHICLES_MAX
     types = traffic_types()
     roles = []
     for i, spawn in enumerate(spawns):
@@ -121,7 +127,7 @@ def _reserve(traffic: TrafficSetup, types: Sequence[str], first: int, seed: int)
     pack = traffic.mode is TrafficStart.PACK
     roles = []
     for i in range(traffic.reserve):
-        name, type = f"{RESERVE}{i + 1:02d}", type_of(first + i, types)
+        name, type = f"{RESERVE_NAME}{i + 1:02d}", type_of(first + i, types)
         actor = ActorSetup(name=name, type=type, place=Pose(0.0, 0.0))
         factor = PACK_FACTOR if pack else float(factors[traffic.vehicles + i])
         roles.append(Role(actor, factor, reserve=True))

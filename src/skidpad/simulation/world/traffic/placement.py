@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.lefthanded import lanes_left_from_carla
 from skidpad.core.randomness import stream
-from skidpad.core.setup import TrafficSetup
+from skidpad.core.setup import VEHICLES_MAX, TrafficSetup
 from skidpad.roads.queries import LanePoint, RoadMap
 
 VARIANTS = ("listing", "table")
@@ -25,7 +25,6 @@ SPEED_SPREAD = 0.03  # standard deviation of desired speeds (decision M-2)
 PACK_AHEAD, PACK_BEHIND = 240.0 / 900.0, 240.0 / 400.0  # of the published distances: within 250 m
 PACK_FACTOR = 0.75  # of the limit: chosen by speed and by ticks with a target (docs/traffic.md)
 RANDOM_SPEED_SPREAD = 0.10  # random mode (A-209); the size is not published
-RANDOM_MAX = 80  # A-209
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,8 +124,8 @@ def _place(map: RoadMap, ego: LanePoint, distance: float, lanes_left: int) -> La
 
 def random_factors(vehicles: int, seed: int) -> NDArray[np.float64]:
     """Desired speeds over the limit, Gaussian, one stream per vehicle (A-209)."""
-    if not 0 <= vehicles <= RANDOM_MAX:
-        raise ConfigError(f"traffic.vehicles must be between 0 and {RANDOM_MAX}, got {vehicles}")
+    if not 0 <= vehicles <= VEHICLES_MAX:
+        raise ConfigError(f"traffic.vehicles must be between 0 and {VEHICLES_MAX}, got {vehicles}")
     draws = [stream(seed, "traffic", "speed", i).normal(0.0, 1.0) for i in range(vehicles)]
     return np.clip(1.0 + RANDOM_SPEED_SPREAD * np.array(draws), 0.6, 1.3)
 

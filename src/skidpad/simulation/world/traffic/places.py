@@ -54,12 +54,10 @@ class FreePlaces:
             return None
         tried = among[self.rng.integers(0, len(among), TRIES)]
         x, y = point["x"][tried], point["y"][tried]
-        from_ego = np.hypot(states.x[0] - x, states.y[0] - y)
+        d = np.hypot(states.x - x[:, None], states.y - y[:, None])
         here = states.present
-        near = np.hypot(states.x[here] - x[:, None], states.y[here] - y[:, None]) < CLEARANCE
-        possible = (nearest <= from_ego) & (from_ego <= farthest) & ~near.any(axis=1)
-        for at in tried[possible].tolist():
-            d = np.hypot(states.x - point["x"][at], states.y - point["y"][at])
-            if not (here & (d < room(at))).any():
-                return int(at)
+        fits = (nearest <= d[:, 0]) & (d[:, 0] <= farthest) & (d[:, here] >= CLEARANCE).all(axis=1)
+        for k in np.flatnonzero(fits):
+            if not (here & (d[k] < room(int(tried[k])))).any():
+                return int(tried[k])
         return None

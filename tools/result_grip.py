@@ -7,23 +7,23 @@ from pathlib import Path
 import polars as pl
 
 from result_texts import limits, markdown, verdict_rows
+from skidpad.evidence.grip import study
 from skidpad.evidence.grip.findings import FINDINGS
 from skidpad.evidence.grip.rain import CELLS, four_cells
 from skidpad.evidence.grip.study import Pair, Share
-from skidpad.evidence.grip.study import completion as study_completion
-from skidpad.evidence.grip.threshold import situations
 from skidpad.evidence.verdicts import judge
-from skidpad.report.grip_data import load_grip, scenario_title
+from skidpad.recording.results import read_results
+from skidpad.report.grip_data import PAIRED, load_grip, scenario_title
+from skidpad.report.threshold import load_threshold
 
 DELAYS = "delays.parquet"
-DELAY_KEYS = ["scenario", "weather", "friction", "cutin", "seed"]
 
 
 def keep_delays(campaign: Path, kept: Path) -> None:
     """The delays of pairs, which are found in series that are not kept."""
     table = load_grip(campaign).with_delays()
     if "delay_s" in table.columns:
-        table.select(*DELAY_KEYS, "delay_s").drop_nulls().write_parquet(kept / DELAYS)
+        table.select(*PAIRED, "delay_s").drop_nulls().write_parquet(kept / DELAYS)
 
 
 def completion(folder: Path) -> str:
@@ -37,7 +37,7 @@ def completion(folder: Path) -> str:
     def cells(pair: Pair | None) -> list[str]:
         if pair is None:
             return ["no run", "no run"]
-        return [percent(study_completion(pair.original)), percent(study_completion(pair.reduced))]
+        return [percent(study.completion(pair.original)), percent(study.completion(pair.reduced))]
 
     rows = [
         [w, *(c for s in campaign.scenarios for c in cells(campaign.pairs.get((s, w))))]
@@ -58,13 +58,13 @@ def claims(folder: Path) -> str:
     """Every claim of the study, with the delays that were kept."""
     table = load_grip(folder).plain
     if (folder / DELAYS).is_file():
-        table = table.join(pl.read_parquet(folder / DELAYS), on=DELAY_KEYS, how="left")
+        table = table.join(pl.read_parquet(folder / DELAYS), on=PAIRED, how="left")
     return verdict_rows(judge(FINDINGS, [table] * len(FINDINGS)))
 
 
 def thresholds(folder: Path) -> str:
     """The friction at which half of the drives have ended in an accident."""
-    found = situations(pl.read_parquet(folder / "results.parquet"))
+    found = load_threshold(folder).situations
     braking = sorted({s.deceleration for s in found})
     by_row: dict[tuple[str, str, str], dict[float, str]] = {}
     for s in found:
@@ -78,7 +78,7 @@ def thresholds(folder: Path) -> str:
 
 def threshold_verdicts(folder: Path) -> str:
     """How often each claim was judged how, over the situations that are completed on dry road."""
-    telling = [s for s in situations(pl.read_parquet(folder / "results.parquet")) if s.tells]
+    telling = load_threshold(folder).telling
     counts: dict[str, dict[str, int]] = {}
     for situation in telling:
         for j in situation.judgements:
@@ -93,7 +93,7 @@ def threshold_verdicts(folder: Path) -> str:
 
 def rain_parted(folder: Path) -> str:
     """Completion, least distance and steering in the four cells, and the effects of lens and road."""
-    table = pl.read_parquet(folder / "results.parquet")
+    table = read_results(folder)
     head = ["quantity", "scenario", "weather", "seeds", *CELLS, "lens", "road", "beyond their sum"]
     rows = []
     for quantity in ("completion", "min_cvip_m", "steer_std"):

@@ -132,27 +132,27 @@ def test_frozen_results_are_left_alone_and_foreign_maps_are_asked_for(
     assert "matrix-foreign: left out, it needs --maps DIR" in told
 
 
-def test_what_a_campaign_left_is_frozen_whole(tmp_path, monkeypatch):
+@pytest.fixture
+def left(tmp_path, monkeypatch):
+    """What a campaign left, and where it is frozen."""
     monkeypatch.setattr(campaigns, "RESULTS", tmp_path / "results")
     (tmp_path / "results").mkdir()
-    left = tmp_path / "out"
-    left.mkdir()
+    folder = tmp_path / "out"
+    folder.mkdir()
     for file in campaigns.KEPT:
-        (left / file).write_text("{}")
+        (folder / file).write_text("{}")
+    return folder
+
+
+def test_what_a_campaign_left_is_frozen_whole(left, tmp_path):
     campaigns.freeze("grip", left)
     frozen = tmp_path / "results" / "grip"
     assert sorted(p.name for p in frozen.iterdir()) == sorted([*campaigns.KEPT, "driven.json"])
     assert set(json.loads((frozen / "driven.json").read_text())) == {"commit", "date", "machine"}
 
 
-def test_a_description_that_only_repeats_the_command_is_left_out(tmp_path, monkeypatch):
-    monkeypatch.setattr(campaigns, "RESULTS", tmp_path / "results")
+def test_a_description_that_only_repeats_the_command_is_left_out(left, tmp_path, monkeypatch):
     monkeypatch.setattr(campaigns, "MOST", 1)
-    (tmp_path / "results").mkdir()
-    left = tmp_path / "out"
-    left.mkdir()
-    for file in campaigns.KEPT:
-        (left / file).write_text("{}")
     campaigns.freeze("grip-threshold", left)
     frozen = tmp_path / "results" / "grip-threshold"
     assert sorted(p.name for p in frozen.iterdir()) == ["driven.json", "results.parquet"]

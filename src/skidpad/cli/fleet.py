@@ -174,17 +174,18 @@ def upload(
         from skidpad.fleet.monitored import Lookout, spool_folder
         from skidpad.fleet.spool import Spool
         from skidpad.fleet.uploader import rounds, send_all
-    kept, lookout = Spool(spool), Lookout(folders or [], release)
-    with posting(to, mqtt, token_file, ca) as post, suppress(KeyboardInterrupt):
-        for folder in [] if every else folders or []:
-            spool_folder(kept, folder, release)
-        look = partial(lookout.spool, kept) if every else list
-        for sent in rounds(look, partial(send_all, kept, post, wait), every):
-            typer.echo(
-                f"{sent.acknowledged} acknowledged, {sent.refused} refused, {sent.waiting} waiting"
-            )
-            if not every:
-                break
+    kept = Spool(spool)
+    with posting(to, mqtt, token_file, ca) as post:
+        send_now = partial(send_all, kept, post, wait)
+        if not every:
+            for folder in folders or []:
+                spool_folder(kept, folder, release)
+            typer.echo(send_now())
+            return
+        lookout = Lookout(folders or [], release)
+        with suppress(KeyboardInterrupt):
+            for sent in rounds(partial(lookout.spool, kept), send_now, every):
+                typer.echo(sent)
 
 
 @fleet.command()

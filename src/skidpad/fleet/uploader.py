@@ -31,6 +31,9 @@ class Sent:
     refused: int
     waiting: int
 
+    def __str__(self) -> str:
+        return f"{self.acknowledged} acknowledged, {self.refused} refused, {self.waiting} waiting"
+
 
 def poster(client: httpx.Client, clock: Callable[[], float] = time.time) -> Post:
     """Sends a batch through `client`, whose headers carry the credential."""

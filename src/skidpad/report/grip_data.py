@@ -39,6 +39,7 @@ WEATHERS = (
     *(f"icy_{k}" for k in (0, 10, 30, 70, 100)),
 )
 Key = tuple[str, str]  # scenario, weather
+PAIRED = ["scenario", "weather", "friction", "cutin", "seed"]  # name a run of the campaign
 
 
 @dataclass(frozen=True)
@@ -168,8 +169,7 @@ class GripCampaign(CampaignView[GripEntry]):
             )
         if not parts:
             return self.plain
-        on = ["scenario", "weather", "friction", "cutin", "seed"]
-        return self.plain.join(pl.concat(parts), on=on, how="left")
+        return self.plain.join(pl.concat(parts), on=PAIRED, how="left")
 
 
 def load_grip(folder: Path) -> GripCampaign:

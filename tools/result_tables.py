@@ -21,21 +21,19 @@ import polars as pl
 import yaml
 
 import result_grip
-from result_texts import limits, markdown, verdict_rows
+import result_matrix
+from result_texts import verdict_rows
 from skidpad.evidence.channels.findings import FINDINGS as CHANNELS
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.grip.findings import FINDINGS as GRIP
-from skidpad.evidence.statistics import Rate
 from skidpad.evidence.verdicts import Finding, judge
-from skidpad.recording.campaigns import CampaignFolder
-from skidpad.recording.matrix import MatrixEntry
-from skidpad.report.matrix_data import Matrix, config_title, weather_title
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "docs" / "results"
 PLAN = RESULTS / "preregistration.yaml"
 CLAIMS = RESULTS / "claims.md"
+OBJECTS = "matrix-figure8"  # what pixels are held against: the same seeds at object level
 PAGES = ("docs/matrix.md", "docs/grip.md")
 BLOCK = re.compile(r"(<!-- results: (\S+) (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
@@ -95,10 +93,12 @@ def block(name: str, which: str, folder: Path) -> str:
     if not folder.is_dir():
         return f"Not driven yet: `skidpad {shlex.join(words)}`\n"
     tables: dict[str, Callable[[Path], str]] = {
-        "adas headline": headline,
-        "adas fatal": lambda path: by_weather(path, "fatal_collisions"),
-        "adas vehicles": lambda path: by_weather(path, "crashes_vehicle"),
-        "adas claims": matrix_claims,
+        "adas headline": result_matrix.headline,
+        "adas fatal": lambda path: result_matrix.by_weather(path, "fatal_collisions"),
+        "adas vehicles": lambda path: result_matrix.by_weather(path, "crashes_vehicle"),
+        "adas factors": result_matrix.factors,
+        "adas claims": result_matrix.claims,
+        "adas agreement": lambda path: result_matrix.agreement(path.with_name(OBJECTS), path),
         "grip completion": result_grip.completion,
         "grip claims": result_grip.claims,
         "grip thresholds": result_grip.thresholds,
@@ -113,59 +113,6 @@ def driven(folder: Path) -> str:
     """When and by what a campaign was driven."""
     told = json.loads((folder / "driven.json").read_text(encoding="utf-8"))
     return f"Driven {told['date']} at commit {told['commit']}, {told['machine']}.\n\n"
-
-
-def rated(rate: Rate | None) -> str:
-    """`1.98 [1.57, 2.40]`, or `too few` in place of the limits."""
-    if rate is None:
-        return "no run"
-    return f"{rate.rate:.2f} {limits(rate.interval)}"
-
-
-def matrix_of(folder: Path) -> Matrix:
-    """The results of a matrix."""
-    return Matrix(CampaignFolder(folder, MatrixEntry))
-
-
-def headline(folder: Path) -> str:
-    """One row per configuration, every drive once."""
-    matrix = matrix_of(folder)
-    columns = ("crashes_vehicle", "road_departures", "fatal_collisions", "fatal_first")
-    head = (
-        "configuration",
-        "runs",
-        "crashes with vehicles",
-        "departures",
-        "fatal",
-        "first of chain",
-    )
-    rows = [
-        [
-            config_title(c),
-            str(len(matrix.cell(c))),
-            *(rated(matrix.rate(name, c)) for name in columns),
-        ]
-        for c in matrix.configs
-    ]
-    return markdown(head, rows)
-
-
-def by_weather(folder: Path, column: str) -> str:
-    """Events per run by configuration and weather."""
-    matrix = matrix_of(folder)
-    head = ["configuration", *map(weather_title, matrix.weathers)]
-    rows = [
-        [config_title(c), *(rated(matrix.rate(column, c, w)) for w in matrix.weathers)]
-        for c in matrix.configs
-    ]
-    return markdown(head, rows)
-
-
-def matrix_claims(folder: Path) -> str:
-    """Every claim that a matrix can judge."""
-    results = matrix_of(folder).results
-    claims = [f for f in (*FINDINGS, *ACCEPTANCE) if not f.study]
-    return verdict_rows(judge(claims, [results] * len(claims), astray(results)))
 
 
 def study_claims(folder: Path, id: str) -> str:

@@ -81,6 +81,7 @@ def results(tmp_path: Path) -> Path:
             "outcome": "completed", "log_hash": f"{config}{seed}", "distance_km": 10.0,
             "fatal_collisions": 6 if config == "0" else seed - 1, "crashes_vehicle": 1,
             "road_departures": 0, "fatal_first": 1, "off_lanes_pct": 0.0,
+            "mean_speed_kmh": 50.0 + seed,
         }
         for config in ("0", "4")
         for weather in ("clear-noon", "clear-night")
@@ -106,6 +107,35 @@ def test_a_table_is_made_of_the_results_and_says_who_drove_them(tmp_path):
     assert re.search(r"\| 6\.00 \[[\d.]+, [\d.]+\] \|", rows["0"])
     assert "| 1.00 [" in rows["4"]
     assert tables.tables_in(made, tmp_path) == made
+
+
+def test_rates_are_per_run_and_per_distance(tmp_path):
+    text = tables.block("matrix-figure8", "headline", results(tmp_path))
+    row = next(line for line in text.splitlines() if line.startswith("| 0"))
+    cells = [cell.strip() for cell in row.strip("|").split("|")]
+    assert cells[-2].startswith("60.00 ["), "six in 10 km"
+    assert cells[-1] == "52.0"
+
+
+def test_factors_have_a_row_per_configuration_and_weather(tmp_path):
+    text = tables.block("matrix-figure8", "factors", results(tmp_path))
+    rows = [line for line in text.splitlines() if "·" in line]
+    assert len(rows) == 4
+    assert all("| 3 |" in row and row.endswith("| 52.0 |") for row in rows)
+
+
+def test_levels_are_paired_by_seed_and_few_seeds_have_no_bound(tmp_path):
+    objects = results(tmp_path)
+    more = pl.read_parquet(objects / "results.parquet").with_columns(
+        fatal_collisions=pl.col("fatal_collisions") + pl.col("seed")
+    )
+    pixels = tmp_path / "matrix-pixels"
+    pixels.mkdir()
+    more.write_parquet(pixels / "results.parquet")
+    (pixels / "driven.json").write_bytes((objects / "driven.json").read_bytes())
+    rows = tables.block("matrix-pixels", "agreement", pixels).splitlines()
+    assert "| all | fatal events | 3 | +2.00 | unbounded |" in rows
+    assert "| all | crashes with vehicles | 3 | +0.00 | unbounded |" in rows
 
 
 def test_claims_are_judged_on_the_results(tmp_path):

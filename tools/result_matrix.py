@@ -1,0 +1,129 @@
+"""Tables of driver assistance in weather, made of committed results."""
+
+from __future__ import annotations
+
+from math import isfinite
+from pathlib import Path
+
+import polars as pl
+
+from result_texts import limits, markdown, verdict_rows
+from skidpad.evidence.drive.acceptance import ACCEPTANCE
+from skidpad.evidence.drive.findings import FINDINGS, astray
+from skidpad.evidence.statistics import Interval, Rate, compare_pairs, event_rate
+from skidpad.evidence.verdicts import judge
+from skidpad.recording.campaigns import CampaignFolder
+from skidpad.recording.matrix import MatrixEntry
+from skidpad.report.matrix_data import Matrix, config_title, rate_by_seed, weather_title
+
+COUNTS = {
+    "crashes_vehicle": "crashes with vehicles",
+    "road_departures": "departures",
+    "fatal_collisions": "fatal",
+    "fatal_first": "first of chain",
+}
+COMPARED = {
+    "fatal_collisions": "fatal events",
+    "crashes_vehicle": "crashes with vehicles",
+    "road_departures": "departures",
+    "mean_speed_kmh": "mean speed, km/h",
+    "dropout_pct": "dropout, percentage points",
+    "mean_error_m": "mean error of distance, m",
+}
+
+
+def matrix_of(folder: Path) -> Matrix:
+    """The results of a matrix."""
+    return Matrix(CampaignFolder(folder, MatrixEntry))
+
+
+def headline(folder: Path) -> str:
+    """One row per configuration, every drive once: per run, per 100 km, and how fast."""
+    matrix = matrix_of(folder)
+    head = ["configuration", "runs", *COUNTS.values(), "fatal per 100 km", "mean speed, km/h"]
+    rows = []
+    for c in matrix.configs:
+        runs = matrix.cell(c)
+        counts = [rated(matrix.rate(name, c)) for name in COUNTS]
+        per_distance = rated(_per_100_km(runs, "fatal_collisions"))
+        rows.append([config_title(c), str(len(runs)), *counts, per_distance, _speed(matrix, c)])
+    return markdown(head, rows)
+
+
+def factors(folder: Path) -> str:
+    """One row per configuration and weather: what a factor changes, and how fast that is."""
+    matrix = matrix_of(folder)
+    cells = [(c, w) for c in matrix.configs for w in matrix.weathers]
+    rows = []
+    for c, w in cells:
+        runs = matrix.cell(c, w)
+        counts = [rated(rate_by_seed(runs, name)) for name in COUNTS]
+        rows.append([config_title(c), weather_title(w), str(len(runs)), *counts, _speed(matrix, c, w)])
+    head = ["configuration", "weather", "runs", *COUNTS.values(), "mean speed, km/h"]
+    return markdown(head, rows)
+
+
+def by_weather(folder: Path, column: str) -> str:
+    """Events per run by configuration and weather."""
+    matrix = matrix_of(folder)
+    head = ["configuration", *map(weather_title, matrix.weathers)]
+    rows = [
+        [config_title(c), *(rated(matrix.rate(column, c, w)) for w in matrix.weathers)]
+        for c in matrix.configs
+    ]
+    return markdown(head, rows)
+
+
+def claims(folder: Path) -> str:
+    """Every claim that a matrix can judge."""
+    results = matrix_of(folder).results
+    found = [f for f in (*FINDINGS, *ACCEPTANCE) if not f.study]
+    return verdict_rows(judge(found, [results] * len(found), astray(results)))
+
+
+def agreement(objects: Path, pixels: Path) -> str:
+    """Pixels minus objects over the cells that both drove.
+
+    Weathers of a seed share their traffic, so a pair is a seed: the mean of its cells.
+    """
+    a, b = (matrix_of(folder).finished for folder in (objects, pixels))
+    pairs = a.join(b, on=["config", "weather", "seed"], suffix="_b")
+    rows = []
+    for config in ["", *matrix_of(pixels).configs]:
+        runs = pairs if not config else pairs.filter(pl.col("config") == config)
+        for name, title in COMPARED.items():
+            both = runs.drop_nulls([name, f"{name}_b"])
+            if not len(both):
+                continue
+            change = (pl.col(f"{name}_b").cast(pl.Float64) - pl.col(name)).mean()
+            seeds = both.group_by("seed").agg(change.alias("change"))["change"]
+            c = compare_pairs(seeds.to_numpy())
+            title_of = config_title(config) if config else "all"
+            rows.append([title_of, title, str(c.n), f"{c.mean:+.2f}", _bounds(c.interval)])
+    return markdown(("configuration", "per run", "seeds", "pixels minus objects", "95 %"), rows)
+
+
+def _bounds(interval: Interval) -> str:
+    return limits(interval) if isfinite(interval.low + interval.high) else "unbounded"
+
+
+def rated(rate: Rate | None) -> str:
+    """`1.98 [1.57, 2.40]`, or `too few` in place of the limits."""
+    if rate is None:
+        return "no run"
+    return f"{rate.rate:.2f} {limits(rate.interval)}"
+
+
+def _per_100_km(runs: pl.DataFrame, column: str) -> Rate | None:
+    """Events over distance; seeds are what the interval is over, as in `rate_by_seed`."""
+    known = runs.drop_nulls([column, "distance_km"])
+    if not len(known):
+        return None
+    seeds = known.group_by("seed", maintain_order=True).agg(pl.col(column, "distance_km").sum())
+    return event_rate(seeds[column].to_list(), (seeds["distance_km"] / 100.0).to_list())
+
+
+
+def _speed(matrix: Matrix, config: str, weather: str | None = None) -> str:
+    speed = matrix.mean("mean_speed_kmh", config, weather)
+    return "no run" if speed is None else f"{speed:.1f}"

@@ -81,7 +81,7 @@ def test_the_required_deceleration_is_enough_behind_one_that_brakes(gap, v, dv, 
 
 
 def only_pair(ego, other):
-    return pair_of("other", ego, other, np.ones(len(ego.x), bool), 0.05)
+    return pair_of(("ego", "other"), ego, other, np.ones(len(ego.x), bool), 0.05)
 
 
 @pytest.mark.parametrize("late", [0.3, 1.1, 1.9, 2.5])
@@ -102,7 +102,7 @@ def test_crossing_paths_are_as_far_apart_in_time_as_they_cross(late):
 
 def test_what_never_applied_is_nothing_and_expected_of_no_run():
     pair = only_pair(a_body([0.0] * 2, 0.0, 0.0, 10.0), a_body([0.0] * 2, 50.0, 0.0, 10.0))
-    assert pair == Pair("other", None, None, None, None, None, None)
+    assert pair == Pair("ego", "other", None, None, None, None, None, None)
 
 
 @pytest.mark.parametrize("text", ["__import__('os')", "min_ttc_s", "ttc > 1", "min_ttc_s > 1.5.2"])

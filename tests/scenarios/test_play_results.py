@@ -8,7 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lxml import etree
-from tests.scenarios.files import at, event, private, speed, story, time, to, write
+from tests.scenarios.files import (
+    at,
+    event,
+    private,
+    speed,
+    story,
+    time,
+    to,
+    vehicle,
+    write,
+)
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
@@ -75,6 +85,24 @@ def test_the_pair_is_told_by_the_closed_form(out):
     # 10 m are lost in 2 s, then 0.5 * 5 * 4 + ... until 5 s: ego 75 m, lead 20 + 10 m
     assert float(pair["min_gap_m"]) == pytest.approx(60.0 + 30.0 - 75.0 - length, abs=0.8)
     assert float(pair["min_ttc_s"]) == pytest.approx(float(pair["min_gap_m"]) / 15.0, abs=0.06)
+
+
+def test_two_others_are_a_pair_and_expectations_are_about_the_ego(tmp_path):
+    """The ego far ahead; of two behind it the follower comes 3 m/s nearer for 4 s."""
+    file = write(
+        tmp_path, entities=vehicle("ego") + vehicle("follower") + vehicle("lead"), end=4.0,
+        init=at("ego", -3, 400, 20) + at("follower", -1, 100, 13) + at("lead", -1, 140, 10),
+    )  # fmt: skip
+    done = play(file, "--out", tmp_path / "out", *RIDE, "--expect", "min_ttc_s > 100")
+    assert done.exit_code == 0, done.output
+    found = {(r["one"], r["other"]): r for r in rows(tmp_path / "out" / "pairs.csv")}
+    assert set(found) == {("ego", "follower"), ("ego", "lead"), ("follower", "lead")}
+    pair = found["follower", "lead"]
+    length = read_log(tmp_path / "out").table.length[1:3].mean()
+    assert float(pair["min_gap_m"]) == pytest.approx(40.0 - 3.0 * 4.0 - length, abs=0.2)
+    assert float(pair["min_ttc_s"]) == pytest.approx(float(pair["min_gap_m"]) / 3.0, abs=0.05)
+    assert pair["min_pet_s"] == "", "2.4 s apart"
+    assert found["ego", "lead"]["min_ttc_s"] == ""
 
 
 def test_expectations_decide_the_exit_code_and_fill_junit(tmp_path):

@@ -87,7 +87,7 @@ def test_which_stage_acts_when():
     assert not degradation(preset("clear-sunrise")).any
 
 
-@pytest.mark.req("A-226", "A-227")
+@pytest.mark.req("A-226", "A-227", "A-264")
 @pytest.mark.parametrize(("height", "width"), [(600, 800), (180, 450), (160, 160)])
 def test_the_mask_is_the_published_windscreen(height, width):
     y, x = np.mgrid[0:height, 0:width]

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import yaml
 
 from skidpad.core.names import inside
-from skidpad.evidence.pairs import Pair, pairs
+from skidpad.evidence.pairs import Pair, pairs, pairs_of_others
 from skidpad.recording.campaigns import RUNS
 from skidpad.recording.files import output_error, write_bytes
 from skidpad.recording.logfiles import write_log
@@ -69,16 +69,16 @@ def write_run(folder: Path, log: RunLog, error: str) -> str:
 
 
 def write_played(folder: Path, driven: Run) -> None:
-    """What a scenario leaves besides: trajectories, its story, how critical each pair became."""
+    """What a scenario leaves besides: trajectories, its story, how critical any two became."""
     if driven.played is None:
         return
     write_results(folder, driven.log, driven.played)
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(Pair._fields)
-    for pair in pairs(driven.log):
-        numbers = ("" if v is None else f"{v:.4f}" for v in pair[1:])
-        writer.writerow((pair.other, *numbers))
+    for pair in (*pairs(driven.log), *pairs_of_others(driven.log)):
+        numbers = ("" if v is None else f"{v:.4f}" for v in pair[2:])
+        writer.writerow((pair.one, pair.other, *numbers))
     write_bytes(folder / PAIRS, text.getvalue().encode())
 
 

@@ -39,7 +39,7 @@ def parse_expectation(text: str) -> Expectation:
 
 
 def run_values(log: RunLog, found: Iterable[Pair] | None = None) -> dict[str, float]:
-    """The numbers by name, over all pairs; inf or 0 where there never was a conflict."""
+    """The numbers by name, over the pairs of the ego; inf or 0 where there never was a conflict."""
     known = list(pairs(log) if found is None else found)
     seconds = float(log.t[-1] - log.t[0]) if len(log) else 0.0
     values = {"collisions": float(len(log.contacts)), "duration_s": seconds}

@@ -1,7 +1,9 @@
-"""How critical it became between the ego and each other actor of a run."""
+"""How critical it became between any two actors of a run."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
+from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
@@ -23,8 +25,9 @@ V_HEADWAY = 1.0  # m/s, below there is no headway
 
 
 class Pair(NamedTuple):
-    """The ego and another actor, whichever of them follows; None where it never applied."""
+    """Two actors, whichever of them follows; None where it never applied."""
 
+    one: str
     other: str
     min_gap_m: float | None  # bumper to bumper, while one is in the other's way
     min_ttc_s: float | None
@@ -58,14 +61,23 @@ class Following(NamedTuple):
 
 
 def pairs(log: RunLog) -> tuple[Pair, ...]:
-    """Every actor that was there together with the ego."""
-    ego = body(log, EGO)
-    found = []
-    for i, name in enumerate(log.table.names):
-        both = log.present[:, EGO] & log.present[:, i]
-        if i != EGO and both.any():
-            found.append(pair_of(name, ego, body(log, i), both, log.header.dt))
-    return tuple(found)
+    """The ego and every actor that was there together with it."""
+    return tuple(_pairs(log, ((EGO, i) for i in range(1, len(log.table.names)))))
+
+
+def pairs_of_others(log: RunLog) -> tuple[Pair, ...]:
+    """Those of two others between whom there was anything to measure."""
+    found = _pairs(log, combinations(range(1, len(log.table.names)), 2))
+    return tuple(pair for pair in found if any(v is not None for v in pair[2:]))
+
+
+def _pairs(log: RunLog, chosen: Iterable[tuple[int, int]]) -> Iterator[Pair]:
+    names = log.table.names
+    bodies = [body(log, i) for i in range(len(names))]
+    for i, j in chosen:
+        both = log.present[:, i] & log.present[:, j]
+        if both.any():
+            yield pair_of((names[i], names[j]), bodies[i], bodies[j], both, log.header.dt)
 
 
 def body(log: RunLog, i: int) -> Body:
@@ -78,22 +90,25 @@ def body(log: RunLog, i: int) -> Body:
     return Body(x, y, yaw, vx, vy, ax, ay, length, width)
 
 
-def pair_of(name: str, ego: Body, other: Body, both: NDArray[np.bool_], dt: float) -> Pair:
+def pair_of(
+    names: tuple[str, str], one: Body, other: Body, both: NDArray[np.bool_], dt: float
+) -> Pair:
     """Their numbers over the ticks in which both are there."""
-    ways = [following(ego, other), following(other, ego)]
+    ways = [following(one, other), following(other, one)]
     use = [both & ~np.isnan(w.gap) for w in ways]
     cut = [Following(*(column[u] for column in w)) for w, u in zip(ways, use, strict=True)]
     f = Following(*(np.concatenate(columns) for columns in zip(*cut, strict=True)))
     drac = deceleration_to_avoid_crash(f.gap, f.v_closing)
     headway = time_to_collision(f.gap, np.where(f.v > V_HEADWAY, f.v, 0.0))
     return Pair(
-        other=name,
+        one=names[0],
+        other=names[1],
         min_gap_m=least(f.gap),
         min_ttc_s=least(time_to_collision(f.gap, f.v_closing)),
         min_thw_s=least(headway),
         max_drac_mps2=_most(drac),
         max_required_mps2=_most(required_deceleration(f.gap, f.v_closing, f.a_lead)),
-        min_pet_s=post_encroachment(ego, other, both, dt),
+        min_pet_s=post_encroachment(one, other, both, dt),
     )
 
 

@@ -13,7 +13,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.frames import LidarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import LidarSpec
-from skidpad.sensors.around import SECTORS, STEEPEST_DEG, look_around, sectors_of
+from skidpad.sensors.around import SECTORS, STEEPEST_DEG, Fan, look_around, sectors_of
 from skidpad.sensors.live_scene import LiveScene
 
 
@@ -41,15 +41,15 @@ class Lidar:
         turn = -(tick * self._sweep + self._sweep * np.arange(self._columns) / self._columns)
         azimuth = (turn + pi / SECTORS) % (2.0 * pi) - pi / SECTORS
         azimuth = azimuth[np.argsort(sectors_of(azimuth), kind="stable")]
-        a, e = (g.ravel() for g in np.meshgrid(azimuth, self._elevation, indexing="ij"))
-        seen = look_around(
-            scene, pose_world_carrier @ self.spec.mount, a, e, self.spec.range, carrier
-        )
-        d = seen.distance[seen.met]
+        columns, channels = len(azimuth), len(self._elevation)
+        column, channel = np.divmod(np.arange(columns * channels), channels)
+        fan = Fan(azimuth, self._elevation, column, channel)
+        pose = pose_world_carrier @ self.spec.mount
+        seen = look_around(scene, pose, fan, self.spec.range, carrier)
         return LidarPoints(
-            (seen.direction[seen.met] * d[:, None]).astype(np.float32),
-            np.exp(-self._extinction * d).astype(np.float32),
-            seen.cosine[seen.met].astype(np.float32),
-            seen.label[seen.met].astype(np.uint8),
-            seen.instance[seen.met].astype(np.uint16),
+            (seen.direction * seen.distance[:, None]).astype(np.float32),
+            np.exp(-self._extinction * seen.distance).astype(np.float32),
+            seen.cosine.astype(np.float32),
+            seen.label.astype(np.uint8),
+            seen.instance.astype(np.uint16),
         )

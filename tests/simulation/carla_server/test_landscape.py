@@ -8,7 +8,7 @@ import pytest
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.bundled import load_map, map_file
-from skidpad.sensors.around import look_around
+from skidpad.sensors.around import Fan, look_around
 from skidpad.simulation.carla_server import scenery
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.landscape import Landscape, objects, pieces, without
@@ -88,11 +88,11 @@ def test_lidar_ray_and_car_go_through_what_is_hidden():
     served = Served(ServerOptions(map="town_Opt"), StreamHub())
     episode = served.episode
     building, eye = facing_a_building(served)
-    ahead = np.zeros(1)
+    ahead = Fan(np.zeros(1), np.zeros(1), np.zeros(1, dtype=int), np.zeros(1, dtype=int))
 
     def seen():
         live = episode.surroundings.picture().live
-        return look_around(live, eye, ahead, ahead, 100.0, -1)
+        return look_around(live, eye, ahead, 100.0, -1)
 
     def met():
         way = (np.cos(eye.yaw), np.sin(eye.yaw), 0.0)
@@ -108,7 +108,7 @@ def test_lidar_ray_and_car_go_through_what_is_hidden():
     episode.relandscape()
     served.tick()
     after = seen()
-    assert not after.met[0] or after.distance[0] > 12.5
+    assert not len(after.ray) or after.distance[0] > 12.5
     assert met() == []
     assert len(episode.moving.obstacles.names) == count - 4
     episode.landscape.toggle([building.id], on=True)

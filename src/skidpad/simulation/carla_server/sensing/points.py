@@ -13,7 +13,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import angles_to_carla, vectors_to_carla
 from skidpad.core.randomness import stream_key
 from skidpad.core.specs import RadarSpec
-from skidpad.sensors.around import STEEPEST_DEG, Seen, look_around
+from skidpad.sensors.around import STEEPEST_DEG, Fan, Seen, look_around
 from skidpad.sensors.beam import Beam
 from skidpad.sensors.radar import Radar
 from skidpad.simulation.carla_server import wire
@@ -144,12 +144,11 @@ def _scan(around: Surroundings, clock: Clock, sensor: Sensor, drop_off: float) -
     seen = look_around(
         around.picture().live,
         around.actors.pose(sensor.actor),
-        azimuth[column],
-        make.elevations[channel],
+        Fan(azimuth, make.elevations, column, channel),
         make.range,
         around.hidden_for(sensor.actor),
     )
-    return _Scan(channel[seen.met], Seen._make(column[seen.met] for column in seen))
+    return _Scan(channel[seen.ray], seen)
 
 
 def plain_lidar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
@@ -162,8 +161,9 @@ def plain_lidar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Mess
     kept = sensor.rng.random(len(distance)) < share
     if noise > 0.0:
         distance = distance + sensor.rng.normal(0.0, noise, len(distance))
-    body = np.column_stack((scan.places(distance), intensity))[kept].astype("<f4").tobytes()
-    return [(sensor.equipment.head(scan.channel[kept]), body)]
+    points = np.empty((len(distance), 4), dtype="<f4")
+    points[:, :3], points[:, 3] = scan.places(distance), intensity
+    return [(sensor.equipment.head(scan.channel[kept]), points[kept].tobytes())]
 
 
 def semantic_lidar(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import hypot
+from math import cos, hypot, radians, sin, sqrt
 
 import pytest
 from tests.scenarios.files import (
@@ -278,12 +278,16 @@ def test_a_way_is_taken_at_forks(tmp_path, kind):
 
 
 @pytest.mark.osc("GeoPosition")
-def test_degrees_are_metres_about_the_maps_origin(tmp_path):
-    """1e-4 degrees are 11.132 m of a sphere of WGS 84's equatorial radius; the map's lies at 48.1."""
+def test_degrees_are_metres_by_the_maps_projection(tmp_path):
+    """Near the origin of a transverse Mercator, at 48.1 and 11.5: radii of curvature of WGS 84."""
     place = '<GeoPosition latitudeDeg="48.0999" longitudeDeg="11.501"/>'
     begin = init("ego", teleport(place)) + at("other", -1, 120)
     row = told(tmp_path, init=begin, end=0.2, minor=3).of("ego")[0]
-    assert (row.x, row.y) == pytest.approx((74.343, -11.132), abs=0.01)
+    a, e2, lat = 6_378_137.0, 0.0066943799901413, radians(48.1)
+    across = a / sqrt(1.0 - e2 * sin(lat) ** 2)
+    along = across * (1.0 - e2) / (1.0 - e2 * sin(lat) ** 2)
+    x, y = across * cos(radians(48.0999)) * radians(0.001), -along * radians(0.0001)
+    assert (row.x, row.y) == pytest.approx((x, y), abs=0.001)
 
 
 @pytest.mark.osc("InRoutePosition", "TargetPosition")

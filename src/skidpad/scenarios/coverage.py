@@ -50,7 +50,6 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         "RelativeAngleCondition": "pitch and roll are those of the road",
         "AssignControllerAction": "matters for the ego only",
         "ActivateControllerAction": "matters for the ego only",
-        "GeoPosition": "on the plane that touches the earth at the map's origin",
         "AcquirePositionAction": "chooses the way at forks; does not change lanes by itself",
         "AssignRouteAction": "chooses the way at forks; does not change lanes by itself",
         "TrafficSourceAction": f"at most {MOST} at a time; who drives them is chosen here",

@@ -8,19 +8,18 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
-from math import cos, pi, radians
+from math import pi
 from typing import Protocol
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.roads.opendrive.document import id_number
+from skidpad.roads.projection import map_place
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.findings import Kind
 from skidpad.scenarios.network import END_SLACK, Place, next_lane_id
 from skidpad.scenarios.scene import Scene
-
-EARTH_RADIUS = 6_378_137.0  # m, WGS 84, for maps without a projection of their own
 
 
 class Position(Protocol):
@@ -108,20 +107,15 @@ def _road(node: Node, ctx: Context) -> Position:
 
 
 def _geo(node: Node, ctx: Context) -> Position:
-    """Degrees about the map's origin, on the plane that touches the earth there."""
+    """Degrees, by the projection of the map."""
     lat = node.number("latitudeDeg") if node.has("latitudeDeg") else node.number("latitude")
     lon = node.number("longitudeDeg") if node.has("longitudeDeg") else node.number("longitude")
-    lat_0, lon_0 = _origin(ctx.network.map.geo_reference)
-    east = EARTH_RADIUS * radians(lon - lon_0) * cos(radians(lat_0))
-    north = EARTH_RADIUS * radians(lat - lat_0)
-    place = ctx.network.place_of(Pose(east, north, node.number("altitude", 0.0)))
+    try:
+        x, y = map_place(ctx.network.map.geo_reference, lat, lon)
+    except ConfigError as error:
+        raise node.error(str(error)) from None
+    place = ctx.network.place_of(Pose(x, y, node.number("altitude", 0.0)))
     return Fixed(_facing(place, orientation(node)))
-
-
-def _origin(projection: str) -> tuple[float, float]:
-    """Latitude and longitude of a PROJ text's origin, degrees."""
-    parts = dict(p.split("=", 1) for p in projection.replace("+", "").split() if "=" in p)
-    return float(parts.get("lat_0", 0.0)), float(parts.get("lon_0", 0.0))
 
 
 def _facing(place: Place, facing: Orientation) -> Place:

@@ -56,7 +56,7 @@ class AskedSensors:
         if setup.range_model is RangeModel.PHYSICAL:
             self.air = extinction(setup.weather)
         self._map, self._table, self._dt = map, table, setup.dt
-        self._origin = inertial.map_origin(map.geo_reference)
+        self._origin = inertial.map_origin(map.geo_reference) or (0.0, 0.0)
         self._lidar = lidar
         self._scene: LiveScene | None = None  # for the first lidar that is read
         self._placed = -1

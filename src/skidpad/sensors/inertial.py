@@ -15,11 +15,11 @@ from skidpad.core.geometry import Pose
 from skidpad.core.states import ActorStates
 
 
-def map_origin(geo_reference: str) -> tuple[float, float]:
-    """Latitude and longitude in deg of a map's origin, from its projection text; 0, 0 without."""
+def map_origin(geo_reference: str) -> tuple[float, float] | None:
+    """Latitude and longitude in deg of a map's origin, from its projection text; None without both."""
     number = r"-?[0-9.]+(?:[eE][-+]?[0-9]+)?"
     found = dict(re.findall(rf"\+(lat_0|lon_0)=({number})", geo_reference))
-    return float(found.get("lat_0", 0.0)), float(found.get("lon_0", 0.0))
+    return (float(found["lat_0"]), float(found["lon_0"])) if len(found) == 2 else None
 
 
 def compass(pose: Pose) -> float:

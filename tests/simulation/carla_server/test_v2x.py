@@ -182,9 +182,9 @@ for actor, type in ((bus, "Bus"), (van, "Special Vehicle")):
     assert part["Basic Container"]["Station Type"] == type, part
     geo = roads.transform_to_geolocation(snapshot.find(actor.id).get_transform().location)
     place = part["Basic Container"]["Reference Position"]
-    # 1 m: the client projects by the map's +proj=tmerc, the server by Mercator (listed)
-    assert abs(place["Latitude"] - geo.latitude * 1e7) <= 100, (place, geo.latitude)
-    assert abs(place["Longitude"] - geo.longitude * 1e7) <= 100, (place, geo.longitude)
+    # the message counts in tenths of a microdegree, rounded to whole ones
+    assert abs(place["Latitude"] - geo.latitude * 1e7) <= 5.01, (place, geo.latitude)
+    assert abs(place["Longitude"] - geo.longitude * 1e7) <= 5.01, (place, geo.longitude)
     high = part["High Frequency Container"]["Basic Vehicle Container High Frequency"]
     v = snapshot.find(actor.id).get_velocity().length()
     assert abs(high["Speed"]["Value"] - 100.0 * v) <= 2, (high, v)

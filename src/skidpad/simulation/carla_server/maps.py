@@ -9,6 +9,7 @@ from pathlib import Path
 from shapely.errors import ShapelyError
 
 from skidpad.core.errors import ConfigError, SkidpadError
+from skidpad.core.geodesy import client_geolocation
 from skidpad.core.geometry import Pose
 from skidpad.roads.bundled import bundled_maps, load_map, map_file
 from skidpad.roads.lanes import LaneKind
@@ -27,6 +28,7 @@ SPACING = 25.0  # m between recommended spawn points along a lane
 MARGIN = 6.0  # m from a lane's ends
 KEPT_MESHES = 16  # navigation meshes, by content of the map: a large town takes seconds
 _NAVIGATION: dict[str, tuple[str, bytes] | None] = {}
+CLIENT_ORIGIN = (42.0, 2.0)  # deg, of maps that name none
 LIFT = 0.3  # m above the road, so that nobody spawns inside it
 
 
@@ -39,10 +41,9 @@ class ServedMap:
     xodr: str
     spawn_points: tuple[Pose, ...]
 
-    @property
-    def origin(self) -> tuple[float, float]:
-        """Latitude and longitude in deg of the map's origin."""
-        return map_origin(self.roads.geo_reference)
+    def geolocation(self, x: float, y: float) -> tuple[float, float]:
+        """(latitude, longitude) in deg of a place in m, as clients of 0.9.16 convert it themselves."""
+        return client_geolocation(x, y, *(map_origin(self.roads.geo_reference) or CLIENT_ORIGIN))
 
     @property
     def full_name(self) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from skidpad.core.frames import ImuReading
-from skidpad.core.geodesy import geolocation
 from skidpad.core.lefthanded import turn_from_carla, vector_from_carla
 from skidpad.sensors import inertial
 from skidpad.simulation.carla_server import codec
@@ -44,7 +43,7 @@ def gnss(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
     """
     pose = around.actors.pose(sensor.actor)
     x, y, _z = vector_from_carla(pose.x, pose.y, pose.z)
-    latitude, longitude = geolocation(x, y, *around.map.origin)
+    latitude, longitude = around.map.geolocation(x, y)
     noise, n = sensor.rng.standard_normal(3), sensor.number
     values = [
         v + n(f"noise_{name}_bias") + noise[k] * n(f"noise_{name}_stddev")

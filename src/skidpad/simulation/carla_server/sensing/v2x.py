@@ -8,7 +8,6 @@ from math import cos, degrees, sin
 
 import numpy as np
 
-from skidpad.core.geodesy import geolocation
 from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import turn_from_carla, vector_from_carla
 from skidpad.sensors import inertial
@@ -138,7 +137,7 @@ def _type(carrier: Actor) -> int:
 def _place(around: Surroundings, sensor: Sensor, pose: Pose) -> cam.Motion:
     x, y, _ = vector_from_carla(pose.x, pose.y, pose.z)
     noise, n = sensor.rng.standard_normal(3), sensor.number
-    latitude, longitude = geolocation(x, y, *around.map.origin)
+    latitude, longitude = around.map.geolocation(x, y)
     latitude, longitude, altitude = (
         float(value + n(f"noise_{name}_bias") + noise[k] * n(f"noise_{name}_stddev"))
         for k, (name, value) in enumerate((("lat", latitude), ("lon", longitude), ("alt", pose.z)))

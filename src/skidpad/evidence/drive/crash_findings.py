@@ -11,6 +11,7 @@ from typing import NamedTuple
 import polars as pl
 
 from skidpad.evidence.contrasts import Outweighs, Paired, RateBelow, highest, lowest
+from skidpad.evidence.drive.collisions import BEND_RADIUS
 from skidpad.evidence.drive.sides import (
     BY_RUN,
     CLEAR,
@@ -34,6 +35,7 @@ class Crashes(NamedTuple):
     counted: str  # as an estimand says it
 
 
+IN_BENDS = f"configurations 1 and 2 on a map with bends tighter than {BEND_RADIUS:g} m"
 FATAL = Crashes("fatal_collisions", "", "collisions", "fatal collisions")
 VEHICLE = Crashes("crashes_vehicle", "v", "crashes with vehicles", "crashes with vehicles")
 
@@ -53,7 +55,7 @@ def _paradox(kind: Crashes) -> Finding:
         f"F-04{kind.mark}",
         f"Lane centring adds {kind.name}, because it lets the car go faster into bends.",
         f"{kind.counted} and speed in bends, configuration 2 minus 1",
-        "configurations 1 and 2",
+        IN_BENDS,
         (
             configs(kind.column, "2", "1", COLLISIONS),
             configs("bend_speed_kmh", "2", "1", SPEED),
@@ -116,7 +118,7 @@ FASTER = Finding(
     "F-05",
     "Lane centring raises the speed.",
     "mean, 95th percentile and bend speed, configuration 2 minus 1",
-    "configurations 1 and 2",
+    IN_BENDS,
     tuple(configs(f"{which}_speed_kmh", "2", "1", SPEED) for which in ("mean", "p95", "bend")),
 )
 HARDER = Finding(

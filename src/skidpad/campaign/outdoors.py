@@ -20,6 +20,7 @@ from skidpad.physics.grip import RAIN_FULL
 from skidpad.physics.optics import V_CLEAR, V_FOG
 from skidpad.scenarios.environment import Environment, Fall, Wetness
 from skidpad.scenarios.player import Player
+from skidpad.scenarios.signals import held_lights
 from skidpad.simulation.backend import Backend
 from skidpad.stack.settings import grip_of, settings_of
 
@@ -68,8 +69,8 @@ class ChangedBackend:
         self.inner.close()
 
 
-class FileSky:
-    """What the <EnvironmentAction>s of a file that is played make of the weather and the road."""
+class FileChanges:
+    """What the actions of a file that is played make of weather, road and traffic lights."""
 
     def __init__(self, player: Player, spec: RunSpec) -> None:
         self.player, self.done = player, 0
@@ -85,7 +86,10 @@ class FileSky:
 
     def news(self) -> Outside | None:
         """What has changed since it was asked last."""
-        fresh = self.player.scene.environments[self.done :]
+        scene = self.player.scene
+        fresh, lights = scene.environments[self.done :], held_lights(scene)
+        changed = bool(fresh) or lights != self.outside.lights
+        self.outside = replace(self.outside, lights=lights)
         for environment in fresh:
             self.done += 1
             if self.follows:
@@ -94,7 +98,7 @@ class FileSky:
             if environment.friction_scale is not None:
                 mu_ref = self.mu_ref * environment.friction_scale
                 self.outside = replace(self.outside, mu_ref=mu_ref)
-        return self.outside if fresh else None
+        return self.outside if changed else None
 
 
 def in_weather_of_file(run: RunSpec, environment: Environment | None) -> RunSpec:

@@ -15,7 +15,7 @@ from skidpad.campaign.backends import make_backend
 from skidpad.campaign.cast import Stage, driver_of, stage_of, with_sensors
 from skidpad.campaign.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
 from skidpad.campaign.drive import Moment, Sink, loop
-from skidpad.campaign.outdoors import ChangedBackend, FileSky
+from skidpad.campaign.outdoors import ChangedBackend, FileChanges
 from skidpad.campaign.snapshots import Snapshots
 from skidpad.core.errors import StackError, require_choice
 from skidpad.core.run import (
@@ -116,9 +116,9 @@ def _named(
 
 
 class Log(Sink):
-    """The tick log of a run as a sink. sky: of a file that may change the weather."""
+    """The tick log of a run as a sink. changes: of a file that may change the weather."""
 
-    sky: FileSky | None = None
+    changes: FileChanges | None = None
 
     def __init__(self, header: LogHeader, weather: str, ticks: int) -> None:
         self.header, self.weather, self.ticks = header, weather, ticks
@@ -130,8 +130,8 @@ class Log(Sink):
     def see(self, moment: Moment) -> None:
         """Write down the moment, and what supervisor and world did besides driving (A-194)."""
         frame, truth, action = moment.frame, moment.truth, moment.action
-        if self.sky is not None and self.sky.done:
-            self.log.set_weather(self.sky.weather.name)
+        if self.changes is not None and self.changes.done:
+            self.log.set_weather(self.changes.weather.name)
         self.log.append(truth, frame, moment.command, moment.report, frame.supervision)
         for text in truth.notices:
             self.log.notice(truth.tick, NoticeSource.TRAFFIC, text)
@@ -174,15 +174,15 @@ def run(
     """
     stage = stage_of(spec) if stage is None else stage
     backend = make_backend(spec.backend) if backend is None else backend
-    sky = None if stage.player is None else FileSky(stage.player, spec)
-    if sky is not None:
-        backend = ChangedBackend(backend, sky.news)
+    changes = None if stage.player is None else FileChanges(stage.player, spec)
+    if changes is not None:
+        backend = ChangedBackend(backend, changes.news)
     if desk is not None:
         backend = DeskBackend(backend, desk)
         script = DeskScript(stage.script, desk)
         stage = replace(stage, supervisor=DeskSupervisor(stage.supervisor, desk), script=script)
     log = log_of(spec, stage, desk)
-    log.sky = sky
+    log.changes = changes
     snapshots = Snapshots(folder, spec.driver.label, spec.weather.name, stage.setup.dt)
     try:
         failure = _drive(spec, stage, kind, desk, backend, (log, snapshots, *sinks))

@@ -13,7 +13,7 @@ from msgspec import Struct
 
 from skidpad.core.errors import require_range
 from skidpad.core.run import Function
-from skidpad.core.vocabulary import GripModel, RangeModel
+from skidpad.core.vocabulary import GripModel, LightState, RangeModel
 from skidpad.core.weather import Weather
 
 
@@ -112,3 +112,5 @@ class Outside:
     range_model: RangeModel
     beam: Beam | None = None  # None: low beam by night
     mu_ref: float | None = None  # on a dry road; None: as it was (embedded backend)
+    # traffic lights that somebody has taken over, by OpenDRIVE id, and what they show
+    lights: tuple[tuple[int, LightState], ...] = ()

@@ -34,18 +34,19 @@ INSIDE = frozenset(  # understood where they stand inside others
         "ConnectTrailerAction", "DisconnectTrailerAction", "TrafficStopAction",
     }
 )  # fmt: skip
+STATES = (
+    "colours and three lamps such as `on;off;off` are shown; other words are for conditions alone"
+)
 PARTIAL: Mapping[str, str] = MappingProxyType(
     {
         "EnvironmentAction": "falling snow counts by its sight, wind not at all",
-        "TrafficSignalStateAction": "conditions see it, the lights of the road do not",
-        "TrafficSignalControllerAction": "conditions see it, the lights of the road do not",
-        "TrafficSignalCondition": "sees states that the file sets, also by its controllers",
+        "TrafficSignalStateAction": STATES,
         "UserDefinedValueCondition": "nobody sets such values: never holds",
         "CustomCommandAction": "is noted, without effect",
         "SetMonitorAction": "is noted, without effect",
         "ConnectTrailerAction": "is noted, without effect",
         "DisconnectTrailerAction": "is noted, without effect",
-        "InfrastructureAction": "conditions see it, the lights of the road do not",
+        "InfrastructureAction": STATES,
         "AngleCondition": "pitch and roll are those of the road",
         "RelativeAngleCondition": "pitch and roll are those of the road",
         "AssignControllerAction": "matters for the ego only",

@@ -12,6 +12,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.run import ActorMode
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import WorldTruth
+from skidpad.core.vocabulary import LightState
 from skidpad.scenarios.entities import Entity
 from skidpad.scenarios.environment import Environment
 from skidpad.scenarios.measures import Point, corners, overlap
@@ -225,6 +226,7 @@ class Scene:
     parameters: dict[str, str] = field(default_factory=dict)
     variables: dict[str, str] = field(default_factory=dict)
     signals: dict[str, str] = field(default_factory=dict)  # states that the file has set
+    lights: Mapping[int, LightState] = field(default_factory=dict)  # of the road, by signal id
     t: float = 0.0
     states: dict[Path, State] = field(default_factory=dict)
     moves: list[tuple[Path, Move]] = field(default_factory=list)  # all, in their order
@@ -245,7 +247,7 @@ class Scene:
 
     def observe(self, truth: WorldTruth) -> None:
         """Take over positions and velocities of a tick."""
-        self.t = truth.tick * self.dt
+        self.t, self.lights = truth.tick * self.dt, truth.lights
         s = truth.states
         columns = (s.x.tolist(), s.y.tolist(), s.yaw.tolist(), s.vx.tolist(), s.vy.tolist())
         for actor in self.actors.values():

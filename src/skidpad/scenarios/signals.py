@@ -5,8 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from skidpad.core.vocabulary import LightState
+from skidpad.roads.opendrive.document import id_number
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.scene import Scene
+
+LAMPS = (LightState.RED, LightState.YELLOW, LightState.GREEN)  # from the top, as esmini reads three
+LIT = ("on", "flashing")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,6 +89,26 @@ def _delay(node: Node, nodes: Mapping[str, Node]) -> float:
             raise node.error(f"reference: there is no controller {reference!r} to count from")
         seen.add(reference)
         node = nodes[reference]
+
+
+def shown(state: str) -> LightState | None:
+    """What a light shows: a colour, or three lamps from the top (`on;off;off`).
+
+    The standard leaves states to the road's own signals; other words are for conditions alone: None.
+    """
+    words = [word.strip().lower() for word in state.split(";")]
+    if len(words) == len(LAMPS):
+        return next(
+            (lamp for lamp, word in zip(LAMPS, words, strict=True) if word in LIT), LightState.OFF
+        )
+    found = LightState.__members__.get(words[0].upper())
+    return None if found is LightState.UNKNOWN else found
+
+
+def held_lights(scene: Scene) -> tuple[tuple[int, LightState], ...]:
+    """Signals that the file has set, by the road's ids, in colours; `id=7` as CARLA's files have it."""
+    states = ((id_number(n.removeprefix("id=")), shown(s)) for n, s in scene.signals.items())
+    return tuple((id, state) for id, state in states if state is not None)
 
 
 class SignalPlan:

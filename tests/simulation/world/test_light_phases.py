@@ -77,3 +77,22 @@ def test_one_arm_at_a_time_has_green_or_yellow_and_all_have_their_turn() -> None
                 open_for[i] += dt
         for seconds in open_for.values():
             assert seconds == pytest.approx(GREEN_S + YELLOW_S, abs=2 * dt)
+
+
+def test_a_light_that_is_held_stays_and_nobody_crosses_it() -> None:
+    lights = Lights.pretimed(TOWN, 1, 0.05)
+    lights.hold([(1003, LightState.GREEN), (77, LightState.RED)])
+    wanted = {
+        1001: LightState.RED,
+        1002: LightState.RED,
+        1003: LightState.GREEN,
+        1004: LightState.RED,
+    }
+    for _ in range(2000):
+        assert not lights.advance(0.05)
+        assert {id: lights.by_id[id] for id in wanted} == wanted
+    lights.hold([(1003, LightState.GREEN), (1004, LightState.YELLOW)])
+    assert lights.by_id[1004] is LightState.YELLOW
+    assert lights.by_id[1003] is LightState.GREEN
+    for light in lights.lights:
+        assert (lights.by_row[list(light.rows)] == light.state).all()

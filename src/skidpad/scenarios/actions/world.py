@@ -95,7 +95,7 @@ def _value(node: Node, ctx: Context) -> GlobalAction:
 
 @dataclass(frozen=True, slots=True)
 class SetSignal:
-    """A signal or a controller gets a state; conditions see it, the road's lights do not."""
+    """A signal or a controller gets a state; a light of the road shows it, as far as it is a colour."""
 
     name: str
     state: str

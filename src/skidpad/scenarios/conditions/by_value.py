@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+from skidpad.roads.opendrive.document import id_number
 from skidpad.scenarios.conditions.base import Condition, Probe, Rule, rule, rule_name
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
@@ -12,6 +13,7 @@ from skidpad.scenarios.environment import moment_of
 from skidpad.scenarios.findings import Kind
 from skidpad.scenarios.parameters import compared
 from skidpad.scenarios.scene import Move, Path, Scene, State
+from skidpad.scenarios.signals import shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -121,14 +123,21 @@ def _element(node: Node, ctx: Context) -> Condition:
 
 @dataclass(frozen=True, slots=True)
 class Signal:
-    """A signal or signal controller is in the state that the file has set."""
+    """A signal or signal controller is in a state: that of the file, else what the road's light shows."""
 
     name: str
     state: str
 
     def probe(self) -> Probe:
         """As it is now."""
-        return lambda scene: scene.signals.get(self.name) == self.state
+        wanted, id = shown(self.state), id_number(self.name.removeprefix("id="))
+
+        def holds(scene: Scene) -> bool:
+            if self.name in scene.signals:
+                return scene.signals[self.name] == self.state
+            return wanted is not None and scene.lights.get(id) is wanted
+
+        return holds
 
 
 @dataclass(frozen=True, slots=True)

@@ -76,8 +76,9 @@ class CarlaBackend:
             self.session.relocate(pose, v)
 
     def change(self, outside: Outside) -> None:
-        """The server's weather is another one; grip and headlights stay as the run began."""
+        """The server's weather and lights are others; grip and headlights stay as the run began."""
         session = self.session
+        session.programme.hold(outside.lights)
         with speaking(self.options, "changing the weather"):
             set_weather(session.carla, session.world, outside.weather)
 

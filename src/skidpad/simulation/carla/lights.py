@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 from skidpad.core.vocabulary import LightState
@@ -45,6 +46,10 @@ class Programme:
         self._shown: dict[int, LightState] = {}
         world.freeze_all_traffic_lights(True)
         self.show(0)
+
+    def hold(self, held: Iterable[tuple[int, LightState]]) -> None:
+        """Lights that somebody has taken over."""
+        self._cycle.hold(held)
 
     def show(self, tick: int) -> None:
         """Let the lights show what belongs to this tick; the server shows it in the coming one."""

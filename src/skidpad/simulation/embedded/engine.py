@@ -82,13 +82,14 @@ class EmbeddedBackend:
         self.world.relocate(pose, v)
 
     def change(self, outside: Outside) -> None:
-        """Weather, grip and headlights are others from the next step on.
+        """Weather, grip, headlights and lights that are taken over are others from the next step on.
 
         Drivers of the background keep the caution that they began with.
         """
         weather, range_model = outside.weather, outside.range_model
         mu_ref = self._setup.mu_ref if outside.mu_ref is None else outside.mu_ref
         self.world.grip = grip_params(weather, outside.grip, mu_ref)
+        self.world.lights.hold(outside.lights)
         self.sensing.change(outside)
         changed = replace(self._setup, weather=weather, range_model=range_model, mu_ref=mu_ref)
         self._setup = changed

@@ -145,6 +145,24 @@ class Lights:
                 group.turn = i
         self._show()
 
+    def hold(self, held: Iterable[tuple[int, LightState]]) -> None:
+        """Lights, by signal id, show what they are told and nothing else.
+
+        The cycle of their junctions ends: the other lights there are red until they are told, too.
+        """
+        by_signal = {light.signal: light for light in self.lights}
+        for signal, state in held:
+            light = by_signal.get(signal)
+            if light is None:
+                continue
+            group = self.groups[light.group]
+            if not group.frozen:
+                group.frozen = True
+                _show_all(list(group.lights()), LightState.RED)
+            if light.state is not state:
+                light.show(state)
+        self._show()
+
     def phase_of(self, light: Light) -> list[Light]:
         """The lights that change together with this one; they share their times."""
         return next(phase for phase in self.groups[light.group].phases if light in phase)

@@ -15,7 +15,14 @@ from skidpad.core.inputs import Outside
 from skidpad.core.setup import ActorCommand, ActorSetup, Setup
 from skidpad.core.specs import CameraSpec, LidarSpec, PointSensorSpec
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import Control, GripModel, RangeModel, SemanticClass, SensorLevel
+from skidpad.core.vocabulary import (
+    Control,
+    GripModel,
+    LightState,
+    RangeModel,
+    SemanticClass,
+    SensorLevel,
+)
 from skidpad.core.weather import Weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
@@ -277,6 +284,23 @@ def goes_on_in_another_weather(make: Make) -> None:
     backend.close()
 
 
+def shows_lights_as_held(make: Make) -> None:
+    backend = make()
+    backend.reset(ALONE, 0)
+    for state in (LightState.GREEN, LightState.YELLOW, LightState.RED):
+        id = min(backend.truth().lights)
+        backend.change(
+            Outside(
+                weather=Weather(), grip=GripModel.NONE, range_model=RangeModel.NONE,
+                lights=((id, state), (77, state)),
+            )
+        )  # fmt: skip
+        for _ in range(2):  # the server shows it a tick later
+            frame = backend.step(VehicleCommand())
+        assert frame.lights[id] is backend.truth().lights[id] is state
+    backend.close()
+
+
 CHECKS: tuple[Callable[[Make], None], ...] = (
     must_be_reset_and_closes_twice,
     begins_at_its_place_and_follows_commands,
@@ -289,4 +313,5 @@ CHECKS: tuple[Callable[[Make], None], ...] = (
     keeps_no_frame_beyond_its_tick,
     gives_the_stack_what_it_asked_for,
     goes_on_in_another_weather,
+    shows_lights_as_held,
 )

@@ -168,7 +168,6 @@ def test_a_value_of_the_users_never_holds_and_the_check_says_so(tmp_path):
 
 
 WITHOUT_EFFECT = {
-    "VisibilityAction": private('<VisibilityAction graphics="true" sensors="false" traffic="true"/>'),
     "LightStateAction": private("""<AppearanceAction><LightStateAction><LightType><VehicleLight
 vehicleLightType="brakeLights"/></LightType><LightState mode="on"/></LightStateAction>
 </AppearanceAction>"""),
@@ -186,9 +185,9 @@ vehicleLightType="brakeLights"/></LightType><LightState mode="on"/></LightStateA
 
 
 @pytest.mark.osc(
-    "VisibilityAction", "LightStateAction", "AnimationAction", "AppearanceAction",
-    "OverrideControllerValueAction", "TrailerAction", "ConnectTrailerAction",
-    "DisconnectTrailerAction", "UserDefinedAction", "CustomCommandAction", "SetMonitorAction",
+    "LightStateAction", "AnimationAction", "AppearanceAction",
+    "TrailerAction", "ConnectTrailerAction", "DisconnectTrailerAction",
+    "UserDefinedAction", "CustomCommandAction", "SetMonitorAction",
 )  # fmt: skip
 @pytest.mark.parametrize("tag", WITHOUT_EFFECT)
 def test_what_this_world_cannot_show_is_over_at_once_and_told(tmp_path, tag):

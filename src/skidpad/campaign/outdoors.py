@@ -36,10 +36,18 @@ WATER = {  # wetness and standing water in percent by the words of the standard;
 
 
 class ChangedBackend:
-    """A backend that is told what `news` says before each step; None: nothing has changed."""
+    """A backend that is told what `news` says before each step; None: nothing has changed.
 
-    def __init__(self, inner: Backend, news: Callable[[], Outside | None]) -> None:
-        self.inner, self.news = inner, news
+    hands: what becomes of the driver's command on its way.
+    """
+
+    def __init__(
+        self,
+        inner: Backend,
+        news: Callable[[], Outside | None],
+        hands: Callable[[VehicleCommand], VehicleCommand] = lambda command: command,
+    ) -> None:
+        self.inner, self.news, self.hands = inner, news, hands
 
     def reset(self, setup: Setup, seed: int) -> Frame:
         """Begin a run."""
@@ -50,7 +58,7 @@ class ChangedBackend:
         outside = self.news()
         if outside is not None:
             self.inner.change(outside)
-        return self.inner.step(command, actor_commands)
+        return self.inner.step(self.hands(command), actor_commands)
 
     def truth(self) -> WorldTruth:
         """Ground truth of the moment."""
@@ -87,18 +95,22 @@ class FileChanges:
     def news(self) -> Outside | None:
         """What has changed since it was asked last."""
         scene = self.player.scene
-        fresh, lights = scene.environments[self.done :], held_lights(scene)
-        changed = bool(fresh) or lights != self.outside.lights
-        self.outside = replace(self.outside, lights=lights)
-        for environment in fresh:
+        unseen = frozenset(actor.name for actor in scene.actors.values() if not actor.visible)
+        now = replace(self.outside, lights=held_lights(scene), unseen=unseen)
+        for environment in scene.environments[self.done :]:
             self.done += 1
             if self.follows:
-                weather = weather_of(environment, self.weather, f"{NAME}-{self.done + 1}")
-                self.outside = replace(self.outside, weather=weather)
+                weather = weather_of(environment, now.weather, f"{NAME}-{self.done + 1}")
+                now = replace(now, weather=weather)
             if environment.friction_scale is not None:
-                mu_ref = self.mu_ref * environment.friction_scale
-                self.outside = replace(self.outside, mu_ref=mu_ref)
-        return self.outside if changed else None
+                now = replace(now, mu_ref=self.mu_ref * environment.friction_scale)
+        before, self.outside = self.outside, now
+        return None if now == before else now
+
+    def hands(self, command: VehicleCommand) -> VehicleCommand:
+        """What the file makes of the driver's command."""
+        ego = self.player.actors.get(self.player.scenario.ego)
+        return command if ego is None else ego.overridden(command)
 
 
 def in_weather_of_file(run: RunSpec, environment: Environment | None) -> RunSpec:

@@ -176,7 +176,7 @@ def run(
     backend = make_backend(spec.backend) if backend is None else backend
     changes = None if stage.player is None else FileChanges(stage.player, spec)
     if changes is not None:
-        backend = ChangedBackend(backend, changes.news)
+        backend = ChangedBackend(backend, changes.news, changes.hands)
     if desk is not None:
         backend = DeskBackend(backend, desk)
         script = DeskScript(stage.script, desk)

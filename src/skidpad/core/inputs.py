@@ -114,3 +114,4 @@ class Outside:
     mu_ref: float | None = None  # on a dry road; None: as it was (embedded backend)
     # traffic lights that somebody has taken over, by OpenDRIVE id, and what they show
     lights: tuple[tuple[int, LightState], ...] = ()
+    unseen: frozenset[str] = frozenset()  # actors that no sensor sees (embedded backend)

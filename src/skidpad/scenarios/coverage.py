@@ -58,7 +58,7 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         "TrafficSwarmAction": f"at most {MOST}; who drives them is chosen here",
         "TrafficAreaAction": f"at most {MOST}; who drives them is chosen here",
         "UserDefinedAction": "is noted, without effect",
-        "OverrideControllerValueAction": "is noted, without effect",
+        "OverrideControllerValueAction": "no clutch, no brake by force; a wheel has 1.5 turns to either side",
     }
 )
 

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from math import cos, hypot, sin
-from typing import Protocol
+from typing import Any, Protocol
 
 from skidpad.core.geometry import Pose
 from skidpad.core.run import ActorMode
 from skidpad.core.setup import ActorCommand
-from skidpad.core.states import WorldTruth
+from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState
 from skidpad.scenarios.entities import Entity
 from skidpad.scenarios.environment import Environment
@@ -94,6 +94,8 @@ class Actor:
     seen: bool = False  # in a tick before
     handed: bool = True  # somebody else's controller is active, where mode is None
     word: ActorCommand | None = None  # appear or vanish, said once
+    visible: bool = True  # to sensors
+    worked: dict[str, Any] = field(default_factory=dict)  # inputs that the file works, by name
     a: float = 0.0  # m/s^2 of the speed
     travelled: float = 0.0  # m
     stood: float = 0.0  # s
@@ -150,7 +152,13 @@ class Actor:
             demand = track_demand(self.track, self.motion, t, dt, self.centre)
         else:
             demand = self.guide.demand(self.motion)
-        return ActorCommand(self.name, command=self.driver.command(self.motion, demand))
+        return ActorCommand(
+            self.name, command=self.overridden(self.driver.command(self.motion, demand))
+        )
+
+    def overridden(self, command: VehicleCommand) -> VehicleCommand:
+        """What a driver does, with the inputs that the file works itself."""
+        return replace(command, **self.worked) if self.worked else command
 
     def _placed(self, t: float, dt: float) -> ActorCommand:
         if self.track is not None:

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from math import pi
+from types import MappingProxyType
 
+from skidpad.core.run import ActorMode
 from skidpad.scenarios.actions.base import NoEffect, PrivateAction
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.findings import Fault, Kind
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 
-OVERRIDES = ("Throttle", "Brake", "Clutch", "ParkingBrake", "SteeringWheel", "Gear")
+FULL_LOCK = 3.0 * pi  # rad of a steering wheel, to either side; assumption
+BACKWARDS = "r"  # of an automatic gear box
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,15 +75,86 @@ def compile_assign(node: Node, ctx: Context) -> Activate:
     return Activate(_flag(node, "activateLateral"), _flag(node, "activateLongitudinal"))
 
 
+@dataclass(frozen=True, slots=True)
+class Override:
+    """Inputs of a vehicle that the file works itself; None gives one back to the driver."""
+
+    inputs: Mapping[str, float | None]  # by field of a VehicleCommand
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """From now on; who is placed by the file has no pedals."""
+        if actor.mode is ActorMode.IDEAL or actor.driver is None:
+            return NoEffect("OverrideControllerValueAction").begin(scene, actor)
+        for name, value in self.inputs.items():
+            if value is None:
+                actor.worked.pop(name, None)
+            else:
+                actor.worked[name] = value
+        return DONE
+
+
 def compile_override(node: Node, ctx: Context) -> PrivateAction:
-    """An <OverrideControllerValueAction>; taking nothing over changes nothing."""
+    """An <OverrideControllerValueAction>."""
     del ctx
-    taken = False
+    inputs: dict[str, float | None] = {}
     for part in node.children():
-        if part.tag not in OVERRIDES:
+        if part.tag not in INPUTS:
             raise part.unsupported()
-        taken = taken or part.flag("active", default=False)
-    return NoEffect(node.tag) if taken else Several(())
+        name, value = INPUTS[part.tag]
+        active = part.flag("active", default=False)
+        if name and not (active and part.find("BrakeForce") is not None):
+            inputs[name] = value(part) if active else None
+    return Override(inputs) if inputs else NoEffect(node.tag)
+
+
+def _share(node: Node) -> float:
+    """A pedal's way, 0 to 1."""
+    percent = node.find("BrakePercent")
+    return min(max((percent or node).number("value"), 0.0), 1.0)
+
+
+def _steer(node: Node) -> float:
+    return min(max(node.number("value") / FULL_LOCK, -1.0), 1.0)
+
+
+def _reverse(node: Node) -> bool:
+    automatic = node.find("AutomaticGear")
+    if automatic is not None:
+        return automatic.text("gear") == BACKWARDS
+    manual = node.find("ManualGear")
+    return manual is not None and manual.number("number" if manual.has("number") else "gear") < 0.0
+
+
+# field of a VehicleCommand and how it is read; there is no clutch
+INPUTS: Mapping[str, tuple[str, Callable[[Node], float]]] = MappingProxyType(
+    {
+        "Throttle": ("throttle", _share),
+        "Brake": ("brake", _share),
+        "ParkingBrake": ("handbrake", lambda node: _share(node) > 0.0),
+        "SteeringWheel": ("steer", _steer),
+        "Gear": ("reverse", _reverse),
+        "Clutch": ("", _share),
+    }
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Visibility:
+    """Whether sensors see the entity."""
+
+    sensors: bool
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """From the next step on."""
+        del scene
+        actor.visible = self.sensors
+        return DONE
+
+
+def compile_visibility(node: Node, ctx: Context) -> Visibility:
+    """A <VisibilityAction>; pictures for people and other traffic are not told apart from sensors."""
+    del ctx
+    return Visibility(node.flag("sensors", default=True))
 
 
 def compile_controller(node: Node, ctx: Context) -> PrivateAction:

@@ -42,7 +42,7 @@ PRIVATE: Mapping[str, Compile] = {
     "FollowTrajectoryAction": compile_follow,
     "ControllerAction": controllers.compile_controller,
     **controllers.TABLE,  # where they stood before 1.1, and may stand since
-    "VisibilityAction": controllers.no_effect,
+    "VisibilityAction": controllers.compile_visibility,
     "LightStateAction": controllers.no_effect,
     "AnimationAction": controllers.no_effect,
     "TrailerAction": controllers.no_effect,

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 from types import MappingProxyType
 
+import numpy as np
+
 from skidpad.core.errors import BackendError
 from skidpad.core.frames import Frame, SensorFrame
 from skidpad.core.geometry import Pose
@@ -49,6 +51,7 @@ class EmbeddedBackend:
         """Begin a run: everything is built anew (decision X-12)."""
         self._world, self._noise = staged(setup, seed), setup.localisation_noise
         self._setup = setup
+        self._unseen = np.zeros(len(self.world.table), dtype=np.bool_)
         self._localisation = stream(seed, "ego", "localisation")
         self.sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
         self._asked = AskedSensors(self.map, self.world.table, setup) if setup.asked else None
@@ -82,7 +85,7 @@ class EmbeddedBackend:
         self.world.relocate(pose, v)
 
     def change(self, outside: Outside) -> None:
-        """Weather, grip, headlights and lights that are taken over are others from the next step on.
+        """All of it is as told from the next step on.
 
         Drivers of the background keep the caution that they began with.
         """
@@ -90,6 +93,8 @@ class EmbeddedBackend:
         mu_ref = self._setup.mu_ref if outside.mu_ref is None else outside.mu_ref
         self.world.grip = grip_params(weather, outside.grip, mu_ref)
         self.world.lights.hold(outside.lights)
+        names = self.world.table.names
+        self._unseen = np.array([name in outside.unseen for name in names], dtype=np.bool_)
         self.sensing.change(outside)
         changed = replace(self._setup, weather=weather, range_model=range_model, mu_ref=mu_ref)
         self._setup = changed
@@ -101,9 +106,11 @@ class EmbeddedBackend:
         self._world = None
 
     def _frame(self) -> SensorFrame:
-        w = self.world
-        seen = self.sensing.read(w.tick, w.states, w.lights.by_id, w.braking())
-        asked = self._asked
+        w, asked = self.world, self._asked
+        states = w.states
+        if self._unseen.any():
+            states = states._replace(present=states.present & ~self._unseen)
+        seen = self.sensing.read(w.tick, states, w.lights.by_id, w.braking())
         return SensorFrame(
             tick=w.tick,
             ego=self._estimate(),
@@ -113,7 +120,7 @@ class EmbeddedBackend:
             lights=MappingProxyType(w.lights.by_id),
             contacts=w.contacts,
             invasions=w.invasions,
-            extra={} if asked is None else asked.read(w.tick, w.states, seen.images),
+            extra={} if asked is None else asked.read(w.tick, states, seen.images),
         )
 
     def _estimate(self) -> EgoEstimate:

@@ -58,7 +58,9 @@ def factors(folder: Path) -> str:
     for c, w in cells:
         runs = matrix.cell(c, w)
         counts = [rated(rate_by_seed(runs, name)) for name in COUNTS]
-        rows.append([config_title(c), weather_title(w), str(len(runs)), *counts, _speed(matrix, c, w)])
+        rows.append(
+            [config_title(c), weather_title(w), str(len(runs)), *counts, _speed(matrix, c, w)]
+        )
     head = ["configuration", "weather", "runs", *COUNTS.values(), "mean speed, km/h"]
     return markdown(head, rows)
 
@@ -81,15 +83,15 @@ def claims(folder: Path) -> str:
     return verdict_rows(judge(found, [results] * len(found), astray(results)))
 
 
-def agreement(objects: Path, pixels: Path) -> str:
-    """Pixels minus objects over the cells that both drove.
+def against(reference: Path, other: Path) -> str:
+    """The other campaign minus the reference over the cells that both drove.
 
     Weathers of a seed share their traffic, so a pair is a seed: the mean of its cells.
     """
-    a, b = (matrix_of(folder).finished for folder in (objects, pixels))
+    a, b = (matrix_of(folder).finished for folder in (reference, other))
     pairs = a.join(b, on=["config", "weather", "seed"], suffix="_b")
     rows = []
-    for config in ["", *matrix_of(pixels).configs]:
+    for config in ["", *matrix_of(other).configs]:
         runs = pairs if not config else pairs.filter(pl.col("config") == config)
         for name, title in COMPARED.items():
             both = runs.drop_nulls([name, f"{name}_b"])
@@ -100,7 +102,7 @@ def agreement(objects: Path, pixels: Path) -> str:
             c = compare_pairs(seeds.to_numpy())
             title_of = config_title(config) if config else "all"
             rows.append([title_of, title, str(c.n), f"{c.mean:+.2f}", _bounds(c.interval)])
-    return markdown(("configuration", "per run", "seeds", "pixels minus objects", "95 %"), rows)
+    return markdown(("configuration", "per run", "seeds", f"minus {reference.name}", "95 %"), rows)
 
 
 def _bounds(interval: Interval) -> str:
@@ -121,7 +123,6 @@ def _per_100_km(runs: pl.DataFrame, column: str) -> Rate | None:
         return None
     seeds = known.group_by("seed", maintain_order=True).agg(pl.col(column, "distance_km").sum())
     return event_rate(seeds[column].to_list(), (seeds["distance_km"] / 100.0).to_list())
-
 
 
 def _speed(matrix: Matrix, config: str, weather: str | None = None) -> str:

@@ -33,7 +33,7 @@ ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "docs" / "results"
 PLAN = RESULTS / "preregistration.yaml"
 CLAIMS = RESULTS / "claims.md"
-OBJECTS = "matrix-figure8"  # what pixels are held against: the same seeds at object level
+REFERENCE = "matrix-figure8"  # what others on the same seeds are held against
 PAGES = ("docs/matrix.md", "docs/grip.md")
 BLOCK = re.compile(r"(<!-- results: (\S+) (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
@@ -98,7 +98,7 @@ def block(name: str, which: str, folder: Path) -> str:
         "adas vehicles": lambda path: result_matrix.by_weather(path, "crashes_vehicle"),
         "adas factors": result_matrix.factors,
         "adas claims": result_matrix.claims,
-        "adas agreement": lambda path: result_matrix.agreement(path.with_name(OBJECTS), path),
+        "adas against": lambda path: result_matrix.against(path.with_name(REFERENCE), path),
         "grip completion": result_grip.completion,
         "grip claims": result_grip.claims,
         "grip thresholds": result_grip.thresholds,

@@ -133,7 +133,7 @@ def test_levels_are_paired_by_seed_and_few_seeds_have_no_bound(tmp_path):
     pixels.mkdir()
     more.write_parquet(pixels / "results.parquet")
     (pixels / "driven.json").write_bytes((objects / "driven.json").read_bytes())
-    rows = tables.block("matrix-pixels", "agreement", pixels).splitlines()
+    rows = tables.block("matrix-pixels", "against", pixels).splitlines()
     assert "| all | fatal events | 3 | +2.00 | unbounded |" in rows
     assert "| all | crashes with vehicles | 3 | +0.00 | unbounded |" in rows
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from math import pi
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,6 +11,8 @@ import typer
 from skidpad.cli.hazards import Osc
 
 if TYPE_CHECKING:
+    from skidpad.recording.osi import World
+    from skidpad.recording.runlog import RunLog
     from skidpad.scenarios.environment import Environment
 
 
@@ -19,13 +22,19 @@ def export(
         Path | None, typer.Option(help="Where to; default: RUN/scenario.", show_default=False)
     ] = None,
     osc: Annotated[Osc, typer.Option(help="1.2, or 1.0 for CARLA ScenarioRunner.")] = Osc.v1_2,
+    osi: Annotated[
+        Path | None, typer.Option(help="Also a trace of OSI GroundTruth: FILE.osi (extra osi).")
+    ] = None,
 ) -> None:
     """Write a driven run as .xosc and .xodr that other simulators replay."""
     from skidpad.recording.logfiles import read_log
+    from skidpad.recording.osi import write_osi
     from skidpad.scenarios.run_export import export_run
     from skidpad.scenarios.writer import OscVersion
 
     log = read_log(run)
+    if osi is not None:
+        typer.echo(f"{osi}: {write_osi(osi, log, _world(run, log))} messages")
     folder = run / "scenario" if out is None else out
     name = run.resolve().name
     scenario, road, known = export_run(
@@ -46,6 +55,33 @@ def _environment(run: Path) -> Environment | None:
         return environment_of(read_run(run.resolve()).weather)
     except InputError:
         return None
+
+
+def _world(run: Path, log: RunLog) -> World:
+    """Projection, lights and rain of the run, as far as road and description are there."""
+    from skidpad.campaign.stored import read_run
+    from skidpad.core.errors import InputError
+    from skidpad.core.geometry import Pose, wrap_angle
+    from skidpad.physics.grip import rain_rate
+    from skidpad.recording.osi import World
+    from skidpad.roads.bundled import load_map
+    from skidpad.scenarios.run_export import road_of
+
+    try:
+        rain = rain_rate(read_run(run.resolve()).weather)
+    except InputError:
+        rain = None
+    road = road_of(log, _roads(run))
+    if road is None:
+        return World(rain_mm_h=rain)
+    map = load_map(road)
+    s = map.signals
+    places = zip(
+        s.id.tolist(), s.x.tolist(), s.y.tolist(), s.z.tolist(), s.heading.tolist(), strict=True
+    )
+    # a head looks against the traffic that it governs
+    heads = {id: Pose(x, y, z, yaw=wrap_angle(heading + pi)) for id, x, y, z, heading in places}
+    return World(map.geo_reference, road.name, heads, rain)
 
 
 def _roads(run: Path) -> list[Path]:

@@ -1,0 +1,175 @@
+"""The log of a run as an ASAM OSI 3 trace of GroundTruth messages (extra `osi`).
+
+Frames and units are ours: ISO 8855, SI. A trace is a row of messages, each behind its length in four
+bytes, little endian (OSI 3.8, "OSI trace file formats").
+"""
+
+from __future__ import annotations
+
+import struct
+from bisect import bisect_right
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import cos, sin
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from skidpad.core.errors import ConfigError, InputError, MissingExtra
+from skidpad.core.geometry import Pose, wrap_angle
+from skidpad.core.vocabulary import ActorKind, LightState
+from skidpad.recording.files import write_bytes
+from skidpad.recording.runlog import RunLog
+
+if TYPE_CHECKING:
+    from osi3.osi_groundtruth_pb2 import GroundTruth
+
+EGO = 0  # row of the log's tables; an actor's id is its row
+NANO = 1_000_000_000
+VEHICLES = {  # MovingObject.VehicleClassification.Type
+    ActorKind.CAR: "TYPE_CAR",
+    ActorKind.VAN: "TYPE_VAN",
+    ActorKind.TRUCK: "TYPE_HEAVY_TRUCK",
+    ActorKind.BUS: "TYPE_BUS",
+    ActorKind.MOTORCYCLE: "TYPE_MOTORCYCLE",
+    ActorKind.BICYCLE: "TYPE_BICYCLE",
+}
+# One message per bulb: colour, what lights it, m below the highest (assumption).
+BULBS = (
+    ("COLOR_RED", LightState.RED, 0.0),
+    ("COLOR_YELLOW", LightState.YELLOW, 0.3),
+    ("COLOR_GREEN", LightState.GREEN, 0.6),
+)
+BULB = 0.2  # m, diameter (assumption)
+FIRST_BULB = 100_000  # id; those of actors are smaller
+# Upper bounds of classes, EnvironmentalConditions of OSI 3.8
+RAIN = (
+    (0.1, "NONE"), (0.5, "VERY_LIGHT"), (1.9, "LIGHT"), (8.1, "MODERATE"), (34.0, "HEAVY"),
+    (149.0, "VERY_HEAVY"),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class World:
+    """What a log does not know of where it was driven; what is left out is not told."""
+
+    projection: str = ""  # PROJ text
+    map_reference: str = ""
+    heads: Mapping[int, Pose] = field(default_factory=dict)  # of traffic lights, by signal id
+    rain_mm_h: float | None = None
+
+
+def write_osi(file: Path, log: RunLog, world: World | None = None) -> int:
+    """Write the trace; the number of messages, one per moment of the log.
+
+    MissingExtra without it. ConfigError for a name without `.osi`, by which readers know the format.
+    InputError for a log without a moment.
+    """
+    if file.suffix != ".osi":
+        raise ConfigError(f"--osi takes a file that ends in .osi, got {file}")
+    if not len(log):
+        raise InputError("the log is empty: there is nothing to write as OSI")
+    messages = (truth.SerializeToString() for truth in moments(log, world or World()))
+    write_bytes(file, b"".join(struct.pack("<I", len(m)) + m for m in messages))
+    return len(log)
+
+
+def moments(log: RunLog, world: World) -> Iterator[GroundTruth]:
+    """One message per row of the log."""
+    osi3 = _library()
+    still = _still(osi3, world)
+    lamps = _Lamps(log)
+    for k in range(len(log)):
+        truth = osi3.osi_groundtruth_pb2.GroundTruth()
+        truth.CopyFrom(still)
+        nanos = round(float(log.t[k]) * NANO)
+        truth.timestamp.seconds, truth.timestamp.nanos = divmod(nanos, NANO)
+        for i in range(len(log.table)):
+            if log.present[k, i]:
+                _put(truth.moving_object.add(), log, k, i)
+        for signal, state in lamps.at(int(log.tick[k])).items():
+            if signal in world.heads:
+                _light(truth, signal, state, world.heads[signal])
+        yield truth
+
+
+def _library() -> Any:
+    try:
+        import osi3.osi_groundtruth_pb2
+    except ImportError:
+        raise MissingExtra("writing OSI", "osi") from None
+    return osi3
+
+
+def _still(osi3: Any, world: World) -> GroundTruth:
+    """What holds for the whole run."""
+    truth: GroundTruth = osi3.osi_groundtruth_pb2.GroundTruth()
+    options = osi3.osi_version_pb2.DESCRIPTOR.GetOptions()
+    truth.version.CopyFrom(options.Extensions[osi3.osi_version_pb2.current_interface_version])
+    truth.host_vehicle_id.value = EGO
+    truth.proj_string, truth.map_reference = world.projection, world.map_reference
+    if world.rain_mm_h is not None:
+        k = bisect_right([bound for bound, _ in RAIN], world.rain_mm_h)
+        name = RAIN[k][1] if k < len(RAIN) else "EXTREME"
+        conditions = truth.environmental_conditions
+        conditions.precipitation = conditions.Precipitation.Value(f"PRECIPITATION_{name}")
+    return truth
+
+
+def _put(object: Any, log: RunLog, k: int, i: int) -> None:
+    """One actor: the place is its box's centre; roll and pitch are not in a log."""
+    a, table, base = log.actors, log.table, object.base
+    yaw, height = float(a.yaw[k, i]), float(table.height[i])
+    object.id.value = i
+    base.dimension.length, base.dimension.width = float(table.length[i]), float(table.width[i])
+    base.dimension.height = height
+    base.position.x, base.position.y = float(a.x[k, i]), float(a.y[k, i])
+    base.position.z = float(a.z[k, i]) + 0.5 * height
+    base.orientation.yaw, base.orientation.pitch, base.orientation.roll = wrap_angle(yaw), 0.0, 0.0
+    base.velocity.x, base.velocity.y = float(a.vx[k, i]), float(a.vy[k, i])
+    base.velocity.z = base.acceleration.z = 0.0
+    ax, ay, c, s = float(a.ax[k, i]), float(a.ay[k, i]), cos(yaw), sin(yaw)
+    base.acceleration.x, base.acceleration.y = ax * c - ay * s, ax * s + ay * c
+    base.orientation_rate.yaw = float(a.yaw_rate[k, i])
+    kind = ActorKind(int(table.kind[i]))
+    if kind in VEHICLES:
+        object.type = object.TYPE_VEHICLE
+        types = object.vehicle_classification
+        types.type = types.Type.Value(VEHICLES[kind])
+    else:
+        object.type = object.TYPE_PEDESTRIAN if kind is ActorKind.PEDESTRIAN else object.TYPE_OTHER
+    reference = object.source_reference.add()
+    reference.reference, reference.type = "skidpad", "actor"
+    reference.identifier.append(table.names[i])
+
+
+def _light(truth: GroundTruth, signal: int, state: LightState, head: Pose) -> None:
+    """A traffic light, a message for each bulb; x is the way that it looks."""
+    for n, (colour, lit, below) in enumerate(BULBS):
+        bulb = truth.traffic_light.add()
+        bulb.id.value = FIRST_BULB + len(BULBS) * signal + n
+        base, kind = bulb.base, bulb.classification
+        base.dimension.length = base.dimension.width = base.dimension.height = BULB
+        base.position.x, base.position.y, base.position.z = head.x, head.y, head.z - below
+        base.orientation.yaw = head.yaw
+        kind.color = kind.Color.Value(colour)
+        kind.mode = kind.MODE_CONSTANT if state is lit else kind.MODE_OFF
+        kind.icon = kind.ICON_NONE
+        reference = bulb.source_reference.add()
+        reference.type = "net.asam.opendrive"
+        reference.identifier.append(f"signal_id:{signal}")
+
+
+class _Lamps:
+    """What traffic lights show, from the log's changes; asked in the order of ticks."""
+
+    def __init__(self, log: RunLog) -> None:
+        self.changes, self.done = log.lights, 0
+        self.states: dict[int, LightState] = {}
+
+    def at(self, tick: int) -> Mapping[int, LightState]:
+        """By signal id."""
+        while self.done < len(self.changes) and self.changes[self.done].tick <= tick:
+            change = self.changes[self.done]
+            self.states[change.signal] = change.state
+            self.done += 1
+        return self.states

@@ -104,7 +104,7 @@ def _rain(kind: Crashes) -> Finding:
         f"F-13{kind.mark}",
         f"Rain makes configuration 3 have more {kind.name}.",
         f"{kind.counted} per run, rain minus clear",
-        "configuration 3 in rain and clear",
+        "configuration 3 in rain and clear at one time of day",
         (
             Paired(
                 column=kind.column, more=RAIN, less=CLEAR, by=("time_of_day", "seed"),

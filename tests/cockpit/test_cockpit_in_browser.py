@@ -97,6 +97,7 @@ def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, t
         unplugged = "() => document.querySelector('.cockpit').dataset.wrong?.includes('unplugged')"
         page.evaluate(f"() => {{ {GAMEPAD}; ({ONE_READING})() }}")
         until(page, unplugged)
+        until_fact(page, "drives", "you, by keyboard")  # what is shown lags: nothing of it is left
         page.evaluate("document.querySelector('.cockpit').dataset.wrong = ''")
         # a gamepad is noticed by itself, and says so
         page.evaluate(GAMEPAD)

@@ -64,7 +64,8 @@ OTHERS: tuple[Finding, ...] = (
     ),
     Finding(
         "F-12", "Night raises distance error and variance without more dropout.",
-        "mean error, variance and dropout, night minus day, configurations 1 to 4", "night and day, both clear or both in rain",
+        "mean error, variance and dropout, night minus day, configurations 1 to 4",
+        "night and day, both clear or both in rain",
         (
             at_night("mean_error_m", METRES),
             at_night("headway_variance_m2", VARIANCE),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 
@@ -11,7 +13,7 @@ from result_texts import limits, markdown, verdict_rows
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.statistics import Interval, Rate, compare_pairs, event_rate
-from skidpad.evidence.verdicts import judge
+from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.matrix import MatrixEntry
 from skidpad.report.matrix_data import Matrix, config_title, rate_by_seed, weather_title
@@ -53,7 +55,7 @@ def headline(folder: Path) -> str:
 def factors(folder: Path) -> str:
     """One row per configuration and weather: what a factor changes, and how fast that is."""
     matrix = matrix_of(folder)
-    cells = [(c, w) for c in matrix.configs for w in matrix.weathers]
+    cells = [(c, w) for c in sorted(matrix.configs, key=_numbers_count) for w in matrix.weathers]
     rows = []
     for c, w in cells:
         runs = matrix.cell(c, w)
@@ -78,9 +80,23 @@ def by_weather(folder: Path, column: str) -> str:
 
 def claims(folder: Path) -> str:
     """Every claim that a matrix can judge."""
+    return verdict_rows(_judged(folder))
+
+
+def verdicts(folders: Sequence[Path]) -> str:
+    """What became of each claim in several campaigns, side by side."""
+    judged = [_judged(folder) for folder in folders]
+    rows = [
+        [same[0].finding.id, same[0].finding.claim, *(j.verdict.value for j in same)]
+        for same in zip(*judged, strict=True)
+    ]
+    return markdown(("id", "claim", *(folder.name for folder in folders)), rows)
+
+
+def _judged(folder: Path) -> list[Judgement]:
     results = matrix_of(folder).results
     found = [f for f in (*FINDINGS, *ACCEPTANCE) if not f.study]
-    return verdict_rows(judge(found, [results] * len(found), astray(results)))
+    return judge(found, [results] * len(found), astray(results))
 
 
 def against(reference: Path, other: Path) -> str:
@@ -91,7 +107,8 @@ def against(reference: Path, other: Path) -> str:
     a, b = (matrix_of(folder).finished for folder in (reference, other))
     pairs = a.join(b, on=["config", "weather", "seed"], suffix="_b")
     rows = []
-    for config in ["", *matrix_of(other).configs]:
+    configs = matrix_of(other).configs
+    for config in configs if len(configs) == 1 else ["", *configs]:
         runs = pairs if not config else pairs.filter(pl.col("config") == config)
         for name, title in COMPARED.items():
             both = runs.drop_nulls([name, f"{name}_b"])
@@ -103,6 +120,11 @@ def against(reference: Path, other: Path) -> str:
             title_of = config_title(config) if config else "all"
             rows.append([title_of, title, str(c.n), f"{c.mean:+.2f}", _bounds(c.interval)])
     return markdown(("configuration", "per run", "seeds", f"minus {reference.name}", "95 %"), rows)
+
+
+def _numbers_count(name: str) -> list[str | int]:
+    """Sorts `2 at 90 km/h` before `2 at 100 km/h`."""
+    return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 
 def _bounds(interval: Interval) -> str:

@@ -34,6 +34,7 @@ RESULTS = ROOT / "docs" / "results"
 PLAN = RESULTS / "preregistration.yaml"
 CLAIMS = RESULTS / "claims.md"
 REFERENCE = "matrix-figure8"  # what others on the same seeds are held against
+MATRICES = (REFERENCE, "matrix-motorway", "matrix-foreign", "matrix-pixels-two")
 PAGES = ("docs/matrix.md", "docs/grip.md")
 BLOCK = re.compile(r"(<!-- results: (\S+) (\S+) -->\n)(.*?)(<!-- end -->)", re.DOTALL)
 
@@ -98,6 +99,9 @@ def block(name: str, which: str, folder: Path) -> str:
         "adas vehicles": lambda path: result_matrix.by_weather(path, "crashes_vehicle"),
         "adas factors": result_matrix.factors,
         "adas claims": result_matrix.claims,
+        "adas verdicts": lambda path: result_matrix.verdicts(
+            [path.with_name(name) for name in MATRICES]
+        ),
         "adas against": lambda path: result_matrix.against(path.with_name(REFERENCE), path),
         "grip completion": result_grip.completion,
         "grip claims": result_grip.claims,

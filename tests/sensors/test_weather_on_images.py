@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from worlds import World, lanes_along, states_at, straight, table_of, traffic
 
+from skidpad.cockpit.studio import SENSOR, Studio, plane
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Beam, Outside
 from skidpad.core.specs import CameraSpec, Modality
@@ -26,6 +27,7 @@ from skidpad.sensors.degradation import (
     degradation,
     glass_mask,
 )
+from skidpad.sensors.finish.extras import NO_EXTRAS
 from skidpad.sensors.perception_noise import PerceptionNoise
 from skidpad.sensors.suite import PixelSettings, PixelSuite
 from skidpad.sensors.twelve import twelve_sensors
@@ -192,6 +194,30 @@ def test_perception_noise_is_off_by_default_and_has_its_strength():
     assert (b[near] / a[near] - 1.0).std() == pytest.approx(0.02, rel=0.03)
     labels = exact.images["semantic_roof"].labels, noisy.images["semantic_roof"].labels
     assert (labels[0] != labels[1]).mean() == pytest.approx(0.1, abs=0.003)
+
+
+@pytest.mark.req("A-226")
+def test_weather_noise_spares_the_mask_only_where_a_cockpit_is_shown():
+    """People look with cameras outside of the car: none of the five views hides a cockpit."""
+    world = straight()
+    table, states = traffic(world)
+    night, nobody = preset("rain-night"), np.zeros(len(table), dtype=np.bool_)
+    outside = Outside(weather=night, grip=GripModel.NONE, range_model=RangeModel.NONE)
+    shown = Studio(world, table, outside, 1, NO_EXTRAS)
+    read = PixelSuite(world, table, twelve_sensors(), night)
+    for view, id in SENSOR.items():
+        if not id.startswith("rgb"):
+            continue
+        ours, theirs = [], []
+        for tick in (3, 4):  # nothing moves: what differs is noise
+            ours.append(plane(shown.look(tick, states, {}, nobody)[view.value]).copy())
+            theirs.append(read.observe(tick, states, {}).images[id].packed.copy())
+        spared = clear_of_weather(*ours[0].shape)
+        moved, stayed = ours[0] != ours[1], theirs[0] == theirs[1]
+        assert stayed[spared].all(), id
+        assert (~stayed[~spared]).mean() > 0.5, id
+        assert moved[spared].mean() > 0.5, id
+        assert moved[~spared].mean() > 0.5, id
 
 
 EYE = CameraSpec("eye", Modality.RGB, 800, 600, 90.0, Pose(0.05, 0.35, 1.3))

@@ -6,7 +6,7 @@
 Three parts on seeds of their own, each on every route in its own weather, by day, by night and in
 rain, among natural and among risky drivers. Trees are fitted on `train`, their limits chosen on
 routes that the fold did not see; `validate` is for looking, `report` is looked at once. Then the
-arbiter and each channel alone drive the same natural drives, for redundancy. What is done is not
+arbiter and each channel alone drive the same two natural hours, for redundancy. What is done is not
 done again, so a campaign that was stopped goes on. `--publish` writes docs/results/channels and the
 tables of docs/channels-evaluation.md, and says what was driven at which commit.
 """
@@ -44,15 +44,16 @@ KEPT = (
 
 @dataclass(frozen=True)
 class Part:
-    """name: its folder. seed: `--seed` of its drives, never used before. share: of all hours."""
+    """name: its folder. seed: `--seed` of its drives, never used before. share: of the hours asked for."""
 
     name: str
     seed: int
     share: float
 
 
-PARTS = (Part("train", 51, 0.4), Part("validate", 52, 0.15), Part("report", 53, 0.35))
-REDUNDANCY = Part("redundancy", 54, 0.1)
+PARTS = (Part("train", 51, 0.45), Part("validate", 52, 0.15), Part("report", 53, 0.4))
+REDUNDANCY, HOURS_EACH = "redundancy", 2.0  # of the arbiter and of each channel alone
+SEED_OF_REDUNDANCY = 54
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -61,7 +62,8 @@ def main(words: Sequence[str] | None = None) -> int:
     out: Path = asked.out
     out.mkdir(parents=True, exist_ok=True)
     for part in PARTS:
-        _drive(out / part.name, asked, part, strata=STRATA, conditions=CONDITIONS)
+        hours = asked.hours * part.share
+        _drive(out / part.name, asked, part.seed, hours, strata=STRATA, conditions=CONDITIONS)
     model = out / "model.npz"
     if not model.exists():
         _skidpad("channels", "train", out / "train", "--out", model, "--workers", asked.workers)
@@ -69,8 +71,8 @@ def main(words: Sequence[str] | None = None) -> int:
         learned = ("--model", model) if model.exists() else ()
         _skidpad("channels", "evaluate", out / name, "--workers", asked.workers, *learned)
     for driver in DRIVERS:
-        folder = out / REDUNDANCY.name / driver
-        _drive(folder, asked, REDUNDANCY, drive_by=driver, each=1.0 / len(DRIVERS))
+        folder = out / REDUNDANCY / driver
+        _drive(folder, asked, SEED_OF_REDUNDANCY, HOURS_EACH, drive_by=driver)
     if asked.publish:
         publish(out, asked.hours)
     return 0
@@ -79,19 +81,21 @@ def main(words: Sequence[str] | None = None) -> int:
 def _asked(words: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True, help="folder of the campaign")
-    parser.add_argument("--hours", type=float, default=50.0, help="simulated hours of all parts")
+    parser.add_argument(
+        "--hours", type=float, default=50.0, help="simulated hours of the three parts"
+    )
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--publish", action="store_true", help="write results and page of docs")
     return parser.parse_args(words)
 
 
 def _drive(
-    folder: Path, asked: argparse.Namespace, part: Part, each: float = 1.0, **options: str
+    folder: Path, asked: argparse.Namespace, seed: int, hours: float, **options: str
 ) -> None:
     more = [w for name, value in options.items() for w in (f"--{name.replace('_', '-')}", value)]
     _skidpad(
-        "channels", "drive", "--route", "all", "--seed", part.seed, "--out", folder, "--resume",
-        "--hours", asked.hours * part.share * each, "--workers", asked.workers, *more,
+        "channels", "drive", "--route", "all", "--seed", seed, "--out", folder, "--resume",
+        "--hours", hours, "--workers", asked.workers, *more,
     )  # fmt: skip
 
 
@@ -110,8 +114,8 @@ def publish(out: Path, hours: float, results: Path = RESULTS) -> None:
     for name in ("validate", "report"):
         table = json.loads((out / name / "evaluation.json").read_text(encoding="utf-8"))
         _write(results / f"{name}.json", {"model": table["model"], "strata": _kept(table)})
-    _write(results / "redundancy.json", _outcomes(out / REDUNDANCY.name))
-    seeds = {p.name: p.seed * 1000 for p in (*PARTS, REDUNDANCY)}
+    _write(results / "redundancy.json", _outcomes(out / REDUNDANCY))
+    seeds = {p.name: p.seed * 1000 for p in PARTS} | {REDUNDANCY: SEED_OF_REDUNDANCY * 1000}
     about = {"commit": _commit(), "date": datetime.now(timezone.utc).date().isoformat(),
              "hours_asked": hours, "first_seed": seeds, "processors": os.cpu_count()}  # fmt: skip
     _write(results / "run.json", about)

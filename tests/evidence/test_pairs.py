@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import cos, pi, sin
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,7 @@ from skidpad.evidence.pairs import (
     Body,
     Pair,
     following,
+    over,
     pair_of,
     post_encroachment,
     required_deceleration,
@@ -67,7 +69,26 @@ def test_ttc_and_drac_are_what_carrying_on_gives(gap, v, dv):
     assert until_contact(gap, v + dv, 0.0, v, 0.0) == pytest.approx(pair.min_ttc_s, abs=2e-3)
     assert until_contact(gap, v + dv, -1.01 * pair.max_drac_mps2, v, 0.0) is None
     assert until_contact(gap, v + dv, -0.98 * pair.max_drac_mps2, v, 0.0) is not None
-    assert gap - (v + dv) * pair.min_thw_s == pytest.approx(0.0, abs=1e-3)
+
+
+@settings(max_examples=25, deadline=None, derandomize=True)
+@given(h=floats(-3.0, 3.0), gap=floats(2.0, 40.0), v=floats(5.0, 30.0), a=floats(0.0, 3.0))
+def test_headway_is_when_the_follower_passes_where_the_lead_is(h, gap, v, a):
+    """Read off the follower's own way, for a lead that draws away, so that the first tick is least."""
+    t = np.arange(0.0, 10.0, 0.05)
+    way = v * t
+    lead = gap + L + (v + 1.0) * t + 0.5 * a * t**2
+    one = a_body(way * cos(h), way * sin(h), h, np.full_like(t, v))
+    other = a_body(lead * cos(h), lead * sin(h), h, v + 1.0 + a * t, a)
+    passes = np.interp(lead[0] - L / 2, way + L / 2, t)
+    assert only_pair(one, other).min_thw_s == pytest.approx(passes, abs=1e-6)
+    assert only_pair(other, one).min_thw_s == pytest.approx(passes, abs=1e-6)
+
+
+@pytest.mark.parametrize(("v", "some"), [(0.9, False), (1.1, True)])
+def test_one_who_creeps_has_no_headway(v, some):
+    pair = only_pair(a_body([0.0] * 2, 0.0, 0.0, v), a_body([20.0] * 2, 0.0, 0.0, v))
+    assert (pair.min_thw_s is not None) == some
 
 
 @settings(max_examples=25, deadline=None, derandomize=True)
@@ -98,6 +119,24 @@ def test_crossing_paths_are_as_far_apart_in_time_as_they_cross(late):
         assert found is None
     else:
         assert found == pytest.approx(late, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("ahead", "up", "apart"),
+    [
+        (10.0, 1.2, False),
+        (100.0, 12.0, False),
+        (4.0, 1.4, False),
+        (4.0, 6.0, True),
+        (0.0, -1.6, True),
+    ],
+)
+def test_a_hill_is_no_bridge(ahead, up, apart):
+    """12 % of climb, as roads have; 6 m up at a crossing; cars 1.5 m high."""
+    columns = (np.array([[0.0, v]]) for v in (ahead, 0.0, up))
+    actors = SimpleNamespace(**dict(zip("xyz", columns, strict=True)))
+    log = SimpleNamespace(actors=actors, table=SimpleNamespace(height=np.array([1.5, 1.5])))
+    assert over(log, 0, 1).tolist() == over(log, 1, 0).tolist() == [apart]
 
 
 def test_what_never_applied_is_nothing_and_expected_of_no_run():

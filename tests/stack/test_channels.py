@@ -60,6 +60,23 @@ def test_tracks_find_position_velocity_and_identity():
     assert len(tracker.objects(np.zeros(3))) == 0
 
 
+@pytest.mark.req("C-020", "C-026")
+@pytest.mark.parametrize("v", [36.0, -36.0, 24.0])
+def test_whoever_drives_at_motorway_speed_becomes_a_track(v):
+    """Between two cycles a car goes farther than a track's gate; the second sight must still be of it."""
+    tracker = Tracker(LAV)
+    for k in range(6):
+        t = 0.1 * k
+        heading = 0.0 if v > 0 else np.pi
+        seen = (20.0 + (v - 30.0) * t, 3.5, heading, 4.5, 1.9)
+        tracker.update(view(t, (30.0 * t, 0, 0, 30.0, 0), [seen]))
+        if k == LAV.confirm - 1:
+            assert tracker.confirmed["id"].tolist() == [0]
+    (found,) = tracker.objects(tracker.pose)
+    assert found[:2] == pytest.approx([30.0 * t + 20.0 + (v - 30.0) * t, 3.5], abs=0.2)
+    assert found[3:] == pytest.approx([v, 0.0], abs=1.5)
+
+
 @pytest.mark.req("C-026")
 def test_a_standing_car_stands_while_the_ego_turns_and_drives():
     """The odometry frame: ego motion gives objects no velocity, latency included."""

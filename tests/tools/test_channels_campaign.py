@@ -88,7 +88,8 @@ def test_parts_share_no_seed_and_are_driven_in_every_condition_and_stratum(monke
         assert call[call.index("--conditions") + 1] == "own,day,night,rain"
         assert call[call.index("--strata") + 1] == "natural,risky"
     hours = [float(c[c.index("--hours") + 1]) for c in drives]
-    assert sum(hours) == pytest.approx(10.0)
+    assert sum(hours[:3]) == pytest.approx(10.0)
+    assert hours[3:] == [2.0, 2.0, 2.0]
     assert all("--resume" in c for c in drives)
     order = [c[1] for c in calls]
     assert order.index("train") < order.index("evaluate")

@@ -188,9 +188,16 @@ class Street:
 
 
 def drive_segment(
-    spec: RunSpec, path: Path, links: Links | None = None, guide: Guide | None = None
+    spec: RunSpec,
+    path: Path,
+    links: Links | None = None,
+    guide: Guide | None = None,
+    aboard: Sequence[Listener] = (),
 ) -> DriveOutcome:
-    """Drive a segment and write its recording to `path`, which appears only when complete."""
+    """Drive a segment and write its recording to `path`, which appears only when complete.
+
+    aboard: who listens besides `links`; the caller closes them.
+    """
     links = links or Links()
     segment = segment_of(spec)
     crew = Crew(spec, segment, guide)
@@ -202,7 +209,7 @@ def drive_segment(
             opened(links, crew.crew.channels, path) as listeners,
             ChannelWriter(part, crew.crew.channels) as writer,
         ):
-            recording = Recording(crew, writer, listeners)
+            recording = Recording(crew, writer, [*listeners, *aboard])
             sinks = (recording, RealTime(DT)) if links.live else (recording,)
             frame = backend.reset(segment.setup, spec.seed)
             street = Street(crew, recording)

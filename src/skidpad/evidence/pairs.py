@@ -22,6 +22,7 @@ from skidpad.recording.runlog import RunLog
 Floats = NDArray[np.float64]
 EGO = 0
 V_HEADWAY = 1.0  # m/s, below there is no headway
+STEEPEST = 0.15  # no road climbs as much; assumption
 
 
 class Pair(NamedTuple):
@@ -75,9 +76,19 @@ def _pairs(log: RunLog, chosen: Iterable[tuple[int, int]]) -> Iterator[Pair]:
     names = log.table.names
     bodies = [body(log, i) for i in range(len(names))]
     for i, j in chosen:
-        both = log.present[:, i] & log.present[:, j]
+        both = together(log, i, j)
         if both.any():
             yield pair_of((names[i], names[j]), bodies[i], bodies[j], both, log.header.dt)
+
+
+def together(log: RunLog, i: int, j: int) -> NDArray[np.bool_]:
+    """Ticks in which both are there and neither is above the other on another road: clear of it, by no
+    road's slope; (T,)."""
+    a, height = log.actors, log.table.height
+    dx, dy, dz = (v[:, j].astype(np.float64) - v[:, i] for v in (a.x, a.y, a.z))
+    clear = np.where(dz > 0.0, height[i], height[j])
+    one_road: NDArray[np.bool_] = np.abs(dz) < np.maximum(clear, STEEPEST * np.hypot(dx, dy))
+    return log.present[:, i] & log.present[:, j] & one_road
 
 
 def body(log: RunLog, i: int) -> Body:

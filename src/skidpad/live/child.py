@@ -6,6 +6,7 @@ and tells hazards in `alarms.jsonl` as they begin. Nothing that it does can reac
 
 from __future__ import annotations
 
+import gc
 import json
 import sys
 from pathlib import Path
@@ -21,7 +22,7 @@ from skidpad.live.watch import Alarms, watch
 from skidpad.live.wire import WireSource
 
 ALARMS = "alarms.jsonl"
-WARM = 8  # cycles: every indicator has its history then
+WARM = 12  # cycles: every indicator has its history of 1 s then
 
 
 def main(folder: str, channels: str, pin: str) -> int:
@@ -31,6 +32,7 @@ def main(folder: str, channels: str, pin: str) -> int:
     try:
         granted = isolate(json.loads(pin))
         warm_up(source.channels)
+        settle()
         out.mkdir(parents=True, exist_ok=True)
         print(json.dumps(granted), flush=True)
         with (out / ALARMS).open("w", encoding="utf-8") as stream:
@@ -46,6 +48,17 @@ def warm_up(channels: tuple[str, ...]) -> None:
     monitor = Monitor(channels)
     for k in range(WARM):
         monitor.update(Cycle(k, 0.1 * k, tuple(_scene(0.1 * k) for _ in channels)))
+
+
+def settle() -> None:
+    """No search for cycles of references from here on: one through all modules takes 40 to 70 ms.
+
+    A drive of 6000 cycles among 40 vehicles leaves 1300 objects in such cycles, and the process ends
+    with the drive.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.disable()
 
 
 def _scene(t: float) -> ChannelFrame:

@@ -23,6 +23,7 @@ GATE = 2.5  # m: a car at 40 m/s may accelerate by 6 m/s^2 for 0.5 s unseen, and
 SIGMA_MEASURED = 0.2  # m per axis
 SIGMA_ACCELERATION = 2.5  # m/s^2, what road users do within a second
 SIGMA_SPEED_FIRST = 6.0  # m/s of an object that was never seen before
+V_FIRST = 50.0  # m/s ahead that it may have; the gate alone ends at 25 m/s in cycles of 0.1 s
 HEADING_SHARE = 0.3  # of a new measurement in the smoothed heading
 SIZE_SHARE = 0.1
 V_TURNING = 2.0  # m/s, from which the motion tells the heading better than a detector
@@ -148,6 +149,15 @@ def _correct(t: Any, x: float, y: float, age: float) -> None:
 
 
 @kernel
+def _start_moving(t: Any, x: float, y: float, age: float) -> None:
+    """State of an object seen twice: the difference of two places whose errors are independent."""
+    t.vx, t.vy = (x - t.x) / t.unseen, (y - t.y) / t.unseen
+    t.x, t.y = x - age * t.vx, y - age * t.vy
+    r = SIGMA_MEASURED**2
+    t.p_xx, t.p_xv, t.p_vv = r, r / t.unseen, 2.0 * r / t.unseen**2
+
+
+@kernel
 def _shape(t: Any, heading: float, length: float, width: float, label: int) -> None:
     """Smooth heading and size, vote on the class."""
     v = np.hypot(t.vx, t.vy)
@@ -168,6 +178,33 @@ def _shape(t: Any, heading: float, length: float, width: float, label: int) -> N
 
 
 @kernel
+def _second_sight(t: Any, dx: float, dy: float) -> float:
+    """m of distance of what may be an object seen once, whose speed is not known, driven on along its
+    heading; it counts as farther than whatever is within a gate."""
+    c, s = np.cos(t.heading), np.sin(t.heading)
+    ahead, aside = c * dx + s * dy, abs(c * dy - s * dx)
+    if not 0.0 < ahead < V_FIRST * t.unseen or aside > 0.5 * GATE:
+        return np.inf
+    return float(GATE + aside)
+
+
+@kernel
+def _distances(tracks: NDArray[np.void], count: int, x: Floats, y: Floats, age: float) -> Floats:
+    """(m, count) m from each detection to each track where they may be one, else inf."""
+    distance = np.full((len(x), count), np.inf)
+    for j in range(len(x)):
+        for i in range(count):
+            t = tracks[i]
+            dx, dy = x[j] - t.x - age * t.vx, y[j] - t.y - age * t.vy
+            d = np.hypot(dx, dy)
+            if d >= GATE and t.hits == 1:
+                d = _second_sight(t, dx, dy)
+            if d < 2.0 * GATE:
+                distance[j, i] = d
+    return distance
+
+
+@kernel
 def _update(
     tracks: NDArray[np.void],
     count: int,
@@ -185,15 +222,10 @@ def _update(
     m = objects.shape[0]
     c, s = np.cos(pose[2]), np.sin(pose[2])
     x, y = np.empty(m), np.empty(m)
-    distance = np.full((m, count), np.inf)
     for j in range(m):
         x[j] = pose[0] + c * objects[j, 0] - s * objects[j, 1]
         y[j] = pose[1] + s * objects[j, 0] + c * objects[j, 1]
-        for i in range(count):
-            t = tracks[i]
-            d = np.hypot(x[j] - t.x - age * t.vx, y[j] - t.y - age * t.vy)
-            if d < GATE:
-                distance[j, i] = d
+    distance = _distances(tracks, count, x, y, age)
     taken = np.zeros(m, np.bool_)
     for _ in range(min(m, count)):
         best, best_j, best_i = np.inf, -1, -1
@@ -207,7 +239,10 @@ def _update(
         distance[best_j, :] = np.inf
         distance[:, best_i] = np.inf
         t = tracks[best_i]
-        _correct(t, x[best_j], y[best_j], age)
+        if best < GATE:
+            _correct(t, x[best_j], y[best_j], age)
+        else:
+            _start_moving(t, x[best_j], y[best_j], age)
         row = objects[best_j]
         _shape(t, pose[2] + row[2], row[3], row[4], classes[best_j])
         t.hits += 1

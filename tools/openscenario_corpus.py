@@ -164,7 +164,10 @@ def main() -> None:
     sums: Counter[str] = sum((t.counts for t in tallies), Counter())
     print("| all |", " | ".join(str(sums[c]) for c in COLUMNS), "| |")
     shares = [share for t in tallies if (share := t.share()) is not None]
-    print(f"\nplayed of valid: {sums['played'] / max(sums['valid'], 1):.1%}; ", end="")
+    if not shares:
+        print("\nno file is valid")
+        return
+    print(f"\nplayed of valid: {sums['played'] / sums['valid']:.1%}; ", end="")
     print(f"each of {len(shares)} authors weighing the same: {sum(shares) / len(shares):.1%}")
     missing: Counter[str] = sum((t.missing for t in tallies), Counter())
     print("\nvalid files, and what keeps them from playing:")

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from skidpad.campaign import bench, bench_matrix
+from skidpad.campaign import bench, bench_matrix, bench_scenarios
 from skidpad.campaign.bench import TickCost, bench_run, tick_cost
 from skidpad.campaign.bench_traffic import measure
 from skidpad.campaign.traffic_asked import TrafficBench
 from skidpad.core.vocabulary import SensorLevel
+from skidpad.scenarios.scenario import compile_scenario
+from skidpad.scenarios.stage import played
 
 
 @pytest.mark.req("A-269")
@@ -47,3 +51,35 @@ def test_traffic_is_measured_until_the_distance_is_driven() -> None:
         3.689 / row.km * 100.0, rel=1e-3
     )  # Garwood, none seen
     assert row.mean_speed_kmh == pytest.approx(row.km / row.hours)
+
+
+def test_files_are_played_and_checked(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bench_scenarios, "CHECKS", 2)
+    rows = bench_scenarios.measure(seconds=2.0, repeats=1)
+    assert [row.unit for row in rows] == ["times real time", "times real time", "s", "s"]
+    assert [row.target for row in rows] == [300.0, 300.0, 2.0, 1.0]
+    assert all(row.value > 0.0 for row in rows)
+    itself, driven, *_ = (row.value for row in rows)
+    assert itself > driven, "the backend and the log cost time"
+
+
+def test_the_measured_files_do_something(tmp_path: Path) -> None:
+    small, large = tmp_path / "small.xosc", tmp_path / "large.xosc"
+    text = bench_scenarios.two_cars(bench_scenarios.SLOWER, bench_scenarios.ASIDE, seconds=12.0)
+    small.write_text(text, encoding="utf-8")
+    result = played(compile_scenario(small), 60.0)
+    last = result.of("other")[-1]
+    assert last.time == pytest.approx(12.0)
+    assert (last.speed, last.y) == pytest.approx((8.0, -5.25), abs=1e-3)
+    text = bench_scenarios.two_cars(bench_scenarios.long_line(), seconds=1.0)
+    assert 5_000_000 <= len(text) < 5_200_000
+    large.write_text(text, encoding="utf-8")
+    assert played(compile_scenario(large), 60.0).of("other")[-1].x == pytest.approx(210.0)
+
+
+def test_a_target_is_a_bound_from_one_side() -> None:
+    slow = bench_scenarios.ScenarioCost("x", 299.0, "times real time", 300.0, most=False)
+    long = bench_scenarios.ScenarioCost("x", 2.1, "s", 2.0, most=True)
+    assert not slow.met
+    assert not long.met
+    assert bench_scenarios.ScenarioCost("x", 1.9, "s", 2.0, most=True).met

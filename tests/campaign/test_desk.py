@@ -9,7 +9,7 @@ from msgspec import structs
 from typer.testing import CliRunner
 
 from runs import adas_run
-from skidpad.campaign.desk import Desk, Recorded, beam_of
+from skidpad.campaign.desk import LOW_VISIBILITY, Desk, Recorded, beam_of
 from skidpad.campaign.desk_run import drive_at_desk
 from skidpad.campaign.hands import HOLD_TO_REVERSE, Hands
 from skidpad.campaign.run import run
@@ -31,6 +31,7 @@ from skidpad.core.run import Function
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import GripModel, RangeModel, SensorLevel, Supervision
 from skidpad.core.weather import Weather
+from skidpad.physics.optics import visibility
 from skidpad.physics.presets import preset
 from skidpad.recording.inputs import INPUTS, decode_inputs, encode_inputs, read_inputs
 from skidpad.recording.logfiles import log_hash, read_log
@@ -216,6 +217,8 @@ def test_keys_turn_the_wheel_by_and_by_and_less_at_speed():
 @pytest.mark.req("A-219", "A-220")
 def test_headlights_are_automatic_until_the_switch_is_moved():
     fog = Weather(fog_density=90.0)
+    assert visibility(preset("clear-noon")) == 1000.0  # what the estimate begins with
+    assert visibility(fog) < LOW_VISIBILITY == 200.0
     assert beam_of(LampSwitch.AUTO, preset("clear-noon")) is Beam.OFF
     assert beam_of(LampSwitch.AUTO, preset("clear-night")) is Beam.LOW
     assert beam_of(LampSwitch.AUTO, fog) is Beam.LOW

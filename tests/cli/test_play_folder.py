@@ -1,6 +1,7 @@
 """`skidpad play DIR`: a folder of scenarios as a campaign."""
 
 import pytest
+from lxml import etree
 from typer.testing import CliRunner
 
 from skidpad.cli.asked import PlayCross
@@ -66,6 +67,43 @@ def test_what_cannot_be_played_is_told_of_a_whole_folder(folder):
     assert done.exit_code == 2
     assert "cut.in.xosc: can be played" in done.stdout
     assert "odd.xosc, line" in done.stdout
+
+
+def test_catalogs_are_passed_over_and_distributions_checked_choice_by_choice(folder):
+    (folder / "odd.xosc").unlink()
+    head = '<FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="" author=""/>'
+    catalog = f'<OpenSCENARIO>{head}<Catalog name="c"/></OpenSCENARIO>'
+    (folder / "catalog.xosc").write_text(catalog, encoding="utf-8")
+    values = "".join(f'<Element value="{v}"/>' for v in (20.0, 25.0))
+    choices = f"""<OpenSCENARIO>{head}<ParameterValueDistribution>
+<ScenarioFile filepath="below/cut.in.xosc"/><Deterministic>
+<DeterministicSingleParameterDistribution parameterName="EgoSpeed"><DistributionSet>{values}
+</DistributionSet></DeterministicSingleParameterDistribution></Deterministic>
+</ParameterValueDistribution></OpenSCENARIO>"""
+    (folder / "choices.xosc").write_text(choices, encoding="utf-8")
+    done = play(folder, "--check")
+    assert done.exit_code == 0, done.output
+    assert "choices.xosc: can be played" in done.stdout
+    assert "catalog" not in done.stdout
+    (folder / "choices.xosc").write_text(choices.replace("EgoSpeed", "Nobody"), encoding="utf-8")
+    (folder / "torn.xosc").write_text("<OpenSCENARIO", encoding="utf-8")
+    done = play(folder, "--check")
+    assert done.exit_code == 2
+    assert "declares no parameter 'Nobody'" in done.stdout
+    assert "not XML" in done.stdout
+    assert "cut.in.xosc: can be played" in done.stdout
+
+
+def test_what_cannot_be_played_is_never_as_expected(folder, tmp_path):
+    junit = tmp_path / "junit.xml"
+    done = play(
+        folder, "--out", tmp_path / "o", "--duration", 1, "--workers", 1, "--controller", "ideal",
+        "--expect", "no-collision", "--junit", junit,
+    )  # fmt: skip
+    assert done.exit_code == 1, done.output
+    cases = {case.get("name"): len(case) for case in etree.parse(str(junit)).getroot()}
+    assert sorted(cases.values()) == [0, 1]
+    assert next(name for name, failed in cases.items() if failed).endswith("odd.xosc: no-collision")
 
 
 def test_a_folder_without_scenarios_and_a_file_with_two_weathers_are_refused(folder, tmp_path):

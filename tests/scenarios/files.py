@@ -28,6 +28,19 @@ positionZ="0.3"/><RearAxle maxSteering="0" wheelDiameter="0.6" trackWidth="1.6" 
 positionZ="0.3"/></Axles><Properties/></Vehicle>"""
 ROAD = '<LogicFile filepath="straight.xodr"/>'
 
+# road 2 runs north over road 1, which runs east, at x = 100 and 6 m above it
+BRIDGE = """<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="4"/>
+{}</OpenDRIVE>""".format(
+    "".join(
+        f"""<road name="" length="200" id="{id}" junction="-1"><link/><planView><geometry s="0" x="{x}"
+y="{y}" hdg="{hdg}" length="200"><line/></geometry></planView><elevationProfile><elevation s="0" a="{z}"
+b="0" c="0" d="0"/></elevationProfile><lanes><laneSection s="0"><center><lane id="0" type="none"
+level="false"/></center><right><lane id="-1" type="driving" level="false"><width sOffset="0" a="3.5"
+b="0" c="0" d="0"/></lane></right></laneSection></lanes></road>"""
+        for id, x, y, hdg, z in ((1, 0, 0, 0, 0), (2, 100, -100, 1.5707963267948966, 6))
+    )
+)
+
 
 def vehicle(name: str, x: float = 0.0) -> str:
     return f'<ScenarioObject name="{name}">{VEHICLE.format(x=x)}</ScenarioObject>'

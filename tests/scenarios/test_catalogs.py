@@ -89,3 +89,13 @@ maximumExecutionCount="1"><Actors selectTriggeringEntities="false"><EntityRef en
 <StartTrigger/></Act></Story>"""
     rows = told(tmp_path, stories=act, init=at("ego", -3, 100) + at("other", -1, 120)).of("other")
     assert rows[-1].speed == pytest.approx(3.0)
+
+
+def test_a_folder_of_catalogs_may_have_a_dot_in_its_name(folder):
+    (folder / "cat").rename(folder / "cat.v1")
+    scenario = compiled(
+        folder,
+        catalogs='<VehicleCatalog><Directory path="cat.v1"/></VehicleCatalog>',
+        entities=other(reference("cars", "long")),
+    )
+    assert scenario.entities["other"].box.length == 9.0

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from math import hypot
+from math import atan2, cos, hypot, sin
 
 import pytest
 from tests.scenarios.files import (
@@ -131,6 +131,58 @@ freespace="false" continuous="true" displacement="leftToReferencedEntity">
     rows = changed(tmp_path, keep)
     assert rows[-1].y == pytest.approx(-8.75 + 2.5, abs=1e-3)
     assert max(abs(b.y - a.y) for a, b in itertools.pairwise(rows)) <= 0.05 + 1e-6
+
+
+BESIDE = """<LateralAction><LateralDistanceAction entityRef="ego" distance="2.5" freespace="false"
+continuous="true" {}/></LateralAction>"""
+
+
+def beside(tmp_path, words, begin, minor=2, **parts):
+    return told(
+        tmp_path, init=begin, stories=story(event("e", private(BESIDE.format(words)), time(1.0))),
+        end=6.0, minor=minor, **parts,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("axes", ["entity", "lane", "road"])
+@pytest.mark.parametrize(
+    ("side", "y"),
+    [("leftToReferencedEntity", -0.75), ("any", -0.75), ("rightToReferencedEntity", 4.25)],
+)
+def test_left_and_right_are_those_of_the_other_one_that_comes_towards(tmp_path, axes, side, y):
+    begin = at("ego", 1, 300) + at("other", -1, 100)
+    words = f'displacement="{side}" coordinateSystem="{axes}"'
+    rows = beside(tmp_path, words, begin).of("other")
+    assert rows[-1].y == pytest.approx(y, abs=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("axes", "lane"),
+    [("", False), ('coordinateSystem="entity"', False), ('coordinateSystem="lane"', True)],
+)
+def test_a_sideways_distance_is_straight_from_the_entity_or_along_the_lane(tmp_path, axes, lane):
+    """On a circle of 60 m radius to the left, 20 m behind the other one, by plane geometry."""
+    (tmp_path / "bend.xodr").write_text(BEND)
+    begin = at("ego", -1, 80, 2) + at("other", -1, 60, 2)
+    words = f'displacement="leftToReferencedEntity" {axes}'
+    result = beside(tmp_path, words, begin, road='<LogicFile filepath="bend.xodr"/>')
+    own, it = result.of("other")[-1], result.of("ego")[-1]
+    if lane:
+        assert 61.75 - hypot(own.x, own.y - 60.0) == pytest.approx(2.5, abs=0.01)
+    else:
+        phi = atan2(own.x, 60.0 - own.y) - atan2(it.x, 60.0 - it.y)
+        left = (own.y - it.y) * cos(it.h) - (own.x - it.x) * sin(it.h)
+        assert left == pytest.approx(2.5, abs=0.01)
+        assert 61.75 - hypot(own.x, own.y - 60.0) == pytest.approx(
+            61.75 - 59.25 / cos(phi), abs=0.01
+        )
+
+
+BEND = """<?xml version="1.0"?><OpenDRIVE><header revMajor="1" revMinor="4"/><road name="" length="180"
+id="1" junction="-1"><link/><planView><geometry s="0" x="0" y="0" hdg="0" length="180"><arc
+curvature="0.016666666666666666"/></geometry></planView><lanes><laneSection s="0"><center><lane id="0"
+type="none" level="false"/></center><right><lane id="-1" type="driving" level="false"><width
+sOffset="0" a="3.5" b="0" c="0" d="0"/></lane></right></laneSection></lanes></road></OpenDRIVE>"""
 
 
 def test_a_speed_changed_after_a_lane_change_in_a_step_moves_it_a_step_later(tmp_path):

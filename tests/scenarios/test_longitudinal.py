@@ -92,6 +92,24 @@ def test_a_gap_is_kept(tmp_path, how, ahead):
     assert other.speed == pytest.approx(10.0, abs=0.05)
 
 
+def test_an_acceleration_grows_no_faster_than_the_file_allows(tmp_path):
+    """The other car is 20 m ahead and shall be 60 m: it hurries, then brakes."""
+    limits = """<DynamicConstraints maxAcceleration="3" maxDeceleration="3" maxSpeed="40"
+maxAccelerationRate="2" maxDecelerationRate="1"/>"""
+
+    def grown(limits):
+        how = gap('distance="60" freespace="false"', limits)
+        result = told(tmp_path, stories=story(event("e", how, time(1.0))), end=12.0)
+        v = [r.speed for r in result.of("other")]
+        a = [(q - p) / 0.05 for p, q in itertools.pairwise(v)]
+        return [(q, (q - p) / 0.05) for p, q in itertools.pairwise(a)]
+
+    eased, hasty = grown(limits), grown(limits.partition("\n")[0] + "/>")
+    assert max(jerk for _, jerk in eased) == pytest.approx(2.0, abs=0.01)
+    assert min(jerk for a, jerk in eased if a < 0.0) >= -1.0 - 0.01
+    assert max(jerk for _, jerk in hasty) > 10.0
+
+
 def test_a_gap_without_limits_is_there_at_once(tmp_path):
     how = gap('distance="50" freespace="false"')
     result = told(tmp_path, stories=story(event("e", how, time(1.0))), end=3.0)

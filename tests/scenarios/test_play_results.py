@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 from lxml import etree
 from tests.scenarios.files import (
+    BRIDGE,
     at,
     event,
+    init,
+    on_lane,
     private,
     speed,
     story,
+    teleport,
     time,
     to,
     vehicle,
@@ -103,6 +107,26 @@ def test_two_others_are_a_pair_and_expectations_are_about_the_ego(tmp_path):
     assert float(pair["min_ttc_s"]) == pytest.approx(float(pair["min_gap_m"]) / 3.0, abs=0.05)
     assert pair["min_pet_s"] == "", "2.4 s apart"
     assert found["ego", "lead"]["min_ttc_s"] == ""
+
+
+@pytest.mark.parametrize("height", [6, 1])
+def test_nobody_is_in_the_way_on_a_bridge_above(tmp_path, height):
+    """Both reach the crossing at the same time; 1 m up the other one is in the way."""
+    (tmp_path / "bridge.xodr").write_text(BRIDGE.replace('a="6"', f'a="{height}"'))
+    begin = "".join(
+        init(name, teleport(on_lane(-1, s, road=road)), speed(to(10)))
+        for name, road, s in (("ego", 1, 40), ("other", 2, 40))
+    )
+    road = '<LogicFile filepath="bridge.xodr"/>'
+    file = write(tmp_path, init=begin, road=road, end=8.0)
+    done = play(file, "--out", tmp_path / "out", *RIDE, "--expect", "min_ttc_s > 1")
+    found = rows(tmp_path / "out" / "pairs.csv")
+    if height == 6:
+        assert done.exit_code == 0, done.output
+        assert [value for pair in found for value in list(pair.values())[2:] if value] == []
+    else:
+        assert done.exit_code == 1
+        assert float(found[0]["min_gap_m"]) < 1.0
 
 
 def test_expectations_decide_the_exit_code_and_fill_junit(tmp_path):

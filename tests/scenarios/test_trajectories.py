@@ -69,6 +69,38 @@ def test_relative_times_are_stretched_and_put_off(tmp_path):
     assert rows[70].x == pytest.approx(210.0, abs=1e-6)  # half of 2 s stretched to 4 s
 
 
+SQUARE = ((200, -1.75), (220, -1.75), (220, 18.25), (200, 18.25))
+
+
+def test_a_closed_line_keeps_its_times_and_ends_with_them(tmp_path):
+    """As in esmini: nobody says when it is back at its begin, so that the last time is the end."""
+    line = polyline(*((2.0 * k, world(*p)) for k, p in enumerate(SQUARE)))
+    rows = rows_of(tmp_path, follow(line, ABSOLUTE, closed="true"))
+    assert (rows[60].x, rows[60].y) == pytest.approx((220.0, 8.25), abs=1e-6)  # 3 s
+    assert (rows[100].x, rows[100].y) == pytest.approx((210.0, 18.25), abs=1e-6)
+    assert (rows[130].x, rows[130].y) == pytest.approx((195.0, 18.25), abs=0.02)  # straight on
+
+
+def test_a_closed_line_without_times_goes_round_and_round(tmp_path):
+    line = polyline(*((None, world(*p)) for p in SQUARE))
+    rows = rows_of(tmp_path, follow(line, closed="true"), end=12.0)
+    assert (rows[160].x, rows[160].y) == pytest.approx((200.0, 8.25), abs=0.02)  # 70 m since 1 s
+    assert (rows[200].x, rows[200].y) == pytest.approx(
+        (210.0, -1.75), abs=0.02
+    )  # once round and 10 m
+
+
+def test_relative_times_begin_where_the_action_asks_to(tmp_path):
+    line = polyline((0.0, world(200, -1.75)), (2.0, world(220, -1.75)), (6.0, world(240, -1.75)))
+    timing = '<Timing domainAbsoluteRelative="relative" scale="1" offset="0"/>'
+    action = follow(line, timing).replace(
+        "<FollowTrajectoryAction>", '<FollowTrajectoryAction initialDistanceOffset="10">'
+    )
+    rows = rows_of(tmp_path, action)
+    assert rows[40].x == pytest.approx(220.0, abs=1e-6)  # 10 m after 1 s
+    assert rows[80].x == pytest.approx(230.0, abs=1e-6)  # at 5 m/s since
+
+
 def test_without_times_the_own_speed_counts(tmp_path):
     corner = polyline((None, world(200, -1.75)), (None, world(215, -1.75)), (None, world(215, 30)))
     rows = rows_of(tmp_path, follow(corner), end=4.0)

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import pytest
 from tests.scenarios.files import (
+    BRIDGE,
     at,
     by_entity,
     by_value,
@@ -76,6 +77,24 @@ def test_a_collision_between_two_others_is_seen(tmp_path, who):
     t = fired(tmp_path, by_entity(hit, "third"), entities=entities, init=begin)
     assert t == pytest.approx((40.0 - 4.2) / 10.0, abs=0.06)
     assert fired(tmp_path, by_entity(hit, "ego"), entities=entities, init=begin) is None
+
+
+@pytest.mark.parametrize(("height", "t"), [(6, None), (1, 5.875)])
+def test_cars_over_and_under_a_bridge_do_not_touch(tmp_path, height, t):
+    """Bodies 1.5 m high; the second to come to the other lane has 58.75 m to go at 10 m/s."""
+    (tmp_path / "bridge.xodr").write_text(BRIDGE.replace('a="6"', f'a="{height}"'))
+    entities = vehicle("ego") + vehicle("other") + vehicle("third")
+    lanes = {"ego": (1, 10, 0), "other": (1, 40, 10), "third": (2, 40, 10)}
+    begin = "".join(
+        init(name, teleport(on_lane(-1, s, road=road)), speed(to(v)))
+        for name, (road, s, v) in lanes.items()
+    )
+    hit = "<CollisionCondition>{}</CollisionCondition>".format('<EntityRef entityRef="other"/>')
+    found = fired(
+        tmp_path, by_entity(hit, "third"), entities=entities, init=begin,
+        road='<LogicFile filepath="bridge.xodr"/>',
+    )  # fmt: skip
+    assert found == (None if t is None else pytest.approx(t, abs=0.06))
 
 
 def test_a_contact_of_the_ego_does_not_end_what_the_file_goes_on_with(tmp_path):

@@ -24,7 +24,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.run import AdasDriver, CameraDriver, RunSpec
 from skidpad.core.specs import SensorSpec
 from skidpad.core.vocabulary import SensorLevel
-from skidpad.recording.files import write_bytes, write_parquet
+from skidpad.recording.files import require_free, write_bytes, write_parquet
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.camera.codes import AHEAD
@@ -110,9 +110,7 @@ def export_drive(spec: RunSpec, out: Path, every: int) -> tuple[Run, int]:
         raise ConfigError("export-dataset drives with stack or camera")
     from skidpad.campaign.cast import stage_of
 
-    folder = out / spec.name
-    if folder.exists() and any(folder.iterdir()):
-        raise OutputError(f"{folder} is not empty; choose another --out")
+    folder = require_free(out / spec.name)
     sink = DatasetSink(folder, stage_of(spec).map, every)
     kind = WatchedStack if isinstance(spec.driver, AdasDriver) else None
     driven = run(spec, kind, sinks=[sink])

@@ -12,17 +12,9 @@ from skidpad.campaign.desk import Desk
 from skidpad.campaign.drive import Sink
 from skidpad.campaign.run import Run, run
 from skidpad.campaign.runfolder import write_config, write_run
-from skidpad.core.errors import OutputError
 from skidpad.core.run import RunSpec
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import require_free, write_bytes
 from skidpad.recording.inputs import INPUTS, encode_inputs, inputs_hash
-
-
-def require_free(folder: Path) -> Path:
-    """`folder` if nothing is in it yet; else OutputError."""
-    if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
-        raise OutputError(f"{folder} exists already: choose another folder for this drive")
-    return folder
 
 
 def drive_at_desk(spec: RunSpec, desk: Desk, folder: Path, sinks: Sequence[Sink] = ()) -> Run:

@@ -20,16 +20,17 @@ from skidpad.core.errors import FileError
 from skidpad.core.run import Friction, RunSpec, Scenario
 from skidpad.core.weather import Weather
 from skidpad.scenarios.distributions import choices, is_distribution
+from skidpad.scenarios.document import holds
 
 RECIPE = replace(recipe(keep_all=True), command="play", finish=nothing_else)
 
 
 def scenario_files(folder: Path) -> list[Path]:
-    """The .xosc files of a folder, at any depth, in order."""
+    """The .xosc files of a folder, at any depth, in order, without catalogs: others refer to those."""
     found = sorted(folder.rglob("*.xosc"))
     if not found:
         raise FileError(f"{folder} holds no .xosc file")
-    return found
+    return [file for file in found if not holds(file, "Catalog")]
 
 
 def courses_of(course: Scenario, file: Path) -> list[Scenario]:

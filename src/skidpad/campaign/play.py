@@ -11,8 +11,9 @@ from skidpad.campaign.pool import run_jobs
 from skidpad.campaign.run import Run, run
 from skidpad.campaign.runfolder import write_config, write_played, write_run
 from skidpad.campaign.worker import Job
-from skidpad.core.errors import BackendError, OutputError
+from skidpad.core.errors import BackendError
 from skidpad.core.run import BackendKind, RunSpec, Scenario
+from skidpad.recording.files import require_free
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,9 +29,7 @@ def run_to(spec: RunSpec, out: Path) -> Run:
 
     On a CARLA server a process of its own drives: the wheel's threads can end theirs.
     """
-    if out.exists() and any(out.iterdir()):
-        raise OutputError(f"{out} is not empty; choose another --out")
-    task = Task(spec, out)
+    task = Task(spec, require_free(out))
     if spec.backend.backend is BackendKind.EMBEDDED:
         return run_task(task)
     if isinstance(spec.course, Scenario):

@@ -27,6 +27,7 @@ class Subject(str, Enum):
     PHYSICS = "physics"
     MATRIX = "matrix"
     TRAFFIC = "traffic"
+    SCENARIOS = "scenarios"
 
 
 @spread()
@@ -41,13 +42,14 @@ def bench(
         bool, typer.Option("--run", help="matrix: drive all 30 runs instead of estimating.")
     ] = False,
 ) -> None:
-    """Measure CPU time: per tick, per sensor, per vehicle, of the matrix; or what traffic does."""
+    """Measure CPU time: per tick, sensor, vehicle, of the matrix, of files; or what traffic does."""
     measure = {
         Subject.TICK: lambda: _tick(seconds, json),
         Subject.SENSORS: lambda: _sensors(json),
         Subject.PHYSICS: lambda: _physics(json),
         Subject.MATRIX: lambda: _matrix(seconds, run, json),
         Subject.TRAFFIC: lambda: _traffic(traffic, json),
+        Subject.SCENARIOS: lambda: _scenarios(seconds, json),
     }
     figures = measure[subject]()
     about = {"subject": subject.value, "machine": machine(), "cores": os.cpu_count()}
@@ -122,6 +124,21 @@ def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
             f"({how}); target {matrix.TARGET:g} min"
         )
     return {"unit": "min", "minutes": minutes, "how": how, "target": matrix.TARGET}
+
+
+def _scenarios(seconds: float, quiet: bool) -> dict[str, Any]:
+    from skidpad.campaign.bench_scenarios import measure
+
+    rows = measure(seconds)
+    if not quiet:
+        typer.echo("two cars, everything ideal, step 0.05 s; medians")
+        for row in rows:
+            verdict = "ok  " if row.met else "over" if row.most else "slow"
+            bound = "at most" if row.most else "at least"
+            typer.echo(
+                f"  {row.what:<22} {row.value:8.2f} {row.unit:<16} {bound} {row.target:g} {verdict}"
+            )
+    return {"rows": [{**asdict(row), "met": row.met} for row in rows]}
 
 
 def _traffic(asked: TrafficBench, quiet: bool) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from skidpad.evidence.compare import Change
+    from skidpad.evidence.compare import Change, Rule
 
 
 class Flaws(str, Enum):
@@ -34,8 +34,8 @@ SHOWN = (
 
 
 def compare(
-    a: Annotated[Path, typer.Argument(help="The campaign before.")],
-    b: Annotated[Path, typer.Argument(help="The campaign after.")],
+    a: Annotated[Path, typer.Argument(help="The campaign before, or one run's folder.")],
+    b: Annotated[Path, typer.Argument(help="The campaign after, or one run's folder.")],
     fail_if: Annotated[
         list[str] | None,
         typer.Option(help="COLUMN > NUMBER about the mean difference B - A; exit 1 when true."),
@@ -51,28 +51,32 @@ def compare(
 ) -> None:
     """Pair two campaigns by configuration, weather and seed; exit 1 on a regression.
 
-    Rules also fail on runs that are missing or crashed and on columns without values.
+    Rules also fail on runs that are missing or crashed and on columns without values. Of the
+    folders of two runs, as a drive by hand leaves one, the metrics are shown side by side.
     """
     from skidpad.core.errors import ConfigError
     from skidpad.evidence.compare import compare_campaigns, flaws, parse_rule
+    from skidpad.recording.logfiles import TICKS
     from skidpad.recording.matrix import MATRIX
     from skidpad.recording.results import read_results
 
     rules = [parse_rule(text) for text in fail_if or []]
     if (junit is not None or allow) and not rules:
         raise ConfigError("--junit and --allow are about the rules of --fail-if, and none is given")
+    if all((folder / TICKS).is_file() for folder in (a, b)):
+        from skidpad.cli.show import compare_runs
+
+        if rules:
+            raise ConfigError("--fail-if judges campaigns, and these are the folders of two runs")
+        compare_runs(a, b)
+        return
     wanted = list(dict.fromkeys([*SHOWN, *(r.column for r in rules)]))
     before, after = (read_results(folder, MATRIX) for folder in (a, b))
     changes, alone_a, alone_b = compare_campaigns(before, after, wanted)
     _print(changes)
     if alone_a or alone_b:
         typer.echo(f"without a partner: {alone_a} runs of {a}, {alone_b} of {b}")
-    failures = {
-        rule.text: [
-            _told(c) for c in changes if c.column == rule.column and rule.broken_by(c, surely)
-        ]
-        for rule in rules
-    }
+    failures = {rule.text: _broken(rule, changes, surely) for rule in rules}
     passed = {flaw.value for flaw in allow or []}
     failures |= {
         f"data: {flaw.value}": [] if flaw.value in passed else [sentence]
@@ -87,6 +91,11 @@ def compare(
             typer.echo(f"regression ({text}): {sentence}", err=True)
     if any(failures.values()):
         raise typer.Exit(1)
+
+
+def _broken(rule: Rule, changes: list[Change], surely: bool) -> list[str]:
+    """What breaks a rule, in words."""
+    return [_told(c) for c in changes if c.column == rule.column and rule.broken_by(c, surely)]
 
 
 def _told(change: Change) -> str:

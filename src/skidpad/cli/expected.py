@@ -33,8 +33,11 @@ class Expected(Struct, frozen=True):
             raise ConfigError("--junit is about the rules of --expect, and none is given")
         return [parse_expectation(text) for text in self.expect]
 
-    def judge(self, runs: Mapping[str, Path]) -> None:
-        """Look at the folders of runs by name; exit code 1 where one is not as expected."""
+    def judge(self, runs: Mapping[str, Path], unplayable: Sequence[str] = ()) -> None:
+        """Look at the folders of runs by name; exit code 1 where one is not as expected.
+
+        unplayable: files of which there is no run, which no rule can hold for.
+        """
         rules = self.rules()
         if not rules:
             return
@@ -42,6 +45,9 @@ class Expected(Struct, frozen=True):
             f"{name}: {rule.text}": by
             for name, folder in runs.items()
             for rule, by in zip(rules, _wrong(folder, rules), strict=True)
+        }
+        failures |= {
+            f"{f}: {rule.text}": ["cannot be played"] for f in unplayable for rule in rules
         }
         if self.junit is not None:
             from skidpad.cli.junit import write_junit

@@ -38,7 +38,7 @@ def play_folder(
 ) -> None:
     """Play every scenario of a folder in every weather, with and without its grip."""
     template = _template(cross, controller, run, scenario, tuned, backend)
-    how(_campaign(template, cross, folder, seeds), table)
+    how(_campaign(template, cross, folder, seeds, []), table)
 
 
 @scenario_options
@@ -108,7 +108,8 @@ def _drive_all(
     """The campaign of a folder, its crash cards, and what was expected of its runs."""
     from skidpad.recording.campaigns import RUNS
 
-    campaign = _campaign(template, cross, file, seeds)
+    left_out: list[Path] = []
+    campaign = _campaign(template, cross, file, seeds, left_out)
     folders: list[Path] = []
 
     def told(folder: Path) -> str:
@@ -122,7 +123,7 @@ def _drive_all(
     runs = {run.name: folders[0] / RUNS / run.name for run in campaign.tasks}
     if how.until_halfwidth is not None:  # which leaves runs out on purpose
         runs = {name: run for name, run in runs.items() if run.exists()}
-    expected.judge(runs)
+    expected.judge(runs, [str(f) for f in left_out])
 
 
 def table(folder: Path) -> str:
@@ -162,14 +163,16 @@ def _template(
 
 
 def _campaign(
-    template: RunSpec, cross: PlayCross, folder: Path, seeds: int
+    template: RunSpec, cross: PlayCross, folder: Path, seeds: int, left_out: list[Path]
 ) -> Campaign[RunSpec, GripKey, GripMetrics]:
+    """Of all that can be played; the others are added to `left_out`."""
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.files import RECIPE, scenario_files
     from skidpad.cli.carla_backend import drives_alone
 
     found = scenario_files(folder) if folder.is_dir() else [folder]
     files = [file for file in found if _playable(file, template)]
+    left_out += [file for file in found if file not in files]
     runs = _runs(template, cross, files, seeds)
     return Campaign(RECIPE, runs, alone=drives_alone(template.backend))
 
@@ -202,17 +205,28 @@ def _playable(file: Path, template: RunSpec) -> bool:
 
 def _check(path: Path, course: Scenario) -> None:
     """Say of a file, or of each in a folder, everything that is wrong or unknown in it."""
-    from skidpad.campaign.cast import check_scenario
     from skidpad.campaign.files import scenario_files
 
-    odd = False
-    for file in scenario_files(path) if path.is_dir() else [path]:
-        found = check_scenario(structs.replace(course, file=str(file)))
-        for finding in found.findings:
-            typer.echo(f"{finding.kind.value}: {finding}")
-        if found.scenario is None:
-            odd = True
-        else:
-            typer.echo(f"{file.name}: can be played")
-    if odd:
+    files = scenario_files(path) if path.is_dir() else [path]
+    clean = [_is_clean(file, course) for file in files]
+    if not all(clean):
         raise typer.Exit(2)
+
+
+def _is_clean(file: Path, course: Scenario) -> bool:
+    """Say everything that is found in a file, and in each choice where it is a distribution."""
+    from skidpad.campaign.cast import check_scenario
+    from skidpad.campaign.files import courses_of
+    from skidpad.core.errors import FileError
+
+    try:
+        found = [check_scenario(one) for one in courses_of(course, file)]
+    except FileError as error:
+        typer.echo(f"error: {error}")
+        return False
+    for finding in dict.fromkeys(f for compiled in found for f in compiled.findings):
+        typer.echo(f"{finding.kind.value}: {finding}")
+    if any(compiled.scenario is None for compiled in found):
+        return False
+    typer.echo(f"{file.name}: can be played")
+    return True

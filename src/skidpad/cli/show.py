@@ -8,20 +8,44 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from skidpad.core.errors import FileError
 from skidpad.evidence.drive.collisions import find_crashes
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.recording.matrix import Metrics
 from skidpad.recording.results import definitions_of
+from skidpad.recording.runlog import RunLog
 from skidpad.report.cards import chain, headline
 from skidpad.roads.bundled import kept_map
+from skidpad.roads.queries import RoadMap
+
+
+def opened(run: Path) -> tuple[RunLog, RoadMap]:
+    """The log of a run's folder, and the map that it was driven on."""
+    log = read_log(run)
+    return log, kept_map(run.resolve().parents[1], log.header.map, log.header.map_hash)
+
+
+def compare_runs(a: Path, b: Path) -> None:
+    """Print the metrics of two runs, of a campaign or driven by hand, and B - A."""
+    found = []
+    for run in (a, b):
+        log, road_map = opened(run)
+        if road_map.content_hash != log.header.map_hash:
+            raise FileError(f"{run}: the map {log.header.map} is another one today")
+        found.append(asdict(run_metrics(log, road_map)))
+    table = Table("metric", "A", "B", "B - A", box=None, pad_edge=False)
+    for name, before in found[0].items():
+        after = found[1][name]
+        change = None if before is None or after is None else after - before
+        table.add_row(name, _text(before), _text(after), _text(change))
+    Console().print(table)
 
 
 def show(run: Path) -> None:
     """Print it."""
-    log = read_log(run)
-    road_map = kept_map(run.resolve().parents[1], log.header.map, log.header.map_hash)
+    log, road_map = opened(run)
     console = Console()
     console.print(f"[bold]{run.name}[/] on {log.header.map}, {len(log) * log.header.dt:g} s")
     for name, value in log.header.about.items():

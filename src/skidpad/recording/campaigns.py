@@ -64,6 +64,16 @@ class CampaignFolder(Generic[E]):
         return folder if (folder / TICKS).is_file() else None
 
 
+def last_snapshot(run: Path) -> Path | None:
+    """The last picture that was taken in a run, if there is one."""
+
+    def when(path: Path) -> tuple[int, str]:
+        t = path.stem.rpartition("_")[2]
+        return len(t), t
+
+    return max((run / SNAPSHOTS).glob("*s.png"), key=when, default=None)
+
+
 def snapshot(run: Path, t: float) -> Path | None:
     """The picture that was taken in a run at `t` s, if there is one."""
     return next(iter(sorted((run / SNAPSHOTS).glob(f"*_{t:07.2f}s.png"))), None)

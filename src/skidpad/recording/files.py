@@ -52,6 +52,23 @@ def _fill(path: Path, content: bytes) -> None:
     path.write_bytes(content)
 
 
+def require_free(folder: Path) -> Path:
+    """`folder` if nothing is in it yet; OutputError where something is, or a file."""
+    if folder.is_file() or (folder.is_dir() and any(folder.iterdir())):
+        raise OutputError(f"{folder} exists already and is not empty; choose another --out")
+    return folder
+
+
+def write_secret(path: Path, content: bytes) -> None:
+    """As `write_bytes`, and at no moment may anybody else read it."""
+    write_atomically(path, lambda temporary: _fill_secret(temporary, content))
+
+
+def _fill_secret(path: Path, content: bytes) -> None:
+    with os.fdopen(os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "wb") as file:
+        file.write(content)
+
+
 def write_parquet(path: Path, table: pl.DataFrame, metadata: dict[str, str] | None = None) -> None:
     """Write `table` as zstd Parquet, atomically, with `metadata` in its footer."""
     buffer = BytesIO()  # polars takes no path that is not UTF-8

@@ -22,7 +22,7 @@ class Catalogs:
             folder = location.find("Directory")
             if folder is not None:
                 path = (root.file.parent / folder.text("path").replace("\\", "/")).resolve()
-                self.folders.append(path.parent if path.suffix else path)
+                self.folders.append(path.parent if path.suffix == ".xosc" else path)
 
     def entry(self, reference: Node, depth: int = 0) -> Node:
         """The entry that a <CatalogReference> means, with its parameters in scope."""

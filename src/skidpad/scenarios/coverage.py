@@ -37,8 +37,21 @@ INSIDE = frozenset(  # understood where they stand inside others
 STATES = (
     "colours and three lamps such as `on;off;off` are shown; other words are for conditions alone"
 )
+FOLLOW = "`follow` is read as `position`"
 PARTIAL: Mapping[str, str] = MappingProxyType(
     {
+        **dict.fromkeys(
+            (*POSITIONS, *FURTHER_POSITIONS), "pitch and roll of its orientation are not read"
+        ),
+        "FollowTrajectoryAction": FOLLOW,
+        "LaneChangeAction": FOLLOW,
+        "SpeedAction": f"{FOLLOW}; rates of acceleration of `Performance` are not read",
+        "SpeedProfileAction": f"{FOLLOW}; `maxAccelerationRate` and `maxDecelerationRate` are not read",
+        "LongitudinalDistanceAction": "axes of the world and of trajectories are those of the entity",
+        "LateralDistanceAction": (
+            "of its limits `maxSpeed` only; axes of the world and of trajectories are those of the lane"
+        ),
+        "VisibilityAction": "for sensors; pictures for people and other traffic go by none",
         "EnvironmentAction": "falling snow counts by its sight, wind not at all",
         "TrafficSignalStateAction": STATES,
         "UserDefinedValueCondition": "nobody sets such values: never holds",

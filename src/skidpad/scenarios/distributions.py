@@ -10,8 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from skidpad.core.errors import FileError
-from skidpad.scenarios.document import Node, parse
+from skidpad.scenarios.document import Node, holds, parse
 from skidpad.scenarios.expressions import as_text
 from skidpad.scenarios.parameters import assignments, inner
 
@@ -31,10 +30,7 @@ class Choice:
 
 def is_distribution(file: Path) -> bool:
     """Whether the file holds choices instead of a scenario; False for what cannot be read."""
-    try:
-        return parse(file).find("ParameterValueDistribution") is not None
-    except FileError:
-        return False
+    return holds(file, "ParameterValueDistribution")
 
 
 def choices(file: Path) -> list[Choice]:

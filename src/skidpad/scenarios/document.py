@@ -199,3 +199,11 @@ def parse(path: Path) -> Node:
     if header is not None and header.get("revMajor") == "0":
         renew(root)
     return Node(root, path, {})
+
+
+def holds(file: Path, tag: str) -> bool:
+    """Whether a file is one of this kind, by the element under its root; False for what cannot be read."""
+    try:
+        return parse(file).find(tag) is not None
+    except FileError:
+        return False

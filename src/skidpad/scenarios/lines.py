@@ -32,16 +32,18 @@ class Vertex:
 class Line:
     """Points with their lengths and headings, and with times where all have one.
 
-    Headings that the vertices do not name are those of the motion from point to point.
+    Headings that the vertices do not name are those of the motion from point to point. A closed
+    line goes back to its first point, at a time that nobody says: its times end before that.
     """
 
-    def __init__(self, vertices: Sequence[Vertex]) -> None:
-        self.x = [v.x for v in vertices]
-        self.y = [v.y for v in vertices]
-        self.z = [v.z for v in vertices]
-        self.named = [v.heading for v in vertices]
+    def __init__(self, vertices: Sequence[Vertex], *, closed: bool = False) -> None:
+        points = [*vertices, vertices[0]] if closed else vertices
+        self.x = [v.x for v in points]
+        self.y = [v.y for v in points]
+        self.z = [v.z for v in points]
+        self.named = [v.heading for v in points]
         self.s = [0.0]
-        for k in range(1, len(vertices)):
+        for k in range(1, len(points)):
             step = hypot(self.x[k] - self.x[k - 1], self.y[k] - self.y[k - 1])
             self.s.append(self.s[-1] + step)
         times = [v.time for v in vertices]
@@ -81,6 +83,12 @@ class Line:
         assert self.t is not None
         k, u = self._find(self.t, t)
         return self.s[k] + (u * (self.s[k + 1] - self.s[k]) if k + 1 < len(self.s) else 0.0)
+
+    def time_at(self, s: float) -> float:
+        """Time at length s, clamped to the line."""
+        assert self.t is not None
+        k, u = self._find(self.s, s)
+        return self.t[k] + (u * (self.t[k + 1] - self.t[k]) if k + 1 < len(self.t) else 0.0)
 
     @staticmethod
     def _find(values: Sequence[float], value: float) -> tuple[int, float]:

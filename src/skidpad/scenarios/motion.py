@@ -94,7 +94,7 @@ class Guide:
         dx, dy = motion.x - self.base.x, motion.y - self.base.y
         forward = dx * cos(self.base.heading) + dy * sin(self.base.heading)
         further = self.network.ahead(self.base, forward, self.roads)
-        self.base = further or self.base
+        self.at_end, self.base = further is None, further or self.base
 
     def shift_to(self, lane_id: int) -> float | None:
         """Make another lane across the road the reference; returns the way left to it, m.
@@ -124,8 +124,8 @@ class Guide:
         left = dy * c - dx * s
         drift = motion.vy * c - motion.vx * s
         return Demand(
-            v=self.v,
-            a=self.a,
+            v=0.0 if self.at_end else self.v,
+            a=0.0 if self.at_end else self.a,
             curvature=self.along * self.base.curvature,
             error=left - self.along * self.offset,
             error_rate=drift - self.along * self.offset_rate,

@@ -27,6 +27,11 @@ class Place:
     pose: Pose
     lane: LanePoint | None = None
 
+    @property
+    def along(self) -> bool:
+        """It looks as its lane runs."""
+        return self.lane is None or cos(self.pose.yaw - self.lane.heading) >= 0.0
+
 
 @dataclass(frozen=True, slots=True)
 class RoadCoordinates:

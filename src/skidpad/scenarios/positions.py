@@ -139,8 +139,8 @@ class RelativeLane:
     def place(self, scene: Scene) -> Place:
         """Seen from the entity's lane now; on its own lane where there is no other."""
         network = scene.network
-        pose = scene.actors[self.other].pose
-        here = scene.actors[self.other].guide.base or network.place_of(pose).lane
+        at = scene.actors[self.other].place(network)
+        pose, here = at.pose, at.lane
         if here is None:
             moved = pose.moved(forward=self.ds, left=self.offset)
             return Place(replace(moved, yaw=self.facing.turned(pose.yaw)))
@@ -153,8 +153,8 @@ class RelativeLane:
         aligned = network.forward(point)
         left = self.offset if (aligned or self.along_lane) else -self.offset
         base = point.heading if (aligned or self.along_lane) else point.heading + pi
-        at = point.pose.moved(left=left)
-        pose = replace(at, yaw=self.facing.turned(wrap_angle(base)))
+        spot = point.pose.moved(left=left)
+        pose = replace(spot, yaw=self.facing.turned(wrap_angle(base)))
         return Place(pose, replace(point, offset=left))
 
 

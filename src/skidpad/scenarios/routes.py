@@ -107,8 +107,7 @@ class OfEntity:
 
     def place(self, scene: Scene) -> Place:
         """Where the entity is now."""
-        actor = scene.actors[self.other]
-        return Place(actor.pose, actor.guide.base)
+        return scene.actors[self.other].place(scene.network)
 
 
 def route_position(node: Node, ctx: Context) -> Position:

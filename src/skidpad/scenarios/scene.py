@@ -15,13 +15,14 @@ from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState
 from skidpad.scenarios.entities import Entity
 from skidpad.scenarios.environment import Environment
-from skidpad.scenarios.measures import Point, corners, overlap
+from skidpad.scenarios.measures import Point, between, corners, overlap
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Network, Place
 from skidpad.scenarios.tracking import Track, track_demand
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 STANDING = 0.05  # m/s
+PAST = 0.05  # m beyond the last place of a lane
 TOUCHING = 0.05  # m, bodies that the physics keeps apart are this near
 Path = tuple[str, ...]
 
@@ -90,6 +91,8 @@ class Actor:
     track: Track | None = None
     longitudinal: Running | None = None  # the newest action of its kind replaces the one before
     lateral: Running | None = None
+    leading: Running | None = None  # the action whose track it is led along
+    led_since: float = 0.0  # s
     present: bool = True
     seen: bool = False  # in a tick before
     handed: bool = True  # somebody else's controller is active, where mode is None
@@ -100,6 +103,7 @@ class Actor:
     travelled: float = 0.0  # m
     stood: float = 0.0  # s
     off_since: float | None = None  # s, when it left the road, if somebody asks
+    out_since: float | None = None  # s, when it passed the end of a road, likewise
     at_end: float = 0.0  # s at the end of a road
 
     @property
@@ -117,6 +121,43 @@ class Actor:
         """The scenario decides where it goes."""
         return self.mode is not None or not self.handed
 
+    @property
+    def placed_by_file(self) -> bool:
+        """It is exactly where the scenario says."""
+        return self.driven_by_file and (self.driver is None or self.mode is not ActorMode.PHYSICAL)
+
+    @property
+    def v_told(self) -> float:
+        """Speed that the file asks of it, m/s, negative backwards; its own, where it drives itself."""
+        return self.guide.v if self.driven_by_file else self.motion.speed
+
+    def let_go(self, action: Running, network: Network) -> None:
+        """An action of it has been stopped: what it did has no more rate, a lane is followed again."""
+        if action is self.longitudinal:
+            self.longitudinal, self.guide.a = None, 0.0
+        if action is self.lateral:
+            self.lateral = None
+            self.guide.offset_rate = self.guide.offset_bend = 0.0
+        if action is self.leading:
+            self.leave_track(network)
+
+    def leave_track(self, network: Network) -> None:
+        """Where it is led along a trajectory: no longer."""
+        if self.track is not None:
+            self.follow_road(network, self.guide.v)
+
+    def lead(self, action: Running, track: Track, t: float) -> None:
+        """An action leads it along a track; what moved it aside is over, with times its speed too."""
+        self.leading, self.track, self.led_since, self.lateral = action, track, t, None
+        if track.timed:
+            self.longitudinal = None
+
+    def pace_by(self, action: Running, scene: Scene) -> None:
+        """An action decides its speed; the newer one wins against a track with times."""
+        self.longitudinal = action
+        if self.track is not None and self.track.timed and self.led_since < scene.t:
+            self.leave_track(scene.network)
+
     def off_road(self, network: Network, t: float) -> float:
         """How long it has been beside every lane, s; kept by asking in every step."""
         point = network.map.project(self.pose.x, self.pose.y, self.pose.z, driving=False)
@@ -126,9 +167,29 @@ class Actor:
         self.off_since = t if self.off_since is None else self.off_since
         return t - self.off_since
 
-    def catch_up(self) -> None:
-        """Bring the lane's point abreast of an actor that the tyres have moved."""
-        if self.mode is not ActorMode.IDEAL and self.driver is not None:
+    def past_road(self, network: Network, t: float) -> float:
+        """How long it has been at the end of a road, s; beside its lane kept by asking in every step."""
+        if self.driven_by_file and self.track is None:
+            return self.at_end
+        lane = network.place_of(self.pose).lane
+        if lane is not None:
+            forward, _ = between(lane.pose, self.pose.x, self.pose.y)
+            past = abs(forward) > PAST and network.map.ahead(lane, forward) is None
+            self.out_since = (t if self.out_since is None else self.out_since) if past else None
+        return 0.0 if self.out_since is None else t - self.out_since
+
+    def place(self, network: Network) -> Place:
+        """Where it is, with its lane: the one that it keeps to, else the one under it."""
+        guide = self.guide
+        if self.driven_by_file and self.track is None and guide.base is not None:
+            return Place(self.pose, replace(guide.base, offset=guide.offset))
+        return network.place_of(self.pose)
+
+    def catch_up(self, network: Network) -> None:
+        """Bring the lane's point abreast of an actor that was not moved along it."""
+        if not self.driven_by_file:
+            self.guide.base = self.place(network).lane
+        elif self.mode is not ActorMode.IDEAL and self.driver is not None:
             self.guide.advance(self.motion)
 
     def outline(self) -> list[Point]:
@@ -146,7 +207,7 @@ class Actor:
             return word
         if not self.present or not self.driven_by_file:
             return None
-        if self.driver is None or self.mode is not ActorMode.PHYSICAL:
+        if self.driver is None or self.placed_by_file:
             return self._placed(t + dt, dt)
         if self.track is not None:
             demand = track_demand(self.track, self.motion, t, dt, self.centre)
@@ -187,17 +248,19 @@ class Actor:
         self.guide.roads = roads
         self.track = None
 
-    def observe(self, motion: Motion, dt: float) -> None:
-        """Take over a tick's motion of the box's centre; nothing has lasted in the first one."""
+    def observe(self, motion: Motion, z: float, dt: float) -> None:
+        """Take over a tick's motion of the box's centre; nothing has lasted in the first one.
+
+        z: of the ground, m, for whom the file does not place.
+        """
         v = self.v
         self.motion = motion
         dt, self.seen = dt if self.seen else 0.0, True
         box = self.entity.box
+        at = Pose(motion.x, motion.y, self.pose.z if self.placed_by_file else z, yaw=motion.yaw)
         if box.forward or box.left:
-            at = Pose(motion.x, motion.y, self.pose.z, yaw=motion.yaw)
-            self.pose = at.moved(forward=-box.forward, left=-box.left)
-        else:
-            self.pose = Pose(motion.x, motion.y, self.pose.z, yaw=motion.yaw)
+            at = at.moved(forward=-box.forward, left=-box.left)
+        self.pose = at
         self.a = (self.v - v) / dt if dt > 0.0 else 0.0
         self.travelled += self.v * dt
         self.stood = self.stood + dt if self.v < STANDING else 0.0
@@ -258,10 +321,11 @@ class Scene:
         self.t, self.lights = truth.tick * self.dt, truth.lights
         s = truth.states
         columns = (s.x.tolist(), s.y.tolist(), s.yaw.tolist(), s.vx.tolist(), s.vy.tolist())
+        z = s.z.tolist()
         for actor in self.actors.values():
             i = actor.row
             motion = Motion(*(column[i] for column in columns))
-            actor.observe(motion, self.dt)
+            actor.observe(motion, z[i], self.dt)
         self.contacts = {c.static or truth.table.names[c.actor] for c in truth.contacts}
 
     def between(self, a: str, b: str) -> Point:
@@ -281,7 +345,19 @@ class Scene:
         reach = one.entity.box.length + other.entity.box.length + 2.0
         if hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y) > reach:
             return False
-        return overlap(one.outline(), other.outline()) <= TOUCHING
+        if overlap(one.outline(), other.outline()) > TOUCHING:
+            return False
+        (low, body), (high, _) = sorted((self._stands(a), self._stands(b)))
+        return high - low < body
+
+    def _stands(self, name: str) -> tuple[float, float]:
+        """Height of the road under an entity, and of its body; m.
+
+        The road's, because a place without z means the ground and is read as z = 0.
+        """
+        actor = self.actors[name]
+        lane = self.network.place_of(actor.pose).lane
+        return actor.pose.z if lane is None else lane.z, actor.entity.box.height
 
     def tell_time(self, environment: Environment) -> None:
         """Set the clock, where an environment says a time of day."""

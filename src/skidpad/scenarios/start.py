@@ -27,8 +27,7 @@ from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.environment import Environment
 from skidpad.scenarios.findings import Fault
-from skidpad.scenarios.motion import Guide
-from skidpad.scenarios.network import Place
+from skidpad.scenarios.network import Network, Place
 from skidpad.scenarios.positions import Position
 from skidpad.scenarios.scene import Actor, Scene
 
@@ -131,9 +130,9 @@ class _Starting:
             raise self.wish.node.error(f"the {key} of {self.name!r} depends on itself")
         return self._known[key]
 
-    @property
-    def place(self) -> Place:
+    def place(self, network: Network) -> Place:
         """Where it begins; while that is worked out, where it is so far."""
+        del network
         if self._known.get("place") is _ASKED and self._so_far is not None:
             return self._so_far
         return cast("Place", self._once("place", self._place))
@@ -150,10 +149,10 @@ class _Starting:
     @property
     def pose(self) -> Pose:
         """As an actor has it."""
-        return self.place.pose
+        return self.place(self.ctx.network).pose
 
     @property
-    def speed(self) -> float:
+    def v_told(self) -> float:
         """At the begin, m/s."""
         return cast("float", self._once("speed", self._speed))
 
@@ -162,28 +161,6 @@ class _Starting:
             return 0.0
         v = self.wish.speed.target.speed(self.scene)
         return limited(v, self.entity.performance)
-
-    @property
-    def guide(self) -> Guide:
-        """As an actor has it; places are seen from it, and speeds."""
-        return cast("Guide", _StartGuide(self))
-
-
-class _StartGuide:
-    """What of a guide other entities may refer to at the begin."""
-
-    def __init__(self, of: _Starting) -> None:
-        self.of = of
-
-    @property
-    def base(self) -> Any:
-        """Lane point."""
-        return self.of.place.lane
-
-    @property
-    def v(self) -> float:
-        """Demanded speed."""
-        return self.of.speed
 
 
 _ASKED = object()
@@ -199,10 +176,10 @@ def _worked_out(
         actors[name] = _Starting(name, wishes.get(name, _Wish(init)), ctx, scene)
     for name, one in actors.items():
         try:
-            place = None if name in gone else one.place
+            place = None if name in gone else one.place(ctx.network)
             if not one.wish.positions and name in ctx.added:
                 place = None
-            yield name, Begin(place, one.speed, tuple(one.wish.actions))
+            yield name, Begin(place, one.v_told, tuple(one.wish.actions))
         except Fault as fault:
             ctx.findings.append(fault.finding)
             yield name, Begin(None, 0.0)

@@ -103,11 +103,18 @@ class ToldEvent(Told):
         """Before its end."""
         if self.complete:
             return
-        for path, _ in self.going:
+        for path, runs in self.going:
+            for run in runs:
+                _let_go(run, scene)
             scene.states[path] = State.COMPLETE
             scene.moved(path, Move.STOP)
         self.going = []
         self.turn(scene, State.COMPLETE, Move.STOP)
+
+
+def _let_go(action: Running, scene: Scene) -> None:
+    for actor in scene.actors.values():
+        actor.let_go(action, scene.network)
 
 
 def _begun(action: NamedAction, actors: Iterable[str], scene: Scene) -> Iterable[Running]:

@@ -14,7 +14,9 @@ NEAR = 1e-6  # m, nothing moves
 
 
 class Track(Protocol):
-    """Where an actor is led, instead of along its lane."""
+    """Where an actor is led, instead of along its lane; timed: at its own times."""
+
+    timed: bool
 
     def at(self, t: float) -> tuple[Pose, float, float]:
         """Pose, speed and acceleration at scenario time t."""
@@ -23,6 +25,8 @@ class Track(Protocol):
 
 class TimedTrack:
     """A line by its times: `begin` is the scenario time of line time 0, `scale` stretches it."""
+
+    timed = True
 
     def __init__(self, line: Line, begin: float, scale: float) -> None:
         assert line.t is not None
@@ -48,6 +52,8 @@ class TimedTrack:
 
 class PacedTrack:
     """A line at the speed that the actor is asked for: `s` grows by its steps."""
+
+    timed = False
 
     def __init__(
         self, line: Line, s: float, t: float, closed: bool, v: Callable[[], float]

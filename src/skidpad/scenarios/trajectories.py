@@ -36,7 +36,7 @@ class Trajectory:
         if self.line is not None or self.shape is None:
             return self.line or Line([Vertex(0.0, 0.0, 0.0)])
         poses = [p.place(scene).pose for p in self.places]
-        return Line(self.shape([here, *poses] if self.from_here else poses))
+        return Line(self.shape([here, *poses] if self.from_here else poses), closed=self.closed)
 
 
 def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
@@ -51,39 +51,37 @@ def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
         quick = [_plain_vertex(v) for v in shape.element.iterchildren("Vertex")]
         known = [v for v in quick if v is not None]
         if known and len(known) == len(quick):
-            return Trajectory(name, closed, Line(_checked(shape, known, closed)))
+            _check_times(shape, [v.time for v in known])
+            return Trajectory(name, closed, Line(known, closed=closed))
     if shape.tag not in SHAPES:
         raise shape.unsupported()
-    nodes, make = SHAPES[shape.tag](shape, closed)
+    nodes, make = SHAPES[shape.tag](shape)
     places = tuple(position(n, ctx) for n in nodes)
     fixed = [p.fixed.pose for p in places if isinstance(p, Fixed)]
     from_here = shape.tag == "ClothoidSpline" and not _begins(next(shape.children()))
     if len(fixed) == len(places) and not from_here:
-        return Trajectory(name, closed, Line(make(fixed)))
+        return Trajectory(name, closed, Line(make(fixed), closed=closed))
     return Trajectory(name, closed, None, places, make, from_here)
 
 
-def _checked(shape: Node, vertices: list[Vertex], closed: bool) -> list[Vertex]:
-    """Vertices in the order of their times; a closed line ends where it begins."""
-    times = [v.time for v in vertices]
+def _check_times(shape: Node, times: Sequence[float | None]) -> None:
+    """Vertices stand in the order of their times."""
     if any(a is not None and b is not None and b < a for a, b in pairwise(times)):
         raise shape.error("the times of its vertices must not fall")
-    return [*vertices, replace(vertices[0], time=None)] if closed else vertices
 
 
-def _polyline(shape: Node, closed: bool) -> tuple[list[Node], Shape]:
+def _polyline(shape: Node) -> tuple[list[Node], Shape]:
     nodes = list(shape.children("Vertex"))
     if not nodes:
         raise shape.error("needs at least one <Vertex>")
     times = [n.number("time") if n.has("time") else None for n in nodes]
     places = [n.child("Position") for n in nodes]
     named = [_named(p.only()) for p in places]
-    _checked(shape, [Vertex(0.0, 0.0, 0.0, None, t) for t in times], False)
+    _check_times(shape, times)
 
     def make(poses: Sequence[Pose]) -> list[Vertex]:
         rows = zip(poses, named, times, strict=True)
-        vertices = [Vertex(p.x, p.y, p.z, p.yaw if n else None, t) for p, n, t in rows]
-        return [*vertices, replace(vertices[0], time=None)] if closed else vertices
+        return [Vertex(p.x, p.y, p.z, p.yaw if n else None, t) for p, n, t in rows]
 
     return places, make
 
@@ -113,8 +111,7 @@ def _plain_vertex(element: etree._Element) -> Vertex | None:
     return values if abs(total) < float("inf") else None
 
 
-def _clothoid(shape: Node, closed: bool) -> tuple[list[Node], Shape]:
-    del closed
+def _clothoid(shape: Node) -> tuple[list[Node], Shape]:
     rate = shape.number("curvatureDot", 0.0)  # the name before 1.1
     times = None
     if shape.has("startTime") and shape.has("stopTime"):
@@ -135,8 +132,7 @@ class Segment:
     times: tuple[float, float] | None
 
 
-def _spline(shape: Node, closed: bool) -> tuple[list[Node], Shape]:
-    del closed
+def _spline(shape: Node) -> tuple[list[Node], Shape]:
     nodes = list(shape.children("ClothoidSplineSegment", "Segment"))
     if not nodes:
         raise shape.error("needs a <ClothoidSplineSegment>")
@@ -173,8 +169,7 @@ def _joined(segments: Sequence[Segment], poses: Sequence[Pose]) -> Iterator[Vert
         pose = Pose(last.x, last.y, last.z, yaw=last.heading or 0.0)
 
 
-def _nurbs(shape: Node, closed: bool) -> tuple[list[Node], Shape]:
-    del closed
+def _nurbs(shape: Node) -> tuple[list[Node], Shape]:
     order = shape.whole("order")
     nodes = list(shape.children("ControlPoint"))
     times = [n.number("time") if n.has("time") else None for n in nodes]
@@ -197,7 +192,7 @@ def _nurbs(shape: Node, closed: bool) -> tuple[list[Node], Shape]:
     return [n.child("Position") for n in nodes], make
 
 
-SHAPES: Mapping[str, Callable[[Node, bool], tuple[list[Node], Shape]]] = {
+SHAPES: Mapping[str, Callable[[Node], tuple[list[Node], Shape]]] = {
     "Polyline": _polyline,
     "Clothoid": _clothoid,
     "ClothoidSpline": _spline,

@@ -31,6 +31,8 @@ class Limits:
     a_max: float = inf
     b_max: float = inf
     v_max: float = inf
+    a_rate: float = inf  # m/s^3, of an acceleration, and of braking
+    b_rate: float = inf
 
     @property
     def none(self) -> bool:
@@ -63,8 +65,9 @@ class KeepGap:
         if side is Displacement.ANY:
             ahead = self.ahead(scene, actor)
             side = Displacement.TRAILING if ahead >= 0.0 else Displacement.LEADING
-        actor.longitudinal = GapKept(self, actor, side, self.limits.of(actor.entity.performance))
-        return actor.longitudinal
+        going = GapKept(self, actor, side, self.limits.of(actor.entity.performance))
+        actor.pace_by(going, scene)
+        return going
 
     def ahead(self, scene: Scene, actor: Actor) -> float:
         """How far the other one is ahead, m; its length and half the own one taken off if free."""
@@ -82,7 +85,7 @@ class KeepGap:
 
     def wanted(self, scene: Scene, side: Displacement) -> float:
         """How far the other one should be ahead, m."""
-        v = abs(scene.actors[self.other].guide.v)
+        v = abs(scene.actors[self.other].v_told)
         size = abs(self.distance if self.distance is not None else (self.time_gap or 0.0) * v)
         return -size if side is Displacement.LEADING else size
 
@@ -100,9 +103,10 @@ class GapKept:
         if self.actor.longitudinal is not self:
             return True
         action, guide = self.action, self.actor.guide
-        v_other = scene.actors[action.other].guide.v
+        v_other = scene.actors[action.other].v_told
         excess = action.ahead(scene, self.actor) - action.wanted(scene, self.side)
         if not action.continuous and abs(excess) < REACHED:
+            guide.a = 0.0
             return True
         if action.limits.none:
             guide.v, guide.a = v_other + excess / scene.dt, 0.0
@@ -111,10 +115,17 @@ class GapKept:
         tension = limits.a_max if excess < 0.0 else limits.b_max
         stiffness = min(tension, 1e3) * SPRING
         a = excess * stiffness - (guide.v - v_other) * 2.0 * sqrt(stiffness)
-        guide.a = min(max(a, -limits.b_max), limits.a_max)
+        guide.a = self._eased(guide.a, min(max(a, -limits.b_max), limits.a_max), scene.dt)
         v = guide.v + guide.a * scene.dt
         guide.v = copysign(min(abs(v), limits.v_max), v)
         return False
+
+    def _eased(self, now: float, wanted: float, dt: float) -> float:
+        """An acceleration that grows no faster than the file allows; it may end at once, as in esmini."""
+        rates = self.action.limits
+        if wanted < 0.0:
+            return max(wanted, now - rates.b_rate * dt)
+        return min(wanted, now + rates.a_rate * dt)
 
 
 def compile_gap(node: Node, ctx: Context) -> KeepGap:
@@ -138,4 +149,6 @@ def compile_gap(node: Node, ctx: Context) -> KeepGap:
     )
 
 
-_LIMITS = ("maxAcceleration", "maxDeceleration", "maxSpeed")
+_LIMITS = (
+    "maxAcceleration", "maxDeceleration", "maxSpeed", "maxAccelerationRate", "maxDecelerationRate",
+)  # fmt: skip

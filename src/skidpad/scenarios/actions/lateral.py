@@ -4,15 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
-from math import inf, sqrt
+from math import cos, inf, sqrt
 
+from skidpad.roads.queries import LanePoint
 from skidpad.scenarios.actions.base import Dimension, Dynamics, dynamics
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
+from skidpad.scenarios.measures import Axes, between
 from skidpad.scenarios.motion import SHARPEST, SLOW, Shape, Transition
 from skidpad.scenarios.network import next_lane_id
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 
+ASKEW = 0.1  # cosine between a lane and an entity, below which the one is not beside the other
 A_LATERAL = 1.0  # m/s^2, of a change of offset for which the file gives no limit
 
 
@@ -50,6 +53,26 @@ class ChangeOfOffset:
         return self.change.over(self.done)
 
 
+class OffsetKept(ChangeOfOffset):
+    """An offset that is gone to and then kept until another action takes over."""
+
+    def __init__(self, actor: Actor, change: Transition, action: LaneOffset) -> None:
+        super().__init__(actor, change)
+        self.action, self.there = action, False
+
+    def step(self, scene: Scene) -> bool:
+        """Once there, beside who it refers to, no faster aside than the entity goes."""
+        if not self.there:
+            self.there = super().step(scene)
+        elif self.actor.lateral is self:
+            guide = self.actor.guide
+            most = abs(guide.v) * scene.dt
+            way = self.action.target(scene, self.actor) - guide.offset
+            move = min(max(way, -most), most)
+            guide.offset, guide.offset_rate = guide.offset + move, move / scene.dt
+        return self.actor.lateral is not self or self.actor.track is not None
+
+
 @dataclass(frozen=True, slots=True)
 class LaneChange:
     """Go to another lane: an absolute id, or so many lanes from an entity's own."""
@@ -61,8 +84,10 @@ class LaneChange:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From where the entity is now."""
-        guide, network = actor.guide, scene.network
-        actor.catch_up()
+        network = scene.network
+        actor.leave_track(network)
+        actor.catch_up(network)
+        guide = actor.guide
         here = guide.base
         target = self.target(scene)
         if here is None or target is None:
@@ -86,11 +111,11 @@ class LaneChange:
         """Id of the lane to go to; None where the reference is on no lane."""
         if self.other is None:
             return self.value
-        reference = scene.actors[self.other].guide
-        if reference.base is None:
+        place = scene.actors[self.other].place(scene.network)
+        if place.lane is None:
             return None
-        ahead = scene.network.forward(reference.base) == (reference.along > 0.0)
-        return next_lane_id(reference.base.lane_id, self.value if ahead else -self.value)
+        ahead = scene.network.forward(place.lane) == place.along
+        return next_lane_id(place.lane.lane_id, self.value if ahead else -self.value)
 
 
 def compile_lane_change(node: Node, ctx: Context) -> LaneChange:
@@ -115,13 +140,15 @@ class LaneOffset:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """The duration follows from the largest lateral acceleration."""
+        actor.leave_track(scene.network)
+        actor.catch_up(scene.network)
         guide = actor.guide
-        actor.catch_up()
         end = self.target(scene, actor)
         size = abs(end - guide.offset)
         sharp = 0.0 if self.shape is Shape.STEP else SHARPEST[self.shape]
         change = Transition(guide.offset, end, sqrt(sharp * size / self.a_max), self.shape)
-        actor.lateral = ChangeOfOffset(actor, change)
+        keep = self.continuous
+        actor.lateral = OffsetKept(actor, change, self) if keep else ChangeOfOffset(actor, change)
         return actor.lateral
 
     def target(self, scene: Scene, actor: Actor) -> float:
@@ -163,17 +190,22 @@ class Side(Enum):
 
 @dataclass(frozen=True, slots=True)
 class LateralDistance:
-    """Keep a sideways distance to another entity."""
+    """Keep a sideways distance to another entity.
+
+    straight: from the line through it in its own direction, else along the own lane.
+    """
 
     other: str
     distance: float
     free: bool
     continuous: bool
     side: Side
+    straight: bool
     v_max: float
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From now on."""
+        actor.leave_track(scene.network)
         _, left = scene.between(self.other, actor.name)
         to_left = left >= 0.0 if self.side is Side.ANY else self.side is Side.LEFT
         actor.lateral = DistanceKept(self, actor, 1.0 if to_left else -1.0)
@@ -191,27 +223,41 @@ class DistanceKept:
         actor, guide, action = self.actor, self.actor.guide, self.action
         if actor.lateral is not self or guide.base is None:
             return True
-        other = scene.actors[action.other]
-        _, left = scene.network.abreast(guide.base, other.pose.x, other.pose.y)
-        size = action.distance
-        if action.free:
-            size += 0.5 * (actor.entity.box.width + other.entity.box.width)
-        end = left + self.sign * guide.along * size
+        end = self._end(scene, guide.base)
         most = min(action.v_max, abs(guide.v)) * scene.dt
         move = min(max(end - guide.offset, -most), most)
         guide.offset += move
-        guide.offset_rate = move / scene.dt
-        return not action.continuous and abs(end - guide.offset) < 1e-3
+        there = not action.continuous and abs(end - guide.offset) < 1e-3
+        guide.offset_rate = 0.0 if there else move / scene.dt
+        return there
+
+    def _end(self, scene: Scene, base: LanePoint) -> float:
+        """The offset at which the distance is kept, m; the sides are those of the other entity."""
+        action, here = self.action, self.actor.guide.offset
+        other = scene.actors[action.other]
+        size = action.distance
+        if action.free:
+            size += 0.5 * (self.actor.entity.box.width + other.entity.box.width)
+        near, left = scene.network.abreast(base, other.pose.x, other.pose.y)
+        if not action.straight:
+            along = 1.0 if cos(near.heading - other.pose.yaw) >= 0.0 else -1.0
+            return left + self.sign * along * size
+        at = base.pose.moved(left=here)
+        _, now = between(other.pose, at.x, at.y)
+        c = cos(base.heading - other.pose.yaw)
+        return here if abs(c) < ASKEW else here + (self.sign * size - now) / c
 
 
 def compile_lateral_distance(node: Node, ctx: Context) -> LateralDistance:
     """A <LateralDistanceAction>."""
     found = node.find("DynamicConstraints")
+    axes = node.choice("coordinateSystem", Axes, Axes.ENTITY)
     return LateralDistance(
         ctx.entity(node),
         node.number("distance", 0.0),
         node.flag("freespace", default=False),
         node.flag("continuous", default=False),
         node.choice("displacement", Side, Side.ANY),
+        axes is Axes.ENTITY,
         inf if found is None else found.limit("maxSpeed", inf),
     )

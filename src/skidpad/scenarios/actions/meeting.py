@@ -46,9 +46,9 @@ class Synchronize:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From now on."""
-        del scene
-        actor.longitudinal = Synchronized(self, actor)
-        return actor.longitudinal
+        going = Synchronized(self, actor)
+        actor.pace_by(going, scene)
+        return going
 
 
 class Phase(Enum):
@@ -83,10 +83,10 @@ class Synchronized:
         over = over or own > self.before[0] + LEAST or its > self.before[1] + LEAST
         self.before = own, its
         own, its = max(own - action.tolerance, LEAST), max(its - action.other_tolerance, LEAST)
-        pace = abs(other.guide.v)
+        pace = abs(other.v_told)
         v_end = action.v_end
         if v_end is not None and action.relative:
-            v_end += other.guide.v
+            v_end += other.v_told
         if over or (pace > V_LEAST and its / pace < dt):
             guide.v, guide.a = guide.v if v_end is None else v_end, 0.0
             return True

@@ -8,11 +8,12 @@ from random import Random
 from skidpad.core.geometry import Pose
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
+from skidpad.scenarios.lines import Line
 from skidpad.scenarios.network import Network
 from skidpad.scenarios.positions import Position, position
 from skidpad.scenarios.routes import Route, compile_route, random_roads, roads_through
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
-from skidpad.scenarios.tracking import PacedTrack, TimedTrack, Track
+from skidpad.scenarios.tracking import PacedTrack, TimedTrack
 from skidpad.scenarios.trajectories import Trajectory, compile_trajectory
 
 
@@ -57,13 +58,13 @@ class RandomRoute:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """At once; it matters at the next fork."""
-        here = actor.guide.base
+        place = actor.place(scene.network)
+        here = place.lane
         if here is None:
             scene.notice(f"{actor.name} takes no random route: it is on no road")
         else:
             draw = Random(actor.name)
-            forward = actor.guide.along > 0.0
-            actor.guide.roads = random_roads(scene.network, here, forward, draw.choice)
+            actor.guide.roads = random_roads(scene.network, here, place.along, draw.choice)
         return DONE
 
 
@@ -86,7 +87,7 @@ class AcquirePosition:
 
 
 def _way_there(network: Network, actor: Actor, goal: Position, scene: Scene) -> tuple[int, ...]:
-    here, there = actor.guide.base, goal.place(scene).lane
+    here, there = actor.place(network).lane, goal.place(scene).lane
     if here is None or there is None:
         scene.notice(f"{actor.name} acquires no position: it or the place is on no road")
         return ()
@@ -123,21 +124,30 @@ class FollowTrajectory:
             return None
         if self.timing is None or line.t is None:
             return line.at_length(self.s_begin)
-        return line.at_time(-self.timing.offset / self.timing.scale)
+        return line.at_time(-self._zero(line, self.timing, 0.0) / self.timing.scale)
+
+    def _zero(self, line: Line, timing: Timing, t: float) -> float:
+        """Scenario time of line time 0 where the action begins at t; as esmini, relative times begin at
+        the place on the line that the action asks for.
+        """
+        if not timing.relative:
+            return timing.offset
+        skipped = timing.scale * line.time_at(self.s_begin) if self.s_begin > 0.0 else 0.0
+        return timing.offset + t - skipped
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """Absolute times count from the begin of the scenario."""
         line = self.trajectory.traced(scene, actor.pose)
         guide = actor.guide
-        track: Track
+        led: Paced | Timed
         if self.timing is None or line.t is None:
-            track = PacedTrack(line, self.s_begin, scene.t, self.trajectory.closed, lambda: guide.v)
-            actor.track = track
-            return Paced(actor, track)
-        begin = self.timing.offset + (scene.t if self.timing.relative else 0.0)
-        track = TimedTrack(line, begin, self.timing.scale)
-        actor.track = track
-        return Timed(actor, track)
+            closed = self.trajectory.closed
+            led = Paced(actor, PacedTrack(line, self.s_begin, scene.t, closed, lambda: guide.v))
+        else:
+            begin = self._zero(line, self.timing, scene.t)
+            led = Timed(actor, TimedTrack(line, begin, self.timing.scale))
+        actor.lead(led, led.track, scene.t)
+        return led
 
 
 class Timed:

@@ -35,7 +35,7 @@ class Target:
         """As it is now, m/s."""
         if self.other is None:
             return self.value
-        v = scene.actors[self.other].guide.v
+        v = scene.actors[self.other].v_told
         return v * self.value if self.relation is Relation.FACTOR else v + self.value
 
 
@@ -63,8 +63,9 @@ class Speed:
         span = max(span, least_span(end - v, span, self.dynamics.shape, limits))
         change = Transition(v, end, span, self.dynamics.shape)
         follow = self.target if self.target.continuous else None
-        actor.longitudinal = ChangeOfSpeed(actor, change, scene.t, follow)
-        return actor.longitudinal
+        going = ChangeOfSpeed(actor, change, scene.t, follow)
+        actor.pace_by(going, scene)
+        return going
 
 
 def limited(v: float, limits: Performance) -> float:
@@ -138,7 +139,7 @@ class Profile:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From the speed demanded so far."""
-        base = 0.0 if self.other is None else scene.actors[self.other].guide.v
+        base = 0.0 if self.other is None else scene.actors[self.other].v_told
         own = actor.entity.performance
         a = min(self.limits.a_max, own.a_max, DEFAULT_CHANGE)
         b = min(self.limits.b_max, own.b_max, DEFAULT_CHANGE)
@@ -148,8 +149,9 @@ class Profile:
             needed = abs(v - speeds[-1]) / (a if v > speeds[-1] else b)
             times.append(times[-1] + (needed if duration is None else duration))
             speeds.append(v)
-        actor.longitudinal = Profiled(actor, times, speeds)
-        return actor.longitudinal
+        going = Profiled(actor, times, speeds)
+        actor.pace_by(going, scene)
+        return going
 
 
 DEFAULT_CHANGE = 10.0  # m/s^2, where a profile's file and its vehicle set no limit

@@ -64,7 +64,11 @@ class SetValue:
     def happen(self, scene: Scene) -> Running:
         """At once."""
         values = scene.variables if self.variable else scene.parameters
-        values[self.name] = self.change(values[self.name])
+        old = values[self.name]
+        try:
+            values[self.name] = self.change(old)
+        except ValueError:  # an action before has made it a word
+            scene.notice(f"{self.name} = {old!r} is no number and stays as it is")
         return DONE
 
 

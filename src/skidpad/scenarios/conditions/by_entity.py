@@ -43,13 +43,10 @@ class Reaches:
         a = scene.actors[actor]
         if self.quantity is Quantity.OFF_ROAD:
             lasted = a.off_road(scene.network, scene.t)
+        elif self.quantity is Quantity.AT_END:
+            lasted = a.past_road(scene.network, scene.t)
         else:
-            counts = {
-                Quantity.TRAVELLED: a.travelled,
-                Quantity.STOOD: a.stood,
-                Quantity.AT_END: a.at_end,
-            }
-            lasted = counts[self.quantity]
+            lasted = a.travelled if self.quantity is Quantity.TRAVELLED else a.stood
         least = 0.0 if self.quantity is Quantity.TRAVELLED else SOME
         return lasted >= max(self.value - SOME, least)
 
@@ -224,11 +221,12 @@ class Clearance:
     def holds(self, scene: Scene, actor: str) -> bool:
         """Nothing is there now."""
         here = scene.actors[actor]
-        base = scene.network.place_of(here.pose).lane
+        place = scene.network.place_of(here.pose)
+        base = place.lane
         others = (n for n in self.others or scene.actors if n != actor and scene.actors[n].present)
         if base is None:
             return True
-        sign = 1 if scene.network.forward(base) == (here.guide.along > 0.0) else -1
+        sign = 1 if scene.network.forward(base) == place.along else -1
         if not self._has_lane(scene, base, sign):
             return False
         return not any(self._inside(scene, here, base.lane_id, sign, n) for n in others)

@@ -183,7 +183,7 @@ __all__ = [
 
 
 @contextmanager
-def mosquitto(folder):
+def mosquitto(folder, more="allow_anonymous true\n"):
     """A real broker; the port may be taken between finding and using it, so it is tried again."""
     program = shutil.which("mosquitto") or "/usr/sbin/mosquitto"
     try:
@@ -195,7 +195,7 @@ def mosquitto(folder):
             one.bind(("127.0.0.1", 0))
             port = one.getsockname()[1]
         config = folder / "mosquitto.conf"
-        config.write_text(f"listener {port} 127.0.0.1\nallow_anonymous true\npersistence false\n")
+        config.write_text(f"listener {port} 127.0.0.1\npersistence false\n{more}")
         with subprocess.Popen(
             [program, "-c", str(config), "-v"],
             stdout=subprocess.PIPE,

@@ -9,7 +9,9 @@ at that rate, whatever becomes of those before, and sends it by itself; times ar
 that a record was due until it was acknowledged, outages included. The server is a process of its own
 on the same machine; a record counts when it was acknowledged, which is after its durable commit. With
 kills the server is ended by SIGKILL and started again on its store; at the end the ids that were
-acknowledged must be exactly those of the store.
+acknowledged must be exactly those of the store, and every body must be there as it was sent. A kill
+falls at a random moment: within LAG_S after a random record was acknowledged, wherever the service is
+then. It ends with 1 when a record was lost or not acknowledged, or when a pace was not kept.
 """
 
 from __future__ import annotations
@@ -22,6 +24,7 @@ import os
 import queue
 import random
 import re
+import secrets
 import signal
 import subprocess
 import sys
@@ -35,9 +38,10 @@ from tempfile import TemporaryDirectory
 from sqlalchemy import select
 
 from skidpad.core.randomness import stream
-from skidpad.fleet.service import Places, open_store
+from skidpad.fleet.identity import digest
+from skidpad.fleet.service import Places, open_fleet, open_store
 from skidpad.fleet.store.accounts import add_vehicle
-from skidpad.fleet.store.tables import hazards
+from skidpad.fleet.store.tables import batches, hazards
 from skidpad.recording.hazard_text import HEADER
 
 HEAD = {
@@ -46,6 +50,8 @@ HEAD = {
     "channels": ["a", "b"], "driving": "a", "involved": ["a", "b"], "objects": [], "flags": [],
     "context": {"map": "town"}, "cycles": 0,
 }  # fmt: skip
+LAG_S = 0.2  # s after a record in which a kill falls: several times what a batch takes
+PACE_SLACK = 1.1  # of the planned time: until then everything that was due is acknowledged
 NOISES = 64  # different worlds: more than a batch holds within reach of its compression
 
 
@@ -60,6 +66,12 @@ class Asked:
     senders: int
     kills: int
     hz: float
+    seed: int  # of the kills
+
+    @property
+    def planned_s(self) -> float:
+        """Seconds in which the records become due; 0: no pace."""
+        return self.records / (self.vehicles * self.hz) if self.hz else 0.0
 
 
 @dataclass(frozen=True)
@@ -87,17 +99,17 @@ class Load:
 
 @cache
 def noise(number: int, size: int) -> str:
-    """Lines of digits that pack as real worlds do (about 1:3)."""
+    """At least `size` characters, lines of digits that pack as real worlds do (about 1:3)."""
     rng = stream(number, "load")
-    digits = " ".join(map(str, rng.integers(-9, 10, size // 3).tolist()))
+    digits = " ".join(map(str, rng.integers(-9, 10, size // 2).tolist()))
     return "\n".join("O 0 " + digits[k : k + 90] for k in range(0, len(digits), 90))
 
 
 def record(number: int, size: int) -> bytes:
-    """A record of about `size` bytes that no other number gives."""
+    """A record of `size` bytes that no other number gives."""
     head = json.dumps(HEAD | {"id": f"h{number}"})
-    worlds = noise(number % NOISES, size)
-    return f"H {head}\nF 0 0 {number} 0 0 0 0\n{worlds}\nZ\n".encode()
+    begin, end = f"H {head}\nF 0 0 {number} 0 0 0 0\n", "\nZ\n"
+    return (begin + noise(number % NOISES, size)[: size - len(begin + end)] + end).encode()
 
 
 def feed(load: Load, asked: Asked) -> None:
@@ -170,11 +182,13 @@ def drive(load: Load, data: Path, asked: Asked) -> float:
     begin = time.perf_counter()
     for thread in threads:
         thread.start()
-    moments = sorted(random.Random(1).sample(range(asked.records), asked.kills))
+    rng = random.Random(asked.seed)
+    moments = sorted(rng.sample(range(asked.records), asked.kills))
     while len(load.ids) < asked.records and all(t.is_alive() for t in threads[: asked.senders]):
         time.sleep(0.02)
         if moments and len(load.ids) >= moments[0]:
             moments.pop(0)
+            time.sleep(rng.uniform(0.0, LAG_S))
             load.up.clear()
             os.kill(child.pid, signal.SIGKILL)
             child.wait()
@@ -201,6 +215,7 @@ def run(data: Path, asked: Asked) -> dict[str, float]:
     with engine.connect() as connection:
         stored = set(connection.execute(select(hazards.c.id)).scalars())
     engine.dispose()
+    damaged = bodies_damaged(data)
     times = sorted(load.times_ms)
     return {
         "records": len(load.ids),
@@ -210,9 +225,33 @@ def run(data: Path, asked: Asked) -> dict[str, float]:
         "p95_ms": times[int(0.95 * len(times))],
         "p999_ms": times[int(0.999 * len(times))],
         "kills": asked.kills,
+        "seed": asked.seed,
+        "planned_s": asked.planned_s,
+        "not_acknowledged": asked.records - len(load.ids),
+        "bodies_damaged": damaged,
         "acknowledged_not_stored": len(set(load.ids) - stored),
         "stored_not_acknowledged": len(stored - set(load.ids)),
     }
+
+
+def bodies_damaged(data: Path) -> int:
+    """How many bodies of the store are not what their row says: it is read as a server would."""
+    fleet = open_fleet(Places(data=data))
+    try:
+        with fleet.engine.connect() as connection:
+            rows = connection.execute(select(batches)).all()
+        return sum(
+            digest(fleet.blobs.part(row.pack, row.start, row.size)) != row.digest for row in rows
+        )
+    finally:
+        fleet.close()
+
+
+def failed(found: dict[str, float]) -> bool:
+    """Whether something was lost, or the pace was not kept."""
+    lost = ("acknowledged_not_stored", "stored_not_acknowledged", "not_acknowledged")
+    late = 0.0 < PACE_SLACK * found["planned_s"] < found["seconds"]
+    return late or any(found[name] for name in (*lost, "bodies_damaged"))
 
 
 def main() -> None:
@@ -225,6 +264,7 @@ def main() -> None:
     parser.add_argument("--hz", type=float, default=0.0, help="records of each vehicle; 0: no pace")
     parser.add_argument("--minutes", type=float, default=10.0, help="with --hz")
     parser.add_argument("--kills", type=int, default=0)
+    parser.add_argument("--seed", type=int, help="of the kills; without it another one each time")
     told = parser.parse_args()
     paced = told.hz > 0.0
     asked = Asked(
@@ -235,11 +275,12 @@ def main() -> None:
         senders=64 if paced else 4,
         kills=told.kills,
         hz=told.hz,
+        seed=secrets.randbelow(2**31) if told.seed is None else told.seed,
     )
     with TemporaryDirectory() as folder:
         found = run(Path(folder), asked)
     print("; ".join(f"{name} {value:.1f}".removesuffix(".0") for name, value in found.items()))
-    if found["acknowledged_not_stored"] or found["stored_not_acknowledged"]:
+    if failed(found):
         raise SystemExit(1)
 
 

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import asyncio
 import json
+import secrets
+import socket
 import threading
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from math import inf
 
@@ -35,6 +37,11 @@ def raised(world, vehicle="red-1", key="alert-key-1", **change) -> str:
     )
     assert answer.status_code == 200, answer.text
     return answer.json()["alert"]
+
+
+def ordered(world, who: str, path: str, key: str | None = None):
+    """An order by a request of its own."""
+    return world.post(who, path, headers={"Idempotency-Key": key or secrets.token_hex(8)})
 
 
 class Wire:
@@ -151,6 +158,29 @@ def test_the_thread_relays_without_being_asked(lite):
     assert came.wait(120)
 
 
+def test_a_relay_that_does_not_answer_delays_no_other(lite):
+    came, ended = threading.Event(), threading.Event()
+
+    class Deaf(Wire):
+        name = "deaf"
+
+        def send(self, alert):
+            ended.wait(120)
+
+    class Bell(Wire):
+        def send(self, alert):
+            came.set()
+
+    look = lite.fleet.dispatcher
+    look.relays = (Deaf(), Bell())
+    look.start()
+    try:
+        raised(lite)
+        assert came.wait(120)
+    finally:
+        ended.set()
+
+
 @contextmanager
 def http_server(answer: int, location: str | None = None):
     """A server on this machine that keeps what it was sent."""
@@ -197,6 +227,43 @@ def test_a_webhook_goes_to_its_host_and_nowhere_else():
     assert not Webhook("red", good, ["127.0.0.1"]).wants("blue")
 
 
+def test_two_webhooks_of_an_operator_on_one_host_get_every_alert(lite):
+    with http_server(200) as (one, first), http_server(200) as (other, second):
+        operator = lite.accounts["red operator"].principal.tenant
+        ways = (one, f"{one}/more", other)
+        look = lite.fleet.dispatcher
+        look.relays = tuple(Webhook(operator, way, ["127.0.0.1"], 120.0) for way in ways)
+        id = raised(lite)
+        look.work()
+        look.work()
+    assert [a["id"] for a in first] == [id, id]  # once for each address
+    assert [a["id"] for a in second] == [id]
+    assert len({relay.name for relay in look.relays}) == 3
+
+
+def test_a_webhook_that_answers_drop_by_drop_is_given_up():
+    """Each drop comes in time, the answer never does."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        gone = threading.Event()
+
+        def drip():
+            connection, _ = server.accept()
+            with connection, suppress(OSError):
+                connection.sendall(b"HTTP/1.1 200 OK\r\n")
+                while not gone.wait(0.1):
+                    connection.sendall(b"X: y\r\n")
+
+        thread = threading.Thread(target=drip)
+        thread.start()
+        url = f"http://127.0.0.1:{server.getsockname()[1]}/"
+        try:
+            with pytest.raises(BackendError, match="Timeout"):
+                Webhook("red", url, ["127.0.0.1"], 2.0).send({"id": "a"})
+        finally:
+            gone.set()
+            thread.join()
+
+
 def test_mqtt_carries_an_alert_to_whoever_subscribed(tmp_path):
     aiomqtt = pytest.importorskip("aiomqtt", reason="aiomqtt, for mosquitto, is not installed")
     with mosquitto(tmp_path) as port:
@@ -237,10 +304,10 @@ class Vehicle:
 def test_a_stop_order_is_good_once(world):
     red, blue = Vehicle(world), Vehicle(world, "red-2")
     id = raised(world)
-    assert world.post("blue teleoperator", f"/api/v1/alerts/{id}/order/stop").status_code == 404
-    assert world.post("red operator", f"/api/v1/alerts/{id}/order/stop").status_code == 403
+    assert ordered(world, "blue teleoperator", f"/api/v1/alerts/{id}/order/stop").status_code == 404
+    assert ordered(world, "red operator", f"/api/v1/alerts/{id}/order/stop").status_code == 403
     assert red.obey() == []
-    order = world.post("red teleoperator", f"/api/v1/alerts/{id}/order/stop").json()["order"]
+    order = ordered(world, "red teleoperator", f"/api/v1/alerts/{id}/order/stop").json()["order"]
     assert blue.obey() == []  # not its order
     (sent,) = red.ask()
     assert red.ask() == []  # handed out once
@@ -253,13 +320,31 @@ def test_a_stop_order_is_good_once(world):
     assert [e["what"] for e in alert["events"]] == ["stop ordered", "obeyed"]
 
 
+def test_a_captured_order_or_answer_that_is_sent_again_orders_nothing(world):
+    red, id = Vehicle(world), raised(world)
+    path = f"/api/v1/alerts/{id}/order/"
+    first = ordered(world, "red teleoperator", path + "slow", "order-key-1").json()
+    assert red.obey() == [Verdict.OBEYED]
+    world.clock.now += 60.0
+    assert ordered(world, "red teleoperator", path + "slow", "order-key-1").json() == first
+    assert ordered(world, "red teleoperator", path + "stop", "order-key-1").status_code == 409
+    assert red.obey() == []
+    assert world.post("red teleoperator", path + "slow").status_code == 422  # no key
+    answer = f"/api/v1/orders/{first['order']}/"
+    assert world.post("red-1", answer + "obeyed").status_code == 200
+    for what in ("obeyed", "refused"):
+        assert world.post("red-1", answer + what).status_code == 409
+    (alert,) = world.get("red teleoperator", "/api/v1/alerts").json()["alerts"]
+    assert [e["what"] for e in alert["events"]] == ["slow ordered", "obeyed"]
+
+
 def test_a_stop_order_is_good_for_two_seconds_by_either_clock(lite):
     red, id = Vehicle(lite), raised(lite)
-    lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/stop")
+    ordered(lite, "red teleoperator", f"/api/v1/alerts/{id}/order/stop")
     lite.clock.now += 2.0
     assert red.ask() == []  # never fetched in time
     for age, verdict in ((2.1, Verdict.EXPIRED), (-0.1, Verdict.EXPIRED), (2.0, Verdict.OBEYED)):
-        lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/stop")
+        ordered(lite, "red teleoperator", f"/api/v1/alerts/{id}/order/stop")
         (sent,) = red.ask()
         assert red.receiver.v_max == inf
         red.clock.now += age
@@ -269,7 +354,7 @@ def test_a_stop_order_is_good_for_two_seconds_by_either_clock(lite):
 
 def test_what_the_fleet_did_not_sign_stops_nobody(lite):
     red, id = Vehicle(lite), raised(lite)
-    lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/stop")
+    ordered(lite, "red teleoperator", f"/api/v1/alerts/{id}/order/stop")
     (sent,) = red.ask()
     other = Ed25519PrivateKey.generate().sign(sent["order"].encode()).hex()
     changed = sent["order"].replace('"what":"stop"', '"what":"slow"')
@@ -289,10 +374,10 @@ def test_a_vehicle_is_slowed_down_and_let_go_until_it_is_stopped(lite):
         ("slow", Verdict.OBEYED, 2.0), ("resume", Verdict.OBEYED, inf),
         ("stop", Verdict.OBEYED, 0.0), ("resume", Verdict.STANDING, 0.0),
     ):  # fmt: skip
-        lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/{order}")
+        ordered(lite, "red teleoperator", f"/api/v1/alerts/{id}/order/{order}")
         assert red.obey() == [verdict]
         assert red.receiver.v_max == v_max
-    unknown = lite.post("red teleoperator", f"/api/v1/alerts/{id}/order/fly")
+    unknown = ordered(lite, "red teleoperator", f"/api/v1/alerts/{id}/order/fly")
     assert unknown.status_code == 422
 
 
@@ -311,7 +396,7 @@ def test_a_simulated_vehicle_obeys(lite, tmp_path):
         red.clock.now, lite.clock.now = 100.0 + t, NOW + t
         if order := orders.get(round(10.0 * t)):
             alert[:] = alert or [raised(lite)]
-            lite.post("red teleoperator", f"/api/v1/alerts/{alert[0]}/order/{order}")
+            ordered(lite, "red teleoperator", f"/api/v1/alerts/{alert[0]}/order/{order}")
             assert red.obey() == [Verdict.OBEYED]
         return red.receiver.v_max
 
@@ -323,9 +408,9 @@ def test_a_simulated_vehicle_obeys(lite, tmp_path):
 
     drive_segment(spec, tmp_path / "free.mcap")
     drive_segment(spec, tmp_path / "ordered.mcap", guide=guided)
-    free, ordered = speed(tmp_path / "free.mcap"), speed(tmp_path / "ordered.mcap")
-    assert np.array_equal(free[:30], ordered[:30])
-    assert 1.0 < ordered[90] < 2.1  # m/s
+    free, obeyed = speed(tmp_path / "free.mcap"), speed(tmp_path / "ordered.mcap")
+    assert np.array_equal(free[:30], obeyed[:30])
+    assert 1.0 < obeyed[90] < 2.1  # m/s
     assert free[90] > 3.0
-    assert ordered[-1] < 0.1
+    assert obeyed[-1] < 0.1
     assert free[-1] > 1.0

@@ -12,11 +12,12 @@ import pytest
 from lxml import etree
 
 from fleet_world import packed, record, text_of
-from skidpad.fleet.api.guard import Needs, Rate
+from skidpad.fleet.api.guard import Needs
+from skidpad.fleet.rate import Rate
 from skidpad.fleet.unpacking import unpack
 from skidpad.fleet.words import RIGHTS, Action, Limits, Refused, Role
 
-OPEN = {"/openapi.json"}  # describes the interface, holds no record
+OPEN = {"/api/v1/openapi.json"}  # describes the interface, holds no record
 
 
 def routes(app):
@@ -45,6 +46,13 @@ def test_every_operation_asks_for_exactly_one_right(lite):
     assert set(RIGHTS) == set(Action)
 
 
+def test_the_interface_describes_every_operation(lite):
+    found = lite.client.get("/api/v1/openapi.json").json()
+    told = {(m.upper(), path) for path, ways in found["paths"].items() for m in ways}
+    assert told == {(m, path) for m, path, _ in routes(lite.client.app) if path not in OPEN}
+    assert found["info"]["title"] == "Skidpad fleet"
+
+
 def filled(path: str, ids: dict[str, str]) -> str:
     for name, value in ids.items():
         path = path.replace("{" + name + "}", value)
@@ -58,7 +66,8 @@ def others(world) -> tuple[str, str, str]:
     text = json.dumps({"kind": "fault", "text": "t", "scene": scene})
     headers = {"Idempotency-Key": "alert-key-1"}
     alert = world.post("red-1", "/api/v1/alerts", content=text, headers=headers).json()["alert"]
-    order = world.post("red teleoperator", f"/api/v1/alerts/{alert}/order/stop").json()["order"]
+    way = f"/api/v1/alerts/{alert}/order/stop"
+    order = world.post("red teleoperator", way, headers=headers).json()["order"]
     more = packed(*(record(k, (100.0 + k, 0.0)) for k in range(5, 9)))
     assert world.send("red-2", more).status_code == 200
     world.post("axle", "/api/v1/analyses")
@@ -83,7 +92,7 @@ def test_every_route_for_every_role_and_foreign_id(lite, tmp_path):
     ids = {"hazard": hazard, "alert": alert, "order": order, "cluster": cluster,
            "change": change, "release": release}  # fmt: skip
     words = {"kind": "hazards", "what": "obeyed", "to": "slow", "name": "timestamp.json"}
-    asked = {"challenge": "0" * 32}
+    asked, key = {"challenge": "0" * 32}, {"Idempotency-Key": "some-key-1"}
     people = {
         Role.MANUFACTURER: "bolt", Role.OPERATOR: "blue operator", Role.VEHICLE: "blue-1",
         Role.TELEOPERATOR: "blue teleoperator", Role.AUTHORITY: "authority",
@@ -99,7 +108,9 @@ def test_every_route_for_every_role_and_foreign_id(lite, tmp_path):
         assert wrong.status_code == 401, (method, path)
         for role, name in people.items():
             lite.clock.now += 10.0
-            answer = lite.client.request(method, target, headers=lite.headers(name), params=asked)
+            answer = lite.client.request(
+                method, target, headers=lite.headers(name) | key, params=asked
+            )
             if role not in RIGHTS[needs[0]]:
                 assert answer.status_code == 403, (method, path, role)
             elif any("{" + name + "}" in path for name in ids):

@@ -235,7 +235,7 @@ def attack(world: World) -> None:
 
 
 def test_an_export_with_one_vehicle_less_differs_by_whole_rows_only(tmp_path):
-    """The differencing attack: the fleet with and without one car, all else equal."""
+    """One car more or less between two steps of five vehicles' hazards: nothing tells them apart."""
     exports = []
     for n, without in ((7, None), (7, "car-6")):
         with crowd(tmp_path / f"{without}", n) as world:
@@ -247,6 +247,72 @@ def test_an_export_with_one_vehicle_less_differs_by_whole_rows_only(tmp_path):
             world.clock.now += 26 * HOUR
             exports.append(export(world.fleet))
     assert exports[0] == exports[1]  # 7 and 6 hazards both read "at least 5"
+
+
+MOST = 3  # hazards of the target in one hour, as the attacker supposes
+LOOKS = (30, 42)  # h after which exports are taken besides the last one
+
+
+def fitting(others: list[int], published: int | None) -> set[int]:
+    """How many hazards of the target fit what was published; others: hazards of every other vehicle.
+
+    By hand from what the page promises: a row from five vehicles on, hazards in whole fives.
+    """
+
+    def promised(own: int) -> int | None:
+        vehicles, hazards = len(others) + (own > 0), sum(others) + own
+        return hazards - hazards % 5 if vehicles >= 5 else None
+
+    return {own for own in range(MOST + 1) if promised(own) == published}
+
+
+def published(world: World) -> dict[int, int]:
+    """Hazards by hour, as an export tells them."""
+    return {r["hour"]: r["hazards_at_least"] for r in export(world.fleet)}
+
+
+@pytest.mark.req("C-177")
+def test_who_knows_all_vehicles_but_one_learns_at_a_step_only_and_nothing_from_a_second_export(
+    tmp_path,
+):
+    """Full background knowledge: every record of the population but the target's own."""
+    hours, rng = 48, np.random.default_rng(11)
+    first = int(NOW // HOUR)
+    known: dict[int, list[int]] = {}
+    truth: dict[int, int] = {}
+    exports: dict[int, dict[int, int]] = {}  # by the hour before which all are out
+    with crowd(tmp_path, 10) as world:
+        for hour in range(first, first + hours):
+            world.clock.now = hour * HOUR + 10.0
+            cars = rng.permutation(np.arange(1, 10))[: rng.integers(2, 10)].tolist()
+            known[hour] = rng.integers(1, 3, len(cars)).tolist()
+            truth[hour] = int(rng.integers(0, MOST + 1))
+            for car, n in [*zip(cars, known[hour], strict=True), (0, truth[hour])]:
+                if n:
+                    number = 100 * (hour - first) + 10 * car
+                    body = packed(*(record(number + i, (250.0, 250.0)) for i in range(n)))
+                    answer = world.send(f"car-{car}", body, f"{hour}-{car}-key")
+                    assert answer.status_code == 200
+            if hour - first in LOOKS:
+                exports[hour - 24] = published(world)
+        world.clock.now = (first + hours + 25) * HOUR
+        exports[first + hours] = published(world)
+    alone = {hour: fitting(known[hour], exports[first + hours].get(hour)) for hour in truth}
+    for hour, own in truth.items():
+        out = [e for until, e in exports.items() if hour < until]
+        together = set.intersection(*(fitting(known[hour], e.get(hour)) for e in out))
+        assert own in together == alone[hour]  # a second export rules out no more
+        vehicles, over = len(known[hour]), sum(known[hour]) % 5
+        if vehicles < K - 1:
+            assert together == set(range(MOST + 1))  # no row whatever the target did
+        if vehicles >= K and over + MOST < 5:
+            assert together == set(range(MOST + 1))
+        if vehicles >= K and over + own < 5:
+            assert {0, own} <= together  # as if it had not been there
+    sure = [hour for hour, own in alone.items() if 0 not in own or own == {0}]
+    steps = [hour for hour in sure if len(known[hour]) == K - 1 or sum(known[hour]) % 5 + MOST >= 5]
+    assert sure == steps
+    assert len(sure) == 18  # of 48, as docs/fleet.md tells
 
 
 HALF = row(0, 300), row(0, 0, indicator="object_location_similarity")  # of 600 cycles each

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import asyncio
+import subprocess
 from contextlib import closing
 
 import pytest
@@ -9,8 +11,9 @@ import pytest
 from fleet_world import make_world, mosquitto, record, text_of
 
 pytest.importorskip("aiomqtt", reason="aiomqtt, for mosquitto, is not installed")
-from skidpad.core.errors import BackendError
-from skidpad.fleet.broker import Broker
+from skidpad.cli.fleet_links import broker_of
+from skidpad.core.errors import BackendError, ConfigError
+from skidpad.fleet.broker import ANSWERS, TOPIC, Broker, connected, request_properties
 from skidpad.fleet.mqtt import BatchListener
 from skidpad.fleet.spool import Spool
 from skidpad.fleet.uploader import mqtt_poster, send
@@ -74,8 +77,72 @@ def test_the_broker_gives_nobody_more_than_https_does(listening, broker, tmp_pat
     assert listening.get("red operator", "/api/v1/hazards").json() == []
 
 
+def test_the_fleet_answers_to_vehicles_and_publishes_nowhere_else(listening, broker):
+    """Whoever may publish must not have the fleet, which may more, publish where they want."""
+    where = f"{ANSWERS}/{'0' * 32}"
+
+    async def heard() -> list[str]:
+        async with connected(broker, WAIT_S, waiting=8) as client:
+            await client.subscribe("skidpad/#", qos=1)
+            for target in ("skidpad/red/alerts", f"{ANSWERS}/x", where):
+                about = request_properties(target, {"key": "key-0000-1"})
+                await client.publish(f"{TOPIC}/hazards", b"x", qos=1, properties=about)
+            topics: list[str] = []
+            while len(topics) < 4:
+                message = await asyncio.wait_for(anext(aiter(client.messages)), WAIT_S)
+                topics.append(str(message.topic))
+            return topics
+
+    assert sorted(asyncio.run(heard())) == sorted([f"{TOPIC}/hazards"] * 3 + [where])
+
+
+def test_the_fleet_logs_in_where_only_it_may_read_what_vehicles_send(tmp_path):
+    """A broker that lets nobody in without a password, and vehicles only write."""
+    words, rights = tmp_path / "words", tmp_path / "rights"
+    for create, user in (("-c", "fleet"), ("", "vehicle")):
+        options = [*filter(None, [create]), "-b", str(words), user, f"{user}-word"]
+        subprocess.run(["mosquitto_passwd", *options], check=True, capture_output=True)
+        (tmp_path / user).write_text(f"{user}-word\n")
+    rights.write_text(
+        f"user fleet\ntopic read {TOPIC}/#\ntopic write {ANSWERS}/#\n"
+        f"user vehicle\ntopic write {TOPIC}/#\ntopic read {ANSWERS}/+\n"
+    )
+    for file in (words, rights):
+        file.chmod(0o644)
+    more = f"allow_anonymous false\npassword_file {words}\nacl_file {rights}\nuser root\n"
+    with mosquitto(tmp_path, more) as port, closing(make_world(tmp_path / "data", None)) as world:
+        at = f"127.0.0.1:{port}"
+        listener = BatchListener(
+            world.fleet, broker_of(at, None, "fleet", tmp_path / "fleet"), WAIT_S
+        )
+        listener.start()
+        try:
+            assert listener.listening.wait(WAIT_S)
+            spool = Spool(tmp_path / "spool")
+            spool.put(Kind.HAZARDS, text_of(record(1)))
+            assert send(spool, posting(world, broker_of(at, None, None, None))).waiting == 1
+            car = broker_of(at, None, "vehicle", tmp_path / "vehicle")
+            assert send(spool, posting(world, car)).acknowledged == 1
+        finally:
+            listener.close()
+    with pytest.raises(ConfigError, match="go together"):
+        broker_of("127.0.0.1", None, "fleet", None)
+
+
 def test_without_a_broker_the_batch_waits(tmp_path):
     spool = Spool(tmp_path / "spool")
     spool.put(Kind.HAZARDS, text_of(record(1)))
     nowhere = Broker(host="127.0.0.1", port=1)
     assert send(spool, mqtt_poster(nowhere, "token", timeout_s=5.0)).waiting == 1
+
+
+def test_a_credential_has_one_bucket_for_both_links(listening, broker, tmp_path):
+    """60 requests at once, however they come."""
+    spool = Spool(tmp_path / "spool")
+    spool.put(Kind.HAZARDS, text_of(record(1)))
+    answers = {listening.get("red-1", "/api/v1/vehicle").status_code for _ in range(60)}
+    assert answers == {200}
+    sent = send(spool, posting(listening, broker))
+    assert (sent.acknowledged, sent.waiting) == (0, 1)
+    listening.clock.now += 1.0
+    assert send(spool, posting(listening, broker)).acknowledged == 1

@@ -7,19 +7,26 @@ import json
 import os
 import signal
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import httpx
 import pytest
+from test_fleet_api import released
 from test_fleet_insight import row
 from test_fleet_upload import served
 
 from chromium import CHROMIUM, FLAGS
 from fleet_world import make_world, packed, record
+from skidpad.cli.fleet_links import map_lines
+from skidpad.core.errors import FileError, InputError
 from skidpad.fleet.alerting.keeping import What
 from skidpad.fleet.alerting.orders import Order
 from skidpad.fleet.site.acting import click_analyse, click_answer, click_order
-from skidpad.fleet.words import Refused
+from skidpad.fleet.site.build import pages_of
+from skidpad.fleet.words import NOT_THERE, RIGHTS, Action, Refused
+from stadium import RADIUS, STRAIGHT, WIDTH, written
 
 WAIT_MS = 120_000
 SCENE = {"map": "town", "ego": {"x": 1.0, "y": 2.0, "heading": 0.1}, "v": 8.0}
@@ -83,6 +90,117 @@ def opened(address: str, token: str) -> str:
     return address + answer.json()["path"]
 
 
+def loaded(client: httpx.Client, path: str) -> str:
+    """A page as it is sent; a busy machine may need more than NiceGUI's 3 s to fill it."""
+    for _ in range(20):
+        answer = client.get(path)
+        assert answer.status_code == 200, (path, answer.status_code)
+        if '"nav"' in answer.text:  # the head that every filled page has
+            return answer.text
+    raise AssertionError(f"{path} was never filled")
+
+
+@contextmanager
+def someone(address: str, token: str) -> Iterator[httpx.Client]:
+    """A browser with a session of whose token it is."""
+    with httpx.Client(
+        base_url=address, timeout=WAIT_MS / 1000, trust_env=False, follow_redirects=True
+    ) as client:
+        client.get(opened(address, token)).raise_for_status()
+        yield client
+
+
+RED = "redtown"  # a map where only red vehicles drove
+
+
+@pytest.mark.slow
+@pytest.mark.req("C-195")
+def test_every_page_for_every_role_and_foreign_id(tmp_path):
+    """Over HTTP: no session, 403; no right, one sentence; another tenant's id and rows, absent."""
+    world = make_world(tmp_path / "data", None)
+    red = [record(k, (120.0 + k, 30.0), map=RED) for k in range(3)]
+    hazard, *_ = world.send("red-1", packed(*red)).json()["ids"]
+    change, release = released(world, tmp_path, hazard)
+    headers = {"Idempotency-Key": "alert-key"}
+    text = json.dumps(ALERT | {"text": f"seen in {RED}"})
+    alert = world.post("red-1", "/api/v1/alerts", content=text, headers=headers).json()["alert"]
+    name = world.get("axle", "/api/v1/releases").json()[0]["payload"]
+    people = {n: a for n, a in world.accounts.items() if a.principal.may(Action.VISIT)}
+    world.close()
+    shown = {"/": RED, "/replay/{hazard}": RED, "/alerts": RED, "/changes": name}
+    pages = pages_of(None, None)  # what they read and draw is not asked for here
+    assert set(shown) | {"/places", "/case"} == set(pages)
+    child, address = served(tmp_path / "data")
+    with child:
+        try:
+            for path in pages:
+                url = address + path.replace("{hazard}", hazard)
+                assert call("GET", url).status_code == 403, path
+                token = world.accounts["red-1"].token
+                bearer = {"Authorization": f"Bearer {token}"}
+                assert call("GET", url, headers=bearer).status_code == 403, path
+            for who, account in people.items():
+                role, own = account.principal.role, who == "axle" or who.startswith("red")
+                with someone(address, account.token) as client:
+                    for path, one in pages.items():
+                        text = loaded(client, path.replace("{hazard}", hazard))
+                        about, may = (who, path), role in RIGHTS[one.action]
+                        refused = f"The role {role.value} may not {one.action.value}."
+                        assert (refused in text) is not may, about
+                        if path in shown:
+                            assert (shown[path] in text) is (may and own), about
+                        if "{" in path:
+                            assert (NOT_THERE in text) is (may and not own), about
+                            absent = loaded(client, path.replace("{hazard}", "0" * 32))
+                            assert (NOT_THERE in absent) is may, about
+                        if not own:
+                            ids = (RED, name, change, release, alert)
+                            assert [i for i in ids if i in text] == [], about
+        finally:
+            os.kill(child.pid, signal.SIGTERM)
+    for who in ("researcher", "red-1"):
+        assert who not in people
+
+
+def test_roads_are_those_of_ones_own_maps_and_of_bundled_ones(tmp_path):
+    """A name leads to no file: maps are read when the service starts."""
+    written(tmp_path, "elsewhere.xodr")
+    own, bundled = map_lines(tmp_path), map_lines(None)
+    outside = RADIUS + WIDTH + 1.0  # the middle of the 2 m beside the street
+    xs = [x for line in own("elsewhere") for x, _ in line]
+    assert max(xs) == pytest.approx(STRAIGHT + outside, abs=0.1)
+    assert min(xs) == pytest.approx(-outside, abs=0.1)
+    assert own("town") == bundled("town") != []
+    for name in ("elsewhere", "", "../elsewhere", str(tmp_path / "elsewhere.xodr")):
+        assert not bundled(name)
+    assert not own("../elsewhere")
+    with pytest.raises(FileError, match="no such folder"):
+        map_lines(tmp_path / "nowhere")
+    (tmp_path / "broken.xodr").write_text("<OpenDRIVE>")
+    with pytest.raises(InputError, match=r"broken\.xodr"):
+        map_lines(tmp_path)
+
+
+@pytest.mark.slow
+def test_the_dashboard_draws_a_map_of_ones_own(tmp_path):
+    (tmp_path / "maps").mkdir()
+    written(tmp_path / "maps", "elsewhere.xodr")
+    world = make_world(tmp_path / "data", None)
+    assert world.send("red-1", packed(record(1, map="elsewhere"))).status_code == 200
+    token = world.accounts["axle"].token
+    world.close()
+    for words, drawn in ((), False), (("--maps", str(tmp_path / "maps")), True):
+        child, address = served(tmp_path / "data", *words)
+        with child:
+            try:
+                with someone(address, token) as client:
+                    text = loaded(client, "/")
+            finally:
+                os.kill(child.pid, signal.SIGTERM)
+        assert "elsewhere: " in text
+        assert ("polyline" in text) is drawn
+
+
 @pytest.mark.slow
 @pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 @pytest.mark.req("C-195")
@@ -97,7 +215,7 @@ def test_the_pages_in_a_browser(tmp_path):
             browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS, timeout=WAIT_MS)
             asked = []
             for size in ({"width": 1280, "height": 900}, {"width": 390, "height": 844}):
-                dashboard(browser, address, tokens["red operator"], size, asked)
+                dashboard(browser, address, tokens, size, asked)
             teleoperator(browser, address, tokens)
             strangers(browser, address, tokens)
             ours = (address, address.replace("http", "ws"))
@@ -117,8 +235,8 @@ def visit(browser, url: str, size=None, asked: list | None = None):
     return page
 
 
-def dashboard(browser, address, token, size, asked) -> None:
-    page = visit(browser, opened(address, token), size, asked)
+def dashboard(browser, address, tokens, size, asked) -> None:
+    page = visit(browser, opened(address, tokens["red operator"]), size, asked)
     assert "token" not in page.url
     page.get_by_text("replay the representative").wait_for()
     assert page.get_by_text("9 x ego").count() == 0
@@ -126,6 +244,7 @@ def dashboard(browser, address, token, size, asked) -> None:
     page.get_by_text("ego location similarity").wait_for()
     assert page.locator("svg polyline").count() > 10  # the roads of the map
     assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+    comes(page, address, tokens, f"map-{size['width']}")
     picture = os.environ.get("SKIDPAD_PICTURES")
     if picture:
         page.screenshot(path=f"{picture}/dashboard-{size['width']}.png", full_page=True)
@@ -140,6 +259,17 @@ def dashboard(browser, address, token, size, asked) -> None:
     if picture:
         page.screenshot(path=f"{picture}/replay-{size['width']}.png", full_page=True)
     page.context.close()
+
+
+def comes(page, address, tokens, name) -> None:
+    """A record shows on a page that is open already; another operator's does not."""
+    for number, vehicle in enumerate(("blue-1", "red-1")):
+        headers = {"Authorization": f"Bearer {tokens[vehicle]}", "Idempotency-Key": name + vehicle}
+        body = packed(record(100 + number, (5000.0, 5000.0), map=name + vehicle))
+        sent = call("POST", f"{address}/api/v1/batches/hazards", headers=headers, content=body)
+        assert sent.status_code == 200, sent.text
+    page.get_by_text(f"{name}red-1: 1 marks").wait_for()
+    assert page.get_by_text(f"{name}blue-1").count() == 0
 
 
 def teleoperator(browser, address, tokens) -> None:
@@ -183,6 +313,7 @@ def strangers(browser, address, tokens) -> None:
     page = visit(browser, f"{address}/")
     assert "this page needs the address" in page.content()
     page.context.close()
+    assert "/api/v1/hazards" in call("GET", f"{address}/api/v1/openapi.json").json()["paths"]
     socket = f"{address}/_nicegui_ws/socket.io/?EIO=4&transport=polling"
     assert call("GET", socket).status_code == 403
     assert (

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import settings as examples
 from hypothesis import strategies as st
 
-from fleet_world import packed, record
+from fleet_world import NOW, packed, record
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
 from skidpad.fleet.identity import digest
@@ -22,6 +22,8 @@ from skidpad.fleet.patterns.clusters import (
     warping_table,
 )
 from skidpad.fleet.patterns.series import POINTS, SIGNALS, from_plain, series_of, to_plain
+from skidpad.fleet.store.accounts import add_person, add_vehicle
+from skidpad.fleet.words import Role
 
 N = len(SIGNALS)
 FALLING = np.tile(np.linspace(1.0, 0.0, POINTS)[:, None], (1, N))
@@ -181,3 +183,24 @@ def test_the_service_looks_by_itself_and_only_when_something_came(world):
     upkeep.work()
     (grown,) = world.get("red operator", "/api/v1/clusters").json()
     assert len(grown["members"]) == 5
+
+
+def test_who_makes_cars_and_runs_others_sees_by_role_what_each_may(world):
+    """One organisation, two roles: what it learns as a maker is no operator's to read."""
+    from skidpad.fleet.upkeep import Upkeep
+
+    with world.fleet.engine.begin() as connection:
+        for k in (1, 2):
+            car = add_vehicle(connection, "axle", "bolt", f"axle-{k}", NOW)
+            world.accounts[f"axle-{k}"] = car
+        person = add_person(connection, "axle", Role.OPERATOR, "olga", NOW)
+        world.accounts["axle operator"] = person
+    for vehicle, x in (("red-1", 120.0), ("axle-1", 900.0)):
+        near = [record(k, (x + k, 30.0)) for k in range(4)]
+        assert world.send(vehicle, packed(*near), f"{vehicle}-key-1").status_code == 200
+    Upkeep(world.fleet).work()
+    (made,) = world.get("axle", "/api/v1/clusters").json()
+    (run,) = world.get("axle operator", "/api/v1/clusters").json()
+    assert (made["x"] < 200.0, run["x"] > 800.0) == (True, True)
+    for who, foreign in (("axle", run), ("axle operator", made)):
+        assert world.get(who, f"/api/v1/clusters/{foreign['id']}").status_code == 404

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import threading
 from concurrent.futures import Future
+from dataclasses import replace
 
 import pytest
 from sqlalchemy import func, inspect, select, text
-from sqlalchemy.exc import DBAPIError
+from sqlalchemy.exc import DBAPIError, SQLAlchemyError
 
 from fleet_world import NOW, packed, record, text_of
 from skidpad.core.errors import ConfigError, FileError
@@ -53,6 +55,11 @@ def test_the_same_batch_again_changes_nothing(world):
     assert count(world, hazards) == 2
     other_vehicle = world.send("red-2", body).json()
     assert set(other_vehicle["ids"]).isdisjoint(first["ids"])
+
+
+def test_nobody_else_on_the_machine_reads_the_store(lite):
+    assert oct(lite.fleet.data.stat().st_mode)[-3:] == "700"
+    assert oct((lite.fleet.data / "keys" / "orders.key").stat().st_mode)[-3:] == "600"
 
 
 def test_facts_can_be_neither_changed_nor_removed(world):
@@ -201,3 +208,50 @@ def test_a_bad_record_refuses_its_whole_batch(lite):
             hazards_of(text_.encode(), Limits())
     with pytest.raises(Refused, match="may hold 1 records"):
         hazards_of(text_of(record(1), record(2)), Limits(records=1))
+
+
+@pytest.mark.parametrize("extra", ["9" * 5000, "[" * 900 + "]" * 900, "1e999"])
+def test_what_a_head_says_besides_hides_no_other_record(lite, extra):
+    """JSON that our readers of a page cannot take, in a field that nobody asked for."""
+    text_ = text_of(record(1)).decode()
+    line = text_.splitlines()[1]
+    poisoned = text_.replace(line, line[:-1] + f', "besides": {extra}' + "}")
+    lite.send("red-2", packed(record(2)), "good-key-1")
+    assert lite.send("red-1", gzip.compress(poisoned.encode()), "poison-key").status_code == 200
+    answer = lite.get("red operator", "/api/v1/hazards")
+    assert (answer.status_code, len(answer.json())) == (200, 2)
+    drive = f'{{"seconds": 1.0, "cycles": 1, "context": {{}}, "besides": {extra}}}'
+    sent = lite.send("red-1", gzip.compress(drive.encode()), "drive-key-1", "drive")
+    assert sent.status_code in (200, 422), sent.text
+
+
+def test_words_that_a_store_cannot_keep_are_refused_alike(world):
+    nul = packed(record(1, map="a\0b"))
+    assert world.send("red-1", nul, "nul-key-1").status_code == 422
+    drive = json.dumps({"seconds": 1.0, "cycles": 1, "context": {"map": "a\0b"}}).encode()
+    assert world.send("red-1", gzip.compress(drive), "nul-key-2", "drive").status_code == 422
+    assert world.get("red operator", "/api/v1/hazards", type="\0").status_code in (200, 422)
+    assert world.get("red operator", "/api/v1/hazards/%00").status_code in (404, 422)
+
+
+def test_a_batch_that_cannot_be_kept_takes_no_other_with_it(world):
+    """Both are of one commit: the one that the store refuses fails alone."""
+    intake, blobs = world.fleet.intake, world.fleet.blobs
+    held, release, put = threading.Event(), threading.Event(), blobs.put
+
+    def slow(content: bytes) -> str:
+        held.set()
+        assert release.wait(120)
+        return put(content)
+
+    blobs.put = slow
+    first = intake.submit(batch(world, "first-key", record(1)))
+    assert held.wait(120)
+    good = intake.submit(batch(world, "good-key", record(2)))
+    bad = intake.submit(replace(batch(world, "bad-key", record(3)), vehicle_time=object()))
+    more = intake.submit(batch(world, "more-key", record(4)))
+    release.set()
+    assert [len(f.result(120).ids) for f in (first, good, more)] == [1, 1, 1]
+    with pytest.raises(SQLAlchemyError):
+        bad.result(120)
+    assert count(world, hazards) == 3

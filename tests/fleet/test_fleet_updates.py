@@ -7,9 +7,11 @@ import gzip
 import io
 import json
 import time
+from contextlib import nullcontext
 from datetime import timedelta
 from pathlib import Path
 
+import httpx
 import numpy as np
 import pytest
 import yaml
@@ -22,10 +24,13 @@ from skidpad.core.errors import ConfigError, FileError, OutputError
 from skidpad.evidence.channels import hazards as hazards_module
 from skidpad.evidence.channels.identifier import model as model_module
 from skidpad.evidence.channels.indicators import catalogue
+from skidpad.fleet.loop import rollout
+from skidpad.fleet.loop.plan import look
 from skidpad.fleet.updates import signing
 from skidpad.fleet.updates.client import UpdateClient, UpdateRefused
 from skidpad.fleet.updates.payloads import PayloadKind, payload_name, settings_of_content
 from skidpad.fleet.updates.repository import SIGNED_AT
+from skidpad.fleet.upkeep import Upkeep
 from skidpad.fleet.words import Refused
 
 
@@ -71,10 +76,10 @@ class Car:
 
     def __init__(self, world: World, folder: Path, root: bytes, name: str = "red-1") -> None:
         self.world, self.name, self.clock = world, name, Clock(world.clock.now)
-        self.client = UpdateClient(folder, root, self.get, self.clock)
+        self.client = UpdateClient(folder, root, self.stream, self.clock)
 
-    def get(self, path: str):
-        return self.world.get(self.name, path)
+    def stream(self, path: str):
+        return self.world.client.stream("GET", path, headers=self.world.headers(self.name))
 
 
 @pytest.fixture
@@ -94,6 +99,43 @@ def test_a_signed_update_arrives_as_it_was(maker, tmp_path):
     assert path.read_bytes() == CONTENT
     assert settings_of_content(PayloadKind.RULES, CONTENT).rules
     assert maker.repository.content(NAME) == CONTENT
+
+
+class Flood:
+    """An answer that never ends, in parts of 10 kB."""
+
+    status_code = 200
+
+    def __init__(self) -> None:
+        self.parts = 0
+
+    def iter_raw(self, size=None):
+        while self.parts < 10_000:  # 100 MB: who reads all of it has failed
+            self.parts += 1
+            yield b" " * 10_000
+
+
+@pytest.mark.parametrize("what", ["timestamp.json", "root.json", NAME])
+def test_an_answer_that_does_not_end_is_given_up_at_its_limit(maker, tmp_path, what):
+    """Limits of The Update Framework hold while the answer is read: metadata 1 MB, a payload its length."""
+    maker.repository.publish(maker.signed(NAME, CONTENT), NAME, CONTENT)
+    car, flood = Car(maker.world, tmp_path / "car", maker.root), Flood()
+    through = car.stream
+    car.client.stream = lambda path: nullcontext(flood) if path.endswith(what) else through(path)
+    with pytest.raises(UpdateRefused):
+        car.client.fetch(NAME)
+    assert 1 <= flood.parts <= 1024 * 1024 / 10_000 + 2
+
+
+def test_a_link_that_breaks_is_a_refused_update(maker, tmp_path):
+    car = Car(maker.world, tmp_path / "car", maker.root)
+
+    def broken(path: str):
+        raise httpx.ConnectError("away")
+
+    car.client.stream = broken
+    with pytest.raises(UpdateRefused, match="away"):
+        car.client.fetch(NAME)
 
 
 def test_the_server_takes_only_what_two_of_three_signed(maker):
@@ -312,6 +354,52 @@ def test_the_loop_from_hazard_to_re_evaluation_is_one_record(lite, tmp_path):
     assert len(record_["evaluations"]) == 2
 
 
+def under_release(maker: Maker, errors: tuple[int, int], drives: int) -> str:
+    """A release under which chosen vehicles drove, and at which nobody has looked."""
+    (hazard,) = maker.world.send("red-1", packed(record(1))).json()["ids"]
+    change = maker.change(CONTENT, [hazard]).json()["change"]
+    release = maker.release(change, maker.signed(NAME, CONTENT), **PLAN).json()["release"]
+    for drive in range(drives):
+        maker.world.clock.now += 10.0
+        vehicle = ("red-1", "red-2")[drive % 2]
+        sent(maker.world, vehicle, hash_of(release, drive), errors, release)
+    return release
+
+
+@pytest.mark.req("C-176")
+def test_a_bad_update_is_taken_back_without_anybody_asking(world, tmp_path):
+    release = under_release(Maker(world, tmp_path), (3, 0), 24)
+    upkeep = Upkeep(world.fleet)
+    upkeep.work()
+    (now,) = world.get("axle", "/api/v1/releases").json()
+    assert [e["what"] for e in now["events"]] == ["stage", "looked", "reverted"]
+    assert {e["actor"] for e in now["events"][1:]} == {"upkeep"}
+    upkeep.work()  # what has ended is not looked at
+    assert world.get("axle", "/api/v1/releases").json() == [now]
+    assert world.post("axle", f"/api/v1/releases/{release}/look").status_code == 409
+
+
+@pytest.mark.req("C-176")
+def test_of_two_who_look_at_one_moment_one_looks(world, tmp_path, monkeypatch):
+    """Between the reading and the keeping of one look the other process takes its own."""
+    release = under_release(Maker(world, tmp_path), (0, 1), 24)
+    who, judged = world.accounts["axle"].principal, []
+
+    def slow(differences, plan, left):
+        judged.append(len(differences))
+        if len(judged) == 1:
+            assert rollout.look_at(world.fleet, who, release) is not None
+        return look(differences, plan, left)
+
+    monkeypatch.setattr(rollout, "look", slow)
+    with pytest.raises(Refused) as refused:
+        rollout.look_at(world.fleet, who, release)
+    assert refused.value.status == 409
+    assert len(judged) == 2
+    (now,) = world.get("axle", "/api/v1/releases").json()
+    assert [e["what"] for e in now["events"]].count("looked") == 1
+
+
 def test_what_a_release_needs(lite, tmp_path):
     maker = Maker(lite, tmp_path)
     (hazard,) = lite.send("red-1", packed(record(1))).json()["ids"]
@@ -332,3 +420,20 @@ def test_what_a_release_needs(lite, tmp_path):
     assert busy.status_code == 409
     nothing = lite.post("axle", f"/api/v1/releases/{first.json()['release']}/look").json()
     assert nothing["finding"] is None  # too little was driven, and no look is spent
+
+
+def test_another_makers_ids_in_a_request_are_absent(lite, tmp_path):
+    """Ids in the body, as those in the path."""
+    maker, other = Maker(lite, tmp_path), Maker(lite, tmp_path, "bolt")
+    red = [record(k, (120.0 + k, 30.0)) for k in range(4)]
+    hazards = lite.send("red-1", packed(*red)).json()["ids"]
+    (own,) = lite.send("blue-1", packed(record(1))).json()["ids"]
+    lite.post("axle", "/api/v1/analyses")
+    cluster = lite.get("axle", "/api/v1/clusters").json()[0]["id"]
+    change = maker.change(CONTENT, hazards[:1]).json()["change"]
+    assert other.release(change, other.signed(NAME, CONTENT)).status_code == 404
+    text = {"kind": "rules", "payload": base64.b64encode(CONTENT).decode(), "reason": "a test",
+            "hazards": [own], "cluster": cluster}  # fmt: skip
+    assert lite.post("bolt", "/api/v1/changes", content=json.dumps(text)).status_code == 404
+    assert lite.post("bolt", "/api/v1/changes",
+                     content=json.dumps(text | {"cluster": None})).status_code == 200  # fmt: skip

@@ -8,6 +8,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 
 import httpx
@@ -19,7 +20,9 @@ from typer.testing import CliRunner
 from fleet_world import record
 from skidpad.cli.main import app
 from skidpad.fleet.monitored import Lookout, hazard_batches, indicator_rows, spool_folder
+from skidpad.fleet.service import Places, open_store
 from skidpad.fleet.spool import Spool
+from skidpad.fleet.store.accounts import principal_of
 from skidpad.fleet.store.tables import drives, hazards
 from skidpad.fleet.uploader import poster, rounds, send, send_all
 from skidpad.fleet.words import Kind
@@ -145,8 +148,11 @@ def test_batches_and_rows_hold_what_the_folder_holds(tmp_path):
 
 SPOOLER = """
 import sys
+import time
 from pathlib import Path
+from skidpad.fleet.service import Places, open_store
 from skidpad.fleet.spool import Spool
+from skidpad.fleet.store.accounts import principal_of
 from skidpad.fleet.words import Kind
 spool = Spool(Path(sys.argv[1]))
 for k in range(100000):
@@ -229,8 +235,6 @@ def test_a_server_killed_at_any_moment_keeps_what_it_acknowledged(tmp_path):
             finally:
                 os.kill(child.pid, signal.SIGKILL)
     acknowledged = {i for r in Spool(tmp_path / "spool").acknowledged().values() for i in r["ids"]}
-    from skidpad.fleet.service import Places, open_store
-
     engine = open_store(Places(data=data))
     with engine.connect() as connection:
         stored = set(connection.execute(select(hazards.c.id)).scalars())
@@ -252,5 +256,29 @@ def test_commands_refuse_in_one_sentence(tmp_path):
     assert "unknown role" in refused("enrol", "king", "K", "--tenant", "t", *data)
     assert "--manufacturer is needed" in refused("enrol", "vehicle", "V", "--tenant", "t", *data)
     to = ("--spool", str(tmp_path / "s"), "--token-file", str(tmp_path / "none"))
-    assert "must be https" in refused("upload", "--to", "http://example.org", *to)
+    for url in (
+        "http://example.org", "http://127.0.0.1.example.org", "http://localhost.example.org",
+        "http://127.0.0.1@example.org", "https://user:word@example.org", "ftp://127.0.0.1",
+    ):  # fmt: skip
+        assert "must be https" in refused("upload", "--to", url, *to), url
     assert "cannot be read" in refused("upload", "--to", "https://example.org", *to)
+
+
+def test_a_credential_is_ended_and_renewed_by_a_command(tmp_path):
+    who = ("vehicle", "V1", "--tenant", "red", "--data", str(tmp_path / "d"))
+    first = invoke("enrol", *who, "--manufacturer", "axle")
+    second = invoke("end", *who, "--renew")
+    engine = open_store(Places(data=tmp_path / "d"))
+
+    def known(token: str):
+        with engine.connect() as connection:
+            return principal_of(connection, token, time.time())
+
+    assert known(first) is None
+    vehicle = known(second)
+    assert vehicle.name == "V1"
+    assert invoke("end", *who) == "2 credentials ended"
+    assert known(second) is None
+    engine.dispose()
+    unknown = RUN.invoke(app, ["fleet", "end", "operator", "V1", *who[2:]])
+    assert "has no operator" in str(unknown.exception)

@@ -172,3 +172,19 @@ def test_no_token_that_was_not_given_opens_anything(token, path):
     house.sessions.invite("owner")
     assert house.sessions.admit(token) is None
     assert status(house.ask(path="/" + path)) == 403
+
+
+def test_an_invitation_that_was_not_used_in_time_opens_nothing_and_is_forgotten():
+    clock = [100.0]
+    sessions = Sessions(valid_s=60.0, clock=lambda: clock[0])
+    early, late = sessions.invite("ann"), sessions.invite("bob")
+    clock[0] += 60.0
+    id = sessions.admit(early)
+    assert sessions.who(id) == "ann"
+    clock[0] += 0.1
+    assert sessions.admit(late) is None
+    sessions.invite("cid")
+    clock[0] += 61.0
+    sessions.invite("dan")
+    assert len(sessions) == 1  # nobody fills the memory with invitations
+    assert sessions.who(id) == "ann"  # a session is as good as the credential behind it

@@ -61,6 +61,9 @@ def drive(
     ] = None,
     rate: Annotated[float, typer.Option(help="Times real time; 0: as fast as it can.")] = 1.0,
     paused: Annotated[bool, typer.Option("--paused", help="Begin standing.")] = False,
+    gc_in_pause: Annotated[
+        bool, typer.Option(help="Collect garbage between ticks only, not at any moment.")
+    ] = True,
     on_close: Annotated[
         OnClose, typer.Option(help="What the drive does when the page is closed.")
     ] = OnClose.GO_ON,
@@ -69,13 +72,14 @@ def drive(
     ] = None,
 ) -> None:
     """Drive in a browser: watch the stack, take over, change weather and grip; keeps a run."""
-    from skidpad.campaign.desk_run import require_free
     from skidpad.cli.carla_backend import checked
     from skidpad.cockpit.about import About
     from skidpad.cockpit.driving import about, drive_job
     from skidpad.cockpit.producer import Producer
     from skidpad.cockpit.serving import serve
     from skidpad.physics.presets import find_weather
+    from skidpad.recording.files import require_free
+    from skidpad.simulation.carla.options import Optimisation
 
     chosen = drivers.chosen() if drivers != Drivers() else Drivers(configs="3").chosen()
     if len(chosen) != 1:
@@ -88,12 +92,26 @@ def drive(
         seed=seed,
         backend=checked(backend),
     )
+    require_place(spec)
     folder = next_free(Path("out/drives") / spec.name) if out is None else require_free(out)
-    producer = Producer(drive_job, about(spec, folder, rate, paused))
+    own_gc = gc_in_pause and Optimisation.GC_IN_PAUSE.value not in backend.without
+    producer = Producer(drive_job, about(spec, folder, rate, paused, own_gc))
     course = spec.course
     most = course.vehicles + course.reserve if isinstance(course, Roads) else 0
     shown = About("drive", vehicles=most, pauses=on_close is OnClose.PAUSE)
     typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
+
+
+def require_place(spec: RunSpec) -> None:
+    """Refuse a file or map that cannot be driven, before a page is opened; a server has its own."""
+    from skidpad.campaign.cast import load_scenario
+    from skidpad.campaign.keeping import road_file
+    from skidpad.roads.bundled import load_map
+
+    if isinstance(spec.course, Scenario):
+        load_scenario(spec.course)
+    elif isinstance(spec.course, Roads) and spec.backend.backend is BackendKind.EMBEDDED:
+        load_map(road_file(spec.course))
 
 
 def with_reserve(roads: Roads, backend: BackendChoice, more: int | None) -> Roads:

@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from skidpad.cli.fleet_links import broker_of, client, fleet_extra, map_lines, posting, relays
+from skidpad.cli.fleet_links import (
+    broker_of,
+    client,
+    committing,
+    fleet_extra,
+    map_lines,
+    posting,
+    relays,
+)
 
 if TYPE_CHECKING:
     from skidpad.fleet.service import Places
@@ -28,6 +36,8 @@ BlobUrl = Annotated[
     str | None,
     typer.Option("--blobs", help="Where bodies are kept: a folder or an fsspec address."),
 ]
+MqttUser = Annotated[str | None, typer.Option(help="Who logs in at the broker.")]
+MqttPassword = Annotated[Path | None, typer.Option(help="File that holds the broker's password.")]
 TokenFile = Annotated[Path, typer.Option(help="File that holds the vehicle's credential.")]
 
 
@@ -59,8 +69,13 @@ def serve(
         typer.Option(help="HOST[:PORT] of an MQTT 5 broker: alerts go out, batches come in."),
     ] = None,
     mqtt_ca: Annotated[Path | None, typer.Option(help="PEM of the broker's authority.")] = None,
+    mqtt_user: MqttUser = None,
+    mqtt_password_file: MqttPassword = None,
     name: Annotated[
         list[str] | None, typer.Option(help="What browsers call this host besides --host.")
+    ] = None,
+    maps: Annotated[
+        Path | None, typer.Option(help="Folder of your own .xodr files, drawn on the dashboard.")
     ] = None,
 ) -> None:
     """Serve the fleet; nothing listens beyond this machine unless --host says so."""
@@ -71,8 +86,8 @@ def serve(
     from skidpad.scenarios.hazard_export import export_hazard
 
     _check_exposure(host, certificate, key)
-    places = _places(data, database, blobs)
-    broker = None if mqtt is None else broker_of(mqtt, mqtt_ca)
+    places, roads = _places(data, database, blobs), map_lines(maps)
+    broker = None if mqtt is None else broker_of(mqtt, mqtt_ca, mqtt_user, mqtt_password_file)
     known = relays(places, webhook or [], webhook_host or [], broker)
     service = open_fleet(places, exporter=export_hazard, relays=known)
     batches = None if broker is None else BatchListener(service, broker)
@@ -80,7 +95,7 @@ def serve(
         if batches is not None:
             batches.start()
         listen = Listen(host, port, certificate, key, tuple(name or ()))
-        run(service, listen, map_lines, typer.echo)
+        run(service, listen, roads, typer.echo)
     finally:
         if batches is not None:
             batches.close()
@@ -113,23 +128,44 @@ def enrol(
     from skidpad.core.errors import ConfigError, require_choice
 
     with fleet_extra():
-        from skidpad.fleet.service import open_store
         from skidpad.fleet.store.accounts import add_person, add_vehicle
         from skidpad.fleet.words import Role
     known = Role(require_choice("role", role, [r.value for r in Role]))
     if (known is Role.VEHICLE) is (manufacturer is None):
         raise ConfigError("--manufacturer is needed for a vehicle, and for nobody else")
-    engine = open_store(_places(data, database, None))
-    try:
-        with engine.begin() as connection:
-            account = (
-                add_person(connection, tenant, known, name, time.time())
-                if manufacturer is None
-                else add_vehicle(connection, tenant, manufacturer, name, time.time())
-            )
-    finally:
-        engine.dispose()
+    with committing(_places(data, database, None)) as connection:
+        account = (
+            add_person(connection, tenant, known, name, time.time())
+            if manufacturer is None
+            else add_vehicle(connection, tenant, manufacturer, name, time.time())
+        )
     typer.echo(account.token)
+
+
+@fleet.command()
+def end(
+    data: Data,
+    role: Annotated[str, typer.Argument(help="manufacturer, operator, ..., vehicle.")],
+    name: Annotated[str, typer.Argument(help="Of the person or vehicle.")],
+    tenant: Annotated[str, typer.Option(help="Organisation; of a vehicle: its operator.")],
+    renew: Annotated[bool, typer.Option(help="Print a fresh credential in its place.")] = False,
+    database: Database = None,
+) -> None:
+    """End the credentials of someone; a service that runs refuses them within 10 s."""
+    import time
+
+    from skidpad.core.errors import require_choice
+
+    with fleet_extra():
+        from skidpad.fleet.store import accounts
+        from skidpad.fleet.words import Role
+    known = Role(require_choice("role", role, [r.value for r in Role]))
+    now = time.time()
+    with committing(_places(data, database, None)) as connection:
+        found = accounts.principals_named(connection, tenant, known, name)
+        ended = sum(accounts.end_credentials(connection, o, "command", now) for o in found)
+        fresh = accounts.add_credential(connection, found[-1], now) if renew else None
+    typer.echo(fresh or f"{ended} credentials ended")
 
 
 @fleet.command("open")
@@ -161,6 +197,8 @@ def upload(
     ] = None,
     release: Annotated[str, typer.Option(help="Update under which the vehicle drove.")] = "",
     ca: Annotated[Path | None, typer.Option(help="PEM of the authority that is trusted.")] = None,
+    mqtt_user: MqttUser = None,
+    mqtt_password_file: MqttPassword = None,
     wait: Annotated[float, typer.Option(help="Seconds to go on trying when nobody answers.")] = 0.0,
     every: Annotated[
         float, typer.Option(min=0.0, help="Look for new drives and send again after s; 0: once.")
@@ -175,7 +213,8 @@ def upload(
         from skidpad.fleet.spool import Spool
         from skidpad.fleet.uploader import rounds, send_all
     kept = Spool(spool)
-    with posting(to, mqtt, token_file, ca) as post:
+    broker = None if mqtt is None else broker_of(mqtt, ca, mqtt_user, mqtt_password_file)
+    with posting(to, broker, token_file, ca) as post:
         send_now = partial(send_all, kept, post, wait)
         if not every:
             for folder in folders or []:
@@ -186,6 +225,46 @@ def upload(
         with suppress(KeyboardInterrupt):
             for sent in rounds(partial(lookout.spool, kept), send_now, every):
                 typer.echo(sent)
+
+
+@fleet.command("drive")
+def drive_one(
+    to: Annotated[str, typer.Option(help="Address of the fleet.")],
+    token_file: TokenFile,
+    orders_key: Annotated[Path, typer.Option(help="DATA/keys/orders.pub of the fleet, pinned.")],
+    out: Annotated[Path, typer.Option(help="A new folder for the recording and its monitor.")],
+    route: Annotated[str, typer.Option(help="One of the six routes.")] = "route-1",
+    seconds: Annotated[float, typer.Option(min=1.0, max=36000.0, help="Of the drive.")] = 60.0,
+    seed: Annotated[int, typer.Option(help="Of the drive.")] = 0,
+    ca: Annotated[Path | None, typer.Option(help="PEM of the authority that is trusted.")] = None,
+) -> None:
+    """Drive a simulated vehicle that raises alerts as its monitor finds hazards, and obeys orders.
+
+    At real time, by three channels. What the monitor found lies in OUT/drive.monitor, for `upload`.
+    """
+    from msgspec import structs
+
+    from skidpad.campaign.channel_routes import driven_routes
+    from skidpad.core.errors import require_choice
+    from skidpad.recording.files import require_free
+
+    with fleet_extra():
+        from skidpad.cli.fleet_drive import PATIENCE_S, drive_aboard
+        from skidpad.fleet.aboard import Aboard, pinned_key
+    chosen = driven_routes()[require_choice("--route", route, [*driven_routes()])]
+    public = pinned_key(orders_key)
+    require_free(out)
+    with client(to, token_file, ca) as link:
+        link.timeout = PATIENCE_S
+        aboard = Aboard(link, public, typer.echo)
+        out.mkdir(parents=True, exist_ok=True)
+        spec = structs.replace(chosen, duration=seconds, seed=seed)
+        outcome, watched = drive_aboard(spec, out, aboard)
+    typer.echo(
+        f"{outcome.driven_s:.1f} s, {outcome.distance_m:.0f} m driven; {aboard.raised} alerts raised, "
+        f"{aboard.obeyed} orders obeyed, {aboard.waiting} words that the fleet has not got\n"
+        f"monitor: {watched.sentence}"
+    )
 
 
 @fleet.command()
@@ -271,13 +350,11 @@ def demo(
     stay: Annotated[bool, typer.Option(help="Go on serving the dashboard at the end.")] = True,
 ) -> None:
     """Vehicles drive, report, and get a good and a bad update; ends with the dashboard's address."""
-    from skidpad.core.errors import OutputError
+    from skidpad.recording.files import require_free
 
     with fleet_extra():
         from skidpad.cli.fleet_demo import Demo, enrolled, play, pool, serving
-    if out.exists() and any(out.iterdir()):
-        raise OutputError(f"--out {out} is not empty; give a new folder")
-    maker, operator, cars = enrolled(out, vehicles)
+    maker, operator, cars = enrolled(require_free(out), vehicles)
     with serving(out / "data", port) as address, pool(workers) as drives:
         story = Demo(out, address, maker, cars, seconds, drives, typer.echo)
         for one in play(story):

@@ -16,8 +16,9 @@ import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -155,7 +156,9 @@ class Demo:
         headers = {"Authorization": f"Bearer {car.token}"}
         root = (self.out / "offline" / "root.json").read_bytes()
         with httpx.Client(base_url=self.address, headers=headers, trust_env=False) as client:
-            path = UpdateClient(car.folder / "updates", root, client.get).fetch(name)
+            path = UpdateClient(car.folder / "updates", root, partial(client.stream, "GET")).fetch(
+                name
+            )
         if path.read_bytes() != self.payloads[name]:
             raise BackendError(f"{car.name} fetched another update than was signed")
 
@@ -193,12 +196,15 @@ class Demo:
         release = self.call(self.maker, "POST", "/api/v1/releases", order).json()["release"]
         self.payloads[payload_name(PayloadKind.RULES, content)] = content
         before = self.payloads[self.releases()[-1]["before"]]
+        said, state = 0, dict[str, Any]()
         for _ in range(ROUNDS_MAX):
             self.round(release)
-            told = self.call(self.maker, "POST", f"/api/v1/releases/{release}/look").json()
-            if told["finding"] is not None:
-                self.say(f"  {title}: {_finding(told)}")
-            if told["now"]["ended"]:
+            state = self.looked(release)
+            looks = [e["detail"] for e in state["events"] if e["what"] == "looked"]
+            for finding in looks[said:]:
+                self.say(f"  {title}: {_finding(finding)}")
+            said = len(looks)
+            if state["ended"]:
                 break
         old = {"kind": "rules", "payload": base64.b64encode(before).decode()}
         scenes = self.call(self.maker, "POST", f"/api/v1/changes/{change}/evaluate", old).json()
@@ -206,8 +212,13 @@ class Demo:
         self.say(
             f"  {title}: on the {len(scenes)} scenes behind it {then} errors before, {now} after"
         )
-        ended: dict[str, Any] = told["now"]
-        return ended
+        return state
+
+    def looked(self, release: str) -> dict[str, Any]:
+        """The release after a look; the service looks by itself too, and it may have ended meanwhile."""
+        with suppress(BackendError):
+            self.call(self.maker, "POST", f"/api/v1/releases/{release}/look")
+        return next(r for r in self.releases() if r["release"] == release)
 
     def signed(self, content: bytes) -> bytes:
         """Off line: two of the three keys sign the list with the new update."""
@@ -235,8 +246,7 @@ def pool(workers: int) -> Iterator[Callable[[list[Job]], list[tuple[int, int]]]]
         yield lambda jobs: list(running.map(drive, jobs))
 
 
-def _finding(told: dict[str, Any]) -> str:
-    f = told["finding"]
+def _finding(f: dict[str, Any]) -> str:
     return (
         f"{f['decision']} after {f['drives']} drives, {f['mean']:+.2f} errors per drive, "
         f"p worse {f['p_worse']:.2g}, p no worse {f['p_no_worse']:.2g} ({f['reason']})"

@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     import httpx
+    from sqlalchemy import Connection
 
     from skidpad.fleet.alerting.relays import Relay
     from skidpad.fleet.broker import Broker
     from skidpad.fleet.service import Places
+    from skidpad.fleet.site.dashboard import MapLines
+    from skidpad.fleet.site.drawing import Line
     from skidpad.fleet.uploader import Post
+    from skidpad.roads.queries import RoadMap
 
 
 @contextmanager
@@ -30,6 +33,19 @@ def fleet_extra() -> Iterator[None]:
         raise MissingExtra("skidpad fleet", "fleet") from error
 
 
+@contextmanager
+def committing(places: Places) -> Iterator[Connection]:
+    """The store of a fleet for one piece of work, which is kept whole or not at all."""
+    from skidpad.fleet.service import open_store
+
+    engine = open_store(places)
+    try:
+        with engine.begin() as connection:
+            yield connection
+    finally:
+        engine.dispose()
+
+
 def relays(
     places: Places, webhooks: list[str], hosts: list[str], broker: Broker | None
 ) -> list[Relay]:
@@ -38,45 +54,47 @@ def relays(
 
     from skidpad.core.errors import ConfigError
     from skidpad.fleet.alerting.relays import Mqtt, Webhook
-    from skidpad.fleet.service import open_store
     from skidpad.fleet.store.accounts import tenant_id
 
     found: list[Relay] = []
     if webhooks:
-        engine = open_store(places)
-        with engine.begin() as connection:
+        with committing(places) as connection:
             for text in webhooks:
                 tenant, equals, url = text.partition("=")
                 if not equals:
                     raise ConfigError(f"--webhook must read TENANT=URL, got {text!r}")
                 found.append(Webhook(tenant_id(connection, tenant, time.time()), url, hosts))
-        engine.dispose()
     if broker is not None:
         found.append(Mqtt(broker))
     return found
 
 
-def broker_of(mqtt: str, ca: Path | None) -> Broker:
-    """ConfigError unless it reads HOST[:PORT]."""
+def broker_of(mqtt: str, ca: Path | None, user: str | None, password: Path | None) -> Broker:
+    """ConfigError unless it reads HOST[:PORT]; password: a file that holds it."""
     from skidpad.core.errors import ConfigError
     from skidpad.fleet.broker import Broker
 
     host, _, port = mqtt.rpartition(":") if ":" in mqtt else (mqtt, "", "1883")
     if not port.isdigit():
         raise ConfigError(f"--mqtt must read HOST[:PORT], got {mqtt!r}")
-    return Broker(host=host, port=int(port), ca=ca)
+    if (user is None) is not (password is None):
+        raise ConfigError("--mqtt-user and --mqtt-password-file go together")
+    word = None if password is None else token_of(password)
+    return Broker(host=host, port=int(port), user=user, password=word, ca=ca)
 
 
 @contextmanager
-def posting(to: str | None, mqtt: str | None, token_file: Path, ca: Path | None) -> Iterator[Post]:
+def posting(
+    to: str | None, broker: Broker | None, token_file: Path, ca: Path | None
+) -> Iterator[Post]:
     """What sends a batch, by HTTPS or through a broker; ConfigError unless exactly one is told."""
     from skidpad.core.errors import ConfigError
     from skidpad.fleet.uploader import mqtt_poster, poster
 
-    if (to is None) is (mqtt is None):
+    if (to is None) is (broker is None):
         raise ConfigError("give one of --to and --mqtt")
-    if mqtt is not None:
-        yield mqtt_poster(broker_of(mqtt, ca), token_of(token_file))
+    if broker is not None:
+        yield mqtt_poster(broker, token_of(token_file))
     else:
         with client(str(to), token_file, ca) as link:
             yield poster(link)
@@ -85,14 +103,18 @@ def posting(to: str | None, mqtt: str | None, token_file: Path, ca: Path | None)
 def client(to: str, token_file: Path, ca: Path | None) -> httpx.Client:
     """A client with a credential; one sentence for an address or file that cannot be used."""
     import ssl
+    from urllib.parse import urlsplit
 
     from skidpad.core.errors import ConfigError, FileError
+    from skidpad.pages.server import is_local
 
     with fleet_extra():
         import httpx
 
         from skidpad.fleet.uploader import TIMEOUT_S
-    if not to.startswith(("https://", "http://127.0.0.1", "http://localhost")):
+    parts = urlsplit(to)
+    host = parts.hostname or ""
+    if not (parts.scheme == "https" or (parts.scheme == "http" and is_local(host))) or "@" in to:
         raise ConfigError(f"--to must be https://, or http:// on this machine, got {to!r}")
     try:
         verify = ssl.create_default_context(cafile=str(ca) if ca else None)
@@ -114,19 +136,30 @@ def token_of(file: Path) -> str:
         raise FileError(f"{file}: cannot be read as a credential ({error})") from error
 
 
-@cache
-def map_lines(name: str) -> list[list[tuple[float, float]]]:
-    """Middles of the lanes of a bundled map, every third point; nothing for another map."""
-    from skidpad.core.errors import InputError
+def map_lines(folder: Path | None) -> MapLines:
+    """Roads of a map by its name: those of the OpenDRIVE files in `folder`, else of bundled maps.
+
+    FileError for what is no folder, InputError for a file in it that cannot be read.
+    """
+    from skidpad.core.errors import FileError
     from skidpad.roads.bundled import bundled_maps, load_map
 
-    try:
-        map = load_map(name) if name in bundled_maps() else None
-    except InputError:
-        map = None
-    if map is None:
-        return []
-    found = []
+    if folder is not None and not folder.is_dir():
+        raise FileError(f"--maps {folder}: there is no such folder")
+    files = sorted(folder.glob("*.xodr")) if folder is not None else []
+    found = {file.stem: _lines_of(load_map(file)) for file in files}
+
+    def lines(name: str) -> Sequence[Line]:
+        if name not in found and name in bundled_maps():
+            found[name] = _lines_of(load_map(name))
+        return found.get(name, ())
+
+    return lines
+
+
+def _lines_of(map: RoadMap) -> list[Line]:
+    """Middles of its lanes, every third point."""
+    found: list[Line] = []
     for first, size in zip(map.lanes.first.tolist(), map.lanes.size.tolist(), strict=True):
         rows = [*range(first, first + size, 3), first + size - 1]
         found.append([(float(map.samples.x[i]), float(map.samples.y[i])) for i in rows])

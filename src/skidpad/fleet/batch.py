@@ -7,7 +7,7 @@ reader that takes nothing on trust (`recording.hazard_text_reader`).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -58,7 +58,7 @@ class Found:
     """One record of a batch."""
 
     head: Head
-    text: str  # the head as it was sent, JSON
+    text: str  # the head as it was understood, JSON: what nobody asked for is in the body alone
     digest: str
     start: int  # byte of the unpacked batch
     size: int
@@ -138,7 +138,7 @@ def _record(text: bytes, start: int, number: int) -> Found:
         raise Refused(422, f"record {number} has an unreadable head ({error})") from error
     _check(head, number)
     x, y = _place(head, text)
-    return Found(head, line[2:].decode("ascii"), digest(text), start, len(text), x, y)
+    return Found(head, msgspec.json.encode(head).decode(), digest(text), start, len(text), x, y)
 
 
 def _check(head: Head, number: int) -> None:
@@ -148,8 +148,13 @@ def _check(head: Head, number: int) -> None:
         raise Refused(422, f"record {number}: its numbers must lie within {NUMBER_MAX:g}")
     words = [head.id, *head.channels, *head.context, *head.context.values(), *head.extremes]
     most = max(len(head.context), len(head.extremes), len(head.channels), len(head.objects))
-    if most > WORDS_MAX or max(map(len, words)) > 200:
+    if most > WORDS_MAX or not _are_words(words):
         raise Refused(422, f"record {number}: at most {WORDS_MAX} words of 200 characters each")
+
+
+def _are_words(words: Iterable[str]) -> bool:
+    """Whether each can be kept in a column; PostgreSQL keeps no NUL."""
+    return all(len(word) <= 200 and "\0" not in word for word in words)
 
 
 def _place(head: Head, text: bytes) -> tuple[float, float]:
@@ -173,9 +178,14 @@ def drive_of(content: bytes) -> Drive:
         raise Refused(422, f"the drive has an unreadable summary ({error})") from error
     if not 0.0 <= drive.seconds <= 1.0e6 or len(drive.context) > WORDS_MAX:
         raise Refused(422, f"a drive lasts 0 to 1e6 s, this one {drive.seconds:g}")
-    if any(len(v) > 200 for v in (drive.release, *drive.context, *drive.context.values())):
+    if not _are_words((drive.release, *drive.context, *drive.context.values())):
         raise Refused(422, "a drive's words have at most 200 characters")
     return drive
+
+
+def drive_text(drive: Drive) -> str:
+    """A drive as it is kept: what was understood of its summary; the body holds all of it."""
+    return msgspec.json.encode(drive).decode()
 
 
 def rows_of(content: bytes, limits: Limits) -> list[IndicatorRow]:

@@ -14,6 +14,7 @@ from skidpad.pages.server import is_local
 
 TOPIC = "skidpad/batches"  # and the kind of a batch
 ANSWERS = "skidpad/answers"  # and a name that the vehicle draws
+ANSWER_MAX = 1024 * 1024  # bytes of a receipt: 2000 ids and room
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -40,13 +41,20 @@ def library() -> ModuleType:
     return aiomqtt
 
 
-def connected(broker: Broker, timeout_s: float) -> AbstractAsyncContextManager[Any]:
-    """A connection as MQTT 5."""
+def connected(
+    broker: Broker, timeout_s: float, largest: int = ANSWER_MAX, waiting: int = 1
+) -> AbstractAsyncContextManager[Any]:
+    """A connection as MQTT 5.
+
+    largest: bytes of a message that the broker may pass on. waiting: messages kept until looked at.
+    """
     aiomqtt = library()
     tls = None if broker.ca is None else ssl.create_default_context(cafile=str(broker.ca))
     client: AbstractAsyncContextManager[Any] = aiomqtt.Client(
         broker.host, broker.port, username=broker.user, password=broker.password,
         timeout=timeout_s, protocol=aiomqtt.ProtocolVersion.V5, tls_context=tls,
+        properties=_properties("CONNECT", MaximumPacketSize=largest),
+        max_queued_incoming_messages=waiting,
     )  # fmt: skip
     return client
 
@@ -60,11 +68,15 @@ def request_properties(answer_to: str, told: dict[str, str]) -> Any:
 
 def properties(**values: Any) -> Any:
     """MQTT 5 properties of a message, by name."""
+    return _properties("PUBLISH", **values)
+
+
+def _properties(packet: str, **values: Any) -> Any:
     from paho.mqtt.packettypes import PacketTypes
     from paho.mqtt.properties import Properties
 
     kind: Any = Properties
-    found = kind(PacketTypes.PUBLISH)
+    found = kind(getattr(PacketTypes, packet))
     for name, value in values.items():
         setattr(found, name, value)
     return found

@@ -13,7 +13,7 @@ from cryptography.hazmat.primitives.asymmetric import ec
 from cryptography.x509.oid import NameOID
 
 from skidpad.core.errors import OutputError
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import write_bytes, write_secret
 
 VALID = timedelta(days=365)
 SKEW = timedelta(hours=1)  # a vehicle's clock may be behind
@@ -37,8 +37,7 @@ def make_certificates(folder: Path, hosts: Sequence[str]) -> list[Path]:
     ), ca_key)  # fmt: skip
     contents = (_pem(authority), _secret(ca_key), _pem(server), _secret(key))
     for name, content in zip(names, contents, strict=True):
-        write_bytes(folder / name, content)
-        (folder / name).chmod(0o600 if name.endswith(".key") else 0o644)
+        (write_secret if name.endswith(".key") else write_bytes)(folder / name, content)
     return [folder / name for name in names]
 
 

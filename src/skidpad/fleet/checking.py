@@ -9,7 +9,7 @@ from typing import Any
 from skidpad.fleet.batch import drive_of, hazards_of, rows_of
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.accounts import vehicle_row
-from skidpad.fleet.store.intake import Batch, summary_text
+from skidpad.fleet.store.intake import Batch
 from skidpad.fleet.unpacking import unpack
 from skidpad.fleet.words import Kind, Principal
 
@@ -34,9 +34,7 @@ def checked(fleet: Fleet, who: Principal, told: Told, body: bytes) -> Batch:
     operator, manufacturer = owners_of(fleet, str(who.vehicle))
     readers: dict[Kind, Callable[[], dict[str, Any]]] = {
         Kind.HAZARDS: lambda: {"found": hazards_of(content, fleet.limits)},
-        Kind.DRIVE: lambda: {
-            "summary": drive_of(content), "summary_text": summary_text(content),
-        },
+        Kind.DRIVE: lambda: {"summary": drive_of(content)},
         Kind.INDICATORS: lambda: {"found": ()} if rows_of(content, fleet.limits) else {},
     }  # fmt: skip
     return Batch(

@@ -18,13 +18,16 @@ from typing import Any
 
 from skidpad.core.errors import SkidpadError
 from skidpad.fleet.api.guard import Guard
-from skidpad.fleet.broker import TOPIC, Broker, connected, library, properties
+from skidpad.fleet.broker import ANSWERS, TOPIC, Broker, connected, library, properties
 from skidpad.fleet.checking import DRIVE, KEY, TIME_MAX, Told, checked
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.intake import plain
 from skidpad.fleet.words import Action, Kind, Refused
 
 AT_ONCE = 64  # batches that are looked at before one of them is answered
+WAITING = 128  # batches that wait to be looked at; what comes beyond is lost and sent again
+ROOM = 65536  # bytes of a message besides its body
+ANSWER = f"{ANSWERS}/[0-9a-f]{{32}}"  # where vehicles wait
 AGAIN_S = 2.0  # until a broker that went away is tried again
 log = logging.getLogger(__name__)
 
@@ -64,7 +67,9 @@ class BatchListener:
         failures = (library().MqttError, OSError, TimeoutError)
         while True:
             try:
-                async with connected(self.broker, self.timeout_s) as client:
+                async with connected(
+                    self.broker, self.timeout_s, self.fleet.limits.body + ROOM, WAITING
+                ) as client:
                     await client.subscribe(f"{TOPIC}/+", qos=1)
                     self.listening.set()
                     await self._serve(client)
@@ -83,9 +88,9 @@ class BatchListener:
             task.add_done_callback(lambda _: free.release())
 
     async def _answer(self, client: Any, message: Any) -> None:
-        where = getattr(message.properties, "ResponseTopic", None)
+        where = str(getattr(message.properties, "ResponseTopic", ""))
         status, content = await self._taken(message)
-        if where is None:
+        if not re.fullmatch(ANSWER, where):  # else anybody could have the fleet publish anywhere
             return
         about = properties(CorrelationData=getattr(message.properties, "CorrelationData", b""))
         answer = json.dumps({"status": status, "content": content})
@@ -120,7 +125,7 @@ def _told(topic: str, told: dict[str, str]) -> Told:
     kind, key, drive = topic.rpartition("/")[2], told.get("key", ""), told.get("drive", "")
     if kind not in {k.value for k in Kind}:
         raise Refused(422, f"the topic must end with one of: {', '.join(k.value for k in Kind)}")
-    if not re.match(KEY, key) or not re.match(DRIVE, drive):
+    if not re.fullmatch(KEY, key) or not re.fullmatch(DRIVE, drive):
         raise Refused(422, f"key must match {KEY} and drive {DRIVE}")
     try:
         time = float(told["time"]) if "time" in told else None

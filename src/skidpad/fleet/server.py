@@ -19,6 +19,7 @@ from skidpad.pages.server import bound, host_headers
 from skidpad.pages.sessions import Sessions
 
 CLOSING_S = 10  # s that open requests get when the server ends
+INVITED_S = 3600.0  # that an address of `fleet open` waits to be opened; assumption
 FREE = ("/api/",)  # paths that check credentials of their own
 
 
@@ -37,7 +38,7 @@ def run(fleet: Fleet, listen: Listen, lines: MapLines, say: Callable[[str], None
     """Serve until a signal ends it."""
     one = bound(listen.host, listen.port)
     port = int(one.getsockname()[1])
-    sessions = Sessions()
+    sessions = Sessions(INVITED_S)
     door = Door(
         hosts=host_headers(listen.host, port, listen.names),
         cookie=f"skidpad-{port}",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 from sqlalchemy import Engine
@@ -15,13 +16,15 @@ from skidpad.fleet.alerting.hub import Hub
 from skidpad.fleet.alerting.orders import Signer
 from skidpad.fleet.alerting.relays import Relay
 from skidpad.fleet.blobs import Blobs
+from skidpad.fleet.rate import Rate
 from skidpad.fleet.store.engine import migrate, open_engine, sqlite_url
-from skidpad.fleet.store.intake import Intake
+from skidpad.fleet.store.intake import Batch, Intake
 from skidpad.fleet.updates.repository import Repository
 from skidpad.fleet.warehouse import Warehouse
 from skidpad.fleet.words import Limits
 from skidpad.recording.hazards import HazardRecord
 
+CAME = "came"  # topic, with a tenant: something new of its vehicles
 Clock = Callable[[], float]  # s since 1970
 Exporter = Callable[[HazardRecord, Path], tuple[Path, Path]]  # writes scenario and road
 
@@ -48,7 +51,8 @@ class Fleet:
     dispatcher: Dispatcher
     signer: Signer
     warehouse: Warehouse
-    limits: Limits = field(default_factory=Limits)
+    limits: Limits
+    rate: Rate  # of all links together
     exporter: Exporter | None = None  # handed in: this house knows no scenarios
     owners: dict[str, tuple[str, str]] = field(default_factory=dict)  # tenants of a vehicle: facts
 
@@ -76,22 +80,29 @@ def open_fleet(
     relays: Sequence[Relay] = (),
 ) -> Fleet:
     """Open the store at `places`, made or brought to this version where needed."""
-    engine = open_store(places)
+    engine, limits = open_store(places), limits or Limits()
     blobs = Blobs(places.blobs or str(places.data.absolute() / "blobs"))
     hub = Hub()
     return Fleet(
         data=places.data,
         engine=engine,
         blobs=blobs,
-        intake=Intake(engine, blobs, clock),
+        intake=Intake(engine, blobs, clock, partial(_tell, hub)),
         clock=clock,
         hub=hub,
         dispatcher=Dispatcher(engine, hub, clock, relays),
         signer=Signer(places.data / "keys"),
         warehouse=Warehouse(places.data / "trends.duckdb"),
-        limits=limits or Limits(),
+        limits=limits,
+        rate=Rate(limits.requests_per_s, limits.burst),
         exporter=exporter,
     )
+
+
+def _tell(hub: Hub, batch: Batch) -> None:
+    """Who owns the vehicle of a batch may want to look."""
+    for tenant in {batch.operator, batch.manufacturer}:
+        hub.tell(f"{CAME} {tenant}")
 
 
 def open_store(places: Places) -> Engine:
@@ -99,7 +110,7 @@ def open_store(places: Places) -> Engine:
     if places.data.exists() and not places.data.is_dir():
         raise OutputError(f"--data {places.data} is a file; the fleet's store is a folder")
     try:
-        places.data.mkdir(parents=True, exist_ok=True)
+        places.data.mkdir(mode=0o700, parents=True, exist_ok=True)
     except OSError as error:
         raise OutputError(f"{places.data}: cannot be written ({error.strerror})") from error
     engine = open_engine(places.database or sqlite_url(places.data))

@@ -1,20 +1,24 @@
-"""What the service does by itself: trends kept current, recurring hazards looked for when some came."""
+"""What the service does by itself: trends, looks at releases under way, a search for recurring hazards."""
 
 from __future__ import annotations
+
+from contextlib import suppress
 
 from sqlalchemy import select
 
 from skidpad.fleet.insight.trends import compact
-from skidpad.fleet.patterns.analysis import SERVICE, analyse
+from skidpad.fleet.loop.rollout import look_at, under_way
+from skidpad.fleet.patterns.analysis import SERVICE, analyse, own
 from skidpad.fleet.rounds import Rounds
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.later import analyses
 from skidpad.fleet.store.rights import visible
 from skidpad.fleet.store.tables import hazards, vehicles
-from skidpad.fleet.words import Principal, Role
+from skidpad.fleet.words import Principal, Refused, Role
 
 LOOK_S = 5.0  # between two rounds: what came shows within 10 s
 REST_S = 60.0  # at least, from one analysis of a tenant to its next
+LOOKER = "upkeep"  # actor of looks that nobody asked for
 OWNERS = ((Role.OPERATOR, vehicles.c.operator), (Role.MANUFACTURER, vehicles.c.manufacturer))
 
 
@@ -34,11 +38,21 @@ class Upkeep:
         self._rounds.close()
 
     def work(self) -> None:
-        """Sum up what came; analyse each tenant that has hazards newer than its last analysis."""
+        """Sum up what came; look at releases; analyse whoever has hazards newer than the last analysis."""
         compact(self.fleet)
+        self._look()
         for who in self._tenants():
             if self._due(who) and not self._rounds.ended.is_set():
                 analyse(self.fleet, who)
+
+    def _look(self) -> None:
+        """A bad update is taken back without anybody asking."""
+        with self.fleet.engine.connect() as connection:
+            found = under_way(connection)
+        for tenant, release in found:
+            who = Principal(LOOKER, tenant, Role.MANUFACTURER, LOOKER)
+            with suppress(Refused):  # a person or another process looked at the same moment
+                look_at(self.fleet, who, release)
 
     def _tenants(self) -> list[Principal]:
         """The service in the place of everyone who owns a vehicle."""
@@ -54,10 +68,7 @@ class Upkeep:
     def _due(self, who: Principal) -> bool:
         with self.fleet.engine.connect() as connection:
             last = connection.execute(
-                select(analyses.c.at)
-                .where(analyses.c.tenant == who.tenant)
-                .order_by(analyses.c.at.desc())
-                .limit(1)
+                select(analyses.c.at).where(own(who)).order_by(analyses.c.at.desc()).limit(1)
             ).scalar()
             if last is not None and self.fleet.clock() - last < REST_S:
                 return False

@@ -105,6 +105,8 @@ class Refused(SkidpadError):
         self.status = status
 
 
+MEANWHILE = "this was being kept at the same time"
+UNKEPT = "it holds a character or number that cannot be kept"
 NOT_THERE = "there is no such thing here"  # also of what is another tenant's
 
 

@@ -119,7 +119,7 @@ def bound(host: str, port: int) -> socket.socket:
         found.close()
         if error.errno == errno.EADDRINUSE:
             raise ConfigError(
-                f"port {port} of {host} is in use: give another one, or --port 0 for any free one"
+                f"port {port} of {host} is in use: give another one, or 0 for any free one"
             ) from error
         raise ConfigError(f"cannot serve on {host}, port {port}: {error.strerror}") from error
     return found

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import secrets
 import threading
+import time
+from collections.abc import Callable
+from math import inf
 
 BYTES = 32  # of a token, 256 bits
 
@@ -11,27 +14,39 @@ BYTES = 32  # of a token, 256 bits
 class Sessions:
     """Invitations that were not used yet, and sessions that came of others. Safe between threads."""
 
-    def __init__(self) -> None:
+    def __init__(self, valid_s: float = inf, clock: Callable[[], float] = time.monotonic) -> None:
+        """valid_s: of an invitation that nobody used; a session ends by `end` alone."""
         self._lock = threading.Lock()
-        self._invited: dict[str, str] = {}  # token: who
+        self._valid_s, self._clock = valid_s, clock
+        self._invited: dict[str, tuple[str, float]] = {}  # token: who, since when
         self._admitted: dict[str, str] = {}  # id of the session, kept in a cookie: who
 
     def invite(self, who: str) -> str:
         """A token for `who`; it opens one session."""
         token = secrets.token_urlsafe(BYTES)
         with self._lock:
-            self._invited[token] = who
+            self._forget()
+            self._invited[token] = who, self._clock()
         return token
 
     def admit(self, token: str) -> str | None:
         """The id of a fresh session for a token, which is worth nothing from now on."""
         with self._lock:
-            who = self._invited.pop(token, None)
-            if who is None:
+            self._forget()
+            invited = self._invited.pop(token, None)
+            if invited is None:
                 return None
             id = secrets.token_urlsafe(BYTES)
-            self._admitted[id] = who
+            self._admitted[id] = invited[0]
         return id
+
+    def _forget(self) -> None:
+        oldest = self._clock() - self._valid_s
+        self._invited = {t: one for t, one in self._invited.items() if one[1] >= oldest}
+
+    def __len__(self) -> int:
+        """Invitations that may still be used."""
+        return len(self._invited)
 
     def who(self, id: str | None) -> str | None:
         """Whose session this is; None: nobody's."""

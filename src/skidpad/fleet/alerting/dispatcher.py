@@ -1,8 +1,12 @@
-"""Relays alerts as they come, tries again what failed, and escalates what nobody took up."""
+"""Relays alerts as they come, tries again what failed, and escalates what nobody took up.
+
+Every relay has a thread of its own, so that one that does not answer delays no other.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 from sqlalchemy import Engine
 
@@ -20,29 +24,42 @@ SERVICE = "dispatcher"
 
 
 class Dispatcher:
-    """One thread; `work` is one round of it, and tests call it themselves."""
+    """`work` is one round of all threads, and tests call it themselves."""
 
     def __init__(
         self, engine: Engine, hub: Hub, clock: Callable[[], float], relays: Sequence[Relay] = ()
     ) -> None:
         self.engine, self.hub, self.clock, self.relays = engine, hub, clock, tuple(relays)
-        self._rounds = Rounds("dispatcher", self.work, LOOK_S)
+        self._rounds: list[Rounds] = []
 
     def start(self) -> None:
         """Begin to look after alerts."""
-        self._rounds.start()
+        self._rounds = [Rounds("escalation", self.escalate, LOOK_S)]
+        self._rounds += [Rounds(r.name, partial(self.relay, r), LOOK_S) for r in self.relays]
+        for one in self._rounds:
+            one.start()
 
     def wake(self) -> None:
         """There is something new."""
-        self._rounds.wake()
+        for one in self._rounds:
+            one.wake()
 
     def close(self) -> None:
         """End the thread; safe to call twice."""
-        self._rounds.close()
+        for one in self._rounds:
+            one.ended.set()
+        for one in self._rounds:
+            one.close()
 
     def work(self) -> None:
-        """Escalate what is overdue, then relay what is not relayed at its level."""
-        now = self.clock()
+        """Escalate, then relay to each."""
+        self.escalate()
+        for relay in self.relays:
+            self.relay(relay)
+
+    def escalate(self) -> None:
+        """One level up for what is overdue."""
+        now, up = self.clock(), False
         with self.engine.begin() as connection:
             for alert in alerts_since(connection, now - DAY):
                 if overdue(alert, now):
@@ -50,12 +67,18 @@ class Dispatcher:
                         connection, (SUBJECT, alert.row.id), What.ESCALATED.value, (SERVICE, now)
                     )
                     self.hub.tell(f"alerts {alert.row.operator}")
+                    up = True
+        if up:
+            self.wake()
+
+    def relay(self, relay: Relay) -> None:
+        """Send what `relay` was not sent at its level."""
+        now = self.clock()
         with self.engine.connect() as connection:
             known = alerts_since(connection, now - DAY)
         for alert in known:
-            for relay in self.relays:
-                if relay.wants(alert.row.operator) and _is_due(alert, relay.name, now):
-                    self._send(alert, relay)
+            if relay.wants(alert.row.operator) and _is_due(alert, relay.name, now):
+                self._send(alert, relay)
 
     def _send(self, alert: Alert, relay: Relay) -> None:
         what, reason = What.RELAYED, ""

@@ -21,10 +21,10 @@ from sqlalchemy.exc import IntegrityError
 from skidpad.core.errors import FileError
 from skidpad.fleet.alerting.keeping import alert_of
 from skidpad.fleet.identity import new_id
-from skidpad.fleet.store.events import add_event
+from skidpad.fleet.store.events import add_event, events_of
 from skidpad.fleet.store.later import deliveries, orders
 from skidpad.fleet.store.rights import visible
-from skidpad.fleet.words import Principal, absent
+from skidpad.fleet.words import Principal, Refused, absent
 from skidpad.recording.files import write_bytes
 
 VALID_S = 2.0
@@ -84,17 +84,29 @@ class Ordered:
 
 
 def give_order(
-    connection: Connection, who: Principal, alert: str, what: Order, at: float
+    connection: Connection, who: Principal, alert: str, asked: tuple[Order, str], at: float
 ) -> Ordered:
-    """Order something of the vehicle of an alert; Refused (404) when `who` may not see the alert."""
+    """Order something of the vehicle of an alert; Refused (404) when `who` may not see the alert.
+
+    asked: the order and the key of the request. The same request again gives the order that it gave,
+    with its time: nothing is ordered anew.
+    """
+    what, key = asked
     row = alert_of(connection, who, alert).row
+    known = connection.execute(
+        select(orders).where(orders.c.alert == alert, orders.c.actor == who.id, orders.c.key == key)
+    ).first()
+    if known is not None:
+        if known.what != what.value:
+            raise Refused(409, "this idempotency key was used for another order")
+        return Ordered(known.id, known.vehicle, known.expires)
     order = Ordered(new_id(), row.vehicle, at + VALID_S)
     connection.execute(
         orders.insert(),
         {
             "id": order.id, "operator": row.operator, "manufacturer": row.manufacturer,
             "vehicle": row.vehicle, "alert": alert, "what": what.value, "actor": who.id,
-            "expires": order.expires, "at": at,
+            "expires": order.expires, "at": at, "key": key,
         },
     )  # fmt: skip
     add_event(connection, ("alert", alert), f"{what.value} ordered", (who.id, at), order=order.id)
@@ -132,12 +144,14 @@ def hand_out(
 
 
 def note_answer(connection: Connection, who: Principal, order: str, what: str, at: float) -> str:
-    """Keep what the vehicle did with its order; the id of the alert that led to it."""
+    """Keep what the vehicle did with its order, once; the id of the alert that led to it."""
     row = connection.execute(
         select(orders).where(orders.c.id == order, visible(who, orders))
     ).first()
     if row is None:
         raise absent()
+    if events_of(connection, [order]):
+        raise Refused(409, "what became of this order was told already")
     add_event(connection, (SUBJECT, order), what, (who.id, at))
     add_event(connection, ("alert", row.alert), what, (who.id, at), order=order)
     return str(row.alert)

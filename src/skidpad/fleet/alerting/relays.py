@@ -12,9 +12,10 @@ import httpx
 
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.fleet.broker import Broker, connected, library
+from skidpad.fleet.identity import digest
 from skidpad.pages.server import is_local
 
-TIMEOUT_S = 5.0  # of a webhook and of a broker
+TIMEOUT_S = 5.0  # of a webhook and of a broker, until its word is there
 
 
 class Relay(Protocol):
@@ -45,23 +46,30 @@ class Webhook:
         if parts.scheme != "https" and not (parts.scheme == "http" and is_local(host)):
             raise ConfigError(f"--webhook {url!r} must be https")
         self.operator, self.url, self.timeout_s = operator, url, timeout_s
-        self.name = f"webhook {host}"
+        self.name = f"webhook {host} {digest(url.encode())[:8]}"  # a host may have several
 
     def wants(self, operator: str) -> bool:
         """Only its own operator's alerts."""
         return operator == self.operator
 
     def send(self, alert: dict[str, Any]) -> None:
-        """One POST of JSON."""
+        """One POST of JSON; who answers drop by drop is given up like who does not answer."""
         try:
-            with httpx.Client(
-                timeout=self.timeout_s, follow_redirects=False, trust_env=False
-            ) as client:
-                answer = client.post(self.url, json=alert)
-        except httpx.HTTPError as error:
+            status = asyncio.run(asyncio.wait_for(self._post(alert), self.timeout_s))
+        except (httpx.HTTPError, asyncio.TimeoutError) as error:
             raise BackendError(f"{self.name}: {type(error).__name__}") from error
-        if not 200 <= answer.status_code < 300:
-            raise BackendError(f"{self.name}: answered {answer.status_code}")
+        if not 200 <= status < 300:
+            raise BackendError(f"{self.name}: answered {status}")
+
+    async def _post(self, alert: dict[str, Any]) -> int:
+        """The status of the answer; nothing else of it is read."""
+        async with (
+            httpx.AsyncClient(
+                timeout=self.timeout_s, follow_redirects=False, trust_env=False
+            ) as client,
+            client.stream("POST", self.url, json=alert) as answer,
+        ):
+            return answer.status_code
 
 
 class Mqtt:

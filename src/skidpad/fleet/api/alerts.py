@@ -99,15 +99,15 @@ def answered(fleet: Fleet, who: Principal, alert: str, what: What) -> dict[str, 
 
 
 @router.post("/{alert}/order/{to}")
-def order(request: Request, who: Teleoperator, alert: str, to: Order) -> dict[str, Any]:
+def order(request: Request, who: Teleoperator, alert: str, to: Order, key: Key) -> dict[str, Any]:
     """Order the vehicle to stop, slow down or go on; void unless it is fetched within 2 s."""
-    return ordered(fleet_of(request), who, alert, to)
+    return ordered(fleet_of(request), who, alert, (to, key))
 
 
-def ordered(fleet: Fleet, who: Principal, alert: str, what: Order) -> dict[str, Any]:
-    """Give an order and tell the vehicle that waits."""
+def ordered(fleet: Fleet, who: Principal, alert: str, asked: tuple[Order, str]) -> dict[str, Any]:
+    """Give an order (what, and the request's key) and tell the vehicle that waits."""
     with fleet.engine.begin() as connection:
-        order = give_order(connection, who, alert, what, fleet.clock())
+        order = give_order(connection, who, alert, asked, fleet.clock())
     fleet.hub.tell(f"orders {order.vehicle}")
     fleet.hub.tell(f"alerts {who.tenant}")
     return {"order": order.id, "expires": order.expires}

@@ -2,25 +2,31 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from fastapi import FastAPI, Request
+from fastapi.openapi.utils import get_openapi
 from fastapi.responses import JSONResponse
+from sqlalchemy.exc import DataError, IntegrityError
 
 import skidpad
 from skidpad.core.errors import SkidpadError
 from skidpad.fleet.api import alerts, changes, hazards, insight, orders, patterns, updates, vehicle
 from skidpad.fleet.api.guard import Guard
 from skidpad.fleet.service import Fleet
-from skidpad.fleet.words import Refused
+from skidpad.fleet.words import MEANWHILE, UNKEPT, Refused
 
+DESCRIPTION = "/api/v1/openapi.json"
 ROUTERS = (
     vehicle.router, hazards.router, patterns.router, alerts.router, orders.router,
     updates.router, changes.router, insight.router,
 )  # fmt: skip
+ROUTES = [route for router in ROUTERS for route in router.routes]
 
 
 def make_app(fleet: Fleet) -> FastAPI:
-    """The HTTP interface of `fleet` alone; /openapi.json describes it."""
-    app = FastAPI(title="Skidpad fleet", version=skidpad.__version__, docs_url=None, redoc_url=None)
+    """The HTTP interface of `fleet` alone; `DESCRIPTION` is where it is described."""
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None)
     add_api(app, fleet)
     return app
 
@@ -30,8 +36,16 @@ def add_api(app: FastAPI, fleet: Fleet) -> None:
     app.state.fleet, app.state.guard = fleet, Guard(fleet)
     for router in ROUTERS:
         app.include_router(router)
+
+    @app.get(DESCRIPTION, include_in_schema=False)
+    def description() -> dict[str, Any]:
+        """What can be asked, as OpenAPI; it holds no record and needs no credential."""
+        return get_openapi(title="Skidpad fleet", version=skidpad.__version__, routes=ROUTES)
+
     app.add_exception_handler(Refused, _refused)
     app.add_exception_handler(SkidpadError, _failed)
+    app.add_exception_handler(DataError, _unkept)
+    app.add_exception_handler(IntegrityError, _meanwhile)
 
 
 async def _refused(request: Request, error: Exception) -> JSONResponse:
@@ -45,3 +59,15 @@ async def _failed(request: Request, error: Exception) -> JSONResponse:
     """What was kept cannot be used: one sentence, without a place on disk."""
     del request
     return JSONResponse({"detail": str(error)}, 422)
+
+
+async def _unkept(request: Request, error: Exception) -> JSONResponse:
+    """A word that the database does not take, such as a NUL in PostgreSQL."""
+    del request, error
+    return JSONResponse({"detail": UNKEPT}, 422)
+
+
+async def _meanwhile(request: Request, error: Exception) -> JSONResponse:
+    """Two requests kept the same at one moment, and this one came second."""
+    del request, error
+    return JSONResponse({"detail": MEANWHILE}, 409)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from threading import Lock
 
 from fastapi import Request
 
@@ -16,38 +15,11 @@ REMEMBERED_S = 10.0  # a credential ended by another process is refused after th
 KNOWN_MAX = 100_000  # credentials remembered
 
 
-@dataclass(slots=True)
-class _Bucket:
-    left: float
-    at: float
-
-
-class Rate:
-    """A bucket per credential: so many requests at once, refilled at a lasting rate."""
-
-    def __init__(self, per_s: float, burst: int) -> None:
-        self.per_s, self.burst = per_s, float(burst)
-        self._buckets: dict[str, _Bucket] = {}
-        self._lock = Lock()
-
-    def take(self, who: str, now: float) -> float:
-        """0 when a request is granted, else the seconds until one will be."""
-        with self._lock:
-            bucket = self._buckets.setdefault(who, _Bucket(self.burst, now))
-            gained = max(0.0, now - bucket.at) * self.per_s
-            bucket.left, bucket.at = min(self.burst, bucket.left + gained), now
-            if bucket.left >= 1.0:
-                bucket.left -= 1.0
-                return 0.0
-            return (1.0 - bucket.left) / self.per_s
-
-
 class Guard:
     """Knows credentials for a moment, so that a busy vehicle costs one look-up per second."""
 
     def __init__(self, fleet: Fleet) -> None:
         self.fleet = fleet
-        self.rate = Rate(fleet.limits.requests_per_s, fleet.limits.burst)
         self._known: dict[str, tuple[float, Principal]] = {}
 
     def principal(self, authorization: str | None) -> Principal:
@@ -56,7 +28,7 @@ class Guard:
         if scheme.lower() != "bearer" or not token:
             raise Refused(401, "a credential is needed: Authorization: Bearer TOKEN")
         who = self._look_up(token)
-        wait = self.rate.take(who.id, self.fleet.clock())
+        wait = self.fleet.rate.take(who.id, self.fleet.clock())
         if wait > 0.0:
             raise Refused(429, f"too many requests, wait {wait:.2f} s")
         return who

@@ -15,12 +15,19 @@ from skidpad.fleet.words import Action, Kind, Limits, Principal, Refused
 
 INLINE = 65536  # bytes of a body that is unpacked at once, without a thread
 Reporter = Annotated[Principal, Depends(Needs(Action.REPORT))]
+Receiving = Annotated[Principal, Depends(Needs(Action.RECEIVE_ORDERS))]
 Key = Annotated[str, Header(alias="Idempotency-Key", pattern=KEY)]
 DriveName = Annotated[str, Header(alias="X-Skidpad-Drive", pattern=DRIVE)]
 VehicleTime = Annotated[
     float | None, Header(alias="X-Skidpad-Time", ge=-TIME_MAX, le=TIME_MAX, allow_inf_nan=False)
 ]
 router = APIRouter(prefix="/api/v1", tags=["vehicle"])
+
+
+@router.get("/vehicle")
+async def who_i_am(who: Receiving) -> dict[str, str]:
+    """The vehicle of this credential, as orders name it."""
+    return {"vehicle": str(who.vehicle)}
 
 
 @router.post("/batches/{kind}")

@@ -7,15 +7,16 @@ from dataclasses import dataclass
 from typing import Any
 
 import msgspec
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, exists, select
+from sqlalchemy.exc import IntegrityError
 
 from skidpad.fleet.identity import new_id
 from skidpad.fleet.loop.changes import change_row, evaluations_of, payload_of
 from skidpad.fleet.loop.plan import Decision, Finding, Plan, chosen, look
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.events import Event, add_event, events_of
-from skidpad.fleet.store.loop import changes, releases
-from skidpad.fleet.store.tables import drives, vehicles
+from skidpad.fleet.store.loop import changes, looks, releases
+from skidpad.fleet.store.tables import drives, events, vehicles
 from skidpad.fleet.words import Principal, Refused, absent
 
 SUBJECT = "release"
@@ -127,25 +128,51 @@ def running_on(connection: Connection, one: Rollout) -> frozenset[str]:
     return chosen(one.row.id, ids, one.share)
 
 
+def under_way(connection: Connection) -> list[tuple[str, str]]:
+    """Tenant and id of every release that has not ended, oldest first."""
+    ended = exists().where(
+        events.c.subject == releases.c.id, events.c.what.in_((COMPLETED, REVERTED))
+    )
+    rows = connection.execute(
+        select(releases.c.tenant, releases.c.id)
+        .where(~ended)
+        .order_by(releases.c.at, releases.c.id)
+    )
+    return [(row.tenant, row.id) for row in rows]
+
+
 def look_at(fleet: Fleet, who: Principal, id: str) -> Finding | None:
-    """Look at a release, and advance, revert or wait; None while too little was driven."""
+    """Look at a release, and advance, revert or wait; None while too little was driven.
+
+    Refused (409) when it has ended, or when somebody else takes this look at the same moment.
+    """
     with fleet.engine.begin() as connection:
         one = rollout_of(connection, who.tenant, id)
         if one.ended is not None:
             raise Refused(409, f"this release was {one.ended} already")
         differences, hours = _driven(connection, one)
-        looks = [e for e in one.events if e.what == LOOKED]
-        seen = sum(int(e.detail["new_drives"]) for e in looks)
+        looks_so_far = [e for e in one.events if e.what == LOOKED]
+        seen = sum(int(e.detail["new_drives"]) for e in looks_so_far)
         new = len(differences) - seen
         if new < one.plan.least_drives or hours < one.plan.least_hours * (one.stage + 1):
             return None
-        here = sum(e.detail["stage"] == one.stage for e in looks)
+        here = sum(e.detail["stage"] == one.stage for e in looks_so_far)
         finding = look(differences, one.plan, one.plan.looks - here - 1)
         by = (who.id, fleet.clock())
+        _take(connection, id, len(looks_so_far), by[1])
         told = msgspec.to_builtins(finding) | {"stage": one.stage, "new_drives": new}
         add_event(connection, (SUBJECT, id), LOOKED, by, **told)
         _conclude(connection, one, finding, by)
         return finding
+
+
+def _take(connection: Connection, release: str, number: int, at: float) -> None:
+    """Two who look at once see the same drives: the second one's look would be one too many."""
+    try:
+        with connection.begin_nested():
+            connection.execute(looks.insert(), {"release": release, "number": number, "at": at})
+    except IntegrityError as error:
+        raise Refused(409, "somebody else looks at this release at this moment") from error
 
 
 def _conclude(

@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 import msgspec
-from sqlalchemy import Connection, select
+from sqlalchemy import ColumnElement, Connection, select
 
 from skidpad.core.errors import FileError
 from skidpad.fleet.identity import new_id
@@ -21,7 +21,7 @@ from skidpad.fleet.patterns.clusters import (
     recurring,
 )
 from skidpad.fleet.patterns.series import VERSION, from_plain, series_of, to_plain
-from skidpad.fleet.service import Fleet
+from skidpad.fleet.service import CAME, Fleet
 from skidpad.fleet.store.events import add_event
 from skidpad.fleet.store.later import analyses, clusters, series
 from skidpad.fleet.store.reading import record_of
@@ -53,7 +53,7 @@ def analyse(fleet: Fleet, who: Principal, settings: ClusterSettings = STANDARD) 
         kept = json.dumps(asdict(settings), sort_keys=True)
         row = {
             "id": id, "tenant": who.tenant, "actor": who.id, "settings": kept,
-            "hazards": len(cases), "at": at,
+            "hazards": len(cases), "at": at, "role": who.role.value,
         }  # fmt: skip
         connection.execute(analyses.insert(), row)
         for rank, cluster in enumerate(found):
@@ -68,6 +68,7 @@ def analyse(fleet: Fleet, who: Principal, settings: ClusterSettings = STANDARD) 
         keys = [{"key": list(key), "hazards": ids} for key, ids in list(often.items())[:200]]
         told = {"unreadable": unreadable, "recurring": keys}
         add_event(connection, ("analysis", id), "analysed", (who.id, at), **told)
+    fleet.hub.tell(f"{CAME} {who.tenant}")
     return Analysed(id, len(cases), unreadable, found)
 
 
@@ -114,11 +115,16 @@ def _keep(fleet: Fleet, fresh: dict[str, str]) -> None:
             connection.execute(series.insert(), row | {"at": fleet.clock()})
 
 
+def own(who: Principal) -> ColumnElement[bool]:
+    """True for analyses that looked at what `who` may see: who makes cars may run others."""
+    return (analyses.c.tenant == who.tenant) & (analyses.c.role == who.role.value)
+
+
 def newest_clusters(connection: Connection, who: Principal) -> list[dict[str, Any]]:
-    """The clusters of the tenant's newest analysis, largest first."""
+    """The clusters of the newest analysis by the rights of `who`, largest first."""
     last = connection.execute(
         select(analyses.c.id, analyses.c.at)
-        .where(analyses.c.tenant == who.tenant)
+        .where(own(who))
         .order_by(analyses.c.at.desc(), analyses.c.id)
         .limit(1)
     ).first()
@@ -134,9 +140,11 @@ def newest_clusters(connection: Connection, who: Principal) -> list[dict[str, An
 
 
 def cluster_row(connection: Connection, who: Principal, cluster: str) -> dict[str, Any]:
-    """One cluster of the tenant's own; Refused (404) otherwise."""
+    """One cluster of an analysis by the rights of `who`; Refused (404) otherwise."""
     row = connection.execute(
-        select(clusters).where(clusters.c.id == cluster, clusters.c.tenant == who.tenant)
+        select(clusters)
+        .join(analyses, analyses.c.id == clusters.c.analysis)
+        .where(clusters.c.id == cluster, own(who))
     ).first()
     if row is None:
         raise absent()

@@ -9,6 +9,7 @@ from starlette.requests import Request
 from skidpad.fleet.alerting.keeping import What
 from skidpad.fleet.alerting.orders import Order
 from skidpad.fleet.api.alerts import answered, ordered
+from skidpad.fleet.identity import new_id
 from skidpad.fleet.patterns.analysis import analyse
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.accounts import principal_by_id
@@ -45,7 +46,7 @@ def click_answer(fleet: Fleet, id: str, alert: str, what: What) -> dict[str, Any
 
 def click_order(fleet: Fleet, id: str, alert: str, what: Order) -> dict[str, Any]:
     """Order the vehicle of an alert to stop, slow down or go on."""
-    return ordered(fleet, granted(fleet, id, Action.GUIDE), alert, what)
+    return ordered(fleet, granted(fleet, id, Action.GUIDE), alert, (what, new_id()))
 
 
 def click_analyse(fleet: Fleet, id: str) -> int:

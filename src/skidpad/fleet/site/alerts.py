@@ -29,17 +29,18 @@ ORDERS = {
 }
 
 
-def alerts_of(fleet: Fleet, who: Principal) -> tuple[Principal, list[Alert]]:
-    """Who looks, as long as their credential holds, and the newest alerts that they may see."""
-    now = person(fleet, who.id)
+def alerts_of(fleet: Fleet, who: Principal) -> tuple[int, Principal, list[Alert]]:
+    """What came so far, counted before it is read; who looks, as long as their credential holds; and
+    the newest alerts that they may see.
+    """
+    now, seen = person(fleet, who.id), fleet.hub.count(f"alerts {who.tenant}")
     with fleet.engine.connect() as connection:
-        return now, newest_alerts(connection, now)
+        return seen, now, newest_alerts(connection, now)
 
 
-def draw_alerts(fleet: Fleet, ui: Any, who: Principal, found: list[Alert]) -> None:
+def draw_alerts(fleet: Fleet, ui: Any, seen: int, who: Principal, found: list[Alert]) -> None:
     """The newest alerts; what changes is pushed to the page within half a second."""
     topic = f"alerts {who.tenant}"
-    seen = fleet.hub.count(topic)
 
     @ui.refreshable  # type: ignore[untyped-decorator]
     def cards(now: Principal, known: list[Alert]) -> None:
@@ -49,12 +50,11 @@ def draw_alerts(fleet: Fleet, ui: Any, who: Principal, found: list[Alert]) -> No
 
     async def look() -> None:
         nonlocal seen
-        count = fleet.hub.count(topic)
-        if count == seen:
+        if fleet.hub.count(topic) == seen:
             return
-        seen = count
         try:
-            cards.refresh(*await run_in_threadpool(alerts_of, fleet, who))
+            seen, now, known = await run_in_threadpool(alerts_of, fleet, who)
+            cards.refresh(now, known)
         except Refused as error:
             cards.refresh(who, [])
             ui.label(str(error))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 from fastapi import FastAPI
 from starlette.requests import Request
@@ -26,6 +26,15 @@ from skidpad.pages.sessions import Sessions
 from skidpad.pages.site import site
 
 
+class Page(NamedTuple):
+    """Who may open it, and how it is read and drawn."""
+
+    action: Action
+    title: str
+    read: Callable[[Principal, Request], Any]
+    draw: Callable[[Any, Any], None]
+
+
 def make_site(fleet: Fleet, lines: MapLines, sessions: Sessions) -> FastAPI:
     """Pages and interface; one per process."""
 
@@ -33,24 +42,31 @@ def make_site(fleet: Fleet, lines: MapLines, sessions: Sessions) -> FastAPI:
         add_api(app, fleet)
         app.state.sessions = sessions
 
+    pages = {path: page(fleet, *one) for path, one in pages_of(fleet, lines).items()}
+    return site("Skidpad fleet", pages, routes=routes, style=STYLE)
+
+
+def pages_of(fleet: Fleet, lines: MapLines) -> dict[str, Page]:
+    """Every page by path; there is no other."""
+
     def read(what: Callable[..., Any]) -> Callable[[Principal, Request], Any]:
         return lambda who, _: what(fleet, who)
 
-    pages = {
-        "/": page(
-            fleet, Action.READ_TRENDS, "Fleet",
-            lambda who, _: overview(fleet, lines, who), draw_overview,
+    return {
+        "/": Page(
+            Action.READ_TRENDS, "Fleet",
+            lambda who, _: (who, overview(fleet, lines, who)),
+            lambda ui, found: draw_overview(fleet, lines, ui, *found),
         ),
-        "/replay/{hazard}": page(
-            fleet, Action.READ_HAZARDS, "Replay",
+        "/replay/{hazard}": Page(
+            Action.READ_HAZARDS, "Replay",
             lambda who, request: replayed(fleet, lines, who, request), draw_replay,
         ),
-        "/alerts": page(
-            fleet, Action.READ_ALERTS, "Alerts", read(alerts_of),
+        "/alerts": Page(
+            Action.READ_ALERTS, "Alerts", read(alerts_of),
             lambda ui, found: draw_alerts(fleet, ui, *found),
         ),
-        "/places": page(fleet, Action.READ_PLACES, "Places", read(places_of), draw_places),
-        "/case": page(fleet, Action.READ_SAFETY_CASE, "Safety case", read(case_of), draw_case),
-        "/changes": page(fleet, Action.READ_CHANGES, "Changes", read(changes_of), draw_changes),
+        "/places": Page(Action.READ_PLACES, "Places", read(places_of), draw_places),
+        "/case": Page(Action.READ_SAFETY_CASE, "Safety case", read(case_of), draw_case),
+        "/changes": Page(Action.READ_CHANGES, "Changes", read(changes_of), draw_changes),
     }  # fmt: skip
-    return site("Skidpad fleet", pages, routes=routes, style=STYLE)

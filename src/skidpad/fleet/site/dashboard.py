@@ -6,17 +6,18 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 
 from skidpad.evidence.statistics import interval_text, share_text
 from skidpad.fleet.insight.trends import HazardRate, Trend, hazard_rates, trends
 from skidpad.fleet.patterns.analysis import newest_clusters
-from skidpad.fleet.service import Fleet
-from skidpad.fleet.site.acting import click_analyse
+from skidpad.fleet.service import CAME, Fleet
+from skidpad.fleet.site.acting import click_analyse, person
 from skidpad.fleet.site.drawing import Dot, Line, map_svg, near, replay_svg, trend_svg
 from skidpad.fleet.site.frame import say, table
 from skidpad.fleet.store.reading import Wanted, hazard_row, hazard_rows, record_of
-from skidpad.fleet.words import Principal
+from skidpad.fleet.words import Principal, Refused
 from skidpad.recording.hazards import HazardRecord
 
 MapLines = Callable[[str], Sequence[Line]]  # roads of a map by its name, m
@@ -24,6 +25,7 @@ SHOWN = 6  # trends
 MAPS = 3
 CLUSTERS = 20
 PLAY_S = 0.1
+LOOK_S = 5.0  # between two looks of an open page for what came
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,20 +38,57 @@ class Overview:
     newest: list[dict[str, Any]]
     roads: dict[str, Sequence[Line]]  # of the maps of the newest hazards
     look: Callable[[], int]  # for recurring hazards, as the person who opened the page
+    seen: int  # of what came, counted before it was read
 
 
 def overview(fleet: Fleet, lines: MapLines, who: Principal) -> Overview:
     """Everything that a manufacturer or operator sees at once."""
+    seen = fleet.hub.count(f"{CAME} {who.tenant}")
     found = trends(fleet, who)
     with fleet.engine.connect() as connection:
         rates, clusters = hazard_rates(connection, who), newest_clusters(connection, who)
         newest = hazard_rows(connection, who, Wanted())
     names = list(dict.fromkeys(row["map"] for row in newest if row["map"]))
     roads = {name: lines(name) for name in names[:MAPS]}
-    return Overview(found, rates, clusters, newest, roads, lambda: click_analyse(fleet, who.id))
+    return Overview(
+        found, rates, clusters, newest, roads, lambda: click_analyse(fleet, who.id), seen
+    )
 
 
-def draw_overview(ui: Any, found: Overview) -> None:
+def draw_overview(fleet: Fleet, lines: MapLines, ui: Any, who: Principal, found: Overview) -> None:
+    """What is known now; what comes is shown within LOOK_S, as long as the credential holds.
+
+    The open page keeps who looks and a count, not what it shows.
+    """
+    topic, box = f"{CAME} {who.tenant}", ui.element("div").classes("parts")
+    seen = found.seen
+    with box:
+        _parts(ui, found)
+
+    def fresh() -> Overview:
+        return overview(fleet, lines, person(fleet, who.id))
+
+    async def look() -> None:
+        nonlocal seen
+        if fleet.hub.count(topic) == seen:
+            return
+        try:
+            now = await run_in_threadpool(fresh)
+        except Refused as error:
+            timer.cancel()
+            box.clear()
+            with box:
+                ui.label(str(error))
+            return
+        seen = now.seen
+        box.clear()
+        with box:
+            _parts(ui, now)
+
+    timer = ui.timer(LOOK_S, look)
+
+
+def _parts(ui: Any, found: Overview) -> None:
     """Hazards per hour, trends, the map, clusters."""
     with ui.element("section"):
         ui.label("Hazards per hour").classes("h2")
@@ -111,7 +150,7 @@ def _clusters(ui: Any, found: list[dict[str, Any]], again: Callable[[], int]) ->
         ui.label("Recurring hazards").classes("h2")
 
         async def look() -> None:
-            await say(ui, again, "looked; reload to see the clusters")
+            await say(ui, again, "looked")
 
         ui.button("Look for recurring hazards now", on_click=look)
         for cluster in found[:CLUSTERS]:

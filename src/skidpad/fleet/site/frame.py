@@ -24,7 +24,8 @@ LINKS = (
     ("Changes", "/changes", Action.READ_CHANGES),
 )
 STYLE = """
-.fleet { width: 100%; max-width: 1100px; margin: 0 auto; display: flex; flex-direction: column; gap: 10px; }
+.fleet, .parts { width: 100%; max-width: 1100px; margin: 0 auto; display: flex;
+  flex-direction: column; gap: 10px; }
 .fleet nav { display: flex; flex-wrap: wrap; gap: 12px; align-items: baseline; }
 .fleet nav a { color: var(--accent); }
 .fleet .h2 { font-size: 16px; margin: 6px 0 0; line-height: 1.3; }

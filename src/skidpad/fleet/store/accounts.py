@@ -70,13 +70,18 @@ def _add(
             "vehicle": vehicle, "at": at,
         },
     )  # fmt: skip
+    return Account(principal, add_credential(connection, principal.id, at))
+
+
+def add_credential(connection: Connection, principal: str, at: float) -> str:
+    """A fresh credential of someone."""
     token = new_token()
     row = {
-        "id": new_id(), "principal": principal.id, "token_hash": token_hash(token),
+        "id": new_id(), "principal": principal, "token_hash": token_hash(token),
         "expires": at + YEAR, "at": at,
     }  # fmt: skip
     connection.execute(credentials.insert(), row)
-    return Account(principal, token)
+    return token
 
 
 def principal_of(connection: Connection, token: str, at: float) -> Principal | None:
@@ -111,6 +116,20 @@ def end_credentials(connection: Connection, principal: str, by: str, at: float) 
     for row in rows:
         add_event(connection, ("credential", row.id), ENDED, (by, at))
     return len(rows)
+
+
+def principals_named(connection: Connection, tenant: str, role: Role, name: str) -> list[str]:
+    """Ids of those of that name (of the tenant, too); ConfigError when there is nobody."""
+    found = connection.execute(
+        select(principals.c.id)
+        .join(tenants, tenants.c.id == principals.c.tenant)
+        .where(tenants.c.name == tenant, principals.c.role == role.value, principals.c.name == name)
+        .order_by(principals.c.at, principals.c.id)
+    ).scalars()
+    ids = [str(id) for id in found]
+    if not ids:
+        raise ConfigError(f"{tenant!r} has no {role.value} of the name {name!r}")
+    return ids
 
 
 def vehicle_row(connection: Connection, vehicle: str) -> Any:

@@ -5,7 +5,6 @@ Bodies of a commit are one pack, a content-addressed blob; rows say where each l
 
 from __future__ import annotations
 
-import json
 import queue
 import threading
 from collections.abc import Callable, Sequence
@@ -14,13 +13,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from sqlalchemy import Connection, Engine, bindparam, select
-from sqlalchemy.exc import IntegrityError
+from sqlalchemy.exc import DataError, IntegrityError
 
-from skidpad.fleet.batch import Drive, Found, weather_class
+from skidpad.fleet.batch import Drive, Found, drive_text, weather_class
 from skidpad.fleet.blobs import Blobs
 from skidpad.fleet.identity import digest, new_id
 from skidpad.fleet.store.tables import batches, drives, hazards
-from skidpad.fleet.words import Kind, Refused
+from skidpad.fleet.words import MEANWHILE, UNKEPT, Kind, Refused
 
 Clock = Callable[[], float]  # s since 1970
 GROUP = 128  # batches of one commit at most
@@ -48,7 +47,6 @@ class Batch:
     vehicle_time: float | None = None
     found: Sequence[Found] = ()
     summary: Drive | None = None
-    summary_text: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,8 +61,11 @@ class Receipt:
 class Intake:
     """One thread that commits what has gathered while it committed."""
 
-    def __init__(self, engine: Engine, blobs: Blobs, clock: Clock) -> None:
-        self.engine, self.blobs, self.clock = engine, blobs, clock
+    def __init__(
+        self, engine: Engine, blobs: Blobs, clock: Clock, came: Callable[[Batch], None]
+    ) -> None:
+        """came: is told of every batch that was kept."""
+        self.engine, self.blobs, self.clock, self.came = engine, blobs, clock, came
         self._queue: queue.SimpleQueue[tuple[Batch, Future[Receipt]] | None] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._run, name="fleet-intake")
         self._closed = False
@@ -106,21 +107,18 @@ class Intake:
     def _commit(self, group: list[tuple[Batch, Future[Receipt]]]) -> None:
         try:
             receipts = self._write([batch for batch, _ in group])
-        except IntegrityError:
+        except Exception as error:  # becomes the answer of the request that it came of
             if len(group) == 1:
-                group[0][1].set_exception(Refused(409, "this was being kept at the same time"))
+                group[0][1].set_exception(_answer_to(error))
                 return
-            for one in group:  # another process keeps the same: each by itself
+            for one in group:  # what cannot be kept must not take others' batches with it
                 self._commit([one])
             return
-        except Exception as error:  # becomes the answer of each request of this commit
-            for _, future in group:
-                future.set_exception(error)
-            return
-        for (_, future), receipt in zip(group, receipts, strict=True):
+        for (batch, future), receipt in zip(group, receipts, strict=True):
             if isinstance(receipt, Refused):
                 future.set_exception(receipt)
             else:
+                self.came(batch)
                 future.set_result(receipt)
 
     def _write(self, group: list[Batch]) -> list[Receipt | Refused]:
@@ -170,7 +168,7 @@ class Intake:
             drive = owned | {
                 "id": new_id(), "seconds": batch.summary.seconds, "map": words.get("map", ""),
                 "weather": weather_class(words), "release": batch.summary.release,
-                "summary": batch.summary_text,
+                "summary": drive_text(batch.summary),
             }  # fmt: skip
             connection.execute(drives.insert(), drive)
             return True, ()
@@ -181,6 +179,14 @@ class Intake:
             connection.execute(hazards.insert(), rows)
             known |= {row["digest"]: row["id"] for row in rows}
         return bool(fresh) or not batch.found, tuple(known[f.digest] for f in batch.found)
+
+
+def _answer_to(error: Exception) -> Exception:
+    if isinstance(error, IntegrityError):
+        return Refused(409, MEANWHILE)
+    if isinstance(error, DataError):
+        return Refused(422, UNKEPT)
+    return error
 
 
 def _hazard_row(found: Found) -> dict[str, Any]:
@@ -211,8 +217,3 @@ def _ids(connection: Connection, batch: Batch) -> tuple[str, ...]:
 def plain(receipt: Receipt) -> dict[str, Any]:
     """The receipt as it is sent."""
     return {"batch": receipt.batch, "ids": list(receipt.ids), "known": receipt.known}
-
-
-def summary_text(content: bytes) -> str:
-    """A drive's summary as it is kept: JSON on one line."""
-    return json.dumps(json.loads(content), separators=(",", ":"))

@@ -23,6 +23,7 @@ analyses = Table(
     Column("settings", Text, nullable=False),  # JSON
     Column("hazards", Integer, nullable=False),  # looked at
     _time(),
+    Column("role", NAME, nullable=True),  # whose rights it used; NULL: of a version before 0005
 )
 clusters = Table(
     "clusters",
@@ -60,7 +61,9 @@ orders = Table(
     Column("actor", NAME, nullable=False),
     _time("expires"),
     _time(),
+    Column("key", NAME, nullable=True),  # of the request; NULL: of a version before 0005
     Index("orders_by_vehicle", "vehicle", "at"),
+    Index("orders_once", "alert", "actor", "key", unique=True),
 )
 deliveries = Table(  # an order is handed out once, whoever asks at the same time
     "deliveries",

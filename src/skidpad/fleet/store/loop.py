@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from sqlalchemy import Column, Index, Integer, Table, Text, UniqueConstraint
+from sqlalchemy import Column, ForeignKey, Index, Integer, Table, Text, UniqueConstraint
 
-from skidpad.fleet.store.tables import DIGEST, NAME, _id, _time, _to, metadata
+from skidpad.fleet.store.tables import DIGEST, ID, NAME, _id, _time, _to, metadata
 
 changes = Table(
     "changes",
@@ -43,5 +43,12 @@ evaluations = Table(
     Column("found_after", Integer, nullable=False),  # whether its kind is still found in the scene
     _time(),
     UniqueConstraint("change", "hazard"),
+)
+looks = Table(  # at a release: each number once, whoever looks at the same time
+    "looks",
+    metadata,
+    Column("release", ID, ForeignKey("releases.id"), primary_key=True),
+    Column("number", Integer, primary_key=True),
+    _time(),
 )
 LOOP = (changes, releases, evaluations)

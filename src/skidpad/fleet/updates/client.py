@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
+import httpx
 from tuf.api.exceptions import DownloadError, DownloadHTTPError, RepositoryError
 from tuf.api.metadata import Metadata, Timestamp
 from tuf.ngclient import FetcherInterface, Updater, UpdaterConfig
@@ -17,8 +19,9 @@ from skidpad.fleet.updates.repository import SIGNED_AT
 from skidpad.recording.files import write_bytes
 
 SKEW_S = 300.0  # that a vehicle's clock may be behind the server's
+PART = 65536  # bytes
 METADATA, TARGETS = "/api/v1/updates/metadata/", "/api/v1/updates/targets/"
-Get = Callable[[str], Any]  # answers a path with `status_code` and `content`, as httpx does
+Stream = Callable[[str], AbstractContextManager[Any]]  # an answer as httpx streams it
 
 
 class UpdateRefused(BackendError):
@@ -26,23 +29,28 @@ class UpdateRefused(BackendError):
 
 
 class _Fetcher(FetcherInterface):
-    def __init__(self, get: Get) -> None:
-        self._get = get
+    """Gives parts as they come: who reads stops at the length that an answer may have."""
+
+    def __init__(self, stream: Stream) -> None:
+        self._stream = stream
 
     def _fetch(self, url: str) -> Iterator[bytes]:
-        answer = self._get(url)
-        if answer.status_code != 200:
-            raise DownloadHTTPError(f"{url}: {answer.status_code}", answer.status_code)
-        return iter([bytes(answer.content)])
+        try:
+            with self._stream(url) as answer:
+                if answer.status_code != 200:
+                    raise DownloadHTTPError(f"{url}: {answer.status_code}", answer.status_code)
+                yield from answer.iter_raw(PART)  # as sent: nothing is unpacked
+        except httpx.HTTPError as error:
+            raise DownloadError(f"{url}: {error}") from error
 
 
 class UpdateClient:
     """Fetches updates into a folder of the vehicle."""
 
     def __init__(
-        self, folder: Path, root: bytes, get: Get, clock: Callable[[], float] = time.time
+        self, folder: Path, root: bytes, stream: Stream, clock: Callable[[], float] = time.time
     ) -> None:
-        self.folder, self.root, self.get, self.clock = folder, root, get, clock
+        self.folder, self.root, self.stream, self.clock = folder, root, stream, clock
         for part in ("metadata", "targets"):
             (folder / part).mkdir(parents=True, exist_ok=True)
 
@@ -56,7 +64,7 @@ class UpdateClient:
         try:
             updater = Updater(
                 str(self.folder / "metadata"), METADATA, str(self.folder / "targets"), TARGETS,
-                _Fetcher(self.get), config, bootstrap=self.root,
+                _Fetcher(self.stream), config, bootstrap=self.root,
             )  # fmt: skip
             updater.refresh()
             self._note_time()

@@ -16,7 +16,7 @@ from securesystemslib.signer import CryptoSigner
 from tuf.api.metadata import Metadata, Root, TargetFile, Targets
 
 from skidpad.core.errors import ConfigError, FileError, OutputError
-from skidpad.recording.files import write_bytes
+from skidpad.recording.files import write_secret
 
 KEYS, THRESHOLD = 3, 2
 ROOT_VALID = timedelta(days=365)
@@ -39,8 +39,7 @@ def new_key(path: Path) -> CryptoSigner:
         serialization.PrivateFormat.PKCS8,
         serialization.NoEncryption(),
     )
-    write_bytes(path, content)
-    path.chmod(0o600)
+    write_secret(path, content)
     return CryptoSigner(key)
 
 

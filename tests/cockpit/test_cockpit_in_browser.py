@@ -1,29 +1,48 @@
 """The cockpit in a real browser: keys, switches, taking over, two tabs, replay."""
 
+import os
+import re
 from dataclasses import replace
+from time import sleep
 
 import pytest
 from commands import PATIENCE, running
+from PIL import Image
 
 from runs import adas_run
+from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cast import stage_of
 from skidpad.campaign.desk import Desk, Recorded
 from skidpad.campaign.desk_run import drive_at_desk
 from skidpad.campaign.drive import Timer
+from skidpad.campaign.matrix import RECIPE
+from skidpad.campaign.pool import local
 from skidpad.campaign.rerun import desk_of, first_ticks
 from skidpad.campaign.run import run
 from skidpad.campaign.stored import read_run
+from skidpad.cockpit.hud import TIERS
+from skidpad.cockpit.tabs import ASLEEP_AFTER
 from skidpad.core.inputs import Functions, Lamps, Method, Pedals, Sky, Timed, Wheel
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.physics.presets import preset
+from skidpad.recording.campaigns import RUNS, SNAPSHOTS
 from skidpad.recording.inputs import read_inputs
+from skidpad.recording.ledger import LEDGER
 from skidpad.recording.logfiles import log_hash, read_log
 
 GAMEPAD = """() => { const pad = { connected: true, id: "pad", axes: [0.5, 0, 0, 0],
     buttons: Array.from({ length: 16 }, (_, i) => ({ value: i === 7 ? 0.4 : 0 })) };
     window.readings = 0; navigator.getGamepads = () => window.readings++ < LAST ? [pad] : []; }"""
+WHEEL = """() => { const wheel = { connected: true, id: "G29 Driving Force Racing Wheel",
+    axes: [-0.25, 0, 0.2, 0, 0, 0], buttons: [] }; navigator.getGamepads = () => [wheel]; }"""
 WAIT = 1000.0 * PATIENCE  # ms
+SMALL = ["left", "rear", "right", "top", "depth", "semantic", "radar"]
+DRAG = """([from, to]) => { const view = (v) => document.querySelector(`figure[data-view=${v}]`);
+    view(from).dispatchEvent(new DragEvent('dragstart', { bubbles: true }));
+    view(to).dispatchEvent(new DragEvent('drop', { bubbles: true, cancelable: true })); }"""
+PLACES = "() => [...document.querySelectorAll('.cockpit figure')].map((f) => f.dataset.view)"
+PICTURES = os.environ.get("SKIDPAD_PICTURES")  # a folder for screenshots, to be looked at
 FACT = """name => [...document.querySelectorAll('.cockpit dt')]
     .find(dt => dt.textContent === name)?.nextElementSibling.textContent"""
 
@@ -47,6 +66,11 @@ def opened(browser, address, errors):
     return context, page
 
 
+def photograph(page, name):
+    if PICTURES:
+        page.screenshot(path=f"{PICTURES}/{name}.png", full_page=True)
+
+
 def picture_of(page, selector=".stage canvas"):
     """Mean brightness and spread of a canvas: something is on it."""
     return page.evaluate(
@@ -58,7 +82,7 @@ def picture_of(page, selector=".stage canvas"):
     )
 
 
-@pytest.mark.req("A-271", "A-272", "A-273", "A-274")
+@pytest.mark.req("A-219", "A-271", "A-272", "A-273", "A-274")
 def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, tmp_path):
     folder, errors = tmp_path / "run", []
     words = ["drive", "--no-browser", "--out", folder, "--vehicles", "6", "--sensors", "objects"]
@@ -67,6 +91,11 @@ def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, t
         assert "token" not in page.url
         until_fact(page, "drives", "the stack")
         assert picture_of(page)[1] > 10.0
+        facts = set(page.locator(".facts dt").all_text_contents())
+        assert {"status", "distance", "time gap", "radar limit", "weather", "real time", "on",
+                "collisions", "drives"} <= facts  # fmt: skip
+        assert page.locator(".tiers li").all_text_contents() == list(TIERS)
+        assert page.locator(".tiers li.lit").count() == 1
         # keys T, Y, U hide and show views
         depth = "() => document.querySelectorAll('.side figure')[1].style.display"
         page.keyboard.press("t")
@@ -104,11 +133,18 @@ def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, t
         page.evaluate("navigator.getGamepads = () => []")
         until(page, unplugged)
         until_fact(page, "drives", "you, by keyboard")
+        # a wheel has axes of its own: a pedal that was never moved says 0, half the way, and is released
+        page.evaluate(WHEEL)
+        until_fact(page, "drives", "you, by wheel")
+        page.evaluate("navigator.getGamepads = () => []")
+        until_fact(page, "drives", "you, by keyboard")
         # headlights, weather, functions by keys and by switches
         page.keyboard.press("l")
         until(page, "() => document.querySelector('.lamp').textContent.includes('low')")
         page.keyboard.press("n")
         until_fact(page, "weather", "clear-night")
+        page.keyboard.press("h")  # the time of day alone
+        until_fact(page, "weather", "clear-sunrise")
         page.get_by_text("pictures (G)").click()
         page.get_by_role("switch", name="clouds").click()
         until(page, "() => !document.querySelector('.cockpit').dataset.extras.includes('clouds')")
@@ -116,7 +152,13 @@ def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, t
         until_fact(page, "on", "limiter")
         page.keyboard.press("m")
         until_fact(page, "drives", "the stack")
+        photograph(page, "drive")
+        # a minute of driving, as fast as it can
+        page.get_by_role("combobox", name="speed").click()
+        page.get_by_role("option", name="as fast as it can").click()
+        until(page, f"() => parseFloat(({FACT})('time')) > 60")
         page.set_viewport_size({"width": 390, "height": 844})
+        photograph(page, "drive-390")
         width = page.evaluate("document.documentElement.scrollWidth")
         assert width <= 390, "the page is wider than a phone"
         page.get_by_role("button", name="end").click()
@@ -131,6 +173,7 @@ def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, t
     kinds = {type(one) for one in done}
     assert {Pedals, Lamps, Sky, Functions} <= kinds
     assert Pedals(throttle=0.4, steer=-0.5, method=Method.GAMEPAD) in done
+    assert Pedals(throttle=0.4, steer=0.25, method=Method.WHEEL) in done
     last = next(one for one in reversed(done) if isinstance(one, Functions))
     assert Function.LIMITER in last.on
     stored = read_log(folder)
@@ -181,6 +224,16 @@ def test_a_run_is_scrubbed_through_in_a_browser(browser, stored, tmp_path):
         until(page, "() => document.querySelector('.cockpit').dataset.extras === ''")
         assert picture_of(page) != night
         page.keyboard.press("g")
+        photograph(page, "replay")
+        # views change places, and stay there when the page is opened again
+        assert page.evaluate(PLACES) == SMALL
+        page.evaluate(DRAG, ["left", "depth"])
+        swapped = ["depth", "rear", "right", "top", "left", "semantic", "radar"]
+        until(page, f"wanted => ({PLACES})().join() === wanted", ",".join(swapped))
+        page.reload()
+        until(page, "() => document.querySelector('figure[data-view=left] canvas')?.width === 280")
+        assert page.evaluate(PLACES) == swapped
+        assert picture_of(page, ".side figure[data-view=left] canvas")[1] > 3.0
         for _ in range(3):
             page.keyboard.press("c")
         until(page, "() => document.querySelector('.cockpit').dataset.main === 'crash'")
@@ -192,3 +245,69 @@ def test_a_run_is_scrubbed_through_in_a_browser(browser, stored, tmp_path):
         context.close()
     assert status == 0, said
     assert errors == []
+
+
+def test_a_campaign_is_watched_in_a_browser(browser, tmp_path):
+    cells = [adas_run(2, "clear-noon", duration=1.0, seed=s, vehicles=2) for s in (1, 2)]
+    Campaign(RECIPE, cells).run(tmp_path, local(1))
+    with running("watch", tmp_path, "--no-browser", cwd=tmp_path) as command:
+        context = browser.new_context(viewport={"width": 390, "height": 844})
+        context.set_default_timeout(WAIT)
+        page = context.new_page()
+        page.goto(command.address())
+        page.get_by_text("adas: 2 of 2 runs done; 2 completed").wait_for()
+        page.get_by_text("0.16 to 1.00").wait_for()
+        page.get_by_text("last crash: none").wait_for()
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        ledger = tmp_path / LEDGER  # a run more while the page is open
+        line = ledger.read_text().splitlines()[0]
+        line = re.sub(',"sum":"[0-9a-f]+"', "", line).replace("-001", "-003")
+        ledger.write_text(
+            ledger.read_text() + line.replace('"fatal_collisions":0', '"fatal_collisions":1') + "\n"
+        )
+        page.get_by_text("adas: 3 of 2 runs done").wait_for()
+        page.get_by_text("last crash: 2_clear-noon-003").wait_for()
+        assert not page.locator(".q-img").is_visible()  # no picture was taken of it
+        # the picture of the next crash, the last one of its run
+        folder = tmp_path / RUNS / "2_clear-noon-004" / SNAPSHOTS
+        folder.mkdir(parents=True)
+        for second, size in ((9.5, (8, 6)), (12.25, (80, 60))):
+            Image.new("RGB", size, "red").save(folder / f"2_clear-noon_{second:07.2f}s.png")
+        line = ledger.read_text().splitlines()[-1]
+        ledger.write_text(ledger.read_text() + line.replace("-003", "-004") + "\n")
+        page.get_by_text("last crash: 2_clear-noon-004").wait_for()
+        until(page, "() => document.querySelector('.q-img img')?.naturalWidth === 80")
+        assert page.evaluate("document.documentElement.scrollWidth") <= 390
+        photograph(page, "watch-390")
+        context.close()
+
+
+@pytest.mark.req("A-274")
+def test_a_page_that_is_put_to_sleep_lets_another_one_drive(browser, tmp_path):
+    words = ["drive", "--no-browser", "--on-close", "pause", "--vehicles", "2", "--sensors"]
+    with running(*words, "objects", "--out", tmp_path / "run", cwd=tmp_path) as command:
+        context, page = opened(browser, command.address(), [])
+        other = context.new_page()
+        other.goto(page.url)
+        until(other, "() => document.querySelector('.bar').textContent.includes('watches')")
+        asleep = context.new_cdp_session(
+            page
+        )  # all that runs in the page stops, its socket is open
+        asleep.send("Debugger.enable")
+        asleep.send("Debugger.pause")
+        until(other, "() => document.querySelector('.bar').textContent === 'this tab drives'")
+        other.keyboard.press("m")
+        until_fact(other, "drives", "you, by keyboard")
+        # it wakes, watches, and drives again when the other one is closed
+        asleep.send("Debugger.resume")
+        until(page, "() => document.querySelector('.bar').textContent.includes('watches')")
+        other.close()
+        until(page, "() => document.querySelector('.bar').textContent === 'this tab drives'")
+        # nobody is awake: the drive stands until somebody is there and says so
+        asleep.send("Debugger.pause")
+        sleep(ASLEEP_AFTER + 3.0)
+        asleep.send("Debugger.resume")
+        until(page, "() => document.querySelector('.cockpit').dataset.paused === 'true'")
+        page.keyboard.press("p")
+        until(page, "() => document.querySelector('.cockpit').dataset.paused === 'false'")
+        context.close()

@@ -2,25 +2,35 @@
 
 import itertools
 import multiprocessing
+import os
+import signal
+from dataclasses import replace
 
+import cv2
 import msgspec
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
 from runs import adas_run
 from skidpad.campaign.desk import Desk, Recorded
+from skidpad.campaign.drive import Sink
 from skidpad.campaign.run import run
+from skidpad.cli.main import app
+from skidpad.cockpit import producer as producer_module
+from skidpad.cockpit import serving
 from skidpad.cockpit.bridge import Bridge
 from skidpad.cockpit.feed import SLOT_BYTES, SLOTS, Feed
+from skidpad.cockpit.hud import TIERS
 from skidpad.cockpit.marks import marks_of, project
-from skidpad.cockpit.pictures import Encoder, views_of
+from skidpad.cockpit.pictures import LIGHTS, Encoder, colours, views_of
 from skidpad.cockpit.producer import Producer
 from skidpad.cockpit.realtime import RealTime
 from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.studio import View, cameras
-from skidpad.cockpit.tabs import RELEASE_AFTER, DeadMan, Tabs
+from skidpad.cockpit.tabs import ASLEEP_AFTER, RELEASE_AFTER, DeadMan, Tabs
 from skidpad.cockpit.words import (
     Do,
     End,
@@ -39,12 +49,17 @@ from skidpad.core.frames import RadarPoints
 from skidpad.core.inputs import Crowd, Functions, Lamps, LampSwitch, Method, Pedals, Sky, Wheel
 from skidpad.core.run import Function
 from skidpad.core.setup import DT
+from skidpad.core.specs import Modality
 from skidpad.core.states import StackReport
-from skidpad.core.vocabulary import GripModel, RangeModel
+from skidpad.core.vocabulary import GripModel, RangeModel, SemanticClass, Tier
 from skidpad.physics.presets import preset
 from skidpad.recording.logfiles import log_hash
 from skidpad.roads.bundled import load_map
-from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
+from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
+from skidpad.sensors.suite import PixelSuite
+from skidpad.simulation import pacing
+
+PICTURES = os.environ.get("SKIDPAD_PICTURES")  # a folder for pictures, to be looked at
 
 
 @pytest.fixture
@@ -208,6 +223,30 @@ def test_a_pause_shows_the_moment_and_goes_on_by_steps():
     theirs.close()
 
 
+@pytest.mark.req("A-267", "A-268")
+@pytest.mark.parametrize(
+    ("words", "own"),
+    [((), True), (("--no-gc-in-pause",), False), (("--without", "gc-in-pause"), False)],
+)
+def test_a_drive_collects_garbage_in_its_pauses_unless_it_is_told_not_to(
+    feed, monkeypatch, tmp_path, words, own
+):
+    kept = []
+    monkeypatch.setattr(serving, "serve", lambda producer, *_: kept.append(producer) or "ended")
+    monkeypatch.setattr(producer_module, "Producer", lambda job, about: (job, about))
+    asked = ["drive", "--sensors", "objects", "--vehicles", "0", "--duration", "0.5", "--rate", "0"]
+    done = CliRunner().invoke(app, [*asked, *words, "--out", str(tmp_path / "run")])
+    assert done.exit_code == 0, done.output
+    ((job, about),) = kept
+    disabled = []
+    monkeypatch.setattr(pacing.gc, "disable", lambda: disabled.append(True))
+    ours, theirs = multiprocessing.Pipe()
+    assert job(feed.name, theirs, about).startswith("completed after 10 ticks")
+    assert bool(disabled) is own
+    ours.close()
+    theirs.close()
+
+
 # --- tabs and what they may say
 
 
@@ -239,6 +278,34 @@ def test_a_drive_without_a_page_goes_on_or_pauses():
         assert made.producer.words == []
         made.leave("b")
         assert made.producer.words == said
+
+
+def test_a_tab_that_sleeps_lets_go_of_the_wheel_and_comes_last_when_it_wakes():
+    made = Bridge(Deaf(), pauses=True, clock=(wall := Wall()))
+    for tab in ("a", "b"):
+        made.tabs.come(tab)
+    made.say("a", "pedals", {"throttle": 1.0})
+    made.producer.words.clear()
+    wall.now += ASLEEP_AFTER - 0.1
+    made.tabs.come("b")
+    made.check()
+    assert made.may("a")
+    wall.now += 0.2
+    made.check()
+    assert made.may("b")
+    assert made.say("b", "take") is None
+    assert made.producer.words == [Do(Pedals()), Do(Wheel(True))]
+    made.tabs.come("a")
+    assert made.may("b")
+    assert len(made.tabs) == 2
+    # when all of them sleep, the drive stands, once
+    made.producer.words.clear()
+    for _ in range(3):
+        wall.now += ASLEEP_AFTER + 0.1
+        made.check()
+    assert made.producer.words == [Pause(True)]
+    made.tabs.come("b")
+    assert made.may("b")
 
 
 @given(st.lists(st.tuples(st.booleans(), st.sampled_from("abc"))))
@@ -315,6 +382,29 @@ def test_what_the_words_of_a_tab_mean():
     sky = b.producer.words[-1].input
     assert (sky.weather.ice_thickness, sky.weather.fog_density) == (30.0, 20.0)
     assert sky.weather.name == "clear-night-custom"
+
+
+@pytest.mark.req("A-273")
+def test_the_time_of_day_goes_round_in_any_weather():
+    def hours(name, **changes):
+        weather = replace(preset(name), **changes)
+        b = bridge(weather=name, sky=weather.values(), grip="none", range="physical")
+        skies = []
+        for _ in range(4):
+            assert b.say("a", "hour") is None
+            skies.append(b.producer.words[-1].input.weather)
+        for sky in skies:  # nothing else changes
+            assert replace(sky, sun_altitude_deg=0.0).values() == (
+                replace(weather, sun_altitude_deg=0.0).values()
+            )
+        return [(sky.name, sky.sun_altitude_deg) for sky in skies]
+
+    clear = [("clear-night", -30.0), ("clear-sunrise", 15.0), ("clear-noon", 75.0)]
+    assert hours("clear-noon") == [*clear, clear[0]]
+    assert hours("rain-night")[0] == ("rain-sunrise", 15.0)
+    snow = hours("snow", sun_altitude_deg=-1.0)
+    assert [name for name, _ in snow] == ["snow-custom", "snow", "snow-custom", "snow-custom"]
+    assert [sun for _, sun in snow] == [15.0, 75.0, -30.0, 15.0]
 
 
 @pytest.mark.req("A-274")
@@ -424,7 +514,72 @@ def test_marks_stand_where_things_are_seen():
     assert marks_of(camera, RadarPoints.none(), StackReport()).lead is None
 
 
+class AtLight(Sink):
+    """Shows one moment: the first one in which the stack reports a light within 50 m."""
+
+    def __init__(self, screen):
+        self.screen, self.moment = screen, None
+
+    def begin(self, table):
+        self.table = table
+        self.screen.begin(table)
+
+    def see(self, moment):
+        near = moment.report.light_distance
+        if self.moment is None and near is not None and near < 50.0:
+            self.moment = moment
+            self.states, self.lights = moment.truth.states.copy(), dict(moment.truth.lights)
+            self.screen.show(moment)
+            self.wrong = [self.mark(near + 9.0), self.mark(None)]
+
+    def mark(self, distance):
+        """What is drawn if the stack says so of the distance."""
+        report = replace(self.moment.report, light_distance=distance)
+        camera = self.screen.cameras["driver"]
+        return self.screen.light.mark(camera, replace(self.moment, report=report))
+
+
+@pytest.mark.req("A-272")
+def test_the_light_that_the_stack_reports_is_framed_where_it_is_seen(feed):
+    wanted = adas_run(4, duration=34.0, seed=2, vehicles=0)
+    desk, map, link = Desk(Recorded([]), wanted), load_map("figure8"), Link(None)
+    link.extras = NO_EXTRAS
+    screen = Screen(feed, link, map, lambda: Shown(desk.outside, {"kind": "drive", "seat": {}}))
+    run(wanted, desk=desk, sinks=(at := AtLight(screen),))
+    packet = feed.take()
+    told = msgspec.json.decode(packet.told)
+    *_, (frames, state, label) = told["marks"]["driver"]
+    assert label == f"red {at.moment.report.light_distance:.0f} m"
+    assert state == "red"
+    # by another route: where a camera for classes in the same place sees a traffic light
+    camera = replace(screen.cameras["driver"], id="classes", modality=Modality.SEMANTIC)
+    suite = PixelSuite(map, at.table, (camera,), wanted.weather)
+    seen = suite.observe(0, at.states, at.lights).images["classes"].labels
+    rows, columns = np.nonzero(seen == SemanticClass.TRAFFIC_LIGHT)
+    ((left, top, right, bottom),) = frames
+    within = (columns >= left) & (columns <= right) & (rows >= top) & (rows <= bottom)
+    assert within.sum() > 8
+    assert within.mean() > 0.9
+    assert (right - left) * (bottom - top) < 60 * within.sum()
+    # and it is painted in its colour
+    plain = colours(packet.views["driver"])
+    drawn = views_of(packet, told)["driver"]
+    assert tuple(drawn[(top + bottom) // 2, left]) == LIGHTS["red"]
+    assert tuple(plain[(top + bottom) // 2, left]) != LIGHTS["red"]
+    # what is said of no light, or of another one, draws nothing
+    assert at.wrong == [None, None]
+    if PICTURES:
+        cv2.imwrite(f"{PICTURES}/light.png", drawn)
+
+
 # --- the producer
+
+
+def test_the_page_is_told_every_tier_by_its_value():
+    assert len(TIERS) == len(Tier) == max(Tier) + 1
+    assert TIERS[Tier.NONE] == "No action"
+    assert TIERS[Tier.ACC_HOLD] == "ACC hold"
+    assert TIERS[Tier.BEND] == "Bend"
 
 
 def fine(feed_name, pipe, about):
@@ -432,6 +587,12 @@ def fine(feed_name, pipe, about):
     while not link.ended:
         link.drain(1.0)
     return f"ended {about['what']}"
+
+
+def signalled(feed_name, pipe, about):
+    for one in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        os.kill(os.getpid(), one)
+    return fine(feed_name, pipe, about)
 
 
 def broken(feed_name, pipe, about):
@@ -454,6 +615,13 @@ def test_a_producer_works_until_it_is_told_to_end():
     producer.stop()
     assert producer.outcome() == "ended well"
     producer.say(End())  # too late, and no harm
+
+
+def test_what_closes_a_terminal_does_not_end_the_simulator_before_it_has_written():
+    producer = Producer(signalled, {"what": "well"})
+    producer.start()
+    producer.stop()
+    assert producer.outcome() == "ended well"
 
 
 @pytest.mark.parametrize(

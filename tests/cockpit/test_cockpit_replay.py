@@ -2,6 +2,7 @@
 
 import re
 import shutil
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -72,6 +73,21 @@ def driven(tmp_path_factory):
     wanted = adas_run(3, "rain-noon", duration=5.0, seed=4)
     drive_at_desk(wanted, Desk(Recorded(INPUTS), wanted), folder, (kept,))
     return folder, kept.moments
+
+
+def test_a_car_on_a_bridge_is_in_nobodys_way_on_the_time_line(driven):
+    recording = Recording(driven[0])
+    log = recording.log
+    at = {name: getattr(log.actors, name).copy() for name in ("x", "y", "z", "yaw", "vx", "vy")}
+    for name in ("x", "y", "z", "yaw"):
+        at[name][:, 1] = at[name][:, 0]
+    at["x"][:, 1] += 12.0 * np.cos(at["yaw"][:, 0])
+    at["y"][:, 1] += 12.0 * np.sin(at["yaw"][:, 0])
+    at["vx"][:, 1] = at["vy"][:, 1] = 0.0
+    recording.log = replace(log, actors=log.actors._replace(**at))
+    assert any(v is not None for v in recording.curves().ttc)
+    at["z"][:, 1:] += 40.0  # more than a road climbs to whoever is that near
+    assert all(v is None for v in recording.curves().ttc)
 
 
 def test_moments_are_those_that_were_driven(driven):
@@ -199,6 +215,8 @@ def test_commands_refuse_in_one_sentence(driven, tmp_path):
         ("drive", "--out", str(driven[0])): "exists already",
         ("drive", "--weather", "frogs"): "unknown weather",
         ("drive", "--configs", "1,2"): "one driver at a time",
+        ("drive", "--map", "nowhere", "--out", str(tmp_path / "x")): "unknown map 'nowhere'",
+        ("drive", "--scenario", "nothing.xosc", "--out", str(tmp_path / "x")): "nothing.xosc",
         ("drive", "--page-port", "70000"): "--page-port must be between",
         ("drive", "--rate", "1000", "--out", str(tmp_path / "x")): "rate must be between",
     }
@@ -206,6 +224,21 @@ def test_commands_refuse_in_one_sentence(driven, tmp_path):
         done = CliRunner().invoke(app, [*words, "--no-browser"])
         assert done.exit_code != 0
         assert told in str(done.exception), words
+
+
+def test_a_drive_by_hand_is_scored_and_compared(driven):
+    run = str(driven[0])
+    scored = CliRunner().invoke(app, ["show", run])
+    assert scored.exit_code == 0, scored.output
+    compared = CliRunner().invoke(app, ["compare", run, run])
+    assert compared.exit_code == 0, compared.output
+    rows = {line.split()[0]: line.split()[1:] for line in compared.output.splitlines()}
+    before, after, change = rows["mean_speed_kmh"]
+    assert before == after
+    assert float(before) > 0.0
+    assert float(change) == 0.0
+    judged = CliRunner().invoke(app, ["compare", run, run, "--fail-if", "collisions_vehicle > 0"])
+    assert "judges campaigns" in str(judged.exception)
 
 
 def test_how_a_campaign_stands(tmp_path):

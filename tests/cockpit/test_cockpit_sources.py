@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
+import polars as pl
 import pytest
 from typer.testing import CliRunner
 
@@ -15,6 +16,7 @@ from skidpad.cli.main import app
 from skidpad.cockpit.channel_source import ChannelSource
 from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.feed import Feed
+from skidpad.cockpit.indicators import every, least_of, ttc_ahead
 from skidpad.cockpit.opening import opened
 from skidpad.cockpit.replay import Recording
 from skidpad.cockpit.replaying import Replayer
@@ -27,6 +29,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Crowd, Pedals, Timed, Wheel
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import ActorKind, HazardType, SemanticClass
+from skidpad.evidence.pairs import Body
 from skidpad.recording.channels import ChannelWriter
 from skidpad.recording.cycles import cycles
 from skidpad.recording.hazards import HazardRecord, HazardWriter
@@ -102,6 +105,57 @@ def test_a_recording_of_channels_is_shown_moment_by_moment(tmp_path):
     line = timeline(source)
     assert (line["first"], line["last"], line["step"]) == (0, 22, 2)
     assert line["speed"] == pytest.approx([72.0] * MOMENTS)
+    # the truck ahead is as fast; the walker stands 40 m ahead and comes 2 m nearer every 0.1 s
+    assert line["ttc"][-1] == pytest.approx((40.0 - 22.0 - 2.25 - 0.45) / 20.0, abs=0.1)
+
+
+def test_what_a_monitor_found_stands_on_the_time_line(tmp_path):
+    source = opened(file := record(tmp_path / "a.b.mcap"))
+    line = timeline(source)
+    assert (line["violated"], line["hazards"]) == ([], [])
+    out = tmp_path / "a.b.monitor"
+    done = CliRunner().invoke(app, ["monitor", str(file), "--out", str(out)])
+    assert done.exit_code == 0, done.output
+    hazards(out)  # as its writer writes one from 0.5 to 1.0 s
+    line = timeline(opened(file))
+    assert line["hazards"] == [(10, 20, "ego tailgated (h0001)")]
+    assert (10, "hazard", "hazard: ego tailgated (h0001)") in line["events"]
+    assert line["events"] == sorted(line["events"])
+    # the rows of the table that are beyond their bounds, by the number of the cycle
+    rows = pl.read_parquet(out / "indicators.parquet").to_dicts()
+    counts = [sum(r["violated"] for r in rows if r["cycle"] == k) for k in range(MOMENTS)]
+    assert max(counts) > 0
+    assert line["violated"] == counts
+    # a folder that is cut short is one sentence
+    (out / "hazards.jsonl").write_text('{"id": "h0')
+    with pytest.raises(FileError, match=r"hazards\.jsonl, line 1"):
+        opened(file)
+
+
+def straight(x, y, v):
+    """A car 4 m long and 2 m wide along x, over two moments 1 s apart."""
+    still = np.zeros(2)
+    return Body(
+        x + v * np.array([0.0, 1.0]), still + y, still, still + v, still, still, still, 4.0, 2.0
+    )
+
+
+def test_the_time_line_shows_how_near_a_crash_it_was():
+    ego = straight(0.0, 0.0, 20.0)
+    others = [straight(44.0, 0.5, 0.0), straight(34.0, 3.0, 0.0), straight(-24.0, 0.0, 40.0)]
+    present = np.ones((2, 4), dtype=np.bool_)
+    # 40 m from bumper to bumper, then 20 m; nobody beside or behind counts
+    assert ttc_ahead([ego, *others], present) == pytest.approx([2.0, 1.0])
+    present[1, 1] = False
+    assert ttc_ahead([ego, *others], present) == pytest.approx([2.0, np.inf])
+    assert ttc_ahead([ego], present[:, :1]) == pytest.approx([np.inf, np.inf])
+    # a short dip is shown, however long the run was
+    long = np.full(3500, np.inf)
+    long[1234] = 0.72
+    shown = least_of(long)
+    assert len(shown) == len(long[every(len(long))])
+    assert [v for v in shown if v is not None] == [0.7]
+    assert least_of(long[:0]) == []
 
 
 def test_without_the_truth_the_first_channel_is_shown(tmp_path):

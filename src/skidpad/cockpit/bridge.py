@@ -28,11 +28,15 @@ from skidpad.core.inputs import (
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.core.weather import Weather
-from skidpad.physics.presets import preset, preset_groups
+from skidpad.physics.presets import all_presets, preset
 from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 
 LAMP_ORDER = (LampSwitch.AUTO, LampSwitch.LOW, LampSwitch.HIGH, LampSwitch.OFF)
 CUSTOM = "-custom"  # behind the name of a preset of which something was changed
+SUNRISE, NOON, NIGHT = (
+    preset(f"clear-{hour}").sun_altitude_deg for hour in ("sunrise", "noon", "night")
+)  # deg (A-213)
+MORNING = 0.5 * (SUNRISE + NOON)  # below it is still sunrise
 FILM_SECONDS = 10.0
 HIDEABLE = (View.DEPTH, View.SEMANTIC, View.TOP)
 
@@ -43,9 +47,9 @@ class Bridge:
     def __init__(
         self, producer: Producer, pauses: bool = False, clock: Callable[[], float] = monotonic
     ) -> None:
-        """pauses: while no tab is open, after one was."""
+        """pauses: when the last tab is closed or falls asleep."""
         self.pauses = pauses
-        self.producer, self.tabs, self.encoder = producer, Tabs(), Encoder()
+        self.producer, self.tabs, self.encoder = producer, Tabs(clock), Encoder()
         self.pedals = Pedals()  # as they were said last
         self.dead_man = DeadMan(self._release, clock)
         self.told: dict[str, Any] = {}  # of the newest picture
@@ -69,12 +73,18 @@ class Bridge:
     # --- tabs
 
     def leave(self, tab: str) -> None:
-        """A tab is gone; the pedals of one that drove are released."""
+        """A tab is gone, or sleeps; the pedals of one that drove are released."""
         if self.tabs.driver == tab:
             self._release()
         self.tabs.go(tab)
         if self.pauses and not len(self.tabs):
             self.producer.say(Pause(True))
+
+    def check(self) -> None:
+        """Let go of what is held by nobody: pedals that are not heard of, tabs that sleep."""
+        self.dead_man.check()
+        for tab in self.tabs.asleep():
+            self.leave(tab)
 
     def may(self, tab: str) -> bool:
         """Whether this tab's words count."""
@@ -109,6 +119,7 @@ class Bridge:
             "crowd": lambda v: Crowd(int(v)),
             "weather": self._weather,
             "sky": self._change,
+            "hour": lambda _: self._change({"sun_altitude_deg": next_hour(self._present())}),
             "grip": lambda v: self._acting(grip=GripModel(v)),
             "range": lambda v: self._acting(range=RangeModel(v)),
         }
@@ -172,7 +183,7 @@ class Bridge:
 
     def _weather(self, value: Any) -> Sky:
         """A preset by name; None: the next one (A-217)."""
-        names = [name for group in preset_groups().values() for name in group]
+        names = list(all_presets())
         if value is None:
             now = str(self._seat("weather", names[0])).removesuffix(CUSTOM)
             at = names.index(now) if now in names else -1
@@ -181,11 +192,11 @@ class Bridge:
         return self._acting()
 
     def _change(self, value: Mapping[str, float]) -> Sky:
-        """Single fields of the present weather."""
+        """Single fields of the present weather; what comes out may be a preset, and is called so."""
         now = self._present()
         name = now.name if now.name.endswith(CUSTOM) else now.name + CUSTOM
         fields = {k: float(v) for k, v in value.items() if k in now.values()}
-        self.sky = replace(now, name=name, title="", **fields)
+        self.sky = called(replace(now, name=name, title="", **fields))
         return self._acting()
 
     def _present(self) -> Weather:
@@ -200,3 +211,16 @@ class Bridge:
             GripModel(self._seat("grip", "physical")) if grip is None else grip,
             RangeModel(self._seat("range", "physical")) if range is None else range,
         )
+
+
+def next_hour(weather: Weather) -> float:
+    """Altitude of the sun (deg) at the next time of day: sunrise, noon, night."""
+    if weather.is_night:
+        return SUNRISE
+    return NOON if weather.sun_altitude_deg < MORNING else NIGHT
+
+
+def called(weather: Weather) -> Weather:
+    """The preset that this weather is, or itself."""
+    known = all_presets().values()
+    return next((one for one in known if one.values() == weather.values()), weather)

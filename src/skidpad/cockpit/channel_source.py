@@ -15,8 +15,10 @@ from numpy.typing import NDArray
 from skidpad.campaign.drive import Moment
 from skidpad.campaign.keeping import housed
 from skidpad.campaign.stored import read_segment
+from skidpad.cockpit.indicators import every, least_of, ttc_ahead
 from skidpad.cockpit.marks import RADAR_MOUNT
-from skidpad.cockpit.source import Said, Seat
+from skidpad.cockpit.monitored import judged
+from skidpad.cockpit.source import Curves, Said, Seat
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
 from skidpad.core.errors import FileError, InputError
 from skidpad.core.frames import RadarPoints, SensorFrame
@@ -41,6 +43,7 @@ from skidpad.core.vocabulary import (
     Supervision,
 )
 from skidpad.core.weather import Weather
+from skidpad.evidence.pairs import Body
 from skidpad.recording.channels import McapRecording
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
@@ -90,7 +93,8 @@ class ChannelSource:
         outside = Outside(weather=weather, grip=GripModel.PHYSICAL, range_model=RangeModel.NONE)
         self._seat = Seat(-1, outside, False, "keyboard", None, None)
         self._build()
-        self.marks = self._switches()
+        self._judged = judged(path, [self.tick(k) for k in range(self.ticks)])
+        self.marks = sorted(self._switches() + self._judged.marks)
 
     def _build(self) -> None:
         """The table of all who ever appear, and where they are."""
@@ -148,11 +152,18 @@ class ChannelSource:
         del k
         return 0
 
-    def curves(self) -> tuple[list[float], list[int | None]]:
-        """Speed in km/h; channels have no tiers."""
-        part = slice(None, None, max(1, self.ticks // 1000))
+    def curves(self) -> Curves:
+        """What is drawn along the time; channels have no tiers."""
+        part = every(self.ticks)
         v = np.hypot(self._state[part, 0, 3], self._state[part, 0, 4])
-        return np.round(v * 3.6, 1).tolist(), [None] * len(v)
+        none = np.zeros(self.ticks)
+        sizes = zip(self._table.length.tolist(), self._table.width.tolist(), strict=True)
+        bodies = []
+        for i, (length, width) in enumerate(sizes):
+            x, y, yaw, vx, vy = self._state[:, i].T
+            bodies.append(Body(x, y, yaw, vx, vy, none, none, length, width))
+        ttc = least_of(ttc_ahead(bodies, self._present))
+        return Curves(np.round(v * 3.6, 1).tolist(), [None] * len(v), ttc, *self._judged[::-1])
 
     def moment(self, k: int) -> Moment:
         """Moment k, 0 <= k < ticks."""

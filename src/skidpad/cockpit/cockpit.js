@@ -1,10 +1,8 @@
 // The canvases of the cockpit: pictures come by websocket and are acknowledged when they are drawn.
-const TIERS = ["No action", "Hard stop", "Stopped too close", "Emergency", "Stopped behind car", "Approach",
-  "ACC hold", "ACC open", "ACC close", "Light stop", "Holding at line", "Coast", "Cruise"];
 const SMALL = ["left", "rear", "right", "top", "depth", "semantic"];
 const TITLES = { left: "left mirror", rear: "rear", right: "right mirror", top: "top (U)", depth: "depth (T)",
-  semantic: "classes (Y)", driver: "driver", follow: "follow", crash: "crash" };
-const WORDS = { KeyM: ["take"], KeyL: ["lamps"], KeyN: ["weather"], KeyP: ["pause"], KeyC: ["main"], KeyG: ["extra"],
+  semantic: "classes (Y)", driver: "driver", follow: "follow", crash: "crash", radar: "radar, orange closing" };
+const WORDS = { KeyM: ["take"], KeyL: ["lamps"], KeyN: ["weather"], KeyH: ["hour"], KeyP: ["pause"], KeyC: ["main"], KeyG: ["extra"],
   KeyT: ["hide", "depth"], KeyY: ["hide", "semantic"], KeyU: ["hide", "top"], Period: ["step", 1],
   Digit1: ["toggle", "acc"], Digit2: ["toggle", "lca"], Digit3: ["toggle", "tla"],
   Digit4: ["toggle", "resume"], Digit5: ["toggle", "limiter"], Digit6: ["toggle", "aeb"],
@@ -13,15 +11,24 @@ const PEDALS = { KeyW: "up", ArrowUp: "up", KeyS: "down", ArrowDown: "down", Key
   KeyD: "right", ArrowRight: "right", Space: "hand" };
 const HEARTBEAT = 100;  // ms between two words of the pedals while they are pressed
 const STRIP_SECONDS = 30;
+const PLACES = ["left", "rear", "right", "top", "depth", "semantic", "radar"];  // of the small views, as a page begins
+const LAYOUT = "skidpad-layout";  // what this browser keeps of it
+
+function layout() {  // as it was left in this browser
+  let kept = {};
+  try { kept = JSON.parse(localStorage.getItem(LAYOUT)) || {}; } catch { /* nothing that can be read */ }
+  const whole = Array.isArray(kept.places) && [...kept.places].sort().join() === [...PLACES].sort().join();
+  return { places: whole ? kept.places : [...PLACES], side: /^\d\d%$/.test(kept.side) ? kept.side : "20%" };
+}
 
 export default {
-  props: { tab: String, kind: String, timeline: Object },
+  props: { tab: String, kind: String, tiers: Array, timeline: Object },
   template: `
-<div class="cockpit" :class="kind">
+<div class="cockpit" :class="kind" :style="{ '--side': side }">
   <div class="bar"><span ref="bar" class="said">connecting ...</span><span ref="wrong" class="wrong"></span></div>
   <div class="mirrors">
-    <figure v-for="v in ['left', 'rear', 'right']" :key="v" @click="say('main', v)"><canvas :ref="v"></canvas>
-      <figcaption>{{ title(v) }}</figcaption></figure>
+    <figure v-for="v in places.slice(0, 3)" :key="v" :data-view="v" draggable="true" @click="choose(v)" @dragstart="dragged = v"
+      @dragover.prevent @drop.prevent="swap(v)"><canvas :ref="v"></canvas><figcaption>{{ title(v) }}</figcaption></figure>
   </div>
   <div class="stage"><canvas ref="main"></canvas><div class="beside"><canvas ref="beside"></canvas><div class="hud"><div ref="other" class="mode"></div></div></div>
     <div class="hud">
@@ -32,11 +39,12 @@ export default {
     </div>
     <div class="lamp" ref="lamp"></div>
     <div class="alert" ref="alert"></div>
+    <div class="edge" title="drag: width of the small views" @pointerdown="$event.target.setPointerCapture($event.pointerId)"
+      @pointermove="$event.buttons && pull($event)"></div>
   </div>
   <div class="side">
-    <figure v-for="v in ['top', 'depth', 'semantic']" :key="v" @click="say('main', v)"><canvas :ref="v"></canvas>
-      <figcaption>{{ title(v) }}</figcaption></figure>
-    <figure><canvas ref="radar" width="240" height="180"></canvas><figcaption>radar, orange closing</figcaption></figure>
+    <figure v-for="v in places.slice(3)" :key="v" :data-view="v" draggable="true" @click="choose(v)" @dragstart="dragged = v"
+      @dragover.prevent @drop.prevent="swap(v)"><canvas :ref="v"></canvas><figcaption>{{ title(v) }}</figcaption></figure>
   </div>
   <div class="facts"><dl ref="facts"></dl>
     <ol ref="tiers" class="tiers"></ol>
@@ -48,10 +56,10 @@ export default {
   <div class="line" v-if="timeline"><canvas ref="line" width="1200" height="70" @pointerdown="seek"
     @pointermove="$event.buttons && seek($event)"></canvas></div>
 </div>`,
-  data: () => ({ wheels: [[4, 10], [45, 10], [4, 48], [45, 48]] }),
+  data: () => ({ wheels: [[4, 10], [45, 10], [4, 48], [45, 48]], ...layout() }),
   mounted() {
     this.keys = {}; this.history = []; this.pressed = false; this.shownAt = []; this.waiting = {};
-    for (const name of TIERS) this.$refs.tiers.append(Object.assign(document.createElement("li"), { textContent: name }));
+    for (const name of this.tiers) this.$refs.tiers.append(Object.assign(document.createElement("li"), { textContent: name }));
     this.down = (e) => this.key(e, true); this.up = (e) => this.key(e, false);
     this.away = () => { this.keys = {}; this.beat(); };
     document.addEventListener("keydown", this.down); document.addEventListener("keyup", this.up);
@@ -66,6 +74,17 @@ export default {
   },
   methods: {
     title(v) { return TITLES[v]; },
+    canvas(name) { const c = this.$refs[name]; return Array.isArray(c) ? c[0] : c; },
+    choose(v) { if (v !== "radar") this.say("main", v); },
+    swap(v) {  // the view that is dragged and the one that it is dropped on change places
+      const from = this.places.indexOf(this.dragged), to = this.places.indexOf(v); if (from < 0 || from === to) return;
+      const places = [...this.places]; places[from] = v; places[to] = this.dragged; this.places = places; this.keep();
+    },
+    pull(e) {
+      const box = this.$el.getBoundingClientRect(), share = (box.right - e.clientX) / box.width;
+      this.side = `${Math.round(100 * Math.max(0.1, Math.min(0.6, share)))}%`; this.keep();
+    },
+    keep() { try { localStorage.setItem(LAYOUT, JSON.stringify({ places: this.places, side: this.side })); } catch { /* it may keep nothing */ } },
     open() {
       const scheme = location.protocol === "https:" ? "wss" : "ws";
       this.socket = new WebSocket(`${scheme}://${location.host}/stream?tab=${this.tab}`);
@@ -78,6 +97,7 @@ export default {
       if (this.socket.readyState === WebSocket.OPEN) this.socket.send(JSON.stringify({ word, value }));
     },
     told(message) {
+      if (message.awake) this.socket.send(JSON.stringify({ awake: true }));
       if ("drives" in message) { this.drives = message.drives;
         this.$refs.bar.textContent = message.drives ? "this tab drives" : "another tab drives: this one watches";
         this.$el.classList.toggle("watches", !message.drives); }
@@ -99,9 +119,9 @@ export default {
       }
       this.show(head);
     },
-    figure(name, on) { const c = this.$refs[name]; const f = (Array.isArray(c) ? c[0] : c).parentElement; f.style.display = on ? "" : "none"; },
+    figure(name, on) { const f = this.canvas(name).parentElement; f.style.display = on ? "" : "none"; },
     draw(name, bitmap) {
-      let canvas = this.$refs[name]; if (Array.isArray(canvas)) canvas = canvas[0];
+      const canvas = this.canvas(name);
       if (!canvas) return;
       if (canvas.width !== bitmap.width || canvas.height !== bitmap.height) { canvas.width = bitmap.width; canvas.height = bitmap.height; }
       canvas.getContext("2d").drawImage(bitmap, 0, 0); bitmap.close();
@@ -109,7 +129,7 @@ export default {
     show(h) {
       const r = this.$refs, m = h.motion, s = h.stack, seat = h.seat; this.head = h; this.$el.dataset.paused = h.paused; this.$el.dataset.main = h.main; this.$el.dataset.extras = h.extras.join(" ");
       r.speed.textContent = Math.round(Math.abs(m.speed_kmh));
-      r.gear.textContent = m.reverse ? "R" : m.gear > 0 ? `D${m.gear}` : "N";
+      r.gear.textContent = (m.reverse ? "R" : m.gear > 0 ? `D${m.gear}` : "N") + (seat.pressed_s > 0 ? `, brake held ${seat.pressed_s} s` : "");
       r.mode.textContent = s.mode || ""; this.$el.classList.toggle("manual", !!seat.manual);
       r.throttle.style.height = `${100 * (m.throttle || 0)}%`; r.brake.style.height = `${100 * (m.brake || 0)}%`;
       r.steer.style.left = `${50 - 50 * (m.steer || 0)}%`;
@@ -141,7 +161,8 @@ export default {
       rows.forEach(([k, v], i) => { dl.children[2 * i].textContent = k; dl.children[2 * i + 1].textContent = v; });
     },
     radar(points) {
-      const c = this.$refs.radar, g = c.getContext("2d"), k = c.height / 85; g.fillStyle = "#10141a"; g.fillRect(0, 0, c.width, c.height);
+      const c = this.canvas("radar"); if (c.width !== 240) { c.width = 240; c.height = 180; }
+      const g = c.getContext("2d"), k = c.height / 85; g.fillStyle = "#10141a"; g.fillRect(0, 0, c.width, c.height);
       g.strokeStyle = "#303944"; g.fillStyle = "#6b7682"; g.font = "10px sans-serif";
       for (const d of [20, 40, 60, 80]) { g.beginPath(); g.arc(c.width / 2, c.height - 6, d * k, 1.17 * Math.PI, 1.83 * Math.PI); g.stroke(); g.fillText(d, c.width / 2 + 3, c.height - 8 - d * k); }
       for (const [x, y, v] of points) { g.fillStyle = v < -1 ? "#ff8552" : "#e8eaed"; g.fillRect(c.width / 2 - y * k - 1.5, c.height - 6 - x * k - 1.5, 3, 3); }
@@ -164,10 +185,18 @@ export default {
       const x = (tick) => (tick - T.first) / n * c.width; g.clearRect(0, 0, c.width, c.height);
       g.fillStyle = "#1d232b"; g.fillRect(0, 0, c.width, c.height); g.strokeStyle = "#4d9dff"; g.beginPath();
       const most = Math.max(...T.speed, 1); T.speed.forEach((v, i) => g.lineTo(i / Math.max(T.speed.length - 1, 1) * c.width, 48 - 40 * v / most)); g.stroke();
+      g.fillStyle = "#ff8552"; const wide = c.width / T.ttc.length + 1;
+      T.ttc.forEach((v, i) => { if (v === null || v >= T.near) return; const high = 48 * (1 - v / T.near); g.fillRect(i / T.ttc.length * c.width, 50 - high, wide, high); });
       T.tier.forEach((v, i) => { if (v === null) return; g.fillStyle = `hsl(${v * 27}, 60%, 50%)`; g.fillRect(i / T.tier.length * c.width, 52, c.width / T.tier.length + 1, 6); });
-      const inks = { crash: "#ff5b52", "put back": "#f2b441", marking: "#b58cff", notice: "#9aa5b1" };
+      const inks = { crash: "#ff5b52", "put back": "#f2b441", marking: "#b58cff", notice: "#9aa5b1", hazard: "#ff4fa3" };
+      for (const [first, last] of T.hazards) { g.fillStyle = inks.hazard; g.fillRect(x(first), 0, Math.max(x(last) - x(first), 3), 5); }
+      const worst = Math.max(...T.violated, 1);
+      T.violated.forEach((v, i) => { if (v) { g.fillStyle = `rgba(255, 79, 163, ${0.25 + 0.75 * v / worst})`; g.fillRect(i / T.violated.length * c.width, 52, c.width / T.violated.length + 1, 6); } });
       for (const [tick, kind] of T.events) { g.fillStyle = inks[kind] || "#fff"; g.fillRect(x(tick) - 1.5, kind === "crash" ? 0 : 30, 3, kind === "crash" ? 62 : 22); }
       g.fillStyle = "#fff"; g.fillRect(x(h.tick) - 1, 0, 2, c.height);
+      g.font = "11px sans-serif"; g.fillStyle = "#4d9dff"; g.fillText(`speed, 0 to ${Math.round(most)} km/h`, 6, 68);
+      g.fillStyle = "#ff8552"; g.fillText(`time to collision, below ${T.near} s`, 150, 68);
+      if (T.violated.length || T.hazards.length) { g.fillStyle = inks.hazard; g.fillText(`hazards above, below indicators beyond their bounds, up to ${Math.max(...T.violated, 0)}`, 340, 68); }
     },
     seek(e) {
       const box = e.target.getBoundingClientRect(), T = this.timeline;
@@ -199,6 +228,11 @@ export default {
       const k = this.keys, n = (v) => v ? 1 : 0;
       return { throttle: n(k.up), brake: n(k.down), steer: n(k.left) - n(k.right), handbrake: !!k.hand, method: "keyboard" };
     },
+    trodden(pad, i) {  // 1 is released; a browser says exactly 0, half the way, until a pedal is first moved
+      this.moved = this.moved || {}; const v = pad.axes[i] ?? 1, name = `${pad.id} ${i}`;
+      if (v !== 0) this.moved[name] = true;
+      return this.moved[name] ? Math.max(0, (1 - v) / 2) : 0;
+    },
     gamepad() {
       const pad = navigator.getGamepads ? [...navigator.getGamepads()].find((p) => p && p.connected) : null;
       if (!pad) {
@@ -208,7 +242,7 @@ export default {
       const b = (i) => pad.buttons[i] ? pad.buttons[i].value : 0, dead = (v) => Math.abs(v) < 0.06 ? 0 : v, r = (v) => Math.round(v * 100) / 100;
       const wheel = /wheel|g29|g920|t150|t300/i.test(pad.id);
       const p = wheel
-        ? { throttle: r(Math.max(0, (1 - (pad.axes[2] ?? 1)) / 2)), brake: r(Math.max(0, (1 - (pad.axes[5] ?? pad.axes[3] ?? 1)) / 2)) }
+        ? { throttle: r(this.trodden(pad, 2)), brake: r(this.trodden(pad, pad.axes.length > 5 ? 5 : 3)) }
         : { throttle: r(b(7)), brake: r(b(6)) };
       Object.assign(p, { steer: r(-dead(pad.axes[0] || 0)), handbrake: b(0) > 0.5, method: wheel ? "wheel" : "gamepad" });
       const used = p.throttle > 0.02 || p.brake > 0.02 || p.steer !== 0 || p.handbrake;

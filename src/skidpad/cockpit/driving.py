@@ -19,10 +19,17 @@ from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
 from skidpad.stack.settings import settings_of
 
 
-def about(spec: RunSpec, folder: Path, rate: float = 1.0, paused: bool = False) -> dict[str, Any]:
-    """What `drive_job` is given; ConfigError for a rate out of range."""
-    rate = Pace(rate).rate
-    return {"spec": spec.to_plain(), "folder": str(folder), "rate": rate, "paused": paused}
+def about(
+    spec: RunSpec, folder: Path, rate: float = 1.0, paused: bool = False, own_gc: bool = True
+) -> dict[str, Any]:
+    """What `drive_job` is given; ConfigError for a rate out of range. own_gc: see `RealTime`."""
+    return {
+        "spec": spec.to_plain(),
+        "folder": str(folder),
+        "rate": Pace(rate).rate,
+        "paused": paused,
+        "own_gc": own_gc,
+    }
 
 
 def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
@@ -48,7 +55,7 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
         return Shown(desk.outside, told)
 
     screen = Screen(feed, link, stage_of(spec).map, shown, spec.seed)
-    time = RealTime(link, screen.show)
+    time = RealTime(link, screen.show, own_gc=about["own_gc"])
     try:
         driven = drive_at_desk(spec, desk, folder, (screen, time))
     finally:

@@ -14,7 +14,7 @@ from PIL import Image
 from skidpad.campaign.drive import Moment
 from skidpad.cockpit import hud
 from skidpad.cockpit.companion import Companion
-from skidpad.cockpit.marks import marks_of
+from skidpad.cockpit.marks import LightAhead, marks_of
 from skidpad.cockpit.pictures import Picture, colours, draw
 from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import Studio, View, plane
@@ -66,7 +66,7 @@ def frames(
     first = source.seat(moments[0]).outside
     studio = Studio(source.map, source.table, first, source.seed)
     companion = None if other is None else Companion(other, source.tick(0))
-    camera = studio.suite.cameras[view.value]
+    camera, light = studio.suite.cameras[view.value], LightAhead(source.map)
     for k in moments:
         moment = source.moment(k)
         studio.change(source.seat(k).outside)
@@ -75,8 +75,8 @@ def frames(
         crash = source.crash(k)
         images = studio.look(truth.tick, truth.states, truth.lights, braking, crash)
         picture = colours(plane(images[view.value]))
-        marks = msgspec.to_builtins(marks_of(camera, moment.frame.radar, moment.report))
-        draw(picture, *marks)
+        seen = marks_of(camera, moment.frame.radar, moment.report, light.mark(camera, moment))
+        draw(picture, *msgspec.to_builtins(seen))
         _inset(picture, {v: colours(plane(images[v.value])) for v, _ in INSETS})
         _say(
             picture,

@@ -13,7 +13,13 @@ from skidpad.core.inputs import Beam
 from skidpad.core.vocabulary import Supervision, Tier
 from skidpad.stack.perception.radar import velocity_limit
 
-TIERS = tuple(tier.name.replace("_", " ").capitalize() for tier in Tier)
+
+def _title(tier: Tier) -> str:
+    return tier.name.replace("_", " ").capitalize().replace("Acc ", "ACC ")
+
+
+# by value: the page lights the one that acted
+TIERS = tuple("No action" if tier is Tier.NONE else _title(tier) for tier in Tier)
 
 
 def rounded(value: float | None, digits: int = 2) -> float | None:

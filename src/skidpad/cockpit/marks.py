@@ -1,4 +1,4 @@
-"""Detections drawn into pictures: radar points and the measured distance, where they are seen."""
+"""Detections drawn into pictures: radar points, the measured distance, the traffic light."""
 
 from __future__ import annotations
 
@@ -7,17 +7,33 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.campaign.drive import Moment
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, RadarSpec
 from skidpad.core.states import StackReport
+from skidpad.roads.queries import RoadMap
+from skidpad.roads.roadside import SignalHead
 from skidpad.sensors.twelve import RADAR_ID, twelve_sensors
 from skidpad.sensors.view import camera_view
+from skidpad.stack.perception.lane_view import LaneView
+from skidpad.stack.perception.lights import LightScan
 
 Floats = NDArray[np.float64]
 CLOSING = -1.0  # m/s, below which a radar point is shown as closing
 LEAD_HALF_WIDTH, LEAD_HEIGHT = 1.0, 1.5  # m, of the bracket at the measured distance
 BODY = Pose(0.0, 0.0)
+LIGHT_AGREES = 2.0  # m between the stop line that a stack reports and that of the light shown
+HEAD_WIDE, HEAD_HIGH = 1.2, 2.0  # lamp diameters from a head's middle to the edges of its frame
+LIGHT_LEAST = 5  # px, half of the smallest frame
+
+
+class LightMark(NamedTuple):
+    """The traffic light that the stack reports."""
+
+    frames: list[tuple[int, int, int, int]]  # about its heads: left, top, right, bottom
+    state: str
+    label: str
 
 
 class Marks(NamedTuple):
@@ -26,6 +42,7 @@ class Marks(NamedTuple):
     points: list[tuple[int, int, bool]]  # radar: column, row, closing
     lead: tuple[int, int, int, int] | None  # bracket: left, top, right, bottom
     label: str
+    light: LightMark | None = None
 
 
 RADAR_MOUNT = next(
@@ -33,9 +50,12 @@ RADAR_MOUNT = next(
 )
 
 
-def project(camera: CameraSpec, points: Floats) -> Floats:
-    """(n, 3) column, row and depth of points (n, 3) in the ego's frame; depth <= 0: behind."""
-    view = camera_view(camera, BODY)
+def project(camera: CameraSpec, points: Floats, body: Pose = BODY) -> Floats:
+    """(n, 3) column, row and depth of points (n, 3) in the ego's frame; depth <= 0: behind.
+
+    body: the pose of the ego in the frame of the points.
+    """
+    view = camera_view(camera, body)
     p = (points - view.centre) @ view.rotation.T
     depth = np.maximum(p[:, 2], 1e-6)
     u = view.cx + view.focal * p[:, 0] / depth
@@ -43,7 +63,9 @@ def project(camera: CameraSpec, points: Floats) -> Floats:
     return np.stack([u, v, p[:, 2]], axis=1)
 
 
-def marks_of(camera: CameraSpec, radar: RadarPoints, report: StackReport) -> Marks:
+def marks_of(
+    camera: CameraSpec, radar: RadarPoints, report: StackReport, light: LightMark | None = None
+) -> Marks:
     """What the ego's sensors said, as seen by a camera."""
     shown = project(camera, _radar_points(radar))
     points = [
@@ -52,15 +74,15 @@ def marks_of(camera: CameraSpec, radar: RadarPoints, report: StackReport) -> Mar
         if depth > 0.5 and 0 <= u < camera.width and 0 <= v < camera.height
     ]
     if report.distance is None:
-        return Marks(points, None, "")
+        return Marks(points, None, "", light)
     x = report.distance + RADAR_MOUNT.x
     box = np.array([[x, LEAD_HALF_WIDTH, LEAD_HEIGHT], [x, -LEAD_HALF_WIDTH, 0.0]])
     (left, top, near), (right, bottom, _) = project(camera, box).tolist()
     if near <= 0.5:
-        return Marks(points, None, "")
+        return Marks(points, None, "", light)
     status = "" if report.status is None else report.status.name.replace("_", " ").lower()
     lead = (int(left), int(top), int(right), int(bottom))
-    return Marks(points, lead, f"{report.distance:.1f} m  {status}")
+    return Marks(points, lead, f"{report.distance:.1f} m  {status}", light)
 
 
 def _radar_points(radar: RadarPoints) -> Floats:
@@ -80,3 +102,49 @@ def _radar_points(radar: RadarPoints) -> Floats:
         RADAR_MOUNT.z,
     )
     return turned
+
+
+class LightAhead:
+    """Finds the heads of the light that a stack reports: it says where the stop line is."""
+
+    def __init__(self, map: RoadMap) -> None:
+        self.map, self.scan = map, LightScan(map)
+        self.heads: dict[int, list[SignalHead]] = {}
+        for head in map.roadside.heads:
+            self.heads.setdefault(head.signal, []).append(head)
+
+    def mark(self, camera: CameraSpec, moment: Moment) -> LightMark | None:
+        """The light as a camera sees it; None: none is reported, or it is not in the picture."""
+        report, pose = moment.report, moment.truth.states.pose(0)
+        if report.light_distance is None:
+            return None
+        frames = [
+            frame
+            for head in self._reported(moment, report.light_distance)
+            if (frame := _frame(camera, head, pose)) is not None
+        ]
+        if not frames:
+            return None
+        state = "unknown" if report.light_state is None else report.light_state.name.lower()
+        seen = "" if report.hsv is None else f", camera: {report.hsv.name.lower()}"
+        return LightMark(frames, state, f"{state} {report.light_distance:.0f} m{seen}")
+
+    def _reported(self, moment: Moment, distance: float) -> list[SignalHead]:
+        """By the stack's own walk along the lane, from where it believes to be."""
+        ego = moment.frame.ego
+        here = self.map.project(ego.pose.x, ego.pose.y, ego.pose.z)
+        view = LaneView(here, None, 0.0, 0.0)
+        found = self.scan.look(ego.pose, ego.speed, view, moment.truth.lights)
+        if found.signal is None or found.distance is None:
+            return []
+        agrees = abs(found.distance - distance) <= LIGHT_AGREES
+        return self.heads.get(found.signal, []) if agrees else []
+
+
+def _frame(camera: CameraSpec, head: SignalHead, ego: Pose) -> tuple[int, int, int, int] | None:
+    ((u, v, depth),) = project(camera, np.array([[head.x, head.y, head.z]]), ego).tolist()
+    if depth <= 0.5 or not (0 <= u < camera.width and 0 <= v < camera.height):
+        return None
+    scale = camera.focal * head.lamp_diameter / depth  # px
+    wide, high = max(HEAD_WIDE * scale, LIGHT_LEAST), max(HEAD_HIGH * scale, LIGHT_LEAST)
+    return int(u - wide), int(v - high), int(u + wide), int(v + high)

@@ -15,6 +15,7 @@ from nicegui.events import GenericEventArguments
 
 from skidpad.cockpit.about import About
 from skidpad.cockpit.bridge import LAMP_ORDER, Bridge
+from skidpad.cockpit.hud import TIERS
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.core.weather import RANGES
@@ -56,12 +57,14 @@ EXTRAS = {
 RATES = {0.25: "0.25 x", 0.5: "0.5 x", 1.0: "1 x", 2.0: "2 x", 4.0: "4 x", 0.0: "as fast as it can"}
 HELP = (
     "W S A D or arrows: pedals and wheel (hold the brake at standstill to reverse), space: handbrake, "
-    "M: take over and hand back, L: headlights, N: next weather, C: camera, T Y U: hide depth, classes, "
-    "top, G: additions to the pictures, P: pause, full stop: one tick further"
+    "M: take over and hand back, L: headlights, N: next weather, H: next time of day, C: camera, "
+    "T Y U: hide depth, classes, top, G: additions to the pictures, P: pause, full stop: one tick further; "
+    "drag a small view onto another to change places, the edge of the main view to change sizes"
 )
 HELP_REPLAY = (
     "space or P: play and pause, arrows: one tick (with shift: 5 s), full stop: one tick further, "
-    "C: camera, T Y U: hide views, G: additions to the pictures; click a small view or the time line"
+    "C: camera, T Y U: hide views, G: additions to the pictures; click a small view or the time line, "
+    "drag a small view onto another, or the edge of the main view"
 )
 
 
@@ -72,6 +75,7 @@ class Canvases(Element, component="cockpit.js"):
         super().__init__()
         self._props["tab"] = tab
         self._props["kind"] = kind
+        self._props["tiers"] = list(TIERS)
         self._props["timeline"] = timeline
 
 

@@ -16,6 +16,8 @@ from skidpad.sensors.encodings import cityscapes_colours
 
 Picture = NDArray[np.uint8]  # (H, W, 3) blue, green, red, as OpenCV wants it
 QUALITY = 80  # of JPEG
+LIGHTS = {"red": (60, 60, 255), "yellow": (60, 220, 255), "green": (110, 220, 60)}  # the same order
+LIGHT_OFF = (200, 200, 200)
 CLOSING, STEADY, LEAD = (82, 133, 255), (235, 235, 235), (127, 206, 79)  # blue, green, red
 
 
@@ -42,8 +44,16 @@ def views_of(packet: Packet, told: Mapping[str, Any]) -> dict[str, Picture]:
     return found
 
 
-def draw(picture: Picture, points: list[list[int]], lead: list[int] | None, label: str) -> None:
-    """Radar points and the bracket at the measured distance, in place."""
+def draw(
+    picture: Picture,
+    points: list[list[int]],
+    lead: list[int] | None,
+    label: str,
+    light: list[Any] | None,
+) -> None:
+    """Radar points, the bracket at the measured distance and the light ahead, in place."""
+    if light is not None:
+        draw_light(picture, *light)
     for u, v, closing in points:
         cv2.circle(picture, (u, v), 3, CLOSING if closing else STEADY, -1, cv2.LINE_AA)
     if lead is None:
@@ -56,6 +66,16 @@ def draw(picture: Picture, points: list[list[int]], lead: list[int] | None, labe
             cv2.line(picture, (x, y), (x, y + down * arm), LEAD, 2, cv2.LINE_AA)
     at = (left, max(top - 8, 14))
     cv2.putText(picture, label, at, cv2.FONT_HERSHEY_SIMPLEX, 0.5, LEAD, 1, cv2.LINE_AA)
+
+
+def draw_light(picture: Picture, frames: list[list[int]], state: str, label: str) -> None:
+    """A frame about every head of the light, and what is known of it, in place."""
+    ink = LIGHTS.get(state, LIGHT_OFF)
+    for left, top, right, bottom in frames:
+        cv2.rectangle(picture, (left, top), (right, bottom), ink, 2, cv2.LINE_AA)
+    left, top, *_ = frames[0]
+    at = (left, max(top - 8, 14))
+    cv2.putText(picture, label, at, cv2.FONT_HERSHEY_SIMPLEX, 0.5, ink, 1, cv2.LINE_AA)
 
 
 class Encoder:

@@ -13,6 +13,8 @@ from skidpad.cockpit.words import End, Word, encode
 from skidpad.core.errors import InputError, SkidpadError
 
 ENDS_WITHIN = 120.0  # s to write the run's folder
+# what a terminal or a service sends to all processes at once
+GROUP = [getattr(signal, n) for n in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, n)]
 Job = Callable[[str, Connection, dict[str, Any]], str]
 
 
@@ -80,7 +82,8 @@ class Producer:
 
 
 def _work(job: Job, name: str, pipe: Connection, about: dict[str, Any]) -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the page's process hears it, and says so
+    for one in GROUP:  # the page's process hears it: the pipe says so, and the drive is kept
+        signal.signal(one, signal.SIG_IGN)
     feed_name = name
     try:
         said = ("done", job(feed_name, pipe, about))

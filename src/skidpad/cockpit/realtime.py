@@ -28,16 +28,20 @@ class RealTime(Sink):
         again: Callable[[Moment], None],
         clock: Callable[[], float] = perf_counter,
         wait: Callable[[float], None] = sleep,
+        own_gc: bool = True,
     ) -> None:
-        """again: shows a moment once more, as views are changed while it stands."""
+        """again: shows a moment once more, as views are changed while it stands.
+
+        own_gc: garbage is collected in the pauses between ticks only (A-267).
+        """
         self.link, self.again, self.clock = link, again, clock
-        self.pacer = Pacer(grace=DT, clock=clock, wait=wait)
+        self.pacer = Pacer(own_gc, grace=DT, clock=clock, wait=wait)
         self.ticks = self.slow = 0
         self._last = self._window = 0.0
         self.rtf: float | None = None
 
     def begin(self, table: ActorTable) -> None:
-        """The clock starts now; garbage is collected here only (A-267)."""
+        """The clock starts now."""
         del table
         self.pacer.begin()
         self._last = self._window = self.clock()

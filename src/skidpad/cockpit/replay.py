@@ -21,7 +21,8 @@ from skidpad.campaign.desk import beam_of
 from skidpad.campaign.drive import Moment
 from skidpad.campaign.keeping import housed, road_file
 from skidpad.campaign.stored import read_run
-from skidpad.cockpit.source import Said, Seat
+from skidpad.cockpit.indicators import every, least_of, ttc_ahead
+from skidpad.cockpit.source import Curves, Said, Seat
 from skidpad.core.errors import FileError
 from skidpad.core.frames import RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
@@ -38,6 +39,7 @@ from skidpad.core.states import (
     WorldTruth,
 )
 from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Supervision, Tier
+from skidpad.evidence.pairs import body, together
 from skidpad.physics.types import vehicle_types
 from skidpad.recording.events import LightChange, Notice, Relocation
 from skidpad.recording.inputs import read_inputs
@@ -183,11 +185,13 @@ class Recording:
                 return Relocate(e.new, 0.0, Moved(e.reason, e.shift, e.old, e.new, True))
         return None
 
-    def curves(self) -> tuple[list[float], list[int | None]]:
-        """Speed in km/h and acting tier of about a thousand moments."""
-        part = slice(None, None, max(1, len(self.log) // 1000))
-        tiers = [None if isnan(v) else int(v) for v in self.log.report.tier[part].tolist()]
-        return np.round(self.log.v_ego[part] * 3.6, 1).tolist(), tiers
+    def curves(self) -> Curves:
+        """What is drawn along the time."""
+        log, part = self.log, every(len(self.log))
+        tiers = [None if isnan(v) else int(v) for v in log.report.tier[part].tolist()]
+        bodies = [body(log, i) for i in range(len(log.table))]
+        ttc = ttc_ahead(bodies, np.column_stack([together(log, 0, i) for i in range(len(bodies))]))
+        return Curves(np.round(log.v_ego[part] * 3.6, 1).tolist(), tiers, least_of(ttc))
 
 
 def map_of(spec: RunSpec, folder: Path) -> RoadMap:

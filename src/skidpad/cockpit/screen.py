@@ -12,7 +12,7 @@ import msgspec
 from skidpad.campaign.drive import Moment, Sink
 from skidpad.cockpit import hud
 from skidpad.cockpit.feed import Feed
-from skidpad.cockpit.marks import marks_of
+from skidpad.cockpit.marks import LightAhead, marks_of
 from skidpad.cockpit.studio import MAIN, Studio, View, plane
 from skidpad.cockpit.words import Link
 from skidpad.core.geometry import Pose
@@ -55,7 +55,7 @@ class Screen(Sink):
     def begin(self, table: ActorTable) -> None:
         """The run begins, with these actors."""
         self.studio = Studio(self.map, table, self.ask().outside, self.seed)
-        self.cameras = self.studio.suite.cameras
+        self.cameras, self.light = self.studio.suite.cameras, LightAhead(self.map)
 
     def see(self, moment: Moment) -> None:
         """Show it, or drop it: a page that is slow, or not there, costs nothing."""
@@ -93,12 +93,11 @@ class Screen(Sink):
         return view not in self.link.hidden and (view not in MAIN or view is View.TOP)
 
     def _told(self, moment: Moment, shown: Shown) -> dict[str, Any]:
-        frame = moment.frame
-        marks = {
-            v.value: marks_of(self.cameras[v.value], frame.radar, moment.report)
-            for v in MARKED
-            if v is self.link.main
-        }
+        frame, marks = moment.frame, {}
+        if self.link.main in MARKED:
+            camera = self.cameras[self.link.main.value]
+            light = self.light.mark(camera, moment)
+            marks[camera.id] = marks_of(camera, frame.radar, moment.report, light)
         return {
             "tick": frame.tick,
             "t": round(frame.tick * DT, 2),

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from bisect import bisect_left
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 from skidpad.campaign.drive import Moment
+from skidpad.cockpit.indicators import NEAR
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import LampSwitch, Outside
@@ -41,6 +43,18 @@ class Said:
     def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
         """Nothing is driven."""
         raise NotImplementedError
+
+
+class Curves(NamedTuple):
+    """What is drawn along the time, at about a thousand moments."""
+
+    speed: list[float]  # km/h
+    tier: list[int | None]  # that acted
+    ttc: list[float | None]  # s, the least up to the next one, to what is in the ego's way
+    violated: Sequence[int] = ()  # indicators of a monitor beyond their bounds; (): none looked on
+    hazards: Sequence[
+        tuple[int, int, str]
+    ] = ()  # first and last tick, and what a monitor called it
 
 
 class Source(Protocol):
@@ -82,8 +96,8 @@ class Source(Protocol):
         """How many contacts of the ego there were up to moment k."""
         ...
 
-    def curves(self) -> tuple[list[float], list[int | None]]:
-        """Speed in km/h and acting tier of about a thousand moments."""
+    def curves(self) -> Curves:
+        """What is drawn along the time."""
         ...
 
 
@@ -93,14 +107,13 @@ def index_at(source: Source, tick: int) -> int:
 
 
 def timeline(source: Source) -> dict[str, Any]:
-    """What the page draws along the time: speed, events, tiers."""
-    speed, tier = source.curves()
+    """What the page draws along the time: speed, time to collision, events, tiers, hazards."""
     return {
         "first": source.tick(0),
         "last": source.tick(source.ticks - 1),
         "step": source.step,
         "dt": DT,
-        "speed": speed,
-        "tier": tier,
+        "near": NEAR,
+        **source.curves()._asdict(),
         "events": source.marks,
     }

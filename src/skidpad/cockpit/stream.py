@@ -12,7 +12,8 @@ from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 from skidpad.cockpit.bridge import Bridge
 
 POLL = 0.006  # s between two looks for a new picture
-CHECK = 0.05  # s between two looks at the dead man's switch
+CHECK = 0.05  # s between two looks at the dead man's switch and at who sleeps
+ASK = 1.0  # s between two questions whether a tab is awake: timers of a hidden page may stand still
 LOST_AFTER = 2.0  # s without an acknowledgement after which the next picture is sent anyway
 
 
@@ -41,9 +42,12 @@ class Stream:
             self.bridge.leave(self.tab)
 
     async def _send(self) -> None:
-        waited = 0.0
+        waited = unasked = 0.0
         while True:
             await self._tell_role()
+            if unasked > ASK:
+                unasked = 0.0
+                await self._tell(awake="?")
             if self.taken >= self.sent or waited > LOST_AFTER:
                 newest = self.bridge.newest(self.sent)
                 if newest is not None:
@@ -56,6 +60,7 @@ class Stream:
                 return
             await asyncio.sleep(POLL)
             waited += POLL
+            unasked += POLL
 
     async def _tell_role(self) -> None:
         role = self.bridge.may(self.tab)
@@ -69,12 +74,15 @@ class Stream:
     async def _receive(self) -> None:
         while True:
             message = await self.socket.receive_text()
+            self.bridge.tabs.come(self.tab)  # whatever it says: it is awake
             with suppress(ValueError, AttributeError):  # not a message of ours
                 await self._take(json.loads(message))
 
     async def _take(self, message: dict[str, Any]) -> None:
         if "ack" in message:
             self.taken = int(message["ack"])
+            return
+        if "awake" in message:
             return
         wrong = self.bridge.say(self.tab, str(message.get("word")), message.get("value"))
         if wrong is not None:
@@ -83,7 +91,7 @@ class Stream:
     async def _check(self) -> None:
         while True:
             await asyncio.sleep(CHECK)
-            self.bridge.dead_man.check()
+            self.bridge.check()
 
 
 def add_stream(app: FastAPI, bridge: Bridge) -> None:

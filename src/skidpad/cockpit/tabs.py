@@ -6,28 +6,33 @@ from collections.abc import Callable
 from time import monotonic
 
 RELEASE_AFTER = 0.3  # s without a sign of the driving tab, after which the pedals are released
+ASLEEP_AFTER = 10.0  # s without an answer of a tab, after which it counts as closed; our choice
 
 
 class Tabs:
-    """The open tabs in order of coming."""
+    """The open tabs in order of coming. One that sleeps goes, and comes anew when it wakes."""
 
-    def __init__(self) -> None:
-        self._open: list[str] = []
+    def __init__(self, clock: Callable[[], float] = monotonic) -> None:
+        self.clock = clock
+        self._open: dict[str, float] = {}  # when each of them was last heard of
 
     def come(self, tab: str) -> None:
-        """A tab is opened."""
-        if tab not in self._open:
-            self._open.append(tab)
+        """A tab is opened, or gives a sign that it is awake."""
+        self._open[tab] = self.clock()
 
     def go(self, tab: str) -> None:
-        """A tab is closed; the next one in order drives."""
-        if tab in self._open:
-            self._open.remove(tab)
+        """A tab is closed, or sleeps; the next one in order drives."""
+        self._open.pop(tab, None)
+
+    def asleep(self) -> list[str]:
+        """Tabs that are open, but do not answer: a browser may stop a page that nobody sees."""
+        now = self.clock()
+        return [tab for tab, heard in self._open.items() if now - heard > ASLEEP_AFTER]
 
     @property
     def driver(self) -> str | None:
         """The tab whose words count."""
-        return self._open[0] if self._open else None
+        return next(iter(self._open), None)
 
     def __len__(self) -> int:
         return len(self._open)

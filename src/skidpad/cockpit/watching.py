@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import time
 import webbrowser
 from collections import Counter
@@ -14,13 +15,16 @@ import msgspec
 
 from skidpad.campaign.recipe import cell_of
 from skidpad.cockpit.serving import has_screen
-from skidpad.core.errors import FileError
+from skidpad.core.errors import FileError, InputError
+from skidpad.core.names import inside
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.statistics import clopper_pearson
 from skidpad.pages.server import Place, Server
 from skidpad.pages.site import nicegui, site
+from skidpad.recording.campaigns import RUNS, last_snapshot
 from skidpad.recording.ledger import CAMPAIGN, LEDGER, latest, read_identity, read_ledger
 
+WRAPPED = "overflow-wrap: anywhere"  # the name of a folder may be wider than a phone
 GOOD = "without a crash"
 REFRESH = 2.0  # s
 FATAL = (
@@ -67,6 +71,7 @@ class Standing:
     outcomes: dict[str, int]
     cells: tuple[Cell, ...]
     last_crash: str  # name of the run; "": none yet
+    picture: Path | None = None  # of that crash, if one was taken
 
 
 def standing(folder: Path) -> Standing:
@@ -81,13 +86,16 @@ def standing(folder: Path) -> Standing:
     for one in counted:
         cells.setdefault(cell_of(one.run), []).append(not crashed(one))
     crashes = [one.run for one in in_order if crashed(one)]
+    last = crashes[-1] if crashes else ""
+    run = inside(folder / RUNS, last) if last else None
     return Standing(
         command=str(identity.get("command", "adas")),
         done=len(lines),
         planned=identity.get("runs"),
         outcomes=dict(sorted(Counter(one.key.outcome for one in lines).items())),
         cells=tuple(_cell(name, good) for name, good in sorted(cells.items())),
-        last_crash=crashes[-1] if crashes else "",
+        last_crash=last,
+        picture=None if run is None else last_snapshot(run),
     )
 
 
@@ -132,17 +140,19 @@ def build(folder: Path) -> Callable[[], None]:
     def page() -> None:
         from nicegui import ui
 
-        ui.label(str(folder)).style("font-size: 18px; font-weight: 600")
+        ui.label(str(folder)).style(f"font-size: 18px; font-weight: 600; {WRAPPED}")
         bar = ui.linear_progress(value=0.0, show_value=False).props("size=14px rounded")
         said = ui.label()
         table = ui.table(columns=COLUMNS, rows=[], row_key="name").props("dense flat dark")
         table.style("width: 100%")
-        crash = ui.label()
+        crash = ui.label().style(WRAPPED)
+        picture = ui.image().props("no-spinner").style("width: 100%; max-width: 640px")
+        shown: list[Path | None] = [None]
 
         def refresh() -> None:
             try:
                 now = standing(folder)
-            except FileError as error:
+            except InputError as error:
                 said.text = str(error)
                 return
             head = lines(now)
@@ -150,6 +160,10 @@ def build(folder: Path) -> Callable[[], None]:
             crash.text = head[-1] + (
                 f"  (skidpad replay {folder / 'runs' / now.last_crash})" if now.last_crash else ""
             )
+            if now.picture != shown[0]:
+                picture.set_source("" if now.picture is None else as_address(now.picture))
+                shown[0] = now.picture
+            picture.set_visibility(now.picture is not None)
             bar.value = now.done / now.planned if now.planned else 0.0
             table.rows = [
                 {
@@ -166,6 +180,11 @@ def build(folder: Path) -> Callable[[], None]:
         ui.timer(REFRESH, refresh)
 
     return page
+
+
+def as_address(picture: Path) -> str:
+    """A picture's file as an address that holds it, so that no folder is served."""
+    return "data:image/png;base64," + base64.b64encode(picture.read_bytes()).decode()
 
 
 def serve_watch(folder: Path, place: Place, say: Callable[[str], None], browser: bool) -> None:

@@ -57,6 +57,16 @@ PROOFS = (
         "the evaluation of the channels whole: driven, trained, validated and reported on seeds of its own",
     ),
     Proof(
+        "first-readings",
+        ("tools/first_readings.py",),
+        "200 of 200 first readings after `listen` are of the first tick, for every kind of sensor",
+    ),
+    Proof(
+        "monitor-hour",
+        ("tools/monitor_hour.py", "--out", "out/nightly/monitor-hour"),
+        "36 000 cycles judged while driving: median 0.5, 99.9 % 2.5, most 25 ms of processor time",
+    ),
+    Proof(
         "fleet-kills",
         ("tools/fleet_load.py", "--records", "20000", "--kills", "20"),
         "20 kills of the fleet's service at random moments: acknowledged ids are the stored ones",

@@ -8,18 +8,16 @@ import time
 
 import carla
 
+from carla_world import PATIENCE_S, loaded
+
 BEAT = 200  # ticks between signs of life
-PATIENCE_S = 120.0
 
 
 def main(port: int, tm_port: int, seed: int, ticks: int, cars: int, name: str) -> None:
     """Load the map, let the Traffic Manager drive, say how it goes."""
     client = carla.Client("127.0.0.1", port)
     client.set_timeout(PATIENCE_S)
-    world = client.load_world(name)
-    settings = world.get_settings()
-    settings.synchronous_mode, settings.fixed_delta_seconds = True, 0.05
-    world.apply_settings(settings)
+    world = loaded(client, name)
     manager = client.get_trafficmanager(tm_port)
     manager.set_synchronous_mode(True)
     manager.set_random_device_seed(seed)

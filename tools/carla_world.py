@@ -1,0 +1,48 @@
+"""A world of a CARLA server, for the programs here that are clients of the `carla` wheel."""
+
+from __future__ import annotations
+
+import queue
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any
+
+import carla
+
+from skidpad.simulation.carla_server.process import ServerProcess
+
+DT = 0.05  # s of a tick
+PATIENCE_S = 120.0  # with a call
+HIGH = 2.0  # m above the middle of the car at which sensors are put
+
+
+@contextmanager
+def served(name: str) -> Iterator[Any]:
+    """The world of a map, loaded and synchronous, on a server of its own."""
+    with ServerProcess(["--idle-exit", "600"]) as server:
+        client = carla.Client("127.0.0.1", server.port)
+        client.set_timeout(PATIENCE_S)
+        yield loaded(client, name)
+
+
+def loaded(client: Any, name: str) -> Any:
+    """The world of a map after a client has loaded it, synchronous by ticks of DT."""
+    world = client.load_world(name)
+    settings = world.get_settings()
+    settings.synchronous_mode, settings.fixed_delta_seconds = True, DT
+    world.apply_settings(settings)
+    return world
+
+
+def listening(
+    world: Any, car: Any, kind: str, options: Mapping[str, str]
+) -> tuple[Any, queue.Queue[Any]]:
+    """A fresh sensor on a car, and where its readings come."""
+    blueprint = world.get_blueprint_library().find(f"sensor.{kind}")
+    for name, value in options.items():
+        blueprint.set_attribute(name, value)
+    place = carla.Transform(carla.Location(z=HIGH))
+    sensor = world.spawn_actor(blueprint, place, attach_to=car)
+    came: queue.Queue[Any] = queue.Queue()
+    sensor.listen(came.put)
+    return sensor, came

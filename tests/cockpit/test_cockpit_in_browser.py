@@ -290,9 +290,9 @@ def test_a_page_that_is_put_to_sleep_lets_another_one_drive(browser, tmp_path):
         other = context.new_page()
         other.goto(page.url)
         until(other, "() => document.querySelector('.bar').textContent.includes('watches')")
-        asleep = context.new_cdp_session(
-            page
-        )  # all that runs in the page stops, its socket is open
+        # all that runs in the page stops, its socket is open
+        asleep = context.new_cdp_session(page)
+        page.evaluate("window.same = true")
         asleep.send("Debugger.enable")
         asleep.send("Debugger.pause")
         until(other, "() => document.querySelector('.bar').textContent === 'this tab drives'")
@@ -307,6 +307,8 @@ def test_a_page_that_is_put_to_sleep_lets_another_one_drive(browser, tmp_path):
         asleep.send("Debugger.pause")
         sleep(ASLEEP_AFTER + 3.0)
         asleep.send("Debugger.resume")
+        sleep(3.0)  # a page that is loaded anew loses what was pressed meanwhile
+        assert page.evaluate("window.same")
         until(page, "() => document.querySelector('.cockpit').dataset.paused === 'true'")
         page.keyboard.press("p")
         until(page, "() => document.querySelector('.cockpit').dataset.paused === 'false'")

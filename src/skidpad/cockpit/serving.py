@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 PATIENCE = 0.5  # s between two looks at the keyboard's Ctrl-C
 LAST_WORD = 1.5  # s in which the page shows how it ended
+SLEEP = 3600.0  # s that a browser may let a hidden page sleep before it is loaded anew; our choice
 
 
 def serve(
@@ -67,7 +68,13 @@ def application(bridge: Bridge, about: About) -> FastAPI:
     from skidpad.cockpit.stream import add_stream
 
     pages = {"/": build(bridge, about)}
-    return site(f"Skidpad {about.kind}", pages, routes=lambda a: add_stream(a, bridge), style=STYLE)
+    return site(
+        f"Skidpad {about.kind}",
+        pages,
+        routes=lambda app: add_stream(app, bridge),
+        style=STYLE,
+        kept=SLEEP,
+    )
 
 
 def has_screen() -> bool:

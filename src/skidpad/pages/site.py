@@ -12,6 +12,7 @@ if TYPE_CHECKING:
 
 Builder = Callable[..., Any]  # fills the page that NiceGUI opens around it
 _BUILT: list[str] = []
+KEPT = 3.0  # s; NiceGUI's own
 
 STYLE = """
 :root { color-scheme: dark; --ink: #e8eaed; --dim: #9aa5b1; --ground: #14181d; --card: #1d232b;
@@ -36,11 +37,13 @@ def site(
     *,
     routes: Callable[[FastAPI], None] | None = None,
     style: str = "",
+    kept: float = KEPT,
 ) -> FastAPI:
     """An application with these pages by path.
 
     routes: adds routes that are no pages; they come first, as NiceGUI answers to any path.
     style: CSS after the house's own.
+    kept: s for which the page of a tab that does not answer is kept; later it is loaded anew.
     """
     module = nicegui()
     from fastapi import FastAPI
@@ -54,7 +57,7 @@ def site(
     if routes is not None:
         routes(app)
     for path, builder in pages.items():
-        module.ui.page(path)(builder)
+        module.ui.page(path, reconnect_timeout=kept)(builder)
     module.ui.add_css(STYLE + style, shared=True)
     module.ui.run_with(app, title=title, dark=True, tailwind=False, show_welcome_message=False)
     return app

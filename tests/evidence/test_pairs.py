@@ -16,10 +16,10 @@ from skidpad.evidence.pairs import (
     Body,
     Pair,
     following,
-    over,
     pair_of,
     post_encroachment,
     required_deceleration,
+    together,
 )
 
 L, W = 4.0, 1.8
@@ -135,8 +135,9 @@ def test_a_hill_is_no_bridge(ahead, up, apart):
     """12 % of climb, as roads have; 6 m up at a crossing; cars 1.5 m high."""
     columns = (np.array([[0.0, v]]) for v in (ahead, 0.0, up))
     actors = SimpleNamespace(**dict(zip("xyz", columns, strict=True)))
-    log = SimpleNamespace(actors=actors, table=SimpleNamespace(height=np.array([1.5, 1.5])))
-    assert over(log, 0, 1).tolist() == over(log, 1, 0).tolist() == [apart]
+    table = SimpleNamespace(height=np.array([1.5, 1.5]))
+    log = SimpleNamespace(actors=actors, table=table, present=np.ones((1, 2), bool))
+    assert together(log, 0, 1).tolist() == together(log, 1, 0).tolist() == [not apart]
 
 
 def test_what_never_applied_is_nothing_and_expected_of_no_run():

@@ -1,14 +1,16 @@
 """The evaluation of the channels, whole: drive, train, validate, report, and the tables of its page.
 
-    python tools/channels_campaign.py --out out/channels --hours 50        # about 3 h on two cores
+    python tools/channels_campaign.py --out out/channels --hours 50        # about 2 h on two cores
     python tools/channels_campaign.py --out out/channels --hours 50 --publish
 
-Three parts on seeds of their own, each on every route in its own weather, by day, by night and in
-rain, among natural and among risky drivers. Trees are fitted on `train`, their limits chosen on
-routes that the fold did not see; `validate` is for looking, `report` is looked at once. Then the
-arbiter and each channel alone drive the same two natural hours, for redundancy. What is done is not
-done again, so a campaign that was stopped goes on. `--publish` writes docs/results/channels and the
-tables of docs/channels-evaluation.md, and says what was driven at which commit.
+Parts on seeds of their own, each on every route. `train` and `validate` are driven in the route's own
+weather, by day, by night, in rain and on ice, among natural and among risky drivers; `report` the same
+without ice, which is a part of its own: there the ego, which knows no grip, tailgates. Trees are fitted
+on `train`, their limits chosen on routes that the fold did not see; `validate` is for looking, `report`
+and `ice` are looked at once. Then the arbiter and each channel alone drive the same two natural hours,
+for redundancy. What is done is not done again, so a campaign that was stopped goes on. `--publish`
+writes docs/results/channels and the tables of docs/channels-evaluation.md, and says what was driven at
+which commit.
 """
 
 from __future__ import annotations
@@ -25,12 +27,14 @@ from pathlib import Path
 from typing import Any
 
 import channels_tables
+from skidpad.campaign.channels import SEEDS_EACH
 from skidpad.evidence.channels.redundancy import compare_drivers
 from skidpad.recording.channel_drives import read_outcomes
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "docs" / "results" / "channels"
-CONDITIONS, STRATA = "own,day,night,rain", "natural,risky"
+CONDITIONS, ICE = "own,day,night,rain", "ice"
+JUDGED = ("validate", "report", "ice")
 DRIVERS = ("arbiter", "lav_like", "tfuse_like")
 KEPT = (
     "hours",
@@ -49,11 +53,18 @@ class Part:
     name: str
     seed: int
     share: float
+    conditions: str
+    strata: str = "natural,risky"
 
 
-PARTS = (Part("train", 51, 0.45), Part("validate", 52, 0.15), Part("report", 53, 0.4))
+PARTS = (
+    Part("train", 61, 0.2, f"{CONDITIONS},{ICE}"),
+    Part("validate", 62, 0.05, f"{CONDITIONS},{ICE}"),
+    Part("report", 63, 0.4, CONDITIONS),
+    Part("ice", 64, 0.35, ICE, "natural"),
+)
 REDUNDANCY, HOURS_EACH = "redundancy", 2.0  # of the arbiter and of each channel alone
-SEED_OF_REDUNDANCY = 54
+SEED_OF_REDUNDANCY = 65
 
 
 def main(words: Sequence[str] | None = None) -> int:
@@ -63,11 +74,12 @@ def main(words: Sequence[str] | None = None) -> int:
     out.mkdir(parents=True, exist_ok=True)
     for part in PARTS:
         hours = asked.hours * part.share
-        _drive(out / part.name, asked, part.seed, hours, strata=STRATA, conditions=CONDITIONS)
+        told = {"strata": part.strata, "conditions": part.conditions}
+        _drive(out / part.name, asked, part.seed, hours, **told)
     model = out / "model.npz"
     if not model.exists():
         _skidpad("channels", "train", out / "train", "--out", model, "--workers", asked.workers)
-    for name in ("validate", "report"):
+    for name in JUDGED:
         learned = ("--model", model) if model.exists() else ()
         _skidpad("channels", "evaluate", out / name, "--workers", asked.workers, *learned)
     for driver in DRIVERS:
@@ -111,11 +123,13 @@ def _skidpad(*words: object) -> None:
 def publish(out: Path, hours: float, results: Path = RESULTS) -> None:
     """Copy what the page needs, and write its tables anew."""
     results.mkdir(parents=True, exist_ok=True)
-    for name in ("validate", "report"):
+    for name in JUDGED:
         table = json.loads((out / name / "evaluation.json").read_text(encoding="utf-8"))
         _write(results / f"{name}.json", {"model": table["model"], "strata": _kept(table)})
     _write(results / "redundancy.json", _outcomes(out / REDUNDANCY))
-    seeds = {p.name: p.seed * 1000 for p in PARTS} | {REDUNDANCY: SEED_OF_REDUNDANCY * 1000}
+    seeds = {p.name: p.seed * SEEDS_EACH for p in PARTS} | {
+        REDUNDANCY: SEED_OF_REDUNDANCY * SEEDS_EACH
+    }
     about = {"commit": _commit(), "date": datetime.now(timezone.utc).date().isoformat(),
              "hours_asked": hours, "first_seed": seeds, "processors": os.cpu_count()}  # fmt: skip
     _write(results / "run.json", about)

@@ -21,6 +21,7 @@ RESULTS = ROOT / "docs" / "results" / "channels"
 SLOT = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 HAZARDS = ("inconsistent_localisation", "ego_tailgating", "ego_tailgated")
 FEW = 100  # of the effective size
+ON_ICE = "natural (on ice)"
 Rows = list[list[str]]
 
 
@@ -45,9 +46,10 @@ def filled(page: str, results: Path) -> str:
 def driven(results: Path) -> str:
     """When, where and how much."""
     run, report = _read(results, "run"), _read(results, "report")
+    parts = report["strata"] | _on_ice(results)
     hours = ", ".join(
-        f"{part['hours']:.2f} h among {stratum} drivers ({part['segments']} segments)"
-        for stratum, part in report["strata"].items()
+        f"{part['hours']:.2f} h among {drivers} drivers ({part['segments']} segments)"
+        for drivers, part in parts.items()
     )
     model = report["model"]
     learned = (
@@ -63,7 +65,22 @@ def driven(results: Path) -> str:
 
 def scores(results: Path) -> str:
     """Every identifier among natural drivers against the simulator's truth."""
-    part = _read(results, "report")["strata"].get("natural")
+    return _scores(_read(results, "report")["strata"].get("natural"))
+
+
+def ice(results: Path) -> str:
+    """The same on ice."""
+    return _scores(_on_ice(results).get(ON_ICE))
+
+
+def _on_ice(results: Path) -> dict[str, Any]:
+    """That part by its name; nothing where it was not driven."""
+    if not (results / "ice.json").is_file():
+        return {}
+    return {ON_ICE: _read(results, "ice")["strata"]["natural"]}
+
+
+def _scores(part: dict[str, Any] | None) -> str:
     if part is None:
         return "No natural drivers were driven among.\n"
     head = ["identifier", "hazard", "found", "false", "missed", "precision, % [95 %]",
@@ -99,7 +116,8 @@ def curves(results: Path) -> str:
     """Best harmonic mean on each curve, and the ceiling."""
     head = ["drivers", "identifier", "hazard", "limit", "precision, %", "recall, %"]
     rows: Rows = []
-    for stratum, part in _read(results, "report")["strata"].items():
+    parts = _read(results, "report")["strata"] | _on_ice(results)
+    for stratum, part in parts.items():
         for identifier, by_hazard in part["precision_recall"].get("sim", {}).items():
             for hazard, points in by_hazard.items():
                 best = max(points, key=lambda p: _harmonic(p[1], p[2], p[3]))
@@ -126,7 +144,7 @@ def redundancy(results: Path) -> str:
 
 
 TABLES: dict[str, Callable[[Path], str]] = {
-    "driven": driven, "scores": scores, "missed": missed, "curves": curves,
+    "driven": driven, "scores": scores, "missed": missed, "ice": ice, "curves": curves,
     "redundancy": redundancy,
 }  # fmt: skip
 

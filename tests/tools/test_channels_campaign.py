@@ -30,7 +30,7 @@ def driven(tmp_path_factory):
             judge("s", "route-1", source.channels, list(cycles(source)), context=context)
         )
     table = Evaluation(segments).as_dict() | {"model": None}
-    for name in ("validate", "report"):
+    for name in campaign.JUDGED:
         (out / name).mkdir()
         (out / name / "evaluation.json").write_text(json.dumps(table, allow_nan=False))
     return out
@@ -65,7 +65,7 @@ def test_a_page_is_filled_and_what_is_written_by_hand_stays(published):
 def test_every_table_says_what_it_holds(published):
     said = {name: make(published) for name, make in tables.TABLES.items()}
     assert "0.00 h among natural drivers (1 segments)" in said["driven"]
-    assert "seeds from 53000" in said["driven"]
+    assert "seeds from 6300000" in said["driven"]
     assert "| tracked | ego tailgated | 1 | 0 | 0 | 100.0 " in said["scores"]
     assert "| natural | tracked | ego tailgated |" in said["curves"]
     assert said["redundancy"] == "Not driven.\n"
@@ -82,14 +82,14 @@ def test_parts_share_no_seed_and_are_driven_in_every_condition_and_stratum(monke
     assert campaign.main(["--out", str(tmp_path), "--hours", "10", "--workers", "1"]) == 0
     drives = [c for c in calls if c[:2] == ["channels", "drive"]]
     seeds = {c[c.index("--seed") + 1] for c in drives}
-    assert len(seeds) == 4
-    assert len(drives) == 3 + 3
-    for call in drives[:3]:
-        assert call[call.index("--conditions") + 1] == "own,day,night,rain"
-        assert call[call.index("--strata") + 1] == "natural,risky"
+    assert len(seeds) == 5
+    assert len(drives) == 4 + 3
+    told = [[c[c.index(w) + 1] for w in ("--conditions", "--strata")] for c in drives[:4]]
+    assert told[:2] == 2 * [["own,day,night,rain,ice", "natural,risky"]]
+    assert told[2:] == [["own,day,night,rain", "natural,risky"], ["ice", "natural"]]
     hours = [float(c[c.index("--hours") + 1]) for c in drives]
-    assert sum(hours[:3]) == pytest.approx(10.0)
-    assert hours[3:] == [2.0, 2.0, 2.0]
+    assert sum(hours[:4]) == pytest.approx(10.0)
+    assert hours[4:] == [2.0, 2.0, 2.0]
     assert all("--resume" in c for c in drives)
     order = [c[1] for c in calls]
     assert order.index("train") < order.index("evaluate")

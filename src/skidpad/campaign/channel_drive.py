@@ -47,6 +47,10 @@ from skidpad.stack.channels.settings import settings_of
 PERIOD = round(CYCLE / DT)  # ticks
 WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
 TRUTH_REACH = 120.0  # m around the ego within which the true world is recorded
+RISKY_JUMPS = (
+    20.0  # times as many jumps of position in the stratum of risky drivers (assumed): each
+)
+# counts a twentieth there, as where, how far and how long a channel jumps is what it was
 MINIMAL_RISK_BRAKE = 0.4  # of full brake, about 4 m/s^2 (UN R157 5.1.6: at most 4 m/s^2)
 NO_REPORT = StackReport()
 Guide = Callable[[float], float]  # at a cycle's time, s: most speed, m/s; 0: it is to stop
@@ -73,8 +77,8 @@ class Crew:
         """Give every channel its sensors."""
         self.suites = [
             ChannelSuite(
-                name, senses_of(name), self.segment.map.roadside, table, self.spec.weather,
-                self.spec.seed, noise=self.crew.noise,
+                name, senses_of(name, jumps_of(self.spec)), self.segment.map.roadside, table,
+                self.spec.weather, self.spec.seed, noise=self.crew.noise,
             )
             for name in self.crew.channels
         ]  # fmt: skip
@@ -245,14 +249,22 @@ def truth_frame(t: float, truth: WorldTruth) -> TruthFrame:
     )
 
 
+def jumps_of(spec: RunSpec) -> float:
+    """How many times as often as it occurs a channel's position jumps."""
+    return RISKY_JUMPS if route_of(spec).stratum is Stratum.RISKY else 1.0
+
+
 def weights_of(spec: RunSpec, table: ActorTable) -> dict[str, str]:
-    """Of the stratum of risky drivers: by which each counts, by his row in the true world."""
+    """Of the stratum of risky drivers: by which each counts, by his row in the true world; and jumps."""
     if route_of(spec).stratum is not Stratum.RISKY:
         return {}
     drivers = [i for i, name in enumerate(table.names) if name.startswith(TRAFFIC)]
     found = {str(i): risky_character(spec.seed, i) for i in drivers}
     weights = {i: [round(c.of_headway, 6), round(c.of_gap, 6)] for i, c in found.items()}
-    return {"weights": json.dumps(weights, separators=(",", ":"))}
+    return {
+        "weights": json.dumps(weights, separators=(",", ":")),
+        "weight_of_jumps": f"{1.0 / jumps_of(spec):g}",
+    }
 
 
 def _about(spec: RunSpec, segment: Segment) -> dict[str, str]:

@@ -26,9 +26,11 @@ class Condition(str, Enum):
     DAY = "day"
     NIGHT = "night"
     RAIN = "rain"
+    ICE = "ice"
 
 
-# CARLA's units. Day and rain have the sun of a forenoon; rain is that of the published mid rain.
+# CARLA's units. Day and rain have the sun of a forenoon; rain is that of the published mid rain,
+# ice that of icy_30 of the friction study.
 CONDITIONS = {
     Condition.DAY: Weather(name="day", cloudiness=20.0, sun_altitude_deg=45.0),
     Condition.NIGHT: Weather(name="night", cloudiness=20.0, sun_altitude_deg=-30.0),
@@ -39,6 +41,15 @@ CONDITIONS = {
         precipitation_deposits=60.0,
         wetness=80.0,
         wind_intensity=40.0,
+        sun_altitude_deg=45.0,
+    ),
+    Condition.ICE: Weather(
+        name="ice",
+        cloudiness=20.0,
+        wetness=30.0,
+        ice_thickness=30.0,
+        air_temperature_c=-5.0,
+        road_temperature_c=-5.0,
         sun_altitude_deg=45.0,
     ),
 }

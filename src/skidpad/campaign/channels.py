@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import product
 from math import ceil
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -37,26 +38,27 @@ from skidpad.recording.channel_hash import recording_hash
 from skidpad.recording.files import write_bytes
 
 SEGMENT = 600.0  # s (C-12)
-SEEDS_PER_ROUTE = 1000  # seeds of a route are seed * this + segment number
+SEEDS_EACH = 100_000  # seeds are seed * this + number of the segment; hours allow for fewer
 
 
 def segments(routes: Sequence[RunSpec], hours: float, template: RunSpec) -> list[RunSpec]:
     """Segments of ten minutes, the hours split equally among routes; the last one is the rest.
 
-    template: what routes do not say; its seed gives each route's first one.
+    Each has a seed of its own (C-12), also where only the weather differs: whoever pools segments
+    counts no error of a sensor twice. template: what routes do not say; its seed gives the first one.
     """
     require_range("hours", hours, 1.0 / 3600.0, 10_000.0)
     seconds = hours * 3600.0 / len(routes)
+    rounds = range(ceil(seconds / SEGMENT - 1e-9))
     return [
         structs.replace(
             template,
             course=route.course,
             weather=route.weather,
-            seed=template.seed * SEEDS_PER_ROUTE + i,
+            seed=template.seed * SEEDS_EACH + number,
             duration=min(SEGMENT, seconds - i * SEGMENT),
         )
-        for i in range(ceil(seconds / SEGMENT - 1e-9))
-        for route in routes
+        for number, (i, route) in enumerate(product(rounds, routes))
     ]
 
 

@@ -33,7 +33,7 @@ def drive(
         Path | None, typer.Option(help="Drive on this map (.xodr) instead of the route's own.")
     ] = None,
     conditions: Annotated[
-        str, typer.Option(help="Light and weather, parted by commas: own, day, night, rain.")
+        str, typer.Option(help="Light and weather, parted by commas: own, day, night, rain, ice.")
     ] = "own",
     strata: Annotated[
         str, typer.Option(help="Background drivers, parted by commas: natural, risky.")

@@ -6,6 +6,7 @@ sees all round and reads lights; `tfuse_like` is blind behind, and localises wor
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import pi, radians
 
 from skidpad.core.errors import require_choice
@@ -128,7 +129,9 @@ SENSES = {
 }
 
 
-def senses_of(channel: str) -> ChannelSensing:
-    """The senses of a shipped channel."""
+def senses_of(channel: str, jumps: float = 1.0) -> ChannelSensing:
+    """The senses of a shipped channel, with so many times its jumps of position."""
     require_choice("channel", channel, tuple(SENSES))
-    return SENSES[channel]
+    senses = SENSES[channel]
+    error = replace(senses.localisation, jump_rate=jumps * senses.localisation.jump_rate)
+    return replace(senses, localisation=error)

@@ -20,7 +20,9 @@ from skidpad.evidence.channels.judging.curves import (
     with_limit,
 )
 from skidpad.evidence.channels.judging.evaluation import Evaluation
-from skidpad.evidence.channels.judging.segments import judge, weights_from
+from skidpad.evidence.channels.judging.segments import judge
+from skidpad.evidence.channels.judging.truth import marks
+from skidpad.evidence.channels.judging.weights import Weights, weights_from
 from skidpad.evidence.channels.matching import Span, Weighed, score, tally
 from skidpad.evidence.channels.timefilter import TimeFilter
 from skidpad.recording.cycles import cycles
@@ -83,7 +85,16 @@ def test_weighted_recall_and_effective_size_by_hand():
 def test_words_that_are_no_weights_are_one_sentence():
     for text in ("[]", "nonsense", '{"3": 1}', '{"3": ["a", 1]}'):
         with pytest.raises(FileError, match="two numbers per actor"):
-            weights_from(text)
+            weights_from({"weights": text})
+    with pytest.raises(FileError, match="weight_of_jumps` must be a number, got 'often'"):
+        weights_from({"weight_of_jumps": "often"})
+
+
+def test_a_jump_counts_as_the_recording_says():
+    kind = HazardType.INCONSISTENT_LOCALISATION
+    jump = marks.TrueHazard(kind, 1.0, 2.0, marks.World.SIM)
+    assert weights_from({"weight_of_jumps": "0.05"}).weigh(jump).weight == 0.05
+    assert Weights().weigh(jump).weight == 1.0
 
 
 @pytest.mark.req("C-105")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -11,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.channels import Cycle
-from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType, Stratum
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile, Signal, load_rules
 from skidpad.evidence.channels.identifier.features import feature_row
@@ -42,6 +40,7 @@ from skidpad.evidence.channels.judging.facts import Observer, times_of
 from skidpad.evidence.channels.judging.truth.marks import TrueHazard
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
 from skidpad.evidence.channels.judging.truth.worldmodel import world_model_truth
+from skidpad.evidence.channels.judging.weights import Weights, weights_from
 from skidpad.evidence.channels.matching import Span, match, merged
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.evidence.channels.timefilter import TimeFilter
@@ -121,7 +120,7 @@ def judge(
         detected[profile.value] = _scored(_found(monitor.hazards, begin))
         sweeps[profile.value] = of_rules(profile, t, columns(rows), begin)
     sweeps[Profile.TRACKED.value] |= of_distances(channels, cycles, begin)
-    weights = weights_from((context or {}).get("weights", "{}"))
+    weights = weights_from(context or {})
     found, unseen, unseen_found = _truths(channels, cycles, truths, begin, detected, weights)
     if "sim" in found:
         detected[CEILING] = tuple(s for s in ceiling(cycles, channels) if s.t_end >= begin)
@@ -189,7 +188,7 @@ def _truths(
     wanted: Sequence[str],
     begin: float,
     detected: Mapping[str, tuple[Span, ...]],
-    weights: Mapping[str, tuple[float, float]],
+    weights: Weights,
 ) -> tuple[dict[str, tuple[Span, ...]], int, int]:
     """True hazards by truth, how many of the simulator's no channel saw, and how many of those
     the practical rules found all the same."""
@@ -197,7 +196,7 @@ def _truths(
     unseen: list[Span] = []
     if "sim" in wanted and any(c.truth is not None for c in cycles):
         sim = [h for h in simulator_truth(cycles, channels) if h.t_end >= begin]
-        found["sim"] = tuple(weighted(h, weights) for h in sim)
+        found["sim"] = tuple(map(weights.weigh, sim))
         unseen = [Span(h.hazard, h.t_start, h.t_end) for h in sim if not h.seen]
     if "world" in wanted:
         found["world"] = _spans(h for h in world_model_truth(cycles, channels) if h.t_end >= begin)
@@ -236,25 +235,3 @@ def _reapplied(
 
 def _spans(hazards: Iterable[TrueHazard]) -> tuple[Span, ...]:
     return tuple(Span(h.hazard, h.t_start, h.t_end) for h in hazards)
-
-
-def weights_from(text: str) -> dict[str, tuple[float, float]]:
-    """Per driver of the risky stratum the weights of his headway and of his cut-ins, from JSON."""
-    try:
-        rows = json.loads(text)
-        return {f"actor {actor}": (float(a), float(b)) for actor, (a, b) in rows.items()}
-    except (ValueError, TypeError, AttributeError):
-        raise FileError(
-            f"the recording's words `weights` must be JSON of two numbers per actor, got {text[:60]!r}"
-        ) from None
-
-
-def weighted(hazard: TrueHazard, weights: Mapping[str, tuple[float, float]]) -> Span:
-    """A true hazard that counts as the driver whom it is about.
-
-    Who is tailgated has a follower's headway to thank, who tailgates the gap that somebody left him.
-    """
-    column = {HazardType.EGO_TAILGATED: 0, HazardType.EGO_TAILGATING: 1}.get(hazard.hazard)
-    own = [] if column is None else [weights[a][column] for a in hazard.about if a in weights]
-    weight = sum(own) / len(own) if own else 1.0
-    return Span(hazard.hazard, hazard.t_start, hazard.t_end, weight=weight)

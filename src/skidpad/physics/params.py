@@ -30,6 +30,7 @@ class VehicleParams(NamedTuple):
     drive_front: Floats
     power: Floats
     force_max: Floats
+    speed_max: Floats
     engine_drag: Floats
     brake_torque: Floats  # (n, 2) per wheel, front and rear
     handbrake_torque: Floats
@@ -75,6 +76,7 @@ def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
         drive_front=column([t.drive_share_front for t in types]),
         power=column([t.power for t in types]),
         force_max=column([t.force_max for t in types]),
+        speed_max=column([t.speed_max for t in types]),
         engine_drag=column([t.engine_drag for t in types]),
         brake_torque=np.array(
             [(t.brake_torque_front, t.brake_torque_rear) for t in types], dtype=np.float64

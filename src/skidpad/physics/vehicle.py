@@ -68,6 +68,7 @@ class Car(NamedTuple):
     drive_front: float
     force_max: float
     power: float
+    speed_max: float
     engine_drag: float
     torque_front: float  # N m per wheel at this pedal
     torque_rear: float
@@ -129,6 +130,7 @@ def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -
         p.drive_front[i],
         p.force_max[i],
         p.power[i],
+        p.speed_max[i],
         p.engine_drag[i],
         brake * p.brake_torque[i, 0],
         brake * p.brake_torque[i, 1],
@@ -163,10 +165,10 @@ def _wheel_loads(car: Car, a_x: float, a_y: float, load: Floats) -> None:
 
 @kernel
 def _drive(car: Car, u: float, speed: float, omega: Floats) -> float:
-    """Force of the engine at all driven wheels in N, negative in reverse."""
+    """Force of the engine at all driven wheels in N, negative in reverse; none beyond its top speed."""
     spin = car.drive_front * (omega[0] + omega[1]) + (1.0 - car.drive_front) * (omega[2] + omega[3])
     v = max(speed, 0.5 * abs(spin) * car.front.radius, V_POWER_MIN)
-    if car.reverse and u >= V_REVERSE_MAX:
+    if v > car.speed_max or (car.reverse and u >= V_REVERSE_MAX):
         return 0.0
     drive = car.throttle * min(car.force_max, car.power / v)
     return float(-drive if car.reverse else drive)

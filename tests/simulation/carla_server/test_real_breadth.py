@@ -68,6 +68,32 @@ def test_batches_report_every_outcome(serve: Serve) -> None:
     """)
 
 
+def test_an_engine_that_a_client_describes_acts(serve: Serve) -> None:
+    """Half the torque pulls half as hard; revolutions end at their limit in the highest gear."""
+    serve().client("""
+    synchronous()
+    library, points = world.get_blueprint_library(), world.get_map().get_spawn_points()
+    cars = [world.spawn_actor(library.find("vehicle.tesla.model3"), p) for p in points[:3]]
+    world.tick()
+    weak, short = cars[1].get_physics_control(), cars[2].get_physics_control()
+    weak.torque_curve = [carla.Vector2D(p.x, 0.5 * p.y) for p in weak.torque_curve]
+    cars[1].apply_physics_control(weak)
+    short.max_rpm, short.forward_gears = 500.0, short.forward_gears[:1]
+    cars[2].apply_physics_control(short)
+    for car in cars:
+        car.apply_control(carla.VehicleControl(throttle=0.4))
+    for _ in range(40):
+        world.tick()
+    full, half, limited = (c.get_velocity().length() for c in cars)
+    assert 0.35 * full < half < 0.6 * full, (full, half)
+    wheel = 0.01 * short.wheels[0].radius
+    ratio = short.final_ratio * short.forward_gears[0].ratio
+    end = 500.0 * 2.0 * math.pi / 60.0 / ratio * wheel
+    assert 0.9 * end < limited < 1.05 * end < full, (limited, end, full)
+    assert 0.0 < cars[0].get_telemetry_data().engine_rpm < cars[0].get_physics_control().max_rpm
+    """)
+
+
 def test_vehicle_interfaces(serve: Serve) -> None:
     serve().client("""
     synchronous()

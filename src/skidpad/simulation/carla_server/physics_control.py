@@ -1,7 +1,7 @@
 """VehiclePhysicsControl: what a client reads and writes, and which of it acts.
 
-Acting members: mass, drag, every wheel's tire_friction, radius, brake and handbrake torque and
-steering angle. Engine and gear box are kept and given back, without effect.
+Acting members: mass, drag, the engine's torque curve, revolutions and ratios of gears, every wheel's
+tire_friction, radius, brake and handbrake torque and steering angle.
 """
 
 from __future__ import annotations
@@ -15,23 +15,17 @@ import numpy as np
 
 from skidpad.physics.types import VehicleType
 from skidpad.simulation.carla_server import wire
+from skidpad.simulation.carla_server.engine import (
+    Engine,
+    at_wheels,
+    engine_of,
+    parse_engine,
+    same_drive,
+)
 
 WHEELS = 4
 CM = 100.0  # a wheel's radius and position travel in cm
 
-ENGINE: tuple[Any, ...] = (  # defaults of the client's own class
-    [[0.0, 500.0], [5000.0, 500.0]],  # torque curve, rpm and N m
-    5000.0,  # max rpm
-    1.0,  # moment of inertia
-    0.15,
-    2.0,
-    0.35,  # damping
-    True,  # automatic gears
-    0.5,  # s, gear switch
-    10.0,  # clutch strength
-    4.0,  # final ratio
-    [[4.0, 0.5, 0.65], [2.0, 0.5, 0.65], [1.5, 0.5, 0.65], [1.1, 0.5, 0.65], [1.0, 0.5, 0.65]],
-)
 STEERING_CURVE = [[0.0, 1.0], [20.0, 0.9], [60.0, 0.8], [120.0, 0.7]]
 MEMBERS = 17
 DRAG_PER_AREA = 0.3 / 0.7  # CARLA's coefficient for a car of 0.7 m^2 drag area; estimated
@@ -41,7 +35,7 @@ DRAG_PER_AREA = 0.3 / 0.7  # CARLA's coefficient for a car of 0.7 m^2 drag area;
 class PhysicsControl:
     """As last set, in the wire's order and units; wheels FL, FR, RL, RR."""
 
-    engine: tuple[Any, ...]
+    engine: Engine
     mass: float
     drag: float
     com: list[float]
@@ -69,7 +63,7 @@ class PhysicsControl:
             for w in range(WHEELS)
         )
         return cls(
-            ENGINE,
+            engine_of(model),
             model.mass,
             model.drag_area * DRAG_PER_AREA,
             [0.0, 0.0, 0.0],
@@ -82,7 +76,7 @@ class PhysicsControl:
         """As it travels; positions: wheel centres in the world, cm, CARLA's axes."""
         wheels = [[*w[:9], p] for w, p in zip(self.wheels, positions, strict=True)]
         return [
-            *self.engine,
+            *self.engine.packed(),
             self.mass,
             self.drag,
             self.com,
@@ -110,7 +104,7 @@ def parse_physics(value: Any) -> PhysicsControl:
     if not 1.0 <= mass <= 1.0e6:
         raise wire.WireError(f"physics control.mass must be between 1 and 1e6 kg, got {mass:g}")
     return PhysicsControl(
-        engine=tuple(v[:11]),
+        engine=parse_engine(v[:11]),
         mass=mass,
         drag=max(wire.number(v[12], "physics control.drag_coefficient"), 0.0),
         com=list(wire.vector(v[13], "physics control.center_of_mass")),
@@ -129,6 +123,9 @@ def applied(model: VehicleType, old: PhysicsControl, new: PhysicsControl) -> Veh
         changes["mass"] = new.mass
     if not isclose(new.drag, old.drag, rel_tol=1e-6, abs_tol=1e-9):
         changes["drag_area"] = new.drag / DRAG_PER_AREA
+    if not same_drive(new.engine, old.engine):
+        drive = at_wheels(new.engine, front[3] / CM)
+        changes |= {"force_max": drive.force, "power": drive.power, "speed_max": drive.speed}
     for name, wheel, was, member, scale in (
         ("wheel_radius", front, old.wheels[0], 3, 1.0 / CM),
         ("steer_max_deg", front, old.wheels[0], 2, 1.0),

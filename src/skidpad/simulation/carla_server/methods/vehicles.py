@@ -13,6 +13,7 @@ from skidpad.simulation.carla_server.ackermann import (
 )
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.control import Control
+from skidpad.simulation.carla_server.engine import revolutions
 from skidpad.simulation.carla_server.physics_control import applied, parse_physics
 from skidpad.simulation.carla_server.rpc import Shape, Table
 from skidpad.simulation.carla_server.served import Served
@@ -102,7 +103,7 @@ def wheel_centres(vehicle: Vehicle) -> list[tuple[float, float]]:
 
 @TABLE.method("apply_physics_control", Shape.VOID)
 def apply_physics_control(served: Served, id: Any, control: Any) -> None:
-    """What acts: mass, drag, wheels' friction, radius, brakes and steering angle."""
+    """What acts: mass, drag, engine and gears, wheels' friction, radius, brakes and steering angle."""
     vehicle = vehicle_of(served, id)
     new = parse_physics(control)
     model = applied(vehicle.type, vehicle.physics, new)
@@ -130,7 +131,7 @@ def set_vehicle_light_state(served: Served, id: Any, state: Any) -> None:
 
 @TABLE.method("get_telemetry_data")
 def get_telemetry_data(served: Served, id: Any) -> list[Any]:
-    """Speed, pedals and per wheel: friction, spin, load."""
+    """Speed, pedals, revolutions and per wheel: friction, spin, load."""
     vehicle = vehicle_of(served, id)
     i = served.episode.vehicles.row(vehicle.actor)
     fleet, c = served.episode.moving.fleet, vehicle.control
@@ -145,7 +146,8 @@ def get_telemetry_data(served: Served, id: Any) -> list[Any]:
         )
     gear = c.gear if c.manual else fleet.gear(i, c.reverse)
     speed = fleet.speed(i)
-    return [speed, wire.iso_steer(c.steer), c.throttle, c.brake, 0.0, gear, 0.0, wheels]
+    rpm = revolutions(vehicle.physics.engine, gear, speed, vehicle.type.wheel_radius)
+    return [speed, wire.iso_steer(c.steer), c.throttle, c.brake, rpm, gear, 0.0, wheels]
 
 
 @TABLE.method("get_wheel_steer_angle")

@@ -1,0 +1,150 @@
+"""An engine and its gears as clients describe them, and what they come to at the wheels.
+
+Vehicles here are driven by min(force, power / v) up to a top speed (`VehicleType`), as if gears were so
+close that the engine is always at its best. CARLA's own curves and gears per blueprint are in no public
+text that we found, so a fresh vehicle describes the drive that it has, and what a client changes acts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from math import ceil, isclose, log, pi
+from typing import Any
+
+import numpy as np
+
+from skidpad.core.constants import G
+from skidpad.core.vocabulary import ActorKind
+from skidpad.physics.params import AIR_DENSITY
+from skidpad.physics.types import VehicleType
+from skidpad.simulation.carla_server import wire
+
+RPM = 2.0 * pi / 60.0  # rad/s
+FINAL_RATIO = 4.0
+# Full power from the first to the second, rpm: petrol engines of cars, diesel engines of others; assumed.
+RANGE, RANGE_HEAVY = (4000.0, 6000.0), (1400.0, 2100.0)
+HEAVY = (ActorKind.TRUCK, ActorKind.BUS)
+SPARE = 1.05  # speed at the limit of revolutions in the highest gear, over the one that drag allows
+BEYOND = 200.0  # m/s, no drive is that fast
+SHIFTS = [0.5, 0.65]  # where an automatic box shifts down and up, as the client's class has it
+
+
+@dataclass(frozen=True, slots=True)
+class Engine:
+    """The first eleven members of VehiclePhysicsControl; those without a comment have no effect."""
+
+    torque_curve: tuple[tuple[float, float], ...]  # rpm and N m, ascending
+    max_rpm: float
+    final_ratio: float
+    gears: tuple[tuple[float, float, float], ...]  # ratio, and where it shifts down and up
+    moi: float = 1.0
+    damping: tuple[float, float, float] = (0.15, 2.0, 0.35)
+    autobox: bool = True
+    switch_time: float = 0.5
+    clutch: float = 10.0
+
+    def packed(self) -> list[Any]:
+        """As it travels."""
+        curve, gears = [list(p) for p in self.torque_curve], [list(g) for g in self.gears]
+        return [
+            curve, self.max_rpm, self.moi, *self.damping, self.autobox, self.switch_time, self.clutch,
+            self.final_ratio, gears,
+        ]  # fmt: skip
+
+
+def parse_engine(value: Sequence[Any]) -> Engine:
+    """From the members of a call; WireError names what is not possible."""
+    name = "physics control"
+    curve = [wire.numbers(p, f"{name}.torque_curve", 2) for p in wire.items(value[0], "curve")]
+    gears = [wire.numbers(g, f"{name}.forward_gears", 3) for g in wire.items(value[10], "gears")]
+    numbers = [wire.number(value[i], f"{name}: engine") for i in (1, 2, 3, 4, 5, 7, 8, 9)]
+    max_rpm, moi, *damping, switch_time, clutch, final_ratio = numbers
+    if any(rpm < 0.0 or torque < 0.0 for rpm, torque in curve):
+        raise wire.WireError(f"{name}.torque_curve: revolutions and torques must not be negative")
+    if any(b[0] < a[0] for a, b in pairwise(curve)):
+        raise wire.WireError(f"{name}.torque_curve: revolutions must ascend")
+    if max_rpm < 0.0 or final_ratio < 0.0 or any(g[0] < 0.0 for g in gears):
+        raise wire.WireError(f"{name}: max_rpm and ratios of gears must not be negative")
+    return Engine(
+        tuple((rpm, torque) for rpm, torque in curve),
+        max_rpm,
+        final_ratio,
+        tuple((ratio, down, up) for ratio, down, up in gears),
+        moi,
+        (damping[0], damping[1], damping[2]),
+        wire.flag(value[6], f"{name}.use_gear_autobox"),
+        switch_time,
+        clutch,
+    )
+
+
+def engine_of(model: VehicleType) -> Engine:
+    """An engine and gears that come to the force and power of this type."""
+    low, high = RANGE_HEAVY if model.actor_kind in HEAVY else RANGE
+    torque = model.power / (low * RPM)
+    past = [(rpm, model.power / (rpm * RPM)) for rpm in np.linspace(low, high, 5).tolist()]
+    first = model.force_max * model.wheel_radius / torque
+    last = high * RPM * model.wheel_radius / (SPARE * _fastest(model))
+    steps = max(
+        ceil(log(first / last) / log(high / low)), 0
+    )  # never out of the range of full power
+    ratios = [first * (last / first) ** (k / max(steps, 1)) for k in range(steps + 1)]
+    return Engine(
+        ((0.0, torque), *past),
+        high,
+        FINAL_RATIO,
+        tuple((ratio / FINAL_RATIO, SHIFTS[0], SHIFTS[1]) for ratio in ratios),
+    )
+
+
+def _fastest(model: VehicleType) -> float:
+    """m/s at which all power goes into air and rolling drag on the level."""
+    air, rolling = 0.5 * AIR_DENSITY * model.drag_area, model.rolling_resistance * model.mass * G
+    roots = np.roots([air, 0.0, rolling, -model.power])
+    return float(roots[np.isreal(roots)].real.max())
+
+
+@dataclass(frozen=True, slots=True)
+class Traction:
+    """What an engine comes to at the driven wheels."""
+
+    force: float  # N in the lowest gear
+    power: float  # W
+    speed: float  # m/s at the limit of revolutions in the highest gear
+
+
+def at_wheels(engine: Engine, radius: float) -> Traction:
+    """Of wheels of this radius in m. Without a gear or revolutions nothing is driven."""
+    ratios = [g[0] * engine.final_ratio for g in engine.gears if g[0] > 0.0]
+    if not ratios or not engine.torque_curve or engine.max_rpm * engine.final_ratio <= 0.0:
+        return Traction(0.0, 0.0, 0.0)
+    rpm, torque = np.array(engine.torque_curve).T
+    at = np.unique(np.append(np.clip(rpm, 0.0, engine.max_rpm), engine.max_rpm))
+    had = np.interp(at, rpm, torque)
+    return Traction(
+        float(had.max() * max(ratios) / radius),
+        float((had * at).max() * RPM),
+        min(engine.max_rpm * RPM * radius / min(ratios), BEYOND),
+    )
+
+
+def revolutions(engine: Engine, gear: int, speed: float, radius: float) -> float:
+    """rpm of the engine at this speed in m/s with wheels of this radius in m; 0 out of gear."""
+    if gear == 0 or not engine.gears:
+        return 0.0
+    ratio = engine.gears[min(abs(gear), len(engine.gears)) - 1][0] * engine.final_ratio
+    return min(abs(speed) / radius * ratio / RPM, engine.max_rpm)
+
+
+def same_drive(a: Engine, b: Engine) -> bool:
+    """Whether nothing that acts differs; clients send single precision back."""
+    one, other = ([e.max_rpm, e.final_ratio, *_flat(e)] for e in (a, b))
+    return len(one) == len(other) and all(
+        isclose(x, y, rel_tol=1e-6, abs_tol=1e-9) for x, y in zip(one, other, strict=True)
+    )
+
+
+def _flat(engine: Engine) -> list[float]:
+    return [x for p in engine.torque_curve for x in p] + [g[0] for g in engine.gears]

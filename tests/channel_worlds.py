@@ -83,6 +83,7 @@ class World:
 
     ego: tuple[float, float, float, float, float] = (0.0, 0.0, 0.0, 10.0, 0.0)
     objects: np.ndarray = field(default_factory=lambda: np.zeros((0, 5)))
+    mu: float = 0.9
 
     def at(self, t: float) -> tuple[np.ndarray, np.ndarray]:
         ego = np.array(self.ego)
@@ -142,5 +143,5 @@ def drive(world: World, eyes: tuple[Eyes, ...], duration: float, with_truth: boo
         rows += [(i, seen(world, e, t)) for i, e in enumerate(eyes)]
         if with_truth:
             ego, objects = world.at(t)
-            rows.append((None, truth(t, tuple(ego), objects)))
+            rows.append((None, truth(t, tuple(ego), objects, world.mu)))
     return Listed(tuple(e.name for e in eyes), rows)

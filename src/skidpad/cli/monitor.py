@@ -60,6 +60,9 @@ IDENTIFIER = typer.Option(
     Identifier.rules, help="Who finds the three scored hazards: the rules, the trained model, both."
 )
 MODEL = typer.Option(None, help="Trained model (.npz) of `skidpad channels train`; default: ours.")
+GRIP = typer.Option(
+    None, help="Friction of the road (0.05 to 1.5) that the rules tracked are told; 0.9: dry."
+)
 TIMING = typer.Option(False, "--timing", help="Measure each module and print the table.")
 FAIL_IF = typer.Option(
     None, help="Exit with 1 when this hazard or indicator violation occurs; may be repeated."
@@ -81,6 +84,7 @@ def monitor(
     thresholds: Path | None = THRESHOLDS,
     identifier: Identifier = IDENTIFIER,
     model: Path | None = MODEL,
+    grip: float | None = GRIP,
     timing: bool = TIMING,
     fail_if: list[str] = FAIL_IF,
     junit: Path | None = JUNIT,
@@ -100,6 +104,7 @@ def monitor(
     from skidpad.evidence.channels.indicators.settings import IndicatorSettings
     from skidpad.evidence.channels.monitor import MonitorSettings
     from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
+    from skidpad.evidence.channels.tracked.distance import NOMINAL_GRIP
     from skidpad.live.watch import Alarms, Timer, watch_whole
     from skidpad.recording.sources import file_hash
     from skidpad.report.channels import write_drive_report
@@ -117,6 +122,7 @@ def monitor(
         thresholds=load_thresholds(thresholds),
         identify=Identify(identifier.value),
         detectors={} if identifier is Identifier.rules else load_model(model).identifier(),
+        grip=NOMINAL_GRIP if grip is None else grip,
     )
     timer = Timer(time.thread_time_ns) if timing else None
     told, digest = (Alarms(sys.stdout), "") if file is None else (None, file_hash(file))

@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from channel_worlds import Eyes, World, drive, frame
+from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import Profile, Signal
 from skidpad.evidence.channels.judging.truth.simulator import would_hit
@@ -22,14 +23,24 @@ LOCALISATION, UNSEEN = HazardType.INCONSISTENT_LOCALISATION, HazardType.UNSEEN_B
 EGO = (0.0, 0.0, 0.0, 15.0, 0.0)
 
 
-@given(v_follower=st.floats(0.5, 45.0), v_leader=st.floats(0.0, 45.0))
-@settings(max_examples=150, derandomize=True)
-def test_the_safe_distance_is_the_least_that_stopping_step_by_step_needs(v_follower, v_leader):
-    need = SafeDistance().of(v_follower, v_leader)
+@given(
+    v_follower=st.floats(0.5, 45.0),
+    v_leader=st.floats(0.0, 45.0),
+    grip=st.sampled_from([0.9, 0.5, 0.15]),
+)
+@settings(max_examples=300, derandomize=True)
+def test_the_safe_distance_is_the_least_that_stopping_step_by_step_needs(
+    v_follower, v_leader, grip
+):
+    need = SafeDistance.on(grip).of(v_follower, v_leader)
     assert need >= 0.0
-    assert not would_hit(need + 0.05, v_leader, 0.9, v_follower, 0.9)
-    if need > 0.1:
-        assert would_hit(need - 0.05, v_leader, 0.9, v_follower, 0.9)
+    assert not would_hit(need + 0.05, v_leader, grip, v_follower, grip)
+    if need > 0.3:  # it looks at 200 moments, of which one may be 0.3 m too early on ice
+        assert would_hit(need - 0.3, v_leader, grip, v_follower, grip)
+
+
+def test_without_a_word_the_road_is_dry():
+    assert SafeDistance.on(0.9) == SafeDistance()
 
 
 def test_the_published_case_follows_the_published_formula():
@@ -58,14 +69,23 @@ def test_a_track_finds_gap_and_speed_through_noise():
 SHARP = (Eyes("a"), Eyes("b"))
 
 
-def found(objects, eyes=SHARP, duration=6.0, ego=EGO):
+def found(objects, eyes=SHARP, duration=6.0, ego=EGO, grip=0.9):
     world = World(ego, np.array(objects, dtype=float).reshape(-1, 5))
-    monitor = Monitor(
-        [e.name for e in eyes], MonitorSettings(profile=Profile.TRACKED, keep_worlds=False)
-    )
+    told = MonitorSettings(profile=Profile.TRACKED, keep_worlds=False, grip=grip)
+    monitor = Monitor([e.name for e in eyes], told)
     for cycle in cycles(drive(world, eyes, duration)):
         monitor.update(cycle)
     return {e.key: e for e in drive_events(monitor)[0]}
+
+
+def test_who_is_told_of_ice_asks_for_more_room():
+    behind = [(-14.0, 0, 0, 15.0, 0)]  # 9.5 m: more than 9 m when dry, less than 15 m on ice
+    assert not found(behind)
+    assert set(found(behind, grip=0.3)) == {TAILGATED}
+    with pytest.raises(ConfigError, match="practical know no grip"):
+        MonitorSettings(grip=0.2)
+    with pytest.raises(ConfigError, match=r"grip must be between 0.05 and 1.5, got 3"):
+        MonitorSettings(profile=Profile.TRACKED, grip=3.0)
 
 
 @pytest.mark.req("C-120", "C-122", "C-123")

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.channels import Cycle
-from skidpad.core.errors import ConfigError
+from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.frames import Usable, usable
 from skidpad.evidence.channels.ghosts import GhostCue
@@ -39,10 +39,12 @@ from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.recorder import CycleEvidence, Recorder
 from skidpad.evidence.channels.risk import RiskForm, RiskMatrix, risk_matrix
 from skidpad.evidence.channels.timefilter import Event, TimeFilter
+from skidpad.evidence.channels.tracked.distance import NOMINAL_GRIP, SafeDistance
 from skidpad.evidence.channels.tracked.vote import Tracked
 from skidpad.recording.hazards import HazardRecord
 
 Floats = NDArray[np.float64]
+GRIPS = (0.05, 1.5)  # between wet ice and racing tyres
 
 
 @dataclass(slots=True)
@@ -73,10 +75,14 @@ class MonitorSettings:
     identify: Identify = Identify.RULES
     detectors: Mapping[HazardType, Detector] = field(default_factory=dict)
     keep_worlds: bool = True  # gather records of hazards
+    grip: float = NOMINAL_GRIP  # of the road, as told to the rules `tracked`; others know none
 
     def __post_init__(self) -> None:
         if self.identify is not Identify.RULES and not self.detectors:
             raise ConfigError(f"--identifier {self.identify.value} needs a trained model")
+        require_range("grip", self.grip, *GRIPS)
+        if self.profile is not Profile.TRACKED and self.grip != NOMINAL_GRIP:
+            raise ConfigError(f"rules {self.profile.value} know no grip: it is told to `tracked`")
 
 
 class Monitor:
@@ -111,7 +117,11 @@ class Monitor:
             if settings.keep_worlds
             else None
         )
-        self.tracked = Tracked(self.channels) if settings.profile is Profile.TRACKED else None
+        self.tracked = (
+            Tracked(self.channels, SafeDistance.on(settings.grip))
+            if settings.profile is Profile.TRACKED
+            else None
+        )
         self._low, self._high = self._bounds()
         self._missing, self._violated = np.zeros((2, len(self.layout.places)), dtype=np.int64)
 

@@ -8,7 +8,7 @@ import pytest
 from channel_worlds import Eyes, World, drive
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.judging.ceiling import NAME, ceiling, smoothed
-from skidpad.evidence.channels.judging.segments import judge
+from skidpad.evidence.channels.judging.segments import TOLD, judge
 from skidpad.evidence.channels.matching import tally
 from skidpad.recording.cycles import cycles
 
@@ -44,9 +44,19 @@ def test_positions_that_jump_are_found_as_the_truth_finds_them(offset, found):
     assert all(s.t_start == pytest.approx(4.0, abs=0.15) for s in spans)
 
 
+@pytest.mark.parametrize(("mu", "nominal", "told"), [(0.9, 0, 0), (0.3, 0, 1)])
+def test_only_who_is_told_of_ice_finds_what_ice_makes_too_close(mu, nominal, told):
+    world = World(CLOSE.ego, np.array([(-14.0, 0, 0, 15.0, 0)]), mu)
+    segment = judge(
+        "s", "town", ["a", "b"], list(cycles(drive(world, (Eyes("a"), Eyes("b")), 8.0)))
+    )
+    assert len(segment.truths["sim"]) == told
+    assert [len(segment.detected[n]) for n in ("tracked", TOLD, NAME)] == [nominal, told, told]
+
+
 def test_no_truth_no_ceiling():
     rows = list(cycles(drive(CLOSE, (Eyes("a"), Eyes("b")), 3.0, with_truth=False)))
-    assert NAME not in judge("s", "town", ["a", "b"], rows).detected
+    assert not {NAME, TOLD} & set(judge("s", "town", ["a", "b"], rows).detected)
     assert ceiling(rows, ["a", "b"]) == ()
 
 

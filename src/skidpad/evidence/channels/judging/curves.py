@@ -14,12 +14,13 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.channels import Cycle
+from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.frames import usable
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile, Rule, Signal, load_rules
 from skidpad.evidence.channels.identifier.model import Detector, events_of, probability_of
 from skidpad.evidence.channels.matching import Span, tally
+from skidpad.evidence.channels.tracked.distance import SafeDistance
 from skidpad.evidence.channels.tracked.vote import Tracked
 
 Floats = NDArray[np.float64]
@@ -129,15 +130,38 @@ def of_distances(
 ) -> dict[HazardType, Sweep]:
     """What `tracked` would find of both tailgating hazards, by how sure a gap must be short."""
     found: dict[HazardType, dict[float, tuple[Span, ...]]] = {hazard: {} for hazard in SIDES}
-    t = np.array([c.t for c in cycles])
-    frames = [[None if f is None else usable(f).frame for f in c.frames] for c in cycles]
+    t, frames = _usable(cycles)
     for sure in SURES:
-        tracked = Tracked(channels, sure=sure)
-        rows = [tracked.distances(c.t, f) for c, f in zip(cycles, frames, strict=True)]
-        for hazard, signal in SIDES.items():
-            present = np.array([row[signal] > 0.0 for row in rows], dtype=np.float64)
-            found[hazard][sure] = spans(hazard, t, present, 0.5, 1, begin)
+        for hazard, short in _short(Tracked(channels, sure=sure), t, frames, begin).items():
+            found[hazard][sure] = short
     return dict(found)
+
+
+def told_the_grip(
+    channels: Sequence[str], cycles: Sequence[Cycle], begin: float
+) -> tuple[Span, ...]:
+    """What `tracked` would find of both tailgating hazards if it knew the ego's grip of the drive."""
+    grips = [c.truth.ego_mu for c in cycles if c.truth is not None]
+    safe = SafeDistance.on(float(np.median(grips)))
+    found = _short(Tracked(channels, safe), *_usable(cycles), begin)
+    return tuple(s for short in found.values() for s in short)
+
+
+def _usable(cycles: Sequence[Cycle]) -> tuple[Floats, list[list[ChannelFrame | None]]]:
+    frames = [[None if f is None else usable(f).frame for f in c.frames] for c in cycles]
+    return np.array([c.t for c in cycles]), frames
+
+
+def _short(
+    tracked: Tracked, t: Floats, frames: Sequence[Sequence[ChannelFrame | None]], begin: float
+) -> dict[HazardType, tuple[Span, ...]]:
+    """Where its gaps are short."""
+    rows = [tracked.distances(at, f) for at, f in zip(t.tolist(), frames, strict=True)]
+    short = {
+        hazard: np.array([row[signal] > 0.0 for row in rows], dtype=np.float64)
+        for hazard, signal in SIDES.items()
+    }
+    return {hazard: spans(hazard, t, p, 0.5, 1, begin) for hazard, p in short.items()}
 
 
 def of_learned(

@@ -34,6 +34,7 @@ from skidpad.evidence.channels.judging.curves import (
     of_distances,
     of_rules,
     swept,
+    told_the_grip,
     with_limit,
 )
 from skidpad.evidence.channels.judging.facts import Observer, times_of
@@ -53,6 +54,7 @@ FORMS = {  # decision C-16
     Profile.AS_PRINTED: Form.COMPLETED,
     Profile.TRACKED: Form.CORRECTED,
 }
+TOLD = "tracked, told the grip"
 CURVE_FACTORS = (0.5, 0.67, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
 WARM_UP = 2.0  # s at the start of a segment that are not evaluated (decision C-12)
 
@@ -123,6 +125,7 @@ def judge(
     weights = weights_from(context or {})
     found, unseen, unseen_found = _truths(channels, cycles, truths, begin, detected, weights)
     if "sim" in found:
+        detected[TOLD] = _told(channels, cycles, begin, detected[Profile.TRACKED.value])
         detected[CEILING] = tuple(s for s in ceiling(cycles, channels) if s.t_end >= begin)
     if marked := tuple(labels):
         found["labels"] = tuple(merged(marked))
@@ -180,6 +183,14 @@ def _practical(
         {hazard: others.count(hazard) for hazard in dict.fromkeys(others)},
         _scored(spans),
     )
+
+
+def _told(
+    channels: Sequence[str], cycles: Sequence[Cycle], begin: float, tracked: Iterable[Span]
+) -> tuple[Span, ...]:
+    """What `tracked` finds where the grip plays no part, and the rest if it knew the grip."""
+    same = [s for s in tracked if s.hazard is HazardType.INCONSISTENT_LOCALISATION]
+    return tuple(sorted([*same, *told_the_grip(channels, cycles, begin)], key=lambda s: s.t_start))
 
 
 def _truths(

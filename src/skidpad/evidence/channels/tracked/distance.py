@@ -6,20 +6,28 @@ from dataclasses import dataclass
 
 from skidpad.core.constants import G
 
+NOMINAL_GRIP = 0.9  # of a dry road (`mu_ref` of decision M-1)
+HARD_BRAKING = 6.0  # m/s^2 of the leader, decision C-3
+
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class SafeDistance:
     """What is assumed of both; the follower reacts, then brakes, the leader brakes at once.
 
     RSS asks for the follower's least and the leader's hardest braking. As a rule about hazards, not
-    about proper response, both get what decision C-3 calls dangerous, on a dry road (`mu_ref` of
-    decision M-1): rules do not know the grip.
+    about proper response, both get what decision C-3 calls dangerous, on a dry road: rules do not
+    know the grip, unless they are told (`on`).
     """
 
     response: float = 1.0  # s
     a_response: float = 0.0  # m/s^2 of the follower while it reacts: it keeps its speed
-    b_follower: float = 0.9 * G  # m/s^2, all nominal grip
-    b_leader: float = 6.0  # m/s^2
+    b_follower: float = NOMINAL_GRIP * G  # m/s^2, all grip
+    b_leader: float = HARD_BRAKING  # m/s^2
+
+    @classmethod
+    def on(cls, grip: float) -> SafeDistance:
+        """With this coefficient of friction for both."""
+        return cls(b_follower=grip * G, b_leader=min(HARD_BRAKING, grip * G))
 
     def of(self, v_follower: float, v_leader: float) -> float:
         """Least gap in m that keeps the follower from hitting, speeds in m/s.

@@ -79,6 +79,8 @@ def test_what_is_given_back_as_it_was_changes_nothing():
     sent = fresh.packed([[0.0, 0.0, 0.0]] * 4)
     single = [[[float(np.float32(x)) for x in p] for p in sent[0]], *sent[1:]]
     assert applied(MINI, fresh, parse_physics(single)) is MINI
+    untold = [[], *sent[1:10], [], *sent[11:]]  # as a client's fresh object has it
+    assert applied(MINI, fresh, parse_physics(untold)) is MINI
     slower = [*sent]
     slower[1] = 0.5 * sent[1]
     model = applied(MINI, fresh, parse_physics(slower))

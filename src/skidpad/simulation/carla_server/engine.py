@@ -45,6 +45,11 @@ class Engine:
     switch_time: float = 0.5
     clutch: float = 10.0
 
+    @property
+    def is_told(self) -> bool:
+        """Whether there are curve and gears; a client's fresh object has none and changes no drive."""
+        return bool(self.torque_curve and self.gears)
+
     def packed(self) -> list[Any]:
         """As it travels."""
         curve, gears = [list(p) for p in self.torque_curve], [list(g) for g in self.gears]
@@ -116,9 +121,9 @@ class Traction:
 
 
 def at_wheels(engine: Engine, radius: float) -> Traction:
-    """Of wheels of this radius in m. Without a gear or revolutions nothing is driven."""
+    """Of wheels of this radius in m. Without a ratio or revolutions nothing is driven."""
     ratios = [g[0] * engine.final_ratio for g in engine.gears if g[0] > 0.0]
-    if not ratios or not engine.torque_curve or engine.max_rpm * engine.final_ratio <= 0.0:
+    if not ratios or not engine.is_told or engine.max_rpm * engine.final_ratio <= 0.0:
         return Traction(0.0, 0.0, 0.0)
     rpm, torque = np.array(engine.torque_curve).T
     at = np.unique(np.append(np.clip(rpm, 0.0, engine.max_rpm), engine.max_rpm))

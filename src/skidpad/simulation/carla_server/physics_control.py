@@ -123,7 +123,7 @@ def applied(model: VehicleType, old: PhysicsControl, new: PhysicsControl) -> Veh
         changes["mass"] = new.mass
     if not isclose(new.drag, old.drag, rel_tol=1e-6, abs_tol=1e-9):
         changes["drag_area"] = new.drag / DRAG_PER_AREA
-    if not same_drive(new.engine, old.engine):
+    if new.engine.is_told and not same_drive(new.engine, old.engine):
         drive = at_wheels(new.engine, front[3] / CM)
         changes |= {"force_max": drive.force, "power": drive.power, "speed_max": drive.speed}
     for name, wheel, was, member, scale in (

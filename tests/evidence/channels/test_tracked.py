@@ -14,7 +14,7 @@ from skidpad.evidence.channels.hazards import Profile, Signal
 from skidpad.evidence.channels.judging.truth.simulator import would_hit
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings, drive_events
 from skidpad.evidence.channels.tracked.distance import SafeDistance
-from skidpad.evidence.channels.tracked.tracks import Tracks
+from skidpad.evidence.channels.tracked.tracks import Lookout, Tracks
 from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, Tracked, parting
 from skidpad.recording.cycles import cycles
 
@@ -52,12 +52,12 @@ def test_the_published_case_follows_the_published_formula():
 
 def test_a_track_finds_gap_and_speed_through_noise():
     rng = np.random.default_rng(2)
-    tracks, misses = Tracks(SafeDistance()), []
+    lookout, tracks, misses = Lookout(), Tracks(SafeDistance()), []
     for k in range(100):
         t = 0.1 * k
         x = -30.0 + 1.0 * t  # closes at 1 m/s
         row = (15 * t + x + rng.normal(0, 0.4), rng.normal(0, 0.2), 0.0, 16 + rng.normal(0, 0.5), 0)
-        tracks.update(t, frame(t, (15 * t, 0, 0, 15.0, 0), [row], ids=[4]))
+        tracks.update(t, lookout.see(frame(t, (15 * t, 0, 0, 15.0, 0), [row], ids=[4])))
         (track,) = tracks
         misses.append((track.gap - (-x - 4.5), track.v - 16.0))
     late = np.array(misses[30:])

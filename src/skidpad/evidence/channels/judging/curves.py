@@ -21,6 +21,7 @@ from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile, Rule, Sig
 from skidpad.evidence.channels.identifier.model import Detector, events_of, probability_of
 from skidpad.evidence.channels.matching import Span, tally
 from skidpad.evidence.channels.tracked.distance import SafeDistance
+from skidpad.evidence.channels.tracked.tracks import Lookout, Seen
 from skidpad.evidence.channels.tracked.vote import Tracked
 
 Floats = NDArray[np.float64]
@@ -130,9 +131,9 @@ def of_distances(
 ) -> dict[HazardType, Sweep]:
     """What `tracked` would find of both tailgating hazards, by how sure a gap must be short."""
     found: dict[HazardType, dict[float, tuple[Span, ...]]] = {hazard: {} for hazard in SIDES}
-    t, frames = _usable(cycles)
+    looked = _looked(channels, cycles)
     for sure in SURES:
-        for hazard, short in _short(Tracked(channels, sure=sure), t, frames, begin).items():
+        for hazard, short in _short(Tracked(channels, sure=sure), looked, begin).items():
             found[hazard][sure] = short
     return dict(found)
 
@@ -143,20 +144,33 @@ def told_the_grip(
     """What `tracked` would find of both tailgating hazards if it knew the ego's grip of the drive."""
     grips = [c.truth.ego_mu for c in cycles if c.truth is not None]
     safe = SafeDistance.on(float(np.median(grips)))
-    found = _short(Tracked(channels, safe), *_usable(cycles), begin)
+    found = _short(Tracked(channels, safe), _looked(channels, cycles), begin)
     return tuple(s for short in found.values() for s in short)
 
 
-def _usable(cycles: Sequence[Cycle]) -> tuple[Floats, list[list[ChannelFrame | None]]]:
-    frames = [[None if f is None else usable(f).frame for f in c.frames] for c in cycles]
-    return np.array([c.t for c in cycles]), frames
+class _Looked(NamedTuple):
+    """A cycle, looked at once for all who judge it."""
+
+    t: float
+    seen: list[Seen | None]
+    frames: list[ChannelFrame | None]
+
+
+def _looked(channels: Sequence[str], cycles: Sequence[Cycle]) -> list[_Looked]:
+    lookouts = [Lookout() for _ in channels]
+    rows = ((c.t, [None if f is None else usable(f).frame for f in c.frames]) for c in cycles)
+    return [
+        _Looked(t, [out.see(f) for out, f in zip(lookouts, frames, strict=True)], frames)
+        for t, frames in rows
+    ]
 
 
 def _short(
-    tracked: Tracked, t: Floats, frames: Sequence[Sequence[ChannelFrame | None]], begin: float
+    tracked: Tracked, looked: Sequence[_Looked], begin: float
 ) -> dict[HazardType, tuple[Span, ...]]:
     """Where its gaps are short."""
-    rows = [tracked.distances(at, f) for at, f in zip(t.tolist(), frames, strict=True)]
+    rows = [tracked.distances(*cycle) for cycle in looked]
+    t = np.array([cycle.t for cycle in looked])
     short = {
         hazard: np.array([row[signal] > 0.0 for row in rows], dtype=np.float64)
         for hazard, signal in SIDES.items()

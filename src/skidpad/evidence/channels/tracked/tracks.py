@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import dist, hypot, sqrt
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,7 +45,7 @@ class Track:
     v: float  # m/s along the path
     p: tuple[float, float, float]  # variances of gap and v, and their covariance
     t: float  # s of the last report
-    place: Floats  # (2,) in the channel's world
+    place: tuple[float, float]  # in the channel's world
     deficit: float = 0.0  # m that the gap is shorter than the safe one
     sigma: float = 0.0  # m of the deficit
     since: float | None = None  # s from when on it has been surely short
@@ -95,46 +96,80 @@ class Track:
         self.alarm = self.alarm or t - self.since >= CONFIRM - 1e-6
 
 
+class Sighting(NamedTuple):
+    """A vehicle near the ego, in path coordinates."""
+
+    key: int  # its identity; negative: the channel gives none
+    xy: tuple[float, float]  # in the channel's world
+    where: Placed
+    half_length: float  # m
+    half_width: float
+
+
+class Seen(NamedTuple):
+    """What a message of a channel says of its path: the same whoever judges it."""
+
+    v_ego: float
+    body: tuple[
+        float, float, float
+    ]  # m, front and rear of the ego from its place, and half its width
+    sightings: tuple[Sighting, ...]
+
+
+class Lookout:
+    """Puts the messages of one channel, in their order, into path coordinates."""
+
+    def __init__(self) -> None:
+        self.way = Way()
+
+    def see(self, frame: ChannelFrame | None) -> Seen | None:
+        """One cycle; None: no message, or one without a place of the ego."""
+        if frame is None or not Way.usable(frame):
+            return None
+        self.way.update(frame)
+        rows = _vehicles_near(frame)
+        x, y = frame.ego_polygon[:, 0], frame.ego_polygon[:, 1]
+        body = (float(x.max()), float(-x.min()), float(np.abs(y).max()))
+        places = self.way.line(frame).places(frame.objects[rows]) if len(rows) else ()
+        return Seen(
+            hypot(*frame.ego[3:].tolist()),
+            body,
+            tuple(_sighting(frame, i, at) for i, at in zip(rows.tolist(), places, strict=True)),
+        )
+
+
+def _sighting(frame: ChannelFrame, i: int, where: Placed) -> Sighting:
+    shape = frame.polygons[i, : frame.polygon_size[i]]
+    half_length, half_width = np.abs(shape).max(axis=0, initial=0.0).tolist()
+    x, y = frame.objects[i, :2].tolist()
+    return Sighting(int(frame.ids[i]), (x, y), where, half_length, half_width)
+
+
 class Tracks:
-    """Call `update` for every message of the channel."""
+    """Call `update` with every message of the channel, as its lookout has seen it."""
 
     def __init__(self, safe: SafeDistance, sure: float = SURE) -> None:
-        self.safe, self.sure, self.way = safe, sure, Way()
+        self.safe, self.sure = safe, sure
         self.tracks: dict[int, Track] = {}
         self.number = -1  # of tracks without identity, downwards
 
     def __iter__(self) -> Iterator[Track]:
         return iter(self.tracks.values())
 
-    def update(self, t: float, frame: ChannelFrame | None) -> None:
+    def update(self, t: float, seen: Seen | None) -> None:
         """One cycle; without a message tracks wait for their end."""
-        if frame is not None and Way.usable(frame):
-            self.way.update(frame)
-            v_ego, rows = hypot(*frame.ego[3:].tolist()), _vehicles_near(frame)
-            x, y = frame.ego_polygon[:, 0], frame.ego_polygon[:, 1]
-            body = (float(x.max()), float(-x.min()), float(np.abs(y).max()))
-            places = self.way.line(frame).places(frame.objects[rows]) if len(rows) else ()
-            for i, where in zip(rows.tolist(), places, strict=True):
-                self._report(t, frame, i, where, v_ego, body)
+        if seen is not None:
+            for sighting in seen.sightings:
+                self._report(t, sighting, seen)
             for track in self:
-                track.judge(t, v_ego, self.safe, self.sure)
+                track.judge(t, seen.v_ego, self.safe, self.sure)
         for key in [k for k, track in self.tracks.items() if t - track.t > COAST + 1e-6]:
             del self.tracks[key]
 
-    def _report(
-        self,
-        t: float,
-        frame: ChannelFrame,
-        i: int,
-        where: Placed,
-        v_ego: float,
-        body: tuple[float, float, float],
-    ) -> None:
-        state = frame.objects[i]
-        s, offset, turn, v = where
-        shape = frame.polygons[i, : frame.polygon_size[i]]
-        half_l, half_w = np.abs(shape).max(axis=0, initial=0.0).tolist()
-        key = self._key(frame, i, state)
+    def _report(self, t: float, sighting: Sighting, seen: Seen) -> None:
+        s, offset, turn, v = sighting.where
+        body, half_l, half_w = seen.body, sighting.half_length, sighting.half_width
+        key = self._key(sighting)
         known = self.tracks.get(key)
         room = body[2] + half_w + (SPARE if known is not None else 0.0)
         if abs(offset) > room or abs(turn) > TURN_MOST:
@@ -143,20 +178,20 @@ class Tracks:
         gap = (-s - body[1] if behind else s - body[0]) - half_l
         if known is None or known.behind is not behind:
             start = (SIGMA_GAP**2, SIGMA_V**2, 0.0)
-            self.tracks[key] = Track(behind, gap, v, start, t, state[:2].copy())
+            self.tracks[key] = Track(behind, gap, v, start, t, sighting.xy)
             return
-        known.predict(max(t - known.t, 0.0), v_ego)
+        known.predict(max(t - known.t, 0.0), seen.v_ego)
         known.correct(gap, v)
-        known.t, known.place = t, state[:2].copy()
+        known.t, known.place = t, sighting.xy
 
-    def _key(self, frame: ChannelFrame, i: int, state: Floats) -> int:
+    def _key(self, sighting: Sighting) -> int:
         """The object's identity, or that of the nearest track where the channel gives none."""
-        if frame.ids[i] >= 0:
-            return int(frame.ids[i])
+        if sighting.key >= 0:
+            return sighting.key
         near = [
             (d, key)
             for key, track in self.tracks.items()
-            if (d := hypot(*(track.place - state[:2]).tolist())) < NEAR
+            if (d := dist(track.place, sighting.xy)) < NEAR
         ]
         if near:
             return min(near)[1]

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from itertools import combinations
-from math import cos, hypot, inf, log, nan, sin
+from math import cos, dist, inf, log, nan, sin
 
 import numpy as np
 
 from skidpad.core.channels import ChannelFrame
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.tracked.distance import SafeDistance
-from skidpad.evidence.channels.tracked.tracks import CONFIRM, SURE, Track, Tracks
+from skidpad.evidence.channels.tracked.tracks import CONFIRM, SURE, Lookout, Seen, Track, Tracks
 
 SAME = 4.0  # m between two channels' reports of one object
 SIGMA_PLACE = 0.27  # m per axis: 0.10 m of jitter and 0.25 m of drift, as docs/channels.md states
@@ -27,6 +27,7 @@ class Tracked:
     def __init__(
         self, channels: Sequence[str], safe: SafeDistance | None = None, sure: float = SURE
     ) -> None:
+        self.lookouts = [Lookout() for _ in channels]
         self.tracks = [Tracks(safe or SafeDistance(), sure) for _ in channels]
         self.pairs = tuple(combinations(range(len(channels)), 2))
         self.offsets: list[deque[tuple[float, float, float]]] = [deque() for _ in self.pairs]
@@ -34,15 +35,18 @@ class Tracked:
 
     def update(self, t: float, frames: Sequence[ChannelFrame | None]) -> dict[Signal, float]:
         """The signals at t: metres of gap that are missing, chi-square, s until plans part."""
-        return self.distances(t, frames) | {
+        seen = [out.see(f) for out, f in zip(self.lookouts, frames, strict=True)]
+        return self.distances(t, seen, frames) | {
             Signal.OFFSET_CHI2: self._offset(t, frames),
             Signal.PLANS_APART: self._plans(t, frames),
         }
 
-    def distances(self, t: float, frames: Sequence[ChannelFrame | None]) -> dict[Signal, float]:
-        """The first of them alone."""
-        for tracks, frame in zip(self.tracks, frames, strict=True):
-            tracks.update(t, frame)
+    def distances(
+        self, t: float, seen: Sequence[Seen | None], frames: Sequence[ChannelFrame | None]
+    ) -> dict[Signal, float]:
+        """The first of them alone, by what lookouts have seen in the frames."""
+        for tracks, one in zip(self.tracks, seen, strict=True):
+            tracks.update(t, one)
         out = {
             Signal.REAR_DEFICIT: 0.0,
             Signal.FRONT_DEFICIT: 0.0,
@@ -73,7 +77,7 @@ class Tracked:
     def _same(self, channel: int, track: Track) -> Track | None:
         """The same object as another channel has it."""
         for other in self.tracks[channel]:
-            near = hypot(*(other.place - track.place).tolist()) < SAME
+            near = dist(other.place, track.place) < SAME
             if near and other.behind is track.behind:
                 return other
         return None

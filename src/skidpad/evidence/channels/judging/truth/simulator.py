@@ -26,6 +26,7 @@ BRAKE_LEADER = 6.0  # m/s^2, decision C-3
 REACTION_TIME = 1.0  # s
 MIN_DURATION = 0.5  # s
 V_EGO_MIN = 2.0  # m/s
+LONGEST = 30.0  # m, more than both vehicles' lengths and widths together
 REACH = 80.0  # m of driven path before and after the ego that is looked at
 VEHICLES = {
     int(c)
@@ -72,9 +73,9 @@ class _DrivenPath:
 def _tail_marks(
     k: int, t: float, truth: TruthFrame, path: _DrivenPath, frames: Sequence[ChannelFrame | None]
 ) -> list[Mark]:
-    line, s_ego = path.around(k)
-    near = np.flatnonzero(np.hypot(*(truth.actors[:, :2] - truth.ego[:2]).T) < REACH)
-    if line is None or near.size == 0:
+    near = _near(truth)
+    line, s_ego = path.around(k) if near.size else (None, 0.0)
+    if line is None:
         return []
     front, rear, half_width = _extent(truth.ego_polygon)
     corridor = line.buffer(half_width, cap_style="flat")
@@ -108,6 +109,14 @@ def _tail_marks(
                 )
             )
     return marks
+
+
+def _near(truth: TruthFrame) -> NDArray[np.int64]:
+    """Rows of those whom the ego could hit or be hit by: no path is shorter than the straight line."""
+    away = np.hypot(*(truth.actors[:, :2] - truth.ego[:2]).T)
+    v = np.maximum(np.hypot(*truth.actors[:, 3:].T), np.hypot(*truth.ego[3:]))
+    stop = v * REACTION_TIME + v * v / (2.0 * G * np.minimum(truth.mu, truth.ego_mu))
+    return np.flatnonzero((away < REACH) & (away < stop + LONGEST))
 
 
 def would_hit(

@@ -104,7 +104,6 @@ def monitor(
     from skidpad.evidence.channels.indicators.settings import IndicatorSettings
     from skidpad.evidence.channels.monitor import MonitorSettings
     from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
-    from skidpad.evidence.channels.tracked.distance import NOMINAL_GRIP
     from skidpad.live.watch import Alarms, Timer, watch_whole
     from skidpad.recording.sources import file_hash
     from skidpad.report.channels import write_drive_report
@@ -122,7 +121,7 @@ def monitor(
         thresholds=load_thresholds(thresholds),
         identify=Identify(identifier.value),
         detectors={} if identifier is Identifier.rules else load_model(model).identifier(),
-        grip=NOMINAL_GRIP if grip is None else grip,
+        grip=grip,
     )
     timer = Timer(time.thread_time_ns) if timing else None
     told, digest = (Alarms(sys.stdout), "") if file is None else (None, file_hash(file))

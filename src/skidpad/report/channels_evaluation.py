@@ -12,6 +12,7 @@ from skidpad import __version__
 from skidpad.core.errors import FileError
 from skidpad.evidence.channels.findings import FINDINGS
 from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
+from skidpad.evidence.channels.judging.segments import TOLD
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import channels_scores as scores
 from skidpad.report.channels_redundancy import redundancy
@@ -120,8 +121,8 @@ def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:
 
 
 def _deciding(evaluation: Row) -> tuple[list[Row], str]:
-    """What identifiers came to by the truth that decides (C-3), and of what."""
-    rows = [r for r in headline(evaluation) if r["rules"] != CEILING]
+    """What identifiers came to by the truth that decides (C-3), and of what; not who is told of it."""
+    rows = [r for r in headline(evaluation) if r["rules"] not in (CEILING, TOLD)]
     if any(r["truth"] == "sim" for r in rows):
         return [r for r in rows if r["truth"] == "sim"], "the hazards that were really there"
     world = [r for r in rows if r["truth"] == "world"]

@@ -39,12 +39,11 @@ from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.recorder import CycleEvidence, Recorder
 from skidpad.evidence.channels.risk import RiskForm, RiskMatrix, risk_matrix
 from skidpad.evidence.channels.timefilter import Event, TimeFilter
-from skidpad.evidence.channels.tracked.distance import NOMINAL_GRIP, SafeDistance
+from skidpad.evidence.channels.tracked.distance import GRIPS, SafeDistance
 from skidpad.evidence.channels.tracked.vote import Tracked
 from skidpad.recording.hazards import HazardRecord
 
 Floats = NDArray[np.float64]
-GRIPS = (0.05, 1.5)  # between wet ice and racing tyres
 
 
 @dataclass(slots=True)
@@ -75,14 +74,20 @@ class MonitorSettings:
     identify: Identify = Identify.RULES
     detectors: Mapping[HazardType, Detector] = field(default_factory=dict)
     keep_worlds: bool = True  # gather records of hazards
-    grip: float = NOMINAL_GRIP  # of the road, as told to the rules `tracked`; others know none
+    grip: float | None = None  # of the road, as told to the rules `tracked`; None: a dry one
 
     def __post_init__(self) -> None:
         if self.identify is not Identify.RULES and not self.detectors:
             raise ConfigError(f"--identifier {self.identify.value} needs a trained model")
-        require_range("grip", self.grip, *GRIPS)
-        if self.profile is not Profile.TRACKED and self.grip != NOMINAL_GRIP:
-            raise ConfigError(f"rules {self.profile.value} know no grip: it is told to `tracked`")
+        if self.grip is not None:
+            require_range("grip", self.grip, *GRIPS)
+            if self.profile is not Profile.TRACKED:
+                raise ConfigError(f"rules {self.profile.value} know no grip: `tracked` is told it")
+
+    @property
+    def safe_distance(self) -> SafeDistance:
+        """Of the rules `tracked`."""
+        return SafeDistance() if self.grip is None else SafeDistance.on(self.grip)
 
 
 class Monitor:
@@ -118,7 +123,7 @@ class Monitor:
             else None
         )
         self.tracked = (
-            Tracked(self.channels, SafeDistance.on(settings.grip))
+            Tracked(self.channels, settings.safe_distance)
             if settings.profile is Profile.TRACKED
             else None
         )

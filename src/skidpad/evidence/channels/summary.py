@@ -49,6 +49,7 @@ def watched(monitor: Monitor, losses: Losses, seconds: float, n: int) -> Watched
         "cycles": n,
         "seconds": round(seconds, 3),
         "rules": monitor.settings.profile.value,
+        "grip": monitor.settings.grip,
         "forms": monitor.settings.indicators.form.value,
         "identifier": monitor.settings.identify.value,
         "losses": asdict(losses),

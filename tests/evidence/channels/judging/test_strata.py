@@ -86,14 +86,16 @@ def test_words_that_are_no_weights_are_one_sentence():
     for text in ("[]", "nonsense", '{"3": 1}', '{"3": ["a", 1]}'):
         with pytest.raises(FileError, match="two numbers per actor"):
             weights_from({"weights": text})
-    with pytest.raises(FileError, match="weight_of_jumps` must be a number, got 'often'"):
-        weights_from({"weight_of_jumps": "often"})
+    for text in ("often", "nan", "inf", "-1", "0", "1.5", "1e999", "..."):
+        with pytest.raises(FileError, match="weight_of_jumps` must be a number in"):
+            weights_from({"weight_of_jumps": text})
 
 
 def test_a_jump_counts_as_the_recording_says():
     kind = HazardType.INCONSISTENT_LOCALISATION
-    jump = marks.TrueHazard(kind, 1.0, 2.0, marks.World.SIM)
-    assert weights_from({"weight_of_jumps": "0.05"}).weigh(jump).weight == 0.05
+    jump, drift = (marks.TrueHazard(kind, 1, 2, marks.World.SIM, kind=k) for k in ("jump", "drift"))
+    weights = weights_from({"weight_of_jumps": "0.05"})
+    assert (weights.weigh(jump).weight, weights.weigh(drift).weight) == (0.05, 1.0)
     assert Weights().weigh(jump).weight == 1.0
 
 

@@ -16,6 +16,7 @@ from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import Profile
 from skidpad.evidence.channels.judging.evaluation import Evaluation, read_labels
 from skidpad.evidence.channels.judging.segments import judge
+from skidpad.evidence.channels.judging.truth import simulator
 from skidpad.evidence.channels.judging.truth.simulator import (
     G,
     footprint,
@@ -90,6 +91,34 @@ def test_ice_makes_a_gap_a_hazard_and_standing_still_none():
     assert {h.hazard for h in simulator_truth(icy, names)} == {TAILGATED}
     rows, names = scene([(-6.0, 0, 0, 0.0, 0)], ego=(0, 0, 0, 0.0, 0))
     assert simulator_truth(rows, names) == []
+
+
+def test_a_cyclist_has_no_grip_and_is_tailgated_all_the_same():
+    rows, names = scene([(8.0, 0, 0, 4.0, 0)], duration=2.0)
+    ridden = [c._replace(truth=c.truth._replace(mu=np.array([np.nan]))) for c in rows]
+    assert {h.hazard for h in simulator_truth(ridden, names)} == {TAILGATING}
+
+
+@given(seed=st.integers(0, 10_000), long=st.sampled_from([1.0, 12.0]))
+@settings(max_examples=60, deadline=None, derandomize=True)
+def test_nobody_who_could_hit_is_left_out(seed, long):
+    """Looking only at who is near enough to stop in time finds what looking at all finds."""
+    rng = np.random.default_rng(seed)
+    n, v = 12, rng.uniform(2.0, 35.0)
+    objects = np.column_stack(
+        [rng.uniform(-80, 80, n), rng.uniform(-4, 4, n), rng.normal(0, 0.2, n),
+         rng.uniform(0, 40, n), np.zeros(n)]
+    )  # fmt: skip
+    rows, names = scene(objects, ego=(0.0, 0.0, 0.0, v, 0.0), duration=1.0)
+    mu = rng.choice([0.1, 0.5, 0.9, np.nan], n)
+    odd = [
+        c._replace(truth=c.truth._replace(mu=mu, polygons=c.truth.polygons * [long, 1.0]))
+        for c in rows
+    ]
+    near = simulator_truth(odd, names)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(simulator, "_near", lambda truth: np.arange(len(truth.actors)))
+        assert simulator_truth(odd, names) == near
 
 
 @pytest.mark.req("C-212")

@@ -127,11 +127,10 @@ def constant(value: float) -> Callable[[float], float]:
 
 
 def of_distances(
-    channels: Sequence[str], cycles: Sequence[Cycle], begin: float
+    channels: Sequence[str], looked: Sequence[Looked], begin: float
 ) -> dict[HazardType, Sweep]:
     """What `tracked` would find of both tailgating hazards, by how sure a gap must be short."""
     found: dict[HazardType, dict[float, tuple[Span, ...]]] = {hazard: {} for hazard in SIDES}
-    looked = _looked(channels, cycles)
     for sure in SURES:
         for hazard, short in _short(Tracked(channels, sure=sure), looked, begin).items():
             found[hazard][sure] = short
@@ -139,16 +138,14 @@ def of_distances(
 
 
 def told_the_grip(
-    channels: Sequence[str], cycles: Sequence[Cycle], begin: float
+    channels: Sequence[str], looked: Sequence[Looked], grip: float, begin: float
 ) -> tuple[Span, ...]:
-    """What `tracked` would find of both tailgating hazards if it knew the ego's grip of the drive."""
-    grips = [c.truth.ego_mu for c in cycles if c.truth is not None]
-    safe = SafeDistance.on(float(np.median(grips)))
-    found = _short(Tracked(channels, safe), _looked(channels, cycles), begin)
+    """What `tracked` would find of both tailgating hazards if it knew the grip."""
+    found = _short(Tracked(channels, SafeDistance.on(grip)), looked, begin)
     return tuple(s for short in found.values() for s in short)
 
 
-class _Looked(NamedTuple):
+class Looked(NamedTuple):
     """A cycle, looked at once for all who judge it."""
 
     t: float
@@ -156,17 +153,18 @@ class _Looked(NamedTuple):
     frames: list[ChannelFrame | None]
 
 
-def _looked(channels: Sequence[str], cycles: Sequence[Cycle]) -> list[_Looked]:
+def look(channels: Sequence[str], cycles: Sequence[Cycle]) -> list[Looked]:
+    """Each cycle in path coordinates."""
     lookouts = [Lookout() for _ in channels]
     rows = ((c.t, [None if f is None else usable(f).frame for f in c.frames]) for c in cycles)
     return [
-        _Looked(t, [out.see(f) for out, f in zip(lookouts, frames, strict=True)], frames)
+        Looked(t, [out.see(f) for out, f in zip(lookouts, frames, strict=True)], frames)
         for t, frames in rows
     ]
 
 
 def _short(
-    tracked: Tracked, looked: Sequence[_Looked], begin: float
+    tracked: Tracked, looked: Sequence[Looked], begin: float
 ) -> dict[HazardType, tuple[Span, ...]]:
     """Where its gaps are short."""
     rows = [tracked.distances(*cycle) for cycle in looked]

@@ -31,6 +31,7 @@ from skidpad.evidence.channels.judging.curves import (
     Table,
     columns,
     found_by,
+    look,
     of_distances,
     of_rules,
     swept,
@@ -46,6 +47,7 @@ from skidpad.evidence.channels.matching import Span, match, merged
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.evidence.channels.timefilter import TimeFilter
 from skidpad.evidence.channels.timing import Stopwatch
+from skidpad.evidence.channels.tracked.distance import GRIPS, NOMINAL_GRIP
 
 Floats = NDArray[np.float64]
 Signals = Sequence[tuple[float, dict[Signal, float]]]
@@ -121,11 +123,13 @@ def judge(
         rows = [monitor.update(cycle).signals.values for cycle in cycles]
         detected[profile.value] = _scored(_found(monitor.hazards, begin))
         sweeps[profile.value] = of_rules(profile, t, columns(rows), begin)
-    sweeps[Profile.TRACKED.value] |= of_distances(channels, cycles, begin)
+    looked = look(channels, cycles)
+    sweeps[Profile.TRACKED.value] |= of_distances(channels, looked, begin)
     weights = weights_from(context or {})
     found, unseen, unseen_found = _truths(channels, cycles, truths, begin, detected, weights)
     if "sim" in found:
-        detected[TOLD] = _told(channels, cycles, begin, detected[Profile.TRACKED.value])
+        told = told_the_grip(channels, looked, grip_of(cycles), begin)
+        detected[TOLD] = _in_order([*_places(detected[Profile.TRACKED.value]), *told])
         detected[CEILING] = tuple(s for s in ceiling(cycles, channels) if s.t_end >= begin)
     if marked := tuple(labels):
         found["labels"] = tuple(merged(marked))
@@ -185,12 +189,19 @@ def _practical(
     )
 
 
-def _told(
-    channels: Sequence[str], cycles: Sequence[Cycle], begin: float, tracked: Iterable[Span]
-) -> tuple[Span, ...]:
-    """What `tracked` finds where the grip plays no part, and the rest if it knew the grip."""
-    same = [s for s in tracked if s.hazard is HazardType.INCONSISTENT_LOCALISATION]
-    return tuple(sorted([*same, *told_the_grip(channels, cycles, begin)], key=lambda s: s.t_start))
+def grip_of(cycles: Sequence[Cycle]) -> float:
+    """The ego's true grip of a drive: median over its time of the mean of its tyres."""
+    grips = [c.truth.ego_mu for c in cycles if c.truth is not None and c.truth.ego_mu > 0.0]
+    return float(np.clip(np.median(grips), *GRIPS)) if grips else NOMINAL_GRIP
+
+
+def _places(spans: Iterable[Span]) -> list[Span]:
+    """Those in which the grip plays no part."""
+    return [s for s in spans if s.hazard is HazardType.INCONSISTENT_LOCALISATION]
+
+
+def _in_order(spans: Iterable[Span]) -> tuple[Span, ...]:
+    return tuple(sorted(spans, key=lambda s: s.t_start))
 
 
 def _truths(

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from math import nan
 from typing import NamedTuple
 
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.judging.truth.marks import TrueHazard
+from skidpad.evidence.channels.judging.truth.marks import JUMP_KIND, TrueHazard
 from skidpad.evidence.channels.matching import Span
 
 
@@ -24,7 +25,7 @@ class Weights(NamedTuple):
         Who is tailgated has a follower's headway to thank, who tailgates the gap that somebody left him.
         """
         match hazard.hazard:
-            case HazardType.INCONSISTENT_LOCALISATION:
+            case HazardType.INCONSISTENT_LOCALISATION if hazard.kind == JUMP_KIND:
                 weight = self.jumps
             case HazardType.EGO_TAILGATED:
                 weight = self._mean(hazard, 0)
@@ -49,8 +50,11 @@ def weights_from(context: Mapping[str, str]) -> Weights:
             f"the recording's words `weights` must be JSON of two numbers per actor, got {text[:60]!r}"
         ) from None
     try:
-        return Weights(drivers, float(jumps))
+        weight = float(jumps)
     except ValueError:
+        weight = nan
+    if not 0.0 < weight <= 1.0:  # nor is NaN
         raise FileError(
-            f"the recording's word `weight_of_jumps` must be a number, got {jumps[:60]!r}"
-        ) from None
+            f"the recording's word `weight_of_jumps` must be a number in (0, 1], got {jumps[:60]!r}"
+        )
+    return Weights(drivers, weight)

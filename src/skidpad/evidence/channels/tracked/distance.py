@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from skidpad.core.constants import G
+from skidpad.core.errors import require_range
 
+GRIPS = (0.05, 1.5)  # between wet ice and racing tyres
 NOMINAL_GRIP = 0.9  # of a dry road (`mu_ref` of decision M-1)
 HARD_BRAKING = 6.0  # m/s^2 of the leader, decision C-3
 
@@ -26,7 +28,8 @@ class SafeDistance:
 
     @classmethod
     def on(cls, grip: float) -> SafeDistance:
-        """With this coefficient of friction for both."""
+        """With this coefficient of friction for both; ConfigError out of range."""
+        require_range("grip", grip, *GRIPS)
         return cls(b_follower=grip * G, b_leader=min(HARD_BRAKING, grip * G))
 
     def of(self, v_follower: float, v_leader: float) -> float:

@@ -13,6 +13,7 @@ from skidpad.core.vocabulary import HazardType
 Floats = NDArray[np.float64]
 JUMP, JUMP_TIME = 1.0, 0.5  # m within s: a position that jumps
 DRIFT = 2.0  # m: a position that is off
+JUMP_KIND, DRIFT_KIND = "jump", "drift"
 PAUSE = 2.0  # s, shorter pauses are one hazard (C-140)
 
 
@@ -32,7 +33,7 @@ class TrueHazard:
     t_end: float
     world: World
     about: frozenset[str] = frozenset()  # objects or channels, by name
-    kind: str = ""  # jump or drift of a position
+    kind: str = ""  # jump or drift of a position; with a jump in it a jump
     seen: bool = True  # False: no channel reported the object at any time
 
 
@@ -55,9 +56,9 @@ def offsets(rows: Floats, about: str) -> list[Mark]:
         j = int(np.searchsorted(rows[:, 0], t - JUMP_TIME - 1e-6))
         change = np.hypot(rows[j:k, 1] - dx, rows[j:k, 2] - dy).max(initial=0.0)
         if change > JUMP:
-            marks.append(Mark(HazardType.INCONSISTENT_LOCALISATION, t, about, "jump"))
+            marks.append(Mark(HazardType.INCONSISTENT_LOCALISATION, t, about, JUMP_KIND))
         elif np.hypot(dx, dy) > DRIFT:
-            marks.append(Mark(HazardType.INCONSISTENT_LOCALISATION, t, about, "drift"))
+            marks.append(Mark(HazardType.INCONSISTENT_LOCALISATION, t, about, DRIFT_KIND))
     return marks
 
 
@@ -105,6 +106,6 @@ def _hazard(group: list[Mark], world: World) -> TrueHazard:
         group[-1].t,
         world,
         frozenset(m.about for m in group if m.about),
-        "jump" if "jump" in kinds else "".join(kinds),
+        JUMP_KIND if JUMP_KIND in kinds else "".join(kinds),
         any(m.seen for m in group),
     )

@@ -26,7 +26,6 @@ BRAKE_LEADER = 6.0  # m/s^2, decision C-3
 REACTION_TIME = 1.0  # s
 MIN_DURATION = 0.5  # s
 V_EGO_MIN = 2.0  # m/s
-LONGEST = 30.0  # m, more than both vehicles' lengths and widths together
 REACH = 80.0  # m of driven path before and after the ego that is looked at
 VEHICLES = {
     int(c)
@@ -112,11 +111,21 @@ def _tail_marks(
 
 
 def _near(truth: TruthFrame) -> NDArray[np.int64]:
-    """Rows of those whom the ego could hit or be hit by: no path is shorter than the straight line."""
+    """Rows of those whom the ego could hit or be hit by: no path is shorter than the straight line.
+
+    Who has no wheels of ours (cyclists) has no grip, NaN; as a leader he brakes as hard as any.
+    """
     away = np.hypot(*(truth.actors[:, :2] - truth.ego[:2]).T)
     v = np.maximum(np.hypot(*truth.actors[:, 3:].T), np.hypot(*truth.ego[3:]))
-    stop = v * REACTION_TIME + v * v / (2.0 * G * np.minimum(truth.mu, truth.ego_mu))
-    return np.flatnonzero((away < REACH) & (away < stop + LONGEST))
+    stop = v * REACTION_TIME + v * v / (2.0 * G * np.fmin(truth.mu, truth.ego_mu))
+    sizes = _size(truth.polygons) + _size(truth.ego_polygon)
+    return np.flatnonzero((away < REACH) & (away < stop + 2.0 * sizes))
+
+
+def _size(polygons: Floats) -> Floats:
+    """m from the reference point to the farthest corner, of polygons (..., k, 2)."""
+    away = np.nan_to_num(np.hypot(polygons[..., 0], polygons[..., 1]))
+    return np.asarray(away.max(axis=-1, initial=0.0), dtype=np.float64)
 
 
 def would_hit(

@@ -62,6 +62,15 @@ def test_silence_after_a_tick_wakes_the_traffic_managers_of_this_client(waker, c
     assert woken == [8000]
 
 
+def test_what_a_traffic_manager_asks_before_it_sleeps_is_no_sign_of_its_work(waker, clock, woken):
+    """It asks for settings between two cycles, often only after the program has ticked again."""
+    waker.asked("add_traffic_manager_running", [TM])
+    waker.asked("tick_cue", [])
+    waker.asked("get_episode_settings", [])
+    clock.go(2.1)
+    assert woken == [8000]
+
+
 def test_a_client_that_goes_on_is_left_alone(waker, clock, woken):
     waker.asked("add_traffic_manager_running", [TM])
     for _ in range(5):

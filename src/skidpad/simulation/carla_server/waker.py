@@ -3,7 +3,8 @@
 After each tick of a synchronous client its Traffic Manager works and sends a batch of commands, an
 empty one if need be. Its thread is told to begin without a lock, so a thread that is just about to
 sleep is not told: then both it and the program wait for each other, for good, and nothing arrives
-here any more. That silence after a tick is what we look for. The Traffic Manager has an RPC server
+here any more, but for the settings that it asks for between two cycles, perhaps only after the
+program has ticked. That silence after a tick is what we look for. The Traffic Manager has an RPC server
 of its own, and to switch it out of synchronous mode notifies the thread; to switch it back leaves
 all as it was.
 """
@@ -26,6 +27,7 @@ TRIES = 10  # for one silence
 ANSWER_S = 5.0  # for one call
 ANSWER_MAX = 65536  # bytes
 METHOD = "set_synchronous_mode"
+BEFORE_SLEEP = "get_episode_settings"
 
 
 class Timer(Protocol):
@@ -52,7 +54,9 @@ class Waker:
         self._tries = 0
 
     def asked(self, method: str, arguments: list[Any], accepted: bool = True) -> None:
-        """A request came: whatever it is, nobody has fallen asleep."""
+        """A request came: nobody has fallen asleep, unless it is what one asks just before."""
+        if method == BEFORE_SLEEP:
+            return
         self.stop()
         port = _port(method, arguments)
         if method == "add_traffic_manager_running" and port is not None and accepted:

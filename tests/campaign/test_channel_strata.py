@@ -9,7 +9,7 @@ import pytest
 from msgspec import structs
 
 from runs import segment_run
-from skidpad.campaign.channel_drive import RISKY_JUMPS, drive_segment
+from skidpad.campaign.channel_drive import RISKY_JUMPS, Crew, drive_segment
 from skidpad.campaign.channel_routes import CONDITIONS, Condition, chosen_routes, driven_routes
 from skidpad.campaign.channel_world import segment_of
 from skidpad.campaign.channels import segments
@@ -19,6 +19,7 @@ from skidpad.core.run import BackendChoice, BackendKind, run_from_plain
 from skidpad.core.vocabulary import Stratum
 from skidpad.recording.channels import McapRecording
 from skidpad.recording.context import context_of
+from skidpad.sensors.channel_presets import senses_of
 from skidpad.simulation.world.stage import staged
 from skidpad.simulation.world.traffic.variety import risky_character
 
@@ -72,6 +73,11 @@ def test_a_recording_of_risky_drivers_says_how_much_each_of_them_counts(tmp_path
     context = context_of(recording)
     assert (context["route"], context["stratum"]) == ("route-4", "risky")
     assert float(context["weight_of_jumps"]) == 1.0 / RISKY_JUMPS
+    rates = [senses_of(c, RISKY_JUMPS).localisation.jump_rate for c in recording.channels]
+    assert rates == [20.0, 20.0]  # per hour; 1 as it occurs
+    crew = Crew(run, segment_of(run))
+    crew.begin(staged(segment_of(run).setup, run.seed).table)
+    assert [s.sensing.localisation.jump_rate for s in crew.suites] == rates
     weights = json.loads(context["weights"])
     world = staged(segment_of(run).setup, run.seed)
     traits = world.traffic.drivers.trait

@@ -47,10 +47,9 @@ from skidpad.stack.channels.settings import settings_of
 PERIOD = round(CYCLE / DT)  # ticks
 WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
 TRUTH_REACH = 120.0  # m around the ego within which the true world is recorded
-RISKY_JUMPS = (
-    20.0  # times as many jumps of position in the stratum of risky drivers (assumed): each
-)
-# counts a twentieth there, as where, how far and how long a channel jumps is what it was
+# Jumps of position in the stratum of risky drivers (assumed): each counts a twentieth there, as where,
+# how far and how long a channel jumps is what it was.
+RISKY_JUMPS = 20.0  # times as many
 MINIMAL_RISK_BRAKE = 0.4  # of full brake, about 4 m/s^2 (UN R157 5.1.6: at most 4 m/s^2)
 NO_REPORT = StackReport()
 Guide = Callable[[float], float]  # at a cycle's time, s: most speed, m/s; 0: it is to stop

@@ -15,6 +15,7 @@ from skidpad.core.errors import require_choice
 from skidpad.core.run import ChannelCrew, Route, RunSpec
 from skidpad.core.vocabulary import SensorLevel, Stratum
 from skidpad.core.weather import Weather
+from skidpad.physics.presets import preset
 
 PACK = 20  # vehicles at least that stay around the ego in the stratum of risky drivers
 
@@ -43,15 +44,7 @@ CONDITIONS = {
         wind_intensity=40.0,
         sun_altitude_deg=45.0,
     ),
-    Condition.ICE: Weather(
-        name="ice",
-        cloudiness=20.0,
-        wetness=30.0,
-        ice_thickness=30.0,
-        air_temperature_c=-5.0,
-        road_temperature_c=-5.0,
-        sun_altitude_deg=45.0,
-    ),
+    Condition.ICE: replace(preset("icy_30"), name="ice", title="", sun_altitude_deg=45.0),
 }
 
 

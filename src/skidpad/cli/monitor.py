@@ -11,6 +11,7 @@ import typer
 if TYPE_CHECKING:
     from skidpad.core.vocabulary import HazardType
     from skidpad.evidence.channels.indicators.catalogue import Indicator
+    from skidpad.evidence.channels.indicators.comfort import Form
     from skidpad.evidence.channels.summary import Watched
     from skidpad.recording.channels import ChannelSource
 
@@ -100,7 +101,6 @@ def monitor(
     from skidpad.evidence.channels.hazards import Profile, load_rules
     from skidpad.evidence.channels.identifier.model import Identify, load_model
     from skidpad.evidence.channels.indicators.catalogue import load_thresholds
-    from skidpad.evidence.channels.indicators.comfort import Form
     from skidpad.evidence.channels.indicators.settings import IndicatorSettings
     from skidpad.evidence.channels.monitor import MonitorSettings
     from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
@@ -111,11 +111,10 @@ def monitor(
     wanted = {name: _rule(name) for name in fail_if or []}
     if junit is not None and not wanted:
         raise ConfigError("--junit writes the verdicts of --fail-if, and none is given")
-    default = Form.COMPLETED if rules is Rules.as_printed else Form.CORRECTED
     source = _source(file, mapping, listen, domain, wait)
     profile = Profile(rules.value)
     settings = MonitorSettings(
-        indicators=IndicatorSettings(form=Form(forms.value) if forms else default),
+        indicators=IndicatorSettings(form=_form(rules, forms)),
         profile=profile,
         rules=load_rules(profile, rules_file),
         thresholds=load_thresholds(thresholds),
@@ -134,6 +133,15 @@ def monitor(
         _print_table(time_by_objects(times))
     if wanted:
         _gate({name: _events(found, rule) for name, rule in wanted.items()}, junit)
+
+
+def _form(rules: Rules, asked: Forms | None) -> Form:
+    """The asked one, else that of the rules (decision C-16)."""
+    from skidpad.evidence.channels.indicators.comfort import Form
+
+    if asked is not None:
+        return Form(asked.value)
+    return Form.COMPLETED if rules is Rules.as_printed else Form.CORRECTED
 
 
 def _source(

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 
 PATIENCE = 0.5  # s between two looks at the keyboard's Ctrl-C
 LAST_WORD = 1.5  # s in which the page shows how it ended
-SLEEP = 3600.0  # s that a browser may let a hidden page sleep before it is loaded anew; our choice
+# s that a hidden page may sleep before it is loaded anew; a closed one is kept as long. Our choice.
+SLEEP = 600.0
 
 
 def serve(

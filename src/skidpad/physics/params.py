@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import inf
 from typing import NamedTuple
 
 import numpy as np
@@ -76,7 +77,7 @@ def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
         drive_front=column([t.drive_share_front for t in types]),
         power=column([t.power for t in types]),
         force_max=column([t.force_max for t in types]),
-        speed_max=column([t.speed_max for t in types]),
+        speed_max=column([inf if t.speed_max is None else t.speed_max for t in types]),
         engine_drag=column([t.engine_drag for t in types]),
         brake_torque=np.array(
             [(t.brake_torque_front, t.brake_torque_rear) for t in types], dtype=np.float64

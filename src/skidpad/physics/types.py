@@ -43,7 +43,7 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     drive: Drive
     power: float  # W at the wheels
     force_max: float  # N at the wheels, lowest gear
-    speed_max: float = 1000.0  # m/s, beyond which the engine does not drive: none by default
+    speed_max: float | None = None  # m/s, beyond which the engine does not drive
     engine_drag: float = 0.5  # m/s^2 at closed throttle
     brake_torque_front: float  # N m per wheel at full pedal
     brake_torque_rear: float

@@ -16,10 +16,16 @@ from skidpad.simulation.carla_server.engine import (
     Traction,
     at_wheels,
     engine_of,
+    gear_at,
     parse_engine,
     revolutions,
 )
-from skidpad.simulation.carla_server.physics_control import PhysicsControl, applied, parse_physics
+from skidpad.simulation.carla_server.physics_control import (
+    PhysicsControl,
+    applied,
+    parse_physics,
+    with_engine,
+)
 from skidpad.simulation.carla_server.vehicles import model_of
 from skidpad.simulation.carla_server.wire import WireError
 
@@ -67,27 +73,73 @@ def test_twice_the_torque_or_half_the_ratio_by_hand():
     )
     half = replace(engine, max_rpm=0.5 * engine.max_rpm)  # below the range of full power
     assert at_wheels(half, 0.3) == Traction(
-        was.force, pytest.approx(0.75 * was.power), pytest.approx(0.5 * was.speed)
+        was.force, pytest.approx(0.75 * was.power, rel=1e-3), pytest.approx(0.5 * was.speed)
     )
     assert at_wheels(replace(engine, gears=()), 0.3) == Traction(0.0, 0.0, 0.0)
     assert at_wheels(replace(engine, max_rpm=0.0), 0.3) == Traction(0.0, 0.0, 0.0)
 
 
+@pytest.mark.parametrize(
+    ("curve", "max_rpm"),
+    [
+        ([(0, 500), (6000, 0)], 6000),
+        ([(20, 400), (1300, 600), (10000, 0)], 10000),
+        ([(0, 400), (1500, 600), (6000, 0)], 6000),
+        ([(0, 400), (1500, 600), (6000, 0)], 2000),
+        ([(0, 0), (5000, 300)], 4000),
+        ([(3000, 200)], 9000),
+    ],
+)
+def test_force_and_power_are_the_greatest_anywhere_on_the_curve(curve, max_rpm):
+    engine = replace(engine_of(MINI), torque_curve=tuple(curve), max_rpm=float(max_rpm))
+    rpm = np.linspace(0.0, max_rpm, 200_001)
+    torque = np.interp(rpm, *np.array(curve).T)
+    came = at_wheels(engine, 0.3)
+    assert came.power == pytest.approx((rpm * torque).max() * RPM, rel=1e-6)
+    first = engine.gears[0][0] * engine.final_ratio
+    assert came.force == pytest.approx(torque.max() * first / 0.3, rel=1e-6)
+
+
+def single(value):
+    """As it travels: every number in single precision."""
+    if isinstance(value, list | tuple):
+        return [single(v) for v in value]
+    return float(np.float32(value)) if isinstance(value, float) else value
+
+
 def test_what_is_given_back_as_it_was_changes_nothing():
-    """Also in the single precision in which it travels."""
     fresh = PhysicsControl.of(MINI)
     sent = fresh.packed([[0.0, 0.0, 0.0]] * 4)
-    single = [[[float(np.float32(x)) for x in p] for p in sent[0]], *sent[1:]]
-    assert applied(MINI, fresh, parse_physics(single)) is MINI
-    untold = [[], *sent[1:10], [], *sent[11:]]  # as a client's fresh object has it
-    assert applied(MINI, fresh, parse_physics(untold)) is MINI
-    slower = [*sent]
-    slower[1] = 0.5 * sent[1]
-    model = applied(MINI, fresh, parse_physics(slower))
-    assert model.speed_max == pytest.approx(0.5 * at_wheels(fresh.engine, MINI.wheel_radius).speed)
-    assert structs.replace(model, power=0.0, speed_max=0.0, force_max=0.0) == structs.replace(
-        MINI, power=0.0, speed_max=0.0, force_max=0.0
+    assert applied(MINI, fresh, parse_physics(single(sent))) is MINI
+    untold = parse_physics([*sent[:10], [], *sent[11:]])  # no gears, as a client's fresh object
+    kept = with_engine(untold, fresh)
+    assert kept.engine == fresh.engine
+    assert applied(MINI, fresh, kept) is MINI
+
+
+def test_a_limit_of_revolutions_limits_the_speed_and_goes_with_them():
+    mini = next(m for m in MODELS if m.title == "vehicle.mini.cooper_s")
+    fresh = PhysicsControl.of(mini)
+    sent = fresh.packed([[0.0, 0.0, 0.0]] * 4)
+    slower = parse_physics([sent[0], 0.5 * sent[1], *sent[2:]])
+    model = applied(mini, fresh, slower)
+    assert model.speed_max == pytest.approx(0.5 * mini.speed_max)
+    changed = {"power": 0.0, "speed_max": 0.0, "force_max": 0.0}
+    assert structs.replace(model, **changed) == structs.replace(mini, **changed)
+    back = applied(model, slower, fresh)
+    assert [back.power, back.force_max, back.speed_max] == pytest.approx(
+        [mini.power, mini.force_max, mini.speed_max]
     )
+
+
+def test_larger_wheels_are_a_longer_gear():
+    fresh = PhysicsControl.of(MINI)
+    sent = fresh.packed([[0.0, 0.0, 0.0]] * 4)
+    for wheel in sent[15]:
+        wheel[3] *= 2.0
+    model = applied(MINI, fresh, parse_physics(sent))
+    assert model.force_max == pytest.approx(0.5 * MINI.force_max)
+    assert model.power == pytest.approx(MINI.power)
 
 
 def test_revolutions_follow_the_gear():
@@ -100,6 +152,16 @@ def test_revolutions_follow_the_gear():
     assert revolutions(engine, 1, 300.0, 0.3) == engine.max_rpm
 
 
+def test_a_box_shifts_up_once_and_for_all_as_it_gets_faster():
+    engine = engine_of(MINI)
+    gears = [gear_at(engine, v, 0.3) for v in np.linspace(0.0, 90.0, 500)]
+    assert gears == sorted(gears)
+    assert set(gears) == set(range(1, len(engine.gears) + 1))
+    shift = 0.65 * engine.max_rpm * RPM * 0.3 / (engine.gears[0][0] * engine.final_ratio)
+    assert [gear_at(engine, f * shift, 0.3) for f in (0.999, 1.001)] == [1, 2]
+    assert gear_at(replace(engine, gears=()), 50.0, 0.3) == 1
+
+
 @pytest.mark.parametrize(
     ("at", "value", "said"),
     [
@@ -107,6 +169,7 @@ def test_revolutions_follow_the_gear():
         (0, [[3000.0, 1.0], [10.0, 1.0]], "revolutions must ascend"),
         (0, [[0.0, float("nan")]], "torque_curve"),
         (1, -5.0, "max_rpm"),
+        (2, "x", "physics control.moi"),
         (10, [[-1.0, 0.5, 0.6]], "ratios of gears"),
         (10, [[1.0, 0.5]], "forward_gears"),
     ],

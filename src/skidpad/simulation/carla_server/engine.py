@@ -21,6 +21,7 @@ from skidpad.physics.params import AIR_DENSITY
 from skidpad.physics.types import VehicleType
 from skidpad.simulation.carla_server import wire
 
+Curve = Sequence[tuple[float, float]]  # rpm and N m
 RPM = 2.0 * pi / 60.0  # rad/s
 FINAL_RATIO = 4.0
 # Full power from the first to the second, rpm: petrol engines of cars, diesel engines of others; assumed.
@@ -28,7 +29,17 @@ RANGE, RANGE_HEAVY = (4000.0, 6000.0), (1400.0, 2100.0)
 HEAVY = (ActorKind.TRUCK, ActorKind.BUS)
 SPARE = 1.05  # speed at the limit of revolutions in the highest gear, over the one that drag allows
 BEYOND = 200.0  # m/s, no drive is that fast
-SHIFTS = [0.5, 0.65]  # where an automatic box shifts down and up, as the client's class has it
+SHIFTS = (0.5, 0.65)  # where an automatic box shifts down and up, as the client's class has it
+NUMBERS = {  # members by their places in a call
+    1: "max_rpm",
+    2: "moi",
+    3: "damping_rate_full_throttle",
+    4: "damping_rate_zero_throttle_clutch_engaged",
+    5: "damping_rate_zero_throttle_clutch_disengaged",
+    7: "gear_switch_time",
+    8: "clutch_strength",
+    9: "final_ratio",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +58,7 @@ class Engine:
 
     @property
     def is_told(self) -> bool:
-        """Whether there are curve and gears; a client's fresh object has none and changes no drive."""
+        """Whether there are curve and gears; a client's fresh object has no gears and changes no drive."""
         return bool(self.torque_curve and self.gears)
 
     def packed(self) -> list[Any]:
@@ -64,7 +75,7 @@ def parse_engine(value: Sequence[Any]) -> Engine:
     name = "physics control"
     curve = [wire.numbers(p, f"{name}.torque_curve", 2) for p in wire.items(value[0], "curve")]
     gears = [wire.numbers(g, f"{name}.forward_gears", 3) for g in wire.items(value[10], "gears")]
-    numbers = [wire.number(value[i], f"{name}: engine") for i in (1, 2, 3, 4, 5, 7, 8, 9)]
+    numbers = [wire.number(value[i], f"{name}.{NUMBERS[i]}") for i in NUMBERS]
     max_rpm, moi, *damping, switch_time, clutch, final_ratio = numbers
     if any(rpm < 0.0 or torque < 0.0 for rpm, torque in curve):
         raise wire.WireError(f"{name}.torque_curve: revolutions and torques must not be negative")
@@ -88,20 +99,17 @@ def parse_engine(value: Sequence[Any]) -> Engine:
 def engine_of(model: VehicleType) -> Engine:
     """An engine and gears that come to the force and power of this type."""
     low, high = RANGE_HEAVY if model.actor_kind in HEAVY else RANGE
-    torque = model.power / (low * RPM)
-    past = [(rpm, model.power / (rpm * RPM)) for rpm in np.linspace(low, high, 5).tolist()]
-    first = model.force_max * model.wheel_radius / torque
+    knots = [0.0, *np.linspace(low, high, 9).tolist()]
+    curve = [(rpm, model.power / (max(rpm, low) * RPM)) for rpm in knots]
+    share = model.power / _power(curve, high)  # between knots a straight line is a little more
+    curve = [(rpm, share * torque) for rpm, torque in curve]
+    first = model.force_max * model.wheel_radius / curve[0][1]
     last = high * RPM * model.wheel_radius / (SPARE * _fastest(model))
-    steps = max(
-        ceil(log(first / last) / log(high / low)), 0
-    )  # never out of the range of full power
+    # no gear leaves the range of full power before the next one is in it
+    steps = max(ceil(log(first / last) / log(high / low)), 0)
     ratios = [first * (last / first) ** (k / max(steps, 1)) for k in range(steps + 1)]
-    return Engine(
-        ((0.0, torque), *past),
-        high,
-        FINAL_RATIO,
-        tuple((ratio / FINAL_RATIO, SHIFTS[0], SHIFTS[1]) for ratio in ratios),
-    )
+    gears = ((ratio / FINAL_RATIO, *SHIFTS) for ratio in ratios)
+    return Engine(tuple(curve), high, FINAL_RATIO, tuple(gears))
 
 
 def _fastest(model: VehicleType) -> float:
@@ -125,18 +133,45 @@ def at_wheels(engine: Engine, radius: float) -> Traction:
     ratios = [g[0] * engine.final_ratio for g in engine.gears if g[0] > 0.0]
     if not ratios or not engine.is_told or engine.max_rpm * engine.final_ratio <= 0.0:
         return Traction(0.0, 0.0, 0.0)
-    rpm, torque = np.array(engine.torque_curve).T
-    at = np.unique(np.append(np.clip(rpm, 0.0, engine.max_rpm), engine.max_rpm))
-    had = np.interp(at, rpm, torque)
     return Traction(
-        float(had.max() * max(ratios) / radius),
-        float((had * at).max() * RPM),
+        max(torque for _, torque in _reached(engine.torque_curve, engine.max_rpm))
+        * max(ratios)
+        / radius,
+        _power(engine.torque_curve, engine.max_rpm),
         min(engine.max_rpm * RPM * radius / min(ratios), BEYOND),
     )
 
 
+def _reached(curve: Curve, max_rpm: float) -> list[tuple[float, float]]:
+    """The curve's knots up to these revolutions, and its end there."""
+    rpm, torque = np.array(curve).T
+    end = float(np.interp(max_rpm, rpm, torque))
+    return [*((r, t) for r, t in curve if r < max_rpm), (max_rpm, end)]
+
+
+def _power(curve: Curve, max_rpm: float) -> float:
+    """Greatest power in W: at a knot, or where torque times revolutions of a falling line is greatest."""
+    knots = _reached(curve, max_rpm)
+    best = max(rpm * torque for rpm, torque in knots)
+    for (r, t), (r_next, t_next) in pairwise([(0.0, knots[0][1]), *knots]):
+        slope = (t_next - t) / (r_next - r) if r_next > r else 0.0
+        if slope < 0.0:
+            top = 0.5 * (r - t / slope)
+            if r < top < r_next:
+                best = max(best, top * (t + slope * (top - r)))
+    return best * RPM
+
+
+def gear_at(engine: Engine, speed: float, radius: float) -> int:
+    """Where an automatic box is at this speed in m/s: the lowest gear that does not shift up yet."""
+    for gear, (_, _, up) in enumerate(engine.gears, start=1):
+        if revolutions(engine, gear, speed, radius) <= up * engine.max_rpm:
+            return gear
+    return max(len(engine.gears), 1)
+
+
 def revolutions(engine: Engine, gear: int, speed: float, radius: float) -> float:
-    """rpm of the engine at this speed in m/s with wheels of this radius in m; 0 out of gear."""
+    """rpm at this speed in m/s with wheels of this radius in m; 0 out of gear, at most the limit."""
     if gear == 0 or not engine.gears:
         return 0.0
     ratio = engine.gears[min(abs(gear), len(engine.gears)) - 1][0] * engine.final_ratio

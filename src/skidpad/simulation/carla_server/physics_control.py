@@ -115,6 +115,11 @@ def parse_physics(value: Any) -> PhysicsControl:
     )
 
 
+def with_engine(new: PhysicsControl, old: PhysicsControl) -> PhysicsControl:
+    """The new one, with the old one's engine where it tells none."""
+    return new if new.engine.is_told else replace(new, engine=old.engine)
+
+
 def applied(model: VehicleType, old: PhysicsControl, new: PhysicsControl) -> VehicleType:
     """The physics type after a client changed members that act; unchanged ones stay exact."""
     front, rear = new.wheels[0], new.wheels[2]
@@ -123,7 +128,8 @@ def applied(model: VehicleType, old: PhysicsControl, new: PhysicsControl) -> Veh
         changes["mass"] = new.mass
     if not isclose(new.drag, old.drag, rel_tol=1e-6, abs_tol=1e-9):
         changes["drag_area"] = new.drag / DRAG_PER_AREA
-    if new.engine.is_told and not same_drive(new.engine, old.engine):
+    same_radius = isclose(front[3], old.wheels[0][3], rel_tol=1e-6)
+    if not (same_radius and same_drive(new.engine, old.engine)):
         drive = at_wheels(new.engine, front[3] / CM)
         changes |= {"force_max": drive.force, "power": drive.power, "speed_max": drive.speed}
     for name, wheel, was, member, scale in (

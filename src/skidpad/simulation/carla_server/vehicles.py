@@ -14,6 +14,7 @@ from skidpad.physics.types import VehicleType, vehicle_type
 from skidpad.simulation.carla_server.ackermann import AckermannDriver, AckermannSettings
 from skidpad.simulation.carla_server.catalogue import Blueprint
 from skidpad.simulation.carla_server.control import Control
+from skidpad.simulation.carla_server.engine import at_wheels, engine_of
 from skidpad.simulation.carla_server.physics_control import PhysicsControl
 from skidpad.simulation.carla_server.wire import Vector
 from skidpad.simulation.world.rows import Newcomer
@@ -70,7 +71,7 @@ def model_of(blueprint: Blueprint) -> VehicleType:
     length, width, height = blueprint.size
     scale = length / base.length
     mass = base.mass * scale * (width / base.width) * (height / base.height)
-    return msgspec.structs.replace(
+    model = msgspec.structs.replace(
         base,
         title=blueprint.id,
         length=length,
@@ -87,6 +88,8 @@ def model_of(blueprint: Blueprint) -> VehicleType:
         brake_torque_rear=base.brake_torque_rear * mass / base.mass,
         handbrake_torque=base.handbrake_torque * mass / base.mass,
     )
+    speed_max = at_wheels(engine_of(model), model.wheel_radius).speed
+    return msgspec.structs.replace(model, speed_max=speed_max)
 
 
 class Vehicles:

@@ -110,9 +110,7 @@ class Seen(NamedTuple):
     """What a message of a channel says of its path: the same whoever judges it."""
 
     v_ego: float
-    body: tuple[
-        float, float, float
-    ]  # m, front and rear of the ego from its place, and half its width
+    body: tuple[float, float, float]  # m from the ego's place: front, rear, either side
     sightings: tuple[Sighting, ...]
 
 

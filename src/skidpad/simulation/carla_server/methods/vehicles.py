@@ -13,8 +13,8 @@ from skidpad.simulation.carla_server.ackermann import (
 )
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.control import Control
-from skidpad.simulation.carla_server.engine import revolutions
-from skidpad.simulation.carla_server.physics_control import applied, parse_physics
+from skidpad.simulation.carla_server.engine import gear_at, revolutions
+from skidpad.simulation.carla_server.physics_control import applied, parse_physics, with_engine
 from skidpad.simulation.carla_server.rpc import Shape, Table
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.vehicles import Vehicle
@@ -105,7 +105,7 @@ def wheel_centres(vehicle: Vehicle) -> list[tuple[float, float]]:
 def apply_physics_control(served: Served, id: Any, control: Any) -> None:
     """What acts: mass, drag, engine and gears, wheels' friction, radius, brakes and steering angle."""
     vehicle = vehicle_of(served, id)
-    new = parse_physics(control)
+    new = with_engine(parse_physics(control), vehicle.physics)
     model = applied(vehicle.type, vehicle.physics, new)
     served.episode.vehicles.reshape(vehicle.actor, new, model)
 
@@ -144,9 +144,9 @@ def get_telemetry_data(served: Served, id: Any) -> list[Any]:
         wheels.append(
             [friction, 0.0, 0.0, omega, load, load / rest, 0.0, mu * load, mu * load, mu, mu]
         )
-    gear = c.gear if c.manual else fleet.gear(i, c.reverse)
-    speed = fleet.speed(i)
-    rpm = revolutions(vehicle.physics.engine, gear, speed, vehicle.type.wheel_radius)
+    engine, radius, speed = vehicle.physics.engine, vehicle.type.wheel_radius, fleet.speed(i)
+    gear = c.gear if c.manual else -1 if c.reverse else gear_at(engine, speed, radius)
+    rpm = revolutions(engine, gear, speed, radius)
     return [speed, wire.iso_steer(c.steer), c.throttle, c.brake, rpm, gear, 0.0, wheels]
 
 

@@ -50,6 +50,11 @@ def test_the_committed_page_is_what_is_made_of_the_committed_results():
     assert tables.main(["--check"]) == 0
 
 
+def test_every_table_has_its_place_on_the_page():
+    places = [m[2] for m in tables.SLOT.finditer(tables.PAGE.read_text())]
+    assert sorted(places) == sorted(tables.TABLES)
+
+
 @pytest.mark.req("C-210", "C-2")
 def test_a_page_is_filled_and_what_is_written_by_hand_stays(published):
     text = tables.PAGE.read_text()

@@ -64,7 +64,7 @@ fleet-load: $(VENV)/.tested-with
 	$(BIN)/python tools/fleet_load.py --records 20000
 	$(BIN)/python tools/fleet_load.py --records 20000 --kills 20
 
-# the evaluation of the channels, whole, and the tables of its page: about 3 h; goes on where it stopped
+# the evaluation of the channels, whole, and the tables of its page: about 1.5 h; goes on where it stopped
 HOURS ?= 50
 channels: $(VENV)/.tested-with
 	PYTHONPATH=src $(BIN)/python tools/channels_campaign.py --out out/channels --hours $(HOURS) --publish

@@ -1,6 +1,6 @@
 """The evaluation of the channels, whole: drive, train, validate, report, and the tables of its page.
 
-    python tools/channels_campaign.py --out out/channels --hours 50        # about 2 h on two cores
+    python tools/channels_campaign.py --out out/channels --hours 50        # about 1.5 h on two cores
     python tools/channels_campaign.py --out out/channels --hours 50 --publish
 
 Parts on seeds of their own, each on every route. `train` and `validate` are driven in the route's own

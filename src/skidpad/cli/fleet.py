@@ -32,6 +32,9 @@ Data = Annotated[Path, typer.Option(help="Folder of the fleet's store.")]
 Database = Annotated[
     str | None, typer.Option(help="postgresql://... instead of the SQLite file in --data.")
 ]
+RoleWord = Annotated[str, typer.Argument(help="manufacturer, operator, ..., vehicle.")]
+Name = Annotated[str, typer.Argument(help="Of the person or vehicle.")]
+Tenant = Annotated[str, typer.Option(help="Organisation; of a vehicle: its operator.")]
 BlobUrl = Annotated[
     str | None,
     typer.Option("--blobs", help="Where bodies are kept: a folder or an fsspec address."),
@@ -116,9 +119,9 @@ def _check_exposure(host: str, certificate: Path | None, key: Path | None) -> No
 @fleet.command()
 def enrol(
     data: Data,
-    role: Annotated[str, typer.Argument(help="manufacturer, operator, ..., vehicle.")],
-    name: Annotated[str, typer.Argument(help="Of the person or vehicle.")],
-    tenant: Annotated[str, typer.Option(help="Organisation; of a vehicle: its operator.")],
+    role: RoleWord,
+    name: Name,
+    tenant: Tenant,
     manufacturer: Annotated[str | None, typer.Option(help="Of a vehicle: who made it.")] = None,
     database: Database = None,
 ) -> None:
@@ -145,9 +148,9 @@ def enrol(
 @fleet.command()
 def end(
     data: Data,
-    role: Annotated[str, typer.Argument(help="manufacturer, operator, ..., vehicle.")],
-    name: Annotated[str, typer.Argument(help="Of the person or vehicle.")],
-    tenant: Annotated[str, typer.Option(help="Organisation; of a vehicle: its operator.")],
+    role: RoleWord,
+    name: Name,
+    tenant: Tenant,
     renew: Annotated[bool, typer.Option(help="Print a fresh credential in its place.")] = False,
     database: Database = None,
 ) -> None:

@@ -132,6 +132,15 @@ def test_a_limit_of_revolutions_limits_the_speed_and_goes_with_them():
     )
 
 
+def test_wheels_without_a_radius_are_refused():
+    fresh = PhysicsControl.of(MINI)
+    sent = fresh.packed([[0.0, 0.0, 0.0]] * 4)
+    for wheel in sent[15]:
+        wheel[3] = 0.0
+    with pytest.raises(WireError, match="radius must be >= 10 cm"):
+        applied(MINI, fresh, parse_physics(sent))
+
+
 def test_larger_wheels_are_a_longer_gear():
     fresh = PhysicsControl.of(MINI)
     sent = fresh.packed([[0.0, 0.0, 0.0]] * 4)

@@ -10,8 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import ceil, isclose, log, pi
-from typing import Any
+from math import ceil, log, pi
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -119,8 +119,7 @@ def _fastest(model: VehicleType) -> float:
     return float(roots[np.isreal(roots)].real.max())
 
 
-@dataclass(frozen=True, slots=True)
-class Traction:
+class Traction(NamedTuple):
     """What an engine comes to at the driven wheels."""
 
     force: float  # N in the lowest gear
@@ -176,15 +175,3 @@ def revolutions(engine: Engine, gear: int, speed: float, radius: float) -> float
         return 0.0
     ratio = engine.gears[min(abs(gear), len(engine.gears)) - 1][0] * engine.final_ratio
     return min(abs(speed) / radius * ratio / RPM, engine.max_rpm)
-
-
-def same_drive(a: Engine, b: Engine) -> bool:
-    """Whether nothing that acts differs; clients send single precision back."""
-    one, other = ([e.max_rpm, e.final_ratio, *_flat(e)] for e in (a, b))
-    return len(one) == len(other) and all(
-        isclose(x, y, rel_tol=1e-6, abs_tol=1e-9) for x, y in zip(one, other, strict=True)
-    )
-
-
-def _flat(engine: Engine) -> list[float]:
-    return [x for p in engine.torque_curve for x in p] + [g[0] for g in engine.gears]

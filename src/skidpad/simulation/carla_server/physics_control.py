@@ -20,11 +20,11 @@ from skidpad.simulation.carla_server.engine import (
     at_wheels,
     engine_of,
     parse_engine,
-    same_drive,
 )
 
 WHEELS = 4
 CM = 100.0  # a wheel's radius and position travel in cm
+RADIUS_LEAST = 10.0  # cm
 
 STEERING_CURVE = [[0.0, 1.0], [20.0, 0.9], [60.0, 0.8], [120.0, 0.7]]
 MEMBERS = 17
@@ -123,14 +123,16 @@ def with_engine(new: PhysicsControl, old: PhysicsControl) -> PhysicsControl:
 def applied(model: VehicleType, old: PhysicsControl, new: PhysicsControl) -> VehicleType:
     """The physics type after a client changed members that act; unchanged ones stay exact."""
     front, rear = new.wheels[0], new.wheels[2]
+    if front[3] < RADIUS_LEAST or front[2] <= 0.0:
+        raise wire.WireError("wheel: radius must be >= 10 cm and max_steer_angle > 0")
     changes: dict[str, Any] = {}
     if not isclose(new.mass, old.mass, rel_tol=1e-6):
         changes["mass"] = new.mass
     if not isclose(new.drag, old.drag, rel_tol=1e-6, abs_tol=1e-9):
         changes["drag_area"] = new.drag / DRAG_PER_AREA
-    same_radius = isclose(front[3], old.wheels[0][3], rel_tol=1e-6)
-    if not (same_radius and same_drive(new.engine, old.engine)):
-        drive = at_wheels(new.engine, front[3] / CM)
+    drive = at_wheels(new.engine, front[3] / CM)
+    had = at_wheels(old.engine, old.wheels[0][3] / CM)
+    if any(not isclose(a, b, rel_tol=1e-6) for a, b in zip(drive, had, strict=True)):
         changes |= {"force_max": drive.force, "power": drive.power, "speed_max": drive.speed}
     for name, wheel, was, member, scale in (
         ("wheel_radius", front, old.wheels[0], 3, 1.0 / CM),
@@ -141,8 +143,6 @@ def applied(model: VehicleType, old: PhysicsControl, new: PhysicsControl) -> Veh
     ):
         if not isclose(wheel[member], was[member], rel_tol=1e-6):
             changes[name] = wheel[member] * scale
-    if changes.get("wheel_radius", 1.0) < 0.1 or changes.get("steer_max_deg", 1.0) <= 0.0:
-        raise wire.WireError("wheel: radius must be >= 10 cm and max_steer_angle > 0")
     return msgspec.structs.replace(model, **changes) if changes else model
 
 

@@ -205,6 +205,20 @@ def _distances(tracks: NDArray[np.void], count: int, x: Floats, y: Floats, age: 
 
 
 @kernel
+def _bury(tracks: NDArray[np.void], count: int, dt: float, confirm: int, coast: float) -> int:
+    """Close the gaps that tracks leave which were not seen for too long; how many are left."""
+    kept = 0
+    for i in range(count):
+        t = tracks[i]
+        patience = coast if t.hits >= confirm else 0.5 * dt
+        if t.unseen <= patience + 1e-9:
+            if kept != i:
+                tracks[kept] = tracks[i]
+            kept += 1
+    return kept
+
+
+@kernel
 def _update(
     tracks: NDArray[np.void],
     count: int,
@@ -247,14 +261,7 @@ def _update(
         _shape(t, pose[2] + row[2], row[3], row[4], classes[best_j])
         t.hits += 1
         t.unseen = 0.0
-    kept = 0
-    for i in range(count):
-        t = tracks[i]
-        patience = coast if t.hits >= confirm else 0.5 * dt
-        if t.unseen <= patience + 1e-9:
-            if kept != i:
-                tracks[kept] = tracks[i]
-            kept += 1
+    kept = _bury(tracks, count, dt, confirm, coast)
     for j in range(m):
         if taken[j] or kept == tracks.shape[0]:
             continue

@@ -77,6 +77,11 @@ class Shading:
         tails[braking, :3] = np.array([BRAKE_GLOW, 0.03, 0.03], dtype=np.float32)
         tails[braking, GLOW] = 1.0
 
+    def surfaces(self, key: NDArray[np.int32]) -> Float32:
+        """(H, W, COLUMNS): colour in linear light, and behaviour, of what each pixel shows."""
+        found: Float32 = self._table[(key >> 16) * MATERIALS + (key & 255)]
+        return found
+
     def paint(
         self,
         view: View,

@@ -11,7 +11,6 @@ from pathlib import Path
 from skidpad.simulation.carla_server.catalogue import Family, load_catalogue
 from skidpad.simulation.carla_server.effects import acting, load_acting, produced
 from skidpad.simulation.carla_server.methods import TABLES
-from skidpad.simulation.carla_server.methods.unserved import REASONS
 
 BEGIN, END = "<!-- coverage: generated -->", "<!-- end of coverage -->"
 
@@ -23,21 +22,19 @@ def coverage() -> str:
 
 def _calls() -> str:
     methods = [m for table in TABLES for m in table.methods.values()]
-    acts = [m for m in methods if not m.without_effect and m.name not in REASONS]
-    vain_count = len(methods) - len(acts) - len(REASONS)
-    counts = f"{len(acts)} act, {vain_count} accepted without effect, {len(REASONS)} refused"
+    acts = sum(not m.without_effect for m in methods)
+    counts = f"{acts} act, {len(methods) - acts} accepted without effect"
     lines = [
         f"### Calls: {len(methods)} known, {counts}",
         "",
-        "| topic | acting | accepted without effect | refused |",
-        "|---|---|---|---|",
+        "| topic | acting | accepted without effect |",
+        "|---|---|---|",
     ]
     for table in TABLES:
         own = table.methods.values()
-        served = [f"`{m.name}`" for m in own if not m.without_effect and m.name not in REASONS]
+        served = [f"`{m.name}`" for m in own if not m.without_effect]
         vain = [f"`{m.name}` ({m.without_effect})" for m in own if m.without_effect]
-        refused = [f"`{m.name}` ({REASONS[m.name]})" for m in own if m.name in REASONS]
-        cells = (", ".join(served), ", ".join(vain), ", ".join(refused))
+        cells = (", ".join(served), ", ".join(vain))
         lines.append(f"| {table.topic} | " + " | ".join(cells) + " |")
     return "\n".join(lines)
 

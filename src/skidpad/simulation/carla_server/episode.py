@@ -165,9 +165,7 @@ class Episode:
         self.falling.forget(id)
         self.walkers.pop(id, None)
         self.skeletons.pop(id, None)
-        self.sensors.forget(id)
-        if actor.stream is not None:
-            self.stock.hub.close(actor.stream)
+        self._hush(actor)
         if actor.family is Family.GRIP:
             self.sky.set_ice(None)
         elif actor.family is Family.TRIGGER:
@@ -181,8 +179,12 @@ class Episode:
     def end(self) -> None:
         """Nobody hears of these sensors any more."""
         for actor in self.actors:
-            if actor.stream is not None:
-                self.stock.hub.close(actor.stream)
+            self._hush(actor)
+
+    def _hush(self, actor: Actor) -> None:
+        for stream in (actor.stream, *self.sensors.forget(actor.id)):
+            if stream is not None:
+                self.stock.hub.close(stream)
 
     def _made(self, wanted: Wanted, pose: Pose) -> Actor:
         blueprint = self.stock.blueprint(wanted.blueprint)

@@ -141,6 +141,7 @@ class CarlaServer:
         self.dispatcher = Dispatcher(self.served, TABLES)
         self.pacer = Pacer(self.served.tick, self._own_step, lambda: not self._clients)
         self.served.platform_time = self.pacer.elapsed
+        self.served.announce = self.hub.announce
         self._clients: set[RpcConnection] = set()
         self._calls: IO[str] | None = None
         self._servers: list[asyncio.Server] = []
@@ -165,14 +166,7 @@ class CarlaServer:
         if self._calls is not None:
             line = [self.served.clock.frame, request.method, request.arguments]
             self._calls.write(json.dumps(line, default=repr) + "\n")
-        if request.method == "get_sensor_token":  # which clients ask for before they connect
-            self._expect(request.arguments)
         return self.dispatcher.answer(request)
-
-    def _expect(self, arguments: list[Any]) -> None:
-        stream = arguments[0] if arguments else None
-        if isinstance(stream, int) and self.hub.exists(stream):
-            self.hub.announce(stream)
 
     def rest_before(self, request: Request) -> float:
         """s by which the answer to a tick is held back while a Traffic Manager listens."""

@@ -38,7 +38,8 @@ class SensorType(IntEnum):
     INSTANCE = 15
     COSMOS = 16
     WORLD = 17
-    AWARENESS = 20  # 18 and 19 are the G-buffers
+    GBUFFER = 18  # of bytes; 19 are those of floats, which no server sends
+    AWARENESS = 20
     CUSTOM_V2X = 21
 
 

@@ -20,6 +20,11 @@ from skidpad.simulation.carla_server.actors import Attachment
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
+from skidpad.simulation.carla_server.sensing.gbuffers import (
+    ColourCamera,
+    Texture,
+    stream_of,
+)
 from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.streams import StreamHub
@@ -63,7 +68,11 @@ def a_tick(
     car = episode.spawn(Wanted(name, {}), episode.map.spawn_points[0])
     small = {"image_size_x": "64", "image_size_y": "48"}
     for kind in PRODUCERS if sensors else ():
-        episode.attach(Wanted(kind, small), Pose(0.0, 0.0, 2.0), car.id, Attachment.RIGID)
+        actor = episode.attach(Wanted(kind, small), Pose(0.0, 0.0, 2.0), car.id, Attachment.RIGID)
+        sensor = episode.sensors.of(actor.id)
+        if sensor is not None and isinstance(sensor.equipment, ColourCamera):
+            sensor.equipment.gbuffers = True
+            stream_of(sensor, Texture.AMBIENT_OCCLUSION, served.hub)
     served.tick()
 
 

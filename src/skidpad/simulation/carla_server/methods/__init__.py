@@ -10,7 +10,6 @@ from skidpad.simulation.carla_server.methods import (
     recording,
     scenery,
     traffic_manager,
-    unserved,
     vehicles,
     walkers,
     weather,
@@ -29,7 +28,6 @@ TABLES = (
     batch.TABLE,
     scenery.TABLE,
     recording.TABLE,
-    unserved.TABLE,
 )
 
 __all__ = ["TABLES"]

@@ -8,6 +8,12 @@ from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.clock import parse_settings
 from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
+from skidpad.simulation.carla_server.sensing.gbuffers import (
+    ColourCamera,
+    Texture,
+    stream_of,
+)
+from skidpad.simulation.carla_server.sensing.sensor import Sensor
 from skidpad.simulation.carla_server.sensing.v2x import Station
 from skidpad.simulation.carla_server.served import Served
 
@@ -33,7 +39,45 @@ def get_sensor_token(served: Served, stream: Any) -> list[bytes]:
     number = wire.integer(stream, "stream id", 0, 2**32 - 1)
     if not served.hub.exists(number):
         raise CallError(f"stream {number} not found")
+    served.announce(number)
     return [served.hub.token(number)]
+
+
+def _colour_camera(served: Served, id: Any) -> Sensor:
+    actor = served.episode.actors.get(id, Family.SENSOR)
+    sensor = served.episode.sensors.of(actor.id)
+    if sensor is None or not isinstance(sensor.equipment, ColourCamera):
+        raise CallError(f"actor {actor.id} has no G-buffers: it is no sensor.camera.rgb")
+    return sensor
+
+
+@TABLE.method("get_gbuffer_token")
+def get_gbuffer_token(served: Served, id: Any, texture: Any) -> bytes:
+    """The token of a texture's stream, asked for before each subscription and each end of one."""
+    sensor = _colour_camera(served, id)
+    number = wire.integer(texture, "G-buffer", 0, max(Texture))
+    stream = stream_of(sensor, number, served.hub)
+    if not served.hub.wanted(stream):
+        served.announce(stream)
+    return served.hub.token(stream)
+
+
+@TABLE.method("enable_gbuffers", Shape.VOID)
+def enable_gbuffers(served: Served, id: Any, enabled: Any) -> None:
+    """Whether a colour camera sends them to those who listen."""
+    _colour_camera(served, id).equipment.gbuffers = wire.flag(enabled, "enabled")
+
+
+@TABLE.method("are_gbuffers_enabled")
+def are_gbuffers_enabled(served: Served, id: Any) -> bool:
+    """As last said."""
+    return bool(_colour_camera(served, id).equipment.gbuffers)
+
+
+@TABLE.method("console_command", without_effect="there is no console")
+def console_command(_: Served, *__: Any) -> bool:
+    """Accepted."""
+    return True
 
 
 @TABLE.method("get_episode_settings")

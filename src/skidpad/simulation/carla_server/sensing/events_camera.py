@@ -11,13 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.sensors.rasteriser import AUTO_LEVEL
-from skidpad.sensors.view import camera_view
 from skidpad.simulation.carla_server.actors import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing.images import Camera, make_camera
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
-from skidpad.simulation.carla_server.sensing.surroundings import Surroundings, headlights
+from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 
 Floats = NDArray[np.float64]
 EVENT = np.dtype([("x", "<u2"), ("y", "<u2"), ("t", "<i8"), ("polarity", "?")])  # 13 bytes, packed
@@ -71,11 +69,9 @@ def make_retina(actor: Actor, seed: int) -> Retina:
 def dynamic_vision(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
     """The events since the last reading in order of time; nothing when there are none."""
     retina: Retina = sensor.equipment
-    camera, scene = retina.camera, around.picture()
-    view = camera_view(camera.spec, around.actors.pose(sensor.actor))
-    scene.live.draw(view, around.hidden_for(sensor.actor), AUTO_LEVEL, camera.drawn)
-    lamps = headlights(around.actors, sensor.actor)
-    scene.shading.paint(view, lamps, camera.drawn.inverse, camera.drawn.key, camera.rgb)
+    camera = retina.camera
+    scene, view = camera.look(around, clock, sensor.actor)
+    camera.paint(around, sensor.actor, scene, view)
     rgb = camera.rgb.view(np.uint8).reshape(*camera.rgb.shape, 4)[..., :3]
     grey: Floats = rgb @ GREY
     light = np.log(retina.log_eps + grey / 255.0) if retina.logarithmic else grey

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.sensors.rasteriser import AUTO_LEVEL
-from skidpad.sensors.view import View, camera_view
+from skidpad.sensors.passes import Pass
+from skidpad.sensors.view import View
 from skidpad.simulation.carla_server.actors import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing.images import Camera, make_camera
@@ -25,12 +25,34 @@ NEAREST = 1e-3  # share of a pixel's depth before which it lay beside the last p
 
 
 @dataclass(slots=True, eq=False)
+class Memory:
+    """Where the camera and everybody was at the last reading."""
+
+    view: View | None = None
+    bodies: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)  # by actor
+
+    def since(self, scene: Pictured, view: View, drawn: Pass) -> NDArray[np.float32]:
+        """(H, W, 2) flow since then, which is forgotten; without a last reading, no motion."""
+        out = np.zeros((*drawn.inverse.shape, 2), dtype=np.float32)
+        if self.view is not None:
+            out[:] = moved(view, self.view, np.eye(3), np.zeros(3), drawn.inverse)
+            for row, actor in enumerate(scene.members):
+                before = self.bodies.get(actor.id)
+                mine = drawn.instances == row + 1
+                if before is not None and mine.any():
+                    turn = before[0] @ scene.live.actors.rotation[row].T
+                    shift = before[1] - turn @ scene.live.actors.position[row]
+                    out[mine] = moved(view, self.view, turn, shift, drawn.inverse)[mine]
+        self.view, self.bodies = view, _bodies(scene)
+        return out
+
+
+@dataclass(slots=True, eq=False)
 class FlowCamera:
     """A camera, and what it saw of whom at its last reading."""
 
     camera: Camera
-    view: View | None = None
-    bodies: dict[int, tuple[Floats, Floats]] = field(default_factory=dict)  # by actor
+    memory: Memory = field(default_factory=Memory)
 
 
 def make_flow_camera(actor: Actor, seed: int) -> FlowCamera:
@@ -38,25 +60,12 @@ def make_flow_camera(actor: Actor, seed: int) -> FlowCamera:
     return FlowCamera(make_camera(actor, seed))
 
 
-def optical_flow(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
+def optical_flow(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
     """One picture; the first one shows no motion."""
-    make: FlowCamera = sensor.equipment
-    camera, scene = make.camera, around.picture()
-    view = camera_view(camera.spec, around.actors.pose(sensor.actor))
-    scene.live.draw(view, around.hidden_for(sensor.actor), AUTO_LEVEL, camera.drawn)
-    out = np.zeros((camera.spec.height, camera.spec.width, 2), dtype=np.float32)
-    if make.view is not None:
-        inverse, instances = camera.drawn.inverse, camera.drawn.instances
-        out[:] = moved(view, make.view, np.eye(3), np.zeros(3), inverse)
-        for row, actor in enumerate(scene.members):
-            before = make.bodies.get(actor.id)
-            mine = instances == row + 1
-            if before is not None and mine.any():
-                turn = before[0] @ scene.live.actors.rotation[row].T
-                shift = before[1] - turn @ scene.live.actors.position[row]
-                out[mine] = moved(view, make.view, turn, shift, inverse)[mine]
-    make.view, make.bodies = view, _bodies(scene)
-    return [(camera.head, out.tobytes())]
+    made: FlowCamera = sensor.equipment
+    camera = made.camera
+    scene, view = camera.look(around, clock, sensor.actor)
+    return [(camera.head, made.memory.since(scene, view, camera.drawn).tobytes())]
 
 
 def _bodies(scene: Pictured) -> dict[int, tuple[Floats, Floats]]:

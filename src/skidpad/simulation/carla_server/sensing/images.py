@@ -13,7 +13,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.sensors.passes import Pass
 from skidpad.sensors.rasteriser import AUTO_LEVEL
-from skidpad.sensors.view import camera_view
+from skidpad.sensors.view import View, camera_view
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.actors import Actor
 from skidpad.simulation.carla_server.clock import Clock
@@ -21,6 +21,7 @@ from skidpad.simulation.carla_server.sensing import pixels
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import (
     WIDEST,
+    Pictured,
     Surroundings,
     headlights,
 )
@@ -47,6 +48,20 @@ class Camera:
     rgb: NDArray[np.uint32]  # packed red, green, blue, 255
     bgra: NDArray[np.uint8]
     head: bytes
+    frame: int = -1  # that is drawn
+
+    def look(self, around: Surroundings, clock: Clock, actor: Actor) -> tuple[Pictured, View]:
+        """Draw depth and keys, once per frame."""
+        scene, view = around.picture(), camera_view(self.spec, around.actors.pose(actor))
+        if self.frame != clock.frame:
+            scene.live.draw(view, around.hidden_for(actor), AUTO_LEVEL, self.drawn)
+            self.frame = clock.frame
+        return scene, view
+
+    def paint(self, around: Surroundings, actor: Actor, scene: Pictured, view: View) -> None:
+        """Colour what is drawn."""
+        lamps = headlights(around.actors, actor)
+        scene.shading.paint(view, lamps, self.drawn.inverse, self.drawn.key, self.rgb)
 
 
 def make_camera(actor: Actor, _: int) -> Camera:
@@ -67,20 +82,22 @@ def make_camera(actor: Actor, _: int) -> Camera:
     )
 
 
-def image(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
+def image(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
     """One picture."""
-    camera: Camera = sensor.equipment
-    scene, drawn = around.picture(), camera.drawn
-    view = camera_view(camera.spec, around.actors.pose(sensor.actor))
-    scene.live.draw(view, around.hidden_for(sensor.actor), AUTO_LEVEL, drawn)
+    return [picture(around, clock, sensor.actor, sensor.equipment)]
+
+
+def picture(around: Surroundings, clock: Clock, actor: Actor, camera: Camera) -> Message:
+    """What its modality shows."""
+    drawn, bgra = camera.drawn, camera.bgra
+    scene, view = camera.look(around, clock, actor)
     if camera.spec.modality is Modality.DEPTH:
-        bgra_from_inverse_depth(drawn.inverse, camera.bgra)
+        bgra_from_inverse_depth(drawn.inverse, bgra)
     elif camera.spec.modality is Modality.SEMANTIC:
-        pixels.bgra_from_labels(drawn.labels, camera.bgra)
+        pixels.bgra_from_labels(drawn.labels, bgra)
     elif camera.spec.modality is Modality.INSTANCE:
-        pixels.bgra_from_instances(drawn.labels, drawn.instances, scene.ids, camera.bgra)
+        pixels.bgra_from_instances(drawn.labels, drawn.instances, scene.ids, bgra)
     else:
-        lamps = headlights(around.actors, sensor.actor)
-        scene.shading.paint(view, lamps, drawn.inverse, drawn.key, camera.rgb)
-        pixels.bgra_from_rgb(camera.rgb, camera.bgra)
-    return [(camera.head, camera.bgra.tobytes())]
+        camera.paint(around, actor, scene, view)
+        pixels.bgra_from_rgb(camera.rgb, bgra)
+    return camera.head, bgra.tobytes()

@@ -6,12 +6,14 @@ had the camera's axes.
 
 from __future__ import annotations
 
+from math import inf, sqrt
+
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.jit import kernel
 from skidpad.core.lefthanded import vectors_to_carla
-from skidpad.sensors.rasteriser import AUTO_LEVEL
-from skidpad.sensors.view import View, camera_view
+from skidpad.sensors.view import View
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing.images import Camera
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
@@ -21,39 +23,57 @@ Floats = NDArray[np.float64]
 HALF = 127.5  # grey level of zero
 
 
-def normals(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
+def normals(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
     """One picture; the sky has no normal and is half grey."""
     camera: Camera = sensor.equipment
-    view = camera_view(camera.spec, around.actors.pose(sensor.actor))
-    around.picture().live.draw(view, around.hidden_for(sensor.actor), AUTO_LEVEL, camera.drawn)
-    found = world_normals(view, camera.drawn.inverse.astype(np.float64))
-    turned = vectors_to_carla(*found.reshape(-1, 3).T).reshape(found.shape)
-    camera.bgra[..., 2::-1] = np.rint(HALF + HALF * turned)
-    camera.bgra[..., 3] = 255
+    _, view = camera.look(around, clock, sensor.actor)
+    bgra_from_normals(world_normals(view, camera.drawn.inverse), camera.bgra)
     return [(camera.head, camera.bgra.tobytes())]
 
 
-def world_normals(view: View, inverse: Floats) -> Floats:
-    """(H, W, 3) towards the camera, 0 where nothing is; inverse: planar, 1/m.
+def bgra_from_normals(found: Floats, out: NDArray[np.uint8]) -> None:
+    """(H, W, 3) of the world, ISO 8855, into (H, W, 4)."""
+    turned = vectors_to_carla(*found.reshape(-1, 3).T).reshape(found.shape)
+    out[..., 2::-1] = np.rint(HALF + HALF * turned)
+    out[..., 3] = 255
 
-    Over a plane the inverse depth is linear in the pixels; of the differences to both sides the gentler
-    one counts, as the other may cross an edge.
-    """
-    a, b = (_slope(inverse, axis) * view.focal for axis in (1, 0))
-    u = (np.arange(view.width) + 0.5 - view.cx) / view.focal
-    v = (np.arange(view.height) + 0.5 - view.cy) / view.focal
-    away = np.stack((a, b, inverse - a * u[None, :] - b * v[:, None]), axis=-1)
-    length = np.linalg.norm(away, axis=-1, keepdims=True)
-    solid = (inverse > 0.0)[..., None] & (length > 0.0)
-    towards = np.where(solid, -away / np.where(solid, length, 1.0), 0.0)
-    found: Floats = towards @ view.rotation
+
+def world_normals(view: View, inverse: NDArray[np.float32]) -> Floats:
+    """(H, W, 3) towards the camera, 0 where nothing is; inverse: planar, 1/m."""
+    found: Floats = camera_normals(view, inverse) @ view.rotation
     return found
 
 
-def _slope(inverse: Floats, axis: int) -> Floats:
-    ahead = np.diff(inverse, axis=axis)
-    none = np.full_like(np.take(inverse, [0], axis=axis), np.inf)
-    after = np.concatenate((ahead, none), axis=axis)
-    before = np.concatenate((none, ahead), axis=axis)
-    slope: Floats = np.where(np.abs(after) < np.abs(before), after, before)
-    return np.where(np.isfinite(slope), slope, 0.0)
+def camera_normals(view: View, inverse: NDArray[np.float32]) -> Floats:
+    """(H, W, 3) in the camera's axes."""
+    found = np.zeros((*inverse.shape, 3))
+    _camera_normals(view, inverse, found)
+    return found
+
+
+@kernel
+def _camera_normals(view: View, inverse: NDArray[np.float32], out: Floats) -> None:
+    """Over a plane the inverse depth is linear in the pixels."""
+    height, width = inverse.shape
+    for y in range(height):
+        v = (y + 0.5 - view.cy) / view.focal
+        for x in range(width):
+            here = float(inverse[y, x])
+            if here <= 0.0:
+                continue
+            u = (x + 0.5 - view.cx) / view.focal
+            left = here - inverse[y, x - 1] if x > 0 else inf
+            right = inverse[y, x + 1] - here if x + 1 < width else inf
+            above = here - inverse[y - 1, x] if y > 0 else inf
+            below = inverse[y + 1, x] - here if y + 1 < height else inf
+            a, b = _gentler(left, right) * view.focal, _gentler(above, below) * view.focal
+            c = here - a * u - b * v
+            length = sqrt(a * a + b * b + c * c)
+            out[y, x, 0], out[y, x, 1], out[y, x, 2] = -a / length, -b / length, -c / length
+
+
+@kernel
+def _gentler(before: float, after: float) -> float:
+    """The difference that does not cross an edge; 0 without neighbours."""
+    found = after if abs(after) < abs(before) else before
+    return found if found < inf and found > -inf else 0.0

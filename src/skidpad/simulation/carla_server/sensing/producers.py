@@ -6,6 +6,7 @@ from skidpad.simulation.carla_server.sensing import (
     events,
     events_camera,
     flow,
+    gbuffers,
     images,
     inertial,
     normals,
@@ -16,7 +17,12 @@ from skidpad.simulation.carla_server.sensing.sensor import Producer
 from skidpad.simulation.carla_server.snapshot import SensorType
 
 PRODUCERS = {
-    "sensor.camera.rgb": Producer(SensorType.RGB, images.image, images.make_camera),
+    "sensor.camera.rgb": Producer(
+        SensorType.RGB,
+        gbuffers.colour_image,
+        gbuffers.make_colour_camera,
+        textures=gbuffers.textures,
+    ),
     "sensor.camera.depth": Producer(SensorType.DEPTH, images.image, images.make_camera),
     "sensor.camera.semantic_segmentation": Producer(
         SensorType.SEMANTIC, images.image, images.make_camera

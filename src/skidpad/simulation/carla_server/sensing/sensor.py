@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -26,6 +26,7 @@ class Sensor:
     rng: np.random.Generator
     equipment: Any  # what its producer made for it
     due: float | None = None  # s of simulated time; None until the first reading
+    textures: dict[int, int] = field(default_factory=dict)  # streams of its G-buffers
 
     def number(self, attribute: str) -> float:
         """A numeric attribute."""
@@ -59,3 +60,5 @@ class Producer:
     """From attributes and the server's seed; WireError when they cannot be used."""
     speak: Callable[[Surroundings, Clock, Sensor], None] | None = None
     """What it sends to others of its kind, in every tick and before any of them reads."""
+    textures: Callable[[Surroundings, Clock, Sensor, list[int]], list[Message]] | None = None
+    """Its G-buffers of these numbers, on streams of their own."""

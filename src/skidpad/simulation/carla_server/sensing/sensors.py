@@ -39,9 +39,10 @@ class SensorSet:
         equipment = producer.equip(actor, self._seed)
         self._sensors[actor.id] = Sensor(actor, period, rng, equipment)
 
-    def forget(self, id: int) -> None:
-        """It is gone."""
-        self._sensors.pop(id, None)
+    def forget(self, id: int) -> list[int]:
+        """It is gone; the streams of its G-buffers."""
+        sensor = self._sensors.pop(id, None)
+        return list(sensor.textures.values()) if sensor is not None else []
 
     def of(self, id: int) -> Sensor | None:
         """The sensor that is this actor; None when it is none that sends something."""
@@ -49,8 +50,7 @@ class SensorSet:
 
     def heard(self, hub: StreamHub) -> bool:
         """Whether anybody listens to any of them."""
-        streams = (sensor.actor.stream for sensor in self._sensors.values())
-        return any(s is not None and hub.wanted(s) for s in streams)
+        return any(_heard(sensor, hub) for sensor in self._sensors.values())
 
     def produce(self, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
         """One tick of every sensor that is due and listened to."""
@@ -60,16 +60,31 @@ class SensorSet:
             if speak is not None:
                 speak(around, clock, sensor)
         for sensor in list(self._sensors.values()):
-            number = sensor.actor.stream
-            if number is None or not hub.wanted(number) or not sensor.is_due(time):
-                continue
-            producer = self._producers[sensor.actor.blueprint.id]
+            if _heard(sensor, hub) and sensor.is_due(time):
+                self._read(sensor, around, clock, hub)
+
+    def _read(self, sensor: Sensor, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
+        producer = self._producers[sensor.actor.blueprint.id]
+        place, number = around.actors.pose(sensor.actor), sensor.actor.stream
+        if number is not None and hub.wanted(number):
             messages = producer.produce(around, clock, sensor)
             for message in messages:
-                place = around.actors.pose(sensor.actor)
                 hub.publish(number, _head(producer.type, clock, place), *message)
             if messages and producer.type is SensorType.COLLISION:
                 sleep(EVENT_PAUSE)
+        wanted = [t for t, stream in sensor.textures.items() if hub.wanted(stream)]
+        if wanted and producer.textures is not None:
+            head = _head(SensorType.GBUFFER, clock, place)
+            for texture, message in zip(
+                wanted, producer.textures(around, clock, sensor, wanted), strict=False
+            ):
+                hub.publish(sensor.textures[texture], head, *message)
+
+
+def _heard(sensor: Sensor, hub: StreamHub) -> bool:
+    """Whether anybody listens to it or to its G-buffers."""
+    streams = (sensor.actor.stream, *sensor.textures.values())
+    return any(s is not None and hub.wanted(s) for s in streams)
 
 
 def _head(type: SensorType, clock: Clock, place: Pose) -> bytes:

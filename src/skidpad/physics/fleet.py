@@ -158,12 +158,6 @@ class Fleet:
         v = s.vy * c - s.vx * sn + s.yaw_rate * x_cog
         return np.where(np.hypot(u, v) > 1.0, np.arctan2(v, u), 0.0)
 
-    def gears(self, reverse: NDArray[np.bool_]) -> NDArray[np.int64]:
-        """(n,) gears of all vehicles as `gear` says them."""
-        s = self.states
-        along = np.abs(s.vx * np.cos(s.yaw) + s.vy * np.sin(s.yaw))
-        return np.where(reverse, -1, 1 + np.searchsorted(GEAR_UP_V, along))
-
     def gear(self, i: int, reverse: bool = False) -> int:
         """Gear that an automatic box shows: -1 in reverse, else 1 to 6 by speed."""
         if reverse:

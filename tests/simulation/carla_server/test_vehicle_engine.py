@@ -9,6 +9,7 @@ import pytest
 from msgspec import structs
 
 from skidpad.core.constants import G
+from skidpad.core.geometry import Pose
 from skidpad.physics.types import vehicle_type
 from skidpad.simulation.carla_server.catalogue import load_catalogue
 from skidpad.simulation.carla_server.engine import (
@@ -19,13 +20,19 @@ from skidpad.simulation.carla_server.engine import (
     gear_at,
     parse_engine,
     revolutions,
+    shift_speeds,
 )
+from skidpad.simulation.carla_server.episode import Wanted
+from skidpad.simulation.carla_server.methods.vehicles import get_telemetry_data
+from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.physics_control import (
     PhysicsControl,
     applied,
     parse_physics,
     with_engine,
 )
+from skidpad.simulation.carla_server.served import Served
+from skidpad.simulation.carla_server.streams import StreamHub
 from skidpad.simulation.carla_server.vehicles import model_of
 from skidpad.simulation.carla_server.wire import WireError
 
@@ -163,12 +170,39 @@ def test_revolutions_follow_the_gear():
 
 def test_a_box_shifts_up_once_and_for_all_as_it_gets_faster():
     engine = engine_of(MINI)
-    gears = [gear_at(engine, v, 0.3) for v in np.linspace(0.0, 90.0, 500)]
+    shifts = shift_speeds(engine, 0.3)
+    gears = [gear_at(shifts, v) for v in np.linspace(0.0, 90.0, 500)]
     assert gears == sorted(gears)
     assert set(gears) == set(range(1, len(engine.gears) + 1))
     shift = 0.65 * engine.max_rpm * RPM * 0.3 / (engine.gears[0][0] * engine.final_ratio)
-    assert [gear_at(engine, f * shift, 0.3) for f in (0.999, 1.001)] == [1, 2]
-    assert gear_at(replace(engine, gears=()), 50.0, 0.3) == 1
+    assert [gear_at(shifts, f * shift) for f in (0.999, 1.001)] == [1, 2]
+    assert gear_at(shift_speeds(replace(engine, gears=()), 0.3), 50.0) == 1
+
+
+def test_gears_in_no_order_are_left_at_the_revolutions_that_they_say():
+    """The lowest gear that does not shift up yet: a second gear shorter than the first is never in."""
+    engine = replace(engine_of(MINI), gears=((2.0, 0.5, 0.65), (3.0, 0.5, 0.65), (1.0, 0.5, 0.65)))
+    first = 0.65 * engine.max_rpm * RPM * 0.3 / (2.0 * engine.final_ratio)
+    shifts = shift_speeds(engine, 0.3)
+    assert [gear_at(shifts, f * first) for f in (0.99, 1.01)] == [1, 3]
+    never = replace(engine, gears=((2.0, 0.5, 1.0), (1.0, 0.5, 0.65)))
+    assert gear_at(shift_speeds(never, 0.3), 90.0) == 1
+
+
+def test_the_snapshot_shows_the_gear_that_telemetry_tells():
+    served = Served(ServerOptions(map="straight"), StreamHub())
+    episode = served.episode
+    shown = []
+    for k, name in enumerate(("vehicle.carlamotors.carlacola", "vehicle.tesla.model3")):
+        actor = episode.spawn(Wanted(name, {}), episode.map.spawn_points[0] @ Pose(40.0 * k, 0.0))
+        yaw = episode.map.spawn_points[0].yaw
+        episode.vehicles.set_velocity(actor.id, (14.0 * np.cos(yaw), 14.0 * np.sin(yaw), 0.0))
+        vehicle = episode.vehicles.of(actor.id)
+        episode.fill_rows(0.05)
+        told = get_telemetry_data(served, actor.id)[5]
+        assert episode.rows.vehicles["gear"][actor.row] == told == vehicle.gear(14.0)
+        shown.append(told)
+    assert shown[0] != shown[1]  # a truck's gears are not a car's
 
 
 @pytest.mark.parametrize(

@@ -7,10 +7,11 @@ text that we found, so a fresh vehicle describes the drive that it has, and what
 
 from __future__ import annotations
 
+from bisect import bisect_left
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from math import ceil, log, pi
+from math import ceil, inf, log, pi
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -161,12 +162,20 @@ def _power(curve: Curve, max_rpm: float) -> float:
     return best * RPM
 
 
-def gear_at(engine: Engine, speed: float, radius: float) -> int:
-    """Where an automatic box is at this speed in m/s: the lowest gear that does not shift up yet."""
-    for gear, (_, _, up) in enumerate(engine.gears, start=1):
-        if revolutions(engine, gear, speed, radius) <= up * engine.max_rpm:
-            return gear
-    return max(len(engine.gears), 1)
+def shift_speeds(engine: Engine, radius: float) -> tuple[float, ...]:
+    """m/s up to which an automatic box stays in each gear but the highest; wheels of this radius in m."""
+    speeds, highest = [], 0.0
+    for ratio, _, up in engine.gears[:-1]:
+        turns = ratio * engine.final_ratio
+        shifts = up < 1.0 and turns * engine.max_rpm > 0.0
+        highest = max(highest, up * engine.max_rpm * RPM * radius / turns if shifts else inf)
+        speeds.append(highest)
+    return tuple(speeds)
+
+
+def gear_at(shifts: tuple[float, ...], speed: float) -> int:
+    """The lowest gear that does not shift up yet at this speed in m/s."""
+    return 1 + bisect_left(shifts, abs(speed))
 
 
 def revolutions(engine: Engine, gear: int, speed: float, radius: float) -> float:

@@ -79,11 +79,12 @@ def fill_vehicles(rows: Rows, actors: ActorTable, vehicles: Vehicles, posts: Pos
 def _fill_controls(rows: Rows, at: NDArray[np.int64], vehicles: Vehicles) -> None:
     told = [vehicle.control for vehicle in vehicles]
     switches = np.array([(c.hand_brake, c.reverse, c.manual) for c in told])
-    shown = vehicles.moving.fleet.gears(switches[:, 1])
+    s = vehicles.moving.fleet.states
+    along = (s.vx * np.cos(s.yaw) + s.vy * np.sin(s.yaw)).tolist()
     table = rows.vehicles
     table["control"][at] = [(c.throttle, wire.iso_steer(c.steer), c.brake) for c in told]
     table["switches"][at] = switches
-    table["gear"][at] = np.where(switches[:, 2], [c.gear for c in told], shown)
+    table["gear"][at] = [v.gear(speed) for v, speed in zip(vehicles, along, strict=False)]
     table["speed_limit"][at] = [kmh_from_mps(v.speed_limit) for v in vehicles]
 
 

@@ -14,7 +14,7 @@ from skidpad.physics.types import VehicleType, vehicle_type
 from skidpad.simulation.carla_server.ackermann import AckermannDriver, AckermannSettings
 from skidpad.simulation.carla_server.catalogue import Blueprint
 from skidpad.simulation.carla_server.control import Control
-from skidpad.simulation.carla_server.engine import at_wheels, engine_of
+from skidpad.simulation.carla_server.engine import at_wheels, engine_of, gear_at, shift_speeds
 from skidpad.simulation.carla_server.physics_control import PhysicsControl
 from skidpad.simulation.carla_server.wire import Vector
 from skidpad.simulation.world.rows import Newcomer
@@ -42,6 +42,7 @@ class Vehicle:
     body: int  # its id in the moving world
     type: VehicleType
     physics: PhysicsControl
+    shifts: tuple[float, ...] = ()  # m/s at which its box shifts up
     control: Control = field(default_factory=Control)
     driver: AckermannDriver | None = None  # while Ackermann commands drive it
     ackermann: AckermannSettings = field(default_factory=AckermannSettings)
@@ -56,6 +57,11 @@ class Vehicle:
         throttle = 0.0 if c.manual and c.gear == 0 else c.throttle
         brake = 1.0 if throttle == 0.0 and self._sticks(slow, dt) else c.brake
         return throttle, brake, c.steer, c.hand_brake, c.reverse or (c.manual and c.gear < 0)
+
+    def gear(self, speed: float) -> int:
+        """Gear that is in at this speed in m/s, -1 in reverse."""
+        c = self.control
+        return c.gear if c.manual else -1 if c.reverse else gear_at(self.shifts, speed)
 
     def _sticks(self, slow: bool, dt: float) -> bool:
         """Whether it stands, so that a slope does not set it rolling."""
@@ -121,6 +127,7 @@ class Vehicles:
         model = model_of(blueprint)
         body = self.moving.add(Newcomer(model, type=blueprint.id), pose)
         vehicle = Vehicle(actor, body, model, PhysicsControl.of(model))
+        vehicle.shifts = shift_speeds(vehicle.physics.engine, model.wheel_radius)
         self._by_actor[actor] = vehicle
         return vehicle
 
@@ -135,6 +142,7 @@ class Vehicles:
         if model is not vehicle.type:
             vehicle.type = model
             self.moving.reshape(vehicle.body, model)
+        vehicle.shifts = shift_speeds(physics.engine, model.wheel_radius)
         self.moving.set_tyres(vehicle.body, physics.tire_friction.tolist())
 
     def set_velocity(self, actor: int, velocity: Vector) -> None:

@@ -13,7 +13,7 @@ from skidpad.simulation.carla_server.ackermann import (
 )
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.control import Control
-from skidpad.simulation.carla_server.engine import gear_at, revolutions
+from skidpad.simulation.carla_server.engine import revolutions
 from skidpad.simulation.carla_server.physics_control import applied, parse_physics, with_engine
 from skidpad.simulation.carla_server.rpc import Shape, Table
 from skidpad.simulation.carla_server.served import Served
@@ -145,7 +145,7 @@ def get_telemetry_data(served: Served, id: Any) -> list[Any]:
             [friction, 0.0, 0.0, omega, load, load / rest, 0.0, mu * load, mu * load, mu, mu]
         )
     engine, radius, speed = vehicle.physics.engine, vehicle.type.wheel_radius, fleet.speed(i)
-    gear = c.gear if c.manual else -1 if c.reverse else gear_at(engine, speed, radius)
+    gear = vehicle.gear(speed)
     rpm = revolutions(engine, gear, speed, radius)
     return [speed, wire.iso_steer(c.steer), c.throttle, c.brake, rpm, gear, 0.0, wheels]
 

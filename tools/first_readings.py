@@ -32,6 +32,7 @@ KINDS = {
     "other.gnss": {},
     "other.imu": {},
 }
+TEXTURE = 3  # carla.GBufferTextureID.GBufferA
 
 
 def main() -> None:
@@ -43,8 +44,10 @@ def main() -> None:
         for kind, options in KINDS.items():
             right[kind] = sum(_first(world, car, kind, options) for _ in range(TRIES))
             print(f"{kind}: {right[kind]} of {TRIES}", flush=True)
+        right["G-buffer"] = sum(_first_texture(world, car) for _ in range(TRIES))
+        print(f"G-buffer: {right['G-buffer']} of {TRIES}", flush=True)
         least = min(right.values())
-        kinds = f"{len(KINDS)} kinds of sensor, {TRIES} tries each"
+        kinds = f"{len(right)} kinds of readings, {TRIES} tries each"
         print(f"{kinds}: at least {least} first readings were of the first tick")
     sys.stdout.flush()
     os._exit(0 if least == TRIES else 1)  # the wheel may abort while it ends
@@ -52,13 +55,29 @@ def main() -> None:
 
 def _first(world: Any, car: Any, kind: str, options: dict[str, str]) -> bool:
     sensor, came = listening(world, car, kind, options)
+    try:
+        return _came(world, came)
+    finally:
+        sensor.destroy()
+
+
+def _first_texture(world: Any, car: Any) -> bool:
+    camera, _ = listening(world, car, "camera.rgb", SMALL)
+    camera.enable_gbuffers(True)
+    came: queue.Queue[Any] = queue.Queue()
+    camera.listen_to_gbuffer(TEXTURE, came.put)
+    try:
+        return _came(world, came)
+    finally:
+        camera.destroy()
+
+
+def _came(world: Any, came: queue.Queue[Any]) -> bool:
     frame = world.tick(PATIENCE_S)
     try:
         return bool(came.get(timeout=PATIENCE_S).frame == frame)
     except queue.Empty:
         return False
-    finally:
-        sensor.destroy()
 
 
 if __name__ == "__main__":

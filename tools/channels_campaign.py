@@ -8,9 +8,9 @@ weather, by day, by night, in rain and on ice, among natural and among risky dri
 without ice, which is a part of its own: there the ego, which knows no grip, tailgates. Trees are fitted
 on `train`, their limits chosen on routes that the fold did not see; `validate` is for looking, `report`
 and `ice` are looked at once. Then the arbiter and each channel alone drive the same two natural hours,
-for redundancy. What is done is not done again, so a campaign that was stopped goes on. `--publish`
-writes docs/results/channels and the tables of docs/channels-evaluation.md, and says what was driven at
-which commit.
+for redundancy. What is done is not done again, so a campaign that was stopped goes on; `--only hazards`
+or `--only redundancy` drives one of the two. `--publish` writes docs/results/channels and the tables of
+docs/channels-evaluation.md, and says what was driven at which commit.
 """
 
 from __future__ import annotations
@@ -63,15 +63,27 @@ PARTS = (
     Part("report", 63, 0.4, CONDITIONS),
     Part("ice", 64, 0.35, ICE, "natural"),
 )
-REDUNDANCY, HOURS_EACH = "redundancy", 2.0  # of the arbiter and of each channel alone
+HAZARDS, REDUNDANCY = "hazards", "redundancy"
+HOURS_EACH = 6.0  # of the arbiter and of each channel alone
 SEED_OF_REDUNDANCY = 65
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Everything; the exit code of what failed first."""
     asked = _asked(words)
-    out: Path = asked.out
-    out.mkdir(parents=True, exist_ok=True)
+    asked.out.mkdir(parents=True, exist_ok=True)
+    if asked.only != REDUNDANCY:
+        _hazards(asked, asked.out)
+    if asked.only != HAZARDS:
+        for driver in DRIVERS:
+            folder = asked.out / REDUNDANCY / driver
+            _drive(folder, asked, SEED_OF_REDUNDANCY, HOURS_EACH, drive_by=driver)
+    if asked.publish:
+        publish(asked.out, asked.hours, only=asked.only)
+    return 0
+
+
+def _hazards(asked: argparse.Namespace, out: Path) -> None:
     for part in PARTS:
         hours = asked.hours * part.share
         told = {"strata": part.strata, "conditions": part.conditions}
@@ -82,12 +94,6 @@ def main(words: Sequence[str] | None = None) -> int:
     for name in JUDGED:
         learned = ("--model", model) if model.exists() else ()
         _skidpad("channels", "evaluate", out / name, "--workers", asked.workers, *learned)
-    for driver in DRIVERS:
-        folder = out / REDUNDANCY / driver
-        _drive(folder, asked, SEED_OF_REDUNDANCY, HOURS_EACH, drive_by=driver)
-    if asked.publish:
-        publish(out, asked.hours)
-    return 0
 
 
 def _asked(words: Sequence[str] | None) -> argparse.Namespace:
@@ -95,6 +101,9 @@ def _asked(words: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument("--out", type=Path, required=True, help="folder of the campaign")
     parser.add_argument(
         "--hours", type=float, default=50.0, help="simulated hours of the three parts"
+    )
+    parser.add_argument(
+        "--only", choices=(HAZARDS, REDUNDANCY), help="drive and publish this alone"
     )
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--publish", action="store_true", help="write results and page of docs")
@@ -120,20 +129,24 @@ def _skidpad(*words: object) -> None:
         sys.exit(done.returncode)
 
 
-def publish(out: Path, hours: float, results: Path = RESULTS) -> None:
+def publish(out: Path, hours: float, results: Path = RESULTS, only: str | None = None) -> None:
     """Copy what the page needs, and write its tables anew."""
     results.mkdir(parents=True, exist_ok=True)
-    for name in JUDGED:
-        table = json.loads((out / name / "evaluation.json").read_text(encoding="utf-8"))
-        _write(results / f"{name}.json", {"model": table["model"], "strata": _kept(table)})
-    _write(results / "redundancy.json", _outcomes(out / REDUNDANCY))
-    seeds = {p.name: p.seed * SEEDS_EACH for p in PARTS} | {
-        REDUNDANCY: SEED_OF_REDUNDANCY * SEEDS_EACH
-    }
-    about = {"commit": _commit(), "date": datetime.now(timezone.utc).date().isoformat(),
-             "hours_asked": hours, "first_seed": seeds, "processors": os.cpu_count()}  # fmt: skip
-    _write(results / "run.json", about)
+    if only != REDUNDANCY:
+        for name in JUDGED:
+            table = json.loads((out / name / "evaluation.json").read_text(encoding="utf-8"))
+            _write(results / f"{name}.json", {"model": table["model"], "strata": _kept(table)})
+        seeds = {p.name: p.seed * SEEDS_EACH for p in PARTS}
+        _write(results / "run.json", _driven() | {"hours_asked": hours, "first_seed": seeds})
+    if only != HAZARDS:
+        about = _driven() | {"first_seed": SEED_OF_REDUNDANCY * SEEDS_EACH}
+        _write(results / "redundancy.json", about | {"drivers": _outcomes(out / REDUNDANCY)})
     channels_tables.main([])
+
+
+def _driven() -> dict[str, Any]:
+    today = datetime.now(timezone.utc).date().isoformat()
+    return {"commit": _commit(), "date": today, "processors": os.cpu_count()}
 
 
 def _kept(table: dict[str, Any]) -> dict[str, Any]:

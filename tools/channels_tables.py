@@ -134,13 +134,19 @@ def curves(results: Path) -> str:
 
 def redundancy(results: Path) -> str:
     """What became of the drives by driver."""
+    told = _read(results, "redundancy")
     head = ["driven by", "segments", "h", "km", "collisions", "red lights run", "stalls"]
     rows = [
         [row["drive_by"], str(row["segments"]), f"{row['hours']:.2f}", f"{row['km']:.1f}"]
         + [_rate(row["rates"][e]) for e in ("collisions", "red_lights_run", "stalls")]
-        for row in _read(results, "redundancy")
+        for row in told["drivers"]
     ]
-    return _table(head, rows) if rows else "Not driven.\n"
+    if not rows:
+        return "Not driven.\n"
+    when = (
+        f"Driven {told['date']} at commit `{told['commit']}`, seeds from {told['first_seed']}.\n\n"
+    )
+    return when + _table(head, rows)
 
 
 TABLES: dict[str, Callable[[Path], str]] = {

@@ -94,7 +94,23 @@ def test_parts_share_no_seed_and_are_driven_in_every_condition_and_stratum(monke
     assert told[2:] == [["own,day,night,rain", "natural,risky"], ["ice", "natural"]]
     hours = [float(c[c.index("--hours") + 1]) for c in drives]
     assert sum(hours[:4]) == pytest.approx(10.0)
-    assert hours[4:] == [2.0, 2.0, 2.0]
+    assert hours[4:] == 3 * [campaign.HOURS_EACH]
     assert all("--resume" in c for c in drives)
     order = [c[1] for c in calls]
     assert order.index("train") < order.index("evaluate")
+
+
+@pytest.mark.req("C-210")
+def test_one_of_the_two_parts_can_be_driven_and_published_alone(monkeypatch, tmp_path, published):
+    calls = []
+    monkeypatch.setattr(campaign, "_skidpad", lambda *words: calls.append([*map(str, words)]))
+    asked = ["--out", str(tmp_path), "--workers", "1", "--only"]
+    campaign.main([*asked, "redundancy"])
+    assert [c[c.index("--drive-by") + 1] for c in calls] == list(campaign.DRIVERS)
+    before = (published / "run.json").read_bytes()
+    campaign.publish(tmp_path, 1.0, published, only="redundancy")
+    assert (published / "run.json").read_bytes() == before
+    assert json.loads((published / "redundancy.json").read_text())["first_seed"] == 6500000
+    calls.clear()
+    campaign.main([*asked, "hazards"])
+    assert not any("--drive-by" in c for c in calls)

@@ -75,3 +75,30 @@ def test_it_comes_to_rest_when_it_hardly_rolls(vehicles: Vehicles) -> None:
     way, speed = drive(vehicles, 3.0)
     assert way == pytest.approx(stopped, abs=0.02)
     assert speed < 0.01
+
+
+def turned_wheels(name: str, ticks: int) -> float:
+    """deg of the front wheels of a vehicle at rest, some ticks after full steering is asked for."""
+    map = load_map("figure8")
+    grip = grip_params(Weather(), GripModel.NONE, 1.0)
+    made = Vehicles(World(map, Lights(map), Conditions(grip=grip, dt=DT, road_noise=0.0)))
+    made.add(CAR, load_catalogue()[name], Pose(0.0, 0.0)).control.steer = 1.0
+    for _ in range(ticks):
+        made.command(DT)
+        made.moving.step()
+    return float(np.degrees(made.moving.fleet.wheels.steer[0]))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "vehicle.tesla.model3",
+        "vehicle.carlamotors.firetruck",
+        "vehicle.carlamotors.european_hgv",
+        "vehicle.mitsubishi.fusorosa",
+    ],
+)
+def test_whatever_drives_steers_as_fast_as_clients_controllers_expect(name):
+    """Lorries that steered at 35 deg/s left their lane by up to 33 m under the Traffic Manager."""
+    assert turned_wheels(name, 5) > 25.0  # after 0.25 s
+    assert turned_wheels(name, 30) == pytest.approx(70.0, abs=1.0)

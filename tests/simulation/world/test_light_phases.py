@@ -46,6 +46,12 @@ def test_controllers_of_the_file_are_the_phases() -> None:
     assert phases(redrawn(controllers=True)) == phases(TOWN)
 
 
+def test_facing_arms_of_a_controller_take_turns_where_that_is_asked_for() -> None:
+    apart = [{light.signal for light in p} for p in Lights(TOWN, arms=True).groups[CROSSING].phases]
+    assert sorted(map(min, apart)) == [1001, 1002, 1003, 1004]
+    assert [len(p) for p in apart] == [1, 1, 1, 1]
+
+
 def test_without_controllers_every_arm_has_its_turn() -> None:
     assert sorted(map(min, phases(redrawn(controllers=False)))) == [1001, 1002, 1003, 1004]
 

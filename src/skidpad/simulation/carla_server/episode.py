@@ -91,7 +91,7 @@ class Episode:
         conditions = Conditions(
             seed=seed, dt=clock.step, grip=self.sky.grip, road_noise=0.0, all_lanes=True
         )
-        self.moving = World(map.roads, Lights(map.roads), conditions)
+        self.moving = World(map.roads, Lights(map.roads, arms=True), conditions)
         self.actors = ActorTable(self.moving, stock.ids)
         self.rows = Rows()
         self.vehicles = Vehicles(self.moving)

@@ -30,6 +30,12 @@ MODELS = {  # physics type that stands for a blueprint of this kind; sizes are t
 }
 """Two-wheelers are narrow cars to the physics: they do not lean (listed as a difference)."""
 
+# Steering as clients' controllers expect it, the Traffic Manager's among them: under it, lorries that
+# steer as slowly as real ones leave their lane in every junction.
+STEER_MAX_DEG = 70.0  # road wheel; carla.WheelPhysicsControl's own
+STEER_PER_S = (
+    2.5  # of all of it; SteeringInputRate.RiseRate of Unreal's wheeled vehicles (public source)
+)
 STICKY_SPEED = 0.2  # m/s below which a vehicle without throttle comes to rest and stays there
 STICKY_TIME = 1.0  # s for which a push frees it; both as PhysX's sticky tyres
 
@@ -93,6 +99,8 @@ def model_of(blueprint: Blueprint) -> VehicleType:
         brake_torque_front=base.brake_torque_front * mass / base.mass,
         brake_torque_rear=base.brake_torque_rear * mass / base.mass,
         handbrake_torque=base.handbrake_torque * mass / base.mass,
+        steer_max_deg=STEER_MAX_DEG,
+        steer_rate_deg=STEER_PER_S * STEER_MAX_DEG,
     )
     speed_max = at_wheels(engine_of(model), model.wheel_radius).speed
     return msgspec.structs.replace(model, speed_max=speed_max)

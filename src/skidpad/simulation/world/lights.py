@@ -1,7 +1,8 @@
 """Traffic lights: groups whose phases take turns, each green, then yellow, then red for all.
 
 A group is a junction. Its phases are those of the file's controllers, else of its arms, so crossing
-streams never have green together.
+streams never have green together. Of a controller with facing arms each arm may get its own turn:
+left-turners of CARLA's Traffic Manager else block each other for good.
 """
 
 from __future__ import annotations
@@ -94,12 +95,13 @@ def _show_all(phase: list[Light], state: LightState) -> bool:
 class Lights:
     """All lights of a map; `by_row` and `by_id` are what they show."""
 
-    def __init__(self, map: RoadMap) -> None:
+    def __init__(self, map: RoadMap, arms: bool = False) -> None:
+        """arms: no two arms of a junction have green together, whatever the file's controllers say."""
         signals = map.signals
         self.rows = np.flatnonzero(signals.kind == SignalKind.LIGHT)
         self.by_row = np.full(len(signals.id), LightState.OFF, dtype=np.uint8)  # (K,) LightState
         self.by_id: dict[int, LightState] = {}
-        self.groups = _groups(map, self.rows)
+        self.groups = _groups(map, self.rows, arms)
         self.lights = [light for group in self.groups.values() for light in group.lights()]
         self.of_row = {row: light for light in self.lights for row in light.rows}
         self.frozen = False  # all of them
@@ -194,31 +196,31 @@ def _set_clock(group: Group, turn: int, elapsed: float) -> None:
         group.begin(turn, LightState.RED, elapsed - GREEN_S - YELLOW_S - ROUNDING)
 
 
-def _groups(map: RoadMap, rows: NDArray[np.intp]) -> dict[int, Group]:
+def _groups(map: RoadMap, rows: NDArray[np.intp], arms: bool) -> dict[int, Group]:
     """Lights by junction, in phases; a light without a junction is with those of its controller."""
     signals = map.signals
     by_id: dict[int, list[int]] = {}
     for row in rows.tolist():
         by_id.setdefault(int(signals.id[row]), []).append(row)
-    phases: dict[int, dict[tuple[bool, int], list[Light]]] = {}
+    phases: dict[int, dict[tuple[int, int, int], list[Light]]] = {}
     for id, governed in by_id.items():
         row = governed[0]
         junction, controller = _junction(map, row), int(signals.group[row])
         group = junction if junction >= 0 else controller
         light = Light(id, tuple(governed), group if group >= 0 else -1 - id)
-        phase = _phase(junction, controller, float(signals.heading[row]))
+        phase = _phase(junction, controller, float(signals.heading[row]), arms)
         phases.setdefault(light.group, {}).setdefault(phase, []).append(light)
     return {id: Group(id, [found[key] for key in sorted(found)]) for id, found in phases.items()}
 
 
-def _phase(junction: int, controller: int, heading: float) -> tuple[bool, int]:
+def _phase(junction: int, controller: int, heading: float, arms: bool) -> tuple[int, int, int]:
     """What lights of one junction share whose green comes together: the controller that the file
-    names; without one the arm, as left-turners of facing arms would block each other. Away from
-    junctions nobody crosses: one phase per axis."""
-    if junction >= 0 and controller >= 0 and controller != junction:
-        return False, controller
+    names, if asked for only on one arm; without one the arm, as left-turners of facing arms would
+    block each other. Away from junctions nobody crosses: one phase per axis."""
+    named = junction >= 0 and controller >= 0 and controller != junction
     turn = pi if junction < 0 else 2.0 * pi
-    return True, round((heading % turn) / SECTOR) % round(turn / SECTOR)
+    arm = round((heading % turn) / SECTOR) % round(turn / SECTOR)
+    return (0, controller, arm if arms else 0) if named else (1, arm, 0)
 
 
 def _junction(map: RoadMap, row: int) -> int:

@@ -13,7 +13,7 @@ from carla_world import PATIENCE_S, loaded
 BEAT = 200  # ticks between signs of life
 
 
-def main(port: int, tm_port: int, seed: int, ticks: int, cars: int, name: str) -> None:
+def main(port: int, tm_port: int, seed: int, ticks: int, cars: int, name: str, only: str) -> None:
     """Load the map, let the Traffic Manager drive, say how it goes."""
     client = carla.Client("127.0.0.1", port)
     client.set_timeout(PATIENCE_S)
@@ -21,7 +21,7 @@ def main(port: int, tm_port: int, seed: int, ticks: int, cars: int, name: str) -
     manager = client.get_trafficmanager(tm_port)
     manager.set_synchronous_mode(True)
     manager.set_random_device_seed(seed)
-    spawned = _spawn(client, world, tm_port, seed, cars)
+    spawned = _spawn(client, world, tm_port, seed, cars, only)
     slowest = 0.0
     for k in range(1, ticks + 1):
         before = time.monotonic()
@@ -35,10 +35,14 @@ def main(port: int, tm_port: int, seed: int, ticks: int, cars: int, name: str) -
     os._exit(0)
 
 
-def _spawn(client: carla.Client, world: carla.World, tm_port: int, seed: int, cars: int) -> int:
+def _spawn(
+    client: carla.Client, world: carla.World, tm_port: int, seed: int, cars: int, only: str
+) -> int:
     """Cars of the Traffic Manager, as many as there is room for; how many came."""
     library = sorted(world.get_blueprint_library().filter("vehicle.*"), key=lambda b: b.id)
     library = [b for b in library if int(b.get_attribute("number_of_wheels")) == 4]
+    if only:
+        library = [b for b in library if b.get_attribute("base_type").as_str() == only]
     points = world.get_map().get_spawn_points()
     apart = max(1, len(points) // cars)
     batch = []
@@ -52,4 +56,4 @@ def _spawn(client: carla.Client, world: carla.World, tm_port: int, seed: int, ca
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:6]), sys.argv[6])  # type: ignore[call-arg,arg-type]
+    main(*map(int, sys.argv[1:6]), *sys.argv[6:8])  # type: ignore[arg-type]

@@ -18,11 +18,11 @@ LINE = {
 
 
 def test_verdict_needs_every_leg_and_steady_memory():
-    legs = [Leg(1, 0, 100, 5)]
+    legs = [Leg(1, 0, 100, 5, "town", "")]
     good, said = soak_server.verdict(legs, [LINE])
     assert good
     assert said.startswith("100 ticks, 0.00 h")
-    assert not soak_server.verdict([*legs, Leg(1, 1, 100, 5)], [LINE])[0]
+    assert not soak_server.verdict([*legs, Leg(1, 1, 100, 5, "town", "")], [LINE])[0]
     assert not soak_server.verdict(legs, [LINE, LINE | {"hung": True, "ok": False}])[0]
     grown = [LINE | {"memory_mb": mb} for mb in (200.0, 210.0, 220.0, 400.0)]
     assert not soak_server.verdict(legs, grown)[0]
@@ -48,12 +48,12 @@ def test_runs_in_one_worker(tmp_path, capsys):
 @pytest.mark.slow
 def test_two_legs_in_one_server(tmp_path):
     pytest.importorskip("carla")
-    legs = [Leg(1, 0, 60, 5), Leg(1, 1, 60, 5)]
+    legs = [Leg(1, 0, 60, 5, "figure8", "car"), Leg(1, 1, 60, 5, "motorway", "")]
     file = tmp_path / "server.jsonl"
-    soak_server.soak(legs, file)
+    soak_server.soak(legs, file, None)
     lines = dated_lines.read(file)
     assert soak_server.verdict(legs, lines)[0], lines
     assert {line["map"] for line in lines} == {"figure8", "motorway"}
     assert len({line["server"] for line in lines}) == 1
-    soak_server.soak(legs, file)
+    soak_server.soak(legs, file, None)
     assert len(dated_lines.read(file)) == 2

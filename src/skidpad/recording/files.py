@@ -161,15 +161,16 @@ def _update(digest: hashlib._Hash, column: pl.Series) -> None:
         digest.update(np.ascontiguousarray(lengths, dtype=np.uint32).data)
         digest.update("".join(column.drop_nulls()).encode())
         return
+    elif column.dtype.is_float():
+        values = column.to_numpy()  # a null is a NaN here
+        digest.update(np.packbits(np.isnan(values)).data)
     else:
-        absent = column.is_null()
-        if column.dtype.is_float():
-            absent = absent | column.is_nan().fill_null(value=True)
-        digest.update(np.packbits(absent.to_numpy()).data)
-        filler = 0.0 if column.dtype.is_float() else 0
+        gaps = column.null_count() > 0 or column.dtype == pl.Null
+        absent = column.is_null().to_numpy() if gaps else np.zeros(len(column), np.bool_)
+        digest.update(np.packbits(absent).data)
         if column.dtype == pl.Boolean:
             column = column.cast(pl.UInt8)
-        values = column.fill_null(filler).to_numpy()
+        values = (column.fill_null(0) if gaps else column).to_numpy()
     if values.dtype.kind == "f":
         values = np.where(np.isnan(values), values.dtype.type(0.0), values) + values.dtype.type(0.0)
     digest.update(np.ascontiguousarray(values).data)

@@ -84,6 +84,11 @@ class RoadMap:
         self._names = list(zip(self.lanes.road.tolist(), self.lanes.lane_id.tolist(), strict=True))
 
     @cached_property
+    def _lengths(self) -> list[float]:
+        lengths: list[float] = self._arrays.length.tolist()
+        return lengths
+
+    @cached_property
     def held(self) -> Held[kernels.LaneArrays]:
         """`arrays` for entry kernels; made when asked, as who only names a map runs no kernel."""
         return hold(self._arrays)
@@ -238,6 +243,11 @@ class RoadMap:
         roads = {start.road}
         lane, s = start.lane, start.s
         for _ in range(ceil(distance / step)):
+            if (
+                0.0 <= s + step <= self._lengths[lane]
+            ):  # still the same lane, no question to the map
+                s += step
+                continue
             lane, s = kernels.advance_kernel(self._arrays, lane, s, step)
             if lane < 0:
                 break

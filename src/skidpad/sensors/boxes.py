@@ -80,11 +80,10 @@ def placed(mount: Mount, states: ActorStates) -> Mount:
 def walls_of(roadside: Roadside) -> Walls:
     """Every stretch of barrier as a vertical rectangle."""
     rows = [
-        (*a, *b, barrier.height)
-        for barrier in roadside.barriers
-        for a, b in zip(barrier.points[:-1], barrier.points[1:], strict=True)
+        np.column_stack([b.points[:-1], b.points[1:], np.full(len(b.points[1:]), b.height)])
+        for b in roadside.barriers
     ]
-    return Walls(*np.array(rows, dtype=np.float64).reshape(-1, 7).T.copy())
+    return Walls(*np.concatenate([np.empty((0, 7)), *rows]).T.copy())
 
 
 def posts_of(roadside: Roadside) -> Boxes:

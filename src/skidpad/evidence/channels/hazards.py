@@ -7,6 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass
 from enum import Enum
+from functools import cache
 from importlib.resources import files
 from pathlib import Path
 
@@ -168,9 +169,18 @@ class Rule:
 
 def load_rules(profile: Profile, path: Path | None = None) -> tuple[Rule, ...]:
     """The rules of `profile`: the built-in ones, or those of the file at `path`."""
-    name = str(path) if path else "hazard_rules.yaml"
+    if path is None:
+        return _own_rules(profile)
+    return _rules(profile, read_bytes(path, "hazard rules"), str(path))
+
+
+@cache
+def _own_rules(profile: Profile) -> tuple[Rule, ...]:
     built_in = files("skidpad.evidence.channels").joinpath("hazard_rules.yaml")
-    data = read_bytes(path, "hazard rules") if path else built_in.read_bytes()
+    return _rules(profile, built_in.read_bytes(), built_in.name)
+
+
+def _rules(profile: Profile, data: bytes, name: str) -> tuple[Rule, ...]:
     tables = decode_yaml(data, name, dict[Profile, dict[HazardType, _RuleText]])
     if profile not in tables:
         raise ConfigError(f"{name}: holds no profile {profile.value}")

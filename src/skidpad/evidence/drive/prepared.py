@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -79,7 +80,7 @@ class Drive:
 
 def prepare(log: RunLog, road_map: RoadMap, settings: MetricSettings | None = None) -> Drive:
     """Match a log to its map."""
-    index = LaneIndex(road_map.samples, road_map.lanes)
+    index = lane_index(road_map)
     a = log.actors
     place = index.match(a.x[:, 0], a.y[:, 0], a.z[:, 0])
     free = log.supervision == Supervision.NONE
@@ -93,6 +94,12 @@ def prepare(log: RunLog, road_map: RoadMap, settings: MetricSettings | None = No
         sample=free & reported,
         strays=_strays(log, road_map, free),
     )
+
+
+@lru_cache(maxsize=4)
+def lane_index(road_map: RoadMap) -> LaneIndex:
+    """The nearest lanes of a map, sought once."""
+    return LaneIndex(road_map.samples, road_map.lanes)
 
 
 def _strays(log: RunLog, road_map: RoadMap, free: Mask) -> Mask:

@@ -98,8 +98,17 @@ class Threshold(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 def load_thresholds(path: Path | None = None) -> dict[Indicator, Threshold]:
     """Thresholds of all indicators: the built-in ones, or those of the file at `path`."""
-    name = str(path) if path else "thresholds.yaml"
-    data = read_bytes(path, "thresholds") if path else _built_in("thresholds.yaml")
+    if path is None:
+        return dict(_own_thresholds())
+    return _thresholds(read_bytes(path, "thresholds"), str(path))
+
+
+@cache
+def _own_thresholds() -> dict[Indicator, Threshold]:
+    return _thresholds(_built_in("thresholds.yaml"), "thresholds.yaml")
+
+
+def _thresholds(data: bytes, name: str) -> dict[Indicator, Threshold]:
     table: dict[Indicator, Threshold] = decode_yaml(data, name, dict[Indicator, Threshold])
     missing = [i.value for i in Indicator if i not in table]
     if missing:

@@ -23,13 +23,15 @@ class FreePlaces:
 
     def __init__(self, map: RoadMap, net: Network, rng: np.random.Generator) -> None:
         self.lane, self.z = map.samples.lane, map.samples.z
-        row = net.lane[self.lane]
+        drivable = (
+            (net.lane["kind"] == LaneKind.DRIVING)
+            & (map.lanes.junction < 0)
+            & (net.lane["ahead"] >= 0)
+        )
         fits = (
-            (row["kind"] == LaneKind.DRIVING)
-            & (map.lanes.junction[self.lane] < 0)
-            & (row["ahead"] >= 0)
+            drivable[self.lane]
             & (net.point["s"] > EDGE)
-            & (net.point["s"] < row["length"] - EDGE)
+            & (net.point["s"] < net.lane["length"][self.lane] - EDGE)
             & (np.abs(net.point["curvature"]) < MAX_CURVE)
         )
         self.candidates: NDArray[np.intp] = np.flatnonzero(fits)

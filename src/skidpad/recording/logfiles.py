@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from skidpad.core.errors import FileError
 from skidpad.core.reading import UNUSABLE, decode_json, read_bytes, unusable
-from skidpad.core.states import ActorTable, ContactEvent
-from skidpad.core.vocabulary import Supervision
+from skidpad.core.states import ActorTable
 from skidpad.recording.events import Event, decode_events, encode_events
 from skidpad.recording.files import content_hash, read_parquet, write_bytes, write_parquet
+from skidpad.recording.logchecks import require_sound
 from skidpad.recording.runlog import (
     ActorSeries,
     CommandSeries,
@@ -140,7 +140,7 @@ def read_log(folder: Path) -> RunLog:
     events = decode_events(text, str(folder / EVENTS))
     try:
         log = _log(table, msgspec.convert(plain, _Kept), events)
-        _require_indices(log)
+        require_sound(log)
     except (*UNUSABLE, pl.exceptions.PolarsError) as error:
         raise unusable(where, "a tick log", error) from None
     return log
@@ -167,21 +167,6 @@ def _log(table: pl.DataFrame, head: _Kept, events: tuple[Event, ...]) -> RunLog:
     )
 
 
-def _require_indices(log: RunLog) -> None:
-    """ValueError unless ticks rise and what counts something points into it."""
-    n = len(log.table)
-    if (np.diff(log.tick) <= 0).any() or (log.tick < 0).any():
-        raise ValueError("ticks must rise")
-    if len(log) and (int(log.weather.min()) < 0 or int(log.weather.max()) >= len(log.weathers)):
-        raise ValueError("weather is none of its weathers")
-    if not set(log.supervision.tolist()) <= set(Supervision):
-        raise ValueError("supervision is no phase")
-    if not n or not 0.0 < log.header.dt < 10.0:
-        raise ValueError("there must be an ego and a time step")
-    if any(not -1 <= e.actor < n for e in log.events if isinstance(e, ContactEvent)):
-        raise ValueError("a contact with an actor that is not there")
-
-
 def _whole(table: pl.DataFrame, name: str) -> NDArray[np.int64]:
     column = table[name]
     if not column.dtype.is_integer() or column.null_count():
@@ -196,8 +181,9 @@ def _matrix(table: pl.DataFrame, name: str, width: int) -> NDArray[Any]:
 
 
 def _series(table: pl.DataFrame, prefix: str, kind: type[S]) -> S:
-    columns = (table[prefix + name].cast(pl.Float64) for name in kind._fields)
-    return kind(*(c.fill_null(float("nan")).to_numpy() for c in columns))
+    names = [prefix + name for name in kind._fields]
+    numbers = table.select(pl.col(names).cast(pl.Float64).fill_null(float("nan")))
+    return kind(*(numbers[name].to_numpy() for name in names))
 
 
 def _head(log: RunLog) -> dict[str, Any]:

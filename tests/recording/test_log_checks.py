@@ -1,0 +1,62 @@
+"""A log whose numbers nobody can compute with is refused when it is read, not where it is used."""
+
+from __future__ import annotations
+
+import polars as pl
+import pytest
+
+import runs
+from skidpad.campaign.run import run
+from skidpad.core.errors import FileError
+from skidpad.recording.files import read_parquet
+from skidpad.recording.logfiles import TICKS, read_log, write_log
+
+
+@pytest.fixture(scope="module")
+def log():
+    return run(runs.adas_run(duration=0.5, vehicles=1)).log
+
+
+def with_column(log, folder, column):
+    """The log's folder with one column exchanged, without a checksum as the first versions wrote."""
+    write_log(folder, log)
+    table, about = read_parquet(folder / TICKS)
+    about = {"skidpad": about["skidpad"]}
+    table.with_columns(column).write_parquet(folder / TICKS, metadata=about)
+    return folder
+
+
+def first(name, value, kind):
+    """A column whose first value is another."""
+    here = pl.int_range(pl.len()) == 0
+    return pl.when(here).then(pl.lit(value, kind)).otherwise(pl.col(name)).cast(kind).alias(name)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "kind", "said"),
+    [
+        ("ego_gear", None, pl.Int32, "what the ego says of itself"),
+        ("ego_x", float("inf"), pl.Float64, "what the ego says of itself"),
+        ("stack_status", 77, pl.Int32, "status of the stack"),
+        ("stack_light_source", 77, pl.Int32, "light_source of the stack"),
+        ("stack_tier", -1, pl.Int32, "tier of the stack"),
+        ("stack_radar_points", float("inf"), pl.Float64, "radar points"),
+    ],
+)
+def test_a_number_that_means_nothing_is_named(log, tmp_path, name, value, kind, said):
+    with pytest.raises(FileError, match=said):
+        read_log(with_column(log, tmp_path, first(name, value, kind)))
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+@pytest.mark.parametrize("name", ["x", "yaw", "vx"])
+def test_whoever_is_present_is_somewhere(log, tmp_path, name, value):
+    width = len(log.table)
+    nowhere = pl.Series(name, [[value] * width] * len(log), pl.Array(pl.Float32, width))
+    with pytest.raises(FileError, match="whoever is present"):
+        read_log(with_column(log, tmp_path, nowhere))
+
+
+def test_what_may_be_absent_is_read(log, tmp_path):
+    absent = pl.lit(None, pl.Float64).alias("stack_distance")
+    assert len(read_log(with_column(log, tmp_path, absent))) == len(log)

@@ -13,6 +13,7 @@ from typing import Annotated, Any
 
 import msgspec
 
+from skidpad.core.told import on_a_line
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.fleet.identity import digest
@@ -135,7 +136,9 @@ def _record(text: bytes, start: int, number: int) -> Found:
     try:
         head = _HEADS.decode(line[2:])
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise Refused(422, f"record {number} has an unreadable head ({error})") from error
+        raise Refused(
+            422, f"record {number} has an unreadable head ({on_a_line(error, 400)})"
+        ) from error
     _check(head, number)
     x, y = _place(head, text)
     return Found(head, msgspec.json.encode(head).decode(), digest(text), start, len(text), x, y)
@@ -175,7 +178,9 @@ def drive_of(content: bytes) -> Drive:
     try:
         drive = _DRIVES.decode(content)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise Refused(422, f"the drive has an unreadable summary ({error})") from error
+        raise Refused(
+            422, f"the drive has an unreadable summary ({on_a_line(error, 400)})"
+        ) from error
     if not 0.0 <= drive.seconds <= 1.0e6 or len(drive.context) > WORDS_MAX:
         raise Refused(422, f"a drive lasts 0 to 1e6 s, this one {drive.seconds:g}")
     if not _are_words((drive.release, *drive.context, *drive.context.values())):
@@ -193,7 +198,9 @@ def rows_of(content: bytes, limits: Limits) -> list[IndicatorRow]:
     try:
         rows = [_ROWS.decode(line) for line in content.splitlines() if line]
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise Refused(422, f"a row of indicators cannot be read ({error})") from error
+        raise Refused(
+            422, f"a row of indicators cannot be read ({on_a_line(error, 400)})"
+        ) from error
     if len(rows) > 100 * limits.records:
         raise Refused(413, f"a batch may hold {100 * limits.records} rows of indicators")
     for row in rows:

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from skidpad.core.errors import FileError, OutputError
+from skidpad.core.told import on_a_line
 from skidpad.fleet.identity import digest
 from skidpad.fleet.words import Kind
 from skidpad.recording.files import write_bytes
@@ -105,4 +106,4 @@ def _read(path: Path) -> Waiting:
         head = json.loads(line)
         return Waiting(path.stem, Kind(head["kind"]), str(head["drive"]), body)
     except (ValueError, KeyError, TypeError) as error:
-        raise FileError(f"{path}: is not a batch ({error})") from error
+        raise FileError(f"{path}: is not a batch ({on_a_line(error, 400)})") from error

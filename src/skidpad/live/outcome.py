@@ -7,7 +7,7 @@ from typing import Any
 
 import msgspec
 
-from skidpad.core.errors import FileError
+from skidpad.core.reading import decode_json, read_bytes
 from skidpad.live.settings import Flow
 from skidpad.recording.files import write_bytes
 
@@ -38,7 +38,5 @@ def write_outcome(folder: Path, outcome: LinkOutcome) -> None:
 def read_outcome(folder: Path) -> LinkOutcome:
     """The outcome in a monitor's folder."""
     path = folder / LINK
-    try:
-        return msgspec.json.decode(path.read_bytes(), type=LinkOutcome)
-    except (OSError, msgspec.DecodeError) as error:
-        raise FileError(f"{path}: is not the outcome of a link ({error})") from error
+    outcome: LinkOutcome = decode_json(read_bytes(path, "outcome"), str(path), LinkOutcome)
+    return outcome

@@ -15,6 +15,7 @@ from typing import Any
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.reading import UNUSABLE, decode_json, read_bytes, unusable
+from skidpad.core.told import on_a_line
 from skidpad.core.vocabulary import HazardType
 from skidpad.recording.hazard_text import HEADER, encode_worlds
 from skidpad.recording.hazard_text_reader import decode_worlds
@@ -135,7 +136,9 @@ def decode_record(text: str) -> HazardRecord:
         row = json.loads(lines[0][2:])
         record, expected = _record(row), int(row["cycles"])
     except UNUSABLE as error:
-        raise FileError(f"a hazard record has an unreadable head ({error})") from error
+        raise FileError(
+            f"a hazard record has an unreadable head ({on_a_line(error, 400)})"
+        ) from error
     worlds = decode_worlds(lines[1:-2], len(record.channels))
     if len(worlds) != expected:
         raise FileError(f"hazard {record.id}: {len(worlds)} cycles, its head says {expected}")

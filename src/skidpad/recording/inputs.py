@@ -10,6 +10,7 @@ import msgspec
 
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.inputs import Input, Timed
+from skidpad.core.told import on_a_line
 
 INPUTS = "inputs.jsonl"
 
@@ -51,7 +52,9 @@ def decode_inputs(text: bytes, name: str = INPUTS) -> tuple[Timed, ...]:
         try:
             read = msgspec.json.decode(line, type=_Line)
         except (msgspec.MsgspecError, ConfigError, UnicodeError, RecursionError) as error:
-            raise FileError(f"{name}, line {number} is not an input: {error}") from error
+            raise FileError(
+                f"{name}, line {number} is not an input: {on_a_line(error, 400)}"
+            ) from error
         if read.tick < (inputs[-1].tick if inputs else 0):
             raise FileError(f"{name}, line {number} goes back in time, to tick {read.tick}")
         inputs.append(Timed(read.tick, read.input))

@@ -8,7 +8,7 @@ from typing import Any
 
 import polars as pl
 
-from skidpad.core.errors import FileError
+from skidpad.core.reading import decode_json, read_bytes
 from skidpad.recording.files import read_parquet, write_bytes, write_parquet
 
 SUMMARY = "monitor.json"
@@ -23,14 +23,8 @@ def write_summary(folder: Path, summary: dict[str, Any]) -> None:
 def read_summary(folder: Path) -> dict[str, Any]:
     """The summary in a monitor's output folder."""
     path = folder / SUMMARY
-    try:
-        summary: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise FileError(
-            f"{path}: cannot be read ({error.strerror}); `skidpad monitor` writes it"
-        ) from error
-    except ValueError as error:
-        raise FileError(f"{path}: is not JSON ({error})") from error
+    data = read_bytes(path, "`skidpad monitor` writes the summary")
+    summary: dict[str, Any] = decode_json(data, str(path), dict[str, Any])
     return summary
 
 

@@ -28,6 +28,7 @@ from numpy.typing import NDArray
 from skidpad.core.channels import ChannelFrame
 from skidpad.core.errors import ConfigError, FileError, MissingExtra
 from skidpad.core.reading import decode_yaml, read_bytes
+from skidpad.core.told import on_a_line
 from skidpad.recording.channels import Losses, Message
 from skidpad.recording.ros_objects import OBJECT_READERS, RosObjects, empty_objects, yaw_of
 
@@ -220,7 +221,9 @@ class RosRecording:
         try:
             return _Opened(AnyReader([self.path], default_typestore=store))
         except (AnyReaderError, OSError, ValueError) as error:
-            raise FileError(f"{self.path}: is not a readable ROS 2 bag ({error})") from error
+            raise FileError(
+                f"{self.path}: is not a readable ROS 2 bag ({on_a_line(error, 400)})"
+            ) from error
 
     def messages(self) -> Iterator[Message]:
         """Frames of all channels in the order of arrival of their ego poses."""
@@ -255,7 +258,7 @@ class _Opened:
         try:
             return self.reader.__enter__()
         except Exception as error:  # sqlite, mcap, yaml: whatever the bag is made of
-            raise FileError(f"the ROS 2 bag cannot be opened ({error})") from error
+            raise FileError(f"the ROS 2 bag cannot be opened ({on_a_line(error, 400)})") from error
 
     def __exit__(self, *args: object) -> None:
         self.reader.__exit__(*args)

@@ -10,6 +10,7 @@ import polars as pl
 
 from skidpad import __version__
 from skidpad.core.errors import FileError
+from skidpad.core.told import on_a_line
 from skidpad.evidence.channels.findings import FINDINGS
 from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
 from skidpad.evidence.channels.judging.segments import TOLD
@@ -49,7 +50,9 @@ def write_evaluation_report(folder: Path) -> Path:
     try:
         evaluation = json.loads(source.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
-        raise FileError(f"{source}: cannot be read as an evaluation ({error})") from error
+        raise FileError(
+            f"{source}: cannot be read as an evaluation ({on_a_line(error, 400)})"
+        ) from error
     return write_report_page(evaluation_page(evaluation, folder), folder)
 
 

@@ -11,6 +11,7 @@ import msgspec
 from msgspec import Meta
 from sqlalchemy import Connection, select
 
+from skidpad.core.told import on_a_line
 from skidpad.fleet.identity import digest, new_id
 from skidpad.fleet.store.events import Event, add_event, events_of
 from skidpad.fleet.store.later import alerts
@@ -114,7 +115,7 @@ def parse_alert(body: bytes) -> AlertText:
     try:
         return msgspec.json.decode(body, type=AlertText)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise Refused(422, f"the alert cannot be read ({error})") from error
+        raise Refused(422, f"the alert cannot be read ({on_a_line(error, 400)})") from error
 
 
 def keep_alert(

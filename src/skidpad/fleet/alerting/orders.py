@@ -19,6 +19,7 @@ from sqlalchemy import Connection, select
 from sqlalchemy.exc import IntegrityError
 
 from skidpad.core.errors import FileError
+from skidpad.core.told import on_a_line
 from skidpad.fleet.alerting.keeping import alert_of
 from skidpad.fleet.identity import new_id
 from skidpad.fleet.store.events import add_event, events_of
@@ -51,7 +52,7 @@ class Signer:
         try:
             key = serialization.load_pem_private_key(path.read_bytes(), None)
         except (OSError, ValueError, TypeError) as error:
-            raise FileError(f"{path}: is not a private key ({error})") from error
+            raise FileError(f"{path}: is not a private key ({on_a_line(error, 400)})") from error
         if not isinstance(key, Ed25519PrivateKey):
             raise FileError(f"{path}: is not an Ed25519 key")
         self._key = key

@@ -11,6 +11,7 @@ from fastapi import APIRouter, Depends, Request, Response
 from msgspec import Meta
 from starlette.concurrency import run_in_threadpool
 
+from skidpad.core.told import on_a_line
 from skidpad.fleet.api.guard import Needs, fleet_of
 from skidpad.fleet.api.vehicle import read_body
 from skidpad.fleet.loop.changes import Proposal, payload_of, propose, re_evaluate
@@ -61,7 +62,7 @@ def _parsed(body: bytes, type: Any) -> Any:
     try:
         return msgspec.json.decode(body, type=type)
     except (msgspec.MsgspecError, ValueError, RecursionError) as error:
-        raise Refused(422, f"the request cannot be read ({error})") from error
+        raise Refused(422, f"the request cannot be read ({on_a_line(error, 400)})") from error
 
 
 @router.post("/changes")

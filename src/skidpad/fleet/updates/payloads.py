@@ -9,6 +9,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from skidpad.core.errors import InputError
+from skidpad.core.told import on_a_line
 from skidpad.evidence.channels.hazards import Profile, load_rules
 from skidpad.evidence.channels.identifier.model import Identify, load_model
 from skidpad.evidence.channels.indicators.catalogue import load_thresholds
@@ -59,4 +60,4 @@ def settings_of_content(kind: PayloadKind, content: bytes) -> MonitorSettings:
         try:
             return settings_of(kind, path)
         except InputError as error:
-            raise Refused(422, f"the update is not valid: {error}") from error
+            raise Refused(422, f"the update is not valid: {on_a_line(error, 400)}") from error

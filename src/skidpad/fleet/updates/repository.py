@@ -11,6 +11,7 @@ from tuf.api.exceptions import RepositoryError
 from tuf.api.metadata import Metadata, MetaFile, Root, Snapshot, Targets, Timestamp
 
 from skidpad.core.errors import FileError, OutputError
+from skidpad.core.told import on_a_line
 from skidpad.fleet.updates.signing import instant, load_key
 from skidpad.fleet.words import Refused, absent
 from skidpad.recording.files import write_bytes
@@ -55,7 +56,7 @@ class Repository:
             self._root().signed.verify_delegate("targets", new.signed_bytes, new.signatures)
         except (RepositoryError, ValueError) as error:
             raise Refused(
-                422, f"the list of updates is not signed as it must be: {error}"
+                422, f"the list of updates is not signed as it must be: {on_a_line(error, 400)}"
             ) from error
         old: Metadata[Targets] = Metadata.from_bytes(self.targets())
         if new.signed.type != "targets" or new.signed.version != old.signed.version + 1:
@@ -69,7 +70,9 @@ class Repository:
         try:
             new.signed.targets[name].verify_length_and_hashes(content)
         except RepositoryError as error:
-            raise Refused(422, f"the payload is not the one that was signed: {error}") from error
+            raise Refused(
+                422, f"the payload is not the one that was signed: {on_a_line(error, 400)}"
+            ) from error
         digest = new.signed.targets[name].hashes["sha256"]
         write_bytes(self.folder / "targets" / f"{digest}.{name}", content)
         self._publish(targets)

@@ -16,6 +16,7 @@ from securesystemslib.signer import CryptoSigner
 from tuf.api.metadata import Metadata, Root, TargetFile, Targets
 
 from skidpad.core.errors import ConfigError, FileError, OutputError
+from skidpad.core.told import on_a_line
 from skidpad.recording.files import write_secret
 
 KEYS, THRESHOLD = 3, 2
@@ -48,7 +49,7 @@ def load_key(path: Path) -> CryptoSigner:
     try:
         key = serialization.load_pem_private_key(path.read_bytes(), None)
     except (OSError, ValueError, TypeError) as error:
-        raise FileError(f"{path}: is not a private key ({error})") from error
+        raise FileError(f"{path}: is not a private key ({on_a_line(error, 400)})") from error
     if not isinstance(key, Ed25519PrivateKey):
         raise FileError(f"{path}: is not an Ed25519 key")
     return CryptoSigner(key)

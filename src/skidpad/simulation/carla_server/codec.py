@@ -13,6 +13,7 @@ from typing import Any
 import msgpack
 
 from skidpad.core.errors import BackendError
+from skidpad.core.told import on_a_line
 
 MAX_MESSAGE = 32 * 1024 * 1024  # bytes; the largest real one is an OpenDRIVE text
 MAX_ITEMS = 100_000  # in one array; the largest real one is a batch of commands
@@ -72,7 +73,7 @@ class Decoder:
             while (message := self._next()) is not None:
                 yield parse_request(msgpack.unpackb(message, **LIMITS))
         except (msgpack.exceptions.UnpackException, ValueError, TypeError, RecursionError) as error:
-            raise ProtocolError(f"not a msgpack-rpc request: {error}") from error
+            raise ProtocolError(f"not a msgpack-rpc request: {on_a_line(error, 400)}") from error
 
     def _next(self) -> bytes | None:
         try:

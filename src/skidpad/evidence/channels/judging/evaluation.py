@@ -11,6 +11,7 @@ from typing import Any
 import polars as pl
 
 from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.told import on_a_line
 from skidpad.core.vocabulary import HazardType, Stratum
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile
 from skidpad.evidence.channels.judging.causes import EXPLAINED
@@ -235,7 +236,7 @@ def read_labels(path: Path) -> dict[str, list[Span]]:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FileError(f"{path}: cannot be read as labels ({error})") from error
+        raise FileError(f"{path}: cannot be read as labels ({on_a_line(error, 400)})") from error
     out: dict[str, list[Span]] = {}
     for number, row in enumerate(rows, start=2):
         out.setdefault(row.get("recording") or "", []).append(_label(f"{path}:{number}", row))
@@ -252,7 +253,7 @@ def _label(where: str, row: dict[str, Any]) -> Span:
         hazard = HazardType(row["hazard"])
         start, end = float(row["start_s"]), float(row["end_s"])
     except ValueError as error:
-        raise ConfigError(f"{where}: {error}") from error
+        raise ConfigError(f"{where}: {on_a_line(error, 400)}") from error
     if not start <= end:
         raise ConfigError(f"{where}: end_s must not be before start_s, got {start:g} to {end:g}")
     return Span(hazard, start, end)

@@ -8,9 +8,19 @@ from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-import mutation
 import numpy as np
-from readers import BYTES_OR_VALUES, Reader, story_of
+import small_files
+from readers import (
+    BYTES_OR_ARRAYS,
+    BYTES_OR_JSON,
+    BYTES_OR_TABLE,
+    BYTES_OR_XML,
+    BYTES_OR_YAML,
+    STORY_DT,
+    STORY_S,
+    Reader,
+    story_of,
+)
 from tests.scenarios.files import VEHICLE, event, private, speed, time, to, vehicle, write
 
 import runs
@@ -53,7 +63,7 @@ def read_catalog(path: Path) -> object:
     file = write(folder, catalogs=PLACES, entities=vehicle("ego") + other, stories=STORY)
     scenario = story_of(file).scenario
     with np.errstate(all="ignore"):
-        return scenario and played(scenario, 5.0).csv()
+        return scenario and played(scenario, STORY_S, STORY_DT).csv()
 
 
 # --- what was judged before
@@ -94,13 +104,17 @@ def drive() -> dict[str, bytes]:
 
     with TemporaryDirectory() as folder:
         out = Path(folder) / "runs" / "a"
-        run_to(runs.adas_run(duration=2.0, vehicles=2), out)
+        run_to(runs.adas_run(duration=0.5, vehicles=1), out)
         return {p.name: p.read_bytes() for p in out.iterdir() if p.is_file()}
 
 
 def part(name: str) -> Callable[[], list[bytes]]:
     """One file of the run."""
     return lambda: [drive()[name]]
+
+
+def events() -> list[bytes]:
+    return [drive()["events.jsonl"], small_files.events()]
 
 
 def look(path: Path) -> object:
@@ -119,11 +133,9 @@ def look(path: Path) -> object:
 
 
 READERS = {
-    "catalog": Reader("all.xosc", catalogs, read_catalog, (mutation.mutated_xml, mutation.mutated)),
-    "judged": Reader("a.judged", judged, read_judged, BYTES_OR_VALUES),
-    "cockpit-ticks": Reader(
-        "ticks.parquet", part("ticks.parquet"), look,
-        (mutation.mutated, mutation.mutated_parquet), share=0.3),
-    "cockpit-events": Reader("events.jsonl", part("events.jsonl"), look, share=0.3),
-    "cockpit-run": Reader("config.yaml", part("config.yaml"), look, share=0.3),
-}  # fmt: skip
+    "catalog": Reader("all.xosc", catalogs, read_catalog, BYTES_OR_XML),
+    "judged": Reader("a.judged", judged, read_judged, BYTES_OR_ARRAYS),
+    "cockpit-ticks": Reader("ticks.parquet", part("ticks.parquet"), look, BYTES_OR_TABLE),
+    "cockpit-events": Reader("events.jsonl", events, look, BYTES_OR_JSON),
+    "cockpit-run": Reader("config.yaml", part("config.yaml"), look, BYTES_OR_YAML),
+}

@@ -12,7 +12,8 @@ from typing import Any
 import msgspec
 import mutation
 import readers
-from readers import Mutate, Reader
+from plain_mutation import mutated_json
+from readers import BYTES_OR_JSON, Mutate, Reader
 
 from skidpad.core.errors import InputError, SkidpadError
 from skidpad.core.inputs import Pedals, Timed, Wheel
@@ -162,15 +163,22 @@ def read_alert(content: bytes, _: Any) -> object:
 
 def repacked(rng: random.Random, data: bytes) -> bytes:
     """The content damaged, not its packing."""
-    return gzip.compress(mutation.mutated(rng, gzip.decompress(data)))
+    return gzip.compress(mutation.mutated(rng, unpacked(data)), 1)
 
 
+def other_values(rng: random.Random, data: bytes) -> bytes:
+    """Other values in the content."""
+    return gzip.compress(mutated_json(rng, unpacked(data)), 1)
+
+
+unpacked = cache(gzip.decompress)
 PACKED: tuple[Mutate, ...] = (mutation.mutated, repacked, repacked)
+PACKED_JSON: tuple[Mutate, ...] = (mutation.mutated, repacked, other_values, other_values)
 READERS = {
-    "inputs": Reader("inputs.jsonl", inputs, read_inputs),
-    "replay": Reader("a.log", replays, asked(replay), share=0.5),
-    "sent-alert": Reader("body.gz", alerts, sent(read_alert), PACKED, share=0.5),
-    "sent-drive": Reader("body.gz", drives, sent(read_drive), PACKED, share=0.5),
-    "sent-rows": Reader("body.gz", rows, sent(read_rows), PACKED, share=0.5),
-    "sent-hazards": Reader("body.gz", hazards, sent(read_hazards), PACKED, share=0.3),
+    "inputs": Reader("inputs.jsonl", inputs, read_inputs, BYTES_OR_JSON),
+    "replay": Reader("a.log", replays, asked(replay)),
+    "sent-alert": Reader("body.gz", alerts, sent(read_alert), PACKED_JSON),
+    "sent-drive": Reader("body.gz", drives, sent(read_drive), PACKED_JSON),
+    "sent-rows": Reader("body.gz", rows, sent(read_rows), PACKED_JSON),
+    "sent-hazards": Reader("body.gz", hazards, sent(read_hazards), PACKED),
 }

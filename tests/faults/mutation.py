@@ -1,13 +1,11 @@
-"""Seeded mutations of files: bytes of any kind, and the values inside XML, .npz, Parquet and MCAP."""
+"""Seeded mutations of files: bytes of any kind, and the elements and attributes of XML."""
 
 from __future__ import annotations
 
-import io
 import random
 import re
 
 import numpy as np
-import polars as pl
 from lxml import etree
 
 WORDS = (
@@ -18,6 +16,7 @@ WORDS = (
 )  # fmt: skip
 TEXTS = tuple(word.decode("utf-8", "ignore").replace("\x00", "") for word in WORDS)
 TOKEN = re.compile(rb"[-+]?\d[\w.+-]*|\w+")
+NEAR = 300  # bytes
 NUMBERS = (
     0.0, -1.0, 1.0, 0.5, np.nan, np.inf, -np.inf, 1e308, -1e308, 1e-320, 1e9, -1e9, 1e18, 7.0,
 )  # fmt: skip
@@ -62,12 +61,19 @@ def _insert(rng: random.Random, data: bytes) -> bytes:
 
 
 def _replace(rng: random.Random, data: bytes) -> bytes:
-    found = list(TOKEN.finditer(data[:200_000]))
-    if not found:
+    token = _token(rng, data)
+    if token is None:
         return _flip(rng, data)
-    token = rng.choice(found)
-    other = rng.choice(found)[0] if rng.random() < 0.3 else rng.choice(WORDS)
+    found = _token(rng, data) if rng.random() < 0.3 else None
+    other = found[0] if found else rng.choice(WORDS)
     return data[: token.start()] + other + data[token.end() :]
+
+
+def _token(rng: random.Random, data: bytes) -> re.Match[bytes] | None:
+    """A number or word near a place; a long file is not searched whole."""
+    i = rng.randrange(len(data) + 1)
+    found = list(TOKEN.finditer(data, max(0, i - NEAR), i + NEAR))
+    return rng.choice(found) if found else None
 
 
 def _nest(rng: random.Random, data: bytes) -> bytes:
@@ -101,92 +107,3 @@ def mutated_xml(rng: random.Random, data: bytes) -> bytes:
                 texts = [*TEXTS, *map(str, other.attrib.values())]
                 node.set(name, "".join(c for c in rng.choice(texts) if c >= " "))
     return etree.tostring(root)
-
-
-def _other_array(rng: random.Random, array: np.ndarray) -> np.ndarray:
-    what = rng.randrange(7)
-    if what == 0:
-        return array[: rng.randrange(len(array) + 1)] if array.ndim else array
-    if what == 1:
-        return np.concatenate([array, array]) if array.ndim else array
-    if what == 2:
-        kind = rng.choice(("f8", "i4", "u1", "i8", "U3", "f4", "c16", "?", "M8[s]"))
-        with np.errstate(all="ignore"):
-            return array.astype(kind) if array.dtype.kind in "fiub" else np.zeros(3, kind)
-    if what == 3:
-        return rng.choice((array.reshape(-1, 1), array.reshape(-1), array[None], np.zeros(())))
-    array = np.array(array)
-    if array.size and array.dtype.kind in "fiu":
-        for _ in range(rng.choice((1, 1, array.size))):
-            with np.errstate(all="ignore"):
-                array.flat[rng.randrange(array.size)] = np.float64(rng.choice(NUMBERS)).astype(
-                    array.dtype
-                )
-    return array
-
-
-def mutated_npz(rng: random.Random, data: bytes) -> bytes:
-    """Arrays that are missing, of other shapes, types or values; names as text that is mutated."""
-    with np.load(io.BytesIO(data), allow_pickle=False) as stored:
-        arrays = dict(stored)
-    for _ in range(rng.randint(1, 3)):
-        name = rng.choice(sorted(arrays)) if arrays else ""
-        if not name:
-            break
-        array = arrays[name]
-        if rng.random() < 0.1:
-            del arrays[name]
-        elif array.dtype.kind == "U":
-            text = mutated(rng, str(array).encode()).decode("utf-8", "ignore").replace("\x00", "")
-            arrays[name] = np.array(text)
-        else:
-            try:
-                arrays[name] = _other_array(rng, array)
-            except (ValueError, TypeError):  # no such array can be made
-                continue
-    out = io.BytesIO()
-    np.savez(out, **arrays)
-    return out.getvalue()
-
-
-def mutated_parquet(rng: random.Random, data: bytes) -> bytes:
-    """Columns that are missing, of other types or values; metadata that is mutated; fewer rows."""
-    table = pl.read_parquet(io.BytesIO(data))
-    about = dict(pl.read_parquet_metadata(io.BytesIO(data)))
-    about.pop("ARROW:schema", None)
-    for _ in range(rng.randint(1, 3)):
-        what = rng.randrange(6)
-        name = rng.choice(table.columns) if table.columns else ""
-        if what == 0 and about:
-            key = rng.choice(sorted(about))
-            about[key] = mutated(rng, about[key].encode()).decode("utf-8", "ignore")
-        elif what == 1 and name:
-            table = table.drop(name)
-        elif what == 2:
-            table = table.head(rng.randrange(len(table) + 1))
-        elif what == 3 and name:
-            kind = rng.choice(
-                (pl.Int64, pl.Float64, pl.String, pl.Boolean, pl.Int8, pl.List(pl.Int8))
-            )
-            table = table.with_columns(pl.lit(None).cast(kind).alias(name))
-        elif name:
-            with_values = _other_column(rng, table[name])
-            table = table.with_columns(with_values.alias(name))
-    out = io.BytesIO()
-    table.write_parquet(out, metadata=about)
-    return out.getvalue()
-
-
-def _other_column(rng: random.Random, column: pl.Series) -> pl.Series:
-    values = column.to_list()
-    if values:
-        i = rng.randrange(len(values))
-        if column.dtype.is_float():
-            values[i] = float(rng.choice(NUMBERS))
-        elif column.dtype.is_integer():
-            values[i] = rng.choice((0, 1, 3, 77, None))
-        elif column.dtype == pl.String:
-            values[i] = rng.choice(TEXTS)
-        else:
-            values[i] = None
-    return pl.Series(values, dtype=column.dtype, strict=False)

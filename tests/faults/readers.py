@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import random
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -15,8 +16,11 @@ import msgspec
 import mutation
 import numpy as np
 import scenario_mutation
+import small_files
 import yaml
-from lxml import etree
+from message_mutation import mutated_messages
+from plain_mutation import mutated_json, mutated_yaml
+from table_mutation import mutated_npz, mutated_parquet
 
 import runs
 from channel_worlds import Eyes, World, drive
@@ -28,7 +32,7 @@ from toy_campaign import RECIPE as TOY
 from toy_campaign import campaign as toy_campaign
 
 Mutate = Callable[[random.Random, bytes], bytes]
-ROADS = 6  # of the town that stay in the map that is damaged
+PLAYED_S, STORY_S, STORY_DT = 0.25, 5.0, 0.2  # 5 and 26 ticks of a scenario
 
 
 @dataclass(frozen=True)
@@ -165,6 +169,12 @@ def identities() -> list[bytes]:
     return [toy_files()["campaign.json"], b'{"cells": [{"a": 1}], "command": "adas"}']
 
 
+def ledgers() -> list[bytes]:
+    """With its checksums, and as the first versions wrote it."""
+    signed = toy_files()["ledger.jsonl"]
+    return [signed, re.sub(rb',"sum":"[0-9a-f]{8}"', b"", signed)]
+
+
 def read_toy_ledger(path: Path) -> object:
     from skidpad.recording.ledger import latest, read_ledger
 
@@ -182,7 +192,7 @@ def run_folder() -> dict[str, bytes]:
     from skidpad.campaign.run import run
     from skidpad.recording.logfiles import write_log
 
-    driven = run(runs.adas_run(duration=2.0, vehicles=2))
+    driven = run(runs.adas_run(duration=0.5, vehicles=1))
     with TemporaryDirectory() as folder:
         write_log(Path(folder), driven.log)
         return {p.name: p.read_bytes() for p in Path(folder).iterdir()}
@@ -209,24 +219,6 @@ def read_drive(path: Path) -> object:
 # --- maps, models, scenarios
 
 
-@cache
-def small_town() -> bytes:
-    root = etree.fromstring(built_in("skidpad.roads", "maps/town.xodr"))
-    for surplus in root.findall("road")[ROADS:]:
-        root.remove(surplus)
-    return etree.tostring(root)
-
-
-@cache
-def baked_town() -> bytes:
-    from skidpad.roads.opendrive.bake import bake
-
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "town.npz"
-        bake(small_town(), "town", "town").save(path)
-        return path.read_bytes()
-
-
 def read_map(path: Path) -> object:
     from skidpad.roads.bundled import load_map
     from skidpad.roads.summary import summarise
@@ -235,10 +227,6 @@ def read_map(path: Path) -> object:
         road_map = load_map(path)
         road_map.project(1.0, 2.0, 0.0)
         return summarise(road_map)
-
-
-def models() -> list[bytes]:
-    return [built_in("skidpad.evidence.channels.identifier", "models/hazards.npz")]
 
 
 def read_model(path: Path) -> object:
@@ -274,7 +262,7 @@ def play_scenario(path: Path) -> object:
 
     beside(path)
     with np.errstate(all="ignore"):
-        return run(runs.scenario_run(path, duration=0.5)).outcome
+        return run(runs.scenario_run(path, duration=PLAYED_S)).outcome
 
 
 def story_of(path: Path) -> Any:
@@ -284,13 +272,13 @@ def story_of(path: Path) -> Any:
 
 
 def tell_story(path: Path) -> object:
-    """A hundred ticks of everything as the file says, where it compiles."""
+    """Everything as the file says, where it compiles."""
     from skidpad.scenarios.stage import played
 
     beside(path)
     scenario = story_of(path).scenario
     with np.errstate(all="ignore"):
-        return scenario and played(scenario, 5.0).csv()
+        return scenario and played(scenario, STORY_S, STORY_DT).csv()
 
 
 # --- channels
@@ -301,7 +289,7 @@ def recording() -> bytes:
     from skidpad.recording.channels import ChannelWriter
 
     world = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(50.0, 3.5, 0, 15, 0), (-9, 0, 0, 16, 0)]))
-    listed = drive(world, (Eyes("left", 0.03), Eyes("right", 0.03)), 1.5)
+    listed = drive(world, (Eyes("left", 0.03), Eyes("right", 0.03)), 0.3)
     with TemporaryDirectory() as folder:
         path = Path(folder) / "a.mcap"
         with ChannelWriter(path, listed.channels) as writer:
@@ -324,63 +312,6 @@ def read_recording(path: Path) -> object:
         return watch(open_channels(path, truth=False), out, MonitorSettings())
 
 
-def mutated_messages(rng: random.Random, data: bytes) -> bytes:
-    """A recording with other numbers in its messages, well packed."""
-    import io
-
-    from mcap.reader import make_reader
-    from mcap.writer import Writer
-
-    from skidpad.recording import channels_pb2 as pb
-
-    out = io.BytesIO()
-    writer = Writer(out)
-    writer.start()
-    schemas: dict[str, int] = {}
-    topics: dict[str, int] = {}
-    reader = make_reader(io.BytesIO(data))
-    found = list(reader.iter_messages())
-    harmed = {rng.randrange(len(found)) for _ in range(rng.choice((1, 3, len(found))))}
-    for k, (schema, channel, message) in enumerate(found):
-        if schema.name not in schemas:
-            schemas[schema.name] = writer.register_schema(schema.name, schema.encoding, schema.data)
-        if channel.topic not in topics:
-            topics[channel.topic] = writer.register_channel(
-                channel.topic, channel.message_encoding, schemas[schema.name]
-            )
-        body = message.data
-        if k in harmed:
-            parsed = getattr(pb, schema.name.removeprefix("skidpad.")).FromString(body)
-            _harm(rng, parsed)
-            body = parsed.SerializeToString()
-        writer.add_message(topics[channel.topic], message.log_time, body, message.publish_time)
-    writer.finish()
-    return out.getvalue()
-
-
-def _harm(rng: random.Random, message: Any) -> None:
-    field = rng.choice(message.DESCRIPTOR.fields)
-    value = getattr(message, field.name)
-    if hasattr(value, "extend"):
-        if value and rng.random() < 0.7:
-            _put(rng, field, value, rng.randrange(len(value)))
-        elif rng.random() < 0.5:
-            del value[:]
-        else:
-            value.extend(list(value))
-    elif field.message_type is None and not hasattr(value, "update"):
-        number = rng.choice(mutation.NUMBERS)
-        if field.cpp_type == field.CPPTYPE_DOUBLE:
-            setattr(message, field.name, number)
-
-
-def _put(rng: random.Random, field: Any, values: Any, i: int) -> None:
-    if field.cpp_type in (field.CPPTYPE_DOUBLE, field.CPPTYPE_FLOAT):
-        values[i] = rng.choice(mutation.NUMBERS)
-    elif field.cpp_type != field.CPPTYPE_STRING:
-        values[i] = rng.choice((0, 1, 3, 63, 64, 2**31 - 1))
-
-
 @cache
 def watched() -> dict[str, bytes]:
     from skidpad.evidence.channels.monitor import MonitorSettings
@@ -392,7 +323,8 @@ def watched() -> dict[str, bytes]:
         out = Path(folder) / "out"
         eyes = (Eyes("lav", 0.03), Eyes("tfuse", 0.03, blind=(0,)))
         watch(drive(world, eyes, 12.0), out, MonitorSettings())
-        return {p.name: p.read_bytes() for p in out.iterdir()}
+        found = {p.name: p.read_bytes() for p in out.iterdir()}
+    return found | {"hazards.txt": small_files.short_record(found["hazards.txt"])}
 
 
 def read_indicators(path: Path) -> object:
@@ -442,41 +374,41 @@ def sentences() -> list[bytes]:
     ]
 
 
-BYTES_OR_VALUES = (mutation.mutated, mutation.mutated_npz, mutation.mutated_npz)
+BYTES_OR_ARRAYS = (mutation.mutated, mutated_npz, mutated_npz)
+BYTES_OR_TABLE = (mutation.mutated, mutated_parquet, mutated_parquet)
+BYTES_OR_JSON = (mutation.mutated, mutated_json, mutated_json)
+BYTES_OR_YAML = (mutation.mutated, mutated_yaml, mutated_yaml)
+BYTES_OR_XML = (mutation.mutated, mutation.mutated_xml)
 READERS = {
-    "weather": Reader("weather.yaml", weather_files, read_weather),
-    "run": Reader("config.yaml", run_files, read_stored),
-    "segment": Reader("a.json", records, lambda p: read_segment(p.with_suffix(".mcap"))),
-    "rules": Reader("rules.yaml", rules, read_rules),
-    "thresholds": Reader("thresholds.yaml", thresholds, read_thresholds),
-    "mapping": Reader("mapping.yaml", mappings, read_mapping),
+    "weather": Reader("weather.yaml", weather_files, read_weather, BYTES_OR_YAML),
+    "run": Reader("config.yaml", run_files, read_stored, BYTES_OR_YAML),
+    "segment": Reader(
+        "a.json", records, lambda p: read_segment(p.with_suffix(".mcap")), BYTES_OR_JSON),
+    "rules": Reader("rules.yaml", rules, read_rules, BYTES_OR_YAML),
+    "thresholds": Reader("thresholds.yaml", thresholds, read_thresholds, BYTES_OR_YAML),
+    "mapping": Reader("mapping.yaml", mappings, read_mapping, BYTES_OR_YAML),
     "labels": Reader("labels.csv", labels, read_labels),
     "words": Reader("words.txt", sentences, words),
-    "campaign": Reader("campaign.json", identities, read_identity),
-    "ledger": Reader("ledger.jsonl", lambda: [toy_files()["ledger.jsonl"]], read_toy_ledger),
+    "campaign": Reader("campaign.json", identities, read_identity, BYTES_OR_JSON),
+    "ledger": Reader("ledger.jsonl", ledgers, read_toy_ledger, BYTES_OR_JSON),
     "results": Reader(
-        "results.parquet", lambda: [toy_files()["results.parquet"]], read_toy_results,
-        (mutation.mutated, mutation.mutated_parquet),
-    ),
-    "ticks": Reader(
-        "ticks.parquet", lambda: [run_folder()["ticks.parquet"]], read_drive,
-        (mutation.mutated, mutation.mutated_parquet, mutation.mutated_parquet), share=0.5),
-    "events": Reader("events.jsonl", lambda: [run_folder()["events.jsonl"]], read_drive, share=0.5),
-    "opendrive": Reader(
-        "map.xodr", lambda: [small_town()], read_map, (mutation.mutated_xml, mutation.mutated), share=0.5),
-    "baked": Reader("map.npz", lambda: [baked_town()], read_map, BYTES_OR_VALUES, share=0.5),
-    "model": Reader("model.npz", models, read_model, BYTES_OR_VALUES, share=0.1),
-    "openscenario": Reader(
-        "a.xosc", scenarios, read_scenario, (mutation.mutated_xml, mutation.mutated)),
-    "played": Reader("a.xosc", scenarios, play_scenario, (mutation.mutated_xml,), share=0.1),
+        "results.parquet", lambda: [toy_files()["results.parquet"]], read_toy_results, BYTES_OR_TABLE),
+    "ticks": Reader("ticks.parquet", lambda: [run_folder()["ticks.parquet"]], read_drive, BYTES_OR_TABLE),
+    "events": Reader(
+        "events.jsonl", lambda: [run_folder()["events.jsonl"], small_files.events()], read_drive,
+        BYTES_OR_JSON),
+    "opendrive": Reader("map.xodr", small_files.maps, read_map, BYTES_OR_XML),
+    "baked": Reader("map.npz", small_files.baked, read_map, BYTES_OR_ARRAYS),
+    "model": Reader("model.npz", small_files.models, read_model, BYTES_OR_ARRAYS),
+    "openscenario": Reader("a.xosc", scenarios, read_scenario, BYTES_OR_XML),
+    "played": Reader("a.xosc", scenarios, play_scenario, (mutation.mutated_xml,), share=0.5),
     "storyboard": Reader(
         "a.xosc", scenario_mutation.seeds, tell_story, (scenario_mutation.mutated_story,)),
     "recording": Reader(
         "a.mcap", lambda: [recording()], read_recording,
-        (mutation.mutated, mutated_messages, mutated_messages), share=0.3),
+        (mutation.mutated, mutated_messages, mutated_messages)),
     "indicators": Reader(
-        "indicators.parquet", lambda: [watched()["indicators.parquet"]], read_indicators,
-        (mutation.mutated, mutation.mutated_parquet), share=0.5),
-    "hazards": Reader("hazards.txt", lambda: [watched()["hazards.txt"]], read_hazards, share=0.3),
-    "index": Reader("hazards.jsonl", lambda: [watched()["hazards.jsonl"]], list_hazards),
+        "indicators.parquet", lambda: [watched()["indicators.parquet"]], read_indicators, BYTES_OR_TABLE),
+    "hazards": Reader("hazards.txt", lambda: [watched()["hazards.txt"]], read_hazards),
+    "index": Reader("hazards.jsonl", lambda: [watched()["hazards.jsonl"]], list_hazards, BYTES_OR_JSON),
 }  # fmt: skip

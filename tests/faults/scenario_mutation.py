@@ -138,14 +138,17 @@ value="1"/></VariableDeclarations>""",
 }
 
 
+FILES = 12
+
+
 @cache
 def seeds() -> list[bytes]:
-    """Six files; each action and condition is in one of them."""
+    """Each action and condition is in one of these files."""
     found = []
-    for k in range(6):
-        actions = [private(a) for a in ACTIONS[k::6]]
-        actions += [f"<GlobalAction>{a}</GlobalAction>" for a in GLOBAL[k::6]]
-        asked = [by_entity(c) for c in ENTITY[k::6]] + [by_value(c) for c in VALUE[k::4]]
+    for k in range(FILES):
+        actions = [private(a) for a in ACTIONS[k::FILES]]
+        actions += [f"<GlobalAction>{a}</GlobalAction>" for a in GLOBAL[k::FILES]]
+        asked = [by_entity(c) for c in ENTITY[k::FILES]] + [by_value(c) for c in VALUE[k::4]]
         asked += [time(0.3), state("event", "e0", "startTransition")]
         events = [event(f"e{i}", a, asked[i % len(asked)]) for i, a in enumerate(actions)]
         begin = at("ego", -3, 100) + at("other", -1, 120) + at("third", -2, 80)

@@ -7,11 +7,13 @@ import json
 import pytest
 
 from skidpad.core.errors import SkidpadError
+from skidpad.core.told import LONGEST
 from skidpad.fleet.alerting.keeping import parse_alert
 from skidpad.fleet.batch import drive_of
 from skidpad.live.outcome import LINK, read_outcome
 from skidpad.recording.inputs import decode_inputs
 from skidpad.recording.monitored import SUMMARY, read_summary
+from skidpad.stack.settings import Settings
 
 NAME = "a\nb"
 SCENE = {"map": "town", "ego": {"x": 1.0, "y": 2.0, "heading": 0.5}, "v": 12.5}
@@ -34,6 +36,13 @@ def test_of_what_a_person_did():
     said = refusal(decode_inputs, json.dumps({"tick": 1, NAME: 1}).encode())
     assert "unknown field" in said
     assert "\n" not in said
+
+
+def test_of_a_setting_with_an_endless_word():
+    said = refusal(Settings().with_values, {"lane_truth": "x" * 200_000 + "\ud800"})
+    assert len(said) <= LONGEST
+    assert "choose one of" in said
+    said.encode()
 
 
 def test_of_a_drive():

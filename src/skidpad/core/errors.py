@@ -13,9 +13,17 @@ SkidpadError
 
 from __future__ import annotations
 
+from skidpad.core.told import clean
+
 
 class SkidpadError(Exception):
-    """Base of all errors raised on purpose; its text is one sentence for a person."""
+    """Base of all errors raised on purpose; its text is one sentence for a person.
+
+    It may repeat foreign words: they can be printed, and no line of it is longer than `told.LONGEST`.
+    """
+
+    def __str__(self) -> str:
+        return "\n".join(clean(line) for line in super().__str__().split("\n"))
 
 
 class InputError(SkidpadError, ValueError):

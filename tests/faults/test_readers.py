@@ -6,6 +6,7 @@ import traceback
 import warnings
 import zlib
 
+import called_readers
 import kept_readers
 import more_readers
 import pytest
@@ -13,7 +14,7 @@ import readers
 
 from skidpad.core.errors import InputError
 
-READERS = readers.READERS | more_readers.READERS | kept_readers.READERS
+READERS = readers.READERS | more_readers.READERS | kept_readers.READERS | called_readers.READERS
 LISTS = ("openscenario", "played", "storyboard", "catalog")  # name all that is wrong, a line each
 LONGEST = 50_000  # characters
 IN_CI = 500  # inputs of a reader

@@ -102,3 +102,7 @@ def test_the_report_shows_factors(tmp_path: Path) -> None:
     page = write_report(tmp_path).read_text(encoding="utf-8")
     assert "By functions and cruise target" in page
     assert "Fatal collisions against the cruise target" in page
+
+
+def test_a_control_character_around_a_number_is_a_space() -> None:
+    assert published_drivers("4, 0\x1d") == published_drivers("4,0")

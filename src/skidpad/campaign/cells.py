@@ -37,7 +37,7 @@ def published_drivers(numbers: str) -> list[AdasDriver]:
             raise ConfigError(
                 f"unknown configuration {told(text.strip(), 100)}; choose among: {allowed}"
             )
-        drivers.append(AdasDriver(label=text.strip(), functions=functions_of(int(text))))
+        drivers.append(AdasDriver(label=text.strip(), functions=functions_of(int(text.strip()))))
     return drivers
 
 

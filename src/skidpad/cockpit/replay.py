@@ -221,10 +221,11 @@ def read_folder(folder: Path) -> tuple[RunLog, RunSpec]:
     """Log and description of a run; FileError in one sentence for anything else."""
     if not (folder / TICKS).is_file():
         raise FileError(f"{folder} is not the folder of a run: it has no {TICKS}")
+    spec = read_run(folder)
     log = read_log(folder)
     if not len(log):
         raise FileError(f"{folder} holds a run that ended before its first tick")
-    return log, read_run(folder)
+    return log, spec
 
 
 def seats_of(spec: RunSpec, inputs: tuple[Timed, ...]) -> list[Seat]:

@@ -9,7 +9,7 @@ from typing import Any
 import polars as pl
 
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.case import NodeEvidence, node_evidence
+from skidpad.evidence.channels.case import NodeEvidence, Nodes, evidence_of, node_evidence
 from skidpad.evidence.channels.indicators.catalogue import (
     Argument,
     Indicator,
@@ -67,18 +67,19 @@ def hazard_list(records: Sequence[HazardRecord]) -> Table:
 def safety_case_tree(drive: MonitoredDrive) -> Tree:
     """Goal, arguments, statements and indicators with evidence now and over the drive (C-033)."""
     case = safety_case()
-    arguments = [_argument(drive, a) for a in case.arguments]
+    evidence = evidence_of(drive.table)
+    arguments = [_argument(evidence, a) for a in case.arguments]
     root = Node(case.goal, _worst([a.state for a in arguments]), children=arguments)
     return Tree(root)
 
 
-def _argument(drive: MonitoredDrive, argument: Argument) -> Node:
-    statements = [_statement(drive, s) for s in argument.statements]
+def _argument(nodes: Nodes, argument: Argument) -> Node:
+    statements = [_statement(nodes, s) for s in argument.statements]
     return Node(argument.claim, _worst([s.state for s in statements]), children=statements)
 
 
-def _statement(drive: MonitoredDrive, statement: Statement) -> Node:
-    evidence = node_evidence(drive.table, statement)
+def _statement(nodes: Nodes, statement: Statement) -> Node:
+    evidence = node_evidence(nodes, statement)
     known, against = sum(n.evaluated for n in evidence), sum(n.violated for n in evidence)
     state = SILENT if not known else CHALLENGED if against else SUPPORTED
     text = f"violated in {against} of {known} evaluated values" if known else ""

@@ -24,36 +24,41 @@ class NodeEvidence:
     cycles: int
 
 
-def node_evidence(table: pl.DataFrame, statement: Statement) -> list[NodeEvidence]:
-    """Evidence for a statement from the indicator table of a drive."""
-    out = []
-    for indicator in statement.indicators:
-        rows = table.filter(pl.col("indicator") == indicator.value)
-        for (subject,), group in rows.group_by("subject", maintain_order=True):
-            values = group["value"].drop_nulls()
-            out.append(
-                NodeEvidence(
-                    indicator,
-                    str(subject),
-                    float(values[-1]) if len(values) else None,
-                    values.min() if len(values) else None,  # type: ignore[arg-type]
-                    values.max() if len(values) else None,  # type: ignore[arg-type]
-                    len(values),
-                    int(group["violated"].sum()),
-                    len(group),
-                )
-            )
-    return out
+Nodes = dict[str, list[NodeEvidence]]  # by indicator, in the order of the table
+
+
+def evidence_of(table: pl.DataFrame) -> Nodes:
+    """What the indicator table of a drive says, indicator by indicator and subject by subject."""
+    value = pl.col("value").drop_nulls()
+    summed = table.group_by("indicator", "subject", maintain_order=True).agg(
+        now=value.last(),
+        least=value.min(),
+        greatest=value.max(),
+        evaluated=value.len(),
+        violated=pl.col("violated").sum(),
+        cycles=pl.len(),
+    )
+    found: Nodes = {indicator.value: [] for indicator in Indicator}
+    for row in summed.iter_rows(named=True):
+        name, subject = row.pop("indicator"), str(row.pop("subject"))
+        if name in found:
+            found[name].append(NodeEvidence(Indicator(name), subject, **row))
+    return found
+
+
+def node_evidence(nodes: Nodes, statement: Statement) -> list[NodeEvidence]:
+    """Evidence for a statement."""
+    return [n for indicator in statement.indicators for n in nodes[indicator.value]]
 
 
 def evidence_lines(table: pl.DataFrame) -> Iterator[str]:
     """The tree as text."""
-    case = safety_case()
+    case, everything = safety_case(), evidence_of(table)
     yield case.goal
     for argument in case.arguments:
         yield f"  {argument.claim}"
         for statement in argument.statements:
-            nodes = node_evidence(table, statement)
+            nodes = node_evidence(everything, statement)
             against = sum(n.violated for n in nodes)
             known = sum(n.evaluated for n in nodes)
             verdict = "no evidence" if not known else "supported" if not against else "challenged"

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from channel_worlds import Eyes, World, drive
+from skidpad.core.errors import InputError
 from skidpad.evidence.channels.monitor import MonitorSettings
 from skidpad.live.watch import Timer, watch
 from skidpad.recording.hazards import read_hazards
@@ -88,3 +89,26 @@ def test_a_timeline_marks_alarms_and_what_was_not_evaluated():
 
 def test_reports_of_the_same_drive_are_the_same_bytes(folder):
     assert write_drive_report(folder).read_bytes() == write_drive_report(folder).read_bytes()
+
+
+def changed(folder, tmp_path, **words):
+    """The folder with other words in its summary."""
+    for file in folder.iterdir():
+        (tmp_path / file.name).write_bytes(file.read_bytes())
+    summary = json.loads((tmp_path / "monitor.json").read_bytes())
+    (tmp_path / "monitor.json").write_text(json.dumps(summary | words))
+    return tmp_path
+
+
+def test_a_recording_that_lost_something_says_so(folder, tmp_path):
+    losses = {"cut": True, "chunks": 2, "stale": {"a": 1}}
+    page = write_drive_report(changed(folder, tmp_path, losses=losses)).read_text()
+    assert "was not read in full" in page
+
+
+@pytest.mark.parametrize(
+    "words", [{"indicators": [{}]}, {"hazards": [{"name": "a"}]}, {"seconds": None}, {"losses": []}]
+)
+def test_a_summary_that_cannot_be_shown_is_refused_in_a_sentence(folder, tmp_path, words):
+    with pytest.raises(InputError, match="monitor.json"):
+        write_drive_report(changed(folder, tmp_path, **words))

@@ -97,8 +97,8 @@ def _warnings(drive: MonitoredDrive) -> list[Block]:
     lost = {k: v for k, v in drive.summary["losses"].items() if v}
     if not lost:
         return []
-    words = ", ".join(f"{words(k)}: {v}" for k, v in lost.items())
-    return [Text(f"The recording was not read in full ({words}).", tone="warning")]
+    told = ", ".join(f"{words(k)}: {v}" for k, v in lost.items())
+    return [Text(f"The recording was not read in full ({told}).", tone="warning")]
 
 
 def _answers(drive: MonitoredDrive) -> Answers:

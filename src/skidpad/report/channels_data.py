@@ -7,14 +7,16 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import msgspec
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
+from skidpad.core.reading import converted
 from skidpad.evidence.channels.indicators.catalogue import Indicator, Threshold, load_thresholds
 from skidpad.recording.hazards import HazardRecord, read_hazards
 from skidpad.recording.indicators import read_indicators
-from skidpad.recording.monitored import read_summary, read_timing
+from skidpad.recording.monitored import SUMMARY, read_summary, read_timing
 
 Floats = NDArray[np.float64]
 
@@ -68,11 +70,51 @@ class MonitoredDrive:
         ]
 
 
+class _Named(msgspec.Struct):
+    name: str
+
+
+class _Event(_Named):
+    t_start: float
+    t_end: float
+
+
+class _Audit(msgspec.Struct):
+    indicator: Indicator
+    subject: str
+    claim: str | None
+    threshold: float | None
+    violation_events: int
+    violation_cycles: int
+    not_evaluated_cycles: int
+
+
+class _Summary(msgspec.Struct):
+    """What pages take from a drive's summary."""
+
+    channels: list[str]
+    cycles: int
+    seconds: float
+    rules: str
+    forms: str
+    losses: dict[str, bool | int | dict[str, int]]
+    unusable: dict[str, dict[str, int]]
+    brief_objects: dict[str, int]
+    undecided_cycles: dict[str, int]
+    hazards: list[_Event]
+    violations: list[_Named]
+    indicators: list[_Audit]
+    identifier: str = "rules"
+    context: dict[str, str] = {}
+
+
 def load_drive(folder: Path) -> MonitoredDrive:
-    """Read the output folder of `skidpad monitor`."""
+    """Read the output folder of `skidpad monitor`; InputError when it is none that can be shown."""
+    summary = read_summary(folder)
+    converted(summary, _Summary, str(folder / SUMMARY))
     return MonitoredDrive(
         name=folder.name,
-        summary=read_summary(folder),
+        summary=summary,
         table=read_indicators(folder),
         records=tuple(read_hazards(folder)),
         timing=read_timing(folder),

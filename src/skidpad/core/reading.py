@@ -69,7 +69,7 @@ def read_bytes(path: Path, what: str, limit: int = TEXT_MAX) -> bytes:
 
 def unusable(where: str, kind: str, error: BaseException) -> FileError:
     """One sentence for content that is not what it should be."""
-    return FileError(f"{where} is not {kind}: {on_a_line(error, 400)}")
+    return FileError(f"{where} is not {kind}: {on_a_line(error)}")
 
 
 def decode_yaml(data: bytes, where: str, kind: Any = None) -> Any:
@@ -92,7 +92,7 @@ def converted(plain: Any, kind: Any, where: str) -> Any:
     try:
         return msgspec.convert(plain, kind)
     except UNUSABLE as error:
-        raise ConfigError(f"{where}: {on_a_line(error, 400)}") from None
+        raise ConfigError(f"{where}: {on_a_line(error)}") from None
 
 
 def measure_yaml(data: bytes, where: str) -> None:
@@ -132,7 +132,7 @@ def decode_json(data: bytes | str, where: str, kind: Any = Any) -> Any:
     try:
         return msgspec.json.decode(data, type=kind)
     except UNUSABLE as error:
-        raise FileError(f"{where} is damaged: {on_a_line(error, 400)}") from None
+        raise FileError(f"{where} is damaged: {on_a_line(error)}") from None
 
 
 def read_arrays(data: bytes, where: str, kind: str = "an .npz file") -> dict[str, NDArray[Any]]:

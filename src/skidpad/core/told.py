@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 LONGEST = 2000  # characters of a sentence about somebody's error
+OF_A_LIBRARY = 400  # of what a library says of it
 CUT = " [...] "
 
 
@@ -14,7 +15,7 @@ def clean(text: str, longest: int = LONGEST) -> str:
     return text.encode("utf-8", "backslashreplace").decode("utf-8")
 
 
-def on_a_line(error: BaseException, longest: int = LONGEST) -> str:
+def on_a_line(error: BaseException, longest: int = OF_A_LIBRARY) -> str:
     """What an exception says, cleaned and on one line; the name of its type where it says nothing."""
     return clean(" ".join(str(error).split()) or type(error).__name__, longest)
 

@@ -39,7 +39,7 @@ def pinned_key(file: Path) -> bytes:
         public = bytes.fromhex(file.read_text(encoding="ascii"))
     except (OSError, ValueError) as error:
         raise FileError(
-            f"{file}: cannot be read as a key for orders ({on_a_line(error, 400)})"
+            f"{file}: cannot be read as a key for orders ({on_a_line(error)})"
         ) from error
     if len(public) != KEY_BYTES:
         raise FileError(f"{file}: a key for orders has {KEY_BYTES} bytes, got {len(public)}")
@@ -80,7 +80,7 @@ class Aboard:
         try:
             answer = client.get("/api/v1/vehicle")
         except httpx.TransportError as error:
-            raise BackendError(f"the fleet cannot be reached ({on_a_line(error, 400)})") from error
+            raise BackendError(f"the fleet cannot be reached ({on_a_line(error)})") from error
         if answer.status_code != 200:
             raise BackendError(f"the fleet does not accept this vehicle: {answer.text}")
         self.receiver = Receiver(public, answer.json()["vehicle"], clock)

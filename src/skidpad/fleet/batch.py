@@ -137,7 +137,7 @@ def _record(text: bytes, start: int, number: int) -> Found:
         head = _HEADS.decode(line[2:])
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
         raise Refused(
-            422, f"record {number} has an unreadable head ({on_a_line(error, 400)})"
+            422, f"record {number} has an unreadable head ({on_a_line(error)})"
         ) from error
     _check(head, number)
     x, y = _place(head, text)
@@ -178,9 +178,7 @@ def drive_of(content: bytes) -> Drive:
     try:
         drive = _DRIVES.decode(content)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise Refused(
-            422, f"the drive has an unreadable summary ({on_a_line(error, 400)})"
-        ) from error
+        raise Refused(422, f"the drive has an unreadable summary ({on_a_line(error)})") from error
     if not 0.0 <= drive.seconds <= 1.0e6 or len(drive.context) > WORDS_MAX:
         raise Refused(422, f"a drive lasts 0 to 1e6 s, this one {drive.seconds:g}")
     if not _are_words((drive.release, *drive.context, *drive.context.values())):
@@ -198,9 +196,7 @@ def rows_of(content: bytes, limits: Limits) -> list[IndicatorRow]:
     try:
         rows = [_ROWS.decode(line) for line in content.splitlines() if line]
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise Refused(
-            422, f"a row of indicators cannot be read ({on_a_line(error, 400)})"
-        ) from error
+        raise Refused(422, f"a row of indicators cannot be read ({on_a_line(error)})") from error
     if len(rows) > 100 * limits.records:
         raise Refused(413, f"a batch may hold {100 * limits.records} rows of indicators")
     for row in rows:

@@ -106,4 +106,4 @@ def _read(path: Path) -> Waiting:
         head = json.loads(line)
         return Waiting(path.stem, Kind(head["kind"]), str(head["drive"]), body)
     except (ValueError, KeyError, TypeError) as error:
-        raise FileError(f"{path}: is not a batch ({on_a_line(error, 400)})") from error
+        raise FileError(f"{path}: is not a batch ({on_a_line(error)})") from error

@@ -23,7 +23,7 @@ def unpack(body: bytes, limits: Limits) -> bytes:
     try:
         content = reader.decompress(body, allowed + 1)
     except zlib.error as error:
-        raise Refused(400, f"the body is not gzip ({on_a_line(error, 400)})") from error
+        raise Refused(400, f"the body is not gzip ({on_a_line(error)})") from error
     if len(content) > allowed:
         raise Refused(413, f"the body unpacks to more than {allowed} bytes")
     if not reader.eof or reader.unused_data:

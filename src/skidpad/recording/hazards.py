@@ -136,9 +136,7 @@ def decode_record(text: str) -> HazardRecord:
         row = json.loads(lines[0][2:])
         record, expected = _record(row), int(row["cycles"])
     except UNUSABLE as error:
-        raise FileError(
-            f"a hazard record has an unreadable head ({on_a_line(error, 400)})"
-        ) from error
+        raise FileError(f"a hazard record has an unreadable head ({on_a_line(error)})") from error
     worlds = decode_worlds(lines[1:-2], len(record.channels))
     if len(worlds) != expected:
         raise FileError(f"hazard {record.id}: {len(worlds)} cycles, its head says {expected}")

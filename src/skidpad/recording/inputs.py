@@ -52,9 +52,7 @@ def decode_inputs(text: bytes, name: str = INPUTS) -> tuple[Timed, ...]:
         try:
             read = msgspec.json.decode(line, type=_Line)
         except (msgspec.MsgspecError, ConfigError, UnicodeError, RecursionError) as error:
-            raise FileError(
-                f"{name}, line {number} is not an input: {on_a_line(error, 400)}"
-            ) from error
+            raise FileError(f"{name}, line {number} is not an input: {on_a_line(error)}") from error
         if read.tick < (inputs[-1].tick if inputs else 0):
             raise FileError(f"{name}, line {number} goes back in time, to tick {read.tick}")
         inputs.append(Timed(read.tick, read.input))

@@ -222,7 +222,7 @@ class RosRecording:
             return _Opened(AnyReader([self.path], default_typestore=store))
         except (AnyReaderError, OSError, ValueError) as error:
             raise FileError(
-                f"{self.path}: is not a readable ROS 2 bag ({on_a_line(error, 400)})"
+                f"{self.path}: is not a readable ROS 2 bag ({on_a_line(error)})"
             ) from error
 
     def messages(self) -> Iterator[Message]:
@@ -258,7 +258,7 @@ class _Opened:
         try:
             return self.reader.__enter__()
         except Exception as error:  # sqlite, mcap, yaml: whatever the bag is made of
-            raise FileError(f"the ROS 2 bag cannot be opened ({on_a_line(error, 400)})") from error
+            raise FileError(f"the ROS 2 bag cannot be opened ({on_a_line(error)})") from error
 
     def __exit__(self, *args: object) -> None:
         self.reader.__exit__(*args)

@@ -51,7 +51,7 @@ def write_evaluation_report(folder: Path) -> Path:
         evaluation = json.loads(source.read_text(encoding="utf-8"))
     except (OSError, ValueError) as error:
         raise FileError(
-            f"{source}: cannot be read as an evaluation ({on_a_line(error, 400)})"
+            f"{source}: cannot be read as an evaluation ({on_a_line(error)})"
         ) from error
     return write_report_page(evaluation_page(evaluation, folder), folder)
 

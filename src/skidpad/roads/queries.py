@@ -243,9 +243,7 @@ class RoadMap:
         roads = {start.road}
         lane, s = start.lane, start.s
         for _ in range(ceil(distance / step)):
-            if (
-                0.0 <= s + step <= self._lengths[lane]
-            ):  # still the same lane, no question to the map
+            if 0.0 <= s + step <= self._lengths[lane]:  # the same lane still
                 s += step
                 continue
             lane, s = kernels.advance_kernel(self._arrays, lane, s, step)

@@ -115,7 +115,7 @@ def parse_alert(body: bytes) -> AlertText:
     try:
         return msgspec.json.decode(body, type=AlertText)
     except (msgspec.MsgspecError, UnicodeError, RecursionError) as error:
-        raise Refused(422, f"the alert cannot be read ({on_a_line(error, 400)})") from error
+        raise Refused(422, f"the alert cannot be read ({on_a_line(error)})") from error
 
 
 def keep_alert(

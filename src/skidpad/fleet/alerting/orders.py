@@ -52,7 +52,7 @@ class Signer:
         try:
             key = serialization.load_pem_private_key(path.read_bytes(), None)
         except (OSError, ValueError, TypeError) as error:
-            raise FileError(f"{path}: is not a private key ({on_a_line(error, 400)})") from error
+            raise FileError(f"{path}: is not a private key ({on_a_line(error)})") from error
         if not isinstance(key, Ed25519PrivateKey):
             raise FileError(f"{path}: is not an Ed25519 key")
         self._key = key

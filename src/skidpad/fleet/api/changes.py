@@ -62,7 +62,7 @@ def _parsed(body: bytes, type: Any) -> Any:
     try:
         return msgspec.json.decode(body, type=type)
     except (msgspec.MsgspecError, ValueError, RecursionError) as error:
-        raise Refused(422, f"the request cannot be read ({on_a_line(error, 400)})") from error
+        raise Refused(422, f"the request cannot be read ({on_a_line(error)})") from error
 
 
 @router.post("/changes")

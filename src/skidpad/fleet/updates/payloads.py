@@ -60,4 +60,4 @@ def settings_of_content(kind: PayloadKind, content: bytes) -> MonitorSettings:
         try:
             return settings_of(kind, path)
         except InputError as error:
-            raise Refused(422, f"the update is not valid: {on_a_line(error, 400)}") from error
+            raise Refused(422, f"the update is not valid: {on_a_line(error)}") from error

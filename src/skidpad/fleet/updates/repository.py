@@ -56,7 +56,7 @@ class Repository:
             self._root().signed.verify_delegate("targets", new.signed_bytes, new.signatures)
         except (RepositoryError, ValueError) as error:
             raise Refused(
-                422, f"the list of updates is not signed as it must be: {on_a_line(error, 400)}"
+                422, f"the list of updates is not signed as it must be: {on_a_line(error)}"
             ) from error
         old: Metadata[Targets] = Metadata.from_bytes(self.targets())
         if new.signed.type != "targets" or new.signed.version != old.signed.version + 1:
@@ -71,7 +71,7 @@ class Repository:
             new.signed.targets[name].verify_length_and_hashes(content)
         except RepositoryError as error:
             raise Refused(
-                422, f"the payload is not the one that was signed: {on_a_line(error, 400)}"
+                422, f"the payload is not the one that was signed: {on_a_line(error)}"
             ) from error
         digest = new.signed.targets[name].hashes["sha256"]
         write_bytes(self.folder / "targets" / f"{digest}.{name}", content)

@@ -73,7 +73,7 @@ class Decoder:
             while (message := self._next()) is not None:
                 yield parse_request(msgpack.unpackb(message, **LIMITS))
         except (msgpack.exceptions.UnpackException, ValueError, TypeError, RecursionError) as error:
-            raise ProtocolError(f"not a msgpack-rpc request: {on_a_line(error, 400)}") from error
+            raise ProtocolError(f"not a msgpack-rpc request: {on_a_line(error)}") from error
 
     def _next(self) -> bytes | None:
         try:

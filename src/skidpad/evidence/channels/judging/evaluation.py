@@ -236,7 +236,7 @@ def read_labels(path: Path) -> dict[str, list[Span]]:
         with path.open(encoding="utf-8", newline="") as file:
             rows = list(csv.DictReader(file))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise FileError(f"{path}: cannot be read as labels ({on_a_line(error, 400)})") from error
+        raise FileError(f"{path}: cannot be read as labels ({on_a_line(error)})") from error
     out: dict[str, list[Span]] = {}
     for number, row in enumerate(rows, start=2):
         out.setdefault(row.get("recording") or "", []).append(_label(f"{path}:{number}", row))
@@ -253,7 +253,7 @@ def _label(where: str, row: dict[str, Any]) -> Span:
         hazard = HazardType(row["hazard"])
         start, end = float(row["start_s"]), float(row["end_s"])
     except ValueError as error:
-        raise ConfigError(f"{where}: {on_a_line(error, 400)}") from error
+        raise ConfigError(f"{where}: {on_a_line(error)}") from error
     if not start <= end:
         raise ConfigError(f"{where}: end_s must not be before start_s, got {start:g} to {end:g}")
     return Span(hazard, start, end)

@@ -11,7 +11,7 @@ from typing import Any
 
 import msgspec
 import mutation
-import readers
+from channel_readers import watched
 from plain_mutation import mutated_json
 from readers import BYTES_OR_JSON, Mutate, Reader
 
@@ -126,7 +126,7 @@ def rows() -> list[bytes]:
 
 
 def hazards() -> list[bytes]:
-    return [gzip.compress(readers.watched()["hazards.txt"])]
+    return [gzip.compress(watched()["hazards.txt"])]
 
 
 def sent(read: Any) -> Any:

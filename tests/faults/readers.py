@@ -18,12 +18,10 @@ import numpy as np
 import scenario_mutation
 import small_files
 import yaml
-from message_mutation import mutated_messages
 from plain_mutation import mutated_json, mutated_yaml
 from table_mutation import mutated_npz, mutated_parquet
 
 import runs
-from channel_worlds import Eyes, World, drive
 from skidpad.campaign.cells import published_drivers, sweep
 from skidpad.campaign.stored import read_run, read_segment
 from skidpad.campaign.worker import Finished
@@ -37,13 +35,17 @@ PLAYED_S, STORY_S, STORY_DT = 0.25, 5.0, 0.2  # 5 and 26 ticks of a scenario
 
 @dataclass(frozen=True)
 class Reader:
-    """read: what is given the damaged file. share: of CI's inputs, where reading takes long."""
+    """read: what is given the damaged file. share: of CI's inputs, where reading takes long.
+
+    most: inputs in all, where reading draws pictures.
+    """
 
     file: str  # its name
     seeds: Callable[[], list[bytes]]
     read: Callable[[Path], object]
     mutations: tuple[Mutate, ...] = (mutation.mutated,)
     share: float = 1.0
+    most: int | None = None
 
 
 def here(jobs: Any) -> Any:
@@ -281,73 +283,6 @@ def tell_story(path: Path) -> object:
         return scenario and played(scenario, STORY_S, STORY_DT).csv()
 
 
-# --- channels
-
-
-@cache
-def recording() -> bytes:
-    from skidpad.recording.channels import ChannelWriter
-
-    world = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(50.0, 3.5, 0, 15, 0), (-9, 0, 0, 16, 0)]))
-    listed = drive(world, (Eyes("left", 0.03), Eyes("right", 0.03)), 0.3)
-    with TemporaryDirectory() as folder:
-        path = Path(folder) / "a.mcap"
-        with ChannelWriter(path, listed.channels) as writer:
-            for channel, item in listed.rows:
-                if channel is not None:
-                    writer.write(listed.channels[channel], item)
-                else:
-                    writer.write_truth(item)
-        return path.read_bytes()
-
-
-def read_recording(path: Path) -> object:
-    """A recording through the whole monitor."""
-    from skidpad.evidence.channels.monitor import MonitorSettings
-    from skidpad.live.watch import watch
-    from skidpad.recording.sources import open_channels
-
-    out = path.parent / "watched"
-    with np.errstate(all="ignore"):
-        return watch(open_channels(path, truth=False), out, MonitorSettings())
-
-
-@cache
-def watched() -> dict[str, bytes]:
-    from skidpad.evidence.channels.monitor import MonitorSettings
-    from skidpad.live.watch import watch
-
-    others = np.array([(-11.0, 0, 0, 15.5, 0), (50.0, 3.5, 0, 15, 0)])
-    world = World((0.0, 0.0, 0.0, 15.0, 0.0), others)
-    with TemporaryDirectory() as folder:
-        out = Path(folder) / "out"
-        eyes = (Eyes("lav", 0.03), Eyes("tfuse", 0.03, blind=(0,)))
-        watch(drive(world, eyes, 12.0), out, MonitorSettings())
-        found = {p.name: p.read_bytes() for p in out.iterdir()}
-    return found | {"hazards.txt": small_files.short_record(found["hazards.txt"])}
-
-
-def read_indicators(path: Path) -> object:
-    from skidpad.evidence.channels.case import evidence_lines
-    from skidpad.recording.indicators import read_indicators
-
-    return list(evidence_lines(read_indicators(path.parent)))
-
-
-def read_hazards(path: Path) -> object:
-    from skidpad.recording.hazards import read_hazards
-    from skidpad.scenarios.hazard_export import export_hazard
-
-    return [export_hazard(r, path.parent / "scenarios") for r in read_hazards(path.parent)]
-
-
-def list_hazards(path: Path) -> object:
-    from skidpad.cli.hazards import lines
-    from skidpad.recording.hazards import read_index
-
-    return list(lines(read_index(path.parent)))
-
-
 # --- words of a command line
 
 
@@ -404,11 +339,4 @@ READERS = {
     "played": Reader("a.xosc", scenarios, play_scenario, (mutation.mutated_xml,), share=0.5),
     "storyboard": Reader(
         "a.xosc", scenario_mutation.seeds, tell_story, (scenario_mutation.mutated_story,)),
-    "recording": Reader(
-        "a.mcap", lambda: [recording()], read_recording,
-        (mutation.mutated, mutated_messages, mutated_messages)),
-    "indicators": Reader(
-        "indicators.parquet", lambda: [watched()["indicators.parquet"]], read_indicators, BYTES_OR_TABLE),
-    "hazards": Reader("hazards.txt", lambda: [watched()["hazards.txt"]], read_hazards),
-    "index": Reader("hazards.jsonl", lambda: [watched()["hazards.jsonl"]], list_hazards, BYTES_OR_JSON),
 }  # fmt: skip

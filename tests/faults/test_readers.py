@@ -7,6 +7,7 @@ import warnings
 import zlib
 
 import called_readers
+import channel_readers
 import kept_readers
 import more_readers
 import pytest
@@ -14,7 +15,8 @@ import readers
 
 from skidpad.core.errors import InputError
 
-READERS = readers.READERS | more_readers.READERS | kept_readers.READERS | called_readers.READERS
+MODULES = (readers, channel_readers, more_readers, kept_readers, called_readers)
+READERS = {name: reader for module in MODULES for name, reader in module.READERS.items()}
 LISTS = ("openscenario", "played", "storyboard", "catalog")  # name all that is wrong, a line each
 LONGEST = 50_000  # characters
 IN_CI = 500  # inputs of a reader
@@ -34,9 +36,16 @@ def inputs(name, count, first=0):
     """Damaged files of a reader, each from its own seed; count: None for as many as CI has time for."""
     reader = READERS[name]
     seeds = reader.seeds()
-    for number in range(first, first + (round(IN_CI * reader.share) if count is None else count)):
+    for number in range(first, first + amount(reader, count)):
         rng = random.Random(zlib.crc32(name.encode()) + number)
         yield number, rng.choice(reader.mutations)(rng, rng.choice(seeds))
+
+
+def amount(reader, asked):
+    """How many inputs a reader gets. asked: None for as many as CI has time for."""
+    if asked is None:
+        return round(IN_CI * reader.share)
+    return asked if reader.most is None else min(asked, reader.most)
 
 
 def refused(reader, path):

@@ -27,10 +27,10 @@ check: $(VENV)/.checked-with
 wheel-check: $(BIN)/python
 	PYTHON=$(BIN)/python .ci/wheel
 
-# damaged files for every reader; what CI tries are the first 500
-FUZZ ?= 10000
+# damaged files for every reader, about an hour on two quiet cores; what CI tries are the first 500
+FUZZ ?= 100000
 fuzz: $(VENV)/.tested-with
-	$(BIN)/python -m pytest -n 2 tests/faults/test_readers.py --fuzz $(FUZZ) --durations=0
+	$(BIN)/python -m pytest -n 2 --dist worksteal tests/faults/test_readers.py --fuzz $(FUZZ) --durations=0
 
 # proofs too long for every change, each with a dated line; NIGHTLY_ARGS="--only fuzz" drives one
 nightly: $(VENV)/.tested-with

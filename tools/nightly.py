@@ -37,8 +37,11 @@ class Proof:
 PROOFS = (
     Proof(
         "fuzz",
-        ("-m", "pytest", "-n", "2", "tests/faults/test_readers.py", "--fuzz", "10000"),
-        "no reader is brought down by damaged files: 10^4 inputs each, in bounded time",
+        (
+            *("-m", "pytest", "-n", "2", "--dist", "worksteal"),
+            *("tests/faults/test_readers.py", "--fuzz", "100000"),
+        ),
+        "no reader is brought down by damaged files: 10^5 inputs each, in bounded time",
     ),
     Proof(
         "soak-server",

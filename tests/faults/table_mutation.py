@@ -100,7 +100,7 @@ def mutated_parquet(rng: random.Random, data: bytes) -> bytes:
             with_values = _other_column(rng, table[name])
             table = table.with_columns(with_values.alias(name))
     out = io.BytesIO()
-    table.write_parquet(out, metadata=about)
+    table.write_parquet(out, metadata=about, compression="uncompressed", statistics=False)
     return out.getvalue()
 
 

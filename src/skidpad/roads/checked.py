@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
@@ -65,6 +66,7 @@ def _columns(table: Any, n: int, name: str) -> None:
             )
 
 
+@cache
 def kinds(table: type[NamedTuple]) -> dict[str, np.dtype[Any]]:
     """The types of a table's columns, as it declares them."""
     return {

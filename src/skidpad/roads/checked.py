@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cache
 from typing import Any, NamedTuple, get_args, get_type_hints
 
 import numpy as np
@@ -53,7 +52,7 @@ def check_arrays(samples: LaneSamples, lanes: LaneTable, signals: SignalTable, w
 
 
 def _columns(table: Any, n: int, name: str) -> None:
-    for column, kind in kinds(type(table)).items():
+    for column, kind in KINDS[type(table)].items():
         values, title = getattr(table, column), f"{name}.{column}"
         _require(values.dtype == kind, f"{title} holds {values.dtype}, not {kind}")
         _require(values.ndim == 1, f"{title} has {values.ndim} dimensions")
@@ -66,13 +65,15 @@ def _columns(table: Any, n: int, name: str) -> None:
             )
 
 
-@cache
 def kinds(table: type[NamedTuple]) -> dict[str, np.dtype[Any]]:
     """The types of a table's columns, as it declares them."""
     return {
         name: np.dtype(get_args(get_args(hint)[1])[0])
         for name, hint in get_type_hints(table).items()
     }
+
+
+KINDS = {table: kinds(table) for table in (LaneSamples, LaneTable, SignalTable)}
 
 
 def _within(values: NDArray[Any], low: int, high: int, title: str) -> None:

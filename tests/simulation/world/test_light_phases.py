@@ -52,23 +52,6 @@ def test_facing_arms_of_a_controller_take_turns_where_that_is_asked_for() -> Non
     assert [len(p) for p in apart] == [1, 1, 1, 1]
 
 
-def test_then_all_wait_until_the_crossing_is_clear() -> None:
-    """(W + L) / V by hand: the longest way through a crossing of town at its limit."""
-    inside = np.flatnonzero(TOWN.lanes.junction == CROSSING)
-    way = float(TOWN.lanes.length[inside].max())
-    limit = float(TOWN.samples.limit[TOWN.lanes.first[inside]].min())
-    lights = Lights(TOWN, arms=True)
-    reds = {light.red for light in lights.groups[CROSSING].lights()}
-    assert len(reds) == 1
-    assert reds.pop() == pytest.approx(min(max((way + 6.1) / limit, RED_S), 6.0))
-    assert {light.red for light in Lights(TOWN).lights} == {RED_S}
-    green = [light.signal for light in lights.lights if light.state is LightState.GREEN]
-    for _ in range(round((GREEN_S + YELLOW_S) / 0.05) + 1):
-        lights.advance(0.05)
-    assert not [i for i in green if lights.by_id[i] is LightState.GREEN]
-    assert LightState.GREEN not in {light.state for light in lights.groups[CROSSING].lights()}
-
-
 def test_without_controllers_every_arm_has_its_turn() -> None:
     assert sorted(map(min, phases(redrawn(controllers=False)))) == [1001, 1002, 1003, 1004]
 

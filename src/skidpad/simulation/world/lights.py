@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 
 from skidpad.core.randomness import stream
 from skidpad.core.vocabulary import LightState
-from skidpad.roads.lanes import LaneKind, SignalKind
+from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap
 
 GREEN_S, YELLOW_S, RED_S = 10.0, 3.0, 2.0  # CARLA's default times; red: for all, before the next
-CAR_M, V_CLEAR, CLEAR_S = 6.1, 30.0 / 3.6, 6.0  # 20 ft; m/s where no limit is known; at most
 CYCLE_S = 45.0  # of a pretimed group: green, yellow and 32 s of red as measured by the publication
 SECTOR = pi / 4.0  # headings this close belong to one arm
 ROUNDING = 1e-6  # s by which summed steps may fall short
@@ -97,17 +96,12 @@ class Lights:
     """All lights of a map; `by_row` and `by_id` are what they show."""
 
     def __init__(self, map: RoadMap, arms: bool = False) -> None:
-        """arms: no two arms of a junction have green together, whatever the file's controllers say, and
-        all wait until the crossing is clear.
-        """
+        """arms: no two arms of a junction have green together, whatever the file's controllers say."""
         signals = map.signals
         self.rows = np.flatnonzero(signals.kind == SignalKind.LIGHT)
         self.by_row = np.full(len(signals.id), LightState.OFF, dtype=np.uint8)  # (K,) LightState
         self.by_id: dict[int, LightState] = {}
         self.groups = _groups(map, self.rows, arms)
-        for group in self.groups.values() if arms else ():
-            for light in group.lights():
-                light.red = max(RED_S, clearance(map, group.id))
         self.lights = [light for group in self.groups.values() for light in group.lights()]
         self.of_row = {row: light for light in self.lights for row in light.rows}
         self.frozen = False  # all of them
@@ -227,17 +221,6 @@ def _phase(junction: int, controller: int, heading: float, arms: bool) -> tuple[
     turn = pi if junction < 0 else 2.0 * pi
     arm = round((heading % turn) / SECTOR) % round(turn / SECTOR)
     return (0, controller, arm if arms else 0) if named else (1, arm, 0)
-
-
-def clearance(map: RoadMap, junction: int) -> float:
-    """s of red for all: (W + L) / V of the longest way through, after the Institute of Transportation
-    Engineers' kinematic equation, with V the lowest limit inside; 0 without a way."""
-    inside = np.flatnonzero((map.lanes.junction == junction) & (map.lanes.kind == LaneKind.DRIVING))
-    if junction < 0 or not len(inside):
-        return 0.0
-    limits = map.samples.limit[map.lanes.first[inside]]
-    speed = float(np.nanmin(np.where(np.isnan(limits), V_CLEAR, limits)))
-    return min((float(map.lanes.length[inside].max()) + CAR_M) / speed, CLEAR_S)
 
 
 def _junction(map: RoadMap, row: int) -> int:

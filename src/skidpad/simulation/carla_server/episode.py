@@ -16,6 +16,7 @@ from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.debug import DebugShapes
 from skidpad.simulation.carla_server.effects import Remarks
 from skidpad.simulation.carla_server.falling import DROP, Falling, ground_below
+from skidpad.simulation.carla_server.giving_way import GivingWay
 from skidpad.simulation.carla_server.landscape import ALL_LAYERS, Landscape
 from skidpad.simulation.carla_server.map_actors import (
     light_actor,
@@ -100,6 +101,7 @@ class Episode:
         self.skeletons: dict[int, Skeleton] = {}  # of walkers whose bones were asked for
         self.debug = DebugShapes()
         self.posts = Posts(self.moving.lights)
+        self.giving_way = GivingWay(map.roads)
         self.surroundings = Surroundings(
             map, self.landscape, self.actors, self.vehicles, self.sky, clock
         )
@@ -286,7 +288,8 @@ class Episode:
 
     def fill_rows(self, dt: float) -> None:
         """The snapshot's columns as of now, dt s after the last time."""
-        filling.fill_vehicles(self.rows, self.actors, self.vehicles, self.posts)
+        red = self.giving_way.shown_red(self.vehicles, dt)
+        filling.fill_vehicles(self.rows, self.actors, self.vehicles, self.posts, red)
         filling.fill_lights(self.rows, self.actors, self.posts)
         for actor in self.actors:
             if actor.family not in filling.BY_COLUMNS:

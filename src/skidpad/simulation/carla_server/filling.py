@@ -12,6 +12,7 @@ from skidpad.core.lefthanded import (
     vector_from_carla,
     vectors_to_carla,
 )
+from skidpad.core.vocabulary import LightState
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.actors import Actor, ActorTable
 from skidpad.simulation.carla_server.catalogue import Family
@@ -21,6 +22,7 @@ from skidpad.simulation.carla_server.vehicles import Vehicles
 from skidpad.simulation.carla_server.walkers import WalkerControl
 
 Signals = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 
 
 BY_COLUMNS = (Family.VEHICLE, Family.TRAFFIC_LIGHT, Family.TRAFFIC_SIGN)
@@ -54,8 +56,10 @@ def fill_sign(rows: Rows, actor: Actor, sign: str, pole: int) -> None:
     row["pole"] = pole
 
 
-def fill_vehicles(rows: Rows, actors: ActorTable, vehicles: Vehicles, posts: Posts) -> None:
-    """Motion, drivers and what the road tells them, by columns."""
+def fill_vehicles(
+    rows: Rows, actors: ActorTable, vehicles: Vehicles, posts: Posts, red: Flags
+) -> None:
+    """Motion, drivers and what the road tells them, by columns. red: (n,) whom a sign holds."""
     n, moving = len(vehicles), vehicles.moving
     if n == 0:
         return
@@ -74,6 +78,8 @@ def fill_vehicles(rows: Rows, actors: ActorTable, vehicles: Vehicles, posts: Pos
     vehicles.heed(signs.limit.tolist())
     _fill_controls(rows, at, vehicles)
     _fill_governed(rows, at, signs.signal[:n], posts)
+    held = at[red & ~rows.vehicles["has_light"][at].astype(np.bool_)]
+    rows.vehicles["light_state"][held] = LightState.RED
 
 
 def _fill_controls(rows: Rows, at: NDArray[np.int64], vehicles: Vehicles) -> None:

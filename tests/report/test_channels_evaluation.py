@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from channel_worlds import Eyes, World, drive
-from skidpad.core.errors import FileError
+from skidpad.core.errors import FileError, InputError
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.judging.evaluation import Evaluation
 from skidpad.evidence.channels.judging.segments import judge
@@ -107,4 +107,34 @@ def test_redundancy_compares_equal_seeds(tmp_path):
 
 def test_a_folder_without_an_evaluation_is_named(tmp_path):
     with pytest.raises(FileError, match="evaluation"):
+        write_evaluation_report(tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("content", "said"),
+    [
+        (b"{}", "segments"),
+        (b"[]", "object"),
+        (b"\xff", "evaluation.json"),
+        (b'{"segments": 1, "hours": "x"}', "hours"),
+    ],
+)
+def test_a_file_that_is_no_evaluation_is_refused_in_a_sentence(tmp_path, content, said):
+    (tmp_path / "evaluation.json").write_bytes(content)
+    with pytest.raises(InputError, match=said) as refused:
+        write_evaluation_report(tmp_path)
+    assert "\n" not in str(refused.value)
+    assert not (tmp_path / "report.html").exists()
+
+
+def test_an_evaluation_that_lost_a_word_is_refused(folder, tmp_path):
+    whole = json.loads((folder / "evaluation.json").read_text())
+    for word in ("results", "curve", "by_route", "causes", "segment_table", "truths_agree"):
+        left = {k: v for k, v in whole.items() if k != word}
+        (tmp_path / "evaluation.json").write_text(json.dumps(left))
+        with pytest.raises(InputError, match=word):
+            write_evaluation_report(tmp_path)
+    odd = whole | {"results": [{"truth": "nobody"}]}
+    (tmp_path / "evaluation.json").write_text(json.dumps(odd))
+    with pytest.raises(InputError):
         write_evaluation_report(tmp_path)

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, Literal
 
+import msgspec
 import polars as pl
 
 from skidpad import __version__
-from skidpad.core.errors import FileError
-from skidpad.core.told import on_a_line
+from skidpad.core.reading import converted, decode_json, read_bytes
 from skidpad.evidence.channels.findings import FINDINGS
 from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
 from skidpad.evidence.channels.judging.segments import TOLD
@@ -46,14 +46,39 @@ Published numbers (8 h, other simulator, other channels, one human annotator) st
 
 def write_evaluation_report(folder: Path) -> Path:
     """Write report.html beside evaluation.json; returns its path."""
-    source = folder / EVALUATION
-    try:
-        evaluation = json.loads(source.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise FileError(
-            f"{source}: cannot be read as an evaluation ({on_a_line(error)})"
-        ) from error
-    return write_report_page(evaluation_page(evaluation, folder), folder)
+    return write_report_page(evaluation_page(_read(folder / EVALUATION), folder), folder)
+
+
+class _Result(msgspec.Struct):
+    """Of one identifier against one truth."""
+
+    rules: str
+    truth: Literal["sim", "world", "labels"]
+    tolerance_s: float
+    hazards: dict[str, dict[str, Any]]
+    micro: list[float | None]
+
+
+class _Evaluation(msgspec.Struct):
+    """What the page takes from an evaluation."""
+
+    segments: int
+    hours: float
+    results: list[_Result]
+    segment_table: list[dict[str, Any]]
+    curve: dict[str, dict[str, Any]]
+    by_route: dict[str, Any]
+    causes: list[dict[str, Any]]
+    truths_agree: dict[str, dict[str, Any]]
+    unseen_by_all_channels: Any
+
+
+def _read(source: Path) -> Row:
+    """InputError when it cannot be shown."""
+    data = read_bytes(source, "an evaluation")
+    evaluation: Row = decode_json(data, str(source), dict[str, Any])
+    converted(evaluation, _Evaluation, str(source))
+    return evaluation
 
 
 def evaluation_page(evaluation: Row, folder: Path) -> Page:

@@ -20,6 +20,7 @@ READERS = {name: reader for module in MODULES for name, reader in module.READERS
 LISTS = ("openscenario", "played", "storyboard", "catalog")  # name all that is wrong, a line each
 LONGEST = 50_000  # characters
 IN_CI = 500  # inputs of a reader
+OF_A_TEST = 10_000  # inputs at most, so that processes that share the readers end together
 FAULTS_SHOWN = 12
 CPU_S = 300  # of one input; thousands of times what one takes
 
@@ -32,11 +33,11 @@ def stop(signum, frame):
     raise TooLong
 
 
-def inputs(name, count, first=0):
-    """Damaged files of a reader, each from its own seed; count: None for as many as CI has time for."""
+def inputs(name, numbers):
+    """Damaged files of a reader, each from its own seed."""
     reader = READERS[name]
     seeds = reader.seeds()
-    for number in range(first, first + amount(reader, count)):
+    for number in numbers:
         rng = random.Random(zlib.crc32(name.encode()) + number)
         yield number, rng.choice(reader.mutations)(rng, rng.choice(seeds))
 
@@ -46,6 +47,22 @@ def amount(reader, asked):
     if asked is None:
         return round(IN_CI * reader.share)
     return asked if reader.most is None else min(asked, reader.most)
+
+
+def parts(asked, first):
+    """The tests: a reader's name and the numbers of its inputs."""
+    for name, reader in READERS.items():
+        end = first + amount(reader, asked)
+        for begin in range(first, end, OF_A_TEST):
+            numbers = range(begin, min(begin + OF_A_TEST, end))
+            yield pytest.param(name, numbers, id=f"{name}-{begin}" if begin else name)
+
+
+def pytest_generate_tests(metafunc):
+    if "numbers" in metafunc.fixturenames:
+        option = metafunc.config.getoption
+        tests = list(parts(option("--fuzz"), option("--fuzz-from")))
+        metafunc.parametrize("name, numbers", tests)
 
 
 def refused(reader, path):
@@ -69,8 +86,7 @@ def stopwatch():
     signal.signal(signal.SIGPROF, before)
 
 
-@pytest.mark.parametrize("name", READERS)
-def test_damaged_files_are_read_or_refused_in_a_sentence(name, tmp_path, request, stopwatch):
+def test_damaged_files_are_read_or_refused_in_a_sentence(name, numbers, tmp_path, stopwatch):
     reader = READERS[name]
     path = tmp_path / reader.file
     for (
@@ -78,8 +94,8 @@ def test_damaged_files_are_read_or_refused_in_a_sentence(name, tmp_path, request
     ) in reader.seeds():  # what is whole is read, and kernels are compiled by no input's clock
         path.write_bytes(seed)
         reader.read(path)
-    first, faults = request.config.getoption("--fuzz-from"), []
-    for number, data in inputs(name, request.config.getoption("--fuzz"), first):
+    faults = []
+    for number, data in inputs(name, numbers):
         path.write_bytes(data)
         try:
             said = refused(reader, path)

@@ -69,7 +69,7 @@ DISPLAYS = (ast.List, ast.Dict, ast.Set, ast.ListComp, ast.DictComp, ast.SetComp
 def is_kernel(node: ast.AST) -> bool:
     """Whether a function is compiled."""
     return isinstance(node, ast.FunctionDef) and any(
-        isinstance(d, ast.Name) and d.id == "kernel" for d in node.decorator_list
+        isinstance(d, ast.Name) and d.id in ("kernel", "inner_kernel") for d in node.decorator_list
     )
 
 

@@ -14,7 +14,7 @@ from skidpad.core.jit import imported, kernel_hash
 
 FILES = {
     "low": "from house.jit import kernel\n@kernel\ndef f(x): return x",
-    "middle": "from house.low import (\n    f,\n)\n@kernel\ndef g(x): return f(x)",
+    "middle": "from house.low import (\n    f,\n)\n@inner_kernel\ndef g(x): return f(x)",
     "high": "from house import middle\n@kernel\ndef h(x): return middle.g(x)",
     "other": "import numpy\n@kernel\ndef k(x): return x",
     "constants": "G = 9.81",
@@ -36,6 +36,22 @@ def hashes(root: Path) -> dict[str, str]:
     return {name: kernel_hash(root / f"{name}.py", root) for name in FILES}
 
 
+@jit.inner_kernel
+def halved(x: float) -> float:
+    return x / 2.0
+
+
+@jit.kernel
+def quartered(x: float) -> float:
+    return halved(halved(x))
+
+
+def test_only_kernels_call_an_inner_kernel() -> None:
+    assert quartered(2.0) == 0.5
+    with pytest.raises(TypeError, match="halved is for kernels alone"):
+        halved(2.0)
+
+
 @pytest.mark.parametrize(
     ("edited", "fresh"),
     [
@@ -53,7 +69,8 @@ def test_an_edit_reaches_those_who_may_call_it(house: Path, edited: str, fresh: 
     assert {name for name in FILES if before[name] != after[name]} == fresh
 
 
-def test_an_edited_callee_is_compiled_into_its_caller(tmp_path: Path) -> None:
+@pytest.mark.parametrize("decorator", ["kernel", "inner_kernel"])
+def test_an_edited_callee_is_compiled_into_its_caller(tmp_path: Path, decorator: str) -> None:
     """The real decorator over two files, in processes of their own."""
     root = tmp_path / "skidpad"
     (root / "core").mkdir(parents=True)
@@ -61,12 +78,12 @@ def test_an_edited_callee_is_compiled_into_its_caller(tmp_path: Path) -> None:
         (package / "__init__.py").touch()
     source = Path(sys.modules["skidpad.core.jit"].__file__ or "")
     (root / "core" / "jit.py").write_bytes(source.read_bytes())
-    head = "from skidpad.core.jit import kernel\n"
+    head = "from skidpad.core.jit import inner_kernel, kernel\n"
     caller = head + "from skidpad.callee import f\n@kernel\ndef g(x):\n    return f(x)\n"
     (root / "caller.py").write_text(caller)
 
     def answer(body: str) -> str:
-        (root / "callee.py").write_text(f"{head}@kernel\ndef f(x):\n    return {body}\n")
+        (root / "callee.py").write_text(f"{head}@{decorator}\ndef f(x):\n    return {body}\n")
         code = "from skidpad.caller import g; print(g(2.0), sum(g.stats.cache_hits.values()))"
         env = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"}
         env |= {"PYTHONPATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path / "cache")}

@@ -7,13 +7,26 @@ from hypothesis import given, settings
 from hypothesis.strategies import floats
 from shapely.affinity import rotate, translate
 
+from skidpad.core.jit import kernel
 from skidpad.core.states import ActorStates
-from skidpad.physics.contact import CONTACT_LAW, Contacts, bodies, find_contacts, resolve_contacts
-from skidpad.physics.segments import candidates, static_segments
+from skidpad.physics import contact, segments
+from skidpad.physics.contact import CONTACT_LAW, Contacts, bodies, resolve_contacts
+from skidpad.physics.segments import static_segments
 
 DT = 0.05
+
 NOTHING = static_segments(np.empty((0, 4)), np.empty(0), np.empty(0))
 RAIL = static_segments(np.array([[-500.0, 0.0, 500.0, 0.0]]), np.zeros(1), np.full(1, 0.8))
+
+
+@kernel
+def find_contacts(states, bodies, rails, dt, out):
+    return contact.find_contacts(states, bodies, rails, dt, out)
+
+
+@kernel
+def candidates(lines, x, y, reach, out):
+    return segments.candidates(lines, x, y, reach, out)
 
 
 def cars(*rows):
@@ -187,10 +200,10 @@ def test_grid_finds_what_a_scan_finds():
     start = rng.uniform(-300, 300, (500, 2))
     lines = np.hstack([start, start + rng.uniform(-60, 60, (500, 2))])
     lines[7, 2:] = lines[7, :2]  # no length, never found
-    segments = static_segments(lines, np.zeros(500), np.ones(500))
+    rails = static_segments(lines, np.zeros(500), np.ones(500))
     near = np.empty(500, dtype=np.int64)
     for x, y in rng.uniform(-320, 320, (50, 2)):
-        count = candidates(segments, x, y, 10.0, near)
+        count = candidates(rails, x, y, 10.0, near)
         low, high = np.minimum(lines[:, :2], lines[:, 2:]), np.maximum(lines[:, :2], lines[:, 2:])
         hit = (low <= [x + 10, y + 10]).all(1) & (high >= [x - 10, y - 10]).all(1)
         hit[7] = False

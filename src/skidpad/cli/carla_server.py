@@ -18,6 +18,7 @@ def carla_server(options: ServerOptions) -> None:
     """Serve unmodified CARLA 0.9.16 clients: no GPU, no download."""
     try:
         from skidpad.simulation.carla_server.server import CarlaServer, Ports
+        from skidpad.simulation.carla_server.warming import start_compiling
     except ModuleNotFoundError as error:
         if error.name != "msgpack":
             raise
@@ -26,6 +27,11 @@ def carla_server(options: ServerOptions) -> None:
     logging.basicConfig(
         level=logging.WARNING if options.strict else logging.ERROR, format="skidpad: %(message)s"
     )
+
+    def say(words: str) -> None:
+        typer.echo(f"skidpad carla-server: {words}", err=True)
+
+    helper = start_compiling(options, say)
     server = CarlaServer(options)
 
     def ready(ports: Ports) -> None:
@@ -34,11 +40,8 @@ def carla_server(options: ServerOptions) -> None:
             f"streams on {ports.streaming}, map {server.served.episode.map.name}"
         )
 
-    def say(words: str) -> None:
-        typer.echo(f"skidpad carla-server: {words}", err=True)
-
     with suppress(KeyboardInterrupt):
-        asyncio.run(server.run(ready, say))
+        asyncio.run(server.run(ready, helper))
     if options.strict and server.complaints():
         typer.echo("\n".join(server.complaints()), err=True)
         raise typer.Exit(1)

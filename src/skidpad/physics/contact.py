@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.overlap import Boxes, box_box, box_segment, corners_room
 from skidpad.physics.segments import Segments, candidates
@@ -90,19 +90,19 @@ def bodies(
     )
 
 
-@kernel
+@inner_kernel
 def _restitution(law: ContactLaw, v: float) -> float:
     return law.e_fast + law.e_slow * exp(-v / law.v_scale)
 
 
-@kernel
+@inner_kernel
 def _point_velocity(states: ActorStates, i: int, x: float, y: float) -> tuple[float, float]:
     """Velocity of actor i's body at a world point."""
     r = states.yaw_rate[i]
     return states.vx[i] - r * (y - states.y[i]), states.vy[i] + r * (x - states.x[i])
 
 
-@kernel
+@inner_kernel
 def _arm(states: ActorStates, b: Bodies, i: int, x: float, y: float) -> tuple[float, float]:
     """From actor i's centre of gravity to a world point."""
     x_cog = b.x_cog[i]
@@ -112,7 +112,7 @@ def _arm(states: ActorStates, b: Bodies, i: int, x: float, y: float) -> tuple[fl
     )
 
 
-@kernel
+@inner_kernel
 def _push(states: ActorStates, b: Bodies, i: int, x: float, y: float, jx: float, jy: float) -> None:
     """Impulse (jx, jy) in N s at a world point on actor i; the state's velocity is the centre's."""
     arm_x, arm_y = _arm(states, b, i, x, y)
@@ -122,7 +122,7 @@ def _push(states: ActorStates, b: Bodies, i: int, x: float, y: float, jx: float,
     states.yaw_rate[i] += d_r
 
 
-@kernel
+@inner_kernel
 def _yielding(
     states: ActorStates, b: Bodies, i: int, x: float, y: float, nx: float, ny: float
 ) -> float:
@@ -132,7 +132,7 @@ def _yielding(
     return float(b.inverse_mass[i] + cross * cross * b.inverse_inertia[i])
 
 
-@kernel
+@inner_kernel
 def _exchange(states: ActorStates, b: Bodies, c: Contacts, k: int, law: ContactLaw) -> float:
     """Apply the impulse of contact k; returns its closing speed before."""
     i, j, x, y, nx, ny = c.i[k], c.j[k], c.x[k], c.y[k], c.nx[k], c.ny[k]
@@ -164,7 +164,7 @@ def _exchange(states: ActorStates, b: Bodies, c: Contacts, k: int, law: ContactL
     return closing
 
 
-@kernel
+@inner_kernel
 def _separate(states: ActorStates, b: Bodies, c: Contacts, k: int) -> None:
     """Move the bodies of contact k apart, the lighter one further."""
     i, j = c.i[k], c.j[k]
@@ -180,7 +180,7 @@ def _separate(states: ActorStates, b: Bodies, c: Contacts, k: int) -> None:
         states.y[j] -= c.ny[k] * distance * (total - share) / total
 
 
-@kernel
+@inner_kernel
 def _record(
     c: Contacts, count: int, i: int, j: int, segment: int,
     found: tuple[bool, float, float, float, float, float],
@@ -195,7 +195,7 @@ def _record(
     return count + 1
 
 
-@kernel
+@inner_kernel
 def find_contacts(
     states: ActorStates, b: Bodies, segments: Segments, dt: float, out: Contacts
 ) -> int:

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 
@@ -199,13 +199,13 @@ def grip_params(weather: Weather, model: GripModel, mu_ref: float = MU_REF) -> G
     return MODELS[model](weather, mu_ref)
 
 
-@kernel
+@inner_kernel
 def dry_ratio(params: GripParams, v: float) -> float:
     """Friction of the same road when dry at speed v in m/s, over mu_ref."""
     return 1.0 + params.fall * (V_REFERENCE - min(v, V_FALL))
 
 
-@kernel
+@inner_kernel
 def afloat(params: GripParams, v: float) -> float:
     """Share of its grip that water leaves a tyre at speed v in m/s."""
     lifted, wedged = params.lift * v * v, params.wedge * v * v

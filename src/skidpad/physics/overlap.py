@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 
 Floats = NDArray[np.float64]
 Overlap = tuple[bool, float, float, float, float, float]  # touching, x, y, nx, ny, depth
@@ -30,7 +30,7 @@ def corners_room() -> Floats:
     return np.empty((2, 12, 2))
 
 
-@kernel
+@inner_kernel
 def _clip(polygon: Floats, count: int, axis: int, limit: float, sign: float, out: Floats) -> int:
     """Part of the polygon (count, 2) with sign * coordinate <= limit, into `out`."""
     kept = 0
@@ -48,7 +48,7 @@ def _clip(polygon: Floats, count: int, axis: int, limit: float, sign: float, out
     return kept
 
 
-@kernel
+@inner_kernel
 def _middle(boxes: Boxes, i: int, j: int) -> tuple[float, float]:
     """Mean corner of the overlap of boxes i and j, in the world."""
     c, s = cos(boxes.yaw[j]), sin(boxes.yaw[j])
@@ -73,7 +73,7 @@ def _middle(boxes: Boxes, i: int, j: int) -> tuple[float, float]:
     return boxes.x[j] + u * c - v * s, boxes.y[j] + u * s + v * c
 
 
-@kernel
+@inner_kernel
 def _radius(boxes: Boxes, i: int, nx: float, ny: float) -> float:
     """Half the extent of box i along a unit direction."""
     c, s = cos(boxes.yaw[i]), sin(boxes.yaw[i])
@@ -100,7 +100,7 @@ def box_box(boxes: Boxes, i: int, j: int) -> Overlap:
     return True, x, y, nx, ny, depth
 
 
-@kernel
+@inner_kernel
 def _clipped_line(
     boxes: Boxes, i: int, line: tuple[float, float, float, float]
 ) -> tuple[float, float]:
@@ -124,7 +124,7 @@ def _clipped_line(
     return enter, leave
 
 
-@kernel
+@inner_kernel
 def box_segment(
     boxes: Boxes, i: int, line: tuple[float, float, float, float], back: tuple[float, float]
 ) -> Overlap:

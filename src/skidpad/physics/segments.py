@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
@@ -71,7 +71,7 @@ def static_segments(lines: Floats, z_low: Floats, z_high: Floats) -> Segments:
     return Segments(x0, y0, x1, y1, *heights, low, shape, cell, first, member)
 
 
-@kernel
+@inner_kernel
 def candidates(s: Segments, x: float, y: float, reach: float, out: Ints) -> int:
     """Indices of segments whose bounding boxes come within `reach` of a place, ascending.
 

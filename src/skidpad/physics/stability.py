@@ -17,7 +17,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from skidpad.core.constants import G
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel
 
 V_LEAST = 20.0 / 3.6  # m/s
 RATE_SHARE = 0.85  # of mu g / v, most yaw rate that is wanted
@@ -54,7 +54,7 @@ class Correction(NamedTuple):
     drive: float  # share of the drive force that is left
 
 
-@kernel
+@inner_kernel
 def correction(m: Motion, model: Model) -> Correction:
     """The yaw acceleration that brakes have to give."""
     if m.u < V_LEAST:

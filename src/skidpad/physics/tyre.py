@@ -13,7 +13,7 @@ Chrono, Sedan_Pac02Tire.tir).
 
 from __future__ import annotations
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 
 SLIDE_SHARE = 0.88  # sliding to peak force; our assumption
 FALL_OFF = 1.0 - SLIDE_SHARE
@@ -46,13 +46,13 @@ def brush_secant(sigma: float) -> float:
     return brush_curve(sigma) / (3.0 * sigma)
 
 
-@kernel
+@inner_kernel
 def grip_share(load: float) -> float:
     """Friction over that at nominal load; load over nominal. Magic Formula: PD1 + PD2 dfz."""
     return max(1.0 - LOAD_GRIP * (load - 1.0), GRIP_LEAST)
 
 
-@kernel
+@inner_kernel
 def stiffness_share(load: float) -> float:
     """Cornering stiffness per load over that at nominal load; load over nominal.
 

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.constants import G
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.params import Floats, VehicleParams, WheelStates
 from skidpad.physics.stability import Correction, Model, Motion, correction
@@ -102,7 +102,7 @@ class Push(NamedTuple):
     held: float  # N that brakes could hold at standstill
 
 
-@kernel
+@inner_kernel
 def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -> Car:
     """Vehicle i under this command (5,)."""
     brake = min(max(command[BRAKE], 0.0), 1.0)
@@ -148,7 +148,7 @@ def _car(i: int, p: VehicleParams, command: Floats, grade: float, bank: float) -
     )
 
 
-@kernel
+@inner_kernel
 def _wheel_loads(car: Car, a_x: float, a_y: float, load: Floats) -> None:
     """Quasi-static loads into `load` (4,); an axle or a wheel never pulls on the road."""
     wheelbase = car.a + car.b
@@ -163,7 +163,7 @@ def _wheel_loads(car: Car, a_x: float, a_y: float, load: Floats) -> None:
         load[2 * axle + 1] = 0.5 * axle_load + transfer
 
 
-@kernel
+@inner_kernel
 def _drive(car: Car, u: float, speed: float, omega: Floats) -> float:
     """Force of the engine at all driven wheels in N, negative in reverse; none beyond its top speed."""
     spin = car.drive_front * (omega[0] + omega[1]) + (1.0 - car.drive_front) * (omega[2] + omega[3])
@@ -174,7 +174,7 @@ def _drive(car: Car, u: float, speed: float, omega: Floats) -> float:
     return float(-drive if car.reverse else drive)
 
 
-@kernel
+@inner_kernel
 def _asked(car: Car, u: float, v: float, r: float, steer: float, mu: Floats) -> Correction:
     """What stability control asks for."""
     if not car.stability:
@@ -184,7 +184,7 @@ def _asked(car: Car, u: float, v: float, r: float, steer: float, mu: Floats) -> 
     return correction(Motion(u, r, slip, steer, mean), car.model)
 
 
-@kernel
+@inner_kernel
 def _push(
     car: Car, u: float, v: float, r: float, a_x: float, drive: float, asked: Correction,
     steer: float, omega: Floats, slip_y: Floats, slide: Floats, load: Floats, mu: Floats, h: float,
@@ -238,7 +238,7 @@ def _push(
     return Push(force_x, force_y, moment, held)
 
 
-@kernel
+@inner_kernel
 def _advance(
     i: int, states: ActorStates, wheels: WheelStates, car: Car, mu: Floats, g_x: float, g_y: float,
     turn_max: float, h: float, steps: int,
@@ -279,7 +279,7 @@ def _advance(
     _keep(i, states, Body(x, y, yaw, vx, vy, r, a_x), car.x_cog, h * steps)
 
 
-@kernel
+@inner_kernel
 def _body(i: int, states: ActorStates, x_cog: float) -> Body:
     """Motion of vehicle i at its centre of gravity."""
     yaw, r = states.yaw[i], states.yaw_rate[i]
@@ -295,7 +295,7 @@ def _body(i: int, states: ActorStates, x_cog: float) -> Body:
     )
 
 
-@kernel
+@inner_kernel
 def _keep(i: int, states: ActorStates, body: Body, x_cog: float, dt: float) -> None:
     """Motion of vehicle i at its reference point, dt seconds after what is stored."""
     c, s = cos(body.yaw), sin(body.yaw)

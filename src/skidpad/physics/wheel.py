@@ -9,7 +9,7 @@ from __future__ import annotations
 from math import sqrt
 from typing import NamedTuple
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel
 from skidpad.physics.tyre import (
     STIFFNESS_ALONG,
     V_SLIP_MIN,
@@ -72,7 +72,7 @@ class Turned(NamedTuple):
     held: float  # N that brakes could hold at standstill
 
 
-@kernel
+@inner_kernel
 def turn(c: Contact, tyre: Tyre, q: Torques, h: float) -> Turned:
     """The wheel h seconds later, and the force on it meanwhile."""
     share = c.load / tyre.nominal
@@ -119,14 +119,14 @@ def turn(c: Contact, tyre: Tyre, q: Torques, h: float) -> Turned:
     return Turned(omega, s_y, sigma, f_x, f_y, min(brake / tyre.radius, grip))
 
 
-@kernel
+@inner_kernel
 def _traction(grip: float, f_y: float, spinning: bool) -> float:
     """Most drive force beside the side force that idealised traction control lets through, N."""
     share = TRACTION_UTILISATION * (TRACTION_RELEASE if spinning else 1.0)
     return sqrt(max(share * share * grip * grip - f_y * f_y, 0.0))
 
 
-@kernel
+@inner_kernel
 def _spin(
     omega: float, drive: float, resist: float, k: float, v_x: float, radius: float, inertia: float,
     h: float,

@@ -8,7 +8,7 @@ from __future__ import annotations
 from math import atan2, ceil, floor, inf, nan, pi, sqrt
 from typing import NamedTuple
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.roads.lanes import Floats, Ints
 
 REACH = 20.0  # m, beyond this there is no lane
@@ -52,13 +52,13 @@ class LaneArrays(NamedTuple):
     cell_point: Floats  # (N, 3) x, y, z in the order of cell_sample: read one after the other
 
 
-@kernel
+@inner_kernel
 def wrapped(angle: float) -> float:
     """`angle` wrapped to (-pi, pi]."""
     return pi - (pi - angle) % (2.0 * pi)
 
 
-@kernel
+@inner_kernel
 def closest_on_segment(
     a: LaneArrays, i: int, x: float, y: float
 ) -> tuple[float, float, float, float]:
@@ -89,7 +89,7 @@ def closest_on_segment(
     return u, across, (x - px) ** 2 + (y - py) ** 2, missed
 
 
-@kernel
+@inner_kernel
 def hermite(a: LaneArrays, i: int, u: float) -> tuple[float, float, float, float]:
     """Position and its derivative by u on the cubic through samples i and i + 1."""
     p, q = a.sample[i], a.sample[i + 1]
@@ -106,7 +106,7 @@ def hermite(a: LaneArrays, i: int, u: float) -> tuple[float, float, float, float
     return x, y, tx, ty
 
 
-@kernel
+@inner_kernel
 def project_kernel(
     a: LaneArrays,
     x: float,
@@ -182,7 +182,7 @@ def project_kernel(
     return lane, s, offset
 
 
-@kernel
+@inner_kernel
 def segment_kernel(a: LaneArrays, lane: int, s: float) -> tuple[int, float]:
     """(sample, share): s lies between that sample of the lane and the next; s is clamped."""
     first = a.first[lane]
@@ -201,7 +201,7 @@ def segment_kernel(a: LaneArrays, lane: int, s: float) -> tuple[int, float]:
     return low, min(max(share, 0.0), 1.0)
 
 
-@kernel
+@inner_kernel
 def sample_kernel(
     a: LaneArrays, lane: int, s: float
 ) -> tuple[float, float, float, float, float, float, float, float, float]:
@@ -226,7 +226,7 @@ def sample_kernel(
     )
 
 
-@kernel
+@inner_kernel
 def project_point(
     a: LaneArrays, x: float, y: float, z: float, driving: bool
 ) -> tuple[int, float, float, float, float, float, float, float, float]:
@@ -238,7 +238,7 @@ def project_point(
     return lane, s, offset, px, py, pz, heading, curvature, width
 
 
-@kernel
+@inner_kernel
 def advance_point(
     a: LaneArrays, lane: int, s: float, distance: float, heading: float
 ) -> tuple[int, float, float, float, float, float, float, float, float]:
@@ -275,7 +275,7 @@ def lane_s_kernel(a: LaneArrays, lane: int, s_road: float) -> float:
     return float(a.sample[low, S] + share * (a.sample[high, S] - a.sample[low, S]))
 
 
-@kernel
+@inner_kernel
 def turn_of(a: LaneArrays, lane: int, heading: float, distance: float) -> float:
     """Absolute angle between `heading` and the direction to the place `distance` m into the lane."""
     s = min(distance, a.length[lane])
@@ -284,7 +284,7 @@ def turn_of(a: LaneArrays, lane: int, heading: float, distance: float) -> float:
     return abs(wrapped(h - heading)) + 1e-3 * abs(wrapped(atan2(y - y0, x - x0) - heading))
 
 
-@kernel
+@inner_kernel
 def straightest_next(a: LaneArrays, lane: int, heading: float) -> int:
     """The drivable successor whose end points closest to `heading` (A-148), or -1."""
     best, chosen = inf, -1
@@ -298,7 +298,7 @@ def straightest_next(a: LaneArrays, lane: int, heading: float) -> int:
     return chosen
 
 
-@kernel
+@inner_kernel
 def straightest_previous(a: LaneArrays, lane: int, heading: float) -> int:
     """The drivable predecessor whose start points closest to `heading`, or -1."""
     best, chosen = inf, -1
@@ -349,7 +349,7 @@ def neighbour_s(a: LaneArrays, lane: int, other: int, s: float) -> float:
     return lane_s_kernel(a, other, s_road_kernel(a, lane, s))
 
 
-@kernel
+@inner_kernel
 def signal_ahead(
     a: LaneArrays, lane: int, s: float, distance: float, kind: int, heading: float = nan
 ) -> tuple[int, float]:
@@ -376,7 +376,7 @@ def signal_ahead(
     return -1, inf
 
 
-@kernel
+@inner_kernel
 def distance_kernel(a: LaneArrays, lane: int, s: float, x: float, y: float) -> float:
     """Plane distance from a point to a place on a lane."""
     px, py, _, _, _, _, _, _, _ = sample_kernel(a, lane, s)

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel
 from skidpad.core.randomness import stream_key
 from skidpad.core.specs import RadarSpec
 from skidpad.sensors.noise import uniform
@@ -32,7 +32,7 @@ def beam_of(spec: RadarSpec, seed: int, dt: float) -> Beam:
     )
 
 
-@kernel
+@inner_kernel
 def direction(beam: Beam, tick: int, ray: int) -> tuple[float, float]:
     """Tangents right and down of one ray: uniform angle and uniform radius in the elliptic cone.
 

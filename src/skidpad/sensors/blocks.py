@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.sensors.materials import MATERIALS
 from skidpad.sensors.packing import pack
 from skidpad.sensors.view import View
@@ -27,7 +27,7 @@ ZERO, ONE = np.float32(0.0), np.float32(1.0)
 _WHITE = np.float32(255.0)
 
 
-@kernel
+@inner_kernel
 def end_of_run(keys: NDArray[np.int32], x: int) -> int:
     """Where the run of equal keys that begins at x ends; looked through `STRIDE` at a time."""
     k, count = keys[x], keys.size
@@ -68,7 +68,7 @@ def gather(
         x = end
 
 
-@kernel
+@inner_kernel
 def slopes(
     inverse: Float32, y: int, first: int, count: int, view: View, work: Float32
 ) -> tuple[bool, bool]:
@@ -108,7 +108,7 @@ def slopes(
     return solid > 0, solid < count
 
 
-@kernel
+@inner_kernel
 def develop(count: int, work: Float32, out: NDArray[np.uint32]) -> None:
     """Linear light to bytes: gamma 2, clipped, packed as red, green, blue, 255."""
     for x in range(count):

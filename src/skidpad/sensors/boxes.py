@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel
 from skidpad.core.states import ActorStates
 from skidpad.roads.roadside import Roadside
 
@@ -51,7 +51,7 @@ def mount_of(pose: Pose) -> Mount:
     return Mount(np.array([pose.x, pose.y, pose.z]), np.ascontiguousarray(pose.rotation()))
 
 
-@kernel
+@inner_kernel
 def placed(mount: Mount, states: ActorStates) -> Mount:
     """The ego's sensor seen from the world, body pitch and roll included (`Pose.rotation`)."""
     cr, sr = np.cos(states.roll[0]), np.sin(states.roll[0])
@@ -92,7 +92,7 @@ def posts_of(roadside: Roadside) -> Boxes:
     return Boxes(*np.array(rows, dtype=np.float64).reshape(-1, 7).T.copy())
 
 
-@kernel
+@inner_kernel
 def walls_in_view(
     origin: Floats, yaw: float, slope: float, walls: Walls, reach: float
 ) -> NDArray[np.int64]:
@@ -116,7 +116,7 @@ def walls_in_view(
     return keep[:n]
 
 
-@kernel
+@inner_kernel
 def boxes_in_view(
     origin: Floats, yaw: float, slope: float, boxes: Boxes, reach: float
 ) -> NDArray[np.int64]:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import Held, kernel
+from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.core.specs import RadarSpec
 from skidpad.core.states import ActorStates
 from skidpad.core.weather import Weather
@@ -43,7 +43,7 @@ def antenna_of(spec: RadarSpec, seed: int, dt: float, weather: Weather | None) -
     return Antenna(mount_of(spec.mount), beam_of(spec, seed, dt), reach)
 
 
-@kernel
+@inner_kernel
 def cast_radar(
     radar: Antenna,
     tick: int,
@@ -124,7 +124,7 @@ def road_slope(map: Held[LaneArrays], x: float, y: float, z: float) -> Floats:
     return slope
 
 
-@kernel
+@inner_kernel
 def _ray_wall(origin: Floats, dx: float, dy: float, dz: float, walls: Walls, w: int) -> float:
     """Distance along the ray to wall w; inf when it misses."""
     ex, ey = walls.x1[w] - walls.x0[w], walls.y1[w] - walls.y0[w]
@@ -140,7 +140,7 @@ def _ray_wall(origin: Floats, dx: float, dy: float, dz: float, walls: Walls, w: 
     return t if 0.0 <= rise <= walls.height[w] else np.inf
 
 
-@kernel
+@inner_kernel
 def _turned(boxes: Boxes, chosen: NDArray[np.int64]) -> Floats:
     """(k, 2) cosine and sine of the chosen boxes' yaw: once per tick, not once per ray."""
     out = np.empty((chosen.size, 2))
@@ -149,7 +149,7 @@ def _turned(boxes: Boxes, chosen: NDArray[np.int64]) -> Floats:
     return out
 
 
-@kernel
+@inner_kernel
 def _ray_box(
     origin: Floats, dx: float, dy: float, dz: float, boxes: Boxes, b: int, turned: Floats
 ) -> float:

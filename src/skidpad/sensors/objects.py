@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.frames import RadarPoints, Segments
 from skidpad.core.inputs import Beam
-from skidpad.core.jit import Held, hold, kernel
+from skidpad.core.jit import Held, hold, inner_kernel, kernel
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind
@@ -191,7 +191,7 @@ def _segments(
     return out[:n].copy(), classes[:n].copy()
 
 
-@kernel
+@inner_kernel
 def _near_to_far(
     camera: Camera, boxes: Boxes, present: NDArray[np.bool_], limit: float
 ) -> NDArray[np.int64]:
@@ -210,7 +210,7 @@ def _near_to_far(
     return order[: np.sum(np.isfinite(distance))]
 
 
-@kernel
+@inner_kernel
 def _box_runs(
     camera: Camera,
     boxes: Boxes,
@@ -238,7 +238,7 @@ def _box_runs(
     return n
 
 
-@kernel
+@inner_kernel
 def _face_runs(
     camera: Camera,
     boxes: Boxes,
@@ -287,7 +287,7 @@ def _face_runs(
     return n
 
 
-@kernel
+@inner_kernel
 def _strip_runs(
     camera: Camera,
     px: float,

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel
 from skidpad.sensors.view import NEAR, View
 
 LEFT, RIGHT, UP, DOWN, BEHIND = 1, 2, 4, 8, 16  # planes of the frustum, as bits
@@ -38,7 +38,7 @@ def make_scratch(largest_block: int, width: int) -> Scratch:
     )
 
 
-@kernel
+@inner_kernel
 def project_block(
     vertices: Floats,
     first: int,
@@ -81,7 +81,7 @@ def project_block(
         scratch.code[i] = code
 
 
-@kernel
+@inner_kernel
 def clip_near(a: int, b: int, c: int, view: View, scratch: Scratch, out: Floats) -> int:
     """Corners (k, 3) of the part of a triangle beyond the near plane, on screen; k is 0, 3 or 4."""
     corners = (a, b, c)
@@ -108,7 +108,7 @@ def clip_near(a: int, b: int, c: int, view: View, scratch: Scratch, out: Floats)
     return k
 
 
-@kernel
+@inner_kernel
 def sphere_visible(centre: Floats, radius: float, view: View, sides: Floats, shift: Floats) -> bool:
     """Whether any of a sphere may lie in the frustum. sides: (4,) lengths of the side normals."""
     r = view.rotation
@@ -127,7 +127,7 @@ def sphere_visible(centre: Floats, radius: float, view: View, sides: Floats, shi
     return bool(f * y - (view.height - view.cy) * z <= radius * sides[3])
 
 
-@kernel
+@inner_kernel
 def frustum_sides(view: View) -> Floats:
     """(4,) lengths of the inward normals of the left, right, upper and lower plane."""
     sides = np.empty(4)
@@ -138,7 +138,7 @@ def frustum_sides(view: View) -> Floats:
     return sides
 
 
-@kernel
+@inner_kernel
 def rotated(m: Floats, v: Floats) -> Floats:
     """m @ v of a (3, 3) and a (3,), in a fixed order of additions."""
     out = np.empty(3)
@@ -147,7 +147,7 @@ def rotated(m: Floats, v: Floats) -> Floats:
     return out
 
 
-@kernel
+@inner_kernel
 def composed(a: Floats, b: Floats) -> Floats:
     """a @ b of two (3, 3), in a fixed order of additions."""
     out = np.empty((3, 3))

@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.sensors.materials import Material
 from skidpad.sensors.projection import (
@@ -54,7 +54,7 @@ class Actors(NamedTuple):
     present: NDArray[np.bool_]
 
 
-@kernel
+@inner_kernel
 def _fill(
     x0: float,
     y0: float,
@@ -120,7 +120,7 @@ def _fill(
             keys[i] = value if nearer else keys[i]
 
 
-@kernel
+@inner_kernel
 def _draw_block(
     triangles: Ints,
     keys: Ints,
@@ -180,7 +180,7 @@ def _draw_block(
             )
 
 
-@kernel
+@inner_kernel
 def chunk_level(centre: Floats, radius: float, view: View, level: int) -> int:
     """The level of detail of a chunk, unless one is prescribed."""
     if level >= 0:

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.sensors.projection import (
     BEHIND,
     Floats,
@@ -64,7 +64,7 @@ def make_hits(n: int) -> Hits:
     return Hits(np.zeros(n), np.zeros(n, dtype=np.int32), np.zeros(n))
 
 
-@kernel
+@inner_kernel
 def sort_into_cells(view: View, rays: Rays) -> None:
     """Fill `start` and `order` from the rays' columns and rows (a counting sort)."""
     rays.start[:] = 0
@@ -85,7 +85,7 @@ def sort_into_cells(view: View, rays: Rays) -> None:
     rays.start[rays.start.size - 1] = rays.order.size
 
 
-@kernel
+@inner_kernel
 def _in_axes(view: View, point: Floats, shift: Floats) -> tuple[float, float, float]:
     """A point (3,) of the world in camera axes."""
     r = view.rotation
@@ -95,7 +95,7 @@ def _in_axes(view: View, point: Floats, shift: Floats) -> tuple[float, float, fl
     return x, y, z
 
 
-@kernel
+@inner_kernel
 def _touched(
     centre: Floats, radius: float, view: View, shift: Floats, rays: Rays, hits: Hits
 ) -> bool:
@@ -130,7 +130,7 @@ def _touched(
     return False
 
 
-@kernel
+@inner_kernel
 def _meet(corners: Floats, value: int, view: View, rays: Rays, hits: Hits) -> None:
     """Test one projected triangle (3, 3) against the rays of the cells that it touches."""
     x0, y0, w0 = corners[0, 0], corners[0, 1], corners[0, 2]
@@ -167,7 +167,7 @@ def _meet(corners: Floats, value: int, view: View, rays: Rays, hits: Hits) -> No
                 hits.cosine[i] = _incidence(a, b, w, px, py, view)
 
 
-@kernel
+@inner_kernel
 def _incidence(a: float, b: float, w: float, px: float, py: float, view: View) -> float:
     """Cosine between the ray and the normal of the plane whose inverse depth has slopes a, b."""
     u, v = (px - view.cx) / view.focal, (py - view.cy) / view.focal
@@ -176,7 +176,7 @@ def _incidence(a: float, b: float, w: float, px: float, py: float, view: View) -
     return float(w / np.sqrt((nx * nx + ny * ny + nz * nz) * (u * u + v * v + 1.0)))
 
 
-@kernel
+@inner_kernel
 def _meet_block(
     triangles: Ints,
     keys: Ints,

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorTable
 from skidpad.sensors.blocks import (
     BLOCK,
@@ -153,7 +153,7 @@ _FARTHEST = np.float32(1e-6)
 _NEAR_LAMP, _LAMP_APART = np.float32(0.3), np.float32(1.2)  # m
 
 
-@kernel
+@inner_kernel
 def beam_at(
     px: np.float32,
     py: np.float32,
@@ -173,7 +173,7 @@ def beam_at(
     return lit if px > ZERO else ZERO
 
 
-@kernel
+@inner_kernel
 def beam_of(light: Lighting) -> tuple[np.float32, np.float32, np.float32]:
     """Power, slope of the cut-off and reach of the ego's beam."""
     beam = np.float32(light.headlights) * _BEAM_POWER
@@ -197,7 +197,7 @@ def behind_lamps(
     return bool(ahead < -BEHIND_BY and before < 0.0)
 
 
-@kernel
+@inner_kernel
 def _headlights(
     v: np.float32,
     count: int,
@@ -221,7 +221,7 @@ def _headlights(
         work[H + x] = beam_at(px, py, pz, beam, slope, reach)
 
 
-@kernel
+@inner_kernel
 def _surfaces(
     v: np.float32, count: int, light: Lighting, sun: Float32, up: Float32, work: Float32
 ) -> None:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.sensors.boxes import Boxes
 
 Floats = NDArray[np.float64]
@@ -30,7 +30,7 @@ class Sight(NamedTuple):
     share: Floats  # (n,) of the bearings that an actor fills, those on which it is nearest
 
 
-@kernel
+@inner_kernel
 def ray_box(dx: float, dy: float, c: float, s: float, half_l: float, half_w: float,
             ux: float, uy: float) -> float:  # fmt: skip
     """Distance along a unit ray (ux, uy) to a box centred at (dx, dy) turned by (c, s); inf: missed.
@@ -50,7 +50,7 @@ def ray_box(dx: float, dy: float, c: float, s: float, half_l: float, half_w: flo
     return near if near <= far else np.inf
 
 
-@kernel
+@inner_kernel
 def _draw(boxes: Boxes, i: int, owner: int, eye: Floats, half_angle: float, sight: Sight) -> int:
     """Draw box i into the buffer; returns how many bearings in view it fills."""
     c, s = np.cos(boxes.yaw[i]), np.sin(boxes.yaw[i])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel
 from skidpad.sensors.blocks import ONE, ZERO, B, Float32, G, R, U, W
 from skidpad.sensors.lighting import Lighting
 
@@ -12,7 +12,7 @@ _TWO = np.float32(2.0)
 _GLOW_SHARE, _DISC_SHARE = np.float32(0.25), np.float32(3.0)
 
 
-@kernel
+@inner_kernel
 def sky(v: np.float32, count: int, light: Lighting, up: Float32, work: Float32) -> None:
     """The sky where a block shows nothing else."""
     hor_r, hor_g, hor_b = light.horizon[0], light.horizon[1], light.horizon[2]
@@ -30,7 +30,7 @@ def sky(v: np.float32, count: int, light: Lighting, up: Float32, work: Float32) 
         work[B + x] = hor_b + climb * zen_b if empty else work[B + x]
 
 
-@kernel
+@inner_kernel
 def disc(v: np.float32, count: int, light: Lighting, sun: Float32, work: Float32) -> None:
     """The sun and its glow in a block's sky."""
     bright = np.float32(light.disc)

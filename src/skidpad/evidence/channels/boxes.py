@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.evidence.channels.paths import sample_path, sample_plan
 
 Floats = NDArray[np.float64]
@@ -26,7 +26,7 @@ class Movers(NamedTuple):
     bounds: Floats  # (n, 4) x_min, x_max, y_min, y_max swept by the boxes
 
 
-@kernel
+@inner_kernel
 def box_of(polygon: Floats, size: int) -> tuple[float, float, float, float]:
     """Centre x, y and half length, half width of the box around a polygon in its own frame.
 
@@ -43,7 +43,7 @@ def box_of(polygon: Floats, size: int) -> tuple[float, float, float, float]:
     return 0.5 * (x0 + x1), 0.5 * (y0 + y1), 0.5 * (x1 - x0), 0.5 * (y1 - y0)
 
 
-@kernel
+@inner_kernel
 def _oriented(
     points: Floats, heading: float, polygon: Floats, size: int, movers: Movers, i: int
 ) -> None:

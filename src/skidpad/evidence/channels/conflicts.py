@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.evidence.channels.boxes import HORIZON, STEP
 
 Floats = NDArray[np.float64]
@@ -19,7 +19,7 @@ TINY = 1e-12
 CORNERS = 16  # of a square cut by eight lines, at most 12
 
 
-@kernel
+@inner_kernel
 def _axes(a: Floats, half_a: Floats, b: Floats, half_b: Floats, out: Floats) -> None:
     """The four edge normals of two boxes and how far apart centres may be on each: out (4, 3)."""
     ac, as_, bc, bs = a[2], a[3], b[2], b[3]
@@ -31,7 +31,7 @@ def _axes(a: Floats, half_a: Floats, b: Floats, half_b: Floats, out: Floats) -> 
     out[3, 0], out[3, 1], out[3, 2] = -bs, bc, bw + al * cs + aw * cc
 
 
-@kernel
+@inner_kernel
 def _entry(x: float, y: float, dx: float, dy: float, axes: Floats) -> float:
     """Share of a step after which boxes (x, y) apart that move by (dx, dy) overlap; inf: never."""
     low, high = 0.0, 1.0
@@ -48,7 +48,7 @@ def _entry(x: float, y: float, dx: float, dy: float, axes: Floats) -> float:
     return low if low <= high else np.inf
 
 
-@kernel
+@inner_kernel
 def first_overlap(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> float:
     """Time in s of the first overlap of two motions (SAMPLES, 4); inf when they never meet."""
     axes = np.empty((4, 3))
@@ -69,7 +69,7 @@ def first_overlap(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> float
     return np.inf
 
 
-@kernel
+@inner_kernel
 def _cut(corners: Floats, n: int, c: float, cs: float, cu: float, out: Floats) -> int:
     """The part of a polygon (n, 2) in (s, u) where c + cs s + cu u <= 0; how many corners it has."""
     m = 0
@@ -88,7 +88,7 @@ def _cut(corners: Floats, n: int, c: float, cs: float, cu: float, out: Floats) -
     return m
 
 
-@kernel
+@inner_kernel
 def _shared(
     a: Floats, i: int, half_a: Floats, b: Floats, j: int, half_b: Floats, axes: Floats, room: Floats
 ) -> int:
@@ -112,7 +112,7 @@ def _shared(
     return n
 
 
-@kernel
+@inner_kernel
 def _stride(motion: Floats) -> float:
     longest = 0.0
     for k in range(motion.shape[0] - 1):

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 
-@kernel
+@inner_kernel
 def usable_length(times: Floats, points: Floats) -> int:
     """Leading rows that are finite and strictly later than the row before them.
 
@@ -24,7 +24,7 @@ def usable_length(times: Floats, points: Floats) -> int:
     return len(times)
 
 
-@kernel
+@inner_kernel
 def sample_path(
     times: Floats, points: Floats, start: Floats, t_start: float, step: float, out: Floats
 ) -> int:

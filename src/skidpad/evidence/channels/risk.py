@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.evidence.channels.boxes import HORIZON, Movers, ego_movers, world_movers
 from skidpad.evidence.channels.conflicts import PET_SAFE, encroachment, first_overlap
 from skidpad.evidence.channels.frames import usable
@@ -80,7 +80,7 @@ def _worst_known(row: list[float]) -> float:
     return max((v for v in row if v == v), default=np.nan)  # v == v: not NaN
 
 
-@kernel
+@inner_kernel
 def printed_risk(ttc: float, pet: float) -> float:
     """Risk of times in s, inf where there is none (C-094)."""
     return max(1.0 - ttc / HORIZON, 1.0 - pet / PET_SAFE, 0.0)

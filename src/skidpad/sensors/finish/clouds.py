@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.randomness import stream
 from skidpad.core.weather import Weather
 from skidpad.sensors.lighting import Lighting
@@ -112,7 +112,7 @@ def draw_clouds(
             _blend(row, width, amount, seen, lanes, layer, inverse, out)
 
 
-@kernel
+@inner_kernel
 def _blend(
     row: int,
     width: int,

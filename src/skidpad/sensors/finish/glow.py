@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.sensors.finish.lamps import Sources
 from skidpad.sensors.packing import pack, unpack
 from skidpad.sensors.view import View
@@ -22,7 +22,7 @@ STREAK_WIDTH, STREAK_SHARE = 0.22, 1.5  # m, strength beside the bloom's
 LONGEST = 6.0  # lengths of its fall after which a streak ends
 
 
-@kernel
+@inner_kernel
 def add_light(p: np.uint32, r: float, g: float, b: float) -> np.uint32:
     """A packed pixel with more light; its bytes are square roots of light."""
     red, green, blue = unpack(p)
@@ -32,7 +32,7 @@ def add_light(p: np.uint32, r: float, g: float, b: float) -> np.uint32:
     return pack(red, green, blue)
 
 
-@kernel
+@inner_kernel
 def _seen(view: View, u: float, v: float, z: float, inverse: NDArray[np.float32]) -> float:
     """Share of a lamp at (u, v), z m ahead, that nothing hides."""
     height, width = inverse.shape
@@ -46,7 +46,7 @@ def _seen(view: View, u: float, v: float, z: float, inverse: NDArray[np.float32]
     return free / 9.0
 
 
-@kernel
+@inner_kernel
 def _halo(
     view: View, u: float, v: float, core: float, light: tuple[float, float, float],
     out: NDArray[np.uint32],
@@ -65,7 +65,7 @@ def _halo(
             out[row, column] = add_light(out[row, column], f * light[0], f * light[1], f * light[2])
 
 
-@kernel
+@inner_kernel
 def _streak(
     view: View,
     place: tuple[float, float, float, float],
@@ -94,7 +94,7 @@ def _streak(
             out[row, column] = add_light(out[row, column], f * light[0], f * light[1], f * light[2])
 
 
-@kernel
+@inner_kernel
 def _ahead(view: View, x: float, y: float, z: float) -> tuple[float, float, float]:
     """Column, row and depth of a point."""
     r, c = view.rotation, view.centre

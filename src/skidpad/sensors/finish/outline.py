@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.sensors.view import View
 
 Floats = NDArray[np.float64]
@@ -13,7 +13,7 @@ MOST = 96  # points on screen: 16 corners, and where their 120 edges pass the ne
 CUT = 0.3  # m, the plane before the camera at which edges are cut
 
 
-@kernel
+@inner_kernel
 def project_corners(view: View, corners: Floats, out: Floats) -> int:
     """Points (k, 2) on screen of corners (n, 3), whose edges are cut before the camera; k."""
     r, n, count = view.rotation, corners.shape[0], 0
@@ -42,14 +42,14 @@ def project_corners(view: View, corners: Floats, out: Floats) -> int:
     return count
 
 
-@kernel
+@inner_kernel
 def _turns_left(p: Floats, a: int, b: int, c: int) -> bool:
     return bool(
         (p[b, 0] - p[a, 0]) * (p[c, 1] - p[a, 1]) - (p[b, 1] - p[a, 1]) * (p[c, 0] - p[a, 0]) > 0.0
     )
 
 
-@kernel
+@inner_kernel
 def hull(points: Floats, count: int, ring: NDArray[np.int64]) -> int:
     """Indices of the convex hull of points (count, 2), sorted in place; how many (Andrew, 1979)."""
     for i in range(1, count):

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.sensors.finish.glow import add_light
 from skidpad.sensors.lighting import Lighting
@@ -59,7 +59,7 @@ def send_back(
     _send_back(view, light, to_body, offset.astype(np.float32), gain, inverse, key, out)
 
 
-@kernel
+@inner_kernel
 def _any(key: NDArray[np.int32]) -> bool:
     """Whether any of these pixels may send light back."""
     found = 0

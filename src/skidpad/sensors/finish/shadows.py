@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.roads.roadside import Box
@@ -110,7 +110,7 @@ class _Cast(NamedTuple):
     sun: float  # share of light that the sun's shadow takes away; 0: there is none
 
 
-@kernel
+@inner_kernel
 def _cast_of(bodies: Bodies, i: int, shade: Shade) -> _Cast:
     c, s = np.cos(bodies.yaw[i]), np.sin(bodies.yaw[i])
     throw = np.hypot(shade.sun_x, shade.sun_y)
@@ -121,7 +121,7 @@ def _cast_of(bodies: Bodies, i: int, shade: Shade) -> _Cast:
     return _Cast(c, s, half_l, half_w, c * tx + s * ty, -s * tx + c * ty, dark)
 
 
-@kernel
+@inner_kernel
 def _corners(bodies: Bodies, i: int, cast: _Cast, out: Floats) -> None:
     """(16, 3) corners of what a shadow can darken: the body's footprint and the shadow's end."""
     size = cast.half_l + cast.half_w
@@ -142,7 +142,7 @@ def _corners(bodies: Bodies, i: int, cast: _Cast, out: Floats) -> None:
                     k += 1
 
 
-@kernel
+@inner_kernel
 def _outside(lx: float, ly: float, half_l: float, half_w: float) -> float:
     """Distance in m to a box's outline, negative inside."""
     qx, qy = abs(lx) - half_l, abs(ly) - half_w
@@ -151,7 +151,7 @@ def _outside(lx: float, ly: float, half_l: float, half_w: float) -> float:
     return float(np.sqrt(qx * qx + qy * qy))
 
 
-@kernel
+@inner_kernel
 def _beyond_shadow(cast: _Cast, lx: float, ly: float) -> float:
     """Distance in m to the outline that the box sweeps to the end of its shadow, negative inside.
 
@@ -170,7 +170,7 @@ def _beyond_shadow(cast: _Cast, lx: float, ly: float) -> float:
     return float(max(along, aside, across))
 
 
-@kernel
+@inner_kernel
 def _light_at(cast: _Cast, lx: float, ly: float) -> float:
     """Share of the light that reaches the ground at (lx, ly) in the body's axes."""
     light = 1.0
@@ -184,14 +184,14 @@ def _light_at(cast: _Cast, lx: float, ly: float) -> float:
     return float(light)
 
 
-@kernel
+@inner_kernel
 def _dimmed(p: np.uint32, light: float) -> np.uint32:
     gain = np.float32(np.sqrt(light))  # the picture's bytes are square roots of light
     red, green, blue = unpack(p)
     return pack(red * gain, green * gain, blue * gain)
 
 
-@kernel
+@inner_kernel
 def _darken(
     view: View,
     bodies: Bodies,

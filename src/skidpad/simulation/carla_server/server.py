@@ -20,7 +20,7 @@ from skidpad.simulation.carla_server.rpc import Dispatcher
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.streams import StreamHub
 from skidpad.simulation.carla_server.waker import Waker, rouse
-from skidpad.simulation.carla_server.warming import warm_up
+from skidpad.simulation.carla_server.warming import Helper, warm_up
 
 log = logging.getLogger("skidpad.carla_server")
 MAX_CLIENTS = 512
@@ -187,11 +187,11 @@ class CarlaServer:
             return ports
         raise ConfigError(f"no free port pair on {host} at {self.options.port}")
 
-    async def run(self, ready: Callable[[Ports], Any], say: Callable[[str], Any]) -> None:
-        """Serve until cancelled or idle for too long. say: what a first start is at."""
+    async def run(self, ready: Callable[[Ports], Any], helper: Helper | None) -> None:
+        """Serve until cancelled or idle for too long. helper: who compiles at a first start."""
         if self.options.record_calls is not None:
             self._calls = self.options.record_calls.open("w", encoding="utf-8")
-        helper = warm_up(self.options, say)
+        warm_up(self.options, helper)
         if helper is not None:
             self.served.before_sensing = helper.finish
         try:

@@ -44,17 +44,24 @@ class EverybodyListens(StreamHub):
         return self.exists(stream)
 
 
-def warm_up(options: ServerOptions, say: Say) -> Helper | None:
-    """Make ticks ready; who still compiles sensors, None when these are ready too."""
+def start_compiling(options: ServerOptions, say: Say) -> Helper | None:
+    """Who compiles what the first tick needs and then sensors; None when all is kept. say: what is done.
+
+    To be called before anything is made of a map, for that compiles too.
+    """
     if is_kept(step.advance_undriven) and is_kept(rays.cast):
-        a_tick(options, sensors=True)
         return None
     say(f"first start: compiling, which is kept in {kernel_cache()}")
-    helper = Helper(options)
-    a_tick(options, sensors=False, before_step=helper.hear)
-    helper.tell()
-    say("ticks are compiled; sensors are being compiled beside the first of them")
-    return helper
+    return Helper(options, say)
+
+
+def warm_up(options: ServerOptions, helper: Helper | None) -> None:
+    """Make ticks ready and, unless a helper makes them so, sensors."""
+    if helper is None:
+        a_tick(options, sensors=True)
+    else:
+        a_tick(options, sensors=False, before_step=helper.hear)
+        helper.tell()
 
 
 def a_tick(
@@ -64,6 +71,9 @@ def a_tick(
     served = Served(options, EverybodyListens())
     episode = served.episode
     name = next(id for id, b in served.stock.catalogue.items() if b.family is Family.VEHICLE)
+    episode.moving.feel_grip()
+    episode.moving.signs()
+    episode.moving.map.project(0.0, 0.0, 0.0)
     before_step()
     car = episode.spawn(Wanted(name, {}), episode.map.spawn_points[0])
     small = {"image_size_x": "64", "image_size_y": "48"}
@@ -79,7 +89,8 @@ def a_tick(
 class Helper:
     """The child that compiles; whatever becomes of it, the server can do without."""
 
-    def __init__(self, options: ServerOptions) -> None:
+    def __init__(self, options: ServerOptions, say: Say) -> None:
+        self._say = say
         self._pipe, there = CONTEXT.Pipe()
         self._process = CONTEXT.Process(target=_help, args=(there, options), daemon=True)
         self._process.start()
@@ -95,6 +106,7 @@ class Helper:
         """The rest of a tick is on the disk."""
         with suppress(OSError):
             self._pipe.send(None)
+        self._say("ticks are compiled; sensors are being compiled beside the first of them")
 
     def finish(self) -> None:
         """Wait for the sensors."""

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.roads.kernels import (
     WIDTH,
     LaneArrays,
@@ -42,7 +42,7 @@ EDGE = 0.05  # m from the lane's edge within which the nearest lane is searched
 LEVEL = 1.0  # m of height that still is the same road
 
 
-@kernel
+@inner_kernel
 def still_on_lane(
     lanes: LaneArrays, lane: int, sample: int, x: float, y: float, z: float
 ) -> tuple[int, float, float]:
@@ -69,7 +69,7 @@ def still_on_lane(
     return -1, 0.0, 0.0
 
 
-@kernel
+@inner_kernel
 def settle(lanes: LaneArrays, rows: Rows, noise: float, driving: bool, tick: int) -> None:
     """Find the lane under every present actor and put those that are grounded on the surface.
 
@@ -116,20 +116,21 @@ class RoadSigns(NamedTuple):
 
 
 @kernel
-def _read_signs(lanes: LaneArrays, placed: Places, limit: Floats, signal: Ints) -> None:
+def _read_signs(map: Held[LaneArrays], placed: Places, limit: Floats, signal: Ints) -> None:
+    lanes = map.value
     for i in range(len(placed)):
-        place = placed[i]
+        place, lane = placed[i], np.int64(placed[i].lane)
         limit[i], signal[i] = np.nan, -1
-        if place.lane < 0:
+        if lane < 0:
             continue
-        _, _, _, _, _, _, _, _, limit[i] = sample_kernel(lanes, place.lane, place.s)
+        _, _, _, _, _, _, _, _, limit[i] = sample_kernel(lanes, lane, place.s)
         turned = cos(place.yaw - place.heading) < 0.5
-        if lanes.drivable[place.lane] == 0 or turned or place.v < -0.5:
+        if lanes.drivable[lane] == 0 or turned or place.v < -0.5:
             continue
         front = place.s + place.half_length - PASSED
         reach = ZONE_MIN + PASSED + place.v * place.v / (2.0 * A_COMFORT)
-        start = min(front, lanes.length[place.lane])
-        row, gap = signal_ahead(lanes, place.lane, start, reach + front - start, LIGHT)
+        start = min(front, lanes.length[lane])
+        row, gap = signal_ahead(lanes, lane, start, reach + front - start, LIGHT)
         if row >= 0 and gap - (front - start) >= 0.0:
             signal[i] = row
 
@@ -137,7 +138,7 @@ def _read_signs(lanes: LaneArrays, placed: Places, limit: Floats, signal: Ints) 
 def read_signs(map: RoadMap, placed: Places) -> RoadSigns:
     """Limit and governing light at these places."""
     signs = RoadSigns(np.empty(len(placed)), np.empty(len(placed), dtype=np.int64))
-    _read_signs(map.arrays, placed, signs.limit, signs.signal)
+    _read_signs(map.held, placed, signs.limit, signs.signal)
     return signs
 
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import Held, kernel
+from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.contact import Bodies, ContactLaw, Contacts, resolve_contacts
 from skidpad.physics.grip import GripParams, mu_at
@@ -92,18 +92,13 @@ def advance(arena: Held[Arena], now: Now) -> tuple[int, int]:
         view = View(a.streets, a.occupancy, rows.placed, now.lights, now.tick, now.dt,
                     now.free_choice, now.care)  # fmt: skip
         drive_all(view, a.drivers, rows.commands)
-    return _go_on(a, now)
+    return advance_undriven(arena, now)
 
 
 @kernel
 def advance_undriven(arena: Held[Arena], now: Now) -> tuple[int, int]:
     """The same without drivers: half as much to compile where there are none."""
-    return _go_on(arena.value, now)
-
-
-@kernel
-def _go_on(a: Arena, now: Now) -> tuple[int, int]:
-    """What follows the drivers."""
+    a = arena.value
     rows = a.rows
     touches = crossed = 0
     if now.stages & MOVE:
@@ -127,7 +122,7 @@ def feel_grip(rows: Rows, w: Wheeled, grip: GripParams) -> None:
             w.felt[i, k] = w.road_mu[i, k] * w.tire_friction[i, k] / TIRE_FRICTION_REFERENCE
 
 
-@kernel
+@inner_kernel
 def _drive(rows: Rows, moved: Flags, w: Wheeled, now: Now) -> None:
     """Vehicles through their physics, or as they are told."""
     s = rows.states
@@ -151,7 +146,7 @@ def _drive(rows: Rows, moved: Flags, w: Wheeled, now: Now) -> None:
             s.vx[i] = s.vy[i] = s.yaw_rate[i] = s.ax[i] = s.ay[i] = 0.0
 
 
-@kernel
+@inner_kernel
 def _glide(rows: Rows, moved: Flags, first: int, dt: float) -> None:
     """Bodies without wheels that nobody placed keep their velocity."""
     s = rows.states
@@ -163,7 +158,7 @@ def _glide(rows: Rows, moved: Flags, first: int, dt: float) -> None:
             s.yaw[i] = yaw if yaw > -pi else pi
 
 
-@kernel
+@inner_kernel
 def _touch(a: Arena, now: Now) -> int:
     """Contacts of those that collide."""
     s = a.rows.states

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel
 from skidpad.core.states import ContactEvent, LaneInvasion, TrafficContact
 from skidpad.physics.contact import Contacts
 from skidpad.roads.kernels import WIDTH, LaneArrays
@@ -96,7 +96,7 @@ def forget(markings: Markings) -> None:
     markings.standing[0] = -1
 
 
-@kernel
+@inner_kernel
 def cross_markings(m: Markings, lanes: LaneArrays, placed: Places) -> int:
     """Markings that the ego's outline began to cross (A-030): LEFT and RIGHT as bits."""
     if len(placed) == 0:

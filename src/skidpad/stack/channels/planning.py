@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.stack.channels.route import PathPoints, locate
 
 Floats = NDArray[np.float64]
@@ -49,7 +49,7 @@ class Blocks(NamedTuple):
     v: Floats  # m/s along the path
 
 
-@kernel
+@inner_kernel
 def idm(v: float, v_desired: float, gap: float, v_lead: float, p: PlanParams) -> float:
     """Acceleration in m/s^2 behind a leader at `gap` m (inf: none)."""
     if v <= v_desired:
@@ -63,7 +63,7 @@ def idm(v: float, v_desired: float, gap: float, v_lead: float, p: PlanParams) ->
     return max(A_HARDEST, free - p.a_max * (wanted / max(gap, 0.1)) ** 2)
 
 
-@kernel
+@inner_kernel
 def desired_speeds(path: PathPoints, at: int, n: int, p: PlanParams, out: Floats) -> None:
     """Speed allowed by limits and bends at the n points from `at` on, braking ahead of each."""
     for k in range(n):
@@ -173,7 +173,7 @@ def roll_out(
     return wanted
 
 
-@kernel
+@inner_kernel
 def _point(path: PathPoints, at: int, s: float, offset: float, out: Floats) -> None:
     j = min(at + int(s), path.x.size - 2)
     u = min(max(at + s - j, 0.0), 1.0)

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelView
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.stack.channels.settings import ChannelSettings
 
 Floats = NDArray[np.float64]
@@ -115,7 +115,7 @@ class Tracker:
         )
 
 
-@kernel
+@inner_kernel
 def _predict(tracks: NDArray[np.void], count: int, dt: float) -> None:
     """Constant velocity with white acceleration (Bar-Shalom et al. 2001, 6.2)."""
     q = SIGMA_ACCELERATION**2
@@ -129,7 +129,7 @@ def _predict(tracks: NDArray[np.void], count: int, dt: float) -> None:
         t.unseen += dt
 
 
-@kernel
+@inner_kernel
 def _correct(t: Any, x: float, y: float, age: float) -> None:
     """Kalman update with a position measured `age` (<= 0) s from now."""
     r = SIGMA_MEASURED**2
@@ -148,7 +148,7 @@ def _correct(t: Any, x: float, y: float, age: float) -> None:
     t.p_vv = p_vv - k_v * (p_xv + h * p_vv)
 
 
-@kernel
+@inner_kernel
 def _start_moving(t: Any, x: float, y: float, age: float) -> None:
     """State of an object seen twice: the difference of two places whose errors are independent."""
     t.vx, t.vy = (x - t.x) / t.unseen, (y - t.y) / t.unseen
@@ -157,7 +157,7 @@ def _start_moving(t: Any, x: float, y: float, age: float) -> None:
     t.p_xx, t.p_xv, t.p_vv = r, r / t.unseen, 2.0 * r / t.unseen**2
 
 
-@kernel
+@inner_kernel
 def _shape(t: Any, heading: float, length: float, width: float, label: int) -> None:
     """Smooth heading and size, vote on the class."""
     v = np.hypot(t.vx, t.vy)
@@ -177,7 +177,7 @@ def _shape(t: Any, heading: float, length: float, width: float, label: int) -> N
         t.label = label
 
 
-@kernel
+@inner_kernel
 def _second_sight(t: Any, dx: float, dy: float) -> float:
     """m of distance of what may be an object seen once, whose speed is not known, driven on along its
     heading; it counts as farther than whatever is within a gate."""
@@ -188,7 +188,7 @@ def _second_sight(t: Any, dx: float, dy: float) -> float:
     return float(GATE + aside)
 
 
-@kernel
+@inner_kernel
 def _distances(tracks: NDArray[np.void], count: int, x: Floats, y: Floats, age: float) -> Floats:
     """(m, count) m from each detection to each track where they may be one, else inf."""
     distance = np.full((len(x), count), np.inf)
@@ -204,7 +204,7 @@ def _distances(tracks: NDArray[np.void], count: int, x: Floats, y: Floats, age: 
     return distance
 
 
-@kernel
+@inner_kernel
 def _bury(tracks: NDArray[np.void], count: int, dt: float, confirm: int, coast: float) -> int:
     """Close the gaps that tracks leave which were not seen for too long; how many are left."""
     kept = 0

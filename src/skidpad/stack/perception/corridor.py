@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
 
 
@@ -67,7 +67,7 @@ def in_corridor(z: float, u: float, c: Corridor, sin_yaw: float, kappa: float) -
     return bool(abs(lateral_offset(z, u, c, sin_yaw, kappa)) < half_width(z, c))
 
 
-@kernel
+@inner_kernel
 def _is_one(label: np.uint8, first: np.uint8, count: np.uint8) -> bool:
     return bool(np.uint8(label - first) < count)
 
@@ -87,7 +87,7 @@ def reachable_columns(c: Corridor, sin_yaw: float, kappa: float, width: int) -> 
     return min(first, width), max(end, 0)
 
 
-@kernel
+@inner_kernel
 def _found_in_row(
     labels: NDArray[np.uint8], row: int, col_first: int, col_end: int, wanted: Labels
 ) -> int:
@@ -99,7 +99,7 @@ def _found_in_row(
     return int(count)
 
 
-@kernel
+@inner_kernel
 def _count_beside(labels: NDArray[np.uint8], c: Corridor, col_first: int, col_end: int) -> int:
     count = 0
     for row in range(c.row_first, c.row_end):
@@ -107,7 +107,7 @@ def _count_beside(labels: NDArray[np.uint8], c: Corridor, col_first: int, col_en
     return count
 
 
-@kernel
+@inner_kernel
 def select(values: NDArray[np.float32], n: int, k: int) -> float:
     """The k-th smallest (from 0) of values[:n]; reorders them so that smaller ones come first."""
     left, right = 0, n - 1

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.frames import CameraImage, image_rows, pack
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.specs import CameraSpec, SensorSpec
 from skidpad.core.vocabulary import LightState
 
@@ -91,7 +91,7 @@ def _is_lamp(contour: Any) -> bool:
     return AREAS[0] <= area <= AREAS[1] and ASPECTS[0] <= width / height <= ASPECTS[1]
 
 
-@kernel
+@inner_kernel
 def _may_be_lamp(pixel: np.uint32) -> bool:
     """Whether a packed pixel can be in one of the hue ranges."""
     word = np.int32(pixel & np.uint32(0xFFFFFF))

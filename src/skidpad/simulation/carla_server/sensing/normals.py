@@ -11,7 +11,7 @@ from math import inf, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.lefthanded import vectors_to_carla
 from skidpad.sensors.view import View
 from skidpad.simulation.carla_server.clock import Clock
@@ -72,7 +72,7 @@ def _camera_normals(view: View, inverse: NDArray[np.float32], out: Floats) -> No
             out[y, x, 0], out[y, x, 1], out[y, x, 2] = -a / length, -b / length, -c / length
 
 
-@kernel
+@inner_kernel
 def _gentler(before: float, after: float) -> float:
     """The difference that does not cross an edge; 0 without neighbours."""
     found = after if abs(after) < abs(before) else before

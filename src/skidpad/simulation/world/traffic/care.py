@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.constants import G
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.setup import Setup
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
@@ -105,7 +105,7 @@ def braking(care: Care, v: float) -> float:
     return min(B_COMFORT, COMFORT_SHARE * grip_at(care, v)) if care.on else B_COMFORT
 
 
-@kernel
+@inner_kernel
 def firm_braking(care: Care, v: float, dry: float) -> float:
     """Braking in m/s^2 that is counted upon; `dry`: on a dry road."""
     return min(dry, FIRM_SHARE * grip_at(care, v)) if care.on else dry
@@ -175,13 +175,13 @@ def traction_limit(care: Care, v: float, carried: float, slide: float) -> float:
     return TRACTION_SHARE * carried * grip_at(care, v) * min(max(left, 0.0), 1.0)
 
 
-@kernel
+@inner_kernel
 def drive_limit(care: Care, v: float, a_max: float) -> float:
     """Acceleration in m/s^2 that is asked for at most."""
     return min(a_max, DRIVE_SHARE * grip_at(care, v)) if care.on else a_max
 
 
-@kernel
+@inner_kernel
 def change_pace(care: Care, v: float) -> float:
     """How fast a change of lane goes, 1 in the dry; its lateral peak falls with the square."""
     pace = min(1.0, max(v, 0.0) / V_CHANGE)

@@ -7,7 +7,7 @@ from math import cos
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel
 from skidpad.simulation.world.traffic import occupancy as occ_
 from skidpad.simulation.world.traffic.care import (
     braking,
@@ -62,7 +62,7 @@ STRAYED = 1.0  # m beyond the lane's edge
 WRONG_WAY = -0.5  # cosine of 120 deg
 
 
-@kernel
+@inner_kernel
 def follow_path(view: View, d: Drivers, i: int) -> None:
     """Update where driver i is along its path; enter the next lane when it is reached."""
     net, path, me, body = view.streets.net, d.path[i], d.state[i], view.placed[i]
@@ -84,7 +84,7 @@ def follow_path(view: View, d: Drivers, i: int) -> None:
     extend(net, path, me.s, me.key, me.turns, view.free_choice)
 
 
-@kernel
+@inner_kernel
 def turn_to(view: View, d: Drivers, i: int, lane: int, s: float) -> None:
     """Follow `lane` from about s on, sliding over from the present lateral offset."""
     me, target = d.state[i], view.streets.net.lane[lane]
@@ -98,7 +98,7 @@ def turn_to(view: View, d: Drivers, i: int, lane: int, s: float) -> None:
     occ_.add(view.occ, i, lane, me.s)
 
 
-@kernel
+@inner_kernel
 def acceleration_along(
     view: View, d: Drivers, i: int, path: Ints, s: float, v_desired: float
 ) -> tuple[float, float]:
@@ -110,7 +110,7 @@ def acceleration_along(
     return idm(v, v_desired, gap, v_lead, c), gap
 
 
-@kernel
+@inner_kernel
 def follower_acceleration(view: View, d: Drivers, j: int, gap: float, v_lead: float) -> float:
     """What follower j would do behind a vehicle at `gap`; it is taken to want its own speed."""
     if j == NOBODY:
@@ -120,7 +120,7 @@ def follower_acceleration(view: View, d: Drivers, j: int, gap: float, v_lead: fl
     return idm(v, max(v, 1.0), gap, v_lead, c)
 
 
-@kernel
+@inner_kernel
 def change_gain(view: View, d: Drivers, i: int, lane: int, a_now: float, v_desired: float) -> float:
     """MOBIL's advantage of moving to `lane` in m/s^2; -inf when it is not safe."""
     me, v = d.state[i], view.placed[i].speed
@@ -142,7 +142,7 @@ def change_gain(view: View, d: Drivers, i: int, lane: int, a_now: float, v_desir
     return incentive(a_new - a_now, min(a_behind, 0.0), max(-a_old, 0.0))
 
 
-@kernel
+@inner_kernel
 def may_enter(view: View, d: Drivers, i: int, lane: int, left: bool) -> bool:
     """There is such a driving lane, it goes on, and the marking may be crossed: broken or none."""
     if lane < 0 or view.streets.net.lane[lane].kind != 0 or view.streets.net.lane[lane].ahead < 0:
@@ -151,7 +151,7 @@ def may_enter(view: View, d: Drivers, i: int, lane: int, left: bool) -> bool:
     return bool((here.marking_left if left else here.marking_right) <= 1)  # Marking.NONE, BROKEN
 
 
-@kernel
+@inner_kernel
 def consider_change(
     view: View, d: Drivers, i: int, a_now: float, v_desired: float, gap_stop: float
 ) -> None:
@@ -184,7 +184,7 @@ def consider_change(
         turn_to(view, d, i, best, occ_.beside(view.streets.net, d.path[i, 0], me.s, best))
 
 
-@kernel
+@inner_kernel
 def plan(view: View, d: Drivers, i: int) -> None:
     """Choose lane and acceleration of driver i; note how long it has been out of order."""
     me, trait, body = d.state[i], d.trait[i], view.placed[i]
@@ -221,7 +221,7 @@ def plan(view: View, d: Drivers, i: int) -> None:
         me.stuck = 0.0
 
 
-@kernel
+@inner_kernel
 def keep_lane_if_pushed(view: View, d: Drivers, i: int) -> None:
     """A vehicle that finds itself on another lane without having changed stays on that one."""
     me, body = d.state[i], view.placed[i]
@@ -232,7 +232,7 @@ def keep_lane_if_pushed(view: View, d: Drivers, i: int) -> None:
         turn_to(view, d, i, body.lane, body.s)
 
 
-@kernel
+@inner_kernel
 def drive_all(view: View, d: Drivers, commands: Floats) -> None:
     """One tick of all active drivers; writes throttle, brake, steer, ... into commands (n, 5)."""
     occ_.fill(view.streets.net, view.placed, view.occ)

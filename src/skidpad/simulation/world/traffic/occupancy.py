@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.network import Network
 
@@ -56,13 +56,13 @@ def add(occ: Occupancy, actor: int, lane: int, s: float) -> None:
     occ.head[lane] = slot
 
 
-@kernel
+@inner_kernel
 def beside(net: Network, lane: int, s: float, other: int) -> float:
     """`s` on a neighbour lane of the same section: lanes of a section scale with their length."""
     return float(s * net.lane[other].length / net.lane[lane].length)
 
 
-@kernel
+@inner_kernel
 def fill(net: Network, placed: Places, occ: Occupancy) -> None:
     """Enter every present actor into each lane that its body overlaps."""
     for lane in range(len(occ.head)):
@@ -86,7 +86,7 @@ def fill(net: Network, placed: Places, occ: Occupancy) -> None:
             add(occ, i, net.lane[lane].right, beside(net, lane, s, net.lane[lane].right))
 
 
-@kernel
+@inner_kernel
 def find_ahead(
     net: Network, occ: Occupancy, placed: Places, path: Ints, s: float, me: int, reach: float
 ) -> tuple[int, float]:
@@ -115,7 +115,7 @@ def find_ahead(
     return NOBODY, np.inf
 
 
-@kernel
+@inner_kernel
 def last_on(occ: Occupancy, lane: int, start: float, me: int) -> tuple[int, float]:
     """The actor on `lane` least behind `start` m along it, and by how much; NOBODY, inf: none."""
     nearest, distance = NOBODY, np.inf

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.simulation.world.traffic.care import (
     Care,
     bend_speed_sq,
@@ -65,7 +65,7 @@ def desired_speed(
     return sqrt(best_sq)
 
 
-@kernel
+@inner_kernel
 def stop_gap(view: View, d: Drivers, i: int) -> float:
     """Metres from the front bumper to the next line at which driver i has to stop; inf: none."""
     net, v = view.streets.net, view.placed[i].speed
@@ -86,7 +86,7 @@ def stop_gap(view: View, d: Drivers, i: int) -> float:
     return np.inf
 
 
-@kernel
+@inner_kernel
 def end_gap(view: View, d: Drivers, i: int) -> float:
     """Metres to the end of the road along the path; inf: not within what the driver knows."""
     known = -d.state[i].s
@@ -98,7 +98,7 @@ def end_gap(view: View, d: Drivers, i: int) -> float:
     return np.inf
 
 
-@kernel
+@inner_kernel
 def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
     """Who arrives at a merge ahead just before driver i on another branch, and the gap to it."""
     net, occ = view.streets.net, view.occ

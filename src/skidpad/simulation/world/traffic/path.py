@@ -7,7 +7,7 @@ from math import cos, pi, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.splitmix import GOLDEN, scrambled, unit
 from skidpad.simulation.world.traffic.network import Network
 
@@ -25,13 +25,13 @@ def uniform(key: np.uint64, tick: int, salt: int) -> float:
     return unit(scrambled(counter + SALT * np.uint64(salt)))
 
 
-@kernel
+@inner_kernel
 def wrapped(angle: float) -> float:
     """`angle` in [-pi, pi)."""
     return (angle + pi) % (2.0 * pi) - pi
 
 
-@kernel
+@inner_kernel
 def choose_branch(net: Network, lane: int, key: np.uint64, turn: int, free_choice: bool) -> int:
     """The lane to take after `lane`: the straightest, or one drawn per driver and turn."""
     here = net.lane[lane]
@@ -42,7 +42,7 @@ def choose_branch(net: Network, lane: int, key: np.uint64, turn: int, free_choic
     return int(choice if kind == 0 or kind == 7 else here.ahead)  # LaneKind.DRIVING, RAMP
 
 
-@kernel
+@inner_kernel
 def extend(net: Network, path: Ints, s: float, key: np.uint64, turn: int, free: bool) -> None:
     """Append lanes to `path` until it reaches LOOKAHEAD, is full, or the road ends."""
     known = -s
@@ -71,7 +71,7 @@ def straight_path(net: Network, lane: int, out: Ints) -> None:
             lane = net.lane[lane].ahead
 
 
-@kernel
+@inner_kernel
 def along(net: Network, lane: int, at: int, x: float, y: float) -> tuple[int, float]:
     """Segment of `lane` beside (x, y), searched from sample `at`, and the fraction along it.
 
@@ -94,7 +94,7 @@ def along(net: Network, lane: int, at: int, x: float, y: float) -> tuple[int, fl
             return at, t
 
 
-@kernel
+@inner_kernel
 def offset_from(net: Network, at: int, t: float, x: float, y: float) -> tuple[float, float]:
     """Metres by which (x, y) lies left of the lane, and the lane's heading there."""
     p, q = net.point[at], net.point[at + 1]

@@ -11,7 +11,7 @@ from math import cos, sin, sqrt
 
 import numpy as np
 
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.care import bend_speed_sq, drive_limit, reach
 from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, find_ahead
@@ -38,7 +38,7 @@ V_WALKING = 0.1  # m/s
 INDICATED = 5  # lanes ahead that others can guess
 
 
-@kernel
+@inner_kernel
 def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
     """m from the front bumper to where driver i has to wait for others; inf: nowhere."""
     body, me = view.placed[i], d.state[i]
@@ -74,7 +74,7 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
     return np.inf
 
 
-@kernel
+@inner_kernel
 def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, control: int) -> bool:
     """Whether driver i, not yet past the line before path[k], must be ready to stop there."""
     me, body = d.state[i], view.placed[i]
@@ -104,7 +104,7 @@ def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, co
     return False
 
 
-@kernel
+@inner_kernel
 def _time_through(view: View, d: Drivers, i: int, way: float, bend: float) -> float:
     """s that driver i takes for `way` m through a junction, no faster than its bend allows."""
     a_max = drive_limit(view.care, view.placed[i].speed, d.trait[i].a_max)
@@ -115,7 +115,7 @@ def _time_through(view: View, d: Drivers, i: int, way: float, bend: float) -> fl
     return _travel_time(v, way, a_max, v_max)
 
 
-@kernel
+@inner_kernel
 def _travel_time(v: float, way: float, a: float, v_max: float) -> float:
     """s for `way` m from speed v at acceleration a up to v_max."""
     if v >= v_max:
@@ -127,7 +127,7 @@ def _travel_time(v: float, way: float, a: float, v_max: float) -> float:
     return t_max + (way - 0.5 * (v + v_max) * t_max) / v_max
 
 
-@kernel
+@inner_kernel
 def _occupied(view: View, i: int, lane: int, start: float, end: float) -> bool:
     """Whether a body other than i's is on [start, end] of a lane."""
     entry = view.occ.head[lane]
@@ -140,7 +140,7 @@ def _occupied(view: View, i: int, lane: int, start: float, end: float) -> bool:
     return False
 
 
-@kernel
+@inner_kernel
 def _taken_ahead(view: View, d: Drivers, i: int, k: int, start: float) -> float:
     """m to the nearest shared area on path[k] in which somebody is, for who is in the junction."""
     entry = view.streets.entry[d.path[i, k]]
@@ -155,7 +155,7 @@ def _taken_ahead(view: View, d: Drivers, i: int, k: int, start: float) -> float:
     return nearest
 
 
-@kernel
+@inner_kernel
 def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> bool:
     """Whether a queue leaves no room behind the junction lane path[k]."""
     body, me = view.placed[i], d.state[i]
@@ -168,7 +168,7 @@ def _queue_behind(view: View, d: Drivers, i: int, k: int, start: float) -> bool:
     return leader != NOBODY and gap < room and view.placed[leader].v < V_QUEUE
 
 
-@kernel
+@inner_kernel
 def _is_coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: float) -> bool:
     """Whether somebody arrives at `zone` m along `lane` within `clear` s."""
     if _arrives(view, d, i, lane, lane, zone, clear):
@@ -193,20 +193,20 @@ def _is_coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: fl
     return False
 
 
-@kernel
+@inner_kernel
 def _watched(view: View, v: float, clear: float) -> float:
     """m before the shared area in which somebody at speed v matters for `clear` s."""
     return max(WATCH, v * clear) if view.care.on else WATCH
 
 
-@kernel
+@inner_kernel
 def _held_by_light(view: View, lane: int) -> bool:
     """Whether a red light stands at the end of a lane."""
     entry = view.streets.entry[lane]
     return bool(entry.control == LIGHT and view.lights[entry.signal] == 0)
 
 
-@kernel
+@inner_kernel
 def _arrives(
     view: View, d: Drivers, i: int, lane: int, target: int, way: float, clear: float
 ) -> bool:
@@ -231,7 +231,7 @@ def _arrives(
     return False
 
 
-@kernel
+@inner_kernel
 def _leads_to(d: Drivers, j: int, lane: int) -> bool:
     """Whether driver j's path goes over a lane: its indicators say so."""
     found = False
@@ -240,7 +240,7 @@ def _leads_to(d: Drivers, j: int, lane: int) -> bool:
     return found
 
 
-@kernel
+@inner_kernel
 def note_walkers(streets: Streets, placed: Places) -> None:
     """Mark the zebras on which somebody walks, or steps from the kerb."""
     for z in range(len(streets.zebras)):
@@ -257,7 +257,7 @@ def note_walkers(streets: Streets, placed: Places) -> None:
                 streets.busy[z] = True
 
 
-@kernel
+@inner_kernel
 def zebra_gap(view: View, d: Drivers, i: int) -> float:
     """m from the front bumper to a zebra on which somebody walks; inf: none within reach."""
     body = view.placed[i]

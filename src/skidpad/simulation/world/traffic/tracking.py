@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import atan, cos, sin
 
 from skidpad.core.constants import G
-from skidpad.core.jit import kernel
+from skidpad.core.jit import inner_kernel
 from skidpad.physics.vehicle import V_CLUTCH, steer_share
 from skidpad.simulation.world.traffic.care import change_pace, steering_limit, traction_limit
 from skidpad.simulation.world.traffic.path import PATH
@@ -21,7 +21,7 @@ V_STANDING = 0.3  # m/s
 BRAKE_STANDING = 0.5
 
 
-@kernel
+@inner_kernel
 def steer(view: View, d: Drivers, i: int) -> float:
     """Steer command that tracks the path: the curvature ahead plus a second-order control.
 
@@ -47,7 +47,7 @@ def steer(view: View, d: Drivers, i: int) -> float:
     return float(min(max(angle / (trait.steer_angle * steer_share(v)), -1.0), 1.0))
 
 
-@kernel
+@inner_kernel
 def curvature_ahead(view: View, d: Drivers, i: int, distance: float) -> float:
     """Curvature of the path `distance` m ahead, 1/m."""
     s = d.state[i].s + distance
@@ -62,7 +62,7 @@ def curvature_ahead(view: View, d: Drivers, i: int, distance: float) -> float:
     return 0.0
 
 
-@kernel
+@inner_kernel
 def pedals(view: View, d: Drivers, i: int) -> tuple[float, float]:
     """Throttle and brake for the acceleration asked for: feedforward plus integral."""
     me, trait, body = d.state[i], d.trait[i], view.placed[i]

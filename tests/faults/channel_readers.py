@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cache
+from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -46,14 +47,14 @@ def read_recording(path: Path) -> object:
 @cache
 def watched() -> dict[str, bytes]:
     from skidpad.evidence.channels.monitor import MonitorSettings
-    from skidpad.live.watch import watch
+    from skidpad.live.watch import Timer, watch
 
     others = np.array([(-11.0, 0, 0, 15.5, 0), (50.0, 3.5, 0, 15, 0)])
     world = World((0.0, 0.0, 0.0, 15.0, 0.0), others)
     with TemporaryDirectory() as folder:
         out = Path(folder) / "out"
         eyes = (Eyes("lav", 0.03), Eyes("tfuse", 0.03, blind=(0,)))
-        watch(drive(world, eyes, 12.0), out, MonitorSettings())
+        watch(drive(world, eyes, 12.0), out, MonitorSettings(), Timer(count(0, 1000).__next__))
         found = {p.name: p.read_bytes() for p in out.iterdir()}
     return found | {"hazards.txt": small_files.short_record(found["hazards.txt"])}
 
@@ -98,6 +99,9 @@ READERS = {
         "indicators.parquet", lambda: [watched()["indicators.parquet"]], read_indicators, BYTES_OR_TABLE),
     "page": Reader(
         "monitor.json", lambda: [watched()["monitor.json"]], read_page, BYTES_OR_JSON, share=0.1, most=5000),
+    "page-times": Reader(
+        "timing.parquet", lambda: [watched()["timing.parquet"]], read_page, BYTES_OR_TABLE, share=0.1,
+        most=5000),
     "hazards": Reader("hazards.txt", lambda: [watched()["hazards.txt"]], read_hazards),
     "index": Reader("hazards.jsonl", lambda: [watched()["hazards.jsonl"]], list_hazards, BYTES_OR_JSON),
 }  # fmt: skip

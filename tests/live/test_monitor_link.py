@@ -17,7 +17,7 @@ from runs import segment_run
 from skidpad.campaign.channel_drive import drive_segment
 from skidpad.core.channels import ChannelFrame, Context
 from skidpad.evidence.channels.monitor import MonitorSettings
-from skidpad.evidence.channels.timing import delay_sentence, late_cycles
+from skidpad.evidence.channels.timing import LIVE_TIMES, delay_sentence, late_cycles
 from skidpad.live import links as live_links
 from skidpad.live.child import ALARMS
 from skidpad.live.monitor_link import MonitorLink
@@ -78,7 +78,7 @@ def test_the_monitor_judges_while_the_drive_goes_on_and_as_the_recording_would_b
     told = [json.loads(line)["hazard"] for line in alarms.read_text().splitlines()]
     assert sorted(told) == sorted(e["name"] for e in read_summary(live)["hazards"])
     assert read_outcome(live).ended == "complete"
-    times = read_timing(live)
+    times = read_timing(live, LIVE_TIMES)
     assert times["cycle"].to_list() == list(range(161))
     for column in ("total", "wall_ms", "waited_ms", "faults"):
         assert times[column].is_not_null().all()

@@ -106,11 +106,11 @@ def _write_pages(folder: Path) -> None:
 
 def _watched(folder: Path) -> str:
     """What became of a monitor beside its drive, in one line."""
-    from skidpad.evidence.channels.timing import delay_sentence
+    from skidpad.evidence.channels.timing import LIVE_TIMES, delay_sentence
     from skidpad.live.outcome import read_outcome
     from skidpad.recording.monitored import read_timing
 
-    times = read_timing(folder)
+    times = read_timing(folder, LIVE_TIMES)
     delay = "" if times is None else f"; {delay_sentence(times)}"
     return f"{folder.name}: {read_outcome(folder).sentence}{delay}"
 

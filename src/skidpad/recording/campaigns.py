@@ -11,10 +11,10 @@ import polars as pl
 
 from skidpad.core.errors import FileError
 from skidpad.core.names import inside
-from skidpad.recording.files import read_parquet
+from skidpad.recording.files import read_parquet, require_columns
 from skidpad.recording.ledger import E, common_configuration, fingerprints, latest, read_ledger
 from skidpad.recording.logfiles import TICKS
-from skidpad.recording.results import TIMING, read_results
+from skidpad.recording.results import TIMING, Timing, read_results, schema
 
 RUNS, SNAPSHOTS = "runs", "snapshots"
 
@@ -36,8 +36,10 @@ class CampaignFolder(Generic[E]):
 
     @cached_property
     def timing(self) -> pl.DataFrame:
-        """Wall and processor time per run."""
-        return read_parquet(self.path / TIMING)[0]
+        """Wall and processor time per run; columns of later versions may be missing."""
+        times = read_parquet(self.path / TIMING)[0]
+        known = {n: kind for n, kind in schema(Timing).items() if n in times.columns}
+        return require_columns(times, known, self.path / TIMING)
 
     @cached_property
     def entries(self) -> list[E]:

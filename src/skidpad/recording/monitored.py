@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import polars as pl
 
+from skidpad.core.errors import FileError
 from skidpad.core.reading import decode_json, read_bytes
-from skidpad.recording.files import read_parquet, write_bytes, write_parquet
+from skidpad.recording.files import read_parquet, require_columns, write_bytes, write_parquet
 
 SUMMARY = "monitor.json"
 TIMING = "timing.parquet"
+MOST = 1e9  # of cycles, and of ms in one: 12 days
 
 
 def write_summary(folder: Path, summary: dict[str, Any]) -> None:
@@ -33,6 +36,19 @@ def write_timing(folder: Path, times: pl.DataFrame) -> None:
     write_parquet(folder / TIMING, times)
 
 
-def read_timing(folder: Path) -> pl.DataFrame | None:
-    """The times of a drive's cycles; None where they were not measured."""
-    return read_parquet(folder / TIMING)[0] if (folder / TIMING).exists() else None
+def read_timing(folder: Path, columns: Mapping[str, Any]) -> pl.DataFrame | None:
+    """The times of a drive's cycles; None where none was measured.
+
+    columns: Polars types of those that are asked for. FileError when one of them is missing, of another
+    type or holds what is no time, and for cycles out of order.
+    """
+    path = folder / TIMING
+    if not path.exists():
+        return None
+    times = require_columns(read_parquet(path)[0], columns, path)
+    for name in columns:
+        if not times[name].is_between(0.0, MOST).fill_null(False).all():
+            raise FileError(f"{path}: column {name!r} holds what is not between 0 and {MOST:g}")
+    if not times["cycle"].is_sorted():
+        raise FileError(f"{path}: the cycles are out of order")
+    return times if len(times) else None

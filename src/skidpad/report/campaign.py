@@ -135,7 +135,7 @@ class CampaignView(Generic[E]):
         parts = []
         for column, (name, unit) in CLOCKS.items():
             if column in self.folder.timing.columns:
-                known = self.folder.timing[column].drop_nulls()
+                known = self.folder.timing[column].drop_nulls().drop_nans()
                 known = known.filter(known > 0.0)
                 if len(known):
                     least, median = known.min(), known.median()

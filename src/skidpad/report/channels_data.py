@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.reading import converted
 from skidpad.evidence.channels.indicators.catalogue import Indicator, Threshold, load_thresholds
+from skidpad.evidence.channels.timing import TIMES
 from skidpad.recording.hazards import HazardRecord, read_hazards
 from skidpad.recording.indicators import read_indicators
 from skidpad.recording.monitored import SUMMARY, read_summary, read_timing
@@ -117,6 +118,6 @@ def load_drive(folder: Path) -> MonitoredDrive:
         summary=summary,
         table=read_indicators(folder),
         records=tuple(read_hazards(folder)),
-        timing=read_timing(folder),
+        timing=read_timing(folder, TIMES),
         thresholds=load_thresholds(),
     )

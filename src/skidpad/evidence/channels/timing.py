@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Protocol
+from typing import Any, Protocol
 
 import numpy as np
 import polars as pl
@@ -12,6 +12,9 @@ from skidpad.core.channels import Cycle
 
 BUDGET_MS = 25.0  # C-006, C-233
 MODULES = ("comfort", "similarity", "motion_prediction", "risk", "hazards")
+COUNTS: dict[str, Any] = {"cycle": pl.Int64, "objects": pl.Int64}
+TIMES = COUNTS | dict.fromkeys(("prepare", *MODULES, "writing", "total"), pl.Float64)  # ms
+LIVE_TIMES = TIMES | dict.fromkeys(("wall_ms", "waited_ms", "faults"), pl.Float64)
 
 
 class Stopwatch(Protocol):
@@ -24,7 +27,7 @@ class Stopwatch(Protocol):
         """The part `name` of the cycle is done."""
 
     def table(self) -> pl.DataFrame:
-        """Milliseconds per part, one row per cycle: prepare, MODULES, total, and objects."""
+        """One row per cycle: TIMES."""
 
 
 def timing_statistics(timing: pl.DataFrame) -> pl.DataFrame:
@@ -78,7 +81,7 @@ FAULTS_MANY = 64  # in a cycle; a warm one has next to none
 def late_cycles(timing: pl.DataFrame) -> pl.DataFrame:
     """Cycles of a live drive whose judgement came over 25 ms after their last word, with causes.
 
-    timing: as `timing_statistics`, with wall_ms, waited_ms (in the queue for a processor), faults.
+    timing: LIVE_TIMES; waited_ms: in the queue for a processor.
     """
     late = pl.col("wall_ms") > BUDGET_MS
     excess = pl.col("wall_ms") - BUDGET_MS

@@ -109,7 +109,7 @@ def kernel(function: F) -> F:
 def inner_kernel(function: F) -> F:
     """Compile for other kernels alone, without the wrappers through which Python calls.
 
-    They are a fifth of what there is to compile: the arrays of a named tuple are unpacked one by one.
+    They take a fifth of the time to compile: the arrays of a named tuple are unpacked one by one.
     """
     compiled = _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
     compiled.__class__ = InnerKernel

@@ -71,6 +71,7 @@ def a_tick(
     served = Served(options, EverybodyListens())
     episode = served.episode
     name = next(id for id, b in served.stock.catalogue.items() if b.family is Family.VEHICLE)
+    # compiled while the helper compiles parts of a step, for which this process then waits
     episode.moving.feel_grip()
     episode.moving.signs()
     episode.moving.map.project(0.0, 0.0, 0.0)

@@ -119,7 +119,8 @@ class RoadSigns(NamedTuple):
 def _read_signs(map: Held[LaneArrays], placed: Places, limit: Floats, signal: Ints) -> None:
     lanes = map.value
     for i in range(len(placed)):
-        place, lane = placed[i], np.int64(placed[i].lane)
+        place = placed[i]
+        lane = np.int64(place.lane)  # as others ask, else the road's kernels are compiled once more
         limit[i], signal[i] = np.nan, -1
         if lane < 0:
             continue

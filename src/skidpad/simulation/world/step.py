@@ -104,7 +104,8 @@ def advance_undriven(arena: Held[Arena], now: Now) -> tuple[int, int]:
     if now.stages & MOVE:
         _drive(rows, a.moved, a.wheeled, now)
         _glide(rows, a.moved, len(a.wheeled.active), now.dt)
-        touches = _touch(a, now)
+        states = _touchable(a)
+        touches = resolve_contacts(states, a.bodies, a.segments, now.law, now.dt, a.touching)
     if now.stages & SETTLE:
         settle(a.lanes, rows, now.road_noise, now.driving_only, now.tick)
         crossed = cross_markings(a.markings, a.lanes, rows.placed)
@@ -159,12 +160,11 @@ def _glide(rows: Rows, moved: Flags, first: int, dt: float) -> None:
 
 
 @inner_kernel
-def _touch(a: Arena, now: Now) -> int:
-    """Contacts of those that collide."""
+def _touchable(a: Arena) -> ActorStates:
+    """The states, present who collides."""
     s = a.rows.states
     for i in range(len(a.touchable)):
         a.touchable[i] = s.present[i] and a.rows.collides[i]
-    states = ActorStates(
+    return ActorStates(
         s.x, s.y, s.z, s.yaw, s.pitch, s.roll, s.vx, s.vy, s.yaw_rate, s.ax, s.ay, a.touchable
     )
-    return resolve_contacts(states, a.bodies, a.segments, now.law, now.dt, a.touching)

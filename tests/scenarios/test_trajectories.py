@@ -3,6 +3,7 @@
 # ruff: noqa: ISC004  elements in lists of parameters
 from __future__ import annotations
 
+import re
 from math import cos, hypot, pi, sin
 
 import pytest
@@ -21,6 +22,7 @@ from tests.scenarios.files import (
     told,
 )
 
+from skidpad.core.errors import InputError
 from skidpad.core.geometry import wrap_angle
 
 ABSOLUTE = '<Timing domainAbsoluteRelative="absolute" scale="1" offset="0"/>'
@@ -129,6 +131,24 @@ def test_a_spline_of_order_two_is_its_polygon(tmp_path):
     rows = rows_of(tmp_path, follow(f'<Nurbs order="2">{points}{knots}</Nurbs>'), end=6.0)
     assert rows[40].x == pytest.approx(210.0, abs=0.02)
     assert rows[80].y == pytest.approx(-1.75 - 3.5 * 10.0 / hypot(20.0, 3.5), abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("knots", "weight", "said"),
+    [
+        ((0, 0, 1, 1, 1), 1, "a knot may stand 2 times"),
+        ((0, 0, 1, 2, 1e300), 1, "knots must be between -1e+09 and 1e+09"),
+        ((0, 0, 1, 2, 2), 1e-320, "weights must be between 1e-09 and 1e+09"),
+        ((0, 0, 1, 2, 2), -1, "weights must be between 1e-09 and 1e+09"),
+    ],
+)
+def test_a_spline_that_is_none_is_refused(tmp_path, knots, weight, said):
+    point = (
+        f'<ControlPoint weight="{weight}"><Position>{world(200, -1.75)}</Position></ControlPoint>'
+    )
+    told = "".join(f'<Knot value="{k}"/>' for k in knots)
+    with pytest.raises(InputError, match=re.escape(said)):
+        rows_of(tmp_path, follow(f'<Nurbs order="2">{3 * point}{told}</Nurbs>'), end=1.0)
 
 
 @pytest.mark.osc("ClothoidSpline")

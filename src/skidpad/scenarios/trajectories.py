@@ -18,6 +18,7 @@ from skidpad.scenarios.scene import Scene
 
 Shape = Callable[[Sequence[Pose]], list[Vertex]]
 ORIGIN = Pose(0.0, 0.0)
+KNOT_MAX, WEIGHT_MAX = 1e9, 1e9  # of splines, so that their sums are numbers
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,8 +183,12 @@ def _nurbs(shape: Node) -> tuple[list[Node], Shape]:
         raise shape.error(f"needs {len(nodes) + order} knots that do not fall, got {len(knots)}")
     if not knots[order - 1] < knots[len(nodes)]:
         raise shape.error("its knots leave no curve")
-    if not all(w > 0.0 for w in weights):
-        raise shape.error("weights must be positive")
+    if any(a == b for a, b in zip(knots, knots[order:], strict=False)):
+        raise shape.error(f"a knot may stand {order} times, as the order says, not more often")
+    if max(abs(knots[0]), abs(knots[-1])) > KNOT_MAX:
+        raise shape.error(f"knots must be between -{KNOT_MAX:g} and {KNOT_MAX:g}")
+    if not all(1.0 / WEIGHT_MAX <= w <= WEIGHT_MAX for w in weights):
+        raise shape.error(f"weights must be between {1.0 / WEIGHT_MAX:g} and {WEIGHT_MAX:g}")
 
     def make(poses: Sequence[Pose]) -> list[Vertex]:
         rows = zip(poses, times, strict=True)

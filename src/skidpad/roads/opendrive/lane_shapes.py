@@ -107,13 +107,17 @@ def lane_shapes(document: Document) -> Iterator[LaneShape]:
                 f"{document.file}: road {road.id} is {road.length:g} m long; at most {LONGEST:g} m"
             )
         for index, section in enumerate(road.sections):
-            if section.s_end - section.s_start < SHORTEST:
+            extent = section.s_end - section.s_start
+            if extent < SHORTEST:
                 continue
+            samples += len(section.lanes) * ceil(extent / STEP)  # before they are made
+            if samples > SAMPLES_MAX:
+                raise FileError(
+                    f"{document.file}: road {road.id}, lane section at s = {section.s_start:g} m: more "
+                    f"than {SAMPLES_MAX} samples of lanes, one each {STEP:g} m"
+                )
             for shape in _section_shapes(road, index, section):
                 _require_sane(document, shape)
-                samples += len(shape.s)
-                if samples > SAMPLES_MAX:
-                    raise FileError(f"{document.file}: more than {SAMPLES_MAX} lane samples")
                 yield shape
 
 

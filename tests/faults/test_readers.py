@@ -1,6 +1,7 @@
 """No file that somebody damaged gives more than one sentence (item 6): seeded mutations of every reader."""
 
 import random
+import resource
 import signal
 import traceback
 import warnings
@@ -23,6 +24,7 @@ IN_CI = 500  # inputs of a reader
 OF_A_TEST = 10_000  # inputs at most, so that processes that share the readers end together
 FAULTS_SHOWN = 12
 CPU_S = 300  # of one input; thousands of times what one takes
+MEMORY = 12 * 2**30  # bytes of addresses; so a greedy input is a fault, not the end of the machine
 
 
 class TooLong(BaseException):
@@ -80,13 +82,17 @@ def refused(reader, path):
 
 
 @pytest.fixture
-def stopwatch():
+def bounds():
+    """Time is up with an exception, and so is memory."""
     before = signal.signal(signal.SIGPROF, stop)
+    soft, hard = resource.getrlimit(resource.RLIMIT_AS)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, hard))
     yield
+    resource.setrlimit(resource.RLIMIT_AS, (soft, hard))
     signal.signal(signal.SIGPROF, before)
 
 
-def test_damaged_files_are_read_or_refused_in_a_sentence(name, numbers, tmp_path, stopwatch):
+def test_damaged_files_are_read_or_refused_in_a_sentence(name, numbers, tmp_path, bounds):
     reader = READERS[name]
     path = tmp_path / reader.file
     for (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import re
 
 import numpy as np
 import pytest
@@ -151,6 +152,12 @@ def test_a_record_cut_off_at_the_end_is_left_out_and_a_damaged_one_named(tmp_pat
 
 
 TEXT = encode_record(record(worlds_of(2, 1.0)))
+
+
+@pytest.mark.parametrize("t", ["Infinity", "NaN", "1e30", "-1.0"])
+def test_times_that_no_clock_shows_are_refused(t):
+    with pytest.raises(FileError, match="t_start must be between 0 and 1e\\+11 s"):
+        decode_record(re.sub(r'"t_start": [^,]*', f'"t_start": {t}', TEXT))
 
 
 @given(st.data())

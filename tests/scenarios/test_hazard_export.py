@@ -92,6 +92,16 @@ def test_the_file_holds_every_ego_and_object_where_the_record_has_them(tmp_path)
     assert (colours["Ego_tfuse"], colours["tfuse_1"]) == ("#0000FF", "#FFFF00")
 
 
+@pytest.mark.parametrize("label", [-7, 104, 2**31])
+def test_who_is_of_no_known_class_is_a_car(tmp_path, label):
+    record = a_record()
+    for cycle in record.worlds:
+        cycle.frames[0].classes[:] = label
+    root = etree.parse(str(export_hazard(record, tmp_path)[0])).getroot()
+    (seen,) = root.xpath("//ScenarioObject[@name='lav_1']/Vehicle")
+    assert seen.get("vehicleCategory") == "car"
+
+
 @pytest.mark.req("C-155", "C-156")
 def test_the_road_covers_every_position(tmp_path):
     scenario, road = export_hazard(a_record(12), tmp_path)

@@ -23,6 +23,7 @@ from skidpad.recording.hazard_text_reader import decode_worlds
 TEXT_FILE = "hazards.txt"
 INDEX_FILE = "hazards.jsonl"
 RECORD_LIMIT = 32 * 1024 * 1024  # bytes of one record
+LATEST = 1e11  # s, since 1970 the year 5138
 FILE_LIMIT = 1024 * 1024 * 1024
 INDEX_LIMIT = 256 * 1024 * 1024
 
@@ -153,9 +154,9 @@ def _record(row: dict[str, Any]) -> HazardRecord:
         type=HazardType(row["type"]),
         profile=str(row["profile"]),
         forms=str(row["forms"]),
-        t_start=float(row["t_start"]),
-        t_end=float(row["t_end"]),
-        t_worst=float(row["t_worst"]),
+        t_start=_time(row, "t_start"),
+        t_end=_time(row, "t_end"),
+        t_worst=_time(row, "t_worst"),
         count=int(row["count"]),
         extremes={str(k): float(v) for k, v in row["extremes"].items()},
         channels=tuple(map(str, row["channels"])),
@@ -165,6 +166,13 @@ def _record(row: dict[str, Any]) -> HazardRecord:
         flags=tuple(map(str, row["flags"])),
         context={str(k): str(v) for k, v in row["context"].items()},
     )
+
+
+def _time(row: dict[str, Any], name: str) -> float:
+    t = float(row[name])
+    if not 0.0 <= t <= LATEST:
+        raise FileError(f"{name} must be between 0 and {LATEST:g} s, got {t:g}")
+    return t
 
 
 _FIELDS = tuple(HazardRecord.__dataclass_fields__)

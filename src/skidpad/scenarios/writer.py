@@ -127,7 +127,8 @@ def _scenario(entities: Sequence[Track], sheet: Sheet) -> ElementTree.Element:
 
 def _entity(track: Track, sheet: Sheet) -> Any:
     length, width, cx, cy = track.box
-    label = SemanticClass(track.label) if track.label >= 0 else SemanticClass.CAR
+    known = track.label in SemanticClass.__members__.values()  # others number on after CARLA's
+    label = SemanticClass(track.label) if known else SemanticClass.CAR
     height = track.height or HEIGHTS.get(label, 1.5)
     box = xosc.BoundingBox(width, length, height, cx, cy, height / 2.0)
     if label is SemanticClass.PEDESTRIAN and not track.is_ego:

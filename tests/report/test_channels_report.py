@@ -106,8 +106,18 @@ def test_a_recording_that_lost_something_says_so(folder, tmp_path):
     assert "was not read in full" in page
 
 
+UNKNOWN = {"name": "no_hazard", "t_start": 0.0, "t_end": 1.0}
+
+
 @pytest.mark.parametrize(
-    "words", [{"indicators": [{}]}, {"hazards": [{"name": "a"}]}, {"seconds": None}, {"losses": []}]
+    "words",
+    [
+        {"indicators": [{}]},
+        {"hazards": [{"name": "a"}]},
+        {"hazards": [UNKNOWN]},
+        {"seconds": None},
+        {"losses": []},
+    ],
 )
 def test_a_summary_that_cannot_be_shown_is_refused_in_a_sentence(folder, tmp_path, words):
     with pytest.raises(InputError, match="monitor.json"):

@@ -13,6 +13,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from skidpad.core.reading import converted
+from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator, Threshold, load_thresholds
 from skidpad.evidence.channels.timing import TIMES
 from skidpad.recording.hazards import HazardRecord, read_hazards
@@ -75,7 +76,8 @@ class _Named(msgspec.Struct):
     name: str
 
 
-class _Event(_Named):
+class _Event(msgspec.Struct):
+    name: HazardType
     t_start: float
     t_end: float
 

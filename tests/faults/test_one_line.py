@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 from skidpad.core.errors import SkidpadError
@@ -13,6 +14,7 @@ from skidpad.fleet.batch import drive_of
 from skidpad.live.outcome import LINK, read_outcome
 from skidpad.recording.inputs import decode_inputs
 from skidpad.recording.monitored import SUMMARY, read_summary
+from skidpad.roads.baked import load_baked
 from skidpad.stack.settings import Settings
 
 NAME = "a\nb"
@@ -43,6 +45,13 @@ def test_of_a_setting_with_an_endless_word():
     assert len(said) <= LONGEST
     assert "choose one of" in said
     said.encode()
+
+
+def test_of_a_baked_map(tmp_path):
+    np.savez(tmp_path / "a.npz", about=json.dumps({"format": NAME}))
+    said = refusal(load_baked, tmp_path / "a.npz")
+    assert "baked in format" in said
+    assert "\n" not in said
 
 
 def test_of_a_drive():

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from skidpad.core.errors import FileError
 from skidpad.core.reading import UNUSABLE, read_arrays, read_bytes, unusable
 from skidpad.core.setup import LanePosition
+from skidpad.core.told import told
 from skidpad.roads.checked import EXTENT, check_arrays
 from skidpad.roads.lanes import LaneSamples, LaneTable, SignalTable
 from skidpad.roads.roadside import (
@@ -89,7 +90,7 @@ def load_baked(path: Path) -> BakedMap:
     try:
         about = json.loads(str(arrays.pop("about")))
         if about["format"] != FORMAT:
-            raise FileError(f"{where}: baked in format {about['format']}, need {FORMAT}")
+            raise FileError(f"{where}: baked in format {told(about['format'], 100)}, need {FORMAT}")
         start = about["ego_start"]
         baked = BakedMap(
             name=str(about["name"]),

@@ -163,6 +163,11 @@ def test_a_lane_change_ends_on_the_other_lane(tmp_path, mode):
     assert y[-1] == pytest.approx(-5.25, abs=0.05 if mode is ActorMode.IDEAL else 0.2)
 
 
+@pytest.mark.parametrize("shape", [Shape.LINEAR, Shape.SINUSOIDAL, Shape.CUBIC])
+def test_a_change_that_takes_for_ever_has_begun(shape):
+    assert Transition(2.0, 7.0, 1e308, shape).at(1.0) == pytest.approx((2.0, 0.0, 0.0))
+
+
 @pytest.mark.parametrize("shape", list(Shape))
 def test_transitions_end_where_they_should_and_their_rates_are_derivatives(shape):
     change = Transition(2.0, 7.0, 3.0, shape)

@@ -29,6 +29,8 @@ STEEPEST = {Shape.LINEAR: 1.0, Shape.SINUSOIDAL: pi / 2.0, Shape.CUBIC: 1.5}  # 
 # largest second derivative for a span of 1 in a duration of 1; a straight line is read as a cubic
 SHARPEST = {Shape.LINEAR: 6.0, Shape.SINUSOIDAL: pi * pi / 2.0, Shape.CUBIC: 6.0}
 
+LONGEST = 1e150  # of a span, whose square is a number
+
 
 def progress(shape: Shape, u: float) -> tuple[float, float, float]:
     """Share covered at u in [0, 1] and its first two derivatives by u."""
@@ -57,7 +59,7 @@ class Transition:
         return (
             self.start + share * size,
             rate * size / self.span,
-            bend * size / self.span**2,
+            bend * size / min(self.span, LONGEST) ** 2,
         )
 
     def over(self, p: float) -> bool:

@@ -37,7 +37,10 @@ BOMB = """<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a
         (STRAIGHT.replace('unit="km/h"', 'unit="knots"'), "<speed> has unknown unit 'knots'"),
         (re.sub(r'(<road [^>]*)length="[^"]*"', r'\1length="1e9"', STRAIGHT), "at most 1e\\+06 m"),
         (re.sub(r'(<road [^>]*)length="[^"]*"', r'\1length="-1"', STRAIGHT), "positive length"),
-        (re.sub(r'<laneSection s="[^"]*"', '<laneSection s="-2e9"', STRAIGHT), "20000000 samples"),
+        (
+            re.sub(r'<laneSection s="[^"]*"', '<laneSection s="-2e9"', STRAIGHT),
+            "20000000 lane samples",
+        ),
         (re.sub(r'(<road [^>]*)\bid="3"', r'\1id="1"', FIGURE8), "twice"),
     ],
 )

@@ -12,8 +12,10 @@ from skidpad.core.channels import Cycle
 
 BUDGET_MS = 25.0  # C-006, C-233
 MODULES = ("comfort", "similarity", "motion_prediction", "risk", "hazards")
-COUNTS: dict[str, Any] = {"cycle": pl.Int64, "objects": pl.Int64}
-TIMES = COUNTS | dict.fromkeys(("prepare", *MODULES, "writing", "total"), pl.Float64)  # ms
+TIMES: dict[str, Any] = {
+    **dict.fromkeys(("cycle", "objects"), pl.Int64),
+    **dict.fromkeys(("prepare", *MODULES, "writing", "total"), pl.Float64),  # ms
+}
 LIVE_TIMES = TIMES | dict.fromkeys(("wall_ms", "waited_ms", "faults"), pl.Float64)
 
 

@@ -110,15 +110,19 @@ def lane_shapes(document: Document) -> Iterator[LaneShape]:
             extent = section.s_end - section.s_start
             if extent < SHORTEST:
                 continue
-            samples += len(section.lanes) * ceil(extent / STEP)  # before they are made
-            if samples > SAMPLES_MAX:
-                raise FileError(
-                    f"{document.file}: road {road.id}, lane section at s = {section.s_start:g} m: more "
-                    f"than {SAMPLES_MAX} samples of lanes, one each {STEP:g} m"
-                )
+            besides_centre = len(section.lanes) - 1
+            # before they are made, as a section may claim any extent
+            _require_room(document, samples + besides_centre * extent / STEP)
             for shape in _section_shapes(road, index, section):
                 _require_sane(document, shape)
+                samples += len(shape.s)
+                _require_room(document, samples)
                 yield shape
+
+
+def _require_room(document: Document, samples: float) -> None:
+    if samples > SAMPLES_MAX:
+        raise FileError(f"{document.file}: more than {SAMPLES_MAX} lane samples")
 
 
 def _require_sane(document: Document, shape: LaneShape) -> None:

@@ -9,7 +9,7 @@ from contextlib import suppress
 import typer
 
 from skidpad.cli.spread import spread
-from skidpad.core.errors import MissingExtra
+from skidpad.core.errors import MissingExtra, require_choice
 from skidpad.simulation.carla_server.options import ServerOptions
 
 
@@ -17,6 +17,7 @@ from skidpad.simulation.carla_server.options import ServerOptions
 def carla_server(options: ServerOptions) -> None:
     """Serve unmodified CARLA 0.9.16 clients: no GPU, no download."""
     try:
+        from skidpad.simulation.carla_server.maps import MapStore
         from skidpad.simulation.carla_server.server import CarlaServer, Ports
         from skidpad.simulation.carla_server.warming import start_compiling
     except ModuleNotFoundError as error:
@@ -24,6 +25,7 @@ def carla_server(options: ServerOptions) -> None:
             raise
         raise MissingExtra("skidpad carla-server", "server") from error
 
+    require_choice("--map", options.map.rsplit("/", 1)[-1], MapStore(options.maps).names())
     logging.basicConfig(
         level=logging.WARNING if options.strict else logging.ERROR, format="skidpad: %(message)s"
     )

@@ -13,6 +13,7 @@ from runs import adas_run, scenario_run
 from skidpad.campaign.desk import Desk, Recorded
 from skidpad.campaign.desk_run import drive_at_desk
 from skidpad.cli.main import app
+from skidpad.cockpit import channel_source
 from skidpad.cockpit.channel_source import ChannelSource
 from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.feed import Feed
@@ -28,7 +29,7 @@ from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Crowd, Pedals, Timed, Wheel
 from skidpad.core.setup import DT
-from skidpad.core.vocabulary import ActorKind, HazardType, SemanticClass
+from skidpad.core.vocabulary import ActorKind, HazardType, SemanticClass, class_of
 from skidpad.evidence.pairs import Body
 from skidpad.recording.channels import ChannelWriter
 from skidpad.recording.cycles import cycles
@@ -292,3 +293,9 @@ def test_the_crash_camera_looks_at_the_crash_from_wherever_the_ego_is(yaw):
     x, y, z = view.rotation @ (np.array([place.x, place.y, place.z + 0.8]) - view.centre)
     assert z > 8.0
     assert (x / z, y / z) == pytest.approx((0.0, 0.0), abs=1e-9)
+
+
+def test_who_is_of_a_foreign_class_is_shown_as_a_car():
+    assert [class_of(label) for label in (-1, 104, 2**31)] == 3 * [SemanticClass.CAR]
+    assert channel_source._kind(104) is channel_source._kind(-1) is ActorKind.CAR
+    assert channel_source._height(104) == channel_source._height(-1) == channel_source.CAR_HEIGHT

@@ -41,6 +41,7 @@ from skidpad.core.vocabulary import (
     RangeModel,
     SemanticClass,
     Supervision,
+    class_of,
 )
 from skidpad.core.weather import Weather
 from skidpad.evidence.pairs import Body
@@ -294,11 +295,11 @@ def _size(polygon: Floats) -> Floats:
 
 
 def _kind(label: int) -> ActorKind:
-    return KINDS.get(SemanticClass(label), ActorKind.PROP) if label >= 0 else ActorKind.CAR
+    return KINDS.get(class_of(label), ActorKind.PROP)
 
 
 def _height(label: int) -> float:
-    return HEIGHT.get(SemanticClass(label), CAR_HEIGHT) if label >= 0 else CAR_HEIGHT
+    return HEIGHT.get(class_of(label), CAR_HEIGHT)
 
 
 def _paint(row: int) -> tuple[int, int, int]:

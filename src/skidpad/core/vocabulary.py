@@ -173,6 +173,14 @@ class SemanticClass(IntEnum):
     GUARD_RAIL = 28
 
 
+LABELS = frozenset(map(int, SemanticClass))
+
+
+def class_of(label: int) -> SemanticClass:
+    """The class of what a channel saw; a car's for -1, unknown, and for numbers beyond CARLA's."""
+    return SemanticClass(label) if label in LABELS else SemanticClass.CAR
+
+
 class GripModel(str, Enum):
     """How weather acts on tyres."""
 

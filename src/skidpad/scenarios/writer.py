@@ -17,7 +17,7 @@ from xml.etree import ElementTree
 
 from scenariogeneration import xosc
 
-from skidpad.core.vocabulary import SemanticClass
+from skidpad.core.vocabulary import SemanticClass, class_of
 from skidpad.recording.files import write_bytes
 from skidpad.scenarios.entities import GHOST
 from skidpad.scenarios.environment import Environment
@@ -127,8 +127,7 @@ def _scenario(entities: Sequence[Track], sheet: Sheet) -> ElementTree.Element:
 
 def _entity(track: Track, sheet: Sheet) -> Any:
     length, width, cx, cy = track.box
-    known = track.label in SemanticClass.__members__.values()  # others number on after CARLA's
-    label = SemanticClass(track.label) if known else SemanticClass.CAR
+    label = class_of(track.label)
     height = track.height or HEIGHTS.get(label, 1.5)
     box = xosc.BoundingBox(width, length, height, cx, cy, height / 2.0)
     if label is SemanticClass.PEDESTRIAN and not track.is_ego:

@@ -37,6 +37,16 @@ def test_spirals_are_what_integration_of_their_curvature_gives(
     assert np.allclose(ours.curvature, k0 + (k1 - k0) * s / length)
 
 
+def test_a_long_cubic_is_where_its_length_says() -> None:
+    a, end = 5e-5, 6000.0  # v = a u^2, whose length is known in closed form
+    length = end / 2.0 * np.hypot(1.0, 2 * a * end) + np.arcsinh(2 * a * end) / (4 * a)
+    shape = Parametric((0.0, 1.0, 0.0, 0.0), (0.0, 0.0, a, 0.0), end)
+    line = ReferenceLine([Element(0.0, 0.0, 0.0, 0.0, length, shape)])
+    u = np.linspace(0.0, end, 977)
+    s = u / 2.0 * np.hypot(1.0, 2 * a * u) + np.arcsinh(2 * a * u) / (4 * a)
+    assert np.allclose(line.at(s).x, u, atol=1e-6)
+
+
 @pytest.mark.parametrize("p_end", [1.0, 30.0])
 def test_parametric_cubics_keep_their_derivatives_consistent(p_end: float) -> None:
     scale = 30.0 / p_end

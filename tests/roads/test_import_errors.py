@@ -38,6 +38,10 @@ BOMB = """<?xml version="1.0"?><!DOCTYPE l [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a
         (re.sub(r'(<road [^>]*)length="[^"]*"', r'\1length="1e9"', STRAIGHT), "at most 1e\\+06 m"),
         (re.sub(r'(<road [^>]*)length="[^"]*"', r'\1length="-1"', STRAIGHT), "positive length"),
         (
+            re.sub(r'(<geometry [^>]*)length="[^"]*"', r'\1length="2147483648"', STRAIGHT),
+            "<geometry> is 2.14748e\\+09 m long; at most 1e\\+06 m",
+        ),
+        (
             re.sub(r'<laneSection s="[^"]*"', '<laneSection s="-2e9"', STRAIGHT),
             "20000000 lane samples",
         ),

@@ -20,6 +20,7 @@ from skidpad.roads.opendrive.reference_line import (
 )
 
 LARGEST = 1.0e15  # of any number in a file: its square and cube can be computed with
+LONGEST = 1e6  # m; a longer road or piece of one is a mistake or an attack
 SIZE_MAX = 64 * 2**20  # bytes; the largest town that we know has 3.4 MB
 NAMED = 2**30  # ids that are no numbers count from here, away from all usual numbers
 Node = Any  # lxml's element
@@ -242,7 +243,7 @@ def _shift(read: Reader, node: Node | None) -> Shift:
 
 
 def _road(read: Reader, node: Node) -> RoadRecord:
-    length = read.number(node, "length")
+    length = _length(read, node)
     if length <= 0.0:
         raise read.fail(node, f"needs a positive length, got {length}")
     elements = [_element(read, n) for n in node.findall("planView/geometry")]
@@ -279,8 +280,15 @@ def _raised(read: Reader, elevation: Cubics) -> Cubics:
     return Cubics(elevation.start, elevation.coefficients + lift)
 
 
-def _element(read: Reader, node: Node) -> Element:
+def _length(read: Reader, node: Node) -> float:
     length = read.number(node, "length")
+    if length > LONGEST:
+        raise read.fail(node, f"is {length:g} m long; at most {LONGEST:g} m")
+    return length
+
+
+def _element(read: Reader, node: Node) -> Element:
+    length = _length(read, node)
     shape: Clothoid | Parametric
     child = next((c for c in node if isinstance(c.tag, str) and c.tag != "userData"), None)
     match None if child is None else child.tag:

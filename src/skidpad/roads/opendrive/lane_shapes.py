@@ -22,7 +22,6 @@ JOINT = 1e-6  # m inside a section: where records are chosen at its ends
 STRETCH_MAX = 3.0  # more is a jump in the file, which no sampling makes smooth
 JOINT_GAP = 0.02  # m, closer joints get no sample of their own
 SHORTEST = 1e-4  # m, shorter sections are joints written twice
-LONGEST = 1e6  # m, a longer road is a mistake or an attack
 FARTHEST = 1e7  # m from the origin; northings of map projections reach 1e7
 SAMPLES_MAX = 20_000_000
 
@@ -102,10 +101,6 @@ def lane_shapes(document: Document) -> Iterator[LaneShape]:
     """All lanes but the centre ones, roads in file order, each section from left to right."""
     samples = 0
     for road in document.roads.values():
-        if road.length > LONGEST:
-            raise FileError(
-                f"{document.file}: road {road.id} is {road.length:g} m long; at most {LONGEST:g} m"
-            )
         for index, section in enumerate(road.sections):
             extent = section.s_end - section.s_start
             if extent < SHORTEST:

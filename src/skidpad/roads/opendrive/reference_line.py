@@ -13,6 +13,7 @@ Floats = NDArray[np.float64]
 
 STRAIGHTEST = 1e-12  # 1/m^2, slower change of curvature than this is an arc
 TABLE_STEP = 0.25  # m, spacing of the table that turns arc length into a cubic's parameter
+TABLE_MAX = 4096  # steps; an element of more than a kilometre has longer ones
 
 
 @dataclass(frozen=True, slots=True)
@@ -141,7 +142,8 @@ def _parametric(e: Element, shape: Parametric, ds: Floats) -> LinePoints:
     """Parameter from arc length by a table; then the cubic and its derivatives."""
     from scipy.interpolate import CubicHermiteSpline  # likewise
 
-    p_table = np.linspace(0.0, shape.p_end, max(int(e.length / TABLE_STEP), 8) + 1)
+    steps = int(np.clip(e.length / TABLE_STEP, 8, TABLE_MAX))
+    p_table = np.linspace(0.0, shape.p_end, steps + 1)
     middle = 0.5 * (p_table[1:] + p_table[:-1])
     speed, speed_middle = (np.hypot(*_derivatives(shape, p)[2:4]) for p in (p_table, middle))
     simpson = (speed[:-1] + 4.0 * speed_middle + speed[1:]) / 6.0 * np.diff(p_table)

@@ -20,6 +20,7 @@ from readers import (
     STORY_S,
     Reader,
     story_of,
+    write_anew,
 )
 from tests.scenarios.files import VEHICLE, event, private, speed, time, to, vehicle, write
 
@@ -124,7 +125,7 @@ def look(path: Path) -> object:
     folder = path.parent / "runs" / "a"
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in drive().items():
-        (folder / name).write_bytes(path.read_bytes() if name == path.name else content)
+        write_anew(folder / name, path.read_bytes() if name == path.name else content)
     source = opened(folder)
     with np.errstate(all="ignore"):
         for k in {0, source.ticks // 2, source.ticks - 1}:

@@ -98,11 +98,11 @@ def test_damaged_files_are_read_or_refused_in_a_sentence(name, numbers, tmp_path
     for (
         seed
     ) in reader.seeds():  # what is whole is read, and kernels are compiled by no input's clock
-        path.write_bytes(seed)
+        readers.write_anew(path, seed)
         reader.read(path)
     faults = []
     for number, data in inputs(name, numbers):
-        path.write_bytes(data)
+        readers.write_anew(path, data)
         try:
             said = refused(reader, path)
         except KeyboardInterrupt:

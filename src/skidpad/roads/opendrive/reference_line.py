@@ -170,9 +170,19 @@ def _parametric(e: Element, shape: Parametric, ds: Floats) -> LinePoints:
 
 def _derivatives(shape: Parametric, p: Floats) -> tuple[Floats, ...]:
     """u, v and their first, second and third derivatives by p."""
-    out: list[Floats] = []
-    for order in range(4):
-        for cubic in (shape.u, shape.v):
-            poly = np.polynomial.Polynomial(cubic)
-            out.append(np.asarray((poly.deriv(order) if order else poly)(p) + 0.0 * p))
-    return tuple(out)
+    return tuple(
+        value
+        for derivatives in zip(_cubic(shape.u, p), _cubic(shape.v, p), strict=True)
+        for value in derivatives
+    )
+
+
+def _cubic(coefficients: tuple[float, float, float, float], p: Floats) -> tuple[Floats, ...]:
+    """Value and first three derivatives at `p`."""
+    a, b, c, d = coefficients
+    return (
+        a + p * (b + p * (c + p * d)),
+        b + p * (2.0 * c + p * (3.0 * d)),
+        2.0 * c + p * (6.0 * d),
+        6.0 * d + 0.0 * p,
+    )

@@ -20,7 +20,7 @@ def driven(tmp_path, monkeypatch, capsys):
 
 
 def proof(name, code):
-    return Proof(name, ("-c", code), f"that {name}")
+    return Proof(name, (sys.executable, "-c", code), f"that {name}")
 
 
 def test_outcomes_are_kept_and_told(driven, tmp_path):

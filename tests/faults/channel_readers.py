@@ -11,7 +11,7 @@ import mutation
 import numpy as np
 import small_files
 from message_mutation import mutated_messages
-from readers import BYTES_OR_JSON, BYTES_OR_TABLE, Reader, write_anew
+from readers import BYTES_OR_JSON, BYTES_OR_TABLE, Reader
 
 from channel_worlds import Eyes, World, drive
 
@@ -72,7 +72,7 @@ def read_page(path: Path) -> object:
 
     for name, content in watched().items():
         if name != path.name:
-            write_anew(path.parent / name, content)
+            (path.parent / name).write_bytes(content)
     with np.errstate(all="ignore"):
         return write_drive_report(path.parent)
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
-from itertools import count
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -20,7 +19,6 @@ from readers import (
     STORY_S,
     Reader,
     story_of,
-    write_anew,
 )
 from tests.scenarios.files import VEHICLE, event, private, speed, time, to, vehicle, write
 
@@ -38,7 +36,6 @@ NAMED = '<CatalogReference catalogName="all" entryName="{}"/>'
 STORY = f"""<Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutionCount="1"><Actors
 selectTriggeringEntities="false"><EntityRef entityRef="other"/></Actors>{NAMED.format("slow")}
 </ManeuverGroup><StartTrigger/></Act></Story>"""
-NUMBER = count()
 
 
 def catalogs() -> list[bytes]:
@@ -57,13 +54,13 @@ def read_catalog(path: Path) -> object:
     """A scenario that takes a vehicle and a manoeuvre from it, played; a new folder each time."""
     from skidpad.scenarios.stage import played
 
-    folder = path.parent / str(next(NUMBER))
-    (folder / "cat").mkdir(parents=True)
-    (folder / "cat" / "all.xosc").write_bytes(path.read_bytes())
-    other = f'<ScenarioObject name="other">{NAMED.format("long")}</ScenarioObject>'
-    file = write(folder, catalogs=PLACES, entities=vehicle("ego") + other, stories=STORY)
-    scenario = story_of(file).scenario
-    with np.errstate(all="ignore"):
+    with TemporaryDirectory(dir=path.parent) as name, np.errstate(all="ignore"):
+        folder = Path(name)
+        (folder / "cat").mkdir()
+        (folder / "cat" / "all.xosc").write_bytes(path.read_bytes())
+        other = f'<ScenarioObject name="other">{NAMED.format("long")}</ScenarioObject>'
+        file = write(folder, catalogs=PLACES, entities=vehicle("ego") + other, stories=STORY)
+        scenario = story_of(file).scenario
         return scenario and played(scenario, STORY_S, STORY_DT).csv()
 
 
@@ -125,7 +122,7 @@ def look(path: Path) -> object:
     folder = path.parent / "runs" / "a"
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in drive().items():
-        write_anew(folder / name, path.read_bytes() if name == path.name else content)
+        (folder / name).write_bytes(path.read_bytes() if name == path.name else content)
     source = opened(folder)
     with np.errstate(all="ignore"):
         for k in {0, source.ticks // 2, source.ticks - 1}:

@@ -33,12 +33,6 @@ Mutate = Callable[[random.Random, bytes], bytes]
 PLAYED_S, STORY_S, STORY_DT = 0.25, 5.0, 0.2  # 5 and 26 ticks of a scenario
 
 
-def write_anew(path: Path, content: bytes) -> None:
-    """Many times faster than over what was there: ext4 puts a file that was truncated on the disk at once."""
-    path.unlink(missing_ok=True)
-    path.write_bytes(content)
-
-
 @dataclass(frozen=True)
 class Reader:
     """read: what is given the damaged file. share: of CI's inputs, where reading takes long.
@@ -216,7 +210,7 @@ def read_drive(path: Path) -> object:
 
     for name, content in run_folder().items():
         if name != path.name:
-            write_anew(path.parent / name, content)
+            (path.parent / name).write_bytes(content)
     log = read_log(path.parent)
     road_map = load_map("figure8")
     with np.errstate(all="ignore"):

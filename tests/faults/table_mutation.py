@@ -108,7 +108,7 @@ def _other_text(rng: random.Random, text: str) -> str:
     try:
         how = rng.choice((mutated, mutated_json, mutated_json))
         return how(rng, text.encode()).decode("utf-8", "ignore")
-    except ValueError:  # no JSON, or none any more
+    except (ValueError, RecursionError):  # no JSON, or none any more
         return mutated(rng, text.encode()).decode("utf-8", "ignore")
 
 

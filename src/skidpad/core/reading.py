@@ -35,14 +35,13 @@ UNUSABLE = (
     IndexError,
     AttributeError,
     ArithmeticError,
-    RecursionError,
+    RuntimeError,  # nested too deeply; zipfile: compressed or encrypted in a way that it cannot undo
     MemoryError,
     EOFError,
     StopIteration,
     msgspec.MsgspecError,
     yaml.YAMLError,
     zipfile.BadZipFile,
-    NotImplementedError,  # zipfile: a compression that it does not know
 )
 
 

@@ -154,7 +154,7 @@ def _array(packed: zipfile.ZipFile, member: zipfile.ZipInfo, where: str) -> NDAr
     with packed.open(member) as stream:
         version = npy.read_magic(stream)
         read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-        shape, _, kind = read(stream)
+        shape, by_columns, kind = read(stream)
         if kind.hasobject:
             raise FileError(f"{where}: {member.filename} holds objects, not numbers")
         if (
@@ -162,6 +162,5 @@ def _array(packed: zipfile.ZipFile, member: zipfile.ZipInfo, where: str) -> NDAr
             or min(shape, default=0) < 0
         ):
             raise FileError(f"{where}: {member.filename} says that it is larger than its content")
-    with packed.open(member) as stream:
-        array: NDArray[Any] = npy.read_array(stream, allow_pickle=False)
-    return array
+        content = bytearray(stream.read())  # not bytes, so that the array can be written
+    return np.ndarray(shape, kind, content, order="F" if by_columns else "C")

@@ -206,6 +206,7 @@ def _draw_curves(axes: Axes, chart: Chart, named: set[str]) -> None:
         axes.set_title(chart.title, fontsize=9.5, loc="left")
     if chart.log:
         axes.set_yscale("log")
+        axes.yaxis.set_major_formatter("{x:g}")  # not 10^-1, which is set slowly and read slowly
     if chart.y_range:
         axes.set_ylim(*chart.y_range)
     if chart.x_range:

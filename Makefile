@@ -27,11 +27,11 @@ check: $(VENV)/.checked-with
 wheel-check: $(BIN)/python
 	PYTHON=$(BIN)/python .ci/wheel
 
-# damaged files for every reader, about an hour on two quiet cores; what CI tries are the first 500
-# one thread for tables: both cores are busy, and small tables pay more for threads than they gain
+# damaged files for every reader, a process per core; what CI tries are the first 500
+# one thread for tables: the cores are busy, and small tables pay more for threads than they gain
 FUZZ ?= 100000
 fuzz: $(VENV)/.tested-with
-	POLARS_MAX_THREADS=1 $(BIN)/python -m pytest -n 2 --dist worksteal tests/faults/test_readers.py --fuzz $(FUZZ) --durations=0
+	POLARS_MAX_THREADS=1 $(BIN)/python -m pytest -n auto --dist worksteal tests/faults/test_readers.py --fuzz $(FUZZ) --durations=0
 
 # proofs too long for every change, each with a dated line; NIGHTLY_ARGS="--only fuzz" drives one
 nightly: $(VENV)/.tested-with

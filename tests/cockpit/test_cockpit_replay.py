@@ -39,6 +39,7 @@ from skidpad.core.inputs import (
     Wheel,
 )
 from skidpad.core.run import Function
+from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.physics.presets import preset
 from skidpad.recording.campaigns import RUNS
@@ -88,6 +89,15 @@ def test_a_car_on_a_bridge_is_in_nobodys_way_on_the_time_line(driven):
     assert any(v is not None for v in recording.curves().ttc)
     at["z"][:, 1:] += 40.0  # more than a road climbs to whoever is that near
     assert all(v is None for v in recording.curves().ttc)
+
+
+@pytest.mark.parametrize("tick", [-5, 2000])
+def test_a_crash_that_no_moment_shows_is_looked_for_in_the_nearest_one(driven, tick):
+    recording = Recording(driven[0])
+    beyond = ContactEvent(tick, 1, "", impulse=1e3, v_closing=2.0, x=0.0, y=0.0)
+    recording.log = replace(recording.log, events=(beyond,))
+    at = 0 if tick < 0 else -1
+    assert recording.crash(40).x == recording.log.actors.x[at, 0]
 
 
 def test_moments_are_those_that_were_driven(driven):

@@ -57,6 +57,15 @@ def test_whoever_is_present_is_somewhere(log, tmp_path, name, value):
         read_log(with_column(log, tmp_path, nowhere))
 
 
+@pytest.mark.parametrize("name", ["x", "yaw_rate", "present", "mu"])
+@pytest.mark.parametrize("kind", [pl.Boolean, pl.Float64])
+def test_a_column_of_actors_in_another_type_is_refused(log, tmp_path, name, kind):
+    width = len(log.table) * (4 if name == "mu" else 1)
+    other = pl.col(name).cast(pl.Array(pl.Float64, width)).cast(pl.Array(kind, width))
+    with pytest.raises(FileError, match=f"column {name} must hold .* per tick"):
+        read_log(with_column(log, tmp_path, other))
+
+
 def test_what_may_be_absent_is_read(log, tmp_path):
     absent = pl.lit(None, pl.Float64).alias("stack_distance")
     assert len(read_log(with_column(log, tmp_path, absent))) == len(log)

@@ -22,7 +22,7 @@ from skidpad.campaign.drive import Moment
 from skidpad.campaign.keeping import housed, road_file
 from skidpad.campaign.stored import read_run
 from skidpad.cockpit.indicators import every, least_of, ttc_ahead
-from skidpad.cockpit.source import Curves, Said, Seat
+from skidpad.cockpit.source import Curves, Said, Seat, index_at
 from skidpad.core.errors import FileError
 from skidpad.core.frames import RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
@@ -79,7 +79,6 @@ class Recording:
         self._seat_ticks = [s.tick for s in self.seats]
         self._lights = [e for e in self.log.events if isinstance(e, LightChange)]
         self._light_ticks = [e.tick for e in self._lights]
-        self._first = int(self.log.tick[0])
         bodies = vehicle_types()
         self._pitch_gradient = np.array(
             [bodies[t].pitch_gradient if t in bodies else 0.0 for t in self.log.table.types]
@@ -106,7 +105,7 @@ class Recording:
         if not self.log.contacts:
             return None
         tick = self.tick(k)
-        nearest = min(self.log.contacts, key=lambda c: abs(c.tick - tick)).tick - self._first
+        nearest = index_at(self, min(self.log.contacts, key=lambda c: abs(c.tick - tick)).tick)
         a = self.log.actors
         x, y, z, yaw = (float(v[nearest, 0]) for v in (a.x, a.y, a.z, a.yaw))
         return Pose(x, y, z, yaw=yaw)

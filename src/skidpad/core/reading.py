@@ -163,4 +163,5 @@ def _array(packed: zipfile.ZipFile, member: zipfile.ZipInfo, where: str) -> NDAr
         ):
             raise FileError(f"{where}: {member.filename} says that it is larger than its content")
         content = bytearray(stream.read())  # not bytes, so that the array can be written
-    return np.ndarray(shape, kind, content, order="F" if by_columns else "C")
+    values: NDArray[Any] = np.ndarray(shape, kind, content, order="F" if by_columns else "C")
+    return values

@@ -153,9 +153,9 @@ def _log(table: pl.DataFrame, head: _Kept, events: tuple[Event, ...]) -> RunLog:
         header=head.header,
         table=actors,
         tick=_whole(table, "tick"),
-        actors=ActorSeries(*(_matrix(table, f, n) for f in ActorSeries._fields)),
-        present=_matrix(table, "present", n).astype(np.bool_),
-        mu=_matrix(table, "mu", 4 * n).reshape(-1, n, 4),
+        actors=ActorSeries(*(_matrix(table, f, n, pl.Float32) for f in ActorSeries._fields)),
+        present=_matrix(table, "present", n, pl.UInt8).astype(np.bool_),
+        mu=_matrix(table, "mu", 4 * n, pl.Float32).reshape(-1, n, 4),
         ego=_series(table, "ego_", EgoSeries),
         applied=_series(table, "applied_", CommandSeries),
         requested=_series(table, "requested_", CommandSeries),
@@ -175,8 +175,12 @@ def _whole(table: pl.DataFrame, name: str) -> NDArray[np.int64]:
     return values
 
 
-def _matrix(table: pl.DataFrame, name: str, width: int) -> NDArray[Any]:
-    values: NDArray[Any] = table[name].to_numpy().reshape(len(table), width)
+def _matrix(
+    table: pl.DataFrame, name: str, width: int, kind: type[pl.Float32 | pl.UInt8]
+) -> NDArray[Any]:
+    if table.schema[name] != pl.Array(kind, width):
+        raise ValueError(f"column {name} must hold {width} numbers ({kind}) per tick")
+    values: NDArray[Any] = table[name].to_numpy()
     return values
 
 

@@ -23,7 +23,7 @@ READERS = {name: reader for module in MODULES for name, reader in module.READERS
 LISTS = ("openscenario", "played", "storyboard", "catalog")  # name all that is wrong, a line each
 LONGEST = 50_000  # characters
 IN_CI = 500  # inputs of a reader
-OF_A_TEST = 10_000  # inputs at most, so that processes that share the readers end together
+TESTS = 10  # of a reader, so that processes that share the readers end together
 FAULTS_SHOWN = 12
 CPU_S = 300  # of one input; thousands of times what one takes
 IN_MEMORY = Path("/dev/shm")
@@ -57,9 +57,10 @@ def amount(reader, asked):
 def parts(asked, first):
     """The tests: a reader's name and the numbers of its inputs."""
     for name, reader in READERS.items():
-        end = first + amount(reader, asked)
-        for begin in range(first, end, OF_A_TEST):
-            numbers = range(begin, min(begin + OF_A_TEST, end))
+        count = amount(reader, asked)
+        end, size = first + count, max(IN_CI, count // TESTS)
+        for begin in range(first, end, size):
+            numbers = range(begin, min(begin + size, end))
             yield pytest.param(name, numbers, id=f"{name}-{begin}" if begin else name)
 
 

@@ -7,7 +7,7 @@ Parts on seeds of their own, each on every route. `train` and `validate` are dri
 weather, by day, by night, in rain and on ice, among natural and among risky drivers; `report` the same
 without ice, which is a part of its own: there the ego, which knows no grip, tailgates. Trees are fitted
 on `train`, their limits chosen on routes that the fold did not see; `validate` is for looking, `report`
-and `ice` are looked at once. Then the arbiter and each channel alone drive the same two natural hours,
+and `ice` are looked at once. Then the arbiter and each channel alone drive the same natural hours,
 for redundancy. What is done is not done again, so a campaign that was stopped goes on; `--only hazards`
 or `--only redundancy` drives one of the two. `--publish` writes docs/results/channels and the tables of
 docs/channels-evaluation.md, and says what was driven at which commit.

@@ -64,10 +64,7 @@ def test_a_vehicle_of_a_catalog_with_its_parameters(folder, given, length):
 
 
 def test_a_manoeuvre_of_a_catalog_for_its_group(folder):
-    act = f"""<Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutionCount="1"><Actors
-selectTriggeringEntities="false"><EntityRef entityRef="other"/></Actors>
-{reference("acts", "slow", v=6)}</ManeuverGroup><StartTrigger/></Act></Story>"""
-    result = told(folder, catalogs=PLACES, stories=act)
+    result = told(folder, catalogs=PLACES, stories=GROUP.format(reference("acts", "slow", v=6)))
     assert result.of("other")[-1].speed == pytest.approx(6.0)
 
 
@@ -78,6 +75,32 @@ selectTriggeringEntities="false"><EntityRef entityRef="other"/></Actors>
 def test_what_is_not_there_is_said(folder, wanted, message):
     with pytest.raises(ScenarioError, match=message):
         compiled(folder, catalogs=PLACES, entities=other(reference(*wanted)))
+
+
+GROUP = """<Story name="s"><Act name="a"><ManeuverGroup name="g" maximumExecutionCount="1"><Actors
+selectTriggeringEntities="false"><EntityRef entityRef="other"/></Actors>{}</ManeuverGroup>
+<StartTrigger/></Act></Story>"""
+MANOEUVRE = '<Maneuver name="m">{}</Maneuver>'
+FOLLOW = """<RoutingAction><FollowTrajectoryAction>{}<TrajectoryFollowingMode followingMode="position"/>
+</FollowTrajectoryAction></RoutingAction>"""
+ROUTE = "<RoutingAction><AssignRouteAction>{}</AssignRouteAction></RoutingAction>"
+SKY = "<GlobalAction><EnvironmentAction>{}</EnvironmentAction></GlobalAction>"
+
+
+@pytest.mark.parametrize(
+    ("action", "needed"),
+    [(private(FOLLOW), "Trajectory"), (private(ROUTE), "Route"), (SKY, "Environment")],
+)
+def test_an_action_with_an_entry_of_another_kind_is_refused(folder, action, needed):
+    inside = MANOEUVRE.format(event("e", action, time(1.0))).format(reference("cars", "long"))
+    with pytest.raises(ScenarioError, match=f"<{needed}> is needed, not <Vehicle>"):
+        compiled(folder, catalogs=PLACES, stories=GROUP.format(inside))
+
+
+def test_a_group_with_an_entry_of_another_kind_is_refused(folder):
+    stories = GROUP.format(reference("cars", "long"))
+    with pytest.raises(ScenarioError, match="<Maneuver> is needed, not <Vehicle>"):
+        compiled(folder, catalogs=PLACES, stories=stories)
 
 
 def test_a_story_has_parameters_of_its_own(tmp_path):

@@ -40,15 +40,18 @@ class Catalogs:
         values = declared(found, reference.values, given)
         return found.scoped(values | given)
 
-    def resolved(self, node: Node) -> Node:
-        """The node itself, or the entry where it is a reference; its own parameters are in scope."""
-        if node.tag != "CatalogReference":
-            return inner(node)
-        depth = 0
-        while node.tag == "CatalogReference":
-            node = self.entry(node, depth)
+    def resolved(self, node: Node, kind: str | None = None) -> Node:
+        """The node itself, or the entry where it is a reference; its own parameters are in scope.
+
+        kind: the element it must be, else a fault; None for any.
+        """
+        found, depth = node, 0
+        while found.tag == "CatalogReference":
+            found = self.entry(found, depth)
             depth += 1
-        return node
+        if kind is not None and found.tag != kind:
+            raise node.error(f"<{kind}> is needed, not <{found.tag}>")
+        return inner(node) if found is node else found
 
 
 def _catalog(folder: Path, name: str) -> Node | None:

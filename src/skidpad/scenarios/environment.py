@@ -75,8 +75,6 @@ class Environment:
 
 def compile_environment(node: Node) -> Environment:
     """An <Environment>."""
-    if node.tag != "Environment":
-        raise node.error("needs an <Environment>")
     weather, road, time = (node.find(t) for t in ("Weather", "RoadCondition", "TimeOfDay"))
     wetness, scale = None, None
     if road is not None:

@@ -32,9 +32,7 @@ class Route:
 
 def compile_route(node: Node, ctx: Context) -> Route:
     """A <Route> or a reference to one; waypoints must not depend on what moves."""
-    node = ctx.catalogs.resolved(node)
-    if node.tag != "Route":
-        raise node.error("needs a <Route>")
+    node = ctx.catalogs.resolved(node, "Route")
     points = []
     for waypoint in node.children("Waypoint"):
         at = position(waypoint.child("Position"), ctx)

@@ -126,7 +126,7 @@ def element_paths(board: Node, ctx: Context) -> list[tuple[str, Path]]:
     def look(node: Node, above: Path) -> None:
         if node.tag == "CatalogReference":
             try:
-                node = ctx.catalogs.resolved(node)
+                node = ctx.catalogs.resolved(node, "Maneuver")
             except Fault:
                 return  # reported where the manoeuvre is compiled
         level = LEVELS[node.tag]
@@ -179,7 +179,7 @@ def _group(node: Node, above: Path, ctx: Context) -> Group:
 
 
 def _manoeuvre(node: Node, above: Path, ctx: Context) -> Manoeuvre:
-    node = ctx.catalogs.resolved(node)
+    node = ctx.catalogs.resolved(node, "Maneuver")
     path = (*above, node.label())
     events = [ctx.attempt(partial(_event, e, path, ctx)) for e in node.children("Event")]
     return Manoeuvre(path, tuple(e for e in events if e is not None))

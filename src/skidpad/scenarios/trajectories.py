@@ -42,9 +42,7 @@ class Trajectory:
 
 def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
     """A <Trajectory>, or a reference to one."""
-    node = ctx.catalogs.resolved(node)
-    if node.tag != "Trajectory":
-        raise node.error("needs a <Trajectory>")
+    node = ctx.catalogs.resolved(node, "Trajectory")
     closed = node.flag("closed", default=False)
     shape = node.child("Shape").only()
     name = node.label()

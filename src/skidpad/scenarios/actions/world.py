@@ -134,7 +134,7 @@ class SetEnvironment:
 
 
 def _environment(node: Node, ctx: Context) -> GlobalAction:
-    return SetEnvironment(compile_environment(ctx.catalogs.resolved(node.only())))
+    return SetEnvironment(compile_environment(ctx.catalogs.resolved(node.only(), "Environment")))
 
 
 def user_defined(node: Node, ctx: Context) -> GlobalAction:

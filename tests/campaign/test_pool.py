@@ -69,15 +69,22 @@ def test_a_worker_that_dies_idle_is_replaced_and_costs_no_attempt(tmp_path):
     assert len(set(done)) == 3
 
 
-def test_workers_leave_when_their_parent_is_killed(tmp_path):
+@pytest.mark.parametrize(
+    "begin",
+    ["list(run_jobs([Job('a', *long)], 1))", "warm(partial(*long))"],
+    ids=["worker", "warm-up"],
+)
+def test_children_leave_when_their_parent_is_killed(tmp_path, begin):
     pid_file = tmp_path / "pid"
     code = (
         f"import sys; sys.path.insert(0, {str(Path(work.__file__).parent)!r})\n"
         "import jobs\n"
-        "from skidpad.campaign.pool import run_jobs\n"
+        "from functools import partial\n"
+        "from skidpad.campaign.pool import run_jobs, warm\n"
         "from skidpad.campaign.worker import Job\n"
         "if __name__ == '__main__':\n"
-        f"    list(run_jobs([Job('a', jobs.write_pid_and_sleep, {str(pid_file)!r})], 1))\n"
+        f"    long = jobs.write_pid_and_sleep, {str(pid_file)!r}\n"
+        f"    {begin}\n"
     )
     script = tmp_path / "parent.py"
     script.write_text(code)
@@ -96,7 +103,7 @@ def test_workers_leave_when_their_parent_is_killed(tmp_path):
         if status.exists() and status.read_text().split(")")[1].split()[0] == "Z":
             return
         time.sleep(0.05)
-    pytest.fail("the worker outlived its parent")
+    pytest.fail("the child outlived its parent")
 
 
 def test_workers_use_one_thread_per_library(monkeypatch):

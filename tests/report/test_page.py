@@ -1,3 +1,4 @@
+import json
 import re
 
 import pytest
@@ -70,6 +71,16 @@ def test_the_page_is_self_contained_and_escapes_what_it_shows():
     assert 'href="#tables"' in html
     assert 'id="tables"' in html
     assert html.count("<script") == html.count("</script>")
+
+
+@pytest.mark.parametrize("kind", ["replay", "worlds"])
+def test_no_word_of_a_picture_leaves_its_script_element(kind):
+    words = {"name": "<!--<script></script><b>"}
+    card = Card("one", **{kind: words})
+    html = render(Page(title="t", subtitle="", sections=[Section("s", [Cards("c", [card])])]))
+    data = re.search(r'<script type="application/json">(.*?)</script>', html).group(1)
+    assert "<" not in data
+    assert json.loads(data) == words
 
 
 def test_questions_come_with_answers_and_verdicts_fold_their_numbers():

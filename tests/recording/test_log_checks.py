@@ -40,7 +40,6 @@ def first(name, value, kind):
         ("stack_status", 77, pl.Int32, "status of the stack"),
         ("stack_light_source", 77, pl.Int32, "light_source of the stack"),
         ("stack_tier", -1, pl.Int32, "tier of the stack"),
-        ("stack_radar_points", float("inf"), pl.Float64, "radar points"),
     ],
 )
 def test_a_number_that_means_nothing_is_named(log, tmp_path, name, value, kind, said):
@@ -64,6 +63,37 @@ def test_a_column_of_actors_in_another_type_is_refused(log, tmp_path, name, kind
     other = pl.col(name).cast(pl.Array(pl.Float64, width)).cast(pl.Array(kind, width))
     with pytest.raises(FileError, match=f"column {name} must hold .* per tick"):
         read_log(with_column(log, tmp_path, other))
+
+
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [
+        ("stack_radar_points", pl.Float64),  # which also holds what no whole number does: 1e308
+        ("ego_gear", pl.Int64),
+        ("stack_distance", pl.Float32),
+        ("stack_v_target", pl.Boolean),
+        ("requested_throttle", pl.String),
+    ],
+)
+def test_a_column_of_numbers_in_another_type_is_refused(log, tmp_path, name, kind):
+    with pytest.raises(FileError, match=f"column {name} must hold .*, not {kind}"):
+        read_log(with_column(log, tmp_path, pl.col(name).cast(kind)))
+
+
+@pytest.mark.parametrize("name", ["tick", "supervision", "weather"])
+def test_what_counts_something_keeps_its_type(log, tmp_path, name):
+    with pytest.raises(FileError, match=f"column {name} must hold whole numbers"):
+        read_log(with_column(log, tmp_path, pl.col(name).cast(pl.Int32)))
+
+
+def test_a_column_that_is_missing_is_named(log, tmp_path):
+    folder = with_column(log, tmp_path, pl.col("tick"))
+    table = pl.read_parquet(folder / TICKS)
+    about = {"skidpad": read_parquet(folder / TICKS)[1]["skidpad"]}
+    for name in ("mu", "stack_distance", "weather"):
+        table.drop(name).write_parquet(folder / TICKS, metadata=about)
+        with pytest.raises(FileError, match=f"column {name} must hold"):
+            read_log(folder)
 
 
 def test_what_may_be_absent_is_read(log, tmp_path):

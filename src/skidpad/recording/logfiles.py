@@ -74,8 +74,11 @@ def tick_table(log: RunLog) -> pl.DataFrame:
 
 def _typed(name: str, values: NDArray[np.float64]) -> pl.Series:
     column = pl.Series(name, np.ascontiguousarray(values), nan_to_null=True)
-    kind = pl.Boolean if name in BOOLEANS else pl.Int32 if name in INTEGERS else pl.Float64
-    return pl.Series(name, column.cast(kind))
+    return pl.Series(name, column.cast(_kind(name)))
+
+
+def _kind(name: str) -> type[pl.Boolean | pl.Int32 | pl.Float64]:
+    return pl.Boolean if name in BOOLEANS else pl.Int32 if name in INTEGERS else pl.Float64
 
 
 def log_hash(log: RunLog) -> str:
@@ -152,7 +155,7 @@ def _log(table: pl.DataFrame, head: _Kept, events: tuple[Event, ...]) -> RunLog:
     return RunLog(
         header=head.header,
         table=actors,
-        tick=_whole(table, "tick"),
+        tick=_whole(table, "tick", pl.Int64),
         actors=ActorSeries(*(_matrix(table, f, n, pl.Float32) for f in ActorSeries._fields)),
         present=_matrix(table, "present", n, pl.UInt8).astype(np.bool_),
         mu=_matrix(table, "mu", 4 * n, pl.Float32).reshape(-1, n, 4),
@@ -167,18 +170,19 @@ def _log(table: pl.DataFrame, head: _Kept, events: tuple[Event, ...]) -> RunLog:
     )
 
 
-def _whole(table: pl.DataFrame, name: str) -> NDArray[np.int64]:
-    column = table[name]
-    if not column.dtype.is_integer() or column.null_count():
-        raise ValueError(f"column {name} must hold whole numbers")
-    values: NDArray[np.int64] = column.cast(pl.Int64).to_numpy()
+def _whole(
+    table: pl.DataFrame, name: str, kind: type[pl.Int64 | pl.UInt8] = pl.UInt8
+) -> NDArray[np.int64]:
+    if table.schema.get(name) != kind or table[name].null_count():
+        raise ValueError(f"column {name} must hold whole numbers ({kind}) and none absent")
+    values: NDArray[np.int64] = table[name].cast(pl.Int64).to_numpy()
     return values
 
 
 def _matrix(
     table: pl.DataFrame, name: str, width: int, kind: type[pl.Float32 | pl.UInt8]
 ) -> NDArray[Any]:
-    if table.schema[name] != pl.Array(kind, width):
+    if table.schema.get(name) != pl.Array(kind, width):
         raise ValueError(f"column {name} must hold {width} numbers ({kind}) per tick")
     values: NDArray[Any] = table[name].to_numpy()
     return values
@@ -186,6 +190,9 @@ def _matrix(
 
 def _series(table: pl.DataFrame, prefix: str, kind: type[S]) -> S:
     names = [prefix + name for name in kind._fields]
+    for name in names:
+        if (found := table.schema.get(name)) != _kind(name):
+            raise ValueError(f"column {name} must hold {_kind(name)}, not {found}")
     numbers = table.select(pl.col(names).cast(pl.Float64).fill_null(float("nan")))
     return kind(*(numbers[name].to_numpy() for name in names))
 

@@ -43,6 +43,10 @@ DRAG = """([from, to]) => { const view = (v) => document.querySelector(`figure[d
     view(to).dispatchEvent(new DragEvent('drop', { bubbles: true, cancelable: true })); }"""
 PLACES = "() => [...document.querySelectorAll('.cockpit figure')].map((f) => f.dataset.view)"
 PICTURES = os.environ.get("SKIDPAD_PICTURES")  # a folder for screenshots, to be looked at
+LATE = """() => { const real = window.createImageBitmap; window.late = 'not yet';
+    window.createImageBitmap = async (blob) => { window.createImageBitmap = real; window.late = 'soon';
+        await new Promise((done) => setTimeout(done, 6000)); window.late = 'now'; return real(blob); }; }"""
+PAUSED = "() => document.querySelector('.cockpit').dataset.paused === 'true'"
 FACT = """name => [...document.querySelectorAll('.cockpit dt')]
     .find(dt => dt.textContent === name)?.nextElementSibling.textContent"""
 
@@ -201,7 +205,7 @@ def test_a_run_is_scrubbed_through_in_a_browser(browser, stored, tmp_path):
     with running("replay", stored, "--beside", stored, "--no-browser", cwd=tmp_path) as command:
         context, page = opened(browser, command.address(), errors)
         page.keyboard.press("p")
-        until(page, "() => document.querySelector('.cockpit').dataset.paused === 'true'")
+        until(page, PAUSED)
         line = page.locator(".line canvas")
         line.scroll_into_view_if_needed()
         box = line.bounding_box()
@@ -283,6 +287,21 @@ def test_a_campaign_is_watched_in_a_browser(browser, tmp_path):
 
 
 @pytest.mark.req("A-274")
+def test_a_picture_that_is_late_is_not_shown_over_a_newer_one(browser, tmp_path):
+    words = ["drive", "--no-browser", "--vehicles", "2", "--sensors", "objects"]
+    with running(*words, "--out", tmp_path / "run", cwd=tmp_path) as command:
+        context, page = opened(browser, command.address(), [])
+        page.evaluate(LATE)  # one picture of a moment before the pause takes 6 s to decode
+        until(page, "() => window.late === 'soon'")
+        page.keyboard.press("p")
+        until(page, "() => window.late === 'now'")
+        until(page, PAUSED)
+        sleep(2.0)
+        assert page.evaluate(PAUSED)
+        context.close()
+
+
+@pytest.mark.req("A-274")
 def test_a_page_that_is_put_to_sleep_lets_another_one_drive(browser, tmp_path):
     words = ["drive", "--no-browser", "--on-close", "pause", "--vehicles", "2", "--sensors"]
     with running(*words, "objects", "--out", tmp_path / "run", cwd=tmp_path) as command:
@@ -305,11 +324,11 @@ def test_a_page_that_is_put_to_sleep_lets_another_one_drive(browser, tmp_path):
         until(page, "() => document.querySelector('.bar').textContent === 'this tab drives'")
         # nobody is awake: the drive stands until somebody is there and says so
         asleep.send("Debugger.pause")
-        sleep(ASLEEP_AFTER + 3.0)
+        sleep(2.0 * ASLEEP_AFTER)  # the server, too, may be busy
         asleep.send("Debugger.resume")
         sleep(3.0)  # a page that is loaded anew loses what was pressed meanwhile
         assert page.evaluate("window.same")
-        until(page, "() => document.querySelector('.cockpit').dataset.paused === 'true'")
+        until(page, PAUSED)
         page.keyboard.press("p")
         until(page, "() => document.querySelector('.cockpit').dataset.paused === 'false'")
         context.close()

@@ -104,7 +104,13 @@ export default {
       if (message.wrong) this.warn(message.wrong);
       if (message.ended) { this.ended = true; this.$refs.alert.textContent = message.ended; this.$el.classList.add("over"); }
     },
-    async picture(data) {
+    async picture(data) {  // one after the other, or a late one would be shown over the newest; who slept sees the newest only
+      this.newest = data;
+      if (this.painting) return;
+      this.painting = true;
+      try { while (this.newest) { const one = this.newest; this.newest = null; await this.paint(one); } } finally { this.painting = false; }
+    },
+    async paint(data) {
       const length = new DataView(data).getUint32(0, true);
       const head = JSON.parse(new TextDecoder().decode(new Uint8Array(data, 4, length)));
       let at = 4 + length;

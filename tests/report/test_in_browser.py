@@ -6,20 +6,16 @@ import pytest
 from test_page import page
 
 from chromium import CHROMIUM, FLAGS
-from skidpad.report.page import write_page
+from skidpad.report.page import Page, Section, Text, write_page
+
+pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
-@pytest.mark.parametrize("size", ["1280,900", "390,844"])
-def test_the_script_of_the_page_runs(tmp_path, size):
-    path = tmp_path / "report.html"
-    write_page(page(), path)
-    clicked = path.read_text().replace(
-        "</body>", "<script>document.querySelector('.sortable th').click()</script></body>"
-    )
-    path.write_text(clicked)
-    where = [f"--user-data-dir={tmp_path / 'profile'}", f"--window-size={size}"]
-    dom = subprocess.run(
+def dom(path, script, size):
+    """What a browser makes of a page when a script of ours has run at its end."""
+    path.write_text(path.read_text().replace("</body>", f"<script>{script}</script></body>"))
+    where = [f"--user-data-dir={path.parent / 'profile'}", f"--window-size={size}"]
+    return subprocess.run(
         [
             CHROMIUM,
             "--headless",
@@ -34,6 +30,22 @@ def test_the_script_of_the_page_runs(tmp_path, size):
         timeout=600,
         check=True,
     ).stdout
-    assert 'aria-sort="ascending"' in dom
-    assert 'class="bar"' in dom
-    assert "3.1 s · contact" in dom
+
+
+@pytest.mark.parametrize("size", ["1280,900", "390,844"])
+def test_the_script_of_the_page_runs(tmp_path, size):
+    path = tmp_path / "report.html"
+    write_page(page(), path)
+    shown = dom(path, "document.querySelector('.sortable th').click()", size)
+    assert 'aria-sort="ascending"' in shown
+    assert 'class="bar"' in shown
+    assert "3.1 s · contact" in shown
+
+
+def test_a_word_wider_than_a_phone_is_broken(tmp_path):
+    path = tmp_path / "report.html"
+    text = Text(f"results hash {'0752e679' * 16}.")  # Chromium's windows are 485 px wide at least
+    write_page(Page(title="t", subtitle="", sections=[Section("s", [text])]), path)
+    root = "document.documentElement"
+    measured = f"{root}.dataset.wider = {root}.scrollWidth - {root}.clientWidth"
+    assert 'data-wider="0"' in dom(path, measured, "390,844")

@@ -46,6 +46,17 @@ def vehicle(name: str, x: float = 0.0) -> str:
     return f'<ScenarioObject name="{name}">{VEHICLE.format(x=x)}</ScenarioObject>'
 
 
+def pedestrian(name: str, mass: float = 80.0) -> str:
+    return f"""<ScenarioObject name="{name}"><Pedestrian name="p" mass="{mass}" model="p"
+pedestrianCategory="pedestrian"><BoundingBox><Center x="0" y="0" z="0.9"/>
+<Dimensions width="0.6" length="0.5" height="1.8"/></BoundingBox><Properties/></Pedestrian>
+</ScenarioObject>"""
+
+
+def world(x: float, y: float, h: float | None = None) -> str:
+    return f'<WorldPosition x="{x}" y="{y}"' + ("/>" if h is None else f' h="{h}"/>')
+
+
 def on_lane(lane: int, s: float, offset: float = 0.0, road: int = 1) -> str:
     return f'<LanePosition roadId="{road}" laneId="{lane}" s="{s}" offset="{offset}"/>'
 
@@ -66,6 +77,27 @@ def speed(target: str, shape: str = "step", value: object = 0, dimension: str = 
 
 def to(v: object) -> str:
     return f'<AbsoluteTargetSpeed value="{v}"/>'
+
+
+def trajectory(*points: tuple[float, ...], timing: str = "<None/>", attributes: str = "") -> str:
+    """A polyline through points x, y, perhaps with heading (None: not said) and time."""
+    vertices = ""
+    for k, (x, y, *more) in enumerate(points):
+        h = more[0] if more else None
+        t = f' time="{more[1]}"' if len(more) > 1 else f' time="{k}"' if "Timing" in timing else ""
+        vertices += f"<Vertex{t}><Position>{world(x, y, h)}</Position></Vertex>"
+    return f"""<RoutingAction><FollowTrajectoryAction {attributes}><TrajectoryRef>
+<Trajectory name="t" closed="false"><Shape><Polyline>{vertices}</Polyline></Shape></Trajectory>
+</TrajectoryRef><TimeReference>{timing}</TimeReference>
+<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>"""
+
+
+def synchronize(
+    master: str, its_goal: str, goal: str, final: str = "", tolerance: float = 0
+) -> str:
+    return f"""<SynchronizeAction masterEntityRef="{master}" targetTolerance="{tolerance}"
+targetToleranceMaster="{tolerance}"><TargetPositionMaster>{its_goal}</TargetPositionMaster>
+<TargetPosition>{goal}</TargetPosition>{final}</SynchronizeAction>"""
 
 
 def init(name: str, *actions: str) -> str:

@@ -42,6 +42,7 @@ class Line:
         self.y = [v.y for v in points]
         self.z = [v.z for v in points]
         self.named = [v.heading for v in points]
+        self._nearest: dict[tuple[float, float], float] = {}  # lengths by point, asked in each step
         self.s = [0.0]
         for k in range(1, len(points)):
             step = hypot(self.x[k] - self.x[k - 1], self.y[k] - self.y[k - 1])
@@ -83,6 +84,24 @@ class Line:
         assert self.t is not None
         k, u = self._find(self.t, t)
         return self.s[k] + (u * (self.s[k + 1] - self.s[k]) if k + 1 < len(self.s) else 0.0)
+
+    def nearest(self, x: float, y: float) -> float:
+        """Returns the length at which the line is nearest to a point; the first of equals."""
+        if (x, y) not in self._nearest:
+            self._nearest[x, y] = self._find_nearest(x, y)
+        return self._nearest[x, y]
+
+    def _find_nearest(self, x: float, y: float) -> float:
+        best, found = float("inf"), 0.0
+        for k in range(len(self.x) - 1):
+            ex, ey = self.x[k + 1] - self.x[k], self.y[k + 1] - self.y[k]
+            length_sq = ex * ex + ey * ey
+            along = (x - self.x[k]) * ex + (y - self.y[k]) * ey
+            u = min(max(along / length_sq, 0.0), 1.0) if length_sq > 0.0 else 0.0
+            away = hypot(x - self.x[k] - u * ex, y - self.y[k] - u * ey)
+            if away < best - NEAR:
+                best, found = away, self.s[k] + u * (self.s[k + 1] - self.s[k])
+        return found
 
     def time_at(self, s: float) -> float:
         """Time at length s, clamped to the line."""

@@ -111,12 +111,6 @@ def along_road(network: Network, a: Pose, b: Pose) -> Point | None:
     return (min(ways, key=abs), left) if ways else None
 
 
-def way(network: Network, a: Pose, b: Pose) -> float:
-    """How far it is from a to b along the road, else straight, m."""
-    found = along_road(network, a, b)
-    return hypot(b.x - a.x, b.y - a.y) if found is None else abs(found[0])
-
-
 def box_corners(box: Box) -> list[Point]:
     """The outline in the entity's own axes."""
     signs = product((-0.5, 0.5), repeat=2)

@@ -14,6 +14,7 @@ from skidpad.roads.bundled import map_file
 from skidpad.roads.opendrive.document import RoadRecord, parse
 from skidpad.roads.opendrive.signals import road_place
 from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.roads.routing import shortest_route
 
 ON_LANE = 1.0  # m beyond a lane's edge that still is on it
 SLOPE_STEP = 0.5  # m to either side, over which a slope is taken
@@ -48,6 +49,7 @@ class Network:
 
     def __init__(self, map: RoadMap, name: str) -> None:
         self.map, self.name = map, name
+        self._route_lengths: dict[tuple[int, int], float | None] = {}
 
     @cached_property
     def roads(self) -> dict[int, RoadRecord]:
@@ -121,6 +123,14 @@ class Network:
         first = int(self.map.lanes.first[point.lane])
         s = self.map.samples.s_road
         return bool(s[first + 1] > s[first])
+
+    def route_length(self, start: int, goal: int) -> float | None:
+        """Returns the length from the begin of one lane to that of another, m; None without a way."""
+        key = start, goal
+        if key not in self._route_lengths:
+            route = shortest_route(self.map, self.map.at(start, 0.0), self.map.at(goal, 0.0))
+            self._route_lengths[key] = None if route is None else route.length
+        return self._route_lengths[key]
 
     def beside(self, point: LanePoint, lane_id: int) -> LanePoint | None:
         """The same place across the road on another lane of it; None where there is no such lane."""

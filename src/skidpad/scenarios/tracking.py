@@ -22,6 +22,10 @@ class Track(Protocol):
         """Pose, speed and acceleration at scenario time t."""
         ...
 
+    def way_to(self, place: Pose, t: float) -> float:
+        """Returns the way along the line from its place at time t to the point nearest to a place, m."""
+        ...
+
 
 class TimedTrack:
     """A line by its times: `begin` is the scenario time of line time 0, `scale` stretches it."""
@@ -42,6 +46,11 @@ class TimedTrack:
             return pose.moved(forward=self.v_end * (t - self.end)), self.v_end, 0.0
         moving = self.first < t <= self.end + 1e-9
         return pose, self.line.speed_at(own) / self.scale if moving else 0.0, 0.0
+
+    def way_to(self, place: Pose, t: float) -> float:
+        """Returns the way along the line from its place at time t to the point nearest to a place, m."""
+        here = self.line.length_at((t - self.begin) / self.scale)
+        return self.line.nearest(place.x, place.y) - here
 
     @property
     def v_end(self) -> float:
@@ -67,6 +76,12 @@ class PacedTrack:
         if self.closed:
             s %= self.line.length
         return self.line.at_length(s), v, 0.0
+
+    def way_to(self, place: Pose, t: float) -> float:
+        """Returns the way along the line from its place at time t to the point nearest to a place, m."""
+        del t
+        way = self.line.nearest(place.x, place.y) - self.s
+        return way % self.line.length if self.closed else way
 
     def step(self, t: float) -> bool:
         """Go on to time t; True at the end of the line."""

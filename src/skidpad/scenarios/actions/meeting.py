@@ -12,15 +12,17 @@ from math import inf, sqrt
 
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
-from skidpad.scenarios.measures import way
+from skidpad.scenarios.network import Place
 from skidpad.scenarios.positions import Position, position
 from skidpad.scenarios.scene import Actor, Running, Scene
+from skidpad.scenarios.ways import way_to
 
 ARRIVED = 0.0  # m, where a file gives no tolerance
 V_LEAST = 1e-6  # m/s
 NEAR_LINE = 0.1  # m/s from the straight course that is on it
 B_STOP = 8.0  # m/s^2, where there is not half of the way left to stop in
 LEAST = 1e-6  # m
+PASSED = 0.01  # m that a way has grown again when its goal lies behind
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,7 +48,8 @@ class Synchronize:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From now on."""
-        going = Synchronized(self, actor)
+        goals = self.goal.place(scene), self.other_goal.place(scene)
+        going = Synchronized(self, actor, *goals)
         actor.pace_by(going, scene)
         return going
 
@@ -66,9 +69,10 @@ class Phase(Enum):
 class Synchronized:
     """On the way."""
 
-    def __init__(self, action: Synchronize, actor: Actor) -> None:
+    def __init__(self, action: Synchronize, actor: Actor, goal: Place, other_goal: Place) -> None:
         self.action, self.actor = action, actor
-        self.before = inf, inf
+        self.goal, self.other_goal = goal, other_goal  # as they were when it began
+        self.least = inf, inf  # m, of both ways so far
         self.phase, self.rising = Phase.BEGIN, False
 
     def step(self, scene: Scene) -> bool:
@@ -77,11 +81,11 @@ class Synchronized:
             return True
         action, guide, dt = self.action, self.actor.guide, scene.dt
         other = scene.actors[action.other]
-        own = way(scene.network, self.actor.pose, action.goal.place(scene).pose)
-        its = way(scene.network, other.pose, action.other_goal.place(scene).pose)
+        own = way_to(scene, self.actor, self.goal)
+        its = way_to(scene, other, self.other_goal)
         over = own < action.tolerance + LEAST or its < action.other_tolerance + LEAST
-        over = over or own > self.before[0] + LEAST or its > self.before[1] + LEAST
-        self.before = own, its
+        over = over or own > self.least[0] + PASSED or its > self.least[1] + PASSED
+        self.least = min(own, self.least[0]), min(its, self.least[1])
         own, its = max(own - action.tolerance, LEAST), max(its - action.other_tolerance, LEAST)
         pace = abs(other.v_told)
         v_end = action.v_end

@@ -9,13 +9,21 @@ TEST_ARGS ?=
 DRIVE_ARGS ?=
 NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run test check wheel-check bench fuzz nightly soak refs data fleet fleet-load figures arm64 channels campaigns tables clean
+.PHONY: cockpit run test test-bare check wheel-check bench fuzz nightly soak refs data fleet fleet-load figures arm64 channels campaigns tables clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next --traffic pack $(RUN_ARGS)
 
 test: $(VENV)/.tested-with
 	$(BIN)/python -m pytest -n 2 $(TEST_ARGS)
+
+# the tests that need a program of the system, with all such programs hidden: they skip, and say why
+BARE := tests/test_programs.py tests/fleet tests/report/test_in_browser.py tests/cockpit/test_cockpit_in_browser.py \
+	tests/faults/test_kills.py tests/scenarios/test_run_export.py tests/scenarios/test_hazard_export.py \
+	tests/scenarios/test_shipped_scenarios.py
+test-bare: $(VENV)/.tested-with
+	env -u SKIDPAD_ASAM_PYTHON -u SKIDPAD_MUST_RUN SKIDPAD_ONLY_PATH=1 PATH=$(CURDIR)/$(BIN) \
+		$(CURDIR)/$(BIN)/python -m pytest --program-tests -p no:cacheprovider $(BARE)
 
 check: $(VENV)/.checked-with
 	$(BIN)/ruff format --check src tests tools

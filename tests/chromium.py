@@ -1,8 +1,8 @@
 """The browser of the tests, kept from calling home."""
 
-import shutil
+from programs import find_program
 
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+CHROMIUM = find_program("chromium", "chromium-browser")
 FLAGS = [
     "--no-sandbox",
     "--disable-gpu",

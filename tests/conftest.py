@@ -8,6 +8,8 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from programs import needs_program
+
 # no test judges by the wall clock: a busy machine is no fault
 settings.register_profile("skidpad", deadline=None)
 settings.load_profile("skidpad")
@@ -23,7 +25,15 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     )
     parser.addoption("--fuzz", type=int, default=None, help="damaged files per reader")
     parser.addoption("--draws", type=int, default=2000, help="draws per case of test_promises")
+    parser.addoption(
+        "--program-tests", action="store_true", help="only tests that need a program of the system"
+    )
     parser.addoption("--fuzz-from", type=int, default=0, help="number of the first of them")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    if config.getoption("--program-tests"):
+        items[:] = [item for item in items if needs_program(item)]
 
 
 @pytest.fixture(scope="session")

@@ -18,6 +18,7 @@ from pathlib import Path
 import pytest
 
 from channel_worlds import frame
+from programs import require_program
 from skidpad.core.channels import Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.recording.hazard_text import HEADER
@@ -149,12 +150,10 @@ class PostgresqlServer:
 
 
 def postgresql_server() -> Iterator[PostgresqlServer]:
-    found = sorted(Path("/usr/lib/postgresql").glob("*/bin/initdb"))
-    if not found:
-        pytest.skip("postgresql is not installed")
+    binaries = Path(require_program("initdb", "postgresql")).resolve().parent
     pytest.importorskip("psycopg", reason="psycopg, for postgresql, is not installed")
     folder = Path(tempfile.mkdtemp(prefix="skidpad-pg-", dir="/tmp"))  # a socket's path is short
-    server = PostgresqlServer(folder, found[-1].parent, "nobody")
+    server = PostgresqlServer(folder, binaries, "nobody")
     if os.getuid() == 0:
         os.chown(folder, pwd.getpwnam("nobody").pw_uid, -1)
     store = str(folder / "store")
@@ -185,11 +184,7 @@ __all__ = [
 @contextmanager
 def mosquitto(folder, more="allow_anonymous true\n"):
     """A real broker; the port may be taken between finding and using it, so it is tried again."""
-    program = shutil.which("mosquitto") or "/usr/sbin/mosquitto"
-    try:
-        subprocess.run([program, "-h"], capture_output=True, check=False)
-    except FileNotFoundError:
-        pytest.skip("mosquitto is not installed")
+    program = require_program("mosquitto", "mosquitto")
     for _ in range(5):
         with socket.socket() as one:
             one.bind(("127.0.0.1", 0))

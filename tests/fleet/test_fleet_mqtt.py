@@ -9,6 +9,7 @@ from contextlib import closing
 import pytest
 
 from fleet_world import make_world, mosquitto, record, text_of
+from programs import require_program
 
 pytest.importorskip("aiomqtt", reason="aiomqtt, for mosquitto, is not installed")
 from skidpad.cli.fleet_links import broker_of
@@ -98,10 +99,11 @@ def test_the_fleet_answers_to_vehicles_and_publishes_nowhere_else(listening, bro
 
 def test_the_fleet_logs_in_where_only_it_may_read_what_vehicles_send(tmp_path):
     """A broker that lets nobody in without a password, and vehicles only write."""
+    hash_password = require_program("mosquitto_passwd", "mosquitto")
     words, rights = tmp_path / "words", tmp_path / "rights"
     for create, user in (("-c", "fleet"), ("", "vehicle")):
         options = [*filter(None, [create]), "-b", str(words), user, f"{user}-word"]
-        subprocess.run(["mosquitto_passwd", *options], check=True, capture_output=True)
+        subprocess.run([hash_password, *options], check=True, capture_output=True)
         (tmp_path / user).write_text(f"{user}-word\n")
     rights.write_text(
         f"user fleet\ntopic read {TOPIC}/#\ntopic write {ANSWERS}/#\n"

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, get_args, get_type_hints
+from collections.abc import Iterator
+from typing import Any, NamedTuple, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,10 +68,22 @@ def _columns(table: Any, n: int, name: str) -> None:
 
 def kinds(table: type[NamedTuple]) -> dict[str, np.dtype[Any]]:
     """The types of a table's columns, as it declares them."""
-    return {
-        name: np.dtype(get_args(get_args(hint)[1])[0])
-        for name, hint in get_type_hints(table).items()
-    }
+    return {name: np.dtype(element_type(hint)) for name, hint in get_type_hints(table).items()}
+
+
+def element_type(hint: Any) -> type[np.generic]:
+    """Returns the numpy type that an array's type hint names.
+
+    NDArray[T] is ndarray[..., dtype[T]], or an alias of T with numpy 2.5 on Python 3.12.
+    """
+    return next(_types_in(hint))
+
+
+def _types_in(hint: Any) -> Iterator[type[np.generic]]:
+    if get_origin(hint) is None and isinstance(hint, type) and issubclass(hint, np.generic):
+        yield hint
+    for part in get_args(hint):
+        yield from _types_in(part)
 
 
 KINDS = {table: kinds(table) for table in (LaneSamples, LaneTable, SignalTable)}

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
 from skidpad.campaign.cast import load_scenario
+from skidpad.campaign.keeping import keep_road
 from skidpad.campaign.pool import run_jobs
 from skidpad.campaign.run import Run, run
 from skidpad.campaign.runfolder import write_config, write_played, write_run
@@ -49,4 +50,5 @@ def run_task(task: Task) -> Run:
     write_config(task.out, task.run.to_plain())
     write_run(task.out, driven.log, driven.error)
     write_played(task.out, driven)
+    keep_road(task.out, driven.road)
     return driven

@@ -48,23 +48,51 @@ def adas(
     how(Campaign(RECIPE, cells, alone=drives_alone(run.backend), files=files), write_report)
 
 
-def report(folder: Annotated[Path, typer.Argument(help="A campaign's folder.")]) -> None:
-    """Write the report of a campaign again, from what it left behind."""
+def report(
+    folder: Annotated[Path, typer.Argument(help="A campaign's folder, or the folder of one run.")],
+) -> None:
+    """Write the report of a campaign again, from what it left behind; of a run, its crash cards."""
+    from skidpad.core.errors import FileError
+    from skidpad.recording.ledger import LEDGER, campaign_command
+    from skidpad.recording.logfiles import TICKS
+    from skidpad.recording.results import RESULTS
+
+    if (folder / TICKS).is_file():
+        typer.echo(_report_run(folder))
+        return
+    if not any((folder / name).is_file() for name in (RESULTS, LEDGER)):
+        raise FileError(
+            f"{folder} holds no results of a campaign; give the folder that a campaign wrote to, "
+            f"or drive one: skidpad adas --out {folder}"
+        )
+    typer.echo(_reports()[campaign_command(folder)](folder))
+
+
+def _reports() -> dict[str, Callable[[Path], object]]:
     from skidpad.cli.channels_drive import totals
     from skidpad.cli.play import table
-    from skidpad.recording.ledger import campaign_command
     from skidpad.report.grip import write_grip_report
     from skidpad.report.matrix import write_report
     from skidpad.report.threshold import write_threshold_report
 
-    reports: dict[str, Callable[[Path], object]] = {
+    return {
         "adas": write_report,
         "grip": write_grip_report,
         "grip-threshold": write_threshold_report,
         "channels": totals,
         "play": table,
     }
-    typer.echo(reports[campaign_command(folder)](folder))
+
+
+def _report_run(run: Path) -> str:
+    """The crash cards of one run, as a sentence."""
+    from skidpad.cli.show import opened
+    from skidpad.report.play import write_crashes
+
+    page = write_crashes(run, opened(run)[1])
+    if page is None:
+        return f"{run}: no crash, so there is no page; skidpad show {run} prints its metrics"
+    return f"crash cards in {page}"
 
 
 def show(run: Annotated[Path, typer.Argument(help="A run's folder.")]) -> None:

@@ -27,6 +27,7 @@ def export(
     ] = None,
 ) -> None:
     """Write a driven run as .xosc and .xodr that other simulators replay."""
+    from skidpad.campaign.run_road import road_files
     from skidpad.recording.logfiles import read_log
     from skidpad.recording.osi import write_osi
     from skidpad.scenarios.run_export import export_run
@@ -38,7 +39,7 @@ def export(
     folder = run / "scenario" if out is None else out
     name = run.resolve().name
     scenario, road, known = export_run(
-        log, folder, name, _roads(run), OscVersion(osc.value), _environment(run)
+        log, folder, name, road_files(run), OscVersion(osc.value), _environment(run)
     )
     typer.echo(f"{scenario} with {road.name}")
     if not known:
@@ -59,6 +60,7 @@ def _environment(run: Path) -> Environment | None:
 
 def _world(run: Path, log: RunLog) -> World:
     """Projection, lights and rain of the run, as far as road and description are there."""
+    from skidpad.campaign.run_road import road_files
     from skidpad.campaign.stored import read_run
     from skidpad.core.errors import InputError
     from skidpad.core.geometry import Pose, wrap_angle
@@ -71,7 +73,7 @@ def _world(run: Path, log: RunLog) -> World:
         rain = rain_rate(read_run(run.resolve()).weather)
     except InputError:
         rain = None
-    road = road_of(log, _roads(run))
+    road = road_of(log, road_files(run))
     if road is None:
         return World(rain_mm_h=rain)
     map = load_map(road)
@@ -82,24 +84,3 @@ def _world(run: Path, log: RunLog) -> World:
     # a head looks against the traffic that it governs
     heads = {id: Pose(x, y, z, yaw=wrap_angle(heading + pi)) for id, x, y, z, heading in places}
     return World(map.geo_reference, road.name, heads, rain)
-
-
-def _roads(run: Path) -> list[Path]:
-    """Files that may be the run's road: those kept with it, and what its description names."""
-    from skidpad.campaign.cast import load_scenario
-    from skidpad.campaign.stored import read_run
-    from skidpad.core.errors import InputError
-    from skidpad.core.run import Roads, Scenario
-    from skidpad.roads.bundled import KEPT
-
-    run = run.resolve()
-    kept = [file for above in (run, *run.parents[:2]) for file in above.glob(f"{KEPT}/*/*.xodr")]
-    try:
-        course = read_run(run).course
-        if isinstance(course, Roads):
-            return [*kept, Path(course.map)]
-        if isinstance(course, Scenario):
-            return [*kept, Path(load_scenario(course).map_name)]
-    except InputError:  # the road is known by its content, or it is not
-        return kept
-    return kept

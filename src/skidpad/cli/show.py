@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from skidpad.campaign.run_road import load_road
 from skidpad.core.errors import FileError
 from skidpad.evidence.drive.collisions import find_crashes
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
@@ -17,14 +18,13 @@ from skidpad.recording.matrix import Metrics
 from skidpad.recording.results import definitions_of
 from skidpad.recording.runlog import RunLog
 from skidpad.report.cards import chain, headline
-from skidpad.roads.bundled import kept_map
 from skidpad.roads.queries import RoadMap
 
 
 def opened(run: Path) -> tuple[RunLog, RoadMap]:
     """The log of a run's folder, and the map that it was driven on."""
     log = read_log(run)
-    return log, kept_map(run.resolve().parents[1], log.header.map, log.header.map_hash)
+    return log, load_road(run, log.header)
 
 
 def compare_runs(a: Path, b: Path) -> None:

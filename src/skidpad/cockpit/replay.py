@@ -16,10 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.cast import load_scenario
 from skidpad.campaign.desk import beam_of
 from skidpad.campaign.drive import Moment
-from skidpad.campaign.keeping import housed, road_file
+from skidpad.campaign.run_road import load_road
 from skidpad.campaign.stored import read_run
 from skidpad.cockpit.indicators import every, least_of, ttc_ahead
 from skidpad.cockpit.source import Curves, Said, Seat, index_at
@@ -27,7 +26,7 @@ from skidpad.core.errors import FileError
 from skidpad.core.frames import RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Functions, Lamps, Outside, Pedals, Sky, Timed, Wheel
-from skidpad.core.run import AdasDriver, Function, Roads, RunSpec, Scenario
+from skidpad.core.run import AdasDriver, Function, RunSpec
 from skidpad.core.states import (
     ActorStates,
     ActorTable,
@@ -45,8 +44,6 @@ from skidpad.recording.events import LightChange, Notice, Relocation
 from skidpad.recording.inputs import read_inputs
 from skidpad.recording.logfiles import TICKS, read_log
 from skidpad.recording.runlog import RunLog
-from skidpad.roads.bundled import load_map
-from skidpad.roads.queries import RoadMap
 from skidpad.simulation.recovery import Action, Moved, Relocate
 from skidpad.stack.control.text import mode_text
 from skidpad.stack.settings import grip_of, settings_of
@@ -72,7 +69,7 @@ class Recording:
     def __init__(self, folder: Path) -> None:
         """FileError for a folder that holds no run, or a damaged one."""
         self.folder, self.log, self.spec = folder, *read_folder(folder)
-        self.map, self.seed, self.step = map_of(self.spec, folder), self.spec.seed, 1
+        self.map, self.seed, self.step = load_road(folder, self.log.header), self.spec.seed, 1
         if self.map.content_hash != self.log.header.map_hash:
             raise FileError(f"{folder}: the map {self.log.header.map} is another one today")
         self.seats = seats_of(self.spec, read_inputs(folder, self.spec.inputs))
@@ -191,15 +188,6 @@ class Recording:
         bodies = [body(log, i) for i in range(len(log.table))]
         ttc = ttc_ahead(bodies, np.column_stack([together(log, 0, i) for i in range(len(bodies))]))
         return Curves(np.round(log.v_ego[part] * 3.6, 1).tolist(), tiers, least_of(ttc))
-
-
-def map_of(spec: RunSpec, folder: Path) -> RoadMap:
-    """The map that a stored run was driven on."""
-    if isinstance(spec.course, Scenario):
-        return load_scenario(spec.course).map
-    course = housed(spec, folder.resolve().parents[1]).course
-    assert isinstance(course, Roads), "channels leave recordings, no folders of runs"
-    return load_map(road_file(course))
 
 
 def told_of(event: Any) -> tuple[str, str] | None:

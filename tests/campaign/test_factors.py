@@ -18,6 +18,8 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
 from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
 from skidpad.physics.presets import find_weather
+from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.motion import motion_hash
 from skidpad.recording.results import read_results
 from skidpad.report.matrix import write_report
 from skidpad.stack.configurations import functions_of
@@ -99,6 +101,11 @@ def test_the_report_shows_factors(tmp_path: Path) -> None:
         ("aeb", 60.0),
         ("aeb", 90.0),
     ]
+    logs = [read_log(tmp_path / "runs" / cell.name) for cell in cells]
+    assert set(table["motion_hash"]) == {motion_hash(log) for log in logs}
+    assert set(table["log_hash"]) == {log_hash(log) for log in logs}
+    assert table["undisturbed_s"].to_list() == pytest.approx([2.0] * 4)
+    assert table["serious_contacts"].to_list() == table["interventions"].to_list() == [0] * 4
     page = write_report(tmp_path).read_text(encoding="utf-8")
     assert "By functions and cruise target" in page
     assert "Fatal collisions against the cruise target" in page

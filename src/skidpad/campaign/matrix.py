@@ -58,6 +58,7 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
     from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.run import run
     from skidpad.evidence.drive.metrics import run_metrics
+    from skidpad.recording.motion import motion_hash
     from skidpad.roads.bundled import load_map
 
     folder = fresh_folder(out, cell.name)
@@ -75,7 +76,7 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
             driven.log, load_map(road_file(roads_of(here))), metric_settings(cell)
         )
     return Driven(
-        key=run_key(cell, driven.outcome, digest),
+        key=run_key(cell, driven.outcome, digest, motion_hash(driven.log)),
         metrics=metrics,
         timing=timing,
         error=last_line(driven.error),
@@ -90,7 +91,12 @@ def metric_settings(cell: RunSpec) -> MetricSettings:
     )
 
 
-def run_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> RunKey:
+def run_key(
+    cell: RunSpec,
+    outcome: Outcome,
+    log_hash: str | None = None,
+    motion_hash: str | None = None,
+) -> RunKey:
     """The identifying columns of a cell's row."""
     settings, driver = settings_of(cell), cell.driver
     ours = driver if isinstance(driver, AdasDriver) else None
@@ -111,6 +117,7 @@ def run_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> Run
         traffic=roads_of(cell).traffic.value,
         version=__version__,
         log_hash=log_hash,
+        motion_hash=motion_hash,
     )
 
 

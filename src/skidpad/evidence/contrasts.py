@@ -302,11 +302,18 @@ def finished(table: pl.DataFrame) -> pl.DataFrame:
 
 
 def distinct(table: pl.DataFrame) -> pl.DataFrame:
-    """Each drive once: equal logs of one driver and seed are one drive, whatever weather it was."""
-    if "log_hash" not in table.columns or table["log_hash"].has_nulls():
-        return table
-    apart = [c for c in DRIVES_APART if c in table.columns]
-    return table.unique([*apart, "log_hash"], keep="first", maintain_order=True)
+    """Each drive once: what moved alike with one driver and seed is one drive in any weather (T-3)."""
+    table = table.with_columns(drive=drive_hash(table))
+    if not table["drive"].has_nulls():
+        apart = [c for c in DRIVES_APART if c in table.columns]
+        table = table.unique([*apart, "drive"], keep="first", maintain_order=True)
+    return table.drop("drive")
+
+
+def drive_hash(table: pl.DataFrame) -> pl.Expr:
+    """What tells drives apart: the hash of the motion, in older results that of the whole log."""
+    known = [pl.col(c) for c in ("motion_hash", "log_hash") if c in table.columns]
+    return pl.coalesce(known) if known else pl.lit(None, pl.String)
 
 
 def per_seed(rows: pl.DataFrame, value: pl.Expr) -> pl.Series:
@@ -328,15 +335,16 @@ def paired_runs(
     pair, in how many weathers ever they were driven. Also whether all pairs are equal drives.
     """
     keys = [k for k in by if k in table.columns]
-    hashes = pl.col("log_hash").sort() if "log_hash" in table.columns else pl.lit(None)
-    wanted = [pl.col(column).cast(pl.Float64).mean().alias("value"), hashes.alias("hashes")]
+    hashes = drive_hash(table)
+    known = not table.select(hashes.has_nulls()).item()
+    wanted = [pl.col(column).cast(pl.Float64).mean().alias("value"), hashes.sort().alias("hashes")]
     sides = [
         table.filter(side).group_by(keys, maintain_order=True).agg(wanted) for side in (more, less)
     ]
     both = sides[0].join(sides[1], on=keys, suffix="_less").drop_nulls(["value", "value_less"])
     both = both.sort(keys)
-    known = "log_hash" in table.columns and not table["log_hash"].has_nulls()
     same = known and len(both) > 0 and bool((both["hashes"] == both["hashes_less"]).all())
+    same = same and bool((both["value"] == both["value_less"]).all())
     if known and "seed" in keys:
         once = ["seed", "hashes", "hashes_less"]
         both = both.unique(once, keep="first", maintain_order=True)

@@ -27,7 +27,8 @@ class RunKey:
     cruise_kmh: float | None = None  # target of free cruise; None: nobody knows
     traffic: str = ""  # core.TrafficStart
     version: str = ""  # of skidpad
-    log_hash: str | None = None  # content hash of the tick log; equal hashes are equal drives
+    log_hash: str | None = None  # content hash of the tick log: the promise of reproducibility
+    motion_hash: str | None = None  # of poses, contacts, commands; equal hashes are one drive
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -52,6 +53,18 @@ class Metrics:
     stuck_relocations: int | None = metric("relocations of a stuck ego, not fatal", "A-253")
     max_impact_kmh: float | None = metric("largest closing speed at a collision", "A-249")
     max_impact_vehicle_kmh: float | None = metric("the same, with a vehicle", "F-05")
+    # severity: contacts with road users by delta-v, the larger of the two (T-4)
+    serious_contacts: int | None = metric("5 km/h or more, or with a person or two wheels", "T-4")
+    contacts_light: int | None = metric("contacts with road users below 5 km/h", "T-4")
+    contacts_medium: int | None = metric("the same, 5 to 20 km/h", "T-4")
+    contacts_heavy: int | None = metric("the same, above 20 km/h", "T-4")
+    contacts_vulnerable: int | None = metric("of these with persons or two wheels", "T-4")
+    contacts_by_closing_speed: int | None = metric("of these graded by closing speed", "T-4")
+    contacts_static: int | None = metric("contacts with all that is no road user", "T-4")
+    max_delta_v_kmh: float | None = metric("largest delta-v at a contact with a road user", "T-4")
+    interventions: int | None = metric("times put back; published as fatal collisions", "T-4")
+    first_intervention_s: float | None = metric("time to the first, if no reset precedes", "T-5")
+    undisturbed_s: float | None = metric("time to the first reset, else of the run", "T-5")
     # lanes
     lane_invasions: int | None = metric("solid markings crossed", "A-030, A-248")
     lane_invasions_all: int | None = metric("markings crossed, of any kind", "A-248")
@@ -97,6 +110,7 @@ class Metrics:
     duration_s: float | None = metric("simulated time", "M-8")
     fatal_per_100_km: float | None = metric("fatal collisions per 100 km", "M-8")
     crashes_vehicle_per_100_km: float | None = metric("crashes with vehicles per 100 km", "R-6")
+    serious_contacts_per_100_km: float | None = metric("serious contacts per 100 km", "T-4")
     road_departures_per_100_km: float | None = metric("departures from the road per 100 km", "R-6")
     off_lanes_pct: float | None = metric("ticks off all lanes, less counted departures", "R-6")
     # the background

@@ -401,3 +401,27 @@ def test_rates_count_each_drive_once() -> None:
     found = rate.draw(table)
     assert found is not None
     assert (found.mean, found.units) == (3.0, 2)  # two a run, and two runs
+
+
+@pytest.mark.req("R-7")
+def test_what_moved_alike_is_one_drive_whatever_the_rest_of_its_log_says() -> None:
+    """Decision T-3: a lamp that is seen at noon and not at night makes no second drive."""
+    clear = {w: 1 for w in WEATHERS if w.startswith("clear")}
+    table = pl.DataFrame(weathers_alike(1, clear | {"rain-noon": 5})).with_columns(
+        motion_hash=pl.col("log_hash"), log_hash=pl.col("log_hash") + pl.col("weather")
+    )
+    sides = (pl.col("config") == "2", pl.col("config") == "1")
+    pairs, _ = paired_runs(table, *sides, ("weather", "seed"), "fatal_collisions")
+    assert sorted(pairs["difference"].to_list()) == [1.0, 5.0]
+    assert len(distinct(table)) == 4
+    older = table.drop("motion_hash")
+    assert len(distinct(older)) == len(table)
+    unknown = table.with_columns(motion_hash=pl.lit(None, pl.String))
+    assert len(distinct(unknown)) == len(table)
+
+
+def test_drives_that_moved_alike_and_were_seen_otherwise_are_not_the_same() -> None:
+    """Equal motion must not hide what the sensors saw: dropout may still differ."""
+    table = campaign("F-11", TRUE["F-11"], 5.0, noise=0.1)
+    same = table.with_columns(motion_hash=pl.col("config") + pl.col("seed").cast(pl.String))
+    assert verdict("F-11", same) is Verdict.SUPPORTED

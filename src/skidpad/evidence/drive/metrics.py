@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import fields
 
@@ -11,6 +12,7 @@ from skidpad.core.vocabulary import RelocationReason
 from skidpad.evidence.drive.background import background
 from skidpad.evidence.drive.collisions import BEND_RADIUS, Crash, CrashKind, find_crashes
 from skidpad.evidence.drive.conflict import conflicts, true_conflicts
+from skidpad.evidence.drive.interventions import first_intervention
 from skidpad.evidence.drive.lateral import count_invasions, lateral_offset
 from skidpad.evidence.drive.perception import (
     distance_errors,
@@ -19,6 +21,7 @@ from skidpad.evidence.drive.perception import (
     radar_levels,
 )
 from skidpad.evidence.drive.prepared import Drive, Floats, Mask, MetricSettings, prepare
+from skidpad.evidence.drive.severity import Measure, Severity, graded_contacts
 from skidpad.recording.events import Event
 from skidpad.recording.matrix import Metrics
 from skidpad.recording.runlog import RunLog
@@ -66,6 +69,7 @@ def summarise(
     here = [c for c in crashes if where[drive.row(c.tick)]]
     return combined(
         _collisions(drive, here, where),
+        _severity(drive, here, where),
         _lanes(drive, highway, where),
         _conflicts(drive, where),
         _radar(drive, where),
@@ -112,6 +116,29 @@ def _collisions(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
         max_impact_vehicle_kmh=max(
             (v for kind, v in impacts if kind is CrashKind.VEHICLE), default=None
         ),
+    )
+
+
+def _severity(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
+    contacts = [c for c in graded_contacts(drive) if where[drive.row(c.tick)]]
+    users = [c for c in contacts if c.is_road_user]
+    counts = Counter(c.severity for c in users)
+    serious = sum(c.is_serious for c in contacts)
+    hardest = max((c.delta_v for c in users if c.delta_v is not None), default=None)
+    first_s, undisturbed_s = first_intervention(drive, where)
+    return Metrics(
+        serious_contacts=serious,
+        contacts_light=counts[Severity.LIGHT],
+        contacts_medium=counts[Severity.MEDIUM],
+        contacts_heavy=counts[Severity.HEAVY],
+        contacts_vulnerable=sum(c.is_vulnerable for c in users),
+        contacts_by_closing_speed=sum(c.graded_by is Measure.CLOSING_SPEED for c in users),
+        contacts_static=len(contacts) - len(users),
+        max_delta_v_kmh=None if hardest is None else hardest * KMH,
+        interventions=len(here),
+        first_intervention_s=first_s,
+        undisturbed_s=undisturbed_s,
+        serious_contacts_per_100_km=_per_100_km(drive, where, serious),
     )
 
 
@@ -186,25 +213,29 @@ def _driving(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
     v = drive.v * KMH
     in_bend = counted & (np.abs(drive.place.curvature) > 1.0 / BEND_RADIUS)
     dt = drive.log.header.dt
-    distance_km = float(drive.v[where].sum() * dt / 1000.0)
     hits = sum(c.kind is CrashKind.VEHICLE for c in here)
-
-    def per_100_km(events: int) -> float | None:
-        return 100.0 * events / distance_km if distance_km > 0.0 else None
-
     return Metrics(
         mean_speed_kmh=float(v[counted].mean()) if counted.any() else None,
         max_speed_kmh=_percentile(v[counted], 100.0),
         p50_speed_kmh=_percentile(v[counted], 50.0),
         p95_speed_kmh=_percentile(v[counted], 95.0),
         bend_speed_kmh=_percentile(v[in_bend], 95.0),
-        distance_km=distance_km,
+        distance_km=_distance_km(drive, where),
         duration_s=float(np.count_nonzero(where) * dt),
-        fatal_per_100_km=per_100_km(len(here)),
-        crashes_vehicle_per_100_km=per_100_km(hits),
-        road_departures_per_100_km=per_100_km(len(here) - hits),
+        fatal_per_100_km=_per_100_km(drive, where, len(here)),
+        crashes_vehicle_per_100_km=_per_100_km(drive, where, hits),
+        road_departures_per_100_km=_per_100_km(drive, where, len(here) - hits),
         off_lanes_pct=100.0 * float(drive.strays[where].mean()) if where.any() else None,
     )
+
+
+def _distance_km(drive: Drive, where: Mask) -> float:
+    return float(drive.v[where].sum() * drive.log.header.dt / 1000.0)
+
+
+def _per_100_km(drive: Drive, where: Mask, events: int) -> float | None:
+    distance_km = _distance_km(drive, where)
+    return 100.0 * events / distance_km if distance_km > 0.0 else None
 
 
 def _percentile(values: Floats, percent: float) -> float | None:

@@ -1,0 +1,201 @@
+"""Contacts are graded by the larger delta-v of the two, else by the closing speed (decision T-4)."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from makelog import DT, actor_table, drive, pose
+from makemap import straight_map
+from skidpad.core.states import ContactEvent
+from skidpad.core.vocabulary import ActorKind, RelocationReason, Supervision
+from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
+from skidpad.evidence.drive.prepared import prepare
+from skidpad.evidence.drive.severity import Contact, Measure, Severity, graded_contacts
+from skidpad.recording.events import Relocation
+from skidpad.recording.matrix import Metrics
+from skidpad.recording.runlog import RunLog
+
+KMH = 3.6
+TICK = 10
+FREE, BRAKE, REALIGN = Supervision.NONE, Supervision.BRAKE, Supervision.REALIGN
+
+
+def touch(v_closing: float = 3.0, actor: int = 1, tick: int = TICK) -> ContactEvent:
+    return ContactEvent(tick, actor, "" if actor > 0 else "guardrail", 900.0, v_closing, 0.0, 0.0)
+
+
+def struck(
+    ego: float = 0.0,
+    other: float = 0.0,
+    *,
+    kind: ActorKind = ActorKind.CAR,
+    contact: ContactEvent | None = None,
+    braking: float = 0.0,
+) -> RunLog:
+    """The ego loses `ego` km/h in the tick of the contact, the other car gains `other` km/h."""
+
+    def rows(k: int) -> list[dict[str, float]]:
+        hit = k >= TICK
+        v = 20.0 - braking * k * DT - hit * ego / KMH
+        return [
+            {"x": 50.0 + 20.0 * k * DT, "vx": v},
+            {"x": 80.0 + 5.0 * k * DT, "vx": 5.0 + hit * other / KMH},
+        ]
+
+    table = actor_table(2)
+    table.kind[1] = kind
+    contacts = [touch() if contact is None else contact]
+    return drive(30, rows, contacts=contacts, table=table)
+
+
+def graded(log: RunLog) -> Contact:
+    (contact,) = graded_contacts(prepare(log, straight_map()))
+    return contact
+
+
+def metrics(log: RunLog) -> Metrics:
+    return run_metrics(log, straight_map())
+
+
+def classes(m: Metrics) -> tuple[int | None, ...]:
+    return m.contacts_light, m.contacts_medium, m.contacts_heavy, m.serious_contacts
+
+
+@pytest.mark.parametrize(("ego", "other"), [(4.0, 11.0), (11.0, 4.0)])
+def test_the_larger_change_of_speed_of_the_two_decides(ego: float, other: float) -> None:
+    c = graded(struck(ego, other))
+    assert c.delta_v is not None
+    assert c.delta_v * KMH == pytest.approx(11.0, abs=0.01)
+    assert (c.severity, c.graded_by) == (Severity.MEDIUM, Measure.DELTA_V)
+
+
+@pytest.mark.parametrize(
+    ("dv", "severity"),
+    [
+        (4.9, Severity.LIGHT),
+        (5.1, Severity.MEDIUM),
+        (19.9, Severity.MEDIUM),
+        (20.1, Severity.HEAVY),
+    ],
+)
+def test_classes_end_at_5_and_20_km_per_hour(dv: float, severity: Severity) -> None:
+    log = struck(dv)
+    assert graded(log).severity is severity
+    m = metrics(log)
+    expected = [int(severity is s) for s in Severity]
+    assert classes(m) == (*expected, expected[1] + expected[2])
+    assert m.max_delta_v_kmh == pytest.approx(dv, abs=0.01)
+    assert (m.contacts_by_closing_speed, m.contacts_static, m.contacts) == (0, 0, 1)
+
+
+def test_braking_is_no_impact() -> None:
+    c = graded(struck(3.0, braking=9.0))  # 1.6 km/h of braking in the tick
+    assert c.delta_v is not None
+    assert c.delta_v * KMH == pytest.approx(3.0, abs=0.05)
+
+
+def test_an_impact_of_the_tick_before_is_not_carried_on() -> None:
+    log = struck(30.0, contact=touch(tick=TICK + 1))
+    c = graded(log)
+    assert c.delta_v == pytest.approx(0.0, abs=0.01)
+
+
+@pytest.mark.parametrize("kind", [ActorKind.PEDESTRIAN, ActorKind.BICYCLE, ActorKind.MOTORCYCLE])
+def test_people_and_two_wheels_are_never_in_the_lowest_class(kind: ActorKind) -> None:
+    log = struck(0.1, 0.1, kind=kind)
+    assert graded(log).severity is Severity.MEDIUM
+    m = metrics(log)
+    assert classes(m) == (0, 1, 0, 1)
+    assert m.contacts_vulnerable == 1
+    assert metrics(struck(0.1, 0.1)).contacts_vulnerable == 0
+
+
+@pytest.mark.parametrize("v", [4.0, 7.0])
+def test_without_a_delta_v_the_closing_speed_decides_and_a_column_says_so(v: float) -> None:
+    log = struck(30.0, contact=touch(v / KMH))
+    log.present[TICK - 1, 1] = False
+    c = graded(log)
+    assert (c.delta_v, c.graded_by) == (None, Measure.CLOSING_SPEED)
+    assert c.severity is (Severity.LIGHT if v < 5.0 else Severity.MEDIUM)
+    m = metrics(log)
+    assert (m.contacts_by_closing_speed, m.max_delta_v_kmh) == (1, None)
+
+
+def test_a_vehicle_that_is_put_elsewhere_has_no_delta_v() -> None:
+    log = struck(3.0, 50.0)
+    log.actors.x[TICK:, 1] += 40.0
+    assert graded(log).graded_by is Measure.CLOSING_SPEED
+
+
+def test_a_contact_in_the_first_tick_has_no_delta_v() -> None:
+    assert graded(struck(contact=touch(tick=0))).graded_by is Measure.CLOSING_SPEED
+
+
+@pytest.mark.parametrize(
+    ("contact", "kind"), [(touch(actor=-1), ActorKind.CAR), (touch(), ActorKind.PROP)]
+)
+def test_barriers_and_cones_are_counted_apart(contact: ContactEvent, kind: ActorKind) -> None:
+    m = metrics(struck(40.0, kind=kind, contact=contact))
+    assert classes(m) == (0, 0, 0, 0)
+    assert (m.contacts_static, m.contacts, m.max_delta_v_kmh) == (1, 1, None)
+
+
+def test_every_contact_is_in_one_class_also_those_that_start_no_recovery() -> None:
+    log = struck(12.0)
+    more = (touch(0.2, tick=20), touch(0.2, actor=-1, tick=22))
+    m = metrics(dataclasses.replace(log, events=(*log.events, *more)))
+    assert (m.contacts_light, m.contacts_medium, m.contacts_heavy, m.contacts_static) == (
+        1,
+        1,
+        0,
+        1,
+    )
+    assert m.contacts == 3
+    assert m.interventions == m.fatal_collisions == 0
+    assert m.serious_contacts_per_100_km == pytest.approx(100.0 / m.distance_km)
+
+
+def reset(
+    phase: Supervision, reason: RelocationReason, begin: int = 12, contact: int | None = None
+) -> RunLog:
+    moved = Relocation(begin + 4, reason, 0.0, pose(1.0), pose(2.0))
+    return drive(
+        40,
+        lambda k: [{"x": 50.0 + k, "vx": 20.0}],
+        supervision=lambda k: phase if begin <= k < begin + 8 else FREE,
+        contacts=[] if contact is None else [touch(actor=-1, tick=contact)],
+        extra=lambda log, k: log.relocated(moved) if k == begin + 4 else None,
+    )
+
+
+def test_the_time_to_the_first_intervention_ends_where_the_supervisor_begins() -> None:
+    m = metrics(reset(BRAKE, RelocationReason.COLLISION, contact=11))
+    assert m.first_intervention_s == m.undisturbed_s == pytest.approx(12 * DT)
+    assert m.interventions == 1
+    m = metrics(reset(REALIGN, RelocationReason.WRONG_WAY))
+    assert m.first_intervention_s == m.undisturbed_s == pytest.approx(12 * DT)
+
+
+@pytest.mark.parametrize("reason", [RelocationReason.STUCK, RelocationReason.ROAD_END])
+def test_another_reset_ends_the_time_without_an_intervention(reason: RelocationReason) -> None:
+    m = metrics(reset(REALIGN, reason))
+    assert (m.first_intervention_s, m.interventions) == (None, 0)
+    assert m.undisturbed_s == pytest.approx(12 * DT)
+
+
+def test_a_run_without_resets_is_undisturbed_to_its_end() -> None:
+    m = metrics(struck())
+    assert (m.first_intervention_s, m.undisturbed_s) == (None, pytest.approx(30 * DT))
+
+
+def test_the_weather_that_saw_the_first_reset_has_the_intervention() -> None:
+    log = reset(BRAKE, RelocationReason.COLLISION, contact=11)
+    weather = (np.arange(len(log)) >= 6).astype(np.int64)
+    log = dataclasses.replace(log, weather=weather, weathers=("clear-noon", "rain-noon"))
+    found = weather_metrics(log, straight_map())
+    clear, rain = found["clear-noon"], found["rain-noon"]
+    assert (clear.first_intervention_s, clear.undisturbed_s) == (None, pytest.approx(6 * DT))
+    assert rain.first_intervention_s == rain.undisturbed_s == pytest.approx(6 * DT)

@@ -81,7 +81,7 @@ class FileChanges:
     """What the actions of a file that is played make of weather, road and traffic lights."""
 
     def __init__(self, player: Player, spec: RunSpec) -> None:
-        self.player, self.done = player, 0
+        self.player, self.done, self.noticed = player, 0, 0
         settings = settings_of(spec)
         assert isinstance(spec.course, Scenario)
         self.follows, self.mu_ref = spec.course.weather_of_file, settings.mu_ref
@@ -106,6 +106,12 @@ class FileChanges:
                 now = replace(now, mu_ref=self.mu_ref * environment.friction_scale)
         before, self.outside = self.outside, now
         return None if now == before else now
+
+    def new_notices(self) -> list[str]:
+        """Returns what the scenario could not do since it was asked last."""
+        new = self.player.scene.notices[self.noticed :]
+        self.noticed += len(new)
+        return new
 
     def hands(self, command: VehicleCommand) -> VehicleCommand:
         """What the file makes of the driver's command."""

@@ -135,6 +135,8 @@ class Log(Sink):
         self.log.append(truth, frame, moment.command, moment.report, frame.supervision)
         for text in truth.notices:
             self.log.notice(truth.tick, NoticeSource.TRAFFIC, text)
+        for text in () if self.changes is None else self.changes.new_notices():
+            self.log.notice(truth.tick, NoticeSource.SCENARIO, text)
         if action.notice:
             self.log.notice(truth.tick, NoticeSource.SUPERVISOR, action.notice)
         if action.relocate is not None and action.relocate.moved is not None:

@@ -49,6 +49,7 @@ class NoticeSource(str, Enum):
     STACK = "stack"
     SUPERVISOR = "supervisor"
     TRAFFIC = "traffic"
+    SCENARIO = "scenario"
 
 
 @dataclass(frozen=True, slots=True)

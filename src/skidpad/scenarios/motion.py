@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from math import atan2, cos, pi, sin, sqrt
 
@@ -81,6 +81,7 @@ class Guide:
         self.free = pose  # where there is no lane: straight on
         self.v, self.a = v, 0.0
         self.pace: float | None = None  # speed of this step's way, where it is not v
+        self.leap = 0.0  # m along the way that this step puts it further, without a speed
         self.offset = 0.0 if point is None else point.offset
         self.offset_rate = self.offset_bend = 0.0
         self.roads: tuple[int, ...] = ()
@@ -97,6 +98,10 @@ class Guide:
         forward = dx * cos(self.base.heading) + dy * sin(self.base.heading)
         further = self.network.ahead(self.base, forward, self.roads)
         self.at_end, self.base = further is None, further or self.base
+
+    def place(self, pose: Pose) -> Place:
+        """Returns a pose of the actor with the lane that it keeps to."""
+        return Place(pose, None if self.base is None else replace(self.base, offset=self.offset))
 
     def shift_to(self, lane_id: int) -> float | None:
         """Make another lane across the road the reference; returns the way left to it, m.
@@ -137,14 +142,15 @@ class Guide:
     def ideal(self, dt: float) -> Pose:
         """The pose of an actor that does exactly as demanded, one step on."""
         v, self.pace = self.v if self.pace is None else self.pace, None
+        leap, self.leap = self.leap, 0.0
         way = v * dt
         if self.base is None:
-            self.free = self.free.moved(forward=way)
+            self.free = self.free.moved(forward=way + leap)
             return self.free
         sideways = min(abs(self.offset_rate) * dt, abs(way))
         forward = sqrt(way * way - sideways * sideways)
         squeezed = max(1.0 - self.base.curvature * self.offset, SQUEEZED)
-        distance = self.along * (forward if way >= 0.0 else -forward) / squeezed
+        distance = self.along * ((forward if way >= 0.0 else -forward) + leap) / squeezed
         self._move(distance)
         return self._posed()
 

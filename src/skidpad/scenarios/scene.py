@@ -158,6 +158,13 @@ class Actor:
         if self.track is not None and self.track.timed and self.led_since < scene.t:
             self.leave_track(scene.network)
 
+    def leap(self, way: float) -> None:
+        """Be `way` m further along its lane or trajectory at the end of this step, at its own speed."""
+        if self.track is not None:
+            self.track.skip(way)
+        else:
+            self.guide.leap += way
+
     def off_road(self, network: Network, t: float) -> float:
         """How long it has been beside every lane, s; kept by asking in every step."""
         point = network.map.project(self.pose.x, self.pose.y, self.pose.z, driving=False)
@@ -182,7 +189,7 @@ class Actor:
         """Where it is, with its lane: the one that it keeps to, else the one under it."""
         guide = self.guide
         if self.driven_by_file and self.track is None and guide.base is not None:
-            return Place(self.pose, replace(guide.base, offset=guide.offset))
+            return guide.place(self.pose)
         return network.place_of(self.pose)
 
     def catch_up(self, network: Network) -> None:

@@ -13,6 +13,7 @@ from typing import Any, cast
 from skidpad.core.geometry import Pose
 from skidpad.scenarios.actions.base import GlobalAction, PrivateAction
 from skidpad.scenarios.actions.controllers import Activate, Several
+from skidpad.scenarios.actions.distance import KeepGap
 from skidpad.scenarios.actions.private import private_action
 from skidpad.scenarios.actions.routing import FollowTrajectory, Teleport
 from skidpad.scenarios.actions.speed import Speed, limited
@@ -27,6 +28,7 @@ from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.environment import Environment
 from skidpad.scenarios.findings import Fault
+from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Network, Place
 from skidpad.scenarios.positions import Position
 from skidpad.scenarios.scene import Actor, Scene
@@ -144,7 +146,19 @@ class _Starting:
             first = action.first if isinstance(action, FollowTrajectory) else None
             if first is not None:
                 self._so_far = self.ctx.network.place_of(first)
+            elif isinstance(action, KeepGap) and action.limits.none:
+                self._so_far = self._at_distance(action)
         return self._so_far or self.ctx.network.place_of(ORIGIN)
+
+    def _at_distance(self, action: KeepGap) -> Place:
+        """Where a distance without limits puts it: along its lane, else straight on."""
+        itself, network = cast("Actor", self), self.ctx.network
+        here = self._so_far = self._so_far or network.place_of(ORIGIN)
+        excess = action.excess(self.scene, itself, action.resolved_side(self.scene, itself))
+        guide = Guide(network, here, 0.0)
+        guide.leap = excess
+        pose = guide.ideal(0.0)
+        return network.place_of(pose) if guide.base is None else guide.place(pose)
 
     @property
     def pose(self) -> Pose:
@@ -157,6 +171,9 @@ class _Starting:
         return cast("float", self._once("speed", self._speed))
 
     def _speed(self) -> float:
+        gap = next((a for a in self.wish.actions if isinstance(a, KeepGap)), None)
+        if gap is not None and gap.limits.none:
+            return self.scene.actors[gap.other].v_told
         if self.wish.speed is None:
             return 0.0
         v = self.wish.speed.target.speed(self.scene)

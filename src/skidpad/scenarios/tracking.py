@@ -26,6 +26,10 @@ class Track(Protocol):
         """Returns the way along the line from its place at time t to the point nearest to a place, m."""
         ...
 
+    def skip(self, way: float) -> None:
+        """Be `way` m further along the line."""
+        ...
+
 
 class TimedTrack:
     """A line by its times: `begin` is the scenario time of line time 0, `scale` stretches it."""
@@ -51,6 +55,9 @@ class TimedTrack:
         """Returns the way along the line from its place at time t to the point nearest to a place, m."""
         here = self.line.length_at((t - self.begin) / self.scale)
         return self.line.nearest(place.x, place.y) - here
+
+    def skip(self, way: float) -> None:
+        """Do nothing: its times alone say where it is."""
 
     @property
     def v_end(self) -> float:
@@ -82,6 +89,10 @@ class PacedTrack:
         del t
         way = self.line.nearest(place.x, place.y) - self.s
         return way % self.line.length if self.closed else way
+
+    def skip(self, way: float) -> None:
+        """Be `way` m further along the line."""
+        self.s += way
 
     def step(self, t: float) -> bool:
         """Go on to time t; True at the end of the line."""

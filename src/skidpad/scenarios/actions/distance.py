@@ -14,6 +14,7 @@ from skidpad.scenarios.scene import Actor, Running, Scene
 
 SPRING = 0.4  # 1/m, of the controller that closes a gap (esmini's, so that files play alike)
 REACHED = 0.1  # m
+STEADY = 0.1  # m/s beside the other one's speed
 
 
 class Displacement(Enum):
@@ -61,13 +62,27 @@ class KeepGap:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From now on."""
-        side = self.side
-        if side is Displacement.ANY:
-            ahead = self.ahead(scene, actor)
-            side = Displacement.TRAILING if ahead >= 0.0 else Displacement.LEADING
-        going = GapKept(self, actor, side, self.limits.of(actor.entity.performance))
+        limits = self.limits.of(actor.entity.performance)
+        if self.limits.none and not actor.placed_by_file:
+            scene.notice(
+                f"<LongitudinalDistanceAction> of {actor.name}: at once asked, at most "
+                f"{limits.a_max:g} m/s^2 faster and {limits.b_max:g} m/s^2 slower applied: "
+                "it drives on its tyres"
+            )
+        going = GapKept(self, actor, self.resolved_side(scene, actor), limits)
         actor.pace_by(going, scene)
         return going
+
+    def resolved_side(self, scene: Scene, actor: Actor) -> Displacement:
+        """Returns the side of the other entity; the one where the entity is, where any will do."""
+        if self.side is not Displacement.ANY:
+            return self.side
+        ahead = self.ahead(scene, actor)
+        return Displacement.TRAILING if ahead >= 0.0 else Displacement.LEADING
+
+    def excess(self, scene: Scene, actor: Actor, side: Displacement) -> float:
+        """Returns by how much the entity is too far back, m."""
+        return self.ahead(scene, actor) - self.wanted(scene, side)
 
     def ahead(self, scene: Scene, actor: Actor) -> float:
         """How far the other one is ahead, m; its length and half the own one taken off if free."""
@@ -104,13 +119,14 @@ class GapKept:
             return True
         action, guide = self.action, self.actor.guide
         v_other = scene.actors[action.other].v_told
-        excess = action.ahead(scene, self.actor) - action.wanted(scene, self.side)
-        if not action.continuous and abs(excess) < REACHED:
+        excess = action.excess(scene, self.actor, self.side)
+        if action.limits.none and self.actor.placed_by_file:
+            guide.v, guide.a = v_other, 0.0
+            self.actor.leap(excess)
+            return not action.continuous
+        if not action.continuous and abs(excess) < REACHED and self._is_steady(v_other):
             guide.a = 0.0
             return True
-        if action.limits.none:
-            guide.v, guide.a = v_other + excess / scene.dt, 0.0
-            return False
         limits = self.limits
         tension = limits.a_max if excess < 0.0 else limits.b_max
         stiffness = min(tension, 1e3) * SPRING
@@ -119,6 +135,10 @@ class GapKept:
         v = guide.v + guide.a * scene.dt
         guide.v = copysign(min(abs(v), limits.v_max), v)
         return False
+
+    def _is_steady(self, v_other: float) -> bool:
+        """It has the other one's speed, which a distance at once asks of what drives on its tyres."""
+        return not self.action.limits.none or abs(self.actor.motion.speed - v_other) < STEADY
 
     def _eased(self, now: float, wanted: float, dt: float) -> float:
         """An acceleration that grows no faster than the file allows; it may end at once, as in esmini."""

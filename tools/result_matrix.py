@@ -21,11 +21,11 @@ from skidpad.report.matrix_data import Matrix, config_title, rate_by_seed, weath
 COUNTS = {
     "crashes_vehicle": "crashes with vehicles",
     "road_departures": "departures",
-    "fatal_collisions": "fatal",
+    "fatal_collisions": "interventions",
     "fatal_first": "first of chain",
 }
 COMPARED = {
-    "fatal_collisions": "fatal events",
+    "fatal_collisions": "interventions",
     "crashes_vehicle": "crashes with vehicles",
     "road_departures": "departures",
     "mean_speed_kmh": "mean speed, km/h",
@@ -42,7 +42,13 @@ def matrix_of(folder: Path) -> Matrix:
 def headline(folder: Path) -> str:
     """One row per configuration, every drive once: per run, per 100 km, and how fast."""
     matrix = matrix_of(folder)
-    head = ["configuration", "runs", *COUNTS.values(), "fatal per 100 km", "mean speed, km/h"]
+    head = [
+        "configuration",
+        "runs",
+        *COUNTS.values(),
+        "interventions per 100 km",
+        "mean speed, km/h",
+    ]
     rows = []
     for c in matrix.configs:
         runs = matrix.cell(c)
@@ -128,7 +134,7 @@ def _numbers_count(name: str) -> list[str | int]:
 
 
 def _bounds(interval: Interval) -> str:
-    return limits(interval) if isfinite(interval.low + interval.high) else "unbounded"
+    return limits(interval) if isfinite(interval.low + interval.high) else "too few"
 
 
 def rated(rate: Rate | None) -> str:

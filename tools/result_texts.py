@@ -17,7 +17,14 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def limits(interval: Interval | None) -> str:
     """Limits in brackets."""
-    return "too few" if interval is None else f"[{interval.low:.2f}, {interval.high:.2f}]"
+    return "too few" if interval is None else f"[{bound(interval.low)}, {bound(interval.high)}]"
+
+
+def bound(value: float) -> str:
+    """Two decimals; of a smaller value two digits, so that it is not shown as zero."""
+    if abs(value) < 1e-9:
+        return "0.00"
+    return f"{value:.2f}" if abs(value) >= 0.01 else f"{value:.2g}"
 
 
 def verdict_rows(judged: Sequence[Judgement]) -> str:

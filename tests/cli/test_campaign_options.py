@@ -56,5 +56,5 @@ def test_another_campaign_goes_to_the_next_folder(tmp_path, capsys):
 def test_an_estimate_is_one_sentence(capsys):
     Estimate(workers=3)(campaign(), str)
     told = capsys.readouterr().out
-    assert told.startswith("8 runs at 0.00 s each (8 were driven) on 3 workers: about 0.0 min")
+    assert told.startswith("8 runs at 0.00 s each (measured on 8) on 3 workers: about 0.0 min")
     assert told.count("\n") == 1

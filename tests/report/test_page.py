@@ -4,6 +4,7 @@ import re
 import pytest
 
 from skidpad.report.page import (
+    Answer,
     Answers,
     Card,
     Cards,
@@ -41,7 +42,7 @@ def page():
             Section(
                 "First",
                 [
-                    Answers([("Is it safe?", "No.")]),
+                    Answers([Answer("Is it safe?", "No.")]),
                     Text("one\n\ntwo"),
                     Numbers([Number("3", "runs", "of 3")]),
                 ],

@@ -152,5 +152,5 @@ RECIPE = Recipe(
     drive=drive_one,
     warm_up=warm_up,
     success=unharmed,
-    success_means="without a fatal collision",
+    success_means="without an intervention",
 )

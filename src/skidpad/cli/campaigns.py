@@ -98,11 +98,14 @@ class Estimate(Struct, frozen=True, kw_only=True):
 
     def __call__(self, campaign: Campaign[Any, Any, Any], report: Callable[[Path], object]) -> None:
         """Drive a few of its runs and print one sentence."""
+        from skidpad.core.wording import count_text
+
         del report
         found, workers = campaign.estimate(), 1 if campaign.alone else self.workers
         typer.echo(
-            f"{found.runs} runs at {found.cpu_s:.2f} s each ({found.probes} were driven) on {workers} "
-            f"workers: about {found.minutes(workers):.1f} min, without compilation on first use"
+            f"{count_text(found.runs, 'run')} at {found.cpu_s:.2f} s each (measured on {found.probes}) "
+            f"on {count_text(workers, 'worker')}: about {found.minutes(workers):.1f} min, without "
+            "compilation on first use"
         )
 
 

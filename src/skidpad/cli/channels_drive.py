@@ -80,6 +80,7 @@ def totals(folder: Path) -> str:
     """What a folder of driven segments came to, in one line."""
     import polars as pl
 
+    from skidpad.core.wording import count_text
     from skidpad.live.outcome import LINK
     from skidpad.recording.results import read_results
 
@@ -88,9 +89,10 @@ def totals(folder: Path) -> str:
     sums = driven.select(pl.col(pl.Float64, pl.Int64).sum()).row(0, named=True)
     watched = "".join(f"\n{_watched(link.parent)}" for link in sorted(folder.glob(f"*/*/{LINK}")))
     return (
-        f"{folder}: {len(driven)} segments, {sums['driven_s'] / 3600.0:.2f} h, "
-        f"{sums['distance_m'] / 1000.0:.1f} km, {sums['collisions']} collisions, "
-        f"{sums['red_lights_run']} red lights run, {sums['stalls']} stalls{watched}"
+        f"{folder}: {count_text(len(driven), 'segment')}, {sums['driven_s'] / 3600.0:.2f} h, "
+        f"{sums['distance_m'] / 1000.0:.1f} km, {count_text(sums['collisions'], 'collision')}, "
+        f"{count_text(sums['red_lights_run'], 'red light')} run, "
+        f"{count_text(sums['stalls'], 'stall')}{watched}"
     )
 
 

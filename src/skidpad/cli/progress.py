@@ -10,6 +10,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from skidpad.campaign.campaign import BATCH, Campaign
 from skidpad.campaign.recipe import cell_of
+from skidpad.core.wording import count_text
 from skidpad.recording.ledger import Entry
 
 console = Console(stderr=True)
@@ -42,4 +43,4 @@ class Shown(Progress):
         if looked_at or len(runs) == self.planned[cell]:
             good = sum(self.campaign.success(e) is True for e in runs)
             means = self.campaign.recipe.success_means
-            self.console.print(f"{cell}: {len(runs)} runs, {good} {means}")
+            self.console.print(f"{cell}: {count_text(len(runs), 'run')}, {good} {means}")

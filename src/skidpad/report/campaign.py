@@ -11,6 +11,7 @@ import msgspec
 import polars as pl
 
 from skidpad import __version__
+from skidpad.core.wording import count_text
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.ledger import E
@@ -111,8 +112,8 @@ class CampaignView(Generic[E]):
             return []
         named = gone.select(*self.columns.sort, "outcome").head(NAMED).rows()
         names = "; ".join(" ".join(str(v) for v in r if not isinstance(v, bool)) for r in named)
-        text = f"{len(gone)} of {len(self.results)} runs did not finish ({names}); "
-        return [Text(text + "they are in no denominator.", tone="warning")]
+        text = f"{len(gone)} of {count_text(len(self.results), 'run')} did not finish ({names}); "
+        return [Text(text + "no denominator counts them.", tone="warning")]
 
     def definitions(self) -> Definitions:
         """Every metric."""

@@ -15,6 +15,7 @@ from skidpad.report import channels_figures as figures
 from skidpad.report import channels_tables as tables
 from skidpad.report.channels_data import MonitoredDrive, load_drive
 from skidpad.report.page import (
+    Answer,
     Answers,
     Block,
     Card,
@@ -112,17 +113,17 @@ def _answers(drive: MonitoredDrive) -> Answers:
     audit = drive.summary["indicators"]
     missing = sum(a["not_evaluated_cycles"] for a in audit)
     share = 100.0 * missing / max(1, len(audit) * drive.summary["cycles"])
-    items = [("Was anything hazardous?", found)]
+    items = [Answer("Was anything hazardous?", found)]
     if worst is not None:
         score = worst.extremes.get("safety_score")
         at = "" if score is None else f", safety score {score:.2f}"
         name = tables.NAMES[worst.type]
-        items.append(("What was the worst?", f"{name} at {worst.t_start:.1f} s{at}."))
+        items.append(Answer("What was the worst?", f"{name} at {worst.t_start:.1f} s{at}."))
     sure = (
         f"Rules on what the channels themselves report; {share:.0f} % of the indicators' values could "
         "not be evaluated, which is never counted as good."
     )
-    return Answers([*items, ("How sure is that?", sure)])
+    return Answers([*items, Answer("How sure is that?", sure)])
 
 
 def _headline(drive: MonitoredDrive) -> Numbers:

@@ -21,6 +21,7 @@ from skidpad.report.channels_scores import FEW, HAZARDS, TRUTHS, Row, headline, 
 from skidpad.report.channels_strata import headline_of_risky, precision_recall, strata
 from skidpad.report.figures import Chart, Curve, curves
 from skidpad.report.page import (
+    Answer,
     Answers,
     Block,
     Figure,
@@ -137,15 +138,15 @@ def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:
     for result in judged_by:
         precision, recall = map(ratio_text, result["micro"])
         sentence = f"{recall} % of {of} are found, and {precision} % of what is found is one."
-        items.append((f"How good is {words(result['rules'])}?", sentence))
+        items.append(Answer(f"How good is {words(result['rules'])}?", sentence))
     rows = [row for result in judged_by[:1] for row in result["hazards"].values()]
     true = sum(row["tp"] + row["fn"] for row in rows)
     few = ", too few to say much" if true < FEW else ""
     sure = f"{evaluation['segments']} drive segments with {true} true hazards{few}. "
     sure += tally_text(judged)
     risky = headline_of_risky(evaluation)
-    items += [("What is missed?", risky)] if risky else []
-    return Answers([*items, ("How sure is that?", sure)])
+    items += [Answer("What is missed?", risky)] if risky else []
+    return Answers([*items, Answer("How sure is that?", sure)])
 
 
 def _deciding(evaluation: Row) -> tuple[list[Row], str]:

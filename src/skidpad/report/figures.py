@@ -35,6 +35,7 @@ STYLE: dict[Any, Any] = {
 
 
 LEGEND_CHARACTERS = 12.0  # of its font, per inch
+WIDEST = 4.0  # times the largest estimate, of an axis with intervals
 LEGEND_MARK = 5  # characters that a mark and its spaces take
 
 
@@ -47,6 +48,8 @@ class Series:
     low: Sequence[float | None] = ()
     high: Sequence[float | None] = ()
     published: Sequence[float | None] = ()  # drawn as hollow diamonds
+    colour: int | None = None  # of the palette; None: by its place in the chart
+    marker: str = "o"  # of points
 
 
 @contextmanager
@@ -108,7 +111,7 @@ def draw_bars(axes: Axes, groups: Sequence[str], series: Sequence[Series], y_lab
     for k, one in enumerate(series):
         x = [g + (k - (len(series) - 1) / 2) * width for g in range(len(groups))]
         heights = [v if v is not None else float("nan") for v in one.values]
-        axes.bar(x, heights, 0.9 * width, color=PALETTE[k % len(PALETTE)], label=one.name)
+        axes.bar(x, heights, 0.9 * width, color=_ink(one, k), label=one.name)
         if one.low:
             for xi, v, lo, hi in zip(x, one.values, one.low, one.high, strict=True):
                 if v is not None and lo is not None and hi is not None:
@@ -129,6 +132,82 @@ def draw_bars(axes: Axes, groups: Sequence[str], series: Sequence[Series], y_lab
     axes.set_ylabel(y_label)
     axes.set_ylim(bottom=0.0)
     axes.grid(axis="x", visible=False)
+
+
+def points_with_intervals(
+    rows: Sequence[str], series: Sequence[Series], x_label: str, origin: float | None = None
+) -> str:
+    """Estimates as points on a common scale, one row per label, with their intervals as lines.
+
+    A bound that holds on one side is an arrow, an estimate without limits is hollow. origin: where a
+    vertical rule is drawn.
+    """
+    height = 1.1 + 0.3 * len(rows) + 0.12 * len(rows) * len(series)
+    with canvas(height=height) as (figure, (axes,)):
+        for k, one in enumerate(series):
+            y = [r + 0.6 * ((k + 0.5) / len(series) - 0.5) for r in range(len(rows))]
+            _draw_points(axes, y, one, _ink(one, k))
+        if origin is not None:
+            axes.axvline(origin, color=INK, linewidth=0.9)
+        _keep_points_apart(axes, series, origin)
+        axes.set_yticks(range(len(rows)), rows)
+        axes.set_ylim(len(rows) - 0.4, -0.6)
+        axes.set_xlabel(x_label)
+        axes.grid(axis="y", visible=False)
+        if len(series) > 1:
+            figure.legend(
+                loc="outside upper center", ncols=legend_columns([s.name for s in series], 8.4)
+            )
+        return svg_of(figure)
+
+
+def _keep_points_apart(axes: Axes, series: Sequence[Series], origin: float | None) -> None:
+    """Limit the axis where a few wide intervals would press all estimates into one place."""
+    values = [abs(v) for one in series for v in one.values if v is not None]
+    reach = max(WIDEST * max(values, default=0.0), 1.0)
+    low, high = axes.get_xlim()
+    axes.set_xlim(0.0 if origin is None else max(low, -reach), min(high, reach))
+
+
+def _ink(one: Series, place: int) -> str:
+    """The colour of a series at this place of its chart."""
+    return PALETTE[(place if one.colour is None else one.colour) % len(PALETTE)]
+
+
+def _draw_points(axes: Axes, y: Sequence[float], one: Series, ink: str) -> None:
+    """The estimates of one series at the heights y."""
+    style = {"marker": one.marker, "color": ink, "markersize": 6.5, "linestyle": "none"}
+    ends = zip(one.low, one.high, strict=True) if one.low else [(None, None)] * len(y)
+    for k, ((low, high), yi, v) in enumerate(zip(ends, y, one.values, strict=True)):
+        if v is None:
+            continue
+        known = [end for end in (low, high) if end is not None]
+        face = ink if known else "white"
+        axes.plot([v], [yi], label=None if k else one.name, markerfacecolor=face, **style)
+        if known:
+            ends_of_line = [min(*known, v), max(*known, v)]
+            axes.plot(ends_of_line, [yi, yi], color=ink, linewidth=1.4)
+        if len(known) == 1:
+            axes.plot(known, [yi], marker="<" if low is None else ">", color=ink, markersize=5)
+
+
+def stacked_bars(rows: Sequence[str], series: Sequence[Series], x_label: str) -> str:
+    """Parts of a whole per row, laid end to end."""
+    with canvas(height=1.2 + 0.36 * len(rows)) as (figure, (axes,)):
+        left = [0.0] * len(rows)
+        for k, one in enumerate(series):
+            widths = [v or 0.0 for v in one.values]
+            colour = _ink(one, k)
+            axes.barh(range(len(rows)), widths, 0.6, left=left, color=colour, label=one.name)
+            left = [a + b for a, b in zip(left, widths, strict=True)]
+        axes.set_yticks(range(len(rows)), rows)
+        axes.set_ylim(len(rows) - 0.4, -0.6)
+        axes.set_xlabel(x_label)
+        axes.grid(axis="y", visible=False)
+        figure.legend(
+            loc="outside upper center", ncols=legend_columns([s.name for s in series], 8.4)
+        )
+        return svg_of(figure)
 
 
 def panel(groups: Sequence[str], charts: Sequence[tuple[str, Series]]) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
+from skidpad.core.wording import count_text
 from skidpad.evidence.grip.findings import FINDINGS
 from skidpad.evidence.grip.study import ORIGINAL, REDUCED, Share, completion, completion_p
 from skidpad.evidence.verdicts import Judgement, judge
@@ -17,6 +18,7 @@ from skidpad.report import grip_figures, grip_tables
 from skidpad.report.grip_data import GripCampaign, load_grip, scenario_title
 from skidpad.report.grip_rain import rain_tables
 from skidpad.report.page import (
+    Answer,
     Answers,
     Block,
     Card,
@@ -86,8 +88,10 @@ def build_page(campaign: GripCampaign) -> Page:
 def _subtitle(campaign: GripCampaign) -> str:
     r = campaign.plain
     return (
-        f"{r['scenario'].n_unique()} scenarios in {r['weather'].n_unique()} weathers, friction "
-        f"{' and '.join(sorted(r['friction'].unique().to_list()))}, {r['seed'].n_unique()} repeats."
+        f"{count_text(r['scenario'].n_unique(), 'scenario')} in "
+        f"{count_text(r['weather'].n_unique(), 'weather')}, friction "
+        f"{' and '.join(sorted(r['friction'].unique().to_list()))}, "
+        f"{count_text(r['seed'].n_unique(), 'repeat')}."
     )
 
 
@@ -111,7 +115,9 @@ def _answers(campaign: GripCampaign, judged: Sequence[Judgement]) -> Answers:
         if (share := completion(p.reduced)).value is not None
     }
     items = [
-        ("Does less grip change the outcome?", f"Runs without an accident: {', '.join(told)}.")
+        Answer(
+            "Does less grip change the outcome?", f"Runs without an accident: {', '.join(told)}."
+        )
     ]
     if campaign.both and after:
         worst = min(after, key=lambda cell: after[cell].value or 0.0)
@@ -120,11 +126,10 @@ def _answers(campaign: GripCampaign, judged: Sequence[Judgement]) -> Answers:
             f"Fewest runs are completed in {where}, {_percent(after[worst])}; the outcome changes "
             f"beyond chance in {len(changed)} of {len(campaign.pairs)} cells."
         )
-        items.append(("Where most?", text))
+        items.append(Answer("Where most?", text))
     seeds = campaign.plain["seed"].n_unique()
-    items.append(
-        ("How sure is that?", f"{seeds_text(seeds)} {tally_text(judged)}{least_seeds_text(judged)}")
-    )
+    sure = f"{seeds_text(seeds)} {tally_text(judged)}{least_seeds_text(judged)}"
+    items.append(Answer("How sure is that?", sure))
     return Answers(items)
 
 

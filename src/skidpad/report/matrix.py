@@ -10,23 +10,24 @@ from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import matrix_figures, matrix_tables
 from skidpad.report.crashes import crash_sections, found_crashes, worst_of_each
-from skidpad.report.matrix_answers import answers, speed_figure
+from skidpad.report.matrix_answers import answers
+from skidpad.report.matrix_baseline import baseline_text
 from skidpad.report.matrix_data import Matrix, load_matrix
 from skidpad.report.matrix_factors import factors
-from skidpad.report.matrix_headline import headline_table
-from skidpad.report.page import Block, Number, Numbers, Page, Section, Text, write_report_page
-from skidpad.report.verdicts import verdict_blocks
+from skidpad.report.matrix_headline import headline_numbers, headline_table
+from skidpad.report.matrix_published import beside_published
+from skidpad.report.page import Block, Page, Section, Text, write_report_page
+from skidpad.report.verdicts import unjudged_text, verdict_blocks
 
 CLAIMS = (*FINDINGS, *ACCEPTANCE)
-LEAD = """Each row below is a set of driving functions, each column a weather. A cell was driven with \
-every seed; seeds are common to all cells, so differences between cells are paired. A fatal collision \
-is a contact that started the recovery supervisor, a departure from the road (all wheels off every lane \
-for 1 s, or more than 3 m beyond the edge), or a wrong-way correction.
+LEAD = """An intervention puts the car back on its lane: after a crash with a vehicle, after a departure \
+from the road (into a barrier, all wheels off every lane for 1 s, or more than 3 m beyond the edge), or \
+because it faces the wrong way.
 
-Intervals are 95 %: of counts score limits that take the spread of the runs into account, of means \
-Student's, widened where values are skew; where neither holds its coverage it says too few. Published \
-numbers stand beside ours in italics. They come from one run per cell on another simulator and another \
-map: they are there to compare, and nothing here was tuned to meet them."""
+Each row is a set of driving functions, each column a weather. Seeds are common to all cells, so \
+differences between cells are paired. Intervals are 95 %: of counts score limits that take the spread of \
+the runs into account, of means Student's, widened where values are skew; where neither holds its \
+coverage it says too few."""
 
 
 def write_report(folder: Path) -> Path:
@@ -43,17 +44,21 @@ def build_page(matrix: Matrix) -> Page:
         Section(
             "What happened",
             [
-                *_warnings(matrix),
-                answers(matrix, judged),
-                _headline(matrix),
+                *matrix.missing(),
+                answers(matrix, judged, crashes),
+                *baseline_text(matrix),
+                headline_numbers(matrix),
                 headline_table(matrix),
-                speed_figure(matrix),
+                matrix_figures.speed_figure(matrix),
                 *worst_of_each(crashes),
                 Text(LEAD),
+                *_alike(matrix),
             ],
         ),
-        Section("Collisions", matrix_tables.collisions(matrix) + matrix_figures.collisions(matrix)),
-        Section("Findings of the sources, judged", _verdicts(judged)),
+        Section(
+            "Interventions", matrix_tables.collisions(matrix) + matrix_figures.collisions(matrix)
+        ),
+        Section("Findings of the sources, judged", _verdicts(matrix, judged)),
         Section(
             "Lane keeping and perception",
             matrix_tables.others(matrix) + matrix_figures.others(matrix),
@@ -61,6 +66,7 @@ def build_page(matrix: Matrix) -> Page:
         *([Section("Functions and cruise target", varied)] if (varied := factors(matrix)) else []),
         Section("One step at a time", matrix_tables.pairs(matrix)),
         Section("Every crash", crash_sections(matrix, crashes)),
+        Section("Beside the published numbers", beside_published(matrix)),
         Section("All metrics", matrix_tables.per_weather(matrix)),
         Section("Definitions", [matrix.definitions()]),
         Section("Configuration and versions", matrix.provenance()),
@@ -73,47 +79,19 @@ def build_page(matrix: Matrix) -> Page:
     )
 
 
-def _warnings(matrix: Matrix) -> list[Block]:
-    if not matrix.same_weather:
-        return matrix.missing()
-    pairs = "; ".join(f"configuration {c}: {' = '.join(group)}" for c, group in matrix.same_weather)
-    text = (
-        f"Identical drives, because weather cannot act here ({pairs}). They count once in totals."
-    )
-    return [*matrix.missing(), Text(text, tone="warning")]
+def _alike(matrix: Matrix) -> list[Block]:
+    groups = {tuple(g.weathers) for g in matrix.weather_groups}
+    others = [(c, w) for c, w in matrix.same_weather if tuple(w) not in groups]
+    if not others:
+        return []
+    pairs = "; ".join(f"configuration {c}: {' = '.join(weathers)}" for c, weathers in others)
+    text = f"Drives that moved alike in several weathers ({pairs}) count once in totals."
+    return [Text(text, tone="note")]
 
 
-def _headline(matrix: Matrix) -> Numbers:
-    t = matrix.counted
-    km = float(t["distance_km"].sum())
-    fatal, hits, left, first = (
-        int(t[c].sum())
-        for c in ("fatal_collisions", "crashes_vehicle", "road_departures", "fatal_first")
-    )
-
-    def per_100_km(events: int) -> str:
-        return f"{100 * events / km:.1f} per 100 km" if km else ""
-
-    return Numbers(
-        [
-            Number(f"{hits}", "crashes with vehicles", per_100_km(hits)),
-            Number(f"{left}", "departures from the road", per_100_km(left)),
-            Number(f"{fatal}", "fatal events", f"{first} of them first of a chain"),
-            Number(
-                f"{len(matrix.results)}",
-                "runs",
-                f"{matrix.results['seed'].n_unique()} seeds per cell",
-            ),
-            Number(
-                f"{km:,.0f} km",
-                "driven",
-                f"{float(t['duration_s'].sum()) / 3600:.1f} h of simulated time",
-            ),
-        ]
-    )
-
-
-def _verdicts(judged: Sequence[Judgement]) -> list[Block]:
+def _verdicts(matrix: Matrix, judged: Sequence[Judgement]) -> list[Block]:
+    if matrix.seeds == 1:
+        return [Text(unjudged_text(judged))]
     intro = Text(
         "Each claim, its test and its margin were written down before results of the matrix were "
         "seen. One rule is not blind: that a margin comes before significance, so that a difference "

@@ -1,91 +1,294 @@
-"""What a reader of the matrix asks first, each in one sentence."""
+"""What a reader of the matrix asks first: which functions, what the weather changes, what comes next."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-import polars as pl
-
-from skidpad.evidence.contrasts import paired_runs, per_seed
-from skidpad.evidence.statistics import Rate, compare_pairs, interval_text, p_text
+from skidpad.core.wording import count_text, list_text
+from skidpad.evidence.statistics import Interval, Rate, p_text, seeds_for_verdict
 from skidpad.evidence.verdicts import Judgement
-from skidpad.report.figures import POINTS, Chart, Curve, curves
-from skidpad.report.matrix_data import Matrix, config_title, rate_by_seed, weather_title
-from skidpad.report.page import Answers, Figure
-from skidpad.report.verdicts import least_seeds_text, seeds_text, tally_text
+from skidpad.report.cards import headline
+from skidpad.report.crashes import Cell, Found
+from skidpad.report.figures import Series, points_with_intervals, stacked_bars
+from skidpad.report.matrix_contrasts import Contrast, by_configuration, by_weather
+from skidpad.report.matrix_data import (
+    BASELINE,
+    EVENT,
+    EVENTS,
+    Matrix,
+    WeatherGroup,
+    config_list,
+    config_title,
+    rate_by_seed,
+)
+from skidpad.report.matrix_kinds import KINDS, count
+from skidpad.report.page import Answer, Answers, Figure
+from skidpad.report.verdicts import tally_text, unjudged_text
 
-FATAL = "fatal_collisions"
-ALPHA = 0.05
+MEANS = (("mean_speed_kmh", "mean speed", "km/h"), ("dropout_pct", "dropout", "%"))
+COLOURS = {"clear sky": 1, "heavy rain": 0}  # of the palette
+FIRST_COLOUR = 2  # of kinds: those before are weathers
+MARKERS = "ovsD^P*X"
 
 
-def answers(matrix: Matrix, judged: Sequence[Judgement]) -> Answers:
-    """Which functions, which weather, how sure."""
-    configs = {c: rate for c in matrix.configs if (rate := matrix.rate(FATAL, c)) is not None}
-    weathers = {w: rate for w in matrix.weathers if (rate := _in_weather(matrix, w)) is not None}
-    seeds = matrix.results["seed"].n_unique()
-    return Answers(
-        [
-            (
-                "Which functions crash least?",
-                _extremes(matrix, "config", configs, {c: config_title(c) for c in configs}),
-            ),
-            (
-                "Which weather is the worst?",
-                _extremes(matrix, "weather", weathers, {w: weather_title(w) for w in weathers}),
-            ),
-            ("How sure is that?", _sure(seeds, judged)),
-        ]
+def answers(
+    matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[Found]]
+) -> Answers:
+    """Three questions, each with its picture."""
+    if not len(matrix.finished):
+        return Answers([Answer("What happened?", "No run was finished.")])
+    return Answers([_functions(matrix), _weather(matrix), _next(matrix, judged, crashes)])
+
+
+# --- which functions
+
+
+def _functions(matrix: Matrix) -> Answer:
+    """The configuration with the fewest interventions in each weather, and how sure that is."""
+    differences = by_configuration(matrix, matrix.climates)
+    rates = {g: _rates(matrix, g) for g in matrix.climates}
+    best = {g: min(r, key=lambda c: r[c].rate) for g, r in rates.items() if r}
+    parts = [_fewest(g, rates[g], rates[g][c].rate) for g, c in best.items()]
+    sentence = f"Fewest {EVENT}s: {'; '.join(parts)}."
+    least = seeds_for_verdict(len(differences))
+    if len(matrix.compared) < 2:
+        lines = []
+    elif matrix.seeds < least:
+        lines = [_too_few_seeds(matrix.seeds, least)]
+    else:
+        lines = [_sureness(matrix, g, c, differences) for g, c in best.items()]
+    return Answer(
+        "Which functions crash least, in which weather, and how sure is that?",
+        sentence,
+        lines,
+        _rate_figure(matrix, rates),
     )
 
 
-def _sure(seeds: int, judged: Sequence[Judgement]) -> str:
-    return f"{seeds_text(seeds)} {tally_text(judged)}{least_seeds_text(judged)}"
+def _fewest(group: WeatherGroup, rates: dict[str, Rate], least: float) -> str:
+    """All configurations that share the least rate of a group."""
+    found = [c for c, rate in rates.items() if rate.rate == least]
+    return f"in {group.name} {config_list(found)} with {least:.2f} per run"
 
 
-def _in_weather(matrix: Matrix, weather: str) -> Rate | None:
-    return rate_by_seed(matrix.finished.filter(pl.col("weather") == weather), FATAL)
+def _too_few_seeds(seeds: int, least: int) -> str:
+    """Why nothing is said of differences."""
+    return (
+        f"{count_text(seeds, 'seed')} per cell cannot tell two configurations apart: what differs "
+        f"may be chance. It takes at least {least} (`--seeds {least}`)."
+    )
 
 
-def _extremes(matrix: Matrix, factor: str, rates: dict[str, Rate], titles: dict[str, str]) -> str:
-    """The level of a factor with the fewest fatal collisions against that with the most."""
-    if not rates:
-        return "No run was finished."
-    least, most = (choose(rates, key=lambda v: rates[v].rate) for choose in (min, max))
-    if len(rates) == 1:
-        return f"Only {titles[least]} was driven: {_rate(rates[least])}."
-    text = f"{titles[most]} has the most fatal collisions, {_rate(rates[most])}; "
-    text += f"{titles[least]} the fewest, {_rate(rates[least])}."
-    by = [name for name in ("config", "weather", "seed") if name != factor]
-    more, less = (pl.col(factor) == level for level in (most, least))
-    pairs, same = paired_runs(matrix.finished, more, less, by, FATAL)
-    if not len(pairs) or same:
-        return text + " Both are the same drives."
-    values = per_seed(pairs, pl.col("difference"))
-    p = compare_pairs(values).p
-    told = "differ beyond chance" if p < ALPHA else "cannot be told apart"
-    return f"{text} Paired by seed the two {told} ({p_text(p)}, {len(values)} seeds)."
+def _rates(matrix: Matrix, group: WeatherGroup) -> dict[str, Rate]:
+    found = {c: rate_by_seed(matrix.within(c, group), EVENTS) for c in matrix.compared}
+    return {c: rate for c, rate in found.items() if rate is not None}
 
 
-def _rate(rate: Rate) -> str:
-    return f"{rate.rate:.2f} per run ({interval_text(rate.interval)})"
+def _sureness(
+    matrix: Matrix,
+    group: WeatherGroup,
+    best: str,
+    differences: dict[tuple[WeatherGroup, str, str], Contrast],
+) -> str:
+    """Which others the best one of a group surely beats, and which it cannot be told from."""
+    others = {
+        (a if b == best else b): c
+        for (g, a, b), c in differences.items()
+        if g == group and best in (a, b)
+    }
+    sure = [c for c, d in others.items() if d.is_sure]
+    same = [c for c, d in others.items() if d.identical]
+    open_ = [c for c in others if c not in sure and c not in same]
+    told = []
+    if sure:
+        largest = max(others[c].p for c in sure)
+        told.append(f"{_named(best)} has fewer than {config_list(sure)} ({_at_most(largest)})")
+    if open_:
+        seeds = count_text(matrix.seeds, "seed")
+        told.append(f"{seeds} cannot tell {_named(best)} from {config_list(open_)}")
+    if same:
+        told.append(f"{_named(best)} drove exactly as {config_list(same)}")
+    return f"{_first_word_large(group.name)}: {'; '.join(told)}."
 
 
-def speed_figure(matrix: Matrix) -> Figure:
-    """Fatal collisions against mean speed, one point per configuration and weather."""
-    clouds = []
-    for config in matrix.configs:
-        cells = [
-            (speed, rate.rate)
-            for weather in matrix.weathers
-            if (rate := matrix.rate(FATAL, config, weather)) is not None
-            and (speed := matrix.mean("mean_speed_kmh", config, weather)) is not None
-        ]
-        if cells:
-            x, y = zip(*cells, strict=True)
-            clouds.append(Curve(config_title(config), x, y, style=POINTS))
-    chart = Chart(clouds, "mean speed, km/h", "fatal collisions per run")
+def _at_most(p: float) -> str:
+    return p_text(p) if p < 0.001 else f"p at most {p:.2g}"
+
+
+def _named(config: str) -> str:
+    return config_list([config])
+
+
+def _first_word_large(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def weather_series(group: WeatherGroup, k: int, **values: Sequence[float | None]) -> Series:
+    """A series in the colour and with the mark of its weather."""
+    colour = COLOURS.get(group.name, 2 + k)
+    return Series(group.name, colour=colour, marker=MARKERS[k % len(MARKERS)], **values)  # type: ignore[arg-type]
+
+
+def _rate_figure(matrix: Matrix, rates: dict[WeatherGroup, dict[str, Rate]]) -> Figure:
+    series = []
+    for k, (group, by_config) in enumerate(rates.items()):
+        found = [by_config.get(c) for c in matrix.compared]
+        limits = [ends(r.interval if r else None) for r in found]
+        low, high = zip(*limits, strict=True)
+        values = [r.rate if r else None for r in found]
+        series.append(weather_series(group, k, values=values, low=low, high=high))
+    rows = [config_title(c) for c in matrix.compared]
+    caption = f"{EVENT.capitalize()}s per run; lines are 95 % intervals, hollow points have none."
+    return Figure(points_with_intervals(rows, series, f"{EVENT}s per run"), caption)
+
+
+def ends(interval: Interval | None) -> tuple[float | None, float | None]:
+    """The finite ends of an interval."""
+    if interval is None:
+        return None, None
+    low, high = (None if abs(end) == float("inf") else end for end in interval)
+    return low, high
+
+
+# --- what the weather changes
+
+
+def _weather(matrix: Matrix) -> Answer:
+    """Every climate against the first one, per configuration."""
+    question = "What does the weather change?"
+    first, *rest = matrix.climates
+    if not rest:
+        return Answer(question, f"Only {first.name} was driven.", _times_of_day(matrix))
+    changes = by_weather(matrix)
+    least = seeds_for_verdict(len(changes))
+    told = [_changes(matrix, group, changes) for group in rest]
+    if matrix.seeds < least:
+        told = [_too_few_seeds(matrix.seeds, least).replace("configurations", "weathers")]
+    lines = [_levels(matrix, c) for c in matrix.compared]
+    return Answer(
+        question,
+        " ".join(told),
+        [*lines, *_times_of_day(matrix)],
+        _change_figure(matrix, rest, changes) if matrix.seeds > 1 else None,
+    )
+
+
+def _changes(
+    matrix: Matrix, group: WeatherGroup, changes: dict[tuple[str, WeatherGroup], Contrast]
+) -> str:
+    """One sentence: for which configurations a climate surely changes the interventions."""
+    mine = {c: changes[c, group] for c in matrix.compared if (c, group) in changes}
+    more = [c for c, d in mine.items() if d.is_sure and d.mean > 0.0]
+    fewer = [c for c, d in mine.items() if d.is_sure and d.mean < 0.0]
+    same = [c for c, d in mine.items() if d.identical]
+    open_ = [c for c in mine if c not in (*more, *fewer, *same)]
+    parts = [
+        f"{word} {config_list(configs)}"
+        for word, configs in (
+            (f"more {EVENT}s with", more),
+            (f"fewer {EVENT}s with", fewer),
+            ("the very same drives with", same),
+            (f"no difference that {count_text(matrix.seeds, 'seed')} can show with", open_),
+        )
+        if configs
+    ]
+    base = matrix.climates[0].name
+    return f"{_first_word_large(group.name)} against {base}: {'; '.join(parts)}."
+
+
+def _levels(matrix: Matrix, config: str) -> str:
+    """A configuration in every climate: interventions per run, speed, dropout."""
+    groups = {g: matrix.within(config, g) for g in matrix.climates}
+    rates = [
+        f"{rate.rate:.2f} in {g.name}"
+        for g, runs in groups.items()
+        if (rate := rate_by_seed(runs, EVENTS)) is not None
+    ]
+    parts = [f"{EVENT}s per run {', '.join(rates)}"]
+    for column, title, unit in MEANS:
+        values = [runs[column].drop_nulls() for runs in groups.values()]
+        if all(len(v) for v in values):
+            between = " → " if len(values) == 2 else ", "
+            parts.append(f"{title} {between.join(f'{v.mean():.1f}' for v in values)} {unit}")
+    return f"{config_title(config)}: {'; '.join(parts)}."
+
+
+def _times_of_day(matrix: Matrix) -> list[str]:
+    """Weathers that every configuration drove alike."""
+    groups = [g for g in matrix.weather_groups if len(g.weathers) > 1]
+    if not groups:
+        return []
+    names = list_text([f"“{g.title}”" for g in groups])
+    return [f"Within {names} every drive moved alike, seed for seed: one column each."]
+
+
+def _change_figure(
+    matrix: Matrix,
+    groups: Sequence[WeatherGroup],
+    changes: dict[tuple[str, WeatherGroup], Contrast],
+) -> Figure:
+    series = []
+    for k, group in enumerate(groups, start=1):
+        found = [changes.get((c, group)) for c in matrix.compared]
+        low, high = zip(*(ends(d.interval if d else None) for d in found), strict=True)
+        values = [d.mean if d else None for d in found]
+        series.append(weather_series(group, k, values=values, low=low, high=high))
+    rows = [config_title(c) for c in matrix.compared]
+    base = matrix.climates[0].name
+    label = f"{EVENT}s per run, minus those in {base}"
     caption = (
-        "Fatal collisions against mean speed, one point per configuration and weather; what "
-        "merely drives slower moves to the left as it moves down."
+        f"What each weather adds to the {EVENT}s per run in {base}, paired by seed; to the right of "
+        "the rule is worse. Lines are 95 % intervals of each difference alone; the sentence above is "
+        f"corrected for all {len(changes)}."
     )
-    return Figure(curves([chart], height=3.6), caption)
+    return Figure(points_with_intervals(rows, series, label, origin=0.0), caption)
+
+
+# --- what to look at next
+
+
+def _next(matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[Found]]) -> Answer:
+    """The commonest kind of intervention, the hardest crash, and what these runs leave open."""
+    runs = {c: matrix.cell(c) for c in matrix.compared}
+    totals = {c: int(r[EVENTS].sum()) for c, r in runs.items()}
+    worst = max(totals, key=lambda c: totals[c] / max(1, len(runs[c])))
+    if not totals[worst]:
+        sentence = f"No configuration needed an {EVENT}: drive harder conditions or more seeds."
+        return Answer("What should be looked at next?", sentence, [_claims(matrix, judged)])
+    kinds = {kind.title: count(kind, runs[worst]) for kind in KINDS}
+    most = max(kinds, key=lambda title: kinds[title])
+    sentence = (
+        f"{_first_word_large(_named(worst))} needs {EVENT}s most often ({totals[worst]} in "
+        f"{count_text(len(runs[worst]), 'drive')}), mostly of the kind “{most}” ({kinds[most]})."
+    )
+    lines = [*_hardest(matrix, crashes), _claims(matrix, judged)]
+    series = [
+        Series(
+            kind.title,
+            [count(kind, runs[c]) / max(1, len(runs[c])) for c in matrix.compared],
+            colour=FIRST_COLOUR + k,
+        )
+        for k, kind in enumerate(KINDS)
+    ]
+    rows = [config_title(c) for c in matrix.compared]
+    figure = Figure(
+        stacked_bars(rows, series, f"{EVENT}s per run"),
+        f"What the {EVENT}s were, every drive once.",
+    )
+    return Answer("What should be looked at next?", sentence, lines, figure)
+
+
+def _claims(matrix: Matrix, judged: Sequence[Judgement]) -> str:
+    """What became of the sources' claims."""
+    return unjudged_text(judged) if matrix.seeds == 1 else tally_text(judged)
+
+
+def _hardest(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[str]:
+    """The hardest crash of all compared configurations."""
+    found = [(cell, items[0]) for cell, items in crashes.items() if cell[0] != BASELINE and items]
+    if not found:
+        return []
+    (config, weather), (crash, _, _, run) = max(found, key=lambda f: f[1][0].v_closing or 0.0)
+    group = next(g for g in matrix.weather_groups if weather in g.weathers)
+    where = f"{_named(config)} in {group.name}, run {run.name} at {crash.t:.0f} s"
+    return [f"The hardest crash: {headline(crash)}, {where}. Its card stands below."]

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 
 import polars as pl
 
+from skidpad.core.wording import count_text, list_text
 from skidpad.evidence.statistics import Rate, event_rate
 from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics
@@ -22,6 +24,9 @@ CONFIGS = {
     "3": "3 · + light assist, resume",
     "4": "4 · + 80 km/h limiter",
 }
+BASELINE = "0"  # nobody at the pedals
+MOTION = "motion_hash"  # of a drive: poses, contacts and commands
+EVENTS, EVENT = "fatal_collisions", "intervention"  # what headlines count, and what pages call one
 WEATHERS = {
     "clear-sunrise": "Clear Sky - Sunrise",
     "clear-noon": "Clear Sky - Noon",
@@ -30,6 +35,44 @@ WEATHERS = {
     "rain-noon": "Heavy Rain - Noon",
     "rain-night": "Heavy Rain - Night",
 }
+
+
+@dataclass(frozen=True, slots=True)
+class WeatherGroup:
+    """Weathers that are looked at together."""
+
+    weathers: tuple[str, ...]
+
+    @property
+    def title(self) -> str:
+        """Heading of its column."""
+        first, *rest = (weather_title(w) for w in self.weathers)
+        if not rest:
+            return first
+        kind, dash, _ = first.partition(" - ")
+        if dash and all(title.startswith(kind + dash) for title in rest):
+            return f"{kind}: {list_text([t.rpartition(dash)[2].lower() for t in (first, *rest)])}"
+        return list_text([first, *rest])
+
+    @property
+    def name(self) -> str:
+        """Within a sentence: `clear sky`, `icy_30`."""
+        return (
+            self.title.partition(" - ")[0].partition(":")[0].lower() if self.known else self.title
+        )
+
+    @property
+    def known(self) -> bool:
+        """Whether they are published weathers."""
+        return all(w in WEATHERS for w in self.weathers)
+
+    @property
+    def short(self) -> str:
+        """Label of an axis."""
+        kind, dash, first = self.weathers[0].partition("-")
+        if not dash or not self.known:
+            return "\n".join(self.weathers)
+        return f"{kind}\n" + ", ".join([first, *(w.partition("-")[2] for w in self.weathers[1:])])
 
 
 @dataclass(frozen=True)
@@ -63,30 +106,107 @@ class Matrix(CampaignView[MatrixEntry]):
         return _known_first(self.results["weather"], WEATHERS)
 
     @cached_property
+    def compared(self) -> list[str]:
+        """Configurations that comparisons and figures are about (decision T-5).
+
+        With nobody at the pedals a run measures how often the car is put back, so the baseline is
+        left out wherever there is another configuration.
+        """
+        return [c for c in self.configs if c != BASELINE] or self.configs
+
+    @cached_property
+    def weather_groups(self) -> list[WeatherGroup]:
+        """Weathers that no configuration drives differently, together; most often rain and clear."""
+        groups: list[list[str]] = []
+        for weather in self.weathers:
+            drives_alike = (
+                g
+                for g in groups
+                if all(weather in self.weathers_like(c, g[0]) for c in self.configs)
+            )
+            group = next(drives_alike, None)
+            if group is None:
+                groups.append([weather])
+            else:
+                group.append(weather)
+        return [WeatherGroup(tuple(g)) for g in groups]
+
+    @cached_property
+    def climates(self) -> list[WeatherGroup]:
+        """Published weathers by what falls, over all times of day; every other weather by itself."""
+        kinds = dict(self.results.select("weather", "precipitation_kind").rows())
+        groups: dict[str, list[str]] = {}
+        for weather in self.weathers:
+            groups.setdefault(kinds[weather] if weather in WEATHERS else weather, []).append(
+                weather
+            )
+        return [WeatherGroup(tuple(g)) for g in groups.values()]
+
+    def weathers_like(self, config: str, weather: str) -> list[str]:
+        """The weathers in which a configuration drives as in this one, in every seed of both."""
+        return self._equal_weathers[config][weather]
+
+    @cached_property
+    def _equal_weathers(self) -> dict[str, dict[str, list[str]]]:
+        drives: dict[tuple[str, str], dict[int, str]] = {}
+        columns = ("config", "weather", "seed", self.drive_column)
+        for config, weather, seed, drive in self.finished.select(columns).rows():
+            drives.setdefault((config, weather), {})[seed] = drive
+
+        def alike(config: str, one: str, other: str) -> bool:
+            a, b = drives.get((config, one), {}), drives.get((config, other), {})
+            shared = a.keys() & b.keys()
+            return one == other or (
+                bool(shared) and all(a[s] is not None and a[s] == b[s] for s in shared)
+            )
+
+        return {
+            c: {w: [o for o in self.weathers if alike(c, w, o)] for w in self.weathers}
+            for c in self.configs
+        }
+
+    @cached_property
+    def drive_column(self) -> str:
+        """The column whose equal values are one drive (decision T-3)."""
+        there = self.results
+        known = MOTION in there.columns and there[MOTION].null_count() < len(there)
+        return MOTION if known else "log_hash"
+
+    @cached_property
     def same_weather(self) -> list[tuple[str, list[str]]]:
         """(configuration, weathers) whose drives are the same for every seed (decision M-1)."""
-        groups: list[tuple[str, list[str]]] = []
-        for config in self.configs:
-            by_drives: dict[tuple[str, ...], list[str]] = {}
-            for weather in self.weathers:
-                hashes = self.cell(config, weather).sort("seed")["log_hash"].to_list()
-                if hashes and None not in hashes:
-                    by_drives.setdefault(tuple(hashes), []).append(weather)
-            groups += [(config, ws) for ws in by_drives.values() if len(ws) > 1]
-        return groups
+        groups = [(c, tuple(self.weathers_like(c, w))) for c in self.configs for w in self.weathers]
+        return [(c, list(ws)) for c, ws in dict.fromkeys(groups) if len(ws) > 1]
 
     @cached_property
     def counted(self) -> pl.DataFrame:
         """Finished runs, each drive once."""
-        return self.finished.unique(
-            ["config", "seed", "log_hash"], keep="first", maintain_order=True
-        )
+        return self._once(self.finished)
 
     def cell(self, config: str, weather: str | None = None) -> pl.DataFrame:
-        """Finished runs of one cell, or of a configuration with each drive once."""
+        """Finished runs of one cell, or of a configuration with each drive once.
+
+        What drives alike in several weathers may have been driven in one of them only, so a cell
+        has the seeds of all weathers like its own.
+        """
         if weather is None:
             return self.counted.filter(pl.col("config") == config)
-        return self.finished.filter((pl.col("config") == config) & (pl.col("weather") == weather))
+        known = weather in self._equal_weathers.get(config, {})
+        like = self.weathers_like(config, weather) if known else [weather]
+        runs = self.finished.filter(
+            (pl.col("config") == config) & pl.col("weather").is_in(like)
+        ).sort(pl.col("weather") != weather, "weather", "seed", "sensors")
+        return runs.unique(["seed", "sensors"], keep="first", maintain_order=True).sort("seed")
+
+    def within(self, config: str, group: WeatherGroup) -> pl.DataFrame:
+        """Finished runs of a configuration in a group of weathers, each drive once."""
+        there = pl.col("weather").is_in(group.weathers) & (pl.col("config") == config)
+        return self._once(self.finished.filter(there))
+
+    def _once(self, runs: pl.DataFrame) -> pl.DataFrame:
+        """Runs without those that moved as another of their configuration and seed did."""
+        keys = ["config", "seed", "sensors", self.drive_column]
+        return runs.unique(keys, keep="first", maintain_order=True)
 
     def rate(self, column: str, config: str, weather: str | None = None) -> Rate | None:
         """Events per run of a cell; None without finished runs."""
@@ -98,6 +218,11 @@ class Matrix(CampaignView[MatrixEntry]):
         return float(values.mean()) if len(values) else None  # type: ignore[arg-type]
 
     @cached_property
+    def seeds(self) -> int:
+        """How many seeds there are."""
+        return self.results["seed"].n_unique()
+
+    @cached_property
     def duration(self) -> float:
         """Simulated seconds of the longest run."""
         return max(self.finished["duration_s"].drop_nulls().to_list(), default=0.0)
@@ -107,8 +232,9 @@ class Matrix(CampaignView[MatrixEntry]):
         """One sentence: what was driven."""
         levels = " and ".join(sorted(self.results["sensors"].unique().to_list()))
         return (
-            f"{len(self.configs)} configurations in {len(self.weathers)} weathers, "
-            f"{self.results['seed'].n_unique()} runs per cell, on {self.values('map')}, "
+            f"{count_text(len(self.configs), 'configuration')} in "
+            f"{count_text(len(self.weathers), 'weather')}, "
+            f"{count_text(self.seeds, 'run')} per cell, on {self.values('map')}, "
             f"sensors as {levels}."
         )
 
@@ -137,6 +263,15 @@ def _known_first(values: pl.Series, known: dict[str, str]) -> list[str]:
 def config_title(config: str) -> str:
     """Name of a driver for people."""
     return CONFIGS.get(config, config)
+
+
+def config_list(configs: Sequence[str]) -> str:
+    """`configuration 2`, `configurations 3 and 4`; other drivers by their names."""
+    numbers = all(c in CONFIGS for c in configs)
+    word = f"configuration{'s' * (len(configs) > 1)} " if numbers else ""
+    if numbers and len(configs) > 2 and int(configs[-1]) - int(configs[0]) == len(configs) - 1:
+        return f"{word}{configs[0]} to {configs[-1]}"
+    return word + list_text(list(configs))
 
 
 def weather_title(weather: str) -> str:

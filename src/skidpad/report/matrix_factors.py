@@ -8,7 +8,7 @@ import polars as pl
 
 from skidpad.evidence.statistics import event_rate
 from skidpad.report.figures import Chart, Curve, curves
-from skidpad.report.matrix_data import CONFIGS, Matrix
+from skidpad.report.matrix_data import CONFIGS, EVENT, EVENTS, Matrix
 from skidpad.report.matrix_tables import RATE, mean_quantity, rate_quantity
 from skidpad.report.page import Block, Figure
 from skidpad.report.tables import Column, Format, Quantity, table
@@ -17,7 +17,7 @@ Level = tuple[str, float]  # functions, cruise target in km/h
 COUNTS = (
     ("crashes_vehicle", "crashes with vehicles per run"),
     ("road_departures", "departures per run"),
-    ("fatal_collisions", "all fatal per run"),
+    (EVENTS, "interventions per run"),
 )
 
 
@@ -62,7 +62,7 @@ def _count(matrix: Matrix, column: str, level: Level) -> Quantity:
 
 
 def _mean(matrix: Matrix, level: Level) -> Quantity:
-    return mean_quantity(_runs(matrix, level)["mean_speed_kmh"])
+    return mean_quantity(_runs(matrix, level), "mean_speed_kmh")
 
 
 def _figure(matrix: Matrix, levels: list[Level]) -> list[Block]:
@@ -71,12 +71,12 @@ def _figure(matrix: Matrix, levels: list[Level]) -> list[Block]:
     for functions in sorted({functions for functions, _ in levels}):
         targets = [cruise for f, cruise in levels if f == functions]
         if len(targets) > 1:
-            rates = [_count(matrix, "fatal_collisions", (functions, v)).value for v in targets]
+            rates = [_count(matrix, EVENTS, (functions, v)).value for v in targets]
             there = [(v, r) for v, r in zip(targets, rates, strict=True) if r is not None]
             if there:
                 x, y = zip(*there, strict=True)
                 found.append(Curve(functions or "none", x, y))
     if not found:
         return []
-    chart = Chart(found, "cruise target, km/h", "fatal collisions per run")
-    return [Figure(curves([chart], height=3.6), "Fatal collisions against the cruise target.")]
+    chart = Chart(found, "cruise target, km/h", f"{EVENT}s per run")
+    return [Figure(curves([chart], height=3.6), "Interventions against the cruise target.")]

@@ -5,115 +5,142 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from skidpad.evidence.statistics import Rate
-from skidpad.report.figures import Series, grouped_bars, panel, scatter
-from skidpad.report.matrix_data import WEATHERS, Matrix, published_preliminary, published_value
+from skidpad.report.figures import POINTS, Chart, Curve, Series, curves, grouped_bars, panel
+from skidpad.report.matrix_answers import MARKERS, ends
+from skidpad.report.matrix_data import (
+    CONFIGS,
+    EVENT,
+    EVENTS,
+    Matrix,
+    WeatherGroup,
+    config_title,
+    rate_by_seed,
+)
 from skidpad.report.page import Block, Figure
 
 PANEL = (
-    ("fatal_collisions", "collisions"),
+    (EVENTS, f"{EVENT}s"),
     ("dropout_pct", "dropout, %"),
     ("mean_error_m", "mean error, m"),
     ("headway_variance_m2", "variance, m²"),
     ("radar_fpr_pct", "radar FPR, %"),
 )
+GREY = 5  # of the palette
 
 
 def collisions(matrix: Matrix) -> list[Block]:
     """By weather and configuration, and by configuration."""
-    column, label = "fatal_collisions", "fatal collisions per run"
+    label = f"{EVENT}s per run"
     by_weather = [
-        _rates(c, [matrix.rate(column, c, w) for w in matrix.weathers], _said(matrix, c, column))
-        for c in matrix.configs
+        _rates(
+            short_title(c),
+            [rate_by_seed(matrix.within(c, g), EVENTS) for g in matrix.weather_groups],
+        )
+        for c in matrix.compared
     ]
-    total = _rates(
-        "all weathers",
-        [matrix.rate(column, c) for c in matrix.configs],
-        [_mean([published_value(column, c, w) for w in WEATHERS]) for c in matrix.configs],
-    )
+    total = _rates("all weathers", [matrix.rate(EVENTS, c) for c in matrix.compared])
+    groups = [g.short for g in matrix.weather_groups]
     return [
         Figure(
-            grouped_bars(_groups(matrix), by_weather, label),
-            "Fatal collisions per run by weather and configuration; lines are 95 % intervals, "
-            "diamonds the published counts.",
+            grouped_bars(groups, by_weather, label),
+            f"{EVENT.capitalize()}s per run by weather and configuration; lines are 95 % intervals.",
         ),
         Figure(
-            grouped_bars(matrix.configs, [total], label),
+            grouped_bars([short_title(c) for c in matrix.compared], [total], label),
             "The same over all weathers, every drive once.",
         ),
     ]
 
 
 def others(matrix: Matrix) -> list[Block]:
-    """Dropout, dropout against collisions, variance, the panel, preliminary against final."""
-    dropout = [_means(matrix, c, "dropout_pct", c) for c in matrix.configs]
+    """Dropout, dropout against interventions, variance, and one configuration in several metrics."""
+    groups = [g.short for g in matrix.weather_groups]
+    dropout = [_means(matrix, c, "dropout_pct", short_title(c)) for c in matrix.compared]
     figures = [
+        (grouped_bars(groups, dropout, "dropout, %"), "Dropout by weather and configuration."),
         (
-            grouped_bars(_groups(matrix), dropout, "dropout, %"),
-            "Dropout by configuration and weather; diamonds published.",
-        ),
-        (
-            _dropout_against_collisions(matrix),
-            "Dropout against fatal collisions, one point per run.",
+            run_figure(matrix, "dropout_pct", "dropout, %"),
+            f"Dropout against {EVENT}s, one point per drive; the mark is the weather.",
         ),
     ]
     if "4" in matrix.configs:
         variance = _means(matrix, "4", "headway_variance_m2", "configuration 4")
-        caption = (
-            "Variance of the distance error by weather, configuration 4 (published as headway "
-            "variance)."
-        )
-        figures.append((grouped_bars(_groups(matrix), [variance], "variance, m²"), caption))
+        caption = "Variance of the distance error by weather, configuration 4."
+        figures.append((grouped_bars(groups, [variance], "variance, m²"), caption))
     if "3" in matrix.configs:
         charts = [(label, _means(matrix, "3", column, "3")) for column, label in PANEL]
-        caption = "Configuration 3 in every weather, several metrics; diamonds published."
-        figures.append((panel(matrix.weathers, charts), caption))
-    caption = (
-        "Published: preliminary against final script, means over the eleven clear runs that both "
-        "have. Run `skidpad adas --profile preliminary` for ours."
-    )
-    figures.append((_preliminary(), caption))
+        figures.append(
+            (panel(groups, charts), "Configuration 3 in every weather, several metrics.")
+        )
     return [Figure(svg, caption) for svg, caption in figures]
 
 
-def _groups(matrix: Matrix) -> list[str]:
-    """Short labels for axes."""
-    return [w.replace("-", "\n", 1) for w in matrix.weathers]
-
-
-def _rates(name: str, rates: Sequence[Rate | None], published: Sequence[float | None]) -> Series:
-    return Series(
-        name,
-        [r.rate if r else None for r in rates],
-        [r.interval.low if r and r.interval else None for r in rates],
-        [r.interval.high if r and r.interval else None for r in rates],
-        published,
+def speed_figure(matrix: Matrix) -> Figure:
+    """Interventions against mean speed, one point per configuration and weather."""
+    points = {}
+    for config in matrix.compared:
+        for group in matrix.weather_groups:
+            runs = matrix.within(config, group)
+            rate = rate_by_seed(runs, EVENTS)
+            speeds = runs["mean_speed_kmh"].drop_nulls()
+            if rate is not None and len(speeds):
+                mean = float(speeds.mean())  # type: ignore[arg-type]
+                points[config, group] = ([mean], [rate.rate])
+    caption = (
+        f"{EVENT.capitalize()}s against mean speed: the colour is the configuration, the mark the "
+        "weather. What merely drives slower moves to the left as it moves down."
     )
+    return Figure(_marked(matrix, points, "mean speed, km/h"), caption)
+
+
+def run_figure(matrix: Matrix, column: str, label: str) -> str:
+    """Interventions against a column, one point per drive, marked by weather."""
+    points = {}
+    for config in matrix.compared:
+        for group in matrix.weather_groups:
+            runs = matrix.within(config, group).drop_nulls([column, EVENTS])
+            if len(runs):
+                points[config, group] = (runs[column].to_list(), runs[EVENTS].to_list())
+    return _marked(matrix, points, label)
+
+
+Points = dict[tuple[str, WeatherGroup], tuple[list[float], list[float]]]
+
+
+def _marked(matrix: Matrix, points: Points, x_label: str) -> str:
+    """Clouds whose colour is the configuration and whose mark is the weather."""
+    marks = {g: MARKERS[k % len(MARKERS)] for k, g in enumerate(matrix.weather_groups)}
+    clouds = [
+        Curve(
+            config_title(config),
+            x,
+            y,
+            colour=matrix.compared.index(config),
+            style=POINTS | {"marker": marks[group]},
+        )
+        for (config, group), (x, y) in points.items()
+    ]
+    clouds += [
+        Curve(group.title, [], [], colour=GREY, style=POINTS | {"marker": mark})
+        for group, mark in marks.items()
+    ]
+    return curves([Chart(clouds, x_label, f"{EVENT}s per run")], height=3.8)
+
+
+def short_title(config: str) -> str:
+    """`configuration 2`; another driver by its name."""
+    return f"configuration {config}" if config in CONFIGS else config
+
+
+def _rates(name: str, rates: Sequence[Rate | None]) -> Series:
+    limits = [ends(r.interval if r else None) for r in rates]
+    low, high = zip(*limits, strict=True) if limits else ((), ())
+    return Series(name, [r.rate if r else None for r in rates], low, high)
 
 
 def _means(matrix: Matrix, config: str, column: str, name: str) -> Series:
-    means = [matrix.mean(column, config, w) for w in matrix.weathers]
-    return Series(name, means, published=_said(matrix, config, column))
-
-
-def _said(matrix: Matrix, config: str, column: str) -> list[float | None]:
-    return [published_value(column, config, w) for w in matrix.weathers]
-
-
-def _mean(values: Sequence[float | None]) -> float | None:
-    known = [v for v in values if v is not None]
-    return sum(known) / len(known) if known else None
-
-
-def _dropout_against_collisions(matrix: Matrix) -> str:
-    points = []
-    for c in matrix.configs:
-        runs = matrix.cell(c).drop_nulls(["dropout_pct", "fatal_collisions"])
-        points.append((c, runs["dropout_pct"].to_list(), runs["fatal_collisions"].to_list()))
-    return scatter(points, "dropout, %", "fatal collisions per run")
-
-
-def _preliminary() -> str:
-    charts = [
-        (label, Series(label, [before, after])) for label, before, after in published_preliminary()
-    ]
-    return panel(["preliminary", "final"], charts)
+    means: list[float | None] = []
+    for group in matrix.weather_groups:
+        values = matrix.within(config, group)[column].drop_nulls()
+        means.append(float(values.mean()) if len(values) else None)  # type: ignore[arg-type]
+    return Series(name, means)

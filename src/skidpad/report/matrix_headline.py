@@ -1,4 +1,4 @@
-"""What the matrix counts first: crashes with vehicles, departures, time to the first fatal event (R-6)."""
+"""What the matrix counts first: crashes with vehicles, departures, time to the first intervention (R-6)."""
 
 from __future__ import annotations
 
@@ -6,19 +6,54 @@ from functools import partial
 
 import numpy as np
 
+from skidpad.core.wording import count_text
 from skidpad.evidence.statistics import median_time
-from skidpad.report.matrix_data import Matrix, config_title, rate_by_seed
-from skidpad.report.matrix_tables import TOO_FEW
-from skidpad.report.page import Cell, Table
-from skidpad.report.tables import Column, Format, Quantity, table
+from skidpad.report.matrix_data import (
+    BASELINE,
+    EVENT,
+    EVENTS,
+    Matrix,
+    config_list,
+    config_title,
+    rate_by_seed,
+)
+from skidpad.report.matrix_tables import RATE, TOO_FEW, rate_hint
+from skidpad.report.page import Cell, Number, Numbers, Table
+from skidpad.report.tables import Column, Quantity, table
 
-RATE = Format(".2f", absent="no run")
 COUNTS = (
-    ("crashes_vehicle", "crashes with vehicles", "recoveries after hitting or being hit"),
+    ("crashes_vehicle", "crashes with vehicles", "the ego hit a vehicle or was hit by one"),
     ("road_departures", "departures", "into a barrier, off the road, or facing the wrong way"),
-    ("fatal_collisions", "all fatal", "both; one between two relocations, its first cause"),
+    (EVENTS, f"{EVENT}s", "both; one between two relocations, its first cause"),
     ("fatal_first", "first of a chain", "more than 8 s or 100 m after a relocation"),
 )
+
+
+def headline_numbers(matrix: Matrix) -> Numbers:
+    """Totals over the compared configurations, every drive once."""
+    t = matrix.counted.filter(matrix.counted["config"].is_in(matrix.compared))
+    km = float(t["distance_km"].sum())
+    fatal, hits, left, first = (
+        int(t[c].sum()) for c in (EVENTS, "crashes_vehicle", "road_departures", "fatal_first")
+    )
+
+    def per_100_km(events: int) -> str:
+        return f"{100 * events / km:.1f} per 100 km" if km else ""
+
+    hours = float(t["duration_s"].sum()) / 3600
+    return Numbers(
+        [
+            Number(f"{hits:,}", "crashes with vehicles", per_100_km(hits)),
+            Number(f"{left:,}", "departures from the road", per_100_km(left)),
+            Number(f"{fatal:,}", f"{EVENT}s", f"{first:,} of them first of a chain"),
+            Number(
+                f"{len(t):,}",
+                "different drives",
+                f"{config_list(matrix.compared)}, {count_text(matrix.seeds, 'seed')}",
+            ),
+            Number(f"{km:,.0f} km", "driven", f"{hours:.1f} h of simulated time"),
+        ]
+    )
 
 
 def headline_table(matrix: Matrix) -> Table:
@@ -28,17 +63,27 @@ def headline_table(matrix: Matrix) -> Table:
         for name, title, meaning in COUNTS
     ]
     first = Column[str](
-        "time to the first, median",
+        f"time to the first {EVENT}, median",
         partial(_first, matrix),
         "of runs; a run without one counts as longer than every run",
         "s",
     )
-    columns = [Column[str]("configuration", config_title), *counts[:2], first, *counts[2:]]
+    columns = [
+        Column[str]("configuration", partial(_name, matrix)),
+        *counts[:3],
+        first,
+        counts[3],
+    ]
     note = (
         "Every drive once. Small: 95 % interval; per 100 km it is that of the count, the way taken "
         "as given; of the median exact by order statistics, from six runs on."
     )
     return table(columns, matrix.configs, "What happened, by configuration", note)
+
+
+def _name(matrix: Matrix, config: str) -> Cell:
+    cycles = config == BASELINE and config not in matrix.compared
+    return Cell(config_title(config), note="counts its reset cycle, see above" if cycles else "")
 
 
 def _count(matrix: Matrix, column: str, config: str) -> Quantity:
@@ -49,29 +94,30 @@ def _count(matrix: Matrix, column: str, config: str) -> Quantity:
     rate = rate_by_seed(runs, column)
     assert rate is not None
     scale = 100.0 * len(runs) / km
-    told = f"per 100 km {scale * rate.rate:.1f}"
+    lines = [f"per 100 km {scale * rate.rate:.1f}"]
     if rate.interval is not None:
         low, high = (scale * end for end in rate.interval)
-        told += f": {low:.1f} to {high:.1f}"
+        lines.append(f"{low:.1f} to {high:.1f}")
     return Quantity(
         value=rate.rate,
         interval=rate.interval,
         remark=TOO_FEW if rate.interval is None else "",
-        lines=(told,),
-        hint=f"{rate.events} events, {rate.runs} seeds, {km:,.0f} km, {rate.method.value}",
+        lines=tuple(lines) if config in matrix.compared else (),
+        hint=f"{rate_hint(rate)}, {km:,.0f} km",
     )
 
 
 def _first(matrix: Matrix, config: str) -> Cell:
-    """Median time to the first fatal event; beyond the end of runs it cannot be told."""
+    """Median time to the first intervention; beyond the end of runs it cannot be told."""
     runs = matrix.cell(config).drop_nulls("duration_s")
     if not len(runs):
         return Cell("no run", kind="muted")
     end = float(runs["duration_s"].min())  # type: ignore[arg-type]
     times = runs["first_fatal_s"].cast(float).fill_null(np.inf).to_numpy()
     median, (low, high) = median_time(times, end)
-    told = f"{_time(low, end)} to {_time(high, end)}" if low > 0.0 else "unbounded"
-    return Cell(_time(median, end), note=told, sort=min(median, end), hint=f"{len(runs)} runs")
+    told = f"{_time(low, end)} to {_time(high, end)}" if low > 0.0 else TOO_FEW
+    hint = count_text(len(runs), "run")
+    return Cell(_time(median, end), note=told, sort=min(median, end), hint=hint)
 
 
 def _time(t: float, end: float) -> str:

@@ -7,8 +7,10 @@ from functools import partial
 
 import polars as pl
 
+from skidpad.core.wording import count_text
 from skidpad.evidence.contrasts import paired_runs, per_seed
 from skidpad.evidence.statistics import (
+    EVER_SIGNIFICANT,
     Rate,
     compare_pairs,
     mean_limits,
@@ -17,20 +19,22 @@ from skidpad.evidence.statistics import (
 )
 from skidpad.recording.matrix import Metrics
 from skidpad.report.campaign import Metric, metrics_of
-from skidpad.report.matrix_data import Matrix, config_title, published_value, weather_title
+from skidpad.report.matrix_contrasts import ALPHA, BY_RUN
+from skidpad.report.matrix_data import EVENTS, Matrix, WeatherGroup, config_title, rate_by_seed
 from skidpad.report.page import Block, Cell, Table, Text
 from skidpad.report.tables import Column, Format, Quantity, table
 
-STEPS = (("0", "1"), ("1", "2"), ("2", "3"), ("3", "4"), ("2", "4"))
-WORSE_UP = ("fatal_collisions", "lane_invasions", "dropout_pct", "ttc_below_1_5_s")
+STEPS = (("1", "2"), ("2", "3"), ("3", "4"), ("2", "4"))
+WORSE_UP = (EVENTS, "lane_invasions", "dropout_pct", "ttc_below_1_5_s", "mean_error_m")
 STEP_COLUMNS = (
     "fatal_collisions",
     "lane_invasions",
     "mean_speed_kmh",
     "dropout_pct",
     "ttc_below_1_5_s",
+    "mean_error_m",
+    "headway_variance_m2",
 )
-BY_RUN = ("weather", "seed")
 TOO_FEW = "too few"
 RATE = Format(".2f", absent="no run")
 MEANS = (
@@ -46,10 +50,14 @@ KINDS = (
     ("rear_ended", "of these struck from behind", "another vehicle drove into the ego"),
     ("collisions_static", "barriers and posts", "recoveries after hitting anything that stands"),
     ("off_road", "off the road", "left all lanes and was put back"),
-    ("bend_exits", "of these two in bends without a lead", "speed alone was too much for the bend"),
+    (
+        "bend_exits",
+        "in a bend without a lead",
+        "of the two before: speed alone was too much for the bend",
+    ),
     ("wrong_way", "wrong-way corrections", ""),
-    ("stuck_relocations", "stuck, put back", "not fatal"),
-    ("contacts", "contacts in all", "also those within the cool-down of a recovery"),
+    ("stuck_relocations", "stuck and put back", "no intervention"),
+    ("contacts", "contacts", "of the ego, also those within the cool-down of a recovery"),
 )
 
 
@@ -65,8 +73,10 @@ def collisions(matrix: Matrix) -> list[Block]:
     return [
         count_table(matrix, "crashes_vehicle", "Crashes with vehicles per run"),
         count_table(matrix, "road_departures", "Departures from the road per run"),
-        count_table(matrix, "fatal_collisions", "Both: fatal events per run"),
-        count_table(matrix, "fatal_first", "Of these the first of their chain, per run"),
+        count_table(matrix, EVENTS, "Interventions per run: crashes with vehicles and departures"),
+        count_table(
+            matrix, "fatal_first", "Interventions per run that are the first of their chain"
+        ),
         kinds_table(matrix),
         background_table(matrix),
     ]
@@ -82,15 +92,21 @@ def others(matrix: Matrix) -> list[Block]:
 
 def by_weather(
     matrix: Matrix,
-    of: Callable[[str | None, str], Quantity],
+    of: Callable[[WeatherGroup | None, str], Quantity],
     format: Format,
     caption: str,
     note: str,
 ) -> Table:
-    """One row per configuration, one column per weather, and one in which each drive counts once."""
+    """One row per configuration, one column per weather, and one in which each drive counts once.
+
+    Weathers that every configuration drove alike are one column.
+    """
     columns = [
         Column[str]("configuration", config_title),
-        *(Column[str](weather_title(w), partial(of, w), w, format=format) for w in matrix.weathers),
+        *(
+            Column[str](g.title, partial(of, g), ", ".join(g.weathers), format=format)
+            for g in matrix.weather_groups
+        ),
         Column[str]("all", partial(of, None), "every drive once", format=format),
     ]
     return table(columns, matrix.configs, caption, note)
@@ -98,25 +114,24 @@ def by_weather(
 
 def count_table(matrix: Matrix, column: str, caption: str) -> Table:
     """Events per run with intervals."""
-    rates = {(c, w): matrix.rate(column, c, w) for c in matrix.configs for w in matrix.weathers}
-    top = max((r.rate for r in rates.values() if r), default=0.0) or 1.0
+    rates = {
+        (c, g): rate_by_seed(matrix.within(c, g), column)
+        for c in matrix.configs
+        for g in matrix.weather_groups
+    }
+    top = max((r.rate for (c, _), r in rates.items() if r and c in matrix.compared), default=0.0)
 
-    def of(weather: str | None, config: str) -> Quantity:
-        if weather is None:
+    def of(group: WeatherGroup | None, config: str) -> Quantity:
+        if group is None:
             return rate_quantity(matrix.rate(column, config))
-        said = published_value(column, config, weather)
-        return rate_quantity(rates[config, weather], said, top)
+        shade = top or 1.0 if config in matrix.compared else None
+        return rate_quantity(rates[config, group], shade)
 
-    note = (
-        f"Per run of {matrix.duration:g} s; small: 95 % interval, and the published value, "
-        "of one run of 500 s, where there is one."
-    )
+    note = f"Per run of {matrix.duration:g} s; small: 95 % interval."
     return by_weather(matrix, of, RATE, caption, note)
 
 
-def rate_quantity(
-    rate: Rate | None, published: float | None = None, top: float | None = None
-) -> Quantity:
+def rate_quantity(rate: Rate | None, top: float | None = None) -> Quantity:
     """Events per run; shaded against the rate `top`."""
     if rate is None:
         return Quantity(value=None)
@@ -124,33 +139,37 @@ def rate_quantity(
         value=rate.rate,
         interval=rate.interval,
         remark=TOO_FEW if rate.interval is None else "",
-        published=published,
         heat=None if top is None else (rate.rate / top) ** 0.5,
-        hint=f"{rate.events} events, {rate.runs} seeds, {rate.method.value}",
+        hint=rate_hint(rate),
     )
+
+
+def rate_hint(rate: Rate) -> str:
+    """What a rate rests on."""
+    events, seeds = count_text(rate.events, "event"), count_text(rate.runs, "seed")
+    return f"{events}, {seeds}, {rate.method.value}"
 
 
 def mean_table(matrix: Matrix, column: str, caption: str) -> Table:
     """Means over seeds with intervals."""
 
-    def of(weather: str | None, config: str) -> Quantity:
-        said = None if weather is None else published_value(column, config, weather)
-        return mean_quantity(matrix.cell(config, weather)[column], said)
+    def of(group: WeatherGroup | None, config: str) -> Quantity:
+        runs = matrix.cell(config) if group is None else matrix.within(config, group)
+        return mean_quantity(runs, column)
 
-    note = "Mean over seeds; small: 95 % interval over seeds, and the published value."
+    note = "Mean over seeds; small: 95 % interval over seeds."
     return by_weather(matrix, of, Format(), caption, note)
 
 
-def mean_quantity(values: pl.Series, published: float | None = None) -> Quantity:
-    """Mean over runs; one run has no interval."""
-    known = values.drop_nulls().cast(pl.Float64).to_numpy()
+def mean_quantity(runs: pl.DataFrame, column: str) -> Quantity:
+    """Mean over seeds, of each the mean of its runs; one seed has no interval."""
+    known = per_seed(runs.drop_nulls(column), pl.col(column).cast(pl.Float64)).to_numpy()
     limits = mean_limits(known)
     return Quantity(
         value=float(known.mean()) if known.size else None,
         interval=limits,
         remark=TOO_FEW if limits is None and known.size > 1 else "",
-        published=published,
-        hint=f"{known.size} runs" if known.size else "",
+        hint=count_text(known.size, "seed") if known.size else "",
     )
 
 
@@ -159,7 +178,7 @@ def kinds_table(matrix: Matrix) -> Table:
 
     def name(config: str) -> Cell:
         runs = matrix.cell(config)
-        note = f"{len(runs)} runs, {runs['distance_km'].sum():,.0f} km"
+        note = f"{count_text(len(runs), 'run')}, {runs['distance_km'].sum():,.0f} km"
         return Cell(config_title(config), note=note)
 
     def count(kind: str, config: str) -> int:
@@ -172,17 +191,17 @@ def kinds_table(matrix: Matrix) -> Table:
             for kind, title, definition in KINDS
         ),
     ]
-    return table(columns, matrix.configs, "What the collisions were: counts over all runs")
+    return table(columns, matrix.configs, "What the interventions were: counts, every drive once")
 
 
 def background_table(matrix: Matrix) -> Table:
-    """How whole the background stayed in each weather, over all configurations."""
+    """How whole the background stayed in each weather, over the compared configurations."""
 
-    def total(column: str, weather: str) -> float:
-        return float(sum(matrix.cell(c, weather)[column].sum() for c in matrix.configs))
+    def total(column: str, group: WeatherGroup) -> float:
+        return float(sum(matrix.within(c, group)[column].sum() for c in matrix.compared))
 
-    def rate(weather: str) -> Quantity:
-        km, contacts = total("traffic_km", weather), int(total("traffic_contacts", weather))
+    def rate(group: WeatherGroup) -> Quantity:
+        km, contacts = total("traffic_km", group), int(total("traffic_contacts", group))
         if km <= 0.0:
             return Quantity(value=None)
         return Quantity(
@@ -190,19 +209,21 @@ def background_table(matrix: Matrix) -> Table:
         )
 
     columns = [
-        Column[str]("weather", weather_title),
-        Column[str]("distance", partial(total, "traffic_km"), "of all of them", "km"),
+        Column[WeatherGroup]("weather", lambda group: group.title),
+        Column[WeatherGroup]("distance", partial(total, "traffic_km"), "of all of them", "km"),
         *(
-            Column[str](title, partial(total, column), note, format=Format(".0f"))
+            Column[WeatherGroup](title, partial(total, column), note, format=Format(".0f"))
             for column, title, note in BACKGROUND
         ),
-        Column[str]("per 100 km", rate, "of the contacts, exact 95 % interval"),
+        Column[WeatherGroup]("per 100 km", rate, "of the contacts, exact 95 % interval"),
     ]
-    return table(columns, matrix.weathers, "Contacts among background vehicles")
+    return table(columns, matrix.weather_groups, "Contacts among background vehicles")
 
 
 def pairs(matrix: Matrix) -> list[Block]:
     """Neighbouring configurations, paired by weather and seed."""
+    if matrix.seeds < EVER_SIGNIFICANT:
+        return [Text(few_seeds_text(matrix.seeds))]
     intro = Text(
         "The difference that each step makes, paired by weather and seed: second minus first "
         "configuration. The step from 2 to 4 adds light assist, resume protocol and limiter at once."
@@ -227,6 +248,14 @@ def pairs(matrix: Matrix) -> list[Block]:
     return [intro, table(columns, there, "Paired differences per run")] if there else []
 
 
+def few_seeds_text(seeds: int) -> str:
+    """The line that stands in place of what so few seeds cannot fill."""
+    return (
+        f"{count_text(seeds, 'seed')} per cell cannot show what a step changes: fewer than "
+        f"{EVER_SIGNIFICANT} pairs allow no test."
+    )
+
+
 def step_quantity(matrix: Matrix, column: str, step: tuple[str, str]) -> Quantity:
     """The second configuration less the first, paired; a clear sign is marked better or worse."""
     less, more = (pl.col("config") == config for config in step)
@@ -234,13 +263,13 @@ def step_quantity(matrix: Matrix, column: str, step: tuple[str, str]) -> Quantit
     if not len(pairs):
         return Quantity(value=None)
     c = compare_pairs(per_seed(pairs, pl.col("difference")))
-    judged = column in WORSE_UP and (c.interval.low > 0.0 or c.interval.high < 0.0)
+    judged = column in WORSE_UP and c.p < ALPHA
     return Quantity(
         value=c.mean,
         interval=c.interval,
         remark=p_text(c.p),
         kind=("bad" if c.mean > 0 else "good") if judged else "",
-        hint=f"{c.n} pairs",
+        hint=count_text(c.n, "seed"),
     )
 
 
@@ -250,18 +279,14 @@ def per_weather(matrix: Matrix) -> list[Block]:
 
 
 def _metrics_table(matrix: Matrix, config: str) -> Table:
-    def of(weather: str, metric: Metric) -> Quantity:
-        return mean_quantity(matrix.cell(config, weather)[metric.name])
+    def of(group: WeatherGroup, metric: Metric) -> Quantity:
+        return mean_quantity(matrix.within(config, group), metric.name)
 
     columns = [
         Column[Metric]("metric", lambda m: Cell(m.heading, note=m.meaning)),
         *(
-            Column[Metric](
-                weather_title(w),
-                partial(of, w),
-                w,
-            )
-            for w in matrix.weathers
+            Column[Metric](g.title, partial(of, g), ", ".join(g.weathers))
+            for g in matrix.weather_groups
         ),
     ]
     return table(columns, metrics_of(Metrics), config_title(config), sortable=False)

@@ -97,10 +97,20 @@ class Text:
 
 
 @dataclass(frozen=True, slots=True)
-class Answers:
-    """What a reader asks first, each question with one sentence that answers it."""
+class Answer:
+    """A question with the sentence that answers it, what follows from it, and a picture."""
 
-    items: Sequence[tuple[str, str]]  # question, answer
+    question: str
+    sentence: str
+    lines: Sequence[str] = ()
+    figure: Figure | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Answers:
+    """What a reader asks first."""
+
+    items: Sequence[Answer]
     kind: str = "answers"
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 import polars as pl
 
 from skidpad.core.errors import FileError
+from skidpad.core.wording import count_text
 from skidpad.evidence.grip.threshold import JUDGED, Situation, situations
 from skidpad.evidence.verdicts import Judgement, Verdict
 from skidpad.recording.campaigns import CampaignFolder
@@ -19,6 +20,7 @@ from skidpad.recording.threshold import THRESHOLD, ThresholdEntry
 from skidpad.report.campaign import CampaignView
 from skidpad.report.grip_tables import share
 from skidpad.report.page import (
+    Answer,
     Answers,
     Block,
     Card,
@@ -103,8 +105,9 @@ def build_page(campaign: ThresholdMap) -> Page:
         Section("Configuration and versions", campaign.provenance()),
     ]
     subtitle = (
-        f"{len(campaign.situations)} situations on {campaign.results['road_mu'].n_unique()} levels of "
-        f"friction, {campaign.results['seed'].n_unique()} repeats."
+        f"{count_text(len(campaign.situations), 'situation')} on "
+        f"{count_text(campaign.results['road_mu'].n_unique(), 'level')} of friction, "
+        f"{count_text(campaign.results['seed'].n_unique(), 'repeat')}."
     )
     return Page("Threshold of grip", subtitle, sections, campaign.facts())
 
@@ -115,18 +118,18 @@ def _answers(campaign: ThresholdMap) -> Answers:
         f"{len(telling)} of {len(campaign.situations)} situations are completed on dry road; in "
         f"{len(reached)} of these half of the drives end in an accident on some level of friction."
     )
-    items = [("Does friction decide?", asked)]
+    items = [Answer("Does friction decide?", asked)]
     if reached:
         most = max(reached, key=lambda s: s.threshold.mu or 0.0)
-        items.append(("Where first?", f"{title(most)}: at friction {most.threshold.text}."))
+        items.append(Answer("Where first?", f"{title(most)}: at friction {most.threshold.text}."))
     told = [
         f"{DRIVERS.get(driver, driver)} with {actors} actors {n} of {of}"
         for (driver, actors), (n, of) in _tally(campaign).items()
     ]
-    items.append(("Who reaches a threshold?", f"{'; '.join(told)} situations."))
+    items.append(Answer("Which driver reaches a threshold?", f"{'; '.join(told)} situations."))
     seeds = campaign.results["seed"].n_unique()
     least = least_seeds_text(telling[0].judgements) if telling else ""
-    items.append(("How sure is that?", seeds_text(seeds) + least))
+    items.append(Answer("How sure is that?", seeds_text(seeds) + least))
     return Answers(items)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Sequence
 
+from skidpad.core.wording import count_text
 from skidpad.evidence.statistics import seeds_for_verdict
 from skidpad.evidence.verdicts import Judgement
 from skidpad.evidence.verdicts import Verdict as Outcome
@@ -40,7 +41,7 @@ def plain(j: Judgement) -> str:
                 else "These runs show the opposite, beyond what chance explains."
             )
         case Outcome.UNDECIDED:
-            more = f"about {j.seeds_needed} seeds" if j.seeds_needed else "more seeds"
+            more = f"about {count_text(j.seeds_needed, 'seed')}" if j.seeds_needed else "more seeds"
             return f"These runs cannot tell; it would take {more}."
         case Outcome.BY_CONSTRUCTION:
             return "Both sides are the same drive: there is nothing to measure."
@@ -56,7 +57,18 @@ def tally_text(judged: Sequence[Judgement]) -> str:
     """How many claims were judged how."""
     counts = Counter(j.verdict for j in judged)
     told = ", ".join(f"{counts[v]} {v.value}" for v in Outcome if counts[v])
+    if len(judged) == 1:
+        return f"The source's one claim is {told.removeprefix('1 ')}."
     return f"Of the sources' {len(judged)} claims: {told}."
+
+
+def unjudged_text(judged: Sequence[Judgement]) -> str:
+    """The line that stands in place of verdicts where there is one seed per cell."""
+    least = seeds_for_verdict(len(judged))
+    return (
+        f"One seed per cell judges none of the sources' {count_text(len(judged), 'claim')}: what "
+        f"differs may be chance. With {least} seeds (`--seeds {least}`) they can be judged."
+    )
 
 
 def least_seeds_text(judged: Sequence[Judgement]) -> str:
@@ -66,8 +78,8 @@ def least_seeds_text(judged: Sequence[Judgement]) -> str:
         return ""
     least = seeds_for_verdict(tested)
     return (
-        f" With {tested} claims tested at once, a paired comparison takes at least {least} seeds per "
-        "cell to decide one."
+        f" With {count_text(tested, 'claim')} tested at once, a paired comparison takes at least "
+        f"{least} seeds per cell to decide one."
     )
 
 

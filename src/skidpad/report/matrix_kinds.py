@@ -1,0 +1,33 @@
+"""The kinds of interventions, which add up to all of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import polars as pl
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """One kind: columns that are added, columns that are taken off."""
+
+    title: str
+    plus: tuple[str, ...]
+    minus: tuple[str, ...] = ()
+    meaning: str = ""
+
+
+KINDS = (
+    Kind("into or beside a vehicle", ("crashes_vehicle",), ("rear_ended",),
+         "the ego drove into a vehicle, or both touched sideways"),
+    Kind("struck from behind", ("rear_ended",), (), "another vehicle drove into the ego"),
+    Kind("into a barrier", ("collisions_static",), (), "or anything else that stands"),
+    Kind("off the road", ("off_road",), (), "left all lanes and was put back"),
+    Kind("facing the wrong way", ("wrong_way",), (), "and was turned round"),
+)  # fmt: skip
+
+
+def count(kind: Kind, runs: pl.DataFrame) -> int:
+    """How many of a kind there were in these runs."""
+    total = sum(int(runs[c].sum() or 0) for c in kind.plus)
+    return max(0, total - sum(int(runs[c].sum() or 0) for c in kind.minus))

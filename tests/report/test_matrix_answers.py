@@ -1,0 +1,192 @@
+"""The three answers of the matrix page, by value: rows in, sentences out."""
+
+import re
+
+import pytest
+from test_matrix_report import key
+
+from skidpad.evidence.drive.findings import FINDINGS
+from skidpad.evidence.verdicts import judge
+from skidpad.recording.matrix import MATRIX, Metrics
+from skidpad.recording.results import Timing
+from skidpad.report.matrix import write_report
+from skidpad.report.matrix_answers import answers
+from skidpad.report.matrix_baseline import baseline_text
+from skidpad.report.matrix_data import WEATHERS, load_matrix
+from skidpad.report.matrix_figures import collisions, speed_figure
+from skidpad.report.matrix_headline import headline_numbers
+from skidpad.report.matrix_kinds import KINDS, count
+from skidpad.report.matrix_tables import count_table
+
+CLAIMS = [f for f in FINDINGS if not f.study]
+
+
+def metrics(barriers=0, struck=0, hit=0, speed=40.0):
+    """A run of 500 s with so many interventions of three kinds."""
+    vehicles = struck + hit
+    return Metrics(
+        fatal_collisions=barriers + vehicles,
+        crashes_vehicle=vehicles,
+        collisions_vehicle=vehicles,
+        rear_ended=struck,
+        road_departures=barriers,
+        collisions_static=barriers,
+        off_road=0,
+        wrong_way=0,
+        fatal_first=barriers + vehicles,
+        first_fatal_s=100.0 if barriers + vehicles else None,
+        bend_exits=0,
+        mean_speed_kmh=speed,
+        dropout_pct=5.0,
+        distance_km=5.0,
+        duration_s=500.0,
+    )
+
+
+def campaign(folder, of, seeds=10, alike=True):
+    """Runs of configurations 0 to 4 in six weathers; of(config, kind) has the metrics of each."""
+    rows = []
+    for weather in WEATHERS:
+        kind, time = weather.split("-")
+        for config in "01234":
+            for seed in range(1, seeds + 1):
+                drive = f"{config}{kind}{'' if alike else time}{seed}"
+                rows.append((key(config, weather, seed, log_hash=drive), of(config, kind)))
+    MATRIX.write(folder, rows, [Timing(wall_s=9, cpu_s=8, rtf=55)] * len(rows))
+    return load_matrix(folder)
+
+
+def clear_cut(config, kind):
+    """Configuration 1 is best, 2 as good in clear sky only, 3 and 4 are worse in rain."""
+    return {
+        "0": metrics(hit=30),
+        "1": metrics(),
+        "2": metrics(hit=4 * (kind == "rain")),
+        "3": metrics(barriers=6, struck=1),
+        "4": metrics(barriers=2 + 3 * (kind == "rain"), speed=35.0),
+    }[config]
+
+
+def told(matrix, crashes=None):
+    return answers(matrix, judge(CLAIMS, [matrix.results] * len(CLAIMS)), crashes or {}).items
+
+
+@pytest.mark.req("R-7")
+def test_the_first_answer_names_the_safest_functions_in_each_weather_and_how_sure_that_is(tmp_path):
+    first = told(campaign(tmp_path, clear_cut))[0]
+    assert first.sentence == (
+        "Fewest interventions: in clear sky configurations 1 and 2 with 0.00 per run; "
+        "in heavy rain configuration 1 with 0.00 per run."
+    )
+    clear, rain = first.lines
+    # twelve comparisons of ten seeds, the two signs of each equally extreme: 12 * 2 / 2^10
+    assert clear == (
+        "Clear sky: configuration 1 has fewer than configurations 3 and 4 (p at most 0.023); "
+        "10 seeds cannot tell configuration 1 from configuration 2."
+    )
+    assert rain == (
+        "Heavy rain: configuration 1 has fewer than configurations 2 to 4 (p at most 0.023)."
+    )
+
+
+@pytest.mark.req("R-7")
+def test_the_second_answer_says_what_rain_changes_for_each_configuration(tmp_path):
+    second = told(campaign(tmp_path, clear_cut))[1]
+    assert second.sentence == (
+        "Heavy rain against clear sky: more interventions with configurations 2 and 4; "
+        "no difference that 10 seeds can show with configurations 1 and 3."
+    )
+    assert second.lines[3] == (
+        "4 · + 80 km/h limiter: interventions per run 2.00 in clear sky, 5.00 in heavy rain; "
+        "mean speed 35.0 → 35.0 km/h; dropout 5.0 → 5.0 %."
+    )
+    assert second.lines[4] == (
+        "Within “Clear Sky: sunrise, noon and night” and “Heavy Rain: sunrise, noon and night” "
+        "every drive moved alike, seed for seed: one column each."
+    )
+
+
+def test_the_third_answer_names_the_commonest_kind_of_the_worst_configuration(tmp_path):
+    third = told(campaign(tmp_path, clear_cut))[2]
+    assert third.sentence == (
+        "Configuration 3 needs interventions most often (140 in 20 drives), mostly of the kind "
+        "“into a barrier” (120)."
+    )
+
+
+@pytest.mark.req("R-7", "X-9")
+def test_one_seed_gets_one_line_and_no_test_anywhere_on_the_page(tmp_path):
+    matrix = campaign(tmp_path, clear_cut, seeds=1)
+    first, second, third = told(matrix)
+    assert " ".join(first.lines) == (
+        "1 seed per cell cannot tell two configurations apart: what differs may be chance. "
+        "It takes at least 9 (`--seeds 9`)."
+    )
+    assert second.sentence.startswith("1 seed per cell cannot tell two weathers apart")
+    assert third.lines[-1].startswith(
+        f"One seed per cell judges none of the sources' {len(CLAIMS)} claims"
+    )
+    page = write_report(tmp_path).read_text(encoding="utf-8")
+    text = re.sub(r"<(script|style|svg).*?</\1>|<[^>]+>", " ", page, flags=re.DOTALL)
+    for never in (
+        r"\bp [=<] ",
+        r"\binf\b",
+        "unbounded",
+        r"\b1 (runs|seeds|claims|events|drives)\b",
+    ):
+        assert not re.search(never, text), never
+    assert 'class="verdict' not in page
+
+
+def test_the_baseline_stands_in_words_and_moves_no_answer_total_or_figure(tmp_path):
+    def busy(config, kind):
+        return metrics(hit=300) if config == "0" else clear_cut(config, kind)
+
+    calm, wild = (
+        campaign(tmp_path / name, of) for name, of in (("calm", clear_cut), ("wild", busy))
+    )
+    words = baseline_text(calm)[0].text
+    assert "nobody at the pedals: it aims for 150 km/h and never brakes" in words
+    assert "every 17 s, the first time after 100 s in the median of 20 drives" in words  # 500 / 30
+    assert "every 2 s" in baseline_text(wild)[0].text
+    for of in (told, headline_numbers, collisions, speed_figure):
+        assert of(calm) == of(wild), of.__name__
+
+
+def test_weathers_that_every_configuration_drove_alike_are_one_column_and_count_once(tmp_path):
+    one, six = (
+        campaign(tmp_path / str(alike), clear_cut, 6, alike=alike) for alike in (True, False)
+    )
+    titles = [title for title, _ in count_table(one, "fatal_collisions", "").columns]
+    assert titles == [
+        "configuration", "Clear Sky: sunrise, noon and night",
+        "Heavy Rain: sunrise, noon and night", "all",
+    ]  # fmt: skip
+    assert len(count_table(six, "fatal_collisions", "").columns) == 8
+    assert (len(one.cell("3")), len(six.cell("3"))) == (12, 36)
+
+
+def test_a_cell_that_drives_as_another_has_its_seeds(tmp_path):
+    rows = [
+        (key("3", weather, seed, log_hash=f"{weather[:4]}{seed}"), metrics(barriers=seed))
+        for weather, seeds in (("clear-noon", 3), ("clear-night", 1), ("rain-noon", 3))
+        for seed in range(1, seeds + 1)
+    ]
+    MATRIX.write(tmp_path, rows)
+    matrix = load_matrix(tmp_path)
+    assert matrix.cell("3", "clear-night")["seed"].to_list() == [1, 2, 3]
+    assert matrix.rate("fatal_collisions", "3", "clear-night").events == 6
+    assert [g.weathers for g in matrix.weather_groups] == [
+        ("clear-noon", "clear-night"), ("rain-noon",)
+    ]  # fmt: skip
+
+
+def test_the_kinds_of_interventions_add_up_to_all(tmp_path):
+    matrix = campaign(tmp_path, clear_cut, 2)
+    runs = matrix.cell("3")
+    assert {k.title: n for k in KINDS if (n := count(k, runs))} == {
+        "into a barrier": 24, "struck from behind": 4
+    }  # fmt: skip
+    assert (
+        sum(count(k, matrix.finished) for k in KINDS) == matrix.finished["fatal_collisions"].sum()
+    )

@@ -176,7 +176,12 @@ def _ink(one: Series, place: int) -> str:
 
 def _draw_points(axes: Axes, y: Sequence[float], one: Series, ink: str) -> None:
     """The estimates of one series at the heights y."""
-    style = {"marker": one.marker, "color": ink, "markersize": 6.5, "linestyle": "none"}
+    style: dict[str, Any] = {
+        "marker": one.marker,
+        "color": ink,
+        "markersize": 6.5,
+        "linestyle": "none",
+    }
     ends = zip(one.low, one.high, strict=True) if one.low else [(None, None)] * len(y)
     for k, ((low, high), yi, v) in enumerate(zip(ends, y, one.values, strict=True)):
         if v is None:

@@ -126,7 +126,7 @@ def _first_word_large(text: str) -> str:
 def weather_series(group: WeatherGroup, k: int, **values: Sequence[float | None]) -> Series:
     """A series in the colour and with the mark of its weather."""
     colour = COLOURS.get(group.name, 2 + k)
-    return Series(group.name, colour=colour, marker=MARKERS[k % len(MARKERS)], **values)  # type: ignore[arg-type]
+    return Series(group.name, colour=colour, marker=MARKERS[k % len(MARKERS)], **values)
 
 
 def _rate_figure(matrix: Matrix, rates: dict[WeatherGroup, dict[str, Rate]]) -> Figure:
@@ -209,7 +209,9 @@ def _levels(matrix: Matrix, config: str) -> str:
         values = [runs[column].drop_nulls() for runs in groups.values()]
         if all(len(v) for v in values):
             between = " → " if len(values) == 2 else ", "
-            parts.append(f"{title} {between.join(f'{v.mean():.1f}' for v in values)} {unit}")
+            parts.append(
+                f"{title} {between.join(f'{float(v.to_numpy().mean()):.1f}' for v in values)} {unit}"
+            )
     return f"{config_title(config)}: {'; '.join(parts)}."
 
 

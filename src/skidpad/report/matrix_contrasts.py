@@ -52,8 +52,8 @@ def by_configuration(
     for group in groups:
         there = pl.col("weather").is_in(group.weathers)
         for a, b in combinations(matrix.compared, 2):
-            sides = ((pl.col("config") == config) & there for config in (b, a))
-            if (c := contrast(matrix, *sides, BY_RUN)) is not None:
+            more, less = ((pl.col("config") == config) & there for config in (b, a))
+            if (c := contrast(matrix, more, less, BY_RUN)) is not None:
                 found[group, a, b] = c
     return _adjusted(found)
 
@@ -64,11 +64,11 @@ def by_weather(matrix: Matrix) -> dict[tuple[str, WeatherGroup], Contrast]:
     found = {}
     for config in matrix.compared:
         for group in rest:
-            sides = (
+            more, less = (
                 (pl.col("config") == config) & pl.col("weather").is_in(g.weathers)
                 for g in (group, first)
             )
-            if (c := contrast(matrix, *sides, BY_SEED)) is not None:
+            if (c := contrast(matrix, more, less, BY_SEED)) is not None:
                 found[config, group] = c
     return _adjusted(found)
 

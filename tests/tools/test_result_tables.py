@@ -135,7 +135,7 @@ def test_levels_are_paired_by_seed_and_few_seeds_have_no_bound(tmp_path):
     (pixels / "driven.json").write_bytes((objects / "driven.json").read_bytes())
     rows = tables.block("matrix-pixels", "against", pixels).splitlines()
     assert "| all | interventions | 3 | +2.00 | too few |" in rows
-    assert "| all | crashes with vehicles | 3 | +0.00 | unbounded |" in rows
+    assert "| all | crashes with vehicles | 3 | +0.00 | too few |" in rows
 
 
 def test_claims_are_judged_on_the_results(tmp_path):

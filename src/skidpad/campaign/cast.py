@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from skidpad.core.run import (
     BackendKind,
     CameraDriver,
     Passenger,
+    ReferenceDriver,
     Render,
     Roads,
     RunSpec,
@@ -32,7 +33,7 @@ from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.told import told
 from skidpad.core.vocabulary import Control, Outcome
-from skidpad.physics.types import EGO_TYPE
+from skidpad.physics.types import EGO_TYPE, vehicle_type
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios import scenario as scenarios
@@ -44,6 +45,7 @@ from skidpad.simulation.recovery import RecoverySettings, Supervisor
 from skidpad.stack import settings as options
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.agents import load_agent
+from skidpad.stack.channels.settings import CarModel
 from skidpad.stack.interface import Stack
 from skidpad.stack.loading import GuardedStack, load_stack
 from skidpad.stack.settings import Settings, grip_of, settings_of
@@ -270,6 +272,10 @@ def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, An
             from skidpad.stack.camera import driver as camera  # its network is read with it
 
             return camera.CameraDriver, cruise
+        case ReferenceDriver():
+            from skidpad.stack.reference.driver import ReferenceStack
+
+            return ReferenceStack, {"seed": spec.seed, "car": asdict(ego_model())}
         case AdasDriver():
             if driver.cruise_kmh is not None:
                 cruise = {"cruise_kmh": driver.cruise_kmh}
@@ -280,6 +286,19 @@ def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, An
                 **cruise,
             }
     raise ConfigError(f"{driver.label} needs a route to drive")
+
+
+def ego_model() -> CarModel:
+    """What a driver knows about the ego."""
+    t = vehicle_type(EGO_TYPE)
+    return CarModel(
+        length=t.length,
+        width=t.width,
+        wheelbase=t.wheelbase,
+        steer_max=t.steer_max,
+        a_drive=t.a_drive,
+        a_brake=t.a_brake,
+    )
 
 
 def with_sensors(setup: Setup, stack: GuardedStack) -> Setup:

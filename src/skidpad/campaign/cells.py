@@ -9,7 +9,7 @@ from math import isfinite
 from msgspec import structs
 
 from skidpad.core.errors import ConfigError, require_range
-from skidpad.core.run import AdasDriver, DriverSpec, RunSpec
+from skidpad.core.run import REFERENCE, AdasDriver, DriverSpec, ReferenceDriver, RunSpec
 from skidpad.core.told import told
 from skidpad.core.weather import RANGES, Weather
 from skidpad.stack.configurations import (
@@ -33,12 +33,23 @@ def published_drivers(numbers: str) -> list[AdasDriver]:
     for text in numbers.split(","):
         known = {str(n) for n in CONFIGURATIONS}
         if text.strip() not in known:
-            allowed = ", ".join(map(str, CONFIGURATIONS))
+            allowed = ", ".join([*map(str, CONFIGURATIONS), REFERENCE])
             raise ConfigError(
                 f"unknown configuration {told(text.strip(), 100)}; choose among: {allowed}"
             )
         drivers.append(AdasDriver(label=text.strip(), functions=functions_of(int(text.strip()))))
     return drivers
+
+
+def matrix_drivers(text: str) -> list[DriverSpec]:
+    """`0,4,reference` to drivers; "all" is the five configurations and the reference driver."""
+    if text == "all":
+        return [*published_drivers(text), ReferenceDriver()]
+    words = [word.strip() for word in text.split(",")]
+    found: list[DriverSpec] = []
+    for word in words:
+        found += [ReferenceDriver()] if word == REFERENCE else published_drivers(word)
+    return found
 
 
 def drivers_with(functions: Iterable[str]) -> list[AdasDriver]:

@@ -7,7 +7,7 @@ from math import hypot
 
 import numpy as np
 
-from skidpad.campaign.cast import setup_of
+from skidpad.campaign.cast import ego_model, setup_of
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.randomness import stream
@@ -97,20 +97,7 @@ def segment_of(spec: RunSpec) -> Segment:
             stratum=route.stratum,
         ),
     )
-    return Segment(map, setup, crowd, path, car_model())
-
-
-def car_model() -> CarModel:
-    """What channels know about the ego."""
-    t = vehicle_type(EGO_TYPE)
-    return CarModel(
-        length=t.length,
-        width=t.width,
-        wheelbase=t.wheelbase,
-        steer_max=t.steer_max,
-        a_drive=t.a_drive,
-        a_brake=t.a_brake,
-    )
+    return Segment(map, setup, crowd, path, ego_model())
 
 
 def _first_lane(map: RoadMap, rng: np.random.Generator) -> int:

@@ -19,10 +19,12 @@ from skidpad.campaign.outdoors import ChangedBackend, FileChanges
 from skidpad.campaign.snapshots import Snapshots
 from skidpad.core.errors import StackError, require_choice
 from skidpad.core.run import (
+    REFERENCE,
     AdasDriver,
     BackendChoice,
     BackendKind,
     DriverSpec,
+    ReferenceDriver,
     Roads,
     RunSpec,
     StackDriver,
@@ -81,9 +83,10 @@ def drive(
 ) -> Run:
     """Drive a stack and return the log.
 
-    stack: a class with the stack interface, "module:Class", or 0 to 4 for a published
-    configuration. settings: single settings over the profile. options: what the class is given as
-    its settings. out: a folder for snapshots of collisions. backend: None is the embedded one.
+    stack: a class with the stack interface, "module:Class", 0 to 4 for a published
+    configuration, or "reference" for the reference driver. settings: single settings over the
+    profile. options: what the class is given as its settings. out: a folder for snapshots of
+    collisions. backend: None is the embedded one.
     """
     driver, kind = _named(stack, dict(options or {}))
     words = [v.value for v in SensorLevel], [v.value for v in TrafficStart]
@@ -110,6 +113,8 @@ def _named(
 ) -> tuple[DriverSpec, type[Stack] | None]:
     if isinstance(stack, int):
         return AdasDriver(label=str(stack), functions=functions_of(stack)), None
+    if stack == REFERENCE:
+        return ReferenceDriver(), None
     if isinstance(stack, str):
         return StackDriver(stack, options), load_stack(stack)
     return StackDriver(f"{stack.__module__}:{stack.__qualname__}", options), stack

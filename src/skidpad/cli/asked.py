@@ -8,12 +8,14 @@ from msgspec import Meta, Struct
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import (
+    REFERENCE,
     AdasDriver,
     AgentDriver,
     CameraDriver,
     DriverSpec,
     Friction,
     Passenger,
+    ReferenceDriver,
     RunSpec,
     StackDriver,
 )
@@ -28,7 +30,11 @@ class Drivers(Struct, frozen=True):
     """Who drives, in turn."""
 
     configs: Annotated[
-        str | None, Meta(description="Published configurations, e.g. 0,1,4; default all five.")
+        str | None,
+        Meta(
+            description="Published configurations and the reference driver, e.g. 0,4,reference; "
+            "default all five and reference."
+        ),
     ] = None
     functions: Annotated[
         tuple[str, ...],
@@ -40,23 +46,30 @@ class Drivers(Struct, frozen=True):
         str | None, Meta(description="Cruise target in km/h, or several as FROM:TO:STEP.")
     ] = None
     stack: Annotated[
-        str | None, Meta(description="Your own stack: module:Class or file.py:Class.")
+        str | None,
+        Meta(description="Your own stack: module:Class or file.py:Class; or reference."),
     ] = None
 
     def chosen(self) -> list[DriverSpec]:
         """The drivers; ConfigError or FileError for what is not there."""
-        from skidpad.campaign.cells import cruising, drivers_with, published_drivers
+        from skidpad.campaign.cells import cruising, drivers_with, matrix_drivers, published_drivers
         from skidpad.stack.loading import load_stack
 
         if self.stack is not None:
             if self.configs is not None or self.functions or self.cruise is not None:
                 raise ConfigError("--stack goes with none of --configs, --functions and --cruise")
+            if self.stack == REFERENCE:
+                return [ReferenceDriver()]
             load_stack(self.stack)  # a stack that is not there is wrong input, no run's outcome
             return [StackDriver(self.stack)]
         chosen = drivers_with(self.functions)
+        if self.cruise is not None:
+            if self.configs is not None or not chosen:
+                chosen = [*published_drivers(self.configs or "all"), *chosen]
+            return [*cruising(chosen, self.cruise)]
         if self.configs is not None or not chosen:
-            chosen = [*published_drivers(self.configs or "all"), *chosen]
-        return [*(chosen if self.cruise is None else cruising(chosen, self.cruise))]
+            return [*matrix_drivers(self.configs or "all"), *chosen]
+        return [*chosen]
 
 
 class Controller(Struct, frozen=True):
@@ -65,7 +78,8 @@ class Controller(Struct, frozen=True):
     controller: Annotated[
         str,
         Meta(
-            description="stack, camera, ideal (as the file says), module:Class, agent:PATH:CLASS."
+            description="stack, camera, reference, ideal (as the file says), module:Class, "
+            "agent:PATH:CLASS."
         ),
     ] = OURS
     config: Annotated[int, Meta(ge=0, le=4, description="Configuration of our stack.")] = 2
@@ -82,6 +96,8 @@ class Controller(Struct, frozen=True):
             return Passenger()
         if self.controller == CAMERA:
             return CameraDriver()
+        if self.controller == REFERENCE:
+            return ReferenceDriver()
         if self.controller.startswith(AGENT):
             where = self.controller.removeprefix(AGENT)
             load_agent(where)

@@ -21,6 +21,7 @@ from skidpad.core.weather import Weather
 VERSION = 2  # of config.yaml; folders without the word were written before there was one value
 DURATION = 500.0  # s (A-005)
 DEADLINE_BASE_S, DEADLINE_PER_SIMULATED_S = 180.0, 4.0  # wall time after which a run is killed
+REFERENCE = "reference"  # the reference driver's name in commands and results
 ARBITER = "arbiter"  # who drives a crew, when it is not one of the channels
 
 Plain = bool | float | str | None
@@ -85,6 +86,15 @@ class CameraDriver(Struct, frozen=True, tag="camera", forbid_unknown_fields=True
         return "camera"
 
 
+class ReferenceDriver(Struct, frozen=True, tag="reference", forbid_unknown_fields=True):
+    """A model of a careful human at the wheel; the seed says which person (docs/reference-driver.md)."""
+
+    @property
+    def label(self) -> str:
+        """What results call it."""
+        return REFERENCE
+
+
 class Passenger(Struct, frozen=True, tag="ideal", forbid_unknown_fields=True):
     """Nobody: the scenario moves the ego."""
 
@@ -122,7 +132,15 @@ class ChannelCrew(Struct, frozen=True, kw_only=True, tag="channels", forbid_unkn
         return self.drive_by
 
 
-DriverSpec = AdasDriver | StackDriver | AgentDriver | CameraDriver | Passenger | ChannelCrew
+DriverSpec = (
+    AdasDriver
+    | StackDriver
+    | AgentDriver
+    | CameraDriver
+    | ReferenceDriver
+    | Passenger
+    | ChannelCrew
+)
 
 
 # --- where, and among whom

@@ -103,4 +103,19 @@ class PointSensorSpec:
     mount: Pose = Pose(0.0, 0.0, 0.0)
 
 
-SensorSpec = CameraSpec | RadarSpec | LidarSpec | PointSensorSpec
+@dataclass(frozen=True, slots=True)
+class EyesSpec:
+    """A human driver's eyes; their reading is a `core.sight.DriverView`."""
+
+    id: str
+    reaction: float = 1.0  # s by which others and lights are seen late
+    height: float = 1.2  # m above the road; drivers of cars, AASHTO Green Book has 1.08
+
+    def __post_init__(self) -> None:
+        if not 0.0 <= self.reaction <= 10.0:
+            raise ConfigError(
+                f"eyes {self.id}: reaction must be in [0, 10] s, got {self.reaction:g}"
+            )
+
+
+SensorSpec = CameraSpec | RadarSpec | LidarSpec | PointSensorSpec | EyesSpec

@@ -23,6 +23,7 @@ CONFIGS = {
     "2": "2 · ACC + lane centring",
     "3": "3 · + light assist, resume",
     "4": "4 · + 80 km/h limiter",
+    "reference": "reference driver (a model)",
 }
 BASELINE = "0"  # nobody at the pedals
 MOTION = "motion_hash"  # of a drive: poses, contacts and commands

@@ -6,6 +6,9 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import partial
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.frames import CameraImage, LidarPoints
 from skidpad.core.setup import Setup
@@ -14,14 +17,16 @@ from skidpad.core.specs import (
     IMU,
     SPEEDOMETER,
     CameraSpec,
+    EyesSpec,
     LidarSpec,
     PointSensorSpec,
     SensorSpec,
 )
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import RangeModel
+from skidpad.core.vocabulary import LightState, RangeModel
 from skidpad.physics.optics import extinction
 from skidpad.sensors import inertial
+from skidpad.sensors.eyes import Eyes
 from skidpad.sensors.lidar import Lidar
 from skidpad.sensors.live_scene import LiveScene, SceneMap
 
@@ -60,13 +65,28 @@ class AskedSensors:
         self._lidar = lidar
         self._scene: LiveScene | None = None  # for the first lidar that is read
         self._placed = -1
+        self._eyes = {
+            s.id: Eyes(s, map.roadside, table, setup)
+            for s in setup.specs
+            if s.id in setup.asked and isinstance(s, EyesSpec)
+        }
         self.readers = {s.id: self._reader(s) for s in setup.specs if s.id in setup.asked}
 
     def read(
-        self, tick: int, states: ActorStates, images: Mapping[str, CameraImage]
+        self,
+        tick: int,
+        states: ActorStates,
+        images: Mapping[str, CameraImage],
+        lights: Mapping[int, LightState],
+        braking: NDArray[np.bool_],
     ) -> Mapping[str, Any]:
-        """Readings of this state by id, valid until the next call (decision X-11)."""
+        """Readings of this state by id, valid until the next call (decision X-11).
+
+        braking: (n,) whose brake lamps are on. Eyes look in every tick, as they see late.
+        """
         self.tick, self.states, self.images = tick, states, images
+        for eyes in self._eyes.values():
+            eyes.look(tick, states, lights, braking)
         return Readings(self, tick)
 
     def _reader(self, spec: SensorSpec) -> Callable[[], Any]:
@@ -76,6 +96,8 @@ class AskedSensors:
             return partial(self._lidar, spec)
         if isinstance(spec, LidarSpec):
             return partial(self._points, Lidar(spec, self._dt, self.air))
+        if isinstance(spec, EyesSpec):
+            return self._eyes[spec.id].view
         if isinstance(spec, PointSensorSpec):
             if spec.kind == GNSS:
                 return lambda: inertial.gnss(self.states.pose(EGO) @ spec.mount, self._origin)

@@ -24,6 +24,7 @@ from skidpad.core.specs import (
     IMU,
     SPEEDOMETER,
     CameraSpec,
+    EyesSpec,
     LidarSpec,
     PointSensorSpec,
     SensorSpec,
@@ -40,7 +41,12 @@ REPORTED = tuple(field.name for field in fields(StackReport))
 INT_MAX = 2**31 - 1  # the log's whole numbers have 32 bits
 LONGEST_MODE = 200  # characters
 NO_REPORT = StackReport()
-ASKABLE = (CameraSpec, LidarSpec, PointSensorSpec)  # there is one radar, and every stack has it
+ASKABLE = (
+    CameraSpec,
+    LidarSpec,
+    PointSensorSpec,
+    EyesSpec,
+)  # there is one radar, and every stack has it
 ASKABLE_KINDS = (GNSS, IMU, SPEEDOMETER)
 
 
@@ -252,7 +258,7 @@ def _check_sensors(name: str, wanted: Sequence[SensorSpec], taken: Collection[st
     for k, spec in enumerate(wanted):
         if not isinstance(spec, ASKABLE):
             raise StackError(
-                f"{name}.sensors() must name cameras, lidars and point sensors, got {told(spec)}"
+                f"{name}.sensors() must name cameras, lidars, point sensors and eyes, got {told(spec)}"
             )
         if spec.id in taken or spec.id in {other.id for other in wanted[:k]}:
             raise StackError(f"{name}.sensors(): there is a sensor {spec.id!r} already")

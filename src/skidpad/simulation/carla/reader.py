@@ -58,9 +58,9 @@ class Reader:
         lights: dict[int, LightState],
     ) -> tuple[Readings, Mapping[str, Any]]:
         """The common sensors' readings, and those that the stack asked for besides."""
-        self._messages = messages
+        self._messages, braking = messages, commands[:, 1] > 0.0
         if self._objects is not None:
-            seen = self._objects.read(tick, states, lights, commands[:, 1] > 0.0)
+            seen = self._objects.read(tick, states, lights, braking)
         else:
             radar = RadarPoints.none()
             if self._radar_id is not None:
@@ -68,7 +68,9 @@ class Reader:
                 radar = decode.radar_points(raw, self._radar_limit)
             seen = Readings(self.pictures.of(tick, messages), {}, radar)
         asked = self._asked
-        return seen, {} if asked is None else asked.read(tick, states, seen.images)
+        if asked is None:
+            return seen, {}
+        return seen, asked.read(tick, states, seen.images, lights, braking)
 
     def _lidar(self, spec: LidarSpec) -> LidarPoints:
         """The server's; GNSS, IMU and speedometer are read off the body, as in our own world."""

@@ -110,17 +110,19 @@ class EmbeddedBackend:
         states = w.states
         if self._unseen.any():
             states = states._replace(present=states.present & ~self._unseen)
-        seen = self.sensing.read(w.tick, states, w.lights.by_id, w.braking())
+        lights, braking = w.lights.by_id, w.braking()
+        seen = self.sensing.read(w.tick, states, lights, braking)
+        extra = {} if asked is None else asked.read(w.tick, states, seen.images, lights, braking)
         return SensorFrame(
             tick=w.tick,
             ego=self._estimate(),
             images=seen.images,
             segments=seen.segments,
             radar=seen.radar,
-            lights=MappingProxyType(w.lights.by_id),
+            lights=MappingProxyType(lights),
             contacts=w.contacts,
             invasions=w.invasions,
-            extra={} if asked is None else asked.read(w.tick, states, seen.images),
+            extra=extra,
         )
 
     def _estimate(self) -> EgoEstimate:

@@ -1,0 +1,193 @@
+"""A careful human-like driver: it is given a view of its own type, late and incomplete, and nothing else.
+
+Car following, bends, lights and care for weather as the background's drivers have them
+(docs/traffic.md); perception limits and reaction time from the literature. A model, not a human.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from math import inf, sqrt
+from typing import Any
+
+import numpy as np
+
+from skidpad.core.errors import require_choice
+from skidpad.core.frames import SensorFrame
+from skidpad.core.setup import DT
+from skidpad.core.sight import DriverView, SeenActors
+from skidpad.core.specs import EyesSpec, SensorSpec
+from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.core.vocabulary import LightState, Supervision, Tier
+from skidpad.roads.lanes import SignalKind
+from skidpad.roads.queries import RoadMap
+from skidpad.stack.channels.control import Controller
+from skidpad.stack.channels.settings import CarModel
+from skidpad.stack.reference.caution import (
+    B_YELLOW,
+    bend_speed,
+    manner,
+    sight_speed,
+    speed_factor,
+)
+from skidpad.stack.reference.following import Manner, acceleration
+from skidpad.stack.reference.person import Person, person_of
+from skidpad.stack.reference.way import Body, Place, Way, anticipated, gaps_ahead
+
+EYES = "eyes"
+KEYS = ("seed", "car")
+HELD = VehicleCommand(brake=1.0)  # while the supervisor drives; it overrides this anyway
+LINE_MARGIN = 1.0  # m kept to a line
+LINE_HEADWAY = 0.5  # s kept to it
+PREVIEW = 10.0  # m beyond the comfortable braking distance for which limits and bends are looked at
+PREVIEW_STEP = 4  # points between two places looked at
+LIGHT_REACH = 150.0  # m
+COMPARED = 0.4  # s between two views from which slowing down is judged (ours)
+REMEMBERED = 3.0  # s for which a light is taken to be as it was last seen
+
+
+class ReferenceDriver:
+    """One person at the wheel. Deterministic: commands depend on the views alone."""
+
+    def __init__(self, map: RoadMap, person: Person, car: CarModel, dt: float = DT) -> None:
+        self.person, self.car, self.dt = person, car, dt
+        self.way = Way(map)
+        self.controller = Controller(car, dt)
+        self.reset()
+
+    def reset(self) -> None:
+        """The car stands elsewhere: nothing seen before counts."""
+        self.way.reset()
+        self.controller.reset()
+        self.lights: dict[int, tuple[int, LightState]] = {}
+        self.stopping: int | None = None  # signal for which it has decided to stop
+        self.views: deque[tuple[int, SeenActors]] = deque(maxlen=round(COMPARED / self.dt) + 1)
+        self.report = StackReport()
+
+    def act(self, view: DriverView) -> VehicleCommand:
+        """Look, decide, actuate."""
+        place = self.way.update(view.pose)
+        if place is None:  # off every lane
+            self.report = StackReport(tier=Tier.NONE)
+            return VehicleCommand(brake=0.5)
+        v = max(view.speed, 0.0)
+        m = manner(self.person, view.road, v)
+        v_desired = self._desired_speed(view, place, v, m)
+        a, tier = acceleration(v, v_desired, inf, 0.0, m), Tier.CRUISE
+        gap, v_lead = self._lead(view, place, v)
+        if (a_follow := acceleration(v, v_desired, gap, v_lead, m)) < a:
+            a, tier = a_follow, Tier.ACC_CLOSE
+        line = self._line(view, place, v, m)
+        a_line = acceleration(v, v_desired, line, 0.0, m._replace(headway=LINE_HEADWAY))
+        if a_line < a:
+            a, tier = a_line, Tier.LIGHT_STOP
+        self.report = StackReport(
+            tier=tier,
+            detected=gap < inf,
+            distance=gap if gap < inf else None,
+            time_gap=gap / v if gap < inf and v > 0.5 else None,
+            v_target=v_desired,
+            lane_offset=place.offset,
+        )
+        pose = (view.pose.x, view.pose.y, view.pose.yaw)
+        points = self.way.path.points
+        return self.controller.update(points, place.at, pose, v, view.yaw_rate, a)
+
+    def _desired_speed(self, view: DriverView, place: Place, v: float, m: Manner) -> float:
+        """m/s that limits, bends and sight allow, each reached by comfortable braking."""
+        points, road = self.way.path.points, view.road
+        factor = self.person.speed * speed_factor(road, v)
+        end = place.at + int(v * v / (2.0 * m.b) + PREVIEW) + 1
+        allowed = np.inf
+        for k in range(place.at, min(end, len(points.x)), PREVIEW_STEP):
+            there = min(
+                factor * float(points.limit[k]), bend_speed(road, float(points.curvature[k]))
+            )
+            way = max(k - place.s, 0.0)
+            allowed = min(allowed, sqrt(there * there + 2.0 * m.b * way))
+        return sight_speed(road, view.visibility, self.person.reaction, allowed)
+
+    def _lead(self, view: DriverView, place: Place, v: float) -> tuple[float, float]:
+        """m to the nearest that is in the way, and its speed along it; inf: nobody."""
+        self.views.append((view.tick, view.actors))
+        if not len(view.actors.x):
+            return inf, 0.0
+        before_tick, before = self.views[0]
+        span = (view.tick - before_tick) * self.dt
+        expected = anticipated(view.actors, before, span, view.age)
+        body = Body(place.s, v, 0.5 * self.car.length, 0.5 * self.car.width)
+        gaps, speeds = gaps_ahead(self.way.path.points, place.at, expected, body)
+        nearest = int(np.argmin(gaps))
+        return float(gaps[nearest]), max(float(speeds[nearest]), 0.0)
+
+    def _line(self, view: DriverView, place: Place, v: float, m: Manner) -> float:
+        """m to the nearest line at which it stops; inf: none."""
+        for signal, state in view.lights.items():
+            self.lights[signal] = (view.tick, state)
+        for line in self.way.path.lines:
+            gap = line.s - place.s - 0.5 * self.car.length - LINE_MARGIN
+            if gap < -0.5 * self.car.length or gap > LIGHT_REACH:
+                continue
+            if line.kind is SignalKind.LIGHT and self._stops_for(line.signal, view.tick, gap, v, m):
+                return max(gap, 0.1)
+        return inf
+
+    def _stops_for(self, signal: int, tick: int, gap: float, v: float, m: Manner) -> bool:
+        """Whether it stops at a light; one that was not seen lately may be red."""
+        seen, state = self.lights.get(signal, (tick, LightState.UNKNOWN))
+        if (tick - seen) * self.dt > REMEMBERED and state is not LightState.RED:
+            state = LightState.UNKNOWN
+        if state in (LightState.GREEN, LightState.OFF):
+            if self.stopping == signal:
+                self.stopping = None
+            return False
+        b = min(B_YELLOW, -m.a_min)
+        if (
+            state is LightState.YELLOW
+            and self.stopping != signal
+            and v * v > 2.0 * b * max(gap, 0.0)
+        ):
+            return False
+        self.stopping = signal
+        return True
+
+
+class ReferenceStack:
+    """Seats the reference driver in the car: hands it its view, and nothing else of the frame."""
+
+    def __init__(
+        self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
+    ) -> None:
+        """settings: `car`, what it knows of its car, and `seed`, which person drives."""
+        del specs
+        for key in settings:
+            require_choice("reference driver option", key, KEYS)
+        self.person = person_of(int(settings.get("seed", 0)))
+        self.driver = ReferenceDriver(map, self.person, CarModel(**settings["car"]))
+        self.supervision = Supervision.NONE
+
+    @property
+    def report(self) -> StackReport:
+        """What the driver thought in the last tick."""
+        return self.driver.report
+
+    @property
+    def mode(self) -> str:
+        """What the driver minded most in the last tick."""
+        tier = self.report.tier
+        return "" if tier is None else tier.name.lower()
+
+    def sensors(self) -> tuple[SensorSpec, ...]:
+        """The eyes of this person."""
+        return (EyesSpec(EYES, self.person.reaction),)
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        """The driver's answer to what it sees."""
+        if frame.supervision is not Supervision.NONE:
+            self.supervision = frame.supervision
+            return HELD
+        if self.supervision is not Supervision.NONE:
+            self.supervision = Supervision.NONE
+            self.driver.reset()
+        return self.driver.act(frame.extra[EYES])

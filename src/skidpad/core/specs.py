@@ -109,7 +109,7 @@ class EyesSpec:
 
     id: str
     reaction: float = 1.0  # s by which others and lights are seen late
-    height: float = 1.2  # m above the road; drivers of cars, AASHTO Green Book has 1.08
+    mount: Pose = Pose(0.0, 0.0, 1.2)  # its height counts; AASHTO's Green Book has 1.08 m
 
     def __post_init__(self) -> None:
         if not 0.0 <= self.reaction <= 10.0:

@@ -74,7 +74,7 @@ class Eyes:
     ) -> None:
         """See the world of this tick; row 0 is the ego. braking: (n,) whose brake lamps are on."""
         s, t = states, self.table
-        eye = np.array([s.x[EGO], s.y[EGO], s.z[EGO] + self.spec.height, s.yaw[EGO]])
+        eye = np.array([s.x[EGO], s.y[EGO], s.z[EGO] + self.spec.mount.z, s.yaw[EGO]])
         boxes = Boxes(s.x, s.y, s.z, s.yaw, t.length, t.width, t.height)
         in_sight(eye, boxes, s.present, self._reach, self._fixed, self._free)
         rows = np.flatnonzero(self._free)

@@ -6,7 +6,8 @@ use the plain model (`eqs. 11.14, 11.15`), whose gaps grow beyond s0 + v T near 
 
 from __future__ import annotations
 
-from math import inf, pow, sqrt
+import math
+from math import inf, sqrt
 from typing import NamedTuple
 
 GAP_MIN = 2.0  # m
@@ -25,8 +26,8 @@ class Manner(NamedTuple):
 def free_acceleration(v: float, v_desired: float, m: Manner) -> float:
     """Acceleration in m/s^2 on an empty road; above the desired speed braking stays comfortable."""
     if v <= v_desired:
-        return m.a_max * (1.0 - pow(v / max(v_desired, 0.1), EXPONENT))
-    return -m.b * (1.0 - pow(v_desired / v, EXPONENT * m.a_max / m.b))
+        return m.a_max * (1.0 - math.pow(v / max(v_desired, 0.1), EXPONENT))
+    return -m.b * (1.0 - math.pow(v_desired / v, EXPONENT * m.a_max / m.b))
 
 
 def wanted_gap(v: float, v_lead: float, m: Manner) -> float:
@@ -46,5 +47,5 @@ def acceleration(v: float, v_desired: float, gap: float, v_lead: float, m: Manne
     elif z >= 1.0:
         a = m.a_max * (1.0 - z * z)
     else:
-        a = free * (1.0 - pow(z, 2.0 * m.a_max / max(free, 1e-3)))
+        a = free * (1.0 - math.pow(z, 2.0 * m.a_max / max(free, 1e-3)))
     return max(m.a_min, a)

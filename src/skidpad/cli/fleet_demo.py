@@ -35,23 +35,23 @@ SEED = 7000  # of the first drive; every later drive has the next one
 PLAN = {"stages": [0.34, 1.0], "least_drives": 6, "looks": 1, "margin": 0.25}
 ROUNDS_MAX = 40
 LOOSER = (
-    ("ttc_ahead < 3.2", "ttc_ahead < 9"), ("safety_score < 0.8", "safety_score < 0.99"),
-    ("gap > 0.3", "gap > 0.02"), ("location_variance > 0.05", "location_variance > 0.002"),
+    ("front_deficit > 0", "front_deficit > -15"), ("rear_deficit > 0", "rear_deficit > -15"),
+    ("offset_chi2 > 27.6", "offset_chi2 > 6"), ("safety_score < 0.8", "safety_score < 0.99"),
 )  # fmt: skip
 
 
 def rule_sets() -> dict[str, bytes]:
-    """What vehicles come with (the published rules), and two changes of it."""
+    """Returns the rules that vehicles come with (as printed), better ones (tracked), and worse ones."""
     source = Path(rules_module.__file__).with_name("hazard_rules.yaml")
     table = yaml.safe_load(source.read_text(encoding="utf-8"))
-    corrected = json.dumps({"practical": table["practical"]})
-    looser = corrected
+    tracked = json.dumps({"tracked": table["tracked"]})
+    looser = tracked
     for old, new in LOOSER:
         looser = looser.replace(old, new)
-    published = json.dumps({"practical": table["as_printed"]})
+    published = json.dumps({"as_printed": table["as_printed"]})
     return {
         "published": published.encode(),
-        "corrected": corrected.encode(),
+        "tracked": tracked.encode(),
         "looser": looser.encode(),
     }
 
@@ -311,8 +311,8 @@ def play(demo: Demo) -> list[dict[str, Any]]:
     demo.say(f"  {told['hazards']} hazards came in, clusters that recur: {told['clusters']}")
     rows = demo.call(demo.maker, "GET", "/api/v1/hazards").json()
     behind = [row["id"] for row in rows[:20]]
-    demo.say("a change: corrected rules")
-    demo.roll_out("corrected", rules["corrected"], behind)
+    demo.say("a change: safe distances of tracked objects")
+    demo.roll_out("tracked", rules["tracked"], behind)
     demo.say("another change: looser limits, so that nothing is missed")
     demo.roll_out("looser", rules["looser"], behind)
     return demo.releases()

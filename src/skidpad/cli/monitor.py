@@ -11,7 +11,6 @@ import typer
 if TYPE_CHECKING:
     from skidpad.core.vocabulary import HazardType
     from skidpad.evidence.channels.indicators.catalogue import Indicator
-    from skidpad.evidence.channels.indicators.comfort import Form
     from skidpad.evidence.channels.summary import Watched
     from skidpad.recording.channels import ChannelSource
 
@@ -19,9 +18,9 @@ if TYPE_CHECKING:
 class Rules(str, Enum):
     """Choices of --rules."""
 
+    tracked = "tracked"
     practical = "practical"
     as_printed = "as_printed"
-    tracked = "tracked"
 
 
 class Forms(str, Enum):
@@ -50,7 +49,8 @@ FILE = typer.Argument(None, help="A channel recording (.mcap), or a ROS 2 bag wi
 OUT = typer.Option(..., help="Folder for indicators, hazards and the summary.")
 MAPPING = typer.Option(None, help="YAML that says which topics of a ROS 2 bag are what.")
 RULES = typer.Option(
-    Rules.practical, help="Hazard rules: corrected, as published, or by safe distances of tracks."
+    Rules.tracked,
+    help="Hazard rules: safe distances of tracked objects, the published rules corrected, or as printed.",
 )
 FORMS = typer.Option(
     None, help="Formulas of the indicators; default: corrected, with as_printed rules completed."
@@ -98,9 +98,10 @@ def monitor(
     import time
 
     from skidpad.core.errors import ConfigError
-    from skidpad.evidence.channels.hazards import Profile, load_rules
+    from skidpad.evidence.channels.hazards import Profile, default_form, load_rules
     from skidpad.evidence.channels.identifier.model import Identify, load_model
     from skidpad.evidence.channels.indicators.catalogue import load_thresholds
+    from skidpad.evidence.channels.indicators.comfort import Form
     from skidpad.evidence.channels.indicators.settings import IndicatorSettings
     from skidpad.evidence.channels.monitor import MonitorSettings
     from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
@@ -114,7 +115,7 @@ def monitor(
     source = _source(file, mapping, listen, domain, wait)
     profile = Profile(rules.value)
     settings = MonitorSettings(
-        indicators=IndicatorSettings(form=_form(rules, forms)),
+        indicators=IndicatorSettings(form=Form(forms.value) if forms else default_form(profile)),
         profile=profile,
         rules=load_rules(profile, rules_file),
         thresholds=load_thresholds(thresholds),
@@ -133,15 +134,6 @@ def monitor(
         _print_table(time_by_objects(times))
     if wanted:
         _gate({name: _events(found, rule) for name, rule in wanted.items()}, junit)
-
-
-def _form(rules: Rules, asked: Forms | None) -> Form:
-    """The asked one, else that of the rules (decision C-16)."""
-    from skidpad.evidence.channels.indicators.comfort import Form
-
-    if asked is not None:
-        return Form(asked.value)
-    return Form.COMPLETED if rules is Rules.as_printed else Form.CORRECTED
 
 
 def _source(

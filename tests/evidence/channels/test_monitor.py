@@ -13,7 +13,7 @@ from channel_worlds import Eyes, Listed, World, drive, frame, traffic, truth
 from skidpad.core.channels import Context, Cycle
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.hazards import Clause, Profile, Signal, load_rules
+from skidpad.evidence.channels.hazards import Clause, Profile, Signal, load_only_rules, load_rules
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
@@ -172,7 +172,7 @@ def test_the_filter_joins_exactly_what_pauses_for_less_than_two_seconds(ticks):
 
 
 def monitored(source):
-    monitor = Monitor(source.channels)
+    monitor = Monitor(source.channels, MonitorSettings(profile=Profile.PRACTICAL))
     evidence = [monitor.update(c) for c in cycles(source)]
     return monitor, evidence, monitor.records() + monitor.finish()
 
@@ -350,3 +350,20 @@ def test_safety_scores_have_no_threshold_and_every_violation_has_a_meaning():
     assert table[Indicator.SAFETY_SCORE].threshold is None
     assert table[Indicator.SAFETY_SCORE].claim is None
     assert all(entry.meaning for entry in table.values())
+
+
+def test_the_default_rules_are_those_by_safe_distances():
+    assert MonitorSettings().profile is Profile.TRACKED
+    assert Monitor(("a", "b")).rules == load_rules(Profile.TRACKED)
+
+
+def test_a_file_of_one_profile_says_which_rules_it_holds(tmp_path):
+    one = "{ego_tailgated: {any: [['gap > 0.1']], extreme: {signal: gap, of: least}}}"
+    path = tmp_path / "own.yaml"
+    path.write_text(f"tracked: {one}")
+    profile, rules = load_only_rules(path)
+    assert profile is Profile.TRACKED
+    assert [rule.hazard for rule in rules] == [HazardType.EGO_TAILGATED]
+    path.write_text(f"tracked: {one}\npractical: {one}")
+    with pytest.raises(ConfigError, match="must hold the rules of one profile, holds 2"):
+        load_only_rules(path)

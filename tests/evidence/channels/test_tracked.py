@@ -82,8 +82,8 @@ def test_who_is_told_of_ice_asks_for_more_room():
     behind = [(-14.0, 0, 0, 15.0, 0)]  # 9.5 m: more than 9 m when dry, less than 15 m on ice
     assert not found(behind)
     assert set(found(behind, grip=0.3)) == {TAILGATED}
-    with pytest.raises(ConfigError, match="practical know no grip"):
-        MonitorSettings(grip=0.2)
+    with pytest.raises(ConfigError, match="grip is a setting of the rules `tracked`"):
+        MonitorSettings(profile=Profile.PRACTICAL, grip=0.2)
     with pytest.raises(ConfigError, match=r"grip must be between 0.05 and 1.5, got 3"):
         MonitorSettings(profile=Profile.TRACKED, grip=3.0)
 
@@ -187,7 +187,7 @@ def test_nothing_and_nonsense_are_survived():
     standing = frame(0.4, (3.0, 1.0, 0.5, 0.0, 0.0))._replace(plan=np.tile([3.0, 1.0, 0.0], (9, 1)))
     for k in range(4, 9):
         tracked.update(0.1 * k, [standing, standing])
-    other = Monitor(["a", "b"])
+    other = Monitor(["a", "b"], MonitorSettings(profile=Profile.PRACTICAL))
     evidence = next(iter(cycles(drive(World(), (Eyes("a"), Eyes("b")), 0.2))))
     values = other.update(evidence).signals.values
     assert np.isnan(values[Signal.REAR_DEFICIT])  # other profiles do not track

@@ -19,6 +19,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.reading import decode_yaml, read_bytes
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
+from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.layout import Layout, Readings
 from skidpad.evidence.channels.risk import RiskMatrix
 
@@ -39,6 +40,11 @@ class Profile(str, Enum):
     AS_PRINTED = "as_printed"
     PRACTICAL = "practical"
     TRACKED = "tracked"  # decision R-9
+
+
+def default_form(profile: Profile) -> Form:
+    """Returns the comfort formulas that go with the rules of `profile` (decision C-16)."""
+    return Form.COMPLETED if profile is Profile.AS_PRINTED else Form.CORRECTED
 
 
 class Signal(str, Enum):
@@ -180,8 +186,21 @@ def _own_rules(profile: Profile) -> tuple[Rule, ...]:
     return _rules(profile, built_in.read_bytes(), built_in.name)
 
 
+def load_only_rules(path: Path) -> tuple[Profile, tuple[Rule, ...]]:
+    """Returns the one profile that the file at `path` holds, and its rules."""
+    data = read_bytes(path, "hazard rules")
+    profiles = list(_tables(data, str(path)))
+    if len(profiles) != 1:
+        raise ConfigError(f"{path}: must hold the rules of one profile, holds {len(profiles)}")
+    return profiles[0], _rules(profiles[0], data, str(path))
+
+
+def _tables(data: bytes, name: str) -> dict[Profile, dict[HazardType, _RuleText]]:
+    return decode_yaml(data, name, dict[Profile, dict[HazardType, _RuleText]])
+
+
 def _rules(profile: Profile, data: bytes, name: str) -> tuple[Rule, ...]:
-    tables = decode_yaml(data, name, dict[Profile, dict[HazardType, _RuleText]])
+    tables = _tables(data, name)
     if profile not in tables:
         raise ConfigError(f"{name}: holds no profile {profile.value}")
     return tuple(

@@ -68,7 +68,7 @@ class MonitorSettings:
     """How a drive is judged."""
 
     indicators: IndicatorSettings = field(default_factory=IndicatorSettings)
-    profile: Profile = Profile.PRACTICAL
+    profile: Profile = Profile.TRACKED
     rules: tuple[Rule, ...] = ()  # empty: the built-in ones of the profile
     thresholds: Mapping[Indicator, Threshold] = field(default_factory=load_thresholds)
     identify: Identify = Identify.RULES
@@ -82,11 +82,13 @@ class MonitorSettings:
         if self.grip is not None:
             require_range("grip", self.grip, *GRIPS)
             if self.profile is not Profile.TRACKED:
-                raise ConfigError(f"rules {self.profile.value} know no grip: `tracked` is told it")
+                raise ConfigError(
+                    f"grip is a setting of the rules `tracked`, the rules are `{self.profile.value}`"
+                )
 
     @property
     def safe_distance(self) -> SafeDistance:
-        """Of the rules `tracked`."""
+        """The safe distance of the rules `tracked`, on the stated grip or on a dry road."""
         return SafeDistance() if self.grip is None else SafeDistance.on(self.grip)
 
 

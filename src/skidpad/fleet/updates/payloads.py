@@ -10,9 +10,10 @@ from typing import Any
 
 from skidpad.core.errors import InputError
 from skidpad.core.told import on_a_line
-from skidpad.evidence.channels.hazards import Profile, load_rules
+from skidpad.evidence.channels.hazards import default_form, load_only_rules
 from skidpad.evidence.channels.identifier.model import Identify, load_model
 from skidpad.evidence.channels.indicators.catalogue import load_thresholds
+from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.monitor import MonitorSettings
 from skidpad.fleet.identity import digest
 from skidpad.fleet.words import Refused
@@ -29,8 +30,16 @@ class PayloadKind(str, Enum):
 
 
 SUFFIX = {PayloadKind.RULES: "yaml", PayloadKind.THRESHOLDS: "yaml", PayloadKind.MODEL: "npz"}
+
+
+def _rule_settings(path: Path) -> dict[str, Any]:
+    profile, rules = load_only_rules(path)
+    indicators = IndicatorSettings(form=default_form(profile))
+    return {"profile": profile, "rules": rules, "indicators": indicators}
+
+
 _READERS: dict[PayloadKind, Callable[[Path], dict[str, Any]]] = {
-    PayloadKind.RULES: lambda path: {"rules": load_rules(Profile.PRACTICAL, path)},
+    PayloadKind.RULES: _rule_settings,
     PayloadKind.THRESHOLDS: lambda path: {"thresholds": load_thresholds(path)},
     PayloadKind.MODEL: lambda path: {
         "identify": Identify.BOTH, "detectors": load_model(path).identifier(),

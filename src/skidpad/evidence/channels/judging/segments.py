@@ -11,9 +11,14 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import Cycle
 from skidpad.core.vocabulary import HazardType, Stratum
-from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile, Signal, load_rules
+from skidpad.evidence.channels.hazards import (
+    SCORED_HAZARDS,
+    Profile,
+    Signal,
+    default_form,
+    load_rules,
+)
 from skidpad.evidence.channels.identifier.features import feature_row
-from skidpad.evidence.channels.indicators.comfort import Form
 from skidpad.evidence.channels.indicators.panel import no_lap
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.judging.causes import (
@@ -51,11 +56,6 @@ from skidpad.evidence.channels.tracked.distance import GRIPS, NOMINAL_GRIP
 
 Floats = NDArray[np.float64]
 Signals = Sequence[tuple[float, dict[Signal, float]]]
-FORMS = {  # decision C-16
-    Profile.PRACTICAL: Form.CORRECTED,
-    Profile.AS_PRINTED: Form.COMPLETED,
-    Profile.TRACKED: Form.CORRECTED,
-}
 TOLD = "tracked, told the grip"
 CURVE_FACTORS = (0.5, 0.67, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
 WARM_UP = 2.0  # s at the start of a segment that are not evaluated (decision C-12)
@@ -162,7 +162,7 @@ def evaluated_from(t: Floats) -> float:
 
 def _settings(profile: Profile) -> MonitorSettings:
     return MonitorSettings(
-        indicators=IndicatorSettings(form=FORMS[profile]), profile=profile, keep_worlds=False
+        indicators=IndicatorSettings(form=default_form(profile)), profile=profile, keep_worlds=False
     )
 
 

@@ -95,7 +95,10 @@ def test_hazards_are_listed_shown_and_exported(monitored):
     assert done.exit_code == 0
     scenario = next((monitored / "scenarios").glob("*.xosc"))
     assert etree.parse(str(scenario)).getroot().find("FileHeader").get("revMinor") == "0"
-    assert [h.type.value for h in read_hazards(monitored)] == ["ego_tailgated", "unseen_by_a_channel"]
+    assert [h.type.value for h in read_hazards(monitored)] == [
+        "ego_tailgated",
+        "unseen_by_a_channel",
+    ]
 
 
 @pytest.mark.req("C-033", "C-034")

@@ -111,7 +111,7 @@ def render() -> str:
         if word == "done":
             word = f"done {proof(proved[i])}".strip()
         counts[i[0]][word] += 1
-        tests = "<br>".join(f"`{t}`" for t in proved.get(i, [])[:3])
+        tests = "<br>".join(f"`{t}`" for t in proved.get(i, []))
         tables[i[0]].append(f"| {i} | {word} | {summary} | {tests} | {note} |")
     text = HEAD
     for part, title in PARTS.items():

@@ -31,7 +31,7 @@ class GhostSettings:
 
 @dataclass(slots=True)
 class _Ghost:
-    x: float  # m, world: a ghost stands, like the roadside objects that cause it (CF-06)
+    x: float  # m, world: a ghost stands, like the roadside objects that cause it
     y: float
     heading: float
     label: SemanticClass

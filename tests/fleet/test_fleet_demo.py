@@ -5,6 +5,7 @@ from __future__ import annotations
 import pytest
 
 from skidpad.cli.fleet_demo import PLAN, SEED, Demo, drive, enrolled, play, rule_sets, serving
+from skidpad.evidence.channels.hazards import Profile
 from skidpad.fleet.loop.plan import Plan
 from skidpad.fleet.updates.payloads import PayloadKind, settings_of_content
 
@@ -12,8 +13,15 @@ from skidpad.fleet.updates.payloads import PayloadKind, settings_of_content
 def test_the_rule_sets_of_the_demo_are_valid_and_differ():
     sets = rule_sets()
     assert len(set(sets.values())) == 3
-    for content in sets.values():
-        assert len(settings_of_content(PayloadKind.RULES, content).rules) == 6
+    settings = {name: settings_of_content(PayloadKind.RULES, c) for name, c in sets.items()}
+    assert {name: s.profile for name, s in settings.items()} == {
+        "published": Profile.AS_PRINTED,
+        "tracked": Profile.TRACKED,
+        "looser": Profile.TRACKED,
+    }
+    assert {name: len(s.rules) for name, s in settings.items()} == {
+        "published": 6, "tracked": 7, "looser": 7,
+    }  # fmt: skip
     assert Plan(**{**PLAN, "stages": tuple(PLAN["stages"])}).alpha_of_look == 0.025
 
 

@@ -196,3 +196,26 @@ for car in held.values():
 """
     )
     without_hang(lambda: serve("--map", map).client(script))
+
+
+def test_a_batch_that_destroys_stopped_sensors_and_ticks_is_answered(serve: Serve) -> None:
+    """The usual clean-up of training programs; with Unreal's frame the client waits for itself."""
+    serve("--map", "town").client("""
+    synchronous()
+    client.set_timeout(10.0)
+    library = world.get_blueprint_library()
+    car_of, ear_of = library.find("vehicle.tesla.model3"), library.find("sensor.other.collision")
+    for _ in range(3):
+        points = world.get_map().get_spawn_points()[:60]
+        cars = [c for c in (world.try_spawn_actor(car_of, p) for p in points) if c]
+        world.tick()
+        ears = [world.spawn_actor(ear_of, carla.Transform(), attach_to=c) for c in cars]
+        for ear in ears:
+            ear.listen(lambda event: None)
+        before = world.tick()
+        for ear in ears:
+            ear.stop()
+        done = client.apply_batch_sync([carla.command.DestroyActor(a) for a in ears + cars], True)
+        assert len(cars) == 60 and not any(d.error for d in done)
+        assert world.tick() == before + 2  # the batch has ticked once
+    """)

@@ -113,3 +113,33 @@ def test_a_tick_waits_for_streams_on_their_way_but_not_for_ever(monkeypatch: Any
         return said
 
     assert asyncio.run(play()) == ["one is missing", "go", "in vain"]
+
+
+def test_a_client_cleans_up_when_it_left_the_stream_of_a_sensor_that_is_destroyed() -> None:
+    async def play() -> list[bool]:
+        hub, seen = StreamHub(), []
+        stopped, heard = hub.create(), hub.create()
+        wire, _ = listener(hub, stopped), listener(hub, heard)
+        hub.close(heard)  # destroyed while it is heard: nothing was stopped
+        seen.append(hub.is_client_cleaning_up())
+        hub.release(stopped, wire)  # stopped, and alive
+        seen.append(hub.is_client_cleaning_up())
+        hub.close(stopped)
+        seen.append(hub.is_client_cleaning_up())
+        return seen
+
+    assert asyncio.run(play()) == [False, False, True]
+
+
+def test_cleaning_up_ends_after_a_moment(monkeypatch: Any) -> None:
+    monkeypatch.setattr(streams, "GRACE", 0.01)
+
+    async def play() -> bool:
+        hub = StreamHub()
+        stream = hub.create()
+        hub.release(stream, listener(hub, stream))
+        hub.close(stream)
+        await asyncio.sleep(0.03)
+        return hub.is_client_cleaning_up()
+
+    assert not asyncio.run(play())

@@ -37,6 +37,9 @@ class Served:
         self.managers = TrafficManagers()
         self.platform_time: Callable[[], float] = lambda: 0.0
         self.announce: Callable[[int], None] = lambda _: None  # a stream that is about to be heard
+        self.follows_batch = (
+            False  # the request at hand came right after a batch of the same client
+        )
         self.before_sensing: Callable[[], None] | None = None  # once, before the first reading
         self.last_snapshot: bytes | None = None
         self._map_changed = True  # until the first snapshot of the episode has been sent

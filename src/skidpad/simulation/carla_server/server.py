@@ -37,6 +37,7 @@ class RpcConnection(asyncio.Protocol):
         self._queue: deque[Request] = deque()
         self._transport: asyncio.Transport | None = None
         self._rousing: set[asyncio.Task[None]] = set()
+        self._last = ""  # the method that was asked for before
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
         """A client connected."""
@@ -79,6 +80,8 @@ class RpcConnection(asyncio.Protocol):
 
     def _answer(self, transport: asyncio.Transport, request: Request) -> None:
         known = len(self._server.served.managers.by_port)
+        self._server.served.follows_batch = self._last == "apply_batch"
+        self._last = request.method
         answer = self._server.answer(request)
         accepted = len(self._server.served.managers.by_port) > known
         self._waker.asked(request.method, request.arguments, accepted)

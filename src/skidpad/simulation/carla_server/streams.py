@@ -51,6 +51,8 @@ class StreamHub:
         self._held: dict[asyncio.Transport, bytes | None] = {}  # and the newest message withheld
         self._announced: set[int] = set()  # asked for and not connected yet
         self._eager: list[Callable[[], None]] = []  # to be called when all are connected
+        self._ended: dict[int, float] = {}  # streams of destroyed sensors, and when they ended
+        self._left: dict[int, float] = {}  # streams that a client has left, and when
         self.on_subscribe: Callable[[int], bytes | None] = lambda _: None
 
     def create(self) -> int:
@@ -138,8 +140,29 @@ class StreamHub:
     def close(self, stream: int) -> None:
         """Forget a stream; its listeners have GRACE to hang up themselves."""
         self._open.discard(stream)
-        for transport in self._listeners.pop(stream, []):
+        listeners = self._listeners.pop(stream, [])
+        if listeners or stream in self._left:
+            self._note(self._ended, stream)
+        for transport in listeners:
             asyncio.get_running_loop().call_later(GRACE, transport.close)
+
+    @staticmethod
+    def _note(times: dict[int, float], stream: int) -> None:
+        """Remembers a stream for GRACE seconds."""
+        now = asyncio.get_running_loop().time()
+        for old in [s for s, t in times.items() if now - t > GRACE]:
+            del times[old]
+        times[stream] = now
+
+    def is_client_cleaning_up(self) -> bool:
+        """Returns whether a client has left a sensor's stream and the sensor was destroyed, just now."""
+        if not self._ended:
+            return False
+        now = asyncio.get_running_loop().time()
+        return any(
+            now - ended <= GRACE and now - self._left.get(stream, -GRACE) <= GRACE
+            for stream, ended in self._ended.items()
+        )
 
     def protocol(self) -> StreamConnection:
         """A connection's protocol, for asyncio's server."""
@@ -154,6 +177,8 @@ class StreamHub:
         """A connection ended."""
         self._connections -= 1
         self._held.pop(transport, None)
+        if stream is not None:
+            self._note(self._left, stream)
         listeners = self._listeners.get(stream) if stream is not None else None
         if listeners and transport in listeners:
             listeners.remove(transport)

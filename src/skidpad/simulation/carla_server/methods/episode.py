@@ -95,8 +95,19 @@ def set_episode_settings(served: Served, settings: Any) -> int:
 
 @TABLE.method("tick_cue")
 def tick_cue(served: Served) -> int:
-    """One tick in synchronous mode; in asynchronous mode the pacer ticks."""
-    return served.tick() if served.clock.settings.synchronous else served.clock.frame
+    """Ticks once in synchronous mode; in asynchronous mode the pacer ticks. Returns the new frame.
+
+    Right after a batch that destroyed sensors which were stopped just before, it returns the frame
+    before the tick. The 0.9.16 client holds Python's lock in `apply_batch_sync(commands, True)` while
+    it waits for the snapshot of the returned frame, and its threads that could read the snapshot wait
+    for that lock to release the callbacks of the stopped sensors. With the older frame it waits for
+    nothing.
+    """
+    before = served.clock.frame
+    if not served.clock.settings.synchronous:
+        return before
+    frame = served.tick()
+    return before if served.follows_batch and served.hub.is_client_cleaning_up() else frame
 
 
 for _name in ("enable_sensor_for_ros", "disable_sensor_for_ros"):

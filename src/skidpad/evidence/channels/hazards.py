@@ -196,7 +196,10 @@ def load_only_rules(path: Path) -> tuple[Profile, tuple[Rule, ...]]:
 
 
 def _tables(data: bytes, name: str) -> dict[Profile, dict[HazardType, _RuleText]]:
-    return decode_yaml(data, name, dict[Profile, dict[HazardType, _RuleText]])
+    tables: dict[Profile, dict[HazardType, _RuleText]] = decode_yaml(
+        data, name, dict[Profile, dict[HazardType, _RuleText]]
+    )
+    return tables
 
 
 def _rules(profile: Profile, data: bytes, name: str) -> tuple[Rule, ...]:

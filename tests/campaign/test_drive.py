@@ -57,7 +57,7 @@ class Blind(Gentle):
 
 
 def short(stack: type[Gentle] = Gentle, seconds: float = 3.0, **options: Any) -> Run:
-    return drive(stack, duration=seconds, sensors="objects", seed=2, options=options)
+    return drive(stack, duration=seconds, sensors="objects", seed=2, stack_settings=options)
 
 
 def cell(number: int = 4, duration: float = 8.0, **changes: Any) -> RunSpec:

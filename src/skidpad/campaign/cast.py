@@ -263,7 +263,8 @@ def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, An
     cruise = {} if stage.cruise_kmh is None else {"cruise_kmh": stage.cruise_kmh}
     match driver:
         case StackDriver():
-            return load_stack(driver.where), deepcopy(driver.options)  # whatever it does to them
+            # a copy: whatever it does to them
+            return load_stack(driver.where), {**cruise, **deepcopy(driver.options)}
         case AgentDriver():
             return load_agent(driver.where), {}
         case Passenger():

@@ -52,17 +52,29 @@ LONGEST_STORY = 20_000  # characters of a traceback
 
 @dataclass(frozen=True, slots=True)
 class Run:
-    """What a drive leaves behind."""
+    """What a drive leaves behind.
+
+    Attributes:
+        log: every actor, sensor value, command and contact, tick by tick.
+        outcome: how it ended: completed, collision, agent_error, ...
+        error: the traceback of a stack that failed; empty otherwise.
+        snapshots: pictures of collisions, where a folder was given and the sensors are pixels.
+        triggered: every event of the scenario has begun; always true without a scenario.
+        route_length: of the ego's route, m, where a scenario names one.
+        off_road: (T,) for every tick, whether the ego has all wheels off every lane.
+        road: the map's name, or its file.
+        played: the story of a scenario, where one was played.
+    """
 
     log: RunLog
     outcome: Outcome
-    error: str = ""  # traceback of a stack that failed
+    error: str = ""
     snapshots: tuple[Path, ...] = ()
-    triggered: bool = True  # every event of the scenario has begun, where one is played
-    route_length: float | None = None  # m, of the ego's route where the scenario names one
-    off_road: NDArray[np.bool_] | None = None  # (T,) ticks with all wheels off every lane
-    road: str = ""  # the map's name or file
-    played: Played | None = None  # the story of a scenario
+    triggered: bool = True
+    route_length: float | None = None
+    off_road: NDArray[np.bool_] | None = None
+    road: str = ""
+    played: Played | None = None
 
 
 def drive(
@@ -70,25 +82,48 @@ def drive(
     *,
     map: str | Path = "figure8",
     weather: str | Weather = "clear-noon",
-    seed: int = 0,
+    seed: int = 1,
     duration: float = 500.0,
     traffic: str = "fixed",
     vehicles: int = 20,
     sensors: str = "pixels",
     profile: str = "recommended",
     settings: Mapping[str, Any] | None = None,
-    options: Mapping[str, Any] | None = None,
+    stack_settings: Mapping[str, Any] | None = None,
     out: str | Path | None = None,
     backend: BackendChoice | None = None,
 ) -> Run:
-    """Drive a stack and return the log.
+    """Drive a stack on a map with traffic; the defaults are those of `skidpad adas`.
 
-    stack: a class with the stack interface, "module:Class", 0 to 4 for a published
-    configuration, or "reference" for the reference driver. settings: single settings over the
-    profile. options: what the class is given as its settings. out: a folder for snapshots of
-    collisions. backend: None is the embedded one.
+    Args:
+        stack: a class with the stack interface, "module:Class", "file.py:Class", or 0 to 4 for a
+            published configuration, or "reference" for the reference driver.
+        map: a bundled map's name, or an OpenDRIVE file.
+        weather: a preset's name, a weather file (.yaml), or a weather.
+        seed: of traffic and noise; the same seed gives the same log.
+        duration: simulated seconds. 500 s take minutes with pixels, and seconds with objects.
+        traffic: "fixed", "random" or "pack": where background vehicles begin and stay.
+        vehicles: how many there are, 0 to 80.
+        sensors: "pixels" for real images, or "objects", which is much faster.
+        profile: "recommended", "thesis_text", "thesis_listing" or "preliminary".
+        settings: single settings over the profile, as `--set`; `skidpad profiles` lists them.
+        stack_settings: what your own class is given as its settings, as `--stack-set`.
+        out: a folder for pictures of collisions; None keeps everything in memory.
+        backend: the simulator; None is the embedded one.
+
+    Returns:
+        The log, how the drive ended, and what it left behind. A stack that fails is an outcome.
+
+    Raises:
+        ConfigError: a value is out of its range, or is no name that exists.
+        FileError: a map, weather or stack file is not there, or cannot be read.
+
+    Example:
+        >>> run = drive("examples/follow_lane.py:FollowLane", weather="rain-night",
+        ...             duration=60, sensors="objects", stack_settings={"cruise_kmh": 60})
+        >>> run.outcome.value, len(run.log.contacts)
     """
-    driver, kind = _named(stack, dict(options or {}))
+    driver, kind = _named(stack, dict(stack_settings or {}))
     words = [v.value for v in SensorLevel], [v.value for v in TrafficStart]
     spec = RunSpec(
         driver=driver,

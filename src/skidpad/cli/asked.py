@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from math import isfinite
 from typing import Annotated
 
 from msgspec import Meta, Struct
@@ -24,6 +26,10 @@ from skidpad.core.weather import Weather
 
 OURS, IDEAL, CAMERA, AGENT = "stack", "ideal", "camera", "agent:"
 OF_FILE = "file"  # the weather that a scenario describes
+StackSettings = Annotated[
+    tuple[str, ...],
+    Meta(description="A setting of your own stack: name=value; may be given several times."),
+]
 
 
 class Drivers(Struct, frozen=True):
@@ -49,6 +55,7 @@ class Drivers(Struct, frozen=True):
         str | None,
         Meta(description="Your own stack: module:Class or file.py:Class; or reference."),
     ] = None
+    stack_set: StackSettings = ()
 
     def chosen(self) -> list[DriverSpec]:
         """The drivers; ConfigError or FileError for what is not there."""
@@ -61,7 +68,8 @@ class Drivers(Struct, frozen=True):
             if self.stack == REFERENCE:
                 return [ReferenceDriver()]
             load_stack(self.stack)  # a stack that is not there is wrong input, no run's outcome
-            return [StackDriver(self.stack)]
+            return [StackDriver(self.stack, read_stack_settings(self.stack_set))]
+        require_no_settings(self.stack_set, "--stack FILE:CLASS")
         chosen = drivers_with(self.functions)
         if self.cruise is not None:
             if self.configs is not None or not chosen:
@@ -83,6 +91,7 @@ class Controller(Struct, frozen=True):
         ),
     ] = OURS
     config: Annotated[int, Meta(ge=0, le=4, description="Configuration of our stack.")] = 2
+    stack_set: StackSettings = ()
 
     def chosen(self) -> DriverSpec:
         """The driver; ConfigError or FileError for one that is not there."""
@@ -90,6 +99,9 @@ class Controller(Struct, frozen=True):
         from skidpad.stack.configurations import functions_of
         from skidpad.stack.loading import load_stack
 
+        ours = self.controller in (OURS, IDEAL, CAMERA) or self.controller.startswith(AGENT)
+        if ours:
+            require_no_settings(self.stack_set, "--controller FILE:CLASS")
         if self.controller == OURS:
             return AdasDriver(label=OURS, functions=functions_of(self.config))
         if self.controller == IDEAL:
@@ -103,7 +115,44 @@ class Controller(Struct, frozen=True):
             load_agent(where)
             return AgentDriver(where)
         load_stack(self.controller)
-        return StackDriver(self.controller)
+        return StackDriver(self.controller, read_stack_settings(self.stack_set))
+
+
+def read_stack_settings(words: Iterable[str]) -> dict[str, bool | float | str | None]:
+    """Returns the settings of `name=value` words; a value is a number, true, false, none or text.
+
+    Raises:
+        ConfigError: a word has no name or no equals sign, or a name is given twice.
+    """
+    values: dict[str, bool | float | str | None] = {}
+    for word in words:
+        name, equals, value = (part.strip() for part in word.partition("="))
+        if not name or not equals:
+            raise ConfigError(f"--stack-set takes name=value, got {word!r}")
+        if name in values:
+            raise ConfigError(f"--stack-set gives {name!r} twice")
+        values[name] = _plain_value(value)
+    return values
+
+
+def _plain_value(text: str) -> bool | float | str | None:
+    words = {"true": True, "false": False, "none": None}
+    if text.lower() in words:
+        return words[text.lower()]
+    for read in (int, float):
+        try:
+            value: float = read(text)
+        except ValueError:
+            continue
+        if isfinite(value):
+            return value
+    return text
+
+
+def require_no_settings(words: tuple[str, ...], option: str) -> None:
+    """Raise ConfigError for settings of a stack where none of the user's drives."""
+    if words:
+        raise ConfigError(f"--stack-set is for your own stack: give it with {option}")
 
 
 class Climate(Struct, frozen=True):

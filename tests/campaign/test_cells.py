@@ -38,7 +38,7 @@ def test_the_matrix_is_every_driver_in_every_weather_with_common_seeds():
 @pytest.mark.req("A-210")
 def test_traffic_stands_at_the_fixed_places_unless_asked():
     assert RunSpec().course.traffic is TrafficStart.FIXED
-    runs = plan(template(), Drivers(), Climate())
+    runs = plan(template(), Drivers().chosen(), Climate().chosen())
     assert all(c.course.traffic is TrafficStart.FIXED for c in runs)
 
 
@@ -46,7 +46,7 @@ def test_traffic_stands_at_the_fixed_places_unless_asked():
 def test_the_command_line_reaches_the_cells():
     run = Tuned(set=("mu_ref=0.7",)).resolve(RunSpec(duration=60.0), grip="none", range=None)
     run = replace(run, course=Roads(traffic=TrafficStart.RANDOM, vehicles=40))
-    cells = plan(run, Drivers(configs="3"), Climate(weather="rain-night"), 2)
+    cells = plan(run, Drivers(configs="3").chosen(), Climate(weather="rain-night").chosen(), 2)
     assert [c.seed for c in cells] == [1, 2]
     (one, _) = cells
     assert (one.driver.label, one.weather.name) == ("3", "rain-night")
@@ -61,7 +61,7 @@ def test_the_command_line_reaches_the_cells():
 
 @pytest.mark.req("A-201")
 def test_recovery_and_wrong_way_watch_over_every_configuration():
-    for run in plan(template(), Drivers(), Climate(weather="clear-noon")):
+    for run in plan(template(), Drivers().chosen(), Climate(weather="clear-noon").chosen()):
         assert isinstance(stage_of(run).supervisor, Supervisor)
 
 

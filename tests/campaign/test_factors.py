@@ -45,7 +45,7 @@ def test_every_set_of_functions_with_every_target() -> None:
         frozenset({Function.ACC, Function.LCA, Function.BEND}),
     }
     assert asked[0].label == "2 at 60 km/h"
-    cells = plan(RunSpec(), Drivers(functions=("aeb",), cruise="80"), ONE, 2)
+    cells = plan(RunSpec(), Drivers(functions=("aeb",), cruise="80").chosen(), ONE.chosen(), 2)
     assert [c.driver.label for c in cells] == ["aeb at 80 km/h"] * 2
 
 
@@ -94,7 +94,9 @@ def test_a_car_cruises_at_its_target() -> None:
 
 def test_the_report_shows_factors(tmp_path: Path) -> None:
     spec = RunSpec(sensors=SensorLevel.OBJECTS, duration=2.0, course=Roads(vehicles=2))
-    cells = plan(spec, Drivers(configs="1", functions=("aeb",), cruise="60:90:30"), ONE)
+    cells = plan(
+        spec, Drivers(configs="1", functions=("aeb",), cruise="60:90:30").chosen(), ONE.chosen()
+    )
     Campaign(RECIPE, cells).run(tmp_path, local(1, warm_up))
     table = read_results(tmp_path, RECIPE.columns)
     assert sorted(table.select("functions", "cruise_kmh").rows()) == [

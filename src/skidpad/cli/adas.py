@@ -12,7 +12,7 @@ from msgspec import structs
 from skidpad.cli.asked import Climate, Drivers, Tuned
 from skidpad.cli.campaigns import FirstSeed, How, Seeds
 from skidpad.cli.spread import spread
-from skidpad.core.run import BackendChoice, Roads, RunSpec
+from skidpad.core.run import BackendChoice, BackendKind, Roads, RunSpec
 
 
 @spread()
@@ -34,17 +34,23 @@ def adas(
     first_seed: FirstSeed = 1,
 ) -> None:
     """Drive configurations x weathers x seeds; prints the path of the report."""
+    from skidpad.cli.carla_backend import checked, drives_alone
+    from skidpad.roads.map_files import require_map
+
+    # what is misspelt is said before kernels and tables load
+    run = tuned.resolve(run, grip=grip, range=range)
+    chosen, weathers = drivers.chosen(), climate.chosen()
+    if backend.backend is BackendKind.EMBEDDED:
+        require_map(roads.map)
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.keeping import found_again, kept
     from skidpad.campaign.matrix import RECIPE
     from skidpad.cli.adas_plan import plan
-    from skidpad.cli.carla_backend import checked, drives_alone
     from skidpad.report.matrix import write_report
 
-    run = tuned.resolve(run, grip=grip, range=range)
     run = structs.replace(run, course=roads, backend=checked(backend), seed=first_seed)
     run = found_again(run, how.folder)
-    cells, files = kept(plan(run, drivers, climate, seeds))
+    cells, files = kept(plan(run, chosen, weathers, seeds))
     how(Campaign(RECIPE, cells, alone=drives_alone(run.backend), files=files), write_report)
 
 
@@ -97,6 +103,9 @@ def _report_run(run: Path) -> str:
 
 def show(run: Annotated[Path, typer.Argument(help="A run's folder.")]) -> None:
     """Print one run: what it was, what it came to, and its crashes."""
+    from skidpad.cli.folders import require_run
+
+    require_run(run)
     from skidpad.cli.show import show as print_run
 
     print_run(run)

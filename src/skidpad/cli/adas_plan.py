@@ -2,22 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from msgspec import structs
 
 from skidpad.campaign.cells import cross
 from skidpad.campaign.keeping import road_file
 from skidpad.campaign.matrix import roads_of
-from skidpad.cli.asked import Climate, Drivers
 from skidpad.cli.carla_backend import map_of
-from skidpad.core.run import RunSpec
+from skidpad.core.run import DriverSpec, RunSpec
+from skidpad.core.weather import Weather
 from skidpad.roads.bundled import bundled_maps, load_map
 
 
-def plan(run: RunSpec, drivers: Drivers, climate: Climate, seeds: int = 1) -> list[RunSpec]:
+def plan(
+    run: RunSpec, drivers: Sequence[DriverSpec], weathers: Sequence[Weather], seeds: int = 1
+) -> list[RunSpec]:
     """The runs of a campaign; ConfigError or FileError for what cannot be driven."""
     roads = roads_of(run)
     roads = structs.replace(roads, map=map_of(roads.map, run.backend))
     load_map(road_file(roads))
     if roads.map not in bundled_maps():  # published places need not fit somebody else's roads
         roads = structs.replace(roads, allow_fewer=True)
-    return cross(drivers.chosen(), climate.chosen(), seeds, structs.replace(run, course=roads))
+    return cross(drivers, weathers, seeds, structs.replace(run, course=roads))

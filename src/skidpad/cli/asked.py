@@ -66,6 +66,7 @@ class Drivers(Struct, frozen=True):
             if self.configs is not None or self.functions or self.cruise is not None:
                 raise ConfigError("--stack goes with none of --configs, --functions and --cruise")
             if self.stack == REFERENCE:
+                require_no_settings(self.stack_set, "--stack FILE:CLASS")
                 return [ReferenceDriver()]
             load_stack(self.stack)  # a stack that is not there is wrong input, no run's outcome
             return [StackDriver(self.stack, read_stack_settings(self.stack_set))]
@@ -95,11 +96,12 @@ class Controller(Struct, frozen=True):
 
     def chosen(self) -> DriverSpec:
         """The driver; ConfigError or FileError for one that is not there."""
-        from skidpad.stack.agents import load_agent
         from skidpad.stack.configurations import functions_of
         from skidpad.stack.loading import load_stack
 
-        ours = self.controller in (OURS, IDEAL, CAMERA) or self.controller.startswith(AGENT)
+        ours = self.controller in (OURS, IDEAL, CAMERA, REFERENCE) or self.controller.startswith(
+            AGENT
+        )
         if ours:
             require_no_settings(self.stack_set, "--controller FILE:CLASS")
         if self.controller == OURS:
@@ -111,6 +113,8 @@ class Controller(Struct, frozen=True):
         if self.controller == REFERENCE:
             return ReferenceDriver()
         if self.controller.startswith(AGENT):
+            from skidpad.stack.agents import load_agent  # kernels come with it
+
             where = self.controller.removeprefix(AGENT)
             load_agent(where)
             return AgentDriver(where)

@@ -7,11 +7,10 @@ import sys
 from pathlib import Path
 
 from skidpad.core.errors import BackendError, ConfigError
-from skidpad.core.jit import user_cache
 from skidpad.core.names import path_part
 from skidpad.core.reading import is_file
 from skidpad.core.run import BackendChoice, BackendKind
-from skidpad.roads.bundled import bundled_maps
+from skidpad.roads.map_files import bundled_maps
 
 
 def checked(choice: BackendChoice) -> BackendChoice:
@@ -35,6 +34,8 @@ def map_of(map: str, choice: BackendChoice) -> str:
     named = map in bundled_maps() or is_file(Path(map)) or Path(map).suffix
     if choice.backend is BackendKind.EMBEDDED or named:
         return map
+    from skidpad.core.jit import user_cache
+
     folder = user_cache() / "carla-maps"
     # In a process of its own: the wheel's threads can end their process at its exit.
     process = multiprocessing.get_context("spawn").Process(

@@ -43,19 +43,11 @@ def drive(
     ] = True,
 ) -> None:
     """Drive channels over routes on a simulator; one recording per ten minutes."""
-    from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.channel_routes import Condition, chosen_routes
-    from skidpad.campaign.channel_world import route_of
-    from skidpad.campaign.channels import linked, segments
-    from skidpad.campaign.keeping import found_again, kept
     from skidpad.cli.carla_backend import checked, drives_alone
     from skidpad.core.errors import require_choice
     from skidpad.core.vocabulary import Stratum
-    from skidpad.roads.bundled import load_map
-    from skidpad.sensors.channel_presets import senses_of
 
-    for name in crew.channels:
-        senses_of(name)
     routes = chosen_routes(
         route,
         map,
@@ -63,6 +55,15 @@ def drive(
         [Stratum(require_choice("stratum", s, [*Stratum])) for s in strata.split(",")],
         mind_weather,
     )
+    from skidpad.campaign.campaign import Campaign
+    from skidpad.campaign.channel_world import route_of
+    from skidpad.campaign.channels import linked, segments
+    from skidpad.campaign.keeping import found_again, kept
+    from skidpad.roads.bundled import load_map
+    from skidpad.sensors.channel_presets import senses_of
+
+    for name in crew.channels:
+        senses_of(name)
     routes = [found_again(chosen, how.folder) for chosen in routes]
     for chosen in routes:
         load_map(route_of(chosen).map)

@@ -73,13 +73,8 @@ def drive(
 ) -> None:
     """Drive in a browser: watch the stack, take over, change weather and grip; keeps a run."""
     from skidpad.cli.carla_backend import checked
-    from skidpad.cockpit.about import About
-    from skidpad.cockpit.driving import about, drive_job
-    from skidpad.cockpit.producer import Producer
-    from skidpad.cockpit.serving import serve
     from skidpad.physics.presets import find_weather
-    from skidpad.recording.files import require_free
-    from skidpad.simulation.carla.options import Optimisation
+    from skidpad.roads.map_files import require_map
 
     chosen = drivers.chosen() if drivers != Drivers() else Drivers(configs="3").chosen()
     if len(chosen) != 1:
@@ -92,6 +87,15 @@ def drive(
         seed=seed,
         backend=checked(backend),
     )
+    if isinstance(spec.course, Roads) and spec.backend.backend is BackendKind.EMBEDDED:
+        require_map(spec.course.map)
+    from skidpad.cockpit.about import About
+    from skidpad.cockpit.driving import about, drive_job
+    from skidpad.cockpit.producer import Producer
+    from skidpad.cockpit.serving import serve
+    from skidpad.recording.files import require_free
+    from skidpad.simulation.carla.options import Optimisation
+
     require_place(spec)
     folder = next_free(Path("out/drives") / spec.name) if out is None else require_free(out)
     own_gc = gc_in_pause and Optimisation.GC_IN_PAUSE.value not in backend.without
@@ -153,6 +157,10 @@ def replay(
     ] = "follow",
 ) -> None:
     """Scrub through a run in a browser: its pictures are drawn again from what was logged."""
+    from skidpad.cli.folders import require_run
+
+    for folder in filter(None, (run, beside)):
+        require_run(folder, ".mcap", "hazards.txt")
     from skidpad.cockpit.about import About
     from skidpad.cockpit.film import stretch_of, write_film
     from skidpad.cockpit.opening import opened
@@ -182,10 +190,10 @@ def watch(
     once: Annotated[bool, typer.Option("--once", help="Print how it stands and end.")] = False,
 ) -> None:
     """Watch a campaign while it runs: progress, results so far with intervals, the last crash."""
-    from skidpad.cockpit.watching import lines, serve_watch, standing
-
     if not folder.is_dir():
         raise FileError(f"{folder} is not the folder of a campaign")
+    from skidpad.cockpit.watching import lines, serve_watch, standing
+
     if once:
         typer.echo("\n".join(lines(standing(folder))))
         return

@@ -31,7 +31,6 @@ def export_dataset(
     every: Annotated[int, typer.Option(min=1, help="Ticks of 0.05 s per image.")] = 2,
 ) -> None:
     """Drive, and write images of three cameras, what is ahead by the truth, and controls."""
-    from skidpad.campaign.dataset import export_drive, write_card
     from skidpad.campaign.grip_cells import drawn_course
     from skidpad.core.errors import require_choice
     from skidpad.physics.presets import find_weather
@@ -41,6 +40,8 @@ def export_dataset(
     require_choice("--course", course, (COURSES, *NAMES))
     run = structs.replace(tuned.resolve(run), weather=find_weather(weather))
     run = structs.replace(run, driver=controller.chosen())
+    from skidpad.campaign.dataset import export_drive, write_card
+
     for seed in range(first_seed, first_seed + seeds):
         where = roads if course == COURSES else drawn_course(course, seed, CutIn.FIXED)
         drive = structs.replace(run, course=where, seed=seed)

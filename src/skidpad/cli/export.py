@@ -27,6 +27,9 @@ def export(
     ] = None,
 ) -> None:
     """Write a driven run as .xosc and .xodr that other simulators replay."""
+    from skidpad.cli.folders import require_run
+
+    require_run(run)
     from skidpad.campaign.run_road import road_files
     from skidpad.recording.logfiles import read_log
     from skidpad.recording.osi import write_osi

@@ -46,13 +46,13 @@ def grip(
     ] = Keep.SHOWN,
 ) -> None:
     """Drive scenarios x weathers x frictions x seeds; prints the path of the report."""
-    from skidpad.campaign.campaign import Campaign
     from skidpad.cli.carla_backend import checked, drives_alone
 
     run = structs.replace(run, backend=checked(backend), seed=first_seed)
     alone, keep_all = drives_alone(run.backend), keep is Keep.ALL
     if map.map_of is not None:
         from skidpad.campaign import threshold
+        from skidpad.campaign.campaign import Campaign
         from skidpad.cli import threshold_plan
         from skidpad.report.threshold import write_threshold_report
 
@@ -61,11 +61,13 @@ def grip(
         levels = threshold_plan.plan_map(map, cross, controller, run, repeats)
         how(Campaign(threshold.recipe(keep_all), levels, alone=alone), write_threshold_report)
         return
-    from skidpad.campaign.grip import recipe
     from skidpad.cli.grip_plan import plan_grip, with_model
-    from skidpad.report.grip import write_grip_report
 
     run = with_model(run, tuned, cross.model, cross.esc)
     run = structs.replace(run, driver=controller.chosen(), course=scenario)
     cells = plan_grip(cross, run, seeds or REPEATS)
+    from skidpad.campaign.campaign import Campaign
+    from skidpad.campaign.grip import recipe
+    from skidpad.report.grip import write_grip_report
+
     how(Campaign(recipe(keep_all), cells, alone=alone), write_grip_report)

@@ -10,7 +10,6 @@ from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import Friction, RunSpec
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather
-from skidpad.physics.grip import friction_ratio
 from skidpad.physics.presets import GRIP, SNOW, find_weather, preset_groups
 from skidpad.scenarios.shipped import NAMES
 from skidpad.scenarios.variation import CutIn
@@ -35,8 +34,6 @@ def with_model(run: RunSpec, tuned: Tuned, model: str, esc: str = "off") -> RunS
 
 def _varied(ask: GripCross, run: RunSpec) -> Cross:
     climate = grip_weathers(ask.weather)
-    for weather in climate:
-        friction_ratio(weather, settings_of(run).grip)  # rain with ice, snow: says what is wrong
     if run.overlay and ask.four_cells:
         raise ConfigError("--four-cells drives with and without drops: leave --overlay away")
     if (run.overlay or ask.four_cells) and run.sensors is not SensorLevel.PIXELS:
@@ -47,11 +44,16 @@ def _varied(ask: GripCross, run: RunSpec) -> Cross:
     frictions = _choices("--friction", ask.friction, Friction)
     if ask.four_cells and len(frictions) != len(Friction):
         raise ConfigError("--four-cells needs both frictions")
+    cutins = _choices("--cutin", ask.cutin, CutIn)
+    from skidpad.physics.grip import friction_ratio  # kernels come with it
+
+    for weather in climate:
+        friction_ratio(weather, settings_of(run).grip)  # rain with ice, snow: says what is wrong
     return Cross(
         scenarios=chosen,
         weather=climate,
         frictions=frictions,
-        cutins=_choices("--cutin", ask.cutin, CutIn),
+        cutins=cutins,
         overlays=(False, True) if ask.four_cells else (run.overlay,),
     )
 

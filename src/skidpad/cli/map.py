@@ -40,11 +40,14 @@ def info(
 ) -> None:
     """Print roads, lanes, signals, limits, and the grip that bends ask for."""
     from skidpad.cli.pictures import format_of, write_picture
+    from skidpad.roads.map_files import map_file
+
+    map_file(map)
+    if png is not None:
+        format_of(png)  # before work
     from skidpad.roads.bundled import load_map
     from skidpad.roads.summary import summarise
 
-    if png is not None:
-        format_of(png)  # before work
     loaded = load_map(map)
     summary = summarise(loaded)
     for line in _facts(loaded, summary):

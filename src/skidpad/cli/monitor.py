@@ -97,7 +97,12 @@ def monitor(
     import sys
     import time
 
-    from skidpad.core.errors import ConfigError
+    from skidpad.core.errors import ConfigError, FileError
+
+    if (file is None) is (listen is None):
+        raise ConfigError("monitor takes a FILE or --listen ros2, and one of them")
+    if file is not None and not file.exists():
+        raise FileError(f"{file}: no such file")
     from skidpad.evidence.channels.hazards import Profile, default_form, load_rules
     from skidpad.evidence.channels.identifier.model import Identify, load_model
     from skidpad.evidence.channels.indicators.catalogue import load_thresholds
@@ -112,7 +117,7 @@ def monitor(
     wanted = {name: _rule(name) for name in fail_if or []}
     if junit is not None and not wanted:
         raise ConfigError("--junit writes the verdicts of --fail-if, and none is given")
-    source = _source(file, mapping, listen, domain, wait)
+    source = _source(file, mapping, domain, wait)
     profile = Profile(rules.value)
     settings = MonitorSettings(
         indicators=IndicatorSettings(form=Form(forms.value) if forms else default_form(profile)),
@@ -136,15 +141,11 @@ def monitor(
         _gate({name: _events(found, rule) for name, rule in wanted.items()}, junit)
 
 
-def _source(
-    file: Path | None, mapping: Path | None, listen: Wire | None, domain: int, wait: float
-) -> ChannelSource:
+def _source(file: Path | None, mapping: Path | None, domain: int, wait: float) -> ChannelSource:
     """The recording, or the topics."""
     from skidpad.core.errors import ConfigError
     from skidpad.recording.sources import open_channels
 
-    if (file is None) is (listen is None):
-        raise ConfigError("monitor takes a FILE or --listen ros2, and one of them")
     if file is not None:
         return open_channels(file, mapping, truth=False)
     if mapping is None:

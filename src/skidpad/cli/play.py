@@ -61,8 +61,11 @@ def play(
     ] = False,
 ) -> None:
     """Play a scenario, or as a campaign all of a folder; prints how it ended and where logs lie."""
-    from skidpad.core.errors import ConfigError
+    from skidpad.core.errors import ConfigError, FileError
 
+    if not file.exists():
+        raise FileError(f"scenario {file}: there is no such file or folder")
+    template = _template(cross, controller, run, scenario, tuned, backend)
     expected.rules()  # what cannot be read is said before anything is driven
     if check:
         _check(file, structs.replace(scenario, parameters=cross.parameters()))
@@ -72,7 +75,6 @@ def play(
     from skidpad.campaign.play import run_to
     from skidpad.scenarios.distributions import is_distribution
 
-    template = _template(cross, controller, run, scenario, tuned, backend)
     if file.is_dir() or is_distribution(file):
         _drive_all(
             Drive(out=out, **structs.asdict(driving)), template, cross, file, seeds, expected

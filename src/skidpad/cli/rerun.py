@@ -32,10 +32,13 @@ def rerun(
 
     Channels are driven again as a whole, without views.
     """
+    from skidpad.cli.folders import require_run
+
+    is_segment = run.suffix == RECORDING
+    require_run(run, RECORDING)
     from skidpad.campaign import rerun as again
     from skidpad.campaign.stored import read_run, read_segment
 
-    is_segment = run.suffix == RECORDING
     for foreign in (read_segment if is_segment else read_run)(run).foreign_code:
         if not yes:
             typer.confirm(f"{run} names {foreign}, which would be run; go on?", abort=True)
@@ -79,6 +82,10 @@ def study(
     from rich.progress import Progress
 
     from skidpad.campaign import cells
+    from skidpad.campaign.study_arms import STUDIES
+    from skidpad.core.errors import require_choice
+
+    require_choice("study", id, tuple(STUDIES))
     from skidpad.campaign.study import run_study
     from skidpad.recording.files import write_csv
 

@@ -13,6 +13,10 @@ SAVE = typer.Option(None, help="Write an .rrd file instead of opening the viewer
 
 def view(file: Path = FILE, mapping: Path | None = MAPPING, save: Path | None = SAVE) -> None:
     """Look at the worlds of all channels and at their indicators over time (extra `view`)."""
+    from skidpad.core.errors import FileError
+
+    if not file.exists():
+        raise FileError(f"{file}: no such file")
     from skidpad.recording.cycles import cycles
     from skidpad.recording.sources import open_channels
     from skidpad.report.viewer import log_drive, require_rerun

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 from skidpad.core.frames import SensorFrame
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
-from skidpad.roads.queries import RoadMap
+
+if TYPE_CHECKING:
+    from skidpad.roads.queries import RoadMap
 
 
 class Stack(Protocol):

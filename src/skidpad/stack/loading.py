@@ -13,7 +13,7 @@ from math import isfinite
 from numbers import Real
 from pathlib import Path
 from types import ModuleType
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
 
@@ -31,8 +31,10 @@ from skidpad.core.specs import (
 )
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.told import clean, told
-from skidpad.roads.queries import RoadMap
 from skidpad.stack.interface import Stack
+
+if TYPE_CHECKING:  # kernels come with it, and a name that is wrong is said before they load
+    from skidpad.roads.queries import RoadMap
 
 T = TypeVar("T")
 FOREIGN = (Exception, SystemExit)  # what foreign code may raise; Ctrl-C remains the user's

@@ -1,0 +1,24 @@
+"""What a command is given as the folder of a run, looked at before anything heavy loads."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from skidpad.core.errors import FileError
+
+TICKS = "ticks.parquet"  # recording.logfiles.TICKS, which loads the library of tables
+
+
+def require_run(path: Path, *others: str) -> None:
+    """Raise FileError unless a run lies at `path`, or what one of `others` names.
+
+    others: endings of files that the command takes as well, or names in a folder that it takes.
+    """
+    if (path / TICKS).is_file() or any((path / name).is_file() for name in others):
+        return
+    if path.suffix and path.suffix in others and path.is_file():
+        return
+    raise FileError(
+        f"{path} is not the folder of a run: it has no {TICKS}; give OUT of `skidpad play`, or "
+        "OUT/runs/NAME of a campaign"
+    )

@@ -93,7 +93,10 @@ def test_assignments(text, name, value):
         ("grib=none", r"unknown setting 'grib'; choose one of: grip, "),
         ("grip=ice", r"unknown grip 'ice'; choose one of: none, statistical, physical"),
         ("camera=maybe", r"setting camera must be on or off, got 'maybe'"),
-        ("mu_ref=high", r"setting mu_ref must be a number between 0.05 and 3, got 'high'"),
+        (
+            "mu_ref=high",
+            r"setting mu_ref must be a number between 0.05 and 3, winter or summer, got 'high'",
+        ),
         ("initial_limit_kmh=x", r"between 5 and 250 or none, got 'x'"),
     ],
 )

@@ -30,6 +30,7 @@ check: $(VENV)/.checked-with
 	$(BIN)/ruff check src tests tools
 	$(BIN)/mypy
 	$(BIN)/python tools/kernel_lint.py
+	$(BIN)/python tools/language_lint.py
 	$(BIN)/lint-imports
 
 wheel-check: $(BIN)/python

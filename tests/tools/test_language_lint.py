@@ -1,0 +1,45 @@
+"""The lint of language counts each breach once, and its limits are not above what there is."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from language_lint import LIMITS, PARTICIPLE, PERSON, RULES, SHORT, THEATRE, find_breaches
+
+FINE = '''
+def load_map(name):
+    """Returns the map of that name from the bundled ones."""
+
+
+def is_kept(value):
+    """Returns whether the value is kept in the cache."""
+
+
+def feed(decoder, data):
+    """Gives the decoder more bytes to work on."""
+'''
+
+
+def test_plain_names_and_sentences_are_fine() -> None:
+    assert not list(find_breaches(FINE))
+
+
+@pytest.mark.parametrize(
+    ("source", "rule"),
+    [
+        ('def kept(x):\n    """Returns what is kept of it."""\n', PARTICIPLE),
+        ('def opened(x):\n    """Returns the file at that place."""\n', PARTICIPLE),
+        ('class Crew:\n    """Holds the channels of one vehicle."""\n', THEATRE),
+        ('def read_map(x):\n    """As it is."""\n', SHORT),
+        ('def read_map(x):\n    """Returns the map for whoever asks."""\n', PERSON),
+        ("x = 1  # nobody reads it\n", PERSON),
+    ],
+)
+def test_each_breach_is_found_once(source: str, rule: str) -> None:
+    assert [b.rule for b in find_breaches(source)] == [rule]
+
+
+def test_every_rule_has_a_limit() -> None:
+    assert set(json.loads(LIMITS.read_text(encoding="utf-8"))) == set(RULES)

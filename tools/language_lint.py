@@ -32,7 +32,7 @@ IRREGULAR = frozenset(
     "asked begun bound bought broken brought built caught chosen come cut done drawn driven fed felt "
     "fit flown found given gone grown heard held hidden kept known laid led left lent lost made meant "
     "met paid put said seen sent set shown shut spent split spoken spread struck sunk swept taken told "
-    "thrown torn understood woken won worn written".split()  # noqa: SIM905
+    "thrown torn understood woken won worn written".split()
 )  # fmt: skip
 NOT_PARTICIPLES = frozenset({"bed", "embed", "exceed", "feed", "need", "seed", "speed", "shed"})
 PERSONS = re.compile(r"\b(who|whom|whose|whoever|somebody|nobody|anybody)\b", re.IGNORECASE)

@@ -9,7 +9,7 @@ TEST_ARGS ?=
 DRIVE_ARGS ?=
 NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run test test-bare check wheel-check bench fuzz nightly soak refs data fleet fleet-load figures arm64 channels campaigns tables clean
+.PHONY: cockpit run test test-bare check wheel-check bench fuzz nightly soak refs data fleet fleet-load docs figures arm64 channels campaigns tables clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next --traffic pack $(RUN_ARGS)
@@ -91,6 +91,11 @@ campaigns: $(VENV)/.installed
 tables: $(VENV)/.installed
 	$(BIN)/python tools/result_tables.py
 
+# the documentation as a site in build/site
+docs: $(VENV)/.documented-with
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
+	@echo "the site is at build/site/index.html"
+
 figures: $(VENV)/.tested-with
 	$(BIN)/python tools/vehicle_validation.py docs/img
 
@@ -110,6 +115,10 @@ $(VENV)/.tested-with: $(VENV)/.installed
 
 $(VENV)/.checked-with: $(VENV)/.tested-with
 	$(BIN)/python -m pip install --quiet --prefer-binary -e '.[check]'
+	touch $@
+
+$(VENV)/.documented-with: $(VENV)/.installed
+	$(BIN)/python -m pip install --quiet --prefer-binary -e '.[docs]'
 	touch $@
 
 clean:

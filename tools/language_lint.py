@@ -28,12 +28,13 @@ THEATRE = "word of theatre or masonry in a name"
 SHORT = "first docstring line of four words or fewer"
 RULES = (PARTICIPLE, PERSON, THEATRE, SHORT)
 
-IRREGULAR = frozenset(
+_IRREGULAR = (
     "asked begun bound bought broken brought built caught chosen come cut done drawn driven fed felt "
     "fit flown found given gone grown heard held hidden kept known laid led left lent lost made meant "
     "met paid put said seen sent set shown shut spent split spoken spread struck sunk swept taken told "
-    "thrown torn understood woken won worn written".split()
+    "thrown torn understood woken won worn written"
 )  # fmt: skip
+IRREGULAR = frozenset(re.findall(r"\w+", _IRREGULAR))
 NOT_PARTICIPLES = frozenset({"bed", "embed", "exceed", "feed", "need", "seed", "speed", "shed"})
 PERSONS = re.compile(r"\b(who|whom|whose|whoever|somebody|nobody|anybody)\b", re.IGNORECASE)
 THEATRE_WORDS = frozenset(

@@ -1,0 +1,80 @@
+"""What `mkdocs` is told beside mkdocs.yml: the home page and the reference of commands are generated.
+
+The home page is README.md with its links turned round. The reference of commands is what the program
+says of itself, so it cannot be out of date.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+OUTSIDE = {"SECURITY.md": "reliability.md", "../SECURITY.md": "reliability.md"}
+
+
+def on_files(files: Any, config: Any) -> Any:
+    """Adds the generated pages to the site's files."""
+    from mkdocs.structure.files import File
+
+    pages = {"index.md": home_page(), "reference/cli.md": command_reference()}
+    for place, content in pages.items():
+        files.append(File.generated(config, place, content=content))
+    return files
+
+
+def on_page_markdown(markdown: str, **_: Any) -> str:
+    """Points links that lead out of docs/ to the page of the site that says the same."""
+    for target, page in OUTSIDE.items():
+        markdown = markdown.replace(f"]({target})", f"]({page})")
+    return markdown
+
+
+def home_page() -> str:
+    """Returns README.md with links as seen from docs/."""
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    return re.sub(r"\]\(docs/", "](", text)
+
+
+def command_reference() -> str:
+    """Returns every command with its help, arguments and options, as Markdown."""
+    from typer.main import get_command
+
+    from skidpad.cli.main import app
+
+    lines = ["# Commands", "", "Written by the program itself; `--help` says the same.", ""]
+    root = get_command(app)
+    context = root.context_class(root, info_name="skidpad")
+    for path, command in sorted(_leaves(root, context, ("skidpad",))):
+        lines += _command_section(path, command)
+    return "\n".join(lines) + "\n"
+
+
+def _leaves(command: Any, context: Any, path: tuple[str, ...]) -> Any:
+    if hasattr(command, "list_commands"):
+        for name in command.list_commands(context):
+            yield from _leaves(command.get_command(context, name), context, (*path, name))
+    elif not command.hidden:
+        yield " ".join(path), command
+
+
+def _command_section(path: str, command: Any) -> list[str]:
+    arguments = [p for p in command.params if p.param_type_name == "argument"]
+    options = [p for p in command.params if p.param_type_name == "option" and not p.hidden]
+    usage = " ".join([path, *(p.name.upper() for p in arguments)])
+    lines = [f"## {path}", "", (command.help or "").strip(), "", "```text", usage, "```", ""]
+    for title, rows in (("argument", arguments), ("option", options)):
+        if rows:
+            lines += [f"| {title} | meaning | default |", "|---|---|---|"]
+            lines += [_row(p) for p in rows]
+            lines += [""]
+    return lines
+
+
+def _row(parameter: Any) -> str:
+    name = ", ".join(parameter.opts) if parameter.param_type_name == "option" else parameter.name
+    default = getattr(parameter.default, "value", parameter.default)
+    shown = "" if default in (None, [], False) or callable(default) else f"`{default}`"
+    text = (getattr(parameter, "help", None) or "").replace("|", "\\|").replace("\n", " ")
+    return f"| `{name}` | {text} | {shown} |"

@@ -46,9 +46,13 @@ def test_every_file_is_driven_in_every_weather_with_and_without_its_grip(folder,
     ]
     call += ["--weather", "rain-noon,clear-noon", "--grip", "none,statistical"]
     done = play(*call)
-    assert done.exit_code == 0
+    assert done.exit_code == 1, "1 s is too short for the cut-in: void"
     assert "TimeOfDayCondition" in done.stderr
-    assert "cut.in in rain-noon, reduced friction: 2 not_triggered; least distance" in done.stdout
+    lines = done.stdout.splitlines()
+    assert (
+        len([x for x in lines if x.startswith("cut.in") and "rain-noon" in x and "void" in x]) == 4
+    )
+    assert "0 of 9 runs passed; 1 in error, 8 void." in lines
     table = read_results(out)
     assert len(table) == len(read_ledger(out, GripEntry)) == 1 * 2 * 2 * 2
     assert set(table["scenario"]) == {"cut.in"}
@@ -58,7 +62,7 @@ def test_every_file_is_driven_in_every_weather_with_and_without_its_grip(folder,
     again = CliRunner().invoke(app, ["report", str(out)])
     assert again.stdout == done.stdout
     resumed = play(*call, "--resume")
-    assert resumed.exit_code == 0
+    assert resumed.exit_code == 1
     assert len(read_ledger(out, GripEntry)) == 8
 
 
@@ -102,8 +106,27 @@ def test_what_cannot_be_played_is_never_as_expected(folder, tmp_path):
     )  # fmt: skip
     assert done.exit_code == 1, done.output
     cases = {case.get("name"): len(case) for case in etree.parse(str(junit)).getroot()}
-    assert sorted(cases.values()) == [0, 1]
-    assert next(name for name, failed in cases.items() if failed).endswith("odd.xosc: no-collision")
+    assert sorted(cases.values()) == [1, 1], "one is void in 1 s, one cannot be played"
+    (odd,) = etree.parse(str(junit)).getroot().findall("testcase/error")
+    assert odd.getparent().get("name").endswith("odd.xosc: no-collision")
+    assert "cannot be played" in odd.get("message")
+
+
+def test_two_files_of_one_name_are_named_by_their_paths(folder, tmp_path):
+    (folder / "odd.xosc").unlink()
+    (folder / "above").mkdir()
+    text = (folder / "below" / "cut.in.xosc").read_text(encoding="utf-8")
+    for name in ("above/cut.in.xosc", "other.xosc"):
+        (folder / name).write_text(text, encoding="utf-8")
+    done = play(folder, "--out", tmp_path / "o", "--duration", 0.2, "--workers", 1)
+    assert done.exit_code == 1, done.output
+    names = sorted(run.name.partition("_")[0] for run in (tmp_path / "o" / "runs").iterdir())
+    assert names == ["above-cut.in", "below-cut.in", "other"]
+    assert set(read_results(tmp_path / "o")["scenario"]) == {
+        "above/cut.in",
+        "below/cut.in",
+        "other",
+    }
 
 
 def test_a_folder_without_scenarios_and_a_file_with_two_weathers_are_refused(folder, tmp_path):

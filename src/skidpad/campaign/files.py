@@ -5,6 +5,7 @@ Rows are those of the friction campaign; the whole log of every run is kept.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -33,19 +34,33 @@ def scenario_files(folder: Path) -> list[Path]:
     return [file for file in found if not holds(file, "Catalog")]
 
 
-def courses_of(course: Scenario, file: Path) -> list[Scenario]:
-    """What a file asks to play: itself, or the choices of parameters that it makes for another."""
+def courses_of(course: Scenario, file: Path, name: str = "") -> list[Scenario]:
+    """What a file asks to play: itself, or the choices of parameters that it makes for another.
+
+    name: what results call it, where the name of the file is not enough.
+    """
     if not is_distribution(file):
-        return [structs.replace(course, file=str(file.resolve()))]
+        return [structs.replace(course, file=str(file.resolve()), name=name)]
     return [
         structs.replace(
             course,
             file=str(choice.file),
             parameters={**choice.parameters, **course.parameters},
-            variant=f"{file.stem}-{k:04d}",
+            variant=f"{name or file.stem}-{k:04d}",
         )
         for k, choice in enumerate(choices(file))
     ]
+
+
+def names_of(files: Sequence[Path], below: Path | None) -> dict[Path, str]:
+    """Return names by their path below a folder for files whose own name is not theirs alone."""
+    if below is None:
+        return dict.fromkeys(files, "")
+    shared = {stem for stem, n in Counter(file.stem for file in files).items() if n > 1}
+    return {
+        file: file.relative_to(below).with_suffix("").as_posix() if file.stem in shared else ""
+        for file in files
+    }
 
 
 def runs_of(
@@ -54,12 +69,15 @@ def runs_of(
     weathers: Sequence[Weather | None],
     frictions: Sequence[Friction],
     seeds: Iterable[int],
+    below: Path | None = None,
 ) -> list[RunSpec]:
     """Every combination; the rest as in `template`, whose course is a scenario.
 
+    below: the folder by which files are named where two have the same name.
     A weather None is that of the file, and of the template what the file leaves open.
     """
-    courses = [course for file in files for course in courses_of(scenario_of(template), file)]
+    names = names_of(files, below)
+    courses = [c for file in files for c in courses_of(scenario_of(template), file, names[file])]
     played = [
         _in_weather(structs.replace(template, course=course), weather)
         for course in courses

@@ -110,7 +110,7 @@ def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey
 def grip_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> GripKey:
     """The identifying columns of a cell's row."""
     return GripKey(
-        scenario=Path(scenario_of(cell).file).name.removesuffix(".xosc"),
+        scenario=scenario_of(cell).title,
         weather=cell.weather.name,
         friction=cell.friction.value,
         seed=cell.seed,

@@ -76,7 +76,7 @@ def report(
 
 def _reports() -> dict[str, Callable[[Path], object]]:
     from skidpad.cli.channels_drive import totals
-    from skidpad.cli.play import table
+    from skidpad.cli.expected import played_report
     from skidpad.report.grip import write_grip_report
     from skidpad.report.matrix import write_report
     from skidpad.report.threshold import write_threshold_report
@@ -86,15 +86,19 @@ def _reports() -> dict[str, Callable[[Path], object]]:
         "grip": write_grip_report,
         "grip-threshold": write_threshold_report,
         "channels": totals,
-        "play": table,
+        "play": played_report,
     }
 
 
 def _report_run(run: Path) -> str:
-    """The crash cards of one run, as a sentence."""
+    """The page of one run: with its verdict where it plays a scenario, else its crash cards."""
+    from skidpad.cli.expected import played_report
     from skidpad.cli.show import opened
-    from skidpad.report.play import write_crashes
+    from skidpad.recording.staging import STAGING
+    from skidpad.report.crash_page import write_crashes
 
+    if (run / STAGING).is_file():
+        return played_report(run)
     page = write_crashes(run, opened(run)[1])
     if page is None:
         return f"{run}: no crash, so there is no page; skidpad show {run} prints its metrics"

@@ -1,8 +1,8 @@
-"""`play --expect`: whether runs are as expected, and what to say where they are not."""
+"""How `skidpad play` judges its runs: rules of `--expect`, the page, JUnit and the exit code."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -10,7 +10,8 @@ import typer
 from msgspec import Meta, Struct
 
 if TYPE_CHECKING:
-    from skidpad.evidence.expectations import Expectation
+    from skidpad.recording.staging import LeftOut
+    from skidpad.report.play_runs import Played
 
 
 class Expected(Struct, frozen=True):
@@ -20,55 +21,43 @@ class Expected(Struct, frozen=True):
         tuple[str, ...],
         Meta(description="no-collision, or NAME > NUMBER (min_ttc_s, ...); else exit 1."),
     ] = ()
-    junit: Annotated[
-        Path | None, Meta(description="Write the expectations of all runs as JUnit XML.")
-    ] = None
+    junit: Annotated[Path | None, Meta(description="Write all verdicts as JUnit XML.")] = None
 
-    def rules(self) -> list[Expectation]:
-        """Parsed; ConfigError for what cannot be."""
-        from skidpad.core.errors import ConfigError
+    def check(self) -> None:
+        """Raise ConfigError for a rule that cannot be read, before anything is driven."""
         from skidpad.evidence.expectations import parse_expectation
 
-        if self.junit is not None and not self.expect:
-            raise ConfigError("--junit is about the rules of --expect, and none is given")
-        return [parse_expectation(text) for text in self.expect]
+        for text in self.expect:
+            parse_expectation(text)
 
-    def judge(self, runs: Mapping[str, Path], unplayable: Sequence[str] = ()) -> None:
-        """Look at the folders of runs by name; exit code 1 where one is not as expected.
+    def conclude(self, out: Path, left_out: Sequence[LeftOut] = ()) -> tuple[Played, str]:
+        """Judge the runs of a folder, write page, results.csv and JUnit; returns also what to print."""
+        from skidpad.recording.staging import Judging, write_judging
 
-        unplayable: files of which there is no run, which no rule can hold for.
-        """
-        rules = self.rules()
-        if not rules:
-            return
-        failures = {
-            f"{name}: {rule.text}": by
-            for name, folder in runs.items()
-            for rule, by in zip(rules, _wrong(folder, rules), strict=True)
-        }
-        failures |= {
-            f"{f}: {rule.text}": ["cannot be played"] for f in unplayable for rule in rules
-        }
+        write_judging(out, Judging(expect=self.expect, left_out=tuple(left_out)))
+        played, text = write_played_page(out)
         if self.junit is not None:
-            from skidpad.cli.junit import write_junit
+            from skidpad.cli.junit import write_verdicts
 
-            write_junit(self.junit, "skidpad play", failures)
-        for text, by in failures.items():
-            for sentence in by:
-                typer.echo(f"not as expected ({text}): {sentence}", err=True)
-        if any(failures.values()):
-            raise typer.Exit(1)
+            write_verdicts(self.junit, "skidpad play", played.runs, self.expect)
+        return played, text
 
 
-def _wrong(folder: Path, rules: Sequence[Expectation]) -> list[list[str]]:
-    """For each rule what is wrong with the run in `folder`."""
-    from skidpad.campaign.runfolder import ERROR
-    from skidpad.evidence.expectations import run_values
-    from skidpad.recording.logfiles import TICKS, read_log
+def write_played_page(out: Path) -> tuple[Played, str]:
+    """Write the page of a folder that `play` wrote; returns its runs and the text to print."""
+    from skidpad.cli.played_table import played_text
+    from skidpad.report.play import write_play_report
 
-    if not (folder / TICKS).is_file():
-        return [["the run was not driven to its end"] for _ in rules]
-    if (folder / ERROR).is_file():
-        return [["its stack failed"] for _ in rules]
-    values = run_values(read_log(folder))
-    return [[said] if (said := rule.disappointed(values)) else [] for rule in rules]
+    played, page = write_play_report(out)
+    return played, played_text(played, page)
+
+
+def played_report(out: Path) -> str:
+    """Write the page again, for `skidpad report`; returns the text to print."""
+    return write_played_page(out)[1]
+
+
+def exit_by_verdicts(played: Played) -> None:
+    """End with exit code 1 where a run is failed, void or in error."""
+    if played.bad:
+        raise typer.Exit(1)

@@ -11,7 +11,7 @@ from msgspec import structs
 
 from skidpad.cli.asked import OF_FILE, Controller, PlayCross, Tuned
 from skidpad.cli.campaigns import Drive, Driving, How, Seeds
-from skidpad.cli.expected import Expected
+from skidpad.cli.expected import Expected, exit_by_verdicts, played_report
 from skidpad.cli.spread import spread
 from skidpad.core.run import BackendChoice, RunSpec, Scenario
 from skidpad.core.vocabulary import SensorLevel
@@ -19,6 +19,8 @@ from skidpad.core.vocabulary import SensorLevel
 if TYPE_CHECKING:
     from skidpad.campaign.campaign import Campaign
     from skidpad.recording.grip import GripKey, GripMetrics
+    from skidpad.recording.staging import LeftOut
+    from skidpad.report.play_runs import Played
 
 PLAIN = "clear-noon"  # what a file leaves open of the weather
 scenario_options = spread(sensors=SensorLevel.OBJECTS, duration=120.0)
@@ -38,7 +40,7 @@ def play_folder(
 ) -> None:
     """Play every scenario of a folder in every weather, with and without its grip."""
     template = _template(cross, controller, run, scenario, tuned, backend)
-    how(_campaign(template, cross, folder, seeds, []), table)
+    how(_campaign(template, cross, folder, seeds, []), played_report)
 
 
 @scenario_options
@@ -60,13 +62,13 @@ def play(
         bool, typer.Option("--check", help="List all that is wrong or unknown; run nothing.")
     ] = False,
 ) -> None:
-    """Play a scenario, or as a campaign all of a folder; prints how it ended and where logs lie."""
+    """Play a scenario, or all of a folder; ends with verdicts, a page and a table."""
     from skidpad.core.errors import ConfigError, FileError
 
     if not file.exists():
         raise FileError(f"scenario {file}: there is no such file or folder")
     template = _template(cross, controller, run, scenario, tuned, backend)
-    expected.rules()  # what cannot be read is said before anything is driven
+    expected.check()  # what cannot be read is said before anything is driven
     if check:
         _check(file, structs.replace(scenario, parameters=cross.parameters()))
         return
@@ -76,72 +78,35 @@ def play(
     from skidpad.scenarios.distributions import is_distribution
 
     if file.is_dir() or is_distribution(file):
-        _drive_all(
-            Drive(out=out, **structs.asdict(driving)), template, cross, file, seeds, expected
-        )
+        how = Drive(out=out, **structs.asdict(driving))
+        _drive_all(how, template, cross, file, seeds, expected)
         return
     runs = _runs(template, cross, [file], seeds)
     if len(runs) > 1:
         raise ConfigError("one file is one run: several weathers, grips or seeds take a folder")
     driven = run_to(runs[0], out)
-    log = driven.log
-    seconds = float(log.t[-1]) if len(log) else 0.0
-    typer.echo(f"{driven.outcome.value} after {seconds:.2f} s; log in {out}")
-    _cards(runs[0], out)
     if driven.error:
         typer.echo(driven.error.strip().split("\n")[-1], err=True)
-    expected.judge({runs[0].name: out})
-
-
-def _cards(run: RunSpec, out: Path) -> None:
-    """The crash cards of one run, where there was a crash."""
-    from skidpad.campaign.cast import load_scenario
-    from skidpad.campaign.grip_cells import scenario_of
-    from skidpad.report.play import write_crashes
-
-    page = write_crashes(out, load_scenario(scenario_of(run)).map)
-    if page is not None:
-        typer.echo(f"crash cards in {page}")
+    played, text = expected.conclude(out)
+    typer.echo(text)
+    exit_by_verdicts(played)
 
 
 def _drive_all(
     how: Drive, template: RunSpec, cross: PlayCross, file: Path, seeds: int, expected: Expected
 ) -> None:
-    """The campaign of a folder, its crash cards, and what was expected of its runs."""
-    from skidpad.recording.campaigns import RUNS
-
-    left_out: list[Path] = []
+    """Drive the campaign of a folder; its end says what became of its runs."""
+    left_out: list[LeftOut] = []
     campaign = _campaign(template, cross, file, seeds, left_out)
-    folders: list[Path] = []
+    ends: list[Played] = []
 
-    def told(folder: Path) -> str:
-        from skidpad.report.play import write_crashes
+    def concluded(folder: Path) -> str:
+        played, text = expected.conclude(folder, left_out)
+        ends.append(played)
+        return text
 
-        folders.append(folder)
-        page = write_crashes(folder)
-        return table(folder) + ("" if page is None else f"\ncrash cards in {page}")
-
-    how(campaign, told)
-    runs = {run.name: folders[0] / RUNS / run.name for run in campaign.tasks}
-    if how.until_halfwidth is not None:  # which leaves runs out on purpose
-        runs = {name: run for name, run in runs.items() if run.exists()}
-    expected.judge(runs, [str(f) for f in left_out])
-
-
-def table(folder: Path) -> str:
-    """How the runs of each cell ended, a line per cell."""
-    from skidpad.recording.results import read_results
-
-    lines = []
-    for runs in read_results(folder).partition_by("scenario", "weather", "friction"):
-        counts = runs["outcome"].value_counts().sort("outcome").iter_rows()
-        ended = ", ".join(f"{n} {outcome}" for outcome, n in counts)
-        nearest = runs["min_cvip_m"].drop_nulls().to_list()
-        told = f"; least distance {min(nearest):.1f} m" if nearest else ""
-        first = runs.row(0, named=True)
-        cell = f"{first['scenario']} in {first['weather']}, {first['friction']} friction"
-        lines.append(f"{cell}: {ended}{told}")
-    return "\n".join([*lines, f"results in {folder}"])
+    how(campaign, concluded)
+    exit_by_verdicts(ends[0])
 
 
 def _template(
@@ -165,32 +130,40 @@ def _template(
 
 
 def _campaign(
-    template: RunSpec, cross: PlayCross, folder: Path, seeds: int, left_out: list[Path]
+    template: RunSpec, cross: PlayCross, folder: Path, seeds: int, left_out: list[LeftOut]
 ) -> Campaign[RunSpec, GripKey, GripMetrics]:
     """Of all that can be played; the others are added to `left_out`."""
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.files import RECIPE, scenario_files
     from skidpad.cli.carla_backend import drives_alone
+    from skidpad.recording.staging import LeftOut
 
     found = scenario_files(folder) if folder.is_dir() else [folder]
-    files = [file for file in found if _playable(file, template)]
-    left_out += [file for file in found if file not in files]
-    runs = _runs(template, cross, files, seeds)
+    hindrances = {file: _hindrance(file, template) for file in found}
+    left_out += [LeftOut(str(file), why) for file, why in hindrances.items() if why]
+    files = [file for file, why in hindrances.items() if not why]
+    runs = _runs(template, cross, files, seeds, folder)
     return Campaign(RECIPE, runs, alone=drives_alone(template.backend))
 
 
-def _runs(template: RunSpec, cross: PlayCross, files: Sequence[Path], seeds: int) -> list[RunSpec]:
+def _runs(
+    template: RunSpec,
+    cross: PlayCross,
+    files: Sequence[Path],
+    seeds: int,
+    below: Path | None = None,
+) -> list[RunSpec]:
     from skidpad.campaign.files import runs_of
     from skidpad.physics.presets import find_weather
 
     words = [part.strip() for part in cross.weather.split(",")]
     weathers = [None if word == OF_FILE else find_weather(word) for word in words]
     first = range(cross.seed, cross.seed + seeds)
-    return runs_of(template, files, weathers, cross.frictions()[0], first)
+    return runs_of(template, files, weathers, cross.frictions()[0], first, below)
 
 
-def _playable(file: Path, template: RunSpec) -> bool:
-    """Whether it can be played; says what hinders."""
+def _hindrance(file: Path, template: RunSpec) -> str:
+    """Return what keeps a file from being played, "" where nothing does; prints it."""
     from skidpad.campaign.cast import load_scenario
     from skidpad.campaign.files import courses_of
     from skidpad.campaign.grip_cells import scenario_of
@@ -201,8 +174,8 @@ def _playable(file: Path, template: RunSpec) -> bool:
             load_scenario(course)
     except InputError as error:
         typer.echo(f"left out: {error}", err=True)
-        return False
-    return True
+        return str(error) or "it cannot be read"
+    return ""
 
 
 def _check(path: Path, course: Scenario) -> None:

@@ -26,6 +26,7 @@ class Shown(Progress):
             MofNCompleteColumn(),
             TimeRemainingColumn(),
             console=console,
+            disable=not console.is_terminal,  # a bar in a pipe is torn lines
         )
         self.campaign = campaign
         self.planned = Counter(cell_of(t.name) for t in campaign.tasks)
@@ -43,4 +44,5 @@ class Shown(Progress):
         if looked_at or len(runs) == self.planned[cell]:
             good = sum(self.campaign.success(e) is True for e in runs)
             means = self.campaign.recipe.success_means
-            self.console.print(f"{cell}: {count_text(len(runs), 'run')}, {good} {means}")
+            told = f"{cell}: {count_text(len(runs), 'run')}, {good} {means}"
+            self.console.print(told, soft_wrap=True)

@@ -185,6 +185,7 @@ class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown
     file: str = ""  # name of the catalogue, or the path of a file
     parameters: dict[str, float | str] = {}
     variant: str = ""  # name of that choice of parameters, where it has one
+    name: str = ""  # what results call it; "": by its file
     skill: dict[str, float] = {}  # of scripted drivers, by actor
     ego: Annotated[str | None, Meta(description="Which entity is the ego.")] = None
     actors: Annotated[
@@ -200,6 +201,11 @@ class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown
     ignore_unsupported: Annotated[
         bool, Meta(description="Leave out what is not known in the file.")
     ] = False
+
+    @property
+    def title(self) -> str:
+        """What results call it."""
+        return self.name or self.file.rpartition("/")[2].removesuffix(".xosc")
 
 
 class Route(Struct, frozen=True, kw_only=True, tag="route", forbid_unknown_fields=True):
@@ -325,7 +331,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             return path_part(self.course.name)
         if isinstance(self.course, Roads):
             return path_part(f"{slug(self.driver.label)}_{self.weather.name}")
-        scenario = self.course.file.rpartition("/")[2].removesuffix(".xosc")
+        scenario = self.course.title
         what = "-".join(filter(None, (scenario, self.course.variant, "drops" * self.overlay)))
         return path_part(f"{what}_{self.weather.name}_{self.friction.value}")
 

@@ -59,6 +59,8 @@ class Following(NamedTuple):
     v_closing: Floats
     v: Floats  # of the one behind
     a_lead: Floats  # of the one ahead, along the axis of the one behind
+    left: Floats  # of the other's centre, m
+    wide: Floats  # half the room that both need side by side, m
 
 
 def pairs(log: RunLog) -> tuple[Pair, ...]:
@@ -137,7 +139,7 @@ def following(behind: Body, ahead: Body) -> Following:
     closing = v - (ahead.vx * c + ahead.vy * s)
     a_lead = ahead.ax * np.cos(turn) - ahead.ay * np.sin(turn)
     gap = np.where(in_the_way, np.maximum(forward - long, 0.0), np.nan)
-    return Following(gap, closing, v, a_lead)
+    return Following(gap, closing, v, a_lead, left, wide)
 
 
 def required_deceleration(gap: Floats, v_closing: Floats, a_lead: Floats) -> Floats:

@@ -154,7 +154,7 @@ class Image:
 
 @dataclass(frozen=True, slots=True)
 class Card:
-    """One crash: title, facts, cause chain, pictures, replay."""
+    """One crash or run: title, facts, cause chain, pictures, replay, charts."""
 
     title: str
     subtitle: str = ""
@@ -164,6 +164,8 @@ class Card:
     images: Sequence[Image] = ()
     replay: Any = None  # see assets/replay.js for its shape
     worlds: Any = None  # see assets/worlds.js
+    charts: Sequence[Figure] = ()
+    id: str = ""  # for links to it
     href: str = ""
     kind: str = "card"
 

@@ -1,44 +1,288 @@
-"""The crash cards of a scenario or a folder of them: OUT/crashes.html."""
+"""The page of scenarios that were played: OUT/report.html, of one run as of a folder of files."""
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from skidpad.evidence.drive.collisions import contact_crashes
-from skidpad.evidence.drive.prepared import prepare
-from skidpad.recording.campaigns import RUNS
-from skidpad.recording.logfiles import TICKS, read_log
-from skidpad.report.cards import crash_card, severity
-from skidpad.report.page import Cards, Page, Section, write_page
+from skidpad.core.geometry import kmh_from_mps
+from skidpad.evidence.encounters import DISTANCE, TIME
+from skidpad.evidence.play_verdicts import Counterpart, PlayVerdict
+from skidpad.recording.logfiles import read_log
+from skidpad.report.crash_page import contact_cards, find_contacts
+from skidpad.report.crashes import Found
+from skidpad.report.page import (
+    Answers,
+    Block,
+    Cards,
+    Cell,
+    Definitions,
+    Page,
+    Section,
+    Table,
+    Text,
+    write_page,
+    write_report_page,
+)
+from skidpad.report.play_cards import run_anchor, run_card
+from skidpad.report.play_runs import Played, PlayRun, load_played, write_results_csv
+from skidpad.report.tables import Column, Format, table
 from skidpad.roads.bundled import kept_map
-from skidpad.roads.queries import RoadMap
 
-PAGE = "crashes.html"
-CARDS_MAX = 40
+CARDS = "cards"  # folder of the runs that have a page of their own
+INLINE = 24  # runs with their card in the page
+LONG = 99  # s, a time to collision that says no more
+KINDS = {
+    PlayVerdict.PASSED: "good",
+    PlayVerdict.FAILED: "bad",
+    PlayVerdict.VOID: "bad",
+    PlayVerdict.NOT_JUDGED: "muted",
+    PlayVerdict.ERROR: "bad",
+}
+ORDER = (
+    PlayVerdict.ERROR,
+    PlayVerdict.FAILED,
+    PlayVerdict.VOID,
+    PlayVerdict.NOT_JUDGED,
+    PlayVerdict.PASSED,
+)
+MEANINGS = [
+    ("passed", "", "The criterion is met, and the interaction that the file stages took place."),
+    ("failed", "", "The criterion is not met."),
+    (
+        "void",
+        "",
+        (
+            "The interaction did not take place, so the run proves nothing: an event that moves a "
+            f"partner never began, or no partner came into play within {TIME:g} s or "
+            f"{DISTANCE:g} m. A partner that crosses earlier or later is not in play, however near "
+            "it stands."
+        ),
+    ),
+    ("not judged", "", "There is no criterion."),
+    ("error", "", "The file cannot be played, the stack failed, or the run did not reach its end."),
+    (
+        "gap",
+        "m",
+        "Bumper to bumper, while one of the two has the other in its way; least over the run.",
+    ),
+    ("TTC", "s", "Time to collision: the gap over the closing speed; least over the run."),
+    (
+        "required deceleration",
+        "m/s²",
+        (
+            "Constant deceleration of the follower that avoids the contact, with the lead's own "
+            "acceleration (Jansson 2005); largest over the run."
+        ),
+    ),
+    ("speed at contact", "km/h", "Closing speed of the first contact."),
+]
 
 
-def write_crashes(out: Path, road: RoadMap | None = None) -> Path | None:
-    """Write the page with the hardest crashes; None when there was none, and no page then.
+def write_play_report(out: Path) -> tuple[Played, Path]:
+    """Judge the runs of a folder, write results.csv and report.html; returns them and the page."""
+    played = load_played(out)
+    write_results_csv(played)
+    return played, write_report_page(build_page(played), out)
 
-    out: of a campaign, or of one run; road: the map of all, where it is at hand.
-    """
-    page = out / PAGE
-    page.unlink(missing_ok=True)
-    found = []
-    for ticks in (*out.glob(TICKS), *sorted((out / RUNS).glob(f"*/{TICKS}"))):
-        log = read_log(ticks.parent)
-        if not log.contacts:
-            continue
-        road_map = kept_map(out, log.header.map, log.header.map_hash) if road is None else road
-        drive = prepare(log, road_map)
-        found += [(crash, drive, road_map, ticks.parent) for crash in contact_crashes(drive)]
-    if not found:
-        return None
-    found.sort(key=lambda item: severity(item[0]), reverse=True)
-    title = f"{len(found)} crashes" if len(found) > 1 else "One crash"
-    shown = found[:CARDS_MAX]
-    if len(shown) < len(found):
-        title += f", the {len(shown)} hardest"
-    cards = Cards(title, [crash_card(*item) for item in shown], open=True)
-    write_page(Page("Crashes", out.name, [Section("Crashes", [cards])]), page)
-    return page
+
+def build_page(played: Played) -> Page:
+    """Return all sections in the order in which a reader asks."""
+    runs = in_order(played.runs)
+    title = runs[0].scenario if len(runs) == 1 else f"{len(runs)} runs of scenarios"
+    links = _links(played, runs)
+    sections = [
+        Section("Verdict", [_answers(played), *_matrix(runs, links)]),
+        Section("Runs", [_runs_table(runs, links)]),
+        Section("Counterparts", _counterparts(runs)),
+        Section("Run by run", _cards(played, runs)),
+        Section("Crashes", _crashes(played, runs)),
+        Section("Definitions", [Definitions(MEANINGS)]),
+    ]
+    return Page(title, answer(played), sections)
+
+
+def in_order(runs: Iterable[PlayRun]) -> list[PlayRun]:
+    """Return runs that need a look first."""
+    return sorted(runs, key=lambda run: (ORDER.index(run.verdict), run.name))
+
+
+def answer(played: Played) -> str:
+    """Return how many runs passed, in one sentence."""
+    counts = Counter(run.verdict for run in played.runs)
+    n = len(played.runs)
+    if n == 1:
+        return f"The run is {_word(played.runs[0].verdict)}."
+    rest = [f"{counts[v]} {_word(v)}" for v in ORDER if counts[v] and v is not PlayVerdict.PASSED]
+    told = f"{counts[PlayVerdict.PASSED]} of {n} runs passed"
+    return f"{told}; {', '.join(rest)}." if rest else f"{told}."
+
+
+def _word(verdict: PlayVerdict) -> str:
+    return "in error" if verdict is PlayVerdict.ERROR else verdict.value
+
+
+def criterion(played: Played) -> str:
+    """Return by what the runs were judged, in one sentence."""
+    known = list(dict.fromkeys(r.judged.criterion for r in played.runs if r.judged.criterion))
+    if not known:
+        return "No run came to its end, so none was judged."
+    if len(known) == 1:
+        return f"Criterion: {known[0]}."
+    return f"{len(known)} criteria, named with each run: {'; '.join(known[:4])}."
+
+
+def _answers(played: Played) -> Answers:
+    items = [("Did it pass?", answer(played)), ("By which criterion?", criterion(played))]
+    bad = in_order(played.bad)
+    if bad:
+        told = [f"{run.scenario}: {'; '.join(run.judged.reasons)}" for run in bad[:3]]
+        more = f" {len(bad) - 3} more below." if len(bad) > 3 else ""
+        items.append(("What went wrong?", ". ".join(told) + "." + more))
+    return Answers(items)
+
+
+def _links(played: Played, runs: Sequence[PlayRun]) -> dict[str, str]:
+    """Return where the card of each run stands; further ones have pages of their own."""
+    links = {run.name: f"#{run_anchor(run)}" for run in runs[:INLINE]}
+    for run in runs[INLINE:]:
+        name = f"{run_anchor(run)}.html"
+        card = run_card(run, played.out)
+        section = Section(card.title, [Cards(card.title, [card], open=True)])
+        write_page(Page(card.title, run.name, [section]), played.out / CARDS / name)
+        links[run.name] = f"{CARDS}/{name}"
+    return links
+
+
+def _cards(played: Played, runs: Sequence[PlayRun]) -> list[Block]:
+    blocks: list[Block] = []
+    if len(runs) > INLINE:
+        text = f"The {INLINE} runs that need a look most. The others are linked from the table."
+        blocks.append(Text(text, tone="note"))
+    for run in runs[:INLINE]:
+        card = run_card(run, played.out)
+        blocks.append(Cards(card.title, [card], open=not run.verdict.is_good or len(runs) == 1))
+    return blocks
+
+
+def _matrix(runs: Sequence[PlayRun], links: dict[str, str]) -> list[Block]:
+    """Return scenario by weather, where there is more than one run; the worst seed speaks."""
+    columns = list(dict.fromkeys(_outside(run) for run in runs if run.weather))
+    if len(runs) < 2 or not columns:
+        return []
+    worst: dict[tuple[str, str], PlayRun] = {}
+    for run in runs:  # the worst first
+        worst.setdefault((run.scenario, _outside(run)), run)
+    rows = [
+        [Cell(name), *(_verdict_cell(worst.get((name, c)), links) for c in columns)]
+        for name in sorted({run.scenario for run in runs if run.weather})
+    ]
+    heads = [("scenario", ""), *((c, "") for c in columns)]
+    note = "Of several seeds the worst one stands here."
+    return [Table(heads, rows, "Scenario by weather", note if _seeds(runs) > 1 else "")]
+
+
+def _seeds(runs: Sequence[PlayRun]) -> int:
+    return len({run.seed for run in runs if run.seed is not None})
+
+
+def _outside(run: PlayRun) -> str:
+    return f"{run.weather}, {run.friction} friction" if run.friction == "original" else run.weather
+
+
+def _verdict_cell(run: PlayRun | None, links: dict[str, str]) -> Cell:
+    if run is None:
+        return Cell("not driven", kind="muted")
+    numbers = []
+    if (ttc := run.least("min_ttc_s")) is not None:
+        numbers.append(f"TTC {ttc:.2f} s")
+    if (gap := run.least("min_gap_m")) is not None:
+        numbers.append(f"gap {gap:.1f} m")
+    return Cell(
+        run.verdict.value, sort=ORDER.index(run.verdict), note=", ".join(numbers),
+        kind=KINDS[run.verdict], href=links[run.name], hint="; ".join(run.judged.reasons),
+    )  # fmt: skip
+
+
+def _runs_table(runs: Sequence[PlayRun], links: dict[str, str]) -> Table:
+    columns: list[Column[PlayRun]] = [
+        Column("scenario", lambda r: Cell(r.scenario, href=links[r.name])),
+        Column("weather", _outside),
+        Column("seed", lambda r: r.seed, format=Format("d")),
+        Column("verdict", lambda r: Cell(r.verdict.value, kind=KINDS[r.verdict])),
+        *MEASURES,
+        Column("touched", lambda r: r.contact[1] if r.contact else None, format=Format(absent="-")),
+        Column("time", lambda r: r.duration, unit="s", format=Format(".1f", absent="-")),
+        Column("why", lambda r: "; ".join(r.judged.reasons)),
+    ]
+    if _seeds(runs) < 2:
+        columns = [c for c in columns if c.title != "seed"]
+    return table(columns, runs, "All runs, those that need a look first")
+
+
+def _time(value: float | None) -> Cell:
+    if value is None:
+        return Cell("-", kind="muted")
+    return Cell(f"{value:.2f}" if value < LONG else f">{LONG}", sort=value)
+
+
+def _contact_speed(run: PlayRun) -> float | None:
+    return None if run.contact is None else kmh_from_mps(run.contact[2])
+
+
+MEASURES: list[Column[PlayRun]] = [
+    Column("least gap", lambda r: r.least("min_gap_m"), unit="m", format=Format(".1f", absent="-")),
+    Column("least TTC", lambda r: _time(r.least("min_ttc_s")), unit="s"),
+    Column(
+        "required deceleration", lambda r: r.most("max_required_mps2"), unit="m/s²",
+        format=Format(".1f", absent="-"),
+    ),
+    Column("speed at contact", _contact_speed, unit="km/h", format=Format(".0f", absent="-")),
+]  # fmt: skip
+Of = tuple[PlayRun, Counterpart]
+
+
+def _counterparts(runs: Sequence[PlayRun]) -> list[Block]:
+    rows = [(run, other) for run in runs for other in run.others]
+    if not rows:
+        return []
+    note = (
+        "A partner is moved by an event of the file. In play: the two came within "
+        f"{TIME:g} s or {DISTANCE:g} m of an interaction. Numbers are with the ego."
+    )
+    return [table(COUNTERPARTS, rows, "The ego and each other actor", note)]
+
+
+def _speed_of_contact(of: Of) -> float | None:
+    v = of[1].contact_v
+    return None if v is None else kmh_from_mps(v)
+
+
+COUNTERPARTS: list[Column[Of]] = [
+    Column("scenario", lambda o: o[0].scenario),
+    Column("weather", lambda o: _outside(o[0])),
+    Column("actor", lambda o: o[1].name),
+    Column("partner", lambda o: "yes" if o[1].staged else "no"),
+    Column("in play", lambda o: Cell("yes" if o[1].encounter.met else "no")),
+    Column("least distance", lambda o: o[1].encounter.distance, unit="m", format=Format(".1f")),
+    Column("least gap", lambda o: o[1].pair.min_gap_m, unit="m", format=Format(".1f", absent="-")),
+    Column("least TTC", lambda o: _time(o[1].pair.min_ttc_s), unit="s"),
+    Column("least PET", lambda o: o[1].pair.min_pet_s, unit="s", format=Format(".2f", absent="-")),
+    Column(
+        "required deceleration", lambda o: o[1].pair.max_required_mps2, unit="m/s²",
+        format=Format(".1f", absent="-"),
+    ),
+    Column("speed at contact", _speed_of_contact, unit="km/h", format=Format(".0f", absent="-")),
+]  # fmt: skip
+
+
+def _crashes(played: Played, runs: Sequence[PlayRun]) -> list[Block]:
+    """Return the hardest crashes of the ego, each with what was seen of it and when."""
+    found: list[Found] = []
+    for run in runs:
+        if run.contact is not None and run.folder is not None:
+            log = read_log(run.folder)
+            road = kept_map(played.out, log.header.map, log.header.map_hash)
+            found += find_contacts(log, road, run.folder)
+    return [] if not found else [contact_cards(found)]

@@ -18,6 +18,8 @@ BEFORE_S, AFTER_S = 6.0, 3.0
 BORDER_STEP = 4  # samples between the points of a lane border
 SPAN = 70.0  # m across the picture
 LEVEL = 4.0  # m of height within which things share a level
+FRAMES = 900  # of a whole run
+Floats = NDArray[np.float64]
 
 
 def replay(
@@ -28,28 +30,61 @@ def replay(
     stride = max(round(STEP_S / dt), 1)
     first = max(row - round(before_s / dt) // stride * stride, row % stride)
     rows = np.arange(first, min(row + round(after_s / dt), len(log) - 1) + 1, stride)
+    return _cut(log, road_map, rows, row, np.array([row]))
+
+
+def replay_run(log: RunLog, road_map: RoadMap, mark: int | None = None) -> dict[str, Any]:
+    """A whole run, with `FRAMES` frames at most; mark: the row that is shown first and marked."""
+    stride = max(round(STEP_S / log.header.dt), -(-len(log) // FRAMES))
+    rows = np.arange(0, len(log), stride)
+    return _cut(log, road_map, rows, mark, rows)
+
+
+def _cut(
+    log: RunLog,
+    road_map: RoadMap,
+    rows: NDArray[np.int64],
+    mark: int | None,
+    stops: NDArray[np.int64],
+) -> dict[str, Any]:
+    """These rows; lanes and barriers near the ego's places in `stops`."""
     a = log.actors
-    centre = np.array([a.x[row, 0], a.y[row, 0]], dtype=np.float64)
-    height = float(a.z[row, 0])
+    way = _stations(np.column_stack([v[stops, 0] for v in (a.x, a.y, a.z)]).astype(np.float64))
+    centre = way[0, :2]
     near = np.hypot(a.x[rows] - a.x[rows, :1], a.y[rows] - a.y[rows, :1]) < REACH
     level = np.abs(a.z[rows] - a.z[rows, :1]) < LEVEL
     shown = np.flatnonzero(np.any(near & level & log.present[rows], axis=0))
     frames = [[v for i in shown for v in _place(log, int(k), int(i), centre)] for k in rows]
     return {
-        "dt": stride * dt,
+        "dt": round(float(log.t[rows[1]] - log.t[rows[0]]), 6) if len(rows) > 1 else STEP_S,
         "unit": UNIT,
         "span": SPAN,
-        "t0": round(float(log.t[first]), 2),
-        "mark": int(np.searchsorted(rows, row)),
+        "t0": round(float(log.t[rows[0]]), 2),
+        "mark": None if mark is None else int(np.searchsorted(rows, mark)),
         "ego": int(np.searchsorted(shown, 0)),
         "size": [
             [round(float(log.table.length[i]), 2), round(float(log.table.width[i]), 2)]
             for i in shown
         ],
         "frames": frames,
-        "lanes": lane_borders(road_map, centre, height),
-        "walls": barriers(road_map, centre, height),
+        "lanes": lane_borders(road_map, way),
+        "walls": barriers(road_map, way),
     }
+
+
+def _stations(way: Floats) -> Floats:
+    """The places of a way (n, 3) that lie a quarter of the reach apart, the first one among them."""
+    gone = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(way[:, :2], axis=0).T))])
+    return way[np.flatnonzero(np.diff(np.floor(gone / (0.25 * REACH)), prepend=-1.0) > 0.0)]
+
+
+def _near(points: Floats, way: Floats) -> NDArray[np.bool_]:
+    """(n,) whether points (n, 3) lie within reach of a station of the way, on its level."""
+    near = np.zeros(len(points), bool)
+    for x, y, z in way:
+        far = np.hypot(points[:, 0] - x, points[:, 1] - y)
+        near |= (far < 1.3 * REACH) & (np.abs(points[:, 2] - z) < LEVEL)
+    return near
 
 
 def _place(log: RunLog, k: int, i: int, centre: NDArray[np.float64]) -> list[int | None]:
@@ -64,37 +99,32 @@ def _whole(points: NDArray[np.float64]) -> list[int]:
     return whole
 
 
-def lane_borders(road_map: RoadMap, centre: NDArray[np.float64], height: float) -> list[list[int]]:
-    """Both borders of every driving lane within reach, on the level of `height`."""
+def lane_borders(road_map: RoadMap, way: Floats) -> list[list[int]]:
+    """Both borders of every lane for vehicles within reach of a way (n, 3), from its first place."""
     s, lanes = road_map.samples, road_map.lanes
-    near = (np.hypot(s.x - centre[0], s.y - centre[1]) < 1.3 * REACH) & (
-        np.abs(s.z - height) < LEVEL
-    )
+    near, centre = _near(np.column_stack([s.x, s.y, s.z]), way), way[0]
     borders = []
     for lane in np.unique(s.lane[near]):
         if lanes.kind[lane] not in (LaneKind.DRIVING, LaneKind.RAMP, LaneKind.SHOULDER):
             continue
         first, size = int(lanes.first[lane]), int(lanes.size[lane])
         rows = np.arange(first, first + size)[near[first : first + size]]
-        if rows.size < 2:
-            continue
-        rows = np.unique(np.append(rows[::BORDER_STEP], rows[-1]))
-        for side in (0.5, -0.5):
-            x = s.x[rows] - side * s.width[rows] * np.sin(s.heading[rows]) - centre[0]
-            y = s.y[rows] + side * s.width[rows] * np.cos(s.heading[rows]) - centre[1]
-            borders.append(_whole(np.column_stack([x, y])))
+        for run in np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1):
+            if run.size < 2:
+                continue
+            some = np.unique(np.append(run[::BORDER_STEP], run[-1]))
+            for side in (0.5, -0.5):
+                x = s.x[some] - side * s.width[some] * np.sin(s.heading[some]) - centre[0]
+                y = s.y[some] + side * s.width[some] * np.cos(s.heading[some]) - centre[1]
+                borders.append(_whole(np.column_stack([x, y])))
     return borders
 
 
-def barriers(road_map: RoadMap, centre: NDArray[np.float64], height: float) -> list[list[int]]:
-    """Stretches of barriers within reach, on the level of `height`."""
+def barriers(road_map: RoadMap, way: Floats) -> list[list[int]]:
+    """Stretches of barriers within reach of a way (n, 3), from its first place."""
     stretches = []
     for barrier in road_map.roadside.barriers:
-        near = (
-            np.hypot(barrier.points[:, 0] - centre[0], barrier.points[:, 1] - centre[1])
-            < 1.3 * REACH
-        ) & (np.abs(barrier.points[:, 2] - height) < LEVEL)
-        rows = np.flatnonzero(near)
+        rows = np.flatnonzero(_near(barrier.points, way))
         runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
-        stretches += [_whole(barrier.points[run, :2] - centre) for run in runs if run.size > 1]
+        stretches += [_whole(barrier.points[run, :2] - way[0, :2]) for run in runs if run.size > 1]
     return stretches

@@ -11,12 +11,14 @@ from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand, ActorSetup
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Control
+from skidpad.recording.staging import Staging
 from skidpad.scenarios.entities import Box
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Place
 from skidpad.scenarios.scenario import Scenario
 from skidpad.scenarios.scene import Actor, Happening, Running, Scene
 from skidpad.scenarios.signals import SignalPlan
+from skidpad.scenarios.staging import staging_of
 from skidpad.scenarios.telling import Telling
 from skidpad.scenarios.traffic import drive
 from skidpad.simulation.scripted import ActorDriver, Motion
@@ -35,10 +37,11 @@ class Begun:
 
 @dataclass(frozen=True, slots=True)
 class Played:
-    """What is left of a scenario that was played: its story, and the boxes of its entities."""
+    """What is left of a scenario that was played: its story, what it staged, its entities' boxes."""
 
     story: tuple[Happening, ...]
     boxes: Mapping[str, Box]
+    staging: Staging
 
 
 def setups(scenario: Scenario) -> tuple[ActorSetup, tuple[ActorSetup, ...]]:
@@ -107,7 +110,9 @@ class Player:
     def played(self) -> Played:
         """As a value."""
         boxes = {name: entity.box for name, entity in self.scenario.entities.items()}
-        return Played(tuple(self.scene.story), boxes)
+        story = tuple(self.scene.story)
+        driven_by_file = self.modes.get(self.scenario.ego, ActorMode.PHYSICAL) is not None
+        return Played(story, boxes, staging_of(self.scenario, story, driven_by_file))
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
         """Look at the moment, go on with the story, say what actors do until the next."""

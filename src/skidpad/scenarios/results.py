@@ -1,4 +1,4 @@
-"""What a played scenario leaves besides its log: trajectories and the story, as CSV."""
+"""What a played scenario leaves besides its log: trajectories, the story, what it staged."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from pathlib import Path
 
 from skidpad.recording.files import write_bytes
 from skidpad.recording.runlog import RunLog
+from skidpad.recording.staging import write_staging
 from skidpad.scenarios.entities import Box
 from skidpad.scenarios.player import Played
 from skidpad.scenarios.scene import Happening
@@ -19,7 +20,8 @@ TRAJECTORIES, STORY = "trajectories.csv", "storyboard.csv"
 
 
 def write_results(folder: Path, log: RunLog, played: Played) -> None:
-    """Write both files."""
+    """Write all three files."""
+    write_staging(folder, played.staging)
     rows = rows_csv(log_rows(log, played.boxes))
     write_bytes(folder / TRAJECTORIES, rows.encode())
     write_bytes(folder / STORY, story_csv(played.story).encode())

@@ -8,11 +8,13 @@ from pathlib import Path
 
 from skidpad.core.errors import ConfigError, FileError, NoLaneError
 from skidpad.core.reading import is_file
+from skidpad.recording.staging import FileCriterion
 from skidpad.roads.bundled import bundled_maps, load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.actions.controllers import Activate, Several
 from skidpad.scenarios.catalogs import Catalogs
 from skidpad.scenarios.context import Context
+from skidpad.scenarios.criteria import file_criteria
 from skidpad.scenarios.document import Node, parse
 from skidpad.scenarios.entities import Entity, choose_ego, compile_entities, spectator
 from skidpad.scenarios.findings import HARMLESS, Fault, Finding, Kind, ScenarioError
@@ -48,6 +50,7 @@ class Scenario:
     variables: Mapping[str, str]
     ego_is_handed_later: bool  # the file drives the ego until it activates its controller
     signals: tuple[SignalController, ...] = ()
+    criteria: tuple[FileCriterion, ...] = ()  # by which the file judges a run
     findings: tuple[Finding, ...] = ()  # of the schema, and what is left out on request
 
     @property
@@ -187,7 +190,7 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
     start = replace(start, entities={**start.entities, **absent})
     return Scenario(
         root.file, network, by_name | ctx.hired, chosen, start, storyboard, values, ctx.variables,
-        later, signals, tuple(findings),
+        later, signals, file_criteria(root), tuple(findings),
     )  # fmt: skip
 
 

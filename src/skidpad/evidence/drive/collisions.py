@@ -52,7 +52,7 @@ class Sighting:
     status: DetectionStatus | None
     tier: Tier | None
     distance: float | None  # m, measured
-    gap: float | None  # m, true, to the lead
+    gap: float | None  # m, true: to what was hit, else to the lead
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -204,7 +204,7 @@ def _event(
         unseen=float(np.count_nonzero(unseen[history]) * log.header.dt),
         lead_since=since,
         first_detection=first,
-        last_detections=_last_detections(drive, history.start, at),
+        last_detections=_last_detections(drive, history.start, at, actor),
     )
 
 
@@ -251,21 +251,38 @@ def _as_lead(drive: Drive, at: int, actor: int) -> tuple[float | None, Sighting 
     breaks = np.flatnonzero(~is_lead[: end + 1])
     begin = int(breaks[-1]) + 1 if breaks.size else 0
     seen = np.flatnonzero(drive.log.report.detected[begin : end + 1] == 1.0)
-    first = _sighting(drive, begin + int(seen[0]), at) if seen.size else None
+    first = _sighting(drive, begin + int(seen[0]), at, actor) if seen.size else None
     return (at - begin) * drive.log.header.dt, first
 
 
-def _last_detections(drive: Drive, begin: int, at: int) -> tuple[Sighting, ...]:
+def _last_detections(drive: Drive, begin: int, at: int, actor: int | None) -> tuple[Sighting, ...]:
     status, tier = drive.log.report.status, drive.log.report.tier
     rows = [
         k
         for k in range(begin, at + 1)
         if drive.sample[k] and (k == begin or status[k] != status[k - 1] or tier[k] != tier[k - 1])
     ]
-    return tuple(_sighting(drive, k, at) for k in rows[-8:])
+    return tuple(_sighting(drive, k, at, actor) for k in rows[-8:])
 
 
-def _sighting(drive: Drive, k: int, at: int) -> Sighting:
+def _gap_to(log: RunLog, k: int, actor: int) -> float:
+    """Gap between the boxes of the ego and an actor, along and across the ego, m."""
+    a, table = log.actors, log.table
+    dx, dy = float(a.x[k, actor] - a.x[k, 0]), float(a.y[k, actor] - a.y[k, 0])
+    c, s = float(np.cos(a.yaw[k, 0])), float(np.sin(a.yaw[k, 0]))
+    turn = float(a.yaw[k, actor] - a.yaw[k, 0])
+    along, across = abs(float(np.cos(turn))), abs(float(np.sin(turn)))
+    length, width = float(table.length[actor]), float(table.width[actor])
+    long = 0.5 * (float(table.length[0]) + length * along + width * across)
+    wide = 0.5 * (float(table.width[0]) + length * across + width * along)
+    return float(
+        np.hypot(max(abs(dx * c + dy * s) - long, 0.0), max(abs(dy * c - dx * s) - wide, 0.0))
+    )
+
+
+def _sighting(drive: Drive, k: int, at: int, actor: int | None) -> Sighting:
+    """What the stack said in row k; actor: what was hit in row `at`."""
+    other = None if actor is None or drive.lead.actor[k] == actor else actor
     report = drive.log.report
     status, tier = number(float(report.status[k])), number(float(report.tier[k]))
     return Sighting(
@@ -273,7 +290,7 @@ def _sighting(drive: Drive, k: int, at: int) -> Sighting:
         status=None if status is None else DetectionStatus(int(status)),
         tier=None if tier is None else Tier(int(tier)),
         distance=number(float(report.distance[k])),
-        gap=number(float(drive.lead.gap[k])),
+        gap=number(float(drive.lead.gap[k])) if other is None else _gap_to(drive.log, k, other),
     )
 
 

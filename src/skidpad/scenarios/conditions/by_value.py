@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from skidpad.roads.opendrive.document import id_number
 from skidpad.scenarios.conditions.base import Condition, Probe, Rule, rule, rule_name
 from skidpad.scenarios.context import Context
+from skidpad.scenarios.criteria import is_criterion
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.environment import moment_of
 from skidpad.scenarios.findings import Kind
@@ -66,8 +67,7 @@ def _value(node: Node, ctx: Context) -> Condition:
 def _is_criterion(node: Node) -> bool:
     """ScenarioRunner judges by conditions of these names, and reads nothing else of them."""
     named = next(node.element.iterancestors("Condition"), None)
-    name = "" if named is None else str(named.get("name", ""))
-    return name.startswith("criteria_") or name.endswith("Test")  # the latter in 2019
+    return named is not None and is_criterion(str(named.get("name", "")))
 
 
 @dataclass(frozen=True, slots=True)

@@ -171,6 +171,8 @@ def _zebras(roadside: Roadside | None) -> Floats:
     rows = []
     for polygon in () if roadside is None else roadside.crosswalks:
         p = polygon[:4, :2]
+        if len(p) < 3:  # a line or a point: no area that somebody could walk on
+            continue
         u, v = p[1] - p[0], p[2] - p[1]
         if np.hypot(*u) < np.hypot(*v):
             u, v = v, u

@@ -1,0 +1,189 @@
+"""Whether two actors of a run came into play with each other, and how their ways crossed.
+
+They did when one of these held at any moment from the beginning of the interaction on:
+(a) both would have met within 3 s, had they kept their velocities;
+(b) one had the other ahead, would still have had it ahead on arrival, and was within 3 s or 20 m;
+(c) one came within 2 s to a place that the other had left;
+(d) their ways never crossed, and both went along the same line, or one stood, within 20 m.
+Who crosses long before or after the other is no encounter, however near the two stand later.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import cos, pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.evidence.pairs import Body, body, following, together
+from skidpad.recording.runlog import RunLog
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+TIME, DISTANCE = 3.0, 20.0  # s, m: farther apart is no interaction
+LEFT = 2.0  # s after which a place that was left is no matter any more, as for PET (C-094)
+STANDING = 0.1  # m/s
+ALONG = cos(pi / 4.0)  # of the angle between headings, below which one crosses the other's line
+SPACING = 0.5  # m between the places of a way that are compared
+PLACES = 400  # at most, of each way
+
+
+@dataclass(frozen=True, slots=True)
+class Encounter:
+    """How near the ego and another actor came to an interaction."""
+
+    met: bool
+    distance: float  # m between the boxes, least
+    crossed_after: float | None  # s, ego behind (+) or before (-) at the same place; None: no place
+
+
+def encounter(log: RunLog, ego: int, other: int, since: float = 0.0) -> Encounter | None:
+    """Return how two actors met; None when they were never there together.
+
+    since: s, when the interaction began; who stands near before that is not in play.
+    """
+    both = together(log, ego, other)
+    if not both.any():
+        return None
+    ways = [_cut(body(log, i), both) for i in (ego, other)]
+    crossed = crossing(*ways, log.t[both])
+    one, two = (_cut(way, log.t[both] >= since - 1e-9) for way in ways)
+    met = (crossed is not None and abs(crossed) <= LEFT) or _in_play(one, two, crossed is None)
+    return Encounter(met, float(box_distance(*ways).min()), crossed)
+
+
+def _in_play(one: Body, two: Body, ways_apart: bool) -> bool:
+    if bool((time_to_meet(one, two) <= TIME).any()) or _follows(one, two) or _follows(two, one):
+        return True
+    near = _alongside(one, two) & (box_distance(one, two) <= DISTANCE)
+    return ways_apart and bool(near.any())
+
+
+def _cut(one: Body, rows: Mask | NDArray[np.int64]) -> Body:
+    return Body(*(column[rows] for column in one[:7]), one.length, one.width)
+
+
+def _axes(one: Body) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:
+    c, s = np.cos(one.yaw), np.sin(one.yaw)
+    return (c, s), (-s, c)
+
+
+def _reach(one: Body, axis: tuple[Floats, Floats]) -> Floats:
+    """Half of what a box covers along an axis, (T,) m."""
+    long, wide = _axes(one)
+    along = np.abs(axis[0] * long[0] + axis[1] * long[1])
+    across = np.abs(axis[0] * wide[0] + axis[1] * wide[1])
+    reach: Floats = 0.5 * (one.length * along + one.width * across)
+    return reach
+
+
+def time_to_meet(one: Body, other: Body) -> Floats:
+    """Time until two boxes touch when both keep velocity and heading, (T,) s; inf: never.
+
+    By separating axes: on each of the four edge normals the boxes overlap in one interval of time.
+    """
+    dx, dy = other.x - one.x, other.y - one.y
+    vx, vy = other.vx - one.vx, other.vy - one.vy
+    low, high = np.zeros_like(dx), np.full_like(dx, np.inf)
+    for axis in (*_axes(one), *_axes(other)):
+        at, rate = axis[0] * dx + axis[1] * dy, axis[0] * vx + axis[1] * vy
+        reach = _reach(one, axis) + _reach(other, axis)
+        moving = np.abs(rate) > 1e-9
+        safe = np.where(moving, rate, 1.0)
+        ends = np.sort(np.stack([(-reach - at) / safe, (reach - at) / safe]), axis=0)
+        still = np.where(np.abs(at) <= reach, np.inf, -np.inf)  # always, or never
+        low = np.maximum(low, np.where(moving, ends[0], -np.inf))
+        high = np.minimum(high, np.where(moving, ends[1], still))
+    time: Floats = np.where(low <= high, low, np.inf)
+    return time
+
+
+def _follows(behind: Body, ahead: Body) -> bool:
+    """Return whether the one was ever close behind the other and would have stayed behind it."""
+    f = following(behind, ahead)
+    seen = ~np.isnan(f.gap)
+    v = np.maximum(f.v, STANDING)
+    arrival = np.minimum(np.where(seen, f.gap, 0.0) / v, TIME)
+    c, s = np.cos(behind.yaw), np.sin(behind.yaw)
+    aside = ahead.vy * c - ahead.vx * s
+    stays = np.abs(f.left + aside * arrival) < f.wide
+    near = (f.gap <= DISTANCE) | (f.gap <= TIME * f.v)
+    return bool((seen & stays & near).any())
+
+
+def _alongside(one: Body, other: Body) -> Mask:
+    same_line = np.abs(np.cos(other.yaw - one.yaw)) > ALONG
+    stands = (np.hypot(one.vx, one.vy) < STANDING) | (np.hypot(other.vx, other.vy) < STANDING)
+    mask: Mask = same_line | stands
+    return mask
+
+
+def _corners(one: Body) -> Floats:
+    """Corners of a box, (4, T, 2) m."""
+    (cx, cy), (sx, sy) = _axes(one)
+    signs = ((1, 1), (1, -1), (-1, -1), (-1, 1))
+    half = 0.5 * one.length, 0.5 * one.width
+    return np.stack(
+        [
+            np.stack(
+                [
+                    one.x + i * half[0] * cx + j * half[1] * sx,
+                    one.y + i * half[0] * cy + j * half[1] * sy,
+                ],
+                axis=-1,
+            )
+            for i, j in signs
+        ]
+    )
+
+
+def _outside(points: Floats, box: Body) -> Floats:
+    """Distance of points (4, T, 2) from a box, 0 inside; (4, T) m."""
+    (cx, cy), (sx, sy) = _axes(box)
+    dx, dy = points[..., 0] - box.x, points[..., 1] - box.y
+    forward = np.maximum(np.abs(dx * cx + dy * cy) - 0.5 * box.length, 0.0)
+    left = np.maximum(np.abs(dx * sx + dy * sy) - 0.5 * box.width, 0.0)
+    distance: Floats = np.hypot(forward, left)
+    return distance
+
+
+def box_distance(one: Body, other: Body) -> Floats:
+    """Distance between two boxes, (T,) m; 0 while they overlap."""
+    corners = np.concatenate([_outside(_corners(one), other), _outside(_corners(other), one)])
+    distance: Floats = np.where(time_to_meet(one, other) <= 0.0, 0.0, corners.min(axis=0))
+    return distance
+
+
+def crossing(one: Body, other: Body, t: Floats) -> float | None:
+    """Least time between both at the same place, s, positive where `one` comes later; None: no place."""
+    a, b = _places(one), _places(other)
+    first, second = _cut(one, a), _cut(other, b)
+    x, y, yaw = first.x[:, None], first.y[:, None], first.yaw[:, None]
+    shared = _overlap(x, y, yaw, second.x, second.y, second.yaw, one, other)
+    shared &= _overlap(second.x, second.y, second.yaw, x, y, yaw, other, one)
+    if not shared.any():
+        return None
+    apart = np.where(shared, t[a][:, None] - t[b][None, :], np.inf)
+    return float(apart.ravel()[np.abs(apart).argmin()])
+
+
+def _places(one: Body) -> NDArray[np.int64]:
+    """Rows at which a body has gone on by half a metre, the first and the last one among them."""
+    way = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(one.x), np.diff(one.y)))])
+    spacing = max(SPACING, way[-1] / PLACES)
+    rows = np.flatnonzero(np.diff(np.floor(way / spacing), prepend=-1.0) > 0.0)
+    return np.unique(np.append(rows, len(way) - 1))
+
+
+def _overlap(
+    x: Floats, y: Floats, yaw: Floats, x2: Floats, y2: Floats, yaw2: Floats, box: Body, box2: Body
+) -> Mask:
+    """Return where boxes at all these places overlap along both edges of the first one."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    along, across = np.abs(np.cos(yaw2 - yaw)), np.abs(np.sin(yaw2 - yaw))
+    forward = np.abs((x2 - x) * c + (y2 - y) * s)
+    left = np.abs((y2 - y) * c - (x2 - x) * s)
+    mask: Mask = forward <= 0.5 * (box.length + box2.length * along + box2.width * across)
+    mask &= left <= 0.5 * (box.width + box2.length * across + box2.width * along)
+    return mask

@@ -1,0 +1,90 @@
+"""What a scenario file stages, as a run of it saw it, and how the runs of a folder are judged."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+from msgspec import Struct
+
+from skidpad.core.errors import FileError
+from skidpad.recording.files import write_bytes
+
+STAGING, JUDGING = "staging.json", "judging.json"
+S = TypeVar("S", bound=Struct)
+
+
+class StagedEvent(Struct, frozen=True, kw_only=True):
+    """Holds one event of the storyboard that acts on others than the ego."""
+
+    name: str  # path in the storyboard, parted by "::"
+    actors: tuple[str, ...]
+    began: float | None  # s, the first time; None: never
+    on_contact: bool = False  # waits for a collision: no part of the interaction
+
+
+class FileCriterion(Struct, frozen=True, kw_only=True):
+    """Holds one criterion that the file states, by the name that ScenarioRunner gives it."""
+
+    name: str  # such as CollisionTest
+    limit: float | None = None  # such as the m of DrivenDistanceTest
+
+
+class Staging(Struct, frozen=True, kw_only=True):
+    """Holds what the file stages. partners: those that its events move, in the order of entities."""
+
+    scenario: str  # name of the file, without its ending
+    ego: str
+    driven_by_file: bool  # the file drives the ego, or there is none: nothing is under test
+    partners: tuple[str, ...] = ()
+    events: tuple[StagedEvent, ...] = ()
+    criteria: tuple[FileCriterion, ...] = ()
+
+    @property
+    def missing(self) -> list[StagedEvent]:
+        """Events of the interaction that never began."""
+        return [e for e in self.events if e.began is None and not e.on_contact]
+
+
+def write_staging(folder: Path, staging: Staging) -> None:
+    """Write staging.json into a run's folder."""
+    write_bytes(folder / STAGING, msgspec.json.format(msgspec.json.encode(staging)))
+
+
+def read_staging(folder: Path) -> Staging | None:
+    """Return the staging of a run; None where it has none, FileError where it cannot be read."""
+    return _read(folder / STAGING, Staging)
+
+
+def _read(path: Path, kind: type[S]) -> S | None:
+    if not path.is_file():
+        return None
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=kind)
+    except (OSError, msgspec.DecodeError) as error:
+        raise FileError(f"{path} cannot be read: {error}") from None
+
+
+class LeftOut(Struct, frozen=True):
+    """Holds a file of a folder that could not be played, and why."""
+
+    file: str
+    why: str
+
+
+class Judging(Struct, frozen=True, kw_only=True):
+    """Holds how the runs of a folder are judged, so that its page can be written again."""
+
+    expect: tuple[str, ...] = ()  # rules of `--expect`
+    left_out: tuple[LeftOut, ...] = ()
+
+
+def write_judging(folder: Path, judging: Judging) -> None:
+    """Write judging.json into the folder of a run or a campaign."""
+    write_bytes(folder / JUDGING, msgspec.json.format(msgspec.json.encode(judging)))
+
+
+def read_judging(folder: Path) -> Judging:
+    """Return how the runs of a folder are judged; the default where it does not say."""
+    return _read(folder / JUDGING, Judging) or Judging()

@@ -1,0 +1,216 @@
+"""The runs of a folder that `skidpad play` wrote, each with its verdict and its counterparts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import Any
+
+import polars as pl
+import yaml
+
+from skidpad.core.errors import FileError
+from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.run import Scenario, run_from_plain
+from skidpad.evidence.drive.file_criteria import judge_criteria
+from skidpad.evidence.drive.prepared import prepare
+from skidpad.evidence.expectations import Expectation, parse_expectation, run_values
+from skidpad.evidence.pairs import pairs
+from skidpad.evidence.play_verdicts import (
+    Counterpart,
+    Judged,
+    PlayVerdict,
+    counterparts,
+    judge_run,
+)
+from skidpad.recording.campaigns import RUNS
+from skidpad.recording.files import write_csv
+from skidpad.recording.grip import GripEntry, GripKey
+from skidpad.recording.ledger import LEDGER, latest, read_ledger
+from skidpad.recording.logfiles import TICKS, read_log
+from skidpad.recording.runlog import RunLog
+from skidpad.recording.staging import Judging, Staging, read_judging, read_staging
+from skidpad.roads.bundled import kept_map
+
+ERROR, CONFIG = "error.txt", "config.yaml"  # of a run's folder
+CSV = "results.csv"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class PlayRun:
+    """One run. folder: None where there is none, as of a file that cannot be played."""
+
+    name: str
+    scenario: str
+    weather: str
+    friction: str
+    seed: int | None
+    judged: Judged
+    folder: Path | None = None
+    duration: float | None = None  # s
+    others: tuple[Counterpart, ...] = ()
+    contact: tuple[float, str, float] | None = None  # first of the ego: s, with what, closing m/s
+    metrics: dict[str, Any] = field(default_factory=dict)  # of the campaign, by column
+
+    @property
+    def verdict(self) -> PlayVerdict:
+        """What it proves."""
+        return self.judged.verdict
+
+    def least(self, name: str) -> float | None:
+        """Return the least of a column of pairs over all counterparts."""
+        known = [v for c in self.others if (v := getattr(c.pair, name)) is not None]
+        return min(known, default=None)
+
+    def most(self, name: str) -> float | None:
+        """Return the largest of a column of pairs over all counterparts."""
+        known = [v for c in self.others if (v := getattr(c.pair, name)) is not None]
+        return max(known, default=None)
+
+
+@dataclass(frozen=True, slots=True)
+class Played:
+    """All runs of a folder, and the rules by which they were judged."""
+
+    out: Path
+    runs: tuple[PlayRun, ...]
+    judging: Judging
+
+    @property
+    def bad(self) -> list[PlayRun]:
+        """Runs that are failed, void or in error."""
+        return [run for run in self.runs if not run.verdict.is_good]
+
+
+def load_played(out: Path) -> Played:
+    """Return the judged runs of a folder, of one run or of a campaign."""
+    judging = read_judging(out)
+    rules = [parse_expectation(text) for text in judging.expect]
+    runs = [*_runs(out, rules)]
+    runs += [
+        PlayRun(
+            name=left.file, scenario=left.file, weather="", friction="", seed=None,
+            judged=Judged(PlayVerdict.ERROR, "", (f"cannot be played: {left.why}",)),
+        )
+        for left in judging.left_out
+    ]  # fmt: skip
+    return Played(out, tuple(runs), judging)
+
+
+def _runs(out: Path, rules: Sequence[Expectation]) -> Iterator[PlayRun]:
+    if not (out / LEDGER).is_file():
+        yield _run(out, out, rules, None)
+        return
+    for entry in latest(read_ledger(out, GripEntry)):
+        yield _run(out, out / RUNS / entry.run, rules, entry)
+
+
+def _run(out: Path, folder: Path, rules: Sequence[Expectation], entry: GripEntry | None) -> PlayRun:
+    """Judge the run in `folder`; entry: what the ledger says of it, where there is one."""
+    name = folder.resolve().name
+    words = _words(folder, None if entry is None else entry.key)
+    metrics = {} if entry is None or entry.metrics is None else asdict(entry.metrics)
+    staging = read_staging(folder)
+    if staging is None or not (folder / TICKS).is_file():
+        what = (entry.error if entry else "").strip().rpartition("\n")[2]
+        judged = Judged(PlayVerdict.ERROR, "", (what or "the run was not driven to its end",))
+        return PlayRun(name=name, judged=judged, metrics=metrics, **words)
+    log = read_log(folder)
+    found = pairs(log)
+    others = tuple(counterparts(log, found, staging))
+    if (folder / ERROR).is_file():
+        judged = Judged(PlayVerdict.ERROR, "", ("the stack failed", *_last_line(folder / ERROR)))
+    else:
+        judged = judge_run(
+            staging, others, rules, _of_file(out, log, staging), run_values(log, found)
+        )
+    return PlayRun(
+        name=name, judged=judged, folder=folder, others=others, metrics=metrics,
+        duration=float(log.t[-1]) if len(log) else 0.0, contact=_contact(log), **words,
+    )  # fmt: skip
+
+
+def _of_file(out: Path, log: RunLog, staging: Staging) -> list[Any]:
+    if not staging.criteria:
+        return []
+    road = kept_map(out, log.header.map, log.header.map_hash)
+    return judge_criteria(prepare(log, road), staging.criteria)
+
+
+def _contact(log: RunLog) -> tuple[float, str, float] | None:
+    first = next(iter(log.contacts), None)
+    if first is None:
+        return None
+    what = first.static or log.table.names[first.actor]
+    return first.tick * log.header.dt, what, first.v_closing
+
+
+def _last_line(path: Path) -> list[str]:
+    text = path.read_text(encoding="utf-8", errors="replace").strip()
+    return [text.rpartition("\n")[2]] if text else []
+
+
+def _words(folder: Path, key: GripKey | None) -> dict[str, Any]:
+    """Return what is known of scenario, weather, friction and seed of a run."""
+    path = folder / CONFIG
+    if not path.is_file():
+        if key is None:
+            return {"scenario": folder.name, "weather": "", "friction": "", "seed": None}
+        return {name: getattr(key, name) for name in ("scenario", "weather", "friction", "seed")}
+    try:
+        plain = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, yaml.YAMLError) as error:
+        raise FileError(f"{path} cannot be read: {error}") from None
+    spec = run_from_plain(plain, str(path))
+    course = spec.course
+    return {
+        "scenario": course.variant or course.title if isinstance(course, Scenario) else spec.cell,
+        "weather": spec.weather.name,
+        "friction": spec.friction.value,
+        "seed": spec.seed,
+    }
+
+
+def results_table(played: Played) -> pl.DataFrame:
+    """Return one row per run and counterpart; a run without any has one row."""
+    rows = [_row(run, other) for run in played.runs for other in run.others or (None,)]
+    return pl.DataFrame(rows, infer_schema_length=None)
+
+
+def write_results_csv(played: Played) -> Path:
+    """Write results.csv into the folder."""
+    path = played.out / CSV
+    write_csv(path, results_table(played))
+    return path
+
+
+def _row(run: PlayRun, other: Counterpart | None) -> dict[str, Any]:
+    row: dict[str, Any] = {
+        "run": run.name, "scenario": run.scenario, "weather": run.weather,
+        "friction": run.friction, "seed": run.seed, "verdict": run.verdict.value,
+        "criterion": run.judged.criterion, "reasons": "; ".join(run.judged.reasons),
+        "duration_s": run.duration, "contacts_with": None if run.contact is None else run.contact[1],
+        "counterpart": None, "staged": None, "met": None, "min_distance_m": None,
+        "crossed_after_s": None, "min_gap_m": None, "min_ttc_s": None, "min_thw_s": None,
+        "max_drac_mps2": None, "max_required_mps2": None, "min_pet_s": None,
+        "contact_t_s": None, "contact_kmh": None, "ego_at_contact_kmh": None,
+    }  # fmt: skip
+    if other is not None:
+        row |= other.pair._asdict()
+        del row["one"], row["other"]
+        row |= {
+            "counterpart": other.name,
+            "staged": other.staged,
+            "met": other.encounter.met,
+            "min_distance_m": other.encounter.distance,
+            "crossed_after_s": other.encounter.crossed_after,
+            "contact_t_s": other.contact_t,
+            "contact_kmh": _kmh(other.contact_v),
+            "ego_at_contact_kmh": _kmh(other.contact_v_ego),
+        }
+    return row | {k: v for k, v in run.metrics.items() if k not in row}
+
+
+def _kmh(v: float | None) -> float | None:
+    return None if v is None else kmh_from_mps(v)

@@ -1,0 +1,63 @@
+"""What a file stages between the ego and others, and which of it a run has reached."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+from skidpad.recording.staging import StagedEvent, Staging
+from skidpad.scenarios.actions.base import NoEffect
+from skidpad.scenarios.conditions.by_entity import Collision
+from skidpad.scenarios.scenario import Scenario
+from skidpad.scenarios.scene import Happening, Move
+from skidpad.scenarios.storyboard import Event, Group
+from skidpad.scenarios.triggers import AnyEntity
+
+
+def staging_of(scenario: Scenario, story: Iterable[Happening], driven_by_file: bool) -> Staging:
+    """Return what the file stages, with the times at which its events began in this story."""
+    began: dict[tuple[str, ...], float] = {}
+    for happening in story:
+        if happening.what == Move.START.value:
+            began.setdefault(happening.path, happening.t)
+    staged = [
+        (event, actors)
+        for group, event in _events(scenario)
+        if (actors := _others(event, group, scenario.ego))
+    ]
+    moved = {name for _, actors in staged for name in actors}
+    return Staging(
+        scenario=scenario.file.stem,
+        ego=scenario.ego,
+        driven_by_file=driven_by_file or scenario.ego_entity.is_ghost,
+        partners=tuple(name for name in scenario.entities if name in moved),
+        events=tuple(
+            StagedEvent(
+                name="::".join(event.path),
+                actors=actors,
+                began=began.get(event.path),
+                on_contact=_waits_for_contact(event),
+            )
+            for event, actors in staged
+        ),
+        criteria=scenario.criteria,
+    )
+
+
+def _events(scenario: Scenario) -> Iterator[tuple[Group, Event]]:
+    acts = (act for story in scenario.storyboard.stories for act in story.acts)
+    for group in (group for act in acts for group in act.groups):
+        for manoeuvre in group.manoeuvres:
+            yield from ((group, event) for event in manoeuvre.events)
+
+
+def _others(event: Event, group: Group, ego: str) -> tuple[str, ...]:
+    """Return the actors that an event moves, without the ego; none where it only sets values."""
+    private = (action.private for action in event.actions)
+    if all(action is None or isinstance(action, NoEffect) for action in private):
+        return ()
+    return tuple(name for name in group.actors if name != ego)
+
+
+def _waits_for_contact(event: Event) -> bool:
+    conditions = (timed.condition for group in event.start.groups for timed in group)
+    return any(isinstance(c, AnyEntity) and isinstance(c.condition, Collision) for c in conditions)

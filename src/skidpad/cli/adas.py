@@ -57,7 +57,7 @@ def adas(
 def report(
     folder: Annotated[Path, typer.Argument(help="A campaign's folder, or the folder of one run.")],
 ) -> None:
-    """Write the report of a campaign again, from what it left behind; of a run, its crash cards."""
+    """Write the report of a campaign again, from what it left behind; of a run, its own page."""
     from skidpad.core.errors import FileError
     from skidpad.recording.ledger import LEDGER, campaign_command
     from skidpad.recording.logfiles import TICKS

@@ -9,6 +9,7 @@ from math import cos
 import numpy as np
 
 from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.wording import count_text
 from skidpad.evidence.drive.prepared import Drive
 from skidpad.recording.staging import FileCriterion
 
@@ -38,7 +39,7 @@ def _wrong(drive: Drive, criterion: FileCriterion) -> str | None:
 def _collision(drive: Drive, limit: float) -> str:
     del limit
     n = len(drive.log.contacts)
-    return "" if n == 0 else f"the ego had {n} contact{'s' * (n > 1)}"
+    return "" if n == 0 else f"the ego had {count_text(n, 'contact')}"
 
 
 def _distance(drive: Drive, limit: float) -> str:
@@ -49,7 +50,7 @@ def _distance(drive: Drive, limit: float) -> str:
 def _keep_lane(drive: Drive, limit: float) -> str:
     del limit
     n = len(drive.log.invasions)
-    return "" if n == 0 else f"the ego crossed {n} marking{'s' * (n > 1)}"
+    return "" if n == 0 else f"the ego crossed {count_text(n, 'marking')}"
 
 
 def _on_road(drive: Drive, limit: float) -> str:

@@ -7,12 +7,14 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.wording import count_text
 from skidpad.evidence.encounters import DISTANCE, TIME
 from skidpad.evidence.play_verdicts import Counterpart, PlayVerdict
 from skidpad.recording.logfiles import read_log
 from skidpad.report.crash_page import contact_cards, find_contacts
 from skidpad.report.crashes import Found
 from skidpad.report.page import (
+    Answer,
     Answers,
     Block,
     Cards,
@@ -26,11 +28,17 @@ from skidpad.report.page import (
     write_report_page,
 )
 from skidpad.report.play_cards import run_anchor, run_card
-from skidpad.report.play_runs import Played, PlayRun, load_played, write_results_csv
+from skidpad.report.play_runs import (
+    Played,
+    PlayRun,
+    find_road,
+    load_played,
+    write_results_csv,
+)
 from skidpad.report.tables import Column, Format, table
-from skidpad.roads.bundled import kept_map
 
 CARDS = "cards"  # folder of the runs that have a page of their own
+BAD = 5  # reasons at the top
 INLINE = 24  # runs with their card in the page
 LONG = 99  # s, a time to collision that says no more
 KINDS = {
@@ -134,12 +142,16 @@ def criterion(played: Played) -> str:
 
 
 def _answers(played: Played) -> Answers:
-    items = [("Did it pass?", answer(played)), ("By which criterion?", criterion(played))]
+    items = [
+        Answer("Did it pass?", answer(played)),
+        Answer("By which criterion?", criterion(played)),
+    ]
     bad = in_order(played.bad)
     if bad:
-        told = [f"{run.scenario}: {'; '.join(run.judged.reasons)}" for run in bad[:3]]
-        more = f" {len(bad) - 3} more below." if len(bad) > 3 else ""
-        items.append(("What went wrong?", ". ".join(told) + "." + more))
+        told = [f"{run.scenario}: {'; '.join(run.judged.reasons)}" for run in bad[:BAD]]
+        more = [f"{len(bad) - BAD} more in the table below."] if len(bad) > BAD else []
+        sentence = f"{count_text(len(bad), 'run')} failed, proved nothing or broke off."
+        items.append(Answer("What went wrong?", sentence, [*told, *more]))
     return Answers(items)
 
 
@@ -283,6 +295,6 @@ def _crashes(played: Played, runs: Sequence[PlayRun]) -> list[Block]:
     for run in runs:
         if run.contact is not None and run.folder is not None:
             log = read_log(run.folder)
-            road = kept_map(played.out, log.header.map, log.header.map_hash)
+            road = find_road(played.out, log.header)
             found += find_contacts(log, road, run.folder)
     return [] if not found else [contact_cards(found)]

@@ -16,10 +16,9 @@ from skidpad.evidence.play_verdicts import Counterpart
 from skidpad.recording.logfiles import read_log
 from skidpad.recording.runlog import RunLog
 from skidpad.report.page import Card, Figure, anchor
-from skidpad.report.play_runs import PlayRun
+from skidpad.report.play_runs import PlayRun, find_road
 from skidpad.report.replay import replay_run
 from skidpad.report.timeline import Mark, Strip, timelines
-from skidpad.roads.bundled import kept_map
 
 Floats = NDArray[np.float64]
 STORY = "storyboard.csv"
@@ -38,7 +37,7 @@ def run_card(run: PlayRun, out: Path) -> Card:
     log = read_log(run.folder)
     if not len(log):
         return Card(_title(run), chain=[*run.judged.reasons, "the run ended before its first tick"])
-    road = kept_map(out, log.header.map, log.header.map_hash)
+    road = find_road(out, log.header)
     at = None if run.contact is None else int(np.searchsorted(log.t, run.contact[0] - 1e-9))
     return Card(
         title=_title(run),

@@ -29,9 +29,10 @@ from skidpad.recording.files import write_csv
 from skidpad.recording.grip import GripEntry, GripKey
 from skidpad.recording.ledger import LEDGER, latest, read_ledger
 from skidpad.recording.logfiles import TICKS, read_log
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.runlog import LogHeader, RunLog
 from skidpad.recording.staging import Judging, Staging, read_judging, read_staging
-from skidpad.roads.bundled import kept_map
+from skidpad.roads.bundled import KEPT, kept_map
+from skidpad.roads.queries import RoadMap
 
 ERROR, CONFIG = "error.txt", "config.yaml"  # of a run's folder
 CSV = "results.csv"
@@ -134,8 +135,14 @@ def _run(out: Path, folder: Path, rules: Sequence[Expectation], entry: GripEntry
 def _of_file(out: Path, log: RunLog, staging: Staging) -> list[Any]:
     if not staging.criteria:
         return []
-    road = kept_map(out, log.header.map, log.header.map_hash)
-    return judge_criteria(prepare(log, road), staging.criteria)
+    return judge_criteria(prepare(log, find_road(out, log.header)), staging.criteria)
+
+
+def find_road(out: Path, header: LogHeader) -> RoadMap:
+    """Return the map of a run in `out`, which keeps it, or the campaign that `out` is a run of."""
+    above = out.resolve().parents[1:2]
+    folder = next((f for f in (out, *above) if (f / KEPT).is_dir()), out)
+    return kept_map(folder, header.map, header.map_hash)
 
 
 def _contact(log: RunLog) -> tuple[float, str, float] | None:

@@ -46,11 +46,13 @@ def encounter(log: RunLog, ego: int, other: int, since: float = 0.0) -> Encounte
     both = together(log, ego, other)
     if not both.any():
         return None
-    ways = [_cut(body(log, i), both) for i in (ego, other)]
-    crossed = crossing(*ways, log.t[both])
-    one, two = (_cut(way, log.t[both] >= since - 1e-9) for way in ways)
-    met = (crossed is not None and abs(crossed) <= LEFT) or _in_play(one, two, crossed is None)
-    return Encounter(met, float(box_distance(*ways).min()), crossed)
+    one, two = _cut(body(log, ego), both), _cut(body(log, other), both)
+    crossed = crossing(one, two, log.t[both])
+    later = log.t[both] >= since - 1e-9
+    met = (crossed is not None and abs(crossed) <= LEFT) or _in_play(
+        _cut(one, later), _cut(two, later), crossed is None
+    )
+    return Encounter(met, float(box_distance(one, two).min()), crossed)
 
 
 def _in_play(one: Body, two: Body, ways_apart: bool) -> bool:
@@ -61,7 +63,8 @@ def _in_play(one: Body, two: Body, ways_apart: bool) -> bool:
 
 
 def _cut(one: Body, rows: Mask | NDArray[np.int64]) -> Body:
-    return Body(*(column[rows] for column in one[:7]), one.length, one.width)
+    x, y, yaw, vx, vy, ax, ay = (column[rows] for column in one[:7])
+    return Body(x, y, yaw, vx, vy, ax, ay, one.length, one.width)
 
 
 def _axes(one: Body) -> tuple[tuple[Floats, Floats], tuple[Floats, Floats]]:

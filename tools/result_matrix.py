@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from math import isfinite
 from pathlib import Path
 
 import polars as pl
@@ -12,7 +11,7 @@ import polars as pl
 from result_texts import limits, markdown, verdict_rows
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS, astray
-from skidpad.evidence.statistics import Interval, Rate, compare_pairs, event_rate
+from skidpad.evidence.statistics import Rate, compare_pairs, event_rate
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.matrix import MatrixEntry
@@ -124,7 +123,7 @@ def against(reference: Path, other: Path) -> str:
             seeds = both.group_by("seed").agg(change.alias("change"))["change"]
             c = compare_pairs(seeds.to_numpy())
             title_of = config_title(config) if config else "all"
-            rows.append([title_of, title, str(c.n), f"{c.mean:+.2f}", _bounds(c.interval)])
+            rows.append([title_of, title, str(c.n), f"{c.mean:+.2f}", limits(c.interval)])
     return markdown(("configuration", "per run", "seeds", f"minus {reference.name}", "95 %"), rows)
 
 
@@ -133,14 +132,12 @@ def _numbers_count(name: str) -> list[str | int]:
     return [int(part) if part.isdigit() else part for part in re.split(r"(\d+)", name)]
 
 
-def _bounds(interval: Interval) -> str:
-    return limits(interval) if isfinite(interval.low + interval.high) else "too few"
-
-
 def rated(rate: Rate | None) -> str:
-    """`1.98 [1.57, 2.40]`, or `too few` in place of the limits."""
+    """`1.98 [1.57, 2.40]`, or in place of the limits the seeds that had an event."""
     if rate is None:
         return "no run"
+    if rate.interval is None:
+        return f"{rate.rate:.2f}, in {rate.runs_with} of {rate.runs}"
     return f"{rate.rate:.2f} {limits(rate.interval)}"
 
 

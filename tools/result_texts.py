@@ -17,7 +17,7 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 def limits(interval: Interval | None) -> str:
     """Limits in brackets."""
-    return "too few" if interval is None else f"[{bound(interval.low)}, {bound(interval.high)}]"
+    return "no limits" if interval is None else f"[{bound(interval.low)}, {bound(interval.high)}]"
 
 
 def bound(value: float) -> str:

@@ -17,14 +17,14 @@ import pytest
 from fleet_world import NOW, World, make_world, packed, record
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.statistics import BOOTSTRAP_FROM, linear_ratio_limits
+from skidpad.evidence.statistics import linear_ratio_limits
 from skidpad.fleet.insight.places import ADVICE
 from skidpad.fleet.insight.research import HOUR, K, export
 from skidpad.fleet.insight.trends import compact, trends
 from skidpad.fleet.service import Places, open_fleet
 from skidpad.fleet.site.drawing import KINDS
 from skidpad.fleet.store.accounts import add_vehicle
-from skidpad.fleet.warehouse import TAKE, Warehouse
+from skidpad.fleet.warehouse import MANY_VEHICLES, TAKE, Warehouse
 
 DRAWS = 2000
 
@@ -62,7 +62,7 @@ def test_trends_hold_what_was_sent_and_no_more_than_ones_own(world):
 def test_every_vehicle_is_told_of_where_they_are_few_and_only_there(lite):
     """Sums over 30 vehicles suffice for limits; of fewer each is needed, whatever other days hold."""
     house, few = lite.fleet.warehouse, [(5, 100), (0, 300), (7, 50)]
-    many = [(k % 4, 100 + k) for k in range(BOOTSTRAP_FROM)]
+    many = [(k % 4, 100 + k) for k in range(MANY_VEHICLES)]
     rows = pl.DataFrame(
         [
             {"manufacturer": "m", "operator": "o", "vehicle": f"{k:032x}", "received": day * 86400.0,
@@ -77,7 +77,7 @@ def test_every_vehicle_is_told_of_where_they_are_few_and_only_there(lite):
     assert list(zip(first.each_violated, first.each_n, strict=True)) == few
     assert (second.each_violated, second.each_n) == ([], [])
     assert second.vn == sum(violated * n for violated, n in many)
-    assert second.vehicles == BOOTSTRAP_FROM
+    assert second.vehicles == MANY_VEHICLES
     assert house.moments("operator", "another", 1) == []
 
 
@@ -329,10 +329,11 @@ def test_the_safety_case_says_what_is_known_and_how_sure(lite):
     assert {c["id"] for c in lite.get("authority", "/api/v1/safety-case").json()} == set(found)
 
 
-def test_six_vehicles_that_agree_challenge_a_claim(tmp_path):
-    with crowd(tmp_path, 6) as many:
-        for k in range(6):
-            send_rows(many, f"car-{k}", f"car-key-{k}", *HALF)
+def test_eight_vehicles_that_nearly_agree_challenge_a_claim(tmp_path):
+    with crowd(tmp_path, 8) as many:
+        for k in range(8):
+            rows = row(0, 300 + k), row(0, 0, indicator="object_location_similarity")
+            send_rows(many, f"car-{k}", f"car-key-{k}", *rows)
         found = {c["id"]: c for c in many.get("axle", "/api/v1/safety-case").json()}
         assert (found["S1"]["verdict"], found["S4"]["verdict"]) == ("challenged", "open")
 
@@ -346,7 +347,10 @@ def test_an_interval_over_vehicles_holds_the_share_that_they_were_drawn_with():
             n = rng.integers(300, 900, vehicles).astype(float)
             y = rng.binomial(n.astype(int), rng.beta(4.0, 12.0, vehicles)).astype(float)
             products = (float(y @ y), float(n @ y), float(n @ n))
-            limits = linear_ratio_limits(vehicles, (float(y.sum()), float(n.sum())), products)
+            y3, y2n, yn2, n3 = (float(v.sum()) for v in (y**3, y * y * n, y * n * n, n**3))
+            sums = (float(y.sum()), float(n.sum()))
+            limits = linear_ratio_limits(vehicles, sums, products, (y3, y2n, yn2, n3))
+            assert limits is not None
             held += limits.low <= 0.25 <= limits.high
         assert held / DRAWS >= 0.94 - 2.0 * (0.94 * 0.06 / DRAWS) ** 0.5, vehicles
 

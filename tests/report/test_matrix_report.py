@@ -149,14 +149,14 @@ def test_metrics_are_named_in_words_with_their_units(html):
 @pytest.mark.req("R-7")
 def test_runs_of_one_seed_are_one_unit_of_a_rate_over_all_weathers():
     def runs(weathers):
-        rows = [(s, n) for s, n in ((1, 9), (2, 4), (3, 14)) for _ in range(weathers)]
+        counts = (9, 4, 14, 9, 8, 10, 11, 7)
+        rows = [(s, n) for s, n in enumerate(counts) for _ in range(weathers)]
         return pl.DataFrame(rows, schema=["seed", "hits"], orient="row")
 
     one, six = (rate_by_seed(runs(k), "hits") for k in (1, 6))
-    assert (one.rate, one.runs) == (six.rate, six.runs) == (9.0, 3)
-    assert one.interval.high - one.interval.low == pytest.approx(
-        six.interval.high - six.interval.low, rel=0.3
-    ), "six copies of a drive tell no more than one"
+    assert (one.rate, one.runs) == (six.rate, six.runs) == (9.0, 8)
+    widths = [r.interval.high - r.interval.low for r in (one, six)]
+    assert widths[0] <= widths[1], "six copies of a drive tell no more than one"
 
 
 @pytest.mark.req("A-256")

@@ -122,7 +122,7 @@ def outcomes(folders: list[Path] = FOLDERS) -> None:
     """Compare drivers over the seeds that all have driven: does redundancy pay?"""
     from skidpad.core.errors import FileError
     from skidpad.evidence.channels.redundancy import compare_drivers
-    from skidpad.evidence.statistics import interval_text
+    from skidpad.evidence.statistics import rate_text
     from skidpad.recording.channel_drives import read_outcomes
 
     driven = read_outcomes(folders)
@@ -131,5 +131,4 @@ def outcomes(folders: list[Path] = FOLDERS) -> None:
     for row in compare_drivers(driven):
         typer.echo(f"{row.drive_by}: {row.segments} segments, {row.hours:.2f} h, {row.km:.1f} km")
         for event, rate in row.rates.items():
-            told = interval_text(rate.interval)
-            typer.echo(f"  {event}: {rate.events}, {rate.rate:.2f} per h ({told})")
+            typer.echo(f"  {event}: {rate.events}, {rate_text(rate, 'segment', 'h')}")

@@ -35,7 +35,7 @@ class Contrast:
 
     label: str
     mean: float
-    interval: Interval
+    interval: Interval | None
     p_claimed: float  # of this or more if the difference were <= 0
     p_against: float  # of this or less if it were >= the margin
     margin: float  # a smaller difference does not matter

@@ -1,15 +1,18 @@
-"""Intervals, comparisons and corrections (decisions X-9, R-7). Every number in a report passes here.
+"""Intervals, comparisons and corrections (decisions X-9, R-7, T-6). Every number in a report passes here.
 
-Counts of crashes are small and clump: exact methods where they exist, else those that hold 94 % in
-simulation (tests/evidence/test_promises.py says where), and None, "too few", where nothing does.
-Nothing is resampled below 30 units.
+A printed interval holds the truth in 95 % of cases given that it is printed, and what is printed is
+never chosen by the estimate that it qualifies. docs/statistics.md has the simulated coverage of each
+method and what it assumes; `tools/coverage_table.py` makes it.
+
+How to write a number: a rate by `rate_text`, any other interval by `interval_text`, a p value by
+`p_text`. An interval is None where no limits hold, below 8 units or when all units are alike; a
+`Rate` then still has its share of runs with an event, whose bound assumes nothing.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from enum import Enum
 from itertools import product
 from math import ceil, floor, log2
 from typing import NamedTuple
@@ -17,23 +20,20 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import stats
-from scipy.special import stdtrit
 
 from skidpad.core.errors import require_range
 from skidpad.core.randomness import stream
+from skidpad.evidence.limits import CONFIDENCE, count_limits, mean_widths, skew_limits
 
 Floats = NDArray[np.float64]
 
-CONFIDENCE = 0.95
-DISPERSION_MAX = 1.2  # above, counts vary more than Poisson (X-9)
-CLUMPED_EVENTS = 25  # fewer of counts that vary more than Poisson: too few
-BOOTSTRAP_FROM = 30  # units
-MEAN_FROM = 6  # values
-SKEW_MAX = 1.0  # of fewer than 30 values
-SKEW_WIDENS = 1.5
+UNITS_FROM = 8  # runs, seeds, segments or vehicles, below which no limits are given
+RUNS_WITH_EVENT_FROM = 2  # below, nothing tells clumps from single events
+DISPERSION_ASSUMED = 10.0  # largest variance / mean of counts for which limits of rates hold
 RESAMPLES = 4000
 EVER_SIGNIFICANT = 6  # fewer pairs cannot give p < 0.05: 2 / 2^5 > 0.05
 EXACT_PAIRS = 12  # up to here all 2^n sign changes are tried
+NO_LIMITS = "no limits: they need 8 units that are not all alike"
 
 
 class Interval(NamedTuple):
@@ -43,24 +43,27 @@ class Interval(NamedTuple):
     high: float
 
 
-class Method(str, Enum):
-    """How an interval was made."""
-
-    POISSON = "exact Poisson"
-    SCORE = "score limits with the spread of runs"
-
-
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """Events per unit of exposure, with its interval."""
+    """Events per unit of exposure, with its limits and the share of runs that had any."""
 
     events: int
     runs: int
+    runs_with: int  # an event
     exposure: float  # runs, km, hours
     rate: float
-    interval: Interval | None  # None: too few
-    method: Method
+    interval: Interval | None  # None: fewer than 8 runs, or fewer than 2 with an event
     dispersion: float | None  # variance / mean of the counts, None: not defined
+
+    @property
+    def most_runs(self) -> float:
+        """Largest share of runs that have an event, at one-sided 95 %; it assumes nothing of clumps."""
+        return share_bound(self.runs_with, self.runs)
+
+    @property
+    def exceeds_assumption(self) -> bool:
+        """Whether the counts vary more than the limits of rates assume."""
+        return (self.dispersion or 0.0) > DISPERSION_ASSUMED
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,7 +72,7 @@ class Comparison:
 
     n: int
     mean: float
-    interval: Interval
+    interval: Interval | None  # None: fewer than 8 pairs, or all differences are alike
     p_greater: float  # against "the mean difference is <= 0"
     p_less: float
     spread: float  # standard deviation of the differences, 0 for one pair
@@ -80,9 +83,17 @@ class Comparison:
         return self.mean / self.spread if self.spread > 0.0 else None
 
     @property
-    def p(self) -> float:
-        """Two-sided."""
+    def p(self) -> float | None:
+        """Two-sided; None below six pairs, of which no outcome could be significant."""
+        if self.n < EVER_SIGNIFICANT:
+            return None
         return min(1.0, 2.0 * min(self.p_greater, self.p_less))
+
+    @property
+    def is_clear(self) -> bool:
+        """Whether the interval has only one sign."""
+        i = self.interval
+        return i is not None and (i.low > 0.0 or i.high < 0.0)
 
 
 def poisson_interval(count: int, exposure: float = 1.0, confidence: float = CONFIDENCE) -> Interval:
@@ -107,146 +118,109 @@ def dispersion_index(counts: ArrayLike, exposures: ArrayLike | None = None) -> f
     return float(np.sum((c[use] - expected) ** 2 / expected) / (c.size - 1))
 
 
-def bootstrap_interval(
-    values: ArrayLike, weights: ArrayLike | None = None, confidence: float = CONFIDENCE
-) -> Interval:
-    """Percentile limits of sum(values) / sum(weights) over resampled runs or drive segments (n,).
-
-    weights: exposure of each, 1 by default. The resamples are the same at every call.
-    """
-    v = np.asarray(values, dtype=np.float64)
-    w = np.ones_like(v) if weights is None else np.asarray(weights, dtype=np.float64)
-    picks = stream(0, "bootstrap", v.size).integers(0, v.size, (RESAMPLES, v.size))
-    means = v[picks].sum(axis=1) / w[picks].sum(axis=1)
-    tail = 100.0 * (1.0 - confidence) / 2.0
-    low, high = np.percentile(means, [tail, 100.0 - tail])
-    return Interval(float(low), float(high))
-
-
 def event_rate(counts: Sequence[int], exposures: Sequence[float] | None = None) -> Rate:
-    """Rate of events over runs: exact Poisson of a single run, else score limits.
+    """Rate of events over independent runs (n,), limits by `count_limits`.
 
-    Score limits take the variance of a count as its mean times the dispersion index of these runs (at
-    least 1, widened for its own error), and Student's quantile. In simulation they hold 94.5 % or more
-    from two runs on, for Poisson counts and for negative binomial ones with a dispersion of up to 3 and
-    a mean of 1 or up to 20 and a mean of 5. Fewer than 25 events that clump have no interval.
+    The limits hold while the variance of counts is at most 10 times their mean. With fewer than two
+    runs with an event, no data can tell rare clumps from single events: then the rate has no limits,
+    and what holds is `most_runs`.
     """
     c = np.asarray(counts, dtype=np.int64)
     e = np.ones(c.size) if exposures is None else np.asarray(exposures, dtype=np.float64)
     if c.size == 0 or e.sum() <= 0.0:
         raise ValueError("a rate needs at least one run with exposure > 0")
-    total, exposure = int(c.sum()), float(e.sum())
-    if c.size == 1:
-        limits = poisson_interval(total, exposure)
-        return Rate(total, 1, exposure, total / exposure, limits, Method.POISSON, None)
+    total, with_events, exposure = int(c.sum()), int((c > 0).sum()), float(e.sum())
     spread = dispersion_index(c, e)
-    few = total < CLUMPED_EVENTS and (spread or 0.0) > DISPERSION_MAX
-    interval = None if few else _score_limits(total, exposure, c.size, spread)
-    return Rate(total, c.size, exposure, total / exposure, interval, Method.SCORE, spread)
-
-
-def _score_limits(total: int, exposure: float, runs: int, spread: float | None) -> Interval:
-    """Rates whose distance from the one seen is at most Student's quantile times its deviation."""
-    over = max((spread or 0.0) - 1.0, 0.0) * (1.0 + np.sqrt(2.0 / (runs - 1)))
-    width = stats.t.ppf(1.0 - (1.0 - CONFIDENCE) / 2.0, runs - 1) ** 2 * (1.0 + over)
-    middle = total + width / 2.0
-    half = float(np.sqrt(width * total + width**2 / 4.0))
-    return Interval(max(middle - half, 0.0) / exposure, (middle + half) / exposure)
+    interval = None
+    if c.size >= UNITS_FROM and with_events >= RUNS_WITH_EVENT_FROM:
+        low, high = count_limits(total, with_events, spread or 0.0, c.size)
+        interval = Interval(float(low) / exposure, float(high) / exposure)
+    return Rate(total, c.size, with_events, exposure, total / exposure, interval, spread)
 
 
 def mean_limits(values: ArrayLike) -> Interval | None:
-    """Limits of the mean of values (n,) that are not counts; None: too few, or too skew for so few.
-
-    Student's limits, widened by the skewness seen. In simulation they hold 94 % or more for
-    normal, uniform, beta and exponential values and log-normal ones with a sigma of 0.5.
-    """
+    """Limits of the mean of values (n,); None: fewer than eight, or all of them alike."""
     v = np.asarray(values, dtype=np.float64)
-    n = v.size
-    spread = float(v.std(ddof=1)) if n > 1 else 0.0
-    if n < MEAN_FROM:
+    if v.size < UNITS_FROM or is_alike(v):
         return None
-    if spread <= 1e-12 * max(1.0, float(np.abs(v).max())):
-        return Interval(float(v[0]), float(v[0]))
-    skew = abs(float(stats.skew(v, bias=False)))
-    if n < BOOTSTRAP_FROM and skew > SKEW_MAX:
-        return None
-    half = stats.t.ppf(1.0 - (1.0 - CONFIDENCE) / 2.0, n - 1) * spread / np.sqrt(n)
-    half *= 1.0 + skew / (SKEW_WIDENS * np.sqrt(n))
-    return Interval(float(v.mean() - half), float(v.mean() + half))
+    low, high = skew_limits(v)
+    return Interval(float(low), float(high))
+
+
+def is_alike(values: Floats) -> bool:
+    """Whether values (n,) differ by no more than rounding."""
+    return bool(np.ptp(values) <= 1e-12 * max(1.0, float(np.abs(values).max())))
 
 
 def ratio_limits(values: ArrayLike, weights: ArrayLike) -> Interval | None:
-    """Limits of sum(values) / sum(weights) over units (n,); None: fewer than six.
+    """Limits of sum(values) / sum(weights) over units (n,); None as for `mean_limits`.
 
-    Resampled from 30 units on, else Student's limits by leaving out one unit after the other.
+    Those of the mean of what each unit contributes: the effects of leaving it out. Source: Efron and
+    Tibshirani (1993), An Introduction to the Bootstrap, chapter 11, infinitesimal jackknife of a ratio.
     """
     v, w = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
-    if v.size >= BOOTSTRAP_FROM:
-        return bootstrap_interval(v, w)
-    if v.size < MEAN_FROM:
-        return None
     ratio = v.sum() / w.sum()
-    off = (v - ratio * w) / (1.0 - w / w.sum()) * v.size / w.sum()
-    half = stats.t.ppf(1.0 - (1.0 - CONFIDENCE) / 2.0, v.size - 1) * off.std(ddof=1)
-    half /= np.sqrt(v.size)
-    return Interval(float(ratio - half), float(ratio + half))
+    off = (v - ratio * w) / (1.0 - w / w.sum()) * v.size / w.sum() if v.size > 1 else v - v
+    if v.size < UNITS_FROM or is_alike(off):
+        return None
+    low, high = skew_limits(off - off.mean())
+    return Interval(float(ratio + low), float(ratio + high))
 
 
 def linear_ratio_limits(
-    units: int, sums: tuple[float, float], products: tuple[float, float, float]
-) -> Interval:
-    """Limits of sum(y) / sum(x) over 30 units or more, from sums alone.
+    units: int,
+    sums: tuple[float, float],
+    products: tuple[float, float, float],
+    cubes: tuple[float, float, float, float],
+) -> Interval | None:
+    """Limits of sum(y) / sum(x) over 30 units or more, from sums alone; None: all are alike.
 
-    sums: of y and x; products: of y y, x y and x x. By Taylor linearisation, var = k / (k - 1)
-    sum((y - R x)^2) / sum(x)^2, with Student's quantile. Source: Woodruff (1971), JASA 66, 411-414;
-    SAS/STAT, The SURVEYMEANS procedure, Ratio.
+    sums: of y and x; products: of y y, x y and x x; cubes: of y y y, y y x, y x x and x x x. By Taylor
+    linearisation, var = k / (k - 1) sum((y - R x)^2) / sum(x)^2, widened for skewness as in
+    `skew_limits`. Source: Woodruff (1971), JASA 66, 411-414; SAS/STAT, The SURVEYMEANS procedure, Ratio.
     """
     (y, x), (yy, xy, xx) = sums, products
     ratio = y / x
-    spread = max(yy - 2.0 * ratio * xy + ratio * ratio * xx, 0.0)
-    half = float(stdtrit(units - 1, 0.5 + 0.5 * CONFIDENCE))
-    half *= float(np.sqrt(units / (units - 1) * spread)) / x
-    return Interval(ratio - half, ratio + half)
+    squares = yy - 2.0 * ratio * xy + ratio**2 * xx
+    if squares <= 1e-12 * yy:
+        return None
+    yyy, yyx, yxx, xxx = cubes
+    thirds = yyy - 3.0 * ratio * yyx + 3.0 * ratio**2 * yxx - ratio**3 * xxx
+    below, above = (units / x * float(width) for width in mean_widths(units, squares, thirds))
+    return Interval(ratio - below, ratio + above)
 
 
 def compare_pairs(differences: ArrayLike) -> Comparison:
     """Test and interval of the mean of differences of runs with equal seeds (n,), n >= 1.
 
-    By changing signs: all of them up to 12 pairs, else 4000 drawn ones, the same at every call. The
-    interval holds the shifts that this test does not reject; below 6 pairs it is unbounded. Source:
-    Fisher (1935), The design of experiments, section 21; Hartigan (1969), JASA 64.
+    The test changes signs: all of them up to 12 pairs, else 4000 drawn ones, the same at every call;
+    the interval is that of `mean_limits`. Source: Fisher (1935), The design of experiments, section 21.
     """
     d = np.asarray(differences, dtype=np.float64)
     if d.size == 0:
         raise ValueError("a paired comparison needs at least one pair")
-    if d.size <= EXACT_PAIRS:
-        signs = np.array(list(product((1.0, -1.0), repeat=d.size)))
-    else:
-        drawn = stream(0, "sign changes", d.size).integers(0, 2, (RESAMPLES - 1, d.size))
-        signs = np.concatenate([np.ones((1, d.size)), 1.0 - 2.0 * drawn])
-    sums, seen = signs @ d, d.sum()
-    near = 1e-9 * max(1.0, float(np.abs(d).sum()))
+    p_greater, p_less = sign_tests(d[None, :])
     return Comparison(
         n=d.size,
         mean=float(d.mean()),
-        interval=_unrejected(signs < 0.0, d),
-        p_greater=float(np.mean(sums >= seen - near)),
-        p_less=float(np.mean(sums <= seen + near)),
+        interval=mean_limits(d),
+        p_greater=float(p_greater[0]),
+        p_less=float(p_less[0]),
         spread=float(d.std(ddof=1)) if d.size > 1 else 0.0,
     )
 
 
-def _unrejected(flipped: NDArray[np.bool_], d: Floats) -> Interval:
-    """Shifts that the sign changes `flipped` (k, n) of d (n,) do not reject.
-
-    A change outdoes the data after a shift just when the mean of what it flips lies below the
-    shift, so the limits are ordered means of subsets; a change that flips nothing always counts.
-    """
-    size = flipped.sum(axis=1)
-    means = np.divide(flipped @ d, size, out=np.full(size.shape, np.inf), where=size > 0)
-    cut = int((1.0 - CONFIDENCE) / 2.0 * means.size + 1e-9)
-    low = np.sort(np.where(size > 0, means, -np.inf))[cut]
-    return Interval(float(low), float(np.sort(means)[-1 - cut]))
+def sign_tests(differences: Floats) -> tuple[Floats, Floats]:
+    """One-sided p values (greater, less) of each row of differences (rows, n), by changing signs."""
+    n = differences.shape[1]
+    if n <= EXACT_PAIRS:
+        signs = np.array(list(product((1.0, -1.0), repeat=n)))
+    else:
+        drawn = stream(0, "sign changes", n).integers(0, 2, (RESAMPLES - 1, n))
+        signs = np.concatenate([np.ones((1, n)), 1.0 - 2.0 * drawn])
+    near = 1e-9 * np.maximum(1.0, np.abs(differences).sum(axis=1))
+    seen, sums = differences.sum(axis=1), signs @ differences.T
+    return (sums >= seen - near).mean(axis=0), (sums <= seen + near).mean(axis=0)
 
 
 def pairs_needed(comparison: Comparison, smallest: float, power: float = 0.8) -> int | None:
@@ -281,11 +255,17 @@ def clopper_pearson(k: int, n: int, confidence: float = CONFIDENCE) -> Interval:
     return Interval(float(limits.low), float(limits.high))
 
 
-def median_time(times: ArrayLike, end: float) -> tuple[float, Interval]:
+def share_bound(k: int, n: int, confidence: float = CONFIDENCE) -> float:
+    """Largest share that k of n leave possible, one-sided and exact. Source: as `clopper_pearson`."""
+    require_range("successes", k, 0, n)
+    return 1.0 if k == n else float(stats.beta.ppf(confidence, k + 1, n - k))
+
+
+def median_time(times: ArrayLike, end: float) -> tuple[float, Interval | None]:
     """Median of times that were watched until `end`, and its exact 95 % interval; inf: beyond it.
 
     times (n,), n >= 1: inf or NaN where nothing happened. The limits are order statistics, so that
-    no form of the distribution is assumed; too few times have the limits 0 and inf. Source: Thompson
+    no form of the distribution is assumed; fewer than six times have none. Source: Thompson
     (1936), Ann. Math. Stat. 7, confidence ranges for the median.
     """
     t = np.asarray(times, dtype=np.float64)
@@ -296,7 +276,7 @@ def median_time(times: ArrayLike, end: float) -> tuple[float, Interval]:
     median = 0.5 * sum(middle) if np.isfinite(middle[1]) else middle[1]
     below = int(stats.binom.ppf((1.0 - CONFIDENCE) / 2.0, t.size, 0.5))
     if below == 0:
-        return median, Interval(0.0, np.inf)
+        return median, None
     return median, Interval(float(t[below - 1]), float(t[t.size - below]))
 
 
@@ -315,13 +295,56 @@ def holm(p_values: Sequence[float]) -> list[float]:
     return [float(v) for v in adjusted]
 
 
-def interval_text(interval: Interval | None) -> str:
-    """`95 % 0.1 to 1.46`, `95 % unbounded`, `too few for an interval`."""
-    if interval is None:
-        return "too few for an interval"
-    if not np.isfinite(interval).any():
-        return "95 % unbounded"
-    return f"95 % {interval.low:.3g} to {interval.high:.3g}"
+def interval_text(interval: Interval | None, units: int | None = None, unit: str = "run") -> str:
+    """`95 % 0.1 to 1.46`; without limits what `no_limits_text` says, if the number of units is given."""
+    if interval is not None:
+        return f"95 % {_plain(interval.low)} to {_plain(interval.high)}"
+    return NO_LIMITS if units is None else no_limits_text(units, unit)
+
+
+def no_limits_text(units: int, unit: str = "run") -> str:
+    """`3 runs give no limits, 8 would`, `all 12 runs are alike, at most 22 % differ (95 %)`."""
+    if units == 1:
+        return f"1 {unit} says nothing of others"
+    if units < UNITS_FROM:
+        return f"{units} {unit}s give no limits, {UNITS_FROM} would"
+    percent = 100.0 * share_bound(0, units)
+    return f"all {units} {unit}s are alike, at most {percent:.0f} % differ (95 %)"
+
+
+def rate_text(rate: Rate, unit: str = "run", per: str = "run") -> str:
+    """`0.60 per run, 95 % 0.31 to 1.14`; without limits `0.10 per run; 1 of 10 runs had one, at most
+    39 % do (95 %)`.
+
+    unit: what `Rate.runs` are; per: the unit of exposure.
+    """
+    text = f"{rate.rate:.2f} per {per}"
+    if rate.interval is not None:
+        text += f", {interval_text(rate.interval)}"
+    remark = rate_remark(rate, unit)
+    return f"{text}; {remark}" if remark else text
+
+
+def runs_with_text(rate: Rate, unit: str = "run") -> str:
+    """`none of 10 runs had one, at most 26 % do (95 %)`: what holds however events clump."""
+    if rate.runs == 1:
+        return f"1 {unit} says nothing of others"
+    had = "none" if rate.runs_with == 0 else f"{rate.runs_with}"
+    text = f"{had} of {rate.runs} {unit}s had one"
+    return (
+        text
+        if rate.most_runs == 1.0
+        else f"{text}, at most {100.0 * rate.most_runs:.0f} % do (95 %)"
+    )
+
+
+def rate_remark(rate: Rate, unit: str = "run") -> str:
+    """What stands beside a rate and its limits: why there are none, or that counts vary too much."""
+    if rate.interval is None:
+        return runs_with_text(rate, unit)
+    if rate.exceeds_assumption:
+        return f"variance/mean {rate.dispersion:.0f}, above the assumed {DISPERSION_ASSUMED:.0f}"
+    return ""
 
 
 def share_text(share: float, interval: Interval | None) -> str:
@@ -329,10 +352,16 @@ def share_text(share: float, interval: Interval | None) -> str:
     if interval is None:
         return f"{100.0 * share:.2f} %, {interval_text(None)}"
     percent = Interval(100.0 * interval.low, 100.0 * interval.high)
-    unit = " %" if np.isfinite(percent).any() else ""
-    return f"{100.0 * share:.2f} %, {interval_text(percent)}{unit}"
+    return f"{100.0 * share:.2f} %, {interval_text(percent)} %"
 
 
-def p_text(p: float) -> str:
-    """`p = 0.25`, `p < 0.001`."""
+def p_text(p: float | None) -> str:
+    """`p = 0.25`, `p < 0.001`; None: `no test below 6 pairs`."""
+    if p is None:
+        return f"no test below {EVER_SIGNIFICANT} pairs"
     return "p < 0.001" if p < 0.001 else f"p = {p:.2g}"
+
+
+def _plain(value: float) -> str:
+    """A finite number with three digits and no negative zero."""
+    return f"{value + 0.0:.3g}"

@@ -154,7 +154,9 @@ def _text(
         return "By construction: both sides are the same drive, so there is nothing to measure."
     if verdict is Verdict.SAME_DRIVES:
         return "Not measured: what differs never came into play, both sides are the same drives."
-    parts = [f"{c.label} {c.mean:+.3g} ({interval_text(c.interval)})" for c in contrasts]
+    parts = [
+        f"{c.label} {c.mean:+.3g} ({interval_text(c.interval, c.units, 'unit')})" for c in contrasts
+    ]
     text = f"{verdict.value.capitalize()}: {'; '.join(parts)}."
     if p is not None:
         text += f" {p_text(p)} after correction for all findings of this report."

@@ -15,7 +15,6 @@ import duckdb
 import polars as pl
 
 from skidpad.core.errors import FileError
-from skidpad.evidence.statistics import BOOTSTRAP_FROM
 
 DAY = 86400.0  # s, in UTC
 LATE_S = 3600.0  # a batch may come to light that long after its time of receipt
@@ -31,6 +30,7 @@ TAKE = """
         CAST(floor(received / 86400) AS BIGINT), sum(n), sum(violated), sum(mean * n)
     FROM read_parquet($file) GROUP BY ALL ORDER BY ALL
 """
+MANY_VEHICLES = 30  # from here on sums over them suffice for limits
 MOMENTS = """
     WITH each AS MATERIALIZED (
         SELECT indicator, day // $days AS slot, vehicle, sum(n)::DOUBLE AS n,
@@ -39,7 +39,8 @@ MOMENTS = """
     ), moments AS (
         SELECT indicator, slot, count(*) AS vehicles, sum(n) AS n, sum(violated) AS violated,
                sum(total) AS total, sum(violated * violated) AS vv, sum(violated * n) AS vn,
-               sum(n * n) AS nn
+               sum(n * n) AS nn, sum(violated ** 3) AS vvv, sum(violated ** 2 * n) AS vvn,
+               sum(violated * n ** 2) AS vnn, sum(n ** 3) AS nnn
         FROM each GROUP BY indicator, slot
     ), few AS (
         SELECT indicator, slot, list(violated ORDER BY vehicle) AS each_violated,
@@ -64,6 +65,10 @@ class Moments(NamedTuple):
     vv: float
     vn: float
     nn: float
+    vvv: float
+    vvn: float
+    vnn: float
+    nnn: float
     each_violated: list[float]  # of every vehicle, where these are few
     each_n: list[float]
 
@@ -140,6 +145,6 @@ class Warehouse:
             right, told["tenant"] = f"{column} = $tenant", tenant
         with self.lock:
             rows = self._database.execute(
-                MOMENTS.format(right=right, few=BOOTSTRAP_FROM), told
+                MOMENTS.format(right=right, few=MANY_VEHICLES), told
             ).fetchall()
         return [Moments(*row) for row in rows]

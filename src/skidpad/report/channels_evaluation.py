@@ -40,8 +40,8 @@ LEAD = """A detection is right when a true hazard of the same kind overlaps it w
 Two truths judge: the simulator's, which knows what was really so, and the world model's, which takes \
 what the channels report as the world. Neither shares code with the rules.
 
-Events within a drive depend on each other, so intervals are over whole drive segments: resampled from \
-30 on, else by leaving out one after the other. \
+Events within a drive depend on each other, so intervals are over whole drive segments, \
+from 8 segments on. \
 Published numbers (8 h, other simulator, other channels, one human annotator) stand beside ours in italics."""
 
 

@@ -12,7 +12,7 @@ from skidpad.evidence.channels.redundancy import (
     compare_drivers,
     differences,
 )
-from skidpad.evidence.statistics import interval_text, p_text
+from skidpad.evidence.statistics import interval_text, p_text, rate_text
 from skidpad.recording.channel_drives import read_outcomes
 from skidpad.report.page import Block, Cell, Text
 from skidpad.report.tables import Column, Format, table
@@ -55,13 +55,12 @@ def redundancy(folder: Path) -> list[Block]:
 
 def _rate(event: str, driver: DriverRow) -> Cell:
     rate = driver.rates[event]
-    note = f"{rate.rate:.2f} per h, {interval_text(rate.interval)}"
-    return Cell(str(rate.events), float(rate.events), note=note)
+    return Cell(str(rate.events), float(rate.events), note=rate_text(rate, "segment", "h"))
 
 
 def _sentence(d: Difference) -> str:
     c = d.pairs
     return (
         f"{d.drive_by} alone less the arbiter, {TITLES[d.event]} per segment: {c.mean:+.3g} "
-        f"({interval_text(c.interval)}, {p_text(c.p)}, {c.n} pairs)."
+        f"({interval_text(c.interval, c.n, 'pair')}, {p_text(c.p)}, {c.n} pairs)."
     )

@@ -46,9 +46,8 @@ def _columns(scale: float) -> list[Column[FourCells]]:
 
     def effect(name: Effect, cell: FourCells) -> Quantity:
         c = getattr(cell, name)
-        clear = c.interval.low > 0.0 or c.interval.high < 0.0
-        limits = Interval(*(scale * end for end in c.interval))
-        return Quantity(value=scale * c.mean, interval=limits, kind="" if clear else "muted")
+        limits = c.interval and Interval(*(scale * end for end in c.interval))
+        return Quantity(value=scale * c.mean, interval=limits, kind="" if c.is_clear else "muted")
 
     return [
         Column("scenario", _name),

@@ -228,7 +228,7 @@ def difference(c: Comparison | None, lines: tuple[str, ...] = ()) -> Quantity:
         interval=c.interval,
         remark=f"d = {c.effect:.1f}" if sized else "",
         lines=lines,
-        kind="" if c.interval.low > 0.0 or c.interval.high < 0.0 else "muted",
+        kind="" if c.is_clear else "muted",
         hint=f"{c.n} pairs",
     )
 

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS, astray
+from skidpad.evidence.statistics import DISPERSION_ASSUMED
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import matrix_figures, matrix_tables
 from skidpad.report.crashes import crash_sections, found_crashes, worst_of_each
@@ -20,14 +21,14 @@ from skidpad.report.page import Block, Page, Section, Text, write_report_page
 from skidpad.report.verdicts import unjudged_text, verdict_blocks
 
 CLAIMS = (*FINDINGS, *ACCEPTANCE)
-LEAD = """An intervention puts the car back on its lane: after a crash with a vehicle, after a departure \
+LEAD = f"""An intervention puts the car back on its lane: after a crash with a vehicle, after a departure \
 from the road (into a barrier, all wheels off every lane for 1 s, or more than 3 m beyond the edge), or \
 because it faces the wrong way.
 
 Each row is a set of driving functions, each column a weather. Seeds are common to all cells, so \
-differences between cells are paired. Intervals are 95 %: of counts score limits that take the spread of \
-the runs into account, of means Student's, widened where values are skew; where neither holds its \
-coverage it says too few."""
+differences between cells are paired. Intervals are 95 %, over seeds, from 8 seeds on. Those of counts hold \
+while the variance of counts is at most {DISPERSION_ASSUMED:g} times their mean. Where fewer than two seeds \
+had an event, the largest share of seeds that have one stands instead: it holds however events clump."""
 
 
 def write_report(folder: Path) -> Path:

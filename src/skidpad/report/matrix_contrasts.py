@@ -41,7 +41,7 @@ def contrast(matrix: Matrix, more: pl.Expr, less: pl.Expr, by: Iterable[str]) ->
     if not len(pairs):
         return None
     c = compare_pairs(per_seed(pairs, pl.col("difference")))
-    return Contrast(c.mean, c.n, c.interval, c.p, same)
+    return Contrast(c.mean, c.n, c.interval, 1.0 if c.p is None else c.p, same)
 
 
 def by_configuration(

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from skidpad.core.wording import count_text
-from skidpad.evidence.statistics import median_time
+from skidpad.evidence.statistics import median_time, rate_remark
 from skidpad.report.matrix_data import (
     BASELINE,
     EVENT,
@@ -17,7 +17,7 @@ from skidpad.report.matrix_data import (
     config_title,
     rate_by_seed,
 )
-from skidpad.report.matrix_tables import RATE, TOO_FEW, rate_hint
+from skidpad.report.matrix_tables import RATE, rate_hint
 from skidpad.report.page import Cell, Number, Numbers, Table
 from skidpad.report.tables import Column, Quantity, table
 
@@ -101,7 +101,7 @@ def _count(matrix: Matrix, column: str, config: str) -> Quantity:
     return Quantity(
         value=rate.rate,
         interval=rate.interval,
-        remark=TOO_FEW if rate.interval is None else "",
+        remark=rate_remark(rate, "seed"),
         lines=tuple(lines) if config in matrix.compared else (),
         hint=f"{rate_hint(rate)}, {km:,.0f} km",
     )
@@ -114,8 +114,8 @@ def _first(matrix: Matrix, config: str) -> Cell:
         return Cell("no run", kind="muted")
     end = float(runs["duration_s"].min())  # type: ignore[arg-type]
     times = runs["first_fatal_s"].cast(float).fill_null(np.inf).to_numpy()
-    median, (low, high) = median_time(times, end)
-    told = f"{_time(low, end)} to {_time(high, end)}" if low > 0.0 else TOO_FEW
+    median, limits = median_time(times, end)
+    told = " to ".join(_time(t, end) for t in limits) if limits else "no limits below 6 runs"
     hint = count_text(len(runs), "run")
     return Cell(_time(median, end), note=told, sort=min(median, end), hint=hint)
 

@@ -14,8 +14,10 @@ from skidpad.evidence.statistics import (
     Rate,
     compare_pairs,
     mean_limits,
+    no_limits_text,
     p_text,
     poisson_interval,
+    rate_remark,
 )
 from skidpad.recording.matrix import Metrics
 from skidpad.report.campaign import Metric, metrics_of
@@ -35,7 +37,6 @@ STEP_COLUMNS = (
     "mean_error_m",
     "headway_variance_m2",
 )
-TOO_FEW = "too few"
 RATE = Format(".2f", absent="no run")
 MEANS = (
     ("dropout_pct", "Dropout: ticks without a target or persisting, %"),
@@ -138,7 +139,7 @@ def rate_quantity(rate: Rate | None, top: float | None = None) -> Quantity:
     return Quantity(
         value=rate.rate,
         interval=rate.interval,
-        remark=TOO_FEW if rate.interval is None else "",
+        remark=rate_remark(rate, "seed"),
         heat=None if top is None else (rate.rate / top) ** 0.5,
         hint=rate_hint(rate),
     )
@@ -147,7 +148,7 @@ def rate_quantity(rate: Rate | None, top: float | None = None) -> Quantity:
 def rate_hint(rate: Rate) -> str:
     """What a rate rests on."""
     events, seeds = count_text(rate.events, "event"), count_text(rate.runs, "seed")
-    return f"{events}, {seeds}, {rate.method.value}"
+    return f"{events}, {seeds}"
 
 
 def mean_table(matrix: Matrix, column: str, caption: str) -> Table:
@@ -168,7 +169,7 @@ def mean_quantity(runs: pl.DataFrame, column: str) -> Quantity:
     return Quantity(
         value=float(known.mean()) if known.size else None,
         interval=limits,
-        remark=TOO_FEW if limits is None and known.size > 1 else "",
+        remark=no_limits_text(known.size, "seed") if limits is None and known.size else "",
         hint=count_text(known.size, "seed") if known.size else "",
     )
 
@@ -263,7 +264,7 @@ def step_quantity(matrix: Matrix, column: str, step: tuple[str, str]) -> Quantit
     if not len(pairs):
         return Quantity(value=None)
     c = compare_pairs(per_seed(pairs, pl.col("difference")))
-    judged = column in WORSE_UP and c.p < ALPHA
+    judged = column in WORSE_UP and c.p is not None and c.p < ALPHA
     return Quantity(
         value=c.mean,
         interval=c.interval,

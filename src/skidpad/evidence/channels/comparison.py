@@ -30,6 +30,6 @@ def compare_drives(a: pl.DataFrame, b: pl.DataFrame) -> Iterator[str]:
         d, n = blocks["d"].to_numpy(), blocks["n"].to_numpy()
         mean = d.sum() / n.sum()
         yield (
-            f"{label}: {mean:+.4f} {interval_text(ratio_limits(d, n))} over {len(known)} "
+            f"{label}: {mean:+.4f} {interval_text(ratio_limits(d, n), len(d), 'block')} over {len(known)} "
             f"cycles; violated in {known['violated'].sum()} and {known['violated_b'].sum()}"
         )

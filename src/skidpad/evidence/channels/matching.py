@@ -185,7 +185,7 @@ def _interval(counts: Sequence[tuple[int, int]]) -> Interval | None:
 
 
 def _share_limits(hits: Sequence[float], cases: Sequence[float]) -> Interval | None:
-    """Of a share of sums over segments; None below six segments."""
+    """Of a share of sums over segments; None as for `ratio_limits`."""
     limits = ratio_limits(hits, cases)
     return None if limits is None else Interval(max(limits.low, 0.0), min(limits.high, 1.0))
 

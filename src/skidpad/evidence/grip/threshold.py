@@ -133,9 +133,10 @@ def threshold(completed: NDArray[np.bool_], levels: Sequence[float]) -> Threshol
     mu = np.asarray(levels, dtype=np.float64)
     under = np.append(mu, -inf)[first]  # the accident happened here ...
     over = np.append(mu[0], mu)[first]  # ... and not yet here
-    middle, (_, late) = median_time(dry - under, dry - least)
-    above, (early, _) = median_time(dry - over, dry - least)
-    interval = Interval(dry - late if isfinite(late) else 0.0, dry - early)
+    middle, late = median_time(dry - under, dry - least)
+    above, early = median_time(dry - over, dry - least)
+    low = dry - late.high if late and isfinite(late.high) else 0.0
+    interval = Interval(low, dry - early.low if early else dry)
     if not isfinite(middle):
         return Threshold(None, interval, least)
     return Threshold(dry - 0.5 * (middle + above), interval, least)

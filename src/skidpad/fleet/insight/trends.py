@@ -11,7 +11,6 @@ import polars as pl
 from sqlalchemy import Connection, func, select
 
 from skidpad.evidence.statistics import (
-    BOOTSTRAP_FROM,
     Interval,
     clopper_pearson,
     event_rate,
@@ -23,7 +22,7 @@ from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.rights import visible
 from skidpad.fleet.store.tables import batches, drives, hazards, vehicles
 from skidpad.fleet.unpacking import unpack
-from skidpad.fleet.warehouse import DAY, Moments
+from skidpad.fleet.warehouse import DAY, MANY_VEHICLES, Moments
 from skidpad.fleet.words import Kind, Principal, Role
 
 GROUP = 500  # batches that are taken at once
@@ -124,17 +123,18 @@ def _trend(m: Moments, days: int) -> Trend:
 
 
 def _limits(m: Moments) -> Interval:
-    """Limits of a share over vehicles; all of it where they are too few.
+    """Limits of a share over vehicles; all of it where they are fewer than eight.
 
     Where nothing was seen, or nothing else, a vehicle counts as one observation: whatever the spread
     of shares over vehicles, none is seen in k of them with a chance of at most (1 - share)^k.
     """
     if m.violated in (0.0, m.n):
         return clopper_pearson(m.vehicles if m.violated else 0, m.vehicles)
-    if m.vehicles < BOOTSTRAP_FROM:
+    if m.vehicles < MANY_VEHICLES:
         limits = ratio_limits(m.each_violated, m.each_n)
     else:
-        limits = linear_ratio_limits(m.vehicles, (m.violated, m.n), (m.vv, m.vn, m.nn))
+        products, cubes = (m.vv, m.vn, m.nn), (m.vvv, m.vvn, m.vnn, m.nnn)
+        limits = linear_ratio_limits(m.vehicles, (m.violated, m.n), products, cubes)
     if limits is None:
         return Interval(0.0, 1.0)
     return Interval(max(limits.low, 0.0), min(limits.high, 1.0))

@@ -66,7 +66,7 @@ class Finding(msgspec.Struct, frozen=True):
     decision: Decision
     drives: int
     mean: float  # errors per drive, update less before
-    low: float | None  # 95 % interval; None: unbounded
+    low: float | None  # 95 % interval; None: too few drives for one, or all alike
     high: float | None
     p_worse: float  # against "it is no worse"
     p_no_worse: float  # against "it is worse by the margin or more"
@@ -85,7 +85,7 @@ def look(differences: Sequence[float], plan: Plan, looks_left: int) -> Finding:
         decision, reason = Decision.REVERT, "it could not be shown to be no worse"
     else:
         decision, reason = Decision.WAIT, "undecided"
-    low, high = (None if not np.isfinite(v) else float(v) for v in seen.interval)
+    low, high = seen.interval or (None, None)
     return Finding(decision, d.size, seen.mean, low, high, seen.p_greater, shifted.p_less, reason)
 
 

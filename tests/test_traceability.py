@@ -5,7 +5,7 @@ import pytest
 
 from traceability import DOC, marks, proof, render, states, summaries
 
-DECISION = re.compile(r"[XLMGCKR]-[1-9]\d?")  # the project's settled questions; not listed
+DECISION = re.compile(r"[XLMGCKRT]-[1-9]\d?")  # the project's settled questions; not listed
 
 
 def test_every_mark_names_a_requirement_or_a_decision():

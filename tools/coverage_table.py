@@ -33,6 +33,10 @@ MEANS = (0.02, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
 DISPERSIONS = (1.0, 2.0, 3.0, 5.0, 10.0)
 
 
+Shape = tuple[int, int]
+Draw = Callable[[np.random.Generator, Shape], Floats]
+
+
 @dataclass(frozen=True, slots=True)
 class Kind:
     """A distribution of one unit's value, with its mean."""
@@ -40,7 +44,7 @@ class Kind:
     family: str
     name: str
     mean: float
-    draw: Callable[[np.random.Generator, tuple[int, int]], Floats]
+    draw: Draw
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,64 +64,78 @@ class Covered:
         return self.coverage < LEAST - 2.0 * sqrt(LEAST * (1.0 - LEAST) / self.draws)
 
 
+def counts_of(mean: float, dispersion: float) -> Draw:
+    """Poisson counts, or negative binomial ones with that variance over mean."""
+
+    def draw(rng: np.random.Generator, shape: Shape) -> Floats:
+        if dispersion == 1.0:
+            return rng.poisson(mean, shape).astype(np.float64)
+        n, p = mean / (dispersion - 1.0), 1.0 / dispersion
+        return rng.negative_binomial(n, p, shape).astype(np.float64)
+
+    return draw
+
+
+def mixed_counts_of(mean: float, dispersion: float) -> Draw:
+    """Poisson counts whose means are log-normal."""
+    v = log(1.0 + (dispersion - 1.0) / mean)
+
+    def draw(rng: np.random.Generator, shape: Shape) -> Floats:
+        means = rng.lognormal(log(mean) - v / 2.0, sqrt(v), shape)
+        return rng.poisson(means).astype(np.float64)
+
+    return draw
+
+
+def two_valued(value: float, share: float) -> Draw:
+    """A value in a share of units, else 0."""
+    return lambda rng, shape: np.where(rng.random(shape) < share, value, 0.0)
+
+
+def difference_of(more: Draw, less: Draw) -> Draw:
+    """Of two independent units."""
+    return lambda rng, shape: more(rng, shape) - less(rng, shape)
+
+
 def count_kinds() -> Iterator[Kind]:
     """Counts of events: Poisson, negative binomial, Poisson with log-normal means, bursts."""
     for mean in MEANS:
-        yield Kind("Poisson", f"mean {mean:g}", mean, lambda r, s, m=mean: r.poisson(m, s))
-        for d in DISPERSIONS[1:]:
-            yield Kind(
-                f"negative binomial, variance/mean {d:g}", f"mean {mean:g}", mean,
-                lambda r, s, m=mean, d=d: r.negative_binomial(m / (d - 1.0), 1.0 / d, s),
-            )  # fmt: skip
-    for mean in MEANS[1:]:
-        for d in (3.0, 10.0):
-            v = log(1.0 + (d - 1.0) / mean)
-            yield Kind(
-                f"log-normal means, variance/mean {d:g}", f"mean {mean:g}", mean,
-                lambda r, s, m=mean, v=v: r.poisson(r.lognormal(log(m) - v / 2.0, sqrt(v), s)),
-            )  # fmt: skip
+        for d in DISPERSIONS:
+            family = "Poisson" if d == 1.0 else f"negative binomial, variance/mean {d:g}"
+            yield Kind(family, f"mean {mean:g}", mean, counts_of(mean, d))
+        for d in (3.0, 10.0) if mean > min(MEANS) else ():
+            family = f"log-normal means, variance/mean {d:g}"
+            yield Kind(family, f"mean {mean:g}", mean, mixed_counts_of(mean, d))
     for size in (2, 5, 10, 20):
         for share in (0.01, 0.02, 0.05, 0.1, 0.2, 0.5):
-            yield Kind(
-                f"bursts of {size}", f"in {100 * share:g} % of runs", size * share,
-                lambda r, s, b=size, q=share: b * (r.random(s) < q),
-            )  # fmt: skip
+            name = f"in {100 * share:g} % of runs"
+            yield Kind(f"bursts of {size}", name, size * share, two_valued(size, share))
+
+
+SMOOTH: dict[str, tuple[float, Draw]] = {
+    "normal": (3.0, lambda rng, shape: rng.normal(3.0, 1.0, shape)),
+    "uniform": (0.5, lambda rng, shape: rng.random(shape)),
+    "beta(2, 8)": (0.2, lambda rng, shape: rng.beta(2.0, 8.0, shape)),
+    "exponential": (1.0, lambda rng, shape: rng.exponential(1.0, shape)),
+    "Student's with 3 degrees": (0.0, lambda rng, shape: rng.standard_t(3.0, shape)),
+    "log-normal, sigma 0.5": (exp(0.125), lambda rng, shape: rng.lognormal(0.0, 0.5, shape)),
+    "log-normal, sigma 1": (exp(0.5), lambda rng, shape: rng.lognormal(0.0, 1.0, shape)),
+}
 
 
 def value_kinds() -> Iterator[Kind]:
     """Values that are not counts, and paired differences."""
-    smooth: dict[str, tuple[float, Callable[[np.random.Generator, tuple[int, int]], Floats]]] = {
-        "normal": (3.0, lambda r, s: r.normal(3.0, 1.0, s)),
-        "uniform": (0.5, lambda r, s: r.random(s)),
-        "beta(2, 8)": (0.2, lambda r, s: r.beta(2.0, 8.0, s)),
-        "exponential": (1.0, lambda r, s: r.exponential(1.0, s)),
-        "Student's with 3 degrees": (0.0, lambda r, s: r.standard_t(3.0, s)),
-        "log-normal, sigma 0.5": (exp(0.125), lambda r, s: r.lognormal(0.0, 0.5, s)),
-        "log-normal, sigma 1": (exp(0.5), lambda r, s: r.lognormal(0.0, 1.0, s)),
-    }
-    for name, (mean, draw) in smooth.items():
+    for name, (mean, draw) in SMOOTH.items():
         yield Kind("mean", name, mean, draw)
     for p in (0.02, 0.05, 0.1, 0.2, 0.5, 0.9):
-        yield Kind(
-            "mean", f"0 or 90, 90 in {100 * p:g} %", 90.0 * p,
-            lambda r, s, p=p: 90.0 * (r.random(s) < p),
-        )  # fmt: skip
+        yield Kind("mean", f"0 or 90, 90 in {100 * p:g} %", 90.0 * p, two_valued(90.0, p))
     for d in (1.0, 3.0, 10.0):
-        yield Kind(
-            "difference", f"counts of mean 2 and 1, variance/mean {d:g}", 1.0,
-            lambda r, s, d=d: (_counts(r, 2.0, d, s) - _counts(r, 1.0, d, s)).astype(float),
-        )  # fmt: skip
+        name = f"counts of mean 2 and 1, variance/mean {d:g}"
+        yield Kind("difference", name, 1.0, difference_of(counts_of(2.0, d), counts_of(1.0, d)))
     for q in (0.02, 0.05, 0.1):
-        yield Kind(
-            "difference", f"bursts of 10 in {200 * q:g} % and {100 * q:g} % of runs", 10.0 * q,
-            lambda r, s, q=q: 10.0 * (r.random(s) < 2 * q) - 10.0 * (r.random(s) < q),
-        )  # fmt: skip
-
-
-def _counts(rng: np.random.Generator, mean: float, d: float, shape: tuple[int, int]) -> Floats:
-    if d == 1.0:
-        return rng.poisson(mean, shape)
-    return rng.negative_binomial(mean / (d - 1.0), 1.0 / d, shape)
+        name = f"bursts of 10 in {200 * q:g} % and {100 * q:g} % of runs"
+        draw = difference_of(two_valued(10.0, 2.0 * q), two_valued(10.0, q))
+        yield Kind("difference", name, 10.0 * q, draw)
 
 
 def cover_counts(kind: Kind, n: int, draws: int = DRAWS) -> Covered | None:

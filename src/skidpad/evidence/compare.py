@@ -49,8 +49,9 @@ class Rule:
     def broken_by(self, change: Change, surely: bool) -> bool:
         """Whether the change is a regression; `surely` asks the whole interval to be one."""
         c = change.comparison
-        values = c.interval if surely else (c.mean,)
-        return all(self.compare(v, self.limit) for v in values)
+        if not surely:
+            return self.compare(c.mean, self.limit)
+        return c.interval is not None and all(self.compare(v, self.limit) for v in c.interval)
 
 
 class Flaw(str, Enum):

@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.randomness import stream
 from skidpad.evidence.grip.warping import Cost, warping_distance
-from skidpad.evidence.statistics import CONFIDENCE, Interval
+from skidpad.evidence.limits import CONFIDENCE
+from skidpad.evidence.statistics import Interval
 
 Floats = NDArray[np.float64]
 

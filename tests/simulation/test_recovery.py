@@ -242,6 +242,14 @@ def test_more_than_120_degrees_is_wrong_way(turn: float, corrected: bool) -> Non
         assert action.relocate.moved.reason is RelocationReason.WRONG_WAY
 
 
+@pytest.mark.req("A-196")
+def test_where_lanes_cross_no_way_through_is_the_wrong_one() -> None:
+    """Seen in town: straight on through a junction, nearest to a lane that crosses."""
+    pose = Pose(-198.25001454484334, 0.6816554613788428, yaw=1.5708)
+    phase, action = play(Supervisor(load_map("town"), RecoverySettings(), DT), 1, pose)[0]
+    assert (phase, action.relocate) == (Supervision.NONE, None)
+
+
 @pytest.mark.req("A-197")
 def test_far_from_any_lane_nothing_is_wrong_way() -> None:
     phase, action = play(supervisor(), 1, Pose(1.0e5, 0.0, yaw=3.0))[0]

@@ -258,7 +258,8 @@ class Supervisor:
         place = self._place(states)
         if place is not None:
             self.first, self.last = self.first or place, place
-            if cos(place.heading - float(states.yaw[0])) < WRONG_WAY_DOT:
+            crossing = self.map.lanes.junction[place.lane] >= 0  # its lanes lead all ways
+            if not crossing and cos(place.heading - float(states.yaw[0])) < WRONG_WAY_DOT:
                 return RelocationReason.WRONG_WAY  # more than 120 deg off
         if self.last is None or not self._has_left(truth, place):
             return None

@@ -10,7 +10,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from referenceworlds import DT, MEDIAN, car, drive, seat
+from reference_driver import (
+    DT,
+    MEDIAN,
+    STOP_LANE,
+    STOP_S,
+    STOP_SIGN,
+    X_MAJOR,
+    car,
+    drive,
+    seat,
+)
 from skidpad.core.frames import RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorCommand
@@ -27,6 +37,7 @@ from skidpad.stack.reference.caution import (
     speed_factor,
 )
 from skidpad.stack.reference.following import Manner, acceleration, free_acceleration, wanted_gap
+from skidpad.stack.reference.junctions import V_THROUGH, travel_time
 from skidpad.stack.reference.person import person_of
 
 ROADS = st.sampled_from(list(RoadLook))
@@ -264,3 +275,44 @@ def test_a_seed_is_a_person_and_a_careful_one():
     assert all(p.headway >= p.reaction for p in people)
     assert all(p.speed <= 1.0 for p in people)
     assert np.median([p.reaction for p in people]) == pytest.approx(0.9, abs=0.1)
+
+
+# --- giving way
+
+
+def at_the_stop_sign(*others: tuple[float, float], v: float = 0.0, halted: bool = True):
+    """The command 2 m before town's stop line; others: (m before the junction, m/s) on the ring."""
+    stack, map = seat("town"), load_map("town")
+    stack.driver.halted = STOP_SIGN if halted else None
+    n = len(others)
+    seen = nobody()
+    if n:
+        distance, speed = np.array(others).T
+        seen = SeenActors(
+            np.arange(1, n + 1), np.zeros(n, np.uint8), np.full(n, X_MAJOR), -distance, np.zeros(n),
+            np.full(n, 0.5 * np.pi), np.zeros(n), speed, np.full(n, 4.0), np.full(n, 1.8),
+            np.zeros(n, np.bool_),
+        )  # fmt: skip
+    place = map.at(STOP_LANE, STOP_S - 0.5 * stack.driver.car.length - 1.5)
+    return stack.driver.act(view_at(place.pose, v, actors=seen))
+
+
+def test_it_halts_at_a_stop_sign_then_goes_when_nobody_comes():
+    assert at_the_stop_sign(v=5.0, halted=False).brake > 0.0
+    assert at_the_stop_sign(halted=False).throttle > 0.0
+    assert at_the_stop_sign((30.0, 14.0)).throttle == 0.0
+    assert at_the_stop_sign((149.0, 10.0)).throttle > 0.0
+    assert at_the_stop_sign((-30.0, 14.0)).throttle > 0.0, "it has passed"
+    assert at_the_stop_sign((149.0, 10.0), (30.0, 14.0)).throttle == 0.0
+    assert at_the_stop_sign((30.0, 0.2)).throttle > 0.0, "it waits itself"
+
+
+@given(v=st.floats(0.0, V_THROUGH), way=st.floats(0.1, 100.0), a=st.floats(0.1, 3.0))
+def test_the_time_through_is_that_of_small_steps(v, way, a):
+    t, gone, speed, dt = 0.0, 0.0, v, 1e-2
+    while gone < way:
+        faster = min(speed + a * dt, V_THROUGH)
+        gone += 0.5 * (speed + faster) * dt
+        speed = faster
+        t += dt
+    assert t == pytest.approx(travel_time(v, way, a), abs=0.05)

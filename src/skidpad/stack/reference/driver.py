@@ -23,6 +23,7 @@ from skidpad.core.vocabulary import LightState, Supervision, Tier
 from skidpad.roads.lanes import SignalKind
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.channels.control import Controller
+from skidpad.stack.channels.route import Line
 from skidpad.stack.channels.settings import CarModel
 from skidpad.stack.reference.caution import (
     B_YELLOW,
@@ -32,6 +33,7 @@ from skidpad.stack.reference.caution import (
     speed_factor,
 )
 from skidpad.stack.reference.following import Manner, acceleration
+from skidpad.stack.reference.junctions import LOOK_FROM, V_THROUGH, GivingWay
 from skidpad.stack.reference.person import Person, person_of
 from skidpad.stack.reference.way import Body, Place, Way, anticipated, gaps_ahead
 
@@ -43,6 +45,8 @@ LINE_HEADWAY = 0.5  # s kept to it
 PREVIEW = 10.0  # m beyond the comfortable braking distance for which limits and bends are looked at
 PREVIEW_STEP = 4  # points between two places looked at
 LIGHT_REACH = 150.0  # m
+HALT, STANDING = 3.0, 0.5  # m to a stop line and m/s at which it counts as having stopped
+PASSED = 1.5  # m beyond which a line is crossed and no longer given way at
 COMPARED = 0.4  # s between two views from which slowing down is judged (ours)
 REMEMBERED = 3.0  # s for which a light is taken to be as it was last seen
 
@@ -52,7 +56,7 @@ class ReferenceDriver:
 
     def __init__(self, map: RoadMap, person: Person, car: CarModel, dt: float = DT) -> None:
         self.person, self.car, self.dt = person, car, dt
-        self.way = Way(map)
+        self.way, self.giving_way = Way(map), GivingWay(map)
         self.controller = Controller(car, dt)
         self.reset()
 
@@ -62,6 +66,7 @@ class ReferenceDriver:
         self.controller.reset()
         self.lights: dict[int, tuple[int, LightState]] = {}
         self.stopping: int | None = None  # signal for which it has decided to stop
+        self.halted: int | None = None  # stop sign at which it has stood
         self.views: deque[tuple[int, SeenActors]] = deque(maxlen=round(COMPARED / self.dt) + 1)
         self.report = StackReport()
 
@@ -129,9 +134,28 @@ class ReferenceDriver:
             gap = line.s - place.s - 0.5 * self.car.length - LINE_MARGIN
             if gap < -0.5 * self.car.length or gap > LIGHT_REACH:
                 continue
-            if line.kind is SignalKind.LIGHT and self._stops_for(line.signal, view.tick, gap, v, m):
+            if line.kind is SignalKind.LIGHT:
+                stops = self._stops_for(line.signal, view.tick, gap, v, m)
+            else:
+                stops = gap > -PASSED and self._gives_way(line, view, place, gap, v, m)
+            if stops:
                 return max(gap, 0.1)
         return inf
+
+    def _gives_way(
+        self, line: Line, view: DriverView, place: Place, gap: float, v: float, m: Manner
+    ) -> bool:
+        """Whether it stops at a stop or yield line: the sign says so, or somebody comes too soon."""
+        if line.kind is SignalKind.STOP and self.halted != line.signal:
+            if gap > HALT or v > STANDING:
+                return True
+            self.halted = line.signal
+        if gap > LOOK_FROM:
+            return v > V_THROUGH
+        return self.giving_way.must_wait(
+            self.way.path.points, place.at, gap + LINE_MARGIN, v, self.car.length, m.a_max,
+            anticipated(view.actors, view.actors, 0.0, view.age),
+        )  # fmt: skip
 
     def _stops_for(self, signal: int, tick: int, gap: float, v: float, m: Manner) -> bool:
         """Whether it stops at a light; one that was not seen lately may be red."""

@@ -9,13 +9,21 @@ TEST_ARGS ?=
 DRIVE_ARGS ?=
 NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run test test-bare check wheel-check bench fuzz nightly soak refs data fleet fleet-load docs figures arm64 channels campaigns tables clean
+.PHONY: cockpit run test test-all test-times test-bare check wheel-check bench fuzz nightly soak refs data fleet fleet-load docs figures arm64 channels campaigns tables clean
 
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next --traffic pack $(RUN_ARGS)
 
+# the quick tests; those that were measured to take long are left to test-all, which is what CI runs
 test: $(VENV)/.tested-with
+	$(BIN)/python -m pytest -n 2 -m "not slow" $(TEST_ARGS)
+
+test-all: $(VENV)/.tested-with
 	$(BIN)/python -m pytest -n 2 $(TEST_ARGS)
+
+# all tests, and which of them are slow, for `make test`
+test-times: $(VENV)/.tested-with
+	$(BIN)/python -m pytest -n 2 --write-slow $(TEST_ARGS)
 
 # the tests that need a program of the system, with all such programs hidden: they skip, and say why
 BARE := tests/test_programs.py tests/fleet tests/report/test_in_browser.py tests/cockpit/test_cockpit_in_browser.py \

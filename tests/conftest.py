@@ -9,6 +9,7 @@ import pytest
 from hypothesis import settings
 
 from programs import needs_program
+from slow_tests import SlowTests, is_slow
 
 # no test judges by the wall clock: a busy machine is no fault
 settings.register_profile("skidpad", deadline=None)
@@ -28,10 +29,20 @@ def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption(
         "--program-tests", action="store_true", help="only tests that need a program of the system"
     )
+    parser.addoption("--write-slow", action="store_true", help="write tests/slow_tests.txt anew")
     parser.addoption("--fuzz-from", type=int, default=0, help="number of the first of them")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    if config.getoption("--write-slow") and not hasattr(config, "workerinput"):
+        config.pluginmanager.register(SlowTests(), "slow-tests")
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    for item in items:
+        if is_slow(item.nodeid):
+            item.add_marker(pytest.mark.slow)
     if config.getoption("--program-tests"):
         items[:] = [item for item in items if needs_program(item)]
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 import shapely
 
 from skidpad.roads.bundled import load_map
 from skidpad.roads.lanes import LaneKind
-from skidpad.roads.walkable import WalkArea, WalkMesh, walk_mesh
+from skidpad.roads.walkable import WalkArea, WalkMesh, _areas_of, _outline, walk_mesh
 
 
 def mesh_of(name: str) -> WalkMesh:
@@ -118,3 +120,25 @@ def test_shoulders_keep_their_heights_where_roads_cross() -> None:
         assert place is not None
         assert z == pytest.approx(place.z, abs=0.3)
     assert np.ptp(mesh.vertices[:, 2]) > 5.0
+
+
+def test_lines_and_points_between_surfaces_are_left_out() -> None:
+    one, two, three = (shapely.box(x, 0, x + 1, 1) for x in (0, 3, 6))
+    line, point = shapely.LineString([(1, 0), (3, 0)]), shapely.Point(9, 9)
+    mixed = shapely.GeometryCollection([shapely.MultiPolygon([one, two]), three, line, point])
+    kept = _areas_of(mixed)
+    assert kept.equals(shapely.union_all([one, two, three]))
+    assert shapely.union(kept, one, grid_size=0.01).area == pytest.approx(3.0)
+
+
+@pytest.mark.parametrize("town", ["Town01", "Town02", "Town07", "Town10HD"])
+def test_towns_have_walking_surfaces_with_their_sidewalks(towns: Path, town: str) -> None:
+    map = load_map(towns / f"{town}.xodr")
+    mesh = walk_mesh(map)
+    assert mesh is not None
+    walked = sum(p.area for p in plan(mesh, WalkArea.SIDEWALK))
+    outlines = [_outline(map, int(i)) for i in np.flatnonzero(map.lanes.kind == LaneKind.SIDEWALK)]
+    assert walked == pytest.approx(shapely.union_all(outlines).area, rel=0.01)
+    crossings = [shapely.Polygon(c[:, :2]) for c in map.roadside.crosswalks]
+    if crossings:
+        assert plan(mesh, WalkArea.CROSSWALK)

@@ -170,14 +170,22 @@ def _surfaces(map: RoadMap) -> dict[WalkArea, shapely.Geometry]:
     pavements = union(kinds == LaneKind.SIDEWALK)
     roads = union(kinds != LaneKind.SIDEWALK)
     verges = union((junction >= 0) & (kinds != LaneKind.SIDEWALK)).buffer(VERGE)
-    paved = shapely.union(pavements, crossings, grid_size=GRID)
-    firm = shapely.union(paved, roads, grid_size=GRID)
+    paved = _areas_of(shapely.union(pavements, crossings, grid_size=GRID))
+    firm = _areas_of(shapely.union(paved, roads, grid_size=GRID))
     return {
         WalkArea.SIDEWALK: pavements,
-        WalkArea.CROSSWALK: shapely.difference(crossings, pavements, grid_size=GRID),
-        WalkArea.ROAD: shapely.difference(roads, paved, grid_size=GRID),
-        WalkArea.GRASS: shapely.difference(verges, firm, grid_size=GRID),
+        WalkArea.CROSSWALK: _areas_of(shapely.difference(crossings, pavements, grid_size=GRID)),
+        WalkArea.ROAD: _areas_of(shapely.difference(roads, paved, grid_size=GRID)),
+        WalkArea.GRASS: _areas_of(shapely.difference(verges, firm, grid_size=GRID)),
     }
+
+
+def _areas_of(geometry: shapely.Geometry) -> shapely.Geometry:
+    """Returns the polygons of a geometry; on the grid, slivers between them become lines and points."""
+    if geometry.geom_type in ("Polygon", "MultiPolygon"):
+        return geometry
+    parts = shapely.get_parts(shapely.get_parts(geometry))
+    return shapely.MultiPolygon([p for p in parts if p.geom_type == "Polygon"])
 
 
 def _outline(map: RoadMap, lane: int) -> shapely.Geometry:

@@ -219,3 +219,32 @@ def test_a_batch_that_destroys_stopped_sensors_and_ticks_is_answered(serve: Serv
         assert len(cars) == 60 and not any(d.error for d in done)
         assert world.tick() == before + 2  # the batch has ticked once
     """)
+
+
+def test_bones_and_components_answer_and_unknown_ones_are_errors(serve: Serve) -> None:
+    serve("--map", "town").client("""
+    synchronous()
+    library = world.get_blueprint_library()
+    points = world.get_map().get_spawn_points()
+    walker = world.spawn_actor(library.filter("walker.pedestrian.*")[0], points[0])
+    car = world.spawn_actor(library.find("vehicle.tesla.model3"), points[5])
+    world.tick()
+    names = walker.get_bone_names()
+    told = {b.name: b for b in walker.get_bones().bone_transforms}
+    assert len(names) == len(set(names)) > 50 and set(names) == set(told)
+    seen = walker.get_bone_world_transforms(), walker.get_bone_relative_transforms()
+    for name, in_world, in_walker in zip(names, *seen):
+        assert in_world.location.distance(told[name].world.location) < 1e-4
+        assert in_walker.location.distance(told[name].component.location) < 1e-4
+    assert car.get_component_names() == ["root"]
+    at = car.get_component_world_transform("root").location
+    assert at.distance(car.get_location()) < 1e-4
+    asked = (lambda: car.get_component_world_transform("zzz"),
+             lambda: car.get_component_relative_transform("zzz"), car.get_bone_names)
+    for ask in asked:
+        try:
+            ask()
+            raise SystemExit("answered what is not there")
+        except RuntimeError as error:
+            assert "could not be found in this actor" in str(error), error
+    """)

@@ -91,44 +91,46 @@ def get_traffic_sign_trigger_volume(served: Served, id: Any) -> list[Any]:
     return get_actor_bounding_box(served, id)
 
 
-def _named_parts(what: str) -> None:
-    """Bodies have one part, the root; bones and sockets there are none."""
-    names = ["root"] if what == "component" else []
+COMPONENT = "root"  # the one component of every actor
 
-    @TABLE.method(f"get_actor_{what}_names")
-    def part_names(served: Served, id: Any) -> list[str]:
-        """Names of parts."""
+
+@TABLE.method("get_actor_component_names")
+def get_actor_component_names(served: Served, id: Any) -> list[str]:
+    """Returns the names of an actor's components: the root alone."""
+    served.episode.actors.get(id)
+    return [COMPONENT]
+
+
+def _require_component(name: Any) -> None:
+    if wire.text(name, "component") != COMPONENT:
+        raise CallError(
+            f"Component could not be found in this actor: {name!r}; there is {COMPONENT!r}"
+        )
+
+
+@TABLE.method("get_actor_component_world_transform")
+def get_actor_component_world_transform(served: Served, id: Any, name: Any) -> list[Any]:
+    """Returns where the root is; CallError for a component that there is not."""
+    actor = served.episode.actors.get(id)
+    _require_component(name)
+    return wire.transform(served.episode.actors.pose(actor))
+
+
+@TABLE.method("get_actor_component_relative_transform")
+def get_actor_component_relative_transform(served: Served, id: Any, name: Any) -> list[Any]:
+    """Returns the root seen from itself; CallError for a component that there is not."""
+    served.episode.actors.get(id)
+    _require_component(name)
+    return wire.transform(Pose(0.0, 0.0))
+
+
+for _seen_from in ("names", "world_transforms", "relative_transforms"):
+
+    @TABLE.method(f"get_actor_socket_{_seen_from}")
+    def sockets(served: Served, id: Any) -> list[Any]:
+        """Returns nothing: no actor has sockets."""
         served.episode.actors.get(id)
-        return names
-
-    if what == "component":
-
-        @TABLE.method("get_actor_component_world_transform")
-        def component_world(served: Served, id: Any, name: Any) -> list[Any]:
-            """Where the root is."""
-            wire.text(name, "component")
-            return wire.transform(served.episode.actors.pose(served.episode.actors.get(id)))
-
-        @TABLE.method("get_actor_component_relative_transform")
-        def component_relative(served: Served, id: Any, name: Any) -> list[Any]:
-            """The root, seen from itself."""
-            served.episode.actors.get(id)
-            wire.text(name, "component")
-            return wire.transform(Pose(0.0, 0.0))
-
-        return
-
-    for seen_from in ("world", "relative"):
-
-        @TABLE.method(f"get_actor_{what}_{seen_from}_transforms")
-        def part_transforms(served: Served, id: Any) -> list[Any]:
-            """There are none."""
-            served.episode.actors.get(id)
-            return []
-
-
-for _what in ("component", "bone", "socket"):
-    _named_parts(_what)
+        return []
 
 
 @TABLE.method("get_vehicle_bone_world_transforms")

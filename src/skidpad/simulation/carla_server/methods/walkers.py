@@ -8,7 +8,7 @@ from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.actors import Actor
 from skidpad.simulation.carla_server.bones import Skeleton, parse_bones
 from skidpad.simulation.carla_server.catalogue import Family
-from skidpad.simulation.carla_server.rpc import Shape, Table
+from skidpad.simulation.carla_server.rpc import CallError, Shape, Table
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.walkers import WalkerControl
 
@@ -40,11 +40,36 @@ def _skeleton(served: Served, id: Any) -> tuple[Actor, Skeleton]:
     return actor, served.episode.skeletons.setdefault(actor.id, Skeleton())
 
 
+def _bone_rows(served: Served, id: Any) -> list[list[Any]]:
+    """Returns the bones of a walker, parents first; CallError for an actor without a skeleton."""
+    if served.episode.actors.get(id).family is not Family.WALKER:
+        raise CallError(f"Component could not be found in this actor: {id} has no skeleton")
+    actor, skeleton = _skeleton(served, id)
+    return skeleton.told(served.episode.actors.pose(actor), 2.0 * actor.half[2])
+
+
+@TABLE.method("get_actor_bone_names")
+def get_actor_bone_names(served: Served, id: Any) -> list[str]:
+    """Returns the names of a walker's bones, in the order of their transforms."""
+    return [row[0] for row in _bone_rows(served, id)]
+
+
+@TABLE.method("get_actor_bone_world_transforms")
+def get_actor_bone_world_transforms(served: Served, id: Any) -> list[Any]:
+    """Returns where a walker's bones are in the world."""
+    return [row[1] for row in _bone_rows(served, id)]
+
+
+@TABLE.method("get_actor_bone_relative_transforms")
+def get_actor_bone_relative_transforms(served: Served, id: Any) -> list[Any]:
+    """Returns where a walker's bones are, seen from the walker (CARLA's component space)."""
+    return [row[2] for row in _bone_rows(served, id)]
+
+
 @TABLE.method("get_bones_transform")
 def get_bones_transform(served: Served, id: Any) -> list[Any]:
     """All bones of a walker."""
-    actor, skeleton = _skeleton(served, id)
-    return [skeleton.told(served.episode.actors.pose(actor), 2.0 * actor.half[2])]
+    return [_bone_rows(served, id)]
 
 
 @TABLE.method("set_bones_transform", Shape.VOID)

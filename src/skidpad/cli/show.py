@@ -13,11 +13,14 @@ from skidpad.core.errors import FileError
 from skidpad.evidence.drive.collisions import find_crashes
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import prepare
+from skidpad.evidence.drive.severity import graded_contacts
+from skidpad.evidence.drive.story import tell_story
 from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.recording.matrix import Metrics
 from skidpad.recording.results import definitions_of
 from skidpad.recording.runlog import RunLog
-from skidpad.report.cards import chain, headline
+from skidpad.report.cards import contact_text, headline, timeline
+from skidpad.report.causes import cause_sentence
 from skidpad.roads.queries import RoadMap
 
 
@@ -62,10 +65,19 @@ def show(run: Path) -> None:
     for name in columns["value"]:
         table.add_row(name, *(_text(c[name]) for c in columns.values()), meanings[name])
     console.print(table)
-    for crash in find_crashes(prepare(log, road_map)):
+    drive = prepare(log, road_map)
+    for crash in find_crashes(drive):
+        story = tell_story(drive, crash)
         console.print(f"\n[bold]{crash.t:.2f} s: {headline(crash)}[/]")
-        for line in chain(crash):
-            console.print(f"  {line}")
+        console.print(f"  {cause_sentence(story)}")
+        for event in timeline(story):
+            style = "red" if event.is_wrong else ""
+            console.print(f"  {event.time:>8}  {event.text}", style=style)
+    contacts = graded_contacts(drive)
+    if contacts:
+        console.print("\n[bold]All contacts[/]")
+    for contact in contacts:
+        console.print(f"  {contact.tick * log.header.dt:8.2f} s  {contact_text(contact)}")
 
 
 def _text(value: float | None) -> str:

@@ -10,10 +10,13 @@ from pathlib import Path
 from PIL import Image as Picture
 
 from skidpad.core.vocabulary import DetectionStatus, Tier
-from skidpad.evidence.drive.collisions import Crash, CrashKind, Sighting, Striker
+from skidpad.evidence.drive.collisions import Crash, CrashKind, Striker
 from skidpad.evidence.drive.prepared import Drive
+from skidpad.evidence.drive.severity import Contact
+from skidpad.evidence.drive.story import Arrival, Sighting, Story, tell_story
 from skidpad.recording.campaigns import snapshot
-from skidpad.report.page import Card, Image
+from skidpad.report.causes import cause_sentence, metres, moment_gap, speed
+from skidpad.report.page import Card, Event, Image
 from skidpad.report.replay import replay
 from skidpad.roads.queries import RoadMap
 
@@ -45,19 +48,25 @@ STATUS = {
 }
 
 
-def severity(crash: Crash) -> float:
-    """What makes a crash the worse one: the closing speed, else the ego's own."""
-    return crash.v_closing if crash.v_closing is not None else crash.v_ego
+def severity(crash: Crash) -> tuple[bool, float, float]:
+    """What makes a crash the worse one: a person, the delta-v, else the closing speed, the speed."""
+    contact = crash.contact
+    if contact is None:
+        return False, 0.0, crash.v_ego
+    v = contact.v_closing if contact.delta_v is None else contact.delta_v
+    return contact.is_vulnerable, v, crash.v_ego
 
 
 def crash_card(crash: Crash, drive: Drive, road_map: RoadMap, run: Path) -> Card:
     """The card of one crash of the run in the folder `run`."""
+    story = tell_story(drive, crash)
     return Card(
         title=headline(crash),
         subtitle=f"{run.name} at {crash.t:.2f} s",
-        tags=tags(crash),
+        tags=tags(story),
         facts=facts(crash),
-        chain=chain(crash),
+        cause=cause_sentence(story),
+        events=timeline(story),
         images=pictures(run, crash.t),
         replay=replay(drive.log, road_map, drive.row(crash.tick)),
     )
@@ -67,70 +76,107 @@ def headline(crash: Crash) -> str:
     """One line that says what happened."""
     if crash.kind is CrashKind.WRONG_WAY:
         return "Facing the wrong way"
+    alone = " in a bend, without a lead" if crash.bend_exit else ""
     if crash.kind is CrashKind.OFF_ROAD:
-        where = " in a bend, without a lead" if crash.bend_exit else ""
-        return f"Off the road at {_kmh(crash.v_ego)}{where}"
+        return f"Off the road at {speed(crash.v_ego)}{alone}"
     if crash.kind is CrashKind.STATIC:
-        where = " in a bend, without a lead" if crash.bend_exit else ""
-        return f"Into the {crash.other} at {_kmh(crash.v_ego)}{where}"
+        return f"Into the {crash.other} at {speed(crash.v_ego)}{alone}"
+    closing = "" if crash.v_closing is None else f", closing at {speed(crash.v_closing)}"
     if crash.rear_ended:
-        return f"Struck from behind by {crash.other}, closing at {_kmh(crash.v_closing)}"
+        return f"Struck from behind by {crash.other}{closing}"
     who = "Ego into" if crash.striker is not Striker.OTHER else "Hit by"
-    return f"{who} {crash.other}, closing at {_kmh(crash.v_closing)}"
+    return f"{who} {crash.other}{closing}"
 
 
-def tags(crash: Crash) -> list[str]:
+def tags(story: Story) -> list[str]:
     """Short marks to scan by."""
-    marks = [crash.kind.value.replace("_", " ")]
-    if crash.rear_ended:
-        marks.append("rear-ended")
-    if crash.bend_exit:
-        marks.append("bend exit")
-    if crash.lead_since is not None and crash.lead_since < 2.0:
-        marks.append("cut-in")
-    return marks
+    crash, contact = story.crash, story.crash.contact
+    marks = [
+        (crash.kind.value.replace("_", " "), True),
+        (_class_mark(contact), contact is not None),
+        ("person or two wheels", contact is not None and contact.is_vulnerable),
+        ("rear-ended", crash.rear_ended),
+        ("bend exit", crash.bend_exit),
+        ("cut-in", story.arrival is Arrival.CUT_IN and story.came_just_before),
+    ]
+    return [mark for mark, applies in marks if applies]
+
+
+def _class_mark(contact: Contact | None) -> str:
+    return "" if contact is None else f"{contact.graded_by.value} {contact.severity.value}"
 
 
 def facts(crash: Crash) -> list[tuple[str, str]]:
     """Numbers of the moment; what was not there is left out."""
+    contact = crash.contact
+    delta_v = None if contact is None else contact.delta_v
     rows = [
-        ("ego", _kmh(crash.v_ego)),
-        ("other", _kmh(crash.v_other)),
-        ("closing", _kmh(crash.v_closing)),
-        ("offset in lane", _metres(crash.lane_offset)),
-        ("bend radius", _metres(crash.bend_radius, 0)),
-        ("friction", f"{crash.mu:.2f}" if crash.mu is not None else None),
-        ("hardest brake, last 2 s", f"{100 * crash.brake_max:.0f} %"),
-        ("lead not reported, last 10 s", f"{crash.unseen:.2f} s"),
+        ("ego", crash.v_ego, speed),
+        ("other", crash.v_other, speed),
+        ("closing", crash.v_closing, speed),
+        (_delta_v_name(contact), delta_v, speed),
+        ("offset in lane", crash.lane_offset, "{:.2f} m".format),
+        ("bend radius", crash.bend_radius, "{:.0f} m".format),
+        ("friction", crash.mu, "{:.2f}".format),
+        ("hardest brake, last 2 s", 100 * crash.brake_max, "{:.0f} %".format),
+        ("lead not reported, last 10 s", crash.unseen, "{:.2f} s".format),
     ]
-    return [(name, value) for name, value in rows if value is not None]
+    return [(name, write(value)) for name, value, write in rows if value is not None]
 
 
-def chain(crash: Crash) -> list[str]:
-    """The causes in order of time."""
-    lines = []
-    if crash.lead_since is not None:
-        lines.append(f"-{crash.lead_since:.1f} s: {crash.other} becomes the lead")
-    if crash.first_detection is not None:
-        lines.append(f"{_sighting(crash.first_detection)} - first seen as the lead")
-    elif crash.kind is CrashKind.VEHICLE and not crash.rear_ended:
-        lines.append("never reported while it was the lead")
-    lines += [_sighting(s) for s in crash.last_detections]
-    lines.append(f"0.0 s: {headline(crash)}")
-    return lines
+def _delta_v_name(contact: Contact | None) -> str:
+    return "delta-v" if contact is None or contact.actor < 0 else "delta-v, larger of the two"
 
 
-def _sighting(s: Sighting) -> str:
-    parts = []
-    if s.status is not None:
-        parts.append(STATUS[s.status])
+def timeline(story: Story) -> list[Event]:
+    """What happened in order of time; mismatches of measured and true are marked."""
+    crash, found = story.crash, []
+    found += [(s.before, _news_event(s, story)) for s in story.news]
+    for moment, text in (
+        (story.arrived, f"{crash.other} is ahead in the lane"),
+        (story.braked, "the ego begins to brake"),
+        (story.slowed, f"{crash.other} begins to slow"),
+        (story.pushed_by, f"contact with {story.pusher}"),
+    ):
+        if moment is not None:
+            parts = [text, moment.v and f"from {speed(moment.v)}", moment_gap(moment)]
+            found.append((moment.before, _event(moment.before, [p for p in parts if p])))
+    found.append((0.0, _event(0.0, [headline(crash)])))
+    found += [(-after, _event(-after, [contact_text(c)])) for after, c in story.followed]
+    if story.put_back is not None:
+        found.append(
+            (-story.put_back, _event(-story.put_back, ["the ego is put back on its lane"]))
+        )
+    return [event for _, event in sorted(found, key=lambda item: -round(item[0], 3))]
+
+
+def _event(before: float, parts: Sequence[str], is_wrong: bool = False) -> Event:
+    sign = "+" if before < 0.0 else "-" if before > 0.0 else ""
+    return Event(f"{sign}{abs(before):.2f} s", ", ".join(parts), is_wrong)
+
+
+def _news_event(s: Sighting, story: Story) -> Event:
+    """One change of what the stack said."""
+    parts = [STATUS[s.status]] if s.status is not None else []
     if s.distance is not None:
-        parts.append(f"measured {s.distance:.1f} m")
+        parts.append(f"measured {metres(s.distance)}")
     if s.gap is not None:
-        parts.append(f"true gap {s.gap:.1f} m")
+        to = f" to {s.to}" if s.to and s.to != story.crash.other else ""
+        parts.append(f"true gap {metres(s.gap)}{to}")
+    elif s.distance is not None:
+        parts.append("nothing ahead in the lane within 80 m")
     if s.tier is not None:
         parts.append(TIERS[s.tier])
-    return f"-{s.before:.1f} s: " + ", ".join(parts)
+    if s == story.first:
+        parts.append(f"first report of {story.crash.other}")
+    return _event(s.before, parts, s.is_wrong)
+
+
+def contact_text(contact: Contact) -> str:
+    """One contact in words, with its class and what it is graded by."""
+    what = contact.other if contact.actor > 0 else f"the {contact.other}"
+    v = contact.v_closing if contact.delta_v is None else contact.delta_v
+    return f"contact with {what}, {contact.graded_by.value} {speed(v)}, {contact.severity.value}"
 
 
 def pictures(run: Path, t: float) -> list[Image]:
@@ -159,11 +205,3 @@ def webp_uri(path: Path) -> str:
 def worst(crashes: Sequence[Crash], n: int) -> list[Crash]:
     """The n hardest crashes, hardest first."""
     return sorted(crashes, key=severity, reverse=True)[:n]
-
-
-def _kmh(v: float | None) -> str:
-    return "unknown speed" if v is None else f"{3.6 * v:.0f} km/h"
-
-
-def _metres(value: float | None, digits: int = 2) -> str | None:
-    return None if value is None else f"{value:.{digits}f} m"

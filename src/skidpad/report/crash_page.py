@@ -8,6 +8,7 @@ from pathlib import Path
 from skidpad.evidence.drive.collisions import contact_crashes
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.logfiles import read_log
+from skidpad.recording.motion import motion_hash
 from skidpad.recording.runlog import RunLog
 from skidpad.report.cards import crash_card, severity
 from skidpad.report.crashes import Found
@@ -27,7 +28,8 @@ def find_contacts(log: RunLog, road: RoadMap, run: Path) -> list[Found]:
 
 
 def contact_cards(found: Sequence[Found]) -> Cards:
-    """Return the cards of crashes, hardest first."""
+    """Return the cards of crashes, hardest first; of drives that moved alike once (T-3)."""
+    found = list({(motion_hash(f[1].log), f[0].tick, f[0].other): f for f in found[::-1]}.values())
     hardest = sorted(found, key=lambda item: severity(item[0]), reverse=True)[:SHOWN]
     title = f"{len(found)} crashes" if len(found) > 1 else "One crash"
     if len(hardest) < len(found):

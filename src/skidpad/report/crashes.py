@@ -9,6 +9,7 @@ from pathlib import Path
 import polars as pl
 
 from skidpad.core.names import slug
+from skidpad.evidence.contrasts import drive_hash
 from skidpad.evidence.drive.collisions import Crash, find_crashes
 from skidpad.evidence.drive.prepared import Drive, prepare
 from skidpad.recording.logfiles import read_log
@@ -26,9 +27,31 @@ Found = tuple[Crash, Drive, RoadMap, Path]  # Path: of the run
 
 
 def found_crashes(matrix: Matrix) -> dict[Cell, list[Found]]:
-    """The crashes of every cell that has some, hardest first."""
-    cells = [(config, weather) for config in matrix.configs for weather in matrix.weathers]
-    return {cell: found for cell in cells if (found := _hardest(matrix, *cell))}
+    """The crashes of every cell that has some, hardest first.
+
+    A drive that moved alike in several weathers stands once, under the first of them (T-3).
+    """
+    return {
+        cell: found
+        for cell, runs in crashed_runs(matrix).items()
+        if (found := _hardest(matrix, runs))
+    }
+
+
+def crashed_runs(matrix: Matrix) -> dict[Cell, pl.DataFrame]:
+    """The runs of each cell that had an intervention, what moved alike in the first cell only."""
+    keys = ("config", "seed", "sensors", "moved")
+    seen: set[tuple[object, ...]] = set()
+    found = {}
+    for config in matrix.configs:
+        for weather in matrix.weathers:
+            runs = matrix.cell(config, weather).filter(pl.col("fatal_collisions") > 0)
+            runs = runs.with_columns(moved=drive_hash(runs))
+            rows = list(runs.select(keys).rows())
+            new = [row[-1] is None or row not in seen for row in rows]
+            seen.update(rows)
+            found[config, weather] = runs.filter(pl.Series(new, dtype=pl.Boolean))
+    return found
 
 
 def worst_of_each(crashes: dict[Cell, list[Found]]) -> list[Block]:
@@ -50,22 +73,21 @@ def worst_of_each(crashes: dict[Cell, list[Found]]) -> list[Block]:
 def crash_sections(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[Block]:
     """One fold per cell with its worst crashes; pages with all of them beside the report."""
     if not crashes:
-        return [Text("No fatal collision.")]
+        return [Text("No intervention: no crash and no departure.")]
     intro = Text(
-        "The three hardest crashes of each cell. Times in a chain count back from the contact. "
-        "Every other crash stands on its cell's own page in the folder cards."
+        "The three hardest crashes of each cell. Times count from the contact. A drive that moved "
+        "alike in several weathers stands once, under the first of them. Every other crash stands "
+        "on its cell's own page in the folder cards."
     )
-    return [intro, *(_cell_block(matrix, *cell, found) for cell, found in crashes.items())]
+    runs = crashed_runs(matrix)
+    blocks = [_cell_block(matrix, cell, found, runs[cell]) for cell, found in crashes.items()]
+    return [intro, *blocks]
 
 
-def _crashed(matrix: Matrix, config: str, weather: str) -> pl.DataFrame:
-    return matrix.cell(config, weather).filter(pl.col("fatal_collisions") > 0)
-
-
-def _hardest(matrix: Matrix, config: str, weather: str) -> list[Found]:
+def _hardest(matrix: Matrix, crashed: pl.DataFrame) -> list[Found]:
     """Crashes in the runs with the hardest impacts, as far as their logs were kept, hardest first."""
-    runs = _crashed(matrix, config, weather).sort(
-        "max_impact_kmh", "seed", descending=[True, False], nulls_last=True
+    runs = crashed.sort(
+        "max_delta_v_kmh", "max_impact_kmh", "seed", descending=[True, True, False], nulls_last=True
     )
     names = matrix.names(runs.head(RUNS_READ))
     found = [crash for name in names if name is not None for crash in _crashes(matrix, name)]
@@ -81,9 +103,9 @@ def _crashes(matrix: Matrix, name: str) -> Iterator[Found]:
         yield from ((crash, drive, road_map, run) for crash in find_crashes(drive))
 
 
-def _cell_block(matrix: Matrix, config: str, weather: str, found: list[Found]) -> Cards:
+def _cell_block(matrix: Matrix, cell: Cell, found: list[Found], crashed: pl.DataFrame) -> Cards:
+    config, weather = cell
     title = f"{config_title(config)}, {weather_title(weather)}"
-    crashed = _crashed(matrix, config, weather)
     inline = [crash_card(*item) for item in found[:INLINE]]
     if len(found) <= INLINE and len(crashed) <= RUNS_READ:
         return Cards(title, inline)

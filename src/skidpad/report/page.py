@@ -153,14 +153,25 @@ class Image:
 
 
 @dataclass(frozen=True, slots=True)
+class Event:
+    """One line of a card's timeline."""
+
+    time: str
+    text: str
+    is_wrong: bool = False  # what was measured and what was true differ
+
+
+@dataclass(frozen=True, slots=True)
 class Card:
-    """One crash or run: title, facts, cause chain, pictures, replay, charts."""
+    """One crash or run: its cause in a sentence, facts, timeline, pictures, replay, charts."""
 
     title: str
     subtitle: str = ""
+    cause: str = ""  # one sentence that is read first
     tags: Sequence[str] = ()
     facts: Sequence[tuple[str, str]] = ()
     chain: Sequence[str] = ()
+    events: Sequence[Event] = ()  # in order of time
     images: Sequence[Image] = ()
     replay: Any = None  # see assets/replay.js for its shape
     worlds: Any = None  # see assets/worlds.js

@@ -22,6 +22,7 @@ from skidpad.evidence.drive.lanematch import LaneIndex
 from skidpad.evidence.drive.lateral import count_invasions
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import LeadDefinition, MetricSettings, prepare
+from skidpad.evidence.drive.story import tell_story
 from skidpad.recording.events import Relocation
 from skidpad.recording.logfiles import read_log, write_log
 from skidpad.recording.matrix import Metrics
@@ -362,15 +363,18 @@ def test_driving_into_a_car_is_one_vehicle_collision_with_its_causes() -> None:
     (c,) = find_crashes(prepare(log, straight_map()))
     assert (c.kind, c.other, c.striker) == (CrashKind.VEHICLE, "car 1", Striker.EGO)
     assert (c.t, c.v_ego, c.v_other) == (pytest.approx(0.6), 20.0, 5.0)
-    assert c.first_detection is not None
-    assert c.first_detection.before == pytest.approx(7 * DT)
-    assert c.first_detection.gap == pytest.approx(10.0 - 15.0 * 5 * DT, abs=1e-3)
+    story = tell_story(prepare(log, straight_map()), c)
+    assert story.first is not None
+    assert story.first.before == pytest.approx(7 * DT)
+    assert story.first.gap == pytest.approx(10.0 - 15.0 * 5 * DT, abs=1e-3)
     assert c.unseen == pytest.approx(5 * DT)
     assert c.lead_since == pytest.approx(12 * DT)
-    assert [s.status for s in c.last_detections] == [
+    assert [s.status for s in story.news] == [
         DetectionStatus.NO_TARGET,
         DetectionStatus.FUSION_DETECT,
+        DetectionStatus.FUSION_DETECT,  # at the contact: 30 m measured, 1 m true
     ]
+    assert story.worst == story.news[-1]
     assert c.lane_offset == pytest.approx(0.0)
     assert c.bend_radius is None
     assert c.mu == pytest.approx(0.9)

@@ -1,4 +1,4 @@
-"""Collisions, each with its chain of causes: what was hit, what was seen of it, and when."""
+"""Collisions: what was hit, who struck whom, and what the moment was like."""
 
 from __future__ import annotations
 
@@ -8,9 +8,10 @@ from enum import Enum
 import numpy as np
 
 from skidpad.core.states import ContactEvent
-from skidpad.core.vocabulary import DetectionStatus, RelocationReason, Supervision, Tier
+from skidpad.core.vocabulary import RelocationReason, Supervision
 from skidpad.evidence.drive.perception import vehicle_present
-from skidpad.evidence.drive.prepared import Drive
+from skidpad.evidence.drive.prepared import Drive, Mask
+from skidpad.evidence.drive.severity import Contact, grade
 from skidpad.recording.runlog import RunLog
 
 BEND_RADIUS = 250.0  # m, a lane curved tighter is a bend
@@ -44,17 +45,6 @@ class Striker(str, Enum):
     OTHER = "other"
 
 
-@dataclass(frozen=True, slots=True)
-class Sighting:
-    """What the stack said at one moment before the crash."""
-
-    before: float  # s
-    status: DetectionStatus | None
-    tier: Tier | None
-    distance: float | None  # m, measured
-    gap: float | None  # m, true: to what was hit, else to the lead
-
-
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Crash:
     """One fatal event and how it came about. None: does not apply, or was not there."""
@@ -64,6 +54,7 @@ class Crash:
     kind: CrashKind
     weather: str
     other: str  # name of the vehicle, or what stood there
+    actor: int | None  # its row in the log; None for what is no actor
     striker: Striker | None
     rear_ended: bool
     bend_exit: bool  # off the road in a bend without a lead (decision M-6)
@@ -72,6 +63,7 @@ class Crash:
     v_other: float | None
     v_closing: float | None  # m/s at the contact
     impulse: float | None  # N s
+    contact: Contact | None  # graded (decision T-4); None without a contact
     x: float
     y: float
     lane_offset: float | None  # m, left positive
@@ -80,8 +72,6 @@ class Crash:
     brake_max: float  # of the last two seconds
     unseen: float  # s of the last ten with a lead in truth that was not reported
     lead_since: float | None  # s that the other car had been the lead: small for a cut-in
-    first_detection: Sighting | None  # of the car that was hit, in its time as the lead
-    last_detections: tuple[Sighting, ...]  # changes of status and tier, newest last
 
 
 def recovery_rows(log: RunLog) -> list[int]:
@@ -147,7 +137,7 @@ def _corrected(drive: Drive, at: int, kind: CrashKind) -> Crash:
 def _is_bend_exit(drive: Drive, at: int) -> bool:
     """In a bend, and nobody was ahead."""
     radius = _bend_radius(drive, at)
-    alone = not np.any(drive.lead.actor[_since(drive, at, JUST_BEFORE) : at + 1] >= 0)
+    alone = not np.any(drive.lead.actor[rows_before(drive, at, JUST_BEFORE) : at + 1] >= 0)
     return radius is not None and radius < BEND_RADIUS and alone
 
 
@@ -177,16 +167,16 @@ def _event(
     contact: ContactEvent | None = None,
 ) -> Crash:
     log, a = drive.log, drive.log.actors
-    recent = slice(_since(drive, at, JUST_BEFORE), at + 1)
-    history = slice(_since(drive, at, LOOK_BACK), at + 1)
+    recent = slice(rows_before(drive, at, JUST_BEFORE), at + 1)
+    history = slice(rows_before(drive, at, LOOK_BACK), at + 1)
     unseen = vehicle_present(drive) & (log.report.detected != 1.0) & drive.sample
-    since, first = (None, None) if actor is None else _as_lead(drive, at, actor)
     return Crash(
         tick=int(log.tick[at]),
         t=float(log.t[at]),
         kind=kind,
         weather=log.weathers[int(log.weather[at])],
         other=other,
+        actor=actor,
         striker=striker,
         rear_ended=rear_ended,
         bend_exit=bend_exit,
@@ -195,6 +185,7 @@ def _event(
         v_other=v_other,
         v_closing=None if contact is None else contact.v_closing,
         impulse=None if contact is None else contact.impulse,
+        contact=None if contact is None else grade(drive, contact),
         x=float(a.x[at, 0]) if contact is None else contact.x,
         y=float(a.y[at, 0]) if contact is None else contact.y,
         lane_offset=number(float(drive.place.offset[at])),
@@ -202,19 +193,18 @@ def _event(
         mu=_grip(log, at),
         brake_max=float(np.nanmax(log.applied.brake[recent])),
         unseen=float(np.count_nonzero(unseen[history]) * log.header.dt),
-        lead_since=since,
-        first_detection=first,
-        last_detections=_last_detections(drive, history.start, at, actor),
+        lead_since=_lead_since(drive, at, actor),
     )
 
 
-def _since(drive: Drive, at: int, seconds: float) -> int:
+def rows_before(drive: Drive, at: int, seconds: float) -> int:
+    """Returns the row that lies so long before `at`, at least the first one of the log."""
     return max(at - round(seconds / drive.log.header.dt), 0)
 
 
 def _bend_radius(drive: Drive, at: int) -> float | None:
     """Tightest radius of the ego's lane in the last two seconds; None on a straight."""
-    curvature = np.abs(drive.place.curvature[_since(drive, at, JUST_BEFORE) : at + 1])
+    curvature = np.abs(drive.place.curvature[rows_before(drive, at, JUST_BEFORE) : at + 1])
     curvature = curvature[np.isfinite(curvature)]
     tightest = float(curvature.max()) if curvature.size else 0.0
     return 1.0 / tightest if tightest > 1e-6 else None
@@ -241,57 +231,21 @@ def _speed(log: RunLog, row: int, actor: int) -> float:
     return float(np.hypot(log.actors.vx[row, actor], log.actors.vy[row, actor]))
 
 
-def _as_lead(drive: Drive, at: int, actor: int) -> tuple[float | None, Sighting | None]:
-    """How long `actor` had been the lead until `at`, and its first detection in that time."""
-    is_lead = drive.lead.actor[: at + 1] == actor
-    last = np.flatnonzero(is_lead[_since(drive, at, JUST_BEFORE) :])
+def _lead_since(drive: Drive, at: int, actor: int | None) -> float | None:
+    if actor is None:
+        return None
+    is_lead = np.asarray(drive.lead.actor[: at + 1] == actor)
+    begin = last_stretch(is_lead, rows_before(drive, at, JUST_BEFORE))
+    return None if begin is None else (at - begin) * drive.log.header.dt
+
+
+def last_stretch(flags: Mask, since: int) -> int | None:
+    """Returns where the last stretch of true values begins, None if it ends before `since`."""
+    last = np.flatnonzero(flags[since:])
     if not last.size:
-        return None, None
-    end = _since(drive, at, JUST_BEFORE) + int(last[-1])
-    breaks = np.flatnonzero(~is_lead[: end + 1])
-    begin = int(breaks[-1]) + 1 if breaks.size else 0
-    seen = np.flatnonzero(drive.log.report.detected[begin : end + 1] == 1.0)
-    first = _sighting(drive, begin + int(seen[0]), at, actor) if seen.size else None
-    return (at - begin) * drive.log.header.dt, first
-
-
-def _last_detections(drive: Drive, begin: int, at: int, actor: int | None) -> tuple[Sighting, ...]:
-    status, tier = drive.log.report.status, drive.log.report.tier
-    rows = [
-        k
-        for k in range(begin, at + 1)
-        if drive.sample[k] and (k == begin or status[k] != status[k - 1] or tier[k] != tier[k - 1])
-    ]
-    return tuple(_sighting(drive, k, at, actor) for k in rows[-8:])
-
-
-def _gap_to(log: RunLog, k: int, actor: int) -> float:
-    """Gap between the boxes of the ego and an actor, along and across the ego, m."""
-    a, table = log.actors, log.table
-    dx, dy = float(a.x[k, actor] - a.x[k, 0]), float(a.y[k, actor] - a.y[k, 0])
-    c, s = float(np.cos(a.yaw[k, 0])), float(np.sin(a.yaw[k, 0]))
-    turn = float(a.yaw[k, actor] - a.yaw[k, 0])
-    along, across = abs(float(np.cos(turn))), abs(float(np.sin(turn)))
-    length, width = float(table.length[actor]), float(table.width[actor])
-    long = 0.5 * (float(table.length[0]) + length * along + width * across)
-    wide = 0.5 * (float(table.width[0]) + length * across + width * along)
-    return float(
-        np.hypot(max(abs(dx * c + dy * s) - long, 0.0), max(abs(dy * c - dx * s) - wide, 0.0))
-    )
-
-
-def _sighting(drive: Drive, k: int, at: int, actor: int | None) -> Sighting:
-    """What the stack said in row k; actor: what was hit in row `at`."""
-    other = None if actor is None or drive.lead.actor[k] == actor else actor
-    report = drive.log.report
-    status, tier = number(float(report.status[k])), number(float(report.tier[k]))
-    return Sighting(
-        before=(at - k) * drive.log.header.dt,
-        status=None if status is None else DetectionStatus(int(status)),
-        tier=None if tier is None else Tier(int(tier)),
-        distance=number(float(report.distance[k])),
-        gap=number(float(drive.lead.gap[k])) if other is None else _gap_to(drive.log, k, other),
-    )
+        return None
+    breaks = np.flatnonzero(~flags[: since + int(last[-1]) + 1])
+    return int(breaks[-1]) + 1 if breaks.size else 0
 
 
 def number(value: float) -> float | None:

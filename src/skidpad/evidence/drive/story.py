@@ -1,0 +1,374 @@
+"""How a crash came about: what the stack said, what was true, and when, in order of time.
+
+Distances that the stack measured stand beside the true gap to the vehicle that was hit, from where
+it was in the ego's way; before that beside the gap to the lead in truth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from itertools import pairwise, product
+from typing import NamedTuple
+
+import numpy as np
+
+from skidpad.core.vocabulary import DetectionStatus, Tier
+from skidpad.evidence.drive.collisions import (
+    CHAIN_TIME,
+    JUST_BEFORE,
+    LOOK_BACK,
+    Crash,
+    last_stretch,
+    number,
+    rows_before,
+)
+from skidpad.evidence.drive.prepared import LEAD_RANGE, Drive, Floats, Mask
+from skidpad.evidence.drive.severity import Contact, graded_contacts
+from skidpad.recording.runlog import RunLog
+
+EGO = 0
+RIGHT_WITHIN, RIGHT_SHARE = 3.0, 0.2  # m, or this share of the gap: measured and true agree
+STRAIGHT_WITHIN = 40.0  # m, nearer the ego's own axis says who is in its way
+ERROR_LOOK_BACK = 5.0  # s before the contact in which an error of measurement may have mattered
+JUST_CAME = 4.0  # s, what was ahead for longer did not come as a surprise
+CAME_WITHIN = 50.0  # m, what appears nearer ahead came from aside
+FLICKER = 0.1  # s, what the stack says for no longer
+BREAK = 0.5  # s that a vehicle may be out of the lane and still be the one ahead
+SLOWED_BY = 5.0  # m/s that the other car lost in the last 5 s
+BRAKES = 0.1  # of the pedal
+SIDE_STEP, SIDE_STEP_TIME = 1.0, 1.5  # m across the lane in so many s: the ego changes lanes
+NEWS_MAX = 8  # changes of what the stack said
+BRAKING = (Tier.HARD_STOP, Tier.EMERGENCY, Tier.STOPPED_TOO_CLOSE)
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """What the stack said at one moment, and what was true."""
+
+    before: float  # s to the contact
+    status: DetectionStatus | None
+    tier: Tier | None
+    distance: float | None  # m, measured
+    gap: float | None  # m, true; None: nothing was ahead in the lane within 80 m
+    to: str  # the vehicle that the gap is to
+    is_wrong: bool  # measured and true do not belong together
+
+
+class Arrival(Enum):
+    """How the vehicle that was hit came before the ego."""
+
+    CUT_IN = 0
+    UNCOVERED = 1  # another vehicle had stood between
+    EGO_CAME = 2  # by a change of lanes
+    EGO_PUT = 3  # by a relocation
+    DRIVEN_UP = 4  # it had been there
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """A number at a time before the contact."""
+
+    before: float  # s
+    gap: float  # m to the vehicle that was hit, or NaN
+    v: float = 0.0  # m/s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Story:
+    """A crash and how it came about; None where something did not happen."""
+
+    crash: Crash
+    arrival: Arrival | None  # of the vehicle that was hit; None: it never was the lead
+    arrived: Moment | None
+    first: Sighting | None  # first report while it was the lead
+    news: tuple[Sighting, ...]  # changes of status and tier in the last 10 s, oldest first
+    worst: Sighting | None  # the largest error that may have mattered
+    braked: Moment | None  # since when the ego had been braking, with its speed then
+    slowed: Moment | None  # when the other car began to slow, with its speed then
+    pushed_by: Moment | None  # a contact with a vehicle just before a departure
+    pusher: str
+    followed: tuple[tuple[float, Contact], ...]  # s after, until the ego was put back
+    put_back: float | None  # s after
+
+    @property
+    def came_just_before(self) -> bool:
+        """Whether the vehicle that was hit came before the ego in the last seconds."""
+        recent = CHAIN_TIME if self.arrival is Arrival.EGO_PUT else JUST_CAME
+        came = self.arrived is not None and self.arrived.before <= recent
+        return came and self.arrival is not Arrival.DRIVEN_UP
+
+
+def tell_story(drive: Drive, crash: Crash) -> Story:
+    """Returns how a crash came about, from the log alone."""
+    at = drive.row(crash.tick)
+    way = _Way(drive, at, crash.actor)
+    begin = way.begin()
+    pushed, worst = _pushed(drive, crash), _worst(way)
+    first = None if begin is None else _first(way, begin)
+    return Story(
+        crash=crash,
+        arrival=None if begin is None else _arrival(drive, begin, way),
+        arrived=None if begin is None else Moment(way.before(begin), float(way.gap[begin])),
+        first=first,
+        news=_news(way, (first, worst)),
+        worst=worst,
+        braked=_braked(way),
+        slowed=None if crash.actor is None else _slowed(way, crash.actor),
+        pushed_by=None if pushed is None else Moment(_seconds(drive, crash, pushed), np.nan),
+        pusher="" if pushed is None else pushed.other,
+        followed=_followed(drive, crash),
+        put_back=_put_back(drive, crash),
+    )
+
+
+class _Way:
+    """The vehicle that was hit as seen from the ego, rows 0 to that of the crash."""
+
+    def __init__(self, drive: Drive, at: int, actor: int | None) -> None:
+        self.drive, self.at, self.actor = drive, at, actor
+        lead = drive.lead
+        self.gap: Floats = np.full(at + 1, np.nan)
+        self.ahead: Mask = np.zeros(at + 1, dtype=np.bool_)
+        if actor is not None:
+            self.gap, straight = _box_gap(drive.log, at, actor)
+            hidden = lead.gap[: at + 1] < self.gap  # the lead stands between
+            self.ahead = (straight & ~hidden) | (lead.actor[: at + 1] == actor)
+        moves = [drive.row(r.tick) for r in drive.log.relocations if drive.row(r.tick) < at]
+        self.put = max(moves, default=-1) + 1  # the first row after the last relocation
+        self.true: Floats = np.where(self.ahead, self.gap, lead.gap[: at + 1])
+
+    def begin(self) -> int | None:
+        """The row from which it was ahead until the contact, 2 s of grace; None: it was not.
+
+        Not before the ego was last put back.
+        """
+        joined, longest = self.ahead.copy(), round(BREAK / self.drive.log.header.dt)
+        rows = np.flatnonzero(joined)
+        for a, b in pairwise(rows):
+            joined[a:b] |= b - a <= longest
+        begin = last_stretch(joined, rows_before(self.drive, self.at, JUST_BEFORE))
+        return None if begin is None else max(begin, self.put)
+
+    def before(self, row: int) -> float:
+        """s before the contact."""
+        return float(self.drive.log.t[self.at] - self.drive.log.t[row])
+
+    def to(self, row: int) -> str:
+        """Name of the vehicle that the true gap is to."""
+        i = self.actor if self.ahead[row] else int(self.drive.lead.actor[row])
+        return "" if i is None or i < 0 else self.drive.log.table.names[i]
+
+    def error(self, row: int) -> float:
+        """m by which measured and true differ beyond what is right; 0 where they agree."""
+        measured = float(self.drive.log.report.distance[row])
+        if np.isnan(measured):
+            return 0.0
+        gaps = [float(self.true[row]), float(self.drive.lead.gap[row])]
+        errors = [
+            max(abs(measured - gap) - max(RIGHT_WITHIN, RIGHT_SHARE * gap), 0.0)
+            for gap in gaps
+            if not np.isnan(gap)
+        ]
+        return min(errors, default=max(LEAD_RANGE - measured, 0.1))
+
+    def sighting(self, row: int) -> Sighting:
+        """What the stack said there."""
+        report = self.drive.log.report
+        status, tier = number(float(report.status[row])), number(float(report.tier[row]))
+        return Sighting(
+            before=self.before(row),
+            status=None if status is None else DetectionStatus(int(status)),
+            tier=None if tier is None else Tier(int(tier)),
+            distance=number(float(report.distance[row])),
+            gap=number(float(self.true[row])),
+            to=self.to(row),
+            is_wrong=self.error(row) > 0.0,
+        )
+
+
+class _Box(NamedTuple):
+    """The box of an actor over time, arrays (T,); half sizes in m."""
+
+    x: Floats
+    y: Floats
+    yaw: Floats
+    half_length: float
+    half_width: float
+
+    def seen(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """Points of the world in its own axes, forward and left."""
+        dx, dy, c, s = x - self.x, y - self.y, np.cos(self.yaw), np.sin(self.yaw)
+        return dx * c + dy * s, dy * c - dx * s
+
+    def corners(self) -> Iterator[tuple[Floats, Floats]]:
+        """Its four corners in the world."""
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        for side, end in product((-1.0, 1.0), repeat=2):
+            along, across = end * self.half_length, side * self.half_width
+            yield self.x + along * c - across * s, self.y + along * s + across * c
+
+    def gap(self, x: Floats, y: Floats) -> Floats:
+        """m from points to it, 0 inside."""
+        forward, left = self.seen(x, y)
+        along = np.maximum(np.abs(forward) - self.half_length, 0.0)
+        return np.hypot(along, np.maximum(np.abs(left) - self.half_width, 0.0))
+
+
+def _box_of(log: RunLog, at: int, actor: int) -> _Box:
+    rows = slice(0, at + 1)
+    x, y, yaw = (
+        np.asarray(values[rows, actor], np.float64)
+        for values in (log.actors.x, log.actors.y, log.actors.yaw)
+    )
+    length, width = float(log.table.length[actor]), float(log.table.width[actor])
+    return _Box(x, y, yaw, length / 2.0, width / 2.0)
+
+
+def _box_gap(log: RunLog, at: int, actor: int) -> tuple[Floats, Mask]:
+    """m between the boxes of the ego and an actor, and whether it is straight ahead and near."""
+    ego, other = (_box_of(log, at, i) for i in (EGO, actor))
+    gaps = [a.gap(x, y) for a, b in ((ego, other), (other, ego)) for x, y in b.corners()]
+    forward, left = ego.seen(other.x, other.y)
+    in_way = np.abs(left) < ego.half_width + other.half_width
+    there = log.present[: at + 1, actor]
+    straight = (forward > 0.0) & (forward < STRAIGHT_WITHIN) & in_way & there
+    return np.where(there, np.min(gaps, axis=0), np.nan), straight
+
+
+def _arrival(drive: Drive, begin: int, way: _Way) -> Arrival:
+    if begin == 0:
+        return Arrival.DRIVEN_UP
+    if begin == way.put or not drive.free[begin]:
+        return Arrival.EGO_PUT
+    if abs(_sideways(drive, begin)) > SIDE_STEP:
+        return Arrival.EGO_CAME
+    before = int(drive.lead.actor[begin - 1])
+    if before >= 0:
+        nearer = drive.lead.gap[begin - 1] < way.gap[begin]
+        return Arrival.UNCOVERED if nearer else Arrival.CUT_IN
+    return Arrival.CUT_IN if way.gap[begin] < CAME_WITHIN else Arrival.DRIVEN_UP
+
+
+def _sideways(drive: Drive, row: int) -> float:
+    """m that the ego moved across its lane in the 1.5 s before a row, left positive."""
+    rows = slice(rows_before(drive, row, SIDE_STEP_TIME), row)
+    a, heading = drive.log.actors, drive.place.heading[rows]
+    across = a.vy[rows, EGO] * np.cos(heading) - a.vx[rows, EGO] * np.sin(heading)
+    return float(np.nansum(across) * drive.log.header.dt)
+
+
+def _first(way: _Way, begin: int) -> Sighting | None:
+    seen = np.flatnonzero(way.drive.log.report.detected[begin : way.at + 1] == 1.0)
+    return way.sighting(begin + int(seen[0])) if seen.size else None
+
+
+def _news(way: _Way, wanted: Sequence[Sighting | None]) -> tuple[Sighting, ...]:
+    """Changes of status and tier in the last 10 s that lasted, and the sightings that are wanted."""
+    drive, begin = way.drive, rows_before(way.drive, way.at, LOOK_BACK)
+    said = np.stack([drive.log.report.status, drive.log.report.tier])[:, : way.at + 1]
+    changes = [
+        k
+        for k in range(begin, way.at + 1)
+        if drive.sample[k] and (k == begin or np.any(said[:, k] != said[:, k - 1]))
+    ]
+    ends = [*changes[1:], way.at + 1]
+    lasting = [k for k, end in zip(changes, ends, strict=True) if _lasts(way, k, end)]
+    found = {way.before(k): way.sighting(k) for k in lasting[-NEWS_MAX:]}
+    found |= {s.before: s for s in wanted if s is not None}
+    return tuple(found[before] for before in sorted(found, reverse=True))
+
+
+def _lasts(way: _Way, row: int, end: int) -> bool:
+    """Whether what the stack said is no flicker; a hard braking never is."""
+    tier = way.drive.log.report.tier[row]
+    return tier in BRAKING or (end - row) * way.drive.log.header.dt > FLICKER
+
+
+def _worst(way: _Way) -> Sighting | None:
+    """The largest error of the last 5 s that may have mattered.
+
+    Too short while the stack braked hard, or too long while the vehicle that was hit was ahead.
+    """
+    begin = rows_before(way.drive, way.at, ERROR_LOOK_BACK)
+    report, true = way.drive.log.report, np.nan_to_num(way.true, nan=LEAD_RANGE)
+    rows = [
+        k
+        for k in range(begin, way.at + 1)
+        if way.drive.sample[k]
+        and way.error(k) > 0.0
+        and (
+            (report.tier[k] in BRAKING and report.distance[k] < true[k])
+            or (way.ahead[k] and report.distance[k] > true[k])
+        )
+    ]
+    return way.sighting(max(rows, key=way.error)) if rows else None
+
+
+def _braked(way: _Way) -> Moment | None:
+    """Since when the pedal was pressed without a break until the contact."""
+    pressed = way.drive.log.applied.brake[: way.at] > BRAKES
+    if not pressed.size or not pressed[-1]:
+        return None
+    free = np.flatnonzero(~pressed)
+    row = int(free[-1]) + 1 if free.size else 0
+    return Moment(way.before(row), float(way.gap[row]), float(way.drive.v[row]))
+
+
+def _slowed(way: _Way, actor: int) -> Moment | None:
+    """When the other car was fastest in the last 5 s, if it lost much speed since."""
+    begin, a = rows_before(way.drive, way.at, ERROR_LOOK_BACK), way.drive.log.actors
+    v = np.hypot(a.vx[begin : way.at, actor], a.vy[begin : way.at, actor]).astype(np.float64)
+    if not v.size or v.max() - v[-1] < SLOWED_BY:
+        return None
+    row = begin + int(v.size - 1 - np.argmax(v[::-1]))
+    return Moment(way.before(row), float(way.gap[row]), float(v.max()))
+
+
+def _pushed(drive: Drive, crash: Crash) -> Contact | None:
+    """The last contact with a road user within 2 s before a departure."""
+    if crash.actor is not None:
+        return None
+    earliest = crash.tick - JUST_BEFORE / drive.log.header.dt
+    near = [
+        c for c in graded_contacts(drive) if c.is_road_user and earliest <= c.tick <= crash.tick
+    ]
+    return near[-1] if near else None
+
+
+def _seconds(drive: Drive, crash: Crash, contact: Contact) -> float:
+    return (crash.tick - contact.tick) * drive.log.header.dt
+
+
+def _followed(drive: Drive, crash: Crash) -> tuple[tuple[float, Contact], ...]:
+    """The contacts after the crash until the supervisor gives the ego back."""
+    end = _end_of_recovery(drive, crash)
+    if end is None:
+        return ()
+    last = int(drive.log.tick[end])
+    return tuple(
+        (-_seconds(drive, crash, c), c)
+        for c in graded_contacts(drive)
+        if crash.tick <= c.tick <= last and c != crash.contact
+    )
+
+
+def _put_back(drive: Drive, crash: Crash) -> float | None:
+    end = _end_of_recovery(drive, crash)
+    if end is None:
+        return None
+    last = int(drive.log.tick[end])
+    ticks = [r.tick for r in drive.log.relocations if crash.tick <= r.tick <= last]
+    return (ticks[0] - crash.tick) * drive.log.header.dt if ticks else None
+
+
+def _end_of_recovery(drive: Drive, crash: Crash) -> int | None:
+    """The last row of the supervised stretch that the crash began; None: nobody supervises."""
+    at = drive.row(crash.tick)
+    begins = np.flatnonzero(~drive.free[at : at + 1 + round(0.3 / drive.log.header.dt)])
+    if not begins.size:
+        return None
+    begin = at + int(begins[0])
+    ends = np.flatnonzero(drive.free[begin:])
+    return begin + int(ends[0]) - 1 if ends.size else len(drive.log) - 1

@@ -1,0 +1,176 @@
+"""Why a crash happened, in one sentence made from the log."""
+
+from __future__ import annotations
+
+from math import isfinite
+
+from skidpad.core.constants import G
+from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.vocabulary import DetectionStatus
+from skidpad.evidence.drive.collisions import Crash, CrashKind, Striker
+from skidpad.evidence.drive.story import Arrival, Moment, Sighting, Story
+
+LATE = 1.0  # s without a report that are worth a word
+STANDS = 1.0  # m/s
+STRAIGHT = 1000.0  # m, a wider bend is none
+ASIDE = 0.5  # m beside the middle of the lane that are worth a word
+REPORTERS = {
+    DetectionStatus.FUSION_DETECT: "the cameras",
+    DetectionStatus.FUSION_PERSIST: "the held track of the cameras",
+    DetectionStatus.RADAR_ACTIVE: "the radar",
+    DetectionStatus.SAFETY_PERSIST: "the held target",
+}
+
+
+def cause_sentence(story: Story) -> str:
+    """Returns the cause of a crash as one sentence."""
+    crash = story.crash
+    if crash.kind is CrashKind.VEHICLE:
+        struck = crash.rear_ended or crash.striker is Striker.OTHER
+        parts = _struck(story) if struck else _drove_into(story)
+    elif crash.kind is CrashKind.WRONG_WAY:
+        parts = [f"The ego faced against the direction of its lane at {speed(crash.v_ego)}"]
+    else:
+        parts = _left_lane(story)
+    if story.pushed_by is not None:
+        parts.append(f"it had touched {story.pusher} {seconds(story.pushed_by.before)} before")
+    text = "; ".join(part for part in parts if part) + "."
+    return "The " + text[4:] if text.startswith("the ") else text
+
+
+def _struck(story: Story) -> list[str]:
+    """Others drove into the ego."""
+    crash, wrong = story.crash, story.worst
+    where = " from behind" if crash.rear_ended else ""
+    closing = "" if crash.v_closing is None else f", {speed(crash.v_closing)} faster"
+    text = f"{crash.other} drove into the ego{where}{closing}, "
+    if story.braked is not None:
+        text += f"while it braked from {speed(story.braked.v)}"
+    elif crash.v_ego < STANDS:
+        text += "while it stood"
+    else:
+        text += f"while it drove at {speed(crash.v_ego)}"
+    return [text, "" if wrong is None else _said(wrong, crash.other)]
+
+
+def _drove_into(story: Story) -> list[str]:
+    """The ego drove into another."""
+    came = _came(story)
+    if came:
+        return [came, _perceived(story), _brake(story)]
+    return [_ahead(story), _perceived(story), _brake(story)]
+
+
+def _came(story: Story) -> str:
+    """How the other came before the ego, if it did so just before."""
+    moment, other = story.arrived, story.crash.other
+    if moment is None:
+        return f"{other} crossed the way of the ego and was never ahead in its lane"
+    if not story.came_just_before:
+        return ""
+    when, gap = f"{seconds(moment.before)} before", metres(moment.gap)
+    return {
+        Arrival.CUT_IN: f"{other} came into the lane of the ego {gap} ahead, {when}",
+        Arrival.UNCOVERED: f"the vehicle ahead left the lane {when} and uncovered {other} {gap} ahead",
+        Arrival.EGO_CAME: f"the ego changed into the lane of {other} {gap} behind it, {when}",
+        Arrival.EGO_PUT: f"the ego had been put on the lane {gap} behind {other}, {when}",
+    }[story.arrival or Arrival.CUT_IN]
+
+
+def _ahead(story: Story) -> str:
+    """What the other did that had been ahead for long."""
+    crash, slowed = story.crash, story.slowed
+    if slowed is not None and crash.v_other is not None:
+        return (
+            f"{crash.other} ahead slowed from {speed(slowed.v)} to {speed(crash.v_other)} "
+            f"within {seconds(slowed.before)}"
+        )
+    stood = crash.v_other is not None and crash.v_other < STANDS
+    return f"{crash.other} {'stood' if stood else f'drove at {speed(crash.v_other)}'} ahead"
+
+
+def _perceived(story: Story) -> str:
+    """What the stack said of it."""
+    if story.worst is not None:
+        return _said(story.worst, story.crash.other)
+    first, arrived = story.first, story.arrived
+    if arrived is None or first is None:
+        return "the stack never reported it"
+    if arrived.before - first.before < LATE:
+        return ""
+    return f"it was first reported {seconds(first.before)} before, {metres(first.gap)} away"
+
+
+def _said(wrong: Sighting, hit: str) -> str:
+    who = "the stack" if wrong.status is None else REPORTERS.get(wrong.status, "the stack")
+    text = f"{who} had reported {metres(wrong.distance)}, {seconds(wrong.before)} before, "
+    if wrong.gap is None:
+        return text + "with nothing ahead in the lane"
+    return (
+        text
+        + f"the true gap was {metres(wrong.gap)}"
+        + (f" to {wrong.to}" if wrong.to not in ("", hit) else "")
+    )
+
+
+def _brake(story: Story) -> str:
+    """When the ego braked, and whether that could have been enough."""
+    crash, braked = story.crash, story.braked
+    if braked is None:
+        return f"the ego did not brake and drove at {speed(crash.v_ego)}"
+    text = f"the ego braked {seconds(braked.before)} before, from {speed(braked.v)}"
+    if not isfinite(braked.gap):
+        return text
+    text += f", {metres(braked.gap)} away"
+    faster = braked.v - (crash.v_other or 0.0)
+    if crash.mu is None or crash.mu <= 0.0 or faster <= 0.0:
+        return text
+    needed = faster**2 / (2.0 * crash.mu * G)
+    enough = "less than" if needed < braked.gap else "more than"
+    return f"{text}; a full braking on a friction of {crash.mu:.2f} takes {needed:.0f} m, {enough} that"
+
+
+def _left_lane(story: Story) -> list[str]:
+    """A departure: the bend against the grip, what the ego braked for, where in the lane it was."""
+    crash, wrong, braked = story.crash, story.worst, story.braked
+    end = f" and hit the {crash.other}" if crash.kind is CrashKind.STATIC else " and left the road"
+    text = f"the ego drove at {speed(crash.v_ego)}{end}"
+    if crash.lane_offset is not None and abs(crash.lane_offset) > ASIDE:
+        side = "left" if crash.lane_offset > 0.0 else "right"
+        text += f", {metres(abs(crash.lane_offset))} {side} of the middle of its lane"
+    brake = ""
+    if braked is not None:
+        brake = f"it had been braking for {seconds(braked.before)}, from {speed(braked.v)}"
+    return [text, _bend(crash), brake, "" if wrong is None else _said(wrong, crash.other)]
+
+
+def _bend(crash: Crash) -> str:
+    if crash.bend_radius is None or crash.bend_radius > STRAIGHT:
+        return "the road was straight"
+    takes = crash.v_ego**2 / crash.bend_radius
+    text = f"the bend of {crash.bend_radius:.0f} m takes {takes:.1f} m/s² at that speed"
+    if crash.mu is None:
+        return text
+    holds = crash.mu * G
+    than = "more" if takes > holds else "less"
+    return f"{text}, {than} than the {holds:.1f} m/s² that the tyres hold"
+
+
+def speed(v: float | None) -> str:
+    """A speed in km/h."""
+    return "unknown speed" if v is None else f"{kmh_from_mps(v):.0f} km/h"
+
+
+def metres(value: float | None) -> str:
+    """A distance in m."""
+    return "an unknown distance" if value is None else f"{value:.1f} m"
+
+
+def seconds(value: float) -> str:
+    """A time in s."""
+    return f"{abs(value):.1f} s"
+
+
+def moment_gap(moment: Moment) -> str:
+    """The gap of a moment, "" where there is none."""
+    return metres(moment.gap) if isfinite(moment.gap) else ""

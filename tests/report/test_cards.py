@@ -23,10 +23,10 @@ from skidpad.recording.results import Timing
 from skidpad.recording.runlog import RunLog
 from skidpad.report.cards import contact_text, crash_card, facts, severity, tags, timeline
 from skidpad.report.causes import cause_sentence
+from skidpad.report.crash_page import contact_cards, find_contacts, write_crashes
 from skidpad.report.crashes import crash_sections, found_crashes
 from skidpad.report.matrix_data import load_matrix
 from skidpad.report.page import Cards
-from skidpad.report.crash_page import contact_cards, find_contacts, write_crashes
 from skidpad.roads.bundled import load_map
 
 KMH = 3.6

@@ -179,6 +179,12 @@ def test_an_ego_that_was_put_behind_a_vehicle_is_told() -> None:
     assert s.arrived.before == pytest.approx(39 * DT)
 
 
+def test_a_stack_that_says_nothing_has_a_story_without_news() -> None:
+    s = told(crashed(lambda k: [ego(k), ahead(k, 12.0)], lambda _k: None))
+    assert (s.news, s.first, s.worst) == ((), None, None)
+    assert s.arrived is not None
+
+
 def test_what_was_always_ahead_did_not_come() -> None:
     s = told(crashed(lambda k: [ego(k), ahead(k, 12.0)]))
     assert (s.arrival, s.came_just_before) == (Arrival.DRIVEN_UP, False)

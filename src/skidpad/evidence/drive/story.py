@@ -273,7 +273,7 @@ def _news(way: _Way, wanted: Sequence[Sighting | None]) -> tuple[Sighting, ...]:
         for k in range(begin, way.at + 1)
         if drive.sample[k] and (k == begin or np.any(said[:, k] != said[:, k - 1]))
     ]
-    ends = [*changes[1:], way.at + 1]
+    ends = [*changes, way.at + 1][1:]
     lasting = [k for k, end in zip(changes, ends, strict=True) if _lasts(way, k, end)]
     found = {way.before(k): way.sighting(k) for k in lasting[-NEWS_MAX:]}
     found |= {s.before: s for s in wanted if s is not None}

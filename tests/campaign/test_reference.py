@@ -63,3 +63,12 @@ def test_it_drives_on_every_map(map, weather, traffic):
     again = drive("reference", map=map, weather=weather, duration=2.0, seed=2, sensors="objects",
                   traffic=traffic, vehicles=12)  # fmt: skip
     assert np.array_equal(again.log.actors.x[:40], a.x[:40])
+
+
+def test_it_takes_the_roundabout_on_ice_as_slowly_as_it_must():
+    """Who brakes late for it leaves the road: before, 4 times in 300 s."""
+    run = drive("reference", map="town", weather="icy_30", duration=190.0, seed=3,
+                sensors="objects", vehicles=0)  # fmt: skip
+    assert not run.log.relocations
+    a = run.log.actors
+    assert np.hypot(a.x[:, 0] - 200.0, a.y[:, 0] - 150.0).min() < 40.0, "it got there"

@@ -35,6 +35,7 @@ from skidpad.stack.reference.caution import (
     manner,
     sight_speed,
     speed_factor,
+    too_fast,
 )
 from skidpad.stack.reference.following import Manner, acceleration, free_acceleration, wanted_gap
 from skidpad.stack.reference.junctions import V_THROUGH, travel_time
@@ -209,6 +210,13 @@ def test_who_sees_farther_or_reacts_faster_drives_no_slower(road, see, more, slo
     v = sight_speed(road, see, 0.5, 40.0)
     assert sight_speed(road, see + more, 0.5, 40.0) >= v - 0.2
     assert sight_speed(road, see, 0.5 + slow, 40.0) <= v + 0.2
+
+
+@given(road=ROADS, v=SPEEDS, excess=st.floats(0.0, 30.0))
+def test_who_is_too_fast_brakes_the_firmer_the_faster(road, v, excess):
+    a = too_fast(excess, road, v)
+    assert -4.0 <= a <= 0.0
+    assert too_fast(excess + 1.0, road, v) <= a
 
 
 @given(road=ROADS, bend=st.floats(1e-4, 0.2))

@@ -29,6 +29,7 @@ COMFORT_SHARE, HARDEST_SHARE, DRIVE_SHARE, CURVE_SHARE = 0.25, 0.9, 0.25, 0.4
 FIRM_SHARE = 0.6  # braking that is counted upon when something turns up
 B_COMFORT, B_HARDEST = 2.0, 8.0  # m/s^2 at most
 A_CURVE = 3.0  # m/s^2 in bends at most; see stack/control/bends.py
+TOO_FAST_TIME, B_TOO_FAST = 0.7, 4.0  # s, m/s^2 at most; as the background (traffic/driver.py)
 B_YELLOW = 3.0  # m/s^2, a yellow light that needs more is passed
 STOP_MARGIN = 10.0  # m kept to what may stand at the end of sight
 CAR_WIDTH = 1.8  # m, of what may stand there
@@ -75,6 +76,12 @@ def bend_speed(road: RoadLook, curvature: float) -> float:
     for _ in range(2):  # friction is that of the speed found
         v = min(v, sqrt(CURVE_SHARE * G * believed_friction(road, v) / bend))
     return v
+
+
+def too_fast(excess: float, road: RoadLook, v: float) -> float:
+    """Acceleration in m/s^2 that takes off what is driven too fast for a bend or limit."""
+    firm = min(B_TOO_FAST, FIRM_SHARE * G * believed_friction(road, v))
+    return max(-excess / TOO_FAST_TIME, -firm)
 
 
 def sight_speed(road: RoadLook, visibility: float, reaction: float, fastest: float) -> float:

@@ -31,6 +31,7 @@ from skidpad.stack.reference.caution import (
     manner,
     sight_speed,
     speed_factor,
+    too_fast,
 )
 from skidpad.stack.reference.following import Manner, acceleration
 from skidpad.stack.reference.junctions import LOOK_FROM, V_THROUGH, GivingWay
@@ -80,6 +81,8 @@ class ReferenceDriver:
         m = manner(self.person, view.road, v)
         v_desired = self._desired_speed(view, place, v, m)
         a, tier = acceleration(v, v_desired, inf, 0.0, m), Tier.CRUISE
+        if v > v_desired:
+            a, tier = min(a, too_fast(v - v_desired, view.road, v)), Tier.BEND
         gap, v_lead = self._lead(view, place, v)
         if (a_follow := acceleration(v, v_desired, gap, v_lead, m)) < a:
             a, tier = a_follow, Tier.ACC_CLOSE

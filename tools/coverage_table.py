@@ -239,7 +239,11 @@ def _least(cells: list[Covered]) -> str:
     return f"{100.0 * min(c.coverage for c in cells):.1f}" if cells else ""
 
 
-BEGIN, END = "<!-- coverage of intervals: begin -->\n", "<!-- coverage of intervals: end -->\n"
+def write_block(page: Path, name: str, text: str) -> None:
+    """Put text between the page's marks of that name."""
+    begin, end = f"<!-- {name}: begin -->\n", f"<!-- {name}: end -->\n"
+    before, rest = page.read_text(encoding="utf-8").split(begin)
+    page.write_text(before + begin + "\n" + text + "\n" + end + rest.split(end)[1])
 
 
 def main() -> None:
@@ -256,9 +260,7 @@ def main() -> None:
     if options.page is None:
         print(text)
         return
-    page = options.page.read_text(encoding="utf-8")
-    before, rest = page.split(BEGIN)
-    options.page.write_text(before + BEGIN + "\n" + text + "\n" + END + rest.split(END)[1])
+    write_block(options.page, "coverage of intervals", text)
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from skidpad.evidence.compare import Change, Rule
+    from skidpad.evidence.compare import Change, Judged, Rule
 
 
 class Flaws(str, Enum):
@@ -18,6 +18,13 @@ class Flaws(str, Enum):
     missing = "missing"
     crashed = "crashed"
     empty = "empty"
+
+
+class Undecided(str, Enum):
+    """Choices of --undecided."""
+
+    fail = "fail"
+    let_pass = "pass"
 
 
 SHOWN = (
@@ -38,11 +45,15 @@ def compare(
     b: Annotated[Path, typer.Argument(help="The campaign after, or one run's folder.")],
     fail_if: Annotated[
         list[str] | None,
-        typer.Option(help="COLUMN > NUMBER about the mean difference B - A; exit 1 when true."),
+        typer.Option(help="COLUMN > NUMBER about the mean difference B - A; exit 1 when shown."),
     ] = None,
-    surely: Annotated[
-        bool, typer.Option("--surely", help="Only when the whole 95 % interval says so.")
+    point: Annotated[
+        bool, typer.Option("--point", help="Judge the mean difference alone, without a test.")
     ] = False,
+    undecided: Annotated[
+        Undecided,
+        typer.Option(help="The exit code when there are too few seeds for any outcome to fire."),
+    ] = Undecided.fail,
     junit: Annotated[Path | None, typer.Option(help="Write the rules as JUnit XML.")] = None,
     allow: Annotated[
         list[Flaws] | None,
@@ -51,18 +62,24 @@ def compare(
 ) -> None:
     """Pair two campaigns by configuration, weather and seed; exit 1 on a regression.
 
-    Rules also fail on runs that are missing or crashed and on columns without values. Of the
-    folders of two runs, as a drive by hand leaves one, the metrics are shown side by side.
+    The seed is the unit: its weathers are averaged. A rule fires when the difference is beyond its
+    limit at 5 %, corrected for all rules and configurations (Holm). Rules also fail on runs that are
+    missing or crashed and on columns without values. Of the folders of two runs, as a drive by hand
+    leaves one, the metrics are shown side by side.
+
+    Example: skidpad compare before after --fail-if "fatal_collisions > 0"
     """
     from skidpad.core.errors import ConfigError
-    from skidpad.evidence.compare import compare_campaigns, flaws, parse_rule
+    from skidpad.evidence.compare import compare_campaigns, flaws, judge_rules, parse_rule
     from skidpad.recording.logfiles import TICKS
     from skidpad.recording.matrix import MATRIX
     from skidpad.recording.results import read_results
 
     rules = [parse_rule(text) for text in fail_if or []]
-    if (junit is not None or allow) and not rules:
-        raise ConfigError("--junit and --allow are about the rules of --fail-if, and none is given")
+    if (junit is not None or allow or point) and not rules:
+        raise ConfigError(
+            "--junit, --allow and --point are about the rules of --fail-if, and none is given"
+        )
     if all((folder / TICKS).is_file() for folder in (a, b)):
         from skidpad.cli.show import compare_runs
 
@@ -76,48 +93,67 @@ def compare(
     _print(changes)
     if alone_a or alone_b:
         typer.echo(f"without a partner: {alone_a} runs of {a}, {alone_b} of {b}")
-    failures = {rule.text: _broken(rule, changes, surely) for rule in rules}
+    judged = judge_rules(rules, changes, point=point)
+    failures = {rule.text: [j.text for j in _against(rule, judged, undecided)] for rule in rules}
     passed = {flaw.value for flaw in allow or []}
-    failures |= {
-        f"data: {flaw.value}": [] if flaw.value in passed else [sentence]
-        for flaw, sentence in (flaws(before, after, rules) if rules else {}).items()
-    }
+    for flaw, sentence in (flaws(before, after, rules) if rules else {}).items():
+        failures[f"data: {flaw.value}"] = [] if flaw.value in passed else [sentence]
     if junit is not None:
         from skidpad.cli.junit import write_junit
 
         write_junit(junit, "skidpad compare", failures)
+    for rule in rules:
+        _say(rule, judged, undecided)
     for text, by in failures.items():
-        for sentence in by:
-            typer.echo(f"regression ({text}): {sentence}", err=True)
+        if by and text.startswith("data: "):
+            typer.echo(f"regression ({text}): {by[0]}", err=True)
     if any(failures.values()):
         raise typer.Exit(1)
 
 
-def _broken(rule: Rule, changes: list[Change], surely: bool) -> list[str]:
-    """What breaks a rule, in words."""
-    return [_told(c) for c in changes if c.column == rule.column and rule.broken_by(c, surely)]
+def _against(rule: Rule, judged: list[Judged], undecided: Undecided) -> list[Judged]:
+    """The judgements for which a rule fails the gate."""
+    from skidpad.evidence.compare import Answer
+
+    bad = {Answer.FIRED} | ({Answer.UNDECIDED} if undecided is Undecided.fail else set())
+    return [j for j in judged if j.rule is rule and j.answer in bad]
 
 
-def _told(change: Change) -> str:
-    who = f"configuration {change.config}" if change.config else "all"
-    return f"{who}, {change.comparison.mean:+.3g}"
+def _say(rule: Rule, judged: list[Judged], undecided: Undecided) -> None:
+    """One line per judgement: to stderr those that fail the gate."""
+    against = _against(rule, judged, undecided)
+    for j in judged:
+        if j.rule is rule:
+            typer.echo(f"{j.answer.value} ({rule.text}): {j.text}", err=j in against)
 
 
 def _print(changes: list[Change]) -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from skidpad.evidence.statistics import interval_text, p_text
+    from skidpad.evidence.statistics import holm, interval_text, p_text
 
-    table = Table("configuration", "column", "B - A", "interval", "p", "pairs", "same drive")
+    tested = [c.comparison.p for c in changes]
+    adjusted = holm([p for p in tested if p is not None])
+    table = Table(
+        "configuration",
+        "column",
+        "B - A",
+        "interval",
+        f"p of {len(changes)}",
+        "seeds",
+        "same drive",
+    )
     for c in changes:
+        found = c.comparison
+        p = None if found.p is None else adjusted.pop(0)
         table.add_row(
             c.config or "all",
             c.column,
-            f"{c.comparison.mean:+.3g}",
-            interval_text(c.comparison.interval),
-            p_text(c.comparison.p),
-            str(c.comparison.n),
-            str(c.same),
+            f"{found.mean:+.3g}",
+            interval_text(found.interval, found.n, "seed"),
+            p_text(p),
+            str(found.n),
+            f"{c.same} of {c.runs}",
         )
     Console().print(table)

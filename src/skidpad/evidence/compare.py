@@ -1,4 +1,9 @@
-"""Two campaigns, run by run: what changed, paired by driver, weather and seed."""
+"""Two campaigns, seed by seed: what changed, and whether chance explains it (decision T-6).
+
+The seed is the unit: runs of one seed share their traffic in all weathers, so their differences are
+averaged first. A gate judges a family of hypotheses, one per rule and driver, by sign changes
+(mid-p) and Holm.
+"""
 
 from __future__ import annotations
 
@@ -7,16 +12,30 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
+from math import ceil, log2
 
+import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.told import told
+from skidpad.core.wording import count_text
 from skidpad.evidence.contrasts import NOT_RUN
-from skidpad.evidence.statistics import Comparison, compare_pairs
+from skidpad.evidence.statistics import (
+    EVER_SIGNIFICANT,
+    Comparison,
+    compare_pairs,
+    holm,
+    p_text,
+    sign_tests,
+)
 from skidpad.recording.matrix import Metrics
 from skidpad.recording.results import definitions_of
 
+Floats = NDArray[np.float64]
+
+ALPHA = 0.05
 PAIRED_BY = ("config", "weather", "seed")
 OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge,
@@ -33,8 +52,15 @@ class Change:
 
     config: str
     column: str
-    comparison: Comparison
-    same: int  # pairs with equal logs
+    comparison: Comparison  # over seeds
+    differences: Floats  # (seeds,), means over weathers
+    runs: int
+    same: int  # of the runs: pairs with equal logs
+
+    @property
+    def subject(self) -> str:
+        """`configuration 2`, `all configurations`."""
+        return f"configuration {self.config}" if self.config else "all configurations"
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,12 +72,65 @@ class Rule:
     compare: Callable[[float, float], bool]
     limit: float
 
-    def broken_by(self, change: Change, surely: bool) -> bool:
-        """Whether the change is a regression; `surely` asks the whole interval to be one."""
-        c = change.comparison
-        if not surely:
-            return self.compare(c.mean, self.limit)
-        return c.interval is not None and all(self.compare(v, self.limit) for v in c.interval)
+    def p(self, change: Change) -> float:
+        """One-sided mid-p against "the mean difference is not beyond the limit"."""
+        greater, less = sign_tests((change.differences - self.limit)[None, :], mid=True)
+        return float((greater if self.compare in (operator.gt, operator.ge) else less)[0])
+
+
+class Answer(str, Enum):
+    """What a gate says of one rule and driver."""
+
+    FIRED = "regression"
+    PASSED = "passed"
+    UNDECIDED = "undecided"  # no outcome with so few seeds could fire
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A rule, judged for one driver."""
+
+    rule: Rule
+    change: Change
+    answer: Answer
+    p: float | None  # adjusted; None: by the point estimate, or undecided
+    seeds_needed: int
+
+    @property
+    def text(self) -> str:
+        """One sentence fragment."""
+        c = self.change
+        told = f"{c.subject}, {c.comparison.mean:+.3g}"
+        if self.answer is Answer.UNDECIDED:
+            seeds = count_text(c.comparison.n, "seed")
+            return f"{told}, {seeds}: needs about {self.seeds_needed} seeds"
+        return told if self.p is None else f"{told}, adjusted {p_text(self.p)}"
+
+
+def judge_rules(rules: Sequence[Rule], changes: Sequence[Change], *, point: bool) -> list[Judged]:
+    """Every rule for every driver; point: by the mean difference alone, without a test."""
+    pairs = [(r, c) for r in rules for c in changes if c.column == r.column]
+    if point:
+        fired = [r.compare(c.comparison.mean, r.limit) for r, c in pairs]
+        answers = [Answer.FIRED if f else Answer.PASSED for f in fired]
+        return [Judged(r, c, a, None, 0) for (r, c), a in zip(pairs, answers, strict=True)]
+    needed = seeds_to_fire(len(pairs))
+    judged = []
+    for (rule, change), p in zip(pairs, holm([r.p(c) for r, c in pairs]), strict=True):
+        if change.comparison.n < needed:
+            judged.append(Judged(rule, change, Answer.UNDECIDED, None, needed))
+        else:
+            answer = Answer.FIRED if p <= ALPHA else Answer.PASSED
+            judged.append(Judged(rule, change, answer, p, needed))
+    return judged
+
+
+def seeds_to_fire(hypotheses: int) -> int:
+    """Least seeds with which one of so many hypotheses can be below 5 %, one-sided and adjusted.
+
+    Six at least: with fewer the mid-p raises more than 5 % of false alarms.
+    """
+    return max(EVER_SIGNIFICANT, ceil(log2(max(hypotheses, 1) / ALPHA)))
 
 
 class Flaw(str, Enum):
@@ -129,19 +208,27 @@ def compare_campaigns(
 ) -> tuple[list[Change], int, int]:
     """Changes per column, over all drivers and per driver; and the runs without a partner in each.
 
-    ConfigError when no run of one is in the other; crashed ones are in it and are not compared.
+    A driver that is the only one is listed once. ConfigError when no run of one is in the other;
+    crashed ones are in it and are not compared.
     """
     if not len(a.join(b, on=list(PAIRED_BY))):
         raise ConfigError("the two campaigns share no run: same configuration, weather and seed")
     pairs = _pairs(a, b)
     a, b = (t.filter(~pl.col("outcome").is_in(NOT_RUN)) for t in (a, b))
+    configs = sorted(pairs["config"].unique().to_list())
     changes = []
-    for config in ["", *sorted(pairs["config"].unique().to_list())]:
+    for config in configs if len(configs) == 1 else ["", *configs]:
         runs = pairs if config == "" else pairs.filter(pl.col("config") == config)
-        same = int((runs["log_hash"] == runs["log_hash_b"]).sum())
-        for column in wanted:
-            both = runs.drop_nulls([column, f"{column}_b"])
-            if len(both):
-                difference = (both[f"{column}_b"] - both[column]).cast(pl.Float64).to_numpy()
-                changes.append(Change(config, column, compare_pairs(difference), same))
+        changes += [c for column in wanted if (c := _change(runs, config, column))]
     return changes, len(a) - len(pairs), len(b) - len(pairs)
+
+
+def _change(runs: pl.DataFrame, config: str, column: str) -> Change | None:
+    """Mean difference per seed; None without a run that has both values."""
+    both = runs.drop_nulls([column, f"{column}_b"])
+    if not len(both):
+        return None
+    same = int((both["log_hash"] == both["log_hash_b"]).sum())
+    change = pl.col(f"{column}_b").cast(pl.Float64) - pl.col(column).cast(pl.Float64)
+    seeds = both.group_by("seed").agg(change.mean().alias("d")).sort("seed")["d"].to_numpy()
+    return Change(config, column, compare_pairs(seeds), seeds, len(both), same)

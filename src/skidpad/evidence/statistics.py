@@ -210,8 +210,13 @@ def compare_pairs(differences: ArrayLike) -> Comparison:
     )
 
 
-def sign_tests(differences: Floats) -> tuple[Floats, Floats]:
-    """One-sided p values (greater, less) of each row of differences (rows, n), by changing signs."""
+def sign_tests(differences: Floats, *, mid: bool = False) -> tuple[Floats, Floats]:
+    """One-sided p values (greater, less) of each row of differences (rows, n), by changing signs.
+
+    mid: changes that give the very sum seen count half, which makes up for the many ties of counts;
+    false alarms are then 5 % at most on average, not for every distribution. Source: Lancaster (1961),
+    JASA 56, 223-234.
+    """
     n = differences.shape[1]
     if n <= EXACT_PAIRS:
         signs = np.array(list(product((1.0, -1.0), repeat=n)))
@@ -220,7 +225,9 @@ def sign_tests(differences: Floats) -> tuple[Floats, Floats]:
         signs = np.concatenate([np.ones((1, n)), 1.0 - 2.0 * drawn])
     near = 1e-9 * np.maximum(1.0, np.abs(differences).sum(axis=1))
     seen, sums = differences.sum(axis=1), signs @ differences.T
-    return (sums >= seen - near).mean(axis=0), (sums <= seen + near).mean(axis=0)
+    greater, less = (sums >= seen - near).mean(axis=0), (sums <= seen + near).mean(axis=0)
+    ties = 0.5 * (greater + less - 1.0) if mid else 0.0
+    return greater - ties, less - ties
 
 
 def pairs_needed(comparison: Comparison, smallest: float, power: float = 0.8) -> int | None:

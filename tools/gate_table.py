@@ -42,7 +42,7 @@ def share_fired(differences: Floats) -> float:
     if n < seeds_to_fire(columns):
         return 0.0
     p = sign_tests(differences.reshape(-1, n), mid=True)[0].reshape(trials, columns)
-    return float(np.mean([min(holm(row)) <= ALPHA for row in p]))
+    return float(np.mean([min(holm(row.tolist())) <= ALPHA for row in p]))
 
 
 def drawn(name: str, mean: float, n: int, columns: int, weathers: int, trials: int) -> Floats:
@@ -70,7 +70,7 @@ def power(n: int, columns: int, trials: int, dispersion: float) -> float:
     after = counts_of(MEAN, dispersion)(rng, (trials * columns, n)).reshape(trials, columns, n)
     after[:, 0] = counts_of(2.0 * MEAN, dispersion)(rng, (trials, n))
     p = sign_tests((after - before).reshape(-1, n), mid=True)[0].reshape(trials, columns)
-    return float(np.mean([holm(row)[0] <= ALPHA for row in p]))
+    return float(np.mean([holm(row.tolist())[0] <= ALPHA for row in p]))
 
 
 def exact_power(n: int, trials: int) -> float:

@@ -71,3 +71,10 @@ def test_fixed_attributes_cannot_be_set() -> None:
     blueprint = load_catalogue()["vehicle.audi.tt"]
     assert chosen(blueprint, {"number_of_wheels": "9"})["number_of_wheels"] == "4"
     assert blueprint.attributes["color"].type is AttributeType.COLOUR
+
+
+def test_sensors_of_events_have_no_period() -> None:
+    catalogue = load_catalogue()
+    sensors = {b.id for b in catalogue.values() if b.family is Family.SENSOR}
+    timed = {id for id in sensors if "sensor_tick" in catalogue[id].attributes}
+    assert sensors - timed == {"sensor.other.collision", "sensor.other.lane_invasion"}

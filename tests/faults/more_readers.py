@@ -85,8 +85,9 @@ def replay(path: Path) -> object:
     from skidpad.simulation.carla_server.replayer import PLAYED, Replayer
 
     recorder, player = Recorder(path.parent), Replayer()
-    recorder.summary(path.name)
+    recorder.summary(path.name, show_all=True)
     recorder.collisions(path.name)
+    recorder.blocked(path.name, 0.1, 1.0)
     player.start(served().episode, recorder.recording(path.name), 0.0, 0.0, 0)
     for _ in range(3):
         player.tick(0.05)

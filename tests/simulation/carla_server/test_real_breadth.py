@@ -233,7 +233,14 @@ def test_recorder_writes_into_the_data_folder(serve: Serve, tmp_path: Path) -> N
         world.tick()
         way.append(car.get_location())
     client.stop_recorder()
-    assert "Frames: 10" in client.show_recorder_file_info("run.log", False)
+    said = client.show_recorder_file_info("run.log", True).split("Frame")
+    assert said[0].splitlines()[1] == f"Map: {world.get_map().name.split('/')[-1]}", said[0]
+    assert int(said[-1].splitlines()[0][3:]) == 10 and len(said) == 12
+    assert f" Create {car.id}: vehicle.audi.tt (1) at (" in said[1]
+    place = said[10].split(f"  Id: {car.id} Location: (")[1].split(")")[0].split(", ")
+    assert abs(float(place[0]) / 100 - way[-1].x) < 0.02, place
+    assert "vehicle.audi.tt" not in client.show_recorder_collisions("run.log", "v", "v")
+    assert "vehicle.audi.tt" not in client.show_recorder_actors_blocked("run.log", 0.1, 1.0)
     car.destroy()
     world.tick()
     said = client.replay_file("run.log", 0.0, 0.0, 0)

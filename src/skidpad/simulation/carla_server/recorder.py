@@ -8,6 +8,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
+from datetime import datetime, timezone
 from pathlib import Path
 from typing import IO, Any
 
@@ -15,9 +16,16 @@ from skidpad.core.errors import FileError
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.actors import ActorTable
 from skidpad.simulation.carla_server.clock import Clock
+from skidpad.simulation.carla_server.recorder_text import (
+    ANY,
+    describe_recording,
+    list_blocked,
+    list_collisions,
+)
 from skidpad.simulation.carla_server.replayer import FORMAT, PLAYED, Recording, recording
 from skidpad.simulation.carla_server.rpc import CallError
 from skidpad.simulation.carla_server.touches import touches
+from skidpad.simulation.carla_server.vehicles import Vehicle, Vehicles
 from skidpad.simulation.world.world import World
 
 MAX_BYTES = 2 * 1024**3
@@ -68,8 +76,8 @@ class Recorder:
             self._file.close()
             self._file = None
 
-    def tick(self, clock: Clock, actors: ActorTable, moving: World) -> None:
-        """One line: frame, time, id and Transform of what moves, contacts, and who is new."""
+    def tick(self, clock: Clock, actors: ActorTable, moving: World, vehicles: Vehicles) -> None:
+        """One line: frame, time, poses of what moves, contacts, new actors, controls of vehicles."""
         if self._file is None:
             return
         poses, born = [], []
@@ -84,7 +92,8 @@ class Recorder:
         contacts = [
             [t.actor.id, 0 if t.other is None else t.other.id] for t in touches(moving, actors)
         ]
-        self._write(json.dumps([clock.frame, clock.elapsed, poses, contacts, born]))
+        controls = [_control_row(vehicle, vehicles) for vehicle in vehicles]
+        self._write(json.dumps([clock.frame, clock.elapsed, poses, contacts, born, controls]))
 
     def _write(self, line: str) -> None:
         assert self._file is not None
@@ -94,28 +103,31 @@ class Recorder:
             return
         self._file.write(line + "\n")
 
-    def summary(self, name: str) -> str:
-        """What `show_recorder_file_info` prints."""
+    def summary(self, name: str, show_all: bool = False) -> str:
+        """Returns what `show_recorder_file_info` prints."""
         with _told(name):
-            head, ticks = self._read(name)
-            seconds = ticks[-1][1] - _start(head, ticks) if ticks else 0.0
-            return (
-                f"Map: {head.get('map')!s:.80}\nFrames: {len(ticks)}\n"
-                f"Duration: {seconds:.3f} seconds\nFormat: Skidpad JSON lines\n"
-            )
+            return describe_recording(*self._read_with_start(name), show_all)
 
-    def collisions(self, name: str) -> str:
-        """What `show_recorder_collisions` prints."""
+    def collisions(self, name: str, first: str = ANY, second: str = ANY) -> str:
+        """Returns what `show_recorder_collisions` prints of contacts between two kinds."""
         with _told(name):
-            head, ticks = self._read(name)
-            start = _start(head, ticks) if ticks else 0.0
-            lines = [f"{t[1] - start:10.3f} {a:6d} {b:6d}" for t in ticks for a, b in t[3]]
-        return "\n".join(["      Time  actor  other", *lines]) + "\n"
+            return list_collisions(*self._read_with_start(name), first, second)
+
+    def blocked(self, name: str, seconds: float, cm: float) -> str:
+        """Returns what `show_recorder_actors_blocked` prints."""
+        with _told(name):
+            return list_blocked(*self._read_with_start(name), seconds, cm)
 
     def recording(self, name: str) -> Recording:
         """What can be replayed of a file."""
         with _told(name):
             return recording(name, *self._read(name))
+
+    def _read_with_start(self, name: str) -> tuple[dict[str, Any], list[list[Any]], float]:
+        head, ticks = self._read(name)
+        written = datetime.fromtimestamp(safe_path(self.folder, name).stat().st_mtime, timezone.utc)
+        head["date"] = written.strftime("%x %X")
+        return head, ticks, _start(head, ticks) if ticks else 0.0
 
     def _read(self, name: str) -> tuple[dict[str, Any], list[list[Any]]]:
         path = safe_path(self.folder, name)
@@ -147,3 +159,14 @@ def _told(name: str) -> Iterator[None]:
 def _start(head: dict[str, Any], ticks: list[list[Any]]) -> float:
     """s of the episode when a recording began; recordings of before told only their first tick."""
     return float(head.get("start", ticks[0][1]))
+
+
+def _control_row(vehicle: Vehicle, vehicles: Vehicles) -> list[float]:
+    c, row = vehicle.control, vehicles.row(vehicle.actor)
+    pedals = [round(v, 4) for v in (c.steer, c.throttle, c.brake)]
+    return [
+        vehicle.actor,
+        *pedals,
+        int(c.hand_brake),
+        vehicle.gear(vehicles.moving.fleet.speed(row)),
+    ]

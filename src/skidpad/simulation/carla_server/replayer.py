@@ -74,7 +74,7 @@ def recording(name: str, head: dict[str, Any], ticks: list[list[Any]]) -> Record
         raise CallError(f"{name} holds no ticks that can be replayed")
     kinds: dict[int, tuple[str, dict[str, str]]] = {}
     poses = []
-    for _, _, places, _, born in ticks:
+    for _, _, places, _, born, *_ in ticks:
         for id, blueprint, attributes in born:
             given = {wire.text(k, "attribute"): wire.text(v, k) for k, v in attributes.items()}
             kinds[wire.integer(id, "actor id")] = wire.text(blueprint, "blueprint"), given

@@ -80,7 +80,7 @@ class Served:
         episode.debug.age(clock.step)
         self._publish_snapshot()
         episode.vehicles.let_go()
-        self.recorder.tick(clock, episode.actors, episode.moving)
+        self.recorder.tick(clock, episode.actors, episode.moving, episode.vehicles)
         if self.before_sensing is not None and episode.sensors.heard(self.hub):
             self.before_sensing()
             self.before_sensing = None

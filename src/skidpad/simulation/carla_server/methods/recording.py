@@ -10,6 +10,7 @@ from skidpad.simulation.carla_server.served import Served
 
 TABLE = Table("recorder")
 MAX_FACTOR = 100.0  # times real time
+KIND_LETTERS = ("o", "v", "w", "t", "h", "a")  # other, vehicle, walker, traffic light, hero, any
 
 
 @TABLE.method("start_recorder")
@@ -29,24 +30,31 @@ def stop_recorder(served: Served) -> None:
 
 @TABLE.method("show_recorder_file_info")
 def show_recorder_file_info(served: Served, name: Any, show_all: Any = False) -> str:
-    """A summary."""
-    wire.flag(show_all, "show_all")
-    return served.recorder.summary(wire.text(name, "file name"))
+    """Returns what is in a recording, in CARLA's words: events, with `show_all` every frame."""
+    all_frames = wire.flag(show_all, "show_all")
+    return served.recorder.summary(wire.text(name, "file name"), all_frames)
 
 
 @TABLE.method("show_recorder_collisions")
-def show_recorder_collisions(served: Served, name: Any, a: Any, b: Any) -> str:
-    """Contacts in a recording; the type filters have no effect."""
-    del a, b
-    return served.recorder.collisions(wire.text(name, "file name"))
+def show_recorder_collisions(served: Served, name: Any, first: Any, second: Any) -> str:
+    """Returns the contacts between two kinds of actors, in CARLA's words."""
+    kinds = [_actor_kind(kind) for kind in (first, second)]
+    return served.recorder.collisions(wire.text(name, "file name"), *kinds)
+
+
+def _actor_kind(value: Any) -> str:
+    """Returns the letter of a kind; the client sends it as a character's number."""
+    letter = chr(value) if isinstance(value, int) and 0 < value < 128 else value
+    if letter not in KIND_LETTERS:
+        raise CallError(f"a kind of actor is one of {', '.join(KIND_LETTERS)}, got {value!r:.20}")
+    return str(letter)
 
 
 @TABLE.method("show_recorder_actors_blocked")
-def show_recorder_actors_blocked(served: Served, name: Any, seconds: Any, metres: Any) -> str:
-    """Not evaluated."""
-    wire.number(seconds, "min_time")
-    wire.number(metres, "min_distance")
-    return served.recorder.summary(wire.text(name, "file name"))
+def show_recorder_actors_blocked(served: Served, name: Any, seconds: Any, distance: Any) -> str:
+    """Returns the actors that stood for longer than `seconds`, in CARLA's words; distance in cm."""
+    least, cm = wire.number(seconds, "min_time"), wire.number(distance, "min_distance")
+    return served.recorder.blocked(wire.text(name, "file name"), least, cm)
 
 
 @TABLE.method("replay_file")

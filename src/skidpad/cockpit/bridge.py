@@ -28,6 +28,7 @@ from skidpad.core.inputs import (
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.core.weather import Weather
+from skidpad.physics.grip import grip_params
 from skidpad.physics.presets import all_presets, preset
 from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
 
@@ -55,7 +56,7 @@ class Bridge:
         self.told: dict[str, Any] = {}  # of the newest picture
         self.main, self.hidden = View.DRIVER, set[View]()
         self.extras = ALL_EXTRAS
-        self.sky: Weather | None = None  # set, but perhaps not yet shown
+        self.acting: Sky | None = None  # set, but perhaps not yet shown
 
     # --- pictures
 
@@ -116,7 +117,7 @@ class Bridge:
             "take": lambda _: Wheel(not self._seat("manual", False)),
             "lamps": self._lamps,
             "toggle": self._toggle,
-            "crowd": lambda v: Crowd(int(v)),
+            "crowd": self._crowd,
             "weather": self._weather,
             "sky": self._change,
             "hour": lambda _: self._change({"sun_altitude_deg": next_hour(self._present())}),
@@ -188,29 +189,47 @@ class Bridge:
             now = str(self._seat("weather", names[0])).removesuffix(CUSTOM)
             at = names.index(now) if now in names else -1
             value = names[(at + 1) % len(names)]
-        self.sky = preset(value)
-        return self._acting()
+        return self._acting(preset(value))
 
     def _change(self, value: Mapping[str, float]) -> Sky:
         """Single fields of the present weather; what comes out may be a preset, and is called so."""
         now = self._present()
         name = now.name if now.name.endswith(CUSTOM) else now.name + CUSTOM
         fields = {k: float(v) for k, v in value.items() if k in now.values()}
-        self.sky = called(replace(now, name=name, title="", **fields))
-        return self._acting()
+        return self._acting(called(replace(now, name=name, title="", **fields)))
 
     def _present(self) -> Weather:
-        if self.sky is None:
-            name = str(self._seat("weather", "clear-noon"))
-            self.sky = Weather(name=name, **self._seat("sky", {}))
-        return self.sky
+        return self._sky().weather
 
-    def _acting(self, grip: GripModel | None = None, range: RangeModel | None = None) -> Sky:
-        return Sky(
-            self._present(),
-            GripModel(self._seat("grip", "physical")) if grip is None else grip,
-            RangeModel(self._seat("range", "physical")) if range is None else range,
-        )
+    def _sky(self) -> Sky:
+        """Weather and how it acts, as they were set last."""
+        if self.acting is None:
+            name = str(self._seat("weather", "clear-noon"))
+            self.acting = Sky(
+                Weather(name=name, **self._seat("sky", {})),
+                GripModel(self._seat("grip", "physical")),
+                RangeModel(self._seat("range", "physical")),
+            )
+        return self.acting
+
+    def _acting(
+        self,
+        weather: Weather | None = None,
+        grip: GripModel | None = None,
+        range: RangeModel | None = None,
+    ) -> Sky:
+        """The input for what is set now; ConfigError for what cannot be, and nothing is set then."""
+        now = self._sky()
+        wanted = Sky(weather or now.weather, grip or now.grip, range or now.range)
+        grip_params(wanted.weather, wanted.grip)  # snow, or rain on ice, in the statistical model
+        self.acting = wanted
+        return wanted
+
+    def _crowd(self, value: Any) -> Crowd:
+        seat = self.told.get("seat", {})
+        if "crowd" in seat and seat["crowd"] is None:
+            raise ConfigError("only on roads with background traffic can vehicles leave or come")
+        return Crowd(int(value))
 
 
 def next_hour(weather: Weather) -> float:

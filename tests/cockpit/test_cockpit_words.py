@@ -1,0 +1,96 @@
+"""What a page may say: words that cannot be are refused in the page, and the drive goes on."""
+
+import random
+
+import msgspec
+import pytest
+
+from skidpad.cockpit.bridge import Bridge
+from skidpad.cockpit.words import Word, encode
+from skidpad.core.inputs import Sky
+from skidpad.core.run import Function
+from skidpad.core.vocabulary import GripModel
+from skidpad.physics.grip import grip_params, mu_at
+from skidpad.physics.presets import all_presets, preset
+
+FIELDS = (
+    "precipitation",
+    "fog_density",
+    "wetness",
+    "ice_thickness",
+    "snow_depth_mm",
+    "sun_altitude_deg",
+)
+
+
+class Deaf:
+    """A producer that keeps what it is told."""
+
+    def __init__(self):
+        self.words = []
+        self.result = None
+
+    def say(self, word):
+        self.words.append(word)
+
+
+def bridge(**seat):
+    made = Bridge(Deaf())
+    made.told = {"seat": seat}
+    made.tabs.come("a")
+    return made
+
+
+@pytest.mark.req("A-217")
+def test_a_combination_that_cannot_be_is_refused_in_words_and_nothing_is_set():
+    made = bridge(weather="clear-noon", sky=preset("clear-noon").values(), grip="physical")
+    assert made.say("a", "weather", "snow") is None
+    wrong = made.say("a", "grip", "statistical")
+    assert "snow" in wrong
+    assert "physical" in wrong
+    assert made.say("a", "range", "none") is None
+    (first, second) = [word.input for word in made.producer.words]
+    assert (first.grip, second.grip) == (GripModel.PHYSICAL, GripModel.PHYSICAL)
+    assert second.weather.name == "snow"
+    # what was just set counts, also before a picture shows it
+    assert made.say("a", "weather", "rain-noon") is None
+    assert made.say("a", "grip", "statistical") is None
+    assert "ice" in made.say("a", "sky", {"ice_thickness": 30})
+    assert "snow" in made.say("a", "weather", "snow")
+    assert made.producer.words[-1].input.weather.name == "rain-noon"
+    assert made.say("a", "hour") is None
+    assert made.producer.words[-1].input.grip is GripModel.STATISTICAL
+    assert "only on roads" in made.say("a", "crowd", 3)
+
+
+def test_no_word_of_a_page_ends_a_drive():
+    """20 000 random words, right and wrong: every input that goes out can be driven."""
+    rng = random.Random(7)
+    made = bridge(weather="clear-noon", sky=preset("clear-noon").values(), crowd=4)
+    values = {
+        "weather": [None, *all_presets(), "hail"],
+        "sky": [{f: v} for f in FIELDS for v in (0, 3, 50, 100, -90, 1e9, float("nan"), "x")],
+        "grip": ["none", "statistical", "physical", "ice", None],
+        "range": ["none", "physical", 3],
+        "toggle": [*(f.value for f in Function), "wings"],
+        "lamps": [None, "auto", "high", "bright"],
+        "crowd": [0, 4, 80, 81, -1, "x", None],
+        "hour": [None], "take": [None], "step": [None, 3, "x"], "rate": [0, 1, 4, -1, None],
+        "pedals": [{"throttle": 1.0}, {"steer": 2.0}, {"brake": float("nan")}, {}, None],
+        "main": [None, "top", "moon"], "hide": ["depth", "driver", "moon"], "extra": [None, "clouds", "x"],
+    }  # fmt: skip
+    refused = 0
+    for _ in range(20_000):
+        word = rng.choice(list(values))
+        refused += made.say("a", word, rng.choice(values[word])) is not None
+        if rng.random() < 0.3:  # a picture shows what is set
+            now = made._sky()
+            seat = {"weather": now.weather.name, "grip": now.grip.value, "range": now.range.value}
+            made.told["seat"] |= seat | {"sky": now.weather.values()}
+    assert 2_000 < refused < 15_000
+    skies = [w.input for w in made.producer.words if isinstance(getattr(w, "input", None), Sky)]
+    assert len(skies) > 2_000
+    for sky in skies:
+        assert 0.0 < mu_at(grip_params(sky.weather, sky.grip), 20.0) < 2.0
+    for word in made.producer.words:  # what is sent can be read at the other end
+        msgspec.json.decode(encode(word), type=Word)

@@ -29,7 +29,7 @@ WALK = """async ([steps, seed]) => {
             const found = all('.panel .q-toggle');
             found[rand(found.length)].click(); seen.toggle++;
         } else if (kind < 7) {
-            const found = all('.panel .q-slider'); const one = found[rand(found.length)];
+            const found = all('.panel .q-slider__track-container'); const one = found[rand(found.length)];
             const code = 33 + rand(2);  // a page up or down, many at once
             one.focus(); for (let i = rand(6); i >= 0; i--) key(one, '', code);
             one.dispatchEvent(new KeyboardEvent('keyup', { keyCode: code, bubbles: true }));
@@ -46,9 +46,14 @@ WALK = """async ([steps, seed]) => {
             document.body.dispatchEvent(new KeyboardEvent('keyup', { key: one, bubbles: true }));
             seen.key++;
         }
-        if (k % 4 === 0) await rest(1);
+        if (k % 4 === 0) await rest(30);  // so that most of it is seen by the drive
     }
     return seen; }"""
+
+
+def choose(page, name, wanted):
+    page.get_by_role("combobox", name=name).click()
+    page.get_by_role("option", name=wanted, exact=True).click()
 
 
 def test_no_walk_over_the_controls_ends_a_drive(browser, tmp_path):
@@ -63,6 +68,9 @@ def test_no_walk_over_the_controls_ends_a_drive(browser, tmp_path):
         page.wait_for_function(
             "() => document.querySelector('.stage canvas')?.width === 800", timeout=WAIT
         )
+        choose(page, "grip", "statistical")
+        choose(page, "weather (N)", "snow")
+        page.get_by_text("needs the physical grip model").wait_for()
         page.get_by_text("pictures (G)").click()
         seen = {}
         for first in range(0, STEPS, 500):

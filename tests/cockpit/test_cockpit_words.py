@@ -43,7 +43,7 @@ def bridge(**seat):
 
 @pytest.mark.req("A-217")
 def test_a_combination_that_cannot_be_is_refused_in_words_and_nothing_is_set():
-    made = bridge(weather="clear-noon", sky=preset("clear-noon").values(), grip="physical")
+    made = bridge(weather="clear-noon", sky=preset("clear-noon").values(), crowd=None)
     assert made.say("a", "weather", "snow") is None
     wrong = made.say("a", "grip", "statistical")
     assert "snow" in wrong

@@ -9,10 +9,22 @@ TEST_ARGS ?=
 DRIVE_ARGS ?=
 NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run test test-all test-times test-bare check wheel-check bench fuzz nightly soak refs data fleet fleet-load docs figures arm64 channels campaigns tables clean
+.PHONY: cockpit run published results test test-all test-times test-bare check wheel-check bench fuzz nightly soak refs data fleet fleet-load docs figures arm64 channels campaigns tables clean
 
+# ten seeds of every distinct cell on objects, one of them once more on pixels
 run: $(VENV)/.installed
-	$(BIN)/skidpad adas --out $(OUT) --resume --or-next --traffic pack $(RUN_ARGS)
+	$(BIN)/skidpad adas --out $(OUT) --resume --or-next --traffic pack --sensors objects --seeds 10 --distinct \
+		--parity-seeds 1 $(RUN_ARGS)
+
+# the published experiment: its settings, vehicles at fixed places, images; TOWN04=FILE.xodr its map
+PUBLISHED_OUT ?= out/published
+published: $(VENV)/.installed
+	$(BIN)/skidpad adas --out $(PUBLISHED_OUT) --resume --or-next --profile thesis_text --traffic fixed --sensors pixels \
+		$(if $(TOWN04),--map $(TOWN04) --edges rail) $(RUN_ARGS)
+
+# drives every campaign of docs/results again and says what moved; RESULTS_ARGS="matrix-figure8" drives one
+results: $(VENV)/.installed
+	$(BIN)/python tools/campaigns.py --again $(RESULTS_ARGS)
 
 # the quick tests; those that were measured to take long are left to test-all, which is what CI runs
 test: $(VENV)/.tested-with

@@ -2,7 +2,8 @@
 
 Each goes on where it was left, one after the other, in its own folder under --out. What a page needs is
 then copied to docs/results/NAME; `make tables` writes the pages. A campaign whose results lie there
-already is left alone, so that frozen numbers stay frozen.
+already is left alone, so that frozen numbers stay frozen. `make results` (--again) drives those too, in
+folders of their own, and prints what moved; with --replace it puts the new results in their place.
 """
 
 from __future__ import annotations
@@ -18,8 +19,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+from moved import read_rows, what_moved
 from result_grip import keep_delays
 from result_tables import RESULTS, ROOT, plan
+from skidpad.recording.fingerprint import fingerprint
 
 KEPT = ("results.parquet", "campaign.json")
 MOST = 1_000_000  # bytes of a description; a longer one repeats what the command says
@@ -78,9 +81,23 @@ def freeze(name: str, target: Path) -> None:
         "commit": commit,
         "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d"),
         "machine": f"{platform.machine()}, {os.cpu_count()} cores",
+        "fingerprint": fingerprint().short,
     }
     (part / "driven.json").write_text(json.dumps(told, indent=1) + "\n", encoding="utf-8")
+    shutil.rmtree(folder, ignore_errors=True)
     part.rename(folder)
+
+
+def again(name: str, words: list[str], ask: argparse.Namespace) -> bool:
+    """Drive a campaign whose results lie in docs/results and print what moved; False when it failed."""
+    target = drive(name, words, ask.out / "again", ask.workers)
+    if target is None:
+        return False
+    lines = what_moved(read_rows(RESULTS / name), read_rows(target))
+    print(f"{name}: " + "\n".join(lines), flush=True)
+    if ask.replace:
+        freeze(name, target)
+    return True
 
 
 def main(arguments: list[str] | None = None) -> int:
@@ -90,6 +107,8 @@ def main(arguments: list[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, default=ROOT / "out" / "campaigns")
     parser.add_argument("--maps", type=Path, help="folder of OpenDRIVE files of somebody else")
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument("--again", action="store_true", help="drive those with results too")
+    parser.add_argument("--replace", action="store_true", help="and put the new results in place")
     parser.add_argument("--list", action="store_true", help="print the commands, drive nothing")
     ask = parser.parse_args(arguments)
     known = {c["name"]: c["command"] for c in plan()["campaigns"]}
@@ -100,10 +119,15 @@ def main(arguments: list[str] | None = None) -> int:
         words = words_of(known[name], ask.maps)
         if ask.list:
             print(f"{name}: skidpad {known[name]}")
-        elif (RESULTS / name).is_dir():
-            print(f"{name}: frozen already in {RESULTS / name}")
         elif words is None:
             print(f"{name}: left out, it needs --maps DIR")
+        elif (RESULTS / name).is_dir() and ask.again:
+            if not again(name, words, ask):
+                failed.append(name)
+        elif (RESULTS / name).is_dir():
+            print(f"{name}: frozen already in {RESULTS / name}")
+        elif ask.again:
+            print(f"{name}: not driven yet, `make campaigns` does")
         elif (target := drive(name, words, ask.out, ask.workers)) is None:
             failed.append(name)
         else:

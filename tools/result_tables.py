@@ -116,7 +116,8 @@ def block(name: str, which: str, folder: Path) -> str:
 def driven(folder: Path) -> str:
     """When and by what a campaign was driven."""
     told = json.loads((folder / "driven.json").read_text(encoding="utf-8"))
-    return f"Driven {told['date']} at commit {told['commit']}, {told['machine']}.\n\n"
+    on = told.get("fingerprint", "not recorded then")
+    return f"Driven {told['date']} at commit {told['commit']}, {told['machine']}, fingerprint {on}.\n\n"
 
 
 def study_claims(folder: Path, id: str) -> str:

@@ -113,3 +113,19 @@ def test_the_cell_of_a_run_is_its_name_without_the_number():
     assert (
         cell_of("ghost_cut_in-drops_icy_30_reduced-000001") == "ghost_cut_in-drops_icy_30_reduced"
     )
+
+
+def test_further_runs_of_cells_that_moved_alike_are_driven_in_the_first_one_only(tmp_path):
+    """Cells `even` and `same` toss alike, `sure` otherwise; a cell without a hash is its own."""
+    moved = {"even": "m", "same": "m", "sure": "n"}
+    recipe = replace(RECIPE, drive_of=lambda key: moved.get(key.cell))
+    tasks = tosses(5, even=0.5, same=0.5, sure=1.0, odd=0.5)
+    totals = []
+    campaign = Campaign(recipe, tasks, distinct=True)
+    summary = campaign.run(tmp_path / "out", here, on_total=totals.append)
+    assert runs(tmp_path / "out") == {"even": 5, "same": 1, "sure": 5, "odd": 5}
+    assert (summary.runs, totals) == (16, [20, 16])
+    again = campaign.run(tmp_path / "out", here, resume=True)
+    assert (again.driven, again.content_hash) == (0, summary.content_hash)
+    with pytest.raises(ConfigError, match="exclude each other"):
+        Campaign(recipe, tasks, distinct=True, until_halfwidth=0.1)

@@ -112,7 +112,7 @@ def test_the_report_shows_factors(tmp_path: Path) -> None:
     assert table["serious_contacts"].to_list() == table["interventions"].to_list() == [0] * 4
     page = write_report(tmp_path).read_text(encoding="utf-8")
     assert "By functions and cruise target" in page
-    assert "Interventions against the cruise target" in page
+    assert "Crashes against the cruise target" in page
 
 
 def test_a_control_character_around_a_number_is_a_space() -> None:

@@ -12,10 +12,10 @@ from skidpad.recording.results import Timing
 from skidpad.report.matrix import write_report
 from skidpad.report.matrix_answers import answers
 from skidpad.report.matrix_baseline import baseline_text
-from skidpad.report.matrix_data import WEATHERS, load_matrix
+from skidpad.report.matrix_data import EVENTS, FIRST, WEATHERS, config_list, load_matrix
 from skidpad.report.matrix_figures import collisions, speed_figure
 from skidpad.report.matrix_headline import headline_numbers
-from skidpad.report.matrix_kinds import KINDS, count
+from skidpad.report.matrix_kinds import count, kinds_of
 from skidpad.report.matrix_tables import count_table
 
 CLAIMS = [f for f in FINDINGS if not f.study]
@@ -26,6 +26,9 @@ def metrics(barriers=0, struck=0, hit=0, speed=40.0):
     vehicles = struck + hit
     return Metrics(
         fatal_collisions=barriers + vehicles,
+        serious_contacts=vehicles,
+        contacts_heavy=hit,
+        contacts_medium=struck,
         crashes_vehicle=vehicles,
         collisions_vehicle=vehicles,
         rear_ended=struck,
@@ -75,7 +78,7 @@ def told(matrix, crashes=None):
 def test_the_first_answer_names_the_safest_functions_in_each_weather_and_how_sure_that_is(tmp_path):
     first = told(campaign(tmp_path, clear_cut))[0]
     assert first.sentence == (
-        "Fewest interventions: in clear sky configurations 1 and 2 with 0.00 per run; "
+        "Fewest crashes: in clear sky configurations 1 and 2 with 0.00 per run; "
         "in heavy rain configuration 1 with 0.00 per run."
     )
     clear, rain = first.lines
@@ -93,11 +96,11 @@ def test_the_first_answer_names_the_safest_functions_in_each_weather_and_how_sur
 def test_the_second_answer_says_what_rain_changes_for_each_configuration(tmp_path):
     second = told(campaign(tmp_path, clear_cut))[1]
     assert second.sentence == (
-        "Heavy rain against clear sky: more interventions with configurations 2 and 4; "
+        "Heavy rain against clear sky: more crashes with configurations 2 and 4; "
         "no difference that 10 seeds can show with configurations 1 and 3."
     )
     assert second.lines[3] == (
-        "4 · + 80 km/h limiter: interventions per run 2.00 in clear sky, 5.00 in heavy rain; "
+        "4 · + 80 km/h limiter: crashes per run 2.00 in clear sky, 5.00 in heavy rain; "
         "mean speed 35.0 → 35.0 km/h; dropout 5.0 → 5.0 %."
     )
     assert second.lines[4] == (
@@ -109,7 +112,7 @@ def test_the_second_answer_says_what_rain_changes_for_each_configuration(tmp_pat
 def test_the_third_answer_names_the_commonest_kind_of_the_worst_configuration(tmp_path):
     third = told(campaign(tmp_path, clear_cut))[2]
     assert third.sentence == (
-        "Configuration 3 needs interventions most often (140 in 20 drives), mostly of the kind "
+        "Configuration 3 crashes most often (140 crashes in 20 drives), mostly of the kind "
         "“into a barrier” (120)."
     )
 
@@ -157,12 +160,12 @@ def test_weathers_that_every_configuration_drove_alike_are_one_column_and_count_
     one, six = (
         campaign(tmp_path / str(alike), clear_cut, 6, alike=alike) for alike in (True, False)
     )
-    titles = [title for title, _ in count_table(one, "fatal_collisions", "").columns]
+    titles = [title for title, _ in count_table(one, EVENTS, "").columns]
     assert titles == [
         "configuration", "Clear Sky: sunrise, noon and night",
         "Heavy Rain: sunrise, noon and night", "all",
     ]  # fmt: skip
-    assert len(count_table(six, "fatal_collisions", "").columns) == 8
+    assert len(count_table(six, EVENTS, "").columns) == 8
     assert (len(one.cell("3")), len(six.cell("3"))) == (12, 36)
 
 
@@ -181,12 +184,50 @@ def test_a_cell_that_drives_as_another_has_its_seeds(tmp_path):
     ]  # fmt: skip
 
 
-def test_the_kinds_of_interventions_add_up_to_all(tmp_path):
+@pytest.mark.parametrize("graded", [True, False])
+def test_the_kinds_of_crashes_add_up_to_all(tmp_path, graded):
     matrix = campaign(tmp_path, clear_cut, 2)
-    runs = matrix.cell("3")
-    assert {k.title: n for k in KINDS if (n := count(k, runs))} == {
-        "into a barrier": 24, "struck from behind": 4
-    }  # fmt: skip
-    assert (
-        sum(count(k, matrix.finished) for k in KINDS) == matrix.finished["fatal_collisions"].sum()
+    kinds = kinds_of(graded)
+    found = {k.title: n for k in kinds if (n := count(k, matrix.cell("3")))}
+    slow = "contact of 5 to 20 km/h" if graded else "struck from behind"
+    assert found == {"into a barrier": 24, slow: 4}
+    assert sum(count(k, matrix.finished) for k in kinds) == matrix.finished[EVENTS].sum()
+
+
+@pytest.mark.req("A-247")
+def test_a_crash_is_a_serious_contact_or_a_departure_and_no_graze(tmp_path):
+    grazed = Metrics(
+        fatal_collisions=3,
+        serious_contacts=1,
+        contacts_light=2,
+        road_departures=0,
+        first_fatal_s=7.0,
+        first_intervention_s=9.0,
     )
+    MATRIX.write(tmp_path, [(key("1", "clear-noon", 1), grazed)])
+    row = load_matrix(tmp_path).results.row(0, named=True)
+    assert (row[EVENTS], row["fatal_collisions"], row[FIRST]) == (1, 3, 9.0)
+
+
+def test_results_that_grade_no_contact_say_that_a_crash_is_an_intervention(tmp_path):
+    ungraded = Metrics(fatal_collisions=3, first_fatal_s=7.0)
+    MATRIX.write(tmp_path, [(key("1", "clear-noon", 1), ungraded)])
+    matrix = load_matrix(tmp_path)
+    assert matrix.results[EVENTS].to_list() == [3]
+    assert matrix.results[FIRST].to_list() == [7.0]
+    assert not matrix.has_grades
+
+
+@pytest.mark.parametrize(
+    ("configs", "words"),
+    [
+        (["2"], "configuration 2"),
+        (["1", "2", "3"], "configurations 1 to 3"),
+        (["1", "3", "4"], "configurations 1, 3 and 4"),
+        (["reference"], "the reference driver"),
+        (["1", "2", "3", "reference"], "configurations 1 to 3 and the reference driver"),
+        (["acc+lca"], "acc+lca"),
+    ],
+)
+def test_configurations_are_listed_as_one_would_say_them(configs, words):
+    assert config_list(configs) == words

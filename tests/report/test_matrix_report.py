@@ -84,7 +84,12 @@ def html(tmp_path_factory):
 
 @pytest.mark.req("A-258", "A-259")
 def test_the_report_has_every_section_and_no_link_to_the_network(html):
-    for title in ("Interventions", "Findings of the sources, judged", "All metrics", "Definitions"):
+    for title in (
+        "Crashes and interventions",
+        "Findings of the sources, judged",
+        "All metrics",
+        "Definitions",
+    ):
         assert f">{title}</h2>" in html
     assert html.count("<svg") >= 6
     assert "published 6" in html  # configuration 0, clear sunrise

@@ -179,7 +179,9 @@ def test_what_a_campaign_left_is_frozen_whole(left, tmp_path):
     campaigns.freeze("grip", left)
     frozen = tmp_path / "results" / "grip"
     assert sorted(p.name for p in frozen.iterdir()) == sorted([*campaigns.KEPT, "driven.json"])
-    assert set(json.loads((frozen / "driven.json").read_text())) == {"commit", "date", "machine"}
+    assert set(json.loads((frozen / "driven.json").read_text())) == {
+        "commit", "date", "machine", "fingerprint"
+    }  # fmt: skip
 
 
 def test_a_description_that_only_repeats_the_command_is_left_out(left, tmp_path, monkeypatch):

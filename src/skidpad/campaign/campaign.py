@@ -19,7 +19,7 @@ from typing import Any, Generic
 import msgspec
 
 from skidpad.campaign.keeping import keep_files
-from skidpad.campaign.recipe import Driven, M, Recipe, T, cell_of
+from skidpad.campaign.recipe import Driven, M, Recipe, T, Task, cell_of
 from skidpad.campaign.worker import Finished, Job, Runner
 from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.vocabulary import Outcome
@@ -85,6 +85,7 @@ class Campaign(Generic[T, K, M]):
     """Runs of one kind.
 
     alone: they need a simulator that drives one run at a time.
+    distinct: where the first runs of cells moved alike, drive the further runs of one cell only.
     until_halfwidth: leave a cell once its share of successes is known to +- this.
     files: what the folder keeps of the user's own, by its name there.
     """
@@ -93,6 +94,7 @@ class Campaign(Generic[T, K, M]):
     tasks: Sequence[T]
     alone: bool = False
     until_halfwidth: float | None = None
+    distinct: bool = False
     files: Mapping[str, Path] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -101,6 +103,8 @@ class Campaign(Generic[T, K, M]):
             raise ConfigError(f"two runs have the same name: {twice[0]}")
         if self.until_halfwidth is not None:
             require_range("--until-halfwidth", self.until_halfwidth, 0.001, 0.5)
+            if self.distinct:
+                raise ConfigError("--distinct and --until-halfwidth exclude each other; pass one")
 
     def identity(self) -> dict[str, Any]:
         """The resolved configuration, without workers and paths (decision M-18).
@@ -122,6 +126,10 @@ class Campaign(Generic[T, K, M]):
 
     def batches(self) -> list[list[T]]:
         """What is driven before a stopping rule looks: whole batches per cell, in the order of tasks."""
+        if self.distinct:
+            firsts = list({cell_of(t.name): t for t in reversed(self.tasks)}.values())[::-1]
+            names = {t.name for t in firsts}
+            return [firsts, [t for t in self.tasks if t.name not in names]]
         if self.until_halfwidth is None:
             return [list(self.tasks)]
         batches: list[list[T]] = []
@@ -142,10 +150,12 @@ class Campaign(Generic[T, K, M]):
         resume: bool = False,
         csv: bool = False,
         on_run: Callable[[Entry[K, M]], None] = lambda _: None,
+        on_total: Callable[[int], None] = lambda _: None,
     ) -> Summary:
         """Drive what the ledger does not have yet, then write the results.
 
-        on_run: told of each run that is done, first of those in the ledger.
+        on_run: called with each run that is done, first with those in the ledger.
+        on_total: called with the number of runs, when fewer are left than were planned.
         OutputError when `out` holds something else, or this campaign and `resume` is false.
         """
         driven, earlier = 0, set[str]()
@@ -155,16 +165,18 @@ class Campaign(Generic[T, K, M]):
             for entry in latest(ledger.entries):
                 if entry.run in done:
                     on_run(entry)
-            for batch in self.batches():
+            batches = self.batches()
+            for k, batch in enumerate(batches):
                 wanted = self._wanted(
                     batch, [e for e in latest(ledger.entries) if e.run in earlier]
                 )
+                on_total(len(earlier) + len(wanted) + sum(map(len, batches[k + 1 :])))
                 todo = {t.name: t for t in wanted if t.name not in done}
                 for entry in self._drive(todo, out, runner):
                     ledger.append(entry)
                     on_run(entry)
                 driven += len(todo)
-                earlier |= {t.name for t in batch}
+                earlier |= {t.name for t in wanted}
             entries = latest(ledger.entries)
         rows, timing = [(e.key, e.metrics) for e in entries], [e.timing for e in entries]
         digest = self.recipe.columns.write(out, rows, timing, csv=csv)
@@ -174,7 +186,10 @@ class Campaign(Generic[T, K, M]):
         return Summary(out, len(entries), driven, failed, digest, mixed, len(ledger.damaged))
 
     def _wanted(self, batch: Sequence[T], entries: Sequence[Entry[K, M]]) -> Sequence[T]:
-        """The runs of a batch whose cells are uncertain after the batches before it."""
+        """The runs of a batch whose cells are uncertain, or distinct, after the batches before it."""
+        if self.distinct and entries:
+            cells = distinct_cells(self.batches()[0], entries, self.recipe.drive_of)
+            return [t for t in batch if cell_of(t.name) in cells]
         if self.until_halfwidth is None or not entries:
             return batch
         trials = [(cell_of(e.run), self.success(e)) for e in entries]
@@ -234,6 +249,21 @@ def uncertain_cells(trials: Iterable[tuple[str, bool | None]], halfwidth: float)
             runs[cell].append(success)
     bounds = {cell: clopper_pearson(sum(s), len(s)) for cell, s in runs.items()}
     return {cell for cell, (low, high) in bounds.items() if (high - low) / 2.0 > halfwidth}
+
+
+def distinct_cells(
+    firsts: Iterable[Task], entries: Iterable[Entry[K, M]], drive_of: Callable[[K], object]
+) -> set[str]:
+    """The cells with a first run that moved as no other before; what is unknown is distinct."""
+    by_run = {e.run: e for e in entries}
+    seen: set[object] = set()
+    found = set()
+    for task in firsts:
+        drive = drive_of(by_run[task.name].key) if task.name in by_run else None
+        if drive is None or drive not in seen:
+            found.add(cell_of(task.name))
+        seen.add(drive)
+    return found
 
 
 def _text(plain: Any) -> bytes:

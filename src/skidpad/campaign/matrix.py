@@ -144,6 +144,11 @@ def unharmed(metrics: Metrics) -> bool | None:
     return None if metrics.fatal_collisions is None else metrics.fatal_collisions == 0
 
 
+def drive_of(key: RunKey) -> tuple[str, str] | None:
+    """What drove and how it moved (decision T-3); None for a run that did not end."""
+    return None if key.motion_hash is None else (key.config, key.motion_hash)
+
+
 RECIPE = Recipe(
     command="adas",
     columns=MATRIX,
@@ -152,5 +157,6 @@ RECIPE = Recipe(
     drive=drive_one,
     warm_up=warm_up,
     success=unharmed,
+    drive_of=drive_of,
     success_means="without an intervention",
 )

@@ -50,6 +50,11 @@ def nothing_else(tasks: Sequence[Any], out: Path, runner: Runner) -> None:
     del tasks, out, runner
 
 
+def no_drive(key: Any) -> None:
+    """A recipe for runs that are never compared in how they moved."""
+    del key
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Recipe(Generic[T, K, M]):
     """What a kind of campaign is made of. `drive` and `warm_up` are called in workers."""
@@ -62,6 +67,7 @@ class Recipe(Generic[T, K, M]):
     warm_up: Callable[[], None]  # compiles every kernel that a run may need
     success: Callable[[M], bool | None]  # what a stopping rule counts; None: not a trial
     success_means: str  # in words, after a number of runs
+    drive_of: Callable[[K], tuple[str, str] | None] = no_drive  # what drove, and how it moved
     finish: Callable[[Sequence[T], Path, Runner], None] = nothing_else
 
 

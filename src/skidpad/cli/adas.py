@@ -32,6 +32,23 @@ def adas(
     ] = None,
     seeds: Seeds = 1,
     first_seed: FirstSeed = 1,
+    distinct: Annotated[
+        bool,
+        typer.Option(
+            "--distinct",
+            help="Where the first seed moves alike in several weathers, drive the other seeds "
+            "in one of them.",
+        ),
+    ] = False,
+    parity_seeds: Annotated[
+        int,
+        typer.Option(
+            "--parity-seeds",
+            min=0,
+            help="With --sensors objects: drive so many of the seeds on pixels too, and show how "
+            "they differ.",
+        ),
+    ] = 0,
 ) -> None:
     """Drive configurations x weathers x seeds; prints the path of the report."""
     from skidpad.cli.carla_backend import checked, drives_alone
@@ -45,13 +62,18 @@ def adas(
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.keeping import found_again, kept
     from skidpad.campaign.matrix import RECIPE
-    from skidpad.cli.adas_plan import plan
+    from skidpad.cli.adas_plan import on_pixels, plan
+    from skidpad.recording.matrix import PIXELS
     from skidpad.report.matrix import write_report
 
     run = structs.replace(run, course=roads, backend=checked(backend), seed=first_seed)
     run = found_again(run, how.folder)
+    alone = drives_alone(run.backend)
     cells, files = kept(plan(run, chosen, weathers, seeds))
-    how(Campaign(RECIPE, cells, alone=drives_alone(run.backend), files=files), write_report)
+    campaign = Campaign(RECIPE, cells, alone=alone, files=files, distinct=distinct)
+    twins = on_pixels(cells, parity_seeds)
+    parts = {PIXELS: Campaign(RECIPE, twins, alone=alone, files=files)} if twins else {}
+    how(campaign, write_report, parts)
 
 
 def report(

@@ -10,7 +10,9 @@ from skidpad.campaign.cells import cross
 from skidpad.campaign.keeping import road_file
 from skidpad.campaign.matrix import roads_of
 from skidpad.cli.carla_backend import map_of
+from skidpad.core.errors import ConfigError
 from skidpad.core.run import DriverSpec, RunSpec
+from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.roads.bundled import bundled_maps, load_map
 
@@ -25,3 +27,13 @@ def plan(
     if roads.map not in bundled_maps():  # published places need not fit somebody else's roads
         roads = structs.replace(roads, allow_fewer=True)
     return cross(drivers, weathers, seeds, structs.replace(run, course=roads))
+
+
+def on_pixels(cells: list[RunSpec], seeds: int) -> list[RunSpec]:
+    """The runs of the first seeds once more, on pixels; ConfigError where they are on pixels."""
+    if seeds and any(c.sensors is SensorLevel.PIXELS for c in cells):
+        raise ConfigError("--parity-seeds compares objects with pixels: pass --sensors objects too")
+    chosen = sorted({c.seed for c in cells})[:seeds]
+    if len(chosen) < seeds:
+        raise ConfigError(f"--parity-seeds {seeds} needs as many --seeds; there are {len(chosen)}")
+    return [structs.replace(c, sensors=SensorLevel.PIXELS) for c in cells if c.seed in chosen]

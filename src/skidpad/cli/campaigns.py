@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -48,19 +49,41 @@ class Drive(Driving, frozen=True, kw_only=True):
         return self.out
 
     def __call__(
-        self, campaign: Campaign[Any, Any, Any], report: Callable[[Path], object]
+        self,
+        campaign: Campaign[Any, Any, Any],
+        report: Callable[[Path], object],
+        parts: Mapping[str, Campaign[Any, Any, Any]] = MappingProxyType({}),
     ) -> Summary:
-        """Drive it under a progress bar and print what `report` says of its folder."""
+        """Drive it under a progress bar and print what `report` says of its folder.
+
+        parts: further campaigns by the folder below its own, driven after it.
+        """
         from dataclasses import replace
 
+        campaign = replace(campaign, until_halfwidth=self.until_halfwidth)
+        identities = {".": campaign.identity()} | {n: c.identity() for n, c in parts.items()}
+        out = next_folder(self.out, identities) if self.or_next else self.out
+        summary = self._run(campaign, out, out)
+        if parts:
+            report(out)
+        for name, part in parts.items():
+            self._run(part, out / name, out)
+        typer.echo(report(out))
+        return summary
+
+    def _run(self, campaign: Campaign[Any, Any, Any], folder: Path, out: Path) -> Summary:
+        """Drive one campaign into its folder; `out` is what the user asked for."""
         from skidpad.cli.progress import Shown, console
 
-        campaign = replace(campaign, until_halfwidth=self.until_halfwidth)
-        out = next_folder(self.out, campaign.identity()) if self.or_next else self.out
         with self._runner(campaign) as runner, Shown(campaign) as shown:
             try:
                 summary = campaign.run(
-                    out, runner, resume=self.resume, csv=self.csv, on_run=shown.ended
+                    folder,
+                    runner,
+                    resume=self.resume,
+                    csv=self.csv,
+                    on_run=shown.ended,
+                    on_total=shown.planned_runs,
                 )
             except KeyboardInterrupt:
                 kept = f"interrupted; what is done is kept: --out {out} --resume finishes it"
@@ -68,7 +91,6 @@ class Drive(Driving, frozen=True, kw_only=True):
                 raise SystemExit(130) from None
         for warning in summary.warnings():
             console.print(f"[yellow]{warning}[/]")
-        typer.echo(report(out))
         return summary
 
     @contextmanager
@@ -96,14 +118,25 @@ class Estimate(Struct, frozen=True, kw_only=True):
         """Nowhere."""
         return None
 
-    def __call__(self, campaign: Campaign[Any, Any, Any], report: Callable[[Path], object]) -> None:
-        """Drive a few of its runs and print one sentence."""
+    def __call__(
+        self,
+        campaign: Campaign[Any, Any, Any],
+        report: Callable[[Path], object],
+        parts: Mapping[str, Campaign[Any, Any, Any]] = MappingProxyType({}),
+    ) -> None:
+        """Drive a few of its runs and print one sentence, and one for each part."""
+        del report
+        self._print(campaign, "")
+        for name, part in parts.items():
+            self._print(part, f"{name}: ")
+
+    def _print(self, campaign: Campaign[Any, Any, Any], name: str) -> None:
         from skidpad.core.wording import count_text
 
-        del report
         found, workers = campaign.estimate(), 1 if campaign.alone else self.workers
         typer.echo(
-            f"{count_text(found.runs, 'run')} at {found.cpu_s:.2f} s each (measured on {found.probes}) "
+            f"{name}{'at most ' * campaign.distinct}{count_text(found.runs, 'run')} at "
+            f"{found.cpu_s:.2f} s each (measured on {found.probes}) "
             f"on {count_text(workers, 'worker')}: about {found.minutes(workers):.1f} min, without "
             "compilation on first use"
         )
@@ -112,12 +145,18 @@ class Estimate(Struct, frozen=True, kw_only=True):
 How = Drive | Estimate
 
 
-def next_folder(out: Path, identity: dict[str, Any]) -> Path:
-    """`out`, or the first of out-2, out-3, ... that is empty or holds this campaign (M-18)."""
+def next_folder(out: Path, identities: Mapping[str, dict[str, Any]]) -> Path:
+    """`out`, or the first of out-2, out-3, ... that is empty or holds these campaigns (M-18).
+
+    identities: of each campaign, by its folder below.
+    """
     from skidpad.recording.ledger import FolderState, folder_state
 
     folder, n = out, 1
-    while folder_state(folder, identity) is FolderState.OTHER:
+    while any(
+        folder_state(folder / name, identity) is FolderState.OTHER
+        for name, identity in identities.items()
+    ):
         n += 1
         folder = out.with_name(f"{out.name}-{n}")
     return folder

@@ -33,6 +33,10 @@ class Shown(Progress):
         self.runs: dict[str, list[Entry[Any, Any]]] = defaultdict(list)
         self.bar = self.add_task("driving", total=len(campaign.tasks))
 
+    def planned_runs(self, total: int) -> None:
+        """The number of runs, once it is known that some need not be driven."""
+        self.update(self.bar, total=total)
+
     def ended(self, entry: Entry[Any, Any]) -> None:
         """A run has ended."""
         cell = cell_of(entry.run)

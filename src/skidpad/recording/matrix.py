@@ -126,5 +126,6 @@ class Metrics:
     notices: int | None = metric("errors and remarks in the log", "A-192")
 
 
+PIXELS = "pixels"  # folder of the runs that were driven on pixels too, below their campaign's
 MATRIX = Columns(RunKey, Metrics, ("config", "weather", "seed", "profile", "sensors"))
 MatrixEntry = Entry[RunKey, Metrics]

@@ -132,6 +132,14 @@ class CampaignView(Generic[E]):
         title = "Resolved configuration common to all runs"
         return [Text(" ".join(lines)), Code(title, text)]
 
+    @cached_property
+    def processor_minutes(self) -> float:
+        """Processor time of all runs."""
+        timing = self.folder.timing
+        if "cpu_s" not in timing.columns:
+            return 0.0
+        return float(timing["cpu_s"].drop_nulls().drop_nans().sum()) / 60.0
+
     def _times(self) -> list[str]:
         parts = []
         for column, (name, unit) in CLOCKS.items():

@@ -105,7 +105,7 @@ def grouped_bars(groups: Sequence[str], series: Sequence[Series], y_label: str) 
 
 
 def draw_bars(axes: Axes, groups: Sequence[str], series: Sequence[Series], y_label: str) -> None:
-    """Bars into existing axes."""
+    """Draws bars into existing axes."""
     width = 0.8 / len(series)
     named = False
     for k, one in enumerate(series):
@@ -301,11 +301,11 @@ Named = tuple[str, ArrayLike, ArrayLike]  # name, x, y
 
 
 def scatter(points: Sequence[Named], x_label: str, y_label: str) -> str:
-    """Clouds of points."""
+    """Draws clouds of points in one chart."""
     clouds = [Curve(*one, style=POINTS) for one in points]
     return curves([Chart(clouds, x_label, y_label)], height=3.6)
 
 
 def lines(series: Sequence[Named], x_label: str, y_label: str) -> str:
-    """Curves in one chart."""
+    """Draws curves in one chart."""
     return curves([Chart([Curve(*one) for one in series], x_label, y_label)])

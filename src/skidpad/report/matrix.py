@@ -16,15 +16,19 @@ from skidpad.report.matrix_baseline import baseline_text
 from skidpad.report.matrix_data import Matrix, load_matrix
 from skidpad.report.matrix_factors import factors
 from skidpad.report.matrix_headline import headline_numbers, headline_table
+from skidpad.report.matrix_parity import Parity, load_parity, parity_section
 from skidpad.report.matrix_published import beside_published
 from skidpad.report.page import Block, Page, Section, Text, write_report_page
 from skidpad.report.verdicts import unjudged_text, verdict_blocks
 
 CLAIMS = (*FINDINGS, *ACCEPTANCE)
-LEAD = f"""An intervention puts the car back on its lane: after a crash with a vehicle, after a departure \
-from the road (into a barrier, all wheels off every lane for 1 s, or more than 3 m beyond the edge), or \
-because it faces the wrong way.
-
+GRADED = """A crash is a serious contact or a departure. A contact is serious when it changes the speed of \
+either side by 5 km/h or more; with a pedestrian or a two-wheeler every contact is. A departure leads into a \
+barrier, takes all wheels off every lane for 1 s or the car more than 3 m beyond the edge, or ends facing \
+the wrong way. An intervention puts the car back on its lane; the source counts these as collisions."""
+UNGRADED = """These results are older than the grading of contacts. A crash is every intervention: what puts \
+the car back on its lane after a contact, a departure from the road, or because it faces the wrong way."""
+LEAD = f"""\
 Each row is a set of driving functions, each column a weather. Seeds are common to all cells, so \
 differences between cells are paired. Intervals are 95 %, over seeds, from 8 seeds on. Those of counts hold \
 while the variance of counts is at most {DISPERSION_ASSUMED:g} times their mean. Where fewer than two seeds \
@@ -41,6 +45,7 @@ def build_page(matrix: Matrix) -> Page:
     claims = [f for f in CLAIMS if not f.study]
     judged = judge(claims, [matrix.results] * len(claims), astray(matrix.results))
     crashes = found_crashes(matrix)
+    parity = load_parity(matrix)
     sections = [
         Section(
             "What happened",
@@ -52,12 +57,14 @@ def build_page(matrix: Matrix) -> Page:
                 headline_table(matrix),
                 matrix_figures.speed_figure(matrix),
                 *worst_of_each(crashes),
+                Text(GRADED if matrix.has_grades else UNGRADED),
                 Text(LEAD),
                 *_alike(matrix),
             ],
         ),
         Section(
-            "Interventions", matrix_tables.collisions(matrix) + matrix_figures.collisions(matrix)
+            "Crashes and interventions",
+            matrix_tables.collisions(matrix) + matrix_figures.collisions(matrix),
         ),
         Section("Findings of the sources, judged", _verdicts(matrix, judged)),
         Section(
@@ -68,6 +75,7 @@ def build_page(matrix: Matrix) -> Page:
         Section("One step at a time", matrix_tables.pairs(matrix)),
         Section("Every crash", crash_sections(matrix, crashes)),
         Section("Beside the published numbers", beside_published(matrix)),
+        Section("Pixels against objects", parity_section(parity)),
         Section("All metrics", matrix_tables.per_weather(matrix)),
         Section("Definitions", [matrix.definitions()]),
         Section("Configuration and versions", matrix.provenance()),
@@ -75,9 +83,20 @@ def build_page(matrix: Matrix) -> Page:
     return Page(
         title="Driver assistance in weather",
         subtitle=matrix.subtitle,
-        facts=matrix.facts(),
+        facts=[*matrix.facts(), *_processor_time(matrix, parity)],
         sections=sections,
     )
+
+
+def _processor_time(matrix: Matrix, parity: Parity | None) -> list[tuple[str, str]]:
+    """What each part of the campaign took, in processor minutes."""
+    parts = [matrix, *([parity.pixels] if parity else [])]
+    told = [
+        f"{m.values('sensors')} {m.processor_minutes:.1f} min"
+        for m in parts
+        if m.processor_minutes > 0.0
+    ]
+    return [("processor time", ", ".join(told))] if told else []
 
 
 def _alike(matrix: Matrix) -> list[Block]:

@@ -21,7 +21,7 @@ from skidpad.report.matrix_data import (
     config_title,
     rate_by_seed,
 )
-from skidpad.report.matrix_kinds import KINDS, count
+from skidpad.report.matrix_kinds import count, kinds_of
 from skidpad.report.page import Answer, Answers, Figure
 from skidpad.report.verdicts import tally_text, unjudged_text
 
@@ -49,9 +49,9 @@ def _functions(matrix: Matrix) -> Answer:
     rates = {g: _rates(matrix, g) for g in matrix.climates}
     best = {g: min(r, key=lambda c: r[c].rate) for g, r in rates.items() if r}
     parts = [_fewest(g, rates[g], rates[g][c].rate) for g, c in best.items()]
-    sentence = f"Fewest {EVENT}s: {'; '.join(parts)}."
+    sentence = f"Fewest {EVENTS}: {'; '.join(parts)}."
     least = seeds_for_verdict(len(differences))
-    if len(matrix.compared) < 2:
+    if len(matrix.comparison_configs) < 2:
         lines = []
     elif matrix.seeds < least:
         lines = [_too_few_seeds(matrix.seeds, least)]
@@ -80,7 +80,7 @@ def _too_few_seeds(seeds: int, least: int) -> str:
 
 
 def _rates(matrix: Matrix, group: WeatherGroup) -> dict[str, Rate]:
-    found = {c: rate_by_seed(matrix.within(c, group), EVENTS) for c in matrix.compared}
+    found = {c: rate_by_seed(matrix.within(c, group), EVENTS) for c in matrix.comparison_configs}
     return {c: rate for c, rate in found.items() if rate is not None}
 
 
@@ -102,12 +102,12 @@ def _sureness(
     told = []
     if sure:
         largest = max(others[c].p for c in sure)
-        told.append(f"{_named(best)} has fewer than {config_list(sure)} ({_at_most(largest)})")
+        told.append(f"{_in_words(best)} has fewer than {config_list(sure)} ({_at_most(largest)})")
     if open_:
         seeds = count_text(matrix.seeds, "seed")
-        told.append(f"{seeds} cannot tell {_named(best)} from {config_list(open_)}")
+        told.append(f"{seeds} cannot tell {_in_words(best)} from {config_list(open_)}")
     if same:
-        told.append(f"{_named(best)} drove exactly as {config_list(same)}")
+        told.append(f"{_in_words(best)} drove exactly as {config_list(same)}")
     return f"{_first_word_large(group.name)}: {'; '.join(told)}."
 
 
@@ -115,7 +115,7 @@ def _at_most(p: float) -> str:
     return p_text(p) if p < 0.001 else f"p at most {p:.2g}"
 
 
-def _named(config: str) -> str:
+def _in_words(config: str) -> str:
     return config_list([config])
 
 
@@ -132,14 +132,14 @@ def weather_series(group: WeatherGroup, k: int, **values: Sequence[float | None]
 def _rate_figure(matrix: Matrix, rates: dict[WeatherGroup, dict[str, Rate]]) -> Figure:
     series = []
     for k, (group, by_config) in enumerate(rates.items()):
-        found = [by_config.get(c) for c in matrix.compared]
+        found = [by_config.get(c) for c in matrix.comparison_configs]
         limits = [ends(r.interval if r else None) for r in found]
         low, high = zip(*limits, strict=True)
         values = [r.rate if r else None for r in found]
         series.append(weather_series(group, k, values=values, low=low, high=high))
-    rows = [config_title(c) for c in matrix.compared]
-    caption = f"{EVENT.capitalize()}s per run; lines are 95 % intervals, hollow points have none."
-    return Figure(points_with_intervals(rows, series, f"{EVENT}s per run"), caption)
+    rows = [config_title(c) for c in matrix.comparison_configs]
+    caption = f"{EVENTS.capitalize()} per run; lines are 95 % intervals, hollow points have none."
+    return Figure(points_with_intervals(rows, series, f"{EVENTS} per run"), caption)
 
 
 def ends(interval: Interval | None) -> tuple[float | None, float | None]:
@@ -164,7 +164,7 @@ def _weather(matrix: Matrix) -> Answer:
     told = [_changes(matrix, group, changes) for group in rest]
     if matrix.seeds < least:
         told = [_too_few_seeds(matrix.seeds, least).replace("configurations", "weathers")]
-    lines = [_levels(matrix, c) for c in matrix.compared]
+    lines = [_levels(matrix, c) for c in matrix.comparison_configs]
     return Answer(
         question,
         " ".join(told),
@@ -177,7 +177,7 @@ def _changes(
     matrix: Matrix, group: WeatherGroup, changes: dict[tuple[str, WeatherGroup], Contrast]
 ) -> str:
     """One sentence: for which configurations a climate surely changes the interventions."""
-    mine = {c: changes[c, group] for c in matrix.compared if (c, group) in changes}
+    mine = {c: changes[c, group] for c in matrix.comparison_configs if (c, group) in changes}
     more = [c for c, d in mine.items() if d.is_sure and d.mean > 0.0]
     fewer = [c for c, d in mine.items() if d.is_sure and d.mean < 0.0]
     same = [c for c, d in mine.items() if d.identical]
@@ -185,8 +185,8 @@ def _changes(
     parts = [
         f"{word} {config_list(configs)}"
         for word, configs in (
-            (f"more {EVENT}s with", more),
-            (f"fewer {EVENT}s with", fewer),
+            (f"more {EVENTS} with", more),
+            (f"fewer {EVENTS} with", fewer),
             ("the very same drives with", same),
             (f"no difference that {count_text(matrix.seeds, 'seed')} can show with", open_),
         )
@@ -204,7 +204,7 @@ def _levels(matrix: Matrix, config: str) -> str:
         for g, runs in groups.items()
         if (rate := rate_by_seed(runs, EVENTS)) is not None
     ]
-    parts = [f"{EVENT}s per run {', '.join(rates)}"]
+    parts = [f"{EVENTS} per run {', '.join(rates)}"]
     for column, title, unit in MEANS:
         values = [runs[column].drop_nulls() for runs in groups.values()]
         if all(len(v) for v in values):
@@ -231,15 +231,15 @@ def _change_figure(
 ) -> Figure:
     series = []
     for k, group in enumerate(groups, start=1):
-        found = [changes.get((c, group)) for c in matrix.compared]
+        found = [changes.get((c, group)) for c in matrix.comparison_configs]
         low, high = zip(*(ends(d.interval if d else None) for d in found), strict=True)
         values = [d.mean if d else None for d in found]
         series.append(weather_series(group, k, values=values, low=low, high=high))
-    rows = [config_title(c) for c in matrix.compared]
+    rows = [config_title(c) for c in matrix.comparison_configs]
     base = matrix.climates[0].name
-    label = f"{EVENT}s per run, minus those in {base}"
+    label = f"{EVENTS} per run, minus those in {base}"
     caption = (
-        f"What each weather adds to the {EVENT}s per run in {base}, paired by seed; to the right of "
+        f"What each weather adds to the {EVENTS} per run in {base}, paired by seed; to the right of "
         "the rule is worse. Lines are 95 % intervals of each difference alone; the sentence above is "
         f"corrected for all {len(changes)}."
     )
@@ -251,31 +251,31 @@ def _change_figure(
 
 def _next(matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[Found]]) -> Answer:
     """The commonest kind of intervention, the hardest crash, and what these runs leave open."""
-    runs = {c: matrix.cell(c) for c in matrix.compared}
+    runs = {c: matrix.cell(c) for c in matrix.comparison_configs}
     totals = {c: int(r[EVENTS].sum()) for c, r in runs.items()}
     worst = max(totals, key=lambda c: totals[c] / max(1, len(runs[c])))
     if not totals[worst]:
-        sentence = f"No configuration needed an {EVENT}: drive harder conditions or more seeds."
+        sentence = f"No configuration had a {EVENT}: drive harder conditions or more seeds."
         return Answer("What should be looked at next?", sentence, [_claims(matrix, judged)])
-    kinds = {kind.title: count(kind, runs[worst]) for kind in KINDS}
+    kinds = {kind.title: count(kind, runs[worst]) for kind in kinds_of(matrix.has_grades)}
     most = max(kinds, key=lambda title: kinds[title])
     sentence = (
-        f"{_first_word_large(_named(worst))} needs {EVENT}s most often ({totals[worst]} in "
+        f"{_first_word_large(_in_words(worst))} crashes most often ({totals[worst]} {EVENTS} in "
         f"{count_text(len(runs[worst]), 'drive')}), mostly of the kind “{most}” ({kinds[most]})."
     )
     lines = [*_hardest(matrix, crashes), _claims(matrix, judged)]
     series = [
         Series(
             kind.title,
-            [count(kind, runs[c]) / max(1, len(runs[c])) for c in matrix.compared],
+            [count(kind, runs[c]) / max(1, len(runs[c])) for c in matrix.comparison_configs],
             colour=FIRST_COLOUR + k,
         )
-        for k, kind in enumerate(KINDS)
+        for k, kind in enumerate(kinds_of(matrix.has_grades))
     ]
-    rows = [config_title(c) for c in matrix.compared]
+    rows = [config_title(c) for c in matrix.comparison_configs]
     figure = Figure(
-        stacked_bars(rows, series, f"{EVENT}s per run"),
-        f"What the {EVENT}s were, every drive once.",
+        stacked_bars(rows, series, f"{EVENTS} per run"),
+        f"What the {EVENTS} were, every drive once.",
     )
     return Answer("What should be looked at next?", sentence, lines, figure)
 
@@ -292,5 +292,5 @@ def _hardest(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[str]:
         return []
     (config, weather), (crash, _, _, run) = max(found, key=lambda f: f[1][0].v_closing or 0.0)
     group = next(g for g in matrix.weather_groups if weather in g.weathers)
-    where = f"{_named(config)} in {group.name}, run {run.name} at {crash.t:.0f} s"
+    where = f"{_in_words(config)} in {group.name}, run {run.name} at {crash.t:.0f} s"
     return [f"The hardest crash: {headline(crash)}, {where}. Its card stands below."]

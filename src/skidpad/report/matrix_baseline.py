@@ -1,20 +1,20 @@
-"""The baseline in words: with nobody at the pedals a run measures how often the car is put back."""
+"""The baseline in words: with no driver at the pedals a run measures how often the car is put back."""
 
 from __future__ import annotations
 
 from skidpad.core.wording import count_text
-from skidpad.report.matrix_data import BASELINE, EVENT, EVENTS, Matrix
+from skidpad.report.matrix_data import BASELINE, FIRST, INTERVENTIONS, Matrix
 from skidpad.report.page import Block, Text
 
 
 def baseline_text(matrix: Matrix) -> list[Block]:
     """What configuration 0 is, and why it stands in no comparison (decision T-5)."""
-    if matrix.compared == matrix.configs:
+    if matrix.comparison_configs == matrix.configs:
         return []
-    runs = matrix.cell(BASELINE).drop_nulls([EVENTS, "duration_s"])
-    events = int(runs[EVENTS].sum())
+    runs = matrix.cell(BASELINE).drop_nulls([INTERVENTIONS, "duration_s"])
+    events = int(runs[INTERVENTIONS].sum())
     text = "Configuration 0 has nobody at the pedals: it aims for 150 km/h and never brakes. "
-    first = runs["first_fatal_s"].drop_nulls()
+    first = runs[FIRST].drop_nulls()
     if events and len(first):
         cycle = float(runs["duration_s"].sum()) / events
         text += (
@@ -22,7 +22,7 @@ def baseline_text(matrix: Matrix) -> list[Block]:
             f"{float(first.median()):.0f} s in the median of {count_text(len(runs), 'drive')}. "  # type: ignore[arg-type]
         )
     text += (
-        f"Its {EVENT}s measure this cycle and not the weather. They stand in the tables as they "
-        "were, and in no comparison, total or figure."
+        "Its counts measure this cycle and not the weather. They stand in the tables as they were, "
+        "and in no comparison, total or figure."
     )
     return [Text(text, tone="note")]

@@ -51,18 +51,18 @@ def by_configuration(
     found = {}
     for group in groups:
         there = pl.col("weather").is_in(group.weathers)
-        for a, b in combinations(matrix.compared, 2):
+        for a, b in combinations(matrix.comparison_configs, 2):
             more, less = ((pl.col("config") == config) & there for config in (b, a))
             if (c := contrast(matrix, more, less, BY_RUN)) is not None:
                 found[group, a, b] = c
-    return _adjusted(found)
+    return _adjust_family(found)
 
 
 def by_weather(matrix: Matrix) -> dict[tuple[str, WeatherGroup], Contrast]:
     """Every climate minus the first one, for each compared configuration, as one family."""
     first, *rest = matrix.climates
     found = {}
-    for config in matrix.compared:
+    for config in matrix.comparison_configs:
         for group in rest:
             more, less = (
                 (pl.col("config") == config) & pl.col("weather").is_in(g.weathers)
@@ -70,10 +70,10 @@ def by_weather(matrix: Matrix) -> dict[tuple[str, WeatherGroup], Contrast]:
             )
             if (c := contrast(matrix, more, less, BY_SEED)) is not None:
                 found[config, group] = c
-    return _adjusted(found)
+    return _adjust_family(found)
 
 
-def _adjusted(family: dict[K, Contrast]) -> dict[K, Contrast]:
+def _adjust_family(family: dict[K, Contrast]) -> dict[K, Contrast]:
     """The same with p values adjusted for the family (Holm)."""
     ps = holm([c.p for c in family.values()]) if family else []
     return {key: replace(c, p=p) for (key, c), p in zip(family.items(), ps, strict=True)}

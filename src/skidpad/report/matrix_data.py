@@ -25,9 +25,12 @@ CONFIGS = {
     "4": "4 · + 80 km/h limiter",
     "reference": "reference driver (a model)",
 }
-BASELINE = "0"  # nobody at the pedals
+IN_SENTENCES = {"reference": "the reference driver"}
+BASELINE = "0"  # no driver at the pedals
 MOTION = "motion_hash"  # of a drive: poses, contacts and commands
-EVENTS, EVENT = "fatal_collisions", "intervention"  # what headlines count, and what pages call one
+EVENTS, EVENT = "crashes", "crash"  # what headlines count (decision T-4): column, and one of them
+FIRST = "first_s"  # time to the first intervention
+INTERVENTIONS = "fatal_collisions"  # published under this name
 WEATHERS = {
     "clear-sunrise": "Clear Sky - Sunrise",
     "clear-noon": "Clear Sky - Noon",
@@ -46,7 +49,7 @@ class WeatherGroup:
 
     @property
     def title(self) -> str:
-        """Heading of its column."""
+        """The heading of its column."""
         first, *rest = (weather_title(w) for w in self.weathers)
         if not rest:
             return first
@@ -59,19 +62,21 @@ class WeatherGroup:
     def name(self) -> str:
         """Within a sentence: `clear sky`, `icy_30`."""
         return (
-            self.title.partition(" - ")[0].partition(":")[0].lower() if self.known else self.title
+            self.title.partition(" - ")[0].partition(":")[0].lower()
+            if self.is_published
+            else self.title
         )
 
     @property
-    def known(self) -> bool:
+    def is_published(self) -> bool:
         """Whether they are published weathers."""
         return all(w in WEATHERS for w in self.weathers)
 
     @property
     def short(self) -> str:
-        """Label of an axis."""
+        """Its label on an axis."""
         kind, dash, first = self.weathers[0].partition("-")
-        if not dash or not self.known:
+        if not dash or not self.is_published:
             return "\n".join(self.weathers)
         return f"{kind}\n" + ", ".join([first, *(w.partition("-")[2] for w in self.weathers[1:])])
 
@@ -94,23 +99,33 @@ class Matrix(CampaignView[MatrixEntry]):
             "road_departures": pl.col("collisions_static") + pl.col("wrong_way"),
         }
         null = {name: pl.lit(None, kinds[name]) for name in gone}
-        return found.with_columns(**(null | {k: v for k, v in known.items() if k in gone}))
+        found = found.with_columns(**(null | {k: v for k, v in known.items() if k in gone}))
+        graded = pl.col("serious_contacts") + pl.col("road_departures")
+        return found.with_columns(
+            pl.coalesce(graded, INTERVENTIONS).alias(EVENTS),
+            pl.coalesce("first_intervention_s", "first_fatal_s").alias(FIRST),
+        )
+
+    @cached_property
+    def has_grades(self) -> bool:
+        """Whether contacts were graded by how hard they were, which older results were not."""
+        return self.finished["serious_contacts"].null_count() == 0
 
     @cached_property
     def configs(self) -> list[str]:
-        """Drivers, published ones first."""
+        """All configurations, the published ones first."""
         return _known_first(self.results["config"], CONFIGS)
 
     @cached_property
     def weathers(self) -> list[str]:
-        """Weathers, published ones first."""
+        """All weathers, the published ones first."""
         return _known_first(self.results["weather"], WEATHERS)
 
     @cached_property
-    def compared(self) -> list[str]:
+    def comparison_configs(self) -> list[str]:
         """Configurations that comparisons and figures are about (decision T-5).
 
-        With nobody at the pedals a run measures how often the car is put back, so the baseline is
+        With no driver at the pedals a run measures how often the car is put back, so the baseline is
         left out wherever there is another configuration.
         """
         return [c for c in self.configs if c != BASELINE] or self.configs
@@ -168,14 +183,14 @@ class Matrix(CampaignView[MatrixEntry]):
 
     @cached_property
     def drive_column(self) -> str:
-        """The column whose equal values are one drive (decision T-3)."""
+        """The column in which equal values are one drive (decision T-3)."""
         there = self.results
         known = MOTION in there.columns and there[MOTION].null_count() < len(there)
         return MOTION if known else "log_hash"
 
     @cached_property
     def same_weather(self) -> list[tuple[str, list[str]]]:
-        """(configuration, weathers) whose drives are the same for every seed (decision M-1)."""
+        """(configuration, weathers) with the same drives for every seed (decision M-1)."""
         groups = [(c, tuple(self.weathers_like(c, w))) for c in self.configs for w in self.weathers]
         return [(c, list(ws)) for c, ws in dict.fromkeys(groups) if len(ws) > 1]
 
@@ -268,11 +283,14 @@ def config_title(config: str) -> str:
 
 def config_list(configs: Sequence[str]) -> str:
     """`configuration 2`, `configurations 3 and 4`; other drivers by their names."""
-    numbers = all(c in CONFIGS for c in configs)
-    word = f"configuration{'s' * (len(configs) > 1)} " if numbers else ""
-    if numbers and len(configs) > 2 and int(configs[-1]) - int(configs[0]) == len(configs) - 1:
-        return f"{word}{configs[0]} to {configs[-1]}"
-    return word + list_text(list(configs))
+    numbers = [c for c in configs if c in CONFIGS and c.isdigit()]
+    names = [IN_SENTENCES.get(c, c) for c in configs if c not in numbers]
+    if not numbers:
+        return list_text(names)
+    word = f"configuration{'s' * (len(numbers) > 1)} "
+    if len(numbers) > 2 and int(numbers[-1]) - int(numbers[0]) == len(numbers) - 1:
+        return list_text([f"{word}{numbers[0]} to {numbers[-1]}", *names])
+    return list_text([word + list_text(numbers), *names] if names else [word + list_text(numbers)])
 
 
 def weather_title(weather: str) -> str:

@@ -8,7 +8,7 @@ import polars as pl
 
 from skidpad.evidence.statistics import event_rate
 from skidpad.report.figures import Chart, Curve, curves
-from skidpad.report.matrix_data import CONFIGS, EVENT, EVENTS, Matrix
+from skidpad.report.matrix_data import CONFIGS, EVENTS, Matrix
 from skidpad.report.matrix_tables import RATE, mean_quantity, rate_quantity
 from skidpad.report.page import Block, Figure
 from skidpad.report.tables import Column, Format, Quantity, table
@@ -17,7 +17,7 @@ Level = tuple[str, float]  # functions, cruise target in km/h
 COUNTS = (
     ("crashes_vehicle", "crashes with vehicles per run"),
     ("road_departures", "departures per run"),
-    (EVENTS, "interventions per run"),
+    (EVENTS, f"{EVENTS} per run"),
 )
 
 
@@ -78,5 +78,7 @@ def _figure(matrix: Matrix, levels: list[Level]) -> list[Block]:
                 found.append(Curve(functions or "none", x, y))
     if not found:
         return []
-    chart = Chart(found, "cruise target, km/h", f"{EVENT}s per run")
-    return [Figure(curves([chart], height=3.6), "Interventions against the cruise target.")]
+    chart = Chart(found, "cruise target, km/h", f"{EVENTS} per run")
+    return [
+        Figure(curves([chart], height=3.6), f"{EVENTS.capitalize()} against the cruise target.")
+    ]

@@ -9,7 +9,6 @@ from skidpad.report.figures import POINTS, Chart, Curve, Series, curves, grouped
 from skidpad.report.matrix_answers import MARKERS, ends
 from skidpad.report.matrix_data import (
     CONFIGS,
-    EVENT,
     EVENTS,
     Matrix,
     WeatherGroup,
@@ -19,7 +18,7 @@ from skidpad.report.matrix_data import (
 from skidpad.report.page import Block, Figure
 
 PANEL = (
-    (EVENTS, f"{EVENT}s"),
+    (EVENTS, EVENTS),
     ("dropout_pct", "dropout, %"),
     ("mean_error_m", "mean error, m"),
     ("headway_variance_m2", "variance, m²"),
@@ -30,23 +29,23 @@ GREY = 5  # of the palette
 
 def collisions(matrix: Matrix) -> list[Block]:
     """By weather and configuration, and by configuration."""
-    label = f"{EVENT}s per run"
+    label = f"{EVENTS} per run"
     by_weather = [
         _rates(
             short_title(c),
             [rate_by_seed(matrix.within(c, g), EVENTS) for g in matrix.weather_groups],
         )
-        for c in matrix.compared
+        for c in matrix.comparison_configs
     ]
-    total = _rates("all weathers", [matrix.rate(EVENTS, c) for c in matrix.compared])
+    total = _rates("all weathers", [matrix.rate(EVENTS, c) for c in matrix.comparison_configs])
     groups = [g.short for g in matrix.weather_groups]
     return [
         Figure(
             grouped_bars(groups, by_weather, label),
-            f"{EVENT.capitalize()}s per run by weather and configuration; lines are 95 % intervals.",
+            f"{EVENTS.capitalize()} per run by weather and configuration; lines are 95 % intervals.",
         ),
         Figure(
-            grouped_bars([short_title(c) for c in matrix.compared], [total], label),
+            grouped_bars([short_title(c) for c in matrix.comparison_configs], [total], label),
             "The same over all weathers, every drive once.",
         ),
     ]
@@ -55,12 +54,12 @@ def collisions(matrix: Matrix) -> list[Block]:
 def others(matrix: Matrix) -> list[Block]:
     """Dropout, dropout against interventions, variance, and one configuration in several metrics."""
     groups = [g.short for g in matrix.weather_groups]
-    dropout = [_means(matrix, c, "dropout_pct", short_title(c)) for c in matrix.compared]
+    dropout = [_means(matrix, c, "dropout_pct", short_title(c)) for c in matrix.comparison_configs]
     figures = [
         (grouped_bars(groups, dropout, "dropout, %"), "Dropout by weather and configuration."),
         (
             run_figure(matrix, "dropout_pct", "dropout, %"),
-            f"Dropout against {EVENT}s, one point per drive; the mark is the weather.",
+            f"Dropout against {EVENTS}, one point per drive; the mark is the weather.",
         ),
     ]
     if "4" in matrix.configs:
@@ -78,7 +77,7 @@ def others(matrix: Matrix) -> list[Block]:
 def speed_figure(matrix: Matrix) -> Figure:
     """Interventions against mean speed, one point per configuration and weather."""
     points = {}
-    for config in matrix.compared:
+    for config in matrix.comparison_configs:
         for group in matrix.weather_groups:
             runs = matrix.within(config, group)
             rate = rate_by_seed(runs, EVENTS)
@@ -87,35 +86,35 @@ def speed_figure(matrix: Matrix) -> Figure:
                 mean = float(speeds.mean())  # type: ignore[arg-type]
                 points[config, group] = ([mean], [rate.rate])
     caption = (
-        f"{EVENT.capitalize()}s against mean speed: the colour is the configuration, the mark the "
+        f"{EVENTS.capitalize()} against mean speed: the colour is the configuration, the mark the "
         "weather. What merely drives slower moves to the left as it moves down."
     )
-    return Figure(_marked(matrix, points, "mean speed, km/h"), caption)
+    return Figure(_draw_marks(matrix, points, "mean speed, km/h"), caption)
 
 
 def run_figure(matrix: Matrix, column: str, label: str) -> str:
     """Interventions against a column, one point per drive, marked by weather."""
     points = {}
-    for config in matrix.compared:
+    for config in matrix.comparison_configs:
         for group in matrix.weather_groups:
             runs = matrix.within(config, group).drop_nulls([column, EVENTS])
             if len(runs):
                 points[config, group] = (runs[column].to_list(), runs[EVENTS].to_list())
-    return _marked(matrix, points, label)
+    return _draw_marks(matrix, points, label)
 
 
 Points = dict[tuple[str, WeatherGroup], tuple[list[float], list[float]]]
 
 
-def _marked(matrix: Matrix, points: Points, x_label: str) -> str:
-    """Clouds whose colour is the configuration and whose mark is the weather."""
+def _draw_marks(matrix: Matrix, points: Points, x_label: str) -> str:
+    """Clouds: the colour is the configuration, the mark the weather."""
     marks = {g: MARKERS[k % len(MARKERS)] for k, g in enumerate(matrix.weather_groups)}
     clouds = [
         Curve(
             config_title(config),
             x,
             y,
-            colour=matrix.compared.index(config),
+            colour=matrix.comparison_configs.index(config),
             style=POINTS | {"marker": marks[group]},
         )
         for (config, group), (x, y) in points.items()
@@ -124,7 +123,7 @@ def _marked(matrix: Matrix, points: Points, x_label: str) -> str:
         Curve(group.title, [], [], colour=GREY, style=POINTS | {"marker": mark})
         for group, mark in marks.items()
     ]
-    return curves([Chart(clouds, x_label, f"{EVENT}s per run")], height=3.8)
+    return curves([Chart(clouds, x_label, f"{EVENTS} per run")], height=3.8)
 
 
 def short_title(config: str) -> str:

@@ -10,8 +10,9 @@ from skidpad.core.wording import count_text
 from skidpad.evidence.statistics import median_time, rate_remark
 from skidpad.report.matrix_data import (
     BASELINE,
-    EVENT,
     EVENTS,
+    FIRST,
+    INTERVENTIONS,
     Matrix,
     config_list,
     config_title,
@@ -21,20 +22,27 @@ from skidpad.report.matrix_tables import RATE, rate_hint
 from skidpad.report.page import Cell, Number, Numbers, Table
 from skidpad.report.tables import Column, Quantity, table
 
-COUNTS = (
-    ("crashes_vehicle", "crashes with vehicles", "the ego hit a vehicle or was hit by one"),
-    ("road_departures", "departures", "into a barrier, off the road, or facing the wrong way"),
-    (EVENTS, f"{EVENT}s", "both; one between two relocations, its first cause"),
-    ("fatal_first", "first of a chain", "more than 8 s or 100 m after a relocation"),
+SERIOUS = (
+    "serious_contacts",
+    "serious contacts",
+    "5 km/h of change of speed or more, or any with a person or two wheels",
+)
+STRUCK = ("crashes_vehicle", "crashes with vehicles", "the ego hit a vehicle or was hit by one")
+LEFT = ("road_departures", "departures", "into a barrier, off the road, or facing the wrong way")
+PUT_BACK = (
+    INTERVENTIONS,
+    "interventions",
+    "times put back, each with its first cause; published as collisions",
 )
 
 
 def headline_numbers(matrix: Matrix) -> Numbers:
     """Totals over the compared configurations, every drive once."""
-    t = matrix.counted.filter(matrix.counted["config"].is_in(matrix.compared))
+    t = matrix.counted.filter(matrix.counted["config"].is_in(matrix.comparison_configs))
     km = float(t["distance_km"].sum())
-    fatal, hits, left, first = (
-        int(t[c].sum()) for c in (EVENTS, "crashes_vehicle", "road_departures", "fatal_first")
+    column, contacts, _ = SERIOUS if matrix.has_grades else STRUCK
+    hits, left, put_back, first = (
+        int(t[c].sum()) for c in (column, "road_departures", INTERVENTIONS, "fatal_first")
     )
 
     def per_100_km(events: int) -> str:
@@ -43,13 +51,13 @@ def headline_numbers(matrix: Matrix) -> Numbers:
     hours = float(t["duration_s"].sum()) / 3600
     return Numbers(
         [
-            Number(f"{hits:,}", "crashes with vehicles", per_100_km(hits)),
+            Number(f"{hits:,}", contacts, per_100_km(hits)),
             Number(f"{left:,}", "departures from the road", per_100_km(left)),
-            Number(f"{fatal:,}", f"{EVENT}s", f"{first:,} of them first of a chain"),
+            Number(f"{put_back:,}", "interventions", f"{first:,} of them first of a chain"),
             Number(
                 f"{len(t):,}",
                 "different drives",
-                f"{config_list(matrix.compared)}, {count_text(matrix.seeds, 'seed')}",
+                f"{config_list(matrix.comparison_configs)}, {count_text(matrix.seeds, 'seed')}",
             ),
             Number(f"{km:,.0f} km", "driven", f"{hours:.1f} h of simulated time"),
         ]
@@ -58,14 +66,17 @@ def headline_numbers(matrix: Matrix) -> Numbers:
 
 def headline_table(matrix: Matrix) -> Table:
     """One row per configuration, every drive once."""
+    both = (EVENTS, EVENTS, "both")
+    kinds = (SERIOUS if matrix.has_grades else STRUCK, LEFT, both, PUT_BACK)
     counts = [
         Column[str](f"{title} per run", partial(_count, matrix, name), meaning, format=RATE)
-        for name, title, meaning in COUNTS
+        for name, title, meaning in kinds
     ]
     first = Column[str](
-        f"time to the first {EVENT}, median",
+        "time to the first intervention, median",
         partial(_first, matrix),
-        "of runs; a run without one counts as longer than every run",
+        "of runs; one without any counts as longer than every run, and so does one that was put "
+        "back for another cause before",
         "s",
     )
     columns = [
@@ -82,7 +93,7 @@ def headline_table(matrix: Matrix) -> Table:
 
 
 def _name(matrix: Matrix, config: str) -> Cell:
-    cycles = config == BASELINE and config not in matrix.compared
+    cycles = config == BASELINE and config not in matrix.comparison_configs
     return Cell(config_title(config), note="counts its reset cycle, see above" if cycles else "")
 
 
@@ -102,7 +113,7 @@ def _count(matrix: Matrix, column: str, config: str) -> Quantity:
         value=rate.rate,
         interval=rate.interval,
         remark=rate_remark(rate, "seed"),
-        lines=tuple(lines) if config in matrix.compared else (),
+        lines=tuple(lines) if config in matrix.comparison_configs else (),
         hint=f"{rate_hint(rate)}, {km:,.0f} km",
     )
 
@@ -113,7 +124,7 @@ def _first(matrix: Matrix, config: str) -> Cell:
     if not len(runs):
         return Cell("no run", kind="muted")
     end = float(runs["duration_s"].min())  # type: ignore[arg-type]
-    times = runs["first_fatal_s"].cast(float).fill_null(np.inf).to_numpy()
+    times = runs[FIRST].cast(float).fill_null(np.inf).to_numpy()
     median, limits = median_time(times, end)
     told = " to ".join(_time(t, end) for t in limits) if limits else "no limits below 6 runs"
     hint = count_text(len(runs), "run")

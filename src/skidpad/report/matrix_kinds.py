@@ -1,4 +1,4 @@
-"""The kinds of interventions, which add up to all of them."""
+"""The kinds of crashes, which add up to all of them."""
 
 from __future__ import annotations
 
@@ -17,14 +17,26 @@ class Kind:
     meaning: str = ""
 
 
-KINDS = (
+CONTACTS = (
+    Kind("contact above 20 km/h", ("contacts_heavy",), (), "change of speed, with a road user"),
+    Kind("contact of 5 to 20 km/h", ("contacts_medium",), (),
+         "or slower, with a person or two wheels"),
+)  # fmt: skip
+UNGRADED = (
     Kind("into or beside a vehicle", ("crashes_vehicle",), ("rear_ended",),
          "the ego drove into a vehicle, or both touched sideways"),
     Kind("struck from behind", ("rear_ended",), (), "another vehicle drove into the ego"),
+)  # fmt: skip
+DEPARTURES = (
     Kind("into a barrier", ("collisions_static",), (), "or anything else that stands"),
     Kind("off the road", ("off_road",), (), "left all lanes and was put back"),
     Kind("facing the wrong way", ("wrong_way",), (), "and was turned round"),
 )  # fmt: skip
+
+
+def kinds_of(graded: bool) -> tuple[Kind, ...]:
+    """The kinds that add up to all crashes; results of older versions have no grades of contacts."""
+    return (*(CONTACTS if graded else UNGRADED), *DEPARTURES)
 
 
 def count(kind: Kind, runs: pl.DataFrame) -> int:

@@ -8,7 +8,7 @@ from functools import partial
 from skidpad.core.wording import list_text
 from skidpad.report.figures import Series, grouped_bars, panel
 from skidpad.report.matrix_data import (
-    EVENTS,
+    INTERVENTIONS,
     WEATHERS,
     Matrix,
     config_title,
@@ -20,7 +20,7 @@ from skidpad.report.page import Block, Figure, Text
 from skidpad.report.tables import Column, Format, Quantity, table
 
 QUANTITIES = (
-    (EVENTS, "Collisions per run", "published “total collisions”; ours: interventions"),
+    (INTERVENTIONS, "Collisions per run", "published: total collisions; ours: interventions"),
     ("dropout_pct", "Dropout, %", "ticks without a target or persisting"),
     ("mean_error_m", "Mean distance error, m", ""),
     ("headway_variance_m2", "Variance of the distance error, m²", "published as headway variance"),
@@ -59,7 +59,7 @@ def beside_published(matrix: Matrix) -> list[Block]:
 
 
 def _has_published(matrix: Matrix, config: str) -> bool:
-    return any(published_value(EVENTS, config, w) is not None for w in matrix.weathers)
+    return any(published_value(INTERVENTIONS, config, w) is not None for w in matrix.weathers)
 
 
 def _words(matrix: Matrix) -> Text:
@@ -99,7 +99,7 @@ def _figures(matrix: Matrix, configs: Sequence[str]) -> list[Block]:
     groups = [w.replace("-", "\n", 1) for w in weathers]
     figures: list[Block] = []
     for column, label, caption in (
-        (EVENTS, "collisions per run", "Interventions per run (bars), published collisions (diamonds)."),
+        (INTERVENTIONS, "collisions per run", "Interventions (bars) and published collisions (diamonds)."),
         ("dropout_pct", "dropout, %", "Dropout (bars) and the published dropout (diamonds)."),
     ):  # fmt: skip
         series = [

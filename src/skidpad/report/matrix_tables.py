@@ -22,7 +22,14 @@ from skidpad.evidence.statistics import (
 from skidpad.recording.matrix import Metrics
 from skidpad.report.campaign import Metric, metrics_of
 from skidpad.report.matrix_contrasts import ALPHA, BY_RUN
-from skidpad.report.matrix_data import EVENTS, Matrix, WeatherGroup, config_title, rate_by_seed
+from skidpad.report.matrix_data import (
+    EVENTS,
+    INTERVENTIONS,
+    Matrix,
+    WeatherGroup,
+    config_title,
+    rate_by_seed,
+)
 from skidpad.report.page import Block, Cell, Table, Text
 from skidpad.report.tables import Column, Format, Quantity, table
 
@@ -60,7 +67,13 @@ KINDS = (
     ("stuck_relocations", "stuck and put back", "no intervention"),
     ("contacts", "contacts", "of the ego, also those within the cool-down of a recovery"),
 )
-
+GRADES = (
+    ("contacts_light", "below 5 km/h", "of the contacts with road users, by change of speed"),
+    ("contacts_medium", "5 to 20", "the same, or slower with a person or two wheels"),
+    ("contacts_heavy", "above 20", "the same"),
+    ("contacts_vulnerable", "with persons or two wheels", "of these"),
+    ("contacts_static", "with what stands", "barriers, posts"),
+)
 
 BACKGROUND = (
     ("traffic_contacts", "contacts", "of two background vehicles, first touch"),
@@ -70,17 +83,29 @@ BACKGROUND = (
 
 
 def collisions(matrix: Matrix) -> list[Block]:
-    """Fatal collisions, and what they were."""
+    """Crashes, interventions, and what they were."""
     return [
-        count_table(matrix, "crashes_vehicle", "Crashes with vehicles per run"),
+        count_table(matrix, EVENTS, crash_caption(matrix)),
+        *(
+            [count_table(matrix, "serious_contacts", "Serious contacts per run")]
+            if matrix.has_grades
+            else []
+        ),
         count_table(matrix, "road_departures", "Departures from the road per run"),
-        count_table(matrix, EVENTS, "Interventions per run: crashes with vehicles and departures"),
+        count_table(matrix, INTERVENTIONS, "Interventions per run (published as collisions)"),
         count_table(
             matrix, "fatal_first", "Interventions per run that are the first of their chain"
         ),
         kinds_table(matrix),
         background_table(matrix),
     ]
+
+
+def crash_caption(matrix: Matrix) -> str:
+    """What a crash is in these results."""
+    if matrix.has_grades:
+        return "Crashes per run: serious contacts and departures"
+    return "Crashes per run: interventions, as these results grade no contact"
 
 
 def others(matrix: Matrix) -> list[Block]:
@@ -120,12 +145,14 @@ def count_table(matrix: Matrix, column: str, caption: str) -> Table:
         for c in matrix.configs
         for g in matrix.weather_groups
     }
-    top = max((r.rate for (c, _), r in rates.items() if r and c in matrix.compared), default=0.0)
+    top = max(
+        (r.rate for (c, _), r in rates.items() if r and c in matrix.comparison_configs), default=0.0
+    )
 
     def of(group: WeatherGroup | None, config: str) -> Quantity:
         if group is None:
             return rate_quantity(matrix.rate(column, config))
-        shade = top or 1.0 if config in matrix.compared else None
+        shade = top or 1.0 if config in matrix.comparison_configs else None
         return rate_quantity(rates[config, group], shade)
 
     note = f"Per run of {matrix.duration:g} s; small: 95 % interval."
@@ -189,17 +216,21 @@ def kinds_table(matrix: Matrix) -> Table:
         Column("configuration", name),
         *(
             Column[str](title, partial(count, kind), definition)
-            for kind, title, definition in KINDS
+            for kind, title, definition in (*KINDS, *(GRADES if matrix.has_grades else ()))
         ),
     ]
-    return table(columns, matrix.configs, "What the interventions were: counts, every drive once")
+    return table(
+        columns,
+        matrix.configs,
+        "What the interventions and contacts were: counts, every drive once",
+    )
 
 
 def background_table(matrix: Matrix) -> Table:
     """How whole the background stayed in each weather, over the compared configurations."""
 
     def total(column: str, group: WeatherGroup) -> float:
-        return float(sum(matrix.within(c, group)[column].sum() for c in matrix.compared))
+        return float(sum(matrix.within(c, group)[column].sum() for c in matrix.comparison_configs))
 
     def rate(group: WeatherGroup) -> Quantity:
         km, contacts = total("traffic_km", group), int(total("traffic_contacts", group))

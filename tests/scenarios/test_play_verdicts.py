@@ -93,7 +93,7 @@ def test_the_same_pedestrian_in_time_is_hit_and_the_run_fails(tmp_path):
     assert done.exit_code == 1, done.output
     found = verdict_of(tmp_path / "out")
     assert found["verdict"] == "failed"
-    assert found["reasons"] == "collisions is 1 (no-collision)"
+    assert found["reasons"] == "the ego had 1 contact (no-collision)"
     assert float(found["ego_at_contact_kmh"]) == pytest.approx(36.0, abs=2.0)
 
 

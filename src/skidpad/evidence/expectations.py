@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import inf
 
+from skidpad.core.wording import count_text
 from skidpad.evidence.compare import parse_comparison
 from skidpad.evidence.pairs import Pair, pairs
 from skidpad.recording.runlog import RunLog
@@ -28,7 +29,11 @@ class Expectation:
     def disappointed(self, values: dict[str, float]) -> str:
         """What is wrong; "" when it is as expected."""
         value = values[self.name]
-        return "" if self.compare(value, self.limit) else f"{self.name} is {value:.4g}"
+        if self.compare(value, self.limit):
+            return ""
+        if self.name == "collisions":
+            return f"the ego had {count_text(round(value), 'contact')}"
+        return f"{self.name} is {value:.4g}"
 
 
 def parse_expectation(text: str) -> Expectation:

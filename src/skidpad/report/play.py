@@ -27,7 +27,7 @@ from skidpad.report.page import (
     write_page,
     write_report_page,
 )
-from skidpad.report.play_cards import run_anchor, run_card
+from skidpad.report.play_cards import run_anchor, run_card, run_title
 from skidpad.report.play_runs import (
     Played,
     PlayRun,
@@ -40,7 +40,7 @@ from skidpad.report.tables import Column, Format, table
 CARDS = "cards"  # folder of the runs that have a page of their own
 BAD = 5  # reasons at the top
 INLINE = 24  # runs with their card in the page
-LONG = 99  # s, a time to collision that says no more
+LARGE = 99  # s of TTC, m/s^2 of deceleration: beyond it a number says no more
 KINDS = {
     PlayVerdict.PASSED: "good",
     PlayVerdict.FAILED: "bad",
@@ -161,8 +161,8 @@ def _links(played: Played, runs: Sequence[PlayRun]) -> dict[str, str]:
     for run in runs[INLINE:]:
         name = f"{run_anchor(run)}.html"
         card = run_card(run, played.out)
-        section = Section(card.title, [Cards(card.title, [card], open=True)])
-        write_page(Page(card.title, run.name, [section]), played.out / CARDS / name)
+        section = Section(run_title(run), [card])
+        write_page(Page(run.scenario, run.name, [section]), played.out / CARDS / name)
         links[run.name] = f"{CARDS}/{name}"
     return links
 
@@ -174,7 +174,8 @@ def _cards(played: Played, runs: Sequence[PlayRun]) -> list[Block]:
         blocks.append(Text(text, tone="note"))
     for run in runs[:INLINE]:
         card = run_card(run, played.out)
-        blocks.append(Cards(card.title, [card], open=not run.verdict.is_good or len(runs) == 1))
+        opened = not run.verdict.is_good or len(runs) == 1
+        blocks.append(Cards(run_title(run), [card], open=opened))
     return blocks
 
 
@@ -222,21 +223,25 @@ def _runs_table(runs: Sequence[PlayRun], links: dict[str, str]) -> Table:
         Column("scenario", lambda r: Cell(r.scenario, href=links[r.name])),
         Column("weather", _outside),
         Column("seed", lambda r: r.seed, format=Format("d")),
-        Column("verdict", lambda r: Cell(r.verdict.value, kind=KINDS[r.verdict])),
+        Column("verdict", _plain_verdict),
         *MEASURES,
         Column("touched", lambda r: r.contact[1] if r.contact else None, format=Format(absent="-")),
         Column("time", lambda r: r.duration, unit="s", format=Format(".1f", absent="-")),
-        Column("why", lambda r: "; ".join(r.judged.reasons)),
     ]
     if _seeds(runs) < 2:
         columns = [c for c in columns if c.title != "seed"]
     return table(columns, runs, "All runs, those that need a look first")
 
 
-def _time(value: float | None) -> Cell:
+def _plain_verdict(run: PlayRun) -> Cell:
+    return Cell(run.verdict.value, kind=KINDS[run.verdict], hint="; ".join(run.judged.reasons))
+
+
+def _bounded(value: float | None, spec: str) -> Cell:
+    """Return a number as a cell, where a large one says no more than that it is large."""
     if value is None:
         return Cell("-", kind="muted")
-    return Cell(f"{value:.2f}" if value < LONG else f">{LONG}", sort=value)
+    return Cell(format(value, spec) if value < LARGE else f">{LARGE}", sort=value)
 
 
 def _contact_speed(run: PlayRun) -> float | None:
@@ -245,10 +250,10 @@ def _contact_speed(run: PlayRun) -> float | None:
 
 MEASURES: list[Column[PlayRun]] = [
     Column("least gap", lambda r: r.least("min_gap_m"), unit="m", format=Format(".1f", absent="-")),
-    Column("least TTC", lambda r: _time(r.least("min_ttc_s")), unit="s"),
+    Column("least TTC", lambda r: _bounded(r.least("min_ttc_s"), ".2f"), unit="s"),
     Column(
-        "required deceleration", lambda r: r.most("max_required_mps2"), unit="m/s²",
-        format=Format(".1f", absent="-"),
+        "required deceleration", lambda r: _bounded(r.most("max_required_mps2"), ".1f"),
+        unit="m/s²",
     ),
     Column("speed at contact", _contact_speed, unit="km/h", format=Format(".0f", absent="-")),
 ]  # fmt: skip
@@ -279,11 +284,11 @@ COUNTERPARTS: list[Column[Of]] = [
     Column("in play", lambda o: Cell("yes" if o[1].encounter.met else "no")),
     Column("least distance", lambda o: o[1].encounter.distance, unit="m", format=Format(".1f")),
     Column("least gap", lambda o: o[1].pair.min_gap_m, unit="m", format=Format(".1f", absent="-")),
-    Column("least TTC", lambda o: _time(o[1].pair.min_ttc_s), unit="s"),
+    Column("least TTC", lambda o: _bounded(o[1].pair.min_ttc_s, ".2f"), unit="s"),
     Column("least PET", lambda o: o[1].pair.min_pet_s, unit="s", format=Format(".2f", absent="-")),
     Column(
-        "required deceleration", lambda o: o[1].pair.max_required_mps2, unit="m/s²",
-        format=Format(".1f", absent="-"),
+        "required deceleration", lambda o: _bounded(o[1].pair.max_required_mps2, ".1f"),
+        unit="m/s²",
     ),
     Column("speed at contact", _speed_of_contact, unit="km/h", format=Format(".0f", absent="-")),
 ]  # fmt: skip

@@ -33,15 +33,19 @@ LABEL = 34  # characters
 def run_card(run: PlayRun, out: Path) -> Card:
     """Return the card of one run of the folder `out`."""
     if run.folder is None:
-        return Card(_title(run), chain=list(run.judged.reasons), id=run_anchor(run))
+        return Card(run.name, chain=list(run.judged.reasons), id=run_anchor(run))
     log = read_log(run.folder)
     if not len(log):
-        return Card(_title(run), chain=[*run.judged.reasons, "the run ended before its first tick"])
+        return Card(
+            run.name,
+            id=run_anchor(run),
+            chain=[*run.judged.reasons, "the run ended before its first tick"],
+        )
     road = find_road(out, log.header)
     at = None if run.contact is None else int(np.searchsorted(log.t, run.contact[0] - 1e-9))
     return Card(
-        title=_title(run),
-        subtitle=f"{run.name}, {run.duration:.1f} s",
+        title=run.name,
+        subtitle=f"{run.duration:.1f} s of simulated time",
         tags=[run.verdict.value],
         facts=facts(run),
         chain=list(run.judged.reasons),
@@ -56,7 +60,8 @@ def run_anchor(run: PlayRun) -> str:
     return "run-" + anchor(run.name)
 
 
-def _title(run: PlayRun) -> str:
+def run_title(run: PlayRun) -> str:
+    """Return scenario, weather and verdict in one line."""
     where = f" in {run.weather}" if run.weather else ""
     return f"{run.scenario}{where}: {run.verdict.value}"
 

@@ -71,15 +71,16 @@ def _marks(marks: Sequence[Mark], t0: float, t1: float, top: float, bottom: floa
 
 
 def _strip(s: Strip, y: float, t0: float, t1: float) -> str:
-    edges = np.clip(((s.t - t0) / (t1 - t0) * BINS).astype(int), 0, BINS - 1)
+    bins = max(min(BINS, len(s.t) - 1), 1)  # none without a value, where there are few
+    edges = np.clip(((s.t - t0) / (t1 - t0) * bins).astype(int), 0, bins - 1)
     known = np.isfinite(s.value)
-    low, high = np.full(BINS, np.inf), np.full(BINS, -np.inf)
+    low, high = np.full(bins, np.inf), np.full(bins, -np.inf)
     np.minimum.at(low, edges[known], s.value[known])
     np.maximum.at(high, edges[known], s.value[known])
-    alarm = np.bincount(edges[s.alarm], minlength=BINS) > 0
-    missing = (np.bincount(edges[~known], minlength=BINS) > 0) & ~np.isfinite(low)
+    alarm = np.bincount(edges[s.alarm], minlength=bins) > 0
+    missing = (np.bincount(edges[~known], minlength=bins) > 0) & ~np.isfinite(low)
     scale = STRIP / max(s.high - s.low, 1e-9)
-    step = WIDTH / BINS
+    step = WIDTH / bins
 
     def at(value: float) -> float:
         return y + STRIP - scale * (min(max(value, s.low), s.high) - s.low)

@@ -237,7 +237,7 @@ def test_a_road_without_a_lane_leaves_a_straight_one(tmp_path):
     place = init("ego", teleport('<WorldPosition x="10" y="0" h="0"/>'))
     scenario = compiled(tmp_path, road='<LogicFile filepath="empty.xodr"/>', init=place)
     assert scenario.map_name == "straight"
-    assert any("no driving lane" in str(f) for f in scenario.findings)
+    assert any("has no lane" in str(f) for f in scenario.findings)
 
 
 def test_a_road_in_a_namespace_is_a_road(tmp_path):

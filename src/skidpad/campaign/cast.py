@@ -213,6 +213,7 @@ def check_scenario(course: Scenario) -> scenarios.Compiled:
         course.ego,
         maps=[Path(folder) for folder in course.maps],
         ignore_unsupported=course.ignore_unsupported,
+        lenient=course.lenient,
     )
 
 

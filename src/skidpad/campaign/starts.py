@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from skidpad.core.errors import ConfigError
+from skidpad.core.errors import ConfigError, NoLaneError
 from skidpad.core.lefthanded import lanes_left_from_carla, vector_from_carla
 from skidpad.core.setup import LanePosition
 from skidpad.roads.queries import LanePoint, RoadMap
@@ -40,6 +40,8 @@ def _longest(map: RoadMap) -> LanePoint:
     lanes = np.flatnonzero((map.arrays.drivable == 1) & (map.lanes.junction < 0))
     if not len(lanes):
         lanes = np.flatnonzero(map.arrays.drivable == 1)
+    if not len(lanes):
+        raise NoLaneError(f"map {map.name} has no driving lane on which the ego could start")
     order = lanes[np.argsort(-map.lanes.length[lanes], kind="stable")]
     places = [
         map.at(int(lane), min(FIRST_S, 0.25 * float(map.lanes.length[lane]))) for lane in order

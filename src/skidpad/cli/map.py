@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 maps = typer.Typer(name="map", help="Bundled and own maps.", no_args_is_help=True)
 
 SPEEDS_KMH = (80.0, 150.0)  # the matrix drives at 80, its limiter ends at 150
-BENDS_SHOWN = 20
+BENDS_SHOWN, IDS_SHOWN = 20, 40
 MAP = typer.Argument(help="Name of a bundled map, or an OpenDRIVE file.")
 FILE = typer.Argument(help="An OpenDRIVE file.")
 PNG = typer.Option(None, help="Also write a picture from above.")
@@ -52,6 +52,7 @@ def info(
     summary = summarise(loaded)
     for line in _facts(loaded, summary):
         typer.echo(line)
+    typer.echo(_ids(map))
     for line in _bends(summary):
         typer.echo(line)
     if summary.dead_ends:
@@ -77,6 +78,19 @@ def bake(
     target = out or file.with_suffix(".npz")
     write_atomically(target, baked.save)
     typer.echo(f"{target}: {len(baked.samples.x)} samples, content hash {baked.content_hash()}")
+
+
+def _ids(map: str) -> str:
+    """Return the ids of the roads as the file writes them."""
+    from skidpad.roads.bundled import map_file
+    from skidpad.roads.opendrive.document import parse
+
+    file = map_file(map)
+    if file.suffix == ".npz":
+        return "road ids: not in a baked map; see the OpenDRIVE file"
+    labels = [road.label for road in parse(file.read_bytes(), str(file)).roads.values()]
+    more = f" and {len(labels) - IDS_SHOWN} more" if len(labels) > IDS_SHOWN else ""
+    return f"road ids: {', '.join(labels[:IDS_SHOWN])}{more}"
 
 
 def _facts(map: RoadMap, summary: MapSummary) -> list[str]:

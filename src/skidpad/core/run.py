@@ -201,6 +201,9 @@ class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown
     ignore_unsupported: Annotated[
         bool, Meta(description="Leave out what is not known in the file.")
     ] = False
+    lenient: Annotated[
+        bool, Meta(description="Fill in what the file lacks where its meaning is clear.")
+    ] = False
 
     @property
     def title(self) -> str:

@@ -62,6 +62,8 @@ class RoadEdge:
         places = np.column_stack([x, y]).astype(np.float64)
         places[~np.isfinite(places).all(axis=1)] = NOWHERE
         out = np.full(len(places), inf)
+        if not len(self._long):  # a map may be all pavement
+            return out
         _, nearest = self._tree.query(places)
         self._lower(out, np.arange(len(places)), nearest, places, z)
         rest = np.flatnonzero(out > 0.0)  # another piece may reach farther than the nearest one

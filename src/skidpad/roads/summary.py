@@ -64,7 +64,7 @@ def summarise(map: RoadMap) -> MapSummary:
         limits=tuple(np.unique(np.round(limits[~np.isnan(limits)], 4)).tolist()),
         bends=tuple(sorted(_bends(map), key=lambda bend: bend.radius)),
         dead_ends=tuple(_dead_ends(map)),
-        steepest=float(np.abs(map.samples.grade[driving]).max()),
+        steepest=float(np.abs(map.samples.grade[driving]).max(initial=0.0)),
     )
 
 

@@ -7,22 +7,55 @@ from pathlib import Path
 
 from skidpad.core.errors import FileError
 from skidpad.scenarios.document import Node, parse
+from skidpad.scenarios.findings import Finding, Kind
 from skidpad.scenarios.parameters import assignments, declared, inner
+from skidpad.scenarios.schema import violations
 
 DEPTH_MAX = 8  # references from entry to entry
+LEVELS_UP = 6  # folders above the file's, from which relative paths may have been meant
 
 
 class Catalogs:
-    """The catalogs that a scenario names by <CatalogLocations>."""
+    """The catalogs that a scenario names by <CatalogLocations>.
 
-    def __init__(self, root: Node) -> None:
+    findings: the list to which is added which folders are not there, and what the schema has
+    against catalogs that are used.
+    """
+
+    def __init__(self, root: Node, findings: list[Finding]) -> None:
         self.folders: list[Path] = []
+        self.findings = findings
+        self._seen: set[Path] = set()
         locations = root.find("CatalogLocations")
         for location in locations.children() if locations else ():
             folder = location.find("Directory")
             if folder is not None:
-                path = (root.file.parent / folder.text("path").replace("\\", "/")).resolve()
-                self.folders.append(path.parent if path.suffix == ".xosc" else path)
+                self.folders.append(self._folder(root, folder))
+
+    def _folder(self, root: Node, folder: Node) -> Path:
+        """The folder of a <Directory>: from the file's own, else from one above it."""
+        name = folder.text("path").replace("\\", "/")
+        path = (root.file.parent / name).resolve()
+        if not path.exists() and not Path(name).is_absolute():
+            above = list(root.file.resolve().parent.parents)[:LEVELS_UP]
+            found = next((f for a in above if name and (f := (a / name).resolve()).is_dir()), None)
+            if found is not None:
+                what = f"path {name!r} is not there; {found} is taken, seen from a folder above"
+                self.findings.append(folder.finding(what, Kind.NOTE))
+                path = found
+        if not path.exists():
+            self.findings.append(folder.finding(f"there is no folder {path}", Kind.NOTE))
+        return path.parent if path.suffix == ".xosc" else path
+
+    def _looked_at(self, root: Node) -> None:
+        """Note once what the schema has against a catalog that is used."""
+        if root.file in self._seen:
+            return
+        self._seen.add(root.file)
+        header = root.find("FileHeader")
+        if header is not None and header.element.get("revMajor") == "1":
+            minor = header.element.get("revMinor", "")
+            self.findings += violations(root.element, root.file.name, minor)
 
     def entry(self, reference: Node, depth: int = 0) -> Node:
         """The entry that a <CatalogReference> means, with its parameters in scope."""
@@ -31,7 +64,12 @@ class Catalogs:
             raise reference.error(f"the references of catalog {catalog!r} run in a circle")
         root = next((r for f in self.folders if (r := _catalog(f, catalog)) is not None), None)
         if root is None:
-            raise reference.error(f"there is no catalog {catalog!r} in the catalog locations")
+            where = ", ".join(map(str, dict.fromkeys(self.folders)))
+            looked = f"looked in {where}" if where else "the file names none"
+            raise reference.error(
+                f"there is no catalog {catalog!r} in the catalog locations ({looked})"
+            )
+        self._looked_at(root)
         body = root.child("Catalog")
         found = next((n for n in body.children() if n.element.get("name") == name), None)
         if found is None:

@@ -6,13 +6,15 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
+from skidpad.roads.opendrive.document import id_number
 from skidpad.scenarios.catalogs import Catalogs
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Entity
-from skidpad.scenarios.findings import Fault, Finding
+from skidpad.scenarios.findings import Fault, Finding, Kind
 from skidpad.scenarios.network import Network
 
 Made = TypeVar("Made")
+ROADS_NAMED = 12  # ids of a map that a fault names
 Path = tuple[str, ...]  # names from the story down to a storyboard element
 
 
@@ -49,6 +51,26 @@ class Context:
             members = self.groups.get(name) or (self.entity(node),)
             found += [m for m in members if m not in found]
         return tuple(found)
+
+    def road(self, node: Node) -> int:
+        """The road that an attribute roadId names; on a map with one road only that one, with a note.
+
+        A fault names the ids that there are.
+        """
+        text = node.text("roadId")
+        number = id_number(text)
+        known = self.network.map.lanes.road
+        if (known == number).any() or number in self.network.labels:
+            return number
+        labels = self.network.labels
+        if len(labels) == 1:
+            ((only, label),) = labels.items()
+            what = f"roadId: there is no road {text!r}; the only one, {label!r}, is taken"
+            self.findings.append(node.finding(what, Kind.NOTE))
+            return only
+        some = ", ".join(repr(label) for label in list(labels.values())[:ROADS_NAMED])
+        more = f" and {len(labels) - ROADS_NAMED} more" if len(labels) > ROADS_NAMED else ""
+        raise node.error(f"roadId: there is no road {text!r}; the map has {some}{more}")
 
     def element(self, node: Node) -> Path:
         """The storyboard element that a condition names, by its name or the end of its path."""

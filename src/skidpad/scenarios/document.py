@@ -176,6 +176,11 @@ def _plain(info: Any) -> bool:
 
 def parse(path: Path) -> Node:
     """The root element of a file, without parameters; FileError when it is no OpenSCENARIO XML."""
+    if path.suffix == ".osc":
+        raise FileError(
+            f"scenario {path}: OpenSCENARIO DSL (2.x, .osc) is not supported; "
+            "Skidpad plays OpenSCENARIO XML (.xosc)"
+        )
     try:
         text = path.read_bytes()
     except OSError as error:

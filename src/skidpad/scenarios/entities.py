@@ -48,6 +48,7 @@ class Box:
     left: float = 0.0
 
 
+SIZES = ("length", "width", "height")
 BICYCLE = Box(1.8, 0.6, 1.7)
 USUAL = {  # sizes where only the category is known; assumption
     ActorKind.CAR: Box(),
@@ -110,6 +111,7 @@ def compile_entities(root: Node, catalogs: Catalogs) -> Entities:
             if entity.name in found:
                 raise one.error(f"there are two entities {entity.name!r}")
             found[entity.name] = entity
+            findings += _sizes(one, catalogs)
         except Fault as fault:
             findings.append(fault.finding)
             found.setdefault(one.element.get("name", ""), UNKNOWN)  # one fault hides no other
@@ -165,6 +167,16 @@ def _controllers(node: Node, catalogs: Catalogs) -> Iterator[Finding]:
                 yield replace(fault.finding, kind=Kind.NOTE)
 
 
+def _sizes(node: Node, catalogs: Catalogs) -> Iterator[Finding]:
+    """A note on a box without volume."""
+    body = next((n for n in node.children() if n.tag != "ObjectController"), None)
+    size = None if body is None else catalogs.resolved(body).find("BoundingBox", "Dimensions")
+    flat = [n for n in SIZES if size is not None and size.number(n) <= 0.0]
+    if size is not None and flat:
+        told = ", ".join(f"{name} {size.number(name):g}" for name in flat)
+        yield size.finding(f"{told}: a box needs a volume; the usual size is taken", Kind.NOTE)
+
+
 def _vehicle(name: str, node: Node, properties: Mapping[str, str]) -> Entity:
     category = node.text("vehicleCategory")
     box, limits = _box(node, Box()), _performance(node)
@@ -193,10 +205,13 @@ def _box(node: Node, default: Box) -> Box:
     if box is None:
         return default
     size, centre = box.child("Dimensions"), box.child("Center")
+    length, width, height = (
+        v if (v := size.number(name)) > 0.0 else getattr(default, name) for name in SIZES
+    )
     return Box(
-        size.number("length"),
-        size.number("width"),
-        size.number("height"),
+        length,
+        width,
+        height,
         centre.number("x"),
         centre.number("y"),
     )

@@ -57,6 +57,13 @@ class Network:
         file = map_file(self.name)
         return parse(file.read_bytes(), file.name).roads
 
+    @cached_property
+    def labels(self) -> dict[int, str]:
+        """Ids of the roads as the file writes them, by their numbers."""
+        if map_file(self.name).suffix == ".npz":  # a baked map keeps the numbers only
+            return {road: str(road) for road in np.unique(self.map.lanes.road).tolist()}
+        return {road.id: road.label for road in self.roads.values()}
+
     def place_of(self, pose: Pose) -> Place:
         """A pose with the lane under it: a driving lane where there is one, else any."""
         for driving in (True, False):

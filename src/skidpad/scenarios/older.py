@@ -117,6 +117,7 @@ WORDS = {
 }
 DIMENSIONS = ("rate", "time", "distance")
 STATES = {"AtStart": "startTransition", "end": "endTransition", "cancel": "stopTransition"}
+ELEMENT_REF = "storyboardElementRef"  # where it is, the content is newer than the header says
 A_MAX = "200"  # m/s^2, as in ASAM's migration; 0.9.1 knows no largest acceleration
 
 
@@ -144,11 +145,11 @@ def _rename(element: Element, old: str) -> None:
         if new != key:
             del element.attrib[key]
         element.set(new, WORDS.get(new, {}).get(str(value), str(value)))
-    if str(element.tag) == "StoryboardElementStateCondition":
+    if str(element.tag) == "StoryboardElementStateCondition" and not element.get(ELEMENT_REF):
         kind, name = element.attrib.pop("type", ""), element.attrib.pop("name", "")
         state = STATES.get(old) or STATES.get(str(element.attrib.pop("rule", "")), "completeState")
         element.set("storyboardElementType", "maneuver" if kind == "sequence" else str(kind))
-        element.set("storyboardElementRef", str(name))
+        element.set(ELEMENT_REF, str(name))
         element.set("state", state)
 
 

@@ -13,7 +13,6 @@ from typing import Protocol
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.roads.opendrive.document import id_number
 from skidpad.roads.projection import map_place
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
@@ -81,7 +80,7 @@ def _world(node: Node, ctx: Context) -> Position:
 
 
 def _lane(node: Node, ctx: Context) -> Position:
-    road, lane = id_number(node.text("roadId")), node.whole("laneId")
+    road, lane = ctx.road(node), node.whole("laneId")
     s, offset = node.number("s"), node.number("offset", 0.0)
     try:
         if lane == 0:  # the line in the middle, where no lane is
@@ -98,9 +97,7 @@ def _lane(node: Node, ctx: Context) -> Position:
 
 def _road(node: Node, ctx: Context) -> Position:
     try:
-        place = ctx.network.on_road(
-            id_number(node.text("roadId")), node.number("s"), node.number("t")
-        )
+        place = ctx.network.on_road(ctx.road(node), node.number("s"), node.number("t"))
     except ConfigError as error:
         raise node.error(str(error)) from None
     return Fixed(_facing(place, orientation(node)))

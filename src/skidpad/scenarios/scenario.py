@@ -18,7 +18,9 @@ from skidpad.scenarios.criteria import file_criteria
 from skidpad.scenarios.document import Node, parse
 from skidpad.scenarios.entities import Entity, choose_ego, compile_entities, spectator
 from skidpad.scenarios.findings import HARMLESS, Fault, Finding, Kind, ScenarioError
+from skidpad.scenarios.lenient import fill_in
 from skidpad.scenarios.network import Network, network_of
+from skidpad.scenarios.oddities import oddities
 from skidpad.scenarios.parameters import root_values, variables
 from skidpad.scenarios.routes import route_position
 from skidpad.scenarios.schema import violations
@@ -90,12 +92,15 @@ def compile_scenario(
     *,
     maps: Sequence[Path] = (),
     ignore_unsupported: bool = False,
+    lenient: bool = False,
 ) -> Scenario:
     """The file as a scenario; ScenarioError lists everything that keeps it from being played.
 
     maps: folders with roads that files name without saying where they are.
     """
-    found = check(file, parameters, ego, maps=maps, ignore_unsupported=ignore_unsupported)
+    found = check(
+        file, parameters, ego, maps=maps, ignore_unsupported=ignore_unsupported, lenient=lenient
+    )
     return found.playable()
 
 
@@ -106,14 +111,19 @@ def check(
     *,
     maps: Sequence[Path] = (),
     ignore_unsupported: bool = False,
+    lenient: bool = False,
 ) -> Compiled:
-    """Compile, and tell everything that was found; FileError for what is no scenario at all."""
+    """Compile, and tell everything that was found; FileError for what is no scenario at all.
+
+    lenient: what is missing but clear is filled in, with a warning.
+    """
     allowed = HARMLESS | {Kind.UNSUPPORTED} if ignore_unsupported else HARMLESS
     root = parse(file)
     findings: list[Finding] = []
     scenario = None
     try:
         findings += violations(root.element, file.name, _minor_revision(root))
+        findings += fill_in(root) if lenient else ()
         scenario = _compiled(root, _Wish(parameters, ego, maps, allowed), findings)
     except Fault as fault:
         findings.append(fault.finding)
@@ -156,8 +166,9 @@ class _Wish:
 def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | None:
     values = root_values(root, wish.parameters)
     root = root.scoped(values)
+    findings += oddities(root)
     network = _network(root, wish.maps, findings)
-    catalogs = Catalogs(root)
+    catalogs = Catalogs(root, findings)
     entities = compile_entities(root, catalogs)
     findings += entities.findings
     watching = spectator(entities.by_name)

@@ -14,7 +14,7 @@ from skidpad.roads.baked import BakedMap
 from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.opendrive.document import Document, parse
 from skidpad.roads.opendrive.lane_shapes import LaneShape, lane_shapes
-from skidpad.roads.opendrive.links import DRIVABLE, compressed, neighbours, successions
+from skidpad.roads.opendrive.links import compressed, neighbours, successions
 from skidpad.roads.opendrive.roadside import roadside
 from skidpad.roads.opendrive.signals import signal_table
 
@@ -41,8 +41,8 @@ def bake(text: bytes, name: str, file: str = "") -> BakedMap:
     """The baked map of OpenDRIVE text; `file` is named in errors."""
     document = parse(text, file or name)
     shapes = list(lane_shapes(document))
-    if not any(shape.kind in DRIVABLE for shape in shapes):
-        raise NoLaneError(f"{document.file}: has no driving lane")
+    if not shapes:
+        raise NoLaneError(f"{document.file}: has no lane")
     index = {shape.key: i for i, shape in enumerate(shapes)}
     signals = signal_table(document, shapes, index)
     return BakedMap(

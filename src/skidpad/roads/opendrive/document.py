@@ -88,6 +88,7 @@ class RoadRecord:
     """One road."""
 
     id: int
+    label: str  # the id as the file writes it
     junction: int  # -1: none
     length: float
     left_hand: bool  # left-hand traffic
@@ -258,6 +259,7 @@ def _road(read: Reader, node: Node) -> RoadRecord:
     ]
     return RoadRecord(
         id=read.id(node),
+        label=str(node.get("id")),
         junction=read.id(node, "junction", "-1"),
         length=length,
         left_hand=node.get("rule", "RHT") == "LHT",

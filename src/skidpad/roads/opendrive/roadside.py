@@ -93,11 +93,11 @@ def _amount(read: Reader, road: RoadRecord, node: Node, barrier: bool) -> float:
     """How many boxes and points an object will make, before any is made."""
     count = 1.0 + len(node.findall(".//cornerLocal")) + len(node.findall(".//cornerRoad"))
     for repeat in node.findall("repeat"):
-        length = read.number(repeat, "length")
+        length = read.number(repeat, "length", 0.0)
         if barrier:
             count += min(length, road.length) / BARRIER_STEP
         else:
-            count += length / max(read.number(repeat, "distance") or CONTINUOUS, 1e-9)
+            count += length / max(read.number(repeat, "distance", 0.0) or CONTINUOUS, 1e-9)
     return count
 
 
@@ -114,18 +114,24 @@ def _barrier_kind(node: Node) -> BarrierKind | None:
 
 def _barriers(read: Reader, road: RoadRecord, node: Node, kind: BarrierKind) -> list[Barrier]:
     height = read.number(node, "height", 0.0) or BARRIER_HEIGHTS[kind]
-    lines = [_repeated_line(read, road, r) for r in node.findall("repeat")]
+    lines = [_repeated_line(read, road, node, r) for r in node.findall("repeat")]
     if not lines:
         lines = [*_outlines(read, road, node)] or [_straight_line(read, road, node)]
     return [Barrier(kind, np.round(line, 5), height) for line in lines if len(line) >= 2]
 
 
-def _repeated_line(read: Reader, road: RoadRecord, repeat: Node) -> Floats:
+def _aside(read: Reader, node: Node, repeat: Node) -> tuple[float, float]:
+    """Returns t where a repetition starts and ends; where the file lets them out, the object's."""
+    start = read.number(repeat, "tStart", read.number(node, "t", 0.0))
+    return start, read.number(repeat, "tEnd", start)
+
+
+def _repeated_line(read: Reader, road: RoadRecord, node: Node, repeat: Node) -> Floats:
     """A continuous object (repeat distance 0) along the road."""
-    s = read.number(repeat, "s")
-    length = min(read.number(repeat, "length"), road.length - s)
+    s = read.number(repeat, "s", read.number(node, "s"))
+    length = min(read.number(repeat, "length", 0.0), road.length - s)
     n = max(int(np.ceil(length / BARRIER_STEP)), 1) + 1
-    t = np.linspace(read.number(repeat, "tStart"), read.number(repeat, "tEnd"), n)
+    t = np.linspace(*_aside(read, node, repeat), n)
     up = np.linspace(
         read.number(repeat, "zOffsetStart", 0.0), read.number(repeat, "zOffsetEnd", 0.0), n
     )
@@ -266,18 +272,21 @@ def _places(read: Reader, node: Node) -> Iterator[tuple[float, float, float]]:
     if not repeats:
         yield read.number(node, "s"), read.number(node, "t"), read.number(node, "zOffset", 0.0)
     for repeat in repeats:
-        step, length = read.number(repeat, "distance") or CONTINUOUS, read.number(repeat, "length")
+        step, length = (
+            read.number(repeat, "distance", 0.0) or CONTINUOUS,
+            read.number(repeat, "length", 0.0),
+        )
         if step <= 0.0 or length / step > REPEATS_MAX:
             raise read.fail(
                 node, f"needs a repeat distance that gives at most {REPEATS_MAX} objects"
             )
         for k in range(int(length / step) + 1):
             share = k * step / length if length > 0.0 else 0.0
-            t0, t1 = read.number(repeat, "tStart"), read.number(repeat, "tEnd")
+            t0, t1 = _aside(read, node, repeat)
             z0 = read.number(repeat, "zOffsetStart", 0.0)
             z1 = read.number(repeat, "zOffsetEnd", 0.0)
             yield (
-                read.number(repeat, "s") + k * step,
+                read.number(repeat, "s", read.number(node, "s")) + k * step,
                 t0 + share * (t1 - t0),
                 z0 + share * (z1 - z0),
             )

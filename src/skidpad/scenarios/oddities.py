@@ -1,0 +1,55 @@
+"""What a file says that can be read, but is hardly meant: one note each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.findings import Fault, Finding, Kind
+
+V_MAX = 150.0  # m/s, 540 km/h: faster is no road vehicle
+
+
+def oddities(root: Node) -> Iterator[Finding]:
+    """Return a note for every absurd speed, count of zero and negative time or distance."""
+    for element in root.element.iter(*LOOKS):
+        node = Node(element, root.file, root.values)
+        try:
+            what = LOOKS[node.tag](node)
+        except Fault:
+            continue  # is reported where it is compiled, or depends on a nested parameter
+        if what:
+            yield node.finding(what, Kind.NOTE)
+
+
+def _speed(node: Node) -> str:
+    name = "speed" if node.tag == "SpeedProfileEntry" else "value"
+    v = node.number(name) if node.has(name) else 0.0
+    return f"{name}: {v:g} m/s is faster than any road vehicle" if abs(v) > V_MAX else ""
+
+
+def _count(node: Node) -> str:
+    if node.whole("maximumExecutionCount", 1) > 0:
+        return ""
+    how = "it never begins" if node.tag == "Event" else "it is carried out once all the same"
+    return f"maximumExecutionCount is {node.text('maximumExecutionCount')}: {how}"
+
+
+def _dynamics(node: Node) -> str:
+    if not node.has("value") or node.text("dynamicsShape", "") == "step":
+        return ""
+    value, dimension = node.number("value"), node.text("dynamicsDimension", "")
+    if dimension == "rate" or value >= 0.0:
+        return ""
+    return f"value: a {dimension} of {value:g} is read as a step"
+
+
+LOOKS: Mapping[str, Callable[[Node], str]] = {
+    "AbsoluteTargetSpeed": _speed,
+    "AbsoluteSpeed": _speed,
+    "SpeedProfileEntry": _speed,
+    "Event": _count,
+    "ManeuverGroup": _count,
+    "SpeedActionDynamics": _dynamics,
+    "LaneChangeActionDynamics": _dynamics,
+}

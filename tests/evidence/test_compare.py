@@ -171,6 +171,17 @@ def test_too_few_seeds_are_said_to_be_undecided_and_an_option_decides_the_exit_c
     assert CliRunner().invoke(app, [*call, "--point"]).exit_code == 1
 
 
+@pytest.mark.req("X-2")
+@pytest.mark.parametrize(
+    ("place", "told"), [("x", "may be compared"), ("y", "may not be compared")]
+)
+def test_the_command_says_whether_hashes_may_be_compared(tmp_path, place, told):
+    MATRIX.write(tmp_path / "a", rows(), fingerprints=["x"] * 16)
+    MATRIX.write(tmp_path / "b", rows(), fingerprints=[place] * 16)
+    call = ["compare", str(tmp_path / "a"), str(tmp_path / "b")]
+    assert f"hashes {told}" in CliRunner().invoke(app, call).stdout
+
+
 @pytest.mark.req("T-6")
 def test_no_text_of_one_seed_has_a_p_value_or_an_infinity(tmp_path):
     for name, extra in (("a", 0), ("b", 2)):

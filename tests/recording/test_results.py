@@ -15,7 +15,7 @@ import pytest
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording import ledger as ledger_module
-from skidpad.recording.fingerprint import fingerprint
+from skidpad.recording.fingerprint import comparison_text, fingerprint
 from skidpad.recording.ledger import (
     CAMPAIGN,
     LEDGER,
@@ -216,6 +216,28 @@ def test_fingerprint_is_stable_and_sees_every_part() -> None:
     changed = {dataclasses.replace(here, **{f.name: "?"}).short for f in dataclasses.fields(here)}
     assert len(changed | {here.short}) == 8
     assert fingerprints([entry("a"), entry("b")]) == {"abc"}
+
+
+@pytest.mark.req("X-1", "X-2")
+def test_rows_say_where_they_were_driven_and_the_hash_does_not_depend_on_it(tmp_path: Path) -> None:
+    keys = [dataclasses.replace(entry("a").key, seed=seed) for seed in (3, 1, 2)]
+    rows = [(key, entry("a").metrics) for key in keys]
+    plain = MATRIX.write(tmp_path / "a", rows)
+    placed = MATRIX.write(tmp_path / "b", rows, fingerprints=["x3", "x1", "x2"])
+    table = read_results(tmp_path / "b", MATRIX)
+    assert dict(zip(table["seed"], table["fingerprint"], strict=True)) == {
+        1: "x1",
+        2: "x2",
+        3: "x3",
+    }
+    assert placed == plain == MATRIX.hash(table)
+
+
+@pytest.mark.req("X-2")
+def test_a_reader_is_told_whether_hashes_may_be_compared() -> None:
+    assert comparison_text({"a"}, {"a"}).startswith("hashes may be compared")
+    for a, b in (({"a"}, {"b"}), ({"a", "b"}, {"a"}), (set(), {"a"}), ({"a"}, set())):
+        assert comparison_text(a, b).startswith("hashes may not be compared")
 
 
 def test_a_folder_says_which_command_wrote_it(tmp_path):

@@ -23,7 +23,16 @@ from skidpad.core.vocabulary import (
 )
 from skidpad.recording.events import LightChange, Notice, NoticeSource, Relocation, decode_events
 from skidpad.recording.files import content_hash, write_atomically
-from skidpad.recording.logfiles import EVENTS, TICKS, log_hash, read_log, tick_table, write_log
+from skidpad.recording.fingerprint import fingerprint
+from skidpad.recording.logfiles import (
+    EVENTS,
+    TICKS,
+    driven_on,
+    log_hash,
+    read_log,
+    tick_table,
+    write_log,
+)
 from skidpad.recording.runlog import LogHeader, ReportSeries, RunLog
 from skidpad.recording.ticks import TickLog
 
@@ -76,6 +85,7 @@ def test_what_is_written_is_what_is_read(tmp_path: Path) -> None:
     again = read_log(tmp_path / "run")
     assert_same(log, again)
     assert written == log_hash(log) == log_hash(again)
+    assert driven_on(tmp_path / "run") == fingerprint().short
 
 
 def test_values_stand_where_the_field_names_say() -> None:

@@ -179,7 +179,8 @@ class Campaign(Generic[T, K, M]):
                 earlier |= {t.name for t in wanted}
             entries = latest(ledger.entries)
         rows, timing = [(e.key, e.metrics) for e in entries], [e.timing for e in entries]
-        digest = self.recipe.columns.write(out, rows, timing, csv=csv)
+        places = [e.fingerprint for e in entries]
+        digest = self.recipe.columns.write(out, rows, timing, csv=csv, fingerprints=places)
         self.recipe.finish(self.tasks, out, runner)
         failed = sum(Outcome(e.key.outcome) in RETRIED for e in entries)
         mixed = len(fingerprints(entries)) > 1

@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from skidpad.evidence.compare import Change, Judged, Rule
 
 
@@ -71,6 +73,7 @@ def compare(
     """
     from skidpad.core.errors import ConfigError
     from skidpad.evidence.compare import compare_campaigns, flaws, judge_rules, parse_rule
+    from skidpad.recording.fingerprint import comparison_text
     from skidpad.recording.logfiles import TICKS
     from skidpad.recording.matrix import MATRIX
     from skidpad.recording.results import read_results
@@ -91,6 +94,7 @@ def compare(
     before, after = (read_results(folder, MATRIX) for folder in (a, b))
     changes, alone_a, alone_b = compare_campaigns(before, after, wanted)
     _print(changes)
+    typer.echo(comparison_text(*(_places(t) for t in (before, after))))
     if alone_a or alone_b:
         typer.echo(f"without a partner: {alone_a} runs of {a}, {alone_b} of {b}")
     judged = judge_rules(rules, changes, point=point)
@@ -109,6 +113,15 @@ def compare(
             typer.echo(f"regression ({text}): {by[0]}", err=True)
     if any(failures.values()):
         raise typer.Exit(1)
+
+
+def _places(results: pl.DataFrame) -> set[str]:
+    """Fingerprints of the rows; none where some row has none."""
+    from skidpad.recording.results import FINGERPRINT
+
+    if FINGERPRINT not in results.columns or results[FINGERPRINT].has_nulls():
+        return set()
+    return set(results[FINGERPRINT])
 
 
 def _against(rule: Rule, judged: list[Judged], undecided: Undecided) -> list[Judged]:

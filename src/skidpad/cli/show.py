@@ -15,7 +15,8 @@ from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.evidence.drive.severity import graded_contacts
 from skidpad.evidence.drive.story import tell_story
-from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.fingerprint import comparison_text, fingerprint
+from skidpad.recording.logfiles import driven_on, log_hash, read_log
 from skidpad.recording.matrix import Metrics
 from skidpad.recording.results import definitions_of
 from skidpad.recording.runlog import RunLog
@@ -38,6 +39,8 @@ def compare_runs(a: Path, b: Path) -> None:
         if road_map.content_hash != log.header.map_hash:
             raise FileError(f"{run}: the map {log.header.map} is another one today")
         found.append(asdict(run_metrics(log, road_map)))
+    places = [[place] if (place := driven_on(run)) else [] for run in (a, b)]
+    Console().print(comparison_text(*places), highlight=False)
     table = Table("metric", "A", "B", "B - A", box=None, pad_edge=False)
     for name, before in found[0].items():
         after = found[1][name]
@@ -54,6 +57,8 @@ def show(run: Path) -> None:
     for name, value in log.header.about.items():
         console.print(f"  {name}: {value}")
     console.print(f"  content hash: {log_hash(log)}")
+    places = [place] if (place := driven_on(run)) else []
+    console.print(f"  here, {comparison_text(places, [fingerprint().short])}", highlight=False)
     if road_map.content_hash != log.header.map_hash:
         console.print("[yellow]the map has changed since this run: lanes may not match[/]")
     meanings = {name: meaning for name, meaning, _ in definitions_of(Metrics)}

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import hashlib
 import platform
+from collections.abc import Collection
 from dataclasses import asdict, dataclass
+from functools import cache
 
-import llvmlite.binding as llvm
 import msgspec
-import numba
 import numpy as np
 
 import skidpad
@@ -33,8 +33,25 @@ class Fingerprint:
         return hashlib.sha256(text).hexdigest()[:16]
 
 
+def comparison_text(a: Collection[str], b: Collection[str]) -> str:
+    """Whether hashes of drives on these fingerprints may be compared; empty: it is not known."""
+    if not a or not b:
+        return "hashes may not be compared: it is not known on which processor and libraries they arose"
+    if len({*a, *b}) == 1:
+        return f"hashes may be compared: same processor features, libraries and version ({next(iter(a))})"
+    places = [", ".join(sorted(side)) for side in (a, b)]
+    return (
+        f"hashes may not be compared: other processor features, libraries or version ({places[0]} against "
+        f"{places[1]}), on which equal drives may have different hashes"
+    )
+
+
+@cache
 def fingerprint() -> Fingerprint:
     """The fingerprint of this process."""
+    import llvmlite.binding as llvm  # slow to load, and readers of logs do not need it
+    import numba
+
     features = llvm.get_host_cpu_features().flatten()
     return Fingerprint(
         cpu=llvm.get_host_cpu_name(),

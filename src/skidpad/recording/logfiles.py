@@ -15,6 +15,7 @@ from skidpad.core.reading import UNUSABLE, decode_json, read_bytes, unusable
 from skidpad.core.states import ActorTable
 from skidpad.recording.events import Event, decode_events, encode_events
 from skidpad.recording.files import content_hash, read_parquet, write_bytes, write_parquet
+from skidpad.recording.fingerprint import fingerprint
 from skidpad.recording.logchecks import require_sound
 from skidpad.recording.runlog import (
     ActorSeries,
@@ -28,7 +29,7 @@ from skidpad.recording.runlog import (
 TICKS, EVENTS = "ticks.parquet", "events.jsonl"
 SCHEMA_VERSION = "1"
 EVENTS_MAX = 1024**3  # bytes
-KEY = "skidpad"
+KEY, PLACE = "skidpad", "fingerprint"
 BOOLEANS = {
     "applied_handbrake",
     "applied_reverse",
@@ -103,8 +104,13 @@ def write_log(folder: Path, log: RunLog) -> str:
     head = msgspec.json.encode(_head(log), order="deterministic")
     table = tick_table(log)
     write_bytes(folder / EVENTS, encode_events(log.events))
-    write_parquet(folder / TICKS, table, {KEY: head.decode()})
+    write_parquet(folder / TICKS, table, {KEY: head.decode(), PLACE: fingerprint().short})
     return _hash(log, table)
+
+
+def driven_on(folder: Path) -> str | None:
+    """Fingerprint of the process that wrote the log in `folder`; None: it is not known."""
+    return read_parquet(folder / TICKS)[1].get(PLACE)
 
 
 class _Actors(msgspec.Struct, frozen=True):

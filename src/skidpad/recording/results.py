@@ -24,6 +24,7 @@ from skidpad.recording.files import (
 )
 
 RESULTS, TIMING = "results.parquet", "timing.parquet"
+FINGERPRINT = "fingerprint"  # of the processor and libraries that drove a row; outside the hash
 TYPES: dict[str, Any] = {"int": pl.Int64, "float": pl.Float64, "str": pl.String, "bool": pl.Boolean}
 K = TypeVar("K")
 M = TypeVar("M")
@@ -63,9 +64,17 @@ class Columns(Generic[K, M]):
         rows: Sequence[tuple[K, M | None]],
         timing: Sequence[Timing] = (),
         csv: bool = False,
+        fingerprints: Sequence[str] = (),
     ) -> str:
-        """Write results.parquet, and timing.parquet with a line for each row; returns the hash."""
+        """Write results.parquet, and timing.parquet with a line for each row; returns the hash.
+
+        fingerprints: of each row, where it was driven.
+        """
         table = self.table(rows)
+        if fingerprints:
+            places = pl.Series(FINGERPRINT, fingerprints, dtype=pl.String)
+            keys = pl.DataFrame([_plain(self.key, key) for key, _ in rows], schema=schema(self.key))
+            table = table.with_columns(keys.with_columns(places).sort(self.sort)[FINGERPRINT])
         names = {name: kind for name, kind in schema(self.key).items() if name in self.sort}
         walls = [
             {name: getattr(key, name) for name in names} | asdict(wall)
@@ -93,8 +102,8 @@ class Columns(Generic[K, M]):
         return require_columns(table, schema(self.key, self.metrics), path)
 
     def hash(self, table: pl.DataFrame) -> str:
-        """Content hash of results; the order of rows does not matter (decision X-1)."""
-        return content_hash([table.sort(self.sort)])
+        """Content hash of results; neither the order of rows nor where they were driven matters (X-1)."""
+        return content_hash([table.drop(FINGERPRINT, strict=False).sort(self.sort)])
 
 
 def _defaults(kind: type[Any]) -> dict[str, Any]:

@@ -6,11 +6,13 @@ from importlib import import_module
 from typing import Any
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "drive"]
+__all__ = ["Scenario", "__version__", "drive"]
 
 
 def __getattr__(name: str) -> Any:
     # Lazy, so that `skidpad --version` does not pay for numba.
     if name == "drive":
         return import_module("skidpad.campaign.run").drive
+    if name == "Scenario":
+        return import_module("skidpad.campaign.stepping").Scenario
     raise AttributeError(f"module 'skidpad' has no attribute {name!r}")

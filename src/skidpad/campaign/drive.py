@@ -12,7 +12,7 @@ What the sinks keep is the only result. Whatever is said about a drive later is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -138,6 +138,24 @@ def loop(
 
     Returns None, or how the driver failed, which ends the run before the sinks see that moment.
     """
+    moments = ticks(backend, frame, driver, supervisor, script, sinks)
+    while True:
+        try:
+            next(moments)
+        except StopIteration as end:
+            failure: StackError | None = end.value
+            return failure
+
+
+def ticks(
+    backend: Backend,
+    frame: SensorFrame,
+    driver: Driver,
+    supervisor: Supervising,
+    script: Script,
+    sinks: Sequence[Sink],
+) -> Generator[Moment, None, StackError | None]:
+    """The loop, stopped after each tick: what the script says of the tick is known by then."""
     truth = backend.truth()
     driver.begin(truth.table)
     for sink in sinks:
@@ -156,6 +174,7 @@ def loop(
         for sink in sinks:
             sink.see(moment)
         words = script.step(truth)
+        yield moment
         if script.ended:
             return None
         if action.relocate is not None:

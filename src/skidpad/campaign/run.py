@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import traceback
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.campaign.backends import make_backend
-from skidpad.campaign.cast import Stage, driver_of, stage_of, with_sensors
+from skidpad.campaign.cast import StackAtWheel, Stage, driver_of, stage_of, with_sensors
 from skidpad.campaign.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
-from skidpad.campaign.drive import Moment, Sink, loop
+from skidpad.campaign.drive import Driver, Moment, Sink, ticks
 from skidpad.campaign.outdoors import ChangedBackend, FileChanges
 from skidpad.campaign.snapshots import Snapshots
 from skidpad.core.errors import StackError, require_choice
@@ -214,60 +215,102 @@ def run(
     fresh one of the run's choice. folder: where snapshots of collisions go. sinks: who else looks on.
     desk: where a person sits, or sat.
     """
-    stage = stage_of(spec) if stage is None else stage
-    backend = make_backend(spec.backend) if backend is None else backend
-    changes = None if stage.player is None else FileChanges(stage.player, spec)
-    if changes is not None:
-        backend = ChangedBackend(backend, changes.news, changes.hands)
-    if desk is not None:
-        backend = DeskBackend(backend, desk)
-        script = DeskScript(stage.script, desk)
-        stage = replace(stage, supervisor=DeskSupervisor(stage.supervisor, desk), script=script)
-    log = log_of(spec, stage, desk)
-    log.changes = changes
-    snapshots = Snapshots(folder, spec.driver.label, spec.weather.name, stage.setup.dt)
-    try:
-        failure = _drive(spec, stage, kind, desk, backend, (log, snapshots, *sinks))
-        if failure is not None:
-            log.log.notice(backend.truth().tick, NoticeSource.STACK, str(failure))
-    finally:
-        backend.close()
-    outcome = stage.outcome if failure is None else Outcome.AGENT_ERROR
-    finished = log.log.finish()
-    return Run(
-        finished,
-        outcome,
-        "" if failure is None else story(failure),
-        tuple(snapshots.paths),
-        stage.triggered,
-        stage.route_length,
-        off_road(finished, stage.map),
-        str(stage.setup.map),
-        None if stage.player is None else stage.player.played,
+    opened = OpenRun(
+        spec, kind, stage=stage, backend=backend, folder=folder, sinks=sinks, desk=desk
     )
-
-
-def _drive(
-    spec: RunSpec,
-    stage: Stage,
-    kind: type[Stack] | None,
-    desk: Desk | None,
-    backend: Backend,
-    sinks: Sequence[Sink],
-) -> StackError | None:
     try:
-        driver = driver_of(spec, stage, kind)
-        setup = with_sensors(stage.setup, driver.stack)
-    except StackError as error:  # it could not even be built
-        backend.reset(stage.setup, spec.seed)
-        for sink in sinks:
-            sink.begin(backend.truth().table)
-        return error
-    frame = backend.reset(setup, spec.seed)
-    at_wheel = driver if desk is None else DeskDriver(driver, desk)
-    failure = loop(backend, frame, at_wheel, stage.supervisor, stage.script, sinks)
-    driver.stack.close()
-    return failure
+        while opened.step() is not None:
+            pass
+    finally:
+        opened.close()
+    return opened.finish()
+
+
+class OpenRun:
+    """A run on its way: the one loop, stopped after each tick.
+
+    at_wheel: what stands between the driver and the loop, as a desk does.
+    """
+
+    def __init__(
+        self,
+        spec: RunSpec,
+        kind: type[Stack] | None = None,
+        *,
+        stage: Stage | None = None,
+        backend: Backend | None = None,
+        folder: Path | None = None,
+        sinks: Sequence[Sink] = (),
+        desk: Desk | None = None,
+        at_wheel: Callable[[StackAtWheel], Driver] | None = None,
+    ) -> None:
+        stage = stage_of(spec) if stage is None else stage
+        backend = make_backend(spec.backend) if backend is None else backend
+        changes = None if stage.player is None else FileChanges(stage.player, spec)
+        if changes is not None:
+            backend = ChangedBackend(backend, changes.news, changes.hands)
+        if desk is not None:
+            backend = DeskBackend(backend, desk)
+            script = DeskScript(stage.script, desk)
+            stage = replace(stage, supervisor=DeskSupervisor(stage.supervisor, desk), script=script)
+        self.spec, self.stage, self.backend = spec, stage, backend
+        self.log = log_of(spec, stage, desk)
+        self.log.changes = changes
+        self.snapshots = Snapshots(folder, spec.driver.label, spec.weather.name, stage.setup.dt)
+        self.sinks = (self.log, self.snapshots, *sinks)
+        self.failure: StackError | None = None
+        if desk is not None:
+            at_wheel = partial(DeskDriver, desk=desk)
+        self._ticks = self._drive(kind, at_wheel)
+
+    def step(self) -> Moment | None:
+        """Go on by one tick; None when the run is over."""
+        return next(self._ticks, None)
+
+    def close(self) -> None:
+        """Release the backend."""
+        self.backend.close()
+
+    def finish(self) -> Run:
+        """Returns what the run leaves, over or not."""
+        stage, finished = self.stage, self.log.log.finish()
+        return Run(
+            finished,
+            stage.outcome if self.failure is None else Outcome.AGENT_ERROR,
+            "" if self.failure is None else story(self.failure),
+            tuple(self.snapshots.paths),
+            stage.triggered,
+            stage.route_length,
+            off_road(finished, stage.map),
+            str(stage.setup.map),
+            None if stage.player is None else stage.player.played,
+        )
+
+    def _drive(
+        self, kind: type[Stack] | None, at_wheel: Callable[[StackAtWheel], Driver] | None
+    ) -> Iterator[Moment]:
+        stage, backend = self.stage, self.backend
+        try:
+            driver = driver_of(self.spec, stage, kind)
+            setup = with_sensors(stage.setup, driver.stack)
+        except StackError as error:  # it could not even be built
+            backend.reset(stage.setup, self.spec.seed)
+            for sink in self.sinks:
+                sink.begin(backend.truth().table)
+            self._failed(error)
+            return
+        frame = backend.reset(setup, self.spec.seed)
+        wheel = driver if at_wheel is None else at_wheel(driver)
+        failure = yield from ticks(
+            backend, frame, wheel, stage.supervisor, stage.script, self.sinks
+        )
+        driver.stack.close()
+        if failure is not None:
+            self._failed(failure)
+
+    def _failed(self, failure: StackError) -> None:
+        self.failure = failure
+        self.log.log.notice(self.backend.truth().tick, NoticeSource.STACK, str(failure))
 
 
 def log_of(spec: RunSpec, stage: Stage, desk: Desk | None = None) -> Log:

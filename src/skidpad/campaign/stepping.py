@@ -1,0 +1,244 @@
+"""A scenario file played tick by tick from Python, over the one loop."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from msgspec import structs
+
+from skidpad.campaign.cast import StackAtWheel, stage_of
+from skidpad.campaign.drive import Script
+from skidpad.campaign.files import runs_of
+from skidpad.campaign.grip_cells import template
+from skidpad.campaign.run import OpenRun, Run
+from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.run import (
+    ActorMode,
+    DriverSpec,
+    Friction,
+    Passenger,
+    StackDriver,
+)
+from skidpad.core.run import Scenario as Course
+from skidpad.core.setup import ActorCommand
+from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
+from skidpad.core.vocabulary import GripModel
+from skidpad.core.weather import Weather
+from skidpad.physics.presets import find_weather
+from skidpad.scenarios.scene import State
+from skidpad.stack.loading import load_stack
+from skidpad.stack.settings import load_profile
+
+PLAIN = "clear-noon"  # what a file leaves open of the weather, as in `skidpad play`
+IDEAL = "ideal"
+HOLDS, ENDS = " holds", " ends"  # how the story tells of a condition
+
+
+@dataclass(frozen=True, slots=True)
+class ActorState:
+    """Where an actor is: the centre of its box, m, rad, m/s."""
+
+    x: float
+    y: float
+    z: float
+    yaw: float
+    vx: float
+    vy: float
+
+
+class Scenario:
+    """A scenario file that is played one tick after the other, as `skidpad play` plays it.
+
+    Args:
+        file: An OpenSCENARIO XML file.
+        stack: Which stack drives the ego: None for ours, "ideal" for the file itself, or a class
+            as "module:Class".
+        actors: "physical" or "ideal", as `--actors`.
+        weather: A preset's name; None for the weather of the file.
+        parameters: Values of the file's parameters, by name.
+        seed: Of sensor noise and traffic.
+        duration: Longest simulated time, s.
+
+    Raises:
+        ScenarioError: The file cannot be played; the message lists all reasons.
+
+    Example:
+        >>> scenario = Scenario("cut_in.xosc")
+        >>> while scenario.step():
+        ...     ego = scenario.states["ego"]
+        >>> scenario.finish().outcome.value
+    """
+
+    def __init__(
+        self,
+        file: str | Path,
+        *,
+        stack: str | None = None,
+        actors: str = "physical",
+        weather: str | Weather | None = None,
+        parameters: Mapping[str, float | str] | None = None,
+        seed: int = 1,
+        duration: float = 120.0,
+    ) -> None:
+        words = [mode.value for mode in ActorMode]
+        course = Course(
+            parameters=dict(parameters or {}),
+            actors=ActorMode(require_choice("actors", actors, words)),
+        )
+        settings = load_profile("recommended", {"grip": GripModel.PHYSICAL.value}).as_plain()
+        spec = template(
+            course=course,
+            seed=seed,
+            duration=duration,
+            settings=settings,
+            weather=find_weather(PLAIN),
+        )
+        if stack is not None:
+            spec = structs.replace(spec, driver=_driver(stack))
+        outside = find_weather(weather) if isinstance(weather, str) else weather
+        (self.spec,) = runs_of(spec, [Path(file)], [outside], [Friction.REDUCED], [seed])
+        stage = stage_of(self.spec)
+        assert stage.player is not None
+        self.player = stage.player
+        self._sent = _SentCommands(stage.script)
+        self._wheel: _Wheel | None = None
+        self._command: VehicleCommand | None = None
+        self._open = OpenRun(
+            self.spec, stage=replace(stage, script=self._sent), at_wheel=self._at_wheel
+        )
+        self._truth: WorldTruth | None = None
+        self._told = 0
+        self._conditions: dict[tuple[str, str], bool] = {}
+
+    def _at_wheel(self, driver: StackAtWheel) -> _Wheel:
+        self._wheel = _Wheel(driver)
+        self._wheel.command = self._command
+        return self._wheel
+
+    def step(self, n: int = 1, command: VehicleCommand | None = None) -> bool:
+        """Go on by n ticks; returns whether the scenario goes on after them.
+
+        command: what drives the ego in these ticks in place of its stack, which still sees them.
+        """
+        if n < 1:
+            raise ConfigError(f"step needs at least 1 tick, got {n}")
+        self._command = command
+        if self._wheel is not None:
+            self._wheel.command = command
+        for _ in range(n):
+            moment = self._open.step()
+            if moment is None:
+                self._open.close()
+                return False
+            self._truth = moment.truth
+        return not self.player.ended
+
+    def send(self, command: ActorCommand) -> None:
+        """Say what another actor does in the next step, in place of what the file says of it."""
+        if command.actor not in self.player.scenario.entities:
+            known = ", ".join(self.player.scenario.entities)
+            raise ConfigError(f"there is no actor {command.actor!r}; the file has {known}")
+        self._sent.replace(command)
+
+    @property
+    def t(self) -> float:
+        """Simulated time of the last tick, s."""
+        return self.player.scene.t
+
+    @property
+    def states(self) -> dict[str, ActorState]:
+        """Every actor that is there, by name."""
+        if self._truth is None:
+            return {}
+        s = self._truth.states
+        return {
+            name: ActorState(*(float(c[i]) for c in (s.x, s.y, s.z, s.yaw, s.vx, s.vy)))
+            for i, name in enumerate(self._truth.table.names)
+            if s.present[i]
+        }
+
+    @property
+    def elements(self) -> dict[str, str]:
+        """The state of every element of the storyboard that has begun, by its path."""
+        return {"::".join(path): State(s).value for path, s in self.player.scene.states.items()}
+
+    @property
+    def conditions(self) -> dict[tuple[str, str], bool]:
+        """Whether each condition that ever held holds now, by path of its element and its name."""
+        story = self.player.scene.story
+        for happening in story[self._told :]:
+            what = happening.what.removeprefix("condition ")
+            if what == happening.what:
+                continue
+            for ending, holds in ((HOLDS, True), (ENDS, False)):
+                if what.endswith(ending):
+                    key = "::".join(happening.path), what.removesuffix(ending)
+                    self._conditions[key] = holds
+        self._told = len(story)
+        return dict(self._conditions)
+
+    def finish(self) -> Run:
+        """Return log and outcome, whether the scenario has ended or not."""
+        if self._truth is None:
+            raise ConfigError("a scenario needs at least one step before it is finished")
+        self._open.close()
+        return self._open.finish()
+
+
+def _driver(stack: str) -> DriverSpec:
+    if stack == IDEAL:
+        return Passenger()
+    load_stack(stack)  # what is not there is said here
+    return StackDriver(stack)
+
+
+class _Wheel:
+    """The driver, whose command another one may replace."""
+
+    def __init__(self, inner: StackAtWheel) -> None:
+        self.inner = inner
+        self.command: VehicleCommand | None = None
+
+    @property
+    def report(self) -> StackReport:
+        """What the stack says."""
+        return self.inner.report
+
+    @property
+    def mode(self) -> str:
+        """The stack's mode in its own words."""
+        return self.inner.mode
+
+    def begin(self, table: ActorTable) -> None:
+        """The run begins."""
+        self.inner.begin(table)
+
+    def drive(self, frame: Any, truth: WorldTruth) -> VehicleCommand:
+        """The stack's command, or the one in its place."""
+        own = self.inner.drive(frame, truth)
+        return own if self.command is None else self.command
+
+
+class _SentCommands:
+    """The script, whose words of the last tick may be replaced until the world steps."""
+
+    def __init__(self, inner: Script) -> None:
+        self.inner = inner
+        self.words: list[ActorCommand] = []
+
+    @property
+    def ended(self) -> bool:
+        """The script has ended."""
+        return self.inner.ended
+
+    def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
+        """The script's words, as a list that `replace` changes."""
+        self.words = list(self.inner.step(truth))
+        return self.words
+
+    def replace(self, command: ActorCommand) -> None:
+        """Say something else to one actor."""
+        self.words[:] = [c for c in self.words if c.actor != command.actor] + [command]

@@ -76,11 +76,22 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
             driven.log, load_map(road_file(roads_of(here))), metric_settings(cell)
         )
     return Driven(
-        key=run_key(cell, driven.outcome, digest, motion_hash(driven.log)),
+        key=run_key(
+            cell,
+            driven.outcome,
+            digest,
+            motion_hash(driven.log),
+            missing_vehicles(roads_of(cell), len(driven.log.table)),
+        ),
         metrics=metrics,
         timing=timing,
         error=last_line(driven.error),
     )
+
+
+def missing_vehicles(course: Roads, actors: int) -> int:
+    """Returns how many of the vehicles asked for found no place; actors: of the log, ego included."""
+    return max(course.vehicles + course.reserve + 1 - actors, 0)
 
 
 def metric_settings(cell: RunSpec) -> MetricSettings:
@@ -96,6 +107,7 @@ def run_key(
     outcome: Outcome,
     log_hash: str | None = None,
     motion_hash: str | None = None,
+    vehicles_missing: int | None = None,
 ) -> RunKey:
     """The identifying columns of a cell's row."""
     settings, driver = settings_of(cell), cell.driver
@@ -118,6 +130,7 @@ def run_key(
         version=__version__,
         log_hash=log_hash,
         motion_hash=motion_hash,
+        vehicles_missing=vehicles_missing,
     )
 
 

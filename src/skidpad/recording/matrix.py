@@ -29,6 +29,7 @@ class RunKey:
     version: str = ""  # of skidpad
     log_hash: str | None = None  # content hash of the tick log: the promise of reproducibility
     motion_hash: str | None = None  # of poses, contacts, commands; equal hashes are one drive
+    vehicles_missing: int | None = None  # asked for, but the map has no place for them
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

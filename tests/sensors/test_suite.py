@@ -76,6 +76,37 @@ def test_the_radar_measures_range_and_rate_of_a_wall_and_of_a_car():
     assert min(seen.values()) > 50
 
 
+def points_of(wall_x, ticks=20):
+    """Returns of the published radar of a car at x 100 before a wall, on an empty road."""
+    (radar,) = (s for s in twelve_sensors() if isinstance(s, RadarSpec))
+    wall = Box(int(SemanticClass.BUILDING), wall_x + 0.5, -7.0, -1.0, 0.0, 1.0, 400.0, 90.0)
+    eyes = suite(straight(400, [wall], rails=False), table_of([]), [radar])
+    frames = [eyes.observe(k, states_at([(100, -7, 0, 0)]), {}).radar for k in range(ticks)]
+    return [np.concatenate(column) for column in zip(*frames, strict=True)]
+
+
+@pytest.mark.req("A-028")
+def test_the_radar_stands_where_it_is_published_and_sees_30_degrees_each_way():
+    away, azimuth, altitude, _ = points_of(130.0)
+    on_wall = away * np.cos(azimuth) * np.cos(altitude) > 27.9
+    assert away[on_wall] * (np.cos(azimuth) * np.cos(altitude))[on_wall] == pytest.approx(
+        28.0, abs=0.01
+    )  # 2 m ahead of the car's middle
+    road = away * np.sin(altitude)
+    assert road[~on_wall].min() == pytest.approx(-1.0, abs=0.01)  # 1 m above the road
+    for angle in (azimuth, altitude[on_wall]):
+        assert 14.5 < np.degrees(np.abs(angle)).max() <= 15.001
+
+
+@pytest.mark.req("A-028")
+@pytest.mark.parametrize(("wall_x", "is_seen"), [(251.0, True), (252.5, False)])
+def test_the_radar_reaches_150_m(wall_x, is_seen):
+    away, azimuth, altitude, _ = points_of(wall_x, ticks=60)
+    far = away * np.cos(azimuth) * np.cos(altitude) > wall_x - 102.5
+    assert far.any() == is_seen
+    assert away.max() <= 150.0
+
+
 def test_standing_clutter_closes_at_the_antennas_own_speed_while_turning():
     spec = RadarSpec("r", Pose(2.0, 0.0, 1.0))
     states = states_at([(100, -7, 0, 0)], [10.0])

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from skidpad.core.lefthanded import pose_from_carla
-from skidpad.core.specs import CameraSpec
+from skidpad.core.specs import CameraSpec, RadarSpec
 from skidpad.sensors.twelve import CaptureSize, mounts_outside, twelve_sensors
 
 PUBLISHED = [
@@ -45,6 +45,13 @@ def test_sizes_fields_of_view_and_mountings():
     assert by_id["depth_bumper"].mount.pitch == pytest.approx(radians(20))  # nose down
     assert by_id["depth_roof"].focal == pytest.approx(400.0)
     assert by_id["depth_bumper"].focal == pytest.approx(167.82, abs=0.005)
+
+
+@pytest.mark.req("A-028")
+def test_the_radar_is_the_published_one():
+    (radar,) = (s for s in twelve_sensors() if isinstance(s, RadarSpec))
+    assert (radar.horizontal_fov_deg, radar.vertical_fov_deg, radar.range) == (30.0, 30.0, 150.0)
+    assert radar.mount == pose_from_carla(2.0, 0.0, 1.0)
 
 
 @pytest.mark.req("A-023", "A-024", "A-027", "A-038")

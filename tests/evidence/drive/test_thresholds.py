@@ -70,7 +70,8 @@ def test_a_vehicle_is_present_from_2_to_80_m() -> None:
 
 @pytest.mark.req("A-240")
 @pytest.mark.parametrize(
-    ("measured", "counts"), [(0.096, False), (0.104, True), (97.0, True), (101.0, False)]
+    ("measured", "counts"),
+    [(0.1, False), (0.1001, True), (98.999, True), (99.0, False), (99.001, False)],
 )
 def test_errors_are_of_distances_from_a_tenth_to_99_m(measured: float, counts: bool) -> None:
     assert (one_tick(distance=measured).mean_error_m is not None) == counts

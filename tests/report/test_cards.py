@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import base64
 import dataclasses
+import io
 from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image as Picture
 
 from makelog import drive
 from skidpad.core.states import ContactEvent, StackReport
@@ -24,9 +27,9 @@ from skidpad.recording.runlog import RunLog
 from skidpad.report.cards import contact_text, crash_card, facts, severity, tags, timeline
 from skidpad.report.causes import cause_sentence
 from skidpad.report.crash_page import contact_cards, find_contacts, write_crashes
-from skidpad.report.crashes import crash_sections, found_crashes
+from skidpad.report.crashes import crash_sections, found_crashes, montages, worst_of_each
 from skidpad.report.matrix_data import load_matrix
-from skidpad.report.page import Cards
+from skidpad.report.page import Cards, Montage, Page, Section, render
 from skidpad.roads.bundled import load_map
 
 KMH = 3.6
@@ -313,8 +316,31 @@ def test_no_crash_stands_twice_where_drives_moved_alike(tmp_path: Path) -> None:
         ("3", "clear-sunrise"): ["3_clear-sunrise-001"],
         ("3", "clear-night"): ["3_clear-night-001", "3_clear-night-002"],
     }
-    blocks = [b for b in crash_sections(matrix, found) if isinstance(b, Cards)]
-    assert sum(len(b.cards) for b in blocks) == 3
+    blocks = [*worst_of_each(found), *crash_sections(matrix, found)]
+    cards = [card for b in blocks if isinstance(b, Cards) for card in b.cards]
+    assert len(cards) == len({card.subtitle for card in cards}) == 3
+    assert cards[0].title.startswith("3 · + light assist, resume: Ego into car 1")
+
+
+def test_all_crash_pictures_of_a_configuration_stand_side_by_side(tmp_path: Path) -> None:
+    a_campaign(tmp_path, {("clear-noon", 1): a_log(), ("rain-noon", 2): a_log(seed=3.0)})
+    for run in ("3_clear-noon-001", "3_rain-noon-002"):
+        folder = tmp_path / "runs" / run / "snapshots"
+        folder.mkdir()
+        Picture.new("RGB", (800, 600), "grey").save(folder / "contact_0002.00s.png")
+    matrix = load_matrix(tmp_path)
+    (montage,) = montages(matrix, found_crashes(matrix))
+    assert isinstance(montage, Montage)
+    assert montage.title == "Crash pictures of 3 · + light assist, resume: 2 of 2 crashes"
+    assert sorted(image.caption for image in montage.images) == [
+        "Clear Sky - Noon, 2 s: Ego into car 1, closing at 72 km/h",
+        "Heavy Rain - Noon, 2 s: Ego into car 1, closing at 72 km/h",
+    ]
+    data = base64.b64decode(montage.images[0].uri.partition(",")[2])
+    with Picture.open(io.BytesIO(data)) as picture:
+        assert (picture.format, picture.size) == ("WEBP", (240, 180))
+    page = render(Page("Crashes", "", [Section("Every crash", [montage])]))
+    assert page.count("<figcaption>") == 2
 
 
 def test_a_played_crash_stands_once_too(tmp_path: Path) -> None:

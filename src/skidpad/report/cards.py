@@ -22,6 +22,7 @@ from skidpad.roads.queries import RoadMap
 
 PICTURE_WIDTH = 480  # px
 PICTURE_BYTES = 60_000  # decision M-17
+THUMBNAIL_WIDTH, THUMBNAIL_BYTES = 240, 10_000  # px, bytes
 QUALITIES = (80, 65, 50, 35, 20)
 TIERS = {
     Tier.NONE: "no rule acted",
@@ -189,19 +190,23 @@ def pictures(run: Path, t: float) -> list[Image]:
 
 def webp_uri(path: Path) -> str:
     """A picture as a WebP data URI of at most 60 kB."""
+    return _webp(path, PICTURE_WIDTH, PICTURE_BYTES)
+
+
+def thumbnail_uri(path: Path) -> str:
+    """The same, small enough for many on a page."""
+    return _webp(path, THUMBNAIL_WIDTH, THUMBNAIL_BYTES)
+
+
+def _webp(path: Path, width: int, bytes_max: int) -> str:
     with Picture.open(path) as picture:
         small = picture.convert("RGB")
-        small.thumbnail((PICTURE_WIDTH, PICTURE_WIDTH))
+        small.thumbnail((width, width))
         data = b""
         for quality in QUALITIES:
             buffer = io.BytesIO()
             small.save(buffer, "WEBP", quality=quality, method=4)
             data = buffer.getvalue()
-            if len(data) <= PICTURE_BYTES:
+            if len(data) <= bytes_max:
                 break
     return "data:image/webp;base64," + base64.b64encode(data).decode()
-
-
-def worst(crashes: Sequence[Crash], n: int) -> list[Crash]:
-    """The n hardest crashes, hardest first."""
-    return sorted(crashes, key=severity, reverse=True)[:n]

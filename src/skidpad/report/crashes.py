@@ -9,18 +9,21 @@ from pathlib import Path
 import polars as pl
 
 from skidpad.core.names import slug
+from skidpad.core.wording import count_text
 from skidpad.evidence.contrasts import drive_hash
 from skidpad.evidence.drive.collisions import Crash, find_crashes
 from skidpad.evidence.drive.prepared import Drive, prepare
+from skidpad.recording.campaigns import snapshot
 from skidpad.recording.logfiles import read_log
-from skidpad.report.cards import crash_card, severity
+from skidpad.report.cards import crash_card, headline, severity, thumbnail_uri
 from skidpad.report.matrix_data import Matrix, config_title, weather_title
-from skidpad.report.page import Block, Cards, Page, Section, Text, write_page
+from skidpad.report.page import Block, Cards, Image, Montage, Page, Section, Text, write_page
 from skidpad.roads.bundled import kept_map
 from skidpad.roads.queries import RoadMap
 
 CARDS = "cards"
 INLINE = 3  # per cell
+MONTAGE = 60  # pictures of a configuration
 RUNS_READ = 10  # per cell, those with the hardest impacts
 Cell = tuple[str, str]  # configuration, weather
 Found = tuple[Crash, Drive, RoadMap, Path]  # Path: of the run
@@ -56,32 +59,64 @@ def crashed_runs(matrix: Matrix) -> dict[Cell, pl.DataFrame]:
 
 def worst_of_each(crashes: dict[Cell, list[Found]]) -> list[Block]:
     """The hardest crash of each configuration, open."""
+    cards = [
+        replace(card, title=f"{config_title(config)}: {card.title}", id=worst_id(config))
+        for config, item in _worst(crashes).items()
+        for card in [crash_card(*item)]
+    ]
+    return [Cards("The worst crash of each configuration", cards, open=True)] if cards else []
+
+
+def worst_id(config: str) -> str:
+    """Name of the place of a configuration's worst crash in the page."""
+    return "worst-" + slug(config)
+
+
+def _worst(crashes: dict[Cell, list[Found]]) -> dict[str, Found]:
     worst: dict[str, Found] = {}
     for (config, _), found in crashes.items():
         if config not in worst or severity(found[0][0]) > severity(worst[config][0]):
             worst[config] = found[0]
-    if not worst:
-        return []
-    cards = [
-        replace(card, title=f"{config_title(config)}: {card.title}")
-        for config, item in worst.items()
-        for card in [crash_card(*item)]
-    ]
-    return [Cards("The worst crash of each configuration", cards, open=True)]
+    return worst
 
 
 def crash_sections(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[Block]:
-    """One fold per cell with its worst crashes; pages with all of them beside the report."""
+    """One fold per cell with its worst crashes; pages with all of them beside the report.
+
+    The worst of a configuration stands at the top of the page, so its cell leaves it out here.
+    """
     if not crashes:
         return [Text("No intervention: no crash and no departure.")]
     intro = Text(
-        "The three hardest crashes of each cell. Times count from the contact. A drive that moved "
-        "alike in several weathers stands once, under the first of them. Every other crash stands "
-        "on its cell's own page in the folder cards."
+        "The hardest crashes of each cell, without the worst of a configuration, which stands in "
+        "the first section. Times count from the contact. A drive that moved alike in several "
+        "weathers stands once, under the first of them. Every other crash stands on its cell's own "
+        "page in the folder cards."
     )
-    runs = crashed_runs(matrix)
-    blocks = [_cell_block(matrix, cell, found, runs[cell]) for cell, found in crashes.items()]
-    return [intro, *blocks]
+    runs, worst = crashed_runs(matrix), _worst(crashes)
+    cells = [
+        _cell_block(matrix, cell, found, runs[cell], worst[cell[0]])
+        for cell, found in crashes.items()
+    ]
+    return [intro, *montages(matrix, crashes), *(c for c in cells if c.cards)]
+
+
+def montages(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[Block]:
+    """The pictures of all crashes of a configuration side by side, hardest first."""
+    blocks: list[Block] = []
+    for config in matrix.configs:
+        cells = [(w, f) for (c, w), found in crashes.items() if c == config for f in found]
+        cells.sort(key=lambda item: severity(item[1][0]), reverse=True)
+        taken = [(w, f, path) for w, f in cells if (path := snapshot(f[3], f[0].t)) is not None]
+        images = [
+            Image(thumbnail_uri(path), f"{weather_title(w)}, {f[0].t:.0f} s: {headline(f[0])}")
+            for w, f, path in taken[:MONTAGE]
+        ]
+        if images:
+            count = count_text(len(cells), "crash", "crashes")
+            title = f"Crash pictures of {config_title(config)}: {len(images)} of {count}"
+            blocks.append(Montage(title, images))
+    return blocks
 
 
 def _hardest(matrix: Matrix, crashed: pl.DataFrame) -> list[Found]:
@@ -103,16 +138,22 @@ def _crashes(matrix: Matrix, name: str) -> Iterator[Found]:
         yield from ((crash, drive, road_map, run) for crash in find_crashes(drive))
 
 
-def _cell_block(matrix: Matrix, cell: Cell, found: list[Found], crashed: pl.DataFrame) -> Cards:
+def _cell_block(
+    matrix: Matrix, cell: Cell, found: list[Found], crashed: pl.DataFrame, worst: Found
+) -> Cards:
     config, weather = cell
     title = f"{config_title(config)}, {weather_title(weather)}"
-    inline = [crash_card(*item) for item in found[:INLINE]]
-    if len(found) <= INLINE and len(crashed) <= RUNS_READ:
-        return Cards(title, inline)
+    others = [item for item in found if item is not worst]
+    inline = [crash_card(*item) for item in others[:INLINE]]
+    if len(others) <= INLINE and len(crashed) <= RUNS_READ:
+        if len(others) == len(found):
+            return Cards(title, inline)
+        return Cards(title, inline, link=f"#{worst_id(config)}", note="the worst stands above")
     name = slug(f"{config}_{weather}") + ".html"
     pages = matrix.folder.path / CARDS
     section = Section(title, [Cards(title, [crash_card(*item) for item in found], open=True)])
     write_page(Page("Crashes", title, [section]), pages / name)
     total = int(crashed["fatal_collisions"].sum())
-    told = f"{len(found)} of {total} crashes" if len(found) < total else f"all {total} crashes"
+    told = f"{len(found)} of" if len(found) < total else "all"
+    told += f" {count_text(total, 'crash', 'crashes')}"
     return Cards(title, inline, link=f"{CARDS}/{name}", note=told)

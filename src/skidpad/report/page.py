@@ -202,6 +202,15 @@ class Cards:
 
 
 @dataclass(frozen=True, slots=True)
+class Montage:
+    """Many small pictures side by side, folded away until asked for."""
+
+    title: str
+    images: Sequence[Image]
+    kind: str = "montage"
+
+
+@dataclass(frozen=True, slots=True)
 class Definitions:
     """Terms and what they mean."""
 
@@ -239,7 +248,18 @@ class Code:
 
 
 Block = (
-    Answers | Table | Figure | Text | Numbers | Verdict | Cards | Card | Definitions | Code | Tree
+    Answers
+    | Table
+    | Figure
+    | Text
+    | Numbers
+    | Verdict
+    | Cards
+    | Card
+    | Montage
+    | Definitions
+    | Code
+    | Tree
 )
 
 

@@ -61,6 +61,7 @@ class Metrics:
     contacts_heavy: int | None = metric("the same, above 20 km/h", "T-4")
     contacts_vulnerable: int | None = metric("of these with persons or two wheels", "T-4")
     contacts_by_closing_speed: int | None = metric("of these graded by closing speed", "T-4")
+    contacts_repeated: int | None = metric("the same one touched again within 8 s", "T-4")
     contacts_static: int | None = metric("contacts with all that is no road user", "T-4")
     max_delta_v_kmh: float | None = metric("largest delta-v at a contact with a road user", "T-4")
     interventions: int | None = metric("times put back; published as fatal collisions", "T-4")

@@ -54,8 +54,7 @@ def severity(crash: Crash) -> tuple[bool, float, float]:
     contact = crash.contact
     if contact is None:
         return False, 0.0, crash.v_ego
-    v = contact.v_closing if contact.delta_v is None else contact.delta_v
-    return contact.is_vulnerable, v, crash.v_ego
+    return contact.is_vulnerable, contact.v_graded, crash.v_ego
 
 
 def crash_card(crash: Crash, drive: Drive, road_map: RoadMap, run: Path) -> Card:
@@ -116,7 +115,7 @@ def facts(crash: Crash) -> list[tuple[str, str]]:
         ("other", crash.v_other, speed),
         ("closing", crash.v_closing, speed),
         (_delta_v_name(contact), delta_v, speed),
-        ("offset in lane", crash.lane_offset, "{:.2f} m".format),
+        ("offset in lane", crash.lane_offset, lambda m: f"{round(m, 2) + 0.0:.2f} m"),
         ("bend radius", crash.bend_radius, "{:.0f} m".format),
         ("friction", crash.mu, "{:.2f}".format),
         ("hardest brake, last 2 s", 100 * crash.brake_max, "{:.0f} %".format),
@@ -176,8 +175,8 @@ def _news_event(s: Sighting, story: Story) -> Event:
 def contact_text(contact: Contact) -> str:
     """One contact in words, with its class and what it is graded by."""
     what = contact.other if contact.actor > 0 else f"the {contact.other}"
-    v = contact.v_closing if contact.delta_v is None else contact.delta_v
-    return f"contact with {what}, {contact.graded_by.value} {speed(v)}, {contact.severity.value}"
+    by = f"{contact.graded_by.value} {speed(contact.v_graded)}"
+    return f"contact with {what}, {by}, {contact.severity.value}"
 
 
 def pictures(run: Path, t: float) -> list[Image]:

@@ -143,19 +143,43 @@ def test_barriers_and_cones_are_counted_apart(contact: ContactEvent, kind: Actor
     assert (m.contacts_static, m.contacts, m.max_delta_v_kmh) == (1, 1, None)
 
 
-def test_every_contact_is_in_one_class_also_those_that_start_no_recovery() -> None:
+def test_every_contact_is_counted_also_those_that_start_no_recovery() -> None:
     log = struck(12.0)
     more = (touch(0.2, tick=20), touch(0.2, actor=-1, tick=22))
     m = metrics(dataclasses.replace(log, events=(*log.events, *more)))
-    assert (m.contacts_light, m.contacts_medium, m.contacts_heavy, m.contacts_static) == (
-        1,
-        1,
-        0,
-        1,
-    )
-    assert m.contacts == 3
+    assert (m.contacts_light, m.contacts_medium, m.contacts_heavy) == (0, 1, 0)
+    assert (m.contacts_repeated, m.contacts_static, m.contacts) == (1, 1, 3)
     assert m.interventions == m.fatal_collisions == 0
     assert m.serious_contacts_per_100_km == pytest.approx(100.0 / m.distance_km)
+
+
+def twice(pause: int, put_back: bool = False) -> RunLog:
+    """Touched at tick 10 and again, the second time with 30 km/h."""
+
+    def rows(k: int) -> list[dict[str, float]]:
+        v = 20.0 - (k >= TICK) * 3.0 / KMH - (k >= TICK + pause) * 30.0 / KMH
+        return [{"x": 50.0, "vx": v}, {"x": 54.0}]
+
+    moved = Relocation(TICK + 5, RelocationReason.COLLISION, 0.0, pose(1.0), pose(2.0))
+    return drive(
+        TICK + pause + 2,
+        rows,
+        contacts=[touch(), touch(tick=TICK + pause)],
+        extra=lambda log, k: log.relocated(moved) if put_back and k == moved.tick else None,
+    )
+
+
+def test_touching_the_same_vehicle_again_is_one_contact_as_hard_as_its_hardest_touch() -> None:
+    m = metrics(twice(pause=160))
+    assert (m.contacts_light, m.contacts_heavy, m.contacts_repeated, m.contacts) == (0, 1, 1, 2)
+    assert m.max_delta_v_kmh == pytest.approx(30.0, abs=0.01)
+
+
+@pytest.mark.parametrize(("pause", "put_back"), [(161, False), (160, True)])
+def test_after_8_s_or_being_put_back_it_is_another_contact(pause: int, put_back: bool) -> None:
+    m = metrics(twice(pause, put_back))
+    assert (m.contacts_light, m.contacts_heavy, m.contacts_repeated) == (1, 1, 0)
+    assert m.serious_contacts == 1
 
 
 def reset(

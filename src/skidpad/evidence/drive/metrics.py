@@ -21,7 +21,12 @@ from skidpad.evidence.drive.perception import (
     radar_levels,
 )
 from skidpad.evidence.drive.prepared import Drive, Floats, Mask, MetricSettings, prepare
-from skidpad.evidence.drive.severity import Measure, Severity, graded_contacts
+from skidpad.evidence.drive.severity import (
+    Measure,
+    Severity,
+    distinct_contacts,
+    graded_contacts,
+)
 from skidpad.recording.events import Event
 from skidpad.recording.matrix import Metrics
 from skidpad.recording.runlog import RunLog
@@ -120,10 +125,11 @@ def _collisions(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
 
 
 def _severity(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
-    contacts = [c for c in graded_contacts(drive) if where[drive.row(c.tick)]]
-    users = [c for c in contacts if c.is_road_user]
+    touches = [c for c in graded_contacts(drive) if where[drive.row(c.tick)]]
+    users = [c for c in distinct_contacts(drive) if where[drive.row(c.tick)]]
+    static = sum(not c.is_road_user for c in touches)
     counts = Counter(c.severity for c in users)
-    serious = sum(c.is_serious for c in contacts)
+    serious = sum(c.is_serious for c in users)
     hardest = max((c.delta_v for c in users if c.delta_v is not None), default=None)
     first_s, undisturbed_s = first_intervention(drive, where)
     return Metrics(
@@ -133,7 +139,8 @@ def _severity(drive: Drive, here: Sequence[Crash], where: Mask) -> Metrics:
         contacts_heavy=counts[Severity.HEAVY],
         contacts_vulnerable=sum(c.is_vulnerable for c in users),
         contacts_by_closing_speed=sum(c.graded_by is Measure.CLOSING_SPEED for c in users),
-        contacts_static=len(contacts) - len(users),
+        contacts_repeated=len(touches) - static - len(users),
+        contacts_static=static,
         max_delta_v_kmh=None if hardest is None else hardest * KMH,
         interventions=len(here),
         first_intervention_s=first_s,

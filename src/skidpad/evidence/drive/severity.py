@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 
 import numpy as np
@@ -15,6 +15,7 @@ from skidpad.recording.runlog import RunLog
 
 LIGHT_BELOW = mps_from_kmh(5.0)  # m/s, a contact below it is of the lowest class
 HEAVY_ABOVE = mps_from_kmh(20.0)  # m/s, a contact above it is of the highest class
+AGAIN = 8.0  # s (A-188) without a touch after which the next one is another contact
 A_POSSIBLE = 15.0  # m/s^2, more than tyres can do: the tick before was a contact too
 JUMP = 1.0  # m, further than any motion explains: the actor was put somewhere else
 VULNERABLE = (ActorKind.MOTORCYCLE, ActorKind.BICYCLE, ActorKind.PEDESTRIAN)
@@ -57,6 +58,11 @@ class Contact:
         return self.kind in VULNERABLE
 
     @property
+    def v_graded(self) -> float:
+        """The speed that decides the class, m/s."""
+        return self.v_closing if self.delta_v is None else self.delta_v
+
+    @property
     def graded_by(self) -> Measure:
         """Whether the delta-v decides, or the closing speed for want of it."""
         return Measure.CLOSING_SPEED if self.delta_v is None else Measure.DELTA_V
@@ -69,16 +75,38 @@ class Contact:
     @property
     def severity(self) -> Severity:
         """The class; never the lowest with a pedestrian or somebody on two wheels."""
-        v = self.v_closing if self.delta_v is None else self.delta_v
-        if v > HEAVY_ABOVE:
+        if self.v_graded > HEAVY_ABOVE:
             return Severity.HEAVY
-        light = v < LIGHT_BELOW and not self.is_vulnerable
+        light = self.v_graded < LIGHT_BELOW and not self.is_vulnerable
         return Severity.LIGHT if light else Severity.MEDIUM
 
 
 def graded_contacts(drive: Drive) -> tuple[Contact, ...]:
     """Returns every contact of the ego in order, each graded."""
     return tuple(grade(drive, contact) for contact in drive.log.contacts)
+
+
+def distinct_contacts(drive: Drive) -> tuple[Contact, ...]:
+    """Returns the contacts with road users, each once and as hard as its hardest touch.
+
+    Touching the same road user again within 8 s, before the ego is put back, is the same contact.
+    """
+    chains: list[list[Contact]] = []
+    last: dict[int, list[Contact]] = {}
+    for contact in (c for c in graded_contacts(drive) if c.is_road_user):
+        chain = last.get(contact.actor)
+        if chain is None or not _is_again(drive, chain[-1], contact):
+            chain = last[contact.actor] = []
+            chains.append(chain)
+        chain.append(contact)
+    return tuple(
+        replace(max(chain, key=lambda c: c.v_graded), tick=chain[0].tick) for chain in chains
+    )
+
+
+def _is_again(drive: Drive, before: Contact, contact: Contact) -> bool:
+    soon = (contact.tick - before.tick) * drive.log.header.dt <= AGAIN
+    return soon and not any(before.tick < r.tick <= contact.tick for r in drive.log.relocations)
 
 
 def grade(drive: Drive, contact: ContactEvent) -> Contact:

@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import Any
 
 __version__ = "0.1.0"
-__all__ = ["Scenario", "__version__", "drive"]
+__all__ = ["Scenario", "__version__", "drive", "register"]
 
 
 def __getattr__(name: str) -> Any:
@@ -15,4 +15,6 @@ def __getattr__(name: str) -> Any:
         return import_module("skidpad.campaign.run").drive
     if name == "Scenario":
         return import_module("skidpad.campaign.stepping").Scenario
+    if name == "register":
+        return import_module("skidpad.scenarios.registry").register
     raise AttributeError(f"module 'skidpad' has no attribute {name!r}")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, replace
 from math import isfinite, nan
@@ -38,6 +38,7 @@ from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios import scenario as scenarios
 from skidpad.scenarios.player import Player, setups
+from skidpad.scenarios.registry import Names
 from skidpad.scenarios.shipped import NAMES, scenario_file
 from skidpad.sensors.overlay import Lens
 from skidpad.sensors.twelve import twelve_sensors
@@ -47,7 +48,7 @@ from skidpad.stack.adas import AdasStack
 from skidpad.stack.agents import load_agent
 from skidpad.stack.channels.settings import CarModel
 from skidpad.stack.interface import Stack
-from skidpad.stack.loading import GuardedStack, load_stack
+from skidpad.stack.loading import GuardedStack, import_class, load_stack
 from skidpad.stack.settings import Settings, grip_of, settings_of
 
 CRUISE = "cruise_speed"  # property of a scenario's ego, m/s
@@ -214,7 +215,19 @@ def check_scenario(course: Scenario) -> scenarios.Compiled:
         maps=[Path(folder) for folder in course.maps],
         ignore_unsupported=course.ignore_unsupported,
         lenient=course.lenient,
+        names=Names(_registered(course.register), strict=course.strict),
     )
+
+
+def _registered(texts: Sequence[str]) -> dict[str, type[Any]]:
+    """The classes that a user gives names: NAME=module:Class."""
+    found = {}
+    for text in texts:
+        name, equals, where = text.partition("=")
+        if not equals or not name:
+            raise ConfigError(f"--register takes NAME=module:Class, got {told(text, 200)}")
+        found[name] = import_class(where, "class")
+    return found
 
 
 def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:

@@ -204,6 +204,13 @@ class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown
     lenient: Annotated[
         bool, Meta(description="Fill in what the file lacks where its meaning is clear.")
     ] = False
+    register: Annotated[
+        tuple[str, ...],
+        Meta(description="NAME=module:Class, a controller, action or value that files may name."),
+    ] = ()
+    strict: Annotated[
+        bool, Meta(description="Names that are not registered are errors, not notes.")
+    ] = False
 
     @property
     def title(self) -> str:
@@ -352,6 +359,8 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             found.append(
                 f"the {'stack' if isinstance(driver, StackDriver) else 'agent'} {driver.where!r}"
             )
+        if isinstance(self.course, Scenario):
+            found += [f"the class {text!r}" for text in self.course.register]
         if self.backend.server_command:
             found.append(f"the command {self.backend.server_command!r}")
         return tuple(found)

@@ -35,6 +35,8 @@ class Context:
     added: frozenset[str] = frozenset()  # entities that some event adds
     elements: Sequence[tuple[str, Path]] = ()
     findings: list[Finding] = field(default_factory=list)
+    names: Any = None  # `registry.Names`: what the file may reach by name
+    controllers: Mapping[str, Any] = field(default_factory=dict)  # of entities, not yet active
 
     def entity(self, node: Node, name: str = "entityRef") -> str:
         """An entity that an attribute names; a fault when there is none."""

@@ -37,6 +37,8 @@ INSIDE = frozenset(  # understood where they stand inside others
 STATES = (
     "colours and three lamps such as `on;off;off` are shown; other words are for conditions alone"
 )
+NAMED = "by registered names; others are noted, without effect"
+CONTROLLED = "of others than the ego `ACC` and registered names, along their lanes"
 FOLLOW = "`follow` is read as `position`"
 PARTIAL: Mapping[str, str] = MappingProxyType(
     {
@@ -54,23 +56,23 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         "VisibilityAction": "for sensors; pictures for people and other traffic go by none",
         "EnvironmentAction": "falling snow counts by its sight, wind not at all",
         "TrafficSignalStateAction": STATES,
-        "UserDefinedValueCondition": "nobody sets such values: never holds",
-        "CustomCommandAction": "is noted, without effect",
+        "UserDefinedValueCondition": NAMED,
+        "CustomCommandAction": NAMED,
         "SetMonitorAction": "is noted, without effect",
         "ConnectTrailerAction": "is noted, without effect",
         "DisconnectTrailerAction": "is noted, without effect",
         "InfrastructureAction": STATES,
         "AngleCondition": "pitch and roll are those of the road",
         "RelativeAngleCondition": "pitch and roll are those of the road",
-        "AssignControllerAction": "matters for the ego only",
-        "ActivateControllerAction": "matters for the ego only",
+        "AssignControllerAction": CONTROLLED,
+        "ActivateControllerAction": CONTROLLED,
         "AcquirePositionAction": "chooses the way at forks; does not change lanes by itself",
         "AssignRouteAction": "chooses the way at forks; does not change lanes by itself",
         "TrafficSourceAction": f"at most {MOST} at a time; who drives them is chosen here",
         "TrafficSinkAction": "takes vehicles of traffic, never entities of the file",
         "TrafficSwarmAction": f"at most {MOST}; who drives them is chosen here",
         "TrafficAreaAction": f"at most {MOST}; who drives them is chosen here",
-        "UserDefinedAction": "is noted, without effect",
+        "UserDefinedAction": NAMED,
         "OverrideControllerValueAction": "no clutch, no brake by force; a wheel has 1.5 turns to either side",
     }
 )

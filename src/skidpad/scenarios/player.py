@@ -15,6 +15,7 @@ from skidpad.recording.staging import Staging
 from skidpad.scenarios.entities import Box
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Place
+from skidpad.scenarios.registry import control
 from skidpad.scenarios.scenario import Scenario
 from skidpad.scenarios.scene import Actor, Happening, Running, Scene
 from skidpad.scenarios.signals import SignalPlan
@@ -128,6 +129,7 @@ class Player:
         self.going = [action for action in self.going if not action.step(self.scene)]
         self.telling.step(self.scene)
         drive(self.scene)
+        control(self.scene)
         t = self.scene.t
         stopped = self.hit and self.end_on_collision
         self.ended = self.telling.ended or stopped or t >= self.duration

@@ -22,6 +22,7 @@ from skidpad.scenarios.lenient import fill_in
 from skidpad.scenarios.network import Network, network_of
 from skidpad.scenarios.oddities import oddities
 from skidpad.scenarios.parameters import root_values, variables
+from skidpad.scenarios.registry import ControllerOf, Names, controller_of
 from skidpad.scenarios.routes import route_position
 from skidpad.scenarios.schema import violations
 from skidpad.scenarios.shipped import FOLDER
@@ -112,10 +113,11 @@ def check(
     maps: Sequence[Path] = (),
     ignore_unsupported: bool = False,
     lenient: bool = False,
+    names: Names | None = None,
 ) -> Compiled:
     """Compile, and tell everything that was found; FileError for what is no scenario at all.
 
-    lenient: what is missing but clear is filled in, with a warning.
+    lenient: what is missing but clear is filled in, with a warning. names: that the file may use.
     """
     allowed = HARMLESS | {Kind.UNSUPPORTED} if ignore_unsupported else HARMLESS
     root = parse(file)
@@ -124,7 +126,9 @@ def check(
     try:
         findings += violations(root.element, file.name, _minor_revision(root))
         findings += fill_in(root) if lenient else ()
-        scenario = _compiled(root, _Wish(parameters, ego, maps, allowed), findings)
+        scenario = _compiled(
+            root, _Wish(parameters, ego, maps, allowed, names or Names()), findings
+        )
     except Fault as fault:
         findings.append(fault.finding)
     found = tuple(sorted(set(findings), key=lambda f: (f.file != file.name, f.line, f.what)))
@@ -161,6 +165,7 @@ class _Wish:
     ego: str | None
     maps: Sequence[Path]
     allowed: frozenset[Kind]
+    names: Names
 
 
 def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | None:
@@ -181,6 +186,8 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
         network, catalogs, by_name, entities.groups, values, variables(root),
         findings=findings, further_positions=FURTHER_POSITIONS,
     )  # fmt: skip
+    ctx.names = wish.names
+    ctx.controllers, unknown = _entity_controllers(root, catalogs, wish.names)
     board = root.child("Storyboard")
     ctx.added = _added(board)
     signals = ctx.attempt(lambda: compile_signals(root.find("RoadNetwork"))) or ()
@@ -189,6 +196,9 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
     faulty = any(f.kind not in wish.allowed for f in findings)
     chosen = None if faulty else ctx.attempt(lambda: choose_ego(root, by_name, wish.ego))
     if chosen is None:
+        return None
+    findings += [finding for name, finding in unknown if name != chosen]
+    if any(f.kind not in wish.allowed for f in findings):
         return None
     if start.entities[chosen].place is None:
         findings.append(
@@ -203,6 +213,25 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
         root.file, network, by_name | ctx.hired, chosen, start, storyboard, values, ctx.variables,
         later, signals, file_criteria(root), tuple(findings),
     )  # fmt: skip
+
+
+def _entity_controllers(
+    root: Node, catalogs: Catalogs, names: Names
+) -> tuple[dict[str, ControllerOf], list[tuple[str, Finding]]]:
+    """Controllers of entities by name, and what is said of those that are not known."""
+    known: dict[str, ControllerOf] = {}
+    unknown: list[tuple[str, Finding]] = []
+    for entity in root.child("Entities").children("ScenarioObject"):
+        for node in entity.children("ObjectController"):
+            try:
+                found, finding = controller_of(catalogs.resolved(node.only(), "Controller"), names)
+            except Fault:
+                continue  # its entity says so
+            if found is not None:
+                known.setdefault(entity.label(), found)
+            if finding is not None:
+                unknown.append((entity.label(), finding))
+    return known, unknown
 
 
 def _added(board: Node) -> frozenset[str]:

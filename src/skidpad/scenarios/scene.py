@@ -73,6 +73,14 @@ class Done:
 DONE = Done()
 
 
+class Controlling(Protocol):
+    """A controller that drives an actor along its lane."""
+
+    def acceleration(self, scene: Scene, actor: str) -> float:
+        """What it asks for, m/s^2."""
+        ...
+
+
 @dataclass
 class Actor:
     """One entity while the scenario is played.
@@ -98,6 +106,8 @@ class Actor:
     handed: bool = True  # somebody else's controller is active, where mode is None
     word: ActorCommand | None = None  # appear or vanish, said once
     visible: bool = True  # to sensors
+    assigned: Any = None  # a `registry.ControllerOf` that an action has given it
+    controller: Controlling | None = None  # active, of an actor other than the ego
     worked: dict[str, Any] = field(default_factory=dict)  # inputs that the file works, by name
     a: float = 0.0  # m/s^2 of the speed
     travelled: float = 0.0  # m

@@ -226,13 +226,13 @@ def drive(scene: Scene) -> None:
         if guide.base is None or scene.network.ahead(guide.base, END, guide.roads) is None:
             vanish(scene, actor)
             continue
-        gap, v_lead = _lead(scene, actor)
+        gap, v_lead = lead_of(scene, actor)
         a = float(idm(guide.v, scene.cruising[name], gap, v_lead, Character()))
         v = max(guide.v + a * scene.dt, 0.0)
         guide.v, guide.a = v, (v - guide.v) / scene.dt
 
 
-def _lead(scene: Scene, actor: Actor) -> tuple[float, float]:
+def lead_of(scene: Scene, actor: Actor) -> tuple[float, float]:
     """Gap in m and speed in m/s of who is ahead in the lane; inf where nobody is."""
     base = actor.guide.base
     assert base is not None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import pi
 from types import MappingProxyType
 
@@ -12,6 +12,7 @@ from skidpad.scenarios.actions.base import NoEffect, PrivateAction
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.findings import Fault, Kind
+from skidpad.scenarios.registry import ControllerOf, controller_of
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 
 FULL_LOCK = 3.0 * pi  # rad of a steering wheel, to either side; assumption
@@ -24,6 +25,8 @@ class Activate:
 
     lateral: bool | None
     longitudinal: bool | None
+    controllers: Mapping[str, ControllerOf] = field(default_factory=dict)  # of entities, by name
+    assigned: ControllerOf | None = None
 
     @property
     def says(self) -> bool | None:
@@ -33,7 +36,12 @@ class Activate:
         return bool(self.lateral or self.longitudinal)
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """Only an entity with a controller of its own (the ego) changes hands."""
+        """The ego changes hands; others have a controller, where one of a known name is theirs."""
+        actor.assigned = self.assigned or actor.assigned
+        if actor.mode is not None and self.longitudinal is not None:
+            found = actor.assigned or self.controllers.get(actor.name)
+            active = found is not None and self.longitudinal
+            actor.controller = found.make() if found is not None and active else None
         if actor.mode is not None or self.says is None:
             return DONE
         if actor.handed and not self.says:
@@ -61,18 +69,22 @@ def _flag(node: Node, name: str) -> bool | None:
 
 def compile_activate(node: Node, ctx: Context) -> Activate:
     """An <ActivateControllerAction>."""
-    del ctx
-    return Activate(_flag(node, "lateral"), _flag(node, "longitudinal"))
+    return Activate(_flag(node, "lateral"), _flag(node, "longitudinal"), ctx.controllers)
 
 
 def compile_assign(node: Node, ctx: Context) -> Activate:
     """An <AssignControllerAction>; before 1.1 it also activated what it assigned."""
-    for reference in node.children("CatalogReference"):
+    found: ControllerOf | None = None
+    for one in node.children("CatalogReference", "Controller"):
         try:
-            ctx.catalogs.entry(reference)
+            found, unknown = controller_of(ctx.catalogs.resolved(one, "Controller"), ctx.names)
         except Fault as fault:
             ctx.findings.append(replace(fault.finding, kind=Kind.NOTE))
-    return Activate(_flag(node, "activateLateral"), _flag(node, "activateLongitudinal"))
+            continue
+        if unknown is not None:
+            ctx.findings.append(replace(unknown, kind=Kind.NOTE))
+    lateral, longitudinal = _flag(node, "activateLateral"), _flag(node, "activateLongitudinal")
+    return Activate(lateral, longitudinal, ctx.controllers, found)
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from skidpad.core.setup import ActorCommand
 from skidpad.scenarios.actions.base import GlobalAction, NoEffect
@@ -137,10 +138,30 @@ def _environment(node: Node, ctx: Context) -> GlobalAction:
     return SetEnvironment(compile_environment(ctx.catalogs.resolved(node.only(), "Environment")))
 
 
+@dataclass(frozen=True, slots=True)
+class UserAction:
+    """An action that Python code carries out, found by its name."""
+
+    act: Callable[..., Any]
+    text: str
+
+    def happen(self, scene: Scene) -> Running:
+        """At once."""
+        self.act(scene, self.text)
+        return DONE
+
+
 def user_defined(node: Node, ctx: Context) -> GlobalAction:
-    """For somebody else: a <UserDefinedAction>, a monitor that is set."""
-    del ctx
-    return NoEffect(node.tag)
+    """A <UserDefinedAction> by the type of its command; a monitor that is set has no effect."""
+    command = node.find("CustomCommandAction")
+    if command is None:
+        return NoEffect(node.tag)
+    name = command.text("type")
+    act = ctx.names.hook(name, "act")
+    if act is None:
+        ctx.findings.append(ctx.names.unknown(command, "command", name))
+        return NoEffect(command.tag)
+    return UserAction(act, (command.element.text or "").strip())
 
 
 GLOBAL: Mapping[str, Callable[[Node, Context], GlobalAction]] = {

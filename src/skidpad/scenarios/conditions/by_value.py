@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from skidpad.roads.opendrive.document import id_number
 from skidpad.scenarios.conditions.base import Condition, Probe, Rule, rule, rule_name
@@ -159,10 +160,26 @@ def _time_of_day(node: Node, ctx: Context) -> Condition:
     return TimeOfDay(Rule(rule_name(node), moment))
 
 
+@dataclass(frozen=True, slots=True)
+class UserValue:
+    """A value that Python code tells, found by its name, against a value of the file."""
+
+    read: Callable[..., Any]
+    rule: str
+    value: str
+
+    def probe(self) -> Probe:
+        """As it is now."""
+        return lambda scene: compared(self.rule, str(self.read(scene)), self.value)
+
+
 def _of_user(node: Node, ctx: Context) -> Condition:
-    what = f"nobody sets the value {node.text('name')!r}: it never holds"
-    ctx.findings.append(node.finding(what, Kind.NOTE))
-    return Never()
+    name = node.text("name")
+    read = ctx.names.hook(name, "value")
+    if read is None:
+        ctx.findings.append(ctx.names.unknown(node, "value", name))
+        return Never()
+    return UserValue(read, rule_name(node), node.text("value"))
 
 
 def _signal(node: Node, ctx: Context) -> Condition:

@@ -1,0 +1,160 @@
+"""Python classes that files reach by name: controllers of actors, actions and values of users.
+
+A file names them and nothing more: it never says what is imported. Names come from `register` in
+Python, or from `--register NAME=module:Class` on the command line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from math import inf, isfinite
+from typing import Any
+
+from skidpad.core.errors import ConfigError
+from skidpad.core.told import told
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.findings import Finding, Kind
+from skidpad.scenarios.scene import Scene
+from skidpad.scenarios.traffic import lead_of
+from skidpad.simulation.world.traffic.idm import Character, idm
+
+Make = Callable[..., Any]
+REGISTERED: dict[str, Make] = {}
+
+
+def register(name: str, made: Make) -> None:
+    """Let files name a class of yours.
+
+    Args:
+        name: As files write it: the name of a Controller, the type of a CustomCommandAction, or the
+            name of a UserDefinedValueCondition.
+        made: A class. A controller is made with its properties (a dict of texts) and has
+            `update(scene, name)`, which returns an acceleration in m/s^2. Others are made without
+            arguments: an action has `act(scene, text)`, a value has `value(scene)`.
+    """
+    if not name or not callable(made):
+        raise ConfigError(f"register needs a name and a class, got {name!r} and {made!r}")
+    REGISTERED[name] = made
+
+
+class Acc:
+    """Adaptive cruise control by the Intelligent Driver Model: controller `ACC`.
+
+    Properties: setSpeed, m/s (default: the speed at which it is activated); timeGap, s.
+    """
+
+    def __init__(self, properties: Mapping[str, str]) -> None:
+        self.v_set = _number(properties, "setSpeed", -1.0)
+        headway = _number(properties, "timeGap", Character().headway)
+        self.character = Character(headway=headway)
+
+    def update(self, scene: Scene, name: str) -> float:
+        """Return the acceleration behind whoever is ahead in the lane."""
+        actor = scene.actors[name]
+        if self.v_set < 0.0:
+            self.v_set = actor.guide.v
+        gap, v_lead = (inf, 0.0) if actor.guide.base is None else lead_of(scene, actor)
+        return float(idm(actor.guide.v, self.v_set, gap, v_lead, self.character))
+
+
+def _number(properties: Mapping[str, str], name: str, default: float) -> float:
+    try:
+        value = float(properties.get(name, default))
+    except ValueError:
+        value = inf
+    if not isfinite(value):
+        raise ConfigError(f"property {name} of a controller must be a number")
+    return value
+
+
+BUILT_IN: Mapping[str, Make] = {"ACC": Acc, "ACCController": Acc}
+
+
+@dataclass
+class Names:
+    """The names that one file may use. strict: one that is not known is an error, else a note."""
+
+    given: Mapping[str, Make] = field(default_factory=dict)
+    strict: bool = False
+    _made: dict[str, Any] = field(default_factory=dict)
+
+    def find(self, name: str) -> Make | None:
+        """Return the class of this name."""
+        return {**BUILT_IN, **REGISTERED, **self.given}.get(name)
+
+    def unknown(self, node: Node, what: str, name: str) -> Finding:
+        """Return what is said of a name that is not registered."""
+        text = f"{what} {name!r} is not registered: it does nothing"
+        return node.finding(text, Kind.ERROR if self.strict else Kind.NOTE)
+
+    def hook(self, name: str, method: str) -> Callable[..., Any] | None:
+        """Return a method of the one object of this name in this file; None: not registered."""
+        made = self.find(name)
+        if made is None or name in BUILT_IN:
+            return None
+        if name not in self._made:
+            self._made[name] = call(name, made)
+        found = getattr(self._made[name], method, None)
+        if found is None:
+            raise ConfigError(f"{name!r}, as it is registered, has no method {method}")
+        return lambda *args: call(name, found, *args)
+
+
+def call(name: str, function: Callable[..., Any], *args: Any) -> Any:
+    """Call a user's code; whatever it raises is said in one sentence."""
+    try:
+        return function(*args)
+    except ConfigError:
+        raise
+    except Exception as error:
+        raise ConfigError(f"{name!r}, as it is registered, failed: {told(error)}") from error
+
+
+@dataclass(frozen=True, slots=True)
+class ControllerOf:
+    """A controller that a file gives to an entity, not yet made."""
+
+    name: str
+    properties: Mapping[str, str]
+    made: Make
+
+    def make(self) -> ActiveController:
+        """Return it for one run."""
+        return ActiveController(self.name, call(self.name, self.made, dict(self.properties)))
+
+
+@dataclass(slots=True)
+class ActiveController:
+    """A controller that drives an actor along its lane."""
+
+    name: str
+    inner: Any
+
+    def acceleration(self, scene: Scene, actor: str) -> float:
+        """Return what it asks for, m/s^2; ConfigError for what is no number."""
+        a = call(self.name, self.inner.update, scene, actor)
+        if not isinstance(a, (int, float)) or not isfinite(a):
+            raise ConfigError(f"controller {self.name!r} must return m/s^2, got {told(a, 100)}")
+        return float(a)
+
+
+def controller_of(node: Node, names: Names) -> tuple[ControllerOf | None, Finding | None]:
+    """Return the controller inside a <Controller>, or what is said where it is not known."""
+    name = node.text("name")
+    made = names.find(name)
+    if made is None:
+        return None, names.unknown(node, "controller", name)
+    found = node.find("Properties")
+    properties = {} if found is None else found.children("Property")
+    return ControllerOf(name, {p.text("name"): p.text("value") for p in properties}, made), None
+
+
+def control(scene: Scene) -> None:
+    """One step of every active controller; an action of the file upon the speed goes before it."""
+    for actor in scene.actors.values():
+        if actor.controller is None or not actor.present or actor.longitudinal is not None:
+            continue
+        guide = actor.guide
+        v = max(guide.v + actor.controller.acceleration(scene, actor.name) * scene.dt, 0.0)
+        guide.v, guide.a = v, (v - guide.v) / scene.dt

@@ -201,16 +201,12 @@ class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown
     ignore_unsupported: Annotated[
         bool, Meta(description="Leave out what is not known in the file.")
     ] = False
-    lenient: Annotated[
-        bool, Meta(description="Fill in what the file lacks where its meaning is clear.")
-    ] = False
+    lenient: Annotated[bool, Meta(description="Fill in what can mean one thing only.")] = False
     register: Annotated[
         tuple[str, ...],
         Meta(description="NAME=module:Class, a controller, action or value that files may name."),
     ] = ()
-    strict: Annotated[
-        bool, Meta(description="Names that are not registered are errors, not notes.")
-    ] = False
+    strict: Annotated[bool, Meta(description="Names that nobody registered are errors.")] = False
 
     @property
     def title(self) -> str:

@@ -160,7 +160,7 @@ def user_defined(node: Node, ctx: Context) -> GlobalAction:
     act = ctx.names.hook(name, "act")
     if act is None:
         ctx.findings.append(ctx.names.unknown(command, "command", name))
-        return NoEffect(command.tag)
+        return NoEffect(node.tag)
     return UserAction(act, (command.element.text or "").strip())
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from skidpad.campaign.drive import Script, Supervising, Timer, Unsupervised
 from skidpad.campaign.keeping import road_file
 from skidpad.campaign.starts import start_of
-from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.run import (
@@ -268,7 +268,8 @@ def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> S
     # our own stack gives the map's arrays to kernels, which know one type of array
     chosen = kind or found
     map = stage.map if chosen is AdasStack else stage.map.read_only()
-    stack = GuardedStack(chosen, stage.setup.specs, map, settings)
+    common = tuple(spec for spec in stage.setup.specs if spec.id not in stage.setup.asked)
+    stack = GuardedStack(chosen, common, map, settings)
     return StackAtWheel(stack, Lens(spec.weather, spec.seed) if spec.overlay else None)
 
 
@@ -317,6 +318,16 @@ def ego_model() -> CarModel:
 
 
 def with_sensors(setup: Setup, stack: GuardedStack) -> Setup:
-    """The set-up with the further sensors that the stack asks for (L-3)."""
-    more = stack.sensors()
-    return replace(setup, specs=(*setup.specs, *more), asked=frozenset(s.id for s in more))
+    """The set-up with the further sensors that the stack asks for (L-3).
+
+    A sensor that is there already as another stack asked for it is shared; StackError for a name
+    that stands for another one.
+    """
+    there = {spec.id: spec for spec in setup.specs}
+    wanted = stack.sensors()
+    for spec in wanted:
+        if there.get(spec.id, spec) != spec:
+            raise StackError(f"{stack.name}.sensors(): {spec.id!r} is another sensor already")
+    more = tuple(spec for spec in wanted if spec.id not in there)
+    asked = setup.asked | {spec.id for spec in wanted}
+    return replace(setup, specs=(*setup.specs, *more), asked=asked)

@@ -31,6 +31,7 @@ from skidpad.cli.monitor import monitor, safety_case
 from skidpad.cli.play import play, play_folder
 from skidpad.cli.profiles import profiles
 from skidpad.cli.rerun import rerun, study
+from skidpad.cli.shadow import shadow
 from skidpad.cli.spread import spread
 from skidpad.cli.view import view
 from skidpad.core.errors import InputError, SkidpadError
@@ -78,6 +79,7 @@ for name, command in (("adas", adas), ("grip", grip), ("channels", drive), ("pla
 app.command()(report)
 app.command()(compare)
 app.command()(rerun)
+app.command()(shadow)
 app.command()(study)
 app.command()(bench)
 app.command()(show)

@@ -1,0 +1,80 @@
+"""A driver that does not drive, against the one that does: when each brakes, and before what.
+
+Pure functions of both drivers' commands on the same moments. The shadow answers what it sees in a
+world that the other driver shapes: after the two have parted, its later commands answer situations
+into which it would not have come. So the first difference counts, and what follows does not.
+"""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+BRAKING = 0.15  # of full brake, from which a driver counts as braking
+BEFORE = 6.0  # s before an event in which braking belongs to it
+SHORTEST = 0.5  # s that a difference lasts at least to be listed
+
+
+class Pedals(NamedTuple):
+    """What one driver asks for, arrays (T,); NaN where it was not asked."""
+
+    throttle: Floats
+    brake: Floats
+
+
+class Parting(NamedTuple):
+    """A stretch in which one driver brakes and the other does not."""
+
+    begin: float  # s
+    end: float  # s
+    shadow_brakes: bool  # else the driver does
+
+
+class Foresight(NamedTuple):
+    """One event of the drive, and how long before it each driver was braking; None: not at all."""
+
+    t: float  # s
+    driver: float | None  # s before
+    shadow: float | None  # s before
+
+
+def is_braking(pedals: Pedals) -> NDArray[np.bool_]:
+    """(T,) whether a driver brakes."""
+    return pedals.brake >= BRAKING
+
+
+def partings(t: Floats, driver: Pedals, shadow: Pedals) -> list[Parting]:
+    """The stretches of at least SHORTEST s in which exactly one of both brakes, in order of time."""
+    asked = np.isfinite(driver.brake) & np.isfinite(shadow.brake)
+    apart = np.where(asked, is_braking(shadow).astype(int) - is_braking(driver).astype(int), 0)
+    edges = np.flatnonzero(np.diff(apart, prepend=0, append=0))
+    found = []
+    for first, end in pairwise(edges):
+        begin, last = float(t[first]), float(t[min(end, len(t) - 1)])
+        if apart[first] and last - begin >= SHORTEST:
+            found.append(Parting(begin, last, bool(apart[first] > 0)))
+    return found
+
+
+def foresight(t: Floats, events: Floats, driver: Pedals, shadow: Pedals) -> list[Foresight]:
+    """How long before each event (s) each driver began the braking that lasted up to it."""
+    return [Foresight(float(e), _ahead(t, e, driver), _ahead(t, e, shadow)) for e in events]
+
+
+def _ahead(t: Floats, event: float, pedals: Pedals) -> float | None:
+    """s from the first braking within BEFORE s of the event; None: no braking there."""
+    near = (t >= event - BEFORE) & (t <= event) & is_braking(pedals)
+    return float(event - t[np.argmax(near)]) if near.any() else None
+
+
+def share_apart(driver: Pedals, shadow: Pedals) -> float:
+    """Share of the moments at which both were asked and exactly one braked; 0 of none."""
+    asked = np.isfinite(driver.brake) & np.isfinite(shadow.brake)
+    if not asked.any():
+        return 0.0
+    return float(np.mean((is_braking(driver) != is_braking(shadow))[asked]))

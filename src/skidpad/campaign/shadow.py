@@ -42,7 +42,7 @@ class Shadow(Sink):
         given = moment.command
         row = (given.throttle, given.brake, asked.throttle, asked.brake)
         led = moment.frame.supervision is not Supervision.NONE
-        self.rows.append((np.nan,) * 4 if led else row)
+        self.rows.append((np.nan, np.nan, np.nan, np.nan) if led else row)
 
 
 @dataclass(frozen=True, slots=True)

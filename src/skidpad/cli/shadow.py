@@ -34,8 +34,8 @@ def shadow(
     from skidpad.campaign.stored import read_run
     from skidpad.cli.asked import Drivers
 
-    words = {"configs": driver} if ":" not in driver else {"stack": driver}
-    (found,) = Drivers(**words).chosen()
+    drivers = Drivers(stack=driver) if ":" in driver else Drivers(configs=driver)
+    (found,) = drivers.chosen()
     spec = read_run(run)
     for foreign in spec.foreign_code:
         if not yes:

@@ -52,7 +52,7 @@ def partings(t: Floats, driver: Pedals, shadow: Pedals) -> list[Parting]:
     """The stretches of at least SHORTEST s in which exactly one of both brakes, in order of time."""
     asked = np.isfinite(driver.brake) & np.isfinite(shadow.brake)
     apart = np.where(asked, is_braking(shadow).astype(int) - is_braking(driver).astype(int), 0)
-    edges = np.flatnonzero(np.diff(apart, prepend=0, append=0))
+    edges: list[int] = np.flatnonzero(np.diff(apart, prepend=0, append=0)).tolist()
     found = []
     for first, end in pairwise(edges):
         begin, last = float(t[first]), float(t[min(end, len(t) - 1)])

@@ -5,9 +5,11 @@ from __future__ import annotations
 import gzip
 import itertools
 import json
+import re
 import subprocess
 import sys
 from contextlib import closing, contextmanager
+from pathlib import Path
 
 import duckdb
 import numpy as np
@@ -19,6 +21,7 @@ from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.statistics import linear_ratio_limits
 from skidpad.fleet.insight.places import ADVICE
+from skidpad.fleet.insight.precision import measured_precision
 from skidpad.fleet.insight.research import HOUR, K, export
 from skidpad.fleet.insight.trends import compact, trends
 from skidpad.fleet.service import Places, open_fleet
@@ -145,7 +148,39 @@ def test_hazards_per_hour_count_the_drives_without_any(world):
     )
     (rate,) = world.get("axle", "/api/v1/trends").json()["hazards"]
     assert (rate["events"], rate["hours"], rate["rate"]) == (2, 1.5, 2 / 1.5)
+    assert rate["rules"] == "practical"
+    assert rate["precision"] == {"true": 8, "false": 345, "low": 0.009, "high": 0.039}
     assert world.get("bolt", "/api/v1/trends").json()["hazards"] == []
+
+
+def test_the_precision_of_alarms_is_that_of_the_published_table():
+    page = (Path(__file__).parents[2] / "docs" / "channels-evaluation.md").read_text()
+    table = page.split("<!-- table: scores -->")[1].split("<!-- end -->")[0]
+    rows = [
+        [cell.strip() for cell in line.split("|")[1:-1]]
+        for line in table.split("\n")
+        if "|" in line
+    ]
+    seen = 0
+    for rules, hazard, found, false, _, share, *_ in rows[2:]:
+        known = measured_precision(rules.replace(" ", "_"), hazard.replace(" ", "_"))
+        if known is None:
+            continue
+        seen += 1
+        assert (known.true, known.false) == (int(found), int(false))
+        limits = [float(v) / 100.0 for v in re.findall(r"[\d.]+", share)[1:]]
+        assert limits == pytest.approx([v for v in (known.low, known.high) if v is not None])
+        assert 100.0 * known.share == pytest.approx(float(share.split(" ")[0]), abs=0.06)
+    assert seen == 9
+
+
+def test_precision_says_limits_and_count():
+    assert measured_precision("tracked", "ego_tailgated").describe() == "33 % [7, 59] of 21 alarms"
+    assert (
+        measured_precision("as_printed", "inconsistent_localisation").describe()
+        == "71 % of 7 alarms"
+    )
+    assert measured_precision("tracked", "unseen_by_a_channel") is None
 
 
 @pytest.mark.req("C-174")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Annotated, Any
 
+import msgspec
 from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import HTMLResponse
 
@@ -12,7 +13,7 @@ from skidpad.fleet.api.guard import Needs, fleet_of
 from skidpad.fleet.insight import places as by_place
 from skidpad.fleet.insight.research import export
 from skidpad.fleet.insight.safety import claims
-from skidpad.fleet.insight.trends import hazard_rates, trends
+from skidpad.fleet.insight.trends import alarm_rates, trends
 from skidpad.fleet.words import Action, Principal, Refused
 
 Analyst = Annotated[Principal, Depends(Needs(Action.READ_TRENDS))]
@@ -26,10 +27,10 @@ router = APIRouter(prefix="/api/v1", tags=["insight"])
 
 @router.get("/trends")
 def read_trends(request: Request, who: Analyst, days: Days = 1) -> dict[str, Any]:
-    """Indicators over time with intervals, and hazards per hour."""
+    """Indicators over time with intervals, and alarms per hour with their precision."""
     fleet = fleet_of(request)
     with fleet.engine.connect() as connection:
-        rates = [asdict(rate) for rate in hazard_rates(connection, who)]
+        rates = [msgspec.to_builtins(rate) for rate in alarm_rates(connection, who)]
     return {"indicators": [asdict(t) for t in trends(fleet, who, days)], "hazards": rates}
 
 

@@ -1,7 +1,8 @@
-"""Indicators of all vehicles over time, with intervals over vehicles, and hazards per hour."""
+"""Indicators of all vehicles over time, with intervals, and alarms per hour with their precision."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -18,6 +19,7 @@ from skidpad.evidence.statistics import (
     ratio_limits,
 )
 from skidpad.fleet.batch import IndicatorRow, rows_of
+from skidpad.fleet.insight.precision import Precision, measured_precision
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.rights import visible
 from skidpad.fleet.store.tables import batches, drives, hazards, vehicles
@@ -47,14 +49,16 @@ class Trend:
 
 
 @dataclass(frozen=True, slots=True)
-class HazardRate:
-    """Hazards of one kind per hour of driving."""
+class AlarmRate:
+    """Alarms of one kind per hour of driving, and how many such alarms are true."""
 
     type: str
     events: int
     hours: float
     rate: float
     interval: Interval | None
+    rules: str  # of the newest alarm of the kind
+    precision: Precision | None  # as measured for these rules; None: not measured
 
 
 def compact(fleet: Fleet) -> int:
@@ -140,8 +144,8 @@ def _limits(m: Moments) -> Interval:
     return Interval(max(limits.low, 0.0), min(limits.high, 1.0))
 
 
-def hazard_rates(connection: Connection, who: Principal) -> list[HazardRate]:
-    """Hazards per hour by kind, over all vehicles that `who` may see and that told of drives."""
+def alarm_rates(connection: Connection, who: Principal) -> list[AlarmRate]:
+    """Alarms per hour by kind, over all vehicles that `who` may see and that told of drives."""
     driven = connection.execute(
         select(drives.c.vehicle, func.sum(drives.c.seconds))
         .where(visible(who, drives))
@@ -160,5 +164,21 @@ def hazard_rates(connection: Connection, who: Principal) -> list[HazardRate]:
     out = []
     for type_ in sorted({type_ for type_, _ in table}):
         rate = event_rate([table.get((type_, vehicle), 0) for vehicle, _ in driven], hours)
-        out.append(HazardRate(type_, rate.events, rate.exposure, rate.rate, rate.interval))
+        rules = _newest_rules(connection, who, type_)
+        out.append(
+            AlarmRate(
+                type_, rate.events, rate.exposure, rate.rate, rate.interval,
+                rules, measured_precision(rules, type_),
+            )
+        )  # fmt: skip
     return out
+
+
+def _newest_rules(connection: Connection, who: Principal, type_: str) -> str:
+    head = connection.execute(
+        select(hazards.c.head)
+        .where(visible(who, hazards), hazards.c.type == type_)
+        .order_by(hazards.c.at.desc())
+        .limit(1)
+    ).scalar_one()
+    return str(json.loads(head)["profile"])

@@ -1,4 +1,4 @@
-"""The dashboard: hazards per hour, trends with intervals, the map, clusters, replay of a hazard."""
+"""The dashboard: alarms per hour, trends with intervals, the map, clusters, replay of a hazard."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 
 from skidpad.evidence.statistics import interval_text, share_text
-from skidpad.fleet.insight.trends import HazardRate, Trend, hazard_rates, trends
+from skidpad.fleet.insight.trends import AlarmRate, Trend, alarm_rates, trends
 from skidpad.fleet.patterns.analysis import newest_clusters
 from skidpad.fleet.service import CAME, Fleet
 from skidpad.fleet.site.acting import click_analyse, person
@@ -27,13 +27,18 @@ CLUSTERS = 20
 PLAY_S = 0.1
 LOOK_S = 5.0  # between two looks of an open page for what came
 
+ALARM_NOTE = (
+    "An alarm is what the rules found, right or wrong. How many are true was measured on simulated"
+    " drives among natural drivers; in your traffic it may differ."
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Overview:
     """What the dashboard shows."""
 
     trends: list[Trend]
-    rates: list[HazardRate]
+    rates: list[AlarmRate]
     clusters: list[dict[str, Any]]
     newest: list[dict[str, Any]]
     roads: dict[str, Sequence[Line]]  # of the maps of the newest hazards
@@ -46,7 +51,7 @@ def overview(fleet: Fleet, lines: MapLines, who: Principal) -> Overview:
     seen = fleet.hub.count(f"{CAME} {who.tenant}")
     found = trends(fleet, who)
     with fleet.engine.connect() as connection:
-        rates, clusters = hazard_rates(connection, who), newest_clusters(connection, who)
+        rates, clusters = alarm_rates(connection, who), newest_clusters(connection, who)
         newest = hazard_rows(connection, who, Wanted())
     names = list(dict.fromkeys(row["map"] for row in newest if row["map"]))
     roads = {name: lines(name) for name in names[:MAPS]}
@@ -89,15 +94,18 @@ def draw_overview(fleet: Fleet, lines: MapLines, ui: Any, who: Principal, found:
 
 
 def _parts(ui: Any, found: Overview) -> None:
-    """Hazards per hour, trends, the map, clusters."""
+    """Alarms per hour, trends, the map, clusters."""
     with ui.element("section"):
-        ui.label("Hazards per hour").classes("h2")
+        ui.label("Alarms per hour").classes("h2")
         rows = [
             [r.type.replace("_", " "), str(r.events), f"{r.hours:.2f}", f"{r.rate:.3g}",
-             interval_text(r.interval)]
+             interval_text(r.interval), r.rules.replace("_", " "),
+             r.precision.describe() if r.precision else "not measured"]
             for r in found.rates
         ]  # fmt: skip
-        table(ui, ["hazard", "events", "hours", "per hour", "interval"], rows)
+        heads = ["alarm", "alarms", "hours", "per hour", "interval", "rules", "of these true"]
+        table(ui, heads, rows)
+        ui.label(ALARM_NOTE).classes("dim")
     _trends(ui, found.trends)
     _map(ui, found)
     _clusters(ui, found.clusters, found.look)

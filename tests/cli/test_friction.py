@@ -1,7 +1,12 @@
+from itertools import pairwise
+from unittest.mock import Mock
+
+import matplotlib as mpl
 import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
+from skidpad.cli.friction_figure import draw_surface, friction_figure
 from skidpad.cli.main import app, main
 
 runner = CliRunner(env={"COLUMNS": "100"})
@@ -64,6 +69,64 @@ def test_table_has_every_preset():
     assert row(output, "rain_100")[0] == "0.300"
     assert row(output, "snow")[:5] == ["-"] * 5
     assert "snow: the statistical model is not defined" in output
+
+
+@pytest.fixture(scope="module")
+def panels():
+    mpl.use("Agg")
+    from matplotlib import pyplot as plt
+
+    figure = friction_figure(0.9)
+    yield figure.axes
+    plt.close(figure)
+
+
+@pytest.mark.req("B-041")
+def test_the_curves_are_the_ratio_over_wetness_and_over_rain_at_three_levels_of_the_other(panels):
+    """By hand: puddles cost a tenth in all, full wetness leaves 0.4 and full ice 0.15 of 1."""
+    over_wetness, over_rain, *_ = panels
+    for axes, label, slope in (
+        (over_wetness, "rain, deposits {} %", None), (over_rain, "wetness {} %", -0.001)
+    ):  # fmt: skip
+        lines = {line.get_label(): line for line in axes.lines}
+        for level in (0, 50, 100):
+            x, y = lines[label.format(level)].get_data()
+            assert (x[0], x[-1], len(x)) == (0.0, 100.0, 51)
+            if slope is None:
+                assert (y[0], y[-1]) == pytest.approx((1.0 - level / 1000, 0.4 - level / 1000))
+                assert all(a > b for a, b in pairwise(y))
+            else:
+                assert [b - a for a, b in pairwise(y)] == pytest.approx([2 * slope] * 50)
+        assert axes.get_ylabel() == "ratio of dry grip"
+    assert over_rain.lines[0].get_ydata()[0] == pytest.approx(1.0)
+    assert over_rain.lines[2].get_ydata()[-1] == pytest.approx(0.3)
+    ice = over_wetness.lines[3].get_ydata()
+    assert (ice[0], ice[-1]) == pytest.approx((1.0, 0.15), abs=1e-3)
+
+
+@pytest.mark.req("B-041")
+def test_the_surface_stands_over_wetness_and_deposits_with_its_height_named(panels):
+    surface = panels[2]
+    assert (surface.get_xlabel(), surface.get_ylabel(), surface.get_zlabel()) == (
+        "wetness, %", "deposits, %", "ratio of dry grip"
+    )  # fmt: skip
+    axes = Mock()
+    draw_surface(axes)
+    w, p, ratio = axes.plot_surface.call_args.args
+    drawn = dict(zip(zip(w.ravel(), p.ravel(), strict=True), ratio.ravel(), strict=True))
+    corners = {(0, 0): 1.0, (0, 100): 0.9, (100, 0): 0.4, (100, 100): 0.3}
+    assert {corner: drawn[corner] for corner in corners} == pytest.approx(corners)
+    assert len(drawn) == 121
+
+
+@pytest.mark.req("B-041")
+def test_the_speed_panel_has_a_curve_per_weather_and_the_measured_levels(panels):
+    speeds = panels[3]
+    named = {line.get_label() for line in speeds.lines}
+    assert {"rain_20", "rain_40", "rain_100", "snow", "icy_30"} <= named
+    assert {t.get_text() for t in speeds.texts} == {
+        "wet braking test", "packed snow test", "ice test"
+    }  # fmt: skip
 
 
 @pytest.mark.req("B-041")

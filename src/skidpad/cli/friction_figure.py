@@ -35,11 +35,21 @@ def _curves(axes: Any) -> None:
     axes.grid(alpha=0.3)
 
 
-def _surface(axes: Any) -> None:
+def _over_deposits(axes: Any) -> None:
+    for w, style in ((0.0, "-"), (50.0, "--"), (100.0, ":")):
+        axes.plot(PERCENT, [_rain(w, p) for p in PERCENT], style, label=f"wetness {w:g} %")
+    axes.set(xlabel="deposits of rain, %", ylabel="ratio of dry grip", ylim=(0, 1.05))
+    axes.set_title("statistical model, ratio over rain")
+    axes.legend()
+    axes.grid(alpha=0.3)
+
+
+def draw_surface(axes: Any) -> None:
+    """Draws the ratio in rain over wetness and deposits."""
     coarse = PERCENT[::5]
     w, p = np.meshgrid(coarse, coarse)
     axes.plot_surface(w, p, np.vectorize(_rain)(w, p), cmap="viridis", linewidth=0)
-    axes.set(xlabel="wetness, %", ylabel="deposits, %")
+    axes.set(xlabel="wetness, %", ylabel="deposits, %", zlabel="ratio of dry grip")
     axes.set_title("statistical model, ratio in rain")
 
 
@@ -57,16 +67,25 @@ def _speeds(axes: Any, mu_ref: float) -> None:
     axes.grid(alpha=0.3)
 
 
+def friction_figure(mu_ref: float) -> Any:
+    """The four panels; the caller closes the figure."""
+    from matplotlib import pyplot as plt
+
+    figure = plt.figure(figsize=(14.0, 8.6), layout="constrained")
+    _curves(figure.add_subplot(2, 2, 1))
+    _over_deposits(figure.add_subplot(2, 2, 2))
+    draw_surface(figure.add_subplot(2, 2, 3, projection="3d"))
+    _speeds(figure.add_subplot(2, 2, 4), mu_ref)
+    return figure
+
+
 def draw(path: Path, mu_ref: float) -> None:
     """Write the figure; the suffix chooses the format."""
     format_of(path)
     mpl.use("Agg")
     from matplotlib import pyplot as plt
 
-    figure = plt.figure(figsize=(14.0, 4.4), layout="constrained")
-    _curves(figure.add_subplot(1, 3, 1))
-    _surface(figure.add_subplot(1, 3, 2, projection="3d"))
-    _speeds(figure.add_subplot(1, 3, 3), mu_ref)
+    figure = friction_figure(mu_ref)
     try:
         write_picture(path, lambda part, kind: figure.savefig(part, dpi=80, format=kind))
     finally:

@@ -17,6 +17,7 @@ from skidpad.evidence.channels.judging.segments import TOLD
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import channels_scores as scores
 from skidpad.report.channels_redundancy import redundancy
+from skidpad.report.channels_routes import route_blocks
 from skidpad.report.channels_scores import FEW, HAZARDS, TRUTHS, Row, headline, ratio_text, short
 from skidpad.report.channels_strata import headline_of_risky, precision_recall, strata
 from skidpad.report.figures import Chart, Curve, curves
@@ -104,6 +105,7 @@ def evaluation_page(evaluation: Row, folder: Path) -> Page:
             Section("Natural and risky drivers", strata(evaluation)),
             Section("Precision against recall", precision_recall(evaluation)),
             Section("By route", [scores.routes(evaluation, t) for t in truths]),
+            Section("Indicators and times by route", route_blocks(evaluation)),
             Section("Findings of the source, judged", verdicts(judged)),
             Section("Why it errs", [scores.causes(evaluation)]),
             Section("One threshold, both errors", _curve(evaluation)),

@@ -228,6 +228,10 @@ class Matrix(CampaignView[MatrixEntry]):
         """Events per run of a cell; None without finished runs."""
         return rate_by_seed(self.cell(config, weather), column)
 
+    def rate_within(self, column: str, config: str, group: WeatherGroup) -> Rate | None:
+        """Events per run of a configuration in a group of weathers, each drive once."""
+        return rate_by_seed(self.within(config, group), column)
+
     def mean(self, column: str, config: str, weather: str | None = None) -> float | None:
         """Mean over the runs of a cell."""
         values = self.cell(config, weather)[column].drop_nulls()

@@ -1,0 +1,77 @@
+"""Violations of indicators and times per route, by value."""
+
+import pytest
+
+from skidpad.report.channels_routes import route_blocks
+
+LOCATION, COUNT = "ego_location_similarity", "object_count_similarity"
+
+
+def segment(route, hours, location, count, mean, worst):
+    return {
+        "name": f"{route}.mcap", "route": route, "hours": hours,
+        f"violations_{LOCATION}": float(location), f"violations_{COUNT}": float(count),
+        "planning_mean_ms": mean / 2, "total_mean_ms": mean, "total_p999_ms": 2 * mean,
+        "total_max_ms": worst,
+    }  # fmt: skip
+
+
+EVALUATION = {
+    "segment_table": [
+        segment("coast", 1.0, 2, 0, 4.0, 9.0),
+        segment("coast", 3.0, 1, 5, 8.0, 30.0),
+        segment("town", 0.5, 0, 7, 2.0, 3.0),
+    ]
+}
+
+
+def rows_of(table):
+    return [[cell.text for cell in row] for row in table.rows]
+
+
+@pytest.mark.req("C-215", "C-216")
+def test_violations_are_summed_per_route_with_totals_and_the_published_towns_below():
+    violations, *_ = route_blocks(EVALUATION)
+    assert [title for title, _ in violations.columns] == [
+        "route", "h", "ego location similarity", "object count similarity", "total"
+    ]  # fmt: skip
+    ours = [row for row in violations.rows if row[0].kind != "published"]
+    assert [[c.text for c in row] for row in ours] == [
+        ["coast", "4.00", "3", "5", "8"],
+        ["town", "0.50", "0", "7", "7"],
+        ["all routes", "4.50", "3", "12", "15"],
+    ]
+    theirs = {row[0].text: row for row in violations.rows if row[0].kind == "published"}
+    assert len(theirs) == 6
+    first = theirs["town 1"]  # table 6.3 of the source
+    assert [c.text for c in first] == ["town 1", "", "6", "4", "10"]
+    assert first[3].hint == "one channel takes static pavement objects for obstacles"
+
+
+@pytest.mark.req("C-215")
+def test_published_causes_are_listed_with_their_violations():
+    causes = route_blocks(EVALUATION)[1]
+    assert causes.caption == "Published causes of violations"
+    sums = {}
+    for row in causes.rows:
+        sums[row[0].text] = sums.get(row[0].text, 0) + int(row[2].text)
+    assert sums == {"ego location similarity": 64, "object count similarity": 60}
+
+
+@pytest.mark.req("C-233")
+def test_times_per_route_are_weighted_by_hours_and_end_with_the_worst_of_all():
+    times = route_blocks(EVALUATION)[-1]
+    assert [title for title, _ in times.columns] == [
+        "route", "planning, ms", "total, ms", "99.9 % of total, ms", "greatest total, ms"
+    ]  # fmt: skip
+    coast = (4.0 * 1.0 + 8.0 * 3.0) / 4.0
+    everything = (4.0 * 1.0 + 8.0 * 3.0 + 2.0 * 0.5) / 4.5
+    assert rows_of(times) == [
+        ["coast", f"{coast / 2:.3f}", f"{coast:.3f}", "16.000", "30.000"],
+        ["town", "1.000", "2.000", "4.000", "3.000"],
+        ["all routes", f"{everything / 2:.3f}", f"{everything:.3f}", "16.000", "30.000"],
+    ]
+
+
+def test_an_evaluation_without_segments_has_no_such_tables():
+    assert route_blocks({"segment_table": []}) == []

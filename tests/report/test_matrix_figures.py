@@ -1,0 +1,126 @@
+"""Figures and tables of the matrix page: recomputed from rows, read back from the HTML."""
+
+import re
+from html import unescape
+
+import polars as pl
+import pytest
+from svg_values import bars, texts
+from test_matrix_report import campaign, key
+
+from skidpad.recording.matrix import MATRIX, Metrics
+from skidpad.recording.results import Timing
+from skidpad.report.figures import PALETTE
+from skidpad.report.matrix import write_report
+from skidpad.report.matrix_data import WEATHERS, load_matrix
+from skidpad.report.matrix_real_time import real_time_blocks
+from skidpad.report.matrix_sides import side_blocks
+from skidpad.report.published import Source, published
+
+CONFIGS = ("1", "2", "3", "4")
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("seven")
+    campaign(folder, seeds=3)
+    html = write_report(folder).read_text(encoding="utf-8")
+    rows = pl.read_parquet(folder / "results.parquet")
+    return html, rows.with_columns(crashes=pl.col("fatal_collisions"))  # no contact is graded here
+
+
+def figure(html, caption):
+    """The SVG of the figure whose caption begins so."""
+    pattern = r'<figure class="chart">((?:(?!</svg>).)*</svg>)\s*<figcaption>([^<]*)</figcaption>'
+    found = [svg for svg, told in re.findall(pattern, html, re.DOTALL) if told.startswith(caption)]
+    assert len(found) == 1, caption
+    return found[0]
+
+
+def means(rows, column, config, weathers=tuple(WEATHERS)):
+    """Mean per weather of the rows of a configuration."""
+    cells = [rows.filter(config=config, weather=w) for w in weathers]
+    return [float(cell[column].mean()) for cell in cells]
+
+
+@pytest.mark.req("A-259")
+@pytest.mark.parametrize(
+    ("caption", "column"),
+    [
+        ("Crashes per run by weather and configuration", "crashes"),
+        ("Dropout by weather and configuration.", "dropout_pct"),
+    ],
+)
+def test_bars_by_weather_are_the_means_of_the_rows(page, caption, column):
+    html, rows = page
+    svg = figure(html, caption)
+    for config, colour in zip(CONFIGS, PALETTE, strict=False):
+        assert bars(svg, colour) == pytest.approx(means(rows, column, config), abs=1e-4)
+    assert {f"configuration {c}" for c in CONFIGS} <= {t for t, *_ in texts(svg)}
+
+
+@pytest.mark.req("A-259")
+def test_the_bars_over_all_weathers_and_the_variance_are_those_of_the_rows(page):
+    html, rows = page
+    total = bars(figure(html, "The same over all weathers"), PALETTE[0])
+    expected = [float(rows.filter(config=c)["crashes"].mean()) for c in CONFIGS]
+    assert total == pytest.approx(expected, abs=1e-4)
+    variance = bars(figure(html, "Variance of the distance error by weather"), PALETTE[0])
+    assert variance == pytest.approx(means(rows, "headway_variance_m2", "4"), abs=1e-3)
+
+
+@pytest.mark.req("A-259")
+def test_every_panel_of_configuration_3_has_its_own_quantity(page):
+    html, rows = page
+    svg = figure(html, "Configuration 3 in every weather")
+    labels = ("crashes", "dropout, %", "mean error, m", "variance, m²", "radar FPR, %")
+    assert set(labels) <= {t for t, *_ in texts(svg)}
+    columns = ("crashes", "dropout_pct", "mean_error_m", "headway_variance_m2", "radar_fpr_pct")
+    expected = [v for column in columns for v in means(rows, column, "3")]
+    assert bars(svg, PALETTE[0]) == pytest.approx(expected, rel=1e-3, abs=1e-4)
+
+
+@pytest.mark.req("A-258", "A-259")
+def test_published_numbers_stand_in_their_own_section_with_what_differs_said_first(page):
+    html, _ = page
+    before, section = html.split('<section id="beside-the-published-numbers">')
+    section = section.split("</section>")[0]
+    assert not re.search(r"<small>published \d", before)
+    assert "Not the published experiment: that had" in section
+    assert "vehicles at fixed places" in section
+    assert "the map Town04 (here: figure8)" in section
+    table = published(Source.MATRIX).filter(
+        pl.col("config_id") == 0, weather="Clear Sky", time_of_day="Sunrise"
+    )
+    assert f"published {table['collisions'][0]:g}" in unescape(section)
+
+
+@pytest.mark.req("A-259")
+def test_two_configurations_stand_side_by_side_with_their_difference(page, tmp_path):
+    _, rows = page
+    rows_of = campaign(tmp_path, seeds=3)
+    assert len(rows_of) == len(rows)
+    one, figure_one, two, _ = side_blocks(load_matrix(tmp_path))
+    assert [title for title, _ in one.columns] == [
+        "metric", "1 · ACC", "2 · ACC + lane centring", "2 minus 1"
+    ]  # fmt: skip
+    assert [title for title, _ in two.columns][-1] == "4 minus 2"
+    speed = next(row for row in one.rows if row[0].text == "mean speed, km/h")
+    first, second = (float(rows.filter(config=c)["mean_speed_kmh"].mean()) for c in "12")
+    assert [c.sort for c in speed[1:]] == pytest.approx([first, second, second - first])
+    assert bars(figure_one.svg, PALETTE[1]) == pytest.approx(means(rows, "crashes", "2"), abs=1e-4)
+
+
+@pytest.mark.req("A-246")
+def test_real_time_is_told_by_weather_with_its_share_of_slow_ticks(tmp_path):
+    rows = [(key("1", w, seed), Metrics()) for w in ("clear-noon", "rain-noon") for seed in (1, 2)]
+    clocks = [
+        Timing(wall_s=9, rtf=rtf, rtf_below_0_9_pct=slow)
+        for rtf, slow in ((50.0, 0.0), (40.0, 1.0), (20.0, 3.0), (0.8, 60.0))
+    ]
+    MATRIX.write(tmp_path, rows, clocks)
+    _, table = real_time_blocks(load_matrix(tmp_path))
+    assert [[c.text for c in row] for row in table.rows] == [
+        ["Clear Sky - Noon", "2", "45.0", "40.0", "0.50"],
+        ["Heavy Rain - Noon", "2", "10.4", "0.8", "31.50"],
+    ]

@@ -1,11 +1,13 @@
 import json
 import re
+from html import unescape
 
 import numpy as np
 import pytest
 
 from channel_worlds import Eyes, World, drive
 from skidpad.core.errors import InputError
+from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.monitor import MonitorSettings
 from skidpad.live.watch import Timer, watch
 from skidpad.recording.hazards import read_hazards
@@ -44,6 +46,21 @@ def test_indicator_table_agrees_with_the_summary(folder):
     assert [int(row[6].text) for row in table.rows] == [a["violation_events"] for a in audit]
     assert [int(row[8].text) for row in table.rows] == [a["not_evaluated_cycles"] for a in audit]
     assert all(row[2].text == (a["claim"] or "") for row, a in zip(table.rows, audit, strict=True))
+
+
+@pytest.mark.req("C-104")
+def test_every_indicator_carries_what_a_violation_points_at_into_the_page(folder):
+    drive_ = load_drive(folder)
+    table = next(s for s in drive_page(drive_).sections if s.title == "Indicators").blocks[0]
+    audit = json.loads((folder / "monitor.json").read_text())["indicators"]
+    meanings = [drive_.thresholds[Indicator(a["indicator"])].meaning for a in audit]
+    claimed = [m for m, a in zip(meanings, audit, strict=True) if a["claim"]]
+    assert len(claimed) >= 9
+    assert all(len(meaning.split()) > 2 for meaning in claimed)
+    assert [row[0].hint for row in table.rows] == meanings
+    html = unescape(write_drive_report(folder).read_text(encoding="utf-8"))
+    for meaning in filter(None, meanings):
+        assert f'title="{meaning}"' in html
 
 
 @pytest.mark.req("C-030", "C-033")

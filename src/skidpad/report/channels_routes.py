@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
@@ -18,7 +19,7 @@ ALL = "all routes"
 MS = Format(".3f", absent="not measured")
 
 
-def route_blocks(evaluation: Row) -> list[Block]:
+def route_blocks(evaluation: Mapping[str, Any]) -> list[Block]:
     """Violations and times per route; nothing of what was not evaluated."""
     segments = pl.DataFrame(evaluation["segment_table"], infer_schema_length=None)
     if "route" not in segments.columns or not len(segments):

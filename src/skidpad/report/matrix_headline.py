@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from skidpad.core.wording import count_text
-from skidpad.evidence.statistics import median_time, rate_remark
+from skidpad.evidence.statistics import median_time
 from skidpad.report.matrix_data import (
     BASELINE,
     EVENTS,
@@ -18,7 +18,7 @@ from skidpad.report.matrix_data import (
     config_title,
     rate_by_seed,
 )
-from skidpad.report.matrix_tables import RATE, rate_hint
+from skidpad.report.matrix_tables import RATE, few_seeds_note, rate_hint, remark_on
 from skidpad.report.page import Cell, Number, Numbers, Table
 from skidpad.report.tables import Column, Quantity, table
 
@@ -88,7 +88,7 @@ def headline_table(matrix: Matrix) -> Table:
     note = (
         "Every drive once. Small: 95 % interval; per 100 km it is that of the count, the way taken "
         "as given; of the median exact by order statistics, from six runs on."
-    )
+    ) + few_seeds_note(matrix)
     return table(columns, matrix.configs, "What happened, by configuration", note)
 
 
@@ -112,7 +112,7 @@ def _count(matrix: Matrix, column: str, config: str) -> Quantity:
     return Quantity(
         value=rate.rate,
         interval=rate.interval,
-        remark=rate_remark(rate, "seed"),
+        remark=remark_on(rate),
         lines=tuple(lines) if config in matrix.comparison_configs else (),
         hint=f"{rate_hint(rate)}, {km:,.0f} km",
     )
@@ -126,7 +126,9 @@ def _first(matrix: Matrix, config: str) -> Cell:
     end = float(runs["duration_s"].min())  # type: ignore[arg-type]
     times = runs[FIRST].cast(float).fill_null(np.inf).to_numpy()
     median, limits = median_time(times, end)
-    told = " to ".join(_time(t, end) for t in limits) if limits else "no limits below 6 runs"
+    told = "" if limits is None else " to ".join(_time(t, end) for t in limits)
+    if limits is not None and not np.isfinite(limits[0]):
+        told = "95 % beyond the run"
     hint = count_text(len(runs), "run")
     return Cell(_time(median, end), note=told, sort=min(median, end), hint=hint)
 

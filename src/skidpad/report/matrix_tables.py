@@ -11,6 +11,7 @@ from skidpad.core.wording import count_text
 from skidpad.evidence.contrasts import paired_runs, per_seed
 from skidpad.evidence.statistics import (
     EVER_SIGNIFICANT,
+    UNITS_FROM,
     Rate,
     compare_pairs,
     mean_limits,
@@ -155,7 +156,7 @@ def count_table(matrix: Matrix, column: str, caption: str) -> Table:
         shade = top or 1.0 if config in matrix.comparison_configs else None
         return rate_quantity(rates[config, group], shade)
 
-    note = f"Per run of {matrix.duration:g} s; small: 95 % interval."
+    note = f"Per run of {matrix.duration:g} s; small: 95 % interval.{few_seeds_note(matrix)}"
     return by_weather(matrix, of, RATE, caption, note)
 
 
@@ -166,10 +167,22 @@ def rate_quantity(rate: Rate | None, top: float | None = None) -> Quantity:
     return Quantity(
         value=rate.rate,
         interval=rate.interval,
-        remark=rate_remark(rate, "seed"),
+        remark=remark_on(rate),
         heat=None if top is None else (rate.rate / top) ** 0.5,
         hint=rate_hint(rate),
     )
+
+
+def remark_on(rate: Rate) -> str:
+    """What stands beside a rate; of a single seed nothing, the table's note says it once."""
+    return rate_remark(rate, "seed") if rate.runs > 1 else ""
+
+
+def few_seeds_note(matrix: Matrix) -> str:
+    """The sentence that stands once below a table, in place of limits that so few seeds cannot give."""
+    if matrix.seeds >= UNITS_FROM:
+        return ""
+    return f" {no_limits_text(matrix.seeds, 'seed')}."
 
 
 def rate_hint(rate: Rate) -> str:
@@ -185,7 +198,7 @@ def mean_table(matrix: Matrix, column: str, caption: str) -> Table:
         runs = matrix.cell(config) if group is None else matrix.within(config, group)
         return mean_quantity(runs, column)
 
-    note = "Mean over seeds; small: 95 % interval over seeds."
+    note = f"Mean over seeds; small: 95 % interval over seeds.{few_seeds_note(matrix)}"
     return by_weather(matrix, of, Format(), caption, note)
 
 
@@ -196,7 +209,9 @@ def mean_quantity(runs: pl.DataFrame, column: str) -> Quantity:
     return Quantity(
         value=float(known.mean()) if known.size else None,
         interval=limits,
-        remark=no_limits_text(known.size, "seed") if limits is None and known.size else "",
+        remark=no_limits_text(known.size, "seed")
+        if limits is None and known.size >= UNITS_FROM
+        else "",
         hint=count_text(known.size, "seed") if known.size else "",
     )
 

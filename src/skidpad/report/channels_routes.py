@@ -35,7 +35,7 @@ def _violations(segments: pl.DataFrame) -> list[Block]:
     sums = [pl.col("hours").sum(), *(pl.col(PREFIX + n).sum().cast(pl.Int64) for n in names)]
     rows = segments.group_by("route").agg(sums).sort("route").to_dicts()
     rows.append({"route": ALL} | segments.select(sums).row(0, named=True))
-    rows += [row | {"kind": "published"} for row in _published()]
+    rows += [row | {"kind": "published"} for row in _town_rows()]
 
     def cell(row: Row, text: str, sort: float | None = None, hint: str = "") -> Cell:
         return Cell(text, sort=sort, kind=row.get("kind", ""), hint=hint)
@@ -69,11 +69,11 @@ def _violations(segments: pl.DataFrame) -> list[Block]:
     )
     return [
         table(columns, rows, "Indicators beyond their threshold, per route", note),
-        *_published_causes(names),
+        *_cause_table(names),
     ]
 
 
-def _published() -> list[Row]:
+def _town_rows() -> list[Row]:
     """Rows of the published towns."""
     towns: dict[int, Row] = {}
     for r in published(Source.VIOLATIONS_BY_TOWN).to_dicts():
@@ -83,7 +83,7 @@ def _published() -> list[Row]:
     return list(towns.values())
 
 
-def _published_causes(names: list[str]) -> list[Block]:
+def _cause_table(names: list[str]) -> list[Block]:
     """Which causes the source gives, with their violations over all towns."""
     known = published(Source.VIOLATIONS_BY_TOWN).drop_nulls("cause")
     known = known.filter(pl.col("spi").is_in(names))
@@ -114,11 +114,11 @@ def _times(segments: pl.DataFrame) -> list[Block]:
     modules.sort(key=lambda m: (m == "total", m))
     known = segments.drop_nulls("total_mean_ms")
 
-    def weighted(module: str) -> pl.Expr:
+    def weighted_mean(module: str) -> pl.Expr:
         return (pl.col(module + MEAN) * pl.col("hours")).sum() / pl.col("hours").sum()
 
     figures = [
-        *(weighted(m).alias(m) for m in modules),
+        *(weighted_mean(m).alias(m) for m in modules),
         pl.col("total_p999_ms").max(),
         pl.col("total_max_ms").max(),
     ]

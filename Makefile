@@ -1,6 +1,6 @@
-# `make run` and `make test` need nothing but Python 3.10 to 3.12, make and pip.
-PYTHON ?= $(shell for p in python3.11 python3.12 python3.10 python3; do \
-	$$p -c 'import sys; sys.exit(not (3,10) <= sys.version_info[:2] < (3,13))' 2>/dev/null && echo $$p && break; done)
+# `make run` and `make test` need nothing but Python 3.10 to 3.13, make and pip.
+PYTHON ?= $(shell for p in python3.11 python3.12 python3.13 python3.10 python3; do \
+	$$p -c 'import sys; sys.exit(not (3,10) <= sys.version_info[:2] < (3,14))' 2>/dev/null && echo $$p && break; done)
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= out/adas
@@ -15,6 +15,7 @@ NIGHTLY_ARGS ?=
 run: $(VENV)/.installed
 	$(BIN)/skidpad adas --out $(OUT) --resume --or-next --traffic pack --sensors objects --seeds 10 --distinct \
 		--parity-seeds 1 $(RUN_ARGS)
+	@echo "for the commands of README.md in this shell: source $(BIN)/activate"
 
 # the published experiment: its settings, vehicles at fixed places, images; TOWN04=FILE.xodr its map
 PUBLISHED_OUT ?= out/published
@@ -120,7 +121,7 @@ figures: $(VENV)/.tested-with
 	$(BIN)/python tools/vehicle_validation.py docs/img
 
 $(BIN)/python:
-	@test -n "$(PYTHON)" || { echo "skidpad needs Python 3.10, 3.11 or 3.12 on the PATH"; exit 2; }
+	@test -n "$(PYTHON)" || { echo "skidpad needs Python 3.10 to 3.13 on the PATH"; exit 2; }
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade pip
 

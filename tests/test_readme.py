@@ -7,6 +7,7 @@ import click
 import typer
 
 from skidpad.cli.main import app
+from skidpad.core.errors import install_command
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -37,6 +38,42 @@ def test_every_command_named_in_the_readme_exists():
     known = {name.split()[0] for name in commands(typer.main.get_command(app))}
     told = set(re.findall(r"skidpad ([a-z][a-z-]*)(?= |`|\n)", README)) - {"import"}
     assert told <= known, f"not a command: {sorted(told - known)}"
+
+
+def test_readme_makefile_and_project_name_one_range_of_python():
+    low, high = re.search(
+        r'requires-python = ">=(3\.\d+),<(3\.\d+)"', text_of("pyproject.toml")
+    ).groups()
+    last = f"3.{int(high.split('.')[1]) - 1}"
+    for name in ("README.md", "Makefile"):
+        assert f"Python {low} to {last}" in text_of(name), name
+    asked = re.search(
+        r"\((3,\d+)\) <= sys.version_info\[:2\] < \((3,\d+)\)", text_of("Makefile")
+    ).groups()
+    assert asked == (low.replace(".", ","), high.replace(".", ","))
+
+
+def test_no_command_asks_a_registry_for_skidpad():
+    """It is not published: what is told to install must work in a clone."""
+    for page in (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))):
+        assert not re.search(r"pip install '?skidpad", page.read_text(encoding="utf-8")), page.name
+    assert "pip install -e" in install_command("carla")
+
+
+def test_configurations_weathers_and_times_are_named_in_words():
+    functions = (
+        "adaptive cruise control",
+        "lane centring",
+        "traffic-light assist",
+        "speed limiter",
+    )
+    others = ("sunrise", "heavy rain", "a minute of processor time", "source .venv/bin/activate")
+    for words in functions + others:
+        assert words in README, words
+
+
+def text_of(name):
+    return (ROOT / name).read_text(encoding="utf-8")
 
 
 def test_links_of_the_readme_lead_somewhere():

@@ -78,7 +78,7 @@ def drive(
 
 
 def totals(folder: Path) -> str:
-    """What a folder of driven segments came to, in one line."""
+    """What a folder of driven segments came to, and the next command."""
     import polars as pl
 
     from skidpad.core.wording import count_text
@@ -89,11 +89,13 @@ def totals(folder: Path) -> str:
     driven = read_results(folder).drop_nulls("driven_s")
     sums = driven.select(pl.col(pl.Float64, pl.Int64).sum()).row(0, named=True)
     watched = "".join(f"\n{_watched(link.parent)}" for link in sorted(folder.glob(f"*/*/{LINK}")))
+    recording = next(iter(sorted(folder.glob("*/*.mcap"))), "FILE.mcap")
     return (
         f"{folder}: {count_text(len(driven), 'segment')}, {sums['driven_s'] / 3600.0:.2f} h, "
         f"{sums['distance_m'] / 1000.0:.1f} km, {count_text(sums['collisions'], 'collision')}, "
         f"{count_text(sums['red_lights_run'], 'red light')} run, "
-        f"{count_text(sums['stalls'], 'stall')}{watched}"
+        f"{count_text(sums['stalls'], 'stall')}{watched}\n"
+        f"Next: skidpad monitor {recording} --out {folder / 'monitored'}"
     )
 
 
@@ -128,7 +130,11 @@ def outcomes(folders: list[Path] = FOLDERS) -> None:
     driven = read_outcomes(folders)
     if not driven:
         raise FileError(f"no driven segments below {', '.join(map(str, folders))}")
+    from skidpad.core.wording import count_text
+
     for row in compare_drivers(driven):
-        typer.echo(f"{row.drive_by}: {row.segments} segments, {row.hours:.2f} h, {row.km:.1f} km")
+        typer.echo(
+            f"{row.drive_by}: {count_text(row.segments, 'segment')}, {row.hours:.2f} h, {row.km:.1f} km"
+        )
         for event, rate in row.rates.items():
             typer.echo(f"  {event}: {rate.events}, {rate_text(rate, 'segment', 'h')}")

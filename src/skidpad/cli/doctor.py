@@ -8,10 +8,11 @@ from dataclasses import dataclass
 from importlib import metadata
 from importlib.util import find_spec
 
+import typer
 from rich.console import Console
-from rich.table import Table
 
 import skidpad
+from skidpad.core.errors import install_command
 from skidpad.core.jit import kernel_cache
 
 
@@ -36,6 +37,7 @@ EXTRAS = (
     Extra("fleet", "fastapi", "fastapi", "skidpad fleet: what many vehicles report, and updates"),
     Extra("view", "rerun", "rerun-sdk", "skidpad view: recordings in Rerun"),
 )
+PROTOCOL = "0.9.16"  # of CARLA's clients, which the server speaks
 CORE = ("numpy", "numba", "scipy", "polars", "opencv-python-headless", "scenariogeneration")
 
 
@@ -49,10 +51,14 @@ def doctor() -> None:
     for name in CORE:
         console.print(f"  {name} {metadata.version(name)}")
     console.print(f"  compiled kernels: in {kernel_cache()}")
-    table = Table("extra", "installed", "gives", "install", box=None, pad_edge=False)
+    console.print()
     for extra in EXTRAS:
         there = find_spec(extra.module) is not None
-        version = metadata.version(extra.distribution) if there else "-"
-        install = "" if there else f"pip install 'skidpad\\[{extra.name}]'"
-        table.add_row(extra.name, version, extra.gives, install)
-    console.print(table)
+        state = f"{extra.module} {metadata.version(extra.distribution)}" if there else "missing"
+        if extra.name == "server" and there:
+            state = f"serves CARLA {PROTOCOL}"
+        # plain lines: in a pipe they are as long as they are
+        typer.echo(f"{extra.name:<8} {state:<24} {extra.gives}")
+    missing = [extra.name for extra in EXTRAS if find_spec(extra.module) is None]
+    if missing:
+        typer.echo(f"\nto install what is missing: {install_command(','.join(missing))}")

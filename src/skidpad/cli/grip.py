@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from enum import Enum
-from typing import Annotated
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from msgspec import structs
@@ -11,8 +12,11 @@ from msgspec import structs
 from skidpad.cli.asked import Controller, GripCross, MapAsked, Tuned
 from skidpad.cli.campaigns import FirstSeed, How
 from skidpad.cli.spread import spread
-from skidpad.core.run import BackendChoice, RunSpec, Scenario
-from skidpad.core.vocabulary import SensorLevel
+from skidpad.core.run import BackendChoice, Friction, RunSpec, Scenario
+from skidpad.core.vocabulary import Outcome, SensorLevel
+
+if TYPE_CHECKING:
+    import polars as pl
 
 REPEATS = 100  # the study's
 
@@ -68,6 +72,32 @@ def grip(
     cells = plan_grip(cross, run, seeds or REPEATS)
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.grip import recipe
+    from skidpad.recording.results import read_results
     from skidpad.report.grip import write_grip_report
 
-    how(Campaign(recipe(keep_all), cells, alone=alone), write_grip_report)
+    def answer(folder: Path) -> str:
+        page = write_grip_report(folder)
+        return f"{answer_text(read_results(folder))}\n{page}"
+
+    how(Campaign(recipe(keep_all), cells, alone=alone), answer)
+
+
+def answer_text(rows: pl.DataFrame) -> str:
+    """Returns what weather's grip changed: collisions without and with it, and the worst cell."""
+    from skidpad.core.wording import count_text
+
+    lines = []
+    for friction, title in ((Friction.ORIGINAL, "on dry grip"), (Friction.REDUCED, "with weather")):
+        runs = rows.filter(rows["friction"] == friction.value)
+        hit = runs.filter(runs["outcome"] == Outcome.COLLISION.value)
+        if not len(runs):
+            continue
+        lines.append(
+            f"{title}: {count_text(len(hit), 'collision')} in {count_text(len(runs), 'run')}"
+        )
+        if friction is Friction.REDUCED and len(hit):
+            cells = hit.group_by("scenario", "weather").len()
+            worst = cells.sort("len", "scenario", "weather", descending=[True, False, False])
+            scenario, weather, n = worst.row(0)
+            lines[-1] += f", most in {scenario} in {weather} ({n})"
+    return "\n".join(lines)

@@ -181,6 +181,8 @@ def _events(found: Watched, rule: HazardType | Indicator) -> int:
 
 
 def _print(found: Watched, out: Path) -> None:
+    from skidpad.core.wording import count_text
+
     summary = found.summary
     typer.echo(
         f"{', '.join(found.channels)}: {found.cycles} cycles, {found.hours * 60:.1f} min; "
@@ -197,7 +199,11 @@ def _print(found: Watched, out: Path) -> None:
     for what, table in (("lost while reading", lost), ("not usable", unusable)):
         if table:
             typer.echo(f"  {what}: " + ", ".join(f"{k} {v}" for k, v in table.items()))
-    typer.echo(f"written to {out}")
+    n = sum(found.hazards.values())
+    kinds = ", ".join(hazard.value for hazard in found.hazards)
+    typer.echo(f"{count_text(n, 'hazardous scene')} ({kinds})" if n else "no hazardous scene")
+    listing = f"; skidpad hazards export {out} writes each as .xosc" if n else ""
+    typer.echo(f"Next: {out / 'report.html'} shows the drive{listing}")
 
 
 def _print_table(table: object) -> None:
@@ -214,7 +220,10 @@ def _gate(counts: dict[str, int], junit: Path | None) -> None:
     """Exit with 1 when anything that must not occur did."""
     from skidpad.cli.junit import write_junit
 
-    wrong = {name: [f"{name} occurred {n} times"] if n else [] for name, n in counts.items()}
+    wrong = {
+        name: [f"{name} occurred {n} time{'' if n == 1 else 's'}"] if n else []
+        for name, n in counts.items()
+    }
     if junit is not None:
         write_junit(junit, "skidpad monitor", wrong)
     failed = [sentence for by in wrong.values() for sentence in by]

@@ -46,7 +46,10 @@ def play_folder(
 @scenario_options
 def play(
     file: Annotated[
-        Path, typer.Argument(help="OpenSCENARIO XML 1.0 to 1.3 (.xosc), or a folder of them.")
+        Path,
+        typer.Argument(
+            help="OpenSCENARIO XML 1.0 to 1.3 (.xosc), a folder of them, or a name of the catalogue."
+        ),
     ],
     cross: PlayCross,
     controller: Controller,
@@ -64,9 +67,14 @@ def play(
 ) -> None:
     """Play a scenario, or all of a folder; ends with verdicts, a page and a table."""
     from skidpad.core.errors import ConfigError, FileError
+    from skidpad.scenarios.shipped import NAMES, scenario_file
 
+    if not file.exists() and str(file) in NAMES:
+        file = scenario_file(str(file))
     if not file.exists():
-        raise FileError(f"scenario {file}: there is no such file or folder")
+        raise FileError(
+            f"scenario {file}: there is no such file or folder; the catalogue has {', '.join(NAMES)}"
+        )
     template = _template(cross, controller, run, scenario, tuned, backend)
     expected.check()  # what cannot be read is said before anything is driven
     if check:

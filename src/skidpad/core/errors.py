@@ -13,6 +13,9 @@ SkidpadError
 
 from __future__ import annotations
 
+import sys
+from pathlib import Path
+
 from skidpad.core.told import clean
 
 
@@ -58,8 +61,16 @@ class MissingExtra(SkidpadError, ImportError):
     """An optional dependency is needed: says which, and how to install it."""
 
     def __init__(self, what: str, extra: str) -> None:
-        super().__init__(f"{what} needs an optional part: pip install 'skidpad[{extra}]'")
+        super().__init__(f"{what} needs an optional part: {install_command(extra)}")
         self.extra = extra
+
+
+def install_command(extra: str) -> str:
+    """Returns the command that installs an extra: of the clone that this is, else by name."""
+    clone = Path(__file__).resolve().parents[3]
+    if (clone / "pyproject.toml").is_file():
+        return f"{sys.executable} -m pip install -e '{clone}[{extra}]'"
+    return f"pip install 'skidpad[{extra}]'"
 
 
 def require_range(field: str, value: float, low: float, high: float) -> float:

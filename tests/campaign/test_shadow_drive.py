@@ -16,7 +16,7 @@ from skidpad.cli.shadow import lines
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Passenger, ReferenceDriver
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.drive.shadow import Foresight
+from skidpad.evidence.shadow import Foresight
 from skidpad.recording.cycles import cycles
 from skidpad.recording.hazards import HazardRecord
 from skidpad.recording.logfiles import read_log

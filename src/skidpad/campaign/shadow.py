@@ -18,7 +18,7 @@ from skidpad.campaign.stored import read_run
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import ChannelCrew, DriverSpec, Passenger
 from skidpad.core.vocabulary import Supervision
-from skidpad.evidence.drive.shadow import (
+from skidpad.evidence.shadow import (
     Foresight,
     Parting,
     Pedals,

@@ -8,7 +8,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skidpad.evidence.drive.shadow import (
+from skidpad.evidence.shadow import (
     SHORTEST,
     Foresight,
     Parting,

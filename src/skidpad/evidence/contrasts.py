@@ -9,22 +9,24 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from math import ceil
 from typing import NamedTuple, Protocol
 
 import numpy as np
 import polars as pl
 from numpy.typing import ArrayLike
-from scipy import stats
 
 from skidpad.core.vocabulary import Outcome
-from skidpad.evidence.statistics import Interval, compare_pairs, pairs_needed, poisson_interval
+from skidpad.evidence.statistics import (
+    Interval,
+    compare_pairs,
+    no_limits_text,
+    pairs_needed,
+)
 
 NOT_RUN = frozenset(  # leave every denominator (L-7)
     {Outcome.AGENT_ERROR.value, Outcome.CRASHED.value, Outcome.TIMEOUT.value}
 )
 DRIVES_APART = ("config", "variant", "controller", "friction", "seed")  # not of the same run
-RUNS_WITHOUT_EVENT = 3.7  # / limit: runs without an event that bound a rate, -ln(0.025)
 SIGNS = "sign changes of the means per seed, exact up to 12"
 SEGMENTS = "sign changes, exact up to 12"
 
@@ -42,6 +44,7 @@ class Contrast:
     units: int  # seeds or runs behind it
     units_needed: int | None  # None: cannot be said
     identical: bool = False  # all pairs are the same drive
+    without_limits: str = ""  # what stands where there is no interval
 
     @property
     def small(self) -> bool:
@@ -133,7 +136,7 @@ class Paired:
     def draw(self, table: pl.DataFrame) -> Contrast | None:
         """From the differences of pairs."""
         needed = (pl.col(self.column), self.more.are, self.less.are)
-        if not _has(table, *needed, *([self.where.are] if self.where else [])):
+        if not has_columns(table, *needed, *([self.where.are] if self.where else [])):
             return None
         rows = table.filter(self.where.are) if self.where else table
         pairs, same = paired_runs(rows, self.more.are, self.less.are, self.by, self.column)
@@ -221,7 +224,7 @@ class Mean:
     def draw(self, table: pl.DataFrame) -> Contrast | None:
         """From the values of all rows; sums within `value` are over the whole table."""
         where = pl.lit(True) if self.where is None else self.where
-        if not _has(table, self.value, where):
+        if not has_columns(table, self.value, where):
             return None
         table = distinct(table)
         rows = table.sort([c for c in self.by if c in table.columns]) if self.by else table
@@ -229,42 +232,6 @@ class Mean:
         rows = rows.filter("counts").drop_nulls("shown")
         values = per_seed(rows, pl.col("shown")) if "seed" in self.by else rows["shown"]
         return paired(self.label, values, self.margin.value) if len(values) else None
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
-class RateBelow:
-    """Events per run, or hour, are fewer than the limit."""
-
-    what: str  # the events
-    events: pl.Expr  # their number, in total
-    limit: Amount
-    exposure: pl.Expr = pl.len()  # runs or hours, in total
-    where: pl.Expr | None = None
-    given: pl.Expr | None = None  # a total that must be positive, or there is nothing to say
-
-    @property
-    def test(self) -> tuple[str, ...]:
-        """An exact test."""
-        return (f"exact Poisson against {self.limit}",)
-
-    @property
-    def amounts(self) -> tuple[Amount, ...]:
-        """None: the limit is the claim."""
-        return ()
-
-    def draw(self, table: pl.DataFrame) -> Contrast | None:
-        """From sums over the rows."""
-        given = pl.lit(1) if self.given is None else self.given
-        where = pl.lit(True) if self.where is None else self.where
-        if not _has(table, self.events, self.exposure, given, where):
-            return None
-        rows = distinct(table.filter(where))
-        events, exposure, known = rows.select(e=self.events, x=self.exposure, g=given).row(0)
-        if not len(rows) or not known:
-            return None
-        return rate_below(
-            f"{self.limit} minus {self.what}", int(events), exposure, self.limit.value
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -365,25 +332,12 @@ def paired(label: str, values: ArrayLike, margin: float, identical: bool = False
         units=c.n,
         units_needed=pairs_needed(c, margin),
         identical=identical,
+        without_limits=no_limits_text(c.n, "unit"),
     )
 
 
-def rate_below(label: str, events: int, runs: float, limit: float) -> Contrast:
-    """The claim that a rate per run, or hour, lies below `limit`, by exact Poisson tests."""
-    low, high = poisson_interval(events, runs)
-    return Contrast(
-        label=label,
-        mean=limit - events / runs,
-        interval=Interval(limit - high, limit - low),
-        p_claimed=float(stats.poisson.cdf(events, limit * runs)),
-        p_against=float(stats.poisson.sf(events - 1, limit * runs)),
-        margin=0.0,
-        units=max(1, round(runs)),
-        units_needed=ceil(RUNS_WITHOUT_EVENT / limit),
-    )
-
-
-def _has(table: pl.DataFrame, *needed: pl.Expr) -> bool:
+def has_columns(table: pl.DataFrame, *needed: pl.Expr) -> bool:
+    """Whether all columns that expressions read are in the table."""
     return {name for e in needed for name in e.meta.root_names()} <= set(table.columns)
 
 

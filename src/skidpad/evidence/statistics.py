@@ -33,6 +33,7 @@ DISPERSION_ASSUMED = 10.0  # largest variance / mean of counts for which limits 
 RESAMPLES = 4000
 EVER_SIGNIFICANT = 6  # fewer pairs cannot give p < 0.05: 2 / 2^5 > 0.05
 EXACT_PAIRS = 12  # up to here all 2^n sign changes are tried
+ASSUMED = f"if variance/mean is at most {DISPERSION_ASSUMED:.0f}"  # of counts
 NO_LIMITS = "no limits: they need 8 units that are not all alike"
 
 
@@ -320,14 +321,13 @@ def no_limits_text(units: int, unit: str = "run") -> str:
 
 
 def rate_text(rate: Rate, unit: str = "run", per: str = "run") -> str:
-    """`0.60 per run, 95 % 0.31 to 1.14`; without limits `0.10 per run; 1 of 10 runs had one, at most
-    39 % do (95 %)`.
+    """`0.60 per run, 95 % 0.31 to 1.14 if variance/mean is at most 10`; without limits what stands for them.
 
     unit: what `Rate.runs` are; per: the unit of exposure.
     """
     text = f"{rate.rate:.2f} per {per}"
     if rate.interval is not None:
-        text += f", {interval_text(rate.interval)}"
+        text += f", {interval_text(rate.interval)} {ASSUMED}"
     remark = rate_remark(rate, unit)
     return f"{text}; {remark}" if remark else text
 

@@ -16,8 +16,9 @@ from math import ceil
 
 import polars as pl
 
+from skidpad.core.wording import count_text
 from skidpad.evidence.contrasts import Contrast, Criterion, finished
-from skidpad.evidence.statistics import holm, interval_text, p_text
+from skidpad.evidence.statistics import EVER_SIGNIFICANT, holm, interval_text, p_text
 
 ALPHA = 0.05
 
@@ -141,6 +142,11 @@ def _seeds_needed(contrasts: list[Contrast], seeds: int) -> int | None:
     return max(seeds + 1, ceil(seeds * max(r for r in ratios if r is not None)))
 
 
+def _limits(contrast: Contrast) -> str:
+    found = contrast.interval
+    return contrast.without_limits if found is None else interval_text(found)
+
+
 def _text(
     finding: Finding,
     verdict: Verdict,
@@ -154,11 +160,12 @@ def _text(
         return "By construction: both sides are the same drive, so there is nothing to measure."
     if verdict is Verdict.SAME_DRIVES:
         return "Not measured: what differs never came into play, both sides are the same drives."
-    parts = [
-        f"{c.label} {c.mean:+.3g} ({interval_text(c.interval, c.units, 'unit')})" for c in contrasts
-    ]
+    parts = [f"{c.label} {c.mean:+.3g} ({_limits(c)})" for c in contrasts]
     text = f"{verdict.value.capitalize()}: {'; '.join(parts)}."
-    if p is not None:
+    few = min(c.units for c in contrasts)
+    if verdict is Verdict.UNDECIDED and few < EVER_SIGNIFICANT:
+        text += f" {count_text(few, 'unit')} cannot be tested."
+    elif p is not None:
         text += f" {p_text(p)} after correction for all findings of this report."
     if verdict is Verdict.CONTRADICTED:
         small = [c.label for c in contrasts if c.small and c.margin]

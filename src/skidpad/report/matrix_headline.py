@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from skidpad.core.wording import count_text
-from skidpad.evidence.statistics import median_time
+from skidpad.evidence.statistics import ASSUMED, median_time
 from skidpad.report.matrix_data import (
     BASELINE,
     EVENTS,
@@ -86,8 +86,8 @@ def headline_table(matrix: Matrix) -> Table:
         counts[3],
     ]
     note = (
-        "Every drive once. Small: 95 % interval; per 100 km it is that of the count, the way taken "
-        "as given; of the median exact by order statistics, from six runs on."
+        f"Every drive once. Small: 95 % interval {ASSUMED}; per 100 km it is that of the count, the way "
+        "taken as given; of the median exact by order statistics, from six runs on."
     ) + few_seeds_note(matrix)
     return table(columns, matrix.configs, "What happened, by configuration", note)
 

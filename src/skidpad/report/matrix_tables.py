@@ -10,6 +10,7 @@ import polars as pl
 from skidpad.core.wording import count_text
 from skidpad.evidence.contrasts import paired_runs, per_seed
 from skidpad.evidence.statistics import (
+    ASSUMED,
     EVER_SIGNIFICANT,
     UNITS_FROM,
     Rate,
@@ -156,7 +157,9 @@ def count_table(matrix: Matrix, column: str, caption: str) -> Table:
         shade = top or 1.0 if config in matrix.comparison_configs else None
         return rate_quantity(rates[config, group], shade)
 
-    note = f"Per run of {matrix.duration:g} s; small: 95 % interval.{few_seeds_note(matrix)}"
+    note = (
+        f"Per run of {matrix.duration:g} s; small: 95 % interval {ASSUMED}.{few_seeds_note(matrix)}"
+    )
     return by_weather(matrix, of, RATE, caption, note)
 
 

@@ -9,17 +9,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from skidpad.evidence.contrasts import (
-    Amount,
-    Contrast,
-    RateBelow,
-    distinct,
-    paired,
-    paired_runs,
-    per_seed,
-    rate_below,
-)
+from skidpad.evidence.contrasts import Amount, Contrast, distinct, paired, paired_runs, per_seed
 from skidpad.evidence.drive.findings import FINDINGS
+from skidpad.evidence.rates import RateBelow, rate_below
+from skidpad.evidence.statistics import event_rate
 from skidpad.evidence.verdicts import Finding, Verdict, judge
 
 BY_ID = {f.id: f for f in FINDINGS}
@@ -320,9 +313,13 @@ def test_weathers_of_one_seed_are_one_unit() -> None:
 def test_a_rate_is_bounded_exactly() -> None:
     none = rate_below("r", 0, 40, 0.1)
     assert none.p_claimed == pytest.approx(np.exp(-4.0))
-    many = rate_below("r", 20, 40, 0.1)
+    assert none.interval is None
+    counts = event_rate([1, 0] * 20)
+    many = rate_below("r", 20, 40, 0.1, counts)
     assert many.p_against < 1e-6
-    assert many.interval.high < 0.0
+    assert many.interval == (0.1 - counts.interval.high, 0.1 - counts.interval.low)
+    few = rate_below("r", 1, 40, 0.1, event_rate([1] + [0] * 39))
+    assert few.without_limits == "1 of 40 seeds had one, at most 11 % do (95 %)"
 
 
 def test_every_finding_is_written_out_before_results_are_seen() -> None:

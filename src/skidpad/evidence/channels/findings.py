@@ -12,7 +12,8 @@ from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.timing import BUDGET_MS
-from skidpad.evidence.contrasts import Amount, Mean, RateBelow
+from skidpad.evidence.contrasts import Amount, Mean
+from skidpad.evidence.rates import RateBelow
 from skidpad.evidence.verdicts import Finding
 
 GOOD = 0.8  # precision and recall that the overall claim stands for (85.4 and 82.5 % macro)

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import polars as pl
 
-from skidpad.evidence.contrasts import Amount, Never, RateBelow
+from skidpad.evidence.contrasts import Amount, Never
 from skidpad.evidence.drive.sides import INVASIONS, POINT, config, configs, variants
+from skidpad.evidence.rates import RateBelow
 from skidpad.evidence.verdicts import Finding
 
 INVASIONS_MAX = Amount(2.0, "markings per run")  # in configurations 2 to 4

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import polars as pl
 
-from skidpad.evidence.contrasts import Outweighs, Paired, RateBelow, highest, lowest
+from skidpad.evidence.contrasts import Outweighs, Paired, highest, lowest
 from skidpad.evidence.drive.collisions import BEND_RADIUS
 from skidpad.evidence.drive.sides import (
     BY_RUN,
@@ -21,6 +21,7 @@ from skidpad.evidence.drive.sides import (
     config,
     configs,
 )
+from skidpad.evidence.rates import RateBelow
 from skidpad.evidence.verdicts import Finding
 
 ORDER = (("0", "3"), ("3", "2"), ("2", "1"), ("1", "4"))

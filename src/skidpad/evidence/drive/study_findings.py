@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import polars as pl
 
-from skidpad.evidence.contrasts import Amount, Criterion, Never, RateBelow, rows_of
+from skidpad.evidence.contrasts import Amount, Criterion, Never, rows_of
 from skidpad.evidence.drive.sides import COLLISIONS, PHANTOMS, POINT, variants
+from skidpad.evidence.rates import RateBelow
 from skidpad.evidence.verdicts import Finding
 
 CHANGES = Amount(0.5, "changes per minute")

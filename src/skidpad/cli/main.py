@@ -26,6 +26,7 @@ from skidpad.cli.fleet import fleet
 from skidpad.cli.friction import friction
 from skidpad.cli.grip import grip
 from skidpad.cli.hazards import hazards
+from skidpad.cli.help_panels import arrange_help
 from skidpad.cli.map import maps
 from skidpad.cli.monitor import monitor, safety_case
 from skidpad.cli.play import play, play_folder
@@ -135,6 +136,9 @@ def carla_unreal(context: typer.Context) -> None:
     from skidpad.cli.carla_server import command
 
     command(translated(context.args))
+
+
+arrange_help(app)
 
 
 def _terminated(number: int, frame: object) -> NoReturn:

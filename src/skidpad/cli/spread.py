@@ -22,6 +22,7 @@ from typing import Annotated, Any, NamedTuple, get_args, get_type_hints
 import typer
 from msgspec import NODEFAULT, Meta, Struct, structs
 
+from skidpad.cli.help_panels import OPTIONS
 from skidpad.core.errors import require_choice, require_range
 from skidpad.core.run import PARTED
 
@@ -44,7 +45,7 @@ def spread(
             hint = (kinds or {}).get(parameter.name, hints[parameter.name])
             if isinstance(hint, type) and issubclass(hint, Struct):
                 groups[parameter.name] = hint
-                parameters += described(hint, defaults)
+                parameters += described(hint, defaults, OPTIONS.get(parameter.name))
             else:
                 kind = inspect.Parameter.KEYWORD_ONLY
                 parameters.append(parameter.replace(annotation=hint, kind=kind))
@@ -74,14 +75,16 @@ def _described(kind: type[Struct]) -> dict[str, Described]:
     return found
 
 
-def described(kind: type[Struct], defaults: dict[str, Any]) -> list[inspect.Parameter]:
-    """A parameter for every field of `kind` that has a description."""
+def described(
+    kind: type[Struct], defaults: dict[str, Any], panel: str | None = None
+) -> list[inspect.Parameter]:
+    """A parameter for every field of `kind` that has a description; panel: its heading in help."""
     return [
         inspect.Parameter(
             field.name,
             inspect.Parameter.KEYWORD_ONLY,
             default=_shown(defaults.get(field.name, field.default), field.meta),
-            annotation=_option(field),
+            annotation=_option(field, panel),
         )
         for field in _described(kind).values()
     ]
@@ -96,7 +99,7 @@ def _shown(default: Any, meta: Meta) -> Any:
     return ",".join(default) if meta.extra == PARTED else list(default)
 
 
-def _option(field: Described) -> Any:
+def _option(field: Described, panel: str | None) -> Any:
     """How typer takes it: as plain as it can be, since `_read` is who judges the value."""
     name, kind, meta, _ = field
     flags = [_flag(name)] if kind is bool else []  # without a --no-...
@@ -106,7 +109,8 @@ def _option(field: Described) -> Any:
         kind = str
     elif kind == tuple[str, ...]:
         kind = str if meta.extra == PARTED else list[str]
-    return Annotated[kind, typer.Option(*flags, help=meta.description, metavar=metavar)]
+    option = typer.Option(*flags, help=meta.description, metavar=metavar, rich_help_panel=panel)
+    return Annotated[kind, option]
 
 
 def _flag(name: str) -> str:

@@ -324,3 +324,48 @@ def test_the_time_through_is_that_of_small_steps(v, way, a):
         speed = faster
         t += dt
     assert t == pytest.approx(travel_time(v, way, a), abs=0.05)
+
+
+# --- who crosses, and who cuts in
+
+
+def one(x: float, y: float, vx: float, vy: float, kind: int = 0, size=(4.0, 1.8)) -> SeenActors:
+    """One road user at (x, y), for an ego at (100, -5.25) that drives along x."""
+    x, y, z, yaw, vx, vy, length, width = (
+        np.array([float(c)]) for c in (x, y, 0.0, np.arctan2(vy, vx), vx, vy, *size)
+    )
+    lamps = np.zeros(1, np.bool_)
+    return SeenActors(np.ones(1, np.int64), np.full(1, kind, np.uint8), x, y, z, yaw, vx, vy, length,
+                      width, lamps)  # fmt: skip
+
+
+def answer(actors: SeenActors, v: float = 15.0) -> VehicleCommand:
+    """The command at 15 m/s on the straight road."""
+    map = load_map("straight")
+    return seat().driver.act(view_at(map.place(map.ego_start).pose, v, actors=actors))
+
+
+PERSON = {"kind": 6, "size": (0.5, 0.5)}
+
+
+def test_it_brakes_for_who_will_cross_when_it_arrives_and_not_for_others():
+    free = answer(nobody())
+    assert answer(one(140.0, -9.0, 0.0, 1.4, **PERSON)).brake > 0.1
+    assert answer(one(140.0, -9.0, 0.0, -1.4, **PERSON)) == free, "walks away"
+    assert answer(one(140.0, -9.0, 0.0, 0.0, **PERSON)) == free, "stands at the kerb"
+    assert answer(one(140.0, -5.25, 0.0, 0.0, **PERSON)).brake > 0.1, "stands in the lane"
+    assert answer(one(140.0, -2.9, 0.0, 1.4, **PERSON)) == free, "has crossed"
+    assert answer(one(190.0, -9.0, 0.0, 5.0, **PERSON)) == free, "is across long before"
+    assert answer(one(140.0, -25.0, 0.0, 8.0)).brake > 0.1, "a car from the side"
+
+
+def test_a_cut_in_is_answered_as_it_begins():
+    beside = one(112.0, -8.75, 11.0, 0.0)
+    assert answer(beside).brake == 0.0
+    assert answer(one(112.0, -8.75, 11.0, 1.5)).brake > 0.1, "comes over within a second"
+
+
+def test_who_drives_on_another_level_is_not_in_the_way():
+    below = one(130.0, -5.25, 0.0, 0.0)
+    assert answer(below).brake > 0.1
+    assert answer(below._replace(z=np.array([6.0]))).brake == 0.0

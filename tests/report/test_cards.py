@@ -25,7 +25,7 @@ from skidpad.recording.motion import motion_hash
 from skidpad.recording.results import Timing
 from skidpad.recording.runlog import RunLog
 from skidpad.report.cards import contact_text, crash_card, facts, severity, tags, timeline
-from skidpad.report.causes import cause_sentence
+from skidpad.report.causes import write_cause
 from skidpad.report.crash_page import contact_cards, find_contacts, write_crashes
 from skidpad.report.crashes import crash_sections, found_crashes, montages, worst_of_each
 from skidpad.report.matrix_data import load_matrix
@@ -164,13 +164,13 @@ CAME = Moment(0.1, 3.7)
     ],
 )  # fmt: skip
 def test_the_cause_is_one_sentence_from_the_log(story: Story, sentence: str) -> None:
-    assert cause_sentence(story) == sentence
+    assert write_cause(story) == sentence
 
 
 def test_a_reported_distance_without_anything_ahead_is_said_so() -> None:
     worst = dataclasses.replace(PHANTOM, gap=None, to="")
     assert "the radar had reported 11.9 m, 0.2 s before, with nothing ahead in the lane" in (
-        cause_sentence(a_story(arrival=Arrival.CUT_IN, arrived=CAME, worst=worst))
+        write_cause(a_story(arrival=Arrival.CUT_IN, arrived=CAME, worst=worst))
     )
 
 
@@ -210,7 +210,7 @@ def test_one_timeline_in_order_of_time_with_mismatches_marked() -> None:
 def test_what_stands_has_no_speed_and_nothing_is_unknown(kind: CrashKind) -> None:
     none = {} if kind is CrashKind.STATIC else {"contact": None, "v_closing": None}
     story = a_story(off_lane(kind, **none))
-    said = [cause_sentence(story), *(e.text for e in timeline(story)), *tags(story)]
+    said = [write_cause(story), *(e.text for e in timeline(story)), *tags(story)]
     assert "unknown" not in " ".join(said + [f"{n} {v}" for n, v in facts(story.crash)])
     assert "other" not in dict(facts(story.crash))
 

@@ -21,7 +21,7 @@ from skidpad.recording.matrix import Metrics
 from skidpad.recording.results import definitions_of
 from skidpad.recording.runlog import RunLog
 from skidpad.report.cards import contact_text, headline, timeline
-from skidpad.report.causes import cause_sentence
+from skidpad.report.causes import write_cause
 from skidpad.roads.queries import RoadMap
 
 
@@ -74,7 +74,7 @@ def show(run: Path) -> None:
     for crash in find_crashes(drive):
         story = tell_story(drive, crash)
         console.print(f"\n[bold]{crash.t:.2f} s: {headline(crash)}[/]")
-        console.print(f"  {cause_sentence(story)}")
+        console.print(f"  {write_cause(story)}")
         for event in timeline(story):
             style = "red" if event.is_wrong else ""
             console.print(f"  {event.time:>8}  {event.text}", style=style)

@@ -15,7 +15,7 @@ from skidpad.evidence.drive.prepared import Drive
 from skidpad.evidence.drive.severity import Contact
 from skidpad.evidence.drive.story import Arrival, Sighting, Story, tell_story
 from skidpad.recording.campaigns import snapshot
-from skidpad.report.causes import cause_sentence, metres, moment_gap, speed
+from skidpad.report.causes import format_gap, format_metres, format_speed, write_cause
 from skidpad.report.page import Card, Event, Image
 from skidpad.report.replay import replay
 from skidpad.roads.queries import RoadMap
@@ -65,7 +65,7 @@ def crash_card(crash: Crash, drive: Drive, road_map: RoadMap, run: Path) -> Card
         subtitle=f"{run.name} at {crash.t:.2f} s",
         tags=tags(story),
         facts=facts(crash),
-        cause=cause_sentence(story),
+        cause=write_cause(story),
         events=timeline(story),
         images=pictures(run, crash.t),
         replay=replay(drive.log, road_map, drive.row(crash.tick)),
@@ -78,10 +78,10 @@ def headline(crash: Crash) -> str:
         return "Facing the wrong way"
     alone = " in a bend, without a lead" if crash.bend_exit else ""
     if crash.kind is CrashKind.OFF_ROAD:
-        return f"Off the road at {speed(crash.v_ego)}{alone}"
+        return f"Off the road at {format_speed(crash.v_ego)}{alone}"
     if crash.kind is CrashKind.STATIC:
-        return f"Into the {crash.other} at {speed(crash.v_ego)}{alone}"
-    closing = "" if crash.v_closing is None else f", closing at {speed(crash.v_closing)}"
+        return f"Into the {crash.other} at {format_speed(crash.v_ego)}{alone}"
+    closing = "" if crash.v_closing is None else f", closing at {format_speed(crash.v_closing)}"
     if crash.rear_ended:
         return f"Struck from behind by {crash.other}{closing}"
     who = "Ego into" if crash.striker is not Striker.OTHER else "Hit by"
@@ -111,10 +111,10 @@ def facts(crash: Crash) -> list[tuple[str, str]]:
     contact = crash.contact
     delta_v = None if contact is None else contact.delta_v
     rows = [
-        ("ego", crash.v_ego, speed),
-        ("other", crash.v_other, speed),
-        ("closing", crash.v_closing, speed),
-        (_delta_v_name(contact), delta_v, speed),
+        ("ego", crash.v_ego, format_speed),
+        ("other", crash.v_other, format_speed),
+        ("closing", crash.v_closing, format_speed),
+        (_delta_v_name(contact), delta_v, format_speed),
         ("offset in lane", crash.lane_offset, lambda m: f"{round(m, 2) + 0.0:.2f} m"),
         ("bend radius", crash.bend_radius, "{:.0f} m".format),
         ("friction", crash.mu, "{:.2f}".format),
@@ -139,7 +139,7 @@ def timeline(story: Story) -> list[Event]:
         (story.pushed_by, f"contact with {story.pusher}"),
     ):
         if moment is not None:
-            parts = [text, moment.v and f"from {speed(moment.v)}", moment_gap(moment)]
+            parts = [text, moment.v and f"from {format_speed(moment.v)}", format_gap(moment)]
             found.append((moment.before, _event(moment.before, [p for p in parts if p])))
     found.append((0.0, _event(0.0, [headline(crash)])))
     found += [(-after, _event(-after, [contact_text(c)])) for after, c in story.followed]
@@ -159,10 +159,10 @@ def _news_event(s: Sighting, story: Story) -> Event:
     """One change of what the stack said."""
     parts = [STATUS[s.status]] if s.status is not None else []
     if s.distance is not None:
-        parts.append(f"measured {metres(s.distance)}")
+        parts.append(f"measured {format_metres(s.distance)}")
     if s.gap is not None:
         to = f" to {s.to}" if s.to and s.to != story.crash.other else ""
-        parts.append(f"true gap {metres(s.gap)}{to}")
+        parts.append(f"true gap {format_metres(s.gap)}{to}")
     elif s.distance is not None:
         parts.append("nothing ahead in the lane within 80 m")
     if s.tier is not None:
@@ -175,7 +175,7 @@ def _news_event(s: Sighting, story: Story) -> Event:
 def contact_text(contact: Contact) -> str:
     """One contact in words, with its class and what it is graded by."""
     what = contact.other if contact.actor > 0 else f"the {contact.other}"
-    by = f"{contact.graded_by.value} {speed(contact.v_graded)}"
+    by = f"{contact.graded_by.value} {format_speed(contact.v_graded)}"
     return f"contact with {what}, {by}, {contact.severity.value}"
 
 

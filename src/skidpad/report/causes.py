@@ -22,53 +22,55 @@ REPORTERS = {
 }
 
 
-def cause_sentence(story: Story) -> str:
+def write_cause(story: Story) -> str:
     """Returns the cause of a crash as one sentence."""
     crash = story.crash
     if crash.kind is CrashKind.VEHICLE:
         struck = crash.rear_ended or crash.striker is Striker.OTHER
-        parts = _struck(story) if struck else _drove_into(story)
+        parts = _describe_struck(story) if struck else _describe_striking(story)
     elif crash.kind is CrashKind.WRONG_WAY:
-        parts = [f"The ego faced against the direction of its lane at {speed(crash.v_ego)}"]
+        parts = [f"The ego faced against the direction of its lane at {format_speed(crash.v_ego)}"]
     else:
-        parts = _left_lane(story)
+        parts = _describe_departure(story)
     if story.pushed_by is not None:
-        parts.append(f"it had touched {story.pusher} {seconds(story.pushed_by.before)} before")
+        parts.append(
+            f"it had touched {story.pusher} {format_seconds(story.pushed_by.before)} before"
+        )
     text = "; ".join(part for part in parts if part) + "."
     return "The " + text[4:] if text.startswith("the ") else text
 
 
-def _struck(story: Story) -> list[str]:
+def _describe_struck(story: Story) -> list[str]:
     """Others drove into the ego."""
     crash, wrong = story.crash, story.worst
     where = " from behind" if crash.rear_ended else ""
-    closing = "" if crash.v_closing is None else f", {speed(crash.v_closing)} faster"
+    closing = "" if crash.v_closing is None else f", {format_speed(crash.v_closing)} faster"
     text = f"{crash.other} drove into the ego{where}{closing}, "
     if story.braked is not None:
-        text += f"while it braked from {speed(story.braked.v)}"
+        text += f"while it braked from {format_speed(story.braked.v)}"
     elif crash.v_ego < STANDS:
         text += "while it stood"
     else:
-        text += f"while it drove at {speed(crash.v_ego)}"
-    return [text, "" if wrong is None else _said(wrong, crash.other)]
+        text += f"while it drove at {format_speed(crash.v_ego)}"
+    return [text, "" if wrong is None else _describe_report(wrong, crash.other)]
 
 
-def _drove_into(story: Story) -> list[str]:
+def _describe_striking(story: Story) -> list[str]:
     """The ego drove into another."""
-    came = _came(story)
+    came = _describe_arrival(story)
     if came:
-        return [came, _perceived(story), _brake(story)]
-    return [_ahead(story), _perceived(story), _brake(story)]
+        return [came, _describe_perception(story), _describe_braking(story)]
+    return [_describe_lead(story), _describe_perception(story), _describe_braking(story)]
 
 
-def _came(story: Story) -> str:
+def _describe_arrival(story: Story) -> str:
     """How the other came before the ego, if it did so just before."""
     moment, other = story.arrived, story.crash.other
     if moment is None:
         return f"{other} crossed the way of the ego and was never ahead in its lane"
     if not story.came_just_before:
         return ""
-    when, gap = f"{seconds(moment.before)} before", metres(moment.gap)
+    when, gap = f"{format_seconds(moment.before)} before", format_metres(moment.gap)
     return {
         Arrival.CUT_IN: f"{other} came into the lane of the ego {gap} ahead, {when}",
         Arrival.UNCOVERED: f"the vehicle ahead left the lane {when} and uncovered {other} {gap} ahead",
@@ -77,51 +79,51 @@ def _came(story: Story) -> str:
     }[story.arrival or Arrival.CUT_IN]
 
 
-def _ahead(story: Story) -> str:
+def _describe_lead(story: Story) -> str:
     """What the other did that had been ahead for long."""
     crash, slowed = story.crash, story.slowed
     if slowed is not None and crash.v_other is not None:
         return (
-            f"{crash.other} ahead slowed from {speed(slowed.v)} to {speed(crash.v_other)} "
-            f"within {seconds(slowed.before)}"
+            f"{crash.other} ahead slowed from {format_speed(slowed.v)} to {format_speed(crash.v_other)} "
+            f"within {format_seconds(slowed.before)}"
         )
     stood = crash.v_other is not None and crash.v_other < STANDS
-    return f"{crash.other} {'stood' if stood else f'drove at {speed(crash.v_other)}'} ahead"
+    return f"{crash.other} {'stood' if stood else f'drove at {format_speed(crash.v_other)}'} ahead"
 
 
-def _perceived(story: Story) -> str:
+def _describe_perception(story: Story) -> str:
     """What the stack said of it."""
     if story.worst is not None:
-        return _said(story.worst, story.crash.other)
+        return _describe_report(story.worst, story.crash.other)
     first, arrived = story.first, story.arrived
     if arrived is None or first is None:
         return "the stack never reported it"
     if arrived.before - first.before < LATE:
         return ""
-    return f"it was first reported {seconds(first.before)} before, {metres(first.gap)} away"
+    return f"it was first reported {format_seconds(first.before)} before, {format_metres(first.gap)} away"
 
 
-def _said(wrong: Sighting, hit: str) -> str:
+def _describe_report(wrong: Sighting, hit: str) -> str:
     who = "the stack" if wrong.status is None else REPORTERS.get(wrong.status, "the stack")
-    text = f"{who} had reported {metres(wrong.distance)}, {seconds(wrong.before)} before, "
+    text = f"{who} had reported {format_metres(wrong.distance)}, {format_seconds(wrong.before)} before, "
     if wrong.gap is None:
         return text + "with nothing ahead in the lane"
     return (
         text
-        + f"the true gap was {metres(wrong.gap)}"
+        + f"the true gap was {format_metres(wrong.gap)}"
         + (f" to {wrong.to}" if wrong.to not in ("", hit) else "")
     )
 
 
-def _brake(story: Story) -> str:
+def _describe_braking(story: Story) -> str:
     """When the ego braked, and whether that could have been enough."""
     crash, braked = story.crash, story.braked
     if braked is None:
-        return f"the ego did not brake and drove at {speed(crash.v_ego)}"
-    text = f"the ego braked {seconds(braked.before)} before, from {speed(braked.v)}"
+        return f"the ego did not brake and drove at {format_speed(crash.v_ego)}"
+    text = f"the ego braked {format_seconds(braked.before)} before, from {format_speed(braked.v)}"
     if not isfinite(braked.gap):
         return text
-    text += f", {metres(braked.gap)} away"
+    text += f", {format_metres(braked.gap)} away"
     faster = braked.v - (crash.v_other or 0.0)
     if crash.mu is None or crash.mu <= 0.0 or faster <= 0.0:
         return text
@@ -130,21 +132,26 @@ def _brake(story: Story) -> str:
     return f"{text}; a full braking on a friction of {crash.mu:.2f} takes {needed:.0f} m, {enough} that"
 
 
-def _left_lane(story: Story) -> list[str]:
+def _describe_departure(story: Story) -> list[str]:
     """A departure: the bend against the grip, what the ego braked for, where in the lane it was."""
     crash, wrong, braked = story.crash, story.worst, story.braked
     end = f" and hit the {crash.other}" if crash.kind is CrashKind.STATIC else " and left the road"
-    text = f"the ego drove at {speed(crash.v_ego)}{end}"
+    text = f"the ego drove at {format_speed(crash.v_ego)}{end}"
     if crash.lane_offset is not None and abs(crash.lane_offset) > ASIDE:
         side = "left" if crash.lane_offset > 0.0 else "right"
-        text += f", {metres(abs(crash.lane_offset))} {side} of the middle of its lane"
+        text += f", {format_metres(abs(crash.lane_offset))} {side} of the middle of its lane"
     brake = ""
     if braked is not None:
-        brake = f"it had been braking for {seconds(braked.before)}, from {speed(braked.v)}"
-    return [text, _bend(crash), brake, "" if wrong is None else _said(wrong, crash.other)]
+        brake = f"it had been braking for {format_seconds(braked.before)}, from {format_speed(braked.v)}"
+    return [
+        text,
+        _describe_bend(crash),
+        brake,
+        "" if wrong is None else _describe_report(wrong, crash.other),
+    ]
 
 
-def _bend(crash: Crash) -> str:
+def _describe_bend(crash: Crash) -> str:
     if crash.bend_radius is None or crash.bend_radius > STRAIGHT:
         return "the road was straight"
     takes = crash.v_ego**2 / crash.bend_radius
@@ -156,21 +163,21 @@ def _bend(crash: Crash) -> str:
     return f"{text}, {than} than the {holds:.1f} m/s² that the tyres hold"
 
 
-def speed(v: float | None) -> str:
-    """A speed in km/h."""
+def format_speed(v: float | None) -> str:
+    """Returns a speed as text in km/h."""
     return "unknown speed" if v is None else f"{kmh_from_mps(v):.0f} km/h"
 
 
-def metres(value: float | None) -> str:
-    """A distance in m."""
+def format_metres(value: float | None) -> str:
+    """Returns a distance as text in m."""
     return "an unknown distance" if value is None else f"{value:.1f} m"
 
 
-def seconds(value: float) -> str:
-    """A time in s."""
+def format_seconds(value: float) -> str:
+    """Returns a time as text in s."""
     return f"{abs(value):.1f} s"
 
 
-def moment_gap(moment: Moment) -> str:
+def format_gap(moment: Moment) -> str:
     """The gap of a moment, "" where there is none."""
-    return metres(moment.gap) if isfinite(moment.gap) else ""
+    return format_metres(moment.gap) if isfinite(moment.gap) else ""

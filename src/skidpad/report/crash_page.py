@@ -1,4 +1,4 @@
-"""The crash cards of drives that nobody supervises: of a scenario, or of one run."""
+"""The crash cards of drives without a supervisor: of a scenario, or of one run."""
 
 from __future__ import annotations
 

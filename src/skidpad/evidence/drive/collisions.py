@@ -1,4 +1,4 @@
-"""Collisions: what was hit, who struck whom, and what the moment was like."""
+"""Collisions: what was hit, which of the two struck the other, and the moment in numbers."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ CORRECTIONS = {
 
 
 class Striker(str, Enum):
-    """Who drove into whom."""
+    """Which of the two drove into the other."""
 
     EGO = "ego"
     OTHER = "other"
@@ -94,7 +94,7 @@ def find_crashes(drive: Drive) -> tuple[Crash, ...]:
 
 
 def contact_crashes(drive: Drive) -> tuple[Crash, ...]:
-    """The first contact with each other body, for drives that nobody supervises."""
+    """The first contact with each other body, for drives without a supervisor."""
     first: dict[tuple[int, str], ContactEvent] = {}
     for contact in drive.log.contacts:
         first.setdefault((contact.actor, contact.static), contact)
@@ -135,7 +135,7 @@ def _corrected(drive: Drive, at: int, kind: CrashKind) -> Crash:
 
 
 def _is_bend_exit(drive: Drive, at: int) -> bool:
-    """In a bend, and nobody was ahead."""
+    """Whether the ego was in a bend with no vehicle ahead."""
     radius = _bend_radius(drive, at)
     alone = not np.any(drive.lead.actor[rows_before(drive, at, JUST_BEFORE) : at + 1] >= 0)
     return radius is not None and radius < BEND_RADIUS and alone
@@ -211,7 +211,7 @@ def _bend_radius(drive: Drive, at: int) -> float | None:
 
 
 def _who(log: RunLog, at: int, other: int) -> tuple[bool, Striker]:
-    """Whether the other car stood behind, and whose approach was the faster one."""
+    """Whether the other car stood behind, and which of the two approached faster."""
     a, k = log.actors, max(at - 1, 0)
     to = np.array([a.x[k, other] - a.x[k, 0], a.y[k, other] - a.y[k, 0]], dtype=np.float64)
     to /= max(float(np.hypot(*to)), 1e-9)

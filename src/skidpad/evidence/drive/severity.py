@@ -54,7 +54,7 @@ class Contact:
 
     @property
     def is_vulnerable(self) -> bool:
-        """Whether a pedestrian or somebody on two wheels was touched."""
+        """Whether a pedestrian or a two-wheeler was touched."""
         return self.kind in VULNERABLE
 
     @property
@@ -74,7 +74,7 @@ class Contact:
 
     @property
     def severity(self) -> Severity:
-        """The class; never the lowest with a pedestrian or somebody on two wheels."""
+        """The class; never the lowest with a pedestrian or a two-wheeler."""
         if self.v_graded > HEAVY_ABOVE:
             return Severity.HEAVY
         light = self.v_graded < LIGHT_BELOW and not self.is_vulnerable

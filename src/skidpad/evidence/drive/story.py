@@ -30,7 +30,7 @@ from skidpad.recording.runlog import RunLog
 
 EGO = 0
 RIGHT_WITHIN, RIGHT_SHARE = 3.0, 0.2  # m, or this share of the gap: measured and true agree
-STRAIGHT_WITHIN = 40.0  # m, nearer the ego's own axis says who is in its way
+STRAIGHT_WITHIN = 40.0  # m, nearer the ego's own axis says what is in its way
 ERROR_LOOK_BACK = 5.0  # s before the contact in which an error of measurement may have mattered
 JUST_CAME = 4.0  # s, what was ahead for longer did not come as a surprise
 CAME_WITHIN = 50.0  # m, what appears nearer ahead came from aside
@@ -105,21 +105,21 @@ def tell_story(drive: Drive, crash: Crash) -> Story:
     at = drive.row(crash.tick)
     way = _Way(drive, at, crash.actor)
     begin = way.begin()
-    pushed, worst = _pushed(drive, crash), _worst(way)
-    first = None if begin is None else _first(way, begin)
+    pushed, worst = _find_push(drive, crash), _find_worst_error(way)
+    first = None if begin is None else _find_first_report(way, begin)
     return Story(
         crash=crash,
-        arrival=None if begin is None else _arrival(drive, begin, way),
+        arrival=None if begin is None else _classify_arrival(drive, begin, way),
         arrived=None if begin is None else Moment(way.before(begin), float(way.gap[begin])),
         first=first,
-        news=_news(way, (first, worst)),
+        news=_list_changes(way, (first, worst)),
         worst=worst,
-        braked=_braked(way),
-        slowed=None if crash.actor is None else _slowed(way, crash.actor),
+        braked=_find_braking(way),
+        slowed=None if crash.actor is None else _find_slowing(way, crash.actor),
         pushed_by=None if pushed is None else Moment(_seconds(drive, crash, pushed), np.nan),
         pusher="" if pushed is None else pushed.other,
-        followed=_followed(drive, crash),
-        put_back=_put_back(drive, crash),
+        followed=_list_later_contacts(drive, crash),
+        put_back=_find_put_back(drive, crash),
     )
 
 
@@ -152,7 +152,7 @@ class _Way:
         return None if begin is None else max(begin, self.put)
 
     def before(self, row: int) -> float:
-        """s before the contact."""
+        """Returns the time from a row to the contact in s."""
         return float(self.drive.log.t[self.at] - self.drive.log.t[row])
 
     def to(self, row: int) -> str:
@@ -174,7 +174,7 @@ class _Way:
         return min(errors, default=max(LEAD_RANGE - measured, 0.1))
 
     def sighting(self, row: int) -> Sighting:
-        """What the stack said there."""
+        """Returns what the stack said in a row, beside the truth."""
         report = self.drive.log.report
         status, tier = number(float(report.status[row])), number(float(report.tier[row]))
         return Sighting(
@@ -197,8 +197,8 @@ class _Box(NamedTuple):
     half_length: float
     half_width: float
 
-    def seen(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        """Points of the world in its own axes, forward and left."""
+    def project(self, x: Floats, y: Floats) -> tuple[Floats, Floats]:
+        """Returns points of the world in the axes of the box, forward and left."""
         dx, dy, c, s = x - self.x, y - self.y, np.cos(self.yaw), np.sin(self.yaw)
         return dx * c + dy * s, dy * c - dx * s
 
@@ -211,7 +211,7 @@ class _Box(NamedTuple):
 
     def gap(self, x: Floats, y: Floats) -> Floats:
         """m from points to it, 0 inside."""
-        forward, left = self.seen(x, y)
+        forward, left = self.project(x, y)
         along = np.maximum(np.abs(forward) - self.half_length, 0.0)
         return np.hypot(along, np.maximum(np.abs(left) - self.half_width, 0.0))
 
@@ -230,19 +230,19 @@ def _box_gap(log: RunLog, at: int, actor: int) -> tuple[Floats, Mask]:
     """m between the boxes of the ego and an actor, and whether it is straight ahead and near."""
     ego, other = (_box_of(log, at, i) for i in (EGO, actor))
     gaps = [a.gap(x, y) for a, b in ((ego, other), (other, ego)) for x, y in b.corners()]
-    forward, left = ego.seen(other.x, other.y)
+    forward, left = ego.project(other.x, other.y)
     in_way = np.abs(left) < ego.half_width + other.half_width
     there = log.present[: at + 1, actor]
     straight = (forward > 0.0) & (forward < STRAIGHT_WITHIN) & in_way & there
     return np.where(there, np.min(gaps, axis=0), np.nan), straight
 
 
-def _arrival(drive: Drive, begin: int, way: _Way) -> Arrival:
+def _classify_arrival(drive: Drive, begin: int, way: _Way) -> Arrival:
     if begin == 0:
         return Arrival.DRIVEN_UP
     if begin == way.put or not drive.free[begin]:
         return Arrival.EGO_PUT
-    if abs(_sideways(drive, begin)) > SIDE_STEP:
+    if abs(_measure_sidestep(drive, begin)) > SIDE_STEP:
         return Arrival.EGO_CAME
     before = int(drive.lead.actor[begin - 1])
     if before >= 0:
@@ -251,7 +251,7 @@ def _arrival(drive: Drive, begin: int, way: _Way) -> Arrival:
     return Arrival.CUT_IN if way.gap[begin] < CAME_WITHIN else Arrival.DRIVEN_UP
 
 
-def _sideways(drive: Drive, row: int) -> float:
+def _measure_sidestep(drive: Drive, row: int) -> float:
     """m that the ego moved across its lane in the 1.5 s before a row, left positive."""
     rows = slice(rows_before(drive, row, SIDE_STEP_TIME), row)
     a, heading = drive.log.actors, drive.place.heading[rows]
@@ -259,12 +259,12 @@ def _sideways(drive: Drive, row: int) -> float:
     return float(np.nansum(across) * drive.log.header.dt)
 
 
-def _first(way: _Way, begin: int) -> Sighting | None:
+def _find_first_report(way: _Way, begin: int) -> Sighting | None:
     seen = np.flatnonzero(way.drive.log.report.detected[begin : way.at + 1] == 1.0)
     return way.sighting(begin + int(seen[0])) if seen.size else None
 
 
-def _news(way: _Way, wanted: Sequence[Sighting | None]) -> tuple[Sighting, ...]:
+def _list_changes(way: _Way, wanted: Sequence[Sighting | None]) -> tuple[Sighting, ...]:
     """Changes of status and tier in the last 10 s that lasted, and the sightings that are wanted."""
     drive, begin = way.drive, rows_before(way.drive, way.at, LOOK_BACK)
     said = np.stack([drive.log.report.status, drive.log.report.tier])[:, : way.at + 1]
@@ -286,7 +286,7 @@ def _lasts(way: _Way, row: int, end: int) -> bool:
     return tier in BRAKING or (end - row) * way.drive.log.header.dt > FLICKER
 
 
-def _worst(way: _Way) -> Sighting | None:
+def _find_worst_error(way: _Way) -> Sighting | None:
     """The largest error of the last 5 s that may have mattered.
 
     Too short while the stack braked hard, or too long while the vehicle that was hit was ahead.
@@ -306,7 +306,7 @@ def _worst(way: _Way) -> Sighting | None:
     return way.sighting(max(rows, key=way.error)) if rows else None
 
 
-def _braked(way: _Way) -> Moment | None:
+def _find_braking(way: _Way) -> Moment | None:
     """Since when the pedal was pressed without a break until the contact."""
     pressed = way.drive.log.applied.brake[: way.at] > BRAKES
     if not pressed.size or not pressed[-1]:
@@ -316,7 +316,7 @@ def _braked(way: _Way) -> Moment | None:
     return Moment(way.before(row), float(way.gap[row]), float(way.drive.v[row]))
 
 
-def _slowed(way: _Way, actor: int) -> Moment | None:
+def _find_slowing(way: _Way, actor: int) -> Moment | None:
     """When the other car was fastest in the last 5 s, if it lost much speed since."""
     begin, a = rows_before(way.drive, way.at, ERROR_LOOK_BACK), way.drive.log.actors
     v = np.hypot(a.vx[begin : way.at, actor], a.vy[begin : way.at, actor]).astype(np.float64)
@@ -326,7 +326,7 @@ def _slowed(way: _Way, actor: int) -> Moment | None:
     return Moment(way.before(row), float(way.gap[row]), float(v.max()))
 
 
-def _pushed(drive: Drive, crash: Crash) -> Contact | None:
+def _find_push(drive: Drive, crash: Crash) -> Contact | None:
     """The last contact with a road user within 2 s before a departure."""
     if crash.actor is not None:
         return None
@@ -341,7 +341,7 @@ def _seconds(drive: Drive, crash: Crash, contact: Contact) -> float:
     return (crash.tick - contact.tick) * drive.log.header.dt
 
 
-def _followed(drive: Drive, crash: Crash) -> tuple[tuple[float, Contact], ...]:
+def _list_later_contacts(drive: Drive, crash: Crash) -> tuple[tuple[float, Contact], ...]:
     """The contacts after the crash until the supervisor gives the ego back."""
     end = _end_of_recovery(drive, crash)
     if end is None:
@@ -354,7 +354,7 @@ def _followed(drive: Drive, crash: Crash) -> tuple[tuple[float, Contact], ...]:
     )
 
 
-def _put_back(drive: Drive, crash: Crash) -> float | None:
+def _find_put_back(drive: Drive, crash: Crash) -> float | None:
     end = _end_of_recovery(drive, crash)
     if end is None:
         return None
@@ -364,7 +364,7 @@ def _put_back(drive: Drive, crash: Crash) -> float | None:
 
 
 def _end_of_recovery(drive: Drive, crash: Crash) -> int | None:
-    """The last row of the supervised stretch that the crash began; None: nobody supervises."""
+    """The last row of the supervised stretch that the crash began; None: the drive has no supervisor."""
     at = drive.row(crash.tick)
     begins = np.flatnonzero(~drive.free[at : at + 1 + round(0.3 / drive.log.header.dt)])
     if not begins.size:

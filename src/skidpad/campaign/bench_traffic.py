@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from skidpad.campaign.cast import stage_of
 from skidpad.campaign.traffic_asked import TrafficBench
+from skidpad.campaign.traffic_watch import Seen, Watch
 from skidpad.core.run import Plain, Roads, RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import TrafficStart
@@ -32,6 +33,7 @@ class TrafficRow:
     static: int = 0  # with what stands beside the road
     put_back: int = 0  # stuck or astray
     changes: int = 0  # of lane
+    seen: Seen = field(default_factory=Seen)
 
     @property
     def per_100_km(self) -> float:
@@ -53,7 +55,8 @@ def measure(asked: TrafficBench, weather: str) -> TrafficRow:
     """Drive seed after seed until the vehicles have covered the distance."""
     row, seed = TrafficRow(weather), FIRST_SEED
     while row.km < asked.km:
-        _drive(row, background_world(asked, weather, seed), asked.km)
+        world = background_world(asked, weather, seed)
+        _drive(row, world, asked.km, Watch(world, row.seen, weather, seed))
         seed += 1
     return row
 
@@ -70,12 +73,13 @@ def background_world(asked: TrafficBench, weather: str, seed: int) -> World:
     return world
 
 
-def _drive(row: TrafficRow, world: World, km: float) -> None:
+def _drive(row: TrafficRow, world: World, km: float, watch: Watch) -> None:
     assert world.traffic is not None
     drivers = world.traffic.drivers.state
     before = drivers["change"].copy()
     for _ in range(round(DRIVE / DT)):
         world.step()
+        watch.look()
         there = world.states.present
         speed = np.hypot(world.states.vx, world.states.vy)[there]
         row.km += float(speed.sum()) * DT / 1000.0
@@ -85,7 +89,8 @@ def _drive(row: TrafficRow, world: World, km: float) -> None:
         row.changes += int((drivers["change"] < before).sum())
         before = drivers["change"].copy()
         if row.km >= km:
-            return
+            break
+    watch.end()
 
 
 def _count(row: TrafficRow, touched: Iterable[int]) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json as plain_json
 import os
 import platform
+from collections.abc import Iterator
 from dataclasses import asdict
 from enum import Enum
 from pathlib import Path
@@ -18,6 +19,7 @@ from skidpad.core.setup import DT
 
 if TYPE_CHECKING:
     from skidpad.campaign.bench import Row
+    from skidpad.campaign.traffic_watch import Seen
 
 
 class Subject(str, Enum):
@@ -128,6 +130,25 @@ def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
     return {"unit": "min", "minutes": minutes, "how": how, "target": matrix.TARGET}
 
 
+def _seen(seen: Seen) -> Iterator[str]:
+    """Headways in steady following, and who stood long and for what."""
+    from skidpad.campaign.traffic_watch import LONG, headways_of
+
+    for road, headways in (("from 80 km/h on", seen.fast), ("below 80 km/h", seen.slow)):
+        if headways:
+            found = headways_of(headways)
+            quantiles = ", ".join(f"{q:.2f}" for q in found["quantiles_s"])
+            yield (
+                f"headway where the limit is {road}: {quantiles} s (5, 25, 50, 75, 95 %), "
+                f"{100.0 * found['share_below_1_s']:.1f} % below 1 s"
+            )
+    for s in seen.stands:
+        yield (
+            f"vehicle {s.actor} of seed {s.seed} stood {s.seconds:.0f} s (more than {LONG:.0f}) at "
+            f"({s.x:.0f}, {s.y:.0f}): {s.cause}"
+        )
+
+
 def _scenarios(seconds: float, quiet: bool) -> dict[str, Any]:
     from skidpad.campaign.bench_scenarios import measure
 
@@ -146,6 +167,7 @@ def _traffic(asked: TrafficBench, quiet: bool) -> dict[str, Any]:
     if not quiet:
         typer.echo(
             "weather          km  contacts  per 100 km [95 %]     km/h  changes/km  off road  put back"
+            "  moved"
         )
     for weather in asked.weather:
         row = measure(asked, weather)
@@ -153,7 +175,8 @@ def _traffic(asked: TrafficBench, quiet: bool) -> dict[str, Any]:
         changes = row.changes / row.km
         rows.append(
             {
-                **asdict(row),
+                **{name: value for name, value in asdict(row).items() if name != "seen"},
+                **row.seen.summary(),
                 "per_100_km": row.per_100_km,
                 "low": low,
                 "high": high,
@@ -166,5 +189,8 @@ def _traffic(asked: TrafficBench, quiet: bool) -> dict[str, Any]:
             typer.echo(
                 f"{weather:<12} {row.km:6.0f} {row.contacts:9} {rate:>20} "
                 f"{row.mean_speed_kmh:8.1f} {changes:11.2f} {row.static:9} {row.put_back:9}"
+                f"{row.seen.moved:7}"
             )
+            for line in _seen(row.seen):
+                typer.echo(f"  {line}")
     return {"map": asked.map, "vehicles": asked.vehicles, "rows": rows}

@@ -174,4 +174,5 @@ class WorldTruth:
     invasions: tuple[LaneInvasion, ...]
     background: tuple[TrafficContact, ...] = ()  # of all others, that began in this tick
     put_back: tuple[int, ...] = ()  # actors of the background, stuck or astray (decision M-7)
+    moved_on: tuple[int, ...] = ()  # actors of the background moved from afar to near the ego
     notices: tuple[str, ...] = ()  # what else happened in this tick: a wreck was put back, ...

@@ -43,6 +43,14 @@ class PutBack:
     actor: int
 
 
+@dataclass(frozen=True, slots=True)
+class MovedOn:
+    """A vehicle of the background that was far from the ego was moved to a place nearer to it."""
+
+    tick: int
+    actor: int
+
+
 class NoticeSource(str, Enum):
     """Who has something to say."""
 
@@ -61,7 +69,16 @@ class Notice:
     text: str
 
 
-Event = ContactEvent | LaneInvasion | Relocation | LightChange | Notice | TrafficContact | PutBack
+Event = (
+    ContactEvent
+    | LaneInvasion
+    | Relocation
+    | LightChange
+    | Notice
+    | TrafficContact
+    | PutBack
+    | MovedOn
+)
 KINDS: dict[str, type[Event]] = {
     "contact": ContactEvent,
     "lane_invasion": LaneInvasion,
@@ -70,6 +87,7 @@ KINDS: dict[str, type[Event]] = {
     "notice": Notice,
     "traffic_contact": TrafficContact,
     "put_back": PutBack,
+    "moved_on": MovedOn,
 }
 NAMES = {kind: name for name, kind in KINDS.items()}
 

@@ -119,6 +119,9 @@ class Metrics:
     traffic_contacts: int | None = metric("contacts among background vehicles", "R-5")
     traffic_contacts_after_ego: int | None = metric("those within 20 s of an ego contact", "R-5")
     traffic_put_back: int | None = metric("background vehicles stuck and put back", "M-7")
+    traffic_moved: int | None = metric(
+        "background vehicles moved from afar to near the ego", "A-209"
+    )
     traffic_km: float | None = metric("distance of all background vehicles", "R-5")
     traffic_contacts_per_100_km: float | None = metric("such contacts per 100 km", "R-5")
     # ticks

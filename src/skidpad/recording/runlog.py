@@ -13,7 +13,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.states import ActorTable, ContactEvent, LaneInvasion, TrafficContact
-from skidpad.recording.events import Event, LightChange, Notice, PutBack, Relocation
+from skidpad.recording.events import (
+    Event,
+    LightChange,
+    MovedOn,
+    Notice,
+    PutBack,
+    Relocation,
+)
 
 Floats = NDArray[np.float64]
 Float32 = NDArray[np.float32]
@@ -141,6 +148,11 @@ class RunLog:
     def put_back(self) -> tuple[PutBack, ...]:
         """Vehicles of the background that were put elsewhere."""
         return tuple(e for e in self.events if isinstance(e, PutBack))
+
+    @property
+    def moved_on(self) -> tuple[MovedOn, ...]:
+        """Vehicles of the background that were moved from afar to near the ego."""
+        return tuple(e for e in self.events if isinstance(e, MovedOn))
 
     @property
     def invasions(self) -> tuple[LaneInvasion, ...]:

@@ -10,7 +10,15 @@ import numpy as np
 from skidpad.core.frames import SensorFrame
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState, Supervision
-from skidpad.recording.events import Event, LightChange, Notice, NoticeSource, PutBack, Relocation
+from skidpad.recording.events import (
+    Event,
+    LightChange,
+    MovedOn,
+    Notice,
+    NoticeSource,
+    PutBack,
+    Relocation,
+)
 from skidpad.recording.runlog import (
     ActorSeries,
     CommandSeries,
@@ -79,9 +87,16 @@ class TickLog:
             buffer[k] = values
         self._present[k] = truth.states.present
         self._mu[k] = truth.mu
-        if truth.contacts or truth.invasions or truth.background or truth.put_back:
+        if (
+            truth.contacts
+            or truth.invasions
+            or truth.background
+            or truth.put_back
+            or truth.moved_on
+        ):
             self._events += [*truth.contacts, *truth.invasions, *truth.background]
             self._events += [PutBack(truth.tick, actor) for actor in truth.put_back]
+            self._events += [MovedOn(truth.tick, actor) for actor in truth.moved_on]
         if truth.lights != self._lights:
             self._note_lights(truth)
         self._n = k + 1

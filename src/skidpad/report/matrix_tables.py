@@ -81,6 +81,7 @@ BACKGROUND = (
     ("traffic_contacts", "contacts", "of two background vehicles, first touch"),
     ("traffic_contacts_after_ego", "soon after the ego's", "within 20 s of a contact of the ego"),
     ("traffic_put_back", "put back", "stood without a cause or left the lane for 10 s"),
+    ("traffic_moved", "moved", "far from the ego, and entered anew nearer to it"),
 )
 
 

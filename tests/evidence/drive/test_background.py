@@ -12,7 +12,7 @@ import pytest
 import makelog
 from skidpad.core.states import ContactEvent, TrafficContact
 from skidpad.evidence.drive.background import UNSEEN, background
-from skidpad.recording.events import PutBack
+from skidpad.recording.events import MovedOn, PutBack
 from skidpad.recording.runlog import RunLog
 
 TICKS = 1000  # 50 s
@@ -32,9 +32,11 @@ def metrics_of(log: RunLog) -> Any:
 def test_contacts_soon_after_one_of_the_ego_are_counted_apart() -> None:
     own = ContactEvent(100, 1, "", 1000.0, 5.0, 0.0, 0.0)
     others = [TrafficContact(tick, 1, 2, 3.0) for tick in (99, 100, 499, 501)]
-    found = metrics_of(log_of(own, *others, TrafficContact(300, 1, -1, 3.0), PutBack(700, 2)))
+    found = metrics_of(
+        log_of(own, *others, TrafficContact(300, 1, -1, 3.0), PutBack(700, 2), MovedOn(800, 1))
+    )
     assert (found.traffic_contacts, found.traffic_contacts_after_ego) == (2, 2)
-    assert found.traffic_put_back == 1
+    assert (found.traffic_put_back, found.traffic_moved) == (1, 1)
     assert found.traffic_km == pytest.approx(2.0, rel=2e-3)
     assert found.traffic_contacts_per_100_km == pytest.approx(100.0, rel=2e-3)
 

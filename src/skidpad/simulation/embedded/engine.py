@@ -77,6 +77,7 @@ class EmbeddedBackend:
             invasions=w.invasions,
             background=w.background,
             put_back=w.put_back,
+            moved_on=w.moved_on,
             notices=w.notices,
         )
 

@@ -41,7 +41,7 @@ from skidpad.simulation.world.step import (
 )
 from skidpad.simulation.world.touch import ContactBook, Touches, forget, invasions, markings_of
 from skidpad.simulation.world.traffic.care import careless
-from skidpad.simulation.world.traffic.manager import CHECK_PERIOD, Traffic, no_streets
+from skidpad.simulation.world.traffic.manager import CHECK_PERIOD, Reason, Traffic, no_streets
 from skidpad.simulation.world.traffic.occupancy import occupancy
 from skidpad.simulation.world.traffic.state import drivers
 
@@ -80,6 +80,7 @@ class World:
         self.markings = markings_of(map)
         self.contacts, self.background = Touches()
         self.put_back: tuple[int, ...] = ()
+        self.moved_on: tuple[int, ...] = ()
         self.invasions: tuple[LaneInvasion, ...] = ()
         self.notices: tuple[str, ...] = ()
         self._next_id = 0
@@ -298,7 +299,7 @@ class World:
             for word in words:
                 self._obey(word)
         self._feel_road()
-        self.notices, self.put_back = (), ()
+        self.notices, self.put_back, self.moved_on = (), (), ()
         if self.traffic is not None and self.tick % CHECK_PERIOD == 0:
             self._advance(stages & ~SETTLE)
             self._put_vehicles(self.traffic)
@@ -412,13 +413,15 @@ class World:
 
     def _put_vehicles(self, traffic: Traffic) -> None:
         """Traffic that enters, is respawned, or is put back as a wreck (decision M-7)."""
-        notes, back = [], []
+        notes, back, onward = [], [], []
         for move in traffic.moves(self.states, self.placed, self.tick):
             self.put(move.actor, move.pose, move.v)
-            if move.wreck:
+            if move.reason is Reason.FAR:
+                onward.append(move.actor)
+            elif move.reason is Reason.WRECK:
                 back.append(move.actor)
                 notes.append(
                     f"{self.table.names[move.actor]} stood without a cause or off its lane and was "
                     f"put back at ({move.pose.x:.1f}, {move.pose.y:.1f})"
                 )
-        self.notices, self.put_back = tuple(notes), tuple(back)
+        self.notices, self.put_back, self.moved_on = tuple(notes), tuple(back), tuple(onward)

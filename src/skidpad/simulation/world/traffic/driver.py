@@ -37,7 +37,11 @@ from skidpad.simulation.world.traffic.path import (
     straight_path,
     uniform,
 )
-from skidpad.simulation.world.traffic.right_of_way import right_of_way_gap, zebra_gap
+from skidpad.simulation.world.traffic.right_of_way import (
+    is_clear_of_line,
+    right_of_way_gap,
+    zebra_gap,
+)
 from skidpad.simulation.world.traffic.state import CHANGE_TIME, Drivers, View
 from skidpad.simulation.world.traffic.tracking import pedals, steer
 
@@ -185,6 +189,20 @@ def consider_change(
 
 
 @inner_kernel
+def held_by(gap: float, gap_merge: float, stops: tuple[float, float, float, float]) -> int:
+    """What of leader, merging traffic and places to stop is nearest and close, as `state.Held`."""
+    nearest, cause = CAUSE_GAP, 0
+    if gap <= nearest:
+        nearest, cause = gap, 1
+    if gap_merge < nearest:
+        nearest, cause = gap_merge, 2
+    for k in range(4):
+        if stops[k] < nearest:
+            nearest, cause = stops[k], 3 + k
+    return cause
+
+
+@inner_kernel
 def plan(view: View, d: Drivers, i: int) -> None:
     """Choose lane and acceleration of driver i; note how long it has been out of order."""
     me, trait, body = d.state[i], d.trait[i], view.placed[i]
@@ -202,8 +220,13 @@ def plan(view: View, d: Drivers, i: int) -> None:
         v_merging = view.placed[merging].v
         a = min(a, idm(v, v_desired, gap_merge, v_merging, c))
     a_lane = a  # what the lane allows, without what holds on every lane
-    gap_stop = min(stop_gap(view, d, i), end_gap(view, d, i))
-    gap_stop = min(gap_stop, right_of_way_gap(view, d, i), zebra_gap(view, d, i))
+    stops = (
+        stop_gap(view, d, i),
+        end_gap(view, d, i),
+        right_of_way_gap(view, d, i),
+        zebra_gap(view, d, i),
+    )
+    gap_stop = min(stops)
     if gap_stop < np.inf:
         stop = Character(HEADWAY_STOP, c.a_max, c.b, c.a_min)
         a = min(a, idm(v, v_desired, gap_stop, 0.0, stop))
@@ -213,7 +236,12 @@ def plan(view: View, d: Drivers, i: int) -> None:
     me.target = a
     consider_change(view, d, i, a_lane, v_desired, gap_stop)
     strayed = abs(me.offset) > view.streets.net.point[me.at].half_width + STRAYED
-    standing = v < STUCK_SPEED and min(gap, gap_stop, gap_merge) > CAUSE_GAP
+    if v < STUCK_SPEED:
+        me.stood += view.dt
+    elif is_clear_of_line(view, d, i):
+        me.stood = 0.0
+    me.held = held_by(gap, gap_merge, stops)
+    standing = v < STUCK_SPEED and me.held == 0
     wrong_way = cos(body.yaw - me.heading) < WRONG_WAY
     if standing or (strayed and me.change > CHANGE_TIME) or wrong_way:
         me.stuck += view.dt

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from enum import Enum
 from functools import lru_cache
 from math import hypot, inf
 from typing import NamedTuple
@@ -22,11 +23,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.rows import Member, Shape
 from skidpad.simulation.world.traffic.care import (
-    FIRM_SHARE,
-    REACTION,
-    STOP_MARGIN,
     Care,
-    grip_at,
     speed_to_stop_within,
 )
 from skidpad.simulation.world.traffic.idm import A_CURVE, A_MAX, T_HEADWAY
@@ -36,8 +33,9 @@ from skidpad.simulation.world.traffic.occupancy import occupancy
 from skidpad.simulation.world.traffic.outlook import desired_speed
 from skidpad.simulation.world.traffic.pack import RADIUS, UNSEEN, Pack
 from skidpad.simulation.world.traffic.path import PATH, begin, straight_path
-from skidpad.simulation.world.traffic.places import CLEARANCE, FreePlaces
+from skidpad.simulation.world.traffic.places import FreePlaces
 from skidpad.simulation.world.traffic.priority import CONFLICT, ENTRY, ZEBRA, bake_priority
+from skidpad.simulation.world.traffic.spacing import LEAST_TIME, room, seconds_to_others
 from skidpad.simulation.world.traffic.state import TRAIT, Streets, drivers
 from skidpad.simulation.world.traffic.variety import vary
 
@@ -80,14 +78,22 @@ def no_streets() -> Streets:
     return Streets(net, *rows, np.empty((0, 5)), nobody, free)
 
 
+class Reason(Enum):
+    """Why a vehicle is put somewhere."""
+
+    ENTERS = "enters"  # it was not there before
+    WRECK = "wreck"  # stuck or astray (decision M-7)
+    FAR = "far"  # it left the surroundings of the ego
+
+
 @dataclass(frozen=True, slots=True)
 class Move:
-    """A vehicle that is to be put somewhere: entering, respawned, or a wreck put back."""
+    """A vehicle that is to be put somewhere."""
 
     actor: int
     pose: Pose
     v: float
-    wreck: bool
+    reason: Reason
 
 
 class Area(NamedTuple):
@@ -171,50 +177,56 @@ class Traffic:
         """Vehicles to put somewhere in this tick; apply each before asking for the next."""
         if tick % CHECK_PERIOD:
             return
-        driver = self.drivers.state
+        driver, placed = self.drivers.state, placed.copy()  # moves of this tick are noted in it
         if self.setup.put_wrecks_back:
             wrecks = np.flatnonzero(driver["active"] & (driver["stuck"] > STUCK_TIME))
             for i in wrecks.tolist():
-                yield from self._put(i, states, Area(PUT_BACK_NEAREST, np.inf), True)
+                yield from self._put(
+                    i, states, placed, Area(PUT_BACK_NEAREST, np.inf), Reason.WRECK
+                )
         if self.free_choice:
-            yield from self._keep_bubble(states)
+            yield from self._keep_bubble(states, placed)
         elif self.setup.mode is TrafficStart.PACK and placed["lane"][0] >= 0:
-            yield from self._keep_pack(states, Pack(self.net, placed[0], self.places.lane))
+            yield from self._keep_pack(states, placed, Pack(self.net, placed[0], self.places.lane))
         elif self.waiting:
-            yield from self._let_in(states, Area(UNSEEN, BUBBLE))
+            yield from self._let_in(states, placed, Area(UNSEEN, BUBBLE))
 
-    def _keep_pack(self, states: ActorStates, pack: Pack) -> Iterator[Move]:
+    def _keep_pack(self, states: ActorStates, placed: Places, pack: Pack) -> Iterator[Move]:
         def area(*sides: bool) -> Area:
             found = [pack.entrances(self.places.candidates, ahead) for ahead in sides]
             return Area(UNSEEN, RADIUS, np.concatenate(found))
 
         if self.waiting:
-            yield from self._let_in(states, area(True, False))
+            yield from self._let_in(states, placed, area(True, False))
         for i, ahead in pack.lost(self.drivers, states):
-            yield from self._put(i, states, area(ahead), False)
+            yield from self._put(i, states, placed, area(ahead), Reason.FAR)
 
-    def _let_in(self, states: ActorStates, area: Area) -> Iterator[Move]:
+    def _let_in(self, states: ActorStates, placed: Places, area: Area) -> Iterator[Move]:
         for id in list(self.waiting):
-            for move in self._put(self.row[id], states, area, False):
+            for move in self._put(self.row[id], states, placed, area, Reason.ENTERS):
                 self.waiting.remove(id)
                 self.drivers.state["active"][move.actor] = True
                 yield move
 
-    def _keep_bubble(self, states: ActorStates) -> Iterator[Move]:
+    def _keep_bubble(self, states: ActorStates, placed: Places) -> Iterator[Move]:
         area = Area(UNSEEN, BUBBLE)
-        yield from self._let_in(states, area)
+        yield from self._let_in(states, placed, area)
         x, y = float(states.x[0]), float(states.y[0])
         driving = self.drivers.state["active"] & states.present
         for i in np.flatnonzero(driving).tolist():
-            if hypot(states.x[i] - x, states.y[i] - y) > 1.2 * BUBBLE:
-                yield from self._put(i, states, area, False)
+            if hypot(states.x[i] - x, states.y[i] - y) > 1.2 * BUBBLE and self._is_alone(
+                i, states, placed
+            ):
+                yield from self._put(i, states, placed, area, Reason.FAR)
 
-    def _put(self, i: int, states: ActorStates, area: Area, wreck: bool) -> Iterator[Move]:
+    def _put(
+        self, i: int, states: ActorStates, placed: Places, area: Area, reason: Reason
+    ) -> Iterator[Move]:
         at = self.places.draw(
             states,
             area.nearest,
             area.farthest,
-            lambda at: room(self.care, self._speed_at(i, at), states),
+            lambda at, d: self._has_room(i, at, d, states, placed),
             area.among,
         )
         if at is None:
@@ -225,13 +237,36 @@ class Traffic:
         me["at"], me["s"] = at, point["s"]
         me["change"] = me["cap"] = np.inf
         me["trim"] = me["stuck"] = me["v_desired"] = 0.0
+        row = placed[i]
+        row["lane"], row["s"], row["speed"] = self.places.lane[at], point["s"], v
+        row["present"] = True
         pose = Pose(
             float(point["x"]),
             float(point["y"]),
             float(self.places.z[at]),
             yaw=float(point["heading"]),
         )
-        yield Move(i, pose, v, wreck)
+        yield Move(i, pose, v, reason)
+
+    def _is_alone(self, i: int, states: ActorStates, placed: Places) -> bool:
+        """Whether nobody is so near to vehicle i that its vanishing would be noticed."""
+        me, v = self.drivers.state[i], float(np.hypot(states.vx[i], states.vy[i]))
+        places = [(int(self.drivers.path[i, 0]), float(me["s"]))]
+        if placed["lane"][i] >= 0:  # another one in a change of lane
+            places.append((int(placed["lane"][i]), float(placed["s"][i])))
+        return all(
+            seconds_to_others(self.net, placed, *place, v, i) >= LEAST_TIME for place in places
+        )
+
+    def _has_room(
+        self, i: int, at: int, d: NDArray[np.float64], states: ActorStates, placed: Places
+    ) -> bool:
+        """Whether vehicle i can be put on sample `at`, d m from every actor."""
+        v = self._speed_at(i, at)
+        if (states.present & (d < room(self.care, v, states))).any():
+            return False
+        lane, s = int(self.places.lane[at]), float(self.net.point["s"][at])
+        return seconds_to_others(self.net, placed, lane, s, v, i) >= LEAST_TIME
 
     def _speed_at(self, i: int, at: int) -> float:
         """m/s at which driver i passes sample `at`: as traffic does there."""
@@ -252,18 +287,6 @@ class Traffic:
         if not entry["size"][self.net.lane["ahead"][lane]]:
             return inf
         return max(float(entry["line"][lane] - self.net.point["s"][at]) - NOSE, 0.0)
-
-
-def room(care: Care, v: float, states: ActorStates) -> NDArray[np.float64]:
-    """(n,) m that somebody put on the road with speed v keeps to every actor, so that either can
-    brake for the other."""
-    clear = np.full(len(states.x), CLEARANCE)
-    if not care.on:
-        return clear
-    other = np.hypot(states.vx, states.vy)
-    faster = np.maximum(other, v)
-    way = np.abs(faster**2 - np.minimum(other, v) ** 2) / (2.0 * FIRM_SHARE * grip_at(care, v))
-    return np.asarray(np.maximum(clear, STOP_MARGIN + REACTION * faster + way))
 
 
 def _traits(bodies: Sequence[VehicleType | Shape]) -> NDArray[np.void]:

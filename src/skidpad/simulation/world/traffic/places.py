@@ -43,12 +43,12 @@ class FreePlaces:
         states: ActorStates,
         nearest: float,
         farthest: float,
-        room: Callable[[int], NDArray[np.float64]],
+        has_room: Callable[[int, NDArray[np.float64]], bool],
         among: NDArray[np.intp] | None = None,
     ) -> int | None:
         """A sample between `nearest` and `farthest` m from the ego, clear of all; None: not found.
 
-        room: m to keep to every actor at a sample, (n,), at least CLEARANCE. among: candidates, None: all.
+        has_room: of a sample and (n,) m from it to every actor. among: candidates, None: all.
         """
         point = self.net.point
         among = self.candidates if among is None else among
@@ -60,6 +60,6 @@ class FreePlaces:
         here = states.present
         fits = (nearest <= d[:, 0]) & (d[:, 0] <= farthest) & (d[:, here] >= CLEARANCE).all(axis=1)
         for k in np.flatnonzero(fits):
-            if not (here & (d[k] < room(int(tried[k])))).any():
+            if has_room(int(tried[k]), d[k]):
                 return int(tried[k])
         return None

@@ -30,6 +30,7 @@ HALTED = 0.5  # m/s
 HALT_GAP = 4.5  # m to the line within which standing counts as a stop
 PATIENCE = 4.0  # s, then who stands on the other side no longer counts
 QUEUE_REACH = 26.0  # m before the area; who stands farther away stands in a queue
+IMPATIENT = 40.0  # s of standing at a light after which those who come the other way let one turn
 TAKEN_TIME = 20.0  # s after which a driver in a junction creeps on
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
 V_QUEUE = 2.0  # m/s, slower leaders make a queue
@@ -95,12 +96,68 @@ def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, co
         if _occupied(view, i, conflict.other, conflict.other_start, conflict.other_end):
             return True
         if not conflict.yields:
+            if control == LIGHT and _lets_turn(view, d, i, conflict.other):
+                return True
             continue
         margin = JOIN_MARGIN if conflict.joins else GAP_MARGIN
         way = max(start + conflict.end + 2.0 * body.half_length, 1.0)
         clear = _time_through(view, d, i, way, entry.bend) + margin
         if _is_coming(view, d, i, conflict.other, conflict.other_start, clear):
             return True
+    return False
+
+
+@inner_kernel
+def is_clear_of_line(view: View, d: Drivers, i: int) -> bool:
+    """Whether driver i is neither in a junction nor close to the line before one."""
+    entry = view.streets.entry[d.path[i, 0]]
+    return bool(entry.junction < 0 and _gap_to_line(view, d, i) > HALT_GAP)
+
+
+@inner_kernel
+def _gap_to_line(view: View, d: Drivers, i: int) -> float:
+    """m from the front bumper of driver i to the line at the end of its present lane."""
+    line = view.streets.entry[d.path[i, 0]].line
+    return float(line - d.state[i].s - view.placed[i].half_length)
+
+
+@inner_kernel
+def _is_impatient(view: View, d: Drivers, i: int) -> bool:
+    """Whether driver i has stood so long that others let it go first."""
+    return bool(view.care.on and d.state[i].active and d.state[i].stood > IMPATIENT)
+
+
+@inner_kernel
+def _lets_turn(view: View, d: Drivers, i: int, lane: int) -> bool:
+    """Whether driver i, who need not yield, lets somebody turn over `lane` who has stood long.
+
+    Without it nobody who turns left gets through while the stream that comes the other way fills
+    each green: on ice a queue needs all of it to start.
+    """
+    if not view.care.on or _is_impatient(view, d, i):
+        return False
+    if _holds_impatient(view, d, lane, lane, np.inf):
+        return True
+    row = view.streets.net.lane[lane]
+    for p in range(row.prev_first, row.prev_first + row.prevs):
+        before = view.streets.net.prev_lane[p]
+        entry = view.streets.entry[before]
+        green = entry.control == LIGHT and view.lights[entry.signal] == 2  # LightState.GREEN
+        if green and _holds_impatient(view, d, before, lane, HALT_GAP):
+            return True
+    return False
+
+
+@inner_kernel
+def _holds_impatient(view: View, d: Drivers, here: int, lane: int, reach: float) -> bool:
+    """Whether somebody on lane `here`, at most `reach` m from its line, is impatient to go over `lane`."""
+    entry = view.occ.head[here]
+    while entry != NOBODY:
+        j = entry // SLOTS
+        turns = _is_impatient(view, d, j) and d.path[j, 0] == here and _leads_to(d, j, lane)
+        if turns and _gap_to_line(view, d, j) < reach:
+            return True
+        entry = view.occ.next[entry]
     return False
 
 
@@ -221,6 +278,8 @@ def _arrives(
         if j == i or far or distance < -2.0 * view.placed[j].half_length:
             continue
         if v < HALTED and (distance > QUEUE_REACH or d.state[i].waited > PATIENCE):
+            continue
+        if v < HALTED and _is_impatient(view, d, i):
             continue
         if d.state[j].active and not _leads_to(d, j, target):
             continue

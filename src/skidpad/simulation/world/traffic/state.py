@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
 from typing import NamedTuple
 
 import numpy as np
@@ -15,6 +16,19 @@ from skidpad.simulation.world.traffic.path import PATH
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]
+
+
+class Held(IntEnum):
+    """What is close ahead of a driver, and would explain that it stands."""
+
+    NOTHING = 0
+    LEADER = 1
+    MERGING = 2  # traffic of another branch
+    LIGHT = 3
+    ROAD_END = 4
+    RIGHT_OF_WAY = 5
+    ZEBRA = 6
+
 
 CHANGE_TIME = 5.0  # s for one lane; naturalistic mean 4 to 6 s (Toledo and Zohar 2007)
 
@@ -35,7 +49,9 @@ DRIVER = np.dtype(
         ("trim", "f8"),  # m/s^2, integral of the pedal control
         ("halted", "i4"),  # junction before which it has made its stop, -1: none
         ("waited", "f8"),  # s for others at a junction
+        ("stood", "f8"),  # s before a line, kept until the junction behind it is passed
         ("stuck", "f8"),  # s stopped, off the lane or wrong-way without a cause ahead
+        ("held", "i4"),  # Held: what is nearest of that for which it slows down or stands
     ],
     align=True,
 )

@@ -1,0 +1,76 @@
+"""How near others are to a place on the road, in metres and in seconds of driving."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.states import ActorStates
+from skidpad.simulation.world.placed import Places
+from skidpad.simulation.world.traffic.care import FIRM_SHARE, REACTION, STOP_MARGIN, Care, grip_at
+from skidpad.simulation.world.traffic.network import Network
+from skidpad.simulation.world.traffic.places import CLEARANCE
+
+Floats = NDArray[np.float64]
+
+# s to those ahead and behind of a vehicle that is moved, where it was and where it will be: 3 s, and
+# what speeds change in a tick.
+LEAST_TIME = 3.5
+REACH = 150.0  # m of road that are searched, farther than anybody drives in LEAST_TIME
+
+
+def seconds_to_others(
+    net: Network, placed: Places, lane: int, s: float, v: float, me: int
+) -> float:
+    """Smallest time gap in s from a place on a lane, passed with speed v, to those ahead and behind.
+
+    me: row of the vehicle that is or will be there. Those on neighbouring lanes do not count.
+    """
+    least = np.inf
+    there = placed["present"] & (placed["lane"] >= 0)
+    there[me] = False
+    for forward in (True, False):
+        begins = np.full(len(net.lane), np.nan)
+        for other, start in _way(net, lane, s, forward).items():
+            begins[other] = start
+        along = begins[placed["lane"]] + placed["s"]
+        near = there & ((along >= 0.0) if forward else (along < 0.0))
+        gap = np.abs(along) - placed["half_length"] - placed["half_length"][me]
+        speed = np.maximum(v if forward else placed["speed"], 0.1)
+        least = min(least, float((np.maximum(gap, 0.0) / speed)[near].min(initial=np.inf)))
+    return least
+
+
+def _way(net: Network, lane: int, s: float, forward: bool) -> dict[int, float]:
+    """Lanes within REACH before or behind a place, and m of road from it to where each begins."""
+    begins = {lane: -s}
+    todo = [lane]
+    for here in todo:  # which grows meanwhile
+        row, start = net.lane[here], begins[here]
+        end = start + float(row["length"])
+        if forward and end < REACH:
+            first = int(row["next_first"])
+            found = [(int(n), end) for n in net.next_lane[first : first + int(row["nexts"])]]
+        elif not forward and start > -REACH:
+            first = int(row["prev_first"])
+            before = net.prev_lane[first : first + int(row["prevs"])]
+            found = [(int(p), start - float(net.lane["length"][p])) for p in before]
+        else:
+            continue
+        for other, at in found:
+            if other not in begins:
+                begins[other] = at
+                todo.append(other)
+    return begins
+
+
+def room(care: Care, v: float, states: ActorStates) -> Floats:
+    """(n,) m that somebody put on the road with speed v keeps to every actor, so that either can
+    brake for the other."""
+    clear = np.full(len(states.x), CLEARANCE)
+    if not care.on:
+        return clear
+    other = np.hypot(states.vx, states.vy)
+    faster = np.maximum(other, v)
+    way = np.abs(faster**2 - np.minimum(other, v) ** 2) / (2.0 * FIRM_SHARE * grip_at(care, v))
+    return np.asarray(np.maximum(clear, STOP_MARGIN + REACTION * faster + way))

@@ -1,0 +1,98 @@
+"""Background traffic looked at from outside: overlaps, headways, standing, moves."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from skidpad.campaign.bench_traffic import background_world
+from skidpad.campaign.traffic_asked import TrafficBench
+from skidpad.campaign.traffic_watch import (
+    LONG,
+    Seen,
+    Watch,
+    headways_of,
+    leaders,
+    overlaps,
+    times_to_neighbours,
+)
+from skidpad.simulation.world.traffic.state import Held
+from skidpad.simulation.world.world import World
+
+
+def world_of(map: str = "motorway", vehicles: int = 20, weather: str = "clear-noon") -> World:
+    return background_world(TrafficBench(map=map, vehicles=vehicles), weather, 900_000)
+
+
+def at(world: World, i: int, forward: float, left: float, turned: float = 0.0) -> None:
+    """Vehicle i stands beside the ego's place."""
+    pose = world.states.pose(0).moved(forward=forward, left=left)
+    world.put(i, pose, 0.0)
+    world.states.yaw[i] += turned
+
+
+def test_rectangles_overlap_where_they_do() -> None:
+    world = world_of()
+    length = float(world.table.length[0] + world.table.length[1]) / 2.0
+    width = float(world.table.width[0] + world.table.width[1]) / 2.0
+    for forward, left, found in (
+        (length - 0.05, 0.0, True),
+        (length + 0.05, 0.0, False),
+        (0.0, width - 0.05, True),
+        (0.0, width + 0.05, False),
+    ):
+        at(world, 1, forward, left)
+        assert ((0, 1) in overlaps(world)) == found
+    across = float(world.table.width[0] + world.table.length[1]) / 2.0
+    for left, found in ((across - 0.05, True), (across + 0.05, False)):
+        at(world, 1, 0.0, left, np.pi / 2.0)
+        assert ((0, 1) in overlaps(world)) == found
+    at(world, 1, 0.0, 0.0)
+    world.states.z[1] += 8.0  # on a bridge
+    assert not overlaps(world)
+
+
+@pytest.mark.req("A-209")
+def test_every_move_of_random_traffic_is_counted_and_nobody_is_near() -> None:
+    """In rain on figure8, where half of all moves came out of a queue."""
+    world, seen, jumps = world_of("figure8", 60, "rain-noon"), Seen(), 0
+    watch = Watch(world, seen, "rain-noon", 900_000)
+    for _ in range(2400):
+        there, x, y = world.states.present.copy(), world.states.x.copy(), world.states.y.copy()
+        world.step()
+        far = np.hypot(world.states.x - x, world.states.y - y) > 10.0
+        jumps += int((far & there).sum())
+        watch.look()
+    assert seen.moved == jumps >= 15
+    assert seen.moved_close == 0
+    assert seen.overlaps == 0
+
+
+def test_leaders_and_times_are_those_of_the_lane() -> None:
+    world = world_of()
+    for _ in range(200):
+        world.step()
+    leader, gap = leaders(world)
+    i = int(np.argmin(gap))
+    j = int(leader[i])
+    apart = np.hypot(world.states.x[i] - world.states.x[j], world.states.y[i] - world.states.y[j])
+    bumpers = float(world.placed["half_length"][i] + world.placed["half_length"][j])
+    assert gap[i] == pytest.approx(apart - bumpers, abs=0.5)
+    time = gap[i] / world.placed["speed"][i]
+    assert times_to_neighbours(world)[j] <= time
+    assert headways_of([0.5, 1.5, 2.5, 1.5])["share_below_2_s"] == 0.75
+
+
+def test_who_stands_long_is_listed_with_the_cause() -> None:
+    world, seen = world_of(vehicles=3), Seen()
+    watch = Watch(world, seen, "clear-noon", 1)
+    assert world.traffic is not None
+    for tick in range(round(LONG / world.dt) + 20):
+        world.tick = tick
+        world.traffic.drivers.state["held"][0] = Held.LIGHT
+        world.placed["speed"][0] = 0.0
+        watch.look()
+    assert not seen.stands
+    watch.end()
+    (stand,) = seen.stands
+    assert (stand.actor, stand.cause, stand.seconds) == (0, "light", pytest.approx(121.0))

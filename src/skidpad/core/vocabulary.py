@@ -74,7 +74,7 @@ class TrafficStart(str, Enum):
 class Stratum(str, Enum):
     """Which background drivers one meets."""
 
-    NATURAL = "natural"  # as they are: how often a hazard is, how often an alarm is right
+    NATURAL = "natural"  # nothing is staged: how often an alarm is right in this traffic
     RISKY = "risky"  # the tails of how they drive, oversampled: what is missed
 
 

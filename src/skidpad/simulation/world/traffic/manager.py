@@ -35,7 +35,7 @@ from skidpad.simulation.world.traffic.pack import RADIUS, UNSEEN, Pack
 from skidpad.simulation.world.traffic.path import PATH, begin, straight_path
 from skidpad.simulation.world.traffic.places import FreePlaces
 from skidpad.simulation.world.traffic.priority import CONFLICT, ENTRY, ZEBRA, bake_priority
-from skidpad.simulation.world.traffic.spacing import LEAST_TIME, room, seconds_to_others
+from skidpad.simulation.world.traffic.spacing import LEAST_TIME, claims, room, seconds_to_others
 from skidpad.simulation.world.traffic.state import TRAIT, Streets, drivers
 from skidpad.simulation.world.traffic.variety import vary
 
@@ -177,56 +177,56 @@ class Traffic:
         """Vehicles to put somewhere in this tick; apply each before asking for the next."""
         if tick % CHECK_PERIOD:
             return
-        driver, placed = self.drivers.state, placed.copy()  # moves of this tick are noted in it
+        driver, claimed = self.drivers.state, claims(placed, self.drivers)
         if self.setup.put_wrecks_back:
             wrecks = np.flatnonzero(driver["active"] & (driver["stuck"] > STUCK_TIME))
             for i in wrecks.tolist():
                 yield from self._put(
-                    i, states, placed, Area(PUT_BACK_NEAREST, np.inf), Reason.WRECK
+                    i, states, claimed, Area(PUT_BACK_NEAREST, np.inf), Reason.WRECK
                 )
         if self.free_choice:
-            yield from self._keep_bubble(states, placed)
+            yield from self._keep_bubble(states, claimed)
         elif self.setup.mode is TrafficStart.PACK and placed["lane"][0] >= 0:
-            yield from self._keep_pack(states, placed, Pack(self.net, placed[0], self.places.lane))
+            yield from self._keep_pack(states, claimed, Pack(self.net, placed[0], self.places.lane))
         elif self.waiting:
-            yield from self._let_in(states, placed, Area(UNSEEN, BUBBLE))
+            yield from self._let_in(states, claimed, Area(UNSEEN, BUBBLE))
 
-    def _keep_pack(self, states: ActorStates, placed: Places, pack: Pack) -> Iterator[Move]:
+    def _keep_pack(self, states: ActorStates, claimed: Places, pack: Pack) -> Iterator[Move]:
         def area(*sides: bool) -> Area:
             found = [pack.entrances(self.places.candidates, ahead) for ahead in sides]
             return Area(UNSEEN, RADIUS, np.concatenate(found))
 
         if self.waiting:
-            yield from self._let_in(states, placed, area(True, False))
+            yield from self._let_in(states, claimed, area(True, False))
         for i, ahead in pack.lost(self.drivers, states):
-            yield from self._put(i, states, placed, area(ahead), Reason.FAR)
+            yield from self._put(i, states, claimed, area(ahead), Reason.FAR)
 
-    def _let_in(self, states: ActorStates, placed: Places, area: Area) -> Iterator[Move]:
+    def _let_in(self, states: ActorStates, claimed: Places, area: Area) -> Iterator[Move]:
         for id in list(self.waiting):
-            for move in self._put(self.row[id], states, placed, area, Reason.ENTERS):
+            for move in self._put(self.row[id], states, claimed, area, Reason.ENTERS):
                 self.waiting.remove(id)
                 self.drivers.state["active"][move.actor] = True
                 yield move
 
-    def _keep_bubble(self, states: ActorStates, placed: Places) -> Iterator[Move]:
+    def _keep_bubble(self, states: ActorStates, claimed: Places) -> Iterator[Move]:
         area = Area(UNSEEN, BUBBLE)
-        yield from self._let_in(states, placed, area)
+        yield from self._let_in(states, claimed, area)
         x, y = float(states.x[0]), float(states.y[0])
         driving = self.drivers.state["active"] & states.present
         for i in np.flatnonzero(driving).tolist():
             if hypot(states.x[i] - x, states.y[i] - y) > 1.2 * BUBBLE and self._is_alone(
-                i, states, placed
+                i, states, claimed
             ):
-                yield from self._put(i, states, placed, area, Reason.FAR)
+                yield from self._put(i, states, claimed, area, Reason.FAR)
 
     def _put(
-        self, i: int, states: ActorStates, placed: Places, area: Area, reason: Reason
+        self, i: int, states: ActorStates, claimed: Places, area: Area, reason: Reason
     ) -> Iterator[Move]:
         at = self.places.draw(
             states,
             area.nearest,
             area.farthest,
-            lambda at, d: self._has_room(i, at, d, states, placed),
+            lambda at, d: self._has_room(i, at, d, states, claimed),
             area.among,
         )
         if at is None:
@@ -237,9 +237,9 @@ class Traffic:
         me["at"], me["s"] = at, point["s"]
         me["change"] = me["cap"] = np.inf
         me["trim"] = me["stuck"] = me["v_desired"] = 0.0
-        row = placed[i]
-        row["lane"], row["s"], row["speed"] = self.places.lane[at], point["s"], v
-        row["present"] = True
+        for row in (claimed[i], claimed[i + len(claimed) // 2]):  # who is put next looks there
+            row["lane"], row["s"], row["speed"] = self.places.lane[at], point["s"], v
+            row["present"] = True
         pose = Pose(
             float(point["x"]),
             float(point["y"]),
@@ -248,25 +248,25 @@ class Traffic:
         )
         yield Move(i, pose, v, reason)
 
-    def _is_alone(self, i: int, states: ActorStates, placed: Places) -> bool:
+    def _is_alone(self, i: int, states: ActorStates, claimed: Places) -> bool:
         """Whether nobody is so near to vehicle i that its vanishing would be noticed."""
-        me, v = self.drivers.state[i], float(np.hypot(states.vx[i], states.vy[i]))
-        places = [(int(self.drivers.path[i, 0]), float(me["s"]))]
-        if placed["lane"][i] >= 0:  # another one in a change of lane
-            places.append((int(placed["lane"][i]), float(placed["s"][i])))
+        v = float(np.hypot(states.vx[i], states.vy[i]))
+        rows = claimed[[i, i + len(claimed) // 2]]
         return all(
-            seconds_to_others(self.net, placed, *place, v, i) >= LEAST_TIME for place in places
+            seconds_to_others(self.net, claimed, int(row["lane"]), float(row["s"]), v, i)
+            >= LEAST_TIME
+            for row in rows[rows["lane"] >= 0]
         )
 
     def _has_room(
-        self, i: int, at: int, d: NDArray[np.float64], states: ActorStates, placed: Places
+        self, i: int, at: int, d: NDArray[np.float64], states: ActorStates, claimed: Places
     ) -> bool:
         """Whether vehicle i can be put on sample `at`, d m from every actor."""
         v = self._speed_at(i, at)
         if (states.present & (d < room(self.care, v, states))).any():
             return False
         lane, s = int(self.places.lane[at]), float(self.net.point["s"][at])
-        return seconds_to_others(self.net, placed, lane, s, v, i) >= LEAST_TIME
+        return seconds_to_others(self.net, claimed, lane, s, v, i) >= LEAST_TIME
 
     def _speed_at(self, i: int, at: int) -> float:
         """m/s at which driver i passes sample `at`: as traffic does there."""

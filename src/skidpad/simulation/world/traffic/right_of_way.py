@@ -12,6 +12,7 @@ from math import cos, sin, sqrt
 import numpy as np
 
 from skidpad.core.jit import inner_kernel
+from skidpad.physics.grip import left_at
 from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.care import bend_speed_sq, drive_limit, reach
 from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS, find_ahead
@@ -31,6 +32,7 @@ HALT_GAP = 4.5  # m to the line within which standing counts as a stop
 PATIENCE = 4.0  # s, then who stands on the other side no longer counts
 QUEUE_REACH = 26.0  # m before the area; who stands farther away stands in a queue
 IMPATIENT = 40.0  # s of standing at a light after which those who come the other way let one turn
+SLIPPERY = 0.5  # of the dry road's friction; with more a queue starts within a green
 TAKEN_TIME = 20.0  # s after which a driver in a junction creeps on
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
 V_QUEUE = 2.0  # m/s, slower leaders make a queue
@@ -124,7 +126,8 @@ def _gap_to_line(view: View, d: Drivers, i: int) -> float:
 @inner_kernel
 def _is_impatient(view: View, d: Drivers, i: int) -> bool:
     """Whether driver i has stood so long that others let it go first."""
-    return bool(view.care.on and d.state[i].active and d.state[i].stood > IMPATIENT)
+    slippery = view.care.on and left_at(view.care.grip, 0.0) < SLIPPERY
+    return bool(slippery and d.state[i].active and d.state[i].stood > IMPATIENT)
 
 
 @inner_kernel
@@ -134,7 +137,7 @@ def _lets_turn(view: View, d: Drivers, i: int, lane: int) -> bool:
     Without it nobody who turns left gets through while the stream that comes the other way fills
     each green: on ice a queue needs all of it to start.
     """
-    if not view.care.on or _is_impatient(view, d, i):
+    if not view.care.on or left_at(view.care.grip, 0.0) >= SLIPPERY or _is_impatient(view, d, i):
         return False
     if _holds_impatient(view, d, lane, lane, np.inf):
         return True

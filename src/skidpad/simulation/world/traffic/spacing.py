@@ -10,6 +10,7 @@ from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.care import FIRM_SHARE, REACTION, STOP_MARGIN, Care, grip_at
 from skidpad.simulation.world.traffic.network import Network
 from skidpad.simulation.world.traffic.places import CLEARANCE
+from skidpad.simulation.world.traffic.state import Drivers
 
 Floats = NDArray[np.float64]
 
@@ -19,16 +20,26 @@ LEAST_TIME = 3.5
 REACH = 150.0  # m of road that are searched, farther than anybody drives in LEAST_TIME
 
 
+def claims(placed: Places, d: Drivers) -> Places:
+    """(2 n,) every actor where it is, then where it goes to: in a change of lane these are two."""
+    aims = placed.copy()
+    drives = d.state["active"]
+    aims["lane"][drives], aims["s"][drives] = d.path[drives, 0], d.state["s"][drives]
+    return np.concatenate([placed, aims])
+
+
 def seconds_to_others(
-    net: Network, placed: Places, lane: int, s: float, v: float, me: int
+    net: Network, claimed: Places, lane: int, s: float, v: float, me: int
 ) -> float:
     """Smallest time gap in s from a place on a lane, passed with speed v, to those ahead and behind.
 
-    me: row of the vehicle that is or will be there. Those on neighbouring lanes do not count.
+    claimed: of `claims`. me: row of the vehicle that is or will be there. Those on neighbouring lanes
+    do not count.
     """
+    placed, n = claimed, len(claimed) // 2
     least = np.inf
     there = placed["present"] & (placed["lane"] >= 0)
-    there[me] = False
+    there[[me, me + n]] = False
     for forward in (True, False):
         begins = np.full(len(net.lane), np.nan)
         for other, start in _way(net, lane, s, forward).items():

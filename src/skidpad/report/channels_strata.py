@@ -17,9 +17,10 @@ STRATA = {
     "natural": "Natural drivers",
     "risky": "Risky drivers",
 }
-EXPLAINED = """Among natural drivers nothing is staged, and hazards are as frequent as this traffic makes them: it \
-follows less closely than drivers on roads do, so tailgating is rarer. How often an alarm is right and how \
-often it is false is read there. Among risky ones the least tenth of published headways and cut-in gaps \
+EXPLAINED = """Among natural drivers nothing is staged, and hazards are as frequent as this traffic \
+makes them: it follows less closely than drivers on roads do, so tailgating is rarer. How often an alarm is \
+right and how often it is false is read there. \
+Among risky ones the least tenth of published headways and cut-in gaps \
 makes up half of all draws, and positions of channels jump twenty times as often, so that there is enough to \
 miss; each true hazard then counts with its driver's or the jump's weight (importance sampling), which gives \
 the recall that natural drivers would show (but for the time in which a position is off, 3 to 7 % per \

@@ -63,8 +63,8 @@ def test_the_export_has_the_same_road_under_it(played, tmp_path):
 
 def test_a_report_of_one_run_or_of_a_folder(played):
     one, campaign = played
-    assert "The run is not judged." in run("report", one)
-    assert "The run is not judged." in run("report", campaign)
+    assert "The run was not judged." in run("report", one)
+    assert "The run was not judged." in run("report", campaign)
 
 
 def test_a_road_that_is_nowhere_is_asked_for(played, tmp_path):

@@ -48,6 +48,13 @@ KINDS = {
     PlayVerdict.NOT_JUDGED: "muted",
     PlayVerdict.ERROR: "bad",
 }
+ONE = {
+    PlayVerdict.PASSED: "The run passed.",
+    PlayVerdict.FAILED: "The run failed.",
+    PlayVerdict.VOID: "The run is void: it proves nothing.",
+    PlayVerdict.NOT_JUDGED: "The run was not judged.",
+    PlayVerdict.ERROR: "There is no complete run.",
+}
 ORDER = (
     PlayVerdict.ERROR,
     PlayVerdict.FAILED,
@@ -98,7 +105,7 @@ def write_play_report(out: Path) -> tuple[Played, Path]:
 def build_page(played: Played) -> Page:
     """Return all sections in the order in which a reader asks."""
     runs = in_order(played.runs)
-    title = runs[0].scenario if len(runs) == 1 else f"{len(runs)} runs of scenarios"
+    title = runs[0].scenario if len(runs) == 1 else f"{count_text(len(runs), 'run')} of scenarios"
     links = _links(played, runs)
     sections = [
         Section("Verdict", [_answers(played), *_matrix(runs, links)]),
@@ -121,7 +128,7 @@ def answer(played: Played) -> str:
     counts = Counter(run.verdict for run in played.runs)
     n = len(played.runs)
     if n == 1:
-        return f"The run is {_word(played.runs[0].verdict)}."
+        return ONE[played.runs[0].verdict]
     rest = [f"{counts[v]} {_word(v)}" for v in ORDER if counts[v] and v is not PlayVerdict.PASSED]
     told = f"{counts[PlayVerdict.PASSED]} of {n} runs passed"
     return f"{told}; {', '.join(rest)}." if rest else f"{told}."
@@ -230,7 +237,8 @@ def _runs_table(runs: Sequence[PlayRun], links: dict[str, str]) -> Table:
     ]
     if _seeds(runs) < 2:
         columns = [c for c in columns if c.title != "seed"]
-    return table(columns, runs, "All runs, those that need a look first")
+    caption = "All runs, those that need a look first" if len(runs) > 1 else ""
+    return table(columns, runs, caption)
 
 
 def _plain_verdict(run: PlayRun) -> Cell:

@@ -22,6 +22,7 @@ from skidpad.report.timeline import Mark, Strip, timelines
 
 Floats = NDArray[np.float64]
 STORY = "storyboard.csv"
+OF_FILE = "file"  # name of the weather that a file describes
 OTHERS, EVENTS = 3, 14  # shown at most
 TTC_SHOWN, TTC_CRITICAL = 10.0, 1.5  # s
 GAP_SHOWN = 60.0  # m
@@ -63,6 +64,8 @@ def run_anchor(run: PlayRun) -> str:
 def run_title(run: PlayRun) -> str:
     """Return scenario, weather and verdict in one line."""
     where = f" in {run.weather}" if run.weather else ""
+    if run.weather == OF_FILE:
+        where = " in the weather of its file"
     return f"{run.scenario}{where}: {run.verdict.value}"
 
 

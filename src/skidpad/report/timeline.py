@@ -71,7 +71,7 @@ def _marks(marks: Sequence[Mark], t0: float, t1: float, top: float, bottom: floa
 
 
 def _strip(s: Strip, y: float, t0: float, t1: float) -> str:
-    bins = max(min(BINS, len(s.t) - 1), 1)  # none without a value, where there are few
+    bins = min(BINS, max(len(s.t) // 2, 1))  # none without a value, where there are few
     edges = np.clip(((s.t - t0) / (t1 - t0) * bins).astype(int), 0, bins - 1)
     known = np.isfinite(s.value)
     low, high = np.full(bins, np.inf), np.full(bins, -np.inf)

@@ -28,7 +28,8 @@ SEGMENT_HOURS = 45.0 / 3600.0
 def command(*words: object) -> None:
     """Run a command of ours in this process."""
     done = CliRunner().invoke(app, [str(w) for w in words], catch_exceptions=False)
-    assert done.exit_code == 0, done.output
+    good = (0, 1) if words[0] == "play" else (0,)  # 1: the verdict, which is no matter here
+    assert done.exit_code in good, done.output
 
 
 def of_log(folder: Path) -> Columns:

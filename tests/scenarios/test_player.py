@@ -226,7 +226,7 @@ def test_everything_unknown_and_wrong_is_listed_at_once_with_its_line(tmp_path):
         ('value="$V"', 'value="nan"', "must be a number"),
         ('value="$V"', 'value="inf"', "must be finite"),
         ('s="120"', 's="far"', "must be a number"),
-        ('roadId="1"', 'roadId="77"', "is not there"),
+        ('roadId="1" laneId="-', 'roadId="1" laneId="-7', "is not there"),
         ('entityRef="other"', 'entityRef="nobody"', "no entity 'nobody'"),
         ("<OpenSCENARIO>", "<OpenDRIVE>", "not XML"),
         ("straight.xodr", "nowhere.xodr", "no road file"),

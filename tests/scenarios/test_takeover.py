@@ -30,7 +30,7 @@ def override(inputs: str) -> str:
 def driven(folder: Path, *events: str, actor: str, end: float, **parts: object) -> RunLog:
     file = write(folder, stories=story(*events, actor=actor), end=end, minor=3, **parts)
     done = CliRunner().invoke(app, ["play", str(file), "--out", str(folder / "out")])
-    assert done.exit_code == 0, done.output
+    assert done.exit_code in (0, 1), done.output  # whatever the verdict
     return read_log(folder / "out")
 
 

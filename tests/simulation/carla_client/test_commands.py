@@ -55,7 +55,7 @@ def test_play_moves_the_same_actors_on_both_backends(serve: Serve, tmp_path: Pat
     file = str(FOLDER / "lead_slowdown.xosc")
     words = ("play", file, "--duration", "4", "--controller", "ideal", "--actors", "ideal")
     said = skidpad(tmp_path / "carla", serve("--mu-ref", "0.9").port, *words)
-    assert "after 4.00 s" in said
+    assert "The run was not judged." in said
     run(*words, "--out", str(tmp_path / "here"))
     there, embedded = (read_log(tmp_path / name) for name in ("carla", "here"))
     assert len(there.t) == len(embedded.t) == 81  # ticks and the start

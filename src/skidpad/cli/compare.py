@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from enum import Enum
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -29,6 +30,7 @@ class Undecided(str, Enum):
     let_pass = "pass"
 
 
+PIPE_WIDTH = 200  # columns, so that nothing wraps where no terminal reads
 SHOWN = (
     "fatal_collisions",
     "crashes_vehicle",
@@ -141,32 +143,34 @@ def _say(rule: Rule, judged: list[Judged], undecided: Undecided) -> None:
 
 
 def _print(changes: list[Change]) -> None:
+    """The table of all changes; what so few seeds cannot tell stands once below it."""
     from rich.console import Console
     from rich.table import Table
 
-    from skidpad.evidence.statistics import holm, interval_text, p_text
+    from skidpad.evidence.statistics import holm, no_limits_text, p_text, range_text
 
     tested = [c.comparison.p for c in changes]
     adjusted = holm([p for p in tested if p is not None])
-    table = Table(
-        "configuration",
-        "column",
-        "B - A",
-        "interval",
-        f"p of {len(changes)}",
-        "seeds",
-        "same drive",
-    )
+    heads = ("config", "column", "B - A", "95 %", f"p of {len(changes)}", "seeds", "same drive")
+    table = Table(*heads, box=None, pad_edge=False, padding=(0, 1, 0, 0))
+    without: dict[str, list[str]] = defaultdict(list)
     for c in changes:
         found = c.comparison
-        p = None if found.p is None else adjusted.pop(0)
+        if found.interval is None:
+            without[no_limits_text(found.n, "seed")].append(f"{c.column} ({c.subject})")
         table.add_row(
             c.config or "all",
             c.column,
             f"{found.mean:+.3g}",
-            interval_text(found.interval, found.n, "seed"),
-            p_text(p),
+            range_text(found.interval) if found.interval else "-",
+            "-"
+            if found.p is None
+            else p_text(adjusted.pop(0)).removeprefix("p ").removeprefix("= "),
             str(found.n),
             f"{c.same} of {c.runs}",
         )
-    Console().print(table)
+    console = Console()
+    Console(width=None if console.is_terminal else PIPE_WIDTH).print(table)
+    for sentence, columns in without.items():
+        everywhere = len(columns) == len(changes)
+        typer.echo(sentence if everywhere else f"{sentence}: {', '.join(columns)}")

@@ -306,8 +306,13 @@ def holm(p_values: Sequence[float]) -> list[float]:
 def interval_text(interval: Interval | None, units: int | None = None, unit: str = "run") -> str:
     """`95 % 0.1 to 1.46`; without limits what `no_limits_text` says, if the number of units is given."""
     if interval is not None:
-        return f"95 % {_plain(interval.low)} to {_plain(interval.high)}"
+        return f"95 % {range_text(interval)}"
     return NO_LIMITS if units is None else no_limits_text(units, unit)
+
+
+def range_text(interval: Interval) -> str:
+    """`0.1 to 1.46`."""
+    return f"{_plain(interval.low)} to {_plain(interval.high)}"
 
 
 def no_limits_text(units: int, unit: str = "run") -> str:

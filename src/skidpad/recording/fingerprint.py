@@ -35,14 +35,12 @@ class Fingerprint:
 
 def comparison_text(a: Collection[str], b: Collection[str]) -> str:
     """Whether hashes of drives on these fingerprints may be compared; empty: it is not known."""
-    if not a or not b:
-        return "hashes may not be compared: it is not known on which processor and libraries they arose"
-    if len({*a, *b}) == 1:
+    if a and b and len({*a, *b}) == 1:
         return f"hashes may be compared: same processor features, libraries and version ({next(iter(a))})"
-    places = [", ".join(sorted(side)) for side in (a, b)]
+    places = [", ".join(sorted(side)) or "not known" for side in (a, b)]
     return (
-        f"hashes may not be compared: other processor features, libraries or version ({places[0]} against "
-        f"{places[1]}), on which equal drives may have different hashes"
+        "hashes may not be compared, equal drives may differ in theirs: other processor features, "
+        f"libraries or version ({places[0]} against {places[1]})"
     )
 
 

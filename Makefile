@@ -117,8 +117,11 @@ docs: $(VENV)/.documented-with
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
 	@echo "the site is at build/site/index.html"
 
+# figures of docs/physics.md and the README's pictures; REPORT=out/adas: its first page too
+REPORT ?=
 figures: $(VENV)/.tested-with
 	$(BIN)/python tools/vehicle_validation.py docs/img
+	$(BIN)/python tools/readme_pictures.py docs/img $(REPORT)
 
 $(BIN)/python:
 	@test -n "$(PYTHON)" || { echo "skidpad needs Python 3.10 to 3.13 on the PATH"; exit 2; }

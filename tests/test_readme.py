@@ -5,6 +5,7 @@ from pathlib import Path
 
 import click
 import typer
+from PIL import Image
 
 from skidpad.cli.main import app
 from skidpad.core.errors import install_command
@@ -70,6 +71,16 @@ def test_configurations_weathers_and_times_are_named_in_words():
     others = ("sunrise", "heavy rain", "a minute of processor time", "source .venv/bin/activate")
     for words in functions + others:
         assert words in README, words
+
+
+def test_pictures_are_those_that_make_figures_writes():
+    tool = text_of("tools/readme_pictures.py")
+    assert "tools/readme_pictures.py docs/img" in text_of("Makefile")
+    for target in re.findall(r"!\[[^\]]*\]\((docs/img/[^)]+)\)", README):
+        assert f'"{Path(target).name}"' in tool, target
+        with Image.open(ROOT / target) as picture:
+            assert picture.size[0] >= 800, target
+            assert getattr(picture, "n_frames", 1) == 1, "a page, no film"
 
 
 def text_of(name):

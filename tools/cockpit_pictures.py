@@ -3,7 +3,7 @@
     python tools/cockpit_pictures.py docs/img
 
 `pictures-for-people.webp` is one moment in the six weathers and snow: the plain picture beside the
-one for people. `cockpit.webp` is the README's film: a drive whose weather changes. No test compares
+one for people. `cockpit.webp` is the film of docs/cockpit.md: a drive whose weather changes. No test compares
 them: they are for looking at.
 """
 

@@ -51,6 +51,10 @@ def test_show_and_compare_find_the_road(played):
         told = run("show", folder)
         assert "on lane" in told
         assert "map has changed" not in told
+        rows = [line for line in told.splitlines() if line.startswith("fatal_collisions ")]
+        assert (
+            rows[0].rstrip().endswith("recoveries, wrong ways and departures")
+        )  # one line in a pipe
     run("compare", *runs(played))
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import asdict
 from pathlib import Path
 
-from rich.console import Console
 from rich.table import Table
 
 from skidpad.campaign.run_road import load_road
+from skidpad.cli.tables import table_console
 from skidpad.core.errors import FileError
 from skidpad.evidence.drive.collisions import find_crashes
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
@@ -40,19 +40,19 @@ def compare_runs(a: Path, b: Path) -> None:
             raise FileError(f"{run}: the map {log.header.map} is another one today")
         found.append(asdict(run_metrics(log, road_map)))
     places = [[place] if (place := driven_on(run)) else [] for run in (a, b)]
-    Console().print(comparison_text(*places), highlight=False)
+    table_console().print(comparison_text(*places), highlight=False)
     table = Table("metric", "A", "B", "B - A", box=None, pad_edge=False)
     for name, before in found[0].items():
         after = found[1][name]
         change = None if before is None or after is None else after - before
         table.add_row(name, _text(before), _text(after), _text(change))
-    Console().print(table)
+    table_console().print(table)
 
 
 def show(run: Path) -> None:
     """Print it."""
     log, road_map = opened(run)
-    console = Console()
+    console = table_console()
     console.print(f"[bold]{run.name}[/] on {log.header.map}, {len(log) * log.header.dt:g} s")
     for name, value in log.header.about.items():
         console.print(f"  {name}: {value}")

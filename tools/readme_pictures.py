@@ -17,7 +17,7 @@ from typing import Any
 
 from PIL import Image
 
-SIZE = {"width": 1280, "height": 860}
+WIDTH, HEIGHT = 1280, 860  # pixels
 QUALITY = 82  # of the pictures
 WAIT_MS = 300_000.0  # kernels may have to be compiled
 DRIVEN_S = 20.0  # simulated, so that traffic is about
@@ -43,7 +43,7 @@ def photograph(address: str, file: Path, ready: Callable[[Any], None]) -> None:
     flags = ["--no-sandbox", "--disable-gpu"]
     with sync_playwright() as playwright:
         browser = playwright.chromium.launch(executable_path=program, args=flags)
-        page = browser.new_page(viewport=SIZE)
+        page = browser.new_page(viewport={"width": WIDTH, "height": HEIGHT})
         page.goto(address)
         ready(page)
         shot = Image.open(BytesIO(page.screenshot()))

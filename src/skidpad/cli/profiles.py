@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
@@ -29,6 +30,21 @@ def list_profiles() -> None:
     for name in PROFILES:
         n = len(differences(recommended, load_profile(name)))
         typer.echo(f"{name:<16}{n} settings differ from recommended" if n else name)
+
+
+@profiles.command()
+def sensors(
+    plot: Annotated[
+        Path | None, typer.Option(help="Draw the layout: a .png, .svg or .pdf.")
+    ] = None,
+) -> None:
+    """Print where the sensors are mounted and what they cover; --plot draws them from above."""
+    from skidpad.cli.sensors import sensor_table, write_layout
+
+    typer.echo(sensor_table())
+    if plot is not None:
+        write_layout(plot)
+        typer.echo(plot)
 
 
 @profiles.command()

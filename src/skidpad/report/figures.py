@@ -248,6 +248,7 @@ class Chart:
     y_range: tuple[float, float] | None = None
     x_range: tuple[float, float] | None = None
     rules: Sequence[float] = ()  # horizontal dashes at these heights
+    equal: bool = False  # one unit is as long on both axes
 
 
 POINTS = {"marker": "o", "linestyle": "none", "alpha": 0.75, "markersize": 5}
@@ -293,6 +294,8 @@ def _draw_curves(axes: Axes, chart: Chart, named: set[str]) -> None:
         axes.yaxis.set_major_formatter("{x:g}")  # not 10^-1, which is set slowly and read slowly
     if chart.y_range:
         axes.set_ylim(*chart.y_range)
+    if chart.equal:
+        axes.set_aspect("equal")
     if chart.x_range:
         axes.set_xlim(*chart.x_range)
 

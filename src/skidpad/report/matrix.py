@@ -20,6 +20,7 @@ from skidpad.report.matrix_parity import Parity, load_parity, parity_section
 from skidpad.report.matrix_published import beside_published
 from skidpad.report.matrix_real_time import real_time_blocks
 from skidpad.report.matrix_sides import side_blocks
+from skidpad.report.matrix_ways import way_blocks
 from skidpad.report.page import Block, Page, Section, Text, write_report_page
 from skidpad.report.verdicts import unjudged_text, verdict_blocks
 
@@ -76,6 +77,7 @@ def build_page(matrix: Matrix) -> Page:
         *([Section("Functions and cruise target", varied)] if (varied := factors(matrix)) else []),
         Section("One step at a time", matrix_tables.pairs(matrix)),
         Section("Two configurations side by side", side_blocks(matrix)),
+        Section("Where it happened", way_blocks(matrix, crashes)),
         Section("Every crash", crash_sections(matrix, crashes)),
         Section("Beside the published numbers", beside_published(matrix)),
         Section("Pixels against objects", parity_section(parity)),

@@ -38,12 +38,15 @@ def sensor_rows() -> list[SensorRow]:
 def row(spec: CameraSpec | RadarSpec) -> SensorRow:
     """The row of one sensor."""
     m = spec.mount
-    place = [round(v, 9) + 0.0 for v in (m.x, m.y, m.z, degrees(m.yaw), degrees(m.pitch))]
+    x, y, z, yaw, pitch = (
+        round(v, 9) + 0.0 for v in (m.x, m.y, m.z, degrees(m.yaw), degrees(m.pitch))
+    )
     if isinstance(spec, CameraSpec):
         pixels = f"{spec.width} x {spec.height} px"
-        return SensorRow(spec.id, spec.modality.value, *place, spec.fov_deg, pixels)
+        kind = spec.modality.value
+        return SensorRow(spec.id, kind, x, y, z, yaw, pitch, spec.fov_deg, pixels)
     fov, reach = spec.horizontal_fov_deg, f"{spec.range:g} m"
-    return SensorRow(spec.id, "radar", *place, fov, reach)
+    return SensorRow(spec.id, "radar", x, y, z, yaw, pitch, fov, reach)
 
 
 def sensor_table() -> str:

@@ -36,7 +36,7 @@ def test_the_map_has_a_way_per_configuration_and_a_mark_per_crash(tmp_path, monk
     assert {"m east", "m north"} <= {t for t, *_ in texts(figure.svg)}
     for colour in PALETTE[:4]:  # of configurations 1 to 4; each has a way and its legend
         assert len(re.findall(rf"fill: none; stroke: {colour}", figure.svg)) == 2
-    marks = re.findall(rf'fill: {PALETTE[2]}; stroke: #000000', figure.svg)
+    marks = re.findall(rf"fill: {PALETTE[2]}; stroke: #000000", figure.svg)
     assert len(marks) == 2, "of configuration 3; the baseline's crash is not drawn"
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from runs import scenario_run
 from skidpad import drive
 from skidpad.campaign.cast import driver_of, stage_of
 from skidpad.campaign.cells import cross, matrix_drivers
@@ -40,6 +41,16 @@ def test_the_seed_says_who_drives():
     run = RunSpec(driver=ReferenceDriver(), seed=11)
     seated = driver_of(run, stage_of(run))
     assert seated.stack.stack.person == person_of(11)
+
+
+def test_in_a_scenario_it_wants_the_speed_of_the_file():
+    run = scenario_run("lead_slowdown", driver=ReferenceDriver())
+    stage = stage_of(run)
+    cruise = driver_of(run, stage).stack.stack.driver.cruise
+    assert cruise is not None
+    assert cruise == pytest.approx(stage.cruise_kmh / 3.6)
+    on_roads = RunSpec(driver=ReferenceDriver())
+    assert driver_of(on_roads, stage_of(on_roads)).stack.stack.driver.cruise is None
 
 
 @pytest.mark.parametrize(

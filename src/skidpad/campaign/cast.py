@@ -291,7 +291,7 @@ def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, An
         case ReferenceDriver():
             from skidpad.stack.reference.driver import ReferenceStack
 
-            return ReferenceStack, {"seed": spec.seed, "car": asdict(ego_model())}
+            return ReferenceStack, {"seed": spec.seed, "car": asdict(ego_model()), **cruise}
         case AdasDriver():
             if driver.cruise_kmh is not None:
                 cruise = {"cruise_kmh": driver.cruise_kmh}

@@ -15,6 +15,7 @@ import numpy as np
 
 from skidpad.core.errors import require_choice
 from skidpad.core.frames import SensorFrame
+from skidpad.core.geometry import mps_from_kmh
 from skidpad.core.setup import DT
 from skidpad.core.sight import DriverView, SeenActors
 from skidpad.core.specs import EyesSpec, SensorSpec
@@ -39,7 +40,7 @@ from skidpad.stack.reference.person import Person, person_of
 from skidpad.stack.reference.way import Body, Place, Way, anticipated, gaps_ahead
 
 EYES = "eyes"
-KEYS = ("seed", "car")
+KEYS = ("seed", "car", "cruise_kmh")
 HELD = VehicleCommand(brake=1.0)  # while the supervisor drives; it overrides this anyway
 LINE_MARGIN = 1.0  # m kept to a line
 LINE_HEADWAY = 0.5  # s kept to it
@@ -55,8 +56,16 @@ REMEMBERED = 3.0  # s for which a light is taken to be as it was last seen
 class ReferenceDriver:
     """One person at the wheel. Deterministic: commands depend on the views alone."""
 
-    def __init__(self, map: RoadMap, person: Person, car: CarModel, dt: float = DT) -> None:
-        self.person, self.car, self.dt = person, car, dt
+    def __init__(
+        self,
+        map: RoadMap,
+        person: Person,
+        car: CarModel,
+        dt: float = DT,
+        cruise: float | None = None,
+    ) -> None:
+        """cruise: speed in m/s that is wanted instead of the person's share of the limit."""
+        self.person, self.car, self.dt, self.cruise = person, car, dt, cruise
         self.way, self.giving_way = Way(map), GivingWay(map)
         self.controller = Controller(car, dt)
         self.reset()
@@ -105,13 +114,14 @@ class ReferenceDriver:
     def _desired_speed(self, view: DriverView, place: Place, v: float, m: Manner) -> float:
         """m/s that limits, bends and sight allow, each reached by comfortable braking."""
         points, road = self.way.path.points, view.road
-        factor = self.person.speed * speed_factor(road, v)
+        factor = speed_factor(road, v)
         end = place.at + int(v * v / (2.0 * m.b) + PREVIEW) + 1
         allowed = np.inf
         for k in range(place.at, min(end, len(points.x)), PREVIEW_STEP):
-            there = min(
-                factor * float(points.limit[k]), bend_speed(road, float(points.curvature[k]))
-            )
+            wish = self.cruise
+            if wish is None:
+                wish = self.person.speed * float(points.limit[k])
+            there = min(factor * wish, bend_speed(road, float(points.curvature[k])))
             way = max(k - place.s, 0.0)
             allowed = min(allowed, sqrt(there * there + 2.0 * m.b * way))
         return sight_speed(road, view.visibility, self.person.reaction, allowed)
@@ -186,12 +196,18 @@ class ReferenceStack:
     def __init__(
         self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
     ) -> None:
-        """settings: `car`, what it knows of its car, and `seed`, which person drives."""
+        """settings: `car`, what it knows of its car; `seed`, which person drives; `cruise_kmh`."""
         del specs
         for key in settings:
             require_choice("reference driver option", key, KEYS)
         self.person = person_of(int(settings.get("seed", 0)))
-        self.driver = ReferenceDriver(map, self.person, CarModel(**settings["car"]))
+        cruise = settings.get("cruise_kmh")
+        self.driver = ReferenceDriver(
+            map,
+            self.person,
+            CarModel(**settings["car"]),
+            cruise=None if cruise is None else mps_from_kmh(float(cruise)),
+        )
         self.supervision = Supervision.NONE
 
     @property

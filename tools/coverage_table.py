@@ -8,6 +8,7 @@ by more than two standard errors of its draws.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from math import exp, log, sqrt
@@ -246,8 +247,8 @@ def write_block(page: Path, name: str, text: str) -> None:
     page.write_text(before + begin + "\n" + text + "\n" + end + rest.split(end)[1])
 
 
-def main() -> None:
-    """Print the tables, or put them into a page."""
+def main() -> int:
+    """Print the tables, or put them into a page; 1 when a cell fails."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("page", nargs="?", type=Path)
     parser.add_argument("--draws", type=int, default=DRAWS)
@@ -259,9 +260,10 @@ def main() -> None:
             print(f"fails: {c.kind.family}, {c.kind.name}, n = {c.n}: {c.coverage:.3f}")
     if options.page is None:
         print(text)
-        return
-    write_block(options.page, "coverage of intervals", text)
+    else:
+        write_block(options.page, "coverage of intervals", text)
+    return int(any(c.fails for c in cells))
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

@@ -41,6 +41,11 @@ PROOFS = (
         "no reader is brought down by damaged files: 10^5 inputs each, in bounded time",
     ),
     Proof(
+        "coverage",
+        (sys.executable, "tools/coverage_table.py", "--draws", "20000"),
+        "printed intervals hold the truth given that they are printed: every cell with 20 000 draws",
+    ),
+    Proof(
         "soak-server",
         (sys.executable, "tools/soak_server.py", "--out", "out/nightly/soak"),
         "ten drives of 10^5 ticks with 50 cars of the Traffic Manager, map loads between (13.9 h of game "

@@ -16,7 +16,7 @@ CONFIDENCE = 0.95
 DISPERSION_ERROR = 12.0  # widens an excess of variance seen in few runs with events
 COUNT_TAIL = 0.015  # of each limit of a count
 EVENTS_SPARED = 0.75  # less for the lower limit, which is given only from two runs with events on
-SKEW_LONG = 3.0  # widens the limit on the side of the longer tail
+SKEW_LONG = 3.5  # widens the limit on the side of the longer tail
 SKEW_SHORT = 0.5  # widens the other one
 
 
@@ -43,7 +43,7 @@ def count_limits(
 def skew_limits(values: Floats) -> tuple[Floats, Floats]:
     """Limits of means over the last axis of values (..., n) that are not all alike.
 
-    Student's limits, widened on the side of the longer tail by 3 g / sqrt(n) and on the other by
+    Student's limits, widened on the side of the longer tail by 3.5 g / sqrt(n) and on the other by
     0.5 g / sqrt(n), g the sample skewness. The order of the correction and its side follow Johnson
     (1978), JASA 73, 536-544, equation 2.5; the factors are calibrated by simulation.
     """

@@ -6,7 +6,7 @@ import pytest
 from test_page import page
 
 from chromium import CHROMIUM, FLAGS
-from skidpad.report.page import Page, Section, Text, write_page
+from skidpad.report.page import Cell, Page, Section, Table, Text, write_page
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 
@@ -49,3 +49,15 @@ def test_a_word_wider_than_a_phone_is_broken(tmp_path):
     root = "document.documentElement"
     measured = f"{root}.dataset.wider = {root}.scrollWidth - {root}.clientWidth"
     assert 'data-wider="0"' in dom(path, measured, "390,844")
+
+
+def test_a_table_with_long_remarks_is_whole_on_a_screen_of_1400_pixels(tmp_path):
+    path = tmp_path / "report.html"
+    remark = "1 of 20 seeds had one, at most 22 % do (95 %)\nper 100 km 12.6\n7.3 to 19.6"
+    row = [Cell("3 · + light assist, resume"), *[Cell("0.25", note=remark)] * 6]
+    heads = [("configuration", ""), *[("crashes with vehicles per run", "")] * 6]
+    table = Table(heads, [row] * 3, "What happened")
+    write_page(Page(title="t", subtitle="", sections=[Section("s", [table])]), path)
+    box = "document.querySelector('.scroll')"
+    measured = f"document.documentElement.dataset.cut = {box}.scrollWidth - {box}.clientWidth"
+    assert 'data-cut="0"' in dom(path, measured, "1400,900")

@@ -122,10 +122,11 @@ def _answers(campaign: GripCampaign, judged: Sequence[Judgement]) -> Answers:
     if campaign.both and after:
         worst = min(after, key=lambda cell: after[cell].value or 0.0)
         where = f"{scenario_title(worst[0])} in {worst[1]}"
-        text = (
-            f"Fewest runs are completed in {where}, {_percent(after[worst])}; the outcome changes "
-            f"beyond chance in {len(changed)} of {len(campaign.pairs)} cells."
-        )
+        fewest = f"Fewest runs are completed in {where}, {_percent(after[worst])}"
+        if all(share.value == 1.0 for share in after.values()):
+            fewest = "With reduced friction every run is completed in every cell"
+        cells = count_text(len(campaign.pairs), "cell")
+        text = f"{fewest}; the outcome changes beyond chance in {len(changed)} of {cells}."
         items.append(Answer("Where most?", text))
     seeds = campaign.plain["seed"].n_unique()
     sure = f"{seeds_text(seeds)} {tally_text(judged)}{least_seeds_text(judged)}"

@@ -167,7 +167,7 @@ class Campaign(Generic[T, K, M]):
                     on_run(entry)
             batches = self.batches()
             for k, batch in enumerate(batches):
-                wanted = self._wanted(
+                wanted = self._uncertain_runs(
                     batch, [e for e in latest(ledger.entries) if e.run in earlier]
                 )
                 on_total(len(earlier) + len(wanted) + sum(map(len, batches[k + 1 :])))
@@ -186,7 +186,7 @@ class Campaign(Generic[T, K, M]):
         mixed = len(fingerprints(entries)) > 1
         return Summary(out, len(entries), driven, failed, digest, mixed, len(ledger.damaged))
 
-    def _wanted(self, batch: Sequence[T], entries: Sequence[Entry[K, M]]) -> Sequence[T]:
+    def _uncertain_runs(self, batch: Sequence[T], entries: Sequence[Entry[K, M]]) -> Sequence[T]:
         """The runs of a batch whose cells are uncertain, or distinct, after the batches before it."""
         if self.distinct and entries:
             cells = distinct_cells(self.batches()[0], entries, self.recipe.drive_of)
@@ -201,7 +201,7 @@ class Campaign(Generic[T, K, M]):
         here = fingerprint().short
         work = partial(self.recipe.drive, out)
         for finished in runner([Job(t.name, work, t, t.deadline_s) for t in tasks.values()]):
-            driven = self._driven(tasks[finished.job.key], finished)
+            driven = self._drive_task(tasks[finished.job.key], finished)
             yield Entry(
                 run=finished.job.key,
                 key=driven.key,
@@ -212,7 +212,7 @@ class Campaign(Generic[T, K, M]):
                 error=driven.error,
             )
 
-    def _driven(self, task: T, finished: Finished) -> Driven[K, M | None]:
+    def _drive_task(self, task: T, finished: Finished) -> Driven[K, M | None]:
         if finished.failure is None:
             driven: Driven[K, M | None] = finished.value
             return driven

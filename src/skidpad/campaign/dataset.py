@@ -122,7 +122,7 @@ def export_drive(spec: RunSpec, out: Path, every: int) -> tuple[Run, int]:
 
 def write_card(out: Path, every: int) -> Path:
     """What the data are; returns the file."""
-    cameras = {camera_name(c.id): _described(c.mount, c) for c in CAMERAS}
+    cameras = {camera_name(c.id): _describe_mount(c.mount, c) for c in CAMERAS}
     card = {
         "frames": "frames.parquet of each drive: one row per image of every camera, by tick",
         "every_ticks": every,
@@ -135,7 +135,7 @@ def write_card(out: Path, every: int) -> Path:
     return out / CARD
 
 
-def _described(mount: Pose, camera: Any) -> dict[str, float]:
+def _describe_mount(mount: Pose, camera: Any) -> dict[str, float]:
     return {
         "width_px": camera.width, "height_px": camera.height, "fov_deg": camera.fov_deg,
         "x_m": mount.x, "y_m": mount.y, "z_m": mount.z,

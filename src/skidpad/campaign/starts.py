@@ -19,11 +19,11 @@ def start_of(map: RoadMap) -> LanePosition:
     """The map's own place, else the published one (A-004), else on the longest lane."""
     if map.ego_start is not None:
         return map.ego_start
-    point = _published(map) or _longest(map)
+    point = _published_start(map) or _longest(map)
     return LanePosition(point.road, point.lane_id, map.s_road(point))
 
 
-def _published(map: RoadMap) -> LanePoint | None:
+def _published_start(map: RoadMap) -> LanePoint | None:
     if map.name not in PUBLISHED:
         return None
     x, y, lanes = PUBLISHED[map.name]

@@ -28,7 +28,7 @@ def read_run(folder: Path) -> RunSpec:
     plain = decode_yaml(read_bytes(path, "run"), str(path))
     if not isinstance(plain, dict):
         raise FileError(f"{path} does not describe a run")
-    return _described(plain, from_version_1, path)
+    return _read_description(plain, from_version_1, path)
 
 
 def read_segment(recording: Path) -> RunSpec:
@@ -37,10 +37,10 @@ def read_segment(recording: Path) -> RunSpec:
     record = read_record(path)
     if record is None:
         raise FileError(f"{path} does not describe a driven segment")
-    return _described(record.plan, _segment_1, path)
+    return _read_description(record.plan, _segment_1, path)
 
 
-def _described(plain: Plain, older: Callable[[Plain], Plain], path: Path) -> RunSpec:
+def _read_description(plain: Plain, older: Callable[[Plain], Plain], path: Path) -> RunSpec:
     """The run of a description of this version, or of one that `older` turns into it."""
     try:
         run = run_from_plain(plain if "version" in plain else older(plain), str(path))

@@ -125,10 +125,10 @@ class Noisy(Changed):
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
         """Drive by what is left."""
-        seen = {id: self._seen(id, s, frame.tick) for id, s in frame.segments.items()}
+        seen = {id: self._disturb_segments(id, s, frame.tick) for id, s in frame.segments.items()}
         return super().tick(replace(frame, segments=seen))
 
-    def _seen(self, id: str, segments: Segments, tick: int) -> Segments:
+    def _disturb_segments(self, id: str, segments: Segments, tick: int) -> Segments:
         factor = self._factor(id)
         keep = segments.depth <= self.noise.range_share * DEPTH_READ
         if self.noise.range_share >= 1.0:

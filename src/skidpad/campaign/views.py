@@ -82,13 +82,15 @@ def _draw_text(picture: Picture, moment: Moment, dt: float) -> None:
     throttle, brake, steer = truth.commands[0, :3]
     first += f"   throttle {throttle:.2f}  brake {brake:.2f}  steer {steer:+.2f}"
     _write(picture, first, left + 12, top + 30, INK, 0.62)
-    _write(picture, _said(moment.report, moment.driver.mode), left + 12, top + 62, INK, 0.55)
+    _write(
+        picture, _describe_report(moment.report, moment.driver.mode), left + 12, top + 62, INK, 0.55
+    )
     events = [f"contact with {c.static or truth.table.names[c.actor]}" for c in truth.contacts]
     events += [f"{i.marking} marking crossed" for i in truth.invasions]
     _write(picture, ", ".join(events), left + 12, top + 94, ACCENT, 0.55)
 
 
-def _said(report: StackReport, mode: str) -> str:
+def _describe_report(report: StackReport, mode: str) -> str:
     tier = report.tier.name.lower().replace("_", " ") if report.tier is not None else None
     shown: Mapping[str, Any] = {
         "tier": mode or tier,

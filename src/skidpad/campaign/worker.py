@@ -187,13 +187,13 @@ def _work(pipe: Connection) -> None:
         except (EOFError, OSError):
             return
         os.chdir(home)  # wherever the last job's stack went
-        value, error = _done(job)
+        value, error = _run_job(job)
         if os.getpid() != me:  # a stack forked: its child must neither answer nor take the next job
             os._exit(0)
         _send(pipe, _Answer(job.key, me, value, error))
 
 
-def _done(job: Job) -> tuple[Any, str]:
+def _run_job(job: Job) -> tuple[Any, str]:
     """The value of a job, or what it failed of; no foreign code ends the worker by an exception."""
     try:
         return job.work(job.argument), ""

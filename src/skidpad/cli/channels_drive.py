@@ -88,7 +88,9 @@ def totals(folder: Path) -> str:
     _write_pages(folder)
     driven = read_results(folder).drop_nulls("driven_s")
     sums = driven.select(pl.col(pl.Float64, pl.Int64).sum()).row(0, named=True)
-    watched = "".join(f"\n{_watched(link.parent)}" for link in sorted(folder.glob(f"*/*/{LINK}")))
+    watched = "".join(
+        f"\n{_describe_monitor(link.parent)}" for link in sorted(folder.glob(f"*/*/{LINK}"))
+    )
     recording = next(iter(sorted(folder.glob("*/*.mcap"))), "FILE.mcap")
     return (
         f"{folder}: {count_text(len(driven), 'segment')}, {sums['driven_s'] / 3600.0:.2f} h, "
@@ -109,7 +111,7 @@ def _write_pages(folder: Path) -> None:
         write_drive_report(summary.parent)
 
 
-def _watched(folder: Path) -> str:
+def _describe_monitor(folder: Path) -> str:
     """What became of a monitor beside its drive, in one line."""
     from skidpad.evidence.channels.timing import LIVE_TIMES, delay_sentence
     from skidpad.live.outcome import read_outcome

@@ -147,7 +147,7 @@ def judge_one(task: _Task) -> Segment:
     made_by, kept = task.made_by(), task.path.with_suffix(".judged")
     segment = segment_from(kept.read_bytes(), made_by) if is_file(kept) else None
     if segment is None:
-        segment = _judged(task)
+        segment = _judge_task(task)
         write_bytes(kept, segment_bytes(segment, made_by))
     segment = replace(segment, name=str(task.path.relative_to(task.folder)))
     if task.model is not None:
@@ -157,7 +157,7 @@ def judge_one(task: _Task) -> Segment:
     return replace(segment, rows=np.empty((0, 0)), motion=np.empty((0, 3)))
 
 
-def _judged(task: _Task) -> Segment:
+def _judge_task(task: _Task) -> Segment:
     import time
 
     from skidpad.evidence.channels.judging.segments import judge

@@ -20,7 +20,7 @@ Choice = TypeVar("Choice", Friction, CutIn)
 
 def plan_grip(ask: GripCross, run: RunSpec, repeats: int) -> list[RunSpec]:
     """The runs of a campaign; ConfigError or FileError for what cannot be driven."""
-    return cross(run, _varied(ask, run), seeds(run.seed - 1, repeats))
+    return cross(run, _vary_run(ask, run), seeds(run.seed - 1, repeats))
 
 
 def with_model(run: RunSpec, tuned: Tuned, model: str, esc: str = "off") -> RunSpec:
@@ -32,7 +32,7 @@ def with_model(run: RunSpec, tuned: Tuned, model: str, esc: str = "off") -> RunS
     )
 
 
-def _varied(ask: GripCross, run: RunSpec) -> Cross:
+def _vary_run(ask: GripCross, run: RunSpec) -> Cross:
     climate = grip_weathers(ask.weather)
     if run.overlay and ask.four_cells:
         raise ConfigError("--four-cells drives with and without drops: leave --overlay away")

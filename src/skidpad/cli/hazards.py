@@ -57,7 +57,7 @@ def show(folder: Path = DIR, id: list[str] = ID) -> None:
     from skidpad.recording.hazards import read_index
 
     rows = read_index(folder)
-    for row in _chosen({row["id"]: row for row in rows}, id):
+    for row in _choose_ids({row["id"]: row for row in rows}, id):
         typer.echo(json.dumps(row, indent=2))
 
 
@@ -74,12 +74,12 @@ def export(
     from skidpad.scenarios.writer import OscVersion
 
     records = {record.id: record for record in read_hazards(folder)}
-    for record in _chosen(records, id):
+    for record in _choose_ids(records, id):
         scenario, road = export_hazard(record, folder / "scenarios", OscVersion(osc.value), world)
         typer.echo(f"{scenario} with {road.name}")
 
 
-def _chosen(table: dict[str, T], ids: list[str] | None) -> list[T]:
+def _choose_ids(table: dict[str, T], ids: list[str] | None) -> list[T]:
     from skidpad.core.errors import ConfigError
 
     unknown = [i for i in ids or [] if i not in table]

@@ -141,7 +141,7 @@ def carla_unreal(context: typer.Context) -> None:
 arrange_help(app)
 
 
-def _terminated(number: int, frame: object) -> NoReturn:
+def _on_termination(number: int, frame: object) -> NoReturn:
     del frame
     raise SystemExit(128 + number)
 
@@ -157,7 +157,7 @@ def guarded(command: Callable[[], object]) -> None:
     SIGTERM ends it as Ctrl-C does: what is under way is dropped, what is done is kept.
     """
     if threading.current_thread() is threading.main_thread():
-        signal.signal(signal.SIGTERM, _terminated)
+        signal.signal(signal.SIGTERM, _on_termination)
     try:
         command()
     except InputError as error:

@@ -182,7 +182,7 @@ class ChannelSource:
             wheel_speeds=(float("nan"),) * 4, gear=1,
         )  # fmt: skip
         decision = self._decisions.get(tick)
-        seen = self._seen(tick, decision, states)
+        seen = self._objects_as_radar_points(tick, decision, states)
         frame = SensorFrame(tick, ego, {}, {}, seen, {}, (), (), Supervision.NONE)
         report, command = StackReport(), VehicleCommand()
         return Moment(frame, truth, Said(report, _mode(decision)), command, report, Action(command))
@@ -205,7 +205,9 @@ class ChannelSource:
             x, y, self._z.copy(), yaw, none, none, vx, vy, none, ax, none, self._present[k].copy()
         )
 
-    def _seen(self, tick: int, decision: Decision | None, states: ActorStates) -> RadarPoints:
+    def _objects_as_radar_points(
+        self, tick: int, decision: Decision | None, states: ActorStates
+    ) -> RadarPoints:
         """What the driving channel says of others, as points in the radar's frame."""
         name = decision.driving if decision and decision.driving else self._channels[0]
         frame = self._frames.get((name, tick))

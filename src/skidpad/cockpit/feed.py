@@ -77,14 +77,14 @@ class Feed:
         number = self.last + 1
         planes = tuple(Plane(n, a.dtype.name, a.shape) for n, a in views.items())
         head = msgspec.json.encode(Head(number, msgspec.Raw(told), planes))
-        data, at = self._slot(number), _rounded(len(head))
-        if at + sum(_rounded(a.nbytes) for a in views.values()) > SLOT_BYTES:
+        data, at = self._slot(number), _align_size(len(head))
+        if at + sum(_align_size(a.nbytes) for a in views.values()) > SLOT_BYTES:
             raise ValueError("the views do not fit into a slot")
         data[: len(head)] = np.frombuffer(head, dtype=np.uint8)
         for array in views.values():
             room = data[at : at + array.nbytes].view(array.dtype)
             room.reshape(array.shape)[...] = array
-            at += _rounded(array.nbytes)
+            at += _align_size(array.nbytes)
         self._state[FIRST_LENGTH + number % SLOTS] = len(head)
         self._state[LAST] = number
         return number
@@ -116,17 +116,17 @@ class Feed:
         return slot
 
 
-def _rounded(size: int) -> int:
+def _align_size(size: int) -> int:
     """Bytes that an array takes, so that the next one begins where any type may."""
     return -(-size // HEAD) * HEAD
 
 
 def _unpack(data: NDArray[np.uint8], length: int) -> Packet:
     head = msgspec.json.decode(data[:length].tobytes(), type=Head)
-    views, at = {}, _rounded(length)
+    views, at = {}, _align_size(length)
     for plane in head.planes:
         kind = np.dtype(plane.kind)
         size = int(np.prod(plane.shape)) * kind.itemsize
         views[plane.name] = data[at : at + size].view(kind).reshape(plane.shape)
-        at += _rounded(size)
+        at += _align_size(size)
     return Packet(head.number, bytes(head.told), views)

@@ -120,7 +120,7 @@ class LightAhead:
             return None
         frames = [
             frame
-            for head in self._reported(moment, report.light_distance)
+            for head in self._reported_heads(moment, report.light_distance)
             if (frame := _frame(camera, head, pose)) is not None
         ]
         if not frames:
@@ -129,7 +129,7 @@ class LightAhead:
         seen = "" if report.hsv is None else f", camera: {report.hsv.name.lower()}"
         return LightMark(frames, state, f"{state} {report.light_distance:.0f} m{seen}")
 
-    def _reported(self, moment: Moment, distance: float) -> list[SignalHead]:
+    def _reported_heads(self, moment: Moment, distance: float) -> list[SignalHead]:
         """By the stack's own walk along the lane, from where it believes to be."""
         ego = moment.frame.ego
         here = self.map.project(ego.pose.x, ego.pose.y, ego.pose.z)

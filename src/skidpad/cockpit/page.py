@@ -226,7 +226,7 @@ def weather_controls(panel: Panel) -> None:
             label="weather (N)",
             on_change=lambda e: panel.changed("weather", e.value, "weather", e.value),
         ).props("dense outlined options-dense")
-        panel.follow("weather", weather, lambda seat: _known(seat.get("weather"), names))
+        panel.follow("weather", weather, lambda seat: _known_name(seat.get("weather"), names))
         acting_select(panel, "grip", GripModel)
         acting_select(panel, "range", RangeModel)
     with ui.element("div").classes("sliders"):
@@ -271,5 +271,5 @@ def crowd_slider(panel: Panel) -> None:
     panel.follow("crowd", slider, lambda seat: seat.get("crowd"))
 
 
-def _known(name: str | None, names: list[str]) -> str | None:
+def _known_name(name: str | None, names: list[str]) -> str | None:
     return name if name in names else None

@@ -77,22 +77,22 @@ class Screen(Sink):
         self.studio.change(shown.outside, self.link.extras)
         braking = truth.commands[:, 1] > BRAKING
         images = self.studio.look(truth.tick, truth.states, truth.lights, braking, self.crash)
-        views = [v for v in View if self._wanted(v)]
+        views = [v for v in View if self._is_wanted(v)]
         planes: dict[str, Any] = {v.value: plane(images[v.value]) for v in views}
         if self.beside is not None:
             planes[BESIDE], said = self.beside(moment, self.link.main, self.link.extras)
             shown = Shown(shown.outside, {**shown.told, BESIDE: said})
         self.shown += 1
         self._at = perf_counter()
-        self.feed.put(msgspec.json.encode(self._told(moment, shown)), planes)
+        self.feed.put(msgspec.json.encode(self._describe_moment(moment, shown)), planes)
 
-    def _wanted(self, view: View) -> bool:
+    def _is_wanted(self, view: View) -> bool:
         """The main view, and all small ones that are not hidden."""
         if view is self.link.main:
             return True
         return view not in self.link.hidden and (view not in MAIN or view is View.TOP)
 
-    def _told(self, moment: Moment, shown: Shown) -> dict[str, Any]:
+    def _describe_moment(self, moment: Moment, shown: Shown) -> dict[str, Any]:
         frame, marks = moment.frame, {}
         if self.link.main in MARKED:
             camera = self.cameras[self.link.main.value]

@@ -103,7 +103,7 @@ def kernel(function: F) -> F:
 
     Fast-math would let results differ between processors (decision X-2), so no kernel has it.
     """
-    return _compiled(function)  # type: ignore[no-any-return]
+    return _compile(function)  # type: ignore[no-any-return]
 
 
 def inner_kernel(function: F) -> F:
@@ -111,7 +111,7 @@ def inner_kernel(function: F) -> F:
 
     They take a fifth of the time to compile: the arrays of a named tuple are unpacked one by one.
     """
-    compiled = _compiled(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
+    compiled = _compile(function, no_cpython_wrapper=True, no_cfunc_wrapper=True)
     compiled.__class__ = InnerKernel
     return compiled  # type: ignore[no-any-return]
 
@@ -124,7 +124,7 @@ class InnerKernel(CPUDispatcher):  # type: ignore[misc]
         raise TypeError(f"{self.py_func.__qualname__} is for kernels alone; its .py_func is not")
 
 
-def _compiled(function: Callable[..., Any], **flags: bool) -> Any:
+def _compile(function: Callable[..., Any], **flags: bool) -> Any:
     if "NUMBA_CACHE_DIR" not in os.environ:  # numba's own variable: the user's word is final
         file = Path(function.__code__.co_filename).resolve()
         numba.config.CACHE_DIR = _cache_of(file) if file.is_relative_to(PACKAGE) else ""

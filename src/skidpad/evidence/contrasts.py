@@ -114,7 +114,7 @@ class Paired:
     @property
     def test(self) -> tuple[str, ...]:
         """Sign changes of paired differences."""
-        return (f"paired by {_listed(self.by)}", SIGNS)
+        return (f"paired by {_join_words(self.by)}", SIGNS)
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
@@ -166,7 +166,7 @@ class Outweighs:
     @property
     def test(self) -> tuple[str, ...]:
         """Sign changes of paired differences."""
-        return (f"paired by {_listed(self.by)}", SIGNS)
+        return (f"paired by {_join_words(self.by)}", SIGNS)
 
     @property
     def amounts(self) -> tuple[Amount, ...]:
@@ -341,5 +341,5 @@ def has_columns(table: pl.DataFrame, *needed: pl.Expr) -> bool:
     return {name for e in needed for name in e.meta.root_names()} <= set(table.columns)
 
 
-def _listed(words: Sequence[str]) -> str:
+def _join_words(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)

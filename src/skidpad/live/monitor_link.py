@@ -102,17 +102,17 @@ class MonitorLink:
             _, writable, _ = select.select([], [self._pipe], [], self.settings.patience)
             if not writable:
                 self.process.kill()
-                self._lost(f"the monitor took nothing for {self.settings.patience:g} s")
+                self._on_loss(f"the monitor took nothing for {self.settings.patience:g} s")
                 break
             try:
                 view = view[os.write(self._pipe, view) :]
             except BlockingIOError:
                 continue  # room for less than the pipe writes at once
             except OSError:
-                self._lost(self._last_words())
+                self._on_loss(self._last_words())
         return not self.ended
 
-    def _lost(self, why: str) -> None:
+    def _on_loss(self, why: str) -> None:
         self.ended = self.ended or f"{why}, after {self.cycles} cycles"
 
     def _last_words(self) -> str:
@@ -134,18 +134,18 @@ class MonitorLink:
             self.isolation = json.loads(line)
             return
         self.process.kill()
-        self._lost(self._last_words())
+        self._on_loss(self._last_words())
 
     def _await_end(self) -> None:
         try:
             code = self.process.wait(self.settings.patience)
         except subprocess.TimeoutExpired:
             self.process.kill()
-            self._lost(f"the monitor did not end within {self.settings.patience:g} s")
+            self._on_loss(f"the monitor did not end within {self.settings.patience:g} s")
             self.process.wait()
             return
         if code:
-            self._lost(self._last_words())
+            self._on_loss(self._last_words())
 
 
 class _Queue:

@@ -175,7 +175,9 @@ def _drive(car: Car, u: float, speed: float, omega: Floats) -> float:
 
 
 @inner_kernel
-def _asked(car: Car, u: float, v: float, r: float, steer: float, mu: Floats) -> Correction:
+def _stability_correction(
+    car: Car, u: float, v: float, r: float, steer: float, mu: Floats
+) -> Correction:
     """What stability control asks for."""
     if not car.stability:
         return Correction(0.0, False, 1.0)
@@ -256,7 +258,7 @@ def _advance(
         change = (car.steer * steer_share(speed) - steer) * steer_lag
         steer += min(max(change, -turn_max), turn_max)
         _wheel_loads(car, a_load[0], a_load[1], load)
-        asked = _asked(car, u, v, r, steer, mu)
+        asked = _stability_correction(car, u, v, r, steer, mu)
         drive = _drive(car, u, speed, omega) * asked.drive
         push = _push(car, u, v, r, a_x, drive, asked, steer, omega, wheels.slip_y[i],
                      wheels.slide[i], load, mu, h)  # fmt: skip

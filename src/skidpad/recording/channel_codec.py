@@ -24,7 +24,7 @@ def message_from_frame(frame: ChannelFrame) -> pb.Channel:
         plan=frame.plan.ravel().tolist(),
         objects=frame.objects.ravel().tolist(),
         polygon_size=frame.polygon_size.tolist(),
-        polygons=_packed(frame.polygons, frame.polygon_size),
+        polygons=_flatten_polygons(frame.polygons, frame.polygon_size),
         predictions=frame.predictions.ravel().tolist(),
         prediction_t=frame.prediction_t.tolist(),
     )
@@ -39,7 +39,7 @@ def frame_from_message(message: pb.Channel) -> ChannelFrame:
     """The frame in `message`; FileError when its arrays do not fit together."""
     n = _rows("objects", len(message.objects), 5)
     p = len(message.prediction_t)
-    size, polygons = _unpacked(message.polygon_size, message.polygons, n)
+    size, polygons = _split_polygons(message.polygon_size, message.polygons, n)
     predictions = _floats(message.predictions)
     if predictions.size != 2 * n * p:
         raise FileError(f"predictions: {predictions.size} numbers, expected {2 * n * p}")
@@ -67,7 +67,7 @@ def message_from_truth(truth: TruthFrame) -> pb.Truth:
         ego_mu=truth.ego_mu,
         actors=truth.actors.ravel().tolist(),
         polygon_size=truth.polygon_size.tolist(),
-        polygons=_packed(truth.polygons, truth.polygon_size),
+        polygons=_flatten_polygons(truth.polygons, truth.polygon_size),
         ids=truth.ids.tolist(),
         classes=truth.classes.tolist(),
         mu=truth.mu.tolist(),
@@ -77,7 +77,7 @@ def message_from_truth(truth: TruthFrame) -> pb.Truth:
 def truth_from_message(message: pb.Truth) -> TruthFrame:
     """The true world in `message`; FileError when its arrays do not fit together."""
     n = _rows("actors", len(message.actors), 5)
-    size, polygons = _unpacked(message.polygon_size, message.polygons, n)
+    size, polygons = _split_polygons(message.polygon_size, message.polygons, n)
     mu = _floats(message.mu)
     if mu.size != n:
         raise FileError(f"mu: {mu.size} numbers, expected {n}")
@@ -130,13 +130,13 @@ def padded_polygons(shapes: Iterable[Floats]) -> tuple[NDArray[np.int64], Floats
     return size, polygons
 
 
-def _packed(polygons: Floats, size: NDArray[np.int64]) -> list[float]:
+def _flatten_polygons(polygons: Floats, size: NDArray[np.int64]) -> list[float]:
     used = np.arange(polygons.shape[1]) < size[:, None]
     flat: list[float] = polygons[used].ravel().tolist()
     return flat
 
 
-def _unpacked(
+def _split_polygons(
     size_field: Iterable[int], polygon_field: Iterable[float], n: int
 ) -> tuple[NDArray[np.int64], Floats]:
     size = np.fromiter(size_field, np.int64)

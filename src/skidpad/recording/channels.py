@@ -234,9 +234,9 @@ class McapRecording:
             t = record.log_time / NS
             _, count, first, last = seen.get(topic, (schema, 0, t, t))
             seen[topic] = (schema, count + 1, min(first, t), max(last, t))
-        return tuple(TopicInfo(topic, *seen[topic]) for topic in self._ordered(list(seen)))
+        return tuple(TopicInfo(topic, *seen[topic]) for topic in self._order_channels(list(seen)))
 
-    def _ordered(self, topics: list[str]) -> list[str]:
+    def _order_channels(self, topics: list[str]) -> list[str]:
         """Channels in the order of the writer's metadata where it survives, then by name."""
         rank = {CHANNEL_TOPIC + name: i for i, name in enumerate(self._declared)}
         return sorted(topics, key=lambda topic: (rank.get(topic, len(rank)), topic))
@@ -246,7 +246,7 @@ class McapRecording:
         schemas: dict[int, str] = {}
         channels: dict[int, tuple[str, str]] = {}
         for record in self._top_level(losses):
-            for inner in _opened(record, losses):
+            for inner in _open_chunk(record, losses):
                 if isinstance(inner, mcap.records.Schema):
                     schemas[inner.id] = inner.name
                 elif isinstance(inner, mcap.records.Channel):
@@ -281,7 +281,7 @@ class McapRecording:
                 yield record
 
 
-def _opened(record: Any, losses: Losses) -> Sequence[Any]:
+def _open_chunk(record: Any, losses: Losses) -> Sequence[Any]:
     """The records inside a chunk, or the record itself; a damaged chunk is counted and empty."""
     if not isinstance(record, mcap.records.Chunk):
         return (record,)

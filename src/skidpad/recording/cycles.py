@@ -46,7 +46,7 @@ class _Clock:
         if (
             self.t is not None
             and message.t > self.t + MAX_GAP
-            and not self._confirmed(state, message)
+            and not self._is_confirmed(state, message)
         ):
             state.doubtful = message
             self.losses.jumps += 1
@@ -57,7 +57,7 @@ class _Clock:
         return True
 
     @staticmethod
-    def _confirmed(state: _Newest, message: Message) -> bool:
+    def _is_confirmed(state: _Newest, message: Message) -> bool:
         return state.doubtful is not None and 0.0 <= message.t - state.doubtful.t <= MAX_GAP
 
 

@@ -64,7 +64,7 @@ def encode_worlds(worlds: Sequence[Cycle], n_channels: int) -> list[str]:
     lines: list[str] = []
     last = 0
     for cycle in worlds:
-        now = _scaled(cycle.t, 1000) or 0
+        now = _scale_to_integer(cycle.t, 1000) or 0
         lines.append(f"W {now - last}")
         last = now
         for c, frame in enumerate(cycle.frames):
@@ -76,12 +76,12 @@ def encode_worlds(worlds: Sequence[Cycle], n_channels: int) -> list[str]:
 def _encode_frame(c: int, channel: Channel, frame: ChannelFrame, now: int) -> list[str]:
     lines = []
     shape = _flat(frame.ego_polygon, 100)
-    if _moved(shape, channel.ego_shape):
+    if _has_moved(shape, channel.ego_shape):
         channel.ego_shape = shape
         lines.append(_line("E", c, shape))
     dt = now - channel.seen_at
     (ego,) = _poses(frame.ego[None])
-    age = now - (_scaled(frame.t, 1000) or 0)
+    age = now - (_scale_to_integer(frame.t, 1000) or 0)
     lines.append(_line("F", c, [age, *_differences(ego, moved_on(channel.ego, dt))]))
     channel.ego, channel.seen_at = ego, now
     slots = _assign_slots(channel, frame)
@@ -102,7 +102,12 @@ def _encode_objects(
         shape = shapes[i]
         id_, label = int(frame.ids[i]), int(frame.classes[i])
         known = channel.slots.get(slot)
-        if known is None or known.id != id_ or known.label != label or _moved(shape, known.shape):
+        if (
+            known is None
+            or known.id != id_
+            or known.label != label
+            or _has_moved(shape, known.shape)
+        ):
             pose: Pose = known.pose if known else [0] * 5
             known = channel.slots[slot] = Object(id_, label, shape, pose)
             lines.append(_line("S", c, [slot, id_, label, *shape]))
@@ -173,7 +178,7 @@ def _nearest_slot(free: dict[int, Object], pose: Pose) -> int | None:
     return best
 
 
-def _scaled(value: float, scale: int) -> int | None:
+def _scale_to_integer(value: float, scale: int) -> int | None:
     number = value * scale
     return round(number) if abs(number) < NUMBER_LIMIT else None  # also NaN
 
@@ -190,7 +195,7 @@ def _flat(table: Floats, scale: int) -> Numbers:
     if np.all(np.abs(scaled) < NUMBER_LIMIT):  # also false for NaN
         whole: Numbers = np.rint(scaled).astype(np.int64).tolist()
         return whole
-    return [_scaled(v, scale) for v in table.ravel().tolist()]
+    return [_scale_to_integer(v, scale) for v in table.ravel().tolist()]
 
 
 def _shapes(frame: ChannelFrame) -> list[Numbers]:
@@ -202,7 +207,7 @@ def _shapes(frame: ChannelFrame) -> list[Numbers]:
     return [_flat(frame.polygons[i, : frame.polygon_size[i]], 100) for i in range(n)]
 
 
-def _moved(shape: Numbers, known: Numbers) -> bool:
+def _has_moved(shape: Numbers, known: Numbers) -> bool:
     if shape == known:
         return False
     if len(shape) != len(known):

@@ -116,7 +116,7 @@ class _Decoder:
     def _plan(self, c: int, numbers: Numbers) -> None:
         if len(numbers) % 3:
             raise FileError("a plan has three numbers per point")
-        t, x, y = (_summed(numbers[k::3]) for k in range(3))
+        t, x, y = (_sum_differences(numbers[k::3]) for k in range(3))
         self.drafts[c].plan = np.column_stack(
             [_metric(x, 100), _metric(y, 100), _metric(t, 1000)]
         ).reshape(-1, 3)
@@ -130,8 +130,8 @@ class _Decoder:
         pose = channel.slots[slot].pose
         self.drafts[c].predictions[slot] = np.column_stack(
             [
-                _metric(_summed(path[0::2], pose[0]), 100),
-                _metric(_summed(path[1::2], pose[1]), 100),
+                _metric(_sum_differences(path[0::2], pose[0]), 100),
+                _metric(_sum_differences(path[1::2], pose[1]), 100),
             ]
         )
 
@@ -177,7 +177,7 @@ def _sums(values: Numbers, base: Numbers) -> Numbers:
     return [None if v is None else v + (b or 0) for v, b in zip(values, base, strict=True)]
 
 
-def _summed(values: Numbers, before: int | None = None) -> Numbers:
+def _sum_differences(values: Numbers, before: int | None = None) -> Numbers:
     """Inverse of `_curvature`."""
     out: Numbers = []
     last, step = before or 0, 0

@@ -57,20 +57,20 @@ class IndicatorLog:
         """Long form, by cycle and then in the order of the columns."""
         n, m = len(self._k), len(self.columns)
         values = np.array(self._rows, dtype=np.float64).reshape(n, m)
-        low = np.array([_bound(c, upper=False) for c in self.columns])
-        high = np.array([_bound(c, upper=True) for c in self.columns])
+        low = np.array([_threshold_in(c, upper=False) for c in self.columns])
+        high = np.array([_threshold_in(c, upper=True) for c in self.columns])
         violated = (values < low) | (values > high)
         return pl.DataFrame(
             {
                 "cycle": np.repeat(np.array(self._k, dtype=np.int64), m),
                 "t": np.repeat(np.array(self._t, dtype=np.float64), m),
-                "subject": _tiled([c.subject for c in self.columns], n),
-                "indicator": _tiled([c.indicator for c in self.columns], n),
+                "subject": _repeat_values([c.subject for c in self.columns], n),
+                "indicator": _repeat_values([c.indicator for c in self.columns], n),
                 "value": pl.Series(values.ravel(), nan_to_null=True),
                 "evaluated": np.isfinite(values).ravel(),
-                "threshold": _tiled([c.threshold for c in self.columns], n, pl.Float64()),
+                "threshold": _repeat_values([c.threshold for c in self.columns], n, pl.Float64()),
                 "violated": violated.ravel(),
-                "claim": _tiled([c.claim for c in self.columns], n),
+                "claim": _repeat_values([c.claim for c in self.columns], n),
             }
         )
 
@@ -84,13 +84,13 @@ def read_indicators(folder: Path) -> pl.DataFrame:
     return require_columns(read_parquet(folder / FILE)[0], TYPES, folder / FILE)
 
 
-def _bound(column: Column, upper: bool) -> float:
+def _threshold_in(column: Column, upper: bool) -> float:
     if column.threshold is None or column.upper is not upper:
         return np.inf if upper else -np.inf
     return column.threshold
 
 
-def _tiled(
+def _repeat_values(
     values: Sequence[str | float | None], n: int, dtype: pl.DataType | None = None
 ) -> pl.Series:
     base = pl.Series(list(values), dtype=dtype or pl.String())

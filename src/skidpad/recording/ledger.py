@@ -125,7 +125,7 @@ class Ledger(Generic[E]):
 
     def append(self, entry: E) -> None:
         """Record a finished run; when this returns, the line is on the disk."""
-        line = _signed(msgspec.json.encode(entry)) + b"\n"
+        line = _add_checksum(msgspec.json.encode(entry)) + b"\n"
         size = os.fstat(self._file).st_size
         try:
             written = os.write(self._file, line)
@@ -207,7 +207,7 @@ def _entries(path: Path, kind: type[E]) -> tuple[list[E], list[Damage]]:
     return entries, damaged
 
 
-def _signed(line: bytes) -> bytes:
+def _add_checksum(line: bytes) -> bytes:
     """A JSON object with a checksum as its last member, so that a flipped bit is no new value."""
     return line[:-1] + b',"sum":"%08x"}' % crc32(line)
 

@@ -66,14 +66,14 @@ def tick_table(log: RunLog) -> pl.DataFrame:
     groups = (log.ego, log.applied, log.requested, log.report)
     for (prefix, names), series in zip(GROUPS, groups, strict=True):
         for field, values in zip(names, series, strict=True):
-            columns[prefix + field] = _typed(prefix + field, values)
+            columns[prefix + field] = _make_series(prefix + field, values)
     columns.update(zip(ActorSeries._fields, log.actors, strict=True))
     columns["present"] = log.present.astype(np.uint8)
     columns["mu"] = log.mu.reshape(len(log), 4 * len(log.table))
     return pl.DataFrame(columns)
 
 
-def _typed(name: str, values: NDArray[np.float64]) -> pl.Series:
+def _make_series(name: str, values: NDArray[np.float64]) -> pl.Series:
     column = pl.Series(name, np.ascontiguousarray(values), nan_to_null=True)
     return pl.Series(name, column.cast(_kind(name)))
 

@@ -85,7 +85,7 @@ def moments(log: RunLog, world: World) -> Iterator[GroundTruth]:
         truth.timestamp.seconds, truth.timestamp.nanos = divmod(nanos, NANO)
         for i in range(len(log.table)):
             if log.present[k, i]:
-                _put(truth.moving_object.add(), log, k, i)
+                _write_actor(truth.moving_object.add(), log, k, i)
         for signal, state in lamps.at(int(log.tick[k])).items():
             if signal in world.heads:
                 _light(truth, signal, state, world.heads[signal])
@@ -115,7 +115,7 @@ def _still(osi3: Any, world: World) -> GroundTruth:
     return truth
 
 
-def _put(object: Any, log: RunLog, k: int, i: int) -> None:
+def _write_actor(object: Any, log: RunLog, k: int, i: int) -> None:
     """One actor: the place is its box's centre; roll and pitch are not in a log."""
     a, table, base = log.actors, log.table, object.base
     yaw, height = float(a.yaw[k, i]), float(table.height[i])

@@ -131,7 +131,7 @@ def _autoware(content: Any) -> RosObjects:
     return _table(rows)
 
 
-def _derived(content: Any) -> RosObjects:
+def _read_derived_objects(content: Any) -> RosObjects:
     """derived_object_msgs/ObjectArray: no predictions, twists in the frame of the poses."""
     rows = []
     for o in content.objects:
@@ -153,5 +153,5 @@ def _derived(content: Any) -> RosObjects:
 OBJECT_READERS: dict[str, Callable[[Any], RosObjects]] = {
     "autoware_perception_msgs/msg/PredictedObjects": _autoware,
     "autoware_auto_perception_msgs/msg/PredictedObjects": _autoware,
-    "derived_object_msgs/msg/ObjectArray": _derived,
+    "derived_object_msgs/msg/ObjectArray": _read_derived_objects,
 }

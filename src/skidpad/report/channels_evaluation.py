@@ -85,7 +85,7 @@ def _read(source: Path) -> Row:
 
 def evaluation_page(evaluation: Row, folder: Path) -> Page:
     """All sections in the order in which a reader asks."""
-    judged = _judged(evaluation)
+    judged = _read_judgements(evaluation)
     truths = sorted({r["truth"] for r in evaluation["results"]}, key=list(TRUTHS).index)
     return Page(
         title="Who finds the hazards",
@@ -179,7 +179,7 @@ def _numbers(evaluation: Row) -> Numbers:
     )
 
 
-def _judged(evaluation: Row) -> list[Judgement]:
+def _read_judgements(evaluation: Row) -> list[Judgement]:
     results = pl.DataFrame(evaluation["segment_table"], infer_schema_length=None)
     return judge(FINDINGS, [results if len(results) else None] * len(FINDINGS))
 

@@ -25,19 +25,19 @@ def factors(matrix: Matrix) -> list[Block]:
     """Nothing when only published configurations at their own targets were driven."""
     if all(config in CONFIGS for config in matrix.configs):
         return []
-    levels = sorted(set(_known(matrix).select("functions", "cruise_kmh").rows()))
+    levels = sorted(set(_known_runs(matrix).select("functions", "cruise_kmh").rows()))
     if not levels:
         return []
     return [_table(matrix, levels), *_figure(matrix, levels)]
 
 
-def _known(matrix: Matrix) -> pl.DataFrame:
+def _known_runs(matrix: Matrix) -> pl.DataFrame:
     """Runs of our own stack, each drive once."""
     return matrix.counted.filter(pl.col("cruise_kmh").is_not_null())
 
 
 def _runs(matrix: Matrix, level: Level) -> pl.DataFrame:
-    return _known(matrix).filter(
+    return _known_runs(matrix).filter(
         (pl.col("functions") == level[0]) & (pl.col("cruise_kmh") == level[1])
     )
 

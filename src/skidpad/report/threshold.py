@@ -188,7 +188,11 @@ def _map(campaign: ThresholdMap) -> list[Block]:
         ),
         *(
             Column(
-                f"at {mu:.2g}", partial(_completed, mu), "completed on this friction", "%", SHARE
+                f"at {mu:.2g}",
+                partial(_completion_at, mu),
+                "completed on this friction",
+                "%",
+                SHARE,
             )
             for mu in sorted(campaign.results["road_mu"].unique().to_list(), reverse=True)[1:]
         ),
@@ -204,7 +208,7 @@ def _threshold(s: Situation) -> Quantity:
     return Quantity(value=found.mu, interval=found.interval, heat=found.mu)
 
 
-def _completed(mu: float, s: Situation) -> Quantity:
+def _completion_at(mu: float, s: Situation) -> Quantity:
     return share(s.at(mu))
 
 
@@ -220,7 +224,9 @@ def _findings(campaign: ThresholdMap) -> list[Block]:
         return []
     judged = [(s, {j.finding.id: j for j in s.judgements}) for s in campaign.telling]
     claims = {j.finding.id: j.finding.claim for _, js in judged for j in js.values()}
-    tallies = [f"{id} ({claims[id]}): {_counted([js[id] for _, js in judged])}." for id in JUDGED]
+    tallies = [
+        f"{id} ({claims[id]}): {_count_verdicts([js[id] for _, js in judged])}." for id in JUDGED
+    ]
     columns = (
         Column[tuple[Situation, dict[str, Judgement]]]("situation", lambda row: title(row[0])),
         *(Column(id, partial(_verdict, id), claims[id]) for id in JUDGED),
@@ -232,7 +238,7 @@ def _findings(campaign: ThresholdMap) -> list[Block]:
     ]
 
 
-def _counted(judged: Sequence[Judgement]) -> str:
+def _count_verdicts(judged: Sequence[Judgement]) -> str:
     counts = Counter(j.verdict for j in judged)
     return ", ".join(f"{v.value} in {counts[v]}" for v in Verdict if counts[v])
 

@@ -140,7 +140,7 @@ def _roadside_arrays(roadside: Roadside) -> dict[str, NDArray[Any]]:
     }
 
 
-def _split(arrays: dict[str, NDArray[Any]], name: str) -> list[NDArray[np.float64]]:
+def _split_arrays(arrays: dict[str, NDArray[Any]], name: str) -> list[NDArray[np.float64]]:
     points, sizes = _rows(arrays, f"{name}.points", 3), arrays[f"{name}.sizes"]
     if sizes.dtype.kind not in "iu" or sizes.ndim != 1 or (sizes < 0).any():
         raise ValueError(f"{name}.sizes must hold numbers of points")
@@ -163,7 +163,7 @@ def _roadside(arrays: dict[str, NDArray[Any]]) -> Roadside:
         barriers=tuple(
             Barrier(BarrierKind(int(kind)), points, float(height))
             for (kind, height), points in zip(
-                _rows(arrays, "barriers.about", 2), _split(arrays, "barriers"), strict=True
+                _rows(arrays, "barriers.about", 2), _split_arrays(arrays, "barriers"), strict=True
             )
         ),
         boxes=tuple(_box(*row) for row in _rows(arrays, "boxes", 12).tolist()),
@@ -171,7 +171,7 @@ def _roadside(arrays: dict[str, NDArray[Any]]) -> Roadside:
             SignalHead(int(signal), x, y, z, heading, diameter)
             for signal, x, y, z, heading, diameter in _rows(arrays, "heads", 6).tolist()
         ),
-        crosswalks=tuple(_split(arrays, "crosswalks")),
+        crosswalks=tuple(_split_arrays(arrays, "crosswalks")),
         parking=tuple(ParkingSpace(*row) for row in _rows(arrays, "parking", 6).tolist()),
     )
 

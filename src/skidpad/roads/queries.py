@@ -104,8 +104,8 @@ class RoadMap:
         side = self.roadside
         shown.roadside = replace(
             side,
-            barriers=tuple(replace(b, points=_locked(b.points)) for b in side.barriers),
-            crosswalks=tuple(_locked(c) for c in side.crosswalks),
+            barriers=tuple(replace(b, points=_lock_array(b.points)) for b in side.barriers),
+            crosswalks=tuple(_lock_array(c) for c in side.crosswalks),
         )
         return shown
 
@@ -256,11 +256,11 @@ class RoadMap:
 def locked(table: Table) -> Table:
     """The same columns; its arrays are shared and cannot be written through it."""
     kind: Any = type(table)
-    shown: Table = kind._make(_locked(c) if isinstance(c, np.ndarray) else c for c in table)
+    shown: Table = kind._make(_lock_array(c) if isinstance(c, np.ndarray) else c for c in table)
     return shown
 
 
-def _locked(array: NDArray[Any]) -> NDArray[Any]:
+def _lock_array(array: NDArray[Any]) -> NDArray[Any]:
     view: NDArray[Any] = array.view()
     view.flags.writeable = False
     return view

@@ -105,7 +105,7 @@ def _strips(map: RoadMap, lanes: list[int]) -> WalkMesh:
         for k in range(len(keep) - 1):
             a = base + 2 * k
             rings.append((a + 1, a + 3, a + 2, a))
-    return _welded(np.concatenate(points), rings, [WalkArea.SIDEWALK] * len(rings))
+    return _weld_points(np.concatenate(points), rings, [WalkArea.SIDEWALK] * len(rings))
 
 
 def _stations(map: RoadMap, lane: int) -> list[int]:
@@ -120,7 +120,7 @@ def _stations(map: RoadMap, lane: int) -> list[int]:
     return [*keep, size - 1]
 
 
-def _welded(points: Floats, rings: list[Ring], areas: list[WalkArea]) -> WalkMesh:
+def _weld_points(points: Floats, rings: list[Ring], areas: list[WalkArea]) -> WalkMesh:
     """Points closer than WELD become one, and pieces that this flattens are left out."""
     near = cKDTree(points).query_ball_point(points, WELD)
     used, index = np.unique([min(n) for n in near], return_inverse=True)
@@ -212,10 +212,10 @@ def _convex_parts(face: shapely.Geometry, corners: dict[tuple[float, float], int
         points = [(float(x), float(y)) for x, y in part.exterior.coords[:3]]
         ring = tuple(corners.setdefault(p, len(corners)) for p in points)
         triangles.append(ring if part.exterior.is_ccw else ring[::-1])
-    return _merged(triangles, list(corners))
+    return _merge_polygons(triangles, list(corners))
 
 
-def _merged(rings: list[Ring], points: list[tuple[float, float]]) -> list[Ring]:
+def _merge_polygons(rings: list[Ring], points: list[tuple[float, float]]) -> list[Ring]:
     """Polygons joined over their longest common edges while they stay convex and small."""
     alive = dict(enumerate(rings))
     owner = {edge: i for i, ring in alive.items() for edge in _edges(ring)}
@@ -223,7 +223,7 @@ def _merged(rings: list[Ring], points: list[tuple[float, float]]) -> list[Ring]:
     inner.sort(key=lambda e: (-_length(points, e), e))
     for a, b in inner:
         i, j = owner[a, b], owner[b, a]
-        joined = _joined(alive[i], alive[j], a, b)
+        joined = _join_polygons(alive[i], alive[j], a, b)
         if i == j or len(joined) > CORNERS or not _convex(joined, points):
             continue
         alive[i] = joined
@@ -232,7 +232,7 @@ def _merged(rings: list[Ring], points: list[tuple[float, float]]) -> list[Ring]:
     return list(alive.values())
 
 
-def _joined(one: Ring, two: Ring, a: int, b: int) -> Ring:
+def _join_polygons(one: Ring, two: Ring, a: int, b: int) -> Ring:
     """The outline of two polygons; `one` has the edge a to b, `two` the edge b to a."""
     k, m = one.index(b), two.index(a)
     around = one[k:] + one[:k]  # from b to a

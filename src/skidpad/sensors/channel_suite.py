@@ -199,7 +199,7 @@ class ChannelSuite:
         white = rng["position"].standard_normal((n, 2))
         turn = cfg.heading_sigma * rng["heading"].standard_normal(n)
         rows = np.flatnonzero(self._sight.share >= max(cfg.share_seen, 1e-9))
-        rows = rows[~self._missed(rows, np.hypot(s.x[rows] - pose[0], s.y[rows] - pose[1]))]
+        rows = rows[~self._draw_misses(rows, np.hypot(s.x[rows] - pose[0], s.y[rows] - pose[1]))]
         dx, dy = s.x[rows] - pose[0], s.y[rows] - pose[1]
         c, sn = cos(pose[2]), sin(pose[2])
         distance = np.hypot(dx, dy)
@@ -221,7 +221,7 @@ class ChannelSuite:
         ghosts, ghost_classes = self.ghosts.update(pose)
         return np.concatenate([objects, ghosts]), np.concatenate([classes, ghost_classes])
 
-    def _missed(self, rows: NDArray[np.intp], distance: Floats) -> NDArray[np.bool_]:
+    def _draw_misses(self, rows: NDArray[np.intp], distance: Floats) -> NDArray[np.bool_]:
         """(k,) which visible actors are missed: a slow latent draw below what distance allows."""
         cfg = self.sensing
         far = np.minimum(distance / np.maximum(self._reach[rows], 1e-9), 1.0) ** 2

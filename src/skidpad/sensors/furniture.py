@@ -48,7 +48,7 @@ def furniture_pieces(roadside: Roadside, box_material: dict[tuple[int, int, int]
 
 
 def _barrier(barrier: Barrier) -> Pieces:
-    points = _resampled(np.asarray(barrier.points, dtype=np.float64), CHORDS[0])
+    points = _resample_polyline(np.asarray(barrier.points, dtype=np.float64), CHORDS[0])
     per_chunk = int(CHUNK / CHORDS[0])
     label, material = BARRIER_LOOK[barrier.kind]
     for a in range(0, len(points) - 1, per_chunk):
@@ -65,7 +65,7 @@ def _barrier(barrier: Barrier) -> Pieces:
         yield cell(float(x), float(y)), meshes
 
 
-def _resampled(points: Points, step: float) -> Points:
+def _resample_polyline(points: Points, step: float) -> Points:
     """The polyline at about `step` m, ends kept."""
     s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     n = max(1, round(s[-1] / step))

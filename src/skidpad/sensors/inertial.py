@@ -44,15 +44,15 @@ def imu(mount: Pose, states: ActorStates, i: int, gravity: float = G) -> ImuRead
     ay = float(states.ay[i]) - rate * rate * mount.y
     c, s = cos(body.yaw), sin(body.yaw)
     force = np.array([ax * c - ay * s, ax * s + ay * c, gravity])
-    return _felt(body @ mount, force, rate)
+    return _measure_motion(body @ mount, force, rate)
 
 
 def imu_at_rest(unit: Pose, gravity: float = G) -> ImuReading:
     """What a unit feels that nothing carries. gravity: m/s^2."""
-    return _felt(unit, np.array([0.0, 0.0, gravity]), 0.0)
+    return _measure_motion(unit, np.array([0.0, 0.0, gravity]), 0.0)
 
 
-def _felt(unit: Pose, force: NDArray[np.float64], rate: float) -> ImuReading:
+def _measure_motion(unit: Pose, force: NDArray[np.float64], rate: float) -> ImuReading:
     """force: (3,) specific, in the world's axes; rate: rad/s about the vertical."""
     to_sensor = unit.rotation().T
     fx, fy, fz = (to_sensor @ force).tolist()

@@ -66,7 +66,10 @@ def cast_radar(
     near_boxes = boxes_in_view(origin, yaw, edge, boxes, reach)
     ox, oy = origin[0] - boxes.x[0], origin[1] - boxes.y[0]
     height = origin[2] - boxes.z[0] - slope[0] * ox - slope[1] * oy
-    turned_posts, turned_boxes = _turned(posts, near_posts), _turned(boxes, near_boxes)
+    turned_posts, turned_boxes = (
+        _box_directions(posts, near_posts),
+        _box_directions(boxes, near_boxes),
+    )
     vx0 = states.vx[0] - states.yaw_rate[0] * oy
     vy0 = states.vy[0] + states.yaw_rate[0] * ox
     out = np.empty((beam.rays, 4), np.float32)
@@ -141,7 +144,7 @@ def _ray_wall(origin: Floats, dx: float, dy: float, dz: float, walls: Walls, w: 
 
 
 @inner_kernel
-def _turned(boxes: Boxes, chosen: NDArray[np.int64]) -> Floats:
+def _box_directions(boxes: Boxes, chosen: NDArray[np.int64]) -> Floats:
     """(k, 2) cosine and sine of the chosen boxes' yaw: once per tick, not once per ray."""
     out = np.empty((chosen.size, 2))
     for j, b in enumerate(chosen):

@@ -96,7 +96,7 @@ def _in_axes(view: View, point: Floats, shift: Floats) -> tuple[float, float, fl
 
 
 @inner_kernel
-def _touched(
+def _is_touched(
     centre: Floats, radius: float, view: View, shift: Floats, rays: Rays, hits: Hits
 ) -> bool:
     """Whether any ray comes to within the sphere before its hit so far.
@@ -244,7 +244,7 @@ def cast(
             continue
         begin = chunks.cluster_start[c, 0]
         for j in range(begin, begin + chunks.cluster_count[c, 0]):
-            if not _touched(clusters.centre[j], clusters.radius[j], view, shift, rays, hits):
+            if not _is_touched(clusters.centre[j], clusters.radius[j], view, shift, rays, hits):
                 continue
             first, count = clusters.vertex_start[j], clusters.vertex_count[j]
             project_block(clusters.vertices, first, count, view.rotation, shift, view, scratch)
@@ -257,7 +257,7 @@ def cast(
             continue
         if not sphere_visible(actors.position[n], actors.radius[n], view, sides, shift):
             continue
-        if not _touched(actors.position[n], actors.radius[n], view, shift, rays, hits):
+        if not _is_touched(actors.position[n], actors.radius[n], view, shift, rays, hits):
             continue
         turn = composed(view.rotation, actors.rotation[n])
         place = rotated(view.rotation, actors.position[n]) + shift

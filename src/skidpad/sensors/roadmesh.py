@@ -68,7 +68,7 @@ def road_pieces(samples: LaneSamples, lanes: LaneTable) -> Iterator[tuple[ChunkK
         for a, b in itertools.pairwise(starts):
             if b > a:
                 key = ("road", int(lanes.road[lane]), int(lanes.section[lane]), int(index[a]))
-                piece = _cut(edges, slice(a, b + 1))
+                piece = _cut_edges(edges, slice(a, b + 1))
                 yield key, _levels(piece, lanes, lane, outer[lane])
 
 
@@ -92,10 +92,10 @@ def _edges(samples: LaneSamples, lanes: LaneTable, lane: int) -> Edges | None:
         samples.marking_left[part],
         samples.marking_right[part],
     )
-    return _cut(edges, slice(None, None, step))
+    return _cut_edges(edges, slice(None, None, step))
 
 
-def _cut(edges: Edges, part: slice) -> Edges:
+def _cut_edges(edges: Edges, part: slice) -> Edges:
     return Edges._make(field[part] for field in edges)
 
 
@@ -149,11 +149,11 @@ def _marking(piece: Edges, at: NDArray[np.intp], level: int, side: int) -> Mesh:
     edge = (piece.left, piece.right)[side] + (0.0, 0.0, MARKING_LIFT)
     half = piece.normal * (MARKING_WIDTH / 2.0)
     style = (piece.marking_left, piece.marking_right)[side]
-    pairs = _painted(piece.s, at, style, level)
+    pairs = _painted_stretches(piece.s, at, style, level)
     return patches(edge + half, edge - half, pairs, SemanticClass.ROAD_LINE, Material.MARKING)
 
 
-def _painted(
+def _painted_stretches(
     s: NDArray[np.float64], at: NDArray[np.intp], style: NDArray[np.uint8], level: int
 ) -> NDArray[np.intp]:
     """(q, 2) index pairs of the painted stretches; dashes keep their length at every level."""

@@ -252,7 +252,7 @@ class Settings:
 
     def with_values(self, values: Mapping[str, Any]) -> Settings:
         """A copy with some values replaced; ConfigError for unknown names and wrong values."""
-        checked = {name: _checked(name, value) for name, value in values.items()}
+        checked = {name: _check_type(name, value) for name, value in values.items()}
         return replace(self, **checked)
 
     def as_plain(self) -> dict[str, Any]:
@@ -288,7 +288,7 @@ def _types() -> dict[str, Any]:
     return get_type_hints(Settings)
 
 
-def _checked(name: str, value: Any) -> Any:
+def _check_type(name: str, value: Any) -> Any:
     """`value` in the type of the setting `name`; text is read as on a command line."""
     require_choice("setting", name, NAMES)
     kind = _types()[name]
@@ -334,7 +334,7 @@ def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:
         name, equals, value = text.partition("=")
         if not equals:
             raise ConfigError(f"--set takes name=value, got {text!r}")
-        values[name.strip()] = _checked(name.strip(), value.strip())
+        values[name.strip()] = _check_type(name.strip(), value.strip())
     return values
 
 

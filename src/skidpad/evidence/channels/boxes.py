@@ -44,7 +44,7 @@ def box_of(polygon: Floats, size: int) -> tuple[float, float, float, float]:
 
 
 @inner_kernel
-def _oriented(
+def _orient_box(
     points: Floats, heading: float, polygon: Floats, size: int, movers: Movers, i: int
 ) -> None:
     """Fill row i of `movers` with the box of `polygon` carried along points (SAMPLES, 2)."""
@@ -76,7 +76,7 @@ def _oriented(
 def _move_plan(ego: Floats, polygon: Floats, plan: Floats, movers: Movers) -> int:
     points = np.empty((SAMPLES, 2))
     inside = sample_plan(plan, ego, 0.0, STEP, points)
-    _oriented(points, ego[2], polygon, polygon.shape[0], movers, 0)
+    _orient_box(points, ego[2], polygon, polygon.shape[0], movers, 0)
     return inside
 
 
@@ -92,7 +92,7 @@ def _move_objects(
     points = np.empty((SAMPLES, 2))
     for i in range(objects.shape[0]):
         sample_path(prediction_t, predictions[i], objects[i], 0.0, STEP, points)
-        _oriented(points, objects[i, 2], polygons[i], size[i], movers, i)
+        _orient_box(points, objects[i, 2], polygons[i], size[i], movers, i)
 
 
 def ego_movers(frame: ChannelFrame | None) -> Movers | None:

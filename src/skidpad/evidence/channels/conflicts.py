@@ -70,7 +70,7 @@ def first_overlap(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> float
 
 
 @inner_kernel
-def _cut(corners: Floats, n: int, c: float, cs: float, cu: float, out: Floats) -> int:
+def _cut_polygon(corners: Floats, n: int, c: float, cs: float, cu: float, out: Floats) -> int:
     """The part of a polygon (n, 2) in (s, u) where c + cs s + cu u <= 0; how many corners it has."""
     m = 0
     for i in range(n):
@@ -89,7 +89,7 @@ def _cut(corners: Floats, n: int, c: float, cs: float, cu: float, out: Floats) -
 
 
 @inner_kernel
-def _shared(
+def _shared_corners(
     a: Floats, i: int, half_a: Floats, b: Floats, j: int, half_b: Floats, axes: Floats, room: Floats
 ) -> int:
     """Where a at share s of step i and b at share u of step j overlap: corners into room[0]."""
@@ -105,8 +105,8 @@ def _shared(
         q = axes[m, 0] * x + axes[m, 1] * y
         cs = -(axes[m, 0] * ax + axes[m, 1] * ay)
         cu = axes[m, 0] * bx + axes[m, 1] * by
-        n = _cut(room[0], n, q - axes[m, 2], cs, cu, room[1])
-        n = _cut(room[1], n, -q - axes[m, 2], -cs, -cu, room[0])
+        n = _cut_polygon(room[0], n, q - axes[m, 2], cs, cu, room[1])
+        n = _cut_polygon(room[1], n, -q - axes[m, 2], -cs, -cu, room[0])
         if n == 0:
             return 0
     return n
@@ -144,7 +144,7 @@ def encroachment(a: Floats, half_a: Floats, b: Floats, half_b: Floats) -> tuple[
                 x, y = b[j, 0] - a[i, 0], b[j, 1] - a[i, 1]
                 if x * x + y * y > reach_sq:
                     continue
-                for k in range(_shared(a, i, half_a, b, j, half_b, axes, room)):
+                for k in range(_shared_corners(a, i, half_a, b, j, half_b, axes, room)):
                     t_a, t_b = (i + room[0, k, 0]) * STEP, (j + room[0, k, 1]) * STEP
                     apart = abs(t_b - t_a)
                     if apart > PET_SAFE:

@@ -157,7 +157,7 @@ class Monitor:
         self, cycle: Cycle, readings: Readings, risk: RiskMatrix, signals: SignalReadings
     ) -> CycleEvidence:
         fired, undecided = [], []
-        learned = self._learned(cycle.t, readings, risk, signals)
+        learned = self._learned_hazards(cycle.t, readings, risk, signals)
         for rule in self.rules:
             verdict = rule.fires(signals.values)
             # what was not learned stays with its rule
@@ -181,7 +181,7 @@ class Monitor:
                 self.undecided[rule.hazard] += 1
         return CycleEvidence(cycle, readings, risk, signals, tuple(fired), tuple(undecided))
 
-    def _learned(
+    def _learned_hazards(
         self, t: float, readings: Readings, risk: RiskMatrix, signals: SignalReadings
     ) -> list[HazardType]:
         if self.learned is None:

@@ -81,7 +81,7 @@ class Recorder:
         while self.past and t - self.past[0].t > BEFORE + SAME_TIME:
             self.past.popleft()
         for hazard in evidence.fired:
-            self._fired(hazard, cycle, evidence)
+            self._note_firing(hazard, cycle, evidence)
         for one in self.open.values():
             if len(one.worlds) < WORLD_LIMIT:
                 one.worlds.append(cycle)
@@ -89,7 +89,7 @@ class Recorder:
                 one.cut = True
         self.past.append(cycle)
 
-    def _fired(self, hazard: HazardType, cycle: Cycle, evidence: CycleEvidence) -> None:
+    def _note_firing(self, hazard: HazardType, cycle: Cycle, evidence: CycleEvidence) -> None:
         rule = self.rules[hazard]
         value = evidence.signals.values[rule.extreme.signal]
         one = self.open.get(hazard)
@@ -114,7 +114,7 @@ class Recorder:
     def _close(self, hazard: HazardType) -> None:
         one = self.open.pop(hazard)
         self.number += 1
-        involved, objects = _involved(hazard, one, self.channels)
+        involved, objects = _name_involved(hazard, one, self.channels)
         driving = one.signals.driving
         assumed = one.assumed and any(
             c.signal in (Signal.GAP, Signal.GAP_SIGNED) for a in one.rule.alternatives for c in a
@@ -157,7 +157,7 @@ class Recorder:
         return self.take()
 
 
-def _involved(
+def _name_involved(
     hazard: HazardType, one: _Open, channels: tuple[str, ...]
 ) -> tuple[tuple[str, ...], tuple[InvolvedObject, ...]]:
     """Channels and objects that a record names."""

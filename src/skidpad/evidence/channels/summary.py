@@ -43,7 +43,7 @@ def columns(monitor: Monitor) -> list[Column]:
 def watched(monitor: Monitor, losses: Losses, seconds: float, n: int) -> Watched:
     """The outcome of a drive of n cycles that has ended."""
     hazards, violations = drive_events(monitor)
-    beyond = _counted([e.key for e in violations])
+    beyond = _count_keys([e.key for e in violations])
     summary = {
         "channels": list(monitor.channels),
         "cycles": n,
@@ -65,7 +65,7 @@ def watched(monitor: Monitor, losses: Losses, seconds: float, n: int) -> Watched
         channels=monitor.channels,
         cycles=n,
         hours=seconds / 3600.0,
-        hazards=_counted([e.key for e in hazards]),
+        hazards=_count_keys([e.key for e in hazards]),
         violations=beyond,
         summary=summary,
     )
@@ -100,5 +100,5 @@ def _event(event: Event[Any], name: str, subject: str | None = None) -> dict[str
     return row | ({"subject": subject} if subject else {})
 
 
-def _counted(keys: list[Any]) -> dict[Any, int]:
+def _count_keys(keys: list[Any]) -> dict[Any, int]:
     return {key: keys.count(key) for key in dict.fromkeys(keys)}

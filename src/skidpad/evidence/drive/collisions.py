@@ -86,7 +86,7 @@ def find_crashes(drive: Drive) -> tuple[Crash, ...]:
     log = drive.log
     crashes = [_crash(drive, row, _culprit(log, row)) for row in recovery_rows(log)]
     crashes += [
-        _corrected(drive, drive.row(r.tick), CORRECTIONS[r.reason])
+        _correct_crash(drive, drive.row(r.tick), CORRECTIONS[r.reason])
         for r in log.relocations
         if r.reason in CORRECTIONS
     ]
@@ -129,7 +129,7 @@ def _crash(drive: Drive, row: int, contact: ContactEvent | None) -> Crash:
     )
 
 
-def _corrected(drive: Drive, at: int, kind: CrashKind) -> Crash:
+def _correct_crash(drive: Drive, at: int, kind: CrashKind) -> Crash:
     left = kind is CrashKind.OFF_ROAD
     return _event(drive, at, kind=kind, other="", bend_exit=left and _is_bend_exit(drive, at))
 

@@ -59,7 +59,7 @@ def jerk_rms(log: RunLog) -> float | None:
     """Root mean square of the longitudinal jerk in m/s^3 over steps of 0.5 s; None: too short."""
     step = max(1, round(JERK_OVER / log.header.dt))
     v = log.ego.speed[::step]
-    calm = (_free(log) & ~_disturbed(log))[::step]
+    calm = (_free(log) & ~_disturbed_ticks(log))[::step]
     if len(v) < 3:
         return None
     jerk = np.diff(v, 2) / (step * log.header.dt) ** 2
@@ -74,7 +74,7 @@ def spins(log: RunLog) -> int:
     forward = np.cos(yaw) * vx + np.sin(yaw) * vy
     aside = np.cos(yaw) * vy - np.sin(yaw) * vx
     slides = np.abs(np.arctan2(aside, forward)) > SPIN_ANGLE
-    slides &= (np.hypot(vx, vy) > SPIN_SPEED) & _free(log) & ~_disturbed(log)
+    slides &= (np.hypot(vx, vy) > SPIN_SPEED) & _free(log) & ~_disturbed_ticks(log)
     return int(np.sum(_begins(slides)))
 
 
@@ -107,7 +107,7 @@ def _within(mask: Mask, seconds: float, dt: float) -> Mask:
     return recent
 
 
-def _disturbed(log: RunLog) -> Mask:
+def _disturbed_ticks(log: RunLog) -> Mask:
     """Ticks soon after a contact or a relocation."""
     mask = np.zeros(len(log), dtype=np.bool_)
     events = [c.tick for c in log.contacts] + [r.tick for r in log.relocations]

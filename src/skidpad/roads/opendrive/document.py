@@ -264,7 +264,7 @@ def _road(read: Reader, node: Node) -> RoadRecord:
         length=length,
         left_hand=node.get("rule", "RHT") == "LHT",
         line=ReferenceLine(sorted(elements, key=lambda e: e.s)),
-        elevation=_raised(read, read.cubics(node.findall("elevationProfile/elevation"))),
+        elevation=_raise_elevation(read, read.cubics(node.findall("elevationProfile/elevation"))),
         superelevation=read.cubics(node.findall("lateralProfile/superelevation")),
         lane_offset=read.cubics(node.findall("lanes/laneOffset")),
         sections=_sections(read, node, length),
@@ -277,7 +277,7 @@ def _road(read: Reader, node: Node) -> RoadRecord:
     )
 
 
-def _raised(read: Reader, elevation: Cubics) -> Cubics:
+def _raise_elevation(read: Reader, elevation: Cubics) -> Cubics:
     lift = np.array([read.shift.z, 0.0, 0.0, 0.0])
     return Cubics(elevation.start, elevation.coefficients + lift)
 

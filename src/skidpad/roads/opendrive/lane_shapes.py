@@ -131,14 +131,14 @@ def _require_sane(document: Document, shape: LaneShape) -> None:
 
 
 def _section_shapes(road: RoadRecord, index: int, section: SectionRecord) -> list[LaneShape]:
-    shapes = _sampled(road, index, section, _grid(road, section, STEP))
+    shapes = _sample_lanes(road, index, section, _grid(road, section, STEP))
     stretch = max(
         (float(np.max(np.diff(shape.s) / abs(np.diff(shape.s_road)))) for shape in shapes),
         default=1.0,
     )
     if stretch > 1.0:  # outer lanes of a bend are longer than the reference line
         step = STEP / min(stretch, STRETCH_MAX)
-        shapes = _sampled(road, index, section, _grid(road, section, step))
+        shapes = _sample_lanes(road, index, section, _grid(road, section, step))
     return shapes
 
 
@@ -163,7 +163,9 @@ def _grid(road: RoadRecord, section: SectionRecord, step: float) -> Floats:
     return np.concatenate([*pieces, [section.s_end]])
 
 
-def _sampled(road: RoadRecord, index: int, section: SectionRecord, s: Floats) -> list[LaneShape]:
+def _sample_lanes(
+    road: RoadRecord, index: int, section: SectionRecord, s: Floats
+) -> list[LaneShape]:
     select = np.clip(s, section.s_start + JOINT, section.s_end - JOINT)
     line = road.line.at(s)
     z_line, grade_line, _ = road.elevation.at(s, select)

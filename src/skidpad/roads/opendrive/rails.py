@@ -48,7 +48,7 @@ def railed(text: bytes, name: str) -> bytes:
     for road, rails in _rails(document, edge):
         objects = _objects(nodes[road.id])
         for corners in rails:
-            objects.append(_written(number, corners))
+            objects.append(_write_rail(number, corners))
             number += 1
     return bytes(etree.tostring(root, xml_declaration=True, encoding="UTF-8"))
 
@@ -101,7 +101,7 @@ def _objects(road: Node) -> Node:
     return found
 
 
-def _written(number: int, corners: Corners) -> Node:
+def _write_rail(number: int, corners: Corners) -> Node:
     rail = _element(
         "object",
         id=number,

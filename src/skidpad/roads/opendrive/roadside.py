@@ -182,21 +182,21 @@ def _outlines(read: Reader, road: RoadRecord, node: Node) -> Iterator[Floats]:
             for c in outline.findall("cornerRoad")
         ]
         if local:
-            yield _turned(np.array(local), place[:3], yaw)
+            yield _turn_points(np.array(local), place[:3], yaw)
         elif on_road:
             s, t, up = np.array(on_road).T
             yield _points(road, s, t, up)
     length, width = read.number(node, "length", 0.0), read.number(node, "width", 0.0)
     if not outlines and length > 0.0 and width > 0.0:
         corners = np.array([[1, 1, 0], [-1, 1, 0], [-1, -1, 0], [1, -1, 0]], dtype=np.float64)
-        yield _turned(corners * (length / 2, width / 2, 1.0), place[:3], yaw)
+        yield _turn_points(corners * (length / 2, width / 2, 1.0), place[:3], yaw)
 
 
 def _outline_nodes(node: Node) -> list[Node]:
     return [*node.findall("outline"), *node.findall("outlines/outline")]
 
 
-def _turned(points: Floats, origin: tuple[float, ...], yaw: float) -> Floats:
+def _turn_points(points: Floats, origin: tuple[float, ...], yaw: float) -> Floats:
     c, s = cos(yaw), sin(yaw)
     out: Floats = points @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]) + np.array(origin)
     return out

@@ -146,14 +146,14 @@ def _rows(
         kind = signal_kind(signal)
         value = _limit(read, signal) if kind is SignalKind.SPEED_LIMIT else np.nan
         group = document.controllers.get(id, road.junction)
-        for lane in _governed(read, node, road, shapes, index):
+        for lane in _governed_lanes(read, node, road, shapes, index):
             s = _along(shapes[lane], read.number(node, "s"))
             if road.junction >= 0 and kind is not SignalKind.SPEED_LIMIT:
                 s = 0.0  # one waits before the crossing, wherever the file puts the reference
             yield _Row(id, kind, head, lane, s, value, group)
 
 
-def _governed(
+def _governed_lanes(
     read: Reader,
     node: Node,
     road: RoadRecord,
@@ -211,7 +211,7 @@ def _stop_lines(
     """(lane, s) of every stop line."""
     for road, node in _signals(document):
         if node.get("type") == STOP_LINE:
-            for lane in _governed(read, node, road, shapes, index):
+            for lane in _governed_lanes(read, node, road, shapes, index):
                 yield lane, _along(shapes[lane], read.number(node, "s"))
 
 

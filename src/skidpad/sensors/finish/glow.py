@@ -33,7 +33,7 @@ def add_light(p: np.uint32, r: float, g: float, b: float) -> np.uint32:
 
 
 @inner_kernel
-def _seen(view: View, u: float, v: float, z: float, inverse: NDArray[np.float32]) -> float:
+def _visible_share(view: View, u: float, v: float, z: float, inverse: NDArray[np.float32]) -> float:
     """Share of a lamp at (u, v), z m ahead, that nothing hides."""
     height, width = inverse.shape
     nearest = 1.0 / max(z - CLEARANCE, 0.1)
@@ -134,7 +134,7 @@ def shine(
         c = sources.colour[i]
         inside = 0.0 <= u < view.width and view.top <= v < view.height
         if inside:
-            power *= _seen(view, u, v, depth, inverse)
+            power *= _visible_share(view, u, v, depth, inverse)
         if power < LEAST:
             continue
         if bloom and inside:

@@ -185,7 +185,7 @@ def _light_at(cast: _Cast, lx: float, ly: float) -> float:
 
 
 @inner_kernel
-def _dimmed(p: np.uint32, light: float) -> np.uint32:
+def _dim_pixel(p: np.uint32, light: float) -> np.uint32:
     gain = np.float32(np.sqrt(light))  # the picture's bytes are square roots of light
     red, green, blue = unpack(p)
     return pack(red * gain, green * gain, blue * gain)
@@ -228,7 +228,7 @@ def _darken(
                 continue
             light = _light_at(cast, z * (x_v + x_u * u) + x0, z * (y_v + y_u * u) + y0)
             if light < 0.995:
-                out[row, column] = _dimmed(out[row, column], light)
+                out[row, column] = _dim_pixel(out[row, column], light)
 
 
 @kernel

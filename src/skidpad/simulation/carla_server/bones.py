@@ -47,7 +47,7 @@ def _skeleton() -> Iterator[tuple[str, str, Place]]:
     for side, sign in (("__L", 1.0), ("__R", -1.0)):
         for name, (parent, x, y, z) in SIDE.items():
             above = parent if parent.endswith("__C") else parent + side
-            yield _named(name, side), _named(above, ""), (x, sign * y, z)
+            yield _bone_name(name, side), _bone_name(above, ""), (x, sign * y, z)
         for number, finger in enumerate(FINGERS):
             above = f"crl_hand{side}"
             for part in ("", "01", "02", "End"):
@@ -59,7 +59,7 @@ def _skeleton() -> Iterator[tuple[str, str, Place]]:
                 above = name
 
 
-def _named(name: str, side: str) -> str:
+def _bone_name(name: str, side: str) -> str:
     """The left shoulder has a name of its own in CARLA."""
     return (name + side).replace("crl_shoulder__L", "ctrl_shoulder__L")
 
@@ -89,16 +89,16 @@ class Skeleton:
         actor: the walker's middle. height: m.
         """
         feet = Pose(0.0, 0.0, -height / 2.0)
-        inside = {ROOT: self._blended(ROOT, Pose(0.0, 0.0))}
+        inside = {ROOT: self._blend_poses(ROOT, Pose(0.0, 0.0))}
         rows = [_row(ROOT, actor @ feet @ inside[ROOT], inside[ROOT], inside[ROOT])]
         for name, parent, place in SKELETON:
             x, y, z = (height * v for v in place)
-            own = self._blended(name, Pose(x, y, z))
+            own = self._blend_poses(name, Pose(x, y, z))
             inside[name] = inside[parent] @ own
             rows.append(_row(name, actor @ feet @ inside[name], inside[name], own))
         return rows
 
-    def _blended(self, name: str, rest: Pose) -> Pose:
+    def _blend_poses(self, name: str, rest: Pose) -> Pose:
         told = self.pose.get(name)
         if told is None or self.blend == 0.0:
             return rest

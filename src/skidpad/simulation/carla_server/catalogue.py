@@ -104,7 +104,7 @@ def _attributes(entry: dict[str, Any]) -> dict[str, Attribute]:
     return made
 
 
-def _fixed(name: str, kind: AttributeType, value: object) -> Attribute:
+def _fixed_attribute(name: str, kind: AttributeType, value: object) -> Attribute:
     written = str(value).lower() if isinstance(value, bool) else str(value)
     return Attribute(name, kind, (written,), modifiable=False)
 
@@ -123,13 +123,13 @@ def _vehicle(id: str, row: list[Any], actor: dict[str, Attribute], colours: list
         Attribute("driver_id", AttributeType.INT, ("0", "1"), restricted=True),
         Attribute("sticky_control", AttributeType.BOOL, ("true",)),
         Attribute("terramechanics", AttributeType.BOOL, ("false",)),
-        _fixed("object_type", AttributeType.STRING, ""),
-        _fixed("base_type", AttributeType.STRING, base),
-        _fixed("special_type", AttributeType.STRING, special),
-        _fixed("number_of_wheels", AttributeType.INT, wheels),
-        _fixed("generation", AttributeType.INT, generation),
-        _fixed("has_dynamic_doors", AttributeType.BOOL, doors),
-        _fixed("has_lights", AttributeType.BOOL, lights),
+        _fixed_attribute("object_type", AttributeType.STRING, ""),
+        _fixed_attribute("base_type", AttributeType.STRING, base),
+        _fixed_attribute("special_type", AttributeType.STRING, special),
+        _fixed_attribute("number_of_wheels", AttributeType.INT, wheels),
+        _fixed_attribute("generation", AttributeType.INT, generation),
+        _fixed_attribute("has_dynamic_doors", AttributeType.BOOL, doors),
+        _fixed_attribute("has_lights", AttributeType.BOOL, lights),
     ):
         attributes[attribute.id] = attribute
     kind = _KINDS[base]
@@ -142,10 +142,10 @@ def _walker(id: str, row: list[Any], actor: dict[str, Attribute]) -> Blueprint:
     length, width, height, age, gender, generation = row
     attributes = _roles(actor, "pedestrian")
     for attribute in (
-        _fixed("gender", AttributeType.STRING, gender),
-        _fixed("generation", AttributeType.INT, generation),
-        _fixed("age", AttributeType.STRING, age),
-        _fixed("can_use_wheelchair", AttributeType.BOOL, False),
+        _fixed_attribute("gender", AttributeType.STRING, gender),
+        _fixed_attribute("generation", AttributeType.INT, generation),
+        _fixed_attribute("age", AttributeType.STRING, age),
+        _fixed_attribute("can_use_wheelchair", AttributeType.BOOL, False),
         Attribute("speed", AttributeType.FLOAT, ("0.0", "1.4", "2.4")),
         Attribute("is_invincible", AttributeType.BOOL, ("true",)),
         Attribute("use_wheelchair", AttributeType.BOOL, ("false",), restricted=True),
@@ -164,7 +164,7 @@ def _size_word(length: float, width: float, height: float) -> str:
 
 def _prop(id: str, size: list[float], actor: dict[str, Attribute]) -> Blueprint:
     attributes = _roles(actor, "prop")
-    attributes["size"] = _fixed("size", AttributeType.STRING, _size_word(*size))
+    attributes["size"] = _fixed_attribute("size", AttributeType.STRING, _size_word(*size))
     if id == "static.prop.mesh":
         for name, kind, value in (
             ("mesh_path", AttributeType.STRING, ""),
@@ -191,8 +191,8 @@ def grip_in_force(blueprint: Blueprint, model: GripModel, mu_ref: float) -> Blue
     of the server's command line, for clients to read.
     """
     told = (
-        _fixed("weather_grip", AttributeType.STRING, model.value),
-        _fixed("mu_ref", AttributeType.FLOAT, mu_ref),
+        _fixed_attribute("weather_grip", AttributeType.STRING, model.value),
+        _fixed_attribute("mu_ref", AttributeType.FLOAT, mu_ref),
     )
     return replace(blueprint, attributes={**blueprint.attributes, **{a.id: a for a in told}})
 
@@ -244,11 +244,11 @@ def chosen(blueprint: Blueprint, given: Mapping[str, str]) -> dict[str, str]:
             raise wire.WireError(
                 f"{blueprint.id}: {name} must be one of {', '.join(attribute.recommended)}"
             )
-        values[name] = _checked(blueprint.id, attribute, value)
+        values[name] = _check_value(blueprint.id, attribute, value)
     return values
 
 
-def _checked(id: str, attribute: Attribute, value: str) -> str:
+def _check_value(id: str, attribute: Attribute, value: str) -> str:
     """The text of a value that its type can be read from; `64.0` is an int to clients."""
     try:
         if attribute.type is AttributeType.FLOAT:

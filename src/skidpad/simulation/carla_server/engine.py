@@ -134,7 +134,7 @@ def at_wheels(engine: Engine, radius: float) -> Traction:
     if not ratios or not engine.is_told or engine.max_rpm * engine.final_ratio <= 0.0:
         return Traction(0.0, 0.0, 0.0)
     return Traction(
-        max(torque for _, torque in _reached(engine.torque_curve, engine.max_rpm))
+        max(torque for _, torque in _curve_until(engine.torque_curve, engine.max_rpm))
         * max(ratios)
         / radius,
         _power(engine.torque_curve, engine.max_rpm),
@@ -142,7 +142,7 @@ def at_wheels(engine: Engine, radius: float) -> Traction:
     )
 
 
-def _reached(curve: Curve, max_rpm: float) -> list[tuple[float, float]]:
+def _curve_until(curve: Curve, max_rpm: float) -> list[tuple[float, float]]:
     """The curve's knots up to these revolutions, and its end there."""
     rpm, torque = np.array(curve).T
     end = float(np.interp(max_rpm, rpm, torque))
@@ -151,7 +151,7 @@ def _reached(curve: Curve, max_rpm: float) -> list[tuple[float, float]]:
 
 def _power(curve: Curve, max_rpm: float) -> float:
     """Greatest power in W: at a knot, or where torque times revolutions of a falling line is greatest."""
-    knots = _reached(curve, max_rpm)
+    knots = _curve_until(curve, max_rpm)
     best = max(rpm * torque for rpm, torque in knots)
     for (r, t), (r_next, t_next) in pairwise([(0.0, knots[0][1]), *knots]):
         slope = (t_next - t) / (r_next - r) if r_next > r else 0.0

@@ -128,7 +128,7 @@ class Episode:
 
     def spawn(self, wanted: Wanted, pose: Pose) -> Actor:
         """A new actor where a client wants it; CallError when something stands there."""
-        actor = self._made(wanted, pose)
+        actor = self._make_actor(wanted, pose)
         feet = self._feet(actor) if actor.family in SOLID else pose
         if actor.family in SOLID:
             if shapes.is_taken(self.moving, feet, actor.half):
@@ -142,7 +142,7 @@ class Episode:
         """A new actor that follows its parent; all attachments are rigid (listed)."""
         del kind
         carrier = self.actors.get(parent)
-        actor = self._made(wanted, mount)
+        actor = self._make_actor(wanted, mount)
         if actor.family is Family.VEHICLE:
             raise CallError("a vehicle cannot be attached")
         actor.parent, actor.mount = carrier.id, mount
@@ -188,7 +188,7 @@ class Episode:
             if stream is not None:
                 self.stock.hub.close(stream)
 
-    def _made(self, wanted: Wanted, pose: Pose) -> Actor:
+    def _make_actor(self, wanted: Wanted, pose: Pose) -> Actor:
         blueprint = self.stock.blueprint(wanted.blueprint)
         attributes = chosen(blueprint, wanted.attributes)
         self.stock.remarks.remark(blueprint, wanted.attributes)

@@ -66,7 +66,7 @@ class Falling:
             return
         self._actors.rising.pop(actor.id, None)
         above = self._above(actor)
-        if above is not None and above > DROP and self._simulated(actor):
+        if above is not None and above > DROP and self._is_simulated(actor):
             self._actors.rising[actor.id] = 0.0
         self._hold(actor)
 
@@ -79,7 +79,7 @@ class Falling:
 
     def push(self, actor: Actor, change: float) -> None:
         """Change its speed upwards by so many m/s."""
-        if actor.family not in FALLS or actor.body is None or not self._simulated(actor):
+        if actor.family not in FALLS or actor.body is None or not self._is_simulated(actor):
             return
         speed = self._actors.rising.get(actor.id, 0.0) + change
         if actor.id in self._actors.rising or speed > LIFT_OFF:
@@ -130,18 +130,18 @@ class Falling:
             if here is None or abs(here.offset) <= here.width / 2.0 + VERGE:
                 continue
             ground = ground_below(self._roads, x, y, z)
-            if ground is not None and z - ground > DROP and self._simulated(actor):
+            if ground is not None and z - ground > DROP and self._is_simulated(actor):
                 self._actors.rising[actor.id] = 0.0
                 self._hold(actor)
 
-    def _simulated(self, actor: Actor) -> bool:
+    def _is_simulated(self, actor: Actor) -> bool:
         return bool(self._moving.rows.simulated[self._moving.row(actor.body or 0)])
 
     def _hold(self, actor: Actor) -> None:
         """Off the road while it floats: nothing sets its height, and tyres have no friction."""
         assert actor.body is not None
         floats = self._floats(actor)
-        self._moving.set_grounded(actor.body, self._simulated(actor) and not floats)
+        self._moving.set_grounded(actor.body, self._is_simulated(actor) and not floats)
         if actor.id in self._vehicles:
             friction = self._vehicles.of(actor.id).physics.tire_friction.tolist()
             self._moving.set_tyres(actor.body, [0.0] * len(friction) if floats else friction)

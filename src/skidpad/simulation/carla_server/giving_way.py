@@ -82,10 +82,10 @@ def _lines(roads: RoadMap) -> Iterator[tuple[int, Line]]:
     for lane in np.flatnonzero(np.isin(entry["control"], (STOP, YIELD))).tolist():
         least = STOPPED if entry["control"][lane] == STOP else 0.0
         begins = float(entry["line"][lane]) - BOX * _width(roads, lane)
-        yield lane, Line(begins, least, _watched(roads, lane))
+        yield lane, Line(begins, least, _watched_lanes(roads, lane))
 
 
-def _watched(roads: RoadMap, lane: int) -> dict[int, Span]:
+def _watched_lanes(roads: RoadMap, lane: int) -> dict[int, Span]:
     """Lanes of the junction that cross or join the ways on from a lane, the ends of those before and
     the beginnings of those behind; what comes from the same road is not watched."""
     entry, conflict, _, _ = priority_of(roads)

@@ -200,14 +200,16 @@ def without(roads: RoadMap, missing: frozenset[int]) -> RoadMap:
         boxes=tuple(b for i, b in enumerate(side.boxes) if ("boxes", i) not in rows),
         heads=tuple(h for i, h in enumerate(side.heads) if ("heads", i) not in rows),
         barriers=tuple(
-            part for i, b in enumerate(side.barriers) for part in _left(b, cut.get(i, []))
+            part
+            for i, b in enumerate(side.barriers)
+            for part in _remaining_barriers(b, cut.get(i, []))
         ),
     )
     shown.content_hash = f"{roads.content_hash} without {sorted(missing)}"
     return shown
 
 
-def _left(barrier: Barrier, gone: list[Source]) -> Iterator[Barrier]:
+def _remaining_barriers(barrier: Barrier, gone: list[Source]) -> Iterator[Barrier]:
     """What is left of a barrier."""
     if not gone:
         yield barrier

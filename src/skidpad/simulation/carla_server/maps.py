@@ -111,11 +111,13 @@ class MapStore:
         if short == OPENDRIVE_MAP:
             if self._text is None:
                 raise CallError("no OpenDRIVE text was sent")
-            return _served(short, roads_from_text(self._text, short), self._text)
+            return _make_served_map(short, roads_from_text(self._text, short), self._text)
         path = self._path(short)
         if path is None:
             raise CallError(f"map not found: {name}")
-        return _served(short, load_map(path), path.read_text(encoding="utf-8", errors="replace"))
+        return _make_served_map(
+            short, load_map(path), path.read_text(encoding="utf-8", errors="replace")
+        )
 
     def _path(self, name: str) -> Path | None:
         names = self._plain_names()
@@ -138,7 +140,7 @@ def roads_from_text(xodr: str, name: str) -> RoadMap:
         raise CallError(str(error)) from error
 
 
-def _served(name: str, roads: RoadMap, xodr: str) -> ServedMap:
+def _make_served_map(name: str, roads: RoadMap, xodr: str) -> ServedMap:
     points = tuple(spawn_points(roads))
     if not points:
         raise ConfigError(f"map {name}: no lane is long enough for a spawn point")

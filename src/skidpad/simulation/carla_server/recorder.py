@@ -105,22 +105,22 @@ class Recorder:
 
     def summary(self, name: str, show_all: bool = False) -> str:
         """Returns what `show_recorder_file_info` prints."""
-        with _told(name):
+        with _explain_failure(name):
             return describe_recording(*self._read_with_start(name), show_all)
 
     def collisions(self, name: str, first: str = ANY, second: str = ANY) -> str:
         """Returns what `show_recorder_collisions` prints of contacts between two kinds."""
-        with _told(name):
+        with _explain_failure(name):
             return list_collisions(*self._read_with_start(name), first, second)
 
     def blocked(self, name: str, seconds: float, cm: float) -> str:
         """Returns what `show_recorder_actors_blocked` prints."""
-        with _told(name):
+        with _explain_failure(name):
             return list_blocked(*self._read_with_start(name), seconds, cm)
 
     def recording(self, name: str) -> Recording:
         """What can be replayed of a file."""
-        with _told(name):
+        with _explain_failure(name):
             return recording(name, *self._read(name))
 
     def _read_with_start(self, name: str) -> tuple[dict[str, Any], list[list[Any]], float]:
@@ -144,7 +144,7 @@ class Recorder:
 
 
 @contextmanager
-def _told(name: str) -> Iterator[None]:
+def _explain_failure(name: str) -> Iterator[None]:
     """What is no recording is said in one sentence, whatever is wrong with it."""
     try:
         yield

@@ -92,13 +92,14 @@ class Dispatcher:
             if not method.fewest <= len(request.arguments) <= method.most:
                 raise CallError(f"{method.name} takes {method.most} arguments")
             result = method.handler(self.world, *request.arguments)
-            return codec.answer(request.msgid, _wrapped(method.shape, result))
+            return codec.answer(request.msgid, _wrap_result(method.shape, result))
         except SkidpadError as error:
-            return codec.answer(request.msgid, _refused(method.shape, str(error)))
+            return codec.answer(request.msgid, _wrap_error(method.shape, str(error)))
         except Exception as error:
             log.exception("%s failed", method.name)
             return codec.answer(
-                request.msgid, _refused(method.shape, f"{method.name}: internal error: {error!r}")
+                request.msgid,
+                _wrap_error(method.shape, f"{method.name}: internal error: {error!r}"),
             )
 
     def _answer_unknown(self, request: Request) -> bytes:
@@ -110,11 +111,11 @@ class Dispatcher:
         return codec.failure(request.msgid, f"skidpad does not serve the call {name!r}")
 
 
-def _wrapped(shape: Shape, result: Any) -> Any:
+def _wrap_result(shape: Shape, result: Any) -> Any:
     if shape is Shape.VOID:
         return [[False]]
     return result if shape is Shape.PLAIN else [[1, result]]
 
 
-def _refused(shape: Shape, message: str) -> Any:
+def _wrap_error(shape: Shape, message: str) -> Any:
     return [[True, [message]]] if shape is Shape.VOID else [[0, [message]]]

@@ -217,7 +217,7 @@ class CarlaServer:
         return [f"unknown call {n} ({k} times)" for n, k in self.dispatcher.unknown.items()]
 
 
-def _bound(host: str, port: int) -> socket.socket:
+def _bind_socket(host: str, port: int) -> socket.socket:
     # Named as TCP: only then does asyncio switch Nagle's algorithm off, which would cost 40 ms a tick.
     made = socket.socket(socket.AF_INET, socket.SOCK_STREAM, socket.IPPROTO_TCP)
     made.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -233,11 +233,11 @@ def _socket_pair(host: str, port: int) -> list[tuple[socket.socket, socket.socke
     """Two bound sockets on neighbouring ports; empty when they cannot be had."""
     for _ in range(PORT_TRIES if port == 0 else 1):
         try:
-            first = _bound(host, port)
+            first = _bind_socket(host, port)
         except OSError:
             return []
         try:
-            return [(first, _bound(host, first.getsockname()[1] + 1))]
+            return [(first, _bind_socket(host, first.getsockname()[1] + 1))]
         except (OSError, OverflowError):
             first.close()
     return []

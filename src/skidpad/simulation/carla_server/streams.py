@@ -80,9 +80,9 @@ class StreamHub:
         stream = canonical(stream)
         if stream not in self._announced:
             self._announced.add(stream)
-            asyncio.get_running_loop().call_later(PATIENCE, self._arrived, stream)
+            asyncio.get_running_loop().call_later(PATIENCE, self._on_arrival, stream)
 
-    def _arrived(self, stream: int) -> None:
+    def _on_arrival(self, stream: int) -> None:
         """It has connected, or is no longer waited for."""
         self._announced.discard(stream)
         if not self._announced:
@@ -194,7 +194,7 @@ class StreamHub:
             return
         self._listeners.setdefault(stream, []).append(transport)
         if stream in self._announced:
-            asyncio.get_running_loop().call_soon(self._arrived, stream)
+            asyncio.get_running_loop().call_soon(self._on_arrival, stream)
         latest = self.on_subscribe(stream)
         if latest is not None:
             transport.write(len(latest).to_bytes(4, "little") + latest)

@@ -84,13 +84,17 @@ class Arbiter:
         dead_after = self.settings.dead_after - 1e-9
         alive = [i for i, heard in enumerate(self.heard_at) if t - heard < dead_after]
         able = [i for i in alive if i not in abstaining] or alive
-        wanted = self._wanted(able, scores, progress)
+        wanted = self._choose_channel(able, scores, progress)
         if wanted.driving != self.wanted_since[0]:
             self.wanted_since = (wanted.driving, t)
         if wanted.driving == self.driving and self.started:
             return Choice(self.driving, wanted.reason if self.driving is None else Reason.KEPT)
         lost = self.driving is not None and self.driving not in able
-        if self.started and not (wanted.driving is None or lost) and not self._settled(t, scores):
+        if (
+            self.started
+            and not (wanted.driving is None or lost)
+            and not self._may_switch(t, scores)
+        ):
             return Choice(self.driving, Reason.KEPT)
         reason = Reason.START if not self.started else wanted.reason
         if lost and wanted.driving is not None:
@@ -98,7 +102,7 @@ class Arbiter:
         self.driving, self.changed_at, self.started = wanted.driving, t, True
         return Choice(self.driving, reason)
 
-    def _settled(self, t: float, scores: Sequence[float]) -> bool:
+    def _may_switch(self, t: float, scores: Sequence[float]) -> bool:
         """Whether the driver may be relieved now: hysteresis in time."""
         s = self.settings
         if t - self.changed_at < s.dwell - 1e-9:
@@ -107,7 +111,7 @@ class Arbiter:
             return True
         return t - self.wanted_since[1] >= s.settle - 1e-9
 
-    def _wanted(
+    def _choose_channel(
         self, able: Sequence[int], scores: Sequence[float], progress: Sequence[float]
     ) -> Choice:
         s = self.settings

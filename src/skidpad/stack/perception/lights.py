@@ -78,9 +78,11 @@ class LightScan:
             return NO_WAYPOINT
         if not self.lines:
             return NO_LIGHT
-        return self._triggered(view.ego, states) or self._walk(pose, v, view.ego, states)
+        return self._triggering_light(view.ego, states) or self._walk(pose, v, view.ego, states)
 
-    def _triggered(self, ego: LanePoint, states: Mapping[int, LightState]) -> LightReading | None:
+    def _triggering_light(
+        self, ego: LanePoint, states: Mapping[int, LightState]
+    ) -> LightReading | None:
         for line in self.lines.get(ego.lane, ()):
             distance = line.s - ego.s
             state = states.get(line.signal, LightState.UNKNOWN)

@@ -87,13 +87,13 @@ def _detector(drives: Sequence[TrainingDrive], truth: str, hazard: HazardType) -
     for number in range(FOLDS):
         inside = [d for d, g in zip(drives, groups, strict=True) if g != number]
         outside = [d for d, g in zip(drives, groups, strict=True) if g == number]
-        forest = _fit(inside, truth, hazard)
+        forest = _fit_trees(inside, truth, hazard)
         if forest is not None:
             judged += [(d, probability_of(forest, d.t, d.rows)) for d in outside]
-    forest = _fit(drives, truth, hazard)
+    forest = _fit_trees(drives, truth, hazard)
     if forest is None or not judged:
         return None
-    limit, confirm = _calibrated(judged, truth, hazard)
+    limit, confirm = _calibrate(judged, truth, hazard)
     return Detector(forest, limit, confirm)
 
 
@@ -105,7 +105,7 @@ def _folds(drives: Sequence[TrainingDrive]) -> list[int]:
     return [routes.index(d.route) % FOLDS for d in drives]
 
 
-def _calibrated(
+def _calibrate(
     judged: Sequence[tuple[TrainingDrive, Floats]], truth: str, hazard: HazardType
 ) -> tuple[float, int]:
     """Limit and confirmation with the best harmonic mean of precision and recall of events."""
@@ -122,7 +122,7 @@ def _calibrated(
     return best[1], -best[2] if best[2] < 0 else 1
 
 
-def _fit(drives: Sequence[TrainingDrive], truth: str, hazard: HazardType) -> Forest | None:
+def _fit_trees(drives: Sequence[TrainingDrive], truth: str, hazard: HazardType) -> Forest | None:
     """Trees by scikit-learn, as tables; None when only one class is there."""
     from sklearn.ensemble import HistGradientBoostingClassifier
     from threadpoolctl import threadpool_limits

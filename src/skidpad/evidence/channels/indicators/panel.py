@@ -48,7 +48,7 @@ class IndicatorPanel:
         speaking = [(i, c, c.frame) for i, c in enumerate(self.channels) if c.frame is not None]
         lap("prepare")
         for i, channel, frame in speaking:
-            self._put(values, i, channel.comfort(frame))
+            self._store_values(values, i, channel.comfort(frame))
         lap("comfort")
         meeting = []
         for p, pair in enumerate(self.pairs):
@@ -56,16 +56,16 @@ class IndicatorPanel:
                 pair.silent()
                 continue
             similar = pair.similarity(pair.a.frame, pair.b.frame)
-            self._put(values, p, similar)
+            self._store_values(values, p, similar)
             meeting.append((p, pair, similar))
         lap("similarity")
         for i, channel, frame in speaking:
-            self._put(values, i, channel.prediction(frame))
+            self._store_values(values, i, channel.prediction(frame))
         for p, pair, similar in meeting:
-            self._put(values, p, pair.prediction(similar))
+            self._store_values(values, p, pair.prediction(similar))
         lap("motion_prediction")
         return Readings(self.layout, values, tuple(pair.matched for pair in self.pairs))
 
-    def _put(self, row: Floats, subject: int, values: Values) -> None:
+    def _store_values(self, row: Floats, subject: int, values: Values) -> None:
         for indicator, value in values.items():
             row[self.layout.span[indicator].start + subject] = value

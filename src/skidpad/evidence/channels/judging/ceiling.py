@@ -37,7 +37,7 @@ def ceiling(cycles: Sequence[Cycle], channels: Sequence[str]) -> tuple[Span, ...
     found: list[Span] = []
     for c in range(len(channels)):
         egos = _smoothed_egos(known, c)
-        perceived = _perceived(known, c, egos)
+        perceived = _perceived_truth(known, c, egos)
         rows = [k._replace(truth=t) for k, t in zip(known, perceived, strict=True)]
         found += [
             Span(h.hazard, h.t_start, h.t_end)
@@ -99,7 +99,7 @@ def smoothed(t: Floats, states: Floats) -> Floats:
     return out
 
 
-def _perceived(cycles: Sequence[Cycle], c: int, egos: Floats) -> list[TruthFrame | None]:
+def _perceived_truth(cycles: Sequence[Cycle], c: int, egos: Floats) -> list[TruthFrame | None]:
     """What the channel knows of the true actors, in the form of the truth."""
     t = np.array([k.t for k in cycles])
     tracks = _tracks(cycles, c)

@@ -121,7 +121,7 @@ def judge(
     for profile in (Profile.AS_PRINTED, Profile.TRACKED):
         monitor = Monitor(channels, _settings(profile))
         rows = [monitor.update(cycle).signals.values for cycle in cycles]
-        detected[profile.value] = _scored(_found(monitor.hazards, begin))
+        detected[profile.value] = _scored_spans(_found_spans(monitor.hazards, begin))
         sweeps[profile.value] = of_rules(profile, t, columns(rows), begin)
     looked = look(channels, cycles)
     sweeps[Profile.TRACKED.value] |= of_distances(channels, looked, begin)
@@ -144,7 +144,7 @@ def judge(
         truths=found,
         candidates=candidates,
         unseen=unseen,
-        curve={f: _reapplied(t, table, curve, f, begin) for f in CURVE_FACTORS if curve},
+        curve={f: _apply_scaled(t, table, curve, f, begin) for f in CURVE_FACTORS if curve},
         points=tuple(swept(sweeps, found)),
         mistakes=tuple(mistakes(detected, found, t, motion, why)),
         facts=seen.facts | {"unseen": float(unseen), "unseen_found": float(unseen_found)},
@@ -180,12 +180,12 @@ def _practical(
         signals.append((cycle.t, evidence.signals.values))
         rows.append(feature_row(evidence.readings, evidence.risk, evidence.signals))
     facts = observer.facts() | (times_of(timer.table()) if timer and cycles else {})
-    spans = _found(monitor.hazards, begin)
+    spans = _found_spans(monitor.hazards, begin)
     others = [s.hazard for s in spans if s.hazard not in SCORED_HAZARDS]
     return (
         _Pass(signals, np.array(rows), facts),
         {hazard: others.count(hazard) for hazard in dict.fromkeys(others)},
-        _scored(spans),
+        _scored_spans(spans),
     )
 
 
@@ -235,17 +235,17 @@ def _why_missed(identifier: str, missed: Span, signals: Signals) -> str:
     return NO_RULE if rule is None else missed_cause(missed, rule, signals)
 
 
-def _scored(spans: Iterable[Span]) -> tuple[Span, ...]:
+def _scored_spans(spans: Iterable[Span]) -> tuple[Span, ...]:
     return tuple(s for s in spans if s.hazard in SCORED_HAZARDS)
 
 
-def _found(events: TimeFilter[HazardType], begin: float) -> list[Span]:
+def _found_spans(events: TimeFilter[HazardType], begin: float) -> list[Span]:
     """The events of a finished drive that reach into its evaluated part."""
     spans = [Span(e.key, e.t_start, e.t_end) for e in events.finish()]
     return sorted((s for s in spans if s.t_end >= begin), key=lambda s: s.t_start)
 
 
-def _reapplied(
+def _apply_scaled(
     t: Floats, signals: Table, signal: Signal, factor: float, begin: float
 ) -> tuple[Span, ...]:
     """What the practical rules find with every threshold on `signal` times `factor`."""

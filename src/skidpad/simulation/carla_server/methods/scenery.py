@@ -33,7 +33,7 @@ def clear_debug_string(served: Served) -> None:
     served.episode.debug.clear(texts=True)
 
 
-def _tagged(served: Served, tag: Any) -> list[EnvironmentObject]:
+def _objects_with_tag(served: Served, tag: Any) -> list[EnvironmentObject]:
     label = wire.integer(tag, "tag", 0, ANY)
     return [o for o in objects(served.episode.map.roads) if label in (ANY, o.label)]
 
@@ -41,13 +41,13 @@ def _tagged(served: Served, tag: Any) -> list[EnvironmentObject]:
 @TABLE.method("get_all_level_BBs")
 def get_all_level_bbs(served: Served, tag: Any) -> list[Any]:
     """Boxes of what belongs to the map, by tag."""
-    return [o.box() for o in _tagged(served, tag)]
+    return [o.box() for o in _objects_with_tag(served, tag)]
 
 
 @TABLE.method("get_environment_objects")
 def get_environment_objects(served: Served, tag: Any) -> list[Any]:
     """What belongs to the map, by tag."""
-    return [o.packed() for o in _tagged(served, tag)]
+    return [o.packed() for o in _objects_with_tag(served, tag)]
 
 
 @TABLE.method("enable_environment_objects", Shape.VOID)

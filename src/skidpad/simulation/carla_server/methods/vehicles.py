@@ -168,7 +168,7 @@ def get_wheel_pitch_angle(served: Served, id: Any, wheel: Any) -> float:
     return 0.0
 
 
-def _accepted(name: str, reason: str) -> None:
+def _accept_without_effect(name: str, reason: str) -> None:
     @TABLE.method(name, Shape.VOID, without_effect=reason)
     def accepted(served: Served, id: Any, a: Any = None, b: Any = None, c: Any = None, d: Any = None,
                  e: Any = None, f: Any = None) -> None:  # fmt: skip
@@ -190,4 +190,4 @@ for _name, _reason in {
     "enable_chrono_physics": "there is no Chrono",
     "restore_physx_physics": "there is one physics",
 }.items():
-    _accepted(_name, _reason)
+    _accept_without_effect(_name, _reason)

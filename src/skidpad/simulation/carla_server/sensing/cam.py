@@ -128,7 +128,7 @@ class Rhythm:
             going = self.last is None or waited >= ROAD_SIDE
         elif waited < self.shortest:
             going = False
-        elif self.fixed or self.last is None or self._changed(pose, speed):
+        elif self.fixed or self.last is None or self._has_changed(pose, speed):
             self.period, self.low = min(waited, self.longest), 0
             going = True
         else:
@@ -139,7 +139,7 @@ class Rhythm:
             self.last, self.pose, self.speed = time, pose, speed or 0.0
         return going
 
-    def _changed(self, pose: Pose, speed: float) -> bool:
+    def _has_changed(self, pose: Pose, speed: float) -> bool:
         turned = abs(degrees(wrap_angle(pose.yaw - self.pose.yaw)))
         gone = np.hypot(np.hypot(pose.x - self.pose.x, pose.y - self.pose.y), pose.z - self.pose.z)
         return bool(turned > TURN_DEG or gone > DISTANCE or abs(speed - self.speed) > CHANGE)

@@ -12,7 +12,7 @@ from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor
 from skidpad.simulation.carla_server.sensing.surroundings import Surroundings
 
 
-def _felt(around: Surroundings, actor: Actor) -> ImuReading:
+def _measure_motion(around: Surroundings, actor: Actor) -> ImuReading:
     """What a unit on its carrier feels; without one it stands still."""
     carrier = around.actors.carrier(actor)
     if carrier is None or carrier.body is None:
@@ -23,7 +23,7 @@ def _felt(around: Surroundings, actor: Actor) -> ImuReading:
 
 def imu(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
     """Specific force, rate of turn and compass in the sensor's axes."""
-    felt = _felt(around, sensor.actor)
+    felt = _measure_motion(around, sensor.actor)
     noise, n = sensor.rng.standard_normal(6), sensor.number
     force = [
         v + noise[k] * n(f"noise_accel_stddev_{axis}")

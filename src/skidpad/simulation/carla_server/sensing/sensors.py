@@ -50,7 +50,7 @@ class SensorSet:
 
     def heard(self, hub: StreamHub) -> bool:
         """Whether anybody listens to any of them."""
-        return any(_heard(sensor, hub) for sensor in self._sensors.values())
+        return any(_is_heard(sensor, hub) for sensor in self._sensors.values())
 
     def produce(self, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
         """One tick of every sensor that is due and listened to."""
@@ -60,7 +60,7 @@ class SensorSet:
             if speak is not None:
                 speak(around, clock, sensor)
         for sensor in list(self._sensors.values()):
-            if _heard(sensor, hub) and sensor.is_due(time):
+            if _is_heard(sensor, hub) and sensor.is_due(time):
                 self._read(sensor, around, clock, hub)
 
     def _read(self, sensor: Sensor, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
@@ -81,7 +81,7 @@ class SensorSet:
                 hub.publish(sensor.textures[texture], head, *message)
 
 
-def _heard(sensor: Sensor, hub: StreamHub) -> bool:
+def _is_heard(sensor: Sensor, hub: StreamHub) -> bool:
     """Whether anybody listens to it or to its G-buffers."""
     streams = (sensor.actor.stream, *sensor.textures.values())
     return any(s is not None and hub.wanted(s) for s in streams)

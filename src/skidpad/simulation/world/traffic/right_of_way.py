@@ -95,7 +95,7 @@ def _waits(view: View, d: Drivers, i: int, k: int, start: float, line: float, co
     entry = view.streets.entry[lane]
     for c in range(entry.first, entry.first + entry.size):
         conflict = view.streets.conflict[c]
-        if _occupied(view, i, conflict.other, conflict.other_start, conflict.other_end):
+        if _is_occupied(view, i, conflict.other, conflict.other_start, conflict.other_end):
             return True
         if not conflict.yields:
             if control == LIGHT and _lets_turn(view, d, i, conflict.other):
@@ -188,7 +188,7 @@ def _travel_time(v: float, way: float, a: float, v_max: float) -> float:
 
 
 @inner_kernel
-def _occupied(view: View, i: int, lane: int, start: float, end: float) -> bool:
+def _is_occupied(view: View, i: int, lane: int, start: float, end: float) -> bool:
     """Whether a body other than i's is on [start, end] of a lane."""
     entry = view.occ.head[lane]
     while entry != NOBODY:
@@ -210,7 +210,7 @@ def _taken_ahead(view: View, d: Drivers, i: int, k: int, start: float) -> float:
         gap = start + conflict.start
         if gap < 0.0 or gap > nearest:
             continue
-        if _occupied(view, i, conflict.other, conflict.other_start, conflict.other_end):
+        if _is_occupied(view, i, conflict.other, conflict.other_start, conflict.other_end):
             nearest = gap
     return nearest
 
@@ -241,7 +241,7 @@ def _is_coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: fl
         way = zone + view.streets.net.lane[first].length
         if _arrives(view, d, i, first, lane, way, clear):
             return True
-        if way > _watched(view, V_COMING, clear):
+        if way > _watch_distance(view, V_COMING, clear):
             continue
         row_2 = view.streets.net.lane[first]
         for q in range(row_2.prev_first, row_2.prev_first + row_2.prevs):
@@ -254,7 +254,7 @@ def _is_coming(view: View, d: Drivers, i: int, lane: int, zone: float, clear: fl
 
 
 @inner_kernel
-def _watched(view: View, v: float, clear: float) -> float:
+def _watch_distance(view: View, v: float, clear: float) -> float:
     """m before the shared area in which somebody at speed v matters for `clear` s."""
     return max(WATCH, v * clear) if view.care.on else WATCH
 
@@ -277,7 +277,7 @@ def _arrives(
         distance = way - view.occ.s[entry] - view.placed[j].half_length
         v = max(view.placed[j].v, 0.0)
         entry_now, entry = entry, view.occ.next[entry]
-        far = distance > _watched(view, v, clear)
+        far = distance > _watch_distance(view, v, clear)
         if j == i or far or distance < -2.0 * view.placed[j].half_length:
             continue
         if v < HALTED and (distance > QUEUE_REACH or d.state[i].waited > PATIENCE):

@@ -104,7 +104,10 @@ def _tail_marks(
         if would_hit(max(gap, 0.0), *map(float, about)):
             marks.append(
                 Mark(
-                    hazard, t, f"actor {int(truth.ids[i])}", seen=_reported(truth.actors[i], frames)
+                    hazard,
+                    t,
+                    f"actor {int(truth.ids[i])}",
+                    seen=_is_reported(truth.actors[i], frames),
                 )
             )
     return marks
@@ -146,7 +149,7 @@ def would_hit(
     return bool((gap + leader - follower).min() <= 0.0)
 
 
-def _reported(actor: Floats, frames: Sequence[ChannelFrame | None], within: float = 3.0) -> bool:
+def _is_reported(actor: Floats, frames: Sequence[ChannelFrame | None], within: float = 3.0) -> bool:
     """Whether any channel has an object within `within` m of the actor."""
     return any(
         bool((np.hypot(*(frame.objects[:, :2] - actor[:2]).T) < within).any())

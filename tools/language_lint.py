@@ -36,7 +36,7 @@ _IRREGULAR = (
 )  # fmt: skip
 IRREGULAR = frozenset(re.findall(r"\w+", _IRREGULAR))
 NOT_PARTICIPLES = frozenset({"bed", "embed", "exceed", "feed", "need", "seed", "speed", "shed"})
-PERSONS = re.compile(r"\b(who|whom|whose|whoever|somebody|nobody|anybody)\b", re.IGNORECASE)
+PERSONS = re.compile(r"\b(who|whoever|somebody|nobody|anybody)\b", re.IGNORECASE)
 THEATRE_WORDS = frozenset(
     {
         "cast",

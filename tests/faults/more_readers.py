@@ -87,7 +87,7 @@ def replay(path: Path) -> object:
     recorder, player = Recorder(path.parent), Replayer()
     recorder.summary(path.name, show_all=True)
     recorder.collisions(path.name)
-    recorder.blocked(path.name, 0.1, 1.0)
+    recorder.describe_blocked(path.name, 0.1, 1.0)
     player.start(served().episode, recorder.recording(path.name), 0.0, 0.0, 0)
     for _ in range(3):
         player.tick(0.05)

@@ -104,7 +104,7 @@ class Recorder:
         self._file.write(line + "\n")
 
     def summary(self, name: str, show_all: bool = False) -> str:
-        """Returns what `show_recorder_file_info` prints."""
+        """Returns the text that `show_recorder_file_info` prints."""
         with _explain_failure(name):
             return describe_recording(*self._read_with_start(name), show_all)
 
@@ -113,8 +113,8 @@ class Recorder:
         with _explain_failure(name):
             return list_collisions(*self._read_with_start(name), first, second)
 
-    def blocked(self, name: str, seconds: float, cm: float) -> str:
-        """Returns what `show_recorder_actors_blocked` prints."""
+    def describe_blocked(self, name: str, seconds: float, cm: float) -> str:
+        """Returns the text that `show_recorder_actors_blocked` prints."""
         with _explain_failure(name):
             return list_blocked(*self._read_with_start(name), seconds, cm)
 

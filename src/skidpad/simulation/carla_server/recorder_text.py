@@ -15,7 +15,7 @@ from typing import Any
 from skidpad.simulation.carla_server.replayer import HERO
 
 Head = dict[str, Any]
-Tick = list[Any]  # frame, s of the episode, poses, contacts, who is new, controls
+Tick = list[Any]  # frame, s of the episode, poses, contacts, new actors, controls
 CM = 100.0  # per metre
 VERSION = 1
 NO_ACTOR = 2**32 - 1  # the other side of a contact with the scenery
@@ -60,7 +60,7 @@ def list_collisions(head: Head, ticks: list[Tick], start: float, first: str, sec
 
 
 def list_blocked(head: Head, ticks: list[Tick], start: float, seconds: float, cm: float) -> str:
-    """Returns the text of `show_recorder_actors_blocked`: who stood for so long, longest first.
+    """Returns the text of `show_recorder_actors_blocked`: actors that stood for so long, longest first.
 
     seconds: shortest time worth telling; cm: an actor that moves less from its place stands.
     """
@@ -94,7 +94,7 @@ def _tail(ticks: list[Tick], start: float) -> str:
 
 
 def _event_lines(tick: Tick, known: dict[int, dict[str, Any]]) -> Iterator[str]:
-    """Actors that come and go, and contacts. `known` holds the attributes of who is there."""
+    """Actors that come and go, and contacts. `known` holds the attributes of those that are there."""
     there = {id: xyz for id, xyz, _ in tick[2]}
     for id, blueprint, attributes in tick[4]:
         known[id] = attributes

@@ -54,7 +54,7 @@ def _actor_kind(value: Any) -> str:
 def show_recorder_actors_blocked(served: Served, name: Any, seconds: Any, distance: Any) -> str:
     """Returns the actors that stood for longer than `seconds`, in CARLA's words; distance in cm."""
     least, cm = wire.number(seconds, "min_time"), wire.number(distance, "min_distance")
-    return served.recorder.blocked(wire.text(name, "file name"), least, cm)
+    return served.recorder.describe_blocked(wire.text(name, "file name"), least, cm)
 
 
 @TABLE.method("replay_file")

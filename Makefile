@@ -9,7 +9,7 @@ TEST_ARGS ?=
 DRIVE_ARGS ?=
 NIGHTLY_ARGS ?=
 
-.PHONY: cockpit run published results test test-all test-times test-bare check wheel-check bench fuzz nightly soak refs data fleet fleet-load docs figures arm64 channels campaigns tables clean
+.PHONY: cockpit run published results test test-all test-times test-bare check wheel-check bench oracle fuzz nightly soak refs data fleet fleet-load docs figures arm64 channels campaigns tables clean
 
 # ten seeds of every distinct cell on objects, one of them once more on pixels
 run: $(VENV)/.installed
@@ -70,6 +70,11 @@ nightly: $(VENV)/.tested-with
 # the CARLA server and a worker for hours; goes on where it was stopped
 soak: $(VENV)/.tested-with
 	$(BIN)/python tools/nightly.py --only soak-server soak-worker $(NIGHTLY_ARGS)
+
+# files of others against the stored trajectories of esmini: make oracle CORPUS=DIR
+CORPUS ?= corpus
+oracle: $(VENV)/.tested-with
+	$(BIN)/python tools/scenario_oracle.py compare $(CORPUS)
 
 bench: $(VENV)/.installed
 	$(BIN)/skidpad bench

@@ -16,6 +16,7 @@ from skidpad.core.geometry import Pose, wrap_angle
 STEP = 0.25  # m between the points of a curve
 STEPS_MAX = 200_000
 NEAR = 1e-9  # m, points closer than this are one place
+CORNER = 2.0  # m before and behind a corner in which headings that nobody names turn, as in esmini
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,6 +61,16 @@ class Line:
     def at_length(self, s: float) -> Pose:
         """The pose at length s, clamped to the line."""
         return self._between(*self._find(self.s, s))
+
+    def tangent(self, s: float) -> float:
+        """Returns the direction in which the line runs at length s, rad, whatever headings it names."""
+        k, _ = self._find(self.s, s)
+        return self._course(k)
+
+    def names_heading(self, s: float) -> bool:
+        """Returns whether the vertices say how an entity looks at length s."""
+        k, _ = self._find(self.s, s)
+        return self.named[k] is not None
 
     def at_time(self, t: float) -> Pose:
         """The pose at time t, clamped to the line; linear between points."""
@@ -135,12 +146,29 @@ class Line:
             return wrap_angle(a + u * ((b - a + pi) % (2.0 * pi) - pi))
         if a is not None and u == 0.0:
             return wrap_angle(a)
+        here = self._course(k)
+        length = self.s[j] - self.s[k]
+        radius = min(CORNER, 0.5 * length)
+        before, after = u * length, (1.0 - u) * length
+        if before < radius and k > 0 and self.named[k - 1] is None:
+            return self._mixed(self._course(k - 1), here, 0.5 + 0.5 * before / radius)
+        if after < radius and j < len(self.x) - 1 and b is None:
+            return self._mixed(here, self._course(j), 0.5 - 0.5 * after / radius)
+        return here
+
+    @staticmethod
+    def _mixed(a: float, b: float, u: float) -> float:
+        return wrap_angle(a + u * wrap_angle(b - a))
+
+    def _course(self, k: int) -> float:
+        """Direction of the segment that begins at vertex k, or of the nearest one with a length, rad."""
+        j = min(k + 1, len(self.x) - 1)
         while j < len(self.x) - 1 and hypot(self.x[j] - self.x[k], self.y[j] - self.y[k]) < NEAR:
             j += 1
         while k > 0 and hypot(self.x[j] - self.x[k], self.y[j] - self.y[k]) < NEAR:
             k -= 1
-        if j == k:
-            return 0.0 if a is None else wrap_angle(a)
+        if j == k or hypot(self.x[j] - self.x[k], self.y[j] - self.y[k]) < NEAR:
+            return wrap_angle(self.named[k] or 0.0)
         return atan2(self.y[j] - self.y[k], self.x[j] - self.x[k])
 
 

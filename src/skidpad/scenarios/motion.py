@@ -81,6 +81,7 @@ class Guide:
         self.free = pose  # where there is no lane: straight on
         self.v, self.a = v, 0.0
         self.pace: float | None = None  # speed of this step's way, where it is not v
+        self.aside = 0.0  # m sideways in this step, without a heading of its own
         self.leap = 0.0  # m along the way that this step puts it further, without a speed
         self.offset = 0.0 if point is None else point.offset
         self.offset_rate = self.offset_bend = 0.0
@@ -142,12 +143,12 @@ class Guide:
     def ideal(self, dt: float) -> Pose:
         """The pose of an actor that does exactly as demanded, one step on."""
         v, self.pace = self.v if self.pace is None else self.pace, None
-        leap, self.leap = self.leap, 0.0
+        leap, aside, self.leap, self.aside = self.leap, self.aside, 0.0, 0.0
         way = v * dt
         if self.base is None:
             self.free = self.free.moved(forward=way + leap)
             return self.free
-        sideways = min(abs(self.offset_rate) * dt, abs(way))
+        sideways = min(abs(self.offset_rate) * dt + abs(aside), abs(way))
         forward = sqrt(way * way - sideways * sideways)
         squeezed = max(1.0 - self.base.curvature * self.offset, SQUEEZED)
         distance = self.along * ((forward if way >= 0.0 else -forward) + leap) / squeezed

@@ -110,6 +110,7 @@ class Actor:
     controller: Controlling | None = None  # active, of an actor other than the ego
     worked: dict[str, Any] = field(default_factory=dict)  # inputs that the file works, by name
     a: float = 0.0  # m/s^2 of the speed
+    acceleration: Point = (0.0, 0.0)  # m/s^2 in the world
     travelled: float = 0.0  # m
     stood: float = 0.0  # s
     off_since: float | None = None  # s, when it left the road, if somebody asks
@@ -125,6 +126,11 @@ class Actor:
     def v(self) -> float:
         """Speed over ground, m/s."""
         return hypot(self.motion.vx, self.motion.vy)
+
+    @property
+    def v_signed(self) -> float:
+        """Speed over ground, m/s, negative backwards."""
+        return self.v if self.motion.speed >= 0.0 else -self.v
 
     @property
     def driven_by_file(self) -> bool:
@@ -241,6 +247,7 @@ class Actor:
     def _placed(self, t: float, dt: float) -> ActorCommand:
         if self.track is not None:
             pose, v, _ = self.track.at(t)
+            v = v if self.track.timed else self.guide.v
         else:
             pose, v = self.guide.ideal(dt), self.guide.v
             if self.guide.at_end:
@@ -270,7 +277,7 @@ class Actor:
 
         z: of the ground, m, for whom the file does not place.
         """
-        v = self.v
+        v, before, stood = self.v, self.motion, self.v < STANDING
         self.motion = motion
         dt, self.seen = dt if self.seen else 0.0, True
         box = self.entity.box
@@ -278,9 +285,12 @@ class Actor:
         if box.forward or box.left:
             at = at.moved(forward=-box.forward, left=-box.left)
         self.pose = at
-        self.a = (self.v - v) / dt if dt > 0.0 else 0.0
+        self.a, self.acceleration = 0.0, (0.0, 0.0)
+        if dt > 0.0:
+            self.a = (self.v - v) / dt
+            self.acceleration = (motion.vx - before.vx) / dt, (motion.vy - before.vy) / dt
         self.travelled += self.v * dt
-        self.stood = self.stood + dt if self.v < STANDING else 0.0
+        self.stood = self.stood + dt if stood and self.v < STANDING else 0.0
         self.at_end = self.at_end + dt if self.guide.at_end else 0.0
 
 

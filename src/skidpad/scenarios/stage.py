@@ -10,7 +10,7 @@ import csv
 import io
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import cos, hypot, sin
+from math import copysign, cos, hypot, sin
 
 import numpy as np
 
@@ -32,7 +32,10 @@ KINDS = {
 
 @dataclass(frozen=True, slots=True)
 class Row:
-    """One entity at one time; the place of its reference point, m, rad, m/s."""
+    """One entity at one time; the place of its reference point, m, rad, m/s.
+
+    speed: over ground, negative backwards.
+    """
 
     time: float
     id: int
@@ -143,6 +146,7 @@ def _rows(player: Player, stage: Stage) -> list[Row]:
         yaw, box = float(s.yaw[k]), actor.entity.box
         x = float(s.x[k]) - box.forward * cos(yaw) + box.left * sin(yaw)
         y = float(s.y[k]) - box.forward * sin(yaw) - box.left * cos(yaw)
-        v = hypot(float(s.vx[k]), float(s.vy[k]))
+        vx, vy = float(s.vx[k]), float(s.vy[k])
+        v = copysign(hypot(vx, vy), vx * cos(yaw) + vy * sin(yaw))
         found.append(Row(t, i, name, x, y, float(s.z[k]), yaw, v))
     return found

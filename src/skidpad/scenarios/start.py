@@ -14,6 +14,7 @@ from skidpad.core.geometry import Pose
 from skidpad.scenarios.actions.base import GlobalAction, PrivateAction
 from skidpad.scenarios.actions.controllers import Activate, Several
 from skidpad.scenarios.actions.distance import KeepGap
+from skidpad.scenarios.actions.lateral import LaneChange, LaneOffset
 from skidpad.scenarios.actions.private import private_action
 from skidpad.scenarios.actions.routing import FollowTrajectory, Teleport
 from skidpad.scenarios.actions.speed import Speed, limited
@@ -28,7 +29,8 @@ from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.environment import Environment
 from skidpad.scenarios.findings import Fault
-from skidpad.scenarios.motion import Guide
+from skidpad.scenarios.measures import Point, corners
+from skidpad.scenarios.motion import Guide, Shape
 from skidpad.scenarios.network import Network, Place
 from skidpad.scenarios.positions import Position
 from skidpad.scenarios.scene import Actor, Scene
@@ -115,12 +117,22 @@ def _handed(wishes: Mapping[str, _Wish]) -> Iterator[tuple[str, bool]]:
                 yield name, action.says
 
 
+def is_step_of_place(action: PrivateAction) -> bool:
+    """Returns whether an action puts its entity somewhere else without taking time."""
+    if isinstance(action, KeepGap):
+        return action.limits.none
+    if isinstance(action, LaneChange):
+        return action.at_once
+    return isinstance(action, LaneOffset) and action.shape is Shape.STEP
+
+
 class _Starting:
     """An entity whose place and speed are worked out when somebody asks; looks like an actor."""
 
     def __init__(self, name: str, wish: _Wish, ctx: Context, scene: Scene) -> None:
         self.name, self.wish, self.ctx, self.scene = name, wish, ctx, scene
         self.entity = ctx.entities[name]
+        self.guide = Guide(ctx.network, Place(ORIGIN), 0.0)
         self._known: dict[str, Any] = {}
         self._so_far: Place | None = None  # where the teleports before the one at hand have put it
 
@@ -146,17 +158,22 @@ class _Starting:
             first = action.first if isinstance(action, FollowTrajectory) else None
             if first is not None:
                 self._so_far = self.ctx.network.place_of(first)
-            elif isinstance(action, KeepGap) and action.limits.none:
-                self._so_far = self._at_distance(action)
+            elif is_step_of_place(action):
+                self._so_far = self._moved(action)
         return self._so_far or self.ctx.network.place_of(ORIGIN)
 
-    def _at_distance(self, action: KeepGap) -> Place:
-        """Where a distance without limits puts it: along its lane, else straight on."""
+    def _moved(self, action: PrivateAction) -> Place:
+        """Where an action that takes no time puts it: along its lane, aside, or straight on."""
         itself, network = cast("Actor", self), self.ctx.network
         here = self._so_far = self._so_far or network.place_of(ORIGIN)
-        excess = action.excess(self.scene, itself, action.resolved_side(self.scene, itself))
-        guide = Guide(network, here, 0.0)
-        guide.leap = excess
+        self.guide = guide = Guide(network, here, 0.0)
+        if isinstance(action, KeepGap):
+            guide.leap = action.excess(self.scene, itself, action.resolved_side(self.scene, itself))
+        elif isinstance(action, LaneChange):
+            end = action.aim(self.scene, self.name, guide)
+            guide.offset = guide.offset if end is None else end
+        elif isinstance(action, LaneOffset):
+            guide.offset = action.target(self.scene, itself)
         pose = guide.ideal(0.0)
         return network.place_of(pose) if guide.base is None else guide.place(pose)
 
@@ -164,6 +181,10 @@ class _Starting:
     def pose(self) -> Pose:
         """As an actor has it."""
         return self.place(self.ctx.network).pose
+
+    def outline(self) -> list[Point]:
+        """Corners on the ground."""
+        return corners(self.pose, self.entity.box)
 
     @property
     def v_told(self) -> float:
@@ -196,7 +217,8 @@ def _worked_out(
             place = None if name in gone else one.place(ctx.network)
             if not one.wish.positions and name in ctx.added:
                 place = None
-            yield name, Begin(place, one.v_told, tuple(one.wish.actions))
+            left = (a for a in one.wish.actions if not (isinstance(a, LaneChange) and a.at_once))
+            yield name, Begin(place, one.v_told, tuple(left))
         except Fault as fault:
             ctx.findings.append(fault.finding)
             yield name, Begin(None, 0.0)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import atan2, cos, hypot, sin
+from dataclasses import replace
+from math import atan2, cos, hypot, pi, sin
 from typing import Protocol
 
 from skidpad.core.geometry import Pose, wrap_angle
@@ -11,6 +12,8 @@ from skidpad.scenarios.lines import Line
 from skidpad.simulation.scripted import Demand, Motion
 
 NEAR = 1e-6  # m, nothing moves
+JUST = 1e-9  # s before a vertex, whose speed is that of the stretch that ends there
+SQUARE = 1e-6  # cosine between heading and line that still is not against the line
 
 
 class Track(Protocol):
@@ -49,7 +52,7 @@ class TimedTrack:
         if t > self.end:
             return pose.moved(forward=self.v_end * (t - self.end)), self.v_end, 0.0
         moving = self.first < t <= self.end + 1e-9
-        return pose, self.line.speed_at(own) / self.scale if moving else 0.0, 0.0
+        return pose, self.line.speed_at(own - JUST) / self.scale if moving else 0.0, 0.0
 
     def way_to(self, place: Pose, t: float) -> float:
         """Returns the way along the line from its place at time t to the point nearest to a place, m."""
@@ -67,41 +70,51 @@ class TimedTrack:
 
 
 class PacedTrack:
-    """A line at the speed that the actor is asked for: `s` grows by its steps."""
+    """A line at the speed that the actor is asked for when its turn comes in a step.
+
+    sense: -1 for an actor that looks against the line, else 1. It comes from the headings that the
+    line names, else from the sign of the speed at the begin: rear first along the line.
+    """
 
     timed = False
 
-    def __init__(
-        self, line: Line, s: float, t: float, closed: bool, v: Callable[[], float]
-    ) -> None:
+    def __init__(self, line: Line, s: float, t: float, closed: bool, v: float) -> None:
         self.line, self.s, self.t, self.closed, self.v = line, s, t, closed, v
+        self.sense = 1.0
+        if line.names_heading(s):
+            self.sense = 1.0 if cos(line.at_length(s).yaw - line.tangent(s)) > -SQUARE else -1.0
+        elif v < 0.0:
+            self.sense = -1.0
 
     def at(self, t: float) -> tuple[Pose, float, float]:
-        """Pose and speed at time t, for the moment's speed."""
-        v = self.v()
-        s = self.s + v * (t - self.t)
+        """Pose and speed at time t, for this step's speed; beyond its ends straight on."""
+        v = self.v
+        s = self.s + self.sense * v * (t - self.t)
         if self.closed:
             s %= self.line.length
-        return self.line.at_length(s), v, 0.0
+        pose = self.line.at_length(s)
+        if self.sense < 0.0 and not self.line.names_heading(s):
+            pose = replace(pose, yaw=wrap_angle(pose.yaw + pi))
+        beyond = s - min(max(s, 0.0), self.line.length)
+        return (pose.moved(forward=self.sense * beyond) if beyond else pose), v, 0.0
 
     def way_to(self, place: Pose, t: float) -> float:
-        """Returns the way along the line from its place at time t to the point nearest to a place, m."""
-        del t
-        way = self.line.nearest(place.x, place.y) - self.s
+        """Returns the way along the line from its place a step on to the point nearest to a place, m."""
+        way = self.line.nearest(place.x, place.y) - self.s - self.sense * self.v * (t - self.t)
         return way % self.line.length if self.closed else way
 
     def skip(self, way: float) -> None:
         """Be `way` m further along the line."""
         self.s += way
 
-    def step(self, t: float) -> bool:
-        """Go on to time t; True at the end of the line."""
-        self.s += self.v() * (t - self.t)
-        self.t = t
+    def step(self, t: float, v: float) -> bool:
+        """Go on to time t, from there at v; True at the end of the line, back at its begin likewise."""
+        move = self.sense * self.v * (t - self.t)
+        self.s, self.t, self.v = self.s + move, t, v
         if self.closed:
             self.s %= self.line.length
             return False
-        return self.s >= self.line.length - 1e-6
+        return self.s >= self.line.length - 1e-6 or (move < 0.0 and self.s <= 1e-6)
 
 
 def course(track: Track, t: float, dt: float) -> float:

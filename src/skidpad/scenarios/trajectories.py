@@ -213,9 +213,13 @@ class OnTrajectory:
     facing: Orientation
 
     def place(self, scene: Scene) -> Place:
-        """On the line as it is now."""
-        pose = self.trajectory.traced(scene).at_length(self.s).moved(left=self.t)
-        return scene.network.place_of(replace(pose, yaw=self.facing.turned(pose.yaw)))
+        """Returns the place on the line as it is now; left of the way that the line runs."""
+        line = self.trajectory.traced(scene)
+        pose = line.at_length(self.s)
+        tangent = line.tangent(self.s)
+        spot = replace(pose, yaw=tangent).moved(left=self.t)
+        facing = self.facing.turned(tangent)
+        return scene.network.place_of(replace(spot, yaw=facing))
 
 
 def trajectory_position(node: Node, ctx: Context) -> Position:

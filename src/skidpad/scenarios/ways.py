@@ -13,10 +13,11 @@ def way_to(scene: Scene, actor: Actor, goal: Place) -> float:
     """Returns how far an entity has to go to a place on the way that it takes, m.
 
     A trajectory that leads it comes first, then its lane and those that follow. Where neither
-    leads to the place the distance is straight.
+    leads to the place the distance is straight. As in esmini, what is led along a trajectory has made
+    this step already when its other actions have their turn.
     """
     if actor.track is not None:
-        return abs(actor.track.way_to(goal.pose, scene.t))
+        return abs(actor.track.way_to(goal.pose, scene.t + scene.dt))
     here = actor.place(scene.network).lane
     if here is not None and goal.lane is not None:
         way = lane_way(scene.network, here, goal.lane)

@@ -9,7 +9,7 @@ from math import copysign, inf, sqrt
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Performance
-from skidpad.scenarios.measures import Axes, along_road
+from skidpad.scenarios.measures import Axes, along_road, between
 from skidpad.scenarios.scene import Actor, Running, Scene
 
 SPRING = 0.4  # 1/m, of the controller that closes a gap (esmini's, so that files play alike)
@@ -85,18 +85,18 @@ class KeepGap:
         return self.ahead(scene, actor) - self.wanted(scene, side)
 
     def ahead(self, scene: Scene, actor: Actor) -> float:
-        """How far the other one is ahead, m; its length and half the own one taken off if free."""
+        """Returns how far the other one is ahead, m; between the outlines if free, 0 abreast."""
         other = scene.actors[self.other]
         found = along_road(scene.network, actor.pose, other.pose) if self.road else None
         gap = found[0] if found else scene.between(actor.name, self.other)[0]
         if not self.free:
             return gap
-        own, its = actor.entity.box, other.entity.box
+        own = actor.entity.box
+        shift = gap - scene.between(actor.name, self.other)[0]  # of a road that is not straight
+        its = [between(actor.pose, x, y)[0] + shift for x, y in other.outline()]
         if gap >= 0.0:
-            room = (its.forward - its.length / 2.0) - (own.forward + own.length / 2.0)
-            return max(gap + room, 0.0)
-        room = (its.forward + its.length / 2.0) - (own.forward - own.length / 2.0)
-        return min(gap + room, 0.0)
+            return max(min(its) - own.forward - own.length / 2.0, 0.0)
+        return min(max(its) - own.forward + own.length / 2.0, 0.0)
 
     def wanted(self, scene: Scene, side: Displacement) -> float:
         """How far the other one should be ahead, m."""

@@ -11,7 +11,7 @@ from skidpad.scenarios.actions.base import Dimension, Dynamics, dynamics
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.measures import Axes, between
-from skidpad.scenarios.motion import SHARPEST, SLOW, Shape, Transition
+from skidpad.scenarios.motion import SHARPEST, SLOW, Guide, Shape, Transition
 from skidpad.scenarios.network import next_lane_id
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 
@@ -84,28 +84,37 @@ class LaneChange:
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From where the entity is now."""
-        network = scene.network
-        actor.leave_track(network)
-        actor.catch_up(network)
+        actor.leave_track(scene.network)
+        actor.catch_up(scene.network)
         guide = actor.guide
-        here = guide.base
-        target = self.target(scene)
-        if here is None or target is None:
-            scene.notice(f"{actor.name} changes no lane: it or its reference is on none")
+        end = self.aim(scene, actor.name, guide)
+        if end is None:
             return DONE
-        lanes = target - here.lane_id
-        forward = network.forward(here)
-        if guide.shift_to(target) is None:  # it may begin further on; keep beside the own lane
-            end = guide.offset + (lanes if forward else -lanes) * here.width
-            scene.notice(f"{actor.name}: there is no lane {target} beside it yet")
-        else:
-            now = guide.base
-            end = self.offset if now is None or network.forward(now) else -self.offset
         span = self.dynamics.span(end - guide.offset)
         change = Transition(guide.offset, end, span, self.dynamics.shape)
         by_way = self.dynamics.dimension is Dimension.DISTANCE
         actor.lateral = ChangeOfOffset(actor, change, by_way=by_way, to_lane=True)
         return actor.lateral
+
+    @property
+    def at_once(self) -> bool:
+        """It takes no time."""
+        return self.dynamics.span(1.0) <= 0.0
+
+    def aim(self, scene: Scene, name: str, guide: Guide) -> float | None:
+        """Makes the new lane the reference of a guide; returns the offset in it, None without lanes."""
+        network, here = scene.network, guide.base
+        target = self.target(scene)
+        if here is None or target is None:
+            scene.notice(f"{name} changes no lane: it or its reference is on none")
+            return None
+        lanes = target - here.lane_id
+        forward = network.forward(here)
+        if guide.shift_to(target) is None:  # it may begin further on; keep beside the own lane
+            scene.notice(f"{name}: there is no lane {target} beside it yet")
+            return guide.offset + (lanes if forward else -lanes) * here.width
+        now = guide.base
+        return self.offset if now is None or network.forward(now) else -self.offset
 
     def target(self, scene: Scene) -> int | None:
         """Id of the lane to go to; None where the reference is on no lane."""
@@ -224,6 +233,12 @@ class DistanceKept:
         if actor.lateral is not self or guide.base is None:
             return True
         end = self._end(scene, guide.base)
+        if action.v_max == inf and actor.placed_by_file:
+            guide.aside = (
+                end - guide.offset if action.straight else 0.0
+            )  # as esmini: part of its way
+            guide.offset, guide.offset_rate = end, 0.0
+            return not action.continuous
         most = min(action.v_max, abs(guide.v)) * scene.dt
         move = min(max(end - guide.offset, -most), most)
         guide.offset += move

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum, auto
-from math import inf, sqrt
+from math import cos, inf, sqrt
 
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
@@ -100,13 +100,13 @@ class Synchronized:
             guide.a = 2.0 * (own * pace / its - guide.v) / (its / pace)
             guide.v += guide.a * dt
         else:
-            v = max(self._speed(guide.v, own, its / pace, v_end, dt), 0.0)
+            v = max(self._speed(guide.v, own, its / pace, v_end, scene), 0.0)
             guide.a, guide.v = (v - guide.v) / dt, v
         return False
 
-    def _speed(self, v: float, own: float, time: float, v_end: float, dt: float) -> float:
+    def _speed(self, v: float, own: float, time: float, v_end: float, scene: Scene) -> float:
         """At the end of this step, on the way to v_end `own` m and `time` s from now."""
-        steady = self.action.steady
+        steady, dt = self.action.steady, scene.dt
         last = max(steady.distance, steady.time * v_end)
         if last > 0.0 and v_end > 0.0:
             if self.phase is Phase.STEADY or own <= last or time <= last / v_end:
@@ -128,19 +128,26 @@ class Synchronized:
             return v
         if self.phase in (Phase.BEGIN, Phase.WAITING):
             self.phase, self.rising = Phase.AWAY, 0.5 * (v_end + v) < own / time
-        a, turn = away(v, v_end, own, time)
+        v_road = v * self._share_of_road(scene)
+        a, turn = away(v_road, v_end, own, time)
         if (a < 0.0) is self.rising and a != 0.0:
             self.phase = Phase.STRAIGHT
             return v
-        return self._stopping(v, own, v_end, dt) if turn < 0.0 else v + a * dt
+        return self._stopping(v, v_road, own, v_end, dt) if turn < 0.0 else v + a * dt
 
-    def _stopping(self, v: float, own: float, v_end: float, dt: float) -> float:
+    def _share_of_road(self, scene: Scene) -> float:
+        """Part of its speed that runs along the road, of which esmini plans the course away."""
+        pose = self.actor.pose
+        lane = scene.network.place_of(pose).lane
+        return 1.0 if lane is None else abs(cos(pose.yaw - lane.heading))
+
+    def _stopping(self, v: float, v_road: float, own: float, v_end: float, dt: float) -> float:
         """The course would go backwards: stop on the way instead, then go on."""
-        time = 2.0 * v * own / (v * v + v_end * v_end)
-        if time * v / 2.0 > own / 2.0:
+        time = 2.0 * v_road * own / (v_road * v_road + v_end * v_end)
+        if time * v_road / 2.0 > own / 2.0:
             self.phase = Phase.STOPPING
             return v - B_STOP * dt
-        slower = v - (v / time if time > LEAST else 0.0) * dt
+        slower = v - (v_road / time if time > LEAST else 0.0) * dt
         if slower < 0.0:
             self.phase = Phase.STANDING
         return slower

@@ -142,7 +142,7 @@ class FollowTrajectory:
         led: Paced | Timed
         if self.timing is None or line.t is None:
             closed = self.trajectory.closed
-            led = Paced(actor, PacedTrack(line, self.s_begin, scene.t, closed, lambda: guide.v))
+            led = Paced(actor, PacedTrack(line, self.s_begin, scene.t, closed, guide.v))
         else:
             begin = self._zero(line, self.timing, scene.t)
             led = Timed(actor, TimedTrack(line, begin, self.timing.scale))
@@ -178,7 +178,7 @@ class Paced:
         """Until its end; the entity then drives on along its lane."""
         if self.actor.track is not self.track:
             return True
-        if not self.track.step(scene.t):
+        if not self.track.step(scene.t, self.actor.guide.v):
             return False
         self.actor.follow_road(scene.network, self.actor.guide.v)
         return True

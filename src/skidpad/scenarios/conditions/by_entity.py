@@ -13,7 +13,7 @@ from skidpad.scenarios.conditions.base import EntityCondition, Rule, rule
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Body
-from skidpad.scenarios.measures import Axes
+from skidpad.scenarios.measures import Axes, between
 from skidpad.scenarios.network import next_lane_id
 from skidpad.scenarios.positions import Position, position
 from skidpad.scenarios.scene import Actor, Scene
@@ -77,23 +77,20 @@ class Motion:
     other: str | None
 
     def holds(self, scene: Scene, actor: str) -> bool:
-        """Against the value."""
-        value = self._value(scene.actors[actor])
-        if self.other is not None:
-            value -= self._value(scene.actors[self.other])
-        return self.rule.met(value)
-
-    def _value(self, actor: Actor) -> float:
+        """Against the value; a relative one is taken in the axes of the triggering entity."""
+        own = scene.actors[actor]
         if self.component is Component.VERTICAL:
-            return 0.0
-        if self.acceleration:
-            return 0.0 if self.component is Component.LATERAL else actor.a
-        m = actor.motion
+            return self.rule.met(0.0)
         if self.component is Component.TOTAL:
-            return actor.v
-        if self.component is Component.LONGITUDINAL:
-            return m.speed
-        return (m.vx**2 + m.vy**2 - m.speed**2) ** 0.5 if actor.v > abs(m.speed) else 0.0
+            total = own.a if self.acceleration else own.v_signed
+            other = 0.0 if self.other is None else scene.actors[self.other].v_signed
+            return self.rule.met(total - other)
+        x, y = own.acceleration if self.acceleration else (own.motion.vx, own.motion.vy)
+        if self.other is not None:
+            m = scene.actors[self.other].motion
+            x, y = x - m.vx, y - m.vy
+        forward, left = between(Pose(0.0, 0.0, yaw=own.motion.yaw), x, y)
+        return self.rule.met(forward if self.component is Component.LONGITUDINAL else left)
 
 
 def _motion(node: Node, ctx: Context) -> EntityCondition:

@@ -1,7 +1,5 @@
 """The files whose reference trajectories esmini has computed: a table of cases, written by us.
 
-# ruff: noqa: E501  a case is one row
-
 Each case has two moving entities, `ego` and `other`. Triggers at times stand half a step before the
 step that is meant, so that sums of steps round alike in every player.
 """
@@ -9,20 +7,14 @@ step that is meant, so that sums of steps round alike in every player.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
-from math import pi
 
 from tests.scenarios.files import (
-    FILE,
-    by_entity,
-    condition,
     event,
     init,
     on_lane,
     pedestrian,
     private,
     speed,
-    state,
     story,
     synchronize,
     teleport,
@@ -44,101 +36,8 @@ from tests.scenarios.oracle.actions import (
     shape_of,
     timing,
 )
-
-NORTH, WEST = pi / 2, pi
-BEGIN = 0.975  # s
-
-
-@dataclass(frozen=True)
-class Case:
-    """One file: its name, its road, and the parts of its text."""
-
-    name: str
-    road: str
-    parts: dict[str, str] = field(default_factory=dict)
-    end: float = 10.0
-
-    def text(self) -> str:
-        values = {
-            "minor": 2,
-            "parameters": "",
-            "variables": "",
-            "catalogs": "",
-            "road": f'<LogicFile filepath="{self.road}.xodr"/>',
-            "stop": condition(time(self.end - 0.025)),
-        } | self.parts
-        return FILE.format(**values)
-
-
-def moving(name: str, place: str, v: float, *more: str) -> str:
-    return init(name, teleport(place), speed(to(v)), *more)
-
-
-def turned(lane: int, s: float, h: float, offset: float = 0.0) -> str:
-    """A place on a lane with a heading against it."""
-    return f"""<LanePosition roadId="1" laneId="{lane}" s="{s}" offset="{offset}">
-<Orientation type="relative" h="{h}"/></LanePosition>"""
-
-
-# name of a setting: road, kind of the other one, where ego and other begin and how fast
-SETTINGS: dict[str, tuple[str, bool, str, str]] = {
-    "straight": (
-        "straight",
-        False,
-        moving("ego", on_lane(-2, 100), 12),
-        moving("other", on_lane(-1, 130), 10),
-    ),
-    "curve": (
-        "curve",
-        False,
-        moving("ego", on_lane(-2, 60), 12),
-        moving("other", on_lane(-1, 90), 10),
-    ),
-    "hill": (
-        "hill",
-        False,
-        moving("ego", on_lane(-2, 60), 12),
-        moving("other", on_lane(-1, 90), 10),
-    ),
-    "oncoming": (
-        "straight",
-        False,
-        moving("ego", on_lane(-1, 100), 12),
-        moving("other", on_lane(1, 300), 10),
-    ),
-    "crossing": (
-        "cross",
-        False,
-        moving("ego", on_lane(-1, 100), 12),
-        moving("other", on_lane(-1, 90, road=2), 10),
-    ),
-    "reverse": (
-        "straight",
-        False,
-        moving("ego", on_lane(-2, 100), 8),
-        moving("other", on_lane(-1, 200), -6),
-    ),
-    "on_foot": (
-        "straight",
-        True,
-        moving("ego", on_lane(-2, 100), 8),
-        moving("other", on_lane(-1, 130), 1.5),
-    ),
-}
-KNOWN = tuple(SETTINGS)
-
-
-def case(
-    name: str, setting: str, action: str, *, when: str = "", more: str = "", end: float = 10.0
-) -> Case:
-    """The other one does something in a setting; at 1 s, unless `when` says otherwise."""
-    road, walks, ego, other = SETTINGS[setting]
-    entities = vehicle("ego") + (pedestrian("other") if walks else vehicle("other"))
-    stories = (
-        story(event("e", private(action), when or time(BEGIN)), start=when and time(BEGIN)) + more
-    )
-    parts = {"entities": entities, "init": ego + other, "stories": stories}
-    return Case(f"{name}_{setting}", road, parts, end)
+from tests.scenarios.oracle.conditions import conditions
+from tests.scenarios.oracle.settings import BEGIN, NORTH, SETTINGS, WEST, Case, case, moving, turned
 
 
 def ego_does(action: str, t: float = 2.975) -> str:
@@ -373,154 +272,6 @@ def begins() -> Iterator[Case]:
         "stories": story(event("e", ways, time(BEGIN))),
     }
     yield Case("route_crossing", road, parts)
-
-
-def entity_condition(body: str, name: str = "other") -> str:
-    return by_entity(body, name)
-
-
-def measured(tag: str, more: str) -> str:
-    return f"<{tag} {more}/>"
-
-
-def towards(place: str, more: str) -> str:
-    return f"<DistanceCondition {more}><Position>{place}</Position></DistanceCondition>"
-
-
-def near(
-    value: float, kind: str, axes: str = "entity", free: str = "false", rule: str = "lessThan"
-) -> str:
-    return measured(
-        "RelativeDistanceCondition",
-        f'entityRef="ego" relativeDistanceType="{kind}" coordinateSystem="{axes}" freespace="{free}" value="{value}" rule="{rule}"',
-    )
-
-
-def collision_time(
-    value: float, free: str = "false", kind: str = "longitudinal", axes: str = "entity"
-) -> str:
-    return f"""<TimeToCollisionCondition value="{value}" freespace="{free}" rule="lessThan"
-relativeDistanceType="{kind}" coordinateSystem="{axes}"><TimeToCollisionConditionTarget>
-<EntityRef entityRef="other"/></TimeToCollisionConditionTarget></TimeToCollisionCondition>"""
-
-
-def headway(value: float, axes: str = "entity", free: str = "false") -> str:
-    return measured(
-        "TimeHeadwayCondition",
-        f'entityRef="other" value="{value}" freespace="{free}" rule="lessThan" coordinateSystem="{axes}" relativeDistanceType="longitudinal"',
-    )
-
-
-STOP = speed(to(3), "linear", 4, "rate")
-# name: setting, condition, the entity that triggers
-CONDITIONS: dict[str, tuple[str, str, str]] = {
-    "distance_straight": ("straight", near(20.05, "longitudinal"), "other"),
-    "distance_euclidean": ("crossing", near(60.05, "euclidianDistance"), "other"),
-    "distance_free": ("crossing", near(30.05, "euclidianDistance", free="true"), "other"),
-    "distance_lateral": ("crossing", near(40.05, "lateral"), "other"),
-    "distance_across": ("crossing", near(40.05, "longitudinal"), "other"),
-    "distance_road": ("curve", near(20.05, "longitudinal", "road"), "other"),
-    "distance_oncoming": ("oncoming", near(70.05, "longitudinal", free="true"), "other"),
-    "distance_reverse": ("reverse", near(45.05, "longitudinal"), "other"),
-    "distance_on_foot": ("on_foot", near(12.05, "longitudinal", free="true"), "other"),
-    "to_place": (
-        "curve",
-        towards(on_lane(-1, 140), 'value="15.05" freespace="false" rule="lessThan"'),
-        "other",
-    ),
-    "to_place_reverse": (
-        "reverse",
-        towards(on_lane(-1, 170), 'value="5.05" freespace="false" rule="lessThan"'),
-        "other",
-    ),
-    "reached": (
-        "hill",
-        f'<ReachPositionCondition tolerance="3.05"><Position>{on_lane(-1, 150)}</Position></ReachPositionCondition>',
-        "other",
-    ),
-    "travelled": ("curve", '<TraveledDistanceCondition value="35.05"/>', "other"),
-    "travelled_reverse": ("reverse", '<TraveledDistanceCondition value="15.05"/>', "other"),
-    "collision_time": ("straight", collision_time(9.03), "ego"),
-    "collision_time_free": ("oncoming", collision_time(4.03, "true"), "ego"),
-    "collision_time_reverse": ("reverse", collision_time(5.03), "ego"),
-    "collision_time_on_foot": ("on_foot", collision_time(3.03), "ego"),
-    "headway": ("straight", headway(1.83), "ego"),
-    "headway_reverse": ("reverse", headway(9.03), "ego"),
-    "headway_road": ("curve", headway(2.0, "road"), "ego"),
-    "speed_reverse": ("reverse", '<SpeedCondition value="-5" rule="lessThan"/>', "other"),
-    "relative_speed": (
-        "oncoming",
-        '<RelativeSpeedCondition entityRef="ego" value="-1" rule="lessThan"/>',
-        "other",
-    ),
-    "clearance": (
-        "straight",
-        '<RelativeClearanceCondition freeSpace="false" distanceForward="25.05" distanceBackward="0" oppositeLanes="false"><RelativeLaneRange from="1" to="1"/></RelativeClearanceCondition>',
-        "ego",
-    ),
-}
-
-
-def conditions() -> Iterator[Case]:
-    """The other one brakes, or drives on, when a condition of either holds."""
-    for name, (setting, body, by) in CONDITIONS.items():
-        yield case(f"when_{name}", setting, STOP, when=by_entity(body, by))
-    slow = event("slow", private(speed(to(0), "linear", 4, "rate")), time(BEGIN))
-    again = event(
-        "again",
-        private(speed(to(5), "linear", 2)),
-        entity_condition('<StandStillCondition duration="0.975"/>'),
-    )
-    yield _chain("stands", "straight", slow, again)
-    follows = event(
-        "again", private(speed(to(12), "linear", 2)), state("event", "slow", "completeState")
-    )
-    yield _chain("state", "curve", slow, follows)
-    braking = event(
-        "again",
-        private(lane_offset(0.6)),
-        entity_condition(
-            '<AccelerationCondition value="-3" rule="lessThan" direction="longitudinal"/>'
-        ),
-    )
-    yield _chain("acceleration", "straight", slow, braking)
-    aside = event(
-        "aside", private(trajectory((140.0, -1.75), (170.0, -11.0), (250.0, -11.0))), time(BEGIN)
-    )
-    off = event(
-        "off",
-        private(speed(to(4), "linear", 1)),
-        entity_condition('<OffroadCondition duration="0.475"/>'),
-    )
-    end_of_road = SETTINGS["straight"][2] + moving("other", on_lane(-1, 960), 10)
-    parts = {
-        "entities": vehicle("ego") + vehicle("other"),
-        "init": end_of_road,
-        "stories": story(
-            event(
-                "e",
-                private(speed(to(4), "linear", 2)),
-                by_entity('<EndOfRoadCondition duration="0.975"/>', "other"),
-            ),
-            actor="ego",
-        ),
-    }
-    yield Case("when_end_of_road_straight", "straight", parts)
-    yield _chain("off_road", "straight", aside, off)
-    shoulder = event(
-        "aside", private(trajectory((140.0, -1.75), (170.0, -8.0), (250.0, -8.0))), time(BEGIN)
-    )
-    yield _chain("off_road_shoulder", "straight", shoulder, off)
-
-
-def _chain(name: str, setting: str, *events: str) -> Case:
-    road, _, ego, other = SETTINGS[setting]
-    parts = {
-        "entities": vehicle("ego") + vehicle("other"),
-        "init": ego + other,
-        "stories": story(*events),
-    }
-    return Case(f"when_{name}_{setting}", road, parts, 12.0)
 
 
 CASES: dict[str, Case] = {

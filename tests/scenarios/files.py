@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from skidpad.scenarios.scenario import Scenario, compile_scenario
 from skidpad.scenarios.stage import Told, played
@@ -79,7 +80,7 @@ def to(v: object) -> str:
     return f'<AbsoluteTargetSpeed value="{v}"/>'
 
 
-def trajectory(*points: tuple[float, ...], timing: str = "<None/>", attributes: str = "") -> str:
+def trajectory(*points: tuple[Any, ...], timing: str = "<None/>", attributes: str = "") -> str:
     """A polyline through points x, y, perhaps with heading (None: not said) and time."""
     vertices = ""
     for k, (x, y, *more) in enumerate(points):
@@ -158,7 +159,7 @@ def write(folder: Path, **parts: object) -> Path:
         "entities": vehicle("ego") + vehicle("other"),
         "init": at("ego", -3, 100) + at("other", -1, 120),
         "stories": "",
-        "stop": condition(time(parts.pop("end", 6.0))),
+        "stop": condition(time(float(str(parts.pop("end", 6.0))))),
     }
     path = folder / "x.xosc"
     path.write_text(FILE.format(**values | parts), encoding="utf-8")

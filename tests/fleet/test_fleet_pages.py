@@ -25,7 +25,8 @@ from skidpad.fleet.alerting.keeping import What
 from skidpad.fleet.alerting.orders import Order
 from skidpad.fleet.site.acting import click_analyse, click_answer, click_order
 from skidpad.fleet.site.build import pages_of
-from skidpad.fleet.words import NOT_THERE, RIGHTS, Action, Refused
+from skidpad.fleet.site.login import log_in_page
+from skidpad.fleet.words import FIRST_PAGE, NOT_THERE, RIGHTS, Action, Refused
 from stadium import RADIUS, STRAIGHT, WIDTH, written
 
 WAIT_MS = 120_000
@@ -129,7 +130,7 @@ def test_every_page_for_every_role_and_foreign_id(tmp_path):
     world.close()
     shown = {"/": RED, "/replay/{hazard}": RED, "/alerts": RED, "/changes": name}
     pages = pages_of(None, None)  # what they read and draw is not asked for here
-    assert set(shown) | {"/places", "/case"} == set(pages)
+    assert set(shown) | {"/places", "/case", "/research"} == set(pages)
     child, address = served(tmp_path / "data")
     with child:
         try:
@@ -158,8 +159,28 @@ def test_every_page_for_every_role_and_foreign_id(tmp_path):
                             assert [i for i in ids if i in text] == [], about
         finally:
             os.kill(child.pid, signal.SIGTERM)
-    for who in ("researcher", "red-1"):
-        assert who not in people
+    assert "researcher" in people
+    assert "red-1" not in people
+
+
+def test_each_role_that_may_visit_lands_on_a_page_that_it_may_read():
+    pages = pages_of(None, None)
+    first = {role.value: path for role, path in FIRST_PAGE.items()}
+    assert first == {
+        "manufacturer": "/", "operator": "/", "teleoperator": "/alerts", "authority": "/places",
+        "researcher": "/research",
+    }  # fmt: skip
+    assert set(FIRST_PAGE) == RIGHTS[Action.VISIT]
+    for role, path in FIRST_PAGE.items():
+        assert role in RIGHTS[pages[path].action], role
+
+
+def test_a_log_in_page_asks_in_one_sentence_and_shows_what_was_wrong_as_text():
+    page = log_in_page("<b>used</b>")
+    assert "&lt;b&gt;used" in page
+    assert page.count("<input") == 1
+    assert page.split("<p>")[1].split("</p>")[0].count(".") == 1
+    assert "action=" not in page  # a credential never goes into an address
 
 
 def test_roads_are_those_of_ones_own_maps_and_of_bundled_ones(tmp_path):
@@ -301,17 +322,40 @@ def teleoperator(browser, address, tokens) -> None:
     page.context.close()
 
 
+def logs_in(page, address, tokens) -> None:
+    """A wrong credential is refused, a good one opens the role's first page, an address too, once."""
+    invitation = opened(address, tokens["red teleoperator"])
+    for given, end in (
+        ("no credential", "is not known"),
+        (tokens["researcher"], f"{address}/research"),
+        (invitation, f"{address}/alerts"),
+        (invitation, "was used already"),
+    ):
+        page.context.clear_cookies()
+        page.goto(f"{address}/")
+        page.get_by_label("One-time address or credential").fill(given)
+        if picture := os.environ.get("SKIDPAD_PICTURES"):
+            page.screenshot(path=f"{picture}/log-in-{page.viewport_size['width']}.png")
+        page.get_by_role("button", name="Log in").click()
+        if end.startswith("http"):
+            page.wait_for_url(end)
+            page.get_by_text("may not").first.wait_for(state="detached")
+        else:
+            page.get_by_role("alert").get_by_text(end).wait_for()
+        assert "token" not in page.url or "used" in end
+
+
 def strangers(browser, address, tokens) -> None:
     """Roles see their own pages; nobody without a session sees any."""
     page = visit(browser, opened(address, tokens["authority"]))
-    page.get_by_text("may not read trends").wait_for()
-    page.goto(f"{address}/places")
     page.get_by_text("9 hazards").wait_for()
+    page.goto(f"{address}/")  # leads on to the first page of the role
+    page.wait_for_url(f"{address}/places")
     page.goto(f"{address}/case")
     page.get_by_text(": open").first.wait_for()  # three vehicles prove nothing
     page.context.close()
     page = visit(browser, f"{address}/")
-    assert "this page needs the address" in page.content()
+    logs_in(page, address, tokens)
     page.context.close()
     assert "/api/v1/hazards" in call("GET", f"{address}/api/v1/openapi.json").json()["paths"]
     socket = f"{address}/_nicegui_ws/socket.io/?EIO=4&transport=polling"

@@ -44,11 +44,13 @@ class House:
         return self.sessions.admit(self.sessions.invite(who))
 
     def ask(
-        self, kind="http", *, host=HOST, origin=None, cookie=None, path="/", query="", method="GET"
-    ):
+        self, kind="http", *, host=HOST, origin=None, cookie=None, path="/", query="", method="GET",
+        accept=None,
+    ):  # fmt: skip
         headers = [(b"host", host.encode())] if host is not None else []
         headers += [(b"origin", origin.encode())] if origin is not None else []
         headers += [(b"cookie", f"skidpad-8123={cookie}".encode())] if cookie else []
+        headers += [(b"accept", accept.encode())] if accept else []
         scope = {"type": kind, "path": path, "query_string": query.encode(), "headers": headers}
         scope |= {"method": method} if kind == "http" else {}
         answers = []
@@ -126,6 +128,28 @@ def test_a_token_opens_one_session_and_leaves_the_address():
     assert "set-cookie" not in headers(reopened)
     house.sessions.end(cookie)
     assert status(house.ask(cookie=cookie)) == 403
+
+
+def test_a_log_in_page_is_the_body_of_a_refusal_and_lets_nobody_in():
+    house, html = House(log_in=lambda wrong: f"<p>log in{wrong}"), "text/html,*/*"
+    first = house.ask(accept=html)
+    assert (status(first), first[1]["body"]) == (403, b"<p>log in")
+    assert "content-security-policy" in headers(first)
+    used = house.ask(accept=html, query="token=never")
+    assert status(used) == 403
+    assert b"log in" in used[1]["body"]
+    assert b"used already" in used[1]["body"]
+    for rest in (
+        {"host": "evil.example"},
+        {"origin": THEIRS},
+        {"method": "POST", "origin": OURS},
+        {"accept": "application/json"},
+    ):
+        answer = house.ask(**{"accept": html} | rest)
+        assert status(answer) == 403, rest
+        assert b"log in" not in answer[1]["body"], rest
+    assert status(house.ask("websocket", origin=OURS, accept=html)) == "websocket.close"
+    assert house.behind.seen == []
 
 
 def test_a_token_counts_for_pages_alone():

@@ -13,6 +13,7 @@ import uvicorn
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.build import make_site
 from skidpad.fleet.site.dashboard import MapLines
+from skidpad.fleet.site.login import log_in_page
 from skidpad.fleet.upkeep import Upkeep
 from skidpad.pages.guard import Door, Guard
 from skidpad.pages.server import bound, host_headers
@@ -45,6 +46,7 @@ def run(fleet: Fleet, listen: Listen, lines: MapLines, say: Callable[[str], None
         sessions=sessions,
         secure=listen.certificate is not None,
         free=FREE,
+        log_in=log_in_page,
     )
     config: Any = uvicorn.Config(
         Guard(make_site(fleet, lines, sessions), door),

@@ -57,7 +57,14 @@ RIGHTS: dict[Action, frozenset[Role]] = {
     Action.READ_PLACES: frozenset({_M, _O, Role.AUTHORITY}),
     Action.READ_RESEARCH: frozenset({Role.RESEARCHER}),
     Action.READ_SAFETY_CASE: frozenset({_M, _O, Role.AUTHORITY}),
-    Action.VISIT: frozenset({_M, _O, _T, Role.AUTHORITY}),
+    Action.VISIT: frozenset({_M, _O, _T, Role.AUTHORITY, Role.RESEARCHER}),
+}
+FIRST_PAGE = {  # of each role that may visit: where a log-in leads
+    Role.MANUFACTURER: "/",
+    Role.OPERATOR: "/",
+    Role.TELEOPERATOR: "/alerts",
+    Role.AUTHORITY: "/places",
+    Role.RESEARCHER: "/research",
 }
 
 

@@ -47,6 +47,8 @@ class Door:
     sessions: Sessions
     secure: bool = False  # pages come by https
     free: tuple[str, ...] = ()  # beginnings of paths whose handlers check credentials of their own
+    log_in: Callable[[str], str] | None = None  # HTML of the refusal to a person without a session,
+    # from what was wrong with their invitation ("" without one)
 
 
 class Guard:
@@ -71,7 +73,7 @@ class Guard:
         who = self.door.sessions.who(_cookie(scope, self.door.cookie))
         if who is None and not self._is_free(scope["path"]):
             said = "this page needs the address that Skidpad printed when it started"
-            await _refuse(scope, receive, send, said)
+            await self._turn_away(scope, receive, send, (said, ""))
             return
         scope[WHO] = who
         await self.app(scope, receive, _with_headers(send))
@@ -92,12 +94,24 @@ class Guard:
     def _is_free(self, path: str) -> bool:
         return ".." not in path and path.startswith(self.door.free)
 
+    async def _turn_away(
+        self, scope: Scope, receive: Receive, send: Send, said: tuple[str, str]
+    ) -> None:
+        """Refuse for want of a session, to a person's browser with the log-in page as the body."""
+        sentence, wrong = said
+        reads = scope["type"] == "http" and scope["method"] == "GET"
+        if self.door.log_in is None or not reads or not _wants_html(scope):
+            await _refuse(scope, receive, send, sentence)
+            return
+        await _forbid(send, b"text/html; charset=utf-8", self.door.log_in(wrong))
+
     async def _exchange(self, scope: Scope, receive: Receive, send: Send, token: str) -> None:
         """The cookie for the token, and on to the address without it."""
         known = self.door.sessions.who(_cookie(scope, self.door.cookie)) is not None
         id = self.door.sessions.admit(token)
         if id is None and not known:
-            await _refuse(scope, receive, send, "this address was used already, or never was ours")
+            wrong = "this address was used already, or never was ours"
+            await self._turn_away(scope, receive, send, (wrong, wrong))
             return
         query = [(k, v) for k, v in _query(scope) if k != TOKEN]
         # one slash: a browser would read two as another host's name
@@ -123,6 +137,10 @@ def _token(scope: Scope) -> str | None:
     if scope["type"] != "http" or scope["method"] != "GET":
         return None
     return dict(_query(scope)).get(TOKEN)
+
+
+def _wants_html(scope: Scope) -> bool:
+    return any("text/html" in value for value in _header(scope, b"accept"))
 
 
 def _cookie(scope: Scope, name: str) -> str | None:
@@ -159,6 +177,10 @@ async def _refuse(scope: Scope, receive: Receive, send: Send, sentence: str) -> 
         await receive()
         await send({"type": "websocket.close", "code": REFUSED, "reason": sentence})
         return
-    headers = [(b"content-type", b"text/plain; charset=utf-8"), *HEADERS]
+    await _forbid(send, b"text/plain; charset=utf-8", f"{sentence}\n")
+
+
+async def _forbid(send: Send, kind: bytes, text: str) -> None:
+    headers = [(b"content-type", kind), (b"cache-control", b"no-store"), *HEADERS]
     await send({"type": "http.response.start", "status": 403, "headers": headers})
-    await send({"type": "http.response.body", "body": f"{sentence}\n".encode()})
+    await send({"type": "http.response.body", "body": text.encode()})

@@ -14,7 +14,7 @@ from skidpad.fleet.insight import places as by_place
 from skidpad.fleet.insight.research import export
 from skidpad.fleet.insight.safety import claims
 from skidpad.fleet.insight.trends import alarm_rates, trends
-from skidpad.fleet.words import Action, Principal, Refused
+from skidpad.fleet.words import FIRST_PAGE, Action, Principal, Refused
 
 Analyst = Annotated[Principal, Depends(Needs(Action.READ_TRENDS))]
 PlaceReader = Annotated[Principal, Depends(Needs(Action.READ_PLACES))]
@@ -75,4 +75,4 @@ def session(request: Request, who: Visitor) -> dict[str, str]:
     sessions = getattr(request.app.state, "sessions", None)
     if sessions is None:
         raise Refused(404, "this fleet serves no pages")
-    return {"path": f"/?token={sessions.invite(who.id)}"}
+    return {"path": f"{FIRST_PAGE[who.role]}?token={sessions.invite(who.id)}"}

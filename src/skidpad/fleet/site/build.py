@@ -19,7 +19,9 @@ from skidpad.fleet.site.reports import (
     draw_case,
     draw_changes,
     draw_places,
+    draw_research,
     places_of,
+    research_of,
 )
 from skidpad.fleet.words import Action, Principal
 from skidpad.pages.sessions import Sessions
@@ -69,4 +71,5 @@ def pages_of(fleet: Fleet, lines: MapLines) -> dict[str, Page]:
         "/places": Page(Action.READ_PLACES, "Places", read(places_of), draw_places),
         "/case": Page(Action.READ_SAFETY_CASE, "Safety case", read(case_of), draw_case),
         "/changes": Page(Action.READ_CHANGES, "Changes", read(changes_of), draw_changes),
+        "/research": Page(Action.READ_RESEARCH, "Research", read(research_of), draw_research),
     }  # fmt: skip

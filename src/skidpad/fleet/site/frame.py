@@ -12,7 +12,7 @@ from starlette.requests import Request
 from skidpad.core.errors import SkidpadError
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.acting import visitor
-from skidpad.fleet.words import Action, Principal, Refused
+from skidpad.fleet.words import FIRST_PAGE, Action, Principal, Refused
 from skidpad.pages.site import nicegui
 
 Found = TypeVar("Found")  # what a page shows
@@ -22,6 +22,7 @@ LINKS = (
     ("Places", "/places", Action.READ_PLACES),
     ("Safety case", "/case", Action.READ_SAFETY_CASE),
     ("Changes", "/changes", Action.READ_CHANGES),
+    ("Research", "/research", Action.READ_RESEARCH),
 )
 STYLE = """
 .fleet, .parts { width: 100%; max-width: 1100px; margin: 0 auto; display: flex;
@@ -58,6 +59,8 @@ def page(
                 head(ui, who, title)
                 if not who.may(action):
                     ui.label(f"The role {who.role.value} may not {action.value}.")
+                    if request.url.path == "/":  # where whoever types the fleet's address arrives
+                        ui.navigate.to(FIRST_PAGE[who.role])
                     return
                 draw(ui, await run_in_threadpool(read, who, request))
             except Refused as error:

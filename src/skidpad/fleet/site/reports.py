@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from typing import Any
 
 from skidpad.evidence.statistics import share_text
 from skidpad.fleet.insight.places import PlaceRow, places
+from skidpad.fleet.insight.research import CELL, HOUR, K, export
 from skidpad.fleet.insight.safety import Claim, claims
 from skidpad.fleet.insight.trends import trends
 from skidpad.fleet.loop.rollout import Rollout, rollouts
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.frame import table
 from skidpad.fleet.words import Principal
+
+ROWS = 200  # of the export that its page shows, newest first
 
 
 def places_of(fleet: Fleet, who: Principal) -> list[PlaceRow]:
@@ -34,6 +38,31 @@ def draw_places(ui: Any, found: Sequence[PlaceRow]) -> None:
     ]  # fmt: skip
     table(ui, heads, rows)
     ui.label("As HTML and PDF: /api/v1/places.html and /api/v1/places.pdf").classes("dim")
+
+
+def research_of(fleet: Fleet, who: Principal) -> list[dict[str, Any]]:
+    """Returns the rows of the anonymised export."""
+    del who  # the export is the same for everybody with the right
+    return export(fleet)
+
+
+def draw_research(ui: Any, found: Sequence[dict[str, Any]]) -> None:
+    """Show the newest rows of the anonymised export, and where all of them are."""
+    count = f"{len(found)} row{'' if len(found) == 1 else 's'}"
+    ui.label(
+        f"{count}: places of {CELL:g} m in one hour where at least {K} vehicles reported a hazard;"
+        " an hour appears a day after it ended."
+    )
+    heads = ["hour (UTC)", "map", "x, y in m", "hazard", "weather", "at least"]
+    rows = [
+        [f"{datetime.fromtimestamp(r['hour'] * HOUR, UTC):%Y-%m-%d %H}:00", r["map"],
+         f"{r['x']:.0f}, {r['y']:.0f}", r["hazard"].replace("_", " "), r["weather"],
+         str(r["hazards_at_least"])]
+        for r in found[: -ROWS - 1 : -1]
+    ]  # fmt: skip
+    if rows:
+        table(ui, heads, rows)
+    ui.label("All rows as JSON, with your credential: /api/v1/research").classes("dim")
 
 
 def case_of(fleet: Fleet, who: Principal) -> list[Claim]:

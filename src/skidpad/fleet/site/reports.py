@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from datetime import UTC, datetime
+from datetime import datetime, timezone
 from typing import Any
 
 from skidpad.evidence.statistics import share_text
@@ -55,7 +55,7 @@ def draw_research(ui: Any, found: Sequence[dict[str, Any]]) -> None:
     )
     heads = ["hour (UTC)", "map", "x, y in m", "hazard", "weather", "at least"]
     rows = [
-        [f"{datetime.fromtimestamp(r['hour'] * HOUR, UTC):%Y-%m-%d %H}:00", r["map"],
+        [f"{datetime.fromtimestamp(r['hour'] * HOUR, timezone.utc):%Y-%m-%d %H}:00", r["map"],
          f"{r['x']:.0f}, {r['y']:.0f}", r["hazard"].replace("_", " "), r["weather"],
          str(r["hazards_at_least"])]
         for r in found[: -ROWS - 1 : -1]

@@ -271,6 +271,8 @@ def dashboard(browser, address, tokens, size, asked) -> None:
         page.screenshot(path=f"{picture}/dashboard-{size['width']}.png", full_page=True)
     page.get_by_text("replay the representative").click()
     page.get_by_text("Play or pause").wait_for()
+    page.get_by_text("0.0 s: before the hazard (1.0 to 1.5 s, worst at 1.2 s)").wait_for()
+    page.get_by_text("circle: what the hazard is about").wait_for()
     first = page.locator("svg[aria-label]").get_attribute("aria-label")
     page.get_by_text("Play or pause").click()
     page.wait_for_function(
@@ -289,7 +291,7 @@ def comes(page, address, tokens, name) -> None:
         body = packed(record(100 + number, (5000.0, 5000.0), map=name + vehicle))
         sent = call("POST", f"{address}/api/v1/batches/hazards", headers=headers, content=body)
         assert sent.status_code == 200, sent.text
-    page.get_by_text(f"{name}red-1: 1 marks").wait_for()
+    page.get_by_text(f"{name}red-1: 1 mark", exact=True).wait_for()
     assert page.get_by_text(f"{name}blue-1").count() == 0
 
 

@@ -14,7 +14,17 @@ from skidpad.fleet.insight.trends import AlarmRate, Trend, alarm_rates, trends
 from skidpad.fleet.patterns.analysis import newest_clusters
 from skidpad.fleet.service import CAME, Fleet
 from skidpad.fleet.site.acting import click_analyse, person
-from skidpad.fleet.site.drawing import Dot, Line, map_svg, near, replay_svg, trend_svg
+from skidpad.fleet.site.charts import trend_svg
+from skidpad.fleet.site.drawing import (
+    Dot,
+    Line,
+    kinds_legend,
+    map_svg,
+    moment_text,
+    near,
+    replay_legend,
+    replay_svg,
+)
 from skidpad.fleet.site.frame import say, table
 from skidpad.fleet.store.reading import Wanted, hazard_row, hazard_rows, record_of
 from skidpad.fleet.words import Principal, Refused
@@ -135,19 +145,18 @@ def _map(ui: Any, found: Overview) -> None:
         ui.label("Where").classes("h2")
         for name, roads in found.roads.items():
             dots = [
-                Dot(r["x"], r["y"], r["type"], 3.0, r["type"])
+                Dot(r["x"], r["y"], r["type"], r["type"].replace("_", " "))
                 for r in found.newest
                 if r["map"] == name
             ]
             dots += [
-                Dot(
-                    c["x"], c["y"], c["type"], 6.0 + len(c["members"]), f"{len(c['members'])} alike"
-                )
+                Dot(c["x"], c["y"], c["type"], f"{len(c['members'])} alike", len(c["members"]))
                 for c in found.clusters
                 if c["map"] == name
             ]
-            ui.label(f"{name}: {len(dots)} marks")
+            ui.label(f"{name}: {len(dots)} mark{'' if len(dots) == 1 else 's'}")
             ui.html(map_svg(roads, dots, f"map {name}"), sanitize=False)
+            ui.html(kinds_legend(dots), sanitize=False).classes("dim")
         if not found.roads:
             ui.label("No hazard has come in yet.").classes("dim")
 
@@ -190,10 +199,14 @@ def draw_replay(ui: Any, found: tuple[dict[str, Any], HazardRecord, Sequence[Lin
         ui.label("This record holds no worlds.")
         return
     picture = ui.html(replay_svg(record, 0, roads), sanitize=False)
+    moment = ui.label(moment_text(record, 0))
+    ui.html(replay_legend(record), sanitize=False).classes("dim")
     last = len(record.worlds) - 1
 
     def show(event: Any) -> None:
-        picture.set_content(replay_svg(record, min(int(event.value), last), roads))
+        k = min(int(event.value), last)
+        picture.set_content(replay_svg(record, k, roads))
+        moment.set_text(moment_text(record, k))
 
     slider = ui.slider(min=0, max=last, value=0, on_change=show)
 

@@ -1,15 +1,14 @@
-"""Small pictures as SVG: a map with hazards, a scene from above, a trend with its interval."""
+"""Small pictures as SVG: a map with hazards, a scene from above, a replay; and their legends."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
-from math import cos, isfinite, sin
+from math import cos, floor, isfinite, log10, sin
 
 from skidpad.core.channels import ChannelFrame
 from skidpad.fleet.alerting.keeping import Body
-from skidpad.fleet.insight.trends import Trend
 from skidpad.recording.hazards import HazardRecord
 
 Line = Sequence[tuple[float, float]]  # m
@@ -19,6 +18,7 @@ KINDS = {
     "crossing_object": "#d98cff", "conflicting_paths": "#4fce7f", "stuck_vehicle": "#ff5b52",
     "unseen_by_a_channel": "#8fe3ff",
 }  # fmt: skip
+HAZARD = "#ff5b52"
 REACH = 60.0  # m around the ego
 AROUND = REACH + 300.0  # m: ten seconds at 30 m/s and what is seen from there
 LINES_MAX = 4000  # of a map
@@ -31,8 +31,8 @@ class Dot:
     x: float
     y: float
     kind: str
-    size: float  # m
     title: str
+    count: int = 1  # hazards that it stands for; more than one are drawn as a ring
 
 
 def _svg(box: tuple[float, float, float, float], body: str, name: str) -> str:
@@ -50,13 +50,67 @@ def map_svg(lines: Sequence[Line], dots: Sequence[Dot], name: str) -> str:
     xs, ys = [p[0] for p in points], [p[1] for p in points]
     box = min(xs) - 30, min(ys) - 30, max(xs) - min(xs) + 60, max(ys) - min(ys) + 60
     roads = _roads(lines)
-    least = max(box[2], box[3]) / 120.0
-    marks = "".join(
-        f'<circle cx="{d.x:.1f}" cy="{-d.y:.1f}" r="{max(d.size, least):.1f}" fill-opacity=".75" '
-        f'fill="{KINDS.get(d.kind, "#fff")}"><title>{escape(d.title)}</title></circle>'
-        for d in dots
+    least = max(box[2], box[3]) / 200.0
+    marks = "".join(_mark(d, least) for d in sorted(dots, key=lambda d: -d.count))
+    return _svg(box, roads + marks + _scale(box), name)
+
+
+def _mark(dot: Dot, least: float) -> str:
+    """A small disc of one hazard; a ring around those that recur, so that no mark hides another."""
+    colour, ring = KINDS.get(dot.kind, "#fff"), dot.count > 1
+    radius = least * (min(2.0 + 0.5 * dot.count**0.5, 6.0) if ring else 1.0)
+    paint = (
+        f'fill="none" stroke="{colour}" stroke-width="{0.6 * least:.2f}"'
+        if ring
+        else f'fill="{colour}"'
     )
-    return _svg(box, roads + marks, name)
+    return (
+        f'<circle cx="{dot.x:.1f}" cy="{-dot.y:.1f}" r="{radius:.2f}" {paint}>'
+        f"<title>{escape(dot.title)}</title></circle>"
+    )
+
+
+def scale_m(width: float) -> float:
+    """Returns the length of the scale's bar for a picture of this width: 1, 2 or 5 times a power of ten."""
+    decade = 10.0 ** floor(log10(width / 4.0))
+    return max(k * decade for k in (1.0, 2.0, 5.0) if k * decade <= width / 4.0)
+
+
+def _scale(box: tuple[float, float, float, float]) -> str:
+    """A bar at the lower left, with its length."""
+    x, y, w, h = box
+    bar, size = scale_m(w), max(w, h) / 40.0
+    left, low = x + size, -y - size
+    return (
+        f'<path d="M{left:.1f} {low:.1f}h{bar:g}" stroke="#e8eaed" stroke-width="{size / 5:.2f}"/>'
+        f'<text x="{left:.1f}" y="{low - size / 2:.1f}" font-size="{size:.1f}" fill="#e8eaed">'
+        f"{bar:g} m</text>"
+    )
+
+
+def legend_html(entries: Iterable[tuple[str, str]]) -> str:
+    """Names (text) with their colours, in a line that wraps."""
+    return "".join(
+        f'<span style="display:inline-block;margin-right:14px"><span style="color:{colour}">'
+        f"&#9632;</span> {escape(name)}</span>"
+        for name, colour in entries
+    )
+
+
+def kinds_legend(dots: Sequence[Dot]) -> str:
+    """The legend of a map: the kinds that are on it, and what a ring is."""
+    kinds = sorted({d.kind for d in dots})
+    named = legend_html((kind.replace("_", " "), KINDS.get(kind, "#fff")) for kind in kinds)
+    return named + legend_html([("disc: one hazard; ring: a hazard that recurs", "#9aa5b1")])
+
+
+def replay_legend(record: HazardRecord) -> str:
+    """The legend of a replay: a colour for each channel, and what marks the hazard."""
+    named = [(f"channel {c}", COLOURS[i % len(COLOURS)]) for i, c in enumerate(record.channels)]
+    return legend_html(
+        [*named, ("solid: the vehicle itself; pale: what it reported; dashes: plan", "#9aa5b1"),
+         ("circle: what the hazard is about", HAZARD)]
+    )  # fmt: skip
 
 
 def _roads(lines: Sequence[Line]) -> str:
@@ -110,7 +164,34 @@ def replay_svg(record: HazardRecord, k: int, roads: Sequence[Line] = ()) -> str:
         if frame is not None
     )
     name = f"hazard {record.type.value} at {cycle.t:.1f} s"
-    return _svg((x - REACH, y - REACH, 2 * REACH, 2 * REACH), body, name)
+    box = x - REACH, y - REACH, 2 * REACH, 2 * REACH
+    return _svg(box, body + _involved(record, k) + _scale(box), name)
+
+
+def _involved(record: HazardRecord, k: int) -> str:
+    """A circle around each object that the hazard is about, where its channel reports it in cycle k."""
+    cycle, places = record.worlds[k], []
+    for one in record.objects:
+        at = record.channels.index(one.channel) if one.channel in record.channels else None
+        frame = None if at is None else cycle.frames[at]
+        if frame is None or one.id is None or one.id < 0:
+            continue
+        places += frame.objects[frame.ids == one.id, :2].tolist()
+    is_now = record.t_start <= cycle.t <= record.t_end
+    dashes = "" if is_now else ' stroke-dasharray="1.5 1.5"'
+    return "".join(
+        f'<circle class="hazard" cx="{x:.1f}" cy="{-y:.1f}" r="5" fill="none" stroke="{HAZARD}" '
+        f'stroke-width=".7"{dashes}/>'
+        for x, y in dict.fromkeys((x, y) for x, y in places if isfinite(x) and isfinite(y))
+    )
+
+
+def moment_text(record: HazardRecord, k: int) -> str:
+    """Returns where cycle k lies in time, and whether the hazard is there then."""
+    t = record.worlds[k].t
+    when = "before" if t < record.t_start else "after" if t > record.t_end else "during"
+    lasts = f"{record.t_start:.1f} to {record.t_end:.1f} s"
+    return f"{t:.1f} s: {when} the hazard ({lasts}, worst at {record.t_worst:.1f} s)"
 
 
 def _frame(frame: ChannelFrame, colour: str) -> str:
@@ -132,20 +213,3 @@ def _shape(pose: list[float], corners: list[list[float]], colour: str, opacity: 
     if not all(isfinite(v) for point in world for v in point):
         return ""
     return f'<polygon points="{_points(world)}" fill="{colour}" fill-opacity="{opacity}"/>'
-
-
-def trend_svg(trends: Sequence[Trend], name: str) -> str:
-    """Share of cycles in violation over time, with its interval as a band."""
-    top = max([0.01, *(t.interval.high for t in trends)])
-    n = max(len(trends) - 1, 1)
-    at = [(100.0 * i / n, t) for i, t in enumerate(trends)]
-    if len(at) == 1:
-        at = [(0.0, trends[0]), (100.0, trends[0])]
-    band = [(x, 30 * t.interval.high / top) for x, t in at]
-    band += [(x, 30 * t.interval.low / top) for x, t in reversed(at)]
-    line = [(x, 30 * t.share / top) for x, t in at]
-    body = (
-        f'<polygon points="{_points(band)}" fill="#4d9dff" fill-opacity=".3"/>'
-        f'<polyline points="{_points(line)}" fill="none" stroke="#4d9dff"/>'
-    )
-    return _svg((-2.0, -2.0, 104.0, 34.0), body, name)

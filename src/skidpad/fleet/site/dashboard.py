@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timezone
 from typing import Any
 
 from starlette.concurrency import run_in_threadpool
@@ -11,6 +12,7 @@ from starlette.requests import Request
 
 from skidpad.evidence.statistics import interval_text, share_text
 from skidpad.fleet.insight.trends import AlarmRate, Trend, alarm_rates, trends
+from skidpad.fleet.insight.worklist import Work, rank_work
 from skidpad.fleet.patterns.analysis import newest_clusters
 from skidpad.fleet.service import CAME, Fleet
 from skidpad.fleet.site.acting import click_analyse, person
@@ -43,6 +45,12 @@ ALARM_NOTE = (
 )
 
 
+WORK_NOTE = (
+    "Ranked by alarms times the measured precision of their kind. A kind that was not measured counts"
+    " in full. How severe a hazard is does not enter."
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Overview:
     """What the dashboard shows."""
@@ -50,6 +58,7 @@ class Overview:
     trends: list[Trend]
     rates: list[AlarmRate]
     clusters: list[dict[str, Any]]
+    work: list[Work]  # the clusters, ranked
     newest: list[dict[str, Any]]
     roads: dict[str, Sequence[Line]]  # of the maps of the newest hazards
     look: Callable[[], int]  # for recurring hazards, as the person who opened the page
@@ -62,11 +71,12 @@ def overview(fleet: Fleet, lines: MapLines, who: Principal) -> Overview:
     found = trends(fleet, who)
     with fleet.engine.connect() as connection:
         rates, clusters = alarm_rates(connection, who), newest_clusters(connection, who)
+        work = rank_work(connection, who, clusters)
         newest = hazard_rows(connection, who, Wanted())
     names = list(dict.fromkeys(row["map"] for row in newest if row["map"]))
     roads = {name: lines(name) for name in names[:MAPS]}
     return Overview(
-        found, rates, clusters, newest, roads, lambda: click_analyse(fleet, who.id), seen
+        found, rates, clusters, work, newest, roads, lambda: click_analyse(fleet, who.id), seen
     )
 
 
@@ -118,7 +128,7 @@ def _parts(ui: Any, found: Overview) -> None:
         ui.label(ALARM_NOTE).classes("dim")
     _trends(ui, found.trends)
     _map(ui, found)
-    _clusters(ui, found.clusters, found.look)
+    _clusters(ui, found.work, found.look)
 
 
 def _trends(ui: Any, found: list[Trend]) -> None:
@@ -161,7 +171,7 @@ def _map(ui: Any, found: Overview) -> None:
             ui.label("No hazard has come in yet.").classes("dim")
 
 
-def _clusters(ui: Any, found: list[dict[str, Any]], again: Callable[[], int]) -> None:
+def _clusters(ui: Any, found: list[Work], again: Callable[[], int]) -> None:
     """A click keeps what it needs for as long as the page is open: `again`, not all that was shown."""
     with ui.element("section"):
         ui.label("Recurring hazards").classes("h2")
@@ -170,14 +180,34 @@ def _clusters(ui: Any, found: list[dict[str, Any]], again: Callable[[], int]) ->
             await say(ui, again, "looked")
 
         ui.button("Look for recurring hazards now", on_click=look)
-        for cluster in found[:CLUSTERS]:
-            with ui.element("div"):
+        ui.label(WORK_NOTE).classes("dim")
+        for rank, one in enumerate(found[:CLUSTERS], 1):
+            cluster = one.cluster
+            with ui.element("div").classes("card"):
                 text = f"{len(cluster['members'])} x {cluster['type'].replace('_', ' ')}"
                 where = f"{cluster['map']} at {cluster['x']:.0f}, {cluster['y']:.0f} m"
-                ui.label(f"{text}, {cluster['vehicles']} vehicles, {where}")
+                ui.label(f"{rank}. {text}, {cluster['vehicles']} vehicles, {where}")
+                ui.label(work_text(one)).classes("dim")
                 ui.link("replay the representative", f"/replay/{cluster['representative']}")
         if not found:
             ui.label("Nothing was found to recur.").classes("dim")
+
+
+def work_text(one: Work) -> str:
+    """Returns how many alarms are likely true, the period (UTC) and the trend."""
+    measured = one.precision
+    likely = (
+        "precision not measured"
+        if measured is None
+        else f"about {one.likely_true:.1f} likely true ({measured.describe()})"
+    )
+    first, last = (
+        f"{datetime.fromtimestamp(at, timezone.utc):%Y-%m-%d}" for at in (one.first, one.last)
+    )
+    period = first if first == last else f"{first} to {last}"
+    if one.first == one.last:
+        return f"{likely}; {period}, all at once"
+    return f"{likely}; {period}, {one.earlier} in the first half, {one.later} in the second"
 
 
 def replayed(

@@ -6,6 +6,8 @@ from collections.abc import Sequence
 from datetime import datetime, timezone
 from typing import Any
 
+from sqlalchemy import select
+
 from skidpad.evidence.statistics import share_text
 from skidpad.fleet.insight.places import PlaceRow, places
 from skidpad.fleet.insight.research import CELL, HOUR, K, export
@@ -14,6 +16,7 @@ from skidpad.fleet.insight.trends import trends
 from skidpad.fleet.loop.rollout import Rollout, rollouts
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.frame import table
+from skidpad.fleet.store.loop import changes
 from skidpad.fleet.words import Principal
 
 ROWS = 200  # of the export that its page shows, newest first
@@ -85,25 +88,42 @@ def draw_case(ui: Any, found: Sequence[Claim]) -> None:
                 ui.label(f"{text}, {claim.vehicles} vehicles").classes("dim")
 
 
-def changes_of(fleet: Fleet, who: Principal) -> list[Rollout]:
-    """What the page of changes shows."""
+def changes_of(fleet: Fleet, who: Principal) -> list[tuple[Rollout, str]]:
+    """Returns the releases with the reason that each change was proposed for."""
     with fleet.engine.connect() as connection:
-        return rollouts(connection, who.tenant)
+        query = select(changes.c.id, changes.c.reason).where(changes.c.tenant == who.tenant)
+        reasons = {row.id: row.reason for row in connection.execute(query)}
+        return [(one, reasons[one.row.change]) for one in rollouts(connection, who.tenant)]
 
 
-def draw_changes(ui: Any, found: Sequence[Rollout]) -> None:
+def draw_changes(ui: Any, found: Sequence[tuple[Rollout, str]]) -> None:
     """Releases, newest first, with every look."""
     if not found:
         ui.label("Nothing was released yet.").classes("dim")
-    for one in reversed(found):
-        _release(ui, one)
+    for one, reason in reversed(found):
+        _release(ui, one, reason)
 
 
-def _release(ui: Any, one: Rollout) -> None:
+def effect_text(one: Rollout) -> str:
+    """Returns what the last look measured of the update, in errors per drive."""
+    measured = [e.detail for e in one.events if isinstance(e.detail.get("mean"), float)]
+    if not measured:
+        return "not measured yet"
+    mean, drives = measured[-1]["mean"], measured[-1]["drives"]
+    many = f"{drives} drive{'' if drives == 1 else 's'}"
+    if mean == 0.0:
+        return f"as many errors per drive as before, over {many}"
+    return f"{abs(mean):.2f} {'more' if mean > 0.0 else 'fewer'} errors per drive, over {many}"
+
+
+def _release(ui: Any, one: Rollout, reason: str) -> None:
     with ui.element("div").classes("card"):
         state = one.ended or f"stage {one.stage + 1} of {len(one.plan.stages)}"
-        ui.label(f"{one.name}: {state}")
-        ui.label(f"in place of {one.row.before or 'what vehicles came with'}").classes("dim")
+        ui.label(f"{reason}: {state}")
+        ui.label(effect_text(one))
+        ui.label(f"{one.name}, in place of {one.row.before or 'what vehicles came with'}").classes(
+            "dim"
+        )
         rows = [
             [e.what, str(e.detail.get("decision", e.detail.get("reason", ""))),
              str(e.detail.get("drives", "")), _number(e.detail.get("mean")),

@@ -96,11 +96,12 @@ def references(programs: Path, names: Sequence[str]) -> int:
 
 
 def corpus_files(folders: Iterable[Path]) -> dict[str, Path]:
-    """Returns scenario files by their hashes, the first of equals."""
+    """Returns scenario files, not catalogs, by their hashes, the first of equals."""
     found: dict[str, Path] = {}
     for folder in folders:
         for file in sorted(folder.rglob("*.xosc")):
-            found.setdefault(file_hash(file), file)
+            if b"<Storyboard" in file.read_bytes():
+                found.setdefault(file_hash(file), file)
     return found
 
 
@@ -124,6 +125,9 @@ def compare(folders: Sequence[Path]) -> int:
     """Prints how far our trajectories of files of others are from the stored ones."""
     files, places, bad = corpus_files(folders), [], 0
     stored = [read_reference(f) for f in sorted(OTHERS.glob("*.csv"))]
+    if not stored:
+        print(f"no trajectories are stored in {OTHERS.name}: `record` them first")
+        return 1
     for reference in stored:
         file = files.get(reference.file_hash)
         if file is None:

@@ -18,6 +18,7 @@ def folder_of(tmp_path, run):
     folder = tmp_path / "run"
     folder.mkdir(exist_ok=True)
     (folder / "config.yaml").write_text(yaml.safe_dump(run.to_plain()))
+    (folder / "ticks.parquet").touch()
     return folder
 
 

@@ -203,7 +203,7 @@ def test_a_vehicle_of_the_command_alerts_and_is_stopped_by_a_teleoperator(tmp_pa
         words = [
             "fleet", "drive", "--to", address, "--token-file", str(tmp_path / "token"),
             "--orders-key", str(tmp_path / "data" / "keys" / "orders.pub"), "--out", str(out),
-            "--route", "route-1", "--seconds", "25", "--seed", "4",
+            "--route", "route-1", "--seconds", "25", "--seed", "8",
         ]  # fmt: skip
         bearer = {"Authorization": f"Bearer {tokens['red teleoperator']}"}
         with (

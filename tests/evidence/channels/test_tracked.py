@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from channel_worlds import Eyes, World, drive, frame
+from skidpad.core.channels import Cycle
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import Profile, Signal
@@ -191,3 +192,12 @@ def test_nothing_and_nonsense_are_survived():
     evidence = next(iter(cycles(drive(World(), (Eyes("a"), Eyes("b")), 0.2))))
     values = other.update(evidence).signals.values
     assert np.isnan(values[Signal.REAR_DEFICIT])  # other profiles do not track
+
+
+def test_a_channel_whose_ego_has_no_outline_says_nothing_of_gaps_and_plans():
+    monitor = Monitor(["a", "b"])
+    bare = frame(0.0, (3.0, 1.0, 0.5, 0.0, 0.0))._replace(ego_polygon=np.zeros((0, 2)))
+    for k in range(12):
+        signals = monitor.update(Cycle(k, 0.1 * k, (bare, bare))).signals.values
+    assert np.isnan(signals[Signal.PLANS_APART])
+    assert not signals[Signal.REAR_DEFICIT] > 0.0

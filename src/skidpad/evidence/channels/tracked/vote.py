@@ -106,7 +106,7 @@ class Tracked:
         least = nan
         for (a, b), window in zip(self.pairs, self.apart, strict=True):
             one, two = frames[a], frames[b]
-            if one is None or two is None or len(one.plan) < 2 or len(two.plan) < 2:
+            if one is None or two is None or not (_has_footprint(one) and _has_footprint(two)):
                 window.clear()
                 continue
             window.append((t, parting(one, two)))
@@ -116,6 +116,11 @@ class Tracked:
                 held = max(value for _, value in window)
                 least = held if least != least else min(least, held)
         return least
+
+
+def _has_footprint(frame: ChannelFrame) -> bool:
+    """Returns whether the ego's outline can be carried along its plan."""
+    return len(frame.plan) > 1 and len(frame.ego_polygon) > 2
 
 
 def parting(one: ChannelFrame, two: ChannelFrame) -> float:

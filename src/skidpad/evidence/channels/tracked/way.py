@@ -26,9 +26,9 @@ class Way:
 
     @staticmethod
     def usable(frame: ChannelFrame) -> bool:
-        """Whether the ego has a place."""
+        """Whether the ego has a place and an outline."""
         x, y, *rest = frame.ego.tolist()
-        return abs(x) + abs(y) < FAR and all(map(isfinite, rest))
+        return len(frame.ego_polygon) > 2 and abs(x) + abs(y) < FAR and all(map(isfinite, rest))
 
     def update(self, frame: ChannelFrame) -> None:
         """Where the ego is in this cycle."""

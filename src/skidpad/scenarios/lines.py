@@ -16,7 +16,7 @@ from skidpad.core.geometry import Pose, wrap_angle
 STEP = 0.25  # m between the points of a curve
 STEPS_MAX = 200_000
 NEAR = 1e-9  # m, points closer than this are one place
-CORNER = 2.0  # m before and behind a corner in which headings that nobody names turn, as in esmini
+CORNER = 2.0  # m before and behind a corner in which headings without a name turn, as in esmini
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,13 +151,13 @@ class Line:
         radius = min(CORNER, 0.5 * length)
         before, after = u * length, (1.0 - u) * length
         if before < radius and k > 0 and self.named[k - 1] is None:
-            return self._mixed(self._course(k - 1), here, 0.5 + 0.5 * before / radius)
+            return self._mix_headings(self._course(k - 1), here, 0.5 + 0.5 * before / radius)
         if after < radius and j < len(self.x) - 1 and b is None:
-            return self._mixed(here, self._course(j), 0.5 - 0.5 * after / radius)
+            return self._mix_headings(here, self._course(j), 0.5 - 0.5 * after / radius)
         return here
 
     @staticmethod
-    def _mixed(a: float, b: float, u: float) -> float:
+    def _mix_headings(a: float, b: float, u: float) -> float:
         return wrap_angle(a + u * wrap_angle(b - a))
 
     def _course(self, k: int) -> float:

@@ -159,10 +159,10 @@ class _Starting:
             if first is not None:
                 self._so_far = self.ctx.network.place_of(first)
             elif is_step_of_place(action):
-                self._so_far = self._moved(action)
+                self._so_far = self._has_moved(action)
         return self._so_far or self.ctx.network.place_of(ORIGIN)
 
-    def _moved(self, action: PrivateAction) -> Place:
+    def _has_moved(self, action: PrivateAction) -> Place:
         """Where an action that takes no time puts it: along its lane, aside, or straight on."""
         itself, network = cast("Actor", self), self.ctx.network
         here = self._so_far = self._so_far or network.place_of(ORIGIN)
@@ -183,7 +183,7 @@ class _Starting:
         return self.place(self.ctx.network).pose
 
     def outline(self) -> list[Point]:
-        """Corners on the ground."""
+        """Returns the corners of the outline on the ground."""
         return corners(self.pose, self.entity.box)
 
     @property

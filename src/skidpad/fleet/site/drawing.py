@@ -165,10 +165,10 @@ def replay_svg(record: HazardRecord, k: int, roads: Sequence[Line] = ()) -> str:
     )
     name = f"hazard {record.type.value} at {cycle.t:.1f} s"
     box = x - REACH, y - REACH, 2 * REACH, 2 * REACH
-    return _svg(box, body + _involved(record, k) + _scale(box), name)
+    return _svg(box, body + _involved_objects(record, k) + _scale(box), name)
 
 
-def _involved(record: HazardRecord, k: int) -> str:
+def _involved_objects(record: HazardRecord, k: int) -> str:
     """A circle around each object that the hazard is about, where its channel reports it in cycle k."""
     cycle, places = record.worlds[k], []
     for one in record.objects:

@@ -59,7 +59,7 @@ def page(
                 head(ui, who, title)
                 if not who.may(action):
                     ui.label(f"The role {who.role.value} may not {action.value}.")
-                    if request.url.path == "/":  # where whoever types the fleet's address arrives
+                    if request.url.path == "/":  # where the fleet's address leads
                         ui.navigate.to(FIRST_PAGE[who.role])
                     return
                 draw(ui, await run_in_threadpool(read, who, request))

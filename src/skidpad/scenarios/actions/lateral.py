@@ -98,7 +98,7 @@ class LaneChange:
 
     @property
     def at_once(self) -> bool:
-        """It takes no time."""
+        """Returns whether the action takes no time."""
         return self.dynamics.span(1.0) <= 0.0
 
     def aim(self, scene: Scene, name: str, guide: Guide) -> float | None:

@@ -159,10 +159,10 @@ class _Starting:
             if first is not None:
                 self._so_far = self.ctx.network.place_of(first)
             elif is_step_of_place(action):
-                self._so_far = self._has_moved(action)
+                self._so_far = self._place_after(action)
         return self._so_far or self.ctx.network.place_of(ORIGIN)
 
-    def _has_moved(self, action: PrivateAction) -> Place:
+    def _place_after(self, action: PrivateAction) -> Place:
         """Where an action that takes no time puts it: along its lane, aside, or straight on."""
         itself, network = cast("Actor", self), self.ctx.network
         here = self._so_far = self._so_far or network.place_of(ORIGIN)

@@ -150,9 +150,10 @@ def test_a_person_drives_in_a_browser_and_the_run_can_be_driven_again(browser, t
         page.keyboard.press("h")  # the time of day alone
         until_fact(page, "weather", "clear-sunrise")
         page.get_by_text("pictures (G)").click()
-        page.get_by_role("switch", name="clouds").click()
+        # by key: while the panel still slides open, a click may fall beside a switch
+        page.get_by_role("switch", name="clouds").press("Space")
         until(page, "() => !document.querySelector('.cockpit').dataset.extras.includes('clouds')")
-        page.get_by_role("switch", name="limiter (5)").click()
+        page.get_by_role("switch", name="limiter (5)").press("Space")
         until_fact(page, "on", "limiter")
         page.keyboard.press("m")
         until_fact(page, "drives", "the stack")

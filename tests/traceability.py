@@ -19,6 +19,7 @@ in weather, B grip in weather, C channels. Written by `python tests/traceability
 that this page, the marks in the tests and the states agree. A row that is simply done is proved by
 behaviour: something was run and did what is asked. *Done by page* is shown by what a report or page of
 the program says, *done by document* by words or names in a text of the project, and by nothing that ran.
+For A-276 and A-277 done means that a verdict is computed; the shipped results may contradict the claim.
 
 """
 WORDS = ("done", "done by page", "done by document", "differs", "not yet")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import cache
@@ -188,11 +188,11 @@ def _own_rules(profile: Profile) -> tuple[Rule, ...]:
 
 def load_only_rules(path: Path) -> tuple[Profile, tuple[Rule, ...]]:
     """Returns the one profile that the file at `path` holds, and its rules."""
-    data = read_bytes(path, "hazard rules")
-    profiles = list(_tables(data, str(path)))
-    if len(profiles) != 1:
-        raise ConfigError(f"{path}: must hold the rules of one profile, holds {len(profiles)}")
-    return profiles[0], _rules(profiles[0], data, str(path))
+    tables = _tables(read_bytes(path, "hazard rules"), str(path))
+    if len(tables) != 1:
+        raise ConfigError(f"{path}: must hold the rules of one profile, holds {len(tables)}")
+    ((profile, table),) = tables.items()
+    return profile, _compile_rules(table)
 
 
 def _tables(data: bytes, name: str) -> dict[Profile, dict[HazardType, _RuleText]]:
@@ -206,13 +206,17 @@ def _rules(profile: Profile, data: bytes, name: str) -> tuple[Rule, ...]:
     tables = _tables(data, name)
     if profile not in tables:
         raise ConfigError(f"{name}: holds no profile {profile.value}")
+    return _compile_rules(tables[profile])
+
+
+def _compile_rules(table: Mapping[HazardType, _RuleText]) -> tuple[Rule, ...]:
     return tuple(
         Rule(
             hazard,
             tuple(tuple(Clause.parse(text) for text in clauses) for clauses in rule.any),
             rule.extreme,
         )
-        for hazard, rule in tables[profile].items()
+        for hazard, rule in table.items()
     )
 
 

@@ -3,11 +3,13 @@
 import re
 from html import unescape
 
+import numpy as np
 import polars as pl
 import pytest
 from svg_values import bars, texts
 from test_matrix_report import campaign, key
 
+from skidpad.evidence.statistics import Interval, mean_limits
 from skidpad.recording.matrix import MATRIX, Metrics
 from skidpad.recording.results import Timing
 from skidpad.report.figures import PALETTE
@@ -15,6 +17,8 @@ from skidpad.report.matrix import write_report
 from skidpad.report.matrix_data import WEATHERS, load_matrix
 from skidpad.report.matrix_real_time import real_time_blocks
 from skidpad.report.matrix_sides import side_blocks
+from skidpad.report.matrix_steps import step_blocks, step_differences
+from skidpad.report.matrix_tables import count_table, mean_table, per_weather, possible_part
 from skidpad.report.published import Source, published
 
 CONFIGS = ("1", "2", "3", "4")
@@ -124,3 +128,77 @@ def test_real_time_is_told_by_weather_with_its_share_of_slow_ticks(tmp_path):
         ["Clear Sky - Noon", "2", "45.0", "40.0", "0.50"],
         ["Heavy Rain - Noon", "2", "10.4", "0.8", "31.50"],
     ]
+
+
+@pytest.mark.req("R-7")
+def test_what_steps_change_is_tested_as_one_family_and_marked_only_where_it_is_sure(tmp_path):
+    """Of 28 tests of ten seeds even ten equal signs (p = 2 / 2^10) are not sure by themselves."""
+    matrix = pairs_of_ten_seeds(tmp_path)
+    found = step_differences(matrix, [("1", "2"), ("2", "3")])
+    dropout, speed = found["dropout_pct", ("1", "2")], found["mean_speed_kmh", ("1", "2")]
+    ps = [float(q.lines[0].removeprefix("p = ").removeprefix("p < ")) for q in found.values()]
+    assert dropout.value == pytest.approx(5.0)
+    assert dropout.lines == (f"p = {14 * 2 / 2**10:.2g}",), "14 comparisons, the two extreme signs"
+    assert dropout.kind == "bad"
+    assert speed.kind == "", "being slower is neither better nor worse"
+    assert all(q.kind == "" for q, p in zip(found.values(), ps, strict=True) if p > 0.05)
+    *_, table = step_blocks(matrix)
+    assert "corrected for all 14 of this table (Holm)" in table.note
+    assert [title for title, _ in table.columns][1:3] == ["interventions", "solid markings crossed"]
+
+
+def pairs_of_ten_seeds(folder):
+    """Configuration 2 has five points more dropout than 1 in every seed, and 3 drives as 2."""
+    rng = np.random.default_rng(3)
+    rows = []
+    for seed in range(1, 11):
+        base = float(rng.uniform(5, 12))
+        speed = float(rng.uniform(40, 60))
+        for config in "123":
+            values = Metrics(
+                fatal_collisions=int(config == "2" and seed < 4),
+                serious_contacts=int(config == "2" and seed < 3),
+                road_departures=0,
+                lane_invasions=1,
+                mean_speed_kmh=speed - (config != "1"),
+                dropout_pct=base + (config != "1") * (4.945 + 0.01 * seed),
+                ttc_below_1_5_s=1.0,
+                mean_error_m=2.0,
+                headway_variance_m2=9.0,
+                radar_fpr_pct=99.0 if seed < 10 else 40.0,
+                distance_km=5.0,
+                duration_s=500.0,
+            )
+            rows.append((key(config, "clear-noon", seed), values))
+    MATRIX.write(folder, rows)
+    return load_matrix(folder)
+
+
+def test_a_rate_has_one_interval_wherever_it_stands_on_the_page(tmp_path):
+    matrix = pairs_of_ten_seeds(tmp_path)
+    beside = next(row for row in side_blocks(matrix)[0].rows if row[0].text == "serious contacts")
+    in_full = next(row for row in per_weather(matrix)[1].rows if row[0].text == "serious contacts")
+    counted = count_table(matrix, "serious_contacts", "").rows[1][1]
+    assert counted.limits is not None
+    assert beside[2].limits == in_full[1].limits == counted.limits
+
+
+def test_no_interval_goes_where_the_quantity_cannot_be(tmp_path):
+    matrix = pairs_of_ten_seeds(tmp_path)
+    skew = mean_limits([99.0] * 9 + [40.0])
+    assert skew.high > 100.0, "the method alone does not know that"
+    shown = mean_table(matrix, "radar_fpr_pct", "").rows[0][1].limits
+    assert shown == (pytest.approx(skew.low), 100.0)
+    assert possible_part(Interval(-2.0, 7.0), "dropout_pct", 0.1) == (0.0, 7.0)
+    assert possible_part(Interval(-2.0, 7.0), "mean_error_m", -0.5) == (-0.5, 7.0)
+    assert possible_part(Interval(1.0, 170.0), "mean_error_m", 1.0) == (1.0, 170.0)
+
+
+def test_a_mean_of_some_seeds_says_of_how_many(tmp_path):
+    rows = [
+        (key("1", "clear-noon", seed), Metrics(radar_fpr_pct=50.0 + seed if seed < 4 else None))
+        for seed in range(1, 11)
+    ]
+    MATRIX.write(tmp_path, rows)
+    cell = mean_table(load_matrix(tmp_path), "radar_fpr_pct", "").rows[0][1]
+    assert (cell.text, cell.note) == ("52", "3 of 10 seeds")

@@ -46,14 +46,35 @@ def test_every_run_on_pixels_stands_beside_its_twin_of_the_same_seed(matrix):
     parity = load_parity(matrix)
     words, figure, table = parity_section(parity)
     assert (
-        "In 2 pairs of drives of the compared configurations there were 5 crashes on pixels and 3 "
-        "crashes on objects; 1 of the pairs moved alike to the last bit." in words.text
+        "In 2 pairs of different drives of the compared configurations there were 5 crashes on "
+        "pixels and 3 crashes on objects; 1 of the pairs moved alike to the last bit, with "
+        "configuration 3." in words.text
     )
     assert [r[0].text[0] for r in table.rows] == ["0", "3", "4"]
     four = table.rows[2]
     assert (four[1].text, four[1].note) == ("4.00", "objects 2.00")
     assert (four[2].text, four[2].note) == ("36.50", "objects 38.00")
     assert "on the line they agree" in figure.caption
+
+
+def test_pairs_that_moved_alike_in_several_weathers_are_one_pair(tmp_path):
+    def at(weather, sensors, motion, **values):
+        named = replace(key("3", weather, 1), sensors=sensors, motion_hash=motion)
+        return named, metrics(**values)
+
+    dry = ("clear-sunrise", "clear-noon", "clear-night")
+    MATRIX.write(
+        tmp_path,
+        [*(at(w, "objects", "a", barriers=1) for w in dry), at("rain-noon", "objects", "b")],
+    )
+    on_images = [*(at(w, "pixels", "x", barriers=2) for w in dry), at("rain-noon", "pixels", "y")]
+    MATRIX.write(tmp_path / PIXELS, on_images)
+    words, _, table = parity_section(load_parity(load_matrix(tmp_path)))
+    assert "In 2 pairs of different drives" in words.text
+    assert "2 crashes on pixels and 1 crash on objects; 0 of the pairs moved alike" in words.text
+    assert [r[0].note for r in table.rows] == [
+        "Clear Sky: sunrise, noon and night, seed 1", "Heavy Rain - Noon, seed 1"
+    ]  # fmt: skip
 
 
 def test_the_page_tells_the_processor_minutes_of_each_part(matrix):

@@ -94,6 +94,16 @@ def test_questions_come_with_answers_and_verdicts_fold_their_numbers():
     assert "+3, p = 0.01" in folded.split("</details>", 1)[0]
 
 
+def test_long_tables_and_definitions_are_folded_away_under_their_name():
+    long = Table([("metric", "")], [[Cell("contacts")]], "Every metric", folded=True)
+    words = Definitions([("contacts", "", "of the ego"), ("min_ttc_s", "s", "least")])
+    html = render(Page(title="t", subtitle="", sections=[Section("s", [long, words])]))
+    assert '<details class="folded"><summary>Every metric</summary>' in html
+    assert html.count("Every metric</") == 1, "the caption stands once"
+    assert "<summary>2 columns of the results and what they mean</summary><dl" in html
+    assert html.count("<details") == html.count("</details>") == 2
+
+
 def test_a_report_is_replaced_only_by_a_complete_one(tmp_path, monkeypatch):
     path = tmp_path / "report.html"
     write_page(page(), path)

@@ -45,6 +45,7 @@ class Contrast:
     units_needed: int | None  # None: cannot be said
     identical: bool = False  # all pairs are the same drive
     without_limits: str = ""  # what stands where there is no interval
+    words: str = ""  # what stands in place of a number that is no estimate
 
     @property
     def small(self) -> bool:
@@ -260,7 +261,8 @@ class Never:
         p_claimed, p_against = (1.0, 0.0) if broken else (0.0, 1.0)
         label = f"0.5 minus the number of {self.cases}"
         sure = Interval(value, value)
-        return Contrast(label, value, sure, p_claimed, p_against, 0.0, judged, judged)
+        words = f"{broken} of {judged} {self.cases}; one is enough"
+        return Contrast(label, value, sure, p_claimed, p_against, 0.0, judged, judged, words=words)
 
 
 def finished(table: pl.DataFrame) -> pl.DataFrame:
@@ -304,7 +306,10 @@ def paired_runs(
     keys = [k for k in by if k in table.columns]
     hashes = drive_hash(table)
     known = not table.select(hashes.has_nulls()).item()
-    wanted = [pl.col(column).cast(pl.Float64).mean().alias("value"), hashes.sort().alias("hashes")]
+    wanted = [
+        pl.col(column).cast(pl.Float64).mean().alias("value"),
+        hashes.unique().sort().alias("hashes"),
+    ]
     sides = [
         table.filter(side).group_by(keys, maintain_order=True).agg(wanted) for side in (more, less)
     ]

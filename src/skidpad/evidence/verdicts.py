@@ -160,7 +160,7 @@ def _text(
         return "By construction: both sides are the same drive, so there is nothing to measure."
     if verdict is Verdict.SAME_DRIVES:
         return "Not measured: what differs never came into play, both sides are the same drives."
-    parts = [f"{c.label} {c.mean:+.3g} ({_limits(c)})" for c in contrasts]
+    parts = [c.words or f"{c.label} {c.mean:+.3g} ({_limits(c)})" for c in contrasts]
     text = f"{verdict.value.capitalize()}: {'; '.join(parts)}."
     few = min(c.units for c in contrasts)
     if verdict is Verdict.UNDECIDED and few < EVER_SIGNIFICANT:

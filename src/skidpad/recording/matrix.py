@@ -38,8 +38,10 @@ class Metrics:
 
     # collisions
     fatal_collisions: int | None = metric("recoveries, wrong ways and departures", "A-247, R-6")
-    crashes_vehicle: int | None = metric("of these with vehicles", "A-190, R-6")
-    road_departures: int | None = metric("of these static, off the road or wrong way", "R-6")
+    crashes_vehicle: int | None = metric("fatal collisions with vehicles", "A-190, R-6")
+    road_departures: int | None = metric(
+        "into a barrier, off the road, or facing the wrong way", "R-6"
+    )
     collisions_vehicle: int | None = metric("recoveries after hitting a vehicle", "A-190")
     collisions_static: int | None = metric("recoveries after hitting anything else", "A-190")
     off_road: int | None = metric("times that the car left the road and was put back", "R-6")

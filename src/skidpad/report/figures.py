@@ -36,6 +36,7 @@ STYLE: dict[Any, Any] = {
 
 LEGEND_CHARACTERS = 12.0  # of its font, per inch
 WIDEST = 4.0  # times the largest estimate, of an axis with intervals
+POINTS_REACH = 1.0  # least reach of an axis of points
 LEGEND_MARK = 5  # characters that a mark and its spaces take
 
 
@@ -130,8 +131,37 @@ def draw_bars(axes: Axes, groups: Sequence[str], series: Sequence[Series], y_lab
             named = True
     axes.set_xticks(range(len(groups)), groups)
     axes.set_ylabel(y_label)
-    axes.set_ylim(bottom=0.0)
+    axes.set_ylim(0.0, min(axes.get_ylim()[1], interval_reach(series)))
+    _mark_cut_bars(axes, series, len(groups), width)
     axes.grid(axis="x", visible=False)
+
+
+def _mark_cut_bars(axes: Axes, series: Sequence[Series], groups: int, width: float) -> None:
+    """An arrow at the upper edge where an interval goes on."""
+    top = axes.get_ylim()[1]
+    cut = [
+        (g + (k - (len(series) - 1) / 2) * width, top)
+        for k, one in enumerate(series)
+        for g, high in zip(range(groups), one.high, strict=False)
+        if high is not None and high > top
+    ]
+    for x, y in cut:
+        axes.plot([x], [y], marker="^", color=INK, markersize=5, clip_on=False)
+
+
+def interval_reach(series: Sequence[Series], least: float = 0.0) -> float:
+    """How far an axis goes for the sake of intervals: a few wide ones would press all estimates
+    into one place."""
+    values = [abs(v) for one in series for v in (*one.values, *one.published) if v is not None]
+    return max(WIDEST * max(values, default=0.0), least) or float("inf")
+
+
+def cut_note(series: Sequence[Series], least: float = 0.0) -> str:
+    """The sentence of a caption where an interval goes beyond the axis; else nothing."""
+    reach = interval_reach(series, least)
+    ends = (end for one in series for end in (*one.low, *one.high) if end is not None)
+    cut = any(abs(end) > reach for end in ends)
+    return " An arrow at the edge: the interval goes on beyond the axis." if cut else ""
 
 
 def points_with_intervals(
@@ -144,12 +174,17 @@ def points_with_intervals(
     """
     height = 1.1 + 0.3 * len(rows) + 0.12 * len(rows) * len(series)
     with canvas(height=height) as (figure, (axes,)):
+        heights = [
+            [r + 0.6 * ((k + 0.5) / len(series) - 0.5) for r in range(len(rows))]
+            for k in range(len(series))
+        ]
         for k, one in enumerate(series):
-            y = [r + 0.6 * ((k + 0.5) / len(series) - 0.5) for r in range(len(rows))]
-            _draw_points(axes, y, one, _ink(one, k))
+            _draw_points(axes, heights[k], one, _ink(one, k))
         if origin is not None:
             axes.axvline(origin, color=INK, linewidth=0.9)
         _keep_points_apart(axes, series, origin)
+        for k, one in enumerate(series):
+            _mark_cut_points(axes, heights[k], one, _ink(one, k))
         axes.set_yticks(range(len(rows)), rows)
         axes.set_ylim(len(rows) - 0.4, -0.6)
         axes.set_xlabel(x_label)
@@ -162,11 +197,20 @@ def points_with_intervals(
 
 
 def _keep_points_apart(axes: Axes, series: Sequence[Series], origin: float | None) -> None:
-    """Limit the axis where a few wide intervals would press all estimates into one place."""
-    values = [abs(v) for one in series for v in one.values if v is not None]
-    reach = max(WIDEST * max(values, default=0.0), 1.0)
+    """Limit the axis to where estimates stand apart."""
+    reach = interval_reach(series, POINTS_REACH)
     low, high = axes.get_xlim()
     axes.set_xlim(0.0 if origin is None else max(low, -reach), min(high, reach))
+
+
+def _mark_cut_points(axes: Axes, heights: Sequence[float], one: Series, ink: str) -> None:
+    """An arrow at the edge where an interval goes on."""
+    left, right = axes.get_xlim()
+    for y, low, high in zip(heights, one.low, one.high, strict=False):
+        for mark, edge, end in (("<", left, low), (">", right, high)):
+            if end is not None and not left <= end <= right:
+                style: dict[str, Any] = {"marker": mark, "color": ink, "markersize": 6}
+                axes.plot([edge], [y], clip_on=False, **style)
 
 
 def _ink(one: Series, place: int) -> str:
@@ -188,7 +232,8 @@ def _draw_points(axes: Axes, y: Sequence[float], one: Series, ink: str) -> None:
             continue
         known = [end for end in (low, high) if end is not None]
         face = ink if known else "white"
-        axes.plot([v], [yi], label=None if k else one.name, markerfacecolor=face, **style)
+        name = None if k else one.name
+        axes.plot([v], [yi], label=name, markerfacecolor=face, clip_on=False, zorder=3, **style)
         if known:
             ends_of_line = [min(*known, v), max(*known, v)]
             axes.plot(ends_of_line, [yi, yi], color=ink, linewidth=1.4)

@@ -20,6 +20,7 @@ from skidpad.report.matrix_parity import Parity, load_parity, parity_section
 from skidpad.report.matrix_published import beside_published
 from skidpad.report.matrix_real_time import real_time_blocks
 from skidpad.report.matrix_sides import side_blocks
+from skidpad.report.matrix_steps import step_blocks
 from skidpad.report.matrix_ways import way_blocks
 from skidpad.report.page import Block, Page, Section, Text, write_report_page
 from skidpad.report.verdicts import unjudged_text, verdict_blocks
@@ -75,7 +76,7 @@ def build_page(matrix: Matrix) -> Page:
             matrix_tables.others(matrix) + matrix_figures.others(matrix),
         ),
         *([Section("Functions and cruise target", varied)] if (varied := factors(matrix)) else []),
-        Section("One step at a time", matrix_tables.pairs(matrix)),
+        Section("One step at a time", step_blocks(matrix)),
         Section("Two configurations side by side", side_blocks(matrix)),
         Section("Where it happened", way_blocks(matrix, crashes)),
         Section("Every crash", crash_sections(matrix, crashes)),

@@ -4,12 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import polars as pl
+
 from skidpad.core.wording import count_text, list_text
 from skidpad.evidence.statistics import Interval, Rate, p_text, seeds_for_verdict
 from skidpad.evidence.verdicts import Judgement
 from skidpad.report.cards import headline
 from skidpad.report.crashes import Cell, Found
-from skidpad.report.figures import Series, points_with_intervals, stacked_bars
+from skidpad.report.figures import (
+    POINTS_REACH,
+    Series,
+    cut_note,
+    points_with_intervals,
+    stacked_bars,
+)
 from skidpad.report.matrix_contrasts import Contrast, by_configuration, by_weather
 from skidpad.report.matrix_data import (
     BASELINE,
@@ -139,6 +147,7 @@ def _rate_figure(matrix: Matrix, rates: dict[WeatherGroup, dict[str, Rate]]) -> 
         series.append(weather_series(group, k, values=values, low=low, high=high))
     rows = [config_title(c) for c in matrix.comparison_configs]
     caption = f"{EVENTS.capitalize()} per run; lines are 95 % intervals, hollow points have none."
+    caption += cut_note(series, POINTS_REACH)
     return Figure(points_with_intervals(rows, series, f"{EVENTS} per run"), caption)
 
 
@@ -241,7 +250,7 @@ def _change_figure(
     caption = (
         f"What each weather adds to the {EVENTS} per run in {base}, paired by seed; to the right of "
         "the rule is worse. Lines are 95 % intervals of each difference alone; the sentence above is "
-        f"corrected for all {len(changes)}."
+        f"corrected for all {len(changes)}.{cut_note(series, POINTS_REACH)}"
     )
     return Figure(points_with_intervals(rows, series, label, origin=0.0), caption)
 
@@ -260,8 +269,9 @@ def _next(matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[
     kinds = {kind.title: count(kind, runs[worst]) for kind in kinds_of(matrix.has_grades)}
     most = max(kinds, key=lambda title: kinds[title])
     sentence = (
-        f"{_first_word_large(_in_words(worst))} crashes most often ({totals[worst]} {EVENTS} in "
-        f"{count_text(len(runs[worst]), 'drive')}), mostly of the kind “{most}” ({kinds[most]})."
+        f"{_first_word_large(_in_words(worst))} had most {EVENTS} ({totals[worst]} in "
+        f"{count_text(len(runs[worst]), 'drive')}{_next_most(totals, runs, worst)}), mostly of the "
+        f"kind “{most}” ({kinds[most]})."
     )
     lines = [*_hardest(matrix, crashes), _claims(matrix, judged)]
     series = [
@@ -278,6 +288,15 @@ def _next(matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[
         f"What the {EVENTS} were, every drive once.",
     )
     return Answer("What should be looked at next?", sentence, lines, figure)
+
+
+def _next_most(totals: dict[str, int], runs: dict[str, pl.DataFrame], worst: str) -> str:
+    """The configuration that comes next, so that a reader sees how close it is."""
+    others = [c for c in totals if c != worst and len(runs[c])]
+    if not others:
+        return ""
+    second = max(others, key=lambda c: totals[c] / len(runs[c]))
+    return f"; next {_in_words(second)} with {totals[second]} in {len(runs[second])}"
 
 
 def _claims(matrix: Matrix, judged: Sequence[Judgement]) -> str:

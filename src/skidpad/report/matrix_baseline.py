@@ -23,6 +23,6 @@ def baseline_text(matrix: Matrix) -> list[Block]:
         )
     text += (
         "Its counts measure this cycle and not the weather. They stand in the tables as they were, "
-        "and in no comparison, total or figure."
+        "and in no total, and in no comparison or figure but those of the sources' own claims and numbers."
     )
     return [Text(text, tone="note")]

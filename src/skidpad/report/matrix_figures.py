@@ -5,11 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from skidpad.evidence.statistics import Rate
-from skidpad.report.figures import POINTS, Chart, Curve, Series, curves, grouped_bars, panel
+from skidpad.report.figures import (
+    POINTS,
+    Chart,
+    Curve,
+    Series,
+    curves,
+    cut_note,
+    grouped_bars,
+    panel,
+)
 from skidpad.report.matrix_answers import MARKERS, ends
 from skidpad.report.matrix_data import (
-    CONFIGS,
     EVENTS,
+    IN_SENTENCES,
     Matrix,
     WeatherGroup,
     config_title,
@@ -42,11 +51,12 @@ def collisions(matrix: Matrix) -> list[Block]:
     return [
         Figure(
             grouped_bars(groups, by_weather, label),
-            f"{EVENTS.capitalize()} per run by weather and configuration; lines are 95 % intervals.",
+            f"{EVENTS.capitalize()} per run by weather and configuration; lines are 95 % intervals."
+            + cut_note(by_weather),
         ),
         Figure(
             grouped_bars([short_title(c) for c in matrix.comparison_configs], [total], label),
-            "The same over all weathers, every drive once.",
+            "The same over all weathers, every drive once." + cut_note([total]),
         ),
     ]
 
@@ -128,7 +138,11 @@ def _draw_marks(matrix: Matrix, points: Points, x_label: str) -> str:
 
 def short_title(config: str) -> str:
     """`configuration 2`; another driver by its name."""
-    return f"configuration {config}" if config in CONFIGS else config
+    return (
+        f"configuration {config}"
+        if config.isdigit()
+        else IN_SENTENCES.get(config, config).removeprefix("the ")
+    )
 
 
 def _rates(name: str, rates: Sequence[Rate | None]) -> Series:

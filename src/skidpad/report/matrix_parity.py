@@ -13,7 +13,14 @@ from skidpad.core.wording import count_text
 from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.matrix import PIXELS, MatrixEntry
 from skidpad.report.figures import POINTS, Chart, Curve, curves
-from skidpad.report.matrix_data import BASELINE, EVENTS, Matrix, config_title, weather_title
+from skidpad.report.matrix_data import (
+    BASELINE,
+    EVENTS,
+    Matrix,
+    WeatherGroup,
+    config_list,
+    config_title,
+)
 from skidpad.report.page import Block, Cell, Figure, Text
 from skidpad.report.tables import Column, Format, Quantity, table
 
@@ -31,6 +38,7 @@ class Twin(NamedTuple):
 
     pixels: dict[str, object]
     objects: dict[str, object]
+    weathers: tuple[str, ...]  # in which both moved so
 
 
 class Parity:
@@ -41,20 +49,31 @@ class Parity:
 
     @cached_property
     def twins(self) -> list[Twin]:
-        """Every pair in the order of configurations and weathers."""
-        found = []
+        """Every pair in the order of configurations and weathers; what moved alike at both levels in
+        several weathers is one pair (decision T-3)."""
+        found: dict[tuple[object, ...], Twin] = {}
         for config in self.matrix.configs:
             for weather in self.matrix.weathers:
                 objects = {r["seed"]: r for r in self.matrix.cell(config, weather).to_dicts()}
                 cell = self.pixels.finished.filter(
                     (pl.col("config") == config) & (pl.col("weather") == weather)
                 )
-                found += [
-                    Twin(row, objects[row["seed"]])
-                    for row in cell.sort("seed").to_dicts()
-                    if row["seed"] in objects
-                ]
-        return found
+                for row in cell.sort("seed").to_dicts():
+                    if row["seed"] in objects:
+                        self._add(found, Twin(row, objects[row["seed"]], (weather,)))
+        return list(found.values())
+
+    def _add(self, found: dict[tuple[object, ...], Twin], twin: Twin) -> None:
+        """Add a pair, or its weather to the pair that moved alike."""
+        moved = (
+            twin.pixels[self.pixels.drive_column],
+            twin.objects[self.matrix.drive_column],
+        )
+        apart = twin.weathers if None in moved else ()  # unknown hashes are of no other drive
+        key = (twin.pixels["config"], twin.pixels["seed"], *moved, apart)
+        known = found.get(key)
+        weathers = (*(known.weathers if known else ()), *twin.weathers)
+        found[key] = (known or twin)._replace(weathers=weathers)
 
 
 def load_parity(matrix: Matrix) -> Parity | None:
@@ -78,15 +97,22 @@ def parity_section(parity: Parity | None) -> list[Block]:
 def parity_text(parity: Parity) -> str:
     """Crashes at both levels over the compared configurations, and how many drives moved alike."""
     twins = [t for t in parity.twins if t.pixels["config"] != BASELINE]
-    on_pixels, on_objects = (sum(int(t[k][EVENTS] or 0) for t in twins) for k in (0, 1))  # type: ignore[call-overload]
-    alike = sum(t.pixels["motion_hash"] == t.objects["motion_hash"] is not None for t in twins)
+    on_pixels, on_objects = (
+        sum(int(row[EVENTS] or 0) for row in rows)  # type: ignore[call-overload]
+        for rows in ([t.pixels for t in twins], [t.objects for t in twins])
+    )
+    alike = [t for t in twins if t.pixels["motion_hash"] == t.objects["motion_hash"] is not None]
     seeds = count_text(len({t.pixels["seed"] for t in twins}), "seed")
+    same = f"{len(alike)} of the pairs moved alike to the last bit"
+    if alike:
+        drivers = list(dict.fromkeys(str(t.pixels["config"]) for t in alike))
+        same += f", with {config_list(drivers)}"
     return (
         f"This page is about the object level: sensors from boxes, without images. {seeds} of it "
-        f"drove once more on camera images. In {count_text(len(twins), 'pair')} of drives of the "
-        f"compared configurations there were {count_text(on_pixels, 'crash', 'crashes')} on pixels "
-        f"and {count_text(on_objects, 'crash', 'crashes')} on objects; {alike} of the pairs moved "
-        "alike to the last bit. One seed shows how the levels differ and not how often."
+        f"drove once more on camera images. In {count_text(len(twins), 'pair')} of different drives "
+        f"of the compared configurations there were {count_text(on_pixels, 'crash', 'crashes')} on "
+        f"pixels and {count_text(on_objects, 'crash', 'crashes')} on objects; {same}. One seed shows "
+        "how the levels differ and not how often."
     )
 
 
@@ -106,7 +132,7 @@ def _table(parity: Parity) -> Block:
     def name(twin: Twin) -> Cell:
         return Cell(
             config_title(str(twin.pixels["config"])),
-            note=f"{weather_title(str(twin.pixels['weather']))}, seed {twin.pixels['seed']}",
+            note=f"{WeatherGroup(twin.weathers).title}, seed {twin.pixels['seed']}",
         )
 
     def of(column: str) -> Column[Twin]:
@@ -114,7 +140,7 @@ def _table(parity: Parity) -> Block:
         return Column(title, lambda twin: _both(column, twin), unit=unit, format=Format(".2f"))
 
     columns = [Column("run", name), of(EVENTS), *(of(column) for column, _, _ in COMPARED)]
-    note = "Large: on pixels; small: on objects, same seed."
+    note = "Large: on pixels; small: on objects, same seed. What moved alike is one row."
     return table(columns, parity.twins, "The same runs on pixels and on objects", note)
 
 

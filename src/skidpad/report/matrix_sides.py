@@ -7,13 +7,12 @@ from functools import partial
 import polars as pl
 
 from skidpad.evidence.contrasts import paired_runs, per_seed
-from skidpad.evidence.statistics import compare_pairs
-from skidpad.recording.matrix import Metrics
-from skidpad.report.campaign import Metric, metrics_of
+from skidpad.evidence.statistics import UNITS_FROM, compare_pairs, no_limits_text
+from skidpad.report.campaign import Metric
 from skidpad.report.figures import Series, grouped_bars
 from skidpad.report.matrix_contrasts import BY_RUN
 from skidpad.report.matrix_data import EVENTS, INTERVENTIONS, Matrix, config_title
-from skidpad.report.matrix_tables import mean_quantity
+from skidpad.report.matrix_tables import METRICS, NAMES, metric_quantity
 from skidpad.report.page import Block, Cell, Figure
 from skidpad.report.tables import Column, Format, Quantity, table
 
@@ -42,9 +41,8 @@ def side_blocks(matrix: Matrix) -> list[Block]:
 
 def _table(matrix: Matrix, first: str, second: str) -> Block:
     """Means over seeds of both, and the paired difference."""
-    metrics = {m.name: m for m in metrics_of(Metrics)}
     columns = [
-        Column[Metric]("metric", lambda m: Cell(m.heading, note=m.meaning)),
+        Column[Metric]("metric", _name),
         *(
             Column[Metric](config_title(c), partial(_mean, matrix, c), format=Format())
             for c in (first, second)
@@ -56,13 +54,18 @@ def _table(matrix: Matrix, first: str, second: str) -> Block:
             format=Format("+.2f", absent="no pairs"),
         ),
     ]
-    rows = [metrics[name] for name in ROWS]
-    note = "Means over seeds, every drive once; small: 95 % interval over seeds."
+    rows = [METRICS[name] for name in ROWS]
+    note = "Means over seeds, every drive once; small: 95 % interval of each number alone."
     return table(columns, rows, f"Configuration {first} and configuration {second}", note, False)
 
 
+def _name(metric: Metric) -> Cell:
+    title = NAMES.get(metric.name, metric.title)
+    return Cell(f"{title}, {metric.unit}" if metric.unit else title, note=metric.meaning)
+
+
 def _mean(matrix: Matrix, config: str, metric: Metric) -> Quantity:
-    return mean_quantity(matrix.cell(config), metric.name)
+    return metric_quantity(matrix.cell(config), metric.name)
 
 
 def _difference(matrix: Matrix, first: str, second: str, metric: Metric) -> Quantity:
@@ -71,7 +74,8 @@ def _difference(matrix: Matrix, first: str, second: str, metric: Metric) -> Quan
     if not len(pairs):
         return Quantity(value=None)
     c = compare_pairs(per_seed(pairs, pl.col("difference")))
-    return Quantity(value=c.mean, interval=c.interval)
+    few = "" if c.interval or matrix.seeds < UNITS_FROM else no_limits_text(c.n, "seed")
+    return Quantity(value=c.mean, interval=c.interval, remark=few)
 
 
 def _figure(matrix: Matrix, first: str, second: str) -> Figure:

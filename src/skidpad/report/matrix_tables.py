@@ -3,27 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 
 import polars as pl
 
 from skidpad.core.wording import count_text
-from skidpad.evidence.contrasts import paired_runs, per_seed
+from skidpad.evidence.contrasts import per_seed
 from skidpad.evidence.statistics import (
     ASSUMED,
-    EVER_SIGNIFICANT,
     UNITS_FROM,
+    Interval,
     Rate,
-    compare_pairs,
     mean_limits,
     no_limits_text,
-    p_text,
     poisson_interval,
     rate_remark,
 )
 from skidpad.recording.matrix import Metrics
 from skidpad.report.campaign import Metric, metrics_of
-from skidpad.report.matrix_contrasts import ALPHA, BY_RUN
 from skidpad.report.matrix_data import (
     EVENTS,
     INTERVENTIONS,
@@ -32,20 +30,20 @@ from skidpad.report.matrix_data import (
     config_title,
     rate_by_seed,
 )
-from skidpad.report.page import Block, Cell, Table, Text
+from skidpad.report.page import Block, Cell, Table
 from skidpad.report.tables import Column, Format, Quantity, table
 
-STEPS = (("1", "2"), ("2", "3"), ("3", "4"), ("2", "4"))
-WORSE_UP = (EVENTS, "lane_invasions", "dropout_pct", "ttc_below_1_5_s", "mean_error_m")
-STEP_COLUMNS = (
-    "fatal_collisions",
-    "lane_invasions",
-    "mean_speed_kmh",
-    "dropout_pct",
-    "ttc_below_1_5_s",
-    "mean_error_m",
-    "headway_variance_m2",
-)
+METRICS = {m.name: m for m in metrics_of(Metrics)}
+NAMES = {  # one name for one quantity, in all tables
+    INTERVENTIONS: "interventions",
+    "road_departures": "departures",
+    "lane_invasions": "solid markings crossed",
+    "ttc_below_1_5_s": "time with a TTC below 1.5 s",
+    "mean_error_m": "mean distance error",
+    "headway_variance_m2": "variance of the distance error",
+    "radar_fpr_pct": "radar false positives",
+    "radar_fnr_pct": "radar false negatives",
+}
 RATE = Format(".2f", absent="no run")
 MEANS = (
     ("dropout_pct", "Dropout: ticks without a target or persisting, %"),
@@ -75,6 +73,13 @@ GRADES = (
     ("contacts_heavy", "above 20", "the same"),
     ("contacts_vulnerable", "with persons or two wheels", "of these"),
     ("contacts_static", "with what stands", "barriers, posts"),
+)
+COUNTS = frozenset(  # events of which a mean is a rate
+    (
+        *("serious_contacts", "road_departures", INTERVENTIONS, "interventions", "fatal_first"),
+        *("crashes_vehicle", "crashes_vehicle_first", "road_departures_first", "lane_invasions"),
+        *(name for name, *_ in (*KINDS, *GRADES)),
+    )
 )
 
 BACKGROUND = (
@@ -206,18 +211,42 @@ def mean_table(matrix: Matrix, column: str, caption: str) -> Table:
     return by_weather(matrix, of, Format(), caption, note)
 
 
+def metric_quantity(runs: pl.DataFrame, column: str) -> Quantity:
+    """The mean of a metric over seeds; of events their rate, with the interval it has everywhere."""
+    return (
+        rate_quantity(rate_by_seed(runs, column))
+        if column in COUNTS
+        else mean_quantity(runs, column)
+    )
+
+
 def mean_quantity(runs: pl.DataFrame, column: str) -> Quantity:
     """Mean over seeds, of each the mean of its runs; one seed has no interval."""
     known = per_seed(runs.drop_nulls(column), pl.col(column).cast(pl.Float64)).to_numpy()
     limits = mean_limits(known)
     return Quantity(
         value=float(known.mean()) if known.size else None,
-        interval=limits,
-        remark=no_limits_text(known.size, "seed")
-        if limits is None and known.size >= UNITS_FROM
-        else "",
+        interval=None if limits is None else possible_part(limits, column, float(known.min())),
+        remark=""
+        if limits or not known.size
+        else _without_limits(known.size, runs["seed"].n_unique()),
         hint=count_text(known.size, "seed") if known.size else "",
     )
+
+
+def _without_limits(known: int, seeds: int) -> str:
+    """Why a mean has no limits; of so few seeds in all the table's note says it once."""
+    if seeds < UNITS_FROM:
+        return ""
+    return no_limits_text(known, "seed") if known >= UNITS_FROM else f"{known} of {seeds} seeds"
+
+
+def possible_part(limits: Interval, column: str, least: float) -> Interval:
+    """The part of an interval in which the quantity can lie: no metric of a run is negative, and no
+    share above 100 %. least: the least value seen."""
+    low, high = limits
+    most = 100.0 if "_pct" in column else float("inf")
+    return Interval(max(low, min(0.0, least)), min(high, most))
 
 
 def kinds_table(matrix: Matrix) -> Table:
@@ -271,59 +300,6 @@ def background_table(matrix: Matrix) -> Table:
     return table(columns, matrix.weather_groups, "Contacts among background vehicles")
 
 
-def pairs(matrix: Matrix) -> list[Block]:
-    """Neighbouring configurations, paired by weather and seed."""
-    if matrix.seeds < EVER_SIGNIFICANT:
-        return [Text(few_seeds_text(matrix.seeds))]
-    intro = Text(
-        "The difference that each step makes, paired by weather and seed: second minus first "
-        "configuration. The step from 2 to 4 adds light assist, resume protocol and limiter at once."
-    )
-    metrics = {m.name: m for m in metrics_of(Metrics)}
-    columns = [
-        Column[tuple[str, str]](
-            "step", lambda step: Cell(" to ".join(step), note=config_title(step[1])[4:])
-        ),
-        *(
-            Column[tuple[str, str]](
-                metrics[name].title,
-                partial(step_quantity, matrix, name),
-                metrics[name].meaning,
-                metrics[name].unit,
-                format=Format("+.2f", absent="no pairs"),
-            )
-            for name in STEP_COLUMNS
-        ),
-    ]
-    there = [step for step in STEPS if {*step} <= {*matrix.configs}]
-    return [intro, table(columns, there, "Paired differences per run")] if there else []
-
-
-def few_seeds_text(seeds: int) -> str:
-    """The line that stands in place of what so few seeds cannot fill."""
-    return (
-        f"{count_text(seeds, 'seed')} per cell cannot show what a step changes: fewer than "
-        f"{EVER_SIGNIFICANT} pairs allow no test."
-    )
-
-
-def step_quantity(matrix: Matrix, column: str, step: tuple[str, str]) -> Quantity:
-    """The second configuration less the first, paired; a clear sign is marked better or worse."""
-    less, more = (pl.col("config") == config for config in step)
-    pairs, _ = paired_runs(matrix.finished, more, less, BY_RUN, column)
-    if not len(pairs):
-        return Quantity(value=None)
-    c = compare_pairs(per_seed(pairs, pl.col("difference")))
-    judged = column in WORSE_UP and c.p is not None and c.p < ALPHA
-    return Quantity(
-        value=c.mean,
-        interval=c.interval,
-        remark=p_text(c.p),
-        kind=("bad" if c.mean > 0 else "good") if judged else "",
-        hint=count_text(c.n, "seed"),
-    )
-
-
 def per_weather(matrix: Matrix) -> list[Block]:
     """Every metric of every cell, one table per configuration (A-256)."""
     return [_metrics_table(matrix, config) for config in matrix.configs]
@@ -331,7 +307,7 @@ def per_weather(matrix: Matrix) -> list[Block]:
 
 def _metrics_table(matrix: Matrix, config: str) -> Table:
     def of(group: WeatherGroup, metric: Metric) -> Quantity:
-        return mean_quantity(matrix.within(config, group), metric.name)
+        return replace(metric_quantity(matrix.within(config, group), metric.name), remark="")
 
     columns = [
         Column[Metric]("metric", lambda m: Cell(m.heading, note=m.meaning)),
@@ -340,4 +316,6 @@ def _metrics_table(matrix: Matrix, config: str) -> Table:
             for g in matrix.weather_groups
         ),
     ]
-    return table(columns, metrics_of(Metrics), config_title(config), sortable=False)
+    note = "Means over seeds; small: 95 % interval, none where all seeds are alike."
+    found = table(columns, metrics_of(Metrics), config_title(config), note, sortable=False)
+    return replace(found, folded=True)

@@ -46,6 +46,7 @@ class Table:
     caption: str = ""
     note: str = ""
     sortable: bool = True
+    folded: bool = False  # away until asked for, under its caption
     kind: str = "table"
 
     def csv(self) -> str:
@@ -215,7 +216,7 @@ class Definitions:
     """Terms and what they mean."""
 
     items: Sequence[tuple[str, str, str]]  # name, unit, definition
-    kind: str = "definitions"
+    kind: str = "definitions"  # folded away until asked for
 
 
 @dataclass(frozen=True, slots=True)

@@ -47,6 +47,14 @@ def test_one_cell_decides_the_collision_check():
     assert verdict("A-276", matrix({"1": 3}, FEW)) == "not testable"
 
 
+@pytest.mark.req("A-276")
+def test_a_claim_that_one_case_decides_counts_cases_in_words():
+    once = {"0": 5, "1": 1, "2": 1, "3": 1, "4": 1}
+    (judged,) = judge([BY_ID["A-276"]], [matrix(once, FEW)])
+    assert "2 of 4 cells that break it over all seeds; one is enough" in judged.text
+    assert "0.5" not in judged.text
+
+
 @pytest.mark.req("A-277")
 def test_the_lane_check_follows_the_counts():
     collisions = dict.fromkeys("01234", 1)

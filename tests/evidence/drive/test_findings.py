@@ -212,6 +212,13 @@ def test_equal_drives_are_by_construction() -> None:
     assert verdict("F-11", same) is Verdict.BY_CONSTRUCTION
 
 
+def test_one_side_of_several_equal_weathers_is_still_the_same_drive() -> None:
+    """By day there are two weathers and by night one: where all three are one drive, so are both sides."""
+    table = campaign("F-12", TRUE["F-12"], 0.0, noise=0.0)
+    drive = pl.concat_str("config", "precipitation_kind", pl.col("seed").cast(pl.String))
+    assert verdict("F-12", table.with_columns(log_hash=drive)) is Verdict.BY_CONSTRUCTION
+
+
 def test_equal_drives_say_nothing_of_a_claim_that_is_not_built_in() -> None:
     table = campaign("F-10", TRUE["F-10"], 0.0, noise=0.0)
     same = table.with_columns(log_hash=pl.col("seed").cast(pl.String))

@@ -1,11 +1,14 @@
 """The page in a real browser: its script runs, tables sort, replays get their controls."""
 
+import re
 import subprocess
 
 import pytest
+from test_matrix_answers import campaign, clear_cut
 from test_page import page
 
 from chromium import CHROMIUM, FLAGS
+from skidpad.report.matrix import write_report
 from skidpad.report.page import Cell, Page, Section, Table, Text, write_page
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
@@ -61,3 +64,19 @@ def test_a_table_with_long_remarks_is_whole_on_a_screen_of_1400_pixels(tmp_path)
     box = "document.querySelector('.scroll')"
     measured = f"document.documentElement.dataset.cut = {box}.scrollWidth - {box}.clientWidth"
     assert 'data-cut="0"' in dom(path, measured, "1400,900")
+
+
+@pytest.mark.parametrize("size", ["1400,900", "1000,900"])
+def test_no_table_of_the_matrix_page_is_cut(tmp_path, size):
+    campaign(tmp_path, clear_cut, seeds=9)
+    path = write_report(tmp_path)
+    boxes = "[...document.querySelectorAll('.scroll')]"
+    script = (
+        "document.querySelectorAll('details').forEach(d => d.open = true);"
+        f"document.documentElement.dataset.cut = {boxes}"
+        ".filter(e => e.scrollWidth > e.clientWidth).length;"
+        f"document.documentElement.dataset.tables = {boxes}.length;"
+    )
+    shown = dom(path, script, size)
+    assert 'data-cut="0"' in shown
+    assert int(re.search(r'data-tables="(\d+)"', shown).group(1)) > 20

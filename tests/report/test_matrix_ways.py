@@ -33,7 +33,9 @@ def test_the_map_has_a_way_per_configuration_and_a_mark_per_crash(tmp_path, monk
     drive = SimpleNamespace(log=SimpleNamespace(actors=actors), row=lambda tick: tick)
     crash = (SimpleNamespace(tick=1), drive, road_map, None)
     (figure,) = way_blocks(matrix, {("0", "clear-noon"): [crash], ("3", "rain-noon"): [crash] * 2})
-    assert {"m east", "m north"} <= {t for t, *_ in texts(figure.svg)}
+    words = {t for t, *_ in texts(figure.svg)}
+    assert {"m east", "m north"} <= words
+    assert {g.title for g in matrix.weather_groups} <= words, "the legend of the marks"
     for colour in PALETTE[:4]:  # of configurations 1 to 4; each has a way and its legend
         assert len(re.findall(rf"fill: none; stroke: {colour}", figure.svg)) == 2
     marks = re.findall(rf"fill: {PALETTE[2]}; stroke: #000000", figure.svg)

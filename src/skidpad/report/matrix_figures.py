@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import cycle
 
 from skidpad.evidence.statistics import Rate
 from skidpad.report.figures import (
@@ -65,6 +66,7 @@ def others(matrix: Matrix) -> list[Block]:
     """Dropout, dropout against interventions, variance, and one configuration in several metrics."""
     groups = [g.short for g in matrix.weather_groups]
     dropout = [_means(matrix, c, "dropout_pct", short_title(c)) for c in matrix.comparison_configs]
+    dropout = [one for one in dropout if any(v is not None for v in one.values)]
     figures = [
         (grouped_bars(groups, dropout, "dropout, %"), "Dropout by weather and configuration."),
         (
@@ -129,11 +131,17 @@ def _draw_marks(matrix: Matrix, points: Points, x_label: str) -> str:
         )
         for (config, group), (x, y) in points.items()
     ]
-    clouds += [
+    return curves(
+        [Chart([*clouds, *weather_marks(matrix)], x_label, f"{EVENTS} per run")], height=3.8
+    )
+
+
+def weather_marks(matrix: Matrix) -> list[Curve]:
+    """What a legend says of marks: each weather has its own."""
+    return [
         Curve(group.title, [], [], colour=GREY, style=POINTS | {"marker": mark})
-        for group, mark in marks.items()
+        for group, mark in zip(matrix.weather_groups, cycle(MARKERS), strict=False)
     ]
-    return curves([Chart(clouds, x_label, f"{EVENTS} per run")], height=3.8)
 
 
 def short_title(config: str) -> str:

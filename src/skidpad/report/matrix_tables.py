@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -65,8 +65,8 @@ KINDS = (
     ),
     ("wrong_way", "wrong-way corrections", ""),
     ("stuck_relocations", "stuck and put back", "no intervention"),
-    ("contacts", "contacts", "of the ego, also those within the cool-down of a recovery"),
 )
+CONTACTS = ("contacts", "contacts", "of the ego, also those within the cool-down of a recovery")
 GRADES = (
     ("contacts_light", "below 5 km/h", "of the contacts with road users, by change of speed"),
     ("contacts_medium", "5 to 20", "the same, or slower with a person or two wheels"),
@@ -78,7 +78,7 @@ COUNTS = frozenset(  # events of which a mean is a rate
     (
         *("serious_contacts", "road_departures", INTERVENTIONS, "interventions", "fatal_first"),
         *("crashes_vehicle", "crashes_vehicle_first", "road_departures_first", "lane_invasions"),
-        *(name for name, *_ in (*KINDS, *GRADES)),
+        *(name for name, *_ in (*KINDS, CONTACTS, *GRADES)),
     )
 )
 
@@ -105,6 +105,7 @@ def collisions(matrix: Matrix) -> list[Block]:
             matrix, "fatal_first", "Interventions per run that are the first of their chain"
         ),
         kinds_table(matrix),
+        grades_table(matrix),
         background_table(matrix),
     ]
 
@@ -250,8 +251,17 @@ def possible_part(limits: Interval, column: str, least: float) -> Interval:
 
 
 def kinds_table(matrix: Matrix) -> Table:
-    """What the collisions of each configuration were."""
+    """What put the car back, as counts of each configuration."""
+    return _counts(matrix, KINDS, "What the interventions were: counts, every drive once")
 
+
+def grades_table(matrix: Matrix) -> Table:
+    """How hard the contacts were."""
+    grades = GRADES if matrix.has_grades else ()
+    return _counts(matrix, (CONTACTS, *grades), "What the contacts were: counts, every drive once")
+
+
+def _counts(matrix: Matrix, kinds: Sequence[tuple[str, str, str]], caption: str) -> Table:
     def name(config: str) -> Cell:
         runs = matrix.cell(config)
         note = f"{count_text(len(runs), 'run')}, {runs['distance_km'].sum():,.0f} km"
@@ -262,16 +272,9 @@ def kinds_table(matrix: Matrix) -> Table:
 
     columns = [
         Column("configuration", name),
-        *(
-            Column[str](title, partial(count, kind), definition)
-            for kind, title, definition in (*KINDS, *(GRADES if matrix.has_grades else ()))
-        ),
+        *(Column[str](title, partial(count, kind), words) for kind, title, words in kinds),
     ]
-    return table(
-        columns,
-        matrix.configs,
-        "What the interventions and contacts were: counts, every drive once",
-    )
+    return table(columns, matrix.configs, caption)
 
 
 def background_table(matrix: Matrix) -> Table:

@@ -12,6 +12,7 @@ from skidpad.report.crashes import Cell, Found
 from skidpad.report.figures import FRAME, Chart, Curve, curves
 from skidpad.report.matrix_answers import MARKERS
 from skidpad.report.matrix_data import Matrix, config_title
+from skidpad.report.matrix_figures import weather_marks
 from skidpad.report.page import Block, Figure
 from skidpad.roads.bundled import kept_map
 from skidpad.roads.lanes import LaneKind
@@ -38,7 +39,7 @@ def way_blocks(matrix: Matrix, crashes: Mapping[Cell, Sequence[Found]]) -> list[
         colour = matrix.comparison_configs.index(config)
         style = {"linewidth": 1.0, "alpha": 0.8}
         lines.append(Curve(config_title(config), way[:, 0], way[:, 1], colour=colour, style=style))
-    lines += _marks(matrix, crashes)
+    lines += [*_marks(matrix, crashes), *weather_marks(matrix)]
     chart = Chart(lines, "m east", "m north", equal=True)
     first = matrix.weather_groups[0]
     caption = (

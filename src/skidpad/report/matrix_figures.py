@@ -67,8 +67,9 @@ def others(matrix: Matrix) -> list[Block]:
     groups = [g.short for g in matrix.weather_groups]
     dropout = [_means(matrix, c, "dropout_pct", short_title(c)) for c in matrix.comparison_configs]
     dropout = [one for one in dropout if any(v is not None for v in one.values)]
+    by_weather = "Dropout by weather and configuration."
     figures = [
-        (grouped_bars(groups, dropout, "dropout, %"), "Dropout by weather and configuration."),
+        *([(grouped_bars(groups, dropout, "dropout, %"), by_weather)] if dropout else []),
         (
             run_figure(matrix, "dropout_pct", "dropout, %"),
             f"Dropout against {EVENTS}, one point per drive; the mark is the weather.",

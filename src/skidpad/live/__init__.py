@@ -1,1 +1,1 @@
-"""Links beside the loop: who listens while channels drive, and how it reaches them (R-12)."""
+"""Links beside the loop: the listeners to a drive of channels, and how its messages reach them (R-12)."""

@@ -15,7 +15,7 @@ MONITORED = ".monitor"  # suffix of the folder beside a recording
 
 @contextmanager
 def opened(links: Links, channels: Sequence[str], recording: Path) -> Iterator[list[Listener]]:
-    """The listeners of a drive that is recorded as `recording`."""
+    """Opens the listeners of a drive that is recorded as `recording`."""
     with ExitStack() as stack:
         listeners: list[Listener] = []
         if links.monitor:

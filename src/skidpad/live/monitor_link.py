@@ -149,7 +149,7 @@ class MonitorLink:
 
 
 class _Queue:
-    """Cycles that wait for the pipe; a thread takes them there, so that who offers never waits."""
+    """Holds cycles that wait for the pipe; a thread takes them there, so that `offer` never waits."""
 
     def __init__(self, deliver: Callable[[int, bytes], None], capacity: int) -> None:
         self.deliver, self.capacity = deliver, capacity
@@ -159,7 +159,7 @@ class _Queue:
         self.thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Begin to take."""
+        """Starts the thread that takes cycles to the pipe."""
         self.thread = threading.Thread(target=self._run, name="monitor link", daemon=True)
         self.thread.start()
 

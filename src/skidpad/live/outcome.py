@@ -25,7 +25,7 @@ class LinkOutcome(msgspec.Struct, frozen=True, kw_only=True):
 
     @property
     def sentence(self) -> str:
-        """For people."""
+        """The outcome as one line of text."""
         lost = f", {len(self.missing)} of them missing" if self.missing else ""
         return f"{self.cycles} cycles{lost}; {self.ended}"
 

@@ -1,4 +1,4 @@
-"""A live scene for Foxglove: what every channel says of the world, who drives, and alarms."""
+"""A live scene for Foxglove: the world as every channel reports it, the driving channel, and alarms."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ MONITORED = ".monitor"
 
 
 class ScenePublisher:
-    """A `Listener` with a WebSocket server on 127.0.0.1; who connects late sees the next cycle."""
+    """A `Listener` with a WebSocket server on 127.0.0.1; a client that connects late sees the next cycle."""
 
     def __init__(self, channels: Sequence[str], recording: Path, port: int) -> None:
         self.channels = tuple(channels)
@@ -53,7 +53,7 @@ class ScenePublisher:
         self.entities: list[Any] = []
 
     def hear(self, channel: int | None, item: Item) -> None:
-        """Draw a channel's world, or say who drives."""
+        """Draws a channel's world, or names the driving channel."""
         if isinstance(item, ChannelFrame) and channel is not None:
             self.entities.append(entity_of(self.channels[channel], channel, item))
         elif isinstance(item, Decision):
@@ -77,7 +77,7 @@ class ScenePublisher:
         return [json.loads(line) for line in new]
 
     def close(self) -> None:
-        """Stop the server."""
+        """Stops the WebSocket server of the scene."""
         self.server.stop()
 
 

@@ -1,4 +1,4 @@
-"""How a drive is linked to those who listen."""
+"""Settings of the links between a drive and its listeners."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ PUBLISHERS = ("ros2", "foxglove")
 
 
 class Flow(str, Enum):
-    """Who waits for whom."""
+    """Whether the drive waits for its listeners."""
 
     LOSSLESS = "lossless"  # the drive waits: campaigns, recordings
     LIVE = "live"  # the drive never waits: what does not fit in the queue is dropped and counted
 
 
 class Links(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """Who listens while channels drive. It changes nothing of the drive, so no run value has it."""
+    """The listeners of a drive of channels. They change nothing of the drive, so no run value has them."""
 
     monitor: Annotated[
         bool,
@@ -50,7 +50,7 @@ class Links(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def flow(self) -> Flow:
-        """Who waits."""
+        """Whether the drive waits for its listeners."""
         return Flow.LIVE if self.live else Flow.LOSSLESS
 
 

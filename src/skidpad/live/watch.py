@@ -44,7 +44,7 @@ class Timer:
         self.rows: list[dict[str, float]] = []
 
     def begin(self, cycle: Cycle) -> None:
-        """A cycle starts."""
+        """Starts the measurements of a cycle."""
         objects = sum(len(f.objects) for f in cycle.frames if f is not None)
         self.rows.append({"cycle": cycle.k, "objects": objects, "writing": 0.0})
         self.last = self.clock()
@@ -136,7 +136,7 @@ class Alarms:
         self.stream = stream
 
     def see(self, monitor: Monitor, evidence: CycleEvidence) -> None:
-        """A judged cycle."""
+        """Writes the hazards that began in a judged cycle."""
         k, t = evidence.cycle.k, evidence.cycle.t
         for hazard in evidence.fired:
             if monitor.hazards.open[hazard].t_start == t:

@@ -37,7 +37,7 @@ _READERS: dict[int, tuple[Any, Callable[[Any], Item]]] = {
 
 
 def packed(channel: int | None, item: Item) -> bytes:
-    """An item as a record; the true world gives none (C-021)."""
+    """Returns an item as a record of bytes; the true world gives none (C-021)."""
     if isinstance(item, TruthFrame):
         return b""
     kind, message_of = _KINDS[type(item)]

@@ -69,7 +69,7 @@ class BakedMap:
         return digest.hexdigest()
 
     def save(self, path: Path) -> None:
-        """Write as compressed npz."""
+        """Writes the map as compressed npz."""
         start = self.ego_start
         about = {
             "format": FORMAT,

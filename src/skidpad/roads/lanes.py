@@ -100,7 +100,7 @@ class SignalTable(NamedTuple):
 
 
 class SignalKind(IntEnum):
-    """What a signal demands."""
+    """What a signal demands of drivers."""
 
     LIGHT = 0
     STOP = 1

@@ -90,7 +90,7 @@ class RoadMap:
 
     @cached_property
     def held(self) -> Held[kernels.LaneArrays]:
-        """`arrays` for entry kernels; made when asked, as who only names a map runs no kernel."""
+        """`arrays` for entry kernels, made at first use: a command that only names a map needs no kernel."""
         return hold(self._arrays)
 
     def read_only(self) -> RoadMap:
@@ -111,7 +111,7 @@ class RoadMap:
 
     @cached_property
     def edge(self) -> RoadEdge:
-        """Where the road ends."""
+        """The edge of the paved road beside each lane."""
         return RoadEdge(self.samples, self.lanes)
 
     def project(self, x: float, y: float, z: float, driving: bool = True) -> LanePoint | None:
@@ -179,11 +179,11 @@ class RoadMap:
         return [int(i) for i in self.lanes.prev_lane[start[lane] : start[lane + 1]]]
 
     def left(self, point: LanePoint) -> LanePoint | None:
-        """The neighbouring driving lane on the left, same direction."""
+        """Returns the neighbouring driving lane on the left, same direction."""
         return self._beside(point, int(self.lanes.left[point.lane]))
 
     def right(self, point: LanePoint) -> LanePoint | None:
-        """The neighbouring driving lane on the right, same direction."""
+        """Returns the neighbouring driving lane on the right, same direction."""
         return self._beside(point, int(self.lanes.right[point.lane]))
 
     def _beside(self, point: LanePoint, lane: int) -> LanePoint | None:
@@ -192,7 +192,7 @@ class RoadMap:
         return self.at(lane, kernels.neighbour_s(self._arrays, point.lane, lane, point.s))
 
     def shifted(self, point: LanePoint, lanes_left: int) -> LanePoint | None:
-        """The place `lanes_left` lanes to the left (negative: right) of it; None when one is missing."""
+        """Returns the place `lanes_left` lanes to the left (negative: right); None when one is missing."""
         place: LanePoint | None = point
         for _ in range(abs(lanes_left)):
             if place is None:
@@ -254,7 +254,7 @@ class RoadMap:
 
 
 def locked(table: Table) -> Table:
-    """The same columns; its arrays are shared and cannot be written through it."""
+    """Returns the same columns; its arrays are shared and cannot be written through it."""
     kind: Any = type(table)
     shown: Table = kind._make(_lock_array(c) if isinstance(c, np.ndarray) else c for c in table)
     return shown

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 
 class BarrierKind(IntEnum):
-    """Linear obstacles."""
+    """Kinds of obstacles along a road."""
 
     GUARDRAIL = 0
     WALL = 1

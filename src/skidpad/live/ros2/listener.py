@@ -135,7 +135,7 @@ class RosTopics:
             self.losses.malformed += 1
 
     def close(self) -> None:
-        """Leave the domain."""
+        """Leaves the DDS domain and releases all readers."""
         self.readers.clear()
         del self.participant
 
@@ -150,17 +150,17 @@ class _Merge:
 
     @property
     def begun(self) -> bool:
-        """Something has come."""
+        """Whether any message has arrived."""
         return self.count > 0
 
     def add(self, topic: str, t: float, content: Any) -> None:
-        """A message."""
+        """Adds a message with its time stamp."""
         self.count += 1
         self.newest[topic] = max(self.newest[topic], t)
         heapq.heappush(self.waiting, (t, self.rank[topic], topic, self.count, content))
 
     def ready(self) -> Iterator[tuple[float, str, Any]]:
-        """What no topic can precede any more; who is silent for 5 s of stamps is not waited for."""
+        """Yields messages that no topic can precede; a topic silent for 5 s of stamps is left out."""
         last = max(self.newest.values())
         safe = min(t for t in self.newest.values() if t >= last - LAG)
         while self.waiting and self.waiting[0][0] <= safe:
@@ -168,7 +168,7 @@ class _Merge:
             yield t, topic, content
 
     def rest(self) -> Iterator[tuple[float, str, Any]]:
-        """Everything else."""
+        """Yields all messages that are left, in order of time."""
         while self.waiting:
             t, _, topic, _, content = heapq.heappop(self.waiting)
             yield t, topic, content

@@ -51,7 +51,7 @@ class Messages:
         return self.types.make(PATH, self._header(frame.t), poses)
 
     def objects(self, frame: ChannelFrame) -> Any:
-        """autoware_perception_msgs/PredictedObjects."""
+        """Returns the objects as autoware_perception_msgs/PredictedObjects."""
         times = frame.prediction_t
         step = float(times[1] - times[0]) if len(times) > 1 else 0.0
         rows = [self._object(frame, i, step) for i in range(len(frame.objects))]

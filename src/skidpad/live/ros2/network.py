@@ -43,7 +43,7 @@ def participant(domain: int) -> Any:
 
 
 def qos(flow: Flow, announced: bytes = b"") -> Any:
-    """Lossless: reliable, everything kept. Live: reliable, the newest kept; nobody waits."""
+    """Returns the policies of a flow: lossless keeps all, live keeps the newest 10 and never waits."""
     kept = [Policy.Reliability.Reliable(duration(seconds=0)), Policy.History.KeepLast(10)]
     if flow is Flow.LOSSLESS:
         kept = [Policy.Reliability.Reliable(duration(seconds=BLOCKING)), Policy.History.KeepAll]

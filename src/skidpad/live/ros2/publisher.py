@@ -114,7 +114,7 @@ class RosPublisher:
                 return
 
     def cycle_over(self, k: int, t: float) -> None:
-        """Count it."""
+        """Counts the cycle, and as missing when a message of it was cut."""
         del t
         self.cycles += 1
         if self.ended or self.cut:

@@ -106,7 +106,7 @@ class Types:
         ]
 
     def announced(self, name: str) -> bytes:
-        """What a writer says of its type, for readers of newer distributions."""
+        """Returns what a writer announces of its type, for readers of newer distributions."""
         return f"typehash={self.store.hash_rihs01(name)};".encode()
 
 

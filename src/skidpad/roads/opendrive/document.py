@@ -45,7 +45,7 @@ class Shift:
     heading: float = 0.0
 
     def applied(self, x: float, y: float) -> tuple[float, float]:
-        """Where a point of the file lies in the world."""
+        """Returns where a point of the file lies in the world."""
         c, s = cos(self.heading), sin(self.heading)
         x, y = x + self.x, y + self.y
         return x * c - y * s, x * s + y * c
@@ -85,7 +85,7 @@ class Link:
 
 @dataclass(frozen=True, slots=True)
 class RoadRecord:
-    """One road."""
+    """One `<road>` of an OpenDRIVE file."""
 
     id: int
     label: str  # the id as the file writes it
@@ -117,7 +117,7 @@ class ConnectionRecord:
 
 @dataclass(frozen=True, slots=True)
 class Document:
-    """A whole file."""
+    """The records of a whole OpenDRIVE file."""
 
     file: str
     roads: dict[int, RoadRecord]

@@ -36,7 +36,7 @@ class Corners(NamedTuple):
 
 
 def railed(text: bytes, name: str) -> bytes:
-    """The text of an OpenDRIVE file with rails; unchanged where it has barriers of its own."""
+    """Returns an OpenDRIVE text with guardrails added; unchanged where it has barriers of its own."""
     baked = bake(text, name)
     if baked.roadside.barriers:
         return text

@@ -9,7 +9,7 @@ from skidpad.core.lefthanded import pose_from_carla, pose_to_carla, vector_from_
 
 
 def to_transform(carla: Any, pose: Pose) -> Any:
-    """carla.Transform of a pose."""
+    """Converts a pose to a carla.Transform."""
     x, y, z, roll, pitch, yaw = pose_to_carla(pose)
     return carla.Transform(
         carla.Location(x=x, y=y, z=z), carla.Rotation(pitch=pitch, yaw=yaw, roll=roll)
@@ -17,7 +17,7 @@ def to_transform(carla: Any, pose: Pose) -> Any:
 
 
 def from_transform(transform: Any) -> Pose:
-    """Pose of a carla.Transform."""
+    """Converts a carla.Transform to a pose."""
     p, r = transform.location, transform.rotation
     return pose_from_carla(p.x, p.y, p.z, r.roll, r.pitch, r.yaw)
 

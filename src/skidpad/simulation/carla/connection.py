@@ -13,7 +13,7 @@ from skidpad.core.errors import BackendError, MissingExtra
 from skidpad.simulation.carla.options import CarlaOptions
 
 _CLIENTS: dict[tuple[str, int], list[Any]] = {}  # of this process, newest last
-PROBE = 5.0  # s to find out whether anybody listens at all
+PROBE = 5.0  # s to find out whether a server listens at all
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ def wheel() -> Any:
 
 
 def require_server(options: CarlaOptions) -> None:
-    """BackendError when nobody listens at that address."""
+    """Raises BackendError when no server listens at that address."""
     try:
         socket.create_connection((options.host, options.port), PROBE).close()
     except OSError:
@@ -80,7 +80,7 @@ def _client(carla: Any, options: CarlaOptions) -> Any:
 
 
 def release(version: str) -> str:
-    """`0.9.16` of `0.9.16-12-gabcdef`."""
+    """Returns the release of a version text: `0.9.16` of `0.9.16-12-gabcdef`."""
     found = re.match(r"\d+(\.\d+)*", version)
     return found[0] if found else version
 

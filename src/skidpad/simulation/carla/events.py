@@ -36,11 +36,11 @@ class EgoEvents:
         self._quiet_until = 0
 
     def hear_collision(self, event: Any) -> None:
-        """Callback of sensor.other.collision."""
+        """Receives a message of sensor.other.collision."""
         self._collisions.append(event)
 
     def hear_invasion(self, event: Any) -> None:
-        """Callback of sensor.other.lane_invasion."""
+        """Receives a message of sensor.other.lane_invasion."""
         self._invasions.append(event)
 
     def forget(self, tick: int) -> None:

@@ -82,7 +82,7 @@ class ServerKeeper:
 
 
 def answers(host: str, port: int) -> bool:
-    """Whether anybody listens there."""
+    """Tells whether a server accepts connections at this address."""
     try:
         socket.create_connection((host, port), GLANCE).close()
     except OSError:

@@ -48,7 +48,7 @@ class Programme:
         self.show(0)
 
     def hold(self, held: Iterable[tuple[int, LightState]]) -> None:
-        """Lights that somebody has taken over."""
+        """Holds lights in states that a client has set."""
         self._cycle.hold(held)
 
     def show(self, tick: int) -> None:

@@ -19,7 +19,7 @@ class Optimisation(str, Enum):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class CarlaOptions:
-    """Address, patience and switches."""
+    """Address, time limits and switches of the CARLA backend."""
 
     host: str = "127.0.0.1"
     port: int = 2000
@@ -34,7 +34,7 @@ class CarlaOptions:
 
     @property
     def address(self) -> str:
-        """For messages."""
+        """The address as host:port, for messages."""
         return f"{self.host}:{self.port}"
 
     def uses(self, one: Optimisation) -> bool:

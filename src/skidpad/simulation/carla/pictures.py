@@ -93,7 +93,7 @@ class Pictures:
             self._newest.settle()
 
     def close(self) -> None:
-        """Let the threads go."""
+        """Ends the threads that decode images."""
         if self._pool is not None:
             self._pool.shutdown(cancel_futures=True)
 
@@ -116,7 +116,7 @@ class TickImages(Mapping[str, CameraImage]):
         self._coming: dict[str, Future[CameraImage]] = {}
 
     def ahead(self, id: str, pool: ThreadPoolExecutor) -> None:
-        """Begin to decode an image that somebody will read."""
+        """Begins to decode an image that a driver will read."""
         p = self._pictures
         self._coming[id] = pool.submit(p.decode, p.cameras[id], self._messages)
 

@@ -23,7 +23,7 @@ GENERATION = {
 
 
 def load_scene(connection: Connection, setup: Setup) -> Any:
-    """carla.World with the set-up's map, fresh and without anybody in it.
+    """Returns the carla.World of the set-up's map, fresh and without actors.
 
     The server's own map is taken when it has one of that name and content, else it makes one from
     our OpenDRIVE text.
@@ -62,7 +62,7 @@ def same_roads(a: str, b: str) -> bool:
 
 
 def synchronise(world: Any, setup: Setup) -> None:
-    """Fixed step, synchronous (A-001); nothing is rendered where nobody looks."""
+    """Sets a fixed step and synchronous mode (A-001); rendering is off where no camera is read."""
     settings = world.get_settings()
     settings.synchronous_mode = True
     settings.fixed_delta_seconds = setup.dt

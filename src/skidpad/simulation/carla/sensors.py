@@ -42,7 +42,7 @@ class Mailbox:
         self._arrived: queue.SimpleQueue[Any] = queue.SimpleQueue()
 
     def hear(self, data: Any) -> None:
-        """Callback."""
+        """Receives a message of the sensor."""
         self._arrived.put(data)
 
     def of(self, frame: int, timeout: float) -> Any:
@@ -57,7 +57,7 @@ class Mailbox:
 
 
 class Sensors:
-    """All sensors of the ego. Every one is attached; only those that somebody reads send."""
+    """All sensors of the ego. Every one is attached; only those that are read send."""
 
     def __init__(
         self, connection: Connection, world: Any, ego: Any, setup: Setup, events: EgoEvents
@@ -144,7 +144,7 @@ def display_cameras(specs: Sequence[SensorSpec]) -> set[str]:
 def described(
     spec: CameraSpec | RadarSpec | LidarSpec,
 ) -> tuple[str, SensorSpec, dict[str, str]]:
-    """Blueprint id, spec and attributes (A-018 to A-028)."""
+    """Returns blueprint id, spec and attributes of a sensor (A-018 to A-028)."""
     if isinstance(spec, LidarSpec):
         return (
             "sensor.lidar.ray_cast_semantic",

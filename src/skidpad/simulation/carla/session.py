@@ -1,4 +1,4 @@
-"""One run on a server: who is there, what was asked of it, and what came back."""
+"""One run on a server: its actors, the commands sent, and the readings that came back."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ HOLD = VehicleCommand(brake=1.0)
 
 
 class Session:
-    """Everything of one run."""
+    """Holds everything of one run on a server."""
 
     def __init__(self, connection: Connection, setup: Setup, seed: int) -> None:
         self.connection, self.setup, self.seed = connection, setup, seed
@@ -147,7 +147,7 @@ class Session:
     # --- driving
 
     def step(self, command: VehicleCommand, actor_commands: Iterable[ActorCommand]) -> None:
-        """One tick."""
+        """Applies the commands and advances the server by one tick."""
         self.command = command
         self._push(EGO)
         self.troupe.command(self.players[EGO], command)
@@ -246,7 +246,7 @@ class Session:
     # --- end
 
     def close(self) -> None:
-        """Leave the server as it was found: nobody of ours, asynchronous."""
+        """Leaves the server as it was found: without our actors, asynchronous."""
         if self.pictures is not None:
             self.pictures.close()
         if self.sensors is not None:

@@ -41,7 +41,7 @@ class Traffic:
         self.manager.update_vehicle_lights(player.actor, True)
 
     def release(self, player: Player) -> None:
-        """Take a vehicle back."""
+        """Takes a vehicle back from the Traffic Manager."""
         if player.autopilot and player.actor is not None:
             player.actor.set_autopilot(False, self.port)
         player.autopilot = False
@@ -53,7 +53,7 @@ class Traffic:
         self.manager.set_boundaries_respawn_dormant_vehicles(NEAR, FAR)
 
     def top_up(self, world: Any, tick: int, ego: Pose) -> list[Player]:
-        """Vehicles that entered now."""
+        """Spawns vehicles that wait and returns those that entered now."""
         if not self._waiting or tick % TOP_UP_EVERY:
             return []
         points = places_around(world, ego, stream(self._seed, "traffic", "top up", tick))

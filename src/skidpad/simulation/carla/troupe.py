@@ -36,7 +36,7 @@ class Troupe:
 
     @property
     def ego(self) -> Any:
-        """The ego's carla.Vehicle."""
+        """The carla.Vehicle of the ego."""
         return self.players[EGO].actor
 
     def grip_on(self, player: Player) -> None:

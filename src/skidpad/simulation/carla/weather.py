@@ -31,7 +31,7 @@ def weather_parameters(weather: Weather) -> dict[str, float]:
 
 
 def set_weather(carla: Any, world: Any, weather: Weather) -> None:
-    """Send it."""
+    """Sends the weather's parameters to the server."""
     parameters = carla.WeatherParameters()
     for name, value in weather_parameters(weather).items():
         setattr(parameters, name, value)

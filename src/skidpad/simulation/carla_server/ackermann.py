@@ -30,7 +30,7 @@ class AckermannSettings:
     accel_kd: float = 0.01
 
     def packed(self) -> list[float]:
-        """As it travels."""
+        """Returns the settings as CARLA's wire sends them."""
         return [
             self.speed_kp,
             self.speed_ki,

@@ -59,7 +59,7 @@ class Actor:
 
     @property
     def family(self) -> Family:
-        """What it is."""
+        """The kind of actor, such as vehicle, walker or sensor."""
         return self.blueprint.family
 
     @property
@@ -72,7 +72,7 @@ class Actor:
         return wire.box(wire.iso_to_wire(self.centre), self.half)
 
     def description(self) -> list[Any]:
-        """ActorDescription."""
+        """Returns the actor's `ActorDescription` as CARLA's wire sends it."""
         types = self.blueprint.attributes
         packed = [
             [name, int(types[name].type if name in types else AttributeType.STRING), value]
@@ -81,7 +81,7 @@ class Actor:
         return [self.id, self.blueprint.id, packed]
 
     def packed(self, token: bytes = b"") -> list[Any]:
-        """Actor as it travels."""
+        """Returns the actor as CARLA's wire sends it."""
         tags = bytes([int(self.blueprint.label)])
         return [self.id, self.parent, self.description(), self.box(), tags, token]
 
@@ -110,7 +110,7 @@ class ActorTable:
         return next(self._ids)
 
     def add(self, actor: Actor) -> None:
-        """Enter a new actor."""
+        """Adds a new actor to the table and to its parent's children."""
         self.alive[actor.id] = actor
         if actor.body is not None:
             self._by_body[actor.body] = actor
@@ -156,7 +156,7 @@ class ActorTable:
         return self._by_body[self._moving.members[i].id]
 
     def pose(self, actor: Actor) -> Pose:
-        """Where it is."""
+        """Returns the actor's pose; that of a walker is the middle of its body."""
         if actor.body is None:
             return actor.pose
         feet = self._moving.states.pose(self._moving.row(actor.body))

@@ -70,13 +70,13 @@ NAMES = frozenset((ROOT, *(name for name, _, _ in SKELETON)))
 
 @dataclass(slots=True)
 class Skeleton:
-    """One walker's bones."""
+    """Holds the bones of one walker that a client has moved."""
 
     pose: dict[str, Pose] = field(default_factory=dict)  # set by clients, seen from the parents
     blend: float = 0.0  # share of that pose
 
     def set(self, bones: Mapping[str, Pose]) -> None:
-        """Bones of the pose; those with other names change nothing."""
+        """Sets the bones named here; names that no walker has change nothing."""
         self.pose |= {name: pose for name, pose in bones.items() if name in NAMES}
 
     def take(self) -> None:
@@ -84,7 +84,7 @@ class Skeleton:
         self.pose = {}
 
     def told(self, actor: Pose, height: float) -> list[list[Any]]:
-        """BoneTransformDataOut of all bones: name, in the world, in the walker, from the parent.
+        """Returns `BoneTransformDataOut` of all bones: name, in the world, in the walker, from the parent.
 
         actor: the walker's middle. height: m.
         """

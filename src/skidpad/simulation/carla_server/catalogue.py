@@ -55,7 +55,7 @@ class Attribute:
     restricted: bool = False
 
     def packed(self) -> list[Any]:
-        """ActorAttribute of an ActorDefinition."""
+        """Returns the attribute as `ActorAttribute` of an `ActorDefinition`."""
         values = list(self.recommended)
         return [self.id, int(self.type), values[0], values, self.modifiable, self.restricted]
 
@@ -72,7 +72,7 @@ class Blueprint:
     label: SemanticClass = SemanticClass.NONE
 
     def packed(self, uid: int) -> list[Any]:
-        """ActorDefinition."""
+        """Returns the blueprint as `ActorDefinition`."""
         tags = ",".join(self.id.split("."))
         return [uid, self.id, tags, [a.packed() for a in self.attributes.values()]]
 
@@ -199,14 +199,14 @@ def grip_in_force(blueprint: Blueprint, model: GripModel, mu_ref: float) -> Blue
 
 @cache
 def load_data() -> dict[str, Any]:
-    """The data file."""
+    """Reads the data file of blueprints and attributes."""
     data: dict[str, Any] = yaml.load(DATA.read_text(encoding="utf-8"), Loader=yaml.CSafeLoader)
     return data
 
 
 @cache
 def load_catalogue() -> dict[str, Blueprint]:
-    """All blueprints by id."""
+    """Returns all blueprints by id."""
     data = load_data()
     actor = _attributes(data["attributes"]["actor"])
     made: list[Blueprint] = []
@@ -225,7 +225,7 @@ def load_catalogue() -> dict[str, Blueprint]:
 
 
 def offered(grip: GripModel, mu_ref: float) -> dict[str, Blueprint]:
-    """The catalogue; the blueprint `skidpad.weather.grip` says how weather acts on grip (K-2)."""
+    """Returns the catalogue; the blueprint `skidpad.weather.grip` says how weather acts on grip (K-2)."""
     everything = load_catalogue()
     if grip is GripModel.NONE:
         return {id: b for id, b in everything.items() if b.family is not Family.GRIP}
@@ -234,7 +234,7 @@ def offered(grip: GripModel, mu_ref: float) -> dict[str, Blueprint]:
 
 
 def chosen(blueprint: Blueprint, given: Mapping[str, str]) -> dict[str, str]:
-    """The attributes of a new actor: the client's where it gave some, else the defaults."""
+    """Returns the attributes of a new actor: the client's where it gave some, else the defaults."""
     values = {a.id: a.recommended[0] for a in blueprint.attributes.values()}
     for name, value in given.items():
         attribute = blueprint.attributes.get(name)

@@ -34,7 +34,7 @@ class EpisodeSettings:
         return DT if self.fixed_step is None else self.fixed_step
 
     def packed(self) -> list[Any]:
-        """As it travels."""
+        """Returns the settings as CARLA's wire sends them."""
         return [
             self.synchronous,
             self.no_rendering,
@@ -51,7 +51,7 @@ class EpisodeSettings:
 
 
 def parse_settings(value: Any) -> EpisodeSettings:
-    """EpisodeSettings from a call."""
+    """Parses and checks the `EpisodeSettings` of a call."""
     v = wire.items(value, "settings", 11)
     step = wire.optional(v[2], "settings.fixed_delta_seconds")
     if step is not None:
@@ -93,7 +93,7 @@ class Clock:
         return self.settings.step
 
     def advance(self) -> None:
-        """One tick passes."""
+        """Advances frame number and elapsed time by one tick."""
         self.frame += 1
         self.elapsed += self.step
 

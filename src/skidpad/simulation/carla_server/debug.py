@@ -38,7 +38,7 @@ class DebugShapes:
         del self.shapes[:-MOST]
 
     def age(self, dt: float) -> None:
-        """Time passes."""
+        """Lets shapes grow older by dt s and removes those whose time is over."""
         if not self.shapes:
             return
         for shape in self.shapes:

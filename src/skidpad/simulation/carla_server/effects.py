@@ -45,7 +45,7 @@ def acting(blueprint: Blueprint) -> set[str]:
 
 
 def produced(sensor: str) -> bool:
-    """Whether a sensor of this kind sends anything."""
+    """Tells whether a sensor of this kind sends anything."""
     table = load_acting()
     return sensor in table.sensors or sensor in table.in_the_client
 

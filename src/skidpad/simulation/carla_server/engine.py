@@ -63,7 +63,7 @@ class Engine:
         return bool(self.torque_curve and self.gears)
 
     def packed(self) -> list[Any]:
-        """As it travels."""
+        """Returns engine and gearbox as CARLA's wire sends them."""
         curve, gears = [list(p) for p in self.torque_curve], [list(g) for g in self.gears]
         return [
             curve, self.max_rpm, self.moi, *self.damping, self.autobox, self.switch_time, self.clutch,

@@ -179,7 +179,7 @@ class Episode:
         return actor
 
     def end(self) -> None:
-        """Nobody hears of these sensors any more."""
+        """Closes the streams of all sensors: clients get no more of their messages."""
         for actor in self.actors:
             self._hush(actor)
 
@@ -252,7 +252,7 @@ class Episode:
     # --- moving
 
     def put(self, actor: Actor, pose: Pose) -> None:
-        """Place an actor; a child is placed relative to where its parent then is."""
+        """Places an actor; a child is placed relative to where its parent then is."""
         if actor.parent:
             actor.mount = pose
         elif actor.body is None:

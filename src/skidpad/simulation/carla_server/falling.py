@@ -43,7 +43,7 @@ def ground_below(roads: RoadMap, x: float, y: float, z: float) -> float | None:
 
 
 class Falling:
-    """Who is in the air, and who weighs nothing."""
+    """Holds the actors that are in the air and those without gravity."""
 
     def __init__(
         self, moving: World, roads: RoadMap, actors: ActorTable, vehicles: Vehicles
@@ -61,7 +61,7 @@ class Falling:
         return None if ground is None else float(s.z[i]) - ground
 
     def placed(self, actor: Actor) -> None:
-        """It was put somewhere: in the air it falls from there, on the ground it stands."""
+        """Begins a fall when the actor was placed above the ground; on the ground it stands."""
         if actor.family not in FALLS or actor.body is None or actor.id in self._weightless:
             return
         self._actors.rising.pop(actor.id, None)
@@ -71,7 +71,7 @@ class Falling:
         self._hold(actor)
 
     def spawned(self, actor: Actor, height: float) -> None:
-        """It has entered with its feet at this height, m; entering set it onto the road."""
+        """Begins the fall of an actor that entered with its feet at this height, m."""
         if actor.body is not None and actor.family in FALLS:
             s, i = self._moving.states, self._moving.row(actor.body)
             s.z[i] = max(float(s.z[i]), height)
@@ -99,7 +99,7 @@ class Falling:
             self._hold(actor)
 
     def forget(self, id: int) -> None:
-        """It is gone."""
+        """Forgets an actor that was destroyed."""
         self._weightless.discard(id)
         self._actors.rising.pop(id, None)
 

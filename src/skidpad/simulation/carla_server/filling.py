@@ -109,7 +109,7 @@ def _fill_governed(rows: Rows, at: NDArray[np.int64], signals: Signals, posts: P
 
 
 def fill_lights(rows: Rows, actors: ActorTable, posts: Posts) -> None:
-    """Timers and lamps."""
+    """Fills the snapshot's rows with timers and lamps of traffic lights."""
     for actor, post in posts:
         row, light = rows.lights[actors.alive[actor].row], post.light
         row["times"] = (light.green, light.yellow, light.red, light.elapsed)

@@ -1,4 +1,4 @@
-"""Stop and yield signs: who waits at one is shown red, without a light, while the way is taken.
+"""Stop and yield signs: a vehicle that waits at one is shown red, without a light, while the way is taken.
 
 CARLA's signs do so (public source: `StopSignComponent`, `YieldSignComponent`), and its Traffic Manager
 lets only those take turns at a junction without lights to whom they have shown red.
@@ -23,7 +23,7 @@ BOX = 0.9  # of a lane's width: how long the box before the line is
 STOPPED = 2.0  # s for which a stop sign shows red in any case
 ALONG = 0.5  # cosine of the angle to the lane up to which one drives along it
 
-Span = tuple[float, float]  # m along a lane: whoever has a part of its body in it is there
+Span = tuple[float, float]  # m along a lane: a vehicle with a part of its body in it is there
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Line:
     """Where one waits at the end of a lane, and for whom."""
 
     begins: float  # m along the lane, of the box
-    least: float  # s of red for everybody who comes
+    least: float  # s of red for every vehicle that comes
     watched: dict[int, Span]  # by lane
 
     def is_taken(self, lane: int, rear: float, front: float) -> bool:
@@ -41,7 +41,7 @@ class Line:
 
 
 class GivingWay:
-    """The lines of a map, and who waits at them for how long."""
+    """Holds the stop and yield lines of a map, and how long which vehicle has waited there."""
 
     def __init__(self, roads: RoadMap) -> None:
         self._lines = dict(_lines(roads))

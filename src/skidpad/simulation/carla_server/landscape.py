@@ -64,12 +64,12 @@ class EnvironmentObject:
     source: Source
 
     def box(self) -> list[list[float]]:
-        """BoundingBox in the world."""
+        """Returns the `BoundingBox` in the world as CARLA's wire sends it."""
         place = wire.iso_to_wire((self.centre.x, self.centre.y, self.centre.z))
         return wire.box(place, self.half, wire.yaw_to_wire(self.centre.yaw))
 
     def packed(self) -> list[Any]:
-        """EnvironmentObject as it travels."""
+        """Returns the `EnvironmentObject` as CARLA's wire sends it."""
         return [wire.transform(self.centre), self.box(), self.id, self.name, self.label]
 
 
@@ -153,7 +153,7 @@ class Landscape:
         self._shown: tuple[frozenset[int], RoadMap] = (frozenset(), roads)
 
     def toggle(self, ids: Iterable[int], on: bool) -> None:
-        """Show or hide single objects; ids that nobody has change nothing."""
+        """Shows or hides single objects; unknown ids change nothing."""
         if on:
             self.hidden.difference_update(ids)
         else:

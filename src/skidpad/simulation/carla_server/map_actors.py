@@ -32,7 +32,7 @@ def spectator(id: int, start: Pose) -> Actor:
 
 
 def light_actor(id: int, post: Post) -> Actor:
-    """A traffic light."""
+    """Makes the actor of a traffic light."""
     actor = Actor(id, LIGHT, {"role_name": "default"}, post.pose)
     actor.half = (post.half_width, BOX_DEPTH, BOX_HEIGHT)
     return actor
@@ -64,7 +64,7 @@ def signs_of(roads: RoadMap) -> Iterator[Sign]:
 
 
 def sign_actor(id: int, sign: Sign) -> Actor:
-    """A traffic sign."""
+    """Makes the actor of a traffic sign."""
     blueprint = Blueprint(sign.name, Family.TRAFFIC_SIGN, {}, label=SemanticClass.TRAFFIC_SIGN)
     actor = Actor(id, blueprint, {"role_name": "default"}, sign.pose)
     actor.half = (BOX_DEPTH, BOX_DEPTH, BOX_HEIGHT)

@@ -29,12 +29,12 @@ MARGIN = 6.0  # m from a lane's ends
 KEPT_MESHES = 16  # navigation meshes, by content of the map: a large town takes seconds
 _NAVIGATION: dict[str, tuple[str, bytes] | None] = {}
 CLIENT_ORIGIN = (42.0, 2.0)  # deg, of maps that name none
-LIFT = 0.3  # m above the road, so that nobody spawns inside it
+LIFT = 0.3  # m above the road, so that no actor spawns inside it
 
 
 @dataclass(frozen=True, slots=True)
 class ServedMap:
-    """A map in use."""
+    """Holds a map as it is served: roads, OpenDRIVE text, spawn points."""
 
     name: str
     roads: RoadMap
@@ -47,12 +47,12 @@ class ServedMap:
 
     @property
     def full_name(self) -> str:
-        """As clients see it."""
+        """The name that clients see, with CARLA's folder in front."""
         return PREFIX + self.name
 
     @property
     def layered(self) -> bool:
-        """Whether clients may take layers away."""
+        """Whether clients may unload layers of the map."""
         return self.name.endswith(LAYERED)
 
     def prepare(self) -> None:
@@ -61,7 +61,7 @@ class ServedMap:
 
     @property
     def navigation(self) -> tuple[str, bytes] | None:
-        """Name and content of the navigation mesh; None for maps on which nobody walks (K-9)."""
+        """Name and content of the navigation mesh; None for maps without pedestrians (K-9)."""
         key = self.roads.content_hash
         if key not in _NAVIGATION:
             if len(_NAVIGATION) >= KEPT_MESHES:
@@ -84,7 +84,7 @@ def _navigation(name: str, roads: RoadMap) -> tuple[str, bytes] | None:
 
 
 class MapStore:
-    """Maps by name."""
+    """Finds maps by name: built in, in a folder, or sent by a client."""
 
     def __init__(self, folder: Path | None = None) -> None:
         self.folder = folder

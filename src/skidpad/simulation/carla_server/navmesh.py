@@ -47,7 +47,7 @@ def file_name(map_name: str, content: bytes) -> str:
 
 
 def packed(mesh: WalkMesh) -> bytes | None:
-    """The file; None when the mesh is too large for one tile."""
+    """Returns the mesh as a file of Recast's; None when it is too large for one tile."""
     n = len(mesh.polygons)
     if n > MAX_POLYGONS or len(mesh.vertices) > MAX_VERTICES:
         return None

@@ -22,16 +22,16 @@ class Pacer:
     def __init__(
         self, tick: Callable[[], object], step: Callable[[], float | None], idle: Callable[[], bool]
     ) -> None:
-        """step: s of simulated time per tick, None while clients tick; idle: nobody is there."""
+        """step: s of simulated time per tick, None while clients tick; idle: is no client connected."""
         self._tick, self._step, self._idle = tick, step, idle
         self._begin = time.monotonic()
 
     def elapsed(self) -> float:
-        """s of wall time since the start, for the snapshots' platform time."""
+        """Returns s of wall time since the start, for the snapshots' platform time."""
         return time.monotonic() - self._begin
 
     async def run(self, idle_exit: float | None = None) -> None:
-        """Until cancelled, or until nobody was there for `idle_exit` s."""
+        """Ticks until cancelled, or until no client was connected for `idle_exit` s."""
         due = time.monotonic()
         seen = due
         while True:

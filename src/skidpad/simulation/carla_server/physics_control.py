@@ -73,7 +73,7 @@ class PhysicsControl:
         )
 
     def packed(self, positions: list[list[float]]) -> list[Any]:
-        """As it travels; positions: wheel centres in the world, cm, CARLA's axes."""
+        """Returns the control for the wire; positions: wheel centres in the world, cm, CARLA's axes."""
         wheels = [[*w[:9], p] for w, p in zip(self.wheels, positions, strict=True)]
         return [
             *self.engine.packed(),
@@ -121,7 +121,7 @@ def with_engine(new: PhysicsControl, old: PhysicsControl) -> PhysicsControl:
 
 
 def applied(model: VehicleType, old: PhysicsControl, new: PhysicsControl) -> VehicleType:
-    """The physics type after a client changed members that act; unchanged ones stay exact."""
+    """Returns the physics type after a client changed members that act; unchanged ones stay exact."""
     front, rear = new.wheels[0], new.wheels[2]
     if front[3] < RADIUS_LEAST or front[2] <= 0.0:
         raise wire.WireError("wheel: radius must be >= 10 cm and max_steer_angle > 0")

@@ -61,7 +61,7 @@ class ServerProcess:
 
     @property
     def alive(self) -> bool:
-        """Whether it still runs."""
+        """Whether the server's process still runs."""
         return self._process.poll() is None
 
     def __enter__(self) -> ServerProcess:

@@ -43,7 +43,7 @@ def safe_path(folder: Path | None, name: str) -> Path:
 
 
 class Recorder:
-    """Writes while started."""
+    """Writes the ticks of an episode to a file while it is started."""
 
     def __init__(self, folder: Path | None) -> None:
         self.folder = folder

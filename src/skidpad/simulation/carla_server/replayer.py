@@ -37,7 +37,7 @@ class Recording:
 
     @property
     def total(self) -> float:
-        """Its length in s."""
+        """Length of the recording in s."""
         return self.times[-1]
 
     def at(self, t: float) -> dict[int, tuple[Pose, Vector]]:
@@ -156,14 +156,14 @@ class _Run:
     refused: set[int] = field(default_factory=set)
 
     def drop(self, keep: Container[int]) -> None:
-        """Who is no longer in the recording vanishes."""
+        """Destroys the actors that are no longer in the recording."""
         for recorded in [r for r in self.actors if r not in keep]:
             id = self.actors.pop(recorded)
             if id in self.episode.actors.alive:
                 self.episode.destroy(id)
 
     def free(self) -> None:
-        """Physics has them again."""
+        """Hands the actors of the recording back to physics."""
         for id in self.actors.values():
             actor = self.episode.actors.alive.get(id)
             if actor is not None:

@@ -29,7 +29,7 @@ class Hit:
 def cast(
     landscape: Landscape, actors: ActorTable, start: Vector, way: Vector, reach: float
 ) -> list[Hit]:
-    """Everything on a ray, near to far: actors, the map's objects, the road."""
+    """Returns everything on a ray, near to far: actors, the map's objects, the road."""
     length = sum(v * v for v in way) ** 0.5
     if length == 0.0:
         return []
@@ -38,7 +38,7 @@ def cast(
     targets = [(int(a.blueprint.label), actors.box(a)) for a in actors if a.family in SOLID]
     targets += [(o.label, Box(o.centre, o.half)) for o in landscape.present()]
     near, far = Boxes.of(targets).spans(start, unit)
-    near = np.maximum(near, 0.0)  # who begins inside meets it at once
+    near = np.maximum(near, 0.0)  # a ray that begins inside meets it at once
     met = np.flatnonzero((near <= far) & (near <= reach)).tolist()
     hits = [_hit(start, unit, float(near[i]), targets[i][0]) for i in met]
     road = _onto_road(landscape.whole, start, unit, reach)

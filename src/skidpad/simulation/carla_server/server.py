@@ -29,7 +29,7 @@ PORT_TRIES = 50
 
 
 class RpcConnection(asyncio.Protocol):
-    """One client."""
+    """Serves the calls of one client in the order of their arrival."""
 
     def __init__(self, server: CarlaServer) -> None:
         self._server = server
@@ -40,7 +40,7 @@ class RpcConnection(asyncio.Protocol):
         self._last = ""  # the method that was asked for before
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """A client connected."""
+        """Registers the client, or closes the connection when too many are open."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         loop = asyncio.get_running_loop()
@@ -100,12 +100,12 @@ class RpcConnection(asyncio.Protocol):
             self._transport.pause_reading()
 
     def resume_writing(self) -> None:
-        """It has caught up."""
+        """Reads on from a client that has fetched its answers."""
         if self._transport is not None and not self._transport.is_closing():
             self._transport.resume_reading()
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  asyncio's name
-        """The client went away."""
+        """Releases a client that went away."""
         self._waker.stop()
         self._server.release(self)
 
@@ -128,7 +128,7 @@ def ticks(request: Request) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Ports:
-    """Where the server listens."""
+    """Holds the two ports on which the server listens."""
 
     rpc: int
     streaming: int
@@ -161,7 +161,7 @@ class CarlaServer:
         return True
 
     def release(self, client: RpcConnection) -> None:
-        """Count it out."""
+        """Removes a client from those that are connected."""
         self._clients.discard(client)
 
     def answer(self, request: Request) -> bytes:
@@ -191,7 +191,7 @@ class CarlaServer:
         raise ConfigError(f"no free port pair on {host} at {self.options.port}")
 
     async def run(self, ready: Callable[[Ports], Any], helper: Helper | None) -> None:
-        """Serve until cancelled or idle for too long. helper: who compiles at a first start."""
+        """Serves until cancelled or idle for too long. helper: the process that compiles at a first start."""
         if self.options.record_calls is not None:
             self._calls = self.options.record_calls.open("w", encoding="utf-8")
         warm_up(self.options, helper)
@@ -204,7 +204,7 @@ class CarlaServer:
             self.close()
 
     def close(self) -> None:
-        """Stop listening."""
+        """Stops listening and closes recordings."""
         for server in self._servers:
             server.close()
         self.served.recorder.stop()

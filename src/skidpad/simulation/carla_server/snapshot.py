@@ -135,7 +135,7 @@ class Rows:
         self.count -= 1
 
     def order(self) -> dict[int, int]:
-        """Row by actor id."""
+        """Returns the row of each actor by its id."""
         return {actor: row for row, actor in enumerate(self._ids)}
 
     def tobytes(self) -> bytes:

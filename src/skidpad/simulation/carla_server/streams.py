@@ -1,7 +1,7 @@
 """The streaming channel: one connection per stream, which first names it by four bytes.
 
-A message is its length in four bytes, little-endian, and the payload. Only streams that somebody
-listens to are produced; what a slow client has not fetched is bounded, and then dropped.
+A message is its length in four bytes, little-endian, and the payload. Only streams with a
+listener are produced; what a slow client has not fetched is bounded, and then dropped.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ HOLD = 0.05
 EPISODE_ALIASES = 2**31
 # s that a tick waits at most for a stream whose token was asked for, once (1 s was too little for a
 # machine with a load of 15 on two cores). The client's `listen` returns
-# before its thread has connected, and what the tick sends to nobody is lost.
+# before its thread has connected, and what the tick sends without a listener is lost.
 PATIENCE = 5.0
 TCP = 1
 ADDRESS_NOT_SET = 0  # the client then uses the host it was given
@@ -38,7 +38,7 @@ def canonical(stream: int) -> int:
 
 
 class StreamHub:
-    """Who listens to what."""
+    """Holds the streams, and which connections listen to each."""
 
     def __init__(self) -> None:
         self.port = 0
@@ -56,14 +56,14 @@ class StreamHub:
         self.on_subscribe: Callable[[int], bytes | None] = lambda _: None
 
     def create(self) -> int:
-        """A new stream id."""
+        """Opens a stream and returns its id."""
         stream = self._next
         self._next += 1
         self._open.add(stream)
         return stream
 
     def episode_token(self) -> bytes:
-        """A token of the snapshots that nobody else has."""
+        """Returns a token of the snapshots that no other client has."""
         self._aliases = EPISODE_ALIASES + (self._aliases + 1) % EPISODE_ALIASES
         return self.token(self._aliases)
 
@@ -100,7 +100,7 @@ class StreamHub:
         self._eager.append(callback)
 
     def wanted(self, stream: int) -> bool:
-        """Whether anybody listens."""
+        """Tells whether any connection listens to a stream."""
         return bool(self._listeners.get(stream))
 
     def publish(self, stream: int, *parts: bytes | memoryview) -> None:
@@ -125,7 +125,7 @@ class StreamHub:
                     transport.write(part)
 
     def hold(self, stream: int) -> None:
-        """Let those who listen now wait for a moment; then they get the newest message."""
+        """Holds back messages to the present listeners for a moment; then they get the newest one."""
         waiting = [t for t in self._listeners.get(stream, []) if t not in self._held]
         if waiting:
             self._held.update(dict.fromkeys(waiting))
@@ -174,7 +174,7 @@ class StreamHub:
         return self._connections <= MAX_CONNECTIONS
 
     def release(self, stream: int | None, transport: asyncio.Transport) -> None:
-        """A connection ended."""
+        """Removes a connection that has ended from its stream."""
         self._connections -= 1
         self._held.pop(transport, None)
         if stream is not None:
@@ -186,7 +186,7 @@ class StreamHub:
     def subscribe(self, stream: int, transport: asyncio.Transport) -> None:
         """Attach a listener; the newest message of a steady stream is sent at once.
 
-        Who asks for a stream that has ended is kept waiting: hung up on, it would try for ever.
+        A client that asks for a stream that has ended is kept waiting: cut off, it would try for ever.
         """
         if not self.exists(stream):
             if stream >= self._next:
@@ -210,7 +210,7 @@ class StreamConnection(asyncio.Protocol):
         self._transport: asyncio.Transport | None = None
 
     def connection_made(self, transport: asyncio.BaseTransport) -> None:
-        """A client connected."""
+        """Admits the client, or closes the connection when too many are open."""
         assert isinstance(transport, asyncio.Transport)
         self._transport = transport
         if not self._hub.admit():
@@ -227,6 +227,6 @@ class StreamConnection(asyncio.Protocol):
             self._hub.subscribe(self._stream, self._transport)
 
     def connection_lost(self, exc: Exception | None) -> None:  # noqa: ARG002  asyncio's name
-        """The client went away."""
+        """Releases a client that went away."""
         if self._transport is not None:
             self._hub.release(self._stream, self._transport)

@@ -1,4 +1,4 @@
-"""Who touched whom in a tick, as collision sensors and the recorder tell it."""
+"""Contacts between actors in a tick, as collision sensors and the recorder report them."""
 
 from __future__ import annotations
 

@@ -34,7 +34,7 @@ class Timer(Protocol):
     """What `call_later` of a loop gives."""
 
     def cancel(self) -> None:
-        """It will not happen."""
+        """Cancels the call that was scheduled."""
         ...
 
 
@@ -54,7 +54,7 @@ class Waker:
         self._tries = 0
 
     def asked(self, method: str, arguments: list[Any], accepted: bool = True) -> None:
-        """A request came: nobody has fallen asleep, unless it is what one asks just before."""
+        """Notes a request: the client is awake, unless it is the call that precedes sleep."""
         if method == BEFORE_SLEEP:
             return
         self.stop()

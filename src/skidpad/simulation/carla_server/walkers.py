@@ -20,7 +20,7 @@ class WalkerControl:
     jump: bool = False
 
     def velocity(self) -> tuple[float, float]:
-        """m/s in the plane."""
+        """Returns the walker's velocity in the plane, m/s."""
         x, y, _ = self.direction
         length = hypot(x, y)
         if length < 1e-6:

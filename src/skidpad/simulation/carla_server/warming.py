@@ -1,8 +1,8 @@
 """Kernels before clients wait: loaded from the disk, or compiled when this machine has none yet.
 
 At a first start two processes compile: this one what a tick needs, a child what takes longest in it
-and then the sensors. The server is ready when ticks are; who listens to a sensor before the child has
-ended waits for it.
+and then the sensors. The server is ready when ticks are; a client that listens to a sensor before the child
+has ended waits for it.
 """
 
 from __future__ import annotations
@@ -37,15 +37,15 @@ Say = Callable[[str], object]
 
 
 class EverybodyListens(StreamHub):
-    """Streams to nobody that are all produced."""
+    """Produces all streams, though no client listens."""
 
     def wanted(self, stream: int) -> bool:
-        """Always."""
+        """Returns True for every stream that exists."""
         return self.exists(stream)
 
 
 def start_compiling(options: ServerOptions, say: Say) -> Helper | None:
-    """Who compiles what the first tick needs and then sensors; None when all is kept. say: what is done.
+    """Compiles what the first tick needs, then sensors in a child; None when all is kept. say: what is done.
 
     To be called before anything is made of a map, for that compiles too.
     """
@@ -110,7 +110,7 @@ class Helper:
         self._say("ticks are compiled; sensors are being compiled beside the first of them")
 
     def finish(self) -> None:
-        """Wait for the sensors."""
+        """Waits until the sensors are compiled."""
         self._process.join(LIMIT)
 
 

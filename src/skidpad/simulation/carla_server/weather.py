@@ -42,7 +42,7 @@ class Sky:
         self._derive()
 
     def packed(self) -> list[float]:
-        """WeatherParameters as last set."""
+        """Returns `WeatherParameters` as the client last set them."""
         return [*(self.values[name] for name in PACKED), self.dust_storm]
 
     def apply(self, value: Any) -> None:

@@ -28,7 +28,7 @@ class WireError(BackendError):
 
 
 def number(value: Any, field: str) -> float:
-    """A finite number."""
+    """Checks that a value is a finite number and returns it."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise WireError(f"{field} must be a number")
     if not isfinite(value) or abs(value) > FLOAT_MAX:
@@ -65,7 +65,7 @@ def items(value: Any, field: str, size: int | None = None) -> list[Any]:
 
 
 def numbers(value: Any, field: str, size: int | None = None) -> list[float]:
-    """An array of numbers."""
+    """Checks that a value is an array of finite numbers and returns it."""
     return [number(v, field) for v in items(value, field, size)]
 
 

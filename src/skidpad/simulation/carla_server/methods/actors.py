@@ -15,7 +15,7 @@ TABLE = Table("actors")
 
 
 def packed(served: Served, actor: Actor) -> list[Any]:
-    """An actor as it travels, with its token when it is a sensor."""
+    """Returns an actor as CARLA's wire sends it, with its token when it is a sensor."""
     token = b"" if actor.stream is None else served.hub.token(actor.stream)
     return actor.packed(token)
 
@@ -32,13 +32,13 @@ def parse_description(value: Any) -> Wanted:
 
 @TABLE.method("get_actor_definitions")
 def get_actor_definitions(served: Served) -> list[Any]:
-    """The whole catalogue."""
+    """Returns the definitions of all blueprints."""
     return [b.packed(uid) for uid, b in enumerate(served.stock.catalogue.values(), start=1)]
 
 
 @TABLE.method("get_spectator")
 def get_spectator(served: Served) -> list[Any]:
-    """The free camera."""
+    """Returns the spectator, CARLA's free camera."""
     return packed(served, served.episode.spectator)
 
 
@@ -51,7 +51,7 @@ def get_actors_by_id(served: Served, ids: Any) -> list[Any]:
 
 @TABLE.method("spawn_actor")
 def spawn_actor(served: Served, description: Any, transform: Any) -> list[Any]:
-    """A new actor."""
+    """Spawns an actor and returns it."""
     pose = wire.pose(transform, "transform")
     return packed(served, served.episode.spawn(parse_description(description), pose))
 
@@ -135,6 +135,6 @@ for _seen_from in ("names", "world_transforms", "relative_transforms"):
 
 @TABLE.method("get_vehicle_bone_world_transforms")
 def get_vehicle_bone_world_transforms(served: Served, id: Any) -> list[Any]:
-    """There are none."""
+    """Returns an empty list, as vehicles have no bones here."""
     served.episode.actors.get(id)
     return []

@@ -64,25 +64,25 @@ def get_gbuffer_token(served: Served, id: Any, texture: Any) -> bytes:
 
 @TABLE.method("enable_gbuffers", Shape.VOID)
 def enable_gbuffers(served: Served, id: Any, enabled: Any) -> None:
-    """Whether a colour camera sends them to those who listen."""
+    """Sets whether a colour camera sends G-buffers to its listeners."""
     _colour_camera(served, id).equipment.gbuffers = wire.flag(enabled, "enabled")
 
 
 @TABLE.method("are_gbuffers_enabled")
 def are_gbuffers_enabled(served: Served, id: Any) -> bool:
-    """As last said."""
+    """Tells whether a colour camera sends G-buffers."""
     return bool(_colour_camera(served, id).equipment.gbuffers)
 
 
 @TABLE.method("console_command", without_effect="there is no console")
 def console_command(_: Served, *__: Any) -> bool:
-    """Accepted."""
+    """Accepts any command and does nothing, as there is no console."""
     return True
 
 
 @TABLE.method("get_episode_settings")
 def get_episode_settings(served: Served) -> list[Any]:
-    """As last set."""
+    """Returns the episode settings as last set."""
     return served.clock.settings.packed()
 
 
@@ -114,12 +114,12 @@ for _name in ("enable_sensor_for_ros", "disable_sensor_for_ros"):
 
     @TABLE.method(_name, without_effect="there is no ROS publisher")
     def no_publisher(_: Served, *__: Any) -> None:
-        """Accepted."""
+        """Accepts the call and does nothing, as there is no ROS publisher."""
 
 
 @TABLE.method("is_sensor_enabled_for_ros")
 def is_sensor_enabled_for_ros(_: Served, __: Any) -> bool:
-    """Never."""
+    """Returns False, as no sensor publishes to ROS."""
     return False
 
 

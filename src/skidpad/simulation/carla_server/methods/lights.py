@@ -30,7 +30,7 @@ def _group(served: Served, id: Any) -> Group:
 
 
 def parse_state(value: Any) -> LightState:
-    """A lamp state."""
+    """Parses the state of a traffic light."""
     return LightState(wire.integer(value, "traffic light state", 0, 4))
 
 
@@ -73,7 +73,7 @@ def freeze_traffic_light(served: Served, id: Any, frozen: Any) -> None:
 
 @TABLE.method("freeze_all_traffic_lights", Shape.VOID)
 def freeze_all_traffic_lights(served: Served, frozen: Any) -> None:
-    """All stand still."""
+    """Stops or restarts the timers of all traffic lights."""
     _lights(served).frozen = wire.flag(frozen, "freeze")
 
 
@@ -85,7 +85,7 @@ def reset_traffic_light_group(served: Served, id: Any) -> None:
 
 @TABLE.method("reset_all_traffic_lights", Shape.VOID)
 def reset_all_traffic_lights(served: Served) -> None:
-    """All from the beginning."""
+    """Restarts the cycles of all traffic lights."""
     _lights(served).reset()
 
 

@@ -33,7 +33,7 @@ def get_map_info(served: Served) -> list[Any]:
 
 @TABLE.method("get_map_data")
 def get_map_data(served: Served) -> str:
-    """The OpenDRIVE text."""
+    """Returns the OpenDRIVE text of the map."""
     return served.episode.map.xodr
 
 
@@ -91,7 +91,7 @@ def load_map_layer(served: Served, layers: Any) -> None:
 
 @TABLE.method("unload_map_layer", Shape.VOID)
 def unload_map_layer(served: Served, layers: Any) -> None:
-    """They are there for nobody."""
+    """Removes the objects of these layers for all clients."""
     _layer(served, layers, on=False)
 
 

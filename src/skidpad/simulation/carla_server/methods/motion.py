@@ -19,7 +19,7 @@ BELONGS_TO_MAP = (Family.TRAFFIC_LIGHT, Family.TRAFFIC_SIGN)
 
 
 def put(served: Served, actor: Actor, pose: Pose) -> None:
-    """Place an actor that is not the map's."""
+    """Places an actor; actors of the map cannot be placed."""
     if actor.family in BELONGS_TO_MAP:
         raise CallError(f"actor {actor.id} belongs to the map and stays where it is")
     served.episode.put(actor, pose)
@@ -34,7 +34,7 @@ def _vehicle(served: Served, id: Any) -> Vehicle | None:
 
 @TABLE.method("set_actor_transform", Shape.VOID)
 def set_actor_transform(served: Served, id: Any, transform: Any) -> None:
-    """Put it there."""
+    """Places an actor at a transform."""
     put(served, served.episode.actors.get(id), wire.pose(transform, "transform"))
 
 
@@ -59,7 +59,7 @@ def set_walker_state(served: Served, id: Any, transform: Any, speed: Any) -> Non
 
 @TABLE.method("set_actor_target_velocity", Shape.VOID)
 def set_actor_target_velocity(served: Served, id: Any, velocity: Any) -> None:
-    """World axes."""
+    """Sets an actor's velocity, in axes of the world."""
     v = wire.iso_vector(velocity, "velocity")
     vehicle = _vehicle(served, id)
     if vehicle is not None:
@@ -89,7 +89,7 @@ def enable_actor_constant_velocity(served: Served, id: Any, velocity: Any) -> No
 
 @TABLE.method("disable_actor_constant_velocity", Shape.VOID)
 def disable_actor_constant_velocity(served: Served, id: Any) -> None:
-    """Physics again."""
+    """Hands the actor's velocity back to physics."""
     vehicle = _vehicle(served, id)
     if vehicle is not None:
         served.episode.moving.hold_velocity(vehicle.body, None)
@@ -109,7 +109,7 @@ def add_actor_impulse_at_location(served: Served, id: Any, impulse: Any, locatio
 
 @TABLE.method("add_actor_force", Shape.VOID)
 def add_actor_force(served: Served, id: Any, force: Any) -> None:
-    """N for one tick."""
+    """Applies a force in N for one tick."""
     push(served, id, force, None, served.clock.step)
 
 
@@ -175,5 +175,5 @@ def set_actor_enable_gravity(served: Served, id: Any, enabled: Any) -> None:
 
 @TABLE.method("set_actor_dead", Shape.VOID, without_effect="nobody lies down")
 def set_actor_dead(served: Served, id: Any) -> None:
-    """Accepted."""
+    """Accepts the call and does nothing, as walkers do not fall down."""
     served.episode.actors.get(id)

@@ -15,7 +15,7 @@ KIND_LETTERS = ("o", "v", "w", "t", "h", "a")  # other, vehicle, walker, traffic
 
 @TABLE.method("start_recorder")
 def start_recorder(served: Served, name: Any, additional: Any = False) -> str:
-    """Begin; needs --data-dir."""
+    """Starts a recording; the server needs --data-dir for it."""
     wire.flag(additional, "additional_data")
     return served.recorder.start(
         wire.text(name, "file name"), served.episode.map.name, served.clock
@@ -24,7 +24,7 @@ def start_recorder(served: Served, name: Any, additional: Any = False) -> str:
 
 @TABLE.method("stop_recorder", Shape.VOID)
 def stop_recorder(served: Served) -> None:
-    """End."""
+    """Stops the recording that runs."""
     served.recorder.stop()
 
 
@@ -85,7 +85,7 @@ def stop_replayer(served: Served, keep_actors: Any) -> None:
 
 @TABLE.method("set_replayer_time_factor", Shape.VOID)
 def set_replayer_time_factor(served: Served, factor: Any) -> None:
-    """Faster or slower."""
+    """Sets how much faster than recorded a replay runs."""
     wanted = wire.number(factor, "time_factor")
     if not 0.0 < wanted <= MAX_FACTOR:
         raise CallError(f"time_factor must be in (0, {MAX_FACTOR:g}], got {wanted:g}")
@@ -94,7 +94,7 @@ def set_replayer_time_factor(served: Served, factor: Any) -> None:
 
 @TABLE.method("set_replayer_ignore_hero", Shape.VOID)
 def set_replayer_ignore_hero(served: Served, ignore: Any) -> None:
-    """Leave out who has the role `hero`."""
+    """Sets whether a replay leaves out actors with the role `hero`."""
     served.replayer.ignore_hero = wire.flag(ignore, "ignore_hero")
 
 

@@ -23,13 +23,13 @@ def draw_debug_shape(served: Served, shape: Any) -> None:
 
 @TABLE.method("clear_debug_shape", Shape.VOID)
 def clear_debug_shape(served: Served) -> None:
-    """All but the texts."""
+    """Removes all debug shapes but the texts."""
     served.episode.debug.clear(texts=False)
 
 
 @TABLE.method("clear_debug_string", Shape.VOID)
 def clear_debug_string(served: Served) -> None:
-    """All texts."""
+    """Removes all debug texts from the world."""
     served.episode.debug.clear(texts=True)
 
 
@@ -52,7 +52,7 @@ def get_environment_objects(served: Served, tag: Any) -> list[Any]:
 
 @TABLE.method("enable_environment_objects", Shape.VOID)
 def enable_environment_objects(served: Served, ids: Any, enable: Any) -> None:
-    """Objects come back, or are there for nobody; ids that are not known change nothing."""
+    """Shows or hides objects for all clients; unknown ids change nothing."""
     known = [wire.integer(id, "id") for id in wire.items(ids, "ids")]
     served.episode.landscape.toggle(known, wire.flag(enable, "enable"))
     served.episode.relandscape()
@@ -93,7 +93,7 @@ for _name in ("apply_color_texture_to_objects", "apply_float_color_texture_to_ob
 
     @TABLE.method(_name, Shape.VOID, without_effect=NO_PAINT)
     def paint(_: Served, names: Any, material: Any, texture: Any) -> None:
-        """Accepted."""
+        """Accepts new materials and textures and does nothing."""
         wire.items(names, "names")
         wire.integer(material, "material")
         wire.items(texture, "texture")
@@ -103,5 +103,5 @@ for _name in ("apply_color_texture_to_objects", "apply_float_color_texture_to_ob
     "set_annotations_traverse_translucency", Shape.VOID, without_effect="nothing is translucent"
 )
 def set_annotations_traverse_translucency(_: Served, enable: Any) -> None:
-    """Accepted."""
+    """Accepts the switch and does nothing."""
     wire.flag(enable, "enable")

@@ -19,7 +19,7 @@ def is_traffic_manager_running(served: Served, port: Any) -> bool:
 
 @TABLE.method("get_traffic_manager_running")
 def get_traffic_manager_running(served: Served, port: Any) -> list[Any]:
-    """Its address."""
+    """Returns address and port of a Traffic Manager that runs."""
     known = served.managers.by_port.get(port) if isinstance(port, int) else None
     return ["", 0] if known is None else [known, port]
 
@@ -38,5 +38,5 @@ def add_traffic_manager_running(served: Served, address: Any) -> bool:
 
 @TABLE.method("destroy_traffic_manager")
 def destroy_traffic_manager(served: Served, port: Any) -> bool:
-    """Forget one."""
+    """Forgets the Traffic Manager of this port."""
     return isinstance(port, int) and served.managers.by_port.pop(port, None) is not None

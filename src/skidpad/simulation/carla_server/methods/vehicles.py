@@ -62,13 +62,13 @@ def apply_ackermann_control_to_vehicle(served: Served, id: Any, control: Any) ->
 
 @TABLE.method("get_ackermann_controller_settings")
 def get_ackermann_controller_settings(served: Served, id: Any) -> list[float]:
-    """Gains."""
+    """Returns the gains of a vehicle's Ackermann controller."""
     return vehicle_of(served, id).ackermann.packed()
 
 
 @TABLE.method("apply_ackermann_controller_settings", Shape.VOID)
 def apply_ackermann_controller_settings(served: Served, id: Any, settings: Any) -> None:
-    """Other gains."""
+    """Sets the gains of a vehicle's Ackermann controller."""
     vehicle = vehicle_of(served, id)
     vehicle.ackermann = AckermannSettings(*wire.numbers(settings, "ackermann settings", 6))
     if vehicle.driver is not None:
@@ -112,7 +112,7 @@ def apply_physics_control(served: Served, id: Any, control: Any) -> None:
 
 @TABLE.method("get_vehicle_light_state")
 def get_vehicle_light_state(served: Served, id: Any) -> list[int]:
-    """Lamp flags."""
+    """Returns the flags of a vehicle's lamps."""
     return [vehicle_of(served, id).lights]
 
 
@@ -162,7 +162,7 @@ def get_wheel_steer_angle(served: Served, id: Any, wheel: Any) -> float:
 
 @TABLE.method("get_wheel_pitch_angle")
 def get_wheel_pitch_angle(served: Served, id: Any, wheel: Any) -> float:
-    """deg turned; not tracked."""
+    """Returns 0 deg, as the turning of wheels is not tracked."""
     vehicle_of(served, id)
     wire.integer(wheel, "wheel", 0, 8)
     return 0.0
@@ -172,7 +172,7 @@ def _accept_without_effect(name: str, reason: str) -> None:
     @TABLE.method(name, Shape.VOID, without_effect=reason)
     def accepted(served: Served, id: Any, a: Any = None, b: Any = None, c: Any = None, d: Any = None,
                  e: Any = None, f: Any = None) -> None:  # fmt: skip
-        """Checked for a living actor, else without effect."""
+        """Checks that the actor is alive and does nothing else."""
         del a, b, c, d, e, f
         served.episode.actors.get(id)
 

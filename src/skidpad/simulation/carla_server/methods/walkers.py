@@ -16,7 +16,7 @@ TABLE = Table("walkers")
 
 
 def parse_control(value: Any) -> WalkerControl:
-    """WalkerControl."""
+    """Parses and checks a `WalkerControl`."""
     direction, speed, jump = wire.items(value, "walker control", 3)
     return WalkerControl(
         wire.iso_vector(direction, "walker control.direction"),

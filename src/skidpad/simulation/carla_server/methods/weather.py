@@ -14,7 +14,7 @@ NO_LAMPS = "maps have no street lamps"
 
 @TABLE.method("get_weather_parameters")
 def get_weather_parameters(served: Served) -> list[float]:
-    """As last set."""
+    """Returns `WeatherParameters` as last set."""
     return served.episode.sky.packed()
 
 
@@ -26,14 +26,14 @@ def set_weather_parameters(served: Served, weather: Any) -> None:
 
 @TABLE.method("query_lights_state")
 def query_lights_state(_: Served, client: Any) -> list[Any]:
-    """No street lamps."""
+    """Returns an empty list, as there are no street lamps."""
     wire.text(client, "client")
     return []
 
 
 @TABLE.method("update_lights_state", Shape.VOID, without_effect=NO_LAMPS)
 def update_lights_state(_: Served, client: Any, lights: Any, discard: Any = False) -> None:
-    """Accepted."""
+    """Accepts states of street lamps and does nothing."""
     wire.text(client, "client")
     wire.items(lights, "lights")
     wire.flag(discard, "discard_client")
@@ -41,18 +41,18 @@ def update_lights_state(_: Served, client: Any, lights: Any, discard: Any = Fals
 
 @TABLE.method("update_day_night_cycle", Shape.VOID, without_effect=NO_LAMPS)
 def update_day_night_cycle(_: Served, client: Any, active: Any) -> None:
-    """Accepted."""
+    """Accepts the switch and does nothing."""
     wire.text(client, "client")
     wire.flag(active, "active")
 
 
 @TABLE.method("get_imui_sensor_gravity")
 def get_imui_sensor_gravity(served: Served) -> float:
-    """m/s^2 that IMUs feel."""
+    """Returns the gravity that IMUs measure, m/s^2."""
     return served.episode.surroundings.gravity
 
 
 @TABLE.method("set_imui_sensor_gravity", Shape.VOID)
 def set_imui_sensor_gravity(served: Served, gravity: Any) -> None:
-    """m/s^2 that IMUs feel."""
+    """Sets the gravity that IMUs measure, m/s^2."""
     served.episode.surroundings.gravity = wire.number(gravity, "gravity")

@@ -122,7 +122,7 @@ class Rhythm:
     speed: float = 0.0
 
     def due(self, time: float, pose: Pose, speed: float | None) -> bool:
-        """Whether a message goes out now; if so, counts from it. speed: None of who does not drive."""
+        """Whether a message goes out now; if so, counts from it. speed: None for one at rest."""
         waited = self.longest if self.last is None else time - self.last + EARLY
         if speed is None:
             going = self.last is None or waited >= ROAD_SIDE

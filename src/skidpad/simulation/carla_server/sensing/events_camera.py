@@ -52,7 +52,7 @@ class Retina:
 
 
 def make_retina(actor: Actor, seed: int) -> Retina:
-    """From an actor's attributes."""
+    """Makes an event camera from an actor's attributes."""
     a = actor.attributes
     return Retina(
         make_camera(actor, seed),

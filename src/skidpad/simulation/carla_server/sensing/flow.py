@@ -56,7 +56,7 @@ class FlowCamera:
 
 
 def make_flow_camera(actor: Actor, seed: int) -> FlowCamera:
-    """From an actor's attributes."""
+    """Makes an optical-flow camera from an actor's attributes."""
     return FlowCamera(make_camera(actor, seed))
 
 
@@ -79,7 +79,7 @@ def _bodies(scene: Pictured) -> dict[int, tuple[Floats, Floats]]:
 def moved(
     now: View, before: View, turn: Floats, shift: Floats, inverse: NDArray[np.float32]
 ) -> NDArray[np.float32]:
-    """(H, W, 2) flow of pixels at inverse depth (1/m), 0 being as far as one can see.
+    """Returns (H, W, 2) flow of pixels at inverse depth (1/m), 0 being infinitely far.
 
     turn, shift: a point p of the world now was at turn p + shift before.
     """

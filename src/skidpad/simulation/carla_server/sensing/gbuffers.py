@@ -44,7 +44,7 @@ LIT = 1  # MSM_DefaultLit; the sky is MSM_Unlit, 0
 
 
 class Texture(IntEnum):
-    """carla.GBufferTextureID."""
+    """Numbers of textures, as carla.GBufferTextureID."""
 
     SCENE_COLOUR = 0
     SCENE_DEPTH = 1
@@ -71,19 +71,19 @@ class ColourCamera:
 
 
 def make_colour_camera(actor: Actor, seed: int) -> ColourCamera:
-    """From an actor's attributes."""
+    """Makes a colour camera from an actor's attributes."""
     return ColourCamera(make_camera(actor, seed))
 
 
 def stream_of(sensor: Sensor, texture: int, hub: StreamHub) -> int:
-    """The stream of a texture, from the first time on that somebody asks for it."""
+    """Returns the stream of a texture, opened at the first request for it."""
     if texture not in sensor.textures:
         sensor.textures[texture] = hub.create()
     return sensor.textures[texture]
 
 
 def colour_image(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
-    """One picture."""
+    """Returns one colour image as a message."""
     return [picture(around, clock, sensor.actor, sensor.equipment.camera)]
 
 

@@ -59,7 +59,7 @@ class Camera:
         return scene, view
 
     def paint(self, around: Surroundings, actor: Actor, scene: Pictured, view: View) -> None:
-        """Colour what is drawn."""
+        """Colours the picture that was drawn."""
         lamps = headlights(around.actors, actor)
         scene.shading.paint(view, lamps, self.drawn.inverse, self.drawn.key, self.rgb)
 
@@ -83,12 +83,12 @@ def make_camera(actor: Actor, _: int) -> Camera:
 
 
 def image(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
-    """One picture."""
+    """Returns one image of the camera's modality as a list of messages."""
     return [picture(around, clock, sensor.actor, sensor.equipment)]
 
 
 def picture(around: Surroundings, clock: Clock, actor: Actor, camera: Camera) -> Message:
-    """What its modality shows."""
+    """Renders one image of the camera's modality as a message."""
     drawn, bgra = camera.drawn, camera.bgra
     scene, view = camera.look(around, clock, actor)
     if camera.spec.modality is Modality.DEPTH:

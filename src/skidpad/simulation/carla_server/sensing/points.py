@@ -49,7 +49,7 @@ class RadarMake:
 
 
 def make_radar(actor: Actor, seed: int) -> RadarMake:
-    """From an actor's attributes."""
+    """Makes a radar from an actor's attributes."""
     a = actor.attributes
     spec = RadarSpec(
         str(actor.id),
@@ -108,7 +108,7 @@ class LidarMake:
 
 
 def make_lidar(actor: Actor, _: int) -> LidarMake:
-    """From an actor's attributes."""
+    """Makes a lidar from an actor's attributes."""
     a = actor.attributes
     channels = wire.integer(int(a["channels"]), "channels", 1, MAX_CHANNELS)
     degrees = np.linspace(float(a["upper_fov"]), float(a["lower_fov"]), channels)

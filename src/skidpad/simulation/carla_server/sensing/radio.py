@@ -1,4 +1,4 @@
-"""Radio between V2X sensors: who is on the air in a tick, and what power arrives.
+"""Radio between V2X sensors: the stations that send in a tick, and what power arrives.
 
 Loss and fading are those of CARLA's V2X sensors (public source, PathLossModel), which name ETSI TR
 103 257-1 and WINNER+ D5.3. Other than there, an obstacle's height counts above the line between the
@@ -59,7 +59,7 @@ class Radio:
 
     @property
     def wavelength(self) -> float:
-        """m."""
+        """Wavelength of the carrier in m."""
         return LIGHT / (self.frequency_ghz * 1e9)
 
     def deviation(self, way: Way) -> float:
@@ -120,7 +120,7 @@ class Air:
         self.calls.append(call)
 
     def heard(self, frame: int, own: Call) -> list[Call]:
-        """What others of the kind send on the channel."""
+        """Returns what other stations of the kind send on the channel."""
         if frame != self.frame:
             return []
         same = (c for c in self.calls if c.kind == own.kind and c.channel == own.channel)
@@ -128,7 +128,7 @@ class Air:
 
 
 def crossed(among: Boxes, a: Vector, b: Vector, besides: tuple[int, ...] = ()) -> list[Box]:
-    """The boxes that the line from a to b goes through, without those of `besides`."""
+    """Returns the boxes that the line from a to b goes through, without those of `besides`."""
     near, far = among.spans(a, (b[0] - a[0], b[1] - a[1], b[2] - a[2]))
     hit = np.flatnonzero((near <= far) & (far >= 0.0) & (near <= 1.0)).tolist()
     return [among.boxes[i] for i in hit if among.owners[i] not in besides]
@@ -146,7 +146,7 @@ def knife_edge(box: Box, a: Vector, b: Vector, wavelength: float) -> float:
 
 
 def free_space(radio: Radio, distance: float) -> float:
-    """dB (Friis)."""
+    """Returns the path loss in free space in dB (Friis)."""
     return 20.0 * log10(4.0 * pi * distance / radio.wavelength)
 
 
@@ -163,7 +163,7 @@ def two_rays(radio: Radio, distance: float, h_a: float, h_b: float) -> float:
 
 
 def winner(radio: Radio, way: Way, distance: float) -> float:
-    """dB, by WINNER+."""
+    """Returns the path loss in dB by WINNER+."""
     d, f = log10(distance), log10(radio.frequency_ghz)
     if way is Way.BUILDING:
         return 36.85 + 30.0 * d + 18.9 * f

@@ -19,7 +19,7 @@ Message = tuple[bytes | memoryview, ...]
 
 @dataclass(slots=True, eq=False)
 class Sensor:
-    """One sensor at work."""
+    """Holds one sensor of the episode, with its period and random stream."""
 
     actor: Actor
     period: float  # s; 0: every tick
@@ -29,7 +29,7 @@ class Sensor:
     textures: dict[int, int] = field(default_factory=dict)  # streams of its G-buffers
 
     def number(self, attribute: str) -> float:
-        """A numeric attribute."""
+        """Returns an attribute of the sensor as a number."""
         return float(self.actor.attributes[attribute])
 
     def is_due(self, time: float) -> bool:

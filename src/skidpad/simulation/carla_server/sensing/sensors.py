@@ -1,4 +1,4 @@
-"""All sensors of an episode. Only those that somebody listens to, and whose time has come, work."""
+"""All sensors of an episode. Only those work that have a listener and whose time has come."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EVENT_PAUSE = 0.002
 
 
 class SensorSet:
-    """Sensors by actor id."""
+    """Holds the sensors of an episode by actor id."""
 
     def __init__(self, producers: Mapping[str, Producer], seed: int) -> None:
         """producers: by blueprint; other kinds stay silent (listed in the coverage table)."""
@@ -49,7 +49,7 @@ class SensorSet:
         return self._sensors.get(id)
 
     def heard(self, hub: StreamHub) -> bool:
-        """Whether anybody listens to any of them."""
+        """Tells whether any sensor has a listener."""
         return any(_is_heard(sensor, hub) for sensor in self._sensors.values())
 
     def produce(self, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
@@ -82,7 +82,7 @@ class SensorSet:
 
 
 def _is_heard(sensor: Sensor, hub: StreamHub) -> bool:
-    """Whether anybody listens to it or to its G-buffers."""
+    """Tells whether the sensor or one of its G-buffers has a listener."""
     streams = (sensor.actor.stream, *sensor.textures.values())
     return any(s is not None and hub.wanted(s) for s in streams)
 

@@ -100,7 +100,7 @@ class Surroundings:
         return row if all(abs(m - c) < h + SKIN for m, c, h in offsets) else -1
 
     def built(self) -> Boxes:
-        """What stands beside the road at present."""
+        """Returns the boxes that stand beside the road at present."""
         roads = self._landscape.roads
         if self._built is None or self._built[0] is not roads:
             there = ((0, Box(o.centre, o.half)) for o in self._landscape.present())
@@ -116,7 +116,7 @@ class Surroundings:
         return self._cars[1]
 
     def lamps(self, vehicle: Actor) -> int:
-        """Flags of VehicleLightState."""
+        """Returns the vehicle's flags of VehicleLightState."""
         return self._vehicles.of(vehicle.id).lights
 
     def _brakes(self, actor: Actor) -> bool:

@@ -24,7 +24,7 @@ from skidpad.live.monitor_link import MonitorLink
 from skidpad.live.outcome import read_outcome
 from skidpad.live.settings import Flow, Links, MonitorLinkSettings
 from skidpad.live.watch import watch
-from skidpad.live.wire import WireSource, cycle_mark, end_mark, packed
+from skidpad.live.wire import WireSource, cycle_mark, end_mark, pack_item
 from skidpad.recording.channel_hash import recording_hash
 from skidpad.recording.channels import McapRecording
 from skidpad.recording.cycles import cycles
@@ -152,7 +152,7 @@ def test_cycles_are_those_of_the_recording_however_long_the_silences(heard):
     rows = [row for row in source.rows if round(row[1].t * 10) in heard]
     sent = []
     for k in heard:
-        sent += [packed(c, item) for c, item in rows if round(item.t * 10) == k]
+        sent += [pack_item(c, item) for c, item in rows if round(item.t * 10) == k]
         sent.append(cycle_mark(k, 0.1 * k, 0))
     wire = WireSource(io.BytesIO(b"".join([*sent, end_mark()])), source.channels)
     listed = Listed(source.channels, rows)

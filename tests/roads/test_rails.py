@@ -7,7 +7,7 @@ import pytest
 
 from skidpad.roads.bundled import map_file
 from skidpad.roads.opendrive.bake import bake
-from skidpad.roads.opendrive.rails import railed
+from skidpad.roads.opendrive.rails import add_rails
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import BarrierKind
 from stadium import RADIUS, STRAIGHT, WIDTH, stadium
@@ -16,7 +16,7 @@ ASIDE = 0.3  # m
 
 
 def with_rails(text: bytes) -> RoadMap:
-    return RoadMap(bake(railed(text, "mine.xodr"), "mine"))
+    return RoadMap(bake(add_rails(text, "mine.xodr"), "mine"))
 
 
 @pytest.mark.parametrize(("beside", "edge"), [("sidewalk", WIDTH), ("shoulder", WIDTH + 2.0)])
@@ -34,7 +34,7 @@ def test_rails_run_all_along_both_edges(beside: str, edge: float) -> None:
 
 def test_a_file_with_barriers_stays_as_it_is() -> None:
     text = map_file("figure8").read_bytes()
-    assert railed(text, "figure8.xodr") is text
+    assert add_rails(text, "figure8.xodr") is text
 
 
 def test_no_rail_stands_in_a_mouth_or_on_another_road(towns) -> None:  # type: ignore[no-untyped-def]

@@ -32,7 +32,7 @@ from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind, Stratum
 from skidpad.evidence.channels.risk import safety_scores
-from skidpad.live.links import opened
+from skidpad.live.links import open_listeners
 from skidpad.live.listener import Listener
 from skidpad.live.settings import Links
 from skidpad.recording.channel_drives import DriveOutcome
@@ -209,7 +209,7 @@ def drive_segment(
     part = path.with_suffix(".part")
     try:
         with (
-            opened(links, crew.crew.channels, path) as listeners,
+            open_listeners(links, crew.crew.channels, path) as listeners,
             ChannelWriter(part, crew.crew.channels) as writer,
         ):
             recording = Recording(crew, writer, [*listeners, *aboard])

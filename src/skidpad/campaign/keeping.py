@@ -23,7 +23,7 @@ def road_file(course: Roads) -> str:
     """The map of a course as it is driven: with rails where they are asked for and none stand."""
     if course.edges is Edges.NONE or load_map(course.map).roadside.barriers:
         return course.map
-    from skidpad.roads.opendrive.rails import VERSION, railed  # lxml is needed for this only
+    from skidpad.roads.opendrive.rails import VERSION, add_rails  # lxml is needed for this only
 
     file = map_file(course.map)
     if file.suffix == ".npz":
@@ -31,7 +31,7 @@ def road_file(course: Roads) -> str:
     content = Path(kept_name(file)).parent.name
     made = user_cache() / "railed" / f"{content}-{VERSION}" / file.name
     if not made.is_file():
-        write_bytes(made, railed(file.read_bytes(), str(file)))
+        write_bytes(made, add_rails(file.read_bytes(), str(file)))
     return str(made)
 
 

@@ -14,7 +14,9 @@ MONITORED = ".monitor"  # suffix of the folder beside a recording
 
 
 @contextmanager
-def opened(links: Links, channels: Sequence[str], recording: Path) -> Iterator[list[Listener]]:
+def open_listeners(
+    links: Links, channels: Sequence[str], recording: Path
+) -> Iterator[list[Listener]]:
     """Opens the listeners of a drive that is recorded as `recording`."""
     with ExitStack() as stack:
         listeners: list[Listener] = []

@@ -24,7 +24,7 @@ from typing import Any
 import skidpad
 from skidpad.live.outcome import LinkOutcome, write_outcome
 from skidpad.live.settings import Flow, MonitorLinkSettings
-from skidpad.live.wire import cycle_mark, end_mark, packed
+from skidpad.live.wire import cycle_mark, end_mark, pack_item
 from skidpad.recording.channels import Item
 
 START_PATIENCE = 600.0  # s: kernels may have to be compiled first
@@ -55,7 +55,7 @@ class MonitorLink:
 
     def hear(self, channel: int | None, item: Item) -> None:
         """Gather what is said in this cycle."""
-        self._cycle.append(packed(channel, item))
+        self._cycle.append(pack_item(channel, item))
 
     def cycle_over(self, k: int, t: float) -> None:
         """Send the cycle, or drop it whole."""

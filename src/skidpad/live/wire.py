@@ -36,7 +36,7 @@ _READERS: dict[int, tuple[Any, Callable[[Any], Item]]] = {
 }
 
 
-def packed(channel: int | None, item: Item) -> bytes:
+def pack_item(channel: int | None, item: Item) -> bytes:
     """Returns an item as a record of bytes; the true world gives none (C-021)."""
     if isinstance(item, TruthFrame):
         return b""

@@ -38,7 +38,9 @@ class RoadEdge:
     """The surface of a map's roads as one rectangle for each pair of neighbouring samples."""
 
     def __init__(self, samples: LaneSamples, lanes: LaneTable) -> None:
-        from scipy.spatial import cKDTree  # large, and a command that only names a map needs no edge
+        from scipy.spatial import (
+            cKDTree,  # large, and a command that only names a map needs no edge
+        )
 
         first = np.isin(lanes.kind[samples.lane], ROAD)
         first[lanes.first + lanes.size - 1] = False

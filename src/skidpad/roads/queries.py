@@ -99,8 +99,8 @@ class RoadMap:
         Kernels go on with the arrays behind it, so that they see one type of array.
         """
         shown = copy(self)
-        shown.samples, shown.lanes = locked(self.samples), locked(self.lanes)
-        shown.signals, shown.arrays = locked(self.signals), locked(self._arrays)
+        shown.samples, shown.lanes = lock_table(self.samples), lock_table(self.lanes)
+        shown.signals, shown.arrays = lock_table(self.signals), lock_table(self._arrays)
         side = self.roadside
         shown.roadside = replace(
             side,
@@ -253,7 +253,7 @@ class RoadMap:
         return frozenset(roads)
 
 
-def locked(table: Table) -> Table:
+def lock_table(table: Table) -> Table:
     """Returns the same columns; its arrays are shared and cannot be written through it."""
     kind: Any = type(table)
     shown: Table = kind._make(_lock_array(c) if isinstance(c, np.ndarray) else c for c in table)

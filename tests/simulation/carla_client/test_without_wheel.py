@@ -24,7 +24,7 @@ from skidpad.simulation.carla.events import closing, marking_name
 from skidpad.simulation.carla.keeper import ServerKeeper
 from skidpad.simulation.carla.options import CarlaOptions, Optimisation
 from skidpad.simulation.carla.scene import same_roads
-from skidpad.simulation.carla.sensors import described, display_cameras
+from skidpad.simulation.carla.sensors import describe_sensor, display_cameras
 from skidpad.simulation.carla.weather import weather_parameters
 
 
@@ -66,7 +66,7 @@ def test_weather_hides_what_lies_beyond_its_sight_along_the_ray() -> None:
 @pytest.mark.req("A-018", "A-019", "A-024", "A-028")
 def test_twelve_sensors_are_described_with_carlas_attributes() -> None:
     specs = twelve_sensors()
-    told = [described(s)[::2] for s in specs if not hasattr(s, "kind")]
+    told = [describe_sensor(s)[::2] for s in specs if not hasattr(s, "kind")]
     assert told[0] == (
         "sensor.camera.rgb",
         {"image_size_x": "800", "image_size_y": "600", "fov": "90", "sensor_tick": "0.0",

@@ -22,7 +22,7 @@ def test_every_bone_hangs_on_one_before_it():
 
 
 def test_it_stands_in_its_box_and_is_as_wide_on_both_sides():
-    rows = {r[0]: r for r in Skeleton().told(Pose(0.0, 0.0, 0.9), 1.8)}
+    rows = {r[0]: r for r in Skeleton().list_transforms(Pose(0.0, 0.0, 0.9), 1.8)}
     heights = [r[1][0][2] for r in rows.values()]
     assert min(heights) == pytest.approx(0.0, abs=1e-9)
     assert 1.5 < max(heights) < 1.8
@@ -36,14 +36,16 @@ def test_it_stands_in_its_box_and_is_as_wide_on_both_sides():
 
 def test_children_follow_and_unknown_names_do_nothing():
     skeleton = Skeleton()
-    skeleton.set({"crl_arm__R": Pose(0.0, -0.1, 0.0, pitch=-pi / 2.0), "nobody": Pose(1.0, 0.0)})
-    hidden = {r[0]: r for r in skeleton.told(Pose(0.0, 0.0), 1.8)}
+    skeleton.set_bones(
+        {"crl_arm__R": Pose(0.0, -0.1, 0.0, pitch=-pi / 2.0), "nobody": Pose(1.0, 0.0)}
+    )
+    hidden = {r[0]: r for r in skeleton.list_transforms(Pose(0.0, 0.0), 1.8)}
     skeleton.blend = 1.0
-    shown = {r[0]: r for r in skeleton.told(Pose(0.0, 0.0), 1.8)}
+    shown = {r[0]: r for r in skeleton.list_transforms(Pose(0.0, 0.0), 1.8)}
     assert hidden["crl_hand__R"][2][0][2] < shown["crl_hand__R"][2][0][2] - 0.5  # the arm is raised
     assert hidden["crl_hand__L"] == shown["crl_hand__L"]
     skeleton.take()
-    assert {r[0]: r for r in skeleton.told(Pose(0.0, 0.0), 1.8)} == hidden
+    assert {r[0]: r for r in skeleton.list_transforms(Pose(0.0, 0.0), 1.8)} == hidden
 
 
 @pytest.mark.parametrize("value", [[], [[["a"]]], [[[1, [[0, 0, 0], [0, 0, 0]]]]], [["a"]], 3])

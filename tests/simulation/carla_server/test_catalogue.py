@@ -6,7 +6,7 @@ from skidpad.core.vocabulary import ActorKind
 from skidpad.simulation.carla_server.catalogue import (
     AttributeType,
     Family,
-    chosen,
+    choose_attributes,
     load_catalogue,
 )
 from skidpad.simulation.carla_server.vehicles import model_of
@@ -42,7 +42,7 @@ def test_attributes_that_scripts_rely_on(id: str, attribute: str, default: str) 
 def test_every_default_parses_as_its_type() -> None:
     for blueprint in load_catalogue().values():
         defaults = {a.id: a.recommended[0] for a in blueprint.attributes.values() if a.modifiable}
-        assert chosen(blueprint, defaults) == chosen(blueprint, {})
+        assert choose_attributes(blueprint, defaults) == choose_attributes(blueprint, {})
 
 
 @pytest.mark.parametrize(
@@ -52,10 +52,10 @@ def test_every_default_parses_as_its_type() -> None:
 def test_values_are_checked(name: str, value: str) -> None:
     blueprint = load_catalogue()["vehicle.audi.tt"]
     if name == "ros_publish_tf":
-        assert chosen(blueprint, {name: value})[name] == value
+        assert choose_attributes(blueprint, {name: value})[name] == value
         return
     with pytest.raises(WireError):
-        chosen(blueprint, {name: value})
+        choose_attributes(blueprint, {name: value})
 
 
 def test_every_vehicle_has_physics_of_its_size() -> None:
@@ -69,7 +69,7 @@ def test_every_vehicle_has_physics_of_its_size() -> None:
 
 def test_fixed_attributes_cannot_be_set() -> None:
     blueprint = load_catalogue()["vehicle.audi.tt"]
-    assert chosen(blueprint, {"number_of_wheels": "9"})["number_of_wheels"] == "4"
+    assert choose_attributes(blueprint, {"number_of_wheels": "9"})["number_of_wheels"] == "4"
     assert blueprint.attributes["color"].type is AttributeType.COLOUR
 
 

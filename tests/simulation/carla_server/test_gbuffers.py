@@ -133,7 +133,7 @@ def test_wet_roads_are_smoother(scene):
     served = scene[0]
     dry = pictures(scene)[Texture.MATERIAL][HEIGHT - 2, WIDTH // 2][0]
     sky = served.episode.sky
-    weather = sky.packed()
+    weather = sky.pack()
     weather[PACKED.index("wetness")] = 100.0
     sky.apply(weather)
     assert pictures(scene)[Texture.MATERIAL][HEIGHT - 2, WIDTH // 2][0] < dry / 2

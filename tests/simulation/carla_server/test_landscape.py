@@ -96,7 +96,9 @@ def test_lidar_ray_and_car_go_through_what_is_hidden():
 
     def met():
         way = (np.cos(eye.yaw), np.sin(eye.yaw), 0.0)
-        hits = scenery.cast(episode.landscape, episode.actors, (eye.x, eye.y, eye.z), way, 14.0)
+        hits = scenery.trace_ray(
+            episode.landscape, episode.actors, (eye.x, eye.y, eye.z), way, 14.0
+        )
         return [h.label for h in hits]
 
     before = seen()

@@ -12,7 +12,7 @@ from skidpad.simulation.carla_server.actors import Attachment
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.sensing.events_camera import EVENT, Retina, crossings
-from skidpad.simulation.carla_server.sensing.flow import moved
+from skidpad.simulation.carla_server.sensing.flow import compute_flow
 from skidpad.simulation.carla_server.sensing.normals import world_normals
 from skidpad.simulation.carla_server.served import Served
 
@@ -40,7 +40,7 @@ def test_flow_is_where_a_point_is_less_where_it_was(spin):
         ray = np.array([(column + 0.5 - 40.0) / 40.0, (row + 0.5 - 30.0) / 40.0, 1.0])
         point = now.centre + now.rotation.T @ (depth * ray)
         inverse = np.full((60, 80), 1.0 / depth, dtype=np.float32)
-        flow = moved(now, before, turn, shift, inverse)[row, column]
+        flow = compute_flow(now, before, turn, shift, inverse)[row, column]
         u, v, _ = pixel(before, turn @ point + shift)
         assert flow[0] * 40.0 == pytest.approx(column + 0.5 - u, abs=1e-3)
         assert -flow[1] * 30.0 == pytest.approx(row + 0.5 - v, abs=1e-3)
@@ -49,9 +49,9 @@ def test_flow_is_where_a_point_is_less_where_it_was(spin):
 def test_the_sky_moves_by_turning_alone():
     straight, turned = view(Pose(0, 0)), view(Pose(5.0, 0.0, yaw=0.1))
     far = np.zeros((60, 80), dtype=np.float32)
-    still = moved(view(Pose(5.0, 0.0)), straight, np.eye(3), np.zeros(3), far)
+    still = compute_flow(view(Pose(5.0, 0.0)), straight, np.eye(3), np.zeros(3), far)
     assert np.abs(still).max() < 1e-6
-    to_the_left = moved(turned, straight, np.eye(3), np.zeros(3), far)
+    to_the_left = compute_flow(turned, straight, np.eye(3), np.zeros(3), far)
     assert to_the_left[30, 40, 0] == pytest.approx(np.tan(0.1) * 40.0 / 40.0, rel=0.02)
 
 

@@ -30,7 +30,7 @@ class Kept(StreamHub):
         super().__init__()
         self.told: dict[int, list[bytes]] = {}
 
-    def wanted(self, stream: int) -> bool:
+    def has_listeners(self, stream: int) -> bool:
         return self.exists(stream)
 
     def publish(self, stream: int, *parts: bytes | memoryview) -> None:

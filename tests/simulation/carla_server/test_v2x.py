@@ -21,7 +21,7 @@ from skidpad.simulation.carla_server.sensing.radio import (
     Call,
     Radio,
     Way,
-    crossed,
+    find_crossed_boxes,
     knife_edge,
     loss,
 )
@@ -72,9 +72,11 @@ def test_lines_cross_boxes():
         Box(Pose(10.0, 0.0, 4.0), (1.0, 1.0, 1.0)),  # above
     ]
     among = Boxes.of(enumerate(boxes, start=1))
-    assert crossed(among, (0.0, 0.0, 1.0), (30.0, 0.0, 1.0)) == boxes[:2]
-    assert crossed(among, (0.0, 0.0, 1.0), (30.0, 0.0, 1.0), besides=(1, 4)) == boxes[1:2]
-    assert crossed(Boxes.of([]), (0.0, 0.0, 1.0), (30.0, 0.0, 1.0)) == []
+    assert find_crossed_boxes(among, (0.0, 0.0, 1.0), (30.0, 0.0, 1.0)) == boxes[:2]
+    assert (
+        find_crossed_boxes(among, (0.0, 0.0, 1.0), (30.0, 0.0, 1.0), besides=(1, 4)) == boxes[1:2]
+    )
+    assert find_crossed_boxes(Boxes.of([]), (0.0, 0.0, 1.0), (30.0, 0.0, 1.0)) == []
 
 
 def test_a_station_speaks_when_something_changes_and_at_least_every_second():

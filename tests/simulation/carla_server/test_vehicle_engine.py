@@ -27,7 +27,7 @@ from skidpad.simulation.carla_server.methods.vehicles import get_telemetry_data
 from skidpad.simulation.carla_server.options import ServerOptions
 from skidpad.simulation.carla_server.physics_control import (
     PhysicsControl,
-    applied,
+    apply_control,
     parse_physics,
     with_engine,
 )
@@ -116,24 +116,24 @@ def single(value):
 
 def test_what_is_given_back_as_it_was_changes_nothing():
     fresh = PhysicsControl.of(MINI)
-    sent = fresh.packed([[0.0, 0.0, 0.0]] * 4)
-    assert applied(MINI, fresh, parse_physics(single(sent))) is MINI
+    sent = fresh.pack([[0.0, 0.0, 0.0]] * 4)
+    assert apply_control(MINI, fresh, parse_physics(single(sent))) is MINI
     untold = parse_physics([*sent[:10], [], *sent[11:]])  # no gears, as a client's fresh object
     kept = with_engine(untold, fresh)
     assert kept.engine == fresh.engine
-    assert applied(MINI, fresh, kept) is MINI
+    assert apply_control(MINI, fresh, kept) is MINI
 
 
 def test_a_limit_of_revolutions_limits_the_speed_and_goes_with_them():
     mini = next(m for m in MODELS if m.title == "vehicle.mini.cooper_s")
     fresh = PhysicsControl.of(mini)
-    sent = fresh.packed([[0.0, 0.0, 0.0]] * 4)
+    sent = fresh.pack([[0.0, 0.0, 0.0]] * 4)
     slower = parse_physics([sent[0], 0.5 * sent[1], *sent[2:]])
-    model = applied(mini, fresh, slower)
+    model = apply_control(mini, fresh, slower)
     assert model.speed_max == pytest.approx(0.5 * mini.speed_max)
     changed = {"power": 0.0, "speed_max": 0.0, "force_max": 0.0}
     assert structs.replace(model, **changed) == structs.replace(mini, **changed)
-    back = applied(model, slower, fresh)
+    back = apply_control(model, slower, fresh)
     assert [back.power, back.force_max, back.speed_max] == pytest.approx(
         [mini.power, mini.force_max, mini.speed_max]
     )
@@ -141,19 +141,19 @@ def test_a_limit_of_revolutions_limits_the_speed_and_goes_with_them():
 
 def test_wheels_without_a_radius_are_refused():
     fresh = PhysicsControl.of(MINI)
-    sent = fresh.packed([[0.0, 0.0, 0.0]] * 4)
+    sent = fresh.pack([[0.0, 0.0, 0.0]] * 4)
     for wheel in sent[15]:
         wheel[3] = 0.0
     with pytest.raises(WireError, match="radius must be >= 10 cm"):
-        applied(MINI, fresh, parse_physics(sent))
+        apply_control(MINI, fresh, parse_physics(sent))
 
 
 def test_larger_wheels_are_a_longer_gear():
     fresh = PhysicsControl.of(MINI)
-    sent = fresh.packed([[0.0, 0.0, 0.0]] * 4)
+    sent = fresh.pack([[0.0, 0.0, 0.0]] * 4)
     for wheel in sent[15]:
         wheel[3] *= 2.0
-    model = applied(MINI, fresh, parse_physics(sent))
+    model = apply_control(MINI, fresh, parse_physics(sent))
     assert model.force_max == pytest.approx(0.5 * MINI.force_max)
     assert model.power == pytest.approx(MINI.power)
 
@@ -218,7 +218,7 @@ def test_the_snapshot_shows_the_gear_that_telemetry_tells():
     ],
 )
 def test_engines_that_cannot_be_are_refused(at, value, said):
-    sent = engine_of(MINI).packed()
+    sent = engine_of(MINI).pack()
     sent[at] = value
     with pytest.raises(WireError, match=said):
         parse_engine(sent)

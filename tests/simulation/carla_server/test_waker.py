@@ -54,8 +54,8 @@ def waker(clock, woken):
 
 
 def test_silence_after_a_tick_wakes_the_traffic_managers_of_this_client(waker, clock, woken):
-    waker.asked("add_traffic_manager_running", [TM])
-    waker.asked("tick_cue", [])
+    waker.note_request("add_traffic_manager_running", [TM])
+    waker.note_request("tick_cue", [])
     clock.go(1.9)
     assert woken == []
     clock.go(0.2)
@@ -64,19 +64,19 @@ def test_silence_after_a_tick_wakes_the_traffic_managers_of_this_client(waker, c
 
 def test_what_a_traffic_manager_asks_before_it_sleeps_is_no_sign_of_its_work(waker, clock, woken):
     """It asks for settings between two cycles, often only after the program has ticked again."""
-    waker.asked("add_traffic_manager_running", [TM])
-    waker.asked("tick_cue", [])
-    waker.asked("get_episode_settings", [])
+    waker.note_request("add_traffic_manager_running", [TM])
+    waker.note_request("tick_cue", [])
+    waker.note_request("get_episode_settings", [])
     clock.go(2.1)
     assert woken == [8000]
 
 
 def test_a_client_that_goes_on_is_left_alone(waker, clock, woken):
-    waker.asked("add_traffic_manager_running", [TM])
+    waker.note_request("add_traffic_manager_running", [TM])
     for _ in range(5):
-        waker.asked("tick_cue", [])
+        waker.note_request("tick_cue", [])
         clock.go(1.5)
-        waker.asked("apply_batch", [[], False])
+        waker.note_request("apply_batch", [[], False])
         clock.go(60.0)  # the program thinks: its Traffic Manager has done its work
     assert woken == []
 
@@ -93,19 +93,19 @@ def test_a_client_that_goes_on_is_left_alone(waker, clock, woken):
 )
 def test_without_a_traffic_manager_of_its_own_a_client_is_not_watched(waker, clock, woken, calls):
     for call in calls:
-        waker.asked(*call)
-    waker.asked("tick_cue", [])
+        waker.note_request(*call)
+    waker.note_request("tick_cue", [])
     clock.go(100.0)
     assert woken == []
 
 
 def test_it_is_tried_again_and_given_up(waker, clock, woken):
-    waker.asked("add_traffic_manager_running", [TM])
-    waker.asked("tick_cue", [])
+    waker.note_request("add_traffic_manager_running", [TM])
+    waker.note_request("tick_cue", [])
     for _ in range(3 * TRIES):
         clock.go(2.0)
     assert len(woken) == TRIES
-    waker.asked("tick_cue", [])
+    waker.note_request("tick_cue", [])
     waker.stop()
     clock.go(100.0)
     assert len(woken) == TRIES

@@ -14,7 +14,7 @@ from skidpad.roads.baked import BakedMap
 from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.opendrive.document import Document, parse
 from skidpad.roads.opendrive.lane_shapes import LaneShape, lane_shapes
-from skidpad.roads.opendrive.links import compressed, neighbours, successions
+from skidpad.roads.opendrive.links import compress_pairs, neighbours, successions
 from skidpad.roads.opendrive.roadside import roadside
 from skidpad.roads.opendrive.signals import signal_table
 
@@ -73,8 +73,8 @@ def _samples(shapes: Sequence[LaneShape]) -> LaneSamples:
 def _table(document: Document, shapes: Sequence[LaneShape]) -> LaneTable:
     index = {shape.key: i for i, shape in enumerate(shapes)}
     pairs = successions(document, shapes, index)
-    next_start, next_lane = compressed(pairs, len(shapes))
-    prev_start, prev_lane = compressed({(b, a) for a, b in pairs}, len(shapes))
+    next_start, next_lane = compress_pairs(pairs, len(shapes))
+    prev_start, prev_lane = compress_pairs({(b, a) for a, b in pairs}, len(shapes))
     beside = neighbours(shapes, index)
     size = np.array([len(shape.s) for shape in shapes], dtype=np.int32)
     return LaneTable(

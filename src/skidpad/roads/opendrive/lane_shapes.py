@@ -107,15 +107,15 @@ def lane_shapes(document: Document) -> Iterator[LaneShape]:
                 continue
             besides_centre = len(section.lanes) - 1
             # before they are made, as a section may claim any extent
-            _require_room(document, samples + besides_centre * extent / STEP)
+            _require_sample_limit(document, samples + besides_centre * extent / STEP)
             for shape in _section_shapes(road, index, section):
                 _require_sane(document, shape)
                 samples += len(shape.s)
-                _require_room(document, samples)
+                _require_sample_limit(document, samples)
                 yield shape
 
 
-def _require_room(document: Document, samples: float) -> None:
+def _require_sample_limit(document: Document, samples: float) -> None:
     if samples > SAMPLES_MAX:
         raise FileError(f"{document.file}: more than {SAMPLES_MAX} lane samples")
 

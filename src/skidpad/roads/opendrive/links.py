@@ -57,7 +57,7 @@ def successions(
     return pairs
 
 
-def compressed(pairs: set[tuple[int, int]], lanes: int) -> tuple[Ints, Ints]:
+def compress_pairs(pairs: set[tuple[int, int]], lanes: int) -> tuple[Ints, Ints]:
     """Compresses pairs (a, b) to (start, b sorted by a): the b of lane i are b[start[i]:start[i + 1]]."""
     table = np.array(sorted(pairs), dtype=np.int32).reshape(-1, 2)
     start = np.searchsorted(table[:, 0], np.arange(lanes + 1)).astype(np.int32)

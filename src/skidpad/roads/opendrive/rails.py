@@ -35,7 +35,7 @@ class Corners(NamedTuple):
     t: Floats
 
 
-def railed(text: bytes, name: str) -> bytes:
+def add_rails(text: bytes, name: str) -> bytes:
     """Returns an OpenDRIVE text with guardrails added; unchanged where it has barriers of its own."""
     baked = bake(text, name)
     if baked.roadside.barriers:

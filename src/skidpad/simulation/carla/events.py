@@ -12,7 +12,7 @@ from skidpad.core.lefthanded import vector_from_carla
 from skidpad.core.states import ActorStates, ContactEvent, Floats, LaneInvasion
 from skidpad.roads.lanes import Marking
 from skidpad.roads.queries import RoadMap
-from skidpad.simulation.carla.cast import Player
+from skidpad.simulation.carla.actor_rows import ActorRow
 
 HOLD = 0.5  # s: bodies that bounce apart and touch again within this are one contact
 CROSSING = 2.0  # s: CARLA tells each corner of the outline; those of one crossing are one invasion
@@ -24,7 +24,7 @@ EGO = 0
 class EgoEvents:
     """What the ego's two event sensors said; callbacks of the wheel's threads only append."""
 
-    def __init__(self, map: RoadMap, players: Sequence[Player], dt: float) -> None:
+    def __init__(self, map: RoadMap, players: Sequence[ActorRow], dt: float) -> None:
         self._map, self._players = map, players
         self._hold = round(HOLD / dt)
         self._collisions: deque[Any] = deque()

@@ -15,7 +15,7 @@ from skidpad.physics.optics import radar_range
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.asked import AskedSensors
 from skidpad.simulation.carla import decode
-from skidpad.simulation.carla.cast import Player
+from skidpad.simulation.carla.actor_rows import ActorRow
 from skidpad.simulation.carla.pictures import Pictures
 from skidpad.simulation.sensing import Objects, Readings
 
@@ -42,7 +42,7 @@ class Reader:
         if radar is not None and setup.range_model is RangeModel.PHYSICAL:
             self._radar_limit = radar_range(setup.weather, radar.range)
 
-    def know(self, players: Sequence[Player]) -> None:
+    def know(self, players: Sequence[ActorRow]) -> None:
         """Which actors' ids in the messages are which rows."""
         rows = self.pictures.rows
         for i, player in enumerate(players):

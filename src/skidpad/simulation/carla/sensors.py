@@ -78,13 +78,13 @@ class Sensors:
                     )
                     self._listen(self._attach(EVENTS[spec.kind], spec, {}), hear)
             elif pixels and isinstance(spec, (CameraSpec, RadarSpec)):
-                actor = self._attach(*described(spec))
+                actor = self._attach(*describe_sensor(spec))
                 if spec.id in display:
                     self.silent.append(spec.id)
                     continue
                 self._read(actor, spec)
             elif isinstance(spec, LidarSpec):
-                self._read(self._attach(*described(spec)), spec)
+                self._read(self._attach(*describe_sensor(spec)), spec)
         self._read(self._attach("sensor.other.imu", LAST, {}), LAST)
 
     def _read(self, actor: Any, spec: SensorSpec) -> None:
@@ -141,7 +141,7 @@ def display_cameras(specs: Sequence[SensorSpec]) -> set[str]:
     return set(rgb[1:])
 
 
-def described(
+def describe_sensor(
     spec: CameraSpec | RadarSpec | LidarSpec,
 ) -> tuple[str, SensorSpec, dict[str, str]]:
     """Returns blueprint id, spec and attributes of a sensor (A-018 to A-028)."""

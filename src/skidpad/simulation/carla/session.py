@@ -17,7 +17,8 @@ from skidpad.core.vocabulary import TrafficStart
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import LanePoint
 from skidpad.simulation.carla import truth
-from skidpad.simulation.carla.cast import Player, place_of, spawn_setup, table_of
+from skidpad.simulation.carla.actor_rows import ActorRow, place_of, spawn_setup, table_of
+from skidpad.simulation.carla.actor_set import EGO, ActorSet
 from skidpad.simulation.carla.connection import Connection
 from skidpad.simulation.carla.events import EgoEvents
 from skidpad.simulation.carla.grip import prepare_grip
@@ -30,7 +31,6 @@ from skidpad.simulation.carla.reader import Reader
 from skidpad.simulation.carla.scene import load_scene, release, synchronise
 from skidpad.simulation.carla.sensors import Sensors
 from skidpad.simulation.carla.traffic import Traffic, spawn_fixed, spawn_random
-from skidpad.simulation.carla.troupe import EGO, Troupe
 from skidpad.simulation.carla.watchdog import rest
 from skidpad.simulation.carla.weather import set_weather
 
@@ -50,7 +50,7 @@ class Session:
         self.map = load_map(setup.map)
         self.tick = 0
         self.server_frame = 0
-        self.players: list[Player] = []
+        self.players: list[ActorRow] = []
         self.sensors: Sensors | None = None
         self.traffic: Traffic | None = None
         self.pictures: Pictures | None = None
@@ -73,11 +73,11 @@ class Session:
         self.commands, self.mu = np.zeros((n, 5)), np.full((n, 4), np.nan)
         self.odometry = Odometry(self.seed, setup.localisation_noise, players[EGO].size[1])
         self.grip = prepare_grip(self.carla, self.world, setup)
-        self.troupe = Troupe(self.carla, self.world, self.map, players, self.grip, setup.dt)
+        self.actor_set = ActorSet(self.carla, self.world, self.map, players, self.grip, setup.dt)
         self.programme = Programme(self.carla, self.world, self.map, self.seed, setup.dt)
         self.lights = TrafficLights(self.world, self.options.uses(Optimisation.LIGHT_CACHE))
         self.events = EgoEvents(self.map, players, setup.dt)
-        ego = self.troupe.ego
+        ego = self.actor_set.ego
         self.sensors = Sensors(self.connection, self.world, ego, setup, self.events)
         pooled = self.options.uses(Optimisation.FEED_POOL)
         self.pictures = Pictures(setup, self.seed, self.sensors.silent, pooled)
@@ -114,11 +114,11 @@ class Session:
 
     def _settle(self, sensors: Sensors) -> None:
         """Always the same number of ticks where the server is quick, so that runs repeat."""
-        self.troupe.command_all(HOLD)
+        self.actor_set.command_all(HOLD)
         for k in range(SETTLE_MAX):
             frame = self._advance()
             rest(SETTLE_PAUSE)
-            ego = self.world.get_snapshot().find(self.troupe.ego.id)
+            ego = self.world.get_snapshot().find(self.actor_set.ego.id)
             if k + 1 < SETTLE or abs(ego.get_velocity().z) > STILL:
                 continue
             found = sensors.collect(frame, timeout=1.0)
@@ -134,11 +134,11 @@ class Session:
         """Start: initial speeds, drivers on their seats."""
         setups = (self.setup.ego, *self.setup.actors)
         self._starting = {i: s.speed for i, s in enumerate(setups) if s.speed != 0.0}
-        self.troupe.command_all(VehicleCommand())
+        self.actor_set.command_all(VehicleCommand())
         if all(p.actor is not None and not p.autopilot for p in self.players):
             return
         self.traffic = Traffic(self.connection, free_port(), self.setup.dt, self.seed)
-        self.troupe.traffic = self.traffic
+        self.actor_set.traffic = self.traffic
         for player in self.players:
             if player.autopilot:
                 self.traffic.drive(player)
@@ -150,9 +150,9 @@ class Session:
         """Applies the commands and advances the server by one tick."""
         self.command = command
         self._push(EGO)
-        self.troupe.command(self.players[EGO], command)
+        self.actor_set.command(self.players[EGO], command)
         for word in actor_commands:
-            self.troupe.obey(word, self.states)
+            self.actor_set.obey(word, self.states)
         for i in range(1, len(self.players)):
             self._push(i)
         self._starting.clear()
@@ -172,7 +172,7 @@ class Session:
         """An initial speed."""
         v = self._starting.get(i)
         if v is not None:
-            self.troupe.push(i, float(self.states.yaw[i]), v)
+            self.actor_set.push(i, float(self.states.yaw[i]), v)
 
     def _advance(self) -> int:
         """Tick the world; its frame number. The images of the last tick are no longer needed."""
@@ -183,15 +183,15 @@ class Session:
 
     def _top_up(self, traffic: Traffic) -> None:
         for player in traffic.top_up(self.world, self.tick, self.states.pose(EGO)):
-            self.troupe.grip_on(player)
-            i = self.troupe.index[player.name]
+            self.actor_set.grip_on(player)
+            i = self.actor_set.index[player.name]
             self.table.length[i], self.table.width[i], self.table.height[i] = player.size
             self.table.kind[i] = player.kind
             self.notices.append(f"{player.name} entered")
 
     def relocate(self, pose: Pose, v: float) -> None:
         """Put the ego elsewhere; it moves from there in the coming tick."""
-        place = self.troupe.relocate(pose, v)
+        place = self.actor_set.relocate(pose, v)
         self.events.forget(self.tick)
         truth.move_row(self.states, EGO, place, v)
 
@@ -230,7 +230,7 @@ class Session:
         seen, asked = self.reader.read(
             self.tick, self.messages, self.states, self.commands, self.light_states
         )
-        gear = int(self.troupe.ego.get_control().gear)
+        gear = int(self.actor_set.ego.get_control().gear)
         return SensorFrame(
             tick=self.tick,
             ego=self.odometry.read(self.states, gear),

@@ -10,8 +10,8 @@ from skidpad.core.randomness import stream
 from skidpad.core.setup import TrafficSetup
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.simulation.carla import blueprints
+from skidpad.simulation.carla.actor_rows import ActorRow, make_row, make_row_in_waiting, try_spawn
 from skidpad.simulation.carla.axes import from_transform
-from skidpad.simulation.carla.cast import Player, awaited, measured, try_spawn
 from skidpad.simulation.carla.connection import Connection
 from skidpad.simulation.world.traffic.placement import fixed_spawns, random_factors
 
@@ -29,30 +29,30 @@ class Traffic:
         self.manager = self._client.get_trafficmanager(port)
         self.manager.set_synchronous_mode(True)  # A-211
         self.manager.set_random_device_seed(seed % MANAGER_SEEDS)
-        self._waiting: list[Player] = []
+        self._waiting: list[ActorRow] = []
         self._seed = seed
         self.notices: list[str] = []
 
-    def drive(self, player: Player) -> None:
+    def drive(self, player: ActorRow) -> None:
         """Hand a vehicle over: desired speed and lamps (A-207)."""
         player.actor.set_autopilot(True, self.port)
         percent = 100.0 * (1.0 - player.factor)  # positive is slower
         self.manager.vehicle_percentage_speed_difference(player.actor, percent)
         self.manager.update_vehicle_lights(player.actor, True)
 
-    def release(self, player: Player) -> None:
+    def release(self, player: ActorRow) -> None:
         """Takes a vehicle back from the Traffic Manager."""
         if player.autopilot and player.actor is not None:
             player.actor.set_autopilot(False, self.port)
         player.autopilot = False
 
-    def wait_for(self, players: list[Player]) -> None:
+    def wait_for(self, players: list[ActorRow]) -> None:
         """These enter when there is room, and random drivers choose their ways (A-209)."""
         self._waiting = list(players)
         self.manager.set_respawn_dormant_vehicles(True)
         self.manager.set_boundaries_respawn_dormant_vehicles(NEAR, FAR)
 
-    def top_up(self, world: Any, tick: int, ego: Pose) -> list[Player]:
+    def top_up(self, world: Any, tick: int, ego: Pose) -> list[ActorRow]:
         """Spawns vehicles that wait and returns those that entered now."""
         if not self._waiting or tick % TOP_UP_EVERY:
             return []
@@ -65,7 +65,7 @@ class Traffic:
             if actor is None:
                 still.append(player)
                 continue
-            fresh = measured(player.name, actor)
+            fresh = make_row(player.name, actor)
             player.actor, player.offset = fresh.actor, fresh.offset
             player.size, player.kind = fresh.size, fresh.kind
             player.autopilot = True
@@ -82,7 +82,7 @@ class Traffic:
 
 def spawn_fixed(
     carla: Any, world: Any, map: RoadMap, ego: LanePoint, setup: TrafficSetup, seed: int
-) -> tuple[list[Player], list[str]]:
+) -> tuple[list[ActorRow], list[str]]:
     """Vehicles at the published positions, and what could not be placed (A-202 to A-208)."""
     kinds = blueprints.traffic_blueprints(world.get_blueprint_library())
     players, refused = [], []
@@ -94,7 +94,7 @@ def spawn_fixed(
         if actor is None:
             refused.append(f"{blueprint.id} at ({spawn.place.x:.0f}, {spawn.place.y:.0f})")
             continue
-        player = measured(f"traffic_{i + 1:02d}", actor)
+        player = make_row(f"traffic_{i + 1:02d}", actor)
         player.factor, player.autopilot = spawn.factor, True
         players.append(player)
     if refused and not setup.allow_fewer:
@@ -105,7 +105,9 @@ def spawn_fixed(
     return players, [f"traffic: CARLA refused {text}" for text in refused]
 
 
-def spawn_random(carla: Any, world: Any, ego: Pose, setup: TrafficSetup, seed: int) -> list[Player]:
+def spawn_random(
+    carla: Any, world: Any, ego: Pose, setup: TrafficSetup, seed: int
+) -> list[ActorRow]:
     """Up to 80 vehicles on recommended spawn points around the ego; some may have to wait."""
     kinds = blueprints.traffic_blueprints(world.get_blueprint_library())
     points = places_around(world, ego, stream(seed, "traffic", "places"))
@@ -115,7 +117,7 @@ def spawn_random(carla: Any, world: Any, ego: Pose, setup: TrafficSetup, seed: i
         blueprints.paint(blueprint, i)
         actor = _first_free(carla, world, blueprint, points)
         name = f"traffic_{i + 1:02d}"
-        player = awaited(name, blueprint) if actor is None else measured(name, actor)
+        player = make_row_in_waiting(name, blueprint) if actor is None else make_row(name, actor)
         player.factor, player.autopilot = float(factor), actor is not None
         players.append(player)
     return players

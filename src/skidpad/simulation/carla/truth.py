@@ -11,14 +11,14 @@ import numpy as np
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.lefthanded import mirrored, turn_from_carla
 from skidpad.core.states import ActorStates, Floats, VehicleCommand
+from skidpad.simulation.carla.actor_rows import ActorRow
 from skidpad.simulation.carla.axes import from_transform, from_vector
-from skidpad.simulation.carla.cast import Player
 from skidpad.simulation.carla.grip import Grip
 
 EGO = 0
 
 
-def read_states(players: Sequence[Player], source: Any, out: ActorStates) -> None:
+def read_states(players: Sequence[ActorRow], source: Any, out: ActorStates) -> None:
     """Fill `out` from a carla.WorldSnapshot, or from a carla.ActorList asked of the server."""
     ask = source.find
     for i, player in enumerate(players):
@@ -28,7 +28,7 @@ def read_states(players: Sequence[Player], source: Any, out: ActorStates) -> Non
             put_row(out, i, player, seen)
 
 
-def put_row(out: ActorStates, i: int, player: Player, seen: Any) -> None:
+def put_row(out: ActorStates, i: int, player: ActorRow, seen: Any) -> None:
     """One actor: the motion of its footprint's centre is taken to be that of its origin."""
     pose = player.footprint(from_transform(seen.get_transform()))
     yaw = wrap_angle(pose.yaw)
@@ -49,7 +49,7 @@ def move_row(out: ActorStates, i: int, pose: Pose, v: float) -> None:
     out.vx[i], out.vy[i] = v * cos(pose.yaw), v * sin(pose.yaw)
 
 
-def read_commands(players: Sequence[Player], ego: VehicleCommand, out: Floats) -> None:
+def read_commands(players: Sequence[ActorRow], ego: VehicleCommand, out: Floats) -> None:
     """(n, 5) throttle, brake, steer, handbrake, reverse as the snapshot tells them."""
     for i, player in enumerate(players):
         if i == EGO or player.actor is None or not player.is_vehicle:
@@ -59,7 +59,7 @@ def read_commands(players: Sequence[Player], ego: VehicleCommand, out: Floats) -
     out[EGO] = (ego.throttle, ego.brake, ego.steer, ego.handbrake, ego.reverse)
 
 
-def read_mu(players: Sequence[Player], grip: Grip, states: ActorStates, out: Floats) -> None:
+def read_mu(players: Sequence[ActorRow], grip: Grip, states: ActorStates, out: Floats) -> None:
     """(n, 4) nominal friction at the tyres; NaN where there is none."""
     out.fill(np.nan)
     for i, player in enumerate(players):

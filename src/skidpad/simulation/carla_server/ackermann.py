@@ -29,7 +29,7 @@ class AckermannSettings:
     accel_ki: float = 0.0
     accel_kd: float = 0.01
 
-    def packed(self) -> list[float]:
+    def pack(self) -> list[float]:
         """Returns the settings as CARLA's wire sends them."""
         return [
             self.speed_kp,

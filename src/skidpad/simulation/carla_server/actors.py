@@ -80,7 +80,7 @@ class Actor:
         ]
         return [self.id, self.blueprint.id, packed]
 
-    def packed(self, token: bytes = b"") -> list[Any]:
+    def pack(self, token: bytes = b"") -> list[Any]:
         """Returns the actor as CARLA's wire sends it."""
         tags = bytes([int(self.blueprint.label)])
         return [self.id, self.parent, self.description(), self.box(), tags, token]

@@ -75,7 +75,7 @@ class Skeleton:
     pose: dict[str, Pose] = field(default_factory=dict)  # set by clients, seen from the parents
     blend: float = 0.0  # share of that pose
 
-    def set(self, bones: Mapping[str, Pose]) -> None:
+    def set_bones(self, bones: Mapping[str, Pose]) -> None:
         """Sets the bones named here; names that no walker has change nothing."""
         self.pose |= {name: pose for name, pose in bones.items() if name in NAMES}
 
@@ -83,7 +83,7 @@ class Skeleton:
         """The animation's pose is the client's from now on."""
         self.pose = {}
 
-    def told(self, actor: Pose, height: float) -> list[list[Any]]:
+    def list_transforms(self, actor: Pose, height: float) -> list[list[Any]]:
         """Returns `BoneTransformDataOut` of all bones: name, in the world, in the walker, from the parent.
 
         actor: the walker's middle. height: m.

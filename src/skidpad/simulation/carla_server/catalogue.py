@@ -54,7 +54,7 @@ class Attribute:
     modifiable: bool = True
     restricted: bool = False
 
-    def packed(self) -> list[Any]:
+    def pack(self) -> list[Any]:
         """Returns the attribute as `ActorAttribute` of an `ActorDefinition`."""
         values = list(self.recommended)
         return [self.id, int(self.type), values[0], values, self.modifiable, self.restricted]
@@ -71,10 +71,10 @@ class Blueprint:
     kind: ActorKind = ActorKind.PROP
     label: SemanticClass = SemanticClass.NONE
 
-    def packed(self, uid: int) -> list[Any]:
+    def pack(self, uid: int) -> list[Any]:
         """Returns the blueprint as `ActorDefinition`."""
         tags = ",".join(self.id.split("."))
-        return [uid, self.id, tags, [a.packed() for a in self.attributes.values()]]
+        return [uid, self.id, tags, [a.pack() for a in self.attributes.values()]]
 
 
 _TYPES = {
@@ -224,7 +224,7 @@ def load_catalogue() -> dict[str, Blueprint]:
     return {b.id: b for b in sorted(made, key=lambda b: b.id)}
 
 
-def offered(grip: GripModel, mu_ref: float) -> dict[str, Blueprint]:
+def make_catalogue(grip: GripModel, mu_ref: float) -> dict[str, Blueprint]:
     """Returns the catalogue; the blueprint `skidpad.weather.grip` says how weather acts on grip (K-2)."""
     everything = load_catalogue()
     if grip is GripModel.NONE:
@@ -233,7 +233,7 @@ def offered(grip: GripModel, mu_ref: float) -> dict[str, Blueprint]:
     return {**everything, GRIP_BLUEPRINT: told}
 
 
-def chosen(blueprint: Blueprint, given: Mapping[str, str]) -> dict[str, str]:
+def choose_attributes(blueprint: Blueprint, given: Mapping[str, str]) -> dict[str, str]:
     """Returns the attributes of a new actor: the client's where it gave some, else the defaults."""
     values = {a.id: a.recommended[0] for a in blueprint.attributes.values()}
     for name, value in given.items():

@@ -33,7 +33,7 @@ class EpisodeSettings:
         """s by which one tick advances; without a fixed one the house's step."""
         return DT if self.fixed_step is None else self.fixed_step
 
-    def packed(self) -> list[Any]:
+    def pack(self) -> list[Any]:
         """Returns the settings as CARLA's wire sends them."""
         return [
             self.synchronous,

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 from skidpad.simulation.carla_server.catalogue import Family, load_catalogue
-from skidpad.simulation.carla_server.effects import acting, load_acting, produced
+from skidpad.simulation.carla_server.effects import acting, is_produced, load_acting
 from skidpad.simulation.carla_server.methods import TABLES
 
 BEGIN, END = "<!-- coverage: generated -->", "<!-- end of coverage -->"
@@ -60,7 +60,7 @@ def _sensors() -> str:
     for blueprint in load_catalogue().values():
         if blueprint.family is not Family.SENSOR:
             continue
-        sends = "yes" if produced(blueprint.id) else "nothing"
+        sends = "yes" if is_produced(blueprint.id) else "nothing"
         if blueprint.id in load_acting().in_the_client:
             sends = "computed in the client"
         own = acting(blueprint)

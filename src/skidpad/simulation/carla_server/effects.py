@@ -36,7 +36,7 @@ def load_acting() -> Acting:
 
 def acting(blueprint: Blueprint) -> set[str]:
     """Ids of the attributes that change something."""
-    if blueprint.family is Family.SENSOR and not produced(blueprint.id):
+    if blueprint.family is Family.SENSOR and not is_produced(blueprint.id):
         return {"role_name"}
     table = load_acting()
     known = table.always | table.sensors.get(blueprint.id, frozenset())
@@ -44,7 +44,7 @@ def acting(blueprint: Blueprint) -> set[str]:
     return {a.id for a in blueprint.attributes.values() if a.id in known or not a.modifiable}
 
 
-def produced(sensor: str) -> bool:
+def is_produced(sensor: str) -> bool:
     """Tells whether a sensor of this kind sends anything."""
     table = load_acting()
     return sensor in table.sensors or sensor in table.in_the_client
@@ -64,7 +64,7 @@ class Remarks:
             if attribute is None or name in known or value == attribute.recommended[0]:
                 continue
             self._once(blueprint.id, f"attribute {name}")
-        if blueprint.family is Family.SENSOR and not produced(blueprint.id):
+        if blueprint.family is Family.SENSOR and not is_produced(blueprint.id):
             self._once(blueprint.id, "the sensor, which sends nothing,")
 
     def _once(self, id: str, what: str) -> None:

@@ -62,7 +62,7 @@ class Engine:
         """Whether there are curve and gears; a client's fresh object has no gears and changes no drive."""
         return bool(self.torque_curve and self.gears)
 
-    def packed(self) -> list[Any]:
+    def pack(self) -> list[Any]:
         """Returns engine and gearbox as CARLA's wire sends them."""
         curve, gears = [list(p) for p in self.torque_curve], [list(g) for g in self.gears]
         return [

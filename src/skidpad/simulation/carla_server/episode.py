@@ -11,7 +11,12 @@ from skidpad.sensors.live_scene import scene_of
 from skidpad.simulation.carla_server import filling, shapes
 from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable, Attachment
 from skidpad.simulation.carla_server.bones import Skeleton
-from skidpad.simulation.carla_server.catalogue import Blueprint, Family, chosen, offered
+from skidpad.simulation.carla_server.catalogue import (
+    Blueprint,
+    Family,
+    choose_attributes,
+    make_catalogue,
+)
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.debug import DebugShapes
 from skidpad.simulation.carla_server.effects import Remarks
@@ -59,7 +64,7 @@ class Stock:
 
     def __init__(self, options: ServerOptions, hub: StreamHub) -> None:
         self.options, self.hub = options, hub
-        self.catalogue = offered(options.weather_grip, options.mu_ref)
+        self.catalogue = make_catalogue(options.weather_grip, options.mu_ref)
         self.remarks = Remarks()
         self.ids: Iterator[int] = count(1)  # of actors
 
@@ -85,7 +90,7 @@ class Episode:
         """Everything that takes long is made here, so that a failure leaves the old episode."""
         self.map, self.stock = map, stock
         map.prepare()
-        self.landscape = Landscape(map.roads, map.layered, layers)
+        self.landscape = Landscape(map.roads, map.has_layers, layers)
         scene_of(self.landscape.roads)  # triangles now, not in the first picture's tick
         self.sky = stock.sky()
         seed = stock.options.seed
@@ -135,7 +140,7 @@ class Episode:
                 raise CallError(COLLISION)
             self._embody(actor, feet)
         self._enlist(actor)
-        self.falling.spawned(actor, feet.z)
+        self.falling.start_fall_at_entry(actor, feet.z)
         return actor
 
     def attach(self, wanted: Wanted, mount: Pose, parent: int, kind: Attachment) -> Actor:
@@ -190,7 +195,7 @@ class Episode:
 
     def _make_actor(self, wanted: Wanted, pose: Pose) -> Actor:
         blueprint = self.stock.blueprint(wanted.blueprint)
-        attributes = chosen(blueprint, wanted.attributes)
+        attributes = choose_attributes(blueprint, wanted.attributes)
         self.stock.remarks.remark(blueprint, wanted.attributes)
         actor = Actor(self.actors.new_id(), blueprint, attributes, pose)
         shapes.give_box(actor)
@@ -251,7 +256,7 @@ class Episode:
 
     # --- moving
 
-    def put(self, actor: Actor, pose: Pose) -> None:
+    def place(self, actor: Actor, pose: Pose) -> None:
         """Places an actor; a child is placed relative to where its parent then is."""
         if actor.parent:
             actor.mount = pose
@@ -259,14 +264,14 @@ class Episode:
             actor.pose = pose
         else:
             self.moving.teleport(actor.body, replace(pose, z=pose.z - actor.lift))
-            self.falling.placed(actor)
+            self.falling.start_fall(actor)
 
     def simulate(self, actor: Actor, on: bool) -> None:
         """Off: it stays where clients put it."""
         if actor.body is not None and actor.family is not Family.PROP:
             self.moving.set_simulated(actor.body, on)
             self.moving.set_grounded(actor.body, on)
-            self.falling.placed(actor)
+            self.falling.start_fall(actor)
 
     def relandscape(self) -> None:
         """Vehicles meet what is there at present."""

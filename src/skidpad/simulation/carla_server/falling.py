@@ -60,7 +60,7 @@ class Falling:
         ground = ground_below(self._roads, float(s.x[i]), float(s.y[i]), float(s.z[i]))
         return None if ground is None else float(s.z[i]) - ground
 
-    def placed(self, actor: Actor) -> None:
+    def start_fall(self, actor: Actor) -> None:
         """Begins a fall when the actor was placed above the ground; on the ground it stands."""
         if actor.family not in FALLS or actor.body is None or actor.id in self._weightless:
             return
@@ -70,12 +70,12 @@ class Falling:
             self._actors.rising[actor.id] = 0.0
         self._hold(actor)
 
-    def spawned(self, actor: Actor, height: float) -> None:
+    def start_fall_at_entry(self, actor: Actor, height: float) -> None:
         """Begins the fall of an actor that entered with its feet at this height, m."""
         if actor.body is not None and actor.family in FALLS:
             s, i = self._moving.states, self._moving.row(actor.body)
             s.z[i] = max(float(s.z[i]), height)
-            self.placed(actor)
+            self.start_fall(actor)
 
     def push(self, actor: Actor, change: float) -> None:
         """Change its speed upwards by so many m/s."""
@@ -92,7 +92,7 @@ class Falling:
             return
         if on:
             self._weightless.discard(actor.id)
-            self.placed(actor)
+            self.start_fall(actor)
         else:
             self._weightless.add(actor.id)
             self._actors.rising.pop(actor.id, None)

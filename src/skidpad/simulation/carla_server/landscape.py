@@ -68,7 +68,7 @@ class EnvironmentObject:
         place = wire.iso_to_wire((self.centre.x, self.centre.y, self.centre.z))
         return wire.box(place, self.half, wire.yaw_to_wire(self.centre.yaw))
 
-    def packed(self) -> list[Any]:
+    def pack(self) -> list[Any]:
         """Returns the `EnvironmentObject` as CARLA's wire sends it."""
         return [wire.transform(self.centre), self.box(), self.id, self.name, self.label]
 

@@ -51,7 +51,7 @@ class ServedMap:
         return PREFIX + self.name
 
     @property
-    def layered(self) -> bool:
+    def has_layers(self) -> bool:
         """Whether clients may unload layers of the map."""
         return self.name.endswith(LAYERED)
 
@@ -76,7 +76,7 @@ def _navigation(name: str, roads: RoadMap) -> tuple[str, bytes] | None:
     except ShapelyError as error:
         log.warning("map %s: no navigation mesh can be made: %s", name, error)
         mesh = None
-    content = None if mesh is None else navmesh.packed(mesh)
+    content = None if mesh is None else navmesh.pack_mesh(mesh)
     if content is None:
         log.info("map %s has no navigation mesh: AI walkers stay where they are", name)
         return None

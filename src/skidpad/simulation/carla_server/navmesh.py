@@ -46,7 +46,7 @@ def file_name(map_name: str, content: bytes) -> str:
     return f"{map_name}-{hashlib.sha256(content).hexdigest()[:16]}.nav"
 
 
-def packed(mesh: WalkMesh) -> bytes | None:
+def pack_mesh(mesh: WalkMesh) -> bytes | None:
     """Returns the mesh as a file of Recast's; None when it is too large for one tile."""
     n = len(mesh.polygons)
     if n > MAX_POLYGONS or len(mesh.vertices) > MAX_VERTICES:

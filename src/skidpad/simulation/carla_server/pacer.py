@@ -26,7 +26,7 @@ class Pacer:
         self._tick, self._step, self._idle = tick, step, idle
         self._begin = time.monotonic()
 
-    def elapsed(self) -> float:
+    def measure_elapsed(self) -> float:
         """Returns s of wall time since the start, for the snapshots' platform time."""
         return time.monotonic() - self._begin
 

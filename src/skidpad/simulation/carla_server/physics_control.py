@@ -72,11 +72,11 @@ class PhysicsControl:
             tire_friction=np.full(WHEELS, model.tire_friction),
         )
 
-    def packed(self, positions: list[list[float]]) -> list[Any]:
+    def pack(self, positions: list[list[float]]) -> list[Any]:
         """Returns the control for the wire; positions: wheel centres in the world, cm, CARLA's axes."""
         wheels = [[*w[:9], p] for w, p in zip(self.wheels, positions, strict=True)]
         return [
-            *self.engine.packed(),
+            *self.engine.pack(),
             self.mass,
             self.drag,
             self.com,
@@ -120,7 +120,7 @@ def with_engine(new: PhysicsControl, old: PhysicsControl) -> PhysicsControl:
     return new if new.engine.is_told else replace(new, engine=old.engine)
 
 
-def applied(model: VehicleType, old: PhysicsControl, new: PhysicsControl) -> VehicleType:
+def apply_control(model: VehicleType, old: PhysicsControl, new: PhysicsControl) -> VehicleType:
     """Returns the physics type after a client changed members that act; unchanged ones stay exact."""
     front, rear = new.wheels[0], new.wheels[2]
     if front[3] < RADIUS_LEAST or front[2] <= 0.0:

@@ -207,7 +207,7 @@ class _Run:
 
 
 def _move(episode: Episode, actor: Actor, pose: Pose, velocity: Vector) -> None:
-    episode.put(actor, pose)
+    episode.place(actor, pose)
     if actor.id in episode.vehicles:
         episode.vehicles.set_velocity(actor.id, velocity)
     elif actor.body is not None:

@@ -26,7 +26,7 @@ class Hit:
     label: int
 
 
-def cast(
+def trace_ray(
     landscape: Landscape, actors: ActorTable, start: Vector, way: Vector, reach: float
 ) -> list[Hit]:
     """Returns everything on a ray, near to far: actors, the map's objects, the road."""

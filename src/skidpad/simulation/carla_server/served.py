@@ -81,7 +81,7 @@ class Served:
         self._publish_snapshot()
         episode.vehicles.let_go()
         self.recorder.tick(clock, episode.actors, episode.moving, episode.vehicles)
-        if self.before_sensing is not None and episode.sensors.heard(self.hub):
+        if self.before_sensing is not None and episode.sensors.has_listeners(self.hub):
             self.before_sensing()
             self.before_sensing = None
         episode.sensors.produce(episode.surroundings, clock, self.hub)
@@ -97,6 +97,6 @@ class Served:
         self.last_snapshot = snapshot.message(
             self.clock, self.episode.rows, self.platform_time(), bits
         )
-        if self.hub.wanted(EPISODE_STREAM):
+        if self.hub.has_listeners(EPISODE_STREAM):
             self.hub.publish(EPISODE_STREAM, self.last_snapshot)
             self._map_changed = False

@@ -84,7 +84,7 @@ class RpcConnection(asyncio.Protocol):
         self._last = request.method
         answer = self._server.answer(request)
         accepted = len(self._server.served.managers.by_port) > known
-        self._waker.asked(request.method, request.arguments, accepted)
+        self._waker.note_request(request.method, request.arguments, accepted)
         rest = self._server.rest_before(request)
         if rest > 0.0:
             asyncio.get_running_loop().call_later(rest, transport.write, answer)
@@ -143,7 +143,7 @@ class CarlaServer:
         self.served = Served(options, self.hub)
         self.dispatcher = Dispatcher(self.served, TABLES)
         self.pacer = Pacer(self.served.tick, self._own_step, lambda: not self._clients)
-        self.served.platform_time = self.pacer.elapsed
+        self.served.platform_time = self.pacer.measure_elapsed
         self.served.announce = self.hub.announce
         self._clients: set[RpcConnection] = set()
         self._calls: IO[str] | None = None

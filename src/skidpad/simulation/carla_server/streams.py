@@ -99,7 +99,7 @@ class StreamHub:
         """Call once when every stream that was announced is connected."""
         self._eager.append(callback)
 
-    def wanted(self, stream: int) -> bool:
+    def has_listeners(self, stream: int) -> bool:
         """Tells whether any connection listens to a stream."""
         return bool(self._listeners.get(stream))
 

@@ -53,7 +53,7 @@ class Waker:
         self._timer: Timer | None = None
         self._tries = 0
 
-    def asked(self, method: str, arguments: list[Any], accepted: bool = True) -> None:
+    def note_request(self, method: str, arguments: list[Any], accepted: bool = True) -> None:
         """Notes a request: the client is awake, unless it is the call that precedes sleep."""
         if method == BEFORE_SLEEP:
             return

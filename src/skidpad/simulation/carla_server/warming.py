@@ -39,7 +39,7 @@ Say = Callable[[str], object]
 class EverybodyListens(StreamHub):
     """Produces all streams, though no client listens."""
 
-    def wanted(self, stream: int) -> bool:
+    def has_listeners(self, stream: int) -> bool:
         """Returns True for every stream that exists."""
         return self.exists(stream)
 

@@ -41,7 +41,7 @@ class Sky:
         self.dust_storm = 0.0  # accepted without effect
         self._derive()
 
-    def packed(self) -> list[float]:
+    def pack(self) -> list[float]:
         """Returns `WeatherParameters` as the client last set them."""
         return [*(self.values[name] for name in PACKED), self.dust_storm]
 

@@ -14,10 +14,10 @@ from skidpad.simulation.carla_server.served import Served
 TABLE = Table("actors")
 
 
-def packed(served: Served, actor: Actor) -> list[Any]:
+def pack_actor(served: Served, actor: Actor) -> list[Any]:
     """Returns an actor as CARLA's wire sends it, with its token when it is a sensor."""
     token = b"" if actor.stream is None else served.hub.token(actor.stream)
-    return actor.packed(token)
+    return actor.pack(token)
 
 
 def parse_description(value: Any) -> Wanted:
@@ -33,27 +33,27 @@ def parse_description(value: Any) -> Wanted:
 @TABLE.method("get_actor_definitions")
 def get_actor_definitions(served: Served) -> list[Any]:
     """Returns the definitions of all blueprints."""
-    return [b.packed(uid) for uid, b in enumerate(served.stock.catalogue.values(), start=1)]
+    return [b.pack(uid) for uid, b in enumerate(served.stock.catalogue.values(), start=1)]
 
 
 @TABLE.method("get_spectator")
 def get_spectator(served: Served) -> list[Any]:
     """Returns the spectator, CARLA's free camera."""
-    return packed(served, served.episode.spectator)
+    return pack_actor(served, served.episode.spectator)
 
 
 @TABLE.method("get_actors_by_id")
 def get_actors_by_id(served: Served, ids: Any) -> list[Any]:
     """Those that live, or are remembered, of these ids."""
     found = (served.episode.actors.find(id) for id in wire.items(ids, "ids"))
-    return [packed(served, actor) for actor in found if actor is not None]
+    return [pack_actor(served, actor) for actor in found if actor is not None]
 
 
 @TABLE.method("spawn_actor")
 def spawn_actor(served: Served, description: Any, transform: Any) -> list[Any]:
     """Spawns an actor and returns it."""
     pose = wire.pose(transform, "transform")
-    return packed(served, served.episode.spawn(parse_description(description), pose))
+    return pack_actor(served, served.episode.spawn(parse_description(description), pose))
 
 
 @TABLE.method("spawn_actor_with_parent")
@@ -65,7 +65,7 @@ def spawn_actor_with_parent(
     mount = wire.pose(transform, "transform")
     attachment = Attachment(wire.integer(kind, "attachment type", 0, max(Attachment)))
     wanted = parse_description(description)
-    return packed(served, served.episode.attach(wanted, mount, parent, attachment))
+    return pack_actor(served, served.episode.attach(wanted, mount, parent, attachment))
 
 
 @TABLE.method("destroy_actor")

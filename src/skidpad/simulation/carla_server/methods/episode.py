@@ -57,7 +57,7 @@ def get_gbuffer_token(served: Served, id: Any, texture: Any) -> bytes:
     sensor = _colour_camera(served, id)
     number = wire.integer(texture, "G-buffer", 0, max(Texture))
     stream = stream_of(sensor, number, served.hub)
-    if not served.hub.wanted(stream):
+    if not served.hub.has_listeners(stream):
         served.announce(stream)
     return served.hub.token(stream)
 
@@ -83,7 +83,7 @@ def console_command(_: Served, *__: Any) -> bool:
 @TABLE.method("get_episode_settings")
 def get_episode_settings(served: Served) -> list[Any]:
     """Returns the episode settings as last set."""
-    return served.clock.settings.packed()
+    return served.clock.settings.pack()
 
 
 @TABLE.method("set_episode_settings")

@@ -18,11 +18,11 @@ TABLE = Table("motion")
 BELONGS_TO_MAP = (Family.TRAFFIC_LIGHT, Family.TRAFFIC_SIGN)
 
 
-def put(served: Served, actor: Actor, pose: Pose) -> None:
+def place_actor(served: Served, actor: Actor, pose: Pose) -> None:
     """Places an actor; actors of the map cannot be placed."""
     if actor.family in BELONGS_TO_MAP:
         raise CallError(f"actor {actor.id} belongs to the map and stays where it is")
-    served.episode.put(actor, pose)
+    served.episode.place(actor, pose)
 
 
 def _vehicle(served: Served, id: Any) -> Vehicle | None:
@@ -35,7 +35,7 @@ def _vehicle(served: Served, id: Any) -> Vehicle | None:
 @TABLE.method("set_actor_transform", Shape.VOID)
 def set_actor_transform(served: Served, id: Any, transform: Any) -> None:
     """Places an actor at a transform."""
-    put(served, served.episode.actors.get(id), wire.pose(transform, "transform"))
+    place_actor(served, served.episode.actors.get(id), wire.pose(transform, "transform"))
 
 
 @TABLE.method("set_actor_location", Shape.VOID)
@@ -44,7 +44,7 @@ def set_actor_location(served: Served, id: Any, location: Any) -> None:
     actor = served.episode.actors.get(id)
     x, y, z = wire.iso_vector(location, "location")
     base = actor.mount if actor.parent else served.episode.actors.pose(actor)
-    put(served, actor, replace(base, x=x, y=y, z=z))
+    place_actor(served, actor, replace(base, x=x, y=y, z=z))
 
 
 @TABLE.method("set_walker_state", Shape.VOID)
@@ -52,7 +52,7 @@ def set_walker_state(served: Served, id: Any, transform: Any, speed: Any) -> Non
     """Place of its feet, and speed, in one, as the client's pedestrian navigation tells them."""
     actor = served.episode.actors.get(id, Family.WALKER)
     pose, v = wire.pose(transform, "transform"), wire.number(speed, "speed")
-    put(served, actor, pose.moved(up=actor.lift))
+    place_actor(served, actor, pose.moved(up=actor.lift))
     if actor.body is not None:
         served.episode.moving.set_velocity(actor.body, v * cos(pose.yaw), v * sin(pose.yaw))
 

@@ -47,7 +47,7 @@ def get_all_level_bbs(served: Served, tag: Any) -> list[Any]:
 @TABLE.method("get_environment_objects")
 def get_environment_objects(served: Served, tag: Any) -> list[Any]:
     """What belongs to the map, by tag."""
-    return [o.packed() for o in _objects_with_tag(served, tag)]
+    return [o.pack() for o in _objects_with_tag(served, tag)]
 
 
 @TABLE.method("enable_environment_objects", Shape.VOID)
@@ -64,8 +64,8 @@ def get_names_of_all_objects(served: Served) -> list[str]:
     return [o.name for o in objects(served.episode.map.roads)]
 
 
-def _cast(served: Served, start: Vector, way: Vector, reach: float) -> list[scenery.Hit]:
-    return scenery.cast(served.episode.landscape, served.episode.actors, start, way, reach)
+def _trace_ray(served: Served, start: Vector, way: Vector, reach: float) -> list[scenery.Hit]:
+    return scenery.trace_ray(served.episode.landscape, served.episode.actors, start, way, reach)
 
 
 @TABLE.method("project_point")
@@ -73,7 +73,7 @@ def project_point(served: Served, location: Any, direction: Any, distance: Any) 
     """[hit, [location, label]] of the first thing on a ray."""
     start = wire.iso_vector(location, "location")
     way = wire.iso_vector(direction, "direction")
-    hits = _cast(served, start, way, wire.number(distance, "distance"))
+    hits = _trace_ray(served, start, way, wire.number(distance, "distance"))
     if not hits:
         return [False, [[0.0, 0.0, 0.0], 0]]
     return [True, [list(wire.iso_to_wire(hits[0].place)), hits[0].label]]
@@ -85,7 +85,7 @@ def cast_ray(served: Served, start: Any, end: Any) -> list[Any]:
     a, b = wire.iso_vector(start, "start"), wire.iso_vector(end, "end")
     way = (b[0] - a[0], b[1] - a[1], b[2] - a[2])
     length = sum(v * v for v in way) ** 0.5
-    hits = _cast(served, a, way, length) if length > 0.0 else []
+    hits = _trace_ray(served, a, way, length) if length > 0.0 else []
     return [[list(wire.iso_to_wire(h.place)), h.label] for h in hits]
 
 

@@ -14,7 +14,11 @@ from skidpad.simulation.carla_server.ackermann import (
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.control import Control
 from skidpad.simulation.carla_server.engine import revolutions
-from skidpad.simulation.carla_server.physics_control import applied, parse_physics, with_engine
+from skidpad.simulation.carla_server.physics_control import (
+    apply_control,
+    parse_physics,
+    with_engine,
+)
 from skidpad.simulation.carla_server.rpc import Shape, Table
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.vehicles import Vehicle
@@ -63,7 +67,7 @@ def apply_ackermann_control_to_vehicle(served: Served, id: Any, control: Any) ->
 @TABLE.method("get_ackermann_controller_settings")
 def get_ackermann_controller_settings(served: Served, id: Any) -> list[float]:
     """Returns the gains of a vehicle's Ackermann controller."""
-    return vehicle_of(served, id).ackermann.packed()
+    return vehicle_of(served, id).ackermann.pack()
 
 
 @TABLE.method("apply_ackermann_controller_settings", Shape.VOID)
@@ -86,7 +90,7 @@ def get_physics_control(served: Served, id: Any) -> list[Any]:
         place = pose.moved(forward=x, left=y, up=vehicle.type.wheel_radius)
         px, py, pz = wire.iso_to_wire((place.x, place.y, place.z))
         places.append([100.0 * px, 100.0 * py, 100.0 * pz])
-    return vehicle.physics.packed(places)
+    return vehicle.physics.pack(places)
 
 
 def wheel_centres(vehicle: Vehicle) -> list[tuple[float, float]]:
@@ -106,7 +110,7 @@ def apply_physics_control(served: Served, id: Any, control: Any) -> None:
     """What acts: mass, drag, engine and gears, wheels' friction, radius, brakes and steering angle."""
     vehicle = vehicle_of(served, id)
     new = with_engine(parse_physics(control), vehicle.physics)
-    model = applied(vehicle.type, vehicle.physics, new)
+    model = apply_control(vehicle.type, vehicle.physics, new)
     served.episode.vehicles.reshape(vehicle.actor, new, model)
 
 

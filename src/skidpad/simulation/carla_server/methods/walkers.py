@@ -45,7 +45,7 @@ def _bone_rows(served: Served, id: Any) -> list[list[Any]]:
     if served.episode.actors.get(id).family is not Family.WALKER:
         raise CallError(f"Component could not be found in this actor: {id} has no skeleton")
     actor, skeleton = _skeleton(served, id)
-    return skeleton.told(served.episode.actors.pose(actor), 2.0 * actor.half[2])
+    return skeleton.list_transforms(served.episode.actors.pose(actor), 2.0 * actor.half[2])
 
 
 @TABLE.method("get_actor_bone_names")
@@ -75,7 +75,7 @@ def get_bones_transform(served: Served, id: Any) -> list[Any]:
 @TABLE.method("set_bones_transform", Shape.VOID)
 def set_bones_transform(served: Served, id: Any, bones: Any) -> None:
     """Bones of the client's pose; they show as far as it is blended in."""
-    _skeleton(served, id)[1].set(parse_bones(bones))
+    _skeleton(served, id)[1].set_bones(parse_bones(bones))
 
 
 @TABLE.method("blend_pose", Shape.VOID)

@@ -15,7 +15,7 @@ NO_LAMPS = "maps have no street lamps"
 @TABLE.method("get_weather_parameters")
 def get_weather_parameters(served: Served) -> list[float]:
     """Returns `WeatherParameters` as last set."""
-    return served.episode.sky.packed()
+    return served.episode.sky.pack()
 
 
 @TABLE.method("set_weather_parameters", Shape.VOID)

@@ -31,7 +31,7 @@ def collision(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
         if touch.actor is carrier and any(touch.impulse):
             other = _of_map(touch.label) if touch.other is None else touch.other
             impulse = list(wire.iso_to_wire(touch.impulse))
-            messages.append((codec.pack([carrier.packed(), other.packed(), impulse]),))
+            messages.append((codec.pack([carrier.pack(), other.pack(), impulse]),))
     return messages
 
 
@@ -69,4 +69,4 @@ def obstacle(around: Surroundings, _: Clock, sensor: Sensor) -> list[Message]:
             best = (max(gap, 0.0), other)
     if best is None:
         return []
-    return [(codec.pack([carrier.packed(), best[1].packed(), best[0]]),)]
+    return [(codec.pack([carrier.pack(), best[1].pack(), best[0]]),)]

@@ -35,14 +35,14 @@ class Memory:
         """(H, W, 2) flow since then, which is forgotten; without a last reading, no motion."""
         out = np.zeros((*drawn.inverse.shape, 2), dtype=np.float32)
         if self.view is not None:
-            out[:] = moved(view, self.view, np.eye(3), np.zeros(3), drawn.inverse)
+            out[:] = compute_flow(view, self.view, np.eye(3), np.zeros(3), drawn.inverse)
             for row, actor in enumerate(scene.members):
                 before = self.bodies.get(actor.id)
                 mine = drawn.instances == row + 1
                 if before is not None and mine.any():
                     turn = before[0] @ scene.live.actors.rotation[row].T
                     shift = before[1] - turn @ scene.live.actors.position[row]
-                    out[mine] = moved(view, self.view, turn, shift, drawn.inverse)[mine]
+                    out[mine] = compute_flow(view, self.view, turn, shift, drawn.inverse)[mine]
         self.view, self.bodies = view, _bodies(scene)
         return out
 
@@ -76,7 +76,7 @@ def _bodies(scene: Pictured) -> dict[int, tuple[Floats, Floats]]:
     }
 
 
-def moved(
+def compute_flow(
     now: View, before: View, turn: Floats, shift: Floats, inverse: NDArray[np.float32]
 ) -> NDArray[np.float32]:
     """Returns (H, W, 2) flow of pixels at inverse depth (1/m), 0 being infinitely far.

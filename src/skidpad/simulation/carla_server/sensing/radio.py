@@ -119,7 +119,7 @@ class Air:
             self.frame, self.calls = frame, []
         self.calls.append(call)
 
-    def heard(self, frame: int, own: Call) -> list[Call]:
+    def receive_calls(self, frame: int, own: Call) -> list[Call]:
         """Returns what other stations of the kind send on the channel."""
         if frame != self.frame:
             return []
@@ -127,7 +127,9 @@ class Air:
         return [c for c in same if c.sensor != own.sensor]
 
 
-def crossed(among: Boxes, a: Vector, b: Vector, besides: tuple[int, ...] = ()) -> list[Box]:
+def find_crossed_boxes(
+    among: Boxes, a: Vector, b: Vector, besides: tuple[int, ...] = ()
+) -> list[Box]:
     """Returns the boxes that the line from a to b goes through, without those of `besides`."""
     near, far = among.spans(a, (b[0] - a[0], b[1] - a[1], b[2] - a[2]))
     hit = np.flatnonzero((near <= far) & (far >= 0.0) & (near <= 1.0)).tolist()

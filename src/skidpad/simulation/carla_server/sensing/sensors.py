@@ -48,7 +48,7 @@ class SensorSet:
         """The sensor that is this actor; None when it is none that sends something."""
         return self._sensors.get(id)
 
-    def heard(self, hub: StreamHub) -> bool:
+    def has_listeners(self, hub: StreamHub) -> bool:
         """Tells whether any sensor has a listener."""
         return any(_is_heard(sensor, hub) for sensor in self._sensors.values())
 
@@ -66,13 +66,13 @@ class SensorSet:
     def _read(self, sensor: Sensor, around: Surroundings, clock: Clock, hub: StreamHub) -> None:
         producer = self._producers[sensor.actor.blueprint.id]
         place, number = around.actors.pose(sensor.actor), sensor.actor.stream
-        if number is not None and hub.wanted(number):
+        if number is not None and hub.has_listeners(number):
             messages = producer.produce(around, clock, sensor)
             for message in messages:
                 hub.publish(number, _head(producer.type, clock, place), *message)
             if messages and producer.type is SensorType.COLLISION:
                 sleep(EVENT_PAUSE)
-        wanted = [t for t, stream in sensor.textures.items() if hub.wanted(stream)]
+        wanted = [t for t, stream in sensor.textures.items() if hub.has_listeners(stream)]
         if wanted and producer.textures is not None:
             head = _head(SensorType.GBUFFER, clock, place)
             for texture, message in zip(
@@ -84,7 +84,7 @@ class SensorSet:
 def _is_heard(sensor: Sensor, hub: StreamHub) -> bool:
     """Tells whether the sensor or one of its G-buffers has a listener."""
     streams = (sensor.actor.stream, *sensor.textures.values())
-    return any(s is not None and hub.wanted(s) for s in streams)
+    return any(s is not None and hub.has_listeners(s) for s in streams)
 
 
 def _head(type: SensorType, clock: Clock, place: Pose) -> bytes:

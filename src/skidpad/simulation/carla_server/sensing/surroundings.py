@@ -99,7 +99,7 @@ class Surroundings:
         offsets = zip((mount.x, mount.y, mount.z), carrier.centre, carrier.half, strict=True)
         return row if all(abs(m - c) < h + SKIN for m, c, h in offsets) else -1
 
-    def built(self) -> Boxes:
+    def get_roadside_boxes(self) -> Boxes:
         """Returns the boxes that stand beside the road at present."""
         roads = self._landscape.roads
         if self._built is None or self._built[0] is not roads:

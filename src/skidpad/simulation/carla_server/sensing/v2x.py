@@ -20,7 +20,7 @@ from skidpad.simulation.carla_server.sensing.radio import (
     Call,
     Radio,
     Way,
-    crossed,
+    find_crossed_boxes,
     loss,
     make_radio,
 )
@@ -98,7 +98,7 @@ def pass_on(around: Surroundings, clock: Clock, sensor: Sensor) -> None:
 def receive(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Message]:
     """All that arrives in this tick in one message; nothing when nothing does."""
     own, heard = _call(around, sensor), []
-    for call in around.air.heard(clock.frame, own):
+    for call in around.air.receive_calls(clock.frame, own):
         power = _arriving(around, sensor, own, call)
         if power is not None:
             for message in call.messages:
@@ -114,8 +114,8 @@ def _arriving(around: Surroundings, sensor: Sensor, own: Call, call: Call) -> fl
     if sum((a - b) ** 2 for a, b in zip(own.place, call.place, strict=True)) >= radio.reach**2:
         return None
     carriers = (own.carrier, call.carrier)
-    tops = crossed(around.cars(), call.place, own.place, carriers)
-    blocked = crossed(around.built(), call.place, own.place)
+    tops = find_crossed_boxes(around.cars(), call.place, own.place, carriers)
+    blocked = find_crossed_boxes(around.get_roadside_boxes(), call.place, own.place)
     way = Way.BUILDING if blocked else Way.VEHICLE if tops else Way.CLEAR
     fading = radio.deviation(way) * float(sensor.rng.standard_normal())
     lost = loss(radio, way, call, own.place, own.ground, tops) + fading

@@ -24,7 +24,7 @@ PAINT = (160, 160, 160)
 
 
 @dataclass(slots=True)
-class Player:
+class ActorRow:
     """One row. `offset` leads from CARLA's origin of the actor to the footprint's centre."""
 
     name: str
@@ -66,7 +66,7 @@ def place_of(map: RoadMap, place: Pose | LanePosition) -> Pose:
     return point.pose.moved(left=point.offset)
 
 
-def spawn_setup(carla: Any, world: Any, map: RoadMap, setup: ActorSetup) -> Player:
+def spawn_setup(carla: Any, world: Any, map: RoadMap, setup: ActorSetup) -> ActorRow:
     """An actor of the set-up; BackendError when something stands in its place."""
     blueprint = blueprints.find(world.get_blueprint_library(), setup.type)
     if blueprint.has_attribute("role_name"):
@@ -80,7 +80,7 @@ def spawn_setup(carla: Any, world: Any, map: RoadMap, setup: ActorSetup) -> Play
             f"CARLA refused to spawn {setup.name} ({blueprint.id}) at "
             f"({pose.x:.1f}, {pose.y:.1f}, {pose.z:.1f}): the place is taken"
         )
-    player = measured(setup.name, actor)
+    player = make_row(setup.name, actor)
     player.autopilot = setup.driver is Control.AUTOPILOT and player.is_vehicle
     if setup.driver is Control.AUTOPILOT and not player.is_vehicle:
         raise ConfigError(f"{setup.name}: a {setup.type} has no autopilot")
@@ -95,13 +95,13 @@ def try_spawn(carla: Any, world: Any, blueprint: Any, pose: Pose) -> Any:
     return world.try_spawn_actor(blueprint, to_transform(carla, pose.moved(up=lift)))
 
 
-def measured(name: str, actor: Any) -> Player:
+def make_row(name: str, actor: Any) -> ActorRow:
     """A row for a spawned actor: its size and origin from its bounding box (D-012)."""
     box = actor.bounding_box
     centre, half = box.location, box.extent
     text = actor.attributes.get("color")
     rgb = tuple(int(v) for v in text.split(",")) if text else PAINT
-    return Player(
+    return ActorRow(
         name=name,
         type=actor.type_id,
         actor=actor,
@@ -112,12 +112,12 @@ def measured(name: str, actor: Any) -> Player:
     )
 
 
-def awaited(name: str, blueprint: Any) -> Player:
+def make_row_in_waiting(name: str, blueprint: Any) -> ActorRow:
     """A row for a vehicle that enters later (A-209)."""
-    return Player(name, blueprint.id, None, Pose(0.0, 0.0), GUESS, ActorKind.CAR, PAINT)
+    return ActorRow(name, blueprint.id, None, Pose(0.0, 0.0), GUESS, ActorKind.CAR, PAINT)
 
 
-def table_of(players: Sequence[Player]) -> ActorTable:
+def table_of(players: Sequence[ActorRow]) -> ActorTable:
     """What does not change about them."""
     sizes = np.array([p.size for p in players])
     return ActorTable(

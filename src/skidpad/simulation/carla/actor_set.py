@@ -12,8 +12,8 @@ from skidpad.core.lefthanded import mirrored
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import ActorStates, VehicleCommand
 from skidpad.roads.queries import RoadMap
+from skidpad.simulation.carla.actor_rows import ActorRow
 from skidpad.simulation.carla.axes import to_transform, to_vector
-from skidpad.simulation.carla.cast import Player
 from skidpad.simulation.carla.grip import Grip
 from skidpad.simulation.carla.traffic import Traffic
 
@@ -21,11 +21,11 @@ EGO = 0
 GROUND_GAP = 0.1  # m above our map's road at which relocated vehicles are put
 
 
-class Troupe:
+class ActorSet:
     """The actors of one run in the order of their rows."""
 
     def __init__(
-        self, carla: Any, world: Any, map: RoadMap, players: list[Player], grip: Grip, dt: float
+        self, carla: Any, world: Any, map: RoadMap, players: list[ActorRow], grip: Grip, dt: float
     ) -> None:
         self.players = players
         self.index = {p.name: i for i, p in enumerate(players)}
@@ -39,12 +39,12 @@ class Troupe:
         """The carla.Vehicle of the ego."""
         return self.players[EGO].actor
 
-    def grip_on(self, player: Player) -> None:
+    def grip_on(self, player: ActorRow) -> None:
         """Only vehicles have tyres (B-065)."""
         if player.actor is not None and player.is_vehicle:
             self._grip.apply(player.actor)
 
-    def command(self, player: Player, c: VehicleCommand) -> None:
+    def command(self, player: ActorRow, c: VehicleCommand) -> None:
         """Pedals and steer of a vehicle."""
         control = self._carla.VehicleControl(
             throttle=c.throttle,
@@ -92,7 +92,7 @@ class Troupe:
         self.ego.set_target_angular_velocity(self._carla.Vector3D())
         return replace(place, z=place.z - GROUND_GAP)
 
-    def _release(self, player: Player) -> None:
+    def _release(self, player: ActorRow) -> None:
         if self.traffic is not None:
             self.traffic.release(player)
 
@@ -111,7 +111,7 @@ class Troupe:
         point = self._map.project(pose.x, pose.y, pose.z, driving=False)
         return pose if point is None else replace(pose, z=point.z + GROUND_GAP)
 
-    def _appear(self, player: Player, present: bool, now: Pose) -> None:
+    def _appear(self, player: ActorRow, present: bool, now: Pose) -> None:
         """Enter the world where it was left, or leave it."""
         if present and player.actor is None and player.rested is not None:
             blueprint = self._world.get_blueprint_library().find(player.type)

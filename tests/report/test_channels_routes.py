@@ -60,7 +60,7 @@ def test_published_causes_are_listed_with_their_violations():
 
 @pytest.mark.req("C-233")
 def test_times_per_route_are_weighted_by_hours_and_end_with_the_worst_of_all():
-    times = route_blocks(EVALUATION)[-1]
+    (times,) = [b for b in route_blocks(EVALUATION) if "per cycle, per route" in b.caption]
     assert [title for title, _ in times.columns] == [
         "route", "planning, ms", "total, ms", "99.9 % of total, ms", "greatest total, ms"
     ]  # fmt: skip
@@ -71,6 +71,71 @@ def test_times_per_route_are_weighted_by_hours_and_end_with_the_worst_of_all():
         ["town", "1.000", "2.000", "4.000", "3.000"],
         ["all routes", f"{everything / 2:.3f}", f"{everything:.3f}", "16.000", "30.000"],
     ]
+
+
+@pytest.mark.req("C-215")
+def test_our_violations_have_their_causes_per_route_with_a_total():
+    def segment_with(route, **causes):
+        return segment(route, 1.0, 0, 0, 4.0, 9.0) | causes
+
+    turning, silent = f"cause_turn_{LOCATION}", f"cause_silent_{COUNT}"
+    evaluation = {
+        "segment_table": [
+            segment_with("coast", **{turning: 2.0}),
+            segment_with("coast", **{turning: 3.0, silent: 1.0}),
+            segment_with("town", **{silent: 7.0}),
+        ]
+    }
+    (causes,) = [b for b in route_blocks(evaluation) if b.caption.startswith("What was going on")]
+    assert [title for title, _ in causes.columns] == [
+        "indicator",
+        "cause",
+        "coast",
+        "town",
+        "total",
+    ]
+    assert rows_of(causes) == [
+        ["object count similarity", "a channel reported nothing", "1", "7", "8"],
+        ["ego location similarity", "ego turning", "5", "0", "5"],
+    ]
+
+
+@pytest.mark.req("C-233")
+def test_every_module_has_mean_deviation_greatest_and_breaches_in_every_route():
+    """By hand: 3 of 4 equal cycles at 4 ms and one at 8 ms are 5 ms with a deviation of sqrt(3)."""
+
+    def timed(route, hours, mean, std, worst, breaches):
+        return segment(route, hours, 0, 0, mean, worst) | {
+            "total_std_ms": std, "total_breaches_pct": breaches,
+            "planning_std_ms": std / 2, "planning_max_ms": worst / 2,
+        }  # fmt: skip
+
+    evaluation = {
+        "segment_table": [
+            timed("coast", 3.0, 4.0, 0.0, 4.0, 0.0),
+            timed("coast", 1.0, 8.0, 0.0, 30.0, 2.0),
+            timed("town", 4.0, 2.0, 1.0, 3.0, 0.0),
+        ]
+    }
+    times = route_blocks(evaluation)[-1]
+    ours = {(r[0].text, r[1].text): r for r in times.rows if r[0].kind != "published"}
+    assert list(ours) == [
+        (route, module)
+        for route in ("coast", "town", "all routes")
+        for module in ("planning", "total")
+    ]
+    assert [c.text for c in ours["coast", "total"][2:]] == ["5.000", "1.732", "30.000", "0.500"]
+    assert [c.text for c in ours["coast", "planning"][2:]] == ["2.500", "0.866", "15.000", ""]
+    # all: mean 3.5; squares (3 * 16 + 64 + 4 * (4 + 1)) / 8 = 16.5, less 12.25
+    assert [c.text for c in ours["all routes", "total"][2:]] == [
+        "3.500",
+        "2.062",
+        "30.000",
+        "0.250",
+    ]
+    first = next(r for r in times.rows if r[0].kind == "published")
+    assert [c.text for c in first] == ["town 1", "total", "15.520", "1.520", "26.430", "0.030"]
+    assert "another machine" in times.note
 
 
 def test_an_evaluation_without_segments_has_no_such_tables():

@@ -14,6 +14,7 @@ from skidpad.report.figures import PALETTE
 from skidpad.report.grip_data import scenario_title
 from skidpad.report.grip_figures import across_weathers, both_modes, trajectories
 from skidpad.report.grip_tables import completion_tables, distance_tables
+from skidpad.report.grip_weathers import weather_blocks
 from skidpad.report.published import Source, published_rows
 
 N = 20
@@ -153,3 +154,28 @@ def test_ways_are_drawn_for_both_frictions_and_for_the_three_variants():
     assert [w for w in words if w in variants] == ["original", "unfixed", "fixed"]
     for colour in PALETTE[:2]:  # four runs of ego and ghost in three panels, and the legend
         assert drawn(three.svg, colour) == 4 * 3 + 1
+
+
+def ratios(model, **by_weather):
+    rows = [
+        {"weather": weather, "friction": friction, "ratio": ratio, "model": model}
+        for weather, ratio in by_weather.items()
+        for friction, ratio in ((ORIGINAL, 1.0), (REDUCED, ratio), (REDUCED, ratio))
+    ]
+    return SimpleNamespace(plain=pl.DataFrame(rows), values=lambda column: model)
+
+
+@pytest.mark.req("B-031", "A-258")
+def test_weathers_stand_with_their_parameters_and_the_published_ratio():
+    (table,) = weather_blocks(ratios("statistical", icy_30=0.31502, rain_20=0.635775, snow=0.4))
+    heads = [title for title, _ in table.columns]
+    assert heads[:4] == ["weather", "cloudiness, %", "precipitation, %", "deposits, %"]
+    assert [[c.text for c in row] for row in table.rows] == [
+        ["rain_20", "20", "20", "20", "20", "5", "20", "0", "0.636"],
+        ["icy_30", "20", "0", "0", "30", "0", "10", "30", "0.315"],
+    ]
+    assert [row[-1].published for row in table.rows] == [0.63, 0.31]
+    assert "Both are of the statistical model" in table.note
+    (other,) = weather_blocks(ratios("physical", rain_20=0.8))
+    assert "Ours are of the model physical" in other.note
+    assert weather_blocks(ratios("statistical", snow=0.4)) == []

@@ -123,11 +123,17 @@ def test_real_time_is_told_by_weather_with_its_share_of_slow_ticks(tmp_path):
         for rtf, slow in ((50.0, 0.0), (40.0, 1.0), (20.0, 3.0), (0.8, 60.0))
     ]
     MATRIX.write(tmp_path, rows, clocks)
-    _, table = real_time_blocks(load_matrix(tmp_path))
+    words, table, said = real_time_blocks(load_matrix(tmp_path))
+    assert "another experiment" in words.text
     assert [[c.text for c in row] for row in table.rows] == [
         ["Clear Sky - Noon", "2", "45.0", "40.0", "0.50"],
         ["Heavy Rain - Noon", "2", "10.4", "0.8", "31.50"],
     ]
+    theirs = {row[0].text: [c.text for c in row[1:3]] for row in said.rows}
+    assert theirs["preliminary, all 11 runs"] == ["0.59 to 0.6", "100"]
+    assert theirs["final, clear weather"] == ["1", "less than 0.2"]
+    assert theirs["final, Clear Sky - Night"] == ["", "6.5"]
+    assert theirs["final, night with rain"] == ["0.99", "5 to 6"]
 
 
 @pytest.mark.req("R-7")

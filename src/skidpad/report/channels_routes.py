@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from functools import partial
 from typing import Any
 
+import numpy as np
 import polars as pl
 
 from skidpad.evidence.channels.indicators.catalogue import Indicator
+from skidpad.evidence.channels.judging.facts import CAUSE_PREFIX, ViolationCause
 from skidpad.report.page import Block, Cell, words
 from skidpad.report.published import Source, published
 from skidpad.report.tables import Column, Format, table
@@ -69,8 +71,34 @@ def _violations(segments: pl.DataFrame) -> list[Block]:
     )
     return [
         table(columns, rows, "Indicators beyond their threshold, per route", note),
+        *_our_causes(segments, names),
         *_cause_table(names),
     ]
+
+
+def _our_causes(segments: pl.DataFrame, names: list[str]) -> list[Block]:
+    """What was going on when our violations began, per route, with totals."""
+    columns = [
+        (name, cause, f"{CAUSE_PREFIX}{cause.name.lower()}_{name}")
+        for name in names
+        for cause in ViolationCause
+    ]
+    there = [(name, cause, column) for name, cause, column in columns if column in segments.columns]
+    routes = sorted(segments["route"].unique())
+    rows: list[Row] = []
+    for name, cause, column in there:
+        counts = dict(segments.group_by("route").agg(pl.col(column).fill_null(0.0).sum()).rows())
+        rows.append({"indicator": name, "cause": cause.value, ALL: sum(counts.values()), **counts})
+    rows.sort(key=lambda row: -row[ALL])
+    shown: list[Column[Row]] = [
+        Column("indicator", lambda r: words(r["indicator"])),
+        Column("cause", lambda r: r["cause"], "the first that applies in this order: "
+               + "; ".join(c.value for c in ViolationCause)),
+        *(Column[Row](route, partial(_value, route), "violations") for route in routes),
+        Column("total", partial(_value, ALL), "violations"),
+    ]  # fmt: skip
+    caption = "What was going on when an indicator went beyond its threshold, per route"
+    return [table(shown, rows, caption)] if rows else []
 
 
 def _town_rows() -> list[Row]:
@@ -132,11 +160,84 @@ def _times(segments: pl.DataFrame) -> list[Block]:
         Column("greatest total", partial(_value, "total_max_ms"), "", "ms", MS),
     ]
     note = "Means weighted by hours. The total has a budget of 25 ms per cycle."
-    return (
-        [table(columns, rows, "The monitor's processor time per cycle, per route", note)]
-        if rows
-        else []
+    if not rows:
+        return []
+    caption = "The monitor's processor time per cycle, per route"
+    return [table(columns, rows, caption, note), *_module_table(known, modules)]
+
+
+STD, GREATEST, BREACHES = "_std_ms", "_max_ms", "total_breaches_pct"
+PUBLISHED_NAMES = {"total": "spi_and_hsi_total"}
+
+
+def _module_table(segments: pl.DataFrame, modules: list[str]) -> list[Block]:
+    """Mean, deviation, greatest and breaches of every module in every route, and the published."""
+    measured = [m for m in modules if {m + STD, m + GREATEST} <= set(segments.columns)]
+    rows: list[Row] = []
+    for route in [*sorted(segments["route"].unique()), ALL]:
+        here = segments if route == ALL else segments.filter(route=route)
+        rows += [{"route": route, "module": m, **_pooled(here, m)} for m in measured]
+    if not rows:
+        return []
+    rows += _published_times(measured)
+
+    def cell(of: str, row: Row) -> Cell:
+        value = row[of]
+        if value is None or isinstance(value, str):
+            return Cell(words(value or ""), kind=row.get("kind", ""))
+        return Cell(f"{value:.3f}", sort=value, kind=row.get("kind", ""))
+
+    columns: list[Column[Row]] = [
+        Column("route", partial(cell, "route")),
+        Column("module", partial(cell, "module")),
+        Column("mean", partial(cell, "mean"), "per cycle", "ms"),
+        Column("deviation", partial(cell, "std"), "over all cycles", "ms"),
+        Column("greatest", partial(cell, "max"), "", "ms"),
+        Column("breaches", partial(cell, "breaches"), "cycles above the total's 25 ms", "%"),
+    ]
+    note = (
+        "Published towns in italics, from an automotive processor (four Cortex-A53): another "
+        "machine, so they do not compare. A module's own threshold is its maximum, which nothing "
+        "breaches; only the total has a budget."
     )
+    return [table(columns, rows, "Times of each module in each route", note)]
+
+
+def _pooled(segments: pl.DataFrame, module: str) -> Row:
+    """Of all cycles of several segments, from the mean and deviation of each."""
+    hours, mean, std = (segments[c].to_numpy() for c in ("hours", module + MEAN, module + STD))
+    share = hours / hours.sum()
+    centre = float(share @ mean)
+    breaches = segments[BREACHES].to_numpy() if BREACHES in segments.columns else None
+    return {
+        "mean": centre,
+        "std": float(np.sqrt(max(share @ (std**2 + mean**2) - centre**2, 0.0))),
+        "max": float(segments[module + GREATEST].to_numpy().max()),
+        "breaches": float(share @ breaches) if module == "total" and breaches is not None else None,
+    }
+
+
+def _published_times(modules: list[str]) -> list[Row]:
+    """The same of the published towns."""
+    known = published(Source.TIMING)
+    rows: list[Row] = []
+    for town in known["town"].unique().sort():
+        for module in modules:
+            here = known.filter(town=town, module=PUBLISHED_NAMES.get(module, module))
+            said = dict(here.select("statistic", "value").rows())
+            if said:
+                rows.append(
+                    {
+                        "route": f"town {town}",
+                        "module": module,
+                        "mean": said["mean_ms"],
+                        "std": said["std_ms"],
+                        "max": said["max_ms"],
+                        "breaches": said.get("breaches_of_25_ms_pct"),
+                        "kind": "published",
+                    }
+                )
+    return rows
 
 
 def _value(name: str, row: Row) -> float | None:

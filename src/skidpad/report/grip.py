@@ -17,6 +17,7 @@ from skidpad.recording.logfiles import read_log
 from skidpad.report import grip_figures, grip_tables
 from skidpad.report.grip_data import GripCampaign, load_grip, scenario_title
 from skidpad.report.grip_rain import rain_tables
+from skidpad.report.grip_weathers import weather_blocks
 from skidpad.report.page import (
     Answer,
     Answers,
@@ -65,6 +66,7 @@ def build_page(campaign: GripCampaign) -> Page:
         Section("Findings of the source, judged", _verdicts(judged)),
         Section("What changes besides", grip_tables.change_tables(campaign) if both else []),
         Section("Rain on the lens and rain on the road", rain_tables(campaign)),
+        Section("Weathers", weather_blocks(campaign)),
         Section("Series over time", grip_figures.both_modes(campaign) if both else []),
         Section("Across weathers", grip_figures.across_weathers(campaign)),
         Section("Trajectories of the cut-in", grip_figures.trajectories(campaign)),

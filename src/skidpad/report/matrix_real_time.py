@@ -8,9 +8,12 @@ import polars as pl
 
 from skidpad.report.matrix_data import Matrix, WeatherGroup
 from skidpad.report.page import Block, Text
+from skidpad.report.published import Source, published
 from skidpad.report.tables import Column, Format, Quantity, table
 
 BEHIND = 0.9  # times real time, below which a tick counts as slow
+SLOW = "ticks_below_0_9_pct"
+KINDS = {"value": "", "upper_bound": "less than ", "target": "aim "}
 
 
 def real_time_blocks(matrix: Matrix) -> list[Block]:
@@ -44,9 +47,36 @@ def real_time_blocks(matrix: Matrix) -> list[Block]:
     ]
     words = Text(
         "Speed of the simulation on the machine that drove these runs, other work included. The "
-        "source ran at 0.30 to 1.02 times real time on its machine, with a simulator that renders."
+        "published numbers are of another experiment: a simulator that renders twelve sensors, held "
+        "back to real time, on another machine. Ours runs as fast as it can."
     )
-    return [words, table(columns, groups, "Real time by weather")]
+    return [words, table(columns, groups, "Real time by weather"), _published_table()]
+
+
+def _published_table() -> Block:
+    """The published factors and shares of slow ticks, each by where it was measured."""
+    rows = published(Source.REAL_TIME).filter(
+        pl.col("quantity").is_in(["mean_rtf", SLOW])
+        & pl.col("stage").is_in(["preliminary", "final"])
+    )
+    scopes = rows.select("stage", "scope", "source").unique(["stage", "scope"], maintain_order=True)
+
+    def of(quantity: str, place: tuple[str, str, str]) -> str:
+        stage, scope, _ = place
+        here = rows.filter(stage=stage, scope=scope, quantity=quantity)
+        kinds = dict(here.select("kind", "value").rows())
+        if "range_low" in kinds:
+            return f"{kinds['range_low']:g} to {kinds['range_high']:g}"
+        return "; ".join(f"{KINDS[kind]}{value:g}" for kind, value in kinds.items())
+
+    columns = [
+        Column[tuple[str, str, str]]("published runs", lambda place: f"{place[0]}, {place[1]}"),
+        Column[tuple[str, str, str]]("times real time, mean", partial(of, "mean_rtf")),
+        Column[tuple[str, str, str]](f"ticks below {BEHIND:g}, %", partial(of, SLOW)),
+        Column[tuple[str, str, str]]("from", lambda place: place[2]),
+    ]
+    note = "The share for clear weather and that for Clear Sky - Night contradict each other in the source."
+    return table(columns, scopes.rows(), "Published: real time", note)
 
 
 def _rows(times: pl.DataFrame, group: WeatherGroup) -> pl.DataFrame:

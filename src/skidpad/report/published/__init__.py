@@ -22,7 +22,8 @@ class Source(str, Enum):
     PRELIMINARY = "adas_preliminary_vs_final_matching_runs"  # table 14
     SAMPLES = "adas_sample_counts"  # table 14 and section 6.1
     REAL_TIME = "adas_rtf_figures"  # sections 4.1, 5.5, 6.3
-    COMPLETION = "grip_completion_and_score"  # tables of the friction thesis
+    PRESETS = "grip_weather_presets"  # tables 2 and 3 of the friction thesis
+    COMPLETION = "grip_completion_and_score"
     WARPING = "grip_dtw_reduced_vs_original"
     CUTIN_COMPLETION = "grip_cutin_fix_completion_score"
     CUTIN_WARPING = "grip_cutin_fix_dtw"

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from enum import Enum
 
 import numpy as np
 import polars as pl
@@ -10,10 +12,12 @@ from numpy.typing import NDArray
 
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.indicators.catalogue import Indicator
+from skidpad.evidence.channels.indicators.layout import Place
 from skidpad.evidence.channels.judging.causes import V_STANDING, YAW_RATE_TURN
 from skidpad.evidence.channels.monitor import Monitor
 from skidpad.evidence.channels.recorder import CycleEvidence
-from skidpad.evidence.channels.timing import MODULES
+from skidpad.evidence.channels.timefilter import Event
+from skidpad.evidence.channels.timing import BUDGET_MS, MODULES
 
 Floats = NDArray[np.float64]
 COMPARED = MODULES[:3]  # those of C-232
@@ -27,6 +31,20 @@ SERIES = (
 )
 
 
+CAUSE_PREFIX = "cause_"
+
+
+class ViolationCause(str, Enum):
+    """What was going on when an indicator went beyond its threshold."""
+
+    SILENT = "a channel reported nothing"
+    STANDING = "ego standing or nearly so"
+    TURN = "ego turning"
+    UNEQUAL = "a channel saw objects that another did not"
+    MANY = "many objects, as many in every channel"
+    NOISE = "none of these: the channels' errors alone"
+
+
 class Observer:
     """Watches a monitor at work on one drive."""
 
@@ -36,6 +54,8 @@ class Observer:
         self.series = {name: np.full(n, np.nan) for name, _ in SERIES}
         self.steady = np.full(n, np.nan)
         self.objects = np.zeros(n)
+        self.silent = np.zeros(n, dtype=bool)  # a channel reported nothing
+        self.unequal = np.zeros(n, dtype=bool)  # channels reported different numbers of objects
 
     def see(self, k: int, evidence: CycleEvidence) -> None:
         """Keep what cycle number k of the drive showed."""
@@ -45,6 +65,8 @@ class Observer:
         self.steady[k] = evidence.signals.values[Signal.STEADY_SHARE]
         counts = [len(f.objects) for f in evidence.cycle.frames if f is not None]
         self.objects[k] = max(counts, default=0)
+        self.silent[k] = len(counts) < len(evidence.cycle.frames)
+        self.unequal[k] = len(set(counts)) > 1
 
     def facts(self) -> dict[str, float | None]:
         """Numbers of the drive; None where there was too little to say."""
@@ -61,17 +83,37 @@ class Observer:
             "steady_standing_minus_moving": _apart(self.steady, standing, ~standing),
             "objects_mean": float(self.objects.mean()) if self.objects.size else None,
         }
-        out |= self._violations()
-        return out
-
-    def _violations(self) -> dict[str, float | None]:
         events = self.monitor.violations.finish()
+        return out | self._violations(events) | self._causes(events)
+
+    def _violations(self, events: Sequence[Event[Place]]) -> dict[str, float | None]:
         counted = [e.key[0] for e in events]
         return {
             f"violations_{i.value}": float(counted.count(i))
             for i, entry in self.monitor.thresholds.items()
             if entry.threshold is not None
         }
+
+    def _causes(self, events: Sequence[Event[Place]]) -> dict[str, float | None]:
+        """Violations by indicator and by what was going on when they began (C-215)."""
+        counted = Counter((e.key[0], self._cause(e.t_start)) for e in events)
+        return {
+            f"{CAUSE_PREFIX}{cause.name.lower()}_{indicator.value}": float(n)
+            for (indicator, cause), n in counted.items()
+        }
+
+    def _cause(self, t: float) -> ViolationCause:
+        """The first that applies at time t."""
+        k = int(np.argmin(np.abs(self.motion["t"] - t)))
+        if self.silent[k]:
+            return ViolationCause.SILENT
+        if self.motion["v"][k] < V_STANDING:
+            return ViolationCause.STANDING
+        if abs(self.motion["yaw_rate"][k]) > YAW_RATE_TURN:
+            return ViolationCause.TURN
+        if self.unequal[k]:
+            return ViolationCause.UNEQUAL
+        return ViolationCause.MANY if self.objects[k] >= MANY_OBJECTS else ViolationCause.NOISE
 
 
 def times_of(times: pl.DataFrame) -> dict[str, float]:
@@ -81,12 +123,16 @@ def times_of(times: pl.DataFrame) -> dict[str, float]:
     warm = times[WARM_CYCLES:]
     total = warm["total"].to_numpy()
     means = {m: float(warm[m].to_numpy().mean()) for m in COMPARED}
-    return {f"{m}_mean_ms": mean for m, mean in means.items()} | {
+    out = {f"{m}_mean_ms": mean for m, mean in means.items()} | {
         "total_mean_ms": float(total.mean()),
         "total_p999_ms": float(np.percentile(total, 99.9)),
-        "total_max_ms": float(total.max()),
+        "total_breaches_pct": float(100.0 * (total > BUDGET_MS).mean()),
         "motion_prediction_share": means["motion_prediction"] / max(sum(means.values()), 1e-9),
     }
+    for module in ("total", *COMPARED):
+        times = warm[module].to_numpy()
+        out |= {f"{module}_std_ms": float(times.std()), f"{module}_max_ms": float(times.max())}
+    return out
 
 
 def _apart(values: Floats, a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float | None:

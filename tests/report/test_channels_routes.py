@@ -105,10 +105,15 @@ def test_every_module_has_mean_deviation_greatest_and_breaches_in_every_route():
     """By hand: 3 of 4 equal cycles at 4 ms and one at 8 ms are 5 ms with a deviation of sqrt(3)."""
 
     def timed(route, hours, mean, std, worst, breaches):
+        shares = {"breaches_pct": breaches, "within_90_pct": 1.0, "under_50_pct": hours}
+        total = {"std_ms": std, "min_ms": mean / 4, **shares}
+        planning = {"std_ms": std / 2, "max_ms": worst / 2, "min_ms": 0.1, **shares}
+        planning["breaches_pct"] = 0.0
         return segment(route, hours, 0, 0, mean, worst) | {
-            "total_std_ms": std, "total_breaches_pct": breaches,
-            "planning_std_ms": std / 2, "planning_max_ms": worst / 2,
-        }  # fmt: skip
+            f"{module}_{name}": value
+            for module, of in (("total", total), ("planning", planning))
+            for name, value in of.items()
+        }
 
     evaluation = {
         "segment_table": [
@@ -124,17 +129,46 @@ def test_every_module_has_mean_deviation_greatest_and_breaches_in_every_route():
         for route in ("coast", "town", "all routes")
         for module in ("planning", "total")
     ]
-    assert [c.text for c in ours["coast", "total"][2:]] == ["5.000", "1.732", "30.000", "0.500"]
-    assert [c.text for c in ours["coast", "planning"][2:]] == ["2.500", "0.866", "15.000", ""]
+    assert [c.text for c in ours["coast", "total"][2:]] == [
+        "5.000",
+        "1.732",
+        "1.000",
+        "30.000",
+        "0.500",
+        "1.000",
+        "2.500",
+    ]
+    assert [c.text for c in ours["coast", "planning"][2:]] == [
+        "2.500",
+        "0.866",
+        "0.100",
+        "15.000",
+        "0.000",
+        "1.000",
+        "2.500",
+    ]
     # all: mean 3.5; squares (3 * 16 + 64 + 4 * (4 + 1)) / 8 = 16.5, less 12.25
     assert [c.text for c in ours["all routes", "total"][2:]] == [
         "3.500",
         "2.062",
+        "0.500",
         "30.000",
         "0.250",
+        "1.000",
+        "3.250",
     ]
     first = next(r for r in times.rows if r[0].kind == "published")
-    assert [c.text for c in first] == ["town 1", "total", "15.520", "1.520", "26.430", "0.030"]
+    assert [c.text for c in first] == [
+        "town 1",
+        "total",
+        "15.520",
+        "1.520",
+        "7.380",
+        "26.430",
+        "0.030",
+        "0.080",
+        "0.100",
+    ]
     assert "another machine" in times.note
 
 

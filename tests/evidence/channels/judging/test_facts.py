@@ -83,4 +83,7 @@ def test_times_leave_the_first_cycles_out_and_know_their_deviation_and_breaches(
     assert times["total_breaches_pct"] == pytest.approx(50.0), "25 ms and less is no breach"
     assert times[f"{COMPARED[0]}_std_ms"] == pytest.approx(0.5)
     assert times[f"{COMPARED[0]}_max_ms"] == pytest.approx(3.0)
+    assert times["total_min_ms"] == pytest.approx(20.0)
+    assert times["total_within_90_pct"] == 0.0, "30 ms is beyond, 20 ms below 22.5"
+    assert times[f"{COMPARED[0]}_within_90_pct"] == pytest.approx(50.0), "of its own maximum"
     assert times_of(pl.DataFrame({"total": total[:5]})) == {}

@@ -17,7 +17,7 @@ from skidpad.evidence.channels.judging.causes import V_STANDING, YAW_RATE_TURN
 from skidpad.evidence.channels.monitor import Monitor
 from skidpad.evidence.channels.recorder import CycleEvidence
 from skidpad.evidence.channels.timefilter import Event
-from skidpad.evidence.channels.timing import BUDGET_MS, MODULES
+from skidpad.evidence.channels.timing import MODULES, time_figures
 
 Floats = NDArray[np.float64]
 COMPARED = MODULES[:3]  # those of C-232
@@ -121,17 +121,14 @@ def times_of(times: pl.DataFrame) -> dict[str, float]:
     if len(times) <= 2 * WARM_CYCLES:
         return {}
     warm = times[WARM_CYCLES:]
-    total = warm["total"].to_numpy()
     means = {m: float(warm[m].to_numpy().mean()) for m in COMPARED}
-    out = {f"{m}_mean_ms": mean for m, mean in means.items()} | {
-        "total_mean_ms": float(total.mean()),
-        "total_p999_ms": float(np.percentile(total, 99.9)),
-        "total_breaches_pct": float(100.0 * (total > BUDGET_MS).mean()),
+    out = {
+        "total_p999_ms": float(np.percentile(warm["total"].to_numpy(), 99.9)),
         "motion_prediction_share": means["motion_prediction"] / max(sum(means.values()), 1e-9),
     }
     for module in ("total", *COMPARED):
-        times = warm[module].to_numpy()
-        out |= {f"{module}_std_ms": float(times.std()), f"{module}_max_ms": float(times.max())}
+        figures = time_figures(warm[module].to_numpy(), module)
+        out |= {f"{module}_{name}": value for name, value in figures.items()}
     return out
 
 

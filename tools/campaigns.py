@@ -74,9 +74,10 @@ def freeze(name: str, target: Path) -> None:
         if (target / "series").is_dir():
             keep_delays(target, part)
     commit = subprocess.run(
-        ["git", "describe", "--always", "--dirty"],
-        check=True, capture_output=True, text=True, cwd=ROOT,
+        ["git", "describe", "--always"], check=True, capture_output=True, text=True, cwd=ROOT,
     ).stdout.strip()  # fmt: skip
+    changed = ["git", "diff", "--quiet", "HEAD", "--", "src", "pyproject.toml"]
+    commit += "-dirty" if subprocess.run(changed, check=False, cwd=ROOT).returncode else ""
     told = {
         "commit": commit,
         "date": datetime.datetime.now(datetime.timezone.utc).strftime("%Y-%m-%d"),

@@ -108,6 +108,58 @@ def test_practical_rules_ask_for_a_gap_and_a_collision_on_the_right_side():
     assert not verdict(Profile.PRACTICAL, HazardType.EGO_TAILGATED, **ahead)
 
 
+TAILGATING = {"safety_score": 0.79, "comfort_least": 0.85, "ttc_ahead": 2.5, "risk_ahead_lead": 0.4}
+TAILGATED = {
+    "safety_score": 0.79,
+    "comfort_driving": 0.85,
+    "ttc_behind": 2.5,
+    "risk_ahead_lead": -0.4,
+}
+
+
+@pytest.mark.req("C-122", "C-123", "C-125")
+@pytest.mark.parametrize(
+    ("profile", "hazard", "gap", "limit", "others"),
+    [
+        (
+            Profile.AS_PRINTED,
+            HazardType.EGO_TAILGATING,
+            "gap",
+            0.5,
+            TAILGATING | {"safety_score": 0.8},
+        ),
+        (Profile.AS_PRINTED, HazardType.EGO_TAILGATED, "gap", 0.5, TAILGATED),
+        (Profile.PRACTICAL, HazardType.EGO_TAILGATING, "gap", 0.3, TAILGATING),
+        (Profile.PRACTICAL, HazardType.EGO_TAILGATED, "gap_signed", 0.3, TAILGATED),
+    ],
+)
+def test_the_gap_must_exceed_its_limit_and_a_hair_is_enough(profile, hazard, gap, limit, others):
+    for value, expected in ((limit - 1e-6, False), (limit, False), (limit + 1e-6, True)):
+        assert verdict(profile, hazard, **others | {gap: value}) is expected
+
+
+@pytest.mark.req("C-122", "C-123")
+@pytest.mark.parametrize(
+    ("hazard", "name", "inside", "outside"),
+    [
+        (HazardType.EGO_TAILGATING, "safety_score", 0.799999, 0.8),
+        (HazardType.EGO_TAILGATING, "ttc_ahead", 3.199999, 3.2),
+        (HazardType.EGO_TAILGATING, "risk_ahead_lead", 1e-6, 0.0),
+        (HazardType.EGO_TAILGATING, "comfort_least", 0.7, 0.699999),
+        (HazardType.EGO_TAILGATING, "comfort_least", 0.899999, 0.9),
+        (HazardType.EGO_TAILGATED, "safety_score", 0.799999, 0.8),
+        (HazardType.EGO_TAILGATED, "ttc_behind", 3.199999, 3.2),
+        (HazardType.EGO_TAILGATED, "risk_ahead_lead", -1e-6, 0.0),
+        (HazardType.EGO_TAILGATED, "comfort_driving", 0.8, 0.799999),
+    ],
+)
+def test_every_limit_of_the_practical_rules_is_where_it_is_printed(hazard, name, inside, outside):
+    calm = {"gap": 0.4, "gap_signed": 0.4}
+    others = calm | (TAILGATING if hazard is HazardType.EGO_TAILGATING else TAILGATED)
+    assert verdict(Profile.PRACTICAL, hazard, **others | {name: inside}) is True
+    assert verdict(Profile.PRACTICAL, hazard, **others | {name: outside}) is False
+
+
 @pytest.mark.req("C-121")
 @pytest.mark.parametrize(("distance", "expected"), [(1.9, False), (2.1, True)])
 def test_practical_localisation_sees_a_drift_however_slow(distance, expected):
@@ -302,8 +354,37 @@ def test_a_stuck_vehicle_is_steady_while_its_cross_path_dips():
         rows.append((0, frame(t, (0, 0, 0, 0, 0), plan=still)))
         rows.append((1, frame(t, (0, 0, 0, 0, 0), plan=away)))
     _, evidence, _ = monitored(Listed(("a", "b"), rows))
-    assert evidence[-1].signals.values[Signal.CROSS_PATH_DIPS] >= 2
-    assert np.isnan(evidence[50].signals.values[Signal.STEADY_SHARE])
+    steady = [e.signals.values[Signal.STEADY_SHARE] for e in evidence]
+    assert evidence[-1].signals.values[Signal.CROSS_PATH_DIPS] == 4, "of five, one is 20 s ago"
+    # of 17 values that are known, b's plan, its variance and the ego trajectories move
+    assert steady[-1] == pytest.approx(14 / 17)
+    assert np.isnan(steady[:180]).all(), "20 s of evidence are needed"
+    assert not np.isnan(steady[200:]).any()
+
+
+@pytest.mark.req("C-129")
+def test_what_stands_still_for_20_s_is_steady_and_fires_with_its_dips():
+    def standing(moved):
+        plan = np.column_stack([np.zeros(16), np.zeros(16), np.arange(16) * 0.2])
+        for k in range(230):
+            ego = (moved * (k % 2), 0, 0, 0, 0)
+            yield 0, frame(0.1 * k, (0, 0, 0, 0, 0), plan=plan)
+            yield 1, frame(0.1 * k, ego, plan=plan)
+
+    def share(moved):
+        _, evidence, _ = monitored(Listed(("a", "b"), list(standing(moved))))
+        return evidence[-1].signals.values[Signal.STEADY_SHARE]
+
+    assert share(0.0) == 1.0
+    # positions d apart are 1 / (1 + d) alike: a tenth less at 1/9 m
+    assert share(0.110) == 1.0
+    assert share(0.112) == pytest.approx(16 / 17)
+    fires = {"steady_share": 0.9, "cross_path_dips": 2}
+    assert verdict(Profile.PRACTICAL, HazardType.STUCK_VEHICLE, **fires) is True
+    for name, below in (("steady_share", 0.899), ("cross_path_dips", 1)):
+        assert (
+            verdict(Profile.PRACTICAL, HazardType.STUCK_VEHICLE, **fires | {name: below}) is False
+        )
 
 
 @pytest.mark.req("C-023", "C-051")

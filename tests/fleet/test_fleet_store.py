@@ -29,7 +29,7 @@ def count(world, table):
         return connection.execute(select(func.count()).select_from(table)).scalar_one()
 
 
-@pytest.mark.req("C-172", "C-194")
+@pytest.mark.req("C-172", "C-193", "C-194")
 def test_what_a_vehicle_sent_comes_back_as_it_was(world):
     sent = [record(1), record(2, place=(300.0, -40.0), precipitation="80")]
     answer = world.send("red-1", packed(*sent), **{"X-Skidpad-Time": "12.5"})
@@ -39,6 +39,7 @@ def test_what_a_vehicle_sent_comes_back_as_it_was(world):
     assert set(ids) == set(rows)
     second = rows[ids[1]]
     assert (second["x"], second["y"], second["weather"]) == (300.0, -40.0, "day, heavy rain")
+    assert second["map"] == "town", "the context that its record carries"
     assert (second["vehicle_time"], second["at"]) == (12.5, NOW)  # both clocks, side by side
     for one, id in zip(sent, ids, strict=True):
         kept = world.get("axle", f"/api/v1/hazards/{id}/record").text

@@ -21,14 +21,14 @@ EYES = (Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,)))
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("evaluated")
     segments = []
-    for i, gap in enumerate((6.0, 45.0)):
+    for i, (route, gap) in enumerate(((0, 6.0), (1, 45.0), (0, 6.5))):
         world = World(
             (0, 0, 0, 15.0, 0), np.array([(-gap - 4.5, 0, 0, 15.7, 0), (60, 3.5, 0, 15, 0)])
         )
         source = drive(world, EYES, 8.0)
         segments.append(
             judge(
-                f"route-{i}.mcap", f"route-{i}", source.channels, list(cycles(source)),
+                f"route-{i}.mcap", f"route-{route}", source.channels, list(cycles(source)),
                 curve=Signal.GAP, context={"sun_altitude_deg": "-5", "seed": str(i)},
             )
         )  # fmt: skip
@@ -76,7 +76,7 @@ def test_totals_are_the_sums_of_the_routes(folder):
             counts = map(int, cell.text.split(" / "))
             sums[key] = tuple(a + b for a, b in zip(sums[key], counts, strict=True))
     assert {k: tuple(v) for k, v in totals.items()} == sums
-    assert totals["practical", "ego tailgated"] == [1, 0, 0]
+    assert totals["practical", "ego tailgated"] == [2, 0, 0]
 
 
 @pytest.mark.req("C-215")

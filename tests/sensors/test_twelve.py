@@ -45,6 +45,8 @@ def test_sizes_fields_of_view_and_mountings():
     assert by_id["depth_bumper"].mount.pitch == pytest.approx(radians(20))  # nose down
     assert by_id["depth_roof"].focal == pytest.approx(400.0)
     assert by_id["depth_bumper"].focal == pytest.approx(167.82, abs=0.005)
+    assert (by_id["depth_roof"].cx, by_id["depth_bumper"].cx) == (400.0, 200.0)
+    assert (by_id["depth_roof"].cy, by_id["depth_bumper"].cy) == (300.0, 150.0)
 
 
 @pytest.mark.req("A-028")

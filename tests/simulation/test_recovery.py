@@ -345,6 +345,13 @@ def test_ten_seconds_near_standstill_and_the_ego_is_moved() -> None:
 
 
 @pytest.mark.req("A-200")
+@pytest.mark.parametrize(("kmh", "moved"), [(0.99, True), (1.01, False)])
+def test_near_standstill_is_below_1_km_per_h(kmh: float, moved: bool) -> None:
+    rows = play(supervisor(), round(12.0 / DT), beside(0.0), v=kmh / 3.6)
+    assert any(a.relocate is not None for _, a in rows) is moved
+
+
+@pytest.mark.req("A-200")
 @pytest.mark.parametrize(
     ("tier", "moved"),
     [(Tier.HOLDING_AT_LINE, False), (Tier.STOPPED_BEHIND_CAR, False), (Tier.CRUISE, True)],

@@ -27,6 +27,12 @@ from skidpad.sensors.boxes import (
 Floats = NDArray[np.float64]
 
 NEAR = 0.1  # m, near clip
+CERTAIN = 1e-9  # a share of a wall this far below its first end, or above its last, is beyond it
+# The least distance to a wall is lowered by its own rounding: relative, and in m.
+SLACK = 1e-6
+MARGIN = 1e-4
+# m: a ray along a wall whose line passes this near the antenna has no distance that could be bounded
+ALONG = 1e-3
 
 
 class Antenna(NamedTuple):
@@ -41,6 +47,31 @@ def antenna_of(spec: RadarSpec, seed: int, dt: float, weather: Weather | None) -
     """A radar in a run; weather: shortens its range, None: it does not."""
     reach = spec.range if weather is None else radar_range(weather, spec.range)
     return Antenna(mount_of(spec.mount), beam_of(spec, seed, dt), reach)
+
+
+class NearWalls(NamedTuple):
+    """The walls in view of a radar, nearest first, with all that does not change from ray to ray."""
+
+    row: NDArray[np.int64]  # (n,) in `Walls`
+    bound: Floats  # m, no ray meets the wall nearer than this
+    x: Floats  # m, first end, seen from the antenna
+    y: Floats
+    ex: Floats  # m, from the first end to the last
+    ey: Floats
+    across: Floats  # m^2, cross product of the wall and its first end
+
+
+class NearBoxes(NamedTuple):
+    """The boxes in view of a radar in their own order, with what does not change from ray to ray."""
+
+    row: NDArray[np.int64]  # (n,) in `Boxes`
+    x: Floats  # m, the antenna seen from the box's foot
+    y: Floats
+    z: Floats  # m, the antenna over the box's middle
+    cos: Floats  # of the box's yaw
+    sin: Floats
+    half: Floats  # (n, 3) m, half of length, width and height
+    radius: Floats  # m, a little more than half the diagonal
 
 
 @inner_kernel
@@ -61,15 +92,11 @@ def cast_radar(
     beam, reach, seat = radar.beam, radar.reach, placed(radar.mount, states)
     origin, rotation = seat.origin, seat.rotation
     yaw, edge = np.arctan2(rotation[1, 0], rotation[0, 0]), beam.half_width
-    near_walls = walls_in_view(origin, yaw, edge, walls, reach)
-    near_posts = boxes_in_view(origin, yaw, edge, posts, reach)
-    near_boxes = boxes_in_view(origin, yaw, edge, boxes, reach)
+    near = _nearest_first(origin, walls, walls_in_view(origin, yaw, edge, walls, reach))
+    near_posts = _boxes_seen(origin, posts, boxes_in_view(origin, yaw, edge, posts, reach))
+    near_boxes = _boxes_seen(origin, boxes, boxes_in_view(origin, yaw, edge, boxes, reach))
     ox, oy = origin[0] - boxes.x[0], origin[1] - boxes.y[0]
     height = origin[2] - boxes.z[0] - slope[0] * ox - slope[1] * oy
-    turned_posts, turned_boxes = (
-        _box_directions(posts, near_posts),
-        _box_directions(boxes, near_boxes),
-    )
     vx0 = states.vx[0] - states.yaw_rate[0] * oy
     vy0 = states.vy[0] + states.yaw_rate[0] * ox
     out = np.empty((beam.rays, 4), np.float32)
@@ -85,17 +112,26 @@ def cast_radar(
         fall = dz - slope[0] * dx - slope[1] * dy
         if fall < 0.0 and -height / fall < best:  # the road
             best, hit = -height / fall, 0
-        for w in near_walls:
-            t = _ray_wall(origin, dx, dy, dz, walls, w)
+        for j in range(near.row.size):
+            if near.bound[j] > best:
+                break
+            t, f = _ray_line(dx, dy, near.x[j], near.y[j], near.ex[j], near.ey[j], near.across[j])
             if t < best:
-                best, hit = t, 0
-        for j, p in enumerate(near_posts):
-            t = _ray_box(origin, dx, dy, dz, posts, p, turned_posts[j])
-            if t < best:
-                best, hit = t, 0
-        for j, i in enumerate(near_boxes):
-            if i > 0 and states.present[i]:
-                t = _ray_box(origin, dx, dy, dz, boxes, i, turned_boxes[j])
+                w = near.row[j]
+                rise = origin[2] + t * dz - (walls.z0[w] + f * (walls.z1[w] - walls.z0[w]))
+                if 0.0 <= rise <= walls.height[w]:
+                    best, hit = t, 0
+        for j in range(near_posts.row.size):
+            if not _is_aside(dx, dy, near_posts.x[j], near_posts.y[j], near_posts.radius[j], best):
+                t = _ray_box(dx, dy, dz, near_posts, j)
+                if t < best:
+                    best, hit = t, 0
+        for j in range(near_boxes.row.size):
+            i = near_boxes.row[j]
+            if i == 0 or not states.present[i]:
+                continue
+            if not _is_aside(dx, dy, near_boxes.x[j], near_boxes.y[j], near_boxes.radius[j], best):
+                t = _ray_box(dx, dy, dz, near_boxes, j)
                 if t < best:
                     best, hit = t, i
         if hit < 0:
@@ -128,43 +164,85 @@ def road_slope(map: Held[LaneArrays], x: float, y: float, z: float) -> Floats:
 
 
 @inner_kernel
-def _ray_wall(origin: Floats, dx: float, dy: float, dz: float, walls: Walls, w: int) -> float:
-    """Distance along the ray to wall w; inf when it misses."""
-    ex, ey = walls.x1[w] - walls.x0[w], walls.y1[w] - walls.y0[w]
-    det = ex * dy - ey * dx
-    if det == 0.0:
-        return np.inf
-    px, py = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
-    t = (ex * py - ey * px) / det
-    f = (dx * py - dy * px) / det
-    if t < NEAR or f < 0.0 or f > 1.0:
-        return np.inf
-    rise = origin[2] + t * dz - (walls.z0[w] + f * (walls.z1[w] - walls.z0[w]))
-    return t if 0.0 <= rise <= walls.height[w] else np.inf
+def _nearest_first(origin: Floats, walls: Walls, chosen: NDArray[np.int64]) -> NearWalls:
+    n = chosen.size
+    bound = np.empty(n)
+    for j, w in enumerate(chosen):
+        px, py = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
+        ex, ey = walls.x1[w] - walls.x0[w], walls.y1[w] - walls.y0[w]
+        length = np.hypot(ex, ey)
+        if abs(ex * py - ey * px) <= ALONG * length:  # a wall without length is one of these
+            bound[j] = 0.0
+            continue
+        share = min(max(-(px * ex + py * ey) / (length * length), 0.0), 1.0)
+        nearest = np.hypot(px + share * ex, py + share * ey)
+        bound[j] = nearest * (1.0 - SLACK) - MARGIN
+    order = np.argsort(bound)
+    near = NearWalls(
+        chosen[order], bound[order], np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
+    )
+    for j, w in enumerate(near.row):
+        near.x[j], near.y[j] = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
+        near.ex[j], near.ey[j] = walls.x1[w] - walls.x0[w], walls.y1[w] - walls.y0[w]
+        near.across[j] = near.ex[j] * near.y[j] - near.ey[j] * near.x[j]
+    return near
 
 
 @inner_kernel
-def _box_directions(boxes: Boxes, chosen: NDArray[np.int64]) -> Floats:
-    """(k, 2) cosine and sine of the chosen boxes' yaw: once per tick, not once per ray."""
-    out = np.empty((chosen.size, 2))
-    for j, b in enumerate(chosen):
-        out[j, 0], out[j, 1] = np.cos(boxes.yaw[b]), np.sin(boxes.yaw[b])
-    return out
+def _ray_line(
+    dx: float, dy: float, px: float, py: float, ex: float, ey: float, across: float
+) -> tuple[float, float]:
+    """Distance along the ray to a wall's line, and the share of the wall there; inf when it misses.
 
-
-@inner_kernel
-def _ray_box(
-    origin: Floats, dx: float, dy: float, dz: float, boxes: Boxes, b: int, turned: Floats
-) -> float:
-    """Distance along the ray to the surface of box b, from outside or inside; inf when it misses.
-
-    turned: cosine and sine of its yaw.
+    Most rays pass beside most walls: signs tell so without a division.
     """
-    c, s = turned[0], turned[1]
-    px, py = origin[0] - boxes.x[b], origin[1] - boxes.y[b]
-    o = (c * px + s * py, -s * px + c * py, origin[2] - boxes.z[b] - boxes.height[b] / 2.0)
+    det = ex * dy - ey * dx
+    along = dx * py - dy * px  # det times the share
+    if det > 0.0:
+        if along < -CERTAIN or along > det * (1.0 + CERTAIN):
+            return np.inf, 0.0
+    elif det < 0.0:
+        if along > CERTAIN or along < det * (1.0 + CERTAIN):
+            return np.inf, 0.0
+    else:
+        return np.inf, 0.0
+    t, f = across / det, along / det
+    if t < NEAR or f < 0.0 or f > 1.0:
+        return np.inf, 0.0
+    return t, f
+
+
+@inner_kernel
+def _is_aside(dx: float, dy: float, x: float, y: float, radius: float, best: float) -> bool:
+    """Whether a ray surely passes beside a box, or meets it beyond `best` m; x, y as in `NearBoxes`."""
+    return abs(dx * y - dy * x) > radius or -dx * x - dy * y - radius > best
+
+
+@inner_kernel
+def _boxes_seen(origin: Floats, boxes: Boxes, chosen: NDArray[np.int64]) -> NearBoxes:
+    n = chosen.size
+    near = NearBoxes(
+        chosen, np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty((n, 3)),
+        np.empty(n),
+    )  # fmt: skip
+    for j, b in enumerate(chosen):
+        near.x[j], near.y[j] = origin[0] - boxes.x[b], origin[1] - boxes.y[b]
+        near.z[j] = origin[2] - boxes.z[b] - boxes.height[b] / 2.0
+        near.cos[j], near.sin[j] = np.cos(boxes.yaw[b]), np.sin(boxes.yaw[b])
+        near.half[j, 0], near.half[j, 1] = boxes.length[b] / 2.0, boxes.width[b] / 2.0
+        near.half[j, 2] = boxes.height[b] / 2.0
+        near.radius[j] = 0.5 * (boxes.length[b] + boxes.width[b]) + MARGIN
+    return near
+
+
+@inner_kernel
+def _ray_box(dx: float, dy: float, dz: float, near: NearBoxes, j: int) -> float:
+    """Distance along the ray to the surface of a box, from outside or inside; inf when it misses."""
+    c, s = near.cos[j], near.sin[j]
+    px, py = near.x[j], near.y[j]
+    o = (c * px + s * py, -s * px + c * py, near.z[j])
     d = (c * dx + s * dy, -s * dx + c * dy, dz)
-    half = (boxes.length[b] / 2.0, boxes.width[b] / 2.0, boxes.height[b] / 2.0)
+    half = (near.half[j, 0], near.half[j, 1], near.half[j, 2])
     enter, leave = -np.inf, np.inf
     for axis in range(3):
         if d[axis] == 0.0:

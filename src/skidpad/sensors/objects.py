@@ -54,15 +54,40 @@ LEVEL_GRADE = 0.065
 LEVEL = np.zeros(2)
 
 
-class Camera(NamedTuple):
-    """A camera placed in the world: origin (3,), rotation (3, 3) with columns forward, left, up."""
+class Axis(NamedTuple):
+    """A unit vector in the world."""
 
-    origin: Floats
-    rotation: Floats
+    x: float
+    y: float
+    z: float
+
+
+class Camera(NamedTuple):
+    """A camera placed in the world. Numbers alone: to hand arrays on costs as much as to use them."""
+
+    x: float
+    y: float
+    z: float
+    forward: Axis
+    left: Axis
+    up: Axis
     focal: float
     width: int
     height: int
     runs: int  # vertical runs per strip
+
+
+class Block(NamedTuple):
+    """One box: its foot, the cosine and sine of its yaw, and half its length and width."""
+
+    x: float
+    y: float
+    z: float
+    cos: float
+    sin: float
+    half_length: float
+    half_width: float
+    height: float
 
 
 class Surroundings(NamedTuple):
@@ -102,6 +127,8 @@ class ObjectSuite:
         self.see_through(weather, None)
         self.labels = np.array([LABEL_OF_KIND[ActorKind(k)] for k in table.kind], dtype=np.uint8)
         self.lanes = lanes
+        rows = (4 * len(table.kind) + 4) * MAX_STRIPS * MAX_RUNS  # all faces of one, two of others
+        self._runs = np.empty((rows, 5), np.float32), np.empty(rows, np.uint8)
         self.walls = walls_of(roadside)
         self.posts = posts_of(roadside)
         self._states: ActorStates | None = None
@@ -121,7 +148,9 @@ class ObjectSuite:
         around = self._around(states)
         seen = {}
         for spec, mount in self.cameras:
-            rows, labels = _segments(around, mount, spec.focal, spec.width, spec.height, self.limit)
+            rows, labels = _segments(
+                around, mount, spec.focal, spec.width, spec.height, self.limit, *self._runs
+            )
             u, width, top, bottom, depth = rows.T
             seen[spec.id] = Segments(u, width, top, bottom, depth, labels)
         return seen
@@ -159,30 +188,38 @@ def _echoes(
 
 @kernel
 def _segments(
-    around: Held[Surroundings], mount: Mount, focal: float, width: int, height: int, limit: float
+    around: Held[Surroundings],
+    mount: Mount,
+    focal: float,
+    width: int,
+    height: int,
+    limit: float,
+    out: NDArray[np.float32],
+    classes: NDArray[np.uint8],
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
-    """(m, 5) u, width, top, bottom, depth and (m,) label of what a camera on box 0 sees."""
+    """(m, 5) u, width, top, bottom, depth and (m,) label of what a camera on box 0 sees.
+
+    out, classes: arrays of the same columns, large enough for any tick, in which to work.
+    """
     states, boxes, labels = around.value.states, around.value.boxes, around.value.labels
-    seat = placed(mount, states)
-    # A camera that looks level sees an upright face at one depth; a pitched one at several.
-    runs = 1 + int(12.0 * abs(seat.rotation[2, 0]))
-    camera = Camera(seat.origin, seat.rotation, focal, width, height, min(runs, MAX_RUNS))
-    present = states.present
-    order = _near_to_far(camera, boxes, present, limit)
-    covered = np.full(camera.width // BIN + 1, float(camera.height))
-    out = np.empty((order.size * 4 * MAX_STRIPS * camera.runs, 5), np.float32)
-    classes = np.empty(out.shape[0], np.uint8)
+    camera = _camera(placed(mount, states), focal, width, height)
+    order = _near_to_far(camera, boxes, states.present, limit)
+    covered = np.full(width // BIN + 1, float(height))
     n = 0
     for i in order:
+        block = Block(
+            boxes.x[i], boxes.y[i], boxes.z[i], np.cos(boxes.yaw[i]), np.sin(boxes.yaw[i]),
+            boxes.length[i] / 2.0, boxes.width[i] / 2.0, boxes.height[i],
+        )  # fmt: skip
         first = n
-        n = _box_runs(camera, boxes, i, False, covered, out, n)
+        n = _box_runs(camera, block, False, covered, out, n)
         for k in range(first, n):
             classes[k] = labels[i]
         # Only now does this box hide others: its own faces do not hide each other. Seen from above,
         # its roof hides up to the far edge, which is where the back faces end.
         last = n
-        if camera.origin[2] > boxes.z[i] + boxes.height[i]:
-            last = _box_runs(camera, boxes, i, True, covered, out, n)
+        if camera.z > block.z + block.height:
+            last = _box_runs(camera, block, True, covered, out, n)
         for k in range(first, last):
             left = max(int((out[k, 0] - out[k, 1] / 2.0) / BIN), 0)
             right = min(int((out[k, 0] + out[k, 1] / 2.0) / BIN), covered.size - 1)
@@ -192,17 +229,27 @@ def _segments(
 
 
 @inner_kernel
+def _camera(seat: Mount, focal: float, width: int, height: int) -> Camera:
+    o, r = seat.origin, seat.rotation
+    forward, left = Axis(r[0, 0], r[1, 0], r[2, 0]), Axis(r[0, 1], r[1, 1], r[2, 1])
+    up = Axis(r[0, 2], r[1, 2], r[2, 2])
+    # A camera that looks level sees an upright face at one depth; a pitched one at several.
+    runs = min(1 + int(12.0 * abs(forward.z)), MAX_RUNS)
+    return Camera(o[0], o[1], o[2], forward, left, up, focal, width, height, runs)
+
+
+@inner_kernel
 def _near_to_far(
     camera: Camera, boxes: Boxes, present: NDArray[np.bool_], limit: float
 ) -> NDArray[np.int64]:
-    origin, n = camera.origin, boxes.x.size
+    origin, n = np.array((camera.x, camera.y, camera.z)), boxes.x.size
     distance = np.full(n, np.inf)
-    yaw = np.arctan2(camera.rotation[1, 0], camera.rotation[0, 0])
+    yaw = np.arctan2(camera.forward.y, camera.forward.x)
     slope = WIDEN * camera.width / (2.0 * camera.focal)
     for i in boxes_in_view(origin, yaw, slope, boxes, limit):
         if i == 0 or not present[i]:
             continue
-        d = np.hypot(boxes.x[i] - origin[0], boxes.y[i] - origin[1])
+        d = np.hypot(boxes.x[i] - camera.x, boxes.y[i] - camera.y)
         reach = d - 0.5 * boxes.length[i]
         if reach < limit and abs(boxes.z[i] - boxes.z[0]) < LEVEL_GAP + LEVEL_GRADE * d:
             distance[i] = d
@@ -212,37 +259,31 @@ def _near_to_far(
 
 @inner_kernel
 def _box_runs(
-    camera: Camera,
-    boxes: Boxes,
-    i: int,
-    back: bool,
-    covered: Floats,
-    out: NDArray[np.float32],
-    n: int,
+    camera: Camera, box: Block, back: bool, covered: Floats, out: NDArray[np.float32], n: int
 ) -> int:
-    """Append runs of box i to `out` from row n on: of its faces in sight, or of those at the back."""
-    c, s = np.cos(boxes.yaw[i]), np.sin(boxes.yaw[i])
-    dx, dy = camera.origin[0] - boxes.x[i], camera.origin[1] - boxes.y[i]
-    along, across = c * dx + s * dy, -s * dx + c * dy  # the camera seen from the box
-    hl, hw = boxes.length[i] / 2.0, boxes.width[i] / 2.0
-    rise = camera.origin[2] - boxes.z[i]
-    inside = abs(along) < hl and abs(across) < hw and 0.0 < rise < boxes.height[i]
+    """Append runs of a box to `out` from row n on: of its faces in sight, or of those at the back."""
+    dx, dy = camera.x - box.x, camera.y - box.y
+    along, across = (
+        box.cos * dx + box.sin * dy,
+        -box.sin * dx + box.cos * dy,
+    )  # the camera from the box
+    hl, hw = box.half_length, box.half_width
+    inside = abs(along) < hl and abs(across) < hw and 0.0 < camera.z - box.z < box.height
     if inside or (along > hl) != back:
-        n = _face_runs(camera, boxes, i, hl, -hw, hl, hw, covered, out, n)
+        n = _face_runs(camera, box, hl, -hw, hl, hw, covered, out, n)
     if inside or (along < -hl) != back:
-        n = _face_runs(camera, boxes, i, -hl, -hw, -hl, hw, covered, out, n)
+        n = _face_runs(camera, box, -hl, -hw, -hl, hw, covered, out, n)
     if inside or (across > hw) != back:
-        n = _face_runs(camera, boxes, i, -hl, hw, hl, hw, covered, out, n)
+        n = _face_runs(camera, box, -hl, hw, hl, hw, covered, out, n)
     if inside or (across < -hw) != back:
-        n = _face_runs(camera, boxes, i, -hl, -hw, hl, -hw, covered, out, n)
+        n = _face_runs(camera, box, -hl, -hw, hl, -hw, covered, out, n)
     return n
 
 
 @inner_kernel
 def _face_runs(
     camera: Camera,
-    boxes: Boxes,
-    i: int,
+    box: Block,
     x0: float,
     y0: float,
     x1: float,
@@ -252,48 +293,46 @@ def _face_runs(
     n: int,
 ) -> int:
     """Runs of the vertical face over the box-frame segment (x0, y0)-(x1, y1)."""
-    c, s = np.cos(boxes.yaw[i]), np.sin(boxes.yaw[i])
     span = np.hypot(x1 - x0, y1 - y0)
     strips = min(max(int(np.ceil(span / STRIP)), MIN_STRIPS), MAX_STRIPS)
-    r = camera.rotation
+    # Strip edges and centre at mid-height give the columns; a strip begins where the last one ended.
+    _, _, end = _column(camera, box, x0, y0)
     for k in range(strips):
-        # Strip edges and centre at mid-height give the columns.
-        u = np.empty(3)
-        valid = True
-        for e in range(3):
-            f = (k + 0.5 * e) / strips
-            bx, by = x0 + f * (x1 - x0), y0 + f * (y1 - y0)
-            px = boxes.x[i] + c * bx - s * by - camera.origin[0]
-            py = boxes.y[i] + s * bx + c * by - camera.origin[1]
-            pz = boxes.z[i] + 0.5 * boxes.height[i] - camera.origin[2]
-            forward = r[0, 0] * px + r[1, 0] * py + r[2, 0] * pz
-            if forward < NEAR:
-                valid = False
-                break
-            left = r[0, 1] * px + r[1, 1] * py + r[2, 1] * pz
-            u[e] = camera.width / 2.0 - camera.focal * left / forward
-            if e == 1:
-                cx, cy = px, py
-        if not valid:
+        begin = end
+        f = (k + 0.5) / strips
+        cx, cy, centre = _column(camera, box, x0 + f * (x1 - x0), y0 + f * (y1 - y0))
+        f = (k + 1.0) / strips
+        _, _, end = _column(camera, box, x0 + f * (x1 - x0), y0 + f * (y1 - y0))
+        if np.isnan(begin) or np.isnan(centre) or np.isnan(end):
             continue
-        lo, hi = max(min(u[0], u[2]), 0.0), min(max(u[0], u[2]), float(camera.width))
+        lo, hi = max(min(begin, end), 0.0), min(max(begin, end), float(camera.width))
         if hi <= lo:
             continue
         middle = 0.5 * (lo + hi)
-        hidden = covered[int(middle / BIN)]
-        n = _strip_runs(
-            camera, cx, cy, boxes.z[i], boxes.height[i], middle, hi - lo, hidden, out, n
-        )
+        n = _strip_runs(camera, box, cx, cy, middle, hi - lo, covered[int(middle / BIN)], out, n)
     return n
+
+
+@inner_kernel
+def _column(camera: Camera, box: Block, bx: float, by: float) -> tuple[float, float, float]:
+    """Place seen from the camera, m, and column, px, of a point of a box; NaN: nearer than `NEAR`."""
+    px = box.x + box.cos * bx - box.sin * by - camera.x
+    py = box.y + box.sin * bx + box.cos * by - camera.y
+    pz = box.z + 0.5 * box.height - camera.z
+    ahead, left = camera.forward, camera.left
+    forward = ahead.x * px + ahead.y * py + ahead.z * pz
+    if forward < NEAR:
+        return px, py, np.nan
+    aside = left.x * px + left.y * py + left.z * pz
+    return px, py, camera.width / 2.0 - camera.focal * aside / forward
 
 
 @inner_kernel
 def _strip_runs(
     camera: Camera,
+    box: Block,
     px: float,
     py: float,
-    z: float,
-    height: float,
     u: float,
     width: float,
     hidden: float,
@@ -301,25 +340,26 @@ def _strip_runs(
     n: int,
 ) -> int:
     """Cut the vertical line over (px, py), relative to the camera, into runs of rows."""
-    r = camera.rotation
+    upper, f_upper = _row(camera, px, py, box.z + box.height * 0 / camera.runs - camera.z)
     for j in range(camera.runs):
-        rows = np.empty(2)
-        depth = 0.0
-        valid = True
-        for e in range(2):
-            pz = z + height * (j + e) / camera.runs - camera.origin[2]
-            forward = r[0, 0] * px + r[1, 0] * py + r[2, 0] * pz
-            if forward < NEAR:
-                valid = False
-                break
-            up = r[0, 2] * px + r[1, 2] * py + r[2, 2] * pz
-            rows[e] = camera.height / 2.0 - camera.focal * up / forward
-            depth += 0.5 * forward
-        if not valid:
+        lower, f_lower = upper, f_upper
+        upper, f_upper = _row(camera, px, py, box.z + box.height * (j + 1) / camera.runs - camera.z)
+        if np.isnan(lower) or np.isnan(upper):
             continue
-        top = max(rows[1], 0.0)
-        bottom = min(rows[0], hidden)
+        top, bottom = max(upper, 0.0), min(lower, hidden)
         if bottom > top:
-            out[n, 0], out[n, 1], out[n, 2], out[n, 3], out[n, 4] = u, width, top, bottom, depth
+            out[n, 0], out[n, 1], out[n, 2], out[n, 3] = u, width, top, bottom
+            out[n, 4] = 0.5 * f_lower + 0.5 * f_upper
             n += 1
     return n
+
+
+@inner_kernel
+def _row(camera: Camera, px: float, py: float, pz: float) -> tuple[float, float]:
+    """Row, px, and depth, m, of a point seen from the camera; the row is NaN nearer than `NEAR`."""
+    ahead, up = camera.forward, camera.up
+    forward = ahead.x * px + ahead.y * py + ahead.z * pz
+    if forward < NEAR:
+        return np.nan, forward
+    above = up.x * px + up.y * py + up.z * pz
+    return camera.height / 2.0 - camera.focal * above / forward, forward

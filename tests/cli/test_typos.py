@@ -7,6 +7,7 @@ import sys
 
 from skidpad.cli import folders
 from skidpad.recording.logfiles import TICKS
+from skidpad.recording.results import RESULTS
 
 TYPOS = """
 adas --weather rain-nigt --out X
@@ -40,6 +41,20 @@ profiles diff a b
 map info foo
 bench foo
 view nofile
+compare X Y
+compare X Y --fail-if foo
+compare A B --fail-if foo
+channels outcomes X
+channels evaluate X
+channels train X --out Y
+hazards list X
+hazards export X
+grip --map-of foo --out X
+campaign estimate adas --weather foo
+shadow X
+export-dataset --weather foo --out X
+profiles show foo
+safety-case X
 adsa
 """
 HEAVY = ("numba", "scipy", "cv2", "matplotlib")
@@ -57,6 +72,9 @@ for words in sys.stdin.read().strip().splitlines():
 
 
 def test_no_typo_waits_for_kernels_and_tables(tmp_path):
+    for name in "AB":
+        (tmp_path / name).mkdir()
+        (tmp_path / name / folders.RESULTS).touch()
     done = subprocess.run(
         [sys.executable, "-c", ASK % (HEAVY,)], input=TYPOS, capture_output=True, text=True,
         cwd=tmp_path, check=False,
@@ -64,4 +82,4 @@ def test_no_typo_waits_for_kernels_and_tables(tmp_path):
     rows = [line.split("|") for line in done.stdout.splitlines() if line.count("|") == 2]
     assert [row[0] for row in rows] == TYPOS.strip().splitlines(), done.stderr
     assert [row for row in rows if row[1:] != ["2", "[]"]] == []
-    assert folders.TICKS == TICKS
+    assert (folders.TICKS, folders.RESULTS) == (TICKS, RESULTS)

@@ -259,6 +259,9 @@ class GripCross(Struct, frozen=True):
     ] = False
 
 
+MAPS = ("threshold",)  # choices of --map-of
+
+
 class MapAsked(Struct, frozen=True):
     """What a threshold map varies; without `map_of` it is none."""
 

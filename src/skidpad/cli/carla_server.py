@@ -17,15 +17,15 @@ from skidpad.simulation.carla_server.options import ServerOptions
 def carla_server(options: ServerOptions) -> None:
     """Serve unmodified CARLA 0.9.16 clients: no GPU, no download."""
     try:
-        from skidpad.simulation.carla_server.maps import MapStore
-        from skidpad.simulation.carla_server.server import CarlaServer, Ports
-        from skidpad.simulation.carla_server.warming import start_compiling
+        import msgpack  # noqa: F401
     except ModuleNotFoundError as error:
-        if error.name != "msgpack":
-            raise
         raise MissingExtra("skidpad carla-server", "server") from error
+    from skidpad.simulation.carla_server.maps import MapStore
 
     require_choice("--map", options.map.rsplit("/", 1)[-1], MapStore(options.maps).names())
+    from skidpad.simulation.carla_server.server import CarlaServer, Ports
+    from skidpad.simulation.carla_server.warming import start_compiling
+
     logging.basicConfig(
         level=logging.WARNING if options.strict else logging.ERROR, format="skidpad: %(message)s"
     )

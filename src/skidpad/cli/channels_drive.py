@@ -125,14 +125,17 @@ def _describe_monitor(folder: Path) -> str:
 def outcomes(folders: list[Path] = FOLDERS) -> None:
     """Compare drivers over the seeds that all have driven: does redundancy pay?"""
     from skidpad.core.errors import FileError
-    from skidpad.evidence.channels.redundancy import compare_drivers
-    from skidpad.evidence.statistics import rate_text
     from skidpad.recording.channel_drives import read_outcomes
 
     driven = read_outcomes(folders)
     if not driven:
-        raise FileError(f"no driven segments below {', '.join(map(str, folders))}")
+        raise FileError(
+            f"no driven segments below {', '.join(map(str, folders))}; give folders that `skidpad "
+            "channels drive` wrote to"
+        )
     from skidpad.core.wording import count_text
+    from skidpad.evidence.channels.redundancy import compare_drivers
+    from skidpad.evidence.statistics import rate_text
 
     for row in compare_drivers(driven):
         typer.echo(

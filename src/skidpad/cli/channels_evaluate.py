@@ -50,20 +50,22 @@ def evaluate(
     import json
 
     from skidpad.core.errors import ConfigError, require_choice
-    from skidpad.evidence.channels.hazards import Signal
-    from skidpad.evidence.channels.judging.evaluation import Evaluation, read_labels
-    from skidpad.recording.files import write_bytes
     from skidpad.recording.sources import recordings_below
-    from skidpad.report.channels_evaluation import write_evaluation_report
 
     paths = recordings_below(folder)
+    from skidpad.evidence.channels.hazards import Signal
+
+    varied = None if curve is None else Signal(require_choice("signal", curve, [*Signal]))
+    from skidpad.evidence.channels.judging.evaluation import Evaluation, read_labels
+    from skidpad.recording.files import write_bytes
+    from skidpad.report.channels_evaluation import write_evaluation_report
+
     marked = read_labels(labels) if labels else {}
     if "" in marked and len(paths) > 1:
         raise ConfigError(
             f"{labels}: needs a column `recording`, since {folder} holds {len(paths)} recordings"
         )
     truths = ("sim", "world") if truth is Truth.both else (truth.value,)
-    varied = None if curve is None else Signal(require_choice("signal", curve, [*Signal]))
     tasks = [_Task(path, folder, truths, _labels_of(path, marked), varied, model) for path in paths]
     evaluation = Evaluation(_segments(tasks, workers))
     if model is not None:
@@ -78,6 +80,9 @@ def evaluate(
 
 def train(folder: Path = DIR, out: Path = MODEL_OUT, workers: int = WORKERS) -> None:
     """Train the learned identifier on recordings with truth; writes the model and its card."""
+    from skidpad.recording.sources import recordings_below
+
+    paths = recordings_below(folder)
     from skidpad.evidence.channels.identifier.model import model_bytes
     from skidpad.evidence.channels.identifier.training import (
         TrainingDrive,
@@ -86,13 +91,9 @@ def train(folder: Path = DIR, out: Path = MODEL_OUT, workers: int = WORKERS) -> 
         train_model,
     )
     from skidpad.recording.files import write_bytes
-    from skidpad.recording.sources import recordings_below
 
     require_learning()
-    tasks = [
-        _Task(path, folder, ("sim", "world"), (), None, None, rows=True)
-        for path in recordings_below(folder)
-    ]
+    tasks = [_Task(path, folder, ("sim", "world"), (), None, None, rows=True) for path in paths]
     drives = [
         TrainingDrive(s.route, s.context.get("seed", s.name), s.t, s.rows, s.truths, s.hours)
         for s in _segments(tasks, workers)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from enum import Enum
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 import typer
 
@@ -73,25 +73,62 @@ def compare(
 
     Example: skidpad compare before after --fail-if "fatal_collisions > 0"
     """
+    from skidpad.cli.folders import require_campaigns_or_runs
     from skidpad.core.errors import ConfigError
-    from skidpad.evidence.compare import compare_campaigns, flaws, judge_rules, parse_rule
-    from skidpad.recording.fingerprint import comparison_text
-    from skidpad.recording.logfiles import TICKS
-    from skidpad.recording.matrix import MATRIX
-    from skidpad.recording.results import read_results
 
-    rules = [parse_rule(text) for text in fail_if or []]
-    if (junit is not None or allow or point) and not rules:
+    if (junit is not None or allow or point) and not fail_if:
         raise ConfigError(
             "--junit, --allow and --point are about the rules of --fail-if, and none is given"
         )
-    if all((folder / TICKS).is_file() for folder in (a, b)):
+    if require_campaigns_or_runs(a, b):
+        if fail_if:
+            raise ConfigError("--fail-if judges campaigns, and these are the folders of two runs")
         from skidpad.cli.show import compare_runs
 
-        if rules:
-            raise ConfigError("--fail-if judges campaigns, and these are the folders of two runs")
         compare_runs(a, b)
         return
+    rules = _read_rules(fail_if or [])
+    gate = Gate(point, undecided, {flaw.value for flaw in allow or []})
+    failures = _compare(a, b, rules, gate)
+    if junit is not None:
+        from skidpad.cli.junit import write_junit
+
+        write_junit(junit, "skidpad compare", failures)
+    for text, by in failures.items():
+        if by and text.startswith("data: "):
+            typer.echo(f"regression ({text}): {by[0]}", err=True)
+    if any(failures.values()):
+        raise typer.Exit(1)
+
+
+class Gate(NamedTuple):
+    """How the rules of --fail-if are judged."""
+
+    point: bool
+    undecided: Undecided
+    allowed: set[str]  # flaws of the data that fail nothing
+
+
+def _read_rules(texts: list[str]) -> list[Rule]:
+    """The rules; one that cannot be read is said before the tests load."""
+    from skidpad.evidence.comparisons import parse_comparison
+    from skidpad.recording.matrix import Metrics
+    from skidpad.recording.results import definitions_of
+
+    columns = [name for name, _, _ in definitions_of(Metrics)]
+    read = [(text, parse_comparison("--fail-if", text, columns)) for text in texts]
+    from skidpad.evidence.compare import Rule
+
+    return [Rule(text, *parts) for text, parts in read]
+
+
+def _compare(a: Path, b: Path, rules: list[Rule], gate: Gate) -> dict[str, list[str]]:
+    """Print what changed and what the rules say of it; returns what fails, by rule."""
+    from skidpad.evidence.compare import compare_campaigns, flaws, judge_rules
+    from skidpad.recording.fingerprint import comparison_text
+    from skidpad.recording.matrix import MATRIX
+    from skidpad.recording.results import read_results
+
     wanted = list(dict.fromkeys([*SHOWN, *(r.column for r in rules)]))
     before, after = (read_results(folder, MATRIX) for folder in (a, b))
     changes, alone_a, alone_b = compare_campaigns(before, after, wanted)
@@ -99,22 +136,15 @@ def compare(
     typer.echo(comparison_text(*(_places(t) for t in (before, after))))
     if alone_a or alone_b:
         typer.echo(f"without a partner: {alone_a} runs of {a}, {alone_b} of {b}")
-    judged = judge_rules(rules, changes, point=point)
-    failures = {rule.text: [j.text for j in _against(rule, judged, undecided)] for rule in rules}
-    passed = {flaw.value for flaw in allow or []}
+    judged = judge_rules(rules, changes, point=gate.point)
+    failures = {
+        rule.text: [j.text for j in _against(rule, judged, gate.undecided)] for rule in rules
+    }
     for flaw, sentence in (flaws(before, after, rules) if rules else {}).items():
-        failures[f"data: {flaw.value}"] = [] if flaw.value in passed else [sentence]
-    if junit is not None:
-        from skidpad.cli.junit import write_junit
-
-        write_junit(junit, "skidpad compare", failures)
+        failures[f"data: {flaw.value}"] = [] if flaw.value in gate.allowed else [sentence]
     for rule in rules:
-        _say(rule, judged, undecided)
-    for text, by in failures.items():
-        if by and text.startswith("data: "):
-            typer.echo(f"regression ({text}): {by[0]}", err=True)
-    if any(failures.values()):
-        raise typer.Exit(1)
+        _say(rule, judged, gate.undecided)
+    return failures
 
 
 def _places(results: pl.DataFrame) -> set[str]:

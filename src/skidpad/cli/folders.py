@@ -6,6 +6,7 @@ from pathlib import Path
 
 from skidpad.core.errors import FileError
 
+RESULTS = "results.parquet"  # recording.results.RESULTS, likewise
 TICKS = "ticks.parquet"  # recording.logfiles.TICKS, which loads the library of tables
 
 
@@ -22,3 +23,16 @@ def require_run(path: Path, *others: str) -> None:
         f"{path} is not the folder of a run: it has no {TICKS}; give OUT of `skidpad play`, or "
         "OUT/runs/NAME of a campaign"
     )
+
+
+def require_campaigns_or_runs(*folders: Path) -> bool:
+    """Whether all folders are of runs; FileError unless they are, or all hold results of a campaign."""
+    if all((folder / TICKS).is_file() for folder in folders):
+        return True
+    for folder in folders:
+        if not (folder / RESULTS).is_file():
+            raise FileError(
+                f"{folder} holds no results of a campaign: it has no {RESULTS}; give the folders that "
+                "two campaigns wrote to, or those of two runs"
+            )
+    return False

@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from msgspec import structs
 
-from skidpad.cli.asked import Controller, GripCross, MapAsked, Tuned
+from skidpad.cli.asked import MAPS, Controller, GripCross, MapAsked, Tuned
 from skidpad.cli.campaigns import FirstSeed, How
 from skidpad.cli.spread import spread
+from skidpad.core.errors import require_choice
 from skidpad.core.run import BackendChoice, Friction, RunSpec, Scenario
 from skidpad.core.vocabulary import Outcome, SensorLevel
 
@@ -55,6 +56,7 @@ def grip(
     run = structs.replace(run, backend=checked(backend), seed=first_seed)
     alone, keep_all = drives_alone(run.backend), keep is Keep.ALL
     if map.map_of is not None:
+        require_choice("--map-of", map.map_of, MAPS)
         from skidpad.campaign import threshold
         from skidpad.campaign.campaign import Campaign
         from skidpad.cli import threshold_plan

@@ -70,11 +70,12 @@ def export(
 ) -> None:
     """Write each hazard as .xosc and .xodr into DIR/scenarios."""
     from skidpad.recording.hazards import read_hazards
+
+    chosen = _choose_ids({record.id: record for record in read_hazards(folder)}, id)
     from skidpad.scenarios.hazard_export import export_hazard
     from skidpad.scenarios.writer import OscVersion
 
-    records = {record.id: record for record in read_hazards(folder)}
-    for record in _choose_ids(records, id):
+    for record in chosen:
         scenario, road = export_hazard(record, folder / "scenarios", OscVersion(osc.value), world)
         typer.echo(f"{scenario} with {road.name}")
 

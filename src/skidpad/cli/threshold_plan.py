@@ -16,13 +16,12 @@ from skidpad.campaign.threshold_cells import (
     start_of_text,
     tasks,
 )
-from skidpad.cli.asked import OURS, Controller, GripCross, MapAsked
+from skidpad.cli.asked import MAPS, OURS, Controller, GripCross, MapAsked
 from skidpad.cli.grip_plan import parted
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import ActorMode, RunSpec
 from skidpad.physics.presets import find_weather
 
-MAPS = ("threshold",)
 REPEATS = 20  # of every level; a median's interval needs six
 WEATHER = "rain_0"  # of the study: dry, and every level looks like it
 

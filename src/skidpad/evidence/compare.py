@@ -8,7 +8,6 @@ averaged first. A gate judges a family of hypotheses, one per rule and driver, b
 from __future__ import annotations
 
 import operator
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -18,9 +17,9 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from skidpad.core.errors import ConfigError, require_choice
-from skidpad.core.told import told
+from skidpad.core.errors import ConfigError
 from skidpad.core.wording import count_text
+from skidpad.evidence.comparisons import parse_comparison
 from skidpad.evidence.contrasts import NOT_RUN
 from skidpad.evidence.statistics import (
     EVER_SIGNIFICANT,
@@ -37,13 +36,6 @@ Floats = NDArray[np.float64]
 
 ALPHA = 0.05
 PAIRED_BY = ("config", "weather", "seed")
-OPERATORS: dict[str, Callable[[float, float], bool]] = {
-    ">=": operator.ge,
-    "<=": operator.le,
-    ">": operator.gt,
-    "<": operator.lt,
-}
-RULE = re.compile(r"^\s*(\w+)\s*(>=|<=|>|<)\s*([-+]?[0-9.]+(?:e[-+]?\d+)?)\s*$")
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,24 +170,6 @@ def _pairs(a: pl.DataFrame, b: pl.DataFrame) -> pl.DataFrame:
 def parse_rule(text: str) -> Rule:
     """`fatal_collisions > 0.1`: column, one of > >= < <=, number; about the mean difference."""
     return Rule(text, *parse_comparison("--fail-if", text, columns()))
-
-
-def parse_comparison(
-    option: str, text: str, known: list[str] | tuple[str, ...]
-) -> tuple[str, Callable[[float, float], bool], float]:
-    """A name among `known`, a comparison and a number; ConfigError says what `option` takes."""
-    match = RULE.match(text)
-    if not match:
-        raise ConfigError(f"{option} takes COLUMN > NUMBER (or >=, <, <=), got {told(text, 200)}")
-    column, sign, number = match.groups()
-    require_choice("column", column, known)
-    try:
-        limit = float(number)
-    except ValueError:
-        raise ConfigError(
-            f"{option}: {told(number, 100)} is no number, in {told(text, 200)}"
-        ) from None
-    return column, OPERATORS[sign], limit
 
 
 def columns() -> list[str]:

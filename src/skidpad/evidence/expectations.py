@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import inf
 
 from skidpad.core.wording import count_text
-from skidpad.evidence.compare import parse_comparison
+from skidpad.evidence.comparisons import parse_comparison
 from skidpad.evidence.pairs import Pair, pairs
 from skidpad.recording.runlog import RunLog
 

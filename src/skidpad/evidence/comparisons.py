@@ -1,0 +1,36 @@
+"""`COLUMN > NUMBER`: a name, a comparison and a number, read before anything heavy loads."""
+
+from __future__ import annotations
+
+import operator
+import re
+from collections.abc import Callable
+
+from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.told import told
+
+OPERATORS: dict[str, Callable[[float, float], bool]] = {
+    ">=": operator.ge,
+    "<=": operator.le,
+    ">": operator.gt,
+    "<": operator.lt,
+}
+RULE = re.compile(r"^\s*(\w+)\s*(>=|<=|>|<)\s*([-+]?[0-9.]+(?:e[-+]?\d+)?)\s*$")
+
+
+def parse_comparison(
+    option: str, text: str, known: list[str] | tuple[str, ...]
+) -> tuple[str, Callable[[float, float], bool], float]:
+    """A name among `known`, a comparison and a number; ConfigError says what `option` takes."""
+    match = RULE.match(text)
+    if not match:
+        raise ConfigError(f"{option} takes COLUMN > NUMBER (or >=, <, <=), got {told(text, 200)}")
+    column, sign, number = match.groups()
+    require_choice("column", column, known)
+    try:
+        limit = float(number)
+    except ValueError:
+        raise ConfigError(
+            f"{option}: {told(number, 100)} is no number, in {told(text, 200)}"
+        ) from None
+    return column, OPERATORS[sign], limit

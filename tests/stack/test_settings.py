@@ -254,7 +254,7 @@ def test_profiles_are_listed_with_their_distance_from_recommended():
 
 def test_a_profile_is_shown_as_set_takes_it():
     out = RUNNER.invoke(app, ["profiles", "show", "thesis_listing"]).output
-    shown = [line.split("#")[0].strip() for line in out.splitlines()]
+    shown = [line for line in out.splitlines() if not line.startswith("#")]
     pairs = parse_assignments(line.replace(": ", "=", 1) for line in shown)
     assert tuple(pairs) == NAMES
     assert Settings().with_values(pairs) == load_profile("thesis_listing")

@@ -50,7 +50,7 @@ def adas(
         ),
     ] = 0,
 ) -> None:
-    """Drive configurations x weathers x seeds; prints the path of the report."""
+    """Drive configurations x weathers x seeds; prints the answer and the path of the report."""
     from skidpad.cli.carla_backend import checked, drives_alone
     from skidpad.roads.map_files import require_map
 
@@ -64,7 +64,6 @@ def adas(
     from skidpad.campaign.matrix import RECIPE
     from skidpad.cli.adas_plan import on_pixels, plan
     from skidpad.recording.matrix import PIXELS
-    from skidpad.report.matrix import write_report
 
     run = structs.replace(run, course=roads, backend=checked(backend), seed=first_seed)
     run = found_again(run, how.folder)
@@ -73,7 +72,19 @@ def adas(
     campaign = Campaign(RECIPE, cells, alone=alone, files=files, distinct=distinct)
     twins = on_pixels(cells, parity_seeds)
     parts = {PIXELS: Campaign(RECIPE, twins, alone=alone, files=files)} if twins else {}
-    how(campaign, write_report, parts)
+    how(campaign, answer, parts)
+
+
+def answer(folder: Path) -> str:
+    """Write the report of a campaign; returns what it answers, its path, and the next command."""
+    from skidpad.report.matrix import write_report
+    from skidpad.report.matrix_answers import terminal_answer
+    from skidpad.report.matrix_data import load_matrix
+
+    page = write_report(folder)
+    *lines, last = terminal_answer(load_matrix(folder))
+    told = [*lines, str(page), last] if last.startswith("Next: ") else [*lines, last, str(page)]
+    return "\n".join(told)
 
 
 def report(
@@ -100,11 +111,10 @@ def _reports() -> dict[str, Callable[[Path], object]]:
     from skidpad.cli.channels_drive import totals
     from skidpad.cli.expected import played_report
     from skidpad.report.grip import write_grip_report
-    from skidpad.report.matrix import write_report
     from skidpad.report.threshold import write_threshold_report
 
     return {
-        "adas": write_report,
+        "adas": answer,
         "grip": write_grip_report,
         "grip-threshold": write_threshold_report,
         "channels": totals,

@@ -30,7 +30,6 @@ class Undecided(str, Enum):
     let_pass = "pass"
 
 
-PIPE_WIDTH = 200  # columns, so that nothing wraps where no terminal reads
 SHOWN = (
     "fatal_collisions",
     "crashes_vehicle",
@@ -97,6 +96,7 @@ def compare(
     for text, by in failures.items():
         if by and text.startswith("data: "):
             typer.echo(f"regression ({text}): {by[0]}", err=True)
+    typer.echo(f"Next: skidpad report {b} writes the page of the second campaign")
     if any(failures.values()):
         raise typer.Exit(1)
 
@@ -174,9 +174,9 @@ def _say(rule: Rule, judged: list[Judged], undecided: Undecided) -> None:
 
 def _print(changes: list[Change]) -> None:
     """The table of all changes; what so few seeds cannot tell stands once below it."""
-    from rich.console import Console
     from rich.table import Table
 
+    from skidpad.cli.tables import table_console
     from skidpad.evidence.statistics import holm, no_limits_text, p_text, range_text
 
     tested = [c.comparison.p for c in changes]
@@ -199,8 +199,7 @@ def _print(changes: list[Change]) -> None:
             str(found.n),
             f"{c.same} of {c.runs}",
         )
-    console = Console()
-    Console(width=None if console.is_terminal else PIPE_WIDTH).print(table)
+    table_console().print(table)
     for sentence, columns in without.items():
         everywhere = len(columns) == len(changes)
         typer.echo(sentence if everywhere else f"{sentence}: {', '.join(columns)}")

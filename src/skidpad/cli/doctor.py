@@ -27,14 +27,14 @@ class Extra:
 
 
 EXTRAS = (
-    Extra("server", "msgpack", "msgpack", "skidpad carla-server: CARLA's protocol without a GPU"),
-    Extra("carla", "carla", "carla", "--backend carla, and the pytest fixture for CARLA clients"),
+    Extra("server", "msgpack", "msgpack", "skidpad carla-server: CARLA without a GPU"),
+    Extra("carla", "carla", "carla", "--backend carla, a pytest fixture for its clients"),
     Extra("cluster", "distributed", "distributed", "--cluster: campaigns on many machines"),
     Extra("ros", "rosbags", "rosbags", "skidpad monitor on ROS 2 bags"),
     Extra("learn", "sklearn", "scikit-learn", "--identifier learned"),
     Extra("osi", "osi3", "osi-python", "skidpad export --osi: traces of ASAM OSI"),
     Extra("cockpit", "nicegui", "nicegui", "skidpad drive, replay, watch: pages in a browser"),
-    Extra("fleet", "fastapi", "fastapi", "skidpad fleet: what many vehicles report, and updates"),
+    Extra("fleet", "fastapi", "fastapi", "skidpad fleet: what many vehicles report"),
     Extra("view", "rerun", "rerun-sdk", "skidpad view: recordings in Rerun"),
 )
 PROTOCOL = "0.9.16"  # of CARLA's clients, which the server speaks
@@ -58,7 +58,7 @@ def doctor() -> None:
         if extra.name == "server" and there:
             state = f"serves CARLA {PROTOCOL}"
         # plain lines: in a pipe they are as long as they are
-        typer.echo(f"{extra.name:<8} {state:<24} {extra.gives}")
+        typer.echo(f"{extra.name:<8} {state:<20} {extra.gives}")
     missing = [extra.name for extra in EXTRAS if find_spec(extra.module) is None]
     if missing:
         typer.echo(f"\nto install what is missing: {install_command(','.join(missing))}")

@@ -50,7 +50,7 @@ def grip(
         Keep, typer.Option(help="shown: logs of runs in the report; all: of every run.")
     ] = Keep.SHOWN,
 ) -> None:
-    """Drive scenarios x weathers x frictions x seeds; prints the path of the report."""
+    """Drive scenarios x weathers x frictions x seeds; prints the answer and the path of the report."""
     from skidpad.cli.carla_backend import checked, drives_alone
 
     run = structs.replace(run, backend=checked(backend), seed=first_seed)
@@ -78,8 +78,8 @@ def grip(
     from skidpad.report.grip import write_grip_report
 
     def answer(folder: Path) -> str:
-        page = write_grip_report(folder)
-        return f"{answer_text(read_results(folder))}\n{page}"
+        page, rows = write_grip_report(folder), read_results(folder)
+        return f"{answer_text(rows)}\n{page}\n{next_text(rows)}"
 
     how(Campaign(recipe(keep_all), cells, alone=alone), answer)
 
@@ -103,3 +103,11 @@ def answer_text(rows: pl.DataFrame) -> str:
             scenario, weather, n = worst.row(0)
             lines[-1] += f", most in {scenario} in {weather} ({n})"
     return "\n".join(lines)
+
+
+def next_text(rows: pl.DataFrame) -> str:
+    """Returns the command that says how much grip the worst weather leaves, of all if none was hit."""
+    hit = rows.filter(rows["outcome"] == Outcome.COLLISION.value)
+    cells = hit.group_by("weather").len().sort("len", "weather", descending=[True, False])
+    told = f"--preset {cells['weather'][0]}" if len(cells) else "--table"
+    return f"Next: skidpad friction {told} says how far it is to a stop"

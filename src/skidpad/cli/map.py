@@ -104,7 +104,8 @@ def _facts(map: RoadMap, summary: MapSummary) -> list[str]:
     limits = ", ".join(f"{limit * 3.6:.0f}" for limit in summary.limits)
     side = map.roadside
     return [
-        f"map {map.name}, content hash {map.content_hash}",
+        f"map {map.name}",
+        f"content hash {map.content_hash}",
         f"{summary.roads} roads, {summary.lanes} lanes, {summary.junctions} junctions",
         f"lanes: {lengths}",
         f"signals: {signals or 'none'}",

@@ -7,6 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
+WIDTH = 80  # columns of a terminal
 profiles = typer.Typer(
     name="profiles",
     help="Settings profiles: list them, show one, compare two.",
@@ -51,16 +52,17 @@ def sensors(
 def show(name: str) -> None:
     """Show every setting of a profile with its source."""
     from dataclasses import fields
+    from textwrap import wrap
 
     from skidpad.stack.settings import Settings, load_profile
 
     plain = load_profile(name).as_plain()
     for f in fields(Settings):
         about = f.metadata
-        typer.echo(
-            f"{f.name + ': ' + _text(plain[f.name]):<42}"
-            f"# {about['source']}, {about['house']}: {about['text']}"
-        )
+        words = f"{about['source']}, {about['house']}: {about['text']}"
+        for line in wrap(words, WIDTH, initial_indent="# ", subsequent_indent="#   "):
+            typer.echo(line)
+        typer.echo(f"{f.name}: {_text(plain[f.name])}")
 
 
 @profiles.command()

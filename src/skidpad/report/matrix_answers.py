@@ -48,6 +48,25 @@ def answers(
     return Answers([_functions(matrix), _weather(matrix), _next(matrix, judged, crashes)])
 
 
+def terminal_answer(matrix: Matrix) -> list[str]:
+    """The first two answers as lines, and what to look at next as a command."""
+    if not len(matrix.finished):
+        return ["No run was finished."]
+    functions, weather = _functions(matrix), _weather(matrix)
+    lines = [functions.sentence, *functions.lines, weather.sentence]
+    runs = matrix.finished.filter(pl.col("config").is_in(matrix.comparison_configs))
+    worst = runs.sort(EVENTS, "config", "weather", "seed", descending=[True, *[False] * 3]).head(1)
+    for name in matrix.names(worst):
+        if (
+            name is not None
+            and worst[EVENTS][0]
+            and (folder := matrix.folder.log(name)) is not None
+        ):
+            crashes = count_text(worst[EVENTS][0], EVENT, EVENTS)
+            lines.append(f"Next: skidpad show {folder} tells of the run with {crashes}")
+    return lines
+
+
 # --- which functions
 
 

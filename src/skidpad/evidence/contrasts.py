@@ -261,7 +261,7 @@ class Never:
         p_claimed, p_against = (1.0, 0.0) if broken else (0.0, 1.0)
         label = f"0.5 minus the number of {self.cases}"
         sure = Interval(value, value)
-        words = f"{broken} of {judged} {self.cases}; one is enough"
+        words = f"{self.cases}: {broken} of {judged}; one is enough"
         return Contrast(label, value, sure, p_claimed, p_against, 0.0, judged, judged, words=words)
 
 

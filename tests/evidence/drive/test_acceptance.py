@@ -51,7 +51,7 @@ def test_one_cell_decides_the_collision_check():
 def test_a_claim_that_one_case_decides_counts_cases_in_words():
     once = {"0": 5, "1": 1, "2": 1, "3": 1, "4": 1}
     (judged,) = judge([BY_ID["A-276"]], [matrix(once, FEW)])
-    assert "2 of 4 cells that break it over all seeds; one is enough" in judged.text
+    assert "cells that break it over all seeds: 2 of 4; one is enough" in judged.text
     assert "0.5" not in judged.text
 
 

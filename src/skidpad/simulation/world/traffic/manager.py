@@ -35,7 +35,13 @@ from skidpad.simulation.world.traffic.pack import RADIUS, UNSEEN, Pack
 from skidpad.simulation.world.traffic.path import PATH, begin, straight_path
 from skidpad.simulation.world.traffic.places import FreePlaces
 from skidpad.simulation.world.traffic.priority import CONFLICT, ENTRY, ZEBRA, bake_priority
-from skidpad.simulation.world.traffic.spacing import LEAST_TIME, claims, room, seconds_to_others
+from skidpad.simulation.world.traffic.spacing import (
+    LEAST_TIME,
+    claims,
+    is_crossing_free,
+    room,
+    seconds_to_others,
+)
 from skidpad.simulation.world.traffic.state import TRAIT, Streets, drivers
 from skidpad.simulation.world.traffic.variety import vary
 
@@ -266,7 +272,10 @@ class Traffic:
         if (states.present & (d < room(self.care, v, states))).any():
             return False
         lane, s = int(self.places.lane[at]), float(self.net.point["s"][at])
-        return seconds_to_others(self.net, claimed, lane, s, v, i) >= LEAST_TIME
+        return (
+            is_crossing_free(self.streets, claimed, lane, s, i)
+            and seconds_to_others(self.net, claimed, lane, s, v, i) >= LEAST_TIME
+        )
 
     def _speed_at(self, i: int, at: int) -> float:
         """m/s at which driver i passes sample `at`: as traffic does there."""

@@ -21,10 +21,13 @@ from skidpad.simulation.world.traffic.care import (
 from skidpad.simulation.world.traffic.network import Network
 from skidpad.simulation.world.traffic.occupancy import NOBODY, SLOTS
 from skidpad.simulation.world.traffic.path import PATH
+from skidpad.simulation.world.traffic.right_of_way import leads_to
 from skidpad.simulation.world.traffic.state import Drivers, View
 
 REACH_LIGHT = 150.0  # m
-MERGE_REACH = 60.0  # m before a merge within which the streams watch each other
+MERGE_REACH = 60.0  # m before a merge within which the streams watch each other, at least
+MERGE_TIME = 6.0  # s before it, at speed: a gap then opens at 2 m/s^2, comfortably
+MERGE_LANES = 4  # of the other branch that are searched backwards: maps cut a road into short lanes
 YELLOW_BRAKE = 3.0  # m/s^2, drivers stop at yellow if this is enough
 STOP_MARGIN = 1.0  # m kept to a stop line, beside the IDM's standstill gap
 PREVIEW_STEP = 5.0  # m between two looks at limit and bend
@@ -103,7 +106,8 @@ def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
     """Who arrives at a merge ahead just before driver i on another branch, and the gap to it."""
     net, occ = view.streets.net, view.occ
     start = net.lane[d.path[i, 0]].length - d.state[i].s
-    far = reach(view.care, view.placed[i].speed, MERGE_REACH)
+    v = view.placed[i].speed
+    far = max(reach(view.care, v, MERGE_REACH), v * MERGE_TIME)
     best, best_gap = NOBODY, np.inf
     for k in range(1, PATH):
         if d.path[i, k] < 0 or start > far:
@@ -113,13 +117,26 @@ def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
             other_lane = net.prev_lane[p]
             if other_lane == d.path[i, k - 1]:
                 continue
-            entry = occ.head[other_lane]
-            while entry != NOBODY:
-                distance = net.lane[other_lane].length - occ.s[entry]
-                gap = start - distance
-                if entry // SLOTS != i and distance < far and 0.0 < gap < best_gap:
-                    best, best_gap = entry // SLOTS, gap
-                entry = occ.next[entry]
+            way, here = (
+                0.0,
+                other_lane,
+            )  # m from the beginning of the merge back to the end of `here`
+            for _ in range(MERGE_LANES):
+                row = net.lane[here]
+                entry = occ.head[here]
+                while entry != NOBODY:
+                    j = entry // SLOTS
+                    gap = start - (way + row.length - occ.s[entry])
+                    comes = (
+                        here == other_lane or not d.state[j].active or leads_to(d, j, other_lane)
+                    )
+                    if j != i and comes and start - gap < far and 0.0 < gap < best_gap:
+                        best, best_gap = j, gap
+                    entry = occ.next[entry]
+                way += row.length
+                if way > far or row.prevs != 1:
+                    break
+                here = net.prev_lane[row.prev_first]
         start += lane.length
     if best == NOBODY:
         return NOBODY, np.inf

@@ -1,8 +1,8 @@
 """Waiting for others at junctions and zebras: stop lines, gap acceptance, areas that are taken.
 
 A driver decides before the junction: it enters when its way through is free, when nobody to whom
-it yields arrives too soon, and when there is room behind the junction. Once in, it only keeps out
-of areas in which somebody stands.
+it yields arrives too soon, and when there is room behind the junction. Once in, it keeps out of areas
+in which another stands, and judges gaps anew when it had to stop.
 """
 
 from __future__ import annotations
@@ -36,6 +36,7 @@ SLIPPERY = 0.5  # of the dry road's friction; with more a queue starts within a 
 TAKEN_TIME = 20.0  # s after which a driver in a junction creeps on
 EXIT_ROOM = 3.0  # m to be free behind the junction beside the own length
 V_QUEUE = 2.0  # m/s, slower leaders make a queue
+V_ANEW = 2.0  # m/s, below which a driver in a junction can still leave the way to others
 KERB = 0.5  # m beside the road from which a pedestrian in motion counts as on the zebra
 V_WALKING = 0.1  # m/s
 INDICATED = 5  # lanes ahead that others can guess
@@ -66,13 +67,12 @@ def right_of_way_gap(view: View, d: Drivers, i: int) -> float:
                     return max(line, 0.1)
             else:
                 me.halted = NOBODY if k == 0 else me.halted  # the stop is over
-                blocked = _taken_ahead(view, d, i, k, start)
-                if blocked == np.inf:
-                    me.waited = 0.0
-                else:
-                    me.waited += view.dt
-                    if me.waited < TAKEN_TIME:
-                        return max(blocked, 0.1)
+                blocked = _gap_within(view, d, i, k, start, True)
+                me.waited = me.waited + view.dt if blocked < np.inf else 0.0
+                if me.waited >= TAKEN_TIME:
+                    blocked = _gap_within(view, d, i, k, start, False)
+                if blocked < np.inf:
+                    return max(blocked, 0.1)
         start += view.streets.net.lane[lane].length
     return np.inf
 
@@ -157,7 +157,7 @@ def _holds_impatient(view: View, d: Drivers, here: int, lane: int, reach: float)
     entry = view.occ.head[here]
     while entry != NOBODY:
         j = entry // SLOTS
-        turns = _is_impatient(view, d, j) and d.path[j, 0] == here and _leads_to(d, j, lane)
+        turns = _is_impatient(view, d, j) and d.path[j, 0] == here and leads_to(d, j, lane)
         if turns and _gap_to_line(view, d, j) < reach:
             return True
         entry = view.occ.next[entry]
@@ -201,17 +201,27 @@ def _is_occupied(view: View, i: int, lane: int, start: float, end: float) -> boo
 
 
 @inner_kernel
-def _taken_ahead(view: View, d: Drivers, i: int, k: int, start: float) -> float:
-    """m to the nearest shared area on path[k] in which somebody is, for who is in the junction."""
-    entry = view.streets.entry[d.path[i, k]]
+def _gap_within(view: View, d: Drivers, i: int, k: int, start: float, keeps_out: bool) -> float:
+    """m to the nearest shared area on path[k] that a driver in the junction must not enter; inf: none.
+
+    keeps_out: of areas in which another stands. A driver who has almost stopped judges gaps anew.
+    """
+    entry, body = view.streets.entry[d.path[i, k]], view.placed[i]
     nearest = np.inf
     for c in range(entry.first, entry.first + entry.size):
         conflict = view.streets.conflict[c]
         gap = start + conflict.start
         if gap < 0.0 or gap > nearest:
             continue
-        if _is_occupied(view, i, conflict.other, conflict.other_start, conflict.other_end):
+        if keeps_out and _is_occupied(
+            view, i, conflict.other, conflict.other_start, conflict.other_end
+        ):
             nearest = gap
+        elif conflict.yields and body.speed < V_ANEW:
+            way = max(start + conflict.end + 2.0 * body.half_length, 1.0)
+            clear = _time_through(view, d, i, way, entry.bend) + GAP_MARGIN
+            if _is_coming(view, d, i, conflict.other, conflict.other_start, clear):
+                nearest = gap
     return nearest
 
 
@@ -284,7 +294,7 @@ def _arrives(
             continue
         if v < HALTED and _is_impatient(view, d, i):
             continue
-        if d.state[j].active and not _leads_to(d, j, target):
+        if d.state[j].active and not leads_to(d, j, target):
             continue
         if view.occ.s[entry_now] > way:
             continue
@@ -294,7 +304,7 @@ def _arrives(
 
 
 @inner_kernel
-def _leads_to(d: Drivers, j: int, lane: int) -> bool:
+def leads_to(d: Drivers, j: int, lane: int) -> bool:
     """Whether driver j's path goes over a lane: its indicators say so."""
     found = False
     for k in range(INDICATED):

@@ -10,7 +10,8 @@ from skidpad.simulation.world.placed import Places
 from skidpad.simulation.world.traffic.care import FIRM_SHARE, REACTION, STOP_MARGIN, Care, grip_at
 from skidpad.simulation.world.traffic.network import Network
 from skidpad.simulation.world.traffic.places import CLEARANCE
-from skidpad.simulation.world.traffic.state import Drivers
+from skidpad.simulation.world.traffic.right_of_way import WATCH
+from skidpad.simulation.world.traffic.state import Drivers, Streets
 
 Floats = NDArray[np.float64]
 
@@ -50,6 +51,34 @@ def seconds_to_others(
         speed = np.maximum(v if forward else placed["speed"], 0.1)
         least = min(least, float((np.maximum(gap, 0.0) / speed)[near].min(initial=np.inf)))
     return least
+
+
+def is_crossing_free(streets: Streets, claimed: Places, lane: int, s: float, me: int) -> bool:
+    """Whether a vehicle that is put before a junction surprises nobody there.
+
+    Drivers judge gaps by those within `WATCH` m of the shared area: who has decided to go cannot
+    yield to a vehicle that was not there. claimed, me: as in `seconds_to_others`.
+    """
+    net, n = streets.net, len(claimed) // 2
+    row = net.lane[lane]
+    if streets.entry["line"][lane] - s > WATCH:
+        return True
+    there = claimed["present"].copy()
+    there[[me, me + n]] = False
+    on, left = (
+        claimed["lane"][there],
+        net.lane["length"][claimed["lane"]][there] - claimed["s"][there],
+    )
+    for way in net.next_lane[row["next_first"] : row["next_first"] + row["nexts"]]:
+        entry = streets.entry[way]
+        conflicts = streets.conflict[entry["first"] : entry["first"] + entry["size"]]
+        for other in conflicts["other"].tolist():
+            across = net.lane[other]
+            first = int(across["prev_first"])
+            before = net.prev_lane[first : first + int(across["prevs"])]
+            if ((on == other) | (np.isin(on, before) & (left < WATCH))).any():
+                return False
+    return True
 
 
 def _way(net: Network, lane: int, s: float, forward: bool) -> dict[int, float]:

@@ -1,0 +1,89 @@
+"""Background drivers in town who once touched: at a slip road, in a junction, and on entering."""
+
+import numpy as np
+import pytest
+
+from skidpad.campaign.bench_traffic import background_world
+from skidpad.campaign.traffic_asked import TrafficBench
+from skidpad.core.vocabulary import LightState
+from skidpad.roads.bundled import load_map
+from skidpad.simulation.world.traffic.spacing import claims, is_crossing_free
+from skidpad.simulation.world.world import EGO
+
+TOWN = load_map("town")
+
+
+def drivers_at(weather, *places):
+    """A town with one driver per (lane, s, v, way) and nobody else, all lights green."""
+    world = background_world(TrafficBench(map="town", vehicles=len(places) + 1, km=1.0), weather, 1)
+    traffic = world.traffic
+    traffic.waiting.clear()
+    traffic.release(EGO)
+    world.states.present[EGO] = False
+    for i, (lane, s, v, way) in enumerate(places, start=1):
+        world.put(i, TOWN.at(lane, s).pose, v)
+        traffic.engage(i, lane, s)
+        traffic.drivers.path[i, : len(way)] = way
+    world.lights.hold((k, LightState.GREEN) for k in world.lights.by_id)
+    return world
+
+
+def drive(world, seconds):
+    """(ticks, actors) speeds and lanes of the drivers, and the number of contacts."""
+    rows, contacts = [], 0
+    for _ in range(round(seconds / 0.05)):
+        world.step()
+        contacts += len(world.background)
+        rows.append(
+            (np.hypot(world.states.vx, world.states.vy), world.traffic.drivers.path[:, 0].copy())
+        )
+    speed, lane = (np.array(column) for column in zip(*rows, strict=True))
+    return speed, lane, contacts
+
+
+@pytest.mark.parametrize("start", [220.0, 243.5])  # of the main road, as in two contacts seen
+def test_the_main_road_makes_room_for_who_joins_from_a_slip_road(start):
+    world = drivers_at(
+        "clear-noon", (86, start, 20.0, (86, 90, 94)), (100, 106.0, 12.2, (100, 102, 94))
+    )
+    speed, _, contacts = drive(world, 9.0)
+    assert contacts == 0
+    assert np.diff(speed[:, 1]).min() / 0.05 > -5.0, "it brakes early instead of hard"
+
+
+def test_who_stopped_in_a_junction_judges_gaps_anew():
+    coming, turning = (20, 272.0, 8.3, (20, 61, 34)), (62, 9.0, 0.0, (62, 12))
+    speed, lane, contacts = drive(drivers_at("clear-noon", coming, turning), 12.0)
+    assert contacts == 0
+    passed = np.flatnonzero(lane[:, 1] == 34)[0]
+    assert speed[:passed, 1].min() > 6.0, "who has priority drives on"
+    assert speed[: passed - 20, 2].max() < 1.5, "who turns left waits where it stands"
+    assert speed[-1, 2] > 2.0, "and then goes"
+
+
+@pytest.mark.parametrize(("weather", "lets_go"), [("icy_30", True), ("clear-noon", False)])
+def test_on_ice_who_stood_long_at_a_light_is_let_go_first(weather, lets_go):
+    line = 157.0
+    turner, coming = (0, line - 4.0, 0.0, (0, 41)), (6, line - 40.0, 5.0, (6, 43))
+    world = drivers_at(weather, turner, coming)
+    world.traffic.drivers.state["stood"][1] = 60.0
+    _, lane, contacts = drive(world, 60.0)
+    assert contacts == 0
+    first_in = [np.flatnonzero(lane[:, i] == way)[0] for i, way in ((1, 41), (2, 43))]
+    assert (first_in[0] < first_in[1]) == lets_go
+
+
+@pytest.mark.parametrize(
+    ("s", "other", "is_free"),
+    [
+        (283.8, (26, 299.0, 11.0, (26, 72, 16)), False),  # who turns left cannot yield any more
+        (283.8, (26, 220.0, 11.0, (26, 72, 16)), True),  # 85 m before the junction: sees and yields
+        (200.0, (26, 299.0, 11.0, (26, 72, 16)), True),  # put 100 m before it
+        (283.8, (28, 100.0, 11.0, (28, 75)), True),  # nobody comes across
+    ],
+)
+def test_nobody_is_put_where_others_have_decided_to_cross(s, other, is_free):
+    world = drivers_at("clear-noon", other, (0, 10.0, 0.0, (0,)))
+    world.step()
+    claimed = claims(world.placed, world.traffic.drivers)
+    assert is_crossing_free(world.traffic.streets, claimed, 28, s, 2) == is_free

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import polars as pl
 import pytest
-from svg_values import texts
+from svg_values import curves_of, texts
 
 from skidpad.evidence.grip.study import METRICS, ORIGINAL, REDUCED, CellSeries, Distance, Pair
 from skidpad.evidence.statistics import Interval
@@ -179,3 +179,57 @@ def test_weathers_stand_with_their_parameters_and_the_published_ratio():
     (other,) = weather_blocks(ratios("physical", rain_20=0.8))
     assert "Ours are of the model physical" in other.note
     assert weather_blocks(ratios("statistical", snow=0.4)) == []
+
+
+@pytest.mark.req("B-140", "B-141")
+def test_every_panel_of_a_cell_has_the_medians_of_its_own_quantity():
+    """Runs whose quantities grow by 1 to 7 per second, so that no two panels can be exchanged."""
+    slopes = dict(
+        zip(("x", "y", "v", "cvip", "steer", "brake", "throttle"), range(1, 8), strict=True)
+    )
+
+    def cell(scale):
+        t = np.arange(80) * 0.05
+        values = {name: np.tile(scale * k * t, (6, 1)) for name, k in slopes.items()}
+        return CellSeries(values | {"npc_x": values["x"], "npc_y": values["y"]})
+
+    scales = {ORIGINAL: 1.0, REDUCED: 0.5}
+    pairs = campaign([pair("icy_100", 2, 14)], series=lambda _, friction: cell(scales[friction]))
+    (figure,) = both_modes(pairs)
+    for colour, scale in zip(PALETTE, (1.0, 0.5), strict=False):
+        lines = {k: p for k, p in curves_of(figure.svg, colour) if len(p) > 10}
+        for k, quantity in enumerate(("cvip", "v", "steer")):
+            assert lines[k][-1] == pytest.approx([3.95, scale * slopes[quantity] * 3.95], rel=2e-3)
+
+
+@pytest.mark.req("B-141")
+def test_distances_across_weathers_are_those_of_each_weather_and_friction():
+    pairs = [pair(f"icy_{k}", 2, 3) for k in (30, 100)]
+    speed = {("icy_30", REDUCED): 4.0, ("icy_100", REDUCED): 8.0,
+             ("icy_30", ORIGINAL): 10.0, ("icy_100", ORIGINAL): 12.0}  # fmt: skip
+    (figure,) = across_weathers(
+        campaign(pairs, series=lambda p, friction: series(speed[p.weather, friction]))
+    )
+    for colour, weather in zip(PALETTE, ("icy_30", "icy_100"), strict=False):
+        ends = {k: p[-1] for k, p in curves_of(figure.svg, colour)}
+        for k, friction in enumerate((REDUCED, ORIGINAL)):
+            assert ends[k] == pytest.approx([3.95, 3.95 * speed[weather, friction]], rel=2e-3)
+
+
+@pytest.mark.req("B-146")
+def test_ways_lie_where_ego_and_ghost_drove():
+    values = series(10.0, runs=4).values | {"x": np.tile(np.linspace(0, -3.5, 80), (4, 1))}
+    values["npc_x"] = np.tile(np.linspace(-3.5, 0.0, 80), (4, 1))
+    cell = CellSeries(values)
+    (modes, *_) = trajectories(
+        campaign([pair("icy_30", 2, 3)], variants={}, series=lambda *_: cell)
+    )
+    for colour, first, last in ((PALETTE[1], 0.0, -3.5), (PALETTE[0], -3.5, 0.0)):
+        drawn_ways = [p for _, p in curves_of(modes.svg, colour) if len(p) > 10]
+        assert len(drawn_ways) == 8, "four runs in each of two panels"
+        for way in drawn_ways:
+            assert way[0][1] == pytest.approx(first, abs=0.02)
+            assert way[-1][1] == pytest.approx(last, abs=0.02)
+        lower = [way for way in drawn_ways if not np.isnan(way).any()]
+        assert len(lower) == 4, "the panels share the axis below the last of them"
+        assert [way[-1][0] for way in lower] == pytest.approx([39.5] * 4, abs=0.05)

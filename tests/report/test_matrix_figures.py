@@ -6,14 +6,15 @@ from html import unescape
 import numpy as np
 import polars as pl
 import pytest
-from svg_values import bars, texts
+from svg_values import bars, curves_of, frames, marks_of, shapes, texts
 from test_matrix_report import campaign, key
 
 from skidpad.evidence.statistics import Interval, mean_limits
 from skidpad.recording.matrix import MATRIX, Metrics
 from skidpad.recording.results import Timing
-from skidpad.report.figures import PALETTE
+from skidpad.report.figures import PALETTE, Series, stacked_bars
 from skidpad.report.matrix import write_report
+from skidpad.report.matrix_answers import answers
 from skidpad.report.matrix_data import WEATHERS, load_matrix
 from skidpad.report.matrix_real_time import real_time_blocks
 from skidpad.report.matrix_sides import side_blocks
@@ -208,3 +209,58 @@ def test_a_mean_of_some_seeds_says_of_how_many(tmp_path):
     MATRIX.write(tmp_path, rows)
     cell = mean_table(load_matrix(tmp_path), "radar_fpr_pct", "").rows[0][1]
     assert (cell.text, cell.note) == ("52", "3 of 10 seeds")
+
+
+def points_of(svg, colour):
+    """Marks of a colour within the axes, sorted."""
+    return sorted(map(tuple, np.vstack([p for _, p in marks_of(svg, colour)]).round(6)))
+
+
+@pytest.mark.req("A-259")
+@pytest.mark.parametrize(
+    ("caption", "column", "by_drive"),
+    [
+        ("Dropout against crashes", "dropout_pct", True),
+        ("Crashes against mean speed", "mean_speed_kmh", False),
+    ],
+)
+def test_each_point_of_a_scatter_is_a_drive_or_the_mean_of_a_cell(page, caption, column, by_drive):
+    html, rows = page
+    svg = figure(html, caption)
+    for config, colour in zip(CONFIGS, PALETTE, strict=False):
+        mine = rows.filter(config=config)
+        if not by_drive:
+            mine = mine.group_by("weather").agg(pl.col(column).mean(), pl.col("crashes").mean())
+        expected = sorted(mine.select(column, pl.col("crashes").cast(pl.Float64)).rows())
+        drawn = points_of(svg, colour)
+        assert len(drawn) == len(expected)
+        span = rows[column].max() - rows[column].min()
+        for (x, y), (at, events) in zip(drawn, expected, strict=True):
+            assert (x - at) / span == pytest.approx(0.0, abs=2e-3)
+            assert y == pytest.approx(events, abs=0.02)
+
+
+@pytest.mark.req("R-7")
+def test_pictures_of_the_answers_show_the_rates_and_their_limits(tmp_path):
+    matrix = pairs_of_ten_seeds(tmp_path)
+    first, *_ = answers(matrix, [], {}).items
+    rate = matrix.rate("crashes", "2")
+    colour = PALETTE[1]  # of clear sky
+    ((_, marks),) = marks_of(first.figure.svg, colour, "stroke")
+    assert [x for x, _ in marks] == pytest.approx([0.0, rate.rate, 0.0], abs=1e-3)
+    ((_, line),) = [c for c in curves_of(first.figure.svg, colour) if len(c[1]) == 2]
+    assert line[:, 0] == pytest.approx(rate.interval, abs=2e-3)
+
+
+def test_the_parts_of_a_stacked_bar_are_as_long_as_their_counts():
+    parts = [Series("a", [1.0, 4.0], colour=0), Series("b", [2.0, 0.5], colour=1)]
+    svg = stacked_bars(["r", "s"], parts, "crashes per run")
+    (frame,) = frames(svg)
+    for colour, values, starts in (
+        (PALETTE[0], [1.0, 4.0], [0.0, 0.0]),
+        (PALETTE[1], [2.0, 0.5], [1.0, 4.0]),
+    ):
+        boxes = [frame.units(s) for s in shapes(svg, colour) if frame.holds(s)]
+        boxes.sort(key=lambda b: -b[:, 1].max())  # rows go down
+        assert [np.ptp(b[:, 0]) for b in boxes] == pytest.approx(values, abs=5e-3)
+        assert [b[:, 0].min() for b in boxes] == pytest.approx(starts, abs=5e-3)

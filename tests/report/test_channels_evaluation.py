@@ -3,16 +3,20 @@ import json
 import msgspec
 import numpy as np
 import pytest
+from svg_values import curves_of, marks_of
 
 from channel_worlds import Eyes, World, drive
 from skidpad.core.errors import FileError, InputError
 from skidpad.evidence.channels.hazards import Signal
+from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
 from skidpad.evidence.channels.judging.evaluation import Evaluation
 from skidpad.evidence.channels.judging.segments import judge
 from skidpad.recording.channel_drives import DriveOutcome, DriveRecord
 from skidpad.recording.cycles import cycles
-from skidpad.report.channels_evaluation import evaluation_page, write_evaluation_report
+from skidpad.report.channels_evaluation import _curve, evaluation_page, write_evaluation_report
 from skidpad.report.channels_redundancy import redundancy
+from skidpad.report.channels_strata import precision_recall
+from skidpad.report.figures import PALETTE
 
 EYES = (Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,)))
 
@@ -138,3 +142,43 @@ def test_an_evaluation_that_lost_a_word_is_refused(folder, tmp_path):
     (tmp_path / "evaluation.json").write_text(json.dumps(odd))
     with pytest.raises(InputError):
         write_evaluation_report(tmp_path)
+
+
+@pytest.mark.req("C-105")
+def test_the_curve_over_the_threshold_has_recall_and_false_alarms_of_each_hazard():
+    names = ("inconsistent_localisation", "ego_tailgating", "ego_tailgated")
+    by_factor = {  # found, false, missed of each hazard
+        "0.5": ([4, 8, 0], [3, 2, 1], [1, 0, 3]),
+        "1.0": ([3, 4, 1], [2, 1, 2], [0, 0, 4]),
+        "2.0": ([1, 0, 3], [1, 0, 3], [0, 0, 4]),
+    }
+    counts = {f: dict(zip(names, rows, strict=True)) for f, rows in by_factor.items()}
+    (figure,) = _curve({"curve": {"sim": counts, "world": {}}, "hours": 2.0})
+    recall = ([1.0, 0.75, 0.25], [0.75, 0.5, 0.25], [0.25, 0.0, 0.0])
+    false = ([4.0, 2.0, 0.0], [1.0, 0.5, 0.0], [0.0, 0.0, 0.0])
+    for colour, found, alarms in zip(PALETTE, recall, false, strict=False):
+        lines = dict(curves_of(figure.svg, colour))
+        assert lines[0] == pytest.approx(np.column_stack([[0.5, 1.0, 2.0], found]), abs=5e-3)
+        assert lines[1] == pytest.approx(np.column_stack([[0.5, 1.0, 2.0], alarms]), abs=2e-2)
+
+
+@pytest.mark.req("C-105", "C-212")
+def test_precision_stands_over_recall_at_each_limit_with_the_ceiling_as_a_star():
+    # limit, right, false, -, weights found and true
+    points = [[0.1, 6, 6, 0, 0.75, 1.0], [0.5, 3, 1, 0, 0.5, 1.0], [0.9, 0, 0, 0, 0.0, 1.0]]
+    hazards = ("inconsistent_localisation", "ego_tailgating", "ego_tailgated")
+    ceiling = {h: {"recall_weighted": 0.9, "precision": 0.8} for h in hazards}
+    part = {
+        "hours": 1.0,
+        "precision_recall": {"sim": {"tracked": dict.fromkeys(hazards, points)}},
+        "results": [{"rules": CEILING, "truth": "sim", "tolerance_s": 1.0, "hazards": ceiling}],
+    }
+    (figure,) = precision_recall({"strata": {"natural": part}})
+    lines = curves_of(figure.svg, PALETTE[0])
+    assert len([line for _, line in lines if len(line) == 2]) == 3, "one per hazard"
+    for _, line in lines:
+        assert line == pytest.approx(np.array([[0.75, 0.5], [0.5, 0.75]]), abs=5e-3)
+    stars = marks_of(figure.svg, PALETTE[1])
+    assert len(stars) == 3
+    for _, at in stars:
+        assert at == pytest.approx(np.array([[0.9, 0.8]]), abs=5e-3)

@@ -1,18 +1,24 @@
 import json
 import re
 from html import unescape
+from types import SimpleNamespace
 
 import numpy as np
+import polars as pl
 import pytest
+from svg_values import curves_of
 
 from channel_worlds import Eyes, World, drive
 from skidpad.core.errors import InputError
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.monitor import MonitorSettings
+from skidpad.evidence.channels.timing import MODULES
 from skidpad.live.watch import Timer, watch
 from skidpad.recording.hazards import read_hazards
 from skidpad.report.channels import drive_page, write_drive_report
 from skidpad.report.channels_data import load_drive
+from skidpad.report.channels_figures import risk, timing
+from skidpad.report.figures import PALETTE
 from skidpad.report.timeline import Mark, Strip, timelines
 from skidpad.report.worlds import UNIT, worlds_replay
 
@@ -139,3 +145,42 @@ UNKNOWN = {"name": "no_hazard", "t_start": 0.0, "t_end": 1.0}
 def test_a_summary_that_cannot_be_shown_is_refused_in_a_sentence(folder, tmp_path, words):
     with pytest.raises(InputError, match="monitor.json"):
         write_drive_report(changed(folder, tmp_path, **words))
+
+
+@pytest.mark.req("C-236", "C-238")
+def test_times_are_drawn_by_objects_and_over_the_drive():
+    """Modules of 1 to 6 times a base that grows with the objects, so that none can be exchanged."""
+    n = 400
+    objects = np.repeat([1, 2, 4, 8], n // 4)
+    times = {m: (k + 1.0) * objects for k, m in enumerate(("total", *MODULES))}
+    table = pl.DataFrame({"cycle": np.arange(n), "objects": objects, **times})
+    over_time, by_objects = timing(SimpleNamespace(timing=table))
+    for k, colour in enumerate(PALETTE[: len(times)]):
+        lines = [p for _, p in curves_of(by_objects.svg, colour) if len(p) == 4]
+        assert len(lines) == 1
+        assert lines[0] == pytest.approx(
+            np.array([[o, (k + 1) * o] for o in (1, 2, 4, 8)]), abs=0.05
+        )
+    assert "the budget is 25 ms" in over_time.caption
+
+
+@pytest.mark.req("C-106")
+def test_the_risk_of_hazard_free_driving_is_cumulated_and_hazards_are_left_out():
+    t = np.arange(0.0, 100.0, 0.1)
+    score = np.where(t < 50.0, 1.0 - t / 100.0, 0.1)  # risks 0 to 0.5, then a hazard of 0.9
+    hazard = {"name": "ego_tailgating", "t_start": 55.0, "t_end": 100.0}
+    trace = SimpleNamespace(subject="lav", t=t, value=score)
+    drive_ = SimpleNamespace(
+        traces=lambda indicator: [trace] if indicator is Indicator.SAFETY_SCORE else [],
+        summary={"hazards": [hazard]},
+    )
+    figure, words = risk(drive_)
+    ((_, line),) = curves_of(figure.svg, PALETTE[0])  # straight, so thinned
+    assert line[0] == pytest.approx([0.0, 1 / 500], abs=2e-3)
+    assert line[-1][0] == pytest.approx(0.5, abs=5e-3)
+    for risk_, share in ((0.1, 0.2), (0.25, 0.5), (0.4, 0.8)):
+        assert np.interp(risk_, line[:, 0], line[:, 1]) == pytest.approx(share, abs=0.01)
+    assert (
+        "lav: median, 90 % and 99 % of 500 cycles: 0.25, 0.45, 0.49; above 0.2 in 60.0 %"
+        in words.text
+    )

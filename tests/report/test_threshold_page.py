@@ -56,7 +56,9 @@ def test_the_map_shows_each_threshold_in_its_place_and_colour(campaign):
     for told, braking in (("0.45", "4"), ("< 0.10", "6")):
         nearest = min("468", key=lambda tick: abs(words[tick][0] - words[told][0]))
         assert nearest == braking, "above its deceleration"
-    scale = mpl.colors.to_hex(mpl.colormaps[COLOURS](0.45 / TOP))
+    mu = campaign.telling[0].threshold.mu
+    assert mu == pytest.approx(0.45)
+    scale = mpl.colors.to_hex(mpl.colormaps[COLOURS](mu / TOP))
     assert len(re.findall(rf"fill: {scale}", svg)) == 1
     assert len(re.findall(rf"fill: {NOT_SHOWN}", svg)) == 1, "grey: not completed on dry road"
 

@@ -15,6 +15,8 @@ from skidpad.evidence.channels.risk import (
     MISS_MOST,
     PET_SAFE,
     RiskForm,
+    braking_needed,
+    close_risk,
     ordered_risk,
     risk_matrix,
     safety_scores,
@@ -65,6 +67,44 @@ def test_following_at_equal_speed_has_its_time_gap_as_encroachment_time():
     # nearest: the ego comes in 1.0 s to where the lead is now
     assert matrix.safety_scores[0] == pytest.approx(1 - 0.1 * (1 - 1 / 2) * (1 - 1 / 4))
     assert single(EGO, lead, PRINTED)[0].safety_scores[0] == pytest.approx(0.5)
+
+
+@pytest.mark.req("C-092", "C-095")
+def test_two_metres_behind_a_lead_at_90_km_h_are_not_safe():
+    v = 25.0
+    ego = (0.0, 0.0, 0.0, v, 0.0)
+    matrix, one = single(ego, (6.5, 0, 0, v, 0))  # cars of 4.5 m: 2 m between the bumpers
+    assert one.ttc is None
+    assert matrix.safety_scores == pytest.approx([0.5, 0.5])
+    # by hand: 2 m and the lead's 52.1 m of braking less 25 m of response leave 29.1 m
+    assert braking_needed(2.0, v, v, v) == pytest.approx(v**2 / (2 * (2 + v**2 / 12 - v)))
+    assert braking_needed(2.0, v, v, v) > 10.0
+    assert single(ego, (6.5, 0, 0, v, 0), PRINTED)[0].safety_scores[0] == pytest.approx(0.04)
+    behind, _ = single(ego, (-6.5, 0, 0, v, 0))
+    assert behind.risk_behind[0, 1] == pytest.approx(0.5)
+    assert behind.risk_ahead[0, 1] == 0.0
+
+
+@pytest.mark.req("C-092")
+def test_following_is_a_risk_below_a_second_of_gap_and_only_in_the_same_lane():
+    v = 20.0
+    ego = (0.0, 0.0, 0.0, v, 0.0)
+    needed = v**2 / (2 * (15.0 + v**2 / 12 - v))  # at 15 m, 7.06 m/s^2
+    for gap, risk in ((20.0, 0.0), (15.0, 0.5 * (needed - 6.0) / 2.0), (10.0, 0.5)):
+        assert close_risk(gap, v, v, v) == pytest.approx(risk)
+        matrix, _ = single(ego, (gap + 4.5, 0, 0, v, 0))
+        assert (
+            matrix.risk_ahead[0, 1] == pytest.approx(risk)
+            if risk
+            else matrix.risk_ahead[0, 1] < 0.1
+        )
+        beside, _ = single(ego, (gap + 4.5, 3.5, 0, v, 0))
+        assert beside.safety_scores == pytest.approx([1.0, 1.0])
+    oncoming, _ = single(ego, (14.5, 0, np.pi, -1.0, 0))
+    assert oncoming.risk_ahead[0, 1] > 0.5, "a hit, and no following"
+    gaps = [close_risk(g, v, v, v) for g in np.linspace(0.0, 30.0, 61)]
+    assert gaps == sorted(gaps, reverse=True)
+    assert max(gaps) == 0.5
 
 
 @pytest.mark.req("C-091", "C-123")

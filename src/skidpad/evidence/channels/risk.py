@@ -8,6 +8,11 @@ the driving channel and feed hazard rules; they are not indicators and have no t
 Recommended risk is ordered as danger is: a conflict that is sooner, nearer to a hit, or a hit
 instead of a miss never has less of it, and every hit has more than any miss. As proposed for the
 publication (C-094), a miss by 0.002 s has 0.999 and a hit in 2.5 s 0.37.
+
+Predictions hold the present speed, so they say nothing of a follower that could not brake in time.
+Recommended risk therefore also asks which braking a follower needs when its lead brakes hard: the
+braking for which the gap is just the safe distance of RSS (Shalev-Shwartz, Shammah and Shashua 2017,
+arXiv:1708.06374, lemma 2); in the response time it moves as planned or predicted.
 """
 
 from __future__ import annotations
@@ -21,12 +26,17 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame
 from skidpad.core.jit import inner_kernel, kernel
-from skidpad.evidence.channels.boxes import HORIZON, Movers, ego_movers, world_movers
+from skidpad.evidence.channels.boxes import HORIZON, STEP, Movers, ego_movers, world_movers
 from skidpad.evidence.channels.conflicts import PET_SAFE, encroachment, first_overlap
 from skidpad.evidence.channels.frames import usable
 
 Floats = NDArray[np.float64]
 MISS_MOST = 0.1  # risk of the nearest miss; the hit at the very end of the horizon begins there
+# Ours: a lead that brakes as hard as cars in traffic do, a response as AASHTO's drivers who expect it,
+# and the hardest braking of a car on a dry road. Below 1 s of time gap at equal speed there is risk.
+LEAD_BRAKE, RESPONSE, HARDEST = 6.0, 1.0, 8.0  # m/s^2, s, m/s^2
+CLOSE_MOST = 0.5  # risk of a gap behind a lead that even the hardest braking does not open in time
+SAME_WAY = 0.866  # cosine of 30 deg, less turned vehicles follow each other
 
 
 class RiskForm(str, Enum):
@@ -95,6 +105,52 @@ def ordered_risk(ttc: float, nearness: float) -> float:
 
 
 @kernel
+def braking_needed(gap: float, way: float, v: float, v_lead: float) -> float:
+    """m/s^2 that a follower needs when its lead brakes at `LEAD_BRAKE`; inf: none is enough.
+
+    gap: m, bumper to bumper. way: m that the follower drives in the response time, v: its speed then,
+    v_lead: that of the lead now, m/s, at least 0. Source: RSS, lemma 2, solved for the braking.
+    """
+    left = gap + v_lead * v_lead / (2.0 * LEAD_BRAKE) - way
+    if v == 0.0 and left > 0.0:
+        return 0.0
+    return v * v / (2.0 * left) if left > 0.0 else np.inf
+
+
+@kernel
+def close_risk(gap: float, way: float, v: float, v_lead: float) -> float:
+    """Risk of following at `gap` m: from 0 where braking as the lead does is enough to `CLOSE_MOST`."""
+    needed = min(braking_needed(gap, way, v, v_lead), HARDEST)
+    return CLOSE_MOST * max(needed - LEAD_BRAKE, 0.0) / (HARDEST - LEAD_BRAKE)
+
+
+@inner_kernel
+def _following_risk(
+    motion: Floats, half: Floats, lead: Floats, lead_half: Floats, v_lead: float
+) -> float:
+    """Risk of a box that moves as `motion` (SAMPLES, 4) behind one that now is at `lead` (4,).
+
+    0 where it does not follow it. v_lead: m/s along its heading.
+    """
+    me = motion[0]
+    if me[2] * lead[2] + me[3] * lead[3] < SAME_WAY:
+        return 0.0
+    x, y = lead[0] - me[0], lead[1] - me[1]
+    ahead, aside = me[2] * x + me[3] * y, me[2] * y - me[3] * x
+    gap = ahead - half[0] - lead_half[0]
+    if gap < 0.0 or abs(aside) > half[1] + lead_half[1]:
+        return 0.0
+    k = round(RESPONSE / STEP)
+    way = 0.0
+    step = 0.0
+    for j in range(k + 1):
+        step = np.hypot(motion[j + 1, 0] - motion[j, 0], motion[j + 1, 1] - motion[j, 1])
+        if j < k:
+            way += step
+    return close_risk(gap, way, step / STEP, max(v_lead, 0.0))
+
+
+@kernel
 def _judge(
     ego: Movers, world: Movers, objects: Floats, pose: Floats, printed: bool, out: Floats
 ) -> None:
@@ -114,7 +170,15 @@ def _judge(
         x, y = objects[i, 0] - pose[0], objects[i, 1] - pose[1]
         out[i, 0], out[i, 1] = ttc, pet
         out[i, 2] = 1.0 if x * c + y * s < 0.0 else 0.0
-        out[i, 3] = printed_risk(ttc, pet) if printed else ordered_risk(ttc, nearness)
+        if printed:
+            out[i, 3] = printed_risk(ttc, pet)
+            continue
+        here, there = ego.motion[0], world.motion[i]
+        v = pose[3] * here[0, 2] + pose[4] * here[0, 3]
+        v_other = objects[i, 3] * there[0, 2] + objects[i, 4] * there[0, 3]
+        behind = _following_risk(there, world.half[i], here[0], ego.half[0], v)
+        ahead = _following_risk(here, ego.half[0], there[0], world.half[i], v_other)
+        out[i, 3] = max(ordered_risk(ttc, nearness), behind, ahead)
 
 
 @kernel

@@ -8,13 +8,19 @@ from pathlib import Path
 from rich.table import Table
 
 from skidpad.campaign.run_road import load_road
+from skidpad.campaign.runfolder import CONFIG
+from skidpad.campaign.stored import read_run
 from skidpad.cli.tables import table_console
 from skidpad.core.errors import FileError
+from skidpad.core.run import BackendKind
+from skidpad.core.vocabulary import ActorKind
 from skidpad.evidence.drive.collisions import find_crashes
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.evidence.drive.severity import graded_contacts
 from skidpad.evidence.drive.story import tell_story
+from skidpad.physics.grip import friction_ratio
+from skidpad.physics.types import vehicle_types
 from skidpad.recording.fingerprint import comparison_text, fingerprint
 from skidpad.recording.logfiles import driven_on, log_hash, read_log
 from skidpad.recording.matrix import Metrics
@@ -23,6 +29,7 @@ from skidpad.recording.runlog import RunLog
 from skidpad.report.cards import contact_text, headline, timeline
 from skidpad.report.causes import write_cause
 from skidpad.roads.queries import RoadMap
+from skidpad.stack.settings import grip_of
 
 
 def opened(run: Path) -> tuple[RunLog, RoadMap]:
@@ -83,6 +90,34 @@ def show(run: Path) -> None:
         console.print("\n[bold]All contacts[/]")
     for contact in contacts:
         console.print(f"  {contact.tick * log.header.dt:8.2f} s  {contact_text(contact)}")
+    grips = vehicle_grips(run, log)
+    if grips:
+        console.print("\n[bold]Tyre friction of each vehicle, at standstill[/]")
+        heads = ("vehicle", "type", "own", "ratio", "in this weather", "weather")
+        shown = Table(*heads, box=None, pad_edge=False)
+        for row in grips:
+            shown.add_row(*row)
+        console.print(shown)
+
+
+def vehicle_grips(run: Path, log: RunLog) -> list[tuple[str, ...]]:
+    """What the weather left of each vehicle's tyre friction: own, ratio, result, weather (B-068).
+
+    Nothing where the folder does not describe its run, or a CARLA server drove it, whose log says it.
+    """
+    if not (run / CONFIG).is_file():
+        return []
+    spec = read_run(run)
+    if spec.backend.backend is not BackendKind.EMBEDDED:
+        return []
+    ratio = friction_ratio(spec.weather, grip_of(spec))
+    types = vehicle_types()
+    return [
+        (name, type_, f"{own:g}", f"{ratio:.4f}", f"{own * ratio:.4g}", spec.weather.name)
+        for name, type_, kind in zip(log.table.names, log.table.types, log.table.kind, strict=True)
+        if kind <= ActorKind.MOTORCYCLE and type_ in types
+        for own in [types[type_].tire_friction]
+    ]
 
 
 def _text(value: float | None) -> str:

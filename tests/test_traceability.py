@@ -17,7 +17,9 @@ def test_states_name_requirements_and_exclude_each_other():
     state = states()
     assert set(state["differs"]) | set(state["not_yet"]) <= set(summaries())
     assert not set(state["differs"]) & set(state["not_yet"])
-    assert [i for i, why in state["differs"].items() if "lost" not in why] == [], "what a user loses"
+    assert [i for i, why in state["differs"].items() if "lost" not in why] == [], (
+        "what a user loses"
+    )
 
 
 def test_what_is_not_yet_there_has_no_test_that_claims_it():

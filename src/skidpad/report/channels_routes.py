@@ -182,7 +182,7 @@ def _module_table(segments: pl.DataFrame, modules: list[str]) -> list[Block]:
     rows: list[Row] = []
     for route in [*sorted(segments["route"].unique()), ALL]:
         here = segments if route == ALL else segments.filter(route=route)
-        rows += [{"route": route, "module": m, **_pooled(here, m)} for m in measured]
+        rows += [{"route": route, "module": m, **_merge_segments(here, m)} for m in measured]
     if not rows or not measured:
         return []
     rows += _published_times(measured)
@@ -213,7 +213,7 @@ def _module_table(segments: pl.DataFrame, modules: list[str]) -> list[Block]:
     return [table(columns, rows, "Times of each module in each route", note)]
 
 
-def _pooled(segments: pl.DataFrame, module: str) -> Row:
+def _merge_segments(segments: pl.DataFrame, module: str) -> Row:
     """Of all cycles of several segments, from the figures of each."""
     hours, mean, std = (segments[c].to_numpy() for c in ("hours", module + MEAN, module + STD))
     weight = hours / hours.sum()

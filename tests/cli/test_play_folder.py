@@ -2,6 +2,7 @@
 
 import pytest
 from lxml import etree
+from tests.scenarios.files import document
 from typer.testing import CliRunner
 
 from skidpad.cli.asked import PlayCross
@@ -75,16 +76,14 @@ def test_what_cannot_be_played_is_told_of_a_whole_folder(folder):
 
 def test_catalogs_are_passed_over_and_distributions_checked_choice_by_choice(folder):
     (folder / "odd.xosc").unlink()
-    head = '<FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="" author=""/>'
-    catalog = f'<OpenSCENARIO>{head}<Catalog name="c"/></OpenSCENARIO>'
-    (folder / "catalog.xosc").write_text(catalog, encoding="utf-8")
+    (folder / "catalog.xosc").write_text(document('<Catalog name="c"/>'), encoding="utf-8")
     values = "".join(f'<Element value="{v}"/>' for v in (20.0, 25.0))
-    choices = f"""<OpenSCENARIO>{head}<ParameterValueDistribution>
+    choices = f"""<ParameterValueDistribution>
 <ScenarioFile filepath="below/cut.in.xosc"/><Deterministic>
 <DeterministicSingleParameterDistribution parameterName="EgoSpeed"><DistributionSet>{values}
 </DistributionSet></DeterministicSingleParameterDistribution></Deterministic>
-</ParameterValueDistribution></OpenSCENARIO>"""
-    (folder / "choices.xosc").write_text(choices, encoding="utf-8")
+</ParameterValueDistribution>"""
+    (folder / "choices.xosc").write_text(document(choices), encoding="utf-8")
     done = play(folder, "--check")
     assert done.exit_code == 0, done.output
     assert "choices.xosc: can be played" in done.stdout

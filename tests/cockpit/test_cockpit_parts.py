@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from producers import Recorder, bridge
 from typer.testing import CliRunner
 
 from runs import adas_run
@@ -250,28 +251,9 @@ def test_a_drive_collects_garbage_in_its_pauses_unless_it_is_told_not_to(
 # --- tabs and what they may say
 
 
-class Deaf:
-    """A producer that keeps what it is told."""
-
-    def __init__(self):
-        self.words = []
-        self.result = None
-
-    def say(self, word):
-        self.words.append(word)
-
-
-def bridge(**seat):
-    made = Bridge(Deaf())
-    made.told = {"seat": seat}
-    for tab in ("a", "b"):
-        made.tabs.come(tab)
-    return made
-
-
 def test_a_drive_without_a_page_goes_on_or_pauses():
     for pauses, said in ((False, []), (True, [Pause(True)])):
-        made = Bridge(Deaf(), pauses)
+        made = Bridge(Recorder(), pauses)
         for tab in ("a", "b"):
             made.tabs.come(tab)
         made.leave("a")
@@ -281,7 +263,7 @@ def test_a_drive_without_a_page_goes_on_or_pauses():
 
 
 def test_a_tab_that_sleeps_lets_go_of_the_wheel_and_comes_last_when_it_wakes():
-    made = Bridge(Deaf(), pauses=True, clock=(wall := Wall()))
+    made = Bridge(Recorder(), pauses=True, clock=(wall := Wall()))
     for tab in ("a", "b"):
         made.tabs.come(tab)
     made.say("a", "pedals", {"throttle": 1.0})
@@ -319,7 +301,7 @@ def test_there_is_always_one_driver_among_the_open_tabs(moves):
 
 
 def test_a_tab_that_watches_says_nothing():
-    b = bridge()
+    b = bridge("a", "b")
     for word, value in (("take", None), ("pedals", {"throttle": 1.0}), ("end", None), ("seek", 3)):
         assert b.say("b", word, value) == "another tab drives: this one watches"
         assert b.say("nobody", word, value) is not None
@@ -331,7 +313,7 @@ def test_a_tab_that_watches_says_nothing():
 
 
 def test_words_that_mean_nothing_are_refused_in_one_sentence():
-    b = bridge(sky=preset("clear-noon").values())
+    b = bridge("a", "b", sky=preset("clear-noon").values())
     wrong = [
         ("fly", None), ("rate", "fast"), ("rate", 1e9), ("seek", None), ("toggle", "wings"),
         ("weather", "frogs"), ("pedals", {"throttle": 7}), ("pedals", {"clutch": 1}), ("pedals", 3),
@@ -348,7 +330,7 @@ def test_words_that_mean_nothing_are_refused_in_one_sentence():
 @pytest.mark.req("A-271", "A-273")
 def test_what_the_words_of_a_tab_mean():
     noon = preset("clear-noon")
-    b = bridge(manual=True, functions=["acc", "lca"], lamps="low", weather=noon.name,
+    b = bridge("a", "b", manual=True, functions=["acc", "lca"], lamps="low", weather=noon.name,
                sky=noon.values(), grip="none", range="physical")  # fmt: skip
     said = {
         ("take", None): Do(Wheel(False)),
@@ -388,7 +370,7 @@ def test_what_the_words_of_a_tab_mean():
 def test_the_time_of_day_goes_round_in_any_weather():
     def hours(name, **changes):
         weather = replace(preset(name), **changes)
-        b = bridge(weather=name, sky=weather.values(), grip="none", range="physical")
+        b = bridge("a", "b", weather=name, sky=weather.values(), grip="none", range="physical")
         skies = []
         for _ in range(4):
             assert b.say("a", "hour") is None
@@ -429,7 +411,7 @@ def test_pedals_are_released_when_nothing_is_heard_of_them():
 
 
 def test_the_same_pedals_are_said_once():
-    b = bridge()
+    b = bridge("a", "b")
     for _ in range(3):
         b.say("a", "pedals", {"brake": 0.5, "method": "gamepad"})
     assert b.producer.words == [Do(Pedals(brake=0.5, method=Method.GAMEPAD))]

@@ -4,8 +4,8 @@ import random
 
 import msgspec
 import pytest
+from producers import bridge
 
-from skidpad.cockpit.bridge import Bridge
 from skidpad.cockpit.words import Word, encode
 from skidpad.core.inputs import Sky
 from skidpad.core.run import Function
@@ -21,24 +21,6 @@ FIELDS = (
     "snow_depth_mm",
     "sun_altitude_deg",
 )
-
-
-class Deaf:
-    """A producer that keeps what it is told."""
-
-    def __init__(self):
-        self.words = []
-        self.result = None
-
-    def say(self, word):
-        self.words.append(word)
-
-
-def bridge(**seat):
-    made = Bridge(Deaf())
-    made.told = {"seat": seat}
-    made.tabs.come("a")
-    return made
 
 
 @pytest.mark.req("A-217")

@@ -8,10 +8,20 @@ from typing import Any
 from skidpad.scenarios.scenario import Scenario, compile_scenario
 from skidpad.scenarios.stage import Told, played
 
-FILE = """<?xml version='1.0'?>
+HEAD = """<?xml version='1.0'?>
 <OpenSCENARIO>
   <FileHeader revMajor="1" revMinor="{minor}" date="2026-01-01T00:00:00" description="x" author="x"/>
-  <ParameterDeclarations>{parameters}</ParameterDeclarations>
+"""
+
+
+def document(body: str, minor: int = 2) -> str:
+    """Returns a whole file of this body."""
+    return f"{HEAD.format(minor=minor)}{body}\n</OpenSCENARIO>\n"
+
+
+FILE = (
+    HEAD
+    + """  <ParameterDeclarations>{parameters}</ParameterDeclarations>
   {variables}
   <CatalogLocations>{catalogs}</CatalogLocations>
   <RoadNetwork>{road}</RoadNetwork>
@@ -21,6 +31,7 @@ FILE = """<?xml version='1.0'?>
   </Storyboard>
 </OpenSCENARIO>
 """
+)
 VEHICLE = """<Vehicle name="v" vehicleCategory="car"><BoundingBox><Center x="{x}" y="0" z="0.7"/>
 <Dimensions width="1.8" length="4.2" height="1.5"/></BoundingBox>
 <Performance maxSpeed="70" maxDeceleration="10" maxAcceleration="10"/>

@@ -7,6 +7,7 @@ from tests.scenarios.files import (
     VEHICLE,
     at,
     compiled,
+    document,
     event,
     private,
     speed,
@@ -18,9 +19,7 @@ from tests.scenarios.files import (
 
 from skidpad.scenarios.findings import ScenarioError
 
-CATALOG = """<?xml version='1.0'?>
-<OpenSCENARIO><FileHeader revMajor="1" revMinor="2" date="2026-01-01T00:00:00" description="x"
-author="x"/><Catalog name="{name}">{entries}</Catalog></OpenSCENARIO>"""
+CATALOG = document('<Catalog name="{name}">{entries}</Catalog>')
 LONG = VEHICLE.format(x=1).replace('name="v"', 'name="long"').replace('length="4.2"', 'length="$L"')
 DECLARED = """<ParameterDeclarations><ParameterDeclaration name="L" parameterType="double" value="9"/>
 </ParameterDeclarations>"""

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.scenarios.files import write
+from tests.scenarios.files import document, write
 
 from skidpad.core.errors import FileError
 from skidpad.scenarios.distributions import choices, is_distribution
 
-FILE = """<?xml version='1.0'?><OpenSCENARIO><FileHeader revMajor="1" revMinor="2"
-date="2026-01-01T00:00:00" description="x" author="x"/><ParameterValueDistribution>
-<ScenarioFile filepath="x.xosc"/>{}</ParameterValueDistribution></OpenSCENARIO>"""
+FILE = document(
+    '<ParameterValueDistribution><ScenarioFile filepath="x.xosc"/>{}</ParameterValueDistribution>'
+)
 SPEEDS = """<DeterministicSingleParameterDistribution parameterName="v"><DistributionRange
 stepWidth="0.1"><Range lowerLimit="1" upperLimit="1.3"/></DistributionRange>
 </DeterministicSingleParameterDistribution>"""

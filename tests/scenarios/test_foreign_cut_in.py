@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from tests.scenarios.files import FILE, ROAD, VEHICLE
+from tests.scenarios.files import FILE, ROAD, VEHICLE, document
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.recording.logfiles import read_log
 
-CATALOG = """<?xml version="1.0" encoding="UTF-8"?>
-<OpenSCENARIO><FileHeader revMajor="1" revMinor="1" date="2024-01-01T00:00:00" description="cars"
-author="else"/><Catalog name="VehicleCatalog">{entries}</Catalog></OpenSCENARIO>"""
+CATALOG = document('<Catalog name="VehicleCatalog">{entries}</Catalog>', minor=1)
 CAR = VEHICLE.format(x=1.4).replace('name="v"', 'name="{name}"')
 DECLARED = "".join(
     f'<ParameterDeclaration name="{name}" parameterType="{kind}" value="{value}"/>'

@@ -88,7 +88,8 @@ def test_catalogs_are_passed_over_and_distributions_checked_choice_by_choice(fol
     assert done.exit_code == 0, done.output
     assert "choices.xosc: can be played" in done.stdout
     assert "catalog" not in done.stdout
-    (folder / "choices.xosc").write_text(choices.replace("EgoSpeed", "Nobody"), encoding="utf-8")
+    wrong = document(choices.replace("EgoSpeed", "Nobody"))
+    (folder / "choices.xosc").write_text(wrong, encoding="utf-8")
     (folder / "torn.xosc").write_text("<OpenSCENARIO", encoding="utf-8")
     done = play(folder, "--check")
     assert done.exit_code == 2

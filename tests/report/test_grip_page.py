@@ -233,3 +233,15 @@ def test_ways_lie_where_ego_and_ghost_drove():
         lower = [way for way in drawn_ways if not np.isnan(way).any()]
         assert len(lower) == 4, "the panels share the axis below the last of them"
         assert [way[-1][0] for way in lower] == pytest.approx([39.5] * 4, abs=0.05)
+
+
+@pytest.mark.req("B-147")
+def test_no_limit_of_a_score_goes_beyond_100():
+    one = pair("icy_30", 0, 0)
+    runs = one.reduced.with_columns(score=pl.when(pl.col("seed") > 0).then(100.0).otherwise(60.0))
+    table = completion_tables(
+        campaign([Pair(one.scenario, one.cutin, one.weather, one.original, runs)])
+    )[0]
+    low, high = table.rows[0][-1].limits
+    assert high == 100.0, "a skew mean of 98 has limits of its own beyond that"
+    assert low < 98.0

@@ -31,6 +31,7 @@ from skidpad.report.tables import Column, Format, Quantity, table
 
 EFFECT_MAX = 100.0  # beyond, the differences hardly vary and the number says nothing
 P_MARKED = 0.05
+SCORE_MAX = 100.0
 UNITS = {"x": "m", "y": "m", "v": "m/s", "cvip": "m"}
 SHARE = Format(".1f", ".0f", "no run")
 SCORE = Format(".2f", ".1f", "no run")
@@ -77,10 +78,17 @@ def if_triggered(friction: str, pair: Pair) -> Quantity:
     return share(completion(pair.side(friction), given_triggered=True), kind=mark(pair, friction))
 
 
+def score_of_runs(runs: pl.DataFrame) -> tuple[float | None, Interval | None]:
+    """The mean score of runs with the part of its interval in which a score can lie."""
+    value, limits = mean_interval(runs["score"]) or (None, None)
+    if limits is None:
+        return value, None
+    return value, Interval(max(limits.low, 0.0), min(limits.high, SCORE_MAX))
+
+
 def score(friction: str, pair: Pair) -> Quantity:
     """Mean benchmark score."""
-    found = mean_interval(pair.side(friction)["score"])
-    value, interval = found if found is not None else (None, None)
+    value, interval = score_of_runs(pair.side(friction))
     kind = mark(pair, friction)
     return Quantity(value=value, interval=interval, kind=kind, **said(pair, friction, SCORED))
 
@@ -244,8 +252,7 @@ def variant_table(campaign: GripCampaign) -> list[Block]:
         )
 
     def score_of(pair: Pair) -> Quantity:
-        found = mean_interval(pair.original["score"])
-        value, interval = found if found is not None else (None, None)
+        value, interval = score_of_runs(pair.original)
         theirs = outcomes.get(pair.cutin, {}).get(SCORED)
         return Quantity(value=value, interval=interval, published=theirs)
 

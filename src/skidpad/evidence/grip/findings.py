@@ -86,7 +86,7 @@ FINDINGS: tuple[Finding, ...] = (
     Finding(
         "BF-02", "Thick ice makes a lead slowdown a certain crash.",
         "completion lost at icy_70 and icy_100, share of crashes; none lost up to icy_30",
-        "lead slowdown on ice",
+        "lead slowdown in icy_70, icy_100, and one of icy_10 and icy_30",
         (
             frictions(scene(LEAD, "icy_70")),
             frictions(scene(LEAD, "icy_100")),
@@ -101,7 +101,8 @@ FINDINGS: tuple[Finding, ...] = (
     Finding(
         "BF-03",
         "In a lead slowdown a threshold lies between ice 30 and 70; beyond, nothing changes.",
-        "completion with reduced friction between ice levels", "lead slowdown on ice",
+        "completion with reduced friction between ice levels",
+        "lead slowdown in icy_30, icy_70 and icy_100",
         (
             weathers(LEAD, "icy_30", "icy_70"),
             weathers(LEAD, "icy_70", "icy_100", claim=Claim.HARDLY_MORE),
@@ -114,7 +115,8 @@ FINDINGS: tuple[Finding, ...] = (
     ),
     Finding(
         "BF-05", "At icy_70 and icy_100 the cut-in looks safer, as the other vehicle slides away.",
-        "completion gained; runs in which the other vehicle loses control", "cut-in on ice",
+        "completion gained; runs in which the other vehicle loses control",
+        "cut-in in icy_70 or icy_100",
         (
             raised(scene(CUT_IN, "icy_70", "icy_100"), "completion"),
             raised(scene(CUT_IN, "icy_70", "icy_100"), "loss_of_control_npc"),
@@ -122,7 +124,8 @@ FINDINGS: tuple[Finding, ...] = (
     ),
     Finding(
         "BF-06", "In the front accident thin ice is worse than thick ice.",
-        "completion lost at icy_10, and between ice levels", "front accident on ice",
+        "completion lost at icy_10, and between ice levels",
+        "front accident in icy_10, icy_30 and icy_100",
         (
             frictions(scene(FRONT, "icy_10")),
             weathers(FRONT, "icy_30", "icy_10"),
@@ -147,7 +150,8 @@ FINDINGS: tuple[Finding, ...] = (
     ),
     Finding(
         "BF-10", "The least distance falls as ice thickens in the lead slowdown.",
-        "least distance between neighbouring ice levels", "lead slowdown on ice",
+        "least distance between neighbouring ice levels",
+        "lead slowdown in icy_0, icy_10, icy_30 and icy_70",
         tuple(
             weathers(LEAD, thin, thick, "min_cvip_m", METRES)
             for thin, thick in (("icy_0", "icy_10"), ("icy_10", "icy_30"), ("icy_30", "icy_70"))
@@ -160,7 +164,7 @@ FINDINGS: tuple[Finding, ...] = (
     ),
     Finding(
         "BF-12", "In the cut-in on ice the other vehicle spins out.",
-        "runs in which another vehicle loses control", "cut-in on ice",
+        "runs in which another vehicle loses control", "cut-in in icy_30, icy_70 or icy_100",
         (raised(scene(CUT_IN, "icy_30", "icy_70", "icy_100"), "loss_of_control_npc"),),
     ),
     Finding(

@@ -48,7 +48,7 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         "FollowTrajectoryAction": FOLLOW,
         "LaneChangeAction": FOLLOW,
         "SpeedAction": f"{FOLLOW}; rates of acceleration of `Performance` are not read",
-        "SpeedProfileAction": f"{FOLLOW}; `maxAccelerationRate` and `maxDecelerationRate` are not read",
+        "SpeedProfileAction": "limits of jerk act under `follow`, each speed with acceleration 0",
         "LongitudinalDistanceAction": "axes of the world and of trajectories are those of the entity",
         "LateralDistanceAction": (
             "of its limits `maxSpeed` only; axes of the world and of trajectories are those of the lane"

@@ -21,6 +21,16 @@ def profile(*entries: tuple[float, float], other: str = "") -> str:
     )
 
 
+def smooth_profile(*entries: float, up: float, down: float) -> str:
+    """Speeds one after the other without times, followed within limits of jerk, m/s^3."""
+    rows = "".join(f'<SpeedProfileEntry speed="{v}"/>' for v in entries)
+    bounds = f"""<DynamicConstraints maxAcceleration="3" maxDeceleration="4" maxSpeed="60"
+maxAccelerationRate="{up}" maxDecelerationRate="{down}"/>"""
+    return longitudinal(
+        f'<SpeedProfileAction followingMode="follow">{bounds}{rows}</SpeedProfileAction>'
+    )
+
+
 def gap(how: str, *, continuous: bool, side: str, limits: str = "", axes: str = "") -> str:
     places = {
         "ahead": "leadingReferencedEntity",

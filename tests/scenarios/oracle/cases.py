@@ -34,6 +34,7 @@ from tests.scenarios.oracle.actions import (
     profile,
     relative,
     shape_of,
+    smooth_profile,
     timing,
 )
 from tests.scenarios.oracle.conditions import conditions
@@ -91,6 +92,8 @@ def actions() -> Iterator[Case]:
     )
     yield case("lane_offset", "on_foot", lane_offset(0.4, a=0.1))
     yield case("profile", "straight", profile((14, 2), (6, 4)))
+    yield case("profile_jerk_up", "straight", smooth_profile(18, up=2, down=3))
+    yield case("profile_jerk_down", "curve", smooth_profile(4, up=1, down=2))
     yield case("profile_relative", "curve", profile((2, 2), (-3, 3), other="ego"))
     yield case(
         "speed_followed",

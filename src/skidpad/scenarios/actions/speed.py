@@ -8,6 +8,7 @@ from itertools import pairwise
 from math import copysign, inf
 
 from skidpad.scenarios.actions.base import Dimension, Dynamics, Following, dynamics
+from skidpad.scenarios.actions.jerk import Jerk, Piece, SmoothProfile, smooth_pieces
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Performance
@@ -136,9 +137,28 @@ class Profile:
     entries: tuple[tuple[float, float | None], ...]  # speed in m/s, seconds
     other: str | None
     limits: Performance
+    jerk: Jerk = Jerk()
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From the speed demanded so far."""
+        going = self._smooth(scene, actor) if self.jerk.is_limited else self._straight(scene, actor)
+        actor.pace_by(going, scene)
+        return going
+
+    def _smooth(self, scene: Scene, actor: Actor) -> Running:
+        """Returns the profile with limits of jerk: at each of its speeds the acceleration is 0."""
+        base = 0.0 if self.other is None else scene.actors[self.other].v_told
+        own, v = actor.entity.performance, actor.guide.v
+        pieces: list[Piece] = []
+        for entry, duration in self.entries:
+            end = limited(base + entry, own)
+            most = (self.limits.a_max, own.a_max) if end > v else (self.limits.b_max, own.b_max)
+            pieces += smooth_pieces(v, end, min(*most, DEFAULT_CHANGE), self.jerk, duration)
+            v = end
+        return SmoothProfile(actor, scene.t, pieces, v)
+
+    def _straight(self, scene: Scene, actor: Actor) -> Running:
+        """Returns the profile as straight lines between its speeds."""
         base = 0.0 if self.other is None else scene.actors[self.other].v_told
         own = actor.entity.performance
         a = min(self.limits.a_max, own.a_max, DEFAULT_CHANGE)
@@ -149,9 +169,7 @@ class Profile:
             needed = abs(v - speeds[-1]) / (a if v > speeds[-1] else b)
             times.append(times[-1] + (needed if duration is None else duration))
             speeds.append(v)
-        going = Profiled(actor, times, speeds)
-        actor.pace_by(going, scene)
-        return going
+        return Profiled(actor, times, speeds)
 
 
 DEFAULT_CHANGE = 10.0  # m/s^2, where a profile's file and its vehicle set no limit
@@ -179,7 +197,7 @@ class Profiled:
 
 def compile_profile(node: Node, ctx: Context) -> Profile:
     """A <SpeedProfileAction>."""
-    node.choice("followingMode", Following, Following.POSITION)
+    following = node.choice("followingMode", Following, Following.POSITION)
     entries = []
     for entry in node.children("SpeedProfileEntry"):
         duration = entry.number("time") if entry.has("time") else None
@@ -188,7 +206,7 @@ def compile_profile(node: Node, ctx: Context) -> Profile:
         entries.append((entry.number("speed"), duration))
     if not entries:
         raise node.error("needs a <SpeedProfileEntry>")
-    limits = Performance()
+    limits, jerk = Performance(), Jerk()
     found = node.find("DynamicConstraints")
     if found is not None:
         limits = Performance(
@@ -196,5 +214,8 @@ def compile_profile(node: Node, ctx: Context) -> Profile:
             found.limit("maxAcceleration", inf),
             found.limit("maxDeceleration", inf),
         )
+        if following is Following.FOLLOW:
+            rates = (found.limit(k, inf) for k in ("maxAccelerationRate", "maxDecelerationRate"))
+            jerk = Jerk(*(rate if rate > 0.0 else inf for rate in rates))
     other = ctx.entity(node) if node.has("entityRef") else None
-    return Profile(tuple(entries), other, limits)
+    return Profile(tuple(entries), other, limits, jerk)

@@ -1,0 +1,87 @@
+"""Changes of speed whose acceleration rises and falls at limited rates (jerk)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import copysign, inf, sqrt
+
+from skidpad.scenarios.motion import SLOW
+from skidpad.scenarios.scene import Actor, Scene
+
+
+@dataclass(frozen=True, slots=True)
+class Jerk:
+    """Holds how fast an acceleration may change, m/s^3: upwards, and downwards."""
+
+    up: float = inf
+    down: float = inf
+
+    @property
+    def is_limited(self) -> bool:
+        """Tells whether there is a limit at all."""
+        return min(self.up, self.down) < inf
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of constant jerk: speed and acceleration at its begin, m/s, m/s^2."""
+
+    duration: float  # s
+    v: float
+    a: float
+    jerk: float
+
+    def at(self, t: float) -> tuple[float, float]:
+        """Returns speed and acceleration t s after its begin."""
+        return self.v + t * (self.a + 0.5 * t * self.jerk), self.a + t * self.jerk
+
+
+def smooth_pieces(
+    v: float, end: float, most: float, jerk: Jerk, duration: float | None
+) -> Iterator[Piece]:
+    """Yields a change of speed: the acceleration rises, stays and falls, and is 0 at both ends.
+
+    most: m/s^2; duration: s that it shall take, None for as fast as the limits allow. It takes
+    longer where the limits leave no other choice.
+    """
+    size = end - v
+    if abs(size) < SLOW:
+        yield Piece(duration or 0.0, v, 0.0, 0.0)
+        return
+    rise, fall = (jerk.up, jerk.down) if size > 0.0 else (jerk.down, jerk.up)
+    ramps = 1.0 / rise + 1.0 / fall  # s per m/s^2 of the peak
+    peak = inf if ramps == 0.0 else sqrt(2.0 * abs(size) / ramps)
+    if duration is not None and duration * duration > 2.0 * ramps * abs(size):
+        root = sqrt(duration * duration - 2.0 * ramps * abs(size))
+        peak = 2.0 * abs(size) / (duration + root)
+    peak = min(peak, most)
+    sign = copysign(1.0, size)
+    held = max(abs(size) / peak - 0.5 * peak * ramps, 0.0)
+    up = Piece(peak / rise, v, 0.0, sign * rise if rise < inf else 0.0)
+    reached = v + sign * 0.5 * peak * up.duration
+    hold = Piece(held, reached, sign * peak, 0.0)
+    down = Piece(
+        peak / fall, reached + sign * peak * held, sign * peak, -sign * fall if fall < inf else 0.0
+    )
+    yield from (up, hold, down)
+
+
+class SmoothProfile:
+    """A speed profile under way, piece by piece."""
+
+    def __init__(self, actor: Actor, began: float, pieces: list[Piece], end: float) -> None:
+        self.actor, self.began, self.pieces, self.end = actor, began, pieces, end
+
+    def step(self, scene: Scene) -> bool:
+        """Demand the speed of the end of this step; True when the last speed is reached."""
+        if self.actor.longitudinal is not self:
+            return True
+        t, guide = scene.t + scene.dt - self.began, self.actor.guide
+        for piece in self.pieces:
+            if t < piece.duration:
+                guide.v, guide.a = piece.at(t)
+                return False
+            t -= piece.duration
+        guide.v, guide.a = self.end, 0.0
+        return True

@@ -23,10 +23,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tools")]
 
-from openscenario_corpus import breaks, content, lacking  # noqa: E402
-from scenario_oracle import LEAST_WAY, run_esmini  # noqa: E402
 from tests.scenarios.oracle.reference import deviations, file_hash  # noqa: E402
 
+from openscenario_corpus import breaks, content, lacking  # noqa: E402
+from scenario_oracle import LEAST_WAY, run_esmini  # noqa: E402
 from skidpad.core.errors import SkidpadError  # noqa: E402
 from skidpad.scenarios.document import parse  # noqa: E402
 from skidpad.scenarios.findings import HARMLESS  # noqa: E402

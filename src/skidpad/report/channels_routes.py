@@ -39,6 +39,21 @@ def _violations(segments: pl.DataFrame) -> list[Block]:
     rows.append({"route": ALL} | segments.select(sums).row(0, named=True))
     rows += [row | {"kind": "published"} for row in _town_rows()]
 
+    columns = _violation_columns(names)
+    note = (
+        "Published towns in italics: 8 h over six towns, another simulator and other channels; the "
+        "cause that the source gives stands behind each of its numbers (hover), and in the table below."
+    )
+    return [
+        table(columns, rows, "Indicators beyond their threshold, per route", note),
+        *_our_causes(segments, names),
+        *_cause_table(names),
+    ]
+
+
+def _violation_columns(names: list[str]) -> list[Column[Row]]:
+    """Route, hours, events of each indicator, and their sum."""
+
     def cell(row: Row, text: str, sort: float | None = None, hint: str = "") -> Cell:
         return Cell(text, sort=sort, kind=row.get("kind", ""), hint=hint)
 
@@ -56,7 +71,7 @@ def _violations(segments: pl.DataFrame) -> list[Block]:
         known = row.get("hours")
         return cell(row, "" if known is None else f"{known:.2f}", known)
 
-    columns: list[Column[Row]] = [
+    return [
         Column("route", lambda row: cell(row, row["route"])),
         Column("h", hours),
         *(
@@ -64,15 +79,6 @@ def _violations(segments: pl.DataFrame) -> list[Block]:
             for n in names
         ),
         Column("total", total),
-    ]
-    note = (
-        "Published towns in italics: 8 h over six towns, another simulator and other channels; the "
-        "cause that the source gives stands behind each of its numbers (hover), and in the table below."
-    )
-    return [
-        table(columns, rows, "Indicators beyond their threshold, per route", note),
-        *_our_causes(segments, names),
-        *_cause_table(names),
     ]
 
 

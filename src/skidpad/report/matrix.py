@@ -10,7 +10,7 @@ from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.statistics import DISPERSION_ASSUMED
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import matrix_figures, matrix_tables
-from skidpad.report.crashes import crash_sections, found_crashes, worst_of_each
+from skidpad.report.crashes import Cell, Found, crash_sections, found_crashes, worst_of_each
 from skidpad.report.matrix_answers import answers
 from skidpad.report.matrix_baseline import baseline_text
 from skidpad.report.matrix_data import Matrix, load_matrix
@@ -51,21 +51,7 @@ def build_page(matrix: Matrix) -> Page:
     crashes = found_crashes(matrix)
     parity = load_parity(matrix)
     sections = [
-        Section(
-            "What happened",
-            [
-                *matrix.missing(),
-                answers(matrix, judged, crashes),
-                *baseline_text(matrix),
-                headline_numbers(matrix),
-                headline_table(matrix),
-                matrix_figures.speed_figure(matrix),
-                *worst_of_each(crashes),
-                Text(GRADED if matrix.has_grades else UNGRADED),
-                Text(LEAD),
-                *_alike(matrix),
-            ],
-        ),
+        Section("What happened", _first(matrix, judged, crashes)),
         Section(
             "Crashes and interventions",
             matrix_tables.collisions(matrix) + matrix_figures.collisions(matrix),
@@ -93,6 +79,24 @@ def build_page(matrix: Matrix) -> Page:
         facts=[*matrix.facts(), *_processor_time(matrix, parity)],
         sections=sections,
     )
+
+
+def _first(
+    matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[Found]]
+) -> list[Block]:
+    """What is read first: answers, headline numbers, the worst crashes, and how to read the rest."""
+    return [
+        *matrix.missing(),
+        answers(matrix, judged, crashes),
+        *baseline_text(matrix),
+        headline_numbers(matrix),
+        headline_table(matrix),
+        matrix_figures.speed_figure(matrix),
+        *worst_of_each(crashes),
+        Text(GRADED if matrix.has_grades else UNGRADED),
+        Text(LEAD),
+        *_alike(matrix),
+    ]
 
 
 def _processor_time(matrix: Matrix, parity: Parity | None) -> list[tuple[str, str]]:

@@ -8,6 +8,8 @@ from test_matrix_answers import campaign, clear_cut
 from test_page import page
 
 from chromium import CHROMIUM, FLAGS
+from skidpad.evidence.channels.indicators.catalogue import Indicator
+from skidpad.report.channels_routes import route_blocks
 from skidpad.report.matrix import write_report
 from skidpad.report.page import Cell, Page, Section, Table, Text, write_page
 
@@ -80,3 +82,18 @@ def test_no_table_of_the_matrix_page_is_cut(tmp_path, size):
     shown = dom(path, script, size)
     assert 'data-cut="0"' in shown
     assert int(re.search(r'data-tables="(\d+)"', shown).group(1)) > 20
+
+
+def test_no_table_of_the_evaluation_page_is_cut(tmp_path):
+    names = [i.value for i in Indicator]
+    counts = {f"violations_{n}": 100.0 for n in names} | {f"cause_many_{n}": 100.0 for n in names}
+    rows = [{"name": "r.mcap", "route": f"route-{k}", "hours": 1.0, **counts} for k in range(1, 7)]
+    blocks = route_blocks({"segment_table": rows})
+    path = tmp_path / "report.html"
+    write_page(Page(title="t", subtitle="", sections=[Section("s", blocks)]), path)
+    script = (
+        "document.documentElement.dataset.cut = [...document.querySelectorAll('.scroll')]"
+        ".filter(e => e.scrollWidth > e.clientWidth).length"
+    )
+    assert len(blocks) == 4
+    assert 'data-cut="0"' in dom(path, script, "1400,900")

@@ -37,49 +37,44 @@ def _violations(segments: pl.DataFrame) -> list[Block]:
     sums = [pl.col("hours").sum(), *(pl.col(PREFIX + n).sum().cast(pl.Int64) for n in names)]
     rows = segments.group_by("route").agg(sums).sort("route").to_dicts()
     rows.append({"route": ALL} | segments.select(sums).row(0, named=True))
-    rows += [row | {"kind": "published"} for row in _town_rows()]
-
-    columns = _violation_columns(names)
-    note = (
-        "Published towns in italics: 8 h over six towns, another simulator and other channels; the "
-        "cause that the source gives stands behind each of its numbers (hover), and in the table below."
+    theirs = (
+        "8 h over six towns, another simulator and other channels. The cause that the source gives "
+        "stands behind each number (hover), and in the table below."
     )
     return [
-        table(columns, rows, "Indicators beyond their threshold, per route", note),
+        _by_indicator(rows, names, "Indicators beyond their threshold, per route"),
         *_our_causes(segments, names),
+        _by_indicator(_town_rows(), names, "Published: indicators per town", theirs, "published"),
         *_cause_table(names),
     ]
 
 
-def _violation_columns(names: list[str]) -> list[Column[Row]]:
-    """Route, hours, events of each indicator, and their sum."""
+HOURS, TOTAL = "hours driven", "total"
 
-    def cell(row: Row, text: str, sort: float | None = None, hint: str = "") -> Cell:
-        return Cell(text, sort=sort, kind=row.get("kind", ""), hint=hint)
 
-    def count(name: str, row: Row) -> Cell:
-        value = row.get(PREFIX + name)
+def _by_indicator(
+    routes: list[Row], names: list[str], caption: str, note: str = "", kind: str = ""
+) -> Block:
+    """One row per indicator and their sum, one column per route."""
+
+    def cell(route: Row, name: str) -> Cell:
+        if name == HOURS:
+            return Cell(f"{route['hours']:.2f}", sort=route["hours"])
+        if name == TOTAL:
+            value = sum(route.get(PREFIX + n) or 0 for n in names)
+        else:
+            value = route.get(PREFIX + name)
         if value is None:
-            return cell(row, "")
-        return cell(row, f"{value}", float(value), row.get("causes", {}).get(name, ""))
+            return Cell("", kind=kind)
+        hint = route.get("causes", {}).get(name, "")
+        return Cell(f"{value}", sort=float(value), kind=kind, hint=hint)
 
-    def total(row: Row) -> Cell:
-        value = sum(row.get(PREFIX + n) or 0 for n in names)
-        return cell(row, f"{value}", float(value))
-
-    def hours(row: Row) -> Cell:
-        known = row.get("hours")
-        return cell(row, "" if known is None else f"{known:.2f}", known)
-
-    return [
-        Column("route", lambda row: cell(row, row["route"])),
-        Column("h", hours),
-        *(
-            Column(words(n), partial(count, n), "events: repeats within 2 s count once")
-            for n in names
-        ),
-        Column("total", total),
+    columns: list[Column[str]] = [
+        Column("indicator", words, "events: repeats within 2 s count once"),
+        *(Column[str](route["route"], partial(cell, route)) for route in routes),
     ]
+    timed = [HOURS] if all("hours" in route for route in routes) else []
+    return table(columns, [*timed, *names, TOTAL], caption, note)
 
 
 def _our_causes(segments: pl.DataFrame, names: list[str]) -> list[Block]:
@@ -97,9 +92,9 @@ def _our_causes(segments: pl.DataFrame, names: list[str]) -> list[Block]:
         rows.append({"indicator": name, "cause": cause.value, ALL: sum(counts.values()), **counts})
     rows.sort(key=lambda row: -row[ALL])
     shown: list[Column[Row]] = [
-        Column("indicator", lambda r: words(r["indicator"])),
-        Column("cause", lambda r: r["cause"], "the first that applies in this order: "
-               + "; ".join(c.value for c in ViolationCause)),
+        Column("indicator: cause", lambda r: f"{words(r['indicator'])}: {r['cause']}",
+               "the first that applies in this order: " + "; ".join(c.value for c in ViolationCause),
+               kind="long"),
         *(Column[Row](route, partial(_value, route), "violations") for route in routes),
         Column("total", partial(_value, ALL), "violations"),
     ]  # fmt: skip

@@ -90,7 +90,7 @@ def test_every_route_for_every_role_and_foreign_id(lite, tmp_path):
     alert, order, cluster = others(lite)
     change, release = released(lite, tmp_path, hazard)
     ids = {"hazard": hazard, "alert": alert, "order": order, "cluster": cluster,
-           "change": change, "release": release}  # fmt: skip
+           "change": change, "release": release, "subject": hazard}  # fmt: skip
     words = {"kind": "hazards", "what": "obeyed", "to": "slow", "name": "timestamp.json"}
     asked, key = {"challenge": "0" * 32}, {"Idempotency-Key": "some-key-1"}
     people = {

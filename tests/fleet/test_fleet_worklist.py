@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import gzip
+import json
+
 import pytest
 
-from fleet_world import packed, record
+from fleet_world import packed, record, replace
 from skidpad.core.vocabulary import HazardType
 from skidpad.fleet.insight.worklist import rank_work
-from skidpad.fleet.site.dashboard import work_text
+from skidpad.fleet.site.work import work_text
 
 
 def test_many_alarms_that_are_rarely_true_stand_below_few_that_often_are(world):
@@ -32,3 +35,95 @@ def test_many_alarms_that_are_rarely_true_stand_below_few_that_often_are(world):
     assert (second.earlier, second.later) == (4, 2)
     assert "2024-10-04 to 2024-10-06, 4 in the first half, 2 in the second" in work_text(second)
     assert work_text(first).startswith("about 1.0 likely true (52 % [45, 59] of 195 alarms)")
+
+
+def drive(world, number: int, release: str, *records) -> None:
+    """Red-1 drives with a release, and sends what it drove and the hazards that it met."""
+    name = {"X-Skidpad-Drive": f"{number:032x}"}
+    summary = {"seconds": 60.0, "cycles": 600, "context": {}, "release": release}
+    body = gzip.compress(json.dumps(summary).encode())
+    assert world.send("red-1", body, f"drive-{number:06d}", "drive", **name).status_code == 200
+    if records:
+        sent = world.send("red-1", packed(*records), f"hazard-{number:06d}", **name)
+        assert sent.status_code == 200, sent.text
+
+
+def listed(world, **filters):
+    world.clock.now += 1.0
+    assert world.post("axle", "/api/v1/analyses").status_code == 200
+    return world.get("axle", "/api/v1/recurring", **filters).json()
+
+
+@pytest.mark.req("C-173", "C-193")
+def test_a_hazard_appears_is_fixed_by_a_release_and_reopened_when_it_recurs(world):
+    day = 86_400.0
+    world.clock.now = start = 20_000 * day
+    # it appears with the first release
+    for k in range(4):
+        drive(world, k, "1.0", record(k))
+        world.clock.now += day
+    (one,) = listed(world)
+    assert (one["state"], one["alarms"], one["owner"]) == ("new", 4, "")
+    place = f"/api/v1/recurring/{one['subject']}"
+    # only who has the right may triage
+    fixed = {"state": "fixed", "owner": "Ada", "release": "1.1", "note": "later braking"}
+    for name, status in (("red teleoperator", 403), ("red-1", 403), ("bolt", 404), (None, 401)):
+        assert world.post(name, f"{place}/state", json=fixed).status_code == status, name
+    assert world.post("axle", f"{place}/state", json={"state": "open", "owner": "Ada"}).is_success
+    assert listed(world, state="open", owner="Ada")[0]["subject"] == one["subject"]
+    assert listed(world, state="new") == []
+    # what cannot be said is refused with one sentence
+    for wrong in ({"state": "fixed"}, {"state": "reopened"}, {"state": "open"}, {"state": "gone"}):
+        answer = world.post("axle", f"{place}/state", json=wrong)
+        assert answer.status_code == 422
+        assert "state" in answer.json()["detail"]
+    # a release fixes it: drives with it stay quiet, one with the old release does not reopen it
+    assert world.post("axle", f"{place}/state", json=fixed).is_success
+    world.clock.now += day
+    drive(world, 10, "1.1")
+    drive(world, 11, "1.0", record(4))
+    world.clock.now += 20 * day
+    drive(world, 12, "1.1")
+    (one,) = listed(world)
+    assert (one["state"], one["release"], one["alarms"]) == ("fixed", "1.1", 5)
+    assert one["earlier"] > one["later"], "it falls in the trend"
+    assert listed(world, release="1.1") == []
+    assert listed(world, since=world.clock.now - day) == []
+    # it recurs with the release that should have fixed it
+    drive(world, 13, "1.1", record(5))
+    (one,) = listed(world)
+    assert (one["state"], one["owner"], one["alarms"]) == ("reopened", "Ada", 6)
+    assert [w["subject"] for w in listed(world, release="1.1", weather="day, dry")] == [
+        one["subject"]
+    ]
+    # every change is an event; looking again adds none
+    listed(world)
+    events = world.get("axle", f"{place}/events").json()
+    assert [e["state"] for e in events] == ["open", "fixed", "reopened"]
+    assert [e["actor"] for e in events[:2]] == [world.accounts["axle"].principal.id] * 2
+    assert events[1]["note"] == "later braking"
+    assert start < events[0]["at"] < events[1]["at"] + 1.0 < events[2]["at"]
+    # one click to the scenario
+    scenario = world.post("axle", f"/api/v1/hazards/{one['representative']}/scenario")
+    assert scenario.headers["content-type"] == "application/zip"
+
+
+def test_risk_times_precision_ranks_and_an_alarm_without_a_score_counts_in_full(world):
+    def scored(number, score):
+        return replace(record(number), extremes={"safety_score": score})
+
+    ids = world.send("red-1", packed(scored(1, 0.9), scored(2, 0.9), scored(3, 0.1), record(4)),
+                     "batch-key-1").json()["ids"]  # fmt: skip
+    clusters = [
+        {"id": "a", "type": "ego_tailgating", "map": "town", "members": ids[:2]},
+        {"id": "b", "type": "ego_tailgating", "map": "town", "members": ids[2:3]},
+        {"id": "c", "type": "ego_tailgating", "map": "town", "members": ids[3:]},
+    ]
+    who = world.accounts["red operator"].principal
+    with world.fleet.engine.connect() as connection:
+        ranked = rank_work(connection, who, clusters)
+    assert [one.cluster["id"] for one in ranked] == ["c", "b", "a"]
+    assert ranked[1].mean_risk == pytest.approx(0.9)
+    assert ranked[1].weight == pytest.approx(0.9 * ranked[1].precision.share)
+    assert ranked[0].mean_risk is None
+    assert ranked[2].weight == pytest.approx(0.2 * ranked[2].precision.share)

@@ -27,6 +27,7 @@ class Action(str, Enum):
     EXPORT_SCENARIO = "export scenario"  # OpenSCENARIO in the stakeholder's own environment
     READ_TRENDS = "read trends"
     ANALYSE = "analyse"  # look for recurring hazards now
+    TRIAGE = "triage"  # say what became of a recurring hazard, and who looks after it
     READ_ALERTS = "read alerts"
     ANSWER_ALERTS = "answer alerts"
     GUIDE = "guide"  # order vehicles to stop, slow down, go on
@@ -47,6 +48,7 @@ RIGHTS: dict[Action, frozenset[Role]] = {
     Action.EXPORT_SCENARIO: frozenset({_M, _O}),
     Action.READ_TRENDS: frozenset({_M, _O}),
     Action.ANALYSE: frozenset({_M, _O}),
+    Action.TRIAGE: frozenset({_M, _O}),
     Action.READ_ALERTS: frozenset({_O, _T}),
     Action.ANSWER_ALERTS: frozenset({_O, _T}),
     Action.GUIDE: frozenset({_T}),

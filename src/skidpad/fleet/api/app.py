@@ -11,7 +11,17 @@ from sqlalchemy.exc import DataError, IntegrityError
 
 import skidpad
 from skidpad.core.errors import SkidpadError
-from skidpad.fleet.api import alerts, changes, hazards, insight, orders, patterns, updates, vehicle
+from skidpad.fleet.api import (
+    alerts,
+    changes,
+    hazards,
+    insight,
+    orders,
+    patterns,
+    recurring,
+    updates,
+    vehicle,
+)
 from skidpad.fleet.api.guard import Guard
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.words import MEANWHILE, UNKEPT, Refused
@@ -19,7 +29,7 @@ from skidpad.fleet.words import MEANWHILE, UNKEPT, Refused
 DESCRIPTION = "/api/v1/openapi.json"
 ROUTERS = (
     vehicle.router, hazards.router, patterns.router, alerts.router, orders.router,
-    updates.router, changes.router, insight.router,
+    updates.router, changes.router, insight.router, recurring.router,
 )  # fmt: skip
 ROUTES = [route for router in ROUTERS for route in router.routes]
 

@@ -12,6 +12,7 @@ from fastapi import APIRouter, Depends, Query, Request, Response
 from fastapi.responses import PlainTextResponse
 
 from skidpad.fleet.api.guard import Needs, fleet_of
+from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.events import add_event
 from skidpad.fleet.store.reading import Wanted, hazard_row, hazard_rows, record_of, record_text
 from skidpad.fleet.words import Action, Principal, Refused
@@ -56,7 +57,13 @@ def record(request: Request, who: Reader, hazard: str) -> str:
 @router.post("/{hazard}/scenario", response_class=Response)
 def scenario(request: Request, who: Exporting, hazard: str) -> Response:
     """OpenSCENARIO and OpenDRIVE of a hazard as .zip; that it was asked for is kept."""
-    fleet = fleet_of(request)
+    content = export_scenario(fleet_of(request), who, hazard)
+    name = f"attachment; filename={hazard}.zip"
+    return Response(content, media_type="application/zip", headers={"Content-Disposition": name})
+
+
+def export_scenario(fleet: Fleet, who: Principal, hazard: str) -> bytes:
+    """Return a .zip of OpenSCENARIO and OpenDRIVE; that it was asked for is kept as an event."""
     if fleet.exporter is None:
         raise Refused(501, "this fleet was started without an exporter of scenarios")
     with fleet.engine.connect() as connection:
@@ -66,8 +73,7 @@ def scenario(request: Request, who: Exporting, hazard: str) -> Response:
         content = _zipped(fleet.exporter(found, Path(folder)))
     with fleet.engine.begin() as connection:
         add_event(connection, ("hazard", hazard), "scenario exported", (who.id, fleet.clock()))
-    name = f"attachment; filename={hazard}.zip"
-    return Response(content, media_type="application/zip", headers={"Content-Disposition": name})
+    return content
 
 
 def _zipped(files: tuple[Path, Path]) -> bytes:

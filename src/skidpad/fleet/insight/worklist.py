@@ -1,4 +1,4 @@
-"""Recurring hazards in the order in which they deserve a look: alarms that are likely true, most first."""
+"""Recurring hazards in the order in which they deserve a look: risk times precision, most first."""
 
 from __future__ import annotations
 
@@ -11,50 +11,153 @@ from typing import Any
 from sqlalchemy import Connection, select
 
 from skidpad.fleet.insight.precision import Precision, measured_precision
+from skidpad.fleet.insight.triage import Standing, State, read_standings, reopen
 from skidpad.fleet.store.rights import visible
-from skidpad.fleet.store.tables import hazards
+from skidpad.fleet.store.tables import drives, hazards
 from skidpad.fleet.words import Principal
 
 CHUNK = 500  # ids of one query
 
 
 @dataclass(frozen=True, slots=True)
-class Work:
-    """One recurring hazard: what was found, when, and how much of it is likely true."""
+class Alarm:
+    """One alarm of a recurring hazard."""
 
+    id: str
+    at: float  # s, server
+    rules: str
+    risk: float | None  # 1 less the least safety score; None: the rules keep none of this kind
+    weather: str
+    release: str  # that the vehicle drove, "" where it told no drive
+
+
+@dataclass(frozen=True, slots=True)
+class Work:
+    """One recurring hazard: its alarms, how much of it is likely true, and what became of it."""
+
+    subject: str  # id of its first alarm: analyses come and go, facts stay
     cluster: dict[str, Any]
-    first: float  # s, when its first alarm came in
-    last: float
-    earlier: int  # alarms in the first half of the period
-    later: int
+    alarms: tuple[Alarm, ...]  # by time
     precision: Precision | None  # as measured for its kind under these rules; None: not measured
+    standing: Standing
+
+    @property
+    def first(self) -> float:
+        """Time of the first alarm in s."""
+        return self.alarms[0].at
+
+    @property
+    def last(self) -> float:
+        """Time of the last alarm in s."""
+        return self.alarms[-1].at
+
+    @property
+    def earlier(self) -> int:
+        """Alarms in the first half of the period."""
+        middle = (self.first + self.last) / 2
+        return sum(alarm.at <= middle for alarm in self.alarms)
+
+    @property
+    def later(self) -> int:
+        """Alarms in the second half of the period."""
+        return len(self.alarms) - self.earlier
 
     @property
     def likely_true(self) -> float:
         """Alarms times precision; all of them where the precision was not measured."""
-        alarms = self.earlier + self.later
-        return alarms if self.precision is None else alarms * self.precision.share
+        share = 1.0 if self.precision is None else self.precision.share
+        return share * len(self.alarms)
+
+    @property
+    def mean_risk(self) -> float | None:
+        """Mean risk of the alarms that have one."""
+        known = [alarm.risk for alarm in self.alarms if alarm.risk is not None]
+        return sum(known) / len(known) if known else None
+
+    @property
+    def weight(self) -> float:
+        """Sum of risk times precision; an alarm without a risk counts in full."""
+        share = 1.0 if self.precision is None else self.precision.share
+        return share * sum(1.0 if a.risk is None else a.risk for a in self.alarms)
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class WorkFilter:
+    """Which recurring hazards; None: any. Period, weather and release hold for single alarms."""
+
+    state: State | None = None
+    owner: str | None = None
+    map: str | None = None
+    weather: str | None = None
+    release: str | None = None
+    since: float | None = None  # s, server
+    before: float | None = None
 
 
 def rank_work(
-    connection: Connection, who: Principal, clusters: Sequence[dict[str, Any]]
+    connection: Connection,
+    who: Principal,
+    clusters: Sequence[dict[str, Any]],
+    wanted: WorkFilter = WorkFilter(),  # frozen
 ) -> list[Work]:
-    """Return the clusters with period and trend, the one with most likely true alarms first."""
-    ids = iter([id for cluster in clusters for id in cluster["members"]])
-    found: dict[str, tuple[float, str]] = {}
-    while some := list(islice(ids, CHUNK)):
-        query = select(hazards.c.id, hazards.c.at, hazards.c.head)
+    """Return the clusters as far as `wanted`, the one with most risk that is likely true first."""
+    found = _read_alarms(connection, who, [id for c in clusters for id in c["members"]])
+    groups = [
+        (c, sorted((found[i] for i in c["members"] if i in found), key=_age)) for c in clusters
+    ]
+    standings = read_standings(connection, [alarms[0].id for _, alarms in groups if alarms])
+    listed = []
+    for cluster, alarms in groups:
+        if not alarms or wanted.map not in (None, cluster.get("map")):
+            continue
+        standing = standings.get(alarms[0].id, Standing())
+        if wanted.state not in (None, standing.state) or wanted.owner not in (None, standing.owner):
+            continue
+        kept = [alarm for alarm in alarms if _is_wanted(alarm, wanted)]
+        if kept:
+            precision = measured_precision(kept[-1].rules, cluster["type"])
+            listed.append(Work(alarms[0].id, cluster, tuple(kept), precision, standing))
+    return sorted(listed, key=lambda w: (-w.weight, w.cluster["id"]))
+
+
+def reopen_recurred(
+    connection: Connection, who: Principal, clusters: Sequence[dict[str, Any]], at: float
+) -> int:
+    """Reopen the fixed ones with later alarms from drives with the release; say how many."""
+    recurred = []
+    for one in rank_work(connection, who, clusters, WorkFilter(state=State.FIXED)):
+        fixed = one.standing
+        if any(a.release == fixed.release and a.at > (fixed.at or 0.0) for a in one.alarms):
+            recurred.append((one.subject, fixed))
+    reopen(connection, recurred, at)
+    return len(recurred)
+
+
+def _age(alarm: Alarm) -> tuple[float, str]:
+    return alarm.at, alarm.id
+
+
+def _is_wanted(alarm: Alarm, wanted: WorkFilter) -> bool:
+    return (
+        wanted.weather in (None, alarm.weather)
+        and wanted.release in (None, alarm.release)
+        and (wanted.since is None or alarm.at >= wanted.since)
+        and (wanted.before is None or alarm.at < wanted.before)
+    )
+
+
+def _read_alarms(connection: Connection, who: Principal, ids: Sequence[str]) -> dict[str, Alarm]:
+    there = (drives.c.vehicle == hazards.c.vehicle) & (drives.c.drive == hazards.c.drive)
+    query = select(
+        hazards.c.id, hazards.c.at, hazards.c.head, hazards.c.weather, drives.c.release
+    ).outerjoin(drives, there & (hazards.c.drive != ""))
+    found, rest = {}, iter(ids)
+    while some := list(islice(rest, CHUNK)):
         for row in connection.execute(query.where(visible(who, hazards), hazards.c.id.in_(some))):
-            found[row.id] = row.at, str(json.loads(row.head)["profile"])
-    listed = [_work(c, [found[id] for id in c["members"] if id in found]) for c in clusters]
-    return sorted((one for one in listed if one), key=lambda w: (-w.likely_true, w.cluster["id"]))
-
-
-def _work(cluster: dict[str, Any], alarms: list[tuple[float, str]]) -> Work | None:
-    if not alarms:
-        return None
-    times = [at for at, _ in alarms]
-    middle = (min(times) + max(times)) / 2
-    earlier = sum(at <= middle for at in times)
-    precision = measured_precision(max(alarms)[1], cluster["type"])
-    return Work(cluster, min(times), max(times), earlier, len(times) - earlier, precision)
+            head = json.loads(row.head)
+            score = head["extremes"].get("safety_score")
+            risk = None if score is None else min(max(1.0 - float(score), 0.0), 1.0)
+            found[row.id] = Alarm(
+                row.id, row.at, str(head["profile"]), risk, row.weather, row.release or ""
+            )
+    return found

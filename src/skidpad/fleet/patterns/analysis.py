@@ -12,6 +12,7 @@ from sqlalchemy import ColumnElement, Connection, select
 
 from skidpad.core.errors import FileError
 from skidpad.fleet.identity import new_id
+from skidpad.fleet.insight.worklist import reopen_recurred
 from skidpad.fleet.patterns.clusters import (
     STANDARD,
     Case,
@@ -66,7 +67,9 @@ def analyse(fleet: Fleet, who: Principal, settings: ClusterSettings = STANDARD) 
                 },
             )  # fmt: skip
         keys = [{"key": list(key), "hazards": ids} for key, ids in list(often.items())[:200]]
-        told = {"unreadable": unreadable, "recurring": keys}
+        plain = [msgspec.to_builtins(cluster) | {"id": id} for cluster in found]
+        reopened = reopen_recurred(connection, who, plain, at)
+        told = {"reopened": reopened, "unreadable": unreadable, "recurring": keys}
         add_event(connection, ("analysis", id), "analysed", (who.id, at), **told)
     fleet.hub.tell(f"{CAME} {who.tenant}")
     return Analysed(id, len(cases), unreadable, found)

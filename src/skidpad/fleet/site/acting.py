@@ -9,6 +9,8 @@ from starlette.requests import Request
 from skidpad.fleet.alerting.keeping import What
 from skidpad.fleet.alerting.orders import Order
 from skidpad.fleet.api.alerts import answered, ordered
+from skidpad.fleet.api.hazards import export_scenario
+from skidpad.fleet.api.recurring import TriageText, triage
 from skidpad.fleet.identity import new_id
 from skidpad.fleet.patterns.analysis import analyse
 from skidpad.fleet.service import Fleet
@@ -47,6 +49,16 @@ def click_answer(fleet: Fleet, id: str, alert: str, what: What) -> dict[str, Any
 def click_order(fleet: Fleet, id: str, alert: str, what: Order) -> dict[str, Any]:
     """Order the vehicle of an alert to stop, slow down or go on."""
     return ordered(fleet, granted(fleet, id, Action.GUIDE), alert, (what, new_id()))
+
+
+def click_triage(fleet: Fleet, id: str, subject: str, text: TriageText) -> dict[str, Any]:
+    """Set state, owner and release of a recurring hazard."""
+    return triage(fleet, granted(fleet, id, Action.TRIAGE), subject, text)
+
+
+def click_export(fleet: Fleet, id: str, hazard: str) -> bytes:
+    """Return the scenario of a hazard as .zip."""
+    return export_scenario(fleet, granted(fleet, id, Action.EXPORT_SCENARIO), hazard)
 
 
 def click_analyse(fleet: Fleet, id: str) -> int:

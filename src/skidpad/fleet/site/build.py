@@ -23,6 +23,7 @@ from skidpad.fleet.site.reports import (
     places_of,
     research_of,
 )
+from skidpad.fleet.site.work import draw_work, work_of
 from skidpad.fleet.words import Action, Principal
 from skidpad.pages.sessions import Sessions
 from skidpad.pages.site import site
@@ -59,6 +60,9 @@ def pages_of(fleet: Fleet, lines: MapLines) -> dict[str, Page]:
             Action.READ_TRENDS, "Fleet",
             lambda who, _: (who, overview(fleet, lines, who)),
             lambda ui, found: draw_overview(fleet, lines, ui, *found),
+        ),
+        "/work": Page(
+            Action.READ_TRENDS, "Work list", lambda who, request: work_of(fleet, who, request), draw_work,
         ),
         "/replay/{hazard}": Page(
             Action.READ_HAZARDS, "Replay",

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from datetime import datetime, timezone
 from typing import Any
 
 from starlette.concurrency import run_in_threadpool
@@ -28,6 +27,7 @@ from skidpad.fleet.site.drawing import (
     replay_svg,
 )
 from skidpad.fleet.site.frame import say, table
+from skidpad.fleet.site.work import WORK_NOTE, draw_top
 from skidpad.fleet.store.reading import Wanted, hazard_row, hazard_rows, record_of
 from skidpad.fleet.words import Principal, Refused
 from skidpad.recording.hazards import HazardRecord
@@ -35,19 +35,13 @@ from skidpad.recording.hazards import HazardRecord
 MapLines = Callable[[str], Sequence[Line]]  # roads of a map by its name, m
 SHOWN = 6  # trends
 MAPS = 3
-CLUSTERS = 20
+CLUSTERS = 5
 PLAY_S = 0.1
 LOOK_S = 5.0  # between two looks of an open page for what came
 
 ALARM_NOTE = (
     "An alarm is what the rules found, right or wrong. How many are true was measured on simulated"
     " drives among natural drivers; in your traffic it may differ."
-)
-
-
-WORK_NOTE = (
-    "Ranked by alarms times the measured precision of their kind. A kind that was not measured counts"
-    " in full. How severe a hazard is does not enter."
 )
 
 
@@ -181,33 +175,7 @@ def _clusters(ui: Any, found: list[Work], again: Callable[[], int]) -> None:
 
         ui.button("Look for recurring hazards now", on_click=look)
         ui.label(WORK_NOTE).classes("dim")
-        for rank, one in enumerate(found[:CLUSTERS], 1):
-            cluster = one.cluster
-            with ui.element("div").classes("card"):
-                text = f"{len(cluster['members'])} x {cluster['type'].replace('_', ' ')}"
-                where = f"{cluster['map']} at {cluster['x']:.0f}, {cluster['y']:.0f} m"
-                ui.label(f"{rank}. {text}, {cluster['vehicles']} vehicles, {where}")
-                ui.label(work_text(one)).classes("dim")
-                ui.link("replay the representative", f"/replay/{cluster['representative']}")
-        if not found:
-            ui.label("Nothing was found to recur.").classes("dim")
-
-
-def work_text(one: Work) -> str:
-    """Returns how many alarms are likely true, the period (UTC) and the trend."""
-    measured = one.precision
-    likely = (
-        "precision not measured"
-        if measured is None
-        else f"about {one.likely_true:.1f} likely true ({measured.describe()})"
-    )
-    first, last = (
-        f"{datetime.fromtimestamp(at, timezone.utc):%Y-%m-%d}" for at in (one.first, one.last)
-    )
-    period = first if first == last else f"{first} to {last}"
-    if one.first == one.last:
-        return f"{likely}; {period}, all at once"
-    return f"{likely}; {period}, {one.earlier} in the first half, {one.later} in the second"
+        draw_top(ui, found, CLUSTERS)
 
 
 def replayed(

@@ -18,6 +18,7 @@ from skidpad.pages.site import nicegui
 Found = TypeVar("Found")  # what a page shows
 LINKS = (
     ("Dashboard", "/", Action.READ_TRENDS),
+    ("Work list", "/work", Action.READ_TRENDS),
     ("Alerts", "/alerts", Action.READ_ALERTS),
     ("Places", "/places", Action.READ_PLACES),
     ("Safety case", "/case", Action.READ_SAFETY_CASE),

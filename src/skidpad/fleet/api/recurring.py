@@ -1,0 +1,124 @@
+"""The work list of recurring hazards, and their triage (C-173, C-193)."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import msgspec
+from fastapi import APIRouter, Depends, Query, Request
+from starlette.concurrency import run_in_threadpool
+
+from skidpad.core.told import on_a_line
+from skidpad.fleet.api.guard import Needs, fleet_of
+from skidpad.fleet.api.vehicle import read_body
+from skidpad.fleet.insight.triage import KIND, Standing, State, set_standing
+from skidpad.fleet.insight.worklist import Work, WorkFilter, rank_work
+from skidpad.fleet.patterns.analysis import newest_clusters
+from skidpad.fleet.service import CAME, Fleet
+from skidpad.fleet.store.events import events_of
+from skidpad.fleet.words import Action, Principal, Refused, absent
+
+Reader = Annotated[Principal, Depends(Needs(Action.READ_TRENDS))]
+Triager = Annotated[Principal, Depends(Needs(Action.TRIAGE))]
+Seconds = Annotated[float | None, Query(ge=0.0, le=1e12, allow_inf_nan=False)]
+Word = Annotated[str | None, Query(max_length=200)]
+router = APIRouter(prefix="/api/v1/recurring", tags=["recurring hazards"])
+
+
+class TriageText(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """A new state of a recurring hazard."""
+
+    state: State
+    owner: str = ""
+    release: str = ""
+    note: str = ""
+
+
+def work_list(fleet: Fleet, who: Principal, wanted: WorkFilter) -> list[Work]:
+    """Return the recurring hazards of the newest analysis, ranked."""
+    with fleet.engine.connect() as connection:
+        return rank_work(connection, who, newest_clusters(connection, who), wanted)
+
+
+def require_subject(fleet: Fleet, who: Principal, subject: str) -> None:
+    """Raise Refused (404) when `who` sees no recurring hazard of that id."""
+    if subject not in {one.subject for one in work_list(fleet, who, WorkFilter())}:
+        raise absent()
+
+
+def triage(fleet: Fleet, who: Principal, subject: str, text: TriageText) -> dict[str, Any]:
+    """Set the state of a recurring hazard that `who` may see; Refused (404) of any other."""
+    require_subject(fleet, who, subject)
+    standing = Standing(text.state, text.owner, text.release, fleet.clock(), who.id)
+    with fleet.engine.begin() as connection:
+        set_standing(connection, who, subject, standing, text.note)
+    fleet.hub.tell(f"{CAME} {who.tenant}")
+    return {"subject": subject, "state": text.state.value}
+
+
+@router.get("")
+def list_work(
+    request: Request,
+    who: Reader,
+    state: State | None = None,
+    owner: Word = None,
+    map: Word = None,
+    weather: Word = None,
+    release: Word = None,
+    since: Seconds = None,
+    before: Seconds = None,
+) -> list[dict[str, Any]]:
+    """The recurring hazards of the newest analysis, most likely true risk first."""
+    wanted = WorkFilter(
+        state=state, owner=owner, map=map, weather=weather, release=release, since=since,
+        before=before,
+    )  # fmt: skip
+    return [_plain(one) for one in work_list(fleet_of(request), who, wanted)]
+
+
+@router.post("/{subject}/state")
+async def set_state(request: Request, who: Triager, subject: str) -> dict[str, Any]:
+    """Say what became of a recurring hazard; the change is kept as an event."""
+    fleet = fleet_of(request)
+    await run_in_threadpool(require_subject, fleet, who, subject)
+    try:
+        text = msgspec.json.decode(await read_body(request, fleet.limits), type=TriageText)
+    except (msgspec.MsgspecError, ValueError) as error:
+        raise Refused(422, f"the request cannot be read ({on_a_line(error)})") from error
+    return await run_in_threadpool(triage, fleet, who, subject, text)
+
+
+@router.get("/{subject}/events")
+def list_events(request: Request, who: Reader, subject: str) -> list[dict[str, Any]]:
+    """Every change of a recurring hazard, in order."""
+    fleet = fleet_of(request)
+    require_subject(fleet, who, subject)
+    with fleet.engine.connect() as connection:
+        found = events_of(connection, [subject])
+    return [
+        {"state": e.what, "at": e.at, "actor": e.actor} | e.detail for e in found if e.kind == KIND
+    ]
+
+
+def _plain(one: Work) -> dict[str, Any]:
+    risk, precision = one.mean_risk, one.precision
+    return {
+        "subject": one.subject,
+        "type": one.cluster["type"],
+        "map": one.cluster["map"],
+        "x": one.cluster["x"],
+        "y": one.cluster["y"],
+        "alarms": len(one.alarms),
+        "vehicles": one.cluster["vehicles"],
+        "mean_risk": risk,
+        "precision": None if precision is None else precision.share,
+        "weight": one.weight,
+        "first": one.first,
+        "last": one.last,
+        "earlier": one.earlier,
+        "later": one.later,
+        "state": one.standing.state.value,
+        "owner": one.standing.owner,
+        "release": one.standing.release,
+        "representative": one.cluster["representative"],
+    }

@@ -130,7 +130,7 @@ def test_every_page_for_every_role_and_foreign_id(tmp_path):
     world.close()
     shown = {"/": RED, "/replay/{hazard}": RED, "/alerts": RED, "/changes": name}
     pages = pages_of(None, None)  # what they read and draw is not asked for here
-    assert set(shown) | {"/places", "/case", "/research"} == set(pages)
+    assert set(shown) | {"/places", "/case", "/research", "/work"} == set(pages)
     child, address = served(tmp_path / "data")
     with child:
         try:
@@ -259,7 +259,7 @@ def visit(browser, url: str, size=None, asked: list | None = None):
 def dashboard(browser, address, tokens, size, asked) -> None:
     page = visit(browser, opened(address, tokens["red operator"]), size, asked)
     assert "token" not in page.url
-    page.get_by_text("replay the representative").wait_for()
+    page.get_by_role("link", name="replay", exact=True).first.wait_for()
     assert page.get_by_text("9 x ego").count() == 0
     page.get_by_text("6 x ego tailgating, 2 vehicles").wait_for()  # not the blue one's
     page.get_by_text("ego location similarity").wait_for()
@@ -269,7 +269,8 @@ def dashboard(browser, address, tokens, size, asked) -> None:
     picture = os.environ.get("SKIDPAD_PICTURES")
     if picture:
         page.screenshot(path=f"{picture}/dashboard-{size['width']}.png", full_page=True)
-    page.get_by_text("replay the representative").click()
+    work_list(page, address, size, picture)
+    page.get_by_role("link", name="replay", exact=True).first.click()
     page.get_by_text("Play or pause").wait_for()
     page.get_by_text("0.0 s: before the hazard (1.0 to 1.5 s, worst at 1.2 s)").wait_for()
     page.get_by_text("circle: what the hazard is about").wait_for()
@@ -282,6 +283,27 @@ def dashboard(browser, address, tokens, size, asked) -> None:
     if picture:
         page.screenshot(path=f"{picture}/replay-{size['width']}.png", full_page=True)
     page.context.close()
+
+
+def work_list(page, address, size, picture) -> None:
+    """A hazard is triaged, found by its state, and its scenario is one click away."""
+    page.goto(f"{address}/work")
+    page.get_by_text("6 x ego tailgating, 2 vehicles").wait_for()
+    state = "new" if size["width"] > 1000 else "open"  # what the other window's visit left
+    page.get_by_text(f"state {state}").first.wait_for()
+    page.get_by_text("set state").first.click()
+    page.get_by_text("The state is open now").wait_for()
+    page.goto(f"{address}/work?state=open")
+    page.get_by_text("state open, owner red operator").wait_for()
+    with page.expect_download() as download:
+        page.get_by_text("scenario (.xosc)").first.click()
+    assert download.value.suggested_filename.endswith(".zip")
+    assert page.evaluate("document.documentElement.scrollWidth") <= size["width"]
+    if picture:
+        page.screenshot(path=f"{picture}/work-{size['width']}.png", full_page=True)
+    page.goto(f"{address}/work?state=rejected")
+    page.get_by_text("No recurring hazard matches these filters.").wait_for()
+    page.goto(f"{address}/")
 
 
 def comes(page, address, tokens, name) -> None:

@@ -121,6 +121,7 @@ def _export(ui: Any, found: WorkPage, hazard: str) -> Callable[[], Any]:
 def _triage(ui: Any, found: WorkPage, one: Work) -> None:
     with ui.element("nav"):
         state = ui.select([s.value for s in SETTABLE], value=State.OPEN.value, label="new state")
+        state.style("min-width:120px")
         owner = ui.input("owner", value=one.standing.owner or found.who.name)
         release = ui.input("fixed by release", value=one.standing.release)
 

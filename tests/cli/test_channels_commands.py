@@ -150,6 +150,11 @@ def test_info_says_what_a_recording_holds_and_what_it_lost(folder, tmp_path):
 def test_timing_gives_the_table_and_the_total_is_the_sum_of_its_parts(folder, tmp_path):
     done = invoke("monitor", folder / "one.mcap", "--out", tmp_path, "--timing")
     assert "motion_prediction" in done.output
+    told = done.output.splitlines()
+    assert [line for line in told if len(line) > 80 and not line.startswith("Next: ")] == []
+    assert told[-1].startswith("Next: "), "the answer and the next command come last"
+    heads = told[told.index("times per cycle, ms, and shares of cycles, %") + 1].split("  ")
+    assert [h.strip() for h in heads if h.strip()][:3] == ["module", "mean", "most"]
     t = pl.read_parquet(tmp_path / "timing.parquet")
     parts = ["prepare", "comfort", "similarity", "motion_prediction", "risk", "hazards"]
     assert t["total"].to_list() == pytest.approx(t.select(pl.sum_horizontal(parts)).to_series())

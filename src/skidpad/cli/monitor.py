@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
+    import polars as pl
+
     from skidpad.core.vocabulary import HazardType
     from skidpad.evidence.channels.indicators.catalogue import Indicator
     from skidpad.evidence.channels.summary import Watched
@@ -132,11 +134,11 @@ def monitor(
     told, digest = (Alarms(sys.stdout), "") if file is None else (None, file_hash(file))
     found = watch_whole(source, out, settings, timer, digest, told)
     write_drive_report(out)
-    _print(found, out)
     if timer is not None:
         times = timer.table()
-        _print_table(timing_statistics(times))
-        _print_table(time_by_objects(times))
+        _print_table(timing_statistics(times), "times per cycle, ms, and shares of cycles, %")
+        _print_table(time_by_objects(times), "mean times by the number of objects, ms")
+    _print(found, out)
     if wanted:
         _gate({name: _events(found, rule) for name, rule in wanted.items()}, junit)
 
@@ -206,14 +208,23 @@ def _print(found: Watched, out: Path) -> None:
     typer.echo(f"Next: {out / 'report.html'} shows the drive{listing}")
 
 
-def _print_table(table: object) -> None:
-    import polars as pl
+SHORT = {  # headings of the table of times, so that it fits a terminal
+    "mean_ms": "mean", "max_ms": "most", "min_ms": "least", "std_ms": "std", "p999_ms": "99.9 %",
+    "breaches_pct": "beyond", "within_90_pct": "90-100", "under_50_pct": "< 50 %",
+}  # fmt: skip
 
-    with pl.Config(
-        tbl_rows=50, tbl_cols=20, tbl_hide_dataframe_shape=True, tbl_width_chars=140,
-        tbl_hide_column_data_types=True, float_precision=3,
-    ):  # fmt: skip
-        typer.echo(str(table))
+
+def _print_table(table: pl.DataFrame, title: str) -> None:
+    """Print a table of numbers with three digits, its columns as wide as they must be."""
+    heads = [SHORT.get(name, name) for name in table.columns]
+    rows = [[f"{v:.3f}" if isinstance(v, float) else str(v) for v in row] for row in table.rows()]
+    widths = [max(map(len, column)) for column in zip(heads, *rows, strict=True)]
+    typer.echo(title)
+    for row in (heads, *rows):
+        cells = zip(row, widths, strict=True)
+        first = next(cells)
+        line = first[0].ljust(first[1]) + "".join(f"  {cell:>{width}}" for cell, width in cells)
+        typer.echo(line.rstrip())
 
 
 def _gate(counts: dict[str, int], junit: Path | None) -> None:

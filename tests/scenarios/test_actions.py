@@ -177,7 +177,6 @@ vehicleLightType="brakeLights"/></LightType><LightState mode="on"/></LightStateA
     "OverrideControllerValueAction": private("""<ControllerAction><OverrideControllerValueAction>
 <Brake active="true"><BrakePercent value="1"/></Brake></OverrideControllerValueAction>
 </ControllerAction>"""),
-    "TrailerAction": private("""<TrailerAction><DisconnectTrailerAction/></TrailerAction>"""),
     "UserDefinedAction": """<UserDefinedAction><CustomCommandAction type="x">y</CustomCommandAction>
 </UserDefinedAction>""",
     "SetMonitorAction": world('<SetMonitorAction monitorRef="m" value="true"/>'),
@@ -186,7 +185,6 @@ vehicleLightType="brakeLights"/></LightType><LightState mode="on"/></LightStateA
 
 @pytest.mark.osc(
     "LightStateAction", "AnimationAction", "AppearanceAction",
-    "TrailerAction", "ConnectTrailerAction", "DisconnectTrailerAction",
     "UserDefinedAction", "CustomCommandAction", "SetMonitorAction",
 )  # fmt: skip
 @pytest.mark.parametrize("tag", WITHOUT_EFFECT)
@@ -197,12 +195,6 @@ def test_what_this_world_cannot_show_is_over_at_once_and_told(tmp_path, tag):
     assert moved == [(2.0, "startTransition"), (2.0, "endTransition")]
     assert any(tag in notice for notice in result.player.scene.notices)
     assert result.of("other")[-1].x == pytest.approx(120.0 + 10.0 * 6.0, abs=0.51)
-
-
-def test_a_trailer_is_connected_without_effect(tmp_path):
-    join = private("""<TrailerAction><ConnectTrailerAction trailerRef="ego"/></TrailerAction>""")
-    result = told(tmp_path, stories=story(event("e", join, time(2.0))), minor=3)
-    assert any("TrailerAction" in notice for notice in result.player.scene.notices)
 
 
 def driven_by_others(tmp_path, action, end=4.0):

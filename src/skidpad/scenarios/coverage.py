@@ -39,6 +39,7 @@ STATES = (
 )
 NAMED = "by registered names; others are noted, without effect"
 CONTROLLED = "of others than the ego `ACC` and registered names, along their lanes"
+TOWED = "without slip at the trailer's axle; masses and forces do not count"
 FOLLOW = "`follow` is read as `position`"
 PARTIAL: Mapping[str, str] = MappingProxyType(
     {
@@ -59,8 +60,9 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         "UserDefinedValueCondition": NAMED,
         "CustomCommandAction": NAMED,
         "SetMonitorAction": "is noted, without effect",
-        "ConnectTrailerAction": "is noted, without effect",
-        "DisconnectTrailerAction": "is noted, without effect",
+        **dict.fromkeys(
+            ("TrailerAction", "ConnectTrailerAction", "DisconnectTrailerAction"), TOWED
+        ),
         "InfrastructureAction": STATES,
         "AngleCondition": "pitch and roll are those of the road",
         "RelativeAngleCondition": "pitch and roll are those of the road",

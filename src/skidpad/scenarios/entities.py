@@ -48,6 +48,7 @@ class Box:
     left: float = 0.0
 
 
+TRAILERS_MOST = 8  # one behind the other, inside one description; assumption
 SIZES = ("length", "width", "height")
 BICYCLE = Box(1.8, 0.6, 1.7)
 USUAL = {  # sizes where only the category is known; assumption
@@ -68,6 +69,18 @@ class Performance:
 
 
 @dataclass(frozen=True, slots=True)
+class Coupling:
+    """Where a vehicle tows and is towed, m forward of its reference point; None: not at all.
+
+    trailer: the entity that it tows from the begin, "" for none.
+    """
+
+    hitch: float | None = None
+    coupler: float | None = None
+    trailer: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Entity:
     """One entity. type: of the backend; wheels: it can be driven through the tyres."""
 
@@ -78,6 +91,7 @@ class Entity:
     box: Box
     performance: Performance = Performance()
     properties: Mapping[str, str] = field(default_factory=dict)
+    coupling: Coupling = Coupling()
 
     @property
     def is_marked_ego(self) -> bool:
@@ -111,6 +125,8 @@ def compile_entities(root: Node, catalogs: Catalogs) -> Entities:
             if entity.name in found:
                 raise one.error(f"there are two entities {entity.name!r}")
             found[entity.name] = entity
+            for trailer in _inner_trailers(one, entity, catalogs):
+                found.setdefault(trailer.name, trailer)
             findings += _sizes(one, catalogs)
         except Fault as fault:
             findings.append(fault.finding)
@@ -122,6 +138,30 @@ def compile_entities(root: Node, catalogs: Catalogs) -> Entities:
         except Fault as fault:
             findings.append(fault.finding)
     return Entities(found, groups, tuple(findings))
+
+
+def _inner_trailers(node: Node, tractor: Entity, catalogs: Catalogs) -> Iterator[Entity]:
+    """Yields the trailers that a vehicle's description holds, one behind the other."""
+    for _ in range(TRAILERS_MOST):
+        body = next((n for n in node.children() if n.tag != "ObjectController"), None)
+        inner = None if body is None else catalogs.resolved(body).find("Trailer", "Trailer")
+        if inner is None:
+            return
+        tractor = described(inner, tractor.coupling.trailer, catalogs)
+        yield tractor
+        node = inner
+
+
+def _coupling(name: str, node: Node) -> Coupling:
+    """Returns the hitch, coupler and trailer of a vehicle; a trailer inside it is called NAME+."""
+    places = (node.find("TrailerHitch"), node.find("TrailerCoupler"))
+    hitch, coupler = (None if place is None else place.number("dx") for place in places)
+    found = node.find("Trailer")
+    if found is None:
+        return Coupling(hitch, coupler)
+    reference = found.find("TrailerRef")
+    trailer = f"{name}+" if reference is None else reference.text("entityRef", "")
+    return Coupling(hitch, coupler, trailer)
 
 
 UNKNOWN = Entity("", Body.PROP, "box", False, Box())
@@ -182,10 +222,11 @@ def _vehicle(name: str, node: Node, properties: Mapping[str, str]) -> Entity:
     box, limits = _box(node, Box()), _performance(node)
     if category in TWO_WHEELED:
         return Entity(name, Body.VEHICLE, "bicycle", False, box, limits, properties)
+    coupling = _coupling(name, node)
     if category not in WHEELED:
         raise node.unsupported(f"vehicleCategory={category!r} is not supported")
     type = nearest_type(WHEELED[category], box.length, box.width, box.height)
-    return Entity(name, Body.VEHICLE, type, True, box, limits, properties)
+    return Entity(name, Body.VEHICLE, type, True, box, limits, properties, coupling)
 
 
 def of_category(node: Node, name: str, category: str) -> Entity:

@@ -22,6 +22,7 @@ from skidpad.scenarios.signals import SignalPlan
 from skidpad.scenarios.staging import staging_of
 from skidpad.scenarios.telling import Telling
 from skidpad.scenarios.traffic import drive
+from skidpad.scenarios.trailers import connect_at_begin, tow_command, tractors_first
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 DURATION_MAX = 3600.0  # s, for files that never end
@@ -133,8 +134,14 @@ class Player:
         t = self.scene.t
         stopped = self.hit and self.end_on_collision
         self.ended = self.telling.ended or stopped or t >= self.duration
-        commands = (a.command(t, self.scene.dt) for a in self.actors.values())
+        commands = (self._command(a, t) for a in tractors_first(self.actors.values()))
         return [c for c in commands if c is not None]
+
+    def _command(self, actor: Actor, t: float) -> ActorCommand | None:
+        """Return what an actor does from t on; a trailer follows the vehicle that tows it."""
+        if actor.towed_by is not None and actor.word is None:
+            return tow_command(actor, actor.towed_by, self.scene.dt)
+        return actor.command(t, self.scene.dt)
 
     def _cast(self, truth: WorldTruth) -> None:
         names, network = truth.table.names, self.scenario.network
@@ -154,6 +161,7 @@ class Player:
             if begin.place is None:
                 actor.present, actor.word = False, ActorCommand(entity.name, present=False)
             self.actors[entity.name] = actor
+        connect_at_begin(self.actors)
         self.actors[self.scenario.ego].handed = not self.scenario.ego_is_handed_later
 
     def _begin(self) -> None:

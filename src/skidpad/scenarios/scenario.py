@@ -29,6 +29,7 @@ from skidpad.scenarios.shipped import FOLDER
 from skidpad.scenarios.signals import SignalController, compile_signals
 from skidpad.scenarios.start import Begin, Start, compile_start
 from skidpad.scenarios.storyboard import Storyboard, compile_storyboard
+from skidpad.scenarios.trailers import line_up, spare_own_trailers
 from skidpad.scenarios.trajectories import trajectory_position
 
 NOTHING: Mapping[str, float | str] = {}
@@ -209,6 +210,8 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
     later = later or watching is not None
     absent = dict.fromkeys(ctx.hired, Begin(None, 0.0))
     start = replace(start, entities={**start.entities, **absent})
+    start = line_up(start, by_name, network)
+    by_name = spare_own_trailers(by_name, chosen)
     return Scenario(
         root.file, network, by_name | ctx.hired, chosen, start, storyboard, values, ctx.variables,
         later, signals, file_criteria(root), tuple(findings),

@@ -107,6 +107,7 @@ class Actor:
     word: ActorCommand | None = None  # appear or vanish, said once
     visible: bool = True  # to sensors
     assigned: Any = None  # a `registry.ControllerOf` that an action has given it
+    towed_by: Actor | None = None  # the vehicle whose hitch draws it
     controller: Controlling | None = None  # active, of an actor other than the ego
     worked: dict[str, Any] = field(default_factory=dict)  # inputs that the file works, by name
     a: float = 0.0  # m/s^2 of the speed

@@ -130,6 +130,49 @@ def actions() -> Iterator[Case]:
     )
 
 
+HITCH = '<TrailerHitch dx="-1.1"/>{}<Properties/></Vehicle>'
+COUPLER = '<TrailerCoupler dx="3.2"/><Properties/></Vehicle>'
+TRAILER = '<Trailer><TrailerRef entityRef="other"/></Trailer>'
+
+
+def trailers() -> Iterator[Case]:
+    """`ego` draws `other`: from the begin through a lane change on a curve, and from 1 s to 6 s."""
+
+    def bodies(more: str) -> str:
+        car = vehicle("ego").replace("<Properties/></Vehicle>", HITCH.format(more))
+        return vehicle("other").replace("<Properties/></Vehicle>", COUPLER) + car
+
+    aside = lane_change('<AbsoluteTargetLane value="-1"/>', "sinusoidal", 3)
+    yield Case(
+        "trailer_curve",
+        "curve",
+        {
+            "minor": "3",
+            "entities": bodies(TRAILER),
+            "init": moving("ego", on_lane(-2, 60), 10),
+            "stories": ego_does(aside),
+        },
+    )
+    join = '<TrailerAction><ConnectTrailerAction trailerRef="other"/></TrailerAction>'
+    leave = "<TrailerAction><DisconnectTrailerAction/></TrailerAction>"
+    events = (
+        event("join", private(join), time(BEGIN)),
+        event("go", private(speed(to(8), "linear", 2)), time(1.975)),
+        event("leave", private(leave), time(5.975)),
+        event("stop", private(speed(to(3), "linear", 2)), time(5.975)),
+    )
+    yield Case(
+        "trailer_joined_straight",
+        "straight",
+        {
+            "minor": "3",
+            "entities": bodies(""),
+            "init": moving("ego", on_lane(-2, 100), 0) + moving("other", turned(-2, 95.5, 0.3), 0),
+            "stories": story(*events, actor="ego"),
+        },
+    )
+
+
 FINAL = '<FinalSpeed><AbsoluteSpeed value="{}">{}</AbsoluteSpeed></FinalSpeed>'
 WALK = trajectory((200.0, -20.0), (200.0, 12.0))
 WALKS = {
@@ -278,5 +321,7 @@ def begins() -> Iterator[Case]:
 
 
 CASES: dict[str, Case] = {
-    c.name: c for part in (actions, meetings, trajectories, begins, conditions) for c in part()
+    c.name: c
+    for part in (actions, trailers, meetings, trajectories, begins, conditions)
+    for c in part()
 }

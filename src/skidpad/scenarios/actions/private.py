@@ -21,6 +21,7 @@ from skidpad.scenarios.actions.routing import (
     compile_teleport,
 )
 from skidpad.scenarios.actions.speed import compile_profile, compile_speed
+from skidpad.scenarios.actions.trailers import compile_trailer
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.findings import Kind
@@ -45,7 +46,7 @@ PRIVATE: Mapping[str, Compile] = {
     "VisibilityAction": controllers.compile_visibility,
     "LightStateAction": controllers.no_effect,
     "AnimationAction": controllers.no_effect,
-    "TrailerAction": controllers.no_effect,
+    "TrailerAction": compile_trailer,
 }
 GROUPS = ("LongitudinalAction", "LateralAction", "RoutingAction", "AppearanceAction")
 

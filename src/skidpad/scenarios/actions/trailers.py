@@ -1,0 +1,54 @@
+"""Trailers are connected and let go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from skidpad.scenarios.context import Context
+from skidpad.scenarios.document import Node
+from skidpad.scenarios.entities import Entity
+from skidpad.scenarios.scene import DONE, Actor, Running, Scene
+
+
+def can_tow(tractor: Entity, trailer: Entity) -> bool:
+    """Tells whether one has a hitch and the other one a coupler."""
+    return tractor.coupling.hitch is not None and trailer.coupling.coupler is not None
+
+
+@dataclass(frozen=True, slots=True)
+class ConnectTrailer:
+    """Draw a trailer from now on."""
+
+    trailer: str
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """At once; without a hitch or a coupler nothing happens, and the log says so."""
+        trailer = scene.actors[self.trailer]
+        if can_tow(actor.entity, trailer.entity) and trailer is not actor:
+            trailer.towed_by = actor
+        else:
+            scene.notice(f"{actor.name} does not tow {trailer.name}: no hitch, or no coupler")
+        return DONE
+
+
+@dataclass(frozen=True, slots=True)
+class DisconnectTrailer:
+    """Let the own trailer go; it keeps its speed, as the standard says nothing of brakes."""
+
+    def begin(self, scene: Scene, actor: Actor) -> Running:
+        """At once."""
+        for trailer in scene.actors.values():
+            if trailer.towed_by is actor:
+                trailer.towed_by = None
+                trailer.follow_road(scene.network, trailer.guide.v)
+        return DONE
+
+
+def compile_trailer(node: Node, ctx: Context) -> ConnectTrailer | DisconnectTrailer:
+    """Returns the action inside a <TrailerAction>."""
+    inner = node.only()
+    if inner.tag == "ConnectTrailerAction":
+        return ConnectTrailer(ctx.entity(inner, "trailerRef"))
+    if inner.tag == "DisconnectTrailerAction":
+        return DisconnectTrailer()
+    raise inner.unsupported()

@@ -10,12 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 from lxml import etree
+from typer.testing import CliRunner
 
 from channel_worlds import Eyes, World, drive, traffic
+from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, InputError
 from skidpad.core.vocabulary import HazardType
 from skidpad.recording.cycles import cycles
-from skidpad.recording.hazards import HazardRecord, decode_record, encode_record
+from skidpad.recording.hazards import HazardRecord, HazardWriter, decode_record, encode_record
 from skidpad.scenarios.hazard_export import export_hazard
 from skidpad.scenarios.writer import OscVersion
 
@@ -38,12 +40,16 @@ def a_record(n=4, seconds=11.0, late=False, noise=0.05) -> HazardRecord:
                 predictions=f.predictions[1:], ids=f.ids[1:], classes=f.classes[1:],
             )  # fmt: skip
             worlds[k] = cycle._replace(frames=(rest, cycle.frames[1]))
-    record = HazardRecord(
+    return decode_record(encode_record(unwritten(worlds)))
+
+
+def unwritten(worlds) -> HazardRecord:
+    """A record as a monitor holds it, before it is text."""
+    return HazardRecord(
         id="h0001", type=HazardType.EGO_TAILGATED, profile="practical", forms="corrected",
         t_start=5.0, t_end=6.0, t_worst=5.5, count=11, extremes={}, channels=("lav", "tfuse"),
         driving="tfuse", involved=("lav",), context={}, worlds=tuple(worlds),
     )  # fmt: skip
-    return decode_record(encode_record(record))
 
 
 def vertices(path):
@@ -90,6 +96,27 @@ def test_the_file_holds_every_ego_and_object_where_the_record_has_them(tmp_path)
     }
     assert (colours["Ego_lav"], colours["lav_1"]) == ("#FF0000", "#FFFFFF")
     assert (colours["Ego_tfuse"], colours["tfuse_1"]) == ("#0000FF", "#FFFF00")
+
+
+@pytest.mark.req("C-152", "C-156")
+def test_the_command_decodes_the_text_file_and_puts_everything_where_it_truly_was(tmp_path):
+    """Compared with the drive before it was written; the text has a resolution of 1 cm."""
+    eyes = (Eyes("lav", 0.05), Eyes("tfuse", 0.05))
+    source = drive(World(objects=traffic(3)), eyes, 11.0)
+    worlds = [c._replace(truth=None) for c in cycles(source)]
+    with HazardWriter(tmp_path) as writer:
+        writer.write(unwritten(worlds))
+    done = CliRunner().invoke(app, ["hazards", "export", str(tmp_path)])
+    assert done.exit_code == 0, done.output
+    (scenario,) = (tmp_path / "scenarios").glob("*.xosc")
+    assert (scenario.with_suffix(".xodr")).exists()
+    _, moved = vertices(scenario)
+    for cycle in worlds[::10]:
+        for channel, frame in zip(("lav", "tfuse"), cycle.frames, strict=True):
+            t = cycle.t - worlds[0].t
+            assert between(moved[f"Ego_{channel}"], t) == pytest.approx(frame.ego[:2], abs=0.02)
+            for i, place in enumerate(frame.objects[:, :2]):
+                assert between(moved[f"{channel}_{i + 1}"], t) == pytest.approx(place, abs=0.02)
 
 
 @pytest.mark.parametrize("label", [-7, 104, 2**31])

@@ -2,12 +2,36 @@
 
 from __future__ import annotations
 
-import pytest
+import subprocess
+import sys
 
-from skidpad.cli.fleet_demo import PLAN, SEED, Demo, drive, enrolled, play, rule_sets, serving
+import pytest
+from sqlalchemy import func, select
+
+from skidpad.cli.fleet_demo import (
+    MAKER,
+    PLAN,
+    SEED,
+    Demo,
+    drive,
+    enrolled,
+    play,
+    rule_sets,
+    serving,
+)
+from skidpad.core.errors import FileError
 from skidpad.evidence.channels.hazards import Profile
+from skidpad.fleet import recorded
+from skidpad.fleet.insight.worklist import rank_work
 from skidpad.fleet.loop.plan import Plan
+from skidpad.fleet.patterns.analysis import newest_clusters
+from skidpad.fleet.recorded import unpack_recorded
+from skidpad.fleet.service import Places, open_fleet
+from skidpad.fleet.store.accounts import add_person
+from skidpad.fleet.store.reading import Wanted, hazard_rows, record_of
+from skidpad.fleet.store.tables import drives, hazards, vehicles
 from skidpad.fleet.updates.payloads import PayloadKind, settings_of_content
+from skidpad.fleet.words import Role
 
 
 def test_the_rule_sets_of_the_demo_are_valid_and_differ():
@@ -47,3 +71,46 @@ def test_the_demo_takes_back_the_bad_update_and_decides_by_what_was_driven(tmp_p
     assert bad["before"] == stands
     assert {t["payload"] for t in told} == {stands}
     assert demo.next_seed - SEED == sum(car.drives for car in cars)  # no seed twice
+
+
+def test_a_recorded_fleet_opens_with_its_provenance_and_holds_what_it_says(tmp_path):
+    about = unpack_recorded(tmp_path / "data")
+    assert about.command.startswith("skidpad fleet demo")
+    assert not list((tmp_path / "data").rglob("*.key"))
+    fleet = open_fleet(Places(data=tmp_path / "data"))
+    try:
+        with fleet.engine.begin() as connection:
+            maker = add_person(connection, MAKER, Role.MANUFACTURER, "visitor", 1.0).principal
+            counts = [
+                connection.execute(select(func.count()).select_from(t)).scalar_one()
+                for t in (vehicles, drives, hazards)
+            ]
+            work = rank_work(connection, maker, newest_clusters(connection, maker))
+            rows = hazard_rows(connection, maker, Wanted())
+            assert record_of(connection, fleet.blobs, rows[0]["id"]).worlds
+        assert counts == [about.vehicles, about.drives, about.hazards]
+        assert work, "something recurs"
+    finally:
+        fleet.close()
+
+
+def test_the_command_opens_it_and_says_where(tmp_path):
+    command = [sys.executable, "-m", "skidpad", "fleet", "demo", "--recorded", "--no-stay"]
+    done = subprocess.run(
+        [*command, "--out", str(tmp_path / "fleet")], capture_output=True, text=True, check=True
+    )
+    first, maker, operator = done.stdout.splitlines()
+    assert first.startswith("recorded 20")
+    assert "dashboard of the manufacturer: http://127.0.0.1:" in maker
+    assert "dashboard of the operator: http://127.0.0.1:" in operator
+    again = subprocess.run(
+        [*command, "--out", str(tmp_path / "fleet")], capture_output=True, text=True, check=False
+    )
+    assert again.returncode == 2, "a folder that holds something is not touched"
+
+
+def test_a_damaged_recording_is_one_sentence(tmp_path, monkeypatch):
+    monkeypatch.setattr(recorded, "ARCHIVE", tmp_path / "fleet.tar.gz")
+    (tmp_path / "fleet.tar.gz").write_bytes(b"nothing")
+    with pytest.raises(FileError, match="the recorded fleet cannot be unpacked"):
+        unpack_recorded(tmp_path / "data")

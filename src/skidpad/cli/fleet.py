@@ -351,12 +351,19 @@ def demo(
     workers: Annotated[int, typer.Option(min=1, max=256, help="Drives at once.")] = 2,
     port: Annotated[int, typer.Option(help="Of the dashboard; 0: any free one.")] = 0,
     stay: Annotated[bool, typer.Option(help="Go on serving the dashboard at the end.")] = True,
+    recorded: Annotated[
+        bool, typer.Option("--recorded", help="Open a fleet that was recorded, in seconds.")
+    ] = False,
 ) -> None:
     """Vehicles drive, report, and get a good and a bad update; ends with the dashboard's address."""
     from skidpad.recording.files import require_free
 
     with fleet_extra():
-        from skidpad.cli.fleet_demo import Demo, enrolled, play, pool, serving
+        from skidpad.cli.fleet_demo import Demo, enrolled, open_recorded, play, pool, serving
+    if recorded:
+        with open_recorded(require_free(out), port, typer.echo):
+            _stay(stay)
+        return
     maker, operator, cars = enrolled(require_free(out), vehicles)
     with serving(out / "data", port) as address, pool(workers) as drives:
         story = Demo(out, address, maker, cars, seconds, drives, typer.echo)
@@ -365,7 +372,11 @@ def demo(
         for who, token in (("manufacturer", maker), ("operator", operator)):
             path = story.call(token, "POST", "/api/v1/session").json()["path"]
             typer.echo(f"dashboard of the {who}: {address}{path}")
-        if stay:
-            typer.echo("Ctrl-C ends it")
-            with suppress(KeyboardInterrupt):
-                threading.Event().wait()
+        _stay(stay)
+
+
+def _stay(stay: bool) -> None:
+    if stay:
+        typer.echo("Ctrl-C ends it")
+        with suppress(KeyboardInterrupt):
+            threading.Event().wait()

@@ -301,6 +301,33 @@ def serving(data: Path, port: int) -> Iterator[str]:
             os.kill(child.pid, signal.SIGTERM)
 
 
+@contextmanager
+def open_recorded(out: Path, port: int, say: Callable[[str], None]) -> Iterator[str]:
+    """Serve the recorded fleet from a copy in `out`, and say what it is and where; its address."""
+    import time
+
+    from skidpad.fleet.recorded import unpack_recorded
+    from skidpad.fleet.service import Places, open_fleet
+    from skidpad.fleet.store.accounts import add_person
+    from skidpad.fleet.words import Role
+
+    about = unpack_recorded(out / "data")
+    people = ((MAKER, Role.MANUFACTURER), (OPERATORS[0], Role.OPERATOR))
+    fleet = open_fleet(Places(data=out / "data"))
+    try:
+        with fleet.engine.begin() as connection:
+            accounts = [add_person(connection, t, r, "visitor", time.time()) for t, r in people]
+    finally:
+        fleet.close()
+    say(about.describe())
+    with serving(out / "data", port) as address:
+        visitor = Demo(out, address, "", [], 0.0, lambda _: [], say)
+        for account in accounts:
+            path = visitor.call(account.token, "POST", "/api/v1/session").json()["path"]
+            say(f"dashboard of the {account.principal.role.value}: {address}{path}")
+        yield address
+
+
 def play(demo: Demo) -> list[dict[str, Any]]:
     """The whole story; the releases as they ended."""
     rules = rule_sets()

@@ -58,6 +58,20 @@ def test_there_is_a_message_for_each_moment(driven, trace):
     assert first.environmental_conditions.precipitation == HEAVY
 
 
+def test_the_road_is_in_the_first_message_and_actors_tilt_with_it(trace):
+    assert len(trace[0].lane) > 20
+    assert len(trace[0].lane_boundary) > 40
+    assert not trace[1].lane
+    tilts = [o.base.orientation for m in trace for o in m.moving_object]
+    assert all(abs(t.roll) < 0.2 and abs(t.pitch) < 0.2 for t in tilts)
+
+
+def test_an_address_for_datagrams_is_checked_before_anything_is_written(driven, tmp_path):
+    done = skidpad("export", driven[0], "--osi-udp", "nowhere:1", "--out", tmp_path / "s")
+    assert done.exit_code != 0
+    assert not (tmp_path / "s").exists()
+
+
 def test_actors_are_boxes_in_motion_where_the_log_has_them(driven, trace):
     _, log = driven
     a, table = log.actors, log.table

@@ -25,6 +25,13 @@ def export(
     osi: Annotated[
         Path | None, typer.Option(help="Also a trace of OSI GroundTruth: FILE.osi (extra osi).")
     ] = None,
+    osi_udp: Annotated[
+        str | None,
+        typer.Option(
+            help="Also send that trace as UDP datagrams, at the run's pace: PORT of this machine, or "
+            "ADDRESS:PORT. In parts as esmini sends them.",
+        ),
+    ] = None,
 ) -> None:
     """Write a driven run as .xosc and .xodr that other simulators replay."""
     from skidpad.cli.folders import require_run
@@ -32,13 +39,18 @@ def export(
     require_run(run)
     from skidpad.campaign.run_road import road_files
     from skidpad.recording.logfiles import read_log
-    from skidpad.recording.osi import write_osi
+    from skidpad.recording.osi import send_run, write_osi
+    from skidpad.recording.osi_udp import read_address
     from skidpad.scenarios.run_export import export_run
     from skidpad.scenarios.writer import OscVersion
 
+    address = None if osi_udp is None else read_address(osi_udp)
     log = read_log(run)
     if osi is not None:
         typer.echo(f"{osi}: {write_osi(osi, log, _world(run, log))} messages")
+    if address is not None:
+        sent = send_run(address, log, _world(run, log))
+        typer.echo(f"{address[0]}:{address[1]}: {sent} messages sent")
     folder = run / "scenario" if out is None else out
     name = run.resolve().name
     scenario, road, known = export_run(
@@ -70,6 +82,7 @@ def _world(run: Path, log: RunLog) -> World:
     from skidpad.physics.grip import rain_rate
     from skidpad.recording.osi import World
     from skidpad.roads.bundled import load_map
+    from skidpad.scenarios.osi_road import Tilt, road_truth
     from skidpad.scenarios.run_export import road_of
 
     try:
@@ -86,4 +99,4 @@ def _world(run: Path, log: RunLog) -> World:
     )
     # a head looks against the traffic that it governs
     heads = {id: Pose(x, y, z, yaw=wrap_angle(heading + pi)) for id, x, y, z, heading in places}
-    return World(map.geo_reference, road.name, heads, rain)
+    return World(map.geo_reference, road.name, heads, rain, road_truth(map), Tilt(map))

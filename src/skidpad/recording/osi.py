@@ -12,12 +12,13 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from math import cos, sin
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from skidpad.core.errors import ConfigError, InputError, MissingExtra
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.vocabulary import ActorKind, LightState
 from skidpad.recording.files import write_bytes
+from skidpad.recording.osi_udp import send_osi
 from skidpad.recording.runlog import RunLog
 
 if TYPE_CHECKING:
@@ -56,6 +57,16 @@ class World:
     map_reference: str = ""
     heads: Mapping[int, Pose] = field(default_factory=dict)  # of traffic lights, by signal id
     rain_mm_h: float | None = None
+    road: GroundTruth | None = None  # lanes, boundaries and signs, for the first message
+    tilt: Tilting | None = None
+
+
+class Tilting(Protocol):
+    """Tells how the ground tilts a body."""
+
+    def at(self, x: float, y: float, z: float, yaw: float) -> tuple[float, float]:
+        """Returns roll and pitch, rad."""
+        ...
 
 
 def write_osi(file: Path, log: RunLog, world: World | None = None) -> int:
@@ -73,9 +84,15 @@ def write_osi(file: Path, log: RunLog, world: World | None = None) -> int:
     return len(log)
 
 
+def send_run(address: tuple[str, int], log: RunLog, world: World | None = None) -> int:
+    """Send a run as UDP datagrams at the pace of its times; returns the number of messages."""
+    rows = zip(log.t.tolist(), moments(log, world or World()), strict=True)
+    return send_osi(address, ((t, truth.SerializeToString()) for t, truth in rows))
+
+
 def moments(log: RunLog, world: World) -> Iterator[GroundTruth]:
     """One message per row of the log."""
-    osi3 = _library()
+    osi3 = library()
     still = _still(osi3, world)
     lamps = _Lamps(log)
     for k in range(len(log)):
@@ -83,16 +100,19 @@ def moments(log: RunLog, world: World) -> Iterator[GroundTruth]:
         truth.CopyFrom(still)
         nanos = round(float(log.t[k]) * NANO)
         truth.timestamp.seconds, truth.timestamp.nanos = divmod(nanos, NANO)
+        if k == 0 and world.road is not None:
+            truth.MergeFrom(world.road)
         for i in range(len(log.table)):
             if log.present[k, i]:
-                _write_actor(truth.moving_object.add(), log, k, i)
+                _write_actor(truth.moving_object.add(), log, k, i, world.tilt)
         for signal, state in lamps.at(int(log.tick[k])).items():
             if signal in world.heads:
                 _light(truth, signal, state, world.heads[signal])
         yield truth
 
 
-def _library() -> Any:
+def library() -> Any:
+    """Returns the package osi3; MissingExtra without it."""
     try:
         import osi3.osi_groundtruth_pb2
     except ImportError:
@@ -115,8 +135,8 @@ def _still(osi3: Any, world: World) -> GroundTruth:
     return truth
 
 
-def _write_actor(object: Any, log: RunLog, k: int, i: int) -> None:
-    """One actor: the place is its box's centre; roll and pitch are not in a log."""
+def _write_actor(object: Any, log: RunLog, k: int, i: int, tilt: Tilting | None) -> None:
+    """One actor: the place is its box's centre; roll and pitch are those of the road under it."""
     a, table, base = log.actors, log.table, object.base
     yaw, height = float(a.yaw[k, i]), float(table.height[i])
     object.id.value = i
@@ -124,7 +144,13 @@ def _write_actor(object: Any, log: RunLog, k: int, i: int) -> None:
     base.dimension.height = height
     base.position.x, base.position.y = float(a.x[k, i]), float(a.y[k, i])
     base.position.z = float(a.z[k, i]) + 0.5 * height
-    base.orientation.yaw, base.orientation.pitch, base.orientation.roll = wrap_angle(yaw), 0.0, 0.0
+    where = float(a.x[k, i]), float(a.y[k, i]), float(a.z[k, i])
+    roll, pitch = (0.0, 0.0) if tilt is None else tilt.at(*where, yaw)
+    base.orientation.yaw, base.orientation.pitch, base.orientation.roll = (
+        wrap_angle(yaw),
+        pitch,
+        roll,
+    )
     base.velocity.x, base.velocity.y = float(a.vx[k, i]), float(a.vy[k, i])
     base.velocity.z = base.acceleration.z = 0.0
     ax, ay, c, s = float(a.ax[k, i]), float(a.ay[k, i]), cos(yaw), sin(yaw)

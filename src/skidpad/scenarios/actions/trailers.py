@@ -36,7 +36,7 @@ class DisconnectTrailer:
     """Let the own trailer go; it keeps its speed, as the standard says nothing of brakes."""
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """At once."""
+        """Let it go in this step."""
         for trailer in scene.actors.values():
             if trailer.towed_by is actor:
                 trailer.towed_by = None

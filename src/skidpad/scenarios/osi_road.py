@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import pairwise, product
 from math import atan, cos, isfinite, pi, sin, tan
 from typing import TYPE_CHECKING, Any
 
@@ -90,7 +90,7 @@ class _Road:
         samples, boundary = self.map.samples, self.truth.lane_boundary.add()
         boundary.id.value = FIRST_BOUNDARY + len(self.truth.lane_boundary) - 1
         side = 0.5 if left else -0.5
-        for k in _thinned(a, b):
+        for k in _pick_samples(a, b):
             aside, yaw = side * float(samples.width[k]), float(samples.heading[k])
             point = boundary.boundary_line.add()
             point.position.x = float(samples.x[k]) - aside * sin(yaw)
@@ -104,7 +104,7 @@ class _Road:
         return int(boundary.id.value)
 
 
-def _thinned(first: int, last: int) -> list[int]:
+def _pick_samples(first: int, last: int) -> list[int]:
     return [*range(first, last, STEP), last]
 
 
@@ -131,7 +131,7 @@ def _write_lane(road: _Road, lane: int) -> None:
     kind.subtype = kind.Subtype.Value(f"SUBTYPE_{subtype}")
     kind.centerline_is_driving_direction = True
     first = int(lanes.first[lane])
-    for k in _thinned(first, first + int(lanes.size[lane]) - 1):
+    for k in _pick_samples(first, first + int(lanes.size[lane]) - 1):
         point = kind.centerline.add()
         point.x, point.y, point.z = float(samples.x[k]), float(samples.y[k]), float(samples.z[k])
     for neighbour, ids in ((lanes.left, kind.left_adjacent_lane_id),
@@ -141,8 +141,11 @@ def _write_lane(road: _Road, lane: int) -> None:
     for left, ids in ((True, kind.left_lane_boundary_id), (False, kind.right_lane_boundary_id)):
         for boundary in road.boundaries(lane, left):
             ids.add().value = boundary
-    before, after = map.predecessors(lane) or [None], map.successors(lane) or [None]
-    for one, other in ((b, a) for b in before for a in after if (b, a) != (None, None)):
+    before: list[int | None] = [*map.predecessors(lane)] or [None]
+    after: list[int | None] = [*map.successors(lane)] or [None]
+    for one, other in product(before, after):
+        if one is None and other is None:
+            continue
         pair = kind.lane_pairing.add()
         if one is not None:
             pair.antecessor_lane_id.value = FIRST_LANE + one

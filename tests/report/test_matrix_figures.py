@@ -19,7 +19,14 @@ from skidpad.report.matrix_data import WEATHERS, load_matrix
 from skidpad.report.matrix_real_time import real_time_blocks
 from skidpad.report.matrix_sides import side_blocks
 from skidpad.report.matrix_steps import step_blocks, step_differences
-from skidpad.report.matrix_tables import count_table, mean_table, per_weather, possible_part
+from skidpad.report.matrix_tables import (
+    count_table,
+    grades_table,
+    kinds_table,
+    mean_table,
+    per_weather,
+    possible_part,
+)
 from skidpad.report.published import Source, published
 
 CONFIGS = ("1", "2", "3", "4")
@@ -264,3 +271,22 @@ def test_the_parts_of_a_stacked_bar_are_as_long_as_their_counts():
         boxes.sort(key=lambda b: -b[:, 1].max())  # rows go down
         assert [np.ptp(b[:, 0]) for b in boxes] == pytest.approx(values, abs=5e-3)
         assert [b[:, 0].min() for b in boxes] == pytest.approx(starts, abs=5e-3)
+
+
+@pytest.mark.req("A-190", "A-256")
+def test_interventions_and_contacts_are_counted_in_tables_of_their_own(tmp_path):
+    counts = Metrics(
+        fatal_collisions=7, serious_contacts=5, road_departures=0, collisions_vehicle=3, rear_ended=1,
+        collisions_static=4, off_road=2, bend_exits=1, wrong_way=0, stuck_relocations=6, contacts=19,
+        contacts_light=8, contacts_medium=4, contacts_heavy=1, contacts_vulnerable=2,
+        contacts_static=9, distance_km=5.0, duration_s=500.0,
+    )  # fmt: skip
+    MATRIX.write(tmp_path, [(key("1", "clear-noon", seed), counts) for seed in (1, 2)])
+    matrix = load_matrix(tmp_path)
+    kinds, contacts = kinds_table(matrix), grades_table(matrix)
+    assert [c.text for c in kinds.rows[0][1:]] == ["6", "2", "8", "4", "2", "0", "12"]
+    assert kinds.rows[0][0].note == "2 runs, 10 km"
+    assert [t for t, _ in contacts.columns][1:5] == [
+        "contacts", "below 5 km/h", "5 to 20 km/h", "above 20 km/h"
+    ]  # fmt: skip
+    assert [c.text for c in contacts.rows[0][1:]] == ["38", "16", "8", "2", "4", "18"]

@@ -69,8 +69,8 @@ KINDS = (
 CONTACTS = ("contacts", "contacts", "of the ego, also those within the cool-down of a recovery")
 GRADES = (
     ("contacts_light", "below 5 km/h", "of the contacts with road users, by change of speed"),
-    ("contacts_medium", "5 to 20", "the same, or slower with a person or two wheels"),
-    ("contacts_heavy", "above 20", "the same"),
+    ("contacts_medium", "5 to 20 km/h", "the same, or slower with a person or two wheels"),
+    ("contacts_heavy", "above 20 km/h", "the same"),
     ("contacts_vulnerable", "with persons or two wheels", "of these"),
     ("contacts_static", "with what stands", "barriers, posts"),
 )

@@ -4,15 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from math import atan2, cos, hypot, sin
+from types import SimpleNamespace
 
 import numpy as np
 
 from skidpad.core.frames import CameraImage, RadarPoints, Segments, SensorFrame
 from skidpad.core.geometry import Pose, wrap_angle
+from skidpad.core.jit import Held, hold
 from skidpad.core.specs import CameraSpec, Modality, RadarSpec
 from skidpad.core.states import EgoEstimate
 from skidpad.core.vocabulary import LightState, SemanticClass, Supervision
-from skidpad.roads.lanes import LaneTable, SignalKind, SignalTable
+from skidpad.roads.kernels import LaneArrays
+from skidpad.roads.lanes import LaneSamples, LaneTable, SignalKind, SignalTable
+from skidpad.roads.packing import lane_arrays
 from skidpad.roads.queries import LanePoint
 
 LANE_WIDTH = 3.5
@@ -39,6 +43,7 @@ class ArcMap:
     off_highway: frozenset[int] = frozenset()
     lights: tuple[tuple[int, int, float], ...] = ()  # id, lane index, s
     first_goes_left: bool = False  # all_ahead lists the left neighbour first, as at a fork
+    leads_on: bool = True  # each piece into the next
     name: str = "arc"
     content_hash: str = "-"
     queries: int = field(default=0, compare=False)
@@ -95,6 +100,39 @@ class ArcMap:
             lane, s, x, y, 0.0, wrap_angle(heading), self.curvature / stretch, LANE_WIDTH,
             int(self.lanes.road[lane]), int(self.lanes.lane_id[lane]), offset,
         )  # fmt: skip
+
+    @property
+    def held(self) -> Held[LaneArrays]:
+        """The lanes as kernels read them."""
+        if getattr(self, "_packed", None) is not self.lanes:
+            self._packed, self._held = self.lanes, hold(lane_arrays(self._baked()))
+        return self._held
+
+    def _baked(self) -> SimpleNamespace:
+        n, size = len(self.lanes.road), int(self.piece) + 2
+        lane = np.repeat(np.arange(n), size)
+        piece, k = np.divmod(lane, self.lanes_count)
+        share = np.tile(np.linspace(0.0, 1.0, size), n)
+        stretch = 1.0 - self.curvature * k * LANE_WIDTH
+        road_s = (piece + share) * self.piece
+        x, y, heading = np.array(
+            [self._point(*place) for place in zip(road_s, k * LANE_WIDTH, strict=True)]
+        ).T
+        flat = np.zeros(len(lane))
+        marking = flat.astype(np.uint8)
+        samples = LaneSamples(
+            x, y, flat, heading, share * self.piece * stretch, road_s, self.curvature / stretch,
+            flat, flat, np.full(len(lane), LANE_WIDTH), np.full(len(lane), np.nan), marking,
+            marking, lane.astype(np.int32),
+        )  # fmt: skip
+        first = np.arange(n) * size
+        following = np.arange(self.lanes_count if self.leads_on else n, n)
+        ends = np.minimum(np.arange(n + 1), len(following))
+        lanes = self.lanes._replace(
+            first=first.astype(np.int32), size=np.full(n, size, np.int32),
+            next_start=ends.astype(np.int32), next_lane=following.astype(np.int32),
+        )  # fmt: skip
+        return SimpleNamespace(samples=samples, lanes=lanes, signals=self.signals)
 
     def project(self, x, y, z, driving=True):
         self.queries += 1

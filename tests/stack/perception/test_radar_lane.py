@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from math import radians, sin
+from math import cos, radians, sin
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from stackfakes import LANE_WIDTH, SPECS, ArcMap, Car, ego_at, frame, radar_poin
 
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import DetectionStatus
+from skidpad.roads.bundled import load_map
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.perception.lane_view import HighwayRoute, LaneTracker, LaneView
 from skidpad.stack.perception.radar import (
@@ -141,7 +142,8 @@ def test_each_measurement_stands_alone():
 
 def lane_match(map, pose, r, azimuth=0.0):
     view = LaneTracker(map, HighwayRoute()).update(pose)
-    return LaneMatch(map)(pose, view, r, azimuth)
+    points = radar_points((r, azimuth, 0.0, 0.0))
+    return LaneMatch(map)(points, np.zeros(1, np.int64), pose, view) == 0
 
 
 @pytest.mark.req("A-076")
@@ -162,12 +164,7 @@ def test_lane_is_that_of_the_point_on_the_map():
 @pytest.mark.req("A-076")
 def test_mount_is_2_m_ahead_of_the_origin():
     """Read off where the point crosses from one road into the next that nobody reaches."""
-
-    class Split(ArcMap):
-        def all_ahead(self, point, distance):
-            return []
-
-    map = Split(piece=100.0)
+    map = ArcMap(piece=100.0, leads_on=False)
     assert lane_match(map, Pose(50.0, 0.0), 47.9)
     assert not lane_match(map, Pose(50.0, 0.0), 48.1)
 
@@ -300,3 +297,52 @@ def test_the_stack_keeps_4_m_about_the_path():
     for left, kept in ((3.9, True), (4.1, False)):
         report = status_of({}, [(40.0, float(np.arcsin(left / 40.0)), 0.0, -3.0)])
         assert (report.radar_pre is not None) is kept
+
+
+def is_in_lane(map, pose, view, r, azimuth):
+    """A-076 to A-078 point by point, by the questions that the map answers."""
+
+    def onto_highway(point):
+        for _ in range(8):
+            left = map.left(point)
+            if point.road in view.highway or left is None:
+                break
+            point = left
+        return point
+
+    bearing = pose.yaw + azimuth
+    target = map.project(
+        pose.x + MOUNT * cos(pose.yaw) + r * cos(bearing),
+        pose.y + MOUNT * sin(pose.yaw) + r * sin(bearing),
+        pose.z,
+    )
+    if target is None or view.ego is None:
+        return False
+    target, ego = onto_highway(target), onto_highway(view.ego)
+    place = (target.road, target.lane_id)
+    reached = [ego, *map.all_ahead(ego, r + 10.0)]
+    return place in {(p.road, p.lane_id) for p in reached}
+
+
+@pytest.mark.req("A-076", "A-077", "A-078", "A-083")
+@pytest.mark.parametrize("name", ["figure8", "town"])
+def test_kernel_finds_the_point_that_the_map_s_own_answers_name(name):
+    """Places all over the map, beside the highway, before forks and at ends of roads."""
+    map, rng, found = load_map(name), np.random.default_rng(7), []
+    match, tracker = LaneMatch(map), LaneTracker(map, HighwayRoute())
+    for _ in range(250):
+        lane = int(rng.integers(len(map.lanes.road)))
+        at = map.at(lane, float(rng.uniform(0.0, map.lanes.length[lane])))
+        pose = Pose(at.x, at.y, at.z, yaw=at.heading + rng.normal(scale=0.05))
+        view = tracker.update(pose)
+        points = radar_points(
+            *((r, rng.normal(scale=0.1), 0.0, 0.0) for r in rng.uniform(5.0, 80.0, 4))
+        )
+        inside = [
+            k
+            for k in range(4)
+            if is_in_lane(map, pose, view, float(points.range[k]), float(points.azimuth[k]))
+        ]
+        found.append(match(points, np.arange(4), pose, view))
+        assert found[-1] == (inside[0] if inside else -1)
+    assert {-1, 0, 1} <= set(found)

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
-from skidpad.core.jit import kernel
-from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.core.jit import Held, inner_kernel, kernel
+from skidpad.roads.kernels import LaneArrays, neighbour_s, project_kernel
+from skidpad.roads.queries import RoadMap
 from skidpad.stack.perception.lane_view import MAX_SHIFTS, LaneView
 
 HALF_WIDTH = 4.0  # m, pre-filter (A-068)
@@ -81,10 +82,12 @@ NO_RADAR = RadarReading(None, None, None, 0)
 
 
 class InLane(Protocol):
-    """Tells whether a radar point lies in the ego's lane."""
+    """Finds the nearest radar point in the ego's lane."""
 
-    def __call__(self, pose: Pose, view: LaneView, range: float, azimuth: float, /) -> bool:
-        """range in m and azimuth in rad (left positive) from the ego at `pose`."""
+    def __call__(
+        self, points: RadarPoints, chosen: NDArray[np.int64], pose: Pose, view: LaneView, /
+    ) -> int:
+        """The first of the chosen rows of `points` that lies in the lane of the ego at `pose`, or -1."""
         ...
 
 
@@ -93,48 +96,103 @@ class LaneMatch:
 
     def __init__(self, map: RoadMap) -> None:
         self.map = map
+        self._traced: frozenset[int] | None = None
 
-    def __call__(self, pose: Pose, view: LaneView, range: float, azimuth: float) -> bool:
-        """False where target or ego is on no lane.
-
-        The look ahead reads one place per branch, `range` + 10 m on, as A-078 is written: a target
-        whose road ends before that place is missed.
-        """
+    def __call__(
+        self, points: RadarPoints, chosen: NDArray[np.int64], pose: Pose, view: LaneView
+    ) -> int:
+        """-1 where the ego is on no lane."""
         if view.ego is None:
-            return False
-        c, s = cos(pose.yaw), sin(pose.yaw)
-        bearing = pose.yaw + azimuth
-        x = pose.x + MOUNT * c + range * cos(bearing)
-        y = pose.y + MOUNT * s + range * sin(bearing)
-        target = self.map.project(x, y, pose.z)
-        if target is None:
-            return False
-        target = self._onto_highway(target, view.highway)
-        ego = self._onto_highway(view.ego, view.highway)
-        place = (target.road, target.lane_id)
-        if place == (ego.road, ego.lane_id):
-            return True
-        reached = self.map.all_ahead(ego, range + LOOK_BEYOND)
-        return any((point.road, point.lane_id) == place for point in reached)
+            return -1
+        if view.highway is not self._traced:
+            self._traced = view.highway
+            self._on_highway = np.isin(self.map.lanes.road, list(view.highway))
+        return first_in_lane(
+            self.map.held, self._on_highway, points, chosen,
+            (pose.x, pose.y, pose.z, pose.yaw), view.ego.lane, view.ego.s,
+        )  # fmt: skip
 
-    def _onto_highway(self, point: LanePoint, highway: frozenset[int]) -> LanePoint:
-        """Leftwards until the road is on the highway or there is no further lane (A-077)."""
-        for _ in range(MAX_SHIFTS):
-            if point.road in highway:
-                break
-            left = self.map.left(point)
-            if left is None:
-                break
-            point = left
-        return point
+
+@kernel
+def first_in_lane(
+    map: Held[LaneArrays],
+    on_highway: NDArray[np.bool_],
+    points: RadarPoints,
+    chosen: NDArray[np.int64],
+    ego: tuple[float, float, float, float],
+    ego_lane: int,
+    ego_s: float,
+) -> int:
+    """The first of the chosen rows of `points` that lies in the ego's lane or where it leads, or -1.
+
+    on_highway: by lane; ego: x, y, z and yaw. The look ahead reads one place per branch, the
+    point's range + 10 m on, as A-078 is written: a target whose road ends before that place is
+    missed.
+    """
+    a = map.value
+    lane, s = _onto_highway(a, on_highway, ego_lane, ego_s)
+    x, y = ego[0] + MOUNT * cos(ego[3]), ego[1] + MOUNT * sin(ego[3])
+    for i in chosen:
+        r, bearing = float(points.range[i]), ego[3] + float(points.azimuth[i])
+        target, at, _ = project_kernel(a, x + r * cos(bearing), y + r * sin(bearing), ego[2], True)
+        if target < 0:
+            continue
+        target, _ = _onto_highway(a, on_highway, target, at)
+        if _is_same(a, target, lane) or _leads_to(a, lane, s + (r + LOOK_BEYOND), target):
+            return int(i)
+    return -1
+
+
+@inner_kernel
+def _onto_highway(
+    a: LaneArrays, on_highway: NDArray[np.bool_], lane: int, s: float
+) -> tuple[int, float]:
+    """Leftwards until the road is on the highway or there is no further lane (A-077)."""
+    for _ in range(MAX_SHIFTS):
+        left = a.left[lane]
+        if on_highway[lane] or left < 0:
+            break
+        s = neighbour_s(a, lane, left, s)
+        lane = left
+    return lane, s
+
+
+@inner_kernel
+def _is_same(a: LaneArrays, one: int, other: int) -> bool:
+    return bool(a.road[one] == a.road[other] and a.lane_id[one] == a.lane_id[other])
+
+
+@inner_kernel
+def _leads_to(a: LaneArrays, lane: int, s: float, target: int) -> bool:
+    """Whether s, counted from the start of a lane, lies on the target's lane on some branch."""
+    lanes, places = [lane], [s]
+    k = 0
+    while k < len(lanes):
+        lane, s = lanes[k], places[k]
+        k += 1
+        if s <= a.length[lane]:
+            if _is_same(a, lane, target):
+                return True
+            continue
+        s -= a.length[lane]
+        for j in range(a.next_start[lane], a.next_start[lane + 1]):
+            following = int(a.next_lane[j])
+            known = False  # branches that meet again are followed once
+            for m in range(len(lanes)):
+                known = known or (lanes[m] == following and places[m] == s)
+            if not known and (a.drivable[following] or not a.drivable[lane]):
+                lanes.append(following)
+                places.append(s)
+    return False
 
 
 class AnyPoint:
     """The compatibility mode trusts its parabolic corridor alone (A-084)."""
 
-    def __call__(self, *_where: object) -> bool:
-        """Every point that passed the corridor."""
-        return True
+    def __call__(self, points: RadarPoints, chosen: NDArray[np.int64], *_where: object) -> int:
+        """The first point that passed the corridor."""
+        del points
+        return int(chosen[0])
 
 
 class Radar:
@@ -162,9 +220,8 @@ class Radar:
         )  # fmt: skip
         if n == 0:
             return NO_RADAR
-        nearest = self.kept[0]
-        for i in self.kept[: 1 if self.nearest_only else n].tolist():
-            r = float(points.range[i])
-            if self.in_lane(pose, view, r, float(points.azimuth[i])):
-                return RadarReading(float(points.range[nearest]), r, float(points.velocity[i]), n)
-        return RadarReading(float(points.range[nearest]), None, float(points.velocity[nearest]), n)
+        chosen, nearest = self.kept[: 1 if self.nearest_only else n], self.kept[0]
+        found = self.in_lane(points, chosen, pose, view)
+        lane = None if found < 0 else float(points.range[found])
+        told = nearest if found < 0 else found
+        return RadarReading(float(points.range[nearest]), lane, float(points.velocity[told]), n)

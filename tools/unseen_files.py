@@ -62,7 +62,7 @@ def is_valid(file: Path, maps: Sequence[Path]) -> bool:
 def names_empty_road(file: Path) -> bool:
     """Tells whether a file's road has no bytes, as where a stored copy leaves out large files."""
     logic = parse(file).find("RoadNetwork", "LogicFile")
-    road = file.parent / (logic.text("filepath") if logic is not None else "")
+    road = file.parent / (logic.element.get("filepath", "") if logic is not None else "")
     return road.is_file() and road.stat().st_size == 0
 
 

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from skidpad.campaign.drive import Script, Supervising, Timer, Unsupervised
+from skidpad.campaign.file_drivers import FILE_DRIVERS
 from skidpad.campaign.keeping import road_file
 from skidpad.campaign.starts import start_of
 from skidpad.core.errors import ConfigError, FileError, StackError
@@ -215,7 +216,7 @@ def check_scenario(course: Scenario) -> scenarios.Compiled:
         maps=[Path(folder) for folder in course.maps],
         ignore_unsupported=course.ignore_unsupported,
         lenient=course.lenient,
-        names=Names(_registered(course.register), strict=course.strict),
+        names=Names({**FILE_DRIVERS, **_registered(course.register)}, strict=course.strict),
     )
 
 

@@ -38,7 +38,9 @@ STATES = (
     "colours and three lamps such as `on;off;off` are shown; other words are for conditions alone"
 )
 NAMED = "by registered names; others are noted, without effect"
-CONTROLLED = "of others than the ego `ACC` and registered names, along their lanes"
+CONTROLLED = (
+    "of others than the ego `ACC`, `ReferenceDriver` and registered names, along their lanes"
+)
 TOWED = "without slip at the trailer's axle; masses and forces do not count"
 FOLLOW = "`follow` is read as `position`"
 PARTIAL: Mapping[str, str] = MappingProxyType(

@@ -90,6 +90,7 @@ def test_actors_are_boxes_in_motion_where_the_log_has_them(driven, trace):
             assert -np.pi < b.orientation.yaw <= np.pi
             assert np.cos(b.orientation.yaw - a.yaw[k, i]) == pytest.approx(1.0)
             assert o.type == o.TYPE_VEHICLE
+            assert o.HasField("vehicle_attributes")  # ASAM's rules: set for every vehicle
             assert o.source_reference[0].identifier == [table.names[i]]
 
 

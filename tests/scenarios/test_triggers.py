@@ -69,7 +69,9 @@ def test_a_transition_is_seen_once(tmp_path):
 
 
 @pytest.mark.osc("CollisionCondition")
-@pytest.mark.parametrize("who", ['<EntityRef entityRef="other"/>', '<ByType type="vehicle"/>'])
+@pytest.mark.parametrize(
+    "who", ['<EntityRef entityRef="other"/>', '<ByType type="vehicle"/>', ""], ids=str
+)
 def test_a_collision_between_two_others_is_seen(tmp_path, who):
     hit = f"<CollisionCondition>{who}</CollisionCondition>"
     entities = vehicle("ego") + vehicle("other") + vehicle("third")

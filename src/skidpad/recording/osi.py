@@ -161,6 +161,7 @@ def _write_actor(object: Any, log: RunLog, k: int, i: int, tilt: Tilting | None)
         object.type = object.TYPE_VEHICLE
         types = object.vehicle_classification
         types.type = types.Type.Value(VEHICLES[kind])
+        object.vehicle_attributes.SetInParent()  # a vehicle has them, though no log knows axles
     else:
         object.type = object.TYPE_PEDESTRIAN if kind is ActorKind.PEDESTRIAN else object.TYPE_OTHER
     reference = object.source_reference.add()

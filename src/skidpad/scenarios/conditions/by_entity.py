@@ -132,6 +132,9 @@ class Collision:
 
 
 def _collision(node: Node, ctx: Context) -> EntityCondition:
+    """Returns the condition; one that names nothing, as 1.0 allows, means any other entity."""
+    if next(node.children(), None) is None:
+        return Collision(tuple(ctx.entities))
     by = node.only()
     if by.tag == "EntityRef":
         return Collision(ctx.actors([by]))

@@ -140,6 +140,7 @@ def count(given: argparse.Namespace) -> None:
             continue
         outcome, told = play(file, road_folders(folder_of(file, given.folders), given.maps))
         kind = outcome.partition(":")[0]
+        print(f"{kind}: {repository} {file.name}", flush=True)
         outcomes[kind] += 1
         by_owner.setdefault(repository, Counter())[kind] += 1
         if told is None:

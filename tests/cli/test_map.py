@@ -32,6 +32,18 @@ def test_info_warns_of_dead_ends() -> None:
     assert "6 driving lanes lead nowhere" in out
 
 
+def test_info_names_the_only_road_as_its_file_does(tmp_path: Path) -> None:
+    """An id may be a word; the number that stands for it inside is nobody's to read."""
+    text = (FOLDER / "straight.xodr").read_text(encoding="utf-8")
+    file = tmp_path / "worded.xodr"
+    worded = text.replace('id="1" junction', 'id="north" junction')
+    file.write_text(worded, encoding="utf-8")
+    out = RUNNER.invoke(app, ["map", "info", str(file)]).output
+    assert out.splitlines()[2].startswith("1 road, "), out
+    assert "driving lanes lead nowhere: road north lane" in out
+    assert "road ids: north" in out
+
+
 def test_bake_writes_a_file_that_loads_as_the_same_map(tmp_path: Path) -> None:
     source = tmp_path / "mine.xodr"
     source.write_bytes((FOLDER / "straight.xodr").read_bytes())

@@ -52,12 +52,12 @@ def info(
     summary = summarise(loaded)
     for line in _facts(loaded, summary):
         typer.echo(line)
-    typer.echo(_ids(map))
+    labels = _road_labels(map)
+    typer.echo(_ids(labels))
     for line in _bends(summary):
         typer.echo(line)
     if summary.dead_ends:
-        ends = ", ".join(f"road {road} lane {lane}" for road, lane in summary.dead_ends[:10])
-        typer.echo(f"warning: {len(summary.dead_ends)} driving lanes lead nowhere: {ends}")
+        typer.echo(_dead_ends(summary, labels))
     if png is not None:
         from skidpad.roads.plan_view import draw
 
@@ -80,17 +80,37 @@ def bake(
     typer.echo(f"{target}: {len(baked.samples.x)} samples, content hash {baked.content_hash()}")
 
 
-def _ids(map: str) -> str:
-    """Return the ids of the roads as the file writes them."""
+def _road_labels(map: str) -> dict[int, str]:
+    """Returns the ids of the roads as the file writes them, by our numbers; none of a baked map."""
     from skidpad.roads.bundled import map_file
     from skidpad.roads.opendrive.document import parse
 
     file = map_file(map)
     if file.suffix == ".npz":
+        return {}
+    roads = parse(file.read_bytes(), str(file)).roads
+    return {number: road.label for number, road in roads.items()}
+
+
+def _ids(labels: dict[int, str]) -> str:
+    """Returns the line that names the roads."""
+    if not labels:
         return "road ids: not in a baked map; see the OpenDRIVE file"
-    labels = [road.label for road in parse(file.read_bytes(), str(file)).roads.values()]
     more = f" and {len(labels) - IDS_SHOWN} more" if len(labels) > IDS_SHOWN else ""
-    return f"road ids: {', '.join(labels[:IDS_SHOWN])}{more}"
+    return f"road ids: {', '.join(list(labels.values())[:IDS_SHOWN])}{more}"
+
+
+def _dead_ends(summary: MapSummary, labels: dict[int, str]) -> str:
+    """Returns the warning of driving lanes that lead nowhere."""
+    found = summary.dead_ends
+    ends = ", ".join(f"road {labels.get(road, road)} lane {lane}" for road, lane in found[:10])
+    lanes = "1 driving lane leads" if len(found) == 1 else f"{len(found)} driving lanes lead"
+    return f"warning: {lanes} nowhere: {ends}"
+
+
+def _count(number: int, noun: str) -> str:
+    """Returns a number of things, one of them in the singular."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
 
 
 def _facts(map: RoadMap, summary: MapSummary) -> list[str]:
@@ -106,7 +126,13 @@ def _facts(map: RoadMap, summary: MapSummary) -> list[str]:
     return [
         f"map {map.name}",
         f"content hash {map.content_hash}",
-        f"{summary.roads} roads, {summary.lanes} lanes, {summary.junctions} junctions",
+        ", ".join(
+            (
+                _count(summary.roads, "road"),
+                _count(summary.lanes, "lane"),
+                _count(summary.junctions, "junction"),
+            )
+        ),
         f"lanes: {lengths}",
         f"signals: {signals or 'none'}",
         f"limits in km/h: {limits or 'none given'}",

@@ -1,5 +1,6 @@
 """What makes the object sensors fast changes no bit of their readings."""
 
+from dataclasses import replace
 from math import pi
 
 import numpy as np
@@ -68,8 +69,8 @@ def plain(table, states, suite, tick):
     )
 
 
-def assert_same(table, states, roadside, ticks):
-    suite = ObjectSuite(roadside, table, [ROOF, BUMPER, RADAR], seed=5, dt=0.05)
+def assert_same(table, states, roadside, ticks, radar=RADAR):
+    suite = ObjectSuite(roadside, table, [ROOF, BUMPER, radar], seed=5, dt=0.05)
     suite._slope = lambda _states: SLOPE
     hits = 0
     for tick in ticks:
@@ -113,6 +114,11 @@ def test_random_scenes_read_the_same(block):
 def test_walls_at_the_antenna_and_of_kilometres(rails):
     table, states = world((40.0, 0.0, 0.0, 0.0), (40.0, 0.0, 0.0, 0.0), (2.0, 0.0, 0.0, 0.0))
     assert assert_same(table, states, Roadside(barriers=tuple(rails)), range(40)) > 0
+
+
+def test_rays_that_look_sideways_are_compared_with_every_wall():
+    wide = replace(RADAR, horizontal_fov_deg=178.0, vertical_fov_deg=4.0)
+    assert sum(assert_same(*random_scene(k), range(3), wide) for k in range(100)) > 5000
 
 
 def test_a_fault_of_one_bit_is_found(monkeypatch):

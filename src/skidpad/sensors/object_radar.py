@@ -28,11 +28,11 @@ Floats = NDArray[np.float64]
 
 NEAR = 0.1  # m, near clip
 CERTAIN = 1e-9  # a share of a wall this far below its first end, or above its last, is beyond it
-# The least distance to a wall is lowered by its own rounding: relative, and in m.
-SLACK = 1e-6
-MARGIN = 1e-4
-# m: a ray along a wall whose line passes this near the antenna has no distance that could be bounded
-ALONG = 1e-3
+MARGIN = 1e-4  # m by which a ray must pass beside a box to be left out
+# A ray whose slope (left by forward) is this far outside a wall's misses it whatever is rounded; so
+# it is where rays and both ends of the wall lie ahead of the antenna: by a share and by m.
+ASIDE = 1e-4
+AHEAD = 0.1
 
 
 class Antenna(NamedTuple):
@@ -49,16 +49,18 @@ def antenna_of(spec: RadarSpec, seed: int, dt: float, weather: Weather | None) -
     return Antenna(mount_of(spec.mount), beam_of(spec, seed, dt), reach)
 
 
-class NearWalls(NamedTuple):
-    """The walls in view of a radar, nearest first, with all that does not change from ray to ray."""
+class Rays(NamedTuple):
+    """The rays of one tick, and what each has met so far; arrays (n,) by ray."""
 
-    row: NDArray[np.int64]  # (n,) in `Walls`
-    bound: Floats  # m, no ray meets the wall nearer than this
-    x: Floats  # m, first end, seen from the antenna
+    x: Floats  # unit vector in the world
     y: Floats
-    ex: Floats  # m, from the first end to the last
-    ey: Floats
-    across: Floats  # m^2, cross product of the wall and its first end
+    z: Floats
+    right: Floats  # tangents
+    down: Floats
+    best: Floats  # m to what was met, or the reach
+    hit: NDArray[np.int64]  # row of the actor, 0: road, wall or post, -1: nothing
+    slope: Floats  # left by forward, rising; -inf: not ahead
+    order: NDArray[np.int64]  # the ray of each slope
 
 
 class NearBoxes(NamedTuple):
@@ -92,35 +94,22 @@ def cast_radar(
     beam, reach, seat = radar.beam, radar.reach, placed(radar.mount, states)
     origin, rotation = seat.origin, seat.rotation
     yaw, edge = np.arctan2(rotation[1, 0], rotation[0, 0]), beam.half_width
-    near = _nearest_first(origin, walls, walls_in_view(origin, yaw, edge, walls, reach))
     near_posts = _boxes_seen(origin, posts, boxes_in_view(origin, yaw, edge, posts, reach))
     near_boxes = _boxes_seen(origin, boxes, boxes_in_view(origin, yaw, edge, boxes, reach))
     ox, oy = origin[0] - boxes.x[0], origin[1] - boxes.y[0]
     height = origin[2] - boxes.z[0] - slope[0] * ox - slope[1] * oy
     vx0 = states.vx[0] - states.yaw_rate[0] * oy
     vy0 = states.vy[0] + states.yaw_rate[0] * ox
+    rays = _rays(beam, tick, rotation, reach)
+    for k in range(beam.rays):
+        fall = rays.z[k] - slope[0] * rays.x[k] - slope[1] * rays.y[k]
+        if fall < 0.0 and -height / fall < reach:  # the road
+            rays.best[k], rays.hit[k] = -height / fall, 0
+    _meet_walls(rays, origin, yaw, walls, walls_in_view(origin, yaw, edge, walls, reach))
     out = np.empty((beam.rays, 4), np.float32)
     n = 0
     for k in range(beam.rays):
-        right, down = direction(beam, tick, k)
-        fx = 1.0 / np.sqrt(1.0 + right * right + down * down)
-        fy, fz = -right * fx, -down * fx
-        dx = rotation[0, 0] * fx + rotation[0, 1] * fy + rotation[0, 2] * fz
-        dy = rotation[1, 0] * fx + rotation[1, 1] * fy + rotation[1, 2] * fz
-        dz = rotation[2, 0] * fx + rotation[2, 1] * fy + rotation[2, 2] * fz
-        best, hit = reach, -1
-        fall = dz - slope[0] * dx - slope[1] * dy
-        if fall < 0.0 and -height / fall < best:  # the road
-            best, hit = -height / fall, 0
-        for j in range(near.row.size):
-            if near.bound[j] > best:
-                break
-            t, f = _ray_line(dx, dy, near.x[j], near.y[j], near.ex[j], near.ey[j], near.across[j])
-            if t < best:
-                w = near.row[j]
-                rise = origin[2] + t * dz - (walls.z0[w] + f * (walls.z1[w] - walls.z0[w]))
-                if 0.0 <= rise <= walls.height[w]:
-                    best, hit = t, 0
+        dx, dy, dz, best, hit = rays.x[k], rays.y[k], rays.z[k], rays.best[k], rays.hit[k]
         for j in range(near_posts.row.size):
             if not _is_aside(dx, dy, near_posts.x[j], near_posts.y[j], near_posts.radius[j], best):
                 t = _ray_box(dx, dy, dz, near_posts, j)
@@ -142,6 +131,7 @@ def cast_radar(
             hy = origin[1] + best * dy - boxes.y[hit]
             vx += states.vx[hit] - states.yaw_rate[hit] * hy
             vy += states.vy[hit] + states.yaw_rate[hit] * hx
+        right, down = rays.right[k], rays.down[k]
         out[n, 0], out[n, 1] = best, np.arctan2(-right, 1.0)
         out[n, 2] = np.arctan2(-down, np.sqrt(1.0 + right * right))
         out[n, 3] = vx * dx + vy * dy
@@ -164,28 +154,62 @@ def road_slope(map: Held[LaneArrays], x: float, y: float, z: float) -> Floats:
 
 
 @inner_kernel
-def _nearest_first(origin: Floats, walls: Walls, chosen: NDArray[np.int64]) -> NearWalls:
-    n = chosen.size
-    bound = np.empty(n)
-    for j, w in enumerate(chosen):
+def _rays(beam: Beam, tick: int, rotation: Floats, reach: float) -> Rays:
+    n = beam.rays
+    table = np.empty((7, n))
+    rays = Rays(
+        table[0], table[1], table[2], table[3], table[4], table[5], np.full(n, -1), table[6],
+        np.empty(n, np.int64),
+    )  # fmt: skip
+    yaw = np.arctan2(rotation[1, 0], rotation[0, 0])
+    c, s = np.cos(yaw), np.sin(yaw)
+    for k in range(n):
+        right, down = direction(beam, tick, k)
+        fx = 1.0 / np.sqrt(1.0 + right * right + down * down)
+        fy, fz = -right * fx, -down * fx
+        dx = rotation[0, 0] * fx + rotation[0, 1] * fy + rotation[0, 2] * fz
+        dy = rotation[1, 0] * fx + rotation[1, 1] * fy + rotation[1, 2] * fz
+        rays.x[k], rays.y[k] = dx, dy
+        rays.z[k] = rotation[2, 0] * fx + rotation[2, 1] * fy + rotation[2, 2] * fz
+        rays.right[k], rays.down[k], rays.best[k] = right, down, reach
+        forward = c * dx + s * dy
+        slope = (c * dy - s * dx) / forward if forward > AHEAD else -np.inf
+        j = k
+        while j > 0 and rays.slope[j - 1] > slope:
+            rays.slope[j], rays.order[j] = rays.slope[j - 1], rays.order[j - 1]
+            j -= 1
+        rays.slope[j], rays.order[j] = slope, k
+    return rays
+
+
+@inner_kernel
+def _meet_walls(
+    rays: Rays, origin: Floats, yaw: float, walls: Walls, chosen: NDArray[np.int64]
+) -> None:
+    """A wall is compared with the rays whose slope lies between those of its ends."""
+    c, s = np.cos(yaw), np.sin(yaw)
+    n = rays.x.size
+    are_ahead = rays.slope[0] > -np.inf
+    for w in chosen:
         px, py = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
+        qx, qy = walls.x1[w] - origin[0], walls.y1[w] - origin[1]
         ex, ey = walls.x1[w] - walls.x0[w], walls.y1[w] - walls.y0[w]
-        length = np.hypot(ex, ey)
-        if abs(ex * py - ey * px) <= ALONG * length:  # a wall without length is one of these
-            bound[j] = 0.0
-            continue
-        share = min(max(-(px * ex + py * ey) / (length * length), 0.0), 1.0)
-        nearest = np.hypot(px + share * ex, py + share * ey)
-        bound[j] = nearest * (1.0 - SLACK) - MARGIN
-    order = np.argsort(bound)
-    near = NearWalls(
-        chosen[order], bound[order], np.empty(n), np.empty(n), np.empty(n), np.empty(n), np.empty(n)
-    )
-    for j, w in enumerate(near.row):
-        near.x[j], near.y[j] = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
-        near.ex[j], near.ey[j] = walls.x1[w] - walls.x0[w], walls.y1[w] - walls.y0[w]
-        near.across[j] = near.ex[j] * near.y[j] - near.ey[j] * near.x[j]
-    return near
+        across = ex * py - ey * px
+        p, q = c * px + s * py, c * qx + s * qy
+        first, last = 0, np.inf
+        if are_ahead and p > AHEAD and q > AHEAD:
+            one, other = (c * py - s * px) / p, (c * qy - s * qx) / q
+            last = max(one, other) + ASIDE
+            first = np.searchsorted(rays.slope, min(one, other) - ASIDE)
+        for j in range(first, n):
+            if rays.slope[j] > last:
+                break
+            k = rays.order[j]
+            t, f = _ray_line(rays.x[k], rays.y[k], px, py, ex, ey, across)
+            if t < rays.best[k]:
+                rise = origin[2] + t * rays.z[k] - (walls.z0[w] + f * (walls.z1[w] - walls.z0[w]))
+                if 0.0 <= rise <= walls.height[w]:
+                    rays.best[k], rays.hit[k] = t, 0
 
 
 @inner_kernel

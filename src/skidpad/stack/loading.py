@@ -40,6 +40,7 @@ T = TypeVar("T")
 FOREIGN = (Exception, SystemExit)  # what foreign code may raise; Ctrl-C remains the user's
 SWITCHES = (bool, np.bool_)
 REPORTED = tuple(field.name for field in fields(StackReport))
+OWN = "skidpad.stack.adas"  # a module of stacks that need no guarding: they run nobody else's code
 INT_MAX = 2**31 - 1  # the log's whole numbers have 32 bits
 LONGEST_MODE = 200  # characters
 NO_REPORT = StackReport()
@@ -124,6 +125,7 @@ class GuardedStack:
         settings: Mapping[str, Any],
     ) -> None:
         self.name = kind.__name__
+        self._is_own = kind.__module__ == OWN
         self._tick = -1  # the last one
         self._taken = frozenset(spec.id for spec in specs)
         self._process, self._folder = os.getpid(), _folder()
@@ -159,6 +161,9 @@ class GuardedStack:
     @property
     def report(self) -> StackReport:
         """What the stack says about its last tick; empty for a stack that says nothing."""
+        if self._is_own:
+            own: StackReport = getattr(self.stack, "report", NO_REPORT)
+            return own
         try:
             report = self._call(getattr, self.stack, "report", NO_REPORT)
         except FOREIGN as error:
@@ -189,6 +194,8 @@ class GuardedStack:
 
     def _call(self, function: Callable[..., T], *arguments: Any) -> T:
         """Call foreign code in the folder that it last chose."""
+        if self._is_own:
+            return function(*arguments)
         home = _folder()
         if self._folder != home:
             _enter(self._folder)

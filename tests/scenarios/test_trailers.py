@@ -68,3 +68,21 @@ def test_without_a_hitch_nothing_is_drawn_and_the_log_says_so(tmp_path):
     join = private("""<TrailerAction><ConnectTrailerAction trailerRef="ego"/></TrailerAction>""")
     result = told(tmp_path, stories=story(event("e", join, time(2.0))), minor=3)
     assert any("other does not tow ego: no hitch" in n for n in result.player.scene.notices)
+
+
+@pytest.mark.parametrize("names", [("", "other"), ("ego", "other")])
+def test_a_ring_of_trailers_and_an_entity_without_a_name_end_no_file(tmp_path, names):
+    """A name may be empty in files of others; both tow each other, so that none is first."""
+    first, second = names
+    both = f'<TrailerHitch dx="{HITCH}"/><TrailerCoupler dx="{COUPLER}"/>'
+    reference = '<Trailer><TrailerRef entityRef="{}"/></Trailer>'
+    result = told(
+        tmp_path,
+        minor=3,
+        entities=with_parts(first, both + reference.format(second))
+        + with_parts(second, both + reference.format(first)),
+        init=init(first, teleport(on_lane(-3, 100)), speed(to(10)))
+        + init(second, teleport(on_lane(-1, 100)), speed(to(10))),
+        end=1.0,
+    )
+    assert result.of("other")[-1].x == pytest.approx(result.of("other")[0].x + 10.0, abs=0.51)

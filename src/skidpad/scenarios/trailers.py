@@ -12,7 +12,7 @@ from math import atan2, cos, sin
 
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorCommand
-from skidpad.scenarios.actions.trailers import can_tow
+from skidpad.scenarios.actions.trailers import can_tow, train_of
 from skidpad.scenarios.entities import GHOST, Entity
 from skidpad.scenarios.network import Network
 from skidpad.scenarios.scene import Actor
@@ -32,29 +32,41 @@ def towed_pose(before: Pose, z: float, hitch: tuple[float, float], trailer: Enti
     return Pose(hitch[0] - length * cos(yaw), hitch[1] - length * sin(yaw), z, yaw=yaw)
 
 
+def towing_pairs(entities: Mapping[str, Entity]) -> list[tuple[Entity, Entity]]:
+    """Returns who tows what from the begin, each tractor before those that its trailer tows.
+
+    Each trailer has one tractor, the first one of the file; a ring of trailers is left alone.
+    """
+    tractors: dict[str, Entity] = {}
+    for tractor in entities.values():
+        trailer = entities.get(tractor.coupling.trailer) if tractor.coupling.trailer else None
+        if trailer is not None and trailer is not tractor and can_tow(tractor, trailer):
+            tractors.setdefault(trailer.name, tractor)
+    pairs, free = [], [e.name for e in entities.values() if e.name not in tractors]
+    while free:
+        name = free.pop(0)
+        behind = [t for t, tractor in tractors.items() if tractor.name == name]
+        pairs += [(entities[name], entities[t]) for t in behind]
+        free += behind
+    return pairs
+
+
 def line_up(start: Start, entities: Mapping[str, Entity], network: Network) -> Start:
     """Returns the begin with every trailer straight behind the vehicle that tows it from the begin."""
     begins = dict(start.entities)
-    waiting = [e for e in entities.values() if e.coupling.trailer in begins]
-    towed = {e.coupling.trailer for e in waiting}
-    for tractor in sorted(waiting, key=lambda e: e.name in towed):
-        chain: Entity | None = tractor
-        while chain is not None and chain.coupling.trailer in begins:
-            begin, trailer = begins[chain.name], entities[chain.coupling.trailer]
-            if begin.place is not None and can_tow(chain, trailer):
-                behind = (chain.coupling.hitch or 0.0) - (trailer.coupling.coupler or 0.0)
-                place = network.place_of(begin.place.pose.moved(forward=behind))
-                begins[trailer.name] = Begin(place, begin.speed, begins[trailer.name].actions)
-            chain = None if trailer.name == tractor.name else trailer
+    for tractor, trailer in towing_pairs(entities):
+        begin = begins[tractor.name]
+        if begin.place is not None:
+            behind = (tractor.coupling.hitch or 0.0) - (trailer.coupling.coupler or 0.0)
+            place = network.place_of(begin.place.pose.moved(forward=behind))
+            begins[trailer.name] = Begin(place, begin.speed, begins[trailer.name].actions)
     return replace(start, entities=begins)
 
 
 def connect_at_begin(actors: Mapping[str, Actor]) -> None:
     """Connect what the vehicles of a file tow from the begin."""
-    for actor in actors.values():
-        trailer = actors.get(actor.entity.coupling.trailer)
-        if trailer is not None and can_tow(actor.entity, trailer.entity):
-            trailer.towed_by = actor
+    for tractor, trailer in towing_pairs({name: a.entity for name, a in actors.items()}):
+        actors[trailer.name].towed_by = actors[tractor.name]
 
 
 def tractors_first(actors: Iterable[Actor]) -> list[Actor]:
@@ -64,10 +76,8 @@ def tractors_first(actors: Iterable[Actor]) -> list[Actor]:
 
 
 def _depth(actor: Actor) -> int:
-    depth, one = 0, actor.towed_by
-    while one is not None and one is not actor:
-        depth, one = depth + 1, one.towed_by
-    return depth
+    """Returns how many vehicles are before it in its train."""
+    return sum(1 for _ in train_of(actor)) - 1
 
 
 def tow_command(actor: Actor, tractor: Actor, dt: float) -> ActorCommand | None:
@@ -84,9 +94,9 @@ def tow_command(actor: Actor, tractor: Actor, dt: float) -> ActorCommand | None:
 
 def spare_own_trailers(entities: Mapping[str, Entity], ego: str) -> dict[str, Entity]:
     """Returns the entities; those that the ego tows touch nothing, as they would be in its way."""
-    found, name = dict(entities), entities[ego].coupling.trailer
-    while name in found and not found[name].is_ghost and name != ego:
-        trailer = found[name]
-        found[name] = replace(trailer, properties={**trailer.properties, GHOST: "true"})
-        name = trailer.coupling.trailer
+    found, train = dict(entities), {ego}
+    for tractor, trailer in towing_pairs(entities):
+        if tractor.name in train:
+            train.add(trailer.name)
+            found[trailer.name] = replace(trailer, properties={**trailer.properties, GHOST: "true"})
     return found

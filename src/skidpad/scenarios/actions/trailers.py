@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from skidpad.scenarios.context import Context
@@ -15,6 +16,14 @@ def can_tow(tractor: Entity, trailer: Entity) -> bool:
     return tractor.coupling.hitch is not None and trailer.coupling.coupler is not None
 
 
+def train_of(actor: Actor) -> Iterator[Actor]:
+    """Yields an actor, what tows it, and so on to the front."""
+    one: Actor | None = actor
+    while one is not None:
+        yield one
+        one = one.towed_by
+
+
 @dataclass(frozen=True, slots=True)
 class ConnectTrailer:
     """Draw a trailer from now on."""
@@ -24,7 +33,9 @@ class ConnectTrailer:
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """At once; without a hitch or a coupler nothing happens, and the log says so."""
         trailer = scene.actors[self.trailer]
-        if can_tow(actor.entity, trailer.entity) and trailer is not actor:
+        if any(one is trailer for one in train_of(actor)):
+            scene.notice(f"{actor.name} does not tow {trailer.name}, which tows it, or is itself")
+        elif can_tow(actor.entity, trailer.entity):
             trailer.towed_by = actor
         else:
             scene.notice(f"{actor.name} does not tow {trailer.name}: no hitch, or no coupler")

@@ -3,6 +3,8 @@
 # ruff: noqa: ISC004  elements in lists of parameters
 from __future__ import annotations
 
+from math import pi
+
 import pytest
 from tests.scenarios.files import (
     BRIDGE,
@@ -22,6 +24,7 @@ from tests.scenarios.files import (
     to,
     told,
     vehicle,
+    world,
 )
 
 STOP = private(speed(to(0)))
@@ -139,6 +142,32 @@ def test_relative_speed(tmp_path):
     slow = story(event("e", SLOW, time(3.0)))
     body = '<RelativeSpeedCondition entityRef="other" value="3" rule="greaterThan"/>'
     assert fired(tmp_path, by_entity(body), more=slow) == pytest.approx(4.0, abs=0.11)
+
+
+CROSSING = at("ego", -1, 100, 20) + init(
+    "other", teleport(world(300.0, -90.0, h=pi / 2)), speed(to(10))
+)
+
+
+@pytest.mark.osc("RelativeSpeedCondition")
+@pytest.mark.parametrize(
+    ("by", "reference", "comparison", "t"),
+    [
+        ("ego", "other", 'direction="lateral" value="-7" rule="greaterThan"', 4.0),
+        ("ego", "other", 'direction="longitudinal" value="19" rule="lessThan"', None),
+        ("other", "ego", 'direction="longitudinal" value="7" rule="lessThan"', 4.0),
+        ("other", "ego", 'direction="lateral" value="19" rule="lessThan"', None),
+        ("other", "ego", 'value="-13" rule="lessThan"', 4.0),
+    ],
+)
+def test_relative_speed_at_right_angles_is_measured_along_the_triggering_entity(
+    tmp_path, by, reference, comparison, t
+):
+    """The ego drives east at 20 m/s, the other one north at 10 m/s, from 3 s on 3 m/s² slower."""
+    slow = story(event("e", SLOW, time(3.0)))
+    when = by_entity(f'<RelativeSpeedCondition entityRef="{reference}" {comparison}/>', by)
+    begun = fired(tmp_path, when, more=slow, init=CROSSING, end=6.0)
+    assert begun == (None if t is None else pytest.approx(t, abs=0.11))
 
 
 FASTER = at("ego", -1, 100, 20) + at("other", -1, 160, 10)

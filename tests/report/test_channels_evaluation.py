@@ -163,7 +163,7 @@ def test_the_curve_over_the_threshold_has_recall_and_false_alarms_of_each_hazard
 
 
 @pytest.mark.req("C-105", "C-212")
-def test_precision_stands_over_recall_at_each_limit_with_the_ceiling_as_a_star():
+def test_precision_stands_over_recall_at_each_limit_with_the_reference_as_a_star():
     # limit, right, false, -, weights found and true
     points = [[0.1, 6, 6, 0, 0.75, 1.0], [0.5, 3, 1, 0, 0.5, 1.0], [0.9, 0, 0, 0, 0.0, 1.0]]
     hazards = ("inconsistent_localisation", "ego_tailgating", "ego_tailgated")

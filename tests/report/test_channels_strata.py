@@ -1,4 +1,4 @@
-"""The page on natural and risky drivers: recall by stratum, curves, the sensors' ceiling."""
+"""The page on natural and risky drivers: recall by stratum, curves, the reference with hindsight."""
 
 from __future__ import annotations
 
@@ -55,11 +55,11 @@ def test_recall_stands_per_stratum_and_precision_does_not(evaluation, tmp_path):
 
 
 @pytest.mark.req("C-105")
-def test_each_stratum_has_its_curves_with_the_ceiling(evaluation, tmp_path):
+def test_each_stratum_has_its_curves_with_the_reference(evaluation, tmp_path):
     figures = section(evaluation_page(evaluation, tmp_path), "Precision against recall").blocks
     assert len(figures) == 2
     for figure in figures:
-        assert "ceiling" in figure.svg
+        assert "reference" in figure.svg
         assert figure.svg.count("tracked") >= 1
     del evaluation["strata"]
     assert (

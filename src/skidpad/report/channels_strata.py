@@ -72,7 +72,7 @@ def _size(row: Row) -> Cell:
 
 
 def precision_recall(evaluation: Row) -> list[Block]:
-    """A chart per stratum: each identifier over its limits, the ceiling of the sensors as a point."""
+    """A chart per stratum: each identifier over its limits, the reference with hindsight as a point."""
     parts = evaluation.get("strata", {}) or {"natural": evaluation}
     out: list[Block] = []
     for stratum, part in parts.items():
@@ -81,7 +81,7 @@ def precision_recall(evaluation: Row) -> list[Block]:
             continue
         text = (
             f"{STRATA[stratum]}, {part['hours']:.2f} h, simulator truth: precision against recall while "
-            f"each identifier's limit varies; the star is the ceiling that the sensors set"
+            f"each identifier's limit varies; the star is the reference with hindsight"
         )
         weighted = ", recall weighted" if stratum == "risky" else ""
         out.append(Figure(_chart(part, drawn), f"{text}{weighted}."))
@@ -102,7 +102,7 @@ def _chart(part: Row, drawn: Row) -> str:
         ]
         lines += [
             Curve(
-                "ceiling",
+                "reference",
                 [r],
                 [p],
                 colour=len(names),

@@ -28,7 +28,7 @@ NEAR = 3.0  # m between an object and the actor that it is
 WINDOW = 10  # cycles before and after: 1 s each way
 LEAST = 5  # cycles seen in the window, else the actor is not known
 MEDIAN = 3  # cycles before and after: a jump stays one, noise of single cycles goes
-NAME = "ceiling of simulator truth"
+NAME = "reference with hindsight"
 
 
 def ceiling(cycles: Sequence[Cycle], channels: Sequence[str]) -> tuple[Span, ...]:

@@ -50,7 +50,7 @@ def make_backend(choice: BackendChoice, watchdog: float | None = None) -> Backen
     """A fresh backend. watchdog: s without a tick after which this process ends; None: never."""
     if choice.backend is BackendKind.EMBEDDED:
         return EmbeddedBackend()
-    # The wheel and its threads concern only those who drive on it.
+    # The wheel and its threads concern only drives on it.
     from skidpad.simulation.carla.backend import CarlaBackend
 
     return CarlaBackend(carla_options(choice, watchdog))

@@ -24,7 +24,7 @@ FIRST_SEED = 900_000  # nothing else is driven from here on (decision X-8)
 
 @dataclass(slots=True)
 class TrafficRow:
-    """What was seen in one weather; whoever sits in the ego's car is one of the background."""
+    """What was seen in one weather; the one in the ego's car is one of the background."""
 
     weather: str
     km: float = 0.0

@@ -1,4 +1,4 @@
-"""From the description of a run to its world and to those who act in it."""
+"""From the description of a run to its world and to the actors in it."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class StackAtWheel:
         return self.stack.mode
 
     def begin(self, table: ActorTable) -> None:
-        """Nothing: a stack does not know who takes part."""
+        """Nothing: a stack does not know the cast."""
 
     def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
         """The stack's answer to the frame."""
@@ -99,7 +99,7 @@ class Seated:
 
 @dataclass(frozen=True, slots=True)
 class Stage:
-    """The world of a run, and who acts in it besides the driver."""
+    """The world of a run, and the actors in it besides the driver."""
 
     map: RoadMap
     setup: Setup

@@ -22,7 +22,7 @@ Floats = NDArray[np.float64]
 # Steady following: speeds within 1.52 m/s and accelerations within 0.75 m/s^2 for 3.5 s (Parashar et
 # al. 2025, Communications in Transportation Research, 10.1016/j.commtr.2025.100169, from NGSIM I-80).
 STEADY_SPEED, STEADY_ACCELERATION, STEADY_TIME = 1.52, 0.75, 3.5  # m/s, m/s^2, s
-CUT_OFF = 5.0  # s: who is farther behind follows nobody (King et al. 2022, see headways.csv)
+CUT_OFF = 5.0  # s: a vehicle farther behind follows none (King et al. 2022, see headways.csv)
 SLOWEST = 5.0  # m/s: slower traffic is a queue
 LOOK = 10  # ticks between two looks at headways
 FAST_ROAD = 80.0 / 3.6 - 0.1  # m/s: limits from here on are those of motorways
@@ -52,7 +52,7 @@ class Seen:
 
     overlaps: int = 0  # pairs of vehicles that began to overlap
     moved: int = 0  # from afar to near the ego
-    moved_close: int = 0  # of these with somebody within CLOSE s before or after
+    moved_close: int = 0  # of these with another one within CLOSE s before or after
     fast: list[float] = field(default_factory=list)  # s, headways in steady following
     slow: list[float] = field(default_factory=list)  # likewise, on roads below FAST_ROAD
     stands: list[Stand] = field(default_factory=list)
@@ -108,7 +108,7 @@ class Watch:
         self._before = w.states.copy()
 
     def end(self) -> None:
-        """The drive is over: who still stands is listed as well."""
+        """The drive is over: a vehicle that still stands is listed as well."""
         for i in range(len(self._stood)):
             self._close_stand(i)
 
@@ -161,7 +161,7 @@ class Watch:
 
 
 def leaders(world: World) -> tuple[NDArray[np.int64], Floats]:
-    """(n,) who is next ahead on the same lane or the one straight on, -1: nobody; and the gap in m."""
+    """(n,) who is next ahead on the same lane or the one straight on, -1: none; and the gap in m."""
     assert world.traffic is not None
     placed, lanes = world.placed, world.traffic.net.lane
     there = np.flatnonzero(world.states.present & (placed["lane"] >= 0))
@@ -217,7 +217,7 @@ def _apart(boxes: list[tuple[float, float, float]], sizes: list[tuple[float, flo
 
 
 def times_to_neighbours(world: World) -> Floats:
-    """(n,) s between each vehicle and the next ahead or behind on its way; inf: nobody."""
+    """(n,) s between each vehicle and the next ahead or behind on its way; inf: none."""
     leader, gap = leaders(world)
     time: Floats = np.maximum(gap, 0.0) / np.maximum(world.placed["speed"], 0.1)
     behind = np.full(len(time), np.inf)

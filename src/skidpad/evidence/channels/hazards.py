@@ -222,7 +222,7 @@ def _compile_rules(table: Mapping[HazardType, _RuleText]) -> tuple[Rule, ...]:
 
 @dataclass(frozen=True, slots=True)
 class SignalReadings:
-    """The signals of a cycle, and who stands behind them."""
+    """The signals of a cycle, and their source."""
 
     values: dict[Signal, float]  # NaN: not evaluated
     gap_pair: int | None  # pair with the largest gap

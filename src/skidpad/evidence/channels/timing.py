@@ -21,7 +21,7 @@ LIVE_TIMES = TIMES | dict.fromkeys(("wall_ms", "waited_ms", "faults"), pl.Float6
 
 
 class Stopwatch(Protocol):
-    """Measures a monitor at work; whoever has a clock brings one."""
+    """Measures a monitor at work; the caller brings its own clock."""
 
     def begin(self, cycle: Cycle) -> None:
         """A cycle starts."""

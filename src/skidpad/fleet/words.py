@@ -27,7 +27,7 @@ class Action(str, Enum):
     EXPORT_SCENARIO = "export scenario"  # OpenSCENARIO in the stakeholder's own environment
     READ_TRENDS = "read trends"
     ANALYSE = "analyse"  # look for recurring hazards now
-    TRIAGE = "triage"  # say what became of a recurring hazard, and who looks after it
+    TRIAGE = "triage"  # set state and owner of a recurring hazard
     READ_ALERTS = "read alerts"
     ANSWER_ALERTS = "answer alerts"
     GUIDE = "guide"  # order vehicles to stop, slow down, go on

@@ -33,7 +33,7 @@ def towed_pose(before: Pose, z: float, hitch: tuple[float, float], trailer: Enti
 
 
 def towing_pairs(entities: Mapping[str, Entity]) -> list[tuple[Entity, Entity]]:
-    """Returns who tows what from the begin, each tractor before those that its trailer tows.
+    """Returns the trailers that are hitched at the start, each tractor before those that its trailer tows.
 
     Each trailer has one tractor, the first one of the file; a ring of trailers is left alone.
     """

@@ -32,7 +32,7 @@ from skidpad.evidence.channels.frames import usable
 
 Floats = NDArray[np.float64]
 MISS_MOST = 0.1  # risk of the nearest miss; the hit at the very end of the horizon begins there
-# Ours: a lead that brakes as hard as cars in traffic do, a response as AASHTO's drivers that expect it,
+# Ours: a lead that brakes as hard as cars in traffic do, the response time of drivers that expect it,
 # and the hardest braking of a car on a dry road. Below 1 s of time gap at equal speed there is risk.
 LEAD_BRAKE, RESPONSE, HARDEST = 6.0, 1.0, 8.0  # m/s^2, s, m/s^2
 CLOSE_MOST = 0.5  # risk of a gap behind a lead that even the hardest braking does not open in time

@@ -41,13 +41,13 @@ def work_list(fleet: Fleet, who: Principal, wanted: WorkFilter) -> list[Work]:
 
 
 def require_subject(fleet: Fleet, who: Principal, subject: str) -> None:
-    """Raise Refused (404) when `who` sees no recurring hazard of that id."""
+    """Raise Refused (404) when no recurring hazard of that id is visible to `who`."""
     if subject not in {one.subject for one in work_list(fleet, who, WorkFilter())}:
         raise absent()
 
 
 def triage(fleet: Fleet, who: Principal, subject: str, text: TriageText) -> dict[str, Any]:
-    """Set the state of a recurring hazard that `who` may see; Refused (404) of any other."""
+    """Set the state of a recurring hazard; Refused (404) unless it is visible."""
     require_subject(fleet, who, subject)
     standing = Standing(text.state, text.owner, text.release, fleet.clock(), who.id)
     with fleet.engine.begin() as connection:

@@ -19,7 +19,7 @@ CHUNK = 500  # subjects of one query
 class State(str, Enum):
     """What became of a recurring hazard."""
 
-    NEW = "new"  # nobody has looked at it
+    NEW = "new"  # not looked at yet
     OPEN = "open"  # true, and has an owner
     REJECTED = "rejected"  # no hazard
     FIXED = "fixed"  # by a release
@@ -56,7 +56,7 @@ def read_standings(connection: Connection, subjects: Iterable[str]) -> dict[str,
 def set_standing(
     connection: Connection, who: Principal, subject: str, standing: Standing, note: str = ""
 ) -> None:
-    """Keep a new standing of a recurring hazard as an event by `who` at `standing.at`.
+    """Keep a new standing of a recurring hazard as an event at `standing.at`.
 
     Raises:
         Refused: 422 for a state that only alarms can cause, a fix without its release, an open

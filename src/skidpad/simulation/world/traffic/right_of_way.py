@@ -204,7 +204,7 @@ def _is_occupied(view: View, i: int, lane: int, start: float, end: float) -> boo
 def _gap_within(view: View, d: Drivers, i: int, k: int, start: float, keeps_out: bool) -> float:
     """m to the nearest shared area on path[k] that a driver in the junction must not enter; inf: none.
 
-    keeps_out: of areas in which another stands. A driver who has almost stopped judges gaps anew.
+    keeps_out: of areas in which another stands. A driver that has almost stopped judges gaps anew.
     """
     entry, body = view.streets.entry[d.path[i, k]], view.placed[i]
     nearest = np.inf

@@ -54,10 +54,10 @@ def seconds_to_others(
 
 
 def is_crossing_free(streets: Streets, claimed: Places, lane: int, s: float, me: int) -> bool:
-    """Whether a vehicle that is put before a junction surprises nobody there.
+    """Whether a vehicle that is put before a junction surprises no driver there.
 
-    Drivers judge gaps by those within `WATCH` m of the shared area: who has decided to go cannot
-    yield to a vehicle that was not there. claimed, me: as in `seconds_to_others`.
+    Drivers judge gaps by those within `WATCH` m of the shared area: a driver that has decided to go
+    cannot yield to a vehicle that was not there. claimed, me: as in `seconds_to_others`.
     """
     net, n = streets.net, len(claimed) // 2
     row = net.lane[lane]

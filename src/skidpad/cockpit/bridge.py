@@ -1,4 +1,4 @@
-"""Between tabs and producer: who may say what, and what a tab's messages mean. It knows no web."""
+"""Between tabs and producer: which tab may do what, and what its messages mean. It knows no web."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Bridge:
             self.producer.say(Pause(True))
 
     def check(self) -> None:
-        """Let go of what is held by nobody: pedals that are not heard of, tabs that sleep."""
+        """Releases pedals that no tab has touched lately, and tabs that sleep."""
         self.dead_man.check()
         for tab in self.tabs.asleep():
             self.leave(tab)

@@ -98,7 +98,7 @@ class ChannelSource:
         self.marks = sorted(self._switches() + self._judged.marks)
 
     def _build(self) -> None:
-        """The table of all who ever appear, and where they are."""
+        """Builds the table of all actors that ever appear, and their places."""
         first: dict[Key, tuple[int, int]] = {}
         for k, world in enumerate(self.worlds):
             for row, key in enumerate(world.keys):
@@ -126,7 +126,7 @@ class ChannelSource:
 
     @property
     def table(self) -> ActorTable:
-        """Who takes part."""
+        """The actors of the recording."""
         return self._table
 
     @property
@@ -135,11 +135,11 @@ class ChannelSource:
         return len(self.worlds)
 
     def tick(self, k: int) -> int:
-        """When moment k was."""
+        """Returns the tick of moment k."""
         return round(self.worlds[k].t / DT)
 
     def seat(self, k: int) -> Seat:
-        """Nobody sat there; the weather is that of the recording."""
+        """Returns a seat without a person; the weather is that of the recording."""
         del k
         return self._seat
 
@@ -149,7 +149,7 @@ class ChannelSource:
         return None
 
     def collisions(self, k: int) -> int:
-        """See `crash`."""
+        """Returns 0, as channels record no contacts."""
         del k
         return 0
 

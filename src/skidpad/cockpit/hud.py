@@ -48,7 +48,7 @@ def motion(moment: Moment) -> dict[str, Any]:
 
 
 def opinion(moment: Moment) -> dict[str, Any]:
-    """What the stack says."""
+    """Returns what the stack reports at a moment."""
     r = moment.report
     return {
         "mode": moment.driver.mode,

@@ -16,7 +16,7 @@ Floats = NDArray[np.float64]
 
 
 def ttc_ahead(bodies: Sequence[Body], present: NDArray[np.bool_]) -> Floats:
-    """(T,) s to the collision with whoever is in the ego's way; inf: nobody is, or none is near.
+    """Returns (T,) s to the collision with the nearest body in the ego's way; inf: none is near.
 
     bodies: the ego first. present: (T, n), each where it may be met.
     """

@@ -163,7 +163,7 @@ def build(bridge: Bridge, about: About) -> Callable[[], None]:
 
 
 def time_controls(panel: Panel, kind: str) -> None:
-    """Pause, rate, camera, end."""
+    """Draws the controls of pause, rate, camera and end."""
     with ui.element("div").classes("row"):
         if kind == "drive":
             panel.button("take over / hand back", "take", icon="swap_horiz")
@@ -187,7 +187,7 @@ def picture_controls(panel: Panel) -> None:
 
 
 def extra_switch(panel: Panel, extra: Extra) -> None:
-    """One addition."""
+    """Draws the switch of one addition to the picture."""
     name, word = PICTURE + extra.value, extra.value
     switch = ui.switch(
         EXTRAS[extra], on_change=lambda e: panel.changed(name, e.value, "extra", word)
@@ -260,7 +260,7 @@ def weather_slider(panel: Panel, field: str, title: str) -> None:
 
 
 def crowd_slider(panel: Panel) -> None:
-    """How many background vehicles are on the road."""
+    """Draws the slider for the number of background vehicles."""
     ui.label("vehicles")
     slider = ui.slider(min=0, max=panel.vehicles, step=1).props("label dense")
 

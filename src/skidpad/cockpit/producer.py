@@ -33,7 +33,7 @@ class Producer:
         self._said: tuple[str, str] | None = None
 
     def start(self) -> None:
-        """Begin."""
+        """Starts the process that makes pictures."""
         self._process.start()
         self._theirs.close()
 

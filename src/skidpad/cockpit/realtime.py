@@ -41,7 +41,7 @@ class RealTime(Sink):
         self.rtf: float | None = None
 
     def begin(self, table: ActorTable) -> None:
-        """The clock starts now."""
+        """Starts the clock that keeps the drive at real time."""
         del table
         self.pacer.begin()
         self._last = self._window = self.clock()

@@ -85,7 +85,7 @@ class Recording:
 
     @property
     def table(self) -> ActorTable:
-        """Who takes part."""
+        """The actors of the recorded run."""
         return self.log.table
 
     @property
@@ -94,7 +94,7 @@ class Recording:
         return len(self.log)
 
     def tick(self, k: int) -> int:
-        """When moment k was."""
+        """Returns the tick of moment k."""
         return int(self.log.tick[k])
 
     def crash(self, k: int) -> Pose | None:

@@ -110,7 +110,7 @@ class Replayer:
         self._since = self.clock()
 
     def show(self) -> None:
-        """Show the present moment."""
+        """Shows the picture of the present moment."""
         self.screen.crash = self.source.crash(self.k)
         self.screen.show(self.source.moment(self.k))
         self._shown_k, self._shown_at = self.k, self.clock()

@@ -67,7 +67,7 @@ class Screen(Sink):
         if perf_counter() - self._at < 1.0 / MOST_PER_SECOND:
             return
         if self.feed.taken < self.feed.last:
-            self.dropped += self.feed.taken > 0  # before the first page there is nobody to miss it
+            self.dropped += self.feed.taken > 0  # before the first page it is not missed
             return
         self.show(moment)
 

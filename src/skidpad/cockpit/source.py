@@ -38,10 +38,10 @@ class Said:
         self.report, self.mode = report, mode
 
     def begin(self, table: ActorTable) -> None:
-        """Nothing begins."""
+        """Does nothing, as a source drives no actor."""
 
     def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
-        """Nothing is driven."""
+        """Raises NotImplementedError, as a source drives no actor."""
         raise NotImplementedError
 
 
@@ -68,7 +68,7 @@ class Source(Protocol):
 
     @property
     def table(self) -> ActorTable:
-        """Who takes part."""
+        """The actors of the source."""
         ...
 
     @property
@@ -77,7 +77,7 @@ class Source(Protocol):
         ...
 
     def tick(self, k: int) -> int:
-        """When moment k was."""
+        """Returns the tick of moment k."""
         ...
 
     def moment(self, k: int) -> Moment:

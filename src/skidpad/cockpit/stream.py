@@ -12,7 +12,7 @@ from fastapi import FastAPI, WebSocket, WebSocketDisconnect
 from skidpad.cockpit.bridge import Bridge
 
 POLL = 0.006  # s between two looks for a new picture
-CHECK = 0.05  # s between two looks at the dead man's switch and at who sleeps
+CHECK = 0.05  # s between two looks at the dead man's switch and at tabs that sleep
 ASK = 1.0  # s between two questions whether a tab is awake: timers of a hidden page may stand still
 LOST_AFTER = 2.0  # s without an acknowledgement after which the next picture is sent anyway
 

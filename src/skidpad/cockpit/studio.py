@@ -76,7 +76,7 @@ def cameras() -> tuple[SensorSpec, ...]:
 
 
 class Studio:
-    """Looks at one run."""
+    """Renders the moments of one run."""
 
     def __init__(
         self,

@@ -25,7 +25,7 @@ class Tabs:
         self._open.pop(tab, None)
 
     def asleep(self) -> list[str]:
-        """Tabs that are open, but do not answer: a browser may stop a page that nobody sees."""
+        """Returns tabs that are open, but do not answer: a browser may stop a hidden page."""
         now = self.clock()
         return [tab for tab, heard in self._open.items() if now - heard > ASLEEP_AFTER]
 

@@ -63,7 +63,7 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Standing:
-    """How it stands."""
+    """Holds how far a campaign has come, and with which outcomes."""
 
     command: str
     done: int
@@ -114,7 +114,7 @@ def _cell(name: str, good: list[bool]) -> Cell:
 
 
 def lines(now: Standing) -> list[str]:
-    """The same as text."""
+    """Returns the standing of a campaign as lines of text."""
     planned = "" if now.planned is None else f" of {now.planned}"
     told = [f"{now.command}: {now.done}{planned} runs done"]
     told.append(", ".join(f"{n} {outcome}" for outcome, n in now.outcomes.items()) or "none yet")

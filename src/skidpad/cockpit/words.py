@@ -1,4 +1,4 @@
-"""What the page says to whoever makes its pictures, and the state that this leads to."""
+"""Messages of the page to the producer of its pictures, and the state that they lead to."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class Pace(Struct, frozen=True, tag="pace"):
 
 
 class Pause(Struct, frozen=True, tag="pause"):
-    """Stop and go."""
+    """Pauses the drive, or lets it go on."""
 
     on: bool
 
@@ -68,7 +68,7 @@ class Film(Struct, frozen=True, tag="film"):
 
 
 class End(Struct, frozen=True, tag="end"):
-    """It is over."""
+    """Ends the drive or the replay."""
 
 
 Word = Do | Pace | Pause | Step | Seek | Show | Film | End
@@ -83,7 +83,7 @@ class Link:
     """The producer's end: what was said so far. Asked often, it never waits unless told to."""
 
     def __init__(self, pipe: Connection | None) -> None:
-        """pipe: None: nobody says anything."""
+        """pipe: None: no message ever comes."""
         self.pipe = pipe
         self.inputs: list[Input] = []
         self.rate = 1.0

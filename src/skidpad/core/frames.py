@@ -74,7 +74,7 @@ class RadarPoints(NamedTuple):
 
     @classmethod
     def none(cls) -> RadarPoints:
-        """No return."""
+        """Returns a reading without returns."""
         return cls(*(np.empty(0, dtype=np.float32) for _ in range(4)))
 
 
@@ -89,7 +89,7 @@ class LidarPoints(NamedTuple):
 
 
 class GnssFix(NamedTuple):
-    """Where the antenna is."""
+    """Place of the GNSS antenna on the globe."""
 
     latitude: float  # deg, north positive; north is the map's +y
     longitude: float  # deg, east positive

@@ -35,7 +35,7 @@ class LampSwitch(str, Enum):
 
 
 class Beam(IntEnum):
-    """What the headlights do."""
+    """Which beam the headlights show."""
 
     OFF = 0
     LOW = 1
@@ -84,7 +84,7 @@ class Lamps(Struct, frozen=True, tag="lamps", forbid_unknown_fields=True):
 
 
 class Crowd(Struct, frozen=True, tag="crowd", forbid_unknown_fields=True):
-    """So many background vehicles on the road from now on, at most those of the run and its reserve."""
+    """Sets the number of background vehicles from now on, at most those of the run and its reserve."""
 
     vehicles: int
 
@@ -112,6 +112,6 @@ class Outside:
     range_model: RangeModel
     beam: Beam | None = None  # None: low beam by night (A-218)
     mu_ref: float | None = None  # on a dry road; None: as it was (embedded backend)
-    # traffic lights that somebody has taken over, by OpenDRIVE id, and what they show
+    # traffic lights that a person has taken over, by OpenDRIVE id, and what they show
     lights: tuple[tuple[int, LightState], ...] = ()
     unseen: frozenset[str] = frozenset()  # actors that no sensor sees (embedded backend)

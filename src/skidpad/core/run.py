@@ -22,7 +22,7 @@ VERSION = 2  # of config.yaml; folders without the word were written before ther
 DURATION = 500.0  # s (A-005)
 DEADLINE_BASE_S, DEADLINE_PER_SIMULATED_S = 180.0, 4.0  # wall time after which a run is killed
 REFERENCE = "reference"  # the reference driver's name in commands and results
-ARBITER = "arbiter"  # who drives a crew, when it is not one of the channels
+ARBITER = "arbiter"  # the driver of a crew, when it is not one of the channels
 
 Plain = bool | float | str | None
 
@@ -54,7 +54,7 @@ class AdasDriver(Struct, frozen=True, kw_only=True, tag="adas", forbid_unknown_f
 
 
 class StackDriver(Struct, frozen=True, tag="stack", forbid_unknown_fields=True):
-    """Anybody's stack."""
+    """A driving stack that a user wrote."""
 
     where: str  # module:Class or file.py:Class
     options: dict[str, Any] = {}  # what the class is given as its settings
@@ -62,7 +62,7 @@ class StackDriver(Struct, frozen=True, tag="stack", forbid_unknown_fields=True):
 
     @property
     def label(self) -> str:
-        """What results call it."""
+        """Name of the driver in results."""
         return self.name or self.where
 
 
@@ -73,7 +73,7 @@ class AgentDriver(Struct, frozen=True, tag="agent", forbid_unknown_fields=True):
 
     @property
     def label(self) -> str:
-        """What results call it."""
+        """Name of the driver in results."""
         return f"agent:{self.where}"
 
 
@@ -82,7 +82,7 @@ class CameraDriver(Struct, frozen=True, tag="camera", forbid_unknown_fields=True
 
     @property
     def label(self) -> str:
-        """What results call it."""
+        """Name of the driver in results."""
         return "camera"
 
 
@@ -91,16 +91,16 @@ class ReferenceDriver(Struct, frozen=True, tag="reference", forbid_unknown_field
 
     @property
     def label(self) -> str:
-        """What results call it."""
+        """Name of the driver in results."""
         return REFERENCE
 
 
 class Passenger(Struct, frozen=True, tag="ideal", forbid_unknown_fields=True):
-    """Nobody: the scenario moves the ego."""
+    """No driver: the scenario moves the ego."""
 
     @property
     def label(self) -> str:
-        """What results call it."""
+        """Name of the driver in results."""
         return "ideal"
 
 
@@ -128,7 +128,7 @@ class ChannelCrew(Struct, frozen=True, kw_only=True, tag="channels", forbid_unkn
 
     @property
     def label(self) -> str:
-        """What results call it."""
+        """Name of the driver in results."""
         return self.drive_by
 
 
@@ -210,7 +210,7 @@ class Scenario(Struct, frozen=True, kw_only=True, tag="scenario", forbid_unknown
 
     @property
     def title(self) -> str:
-        """What results call it."""
+        """Name of the scenario in results."""
         return self.name or self.file.rpartition("/")[2].removesuffix(".xosc")
 
 
@@ -280,14 +280,14 @@ ADDRESS = ("host", "port", "server_command", "restart_every")
 
 
 class Render(str, Enum):
-    """Which images are drawn."""
+    """Which camera images are rendered."""
 
     NEEDED = "needed"  # those that something reads
     ALL = "all"
 
 
 class Friction(str, Enum):
-    """The switch of B-004."""
+    """The switch of friction, as B-004 asks."""
 
     ORIGINAL = "original"  # weather is seen, tyres know nothing of it
     REDUCED = "reduced"  # tyres know it, by the setting `grip`
@@ -316,7 +316,9 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ] = Render.NEEDED
     overlay: Annotated[bool, Meta(description="Rain drops on the cameras (pixels).")] = False
     backend: BackendChoice = BackendChoice()
-    inputs: str = ""  # SHA-256 of what a person did meanwhile (inputs.jsonl); "": nobody was there
+    inputs: str = (
+        ""  # SHA-256 of what a person did meanwhile (inputs.jsonl); "": no person took part
+    )
 
     def __post_init__(self) -> None:
         if isinstance(self.driver, ChannelCrew) is not isinstance(self.course, Route):
@@ -348,7 +350,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     @property
     def foreign_code(self) -> tuple[str, ...]:
-        """What of somebody else's a drive of this run would execute, in words."""
+        """Returns the foreign code that a drive of this run would execute, in words."""
         driver = self.driver
         found = []
         if isinstance(driver, (StackDriver, AgentDriver)) and not driver.where.startswith(OURS):

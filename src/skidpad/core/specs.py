@@ -12,7 +12,7 @@ from skidpad.core.geometry import Pose
 
 
 class Modality(str, Enum):
-    """What a camera delivers."""
+    """The quantity that a camera measures per pixel."""
 
     RGB = "rgb"
     DEPTH = "depth"
@@ -50,12 +50,12 @@ class CameraSpec:
 
     @property
     def cx(self) -> float:
-        """Principal column (A-040)."""
+        """Column of the principal point in px (A-040)."""
         return self.width / 2.0
 
     @property
     def cy(self) -> float:
-        """Principal row."""
+        """Row of the principal point in px."""
         return self.height / 2.0
 
     @property
@@ -78,7 +78,7 @@ class RadarSpec:
 
 @dataclass(frozen=True, slots=True)
 class LidarSpec:
-    """A rotating lidar."""
+    """Mounting and properties of a rotating lidar."""
 
     id: str
     mount: Pose

@@ -64,7 +64,7 @@ class Supervision(IntEnum):
 
 
 class TrafficStart(str, Enum):
-    """Where background vehicles start."""
+    """Where background vehicles start, and whether they stay near."""
 
     FIXED = "fixed"  # A-202
     RANDOM = "random"  # A-209
@@ -79,7 +79,7 @@ class Stratum(str, Enum):
 
 
 class Control(str, Enum):
-    """What drives an actor."""
+    """What decides the motion of an actor."""
 
     AUTOPILOT = "autopilot"  # a driver of the background
     SCRIPTED = "scripted"  # commands from outside
@@ -100,7 +100,7 @@ class RelocationReason(IntEnum):
     WRONG_WAY = 2
     STUCK = 3
     OFF_ROAD = 4
-    ROAD_END = 5  # the map ends there: nobody's fault
+    ROAD_END = 5  # the map ends there: no driver's fault
 
 
 class Outcome(str, Enum):

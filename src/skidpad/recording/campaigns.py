@@ -48,7 +48,7 @@ class CampaignFolder(Generic[E]):
 
     @cached_property
     def fingerprints(self) -> list[str]:
-        """Machines that drove it."""
+        """Fingerprints of the machines that drove the campaign."""
         return sorted(fingerprints(self.entries))
 
     @cached_property

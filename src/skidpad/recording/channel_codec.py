@@ -16,7 +16,7 @@ POLYGON_LIMIT = 64  # vertices; a shape with more is not a shape but damage
 
 
 def message_from_frame(frame: ChannelFrame) -> pb.Channel:
-    """`frame` as a message."""
+    """Returns a channel's frame as a protobuf message."""
     message = pb.Channel(
         t=frame.t,
         ego=frame.ego.tolist(),
@@ -59,7 +59,7 @@ def frame_from_message(message: pb.Channel) -> ChannelFrame:
 
 
 def message_from_truth(truth: TruthFrame) -> pb.Truth:
-    """`truth` as a message."""
+    """Returns the true world as a protobuf message."""
     return pb.Truth(
         t=truth.t,
         ego=truth.ego.tolist(),
@@ -96,7 +96,7 @@ def truth_from_message(message: pb.Truth) -> TruthFrame:
 
 
 def message_from_decision(decision: Decision) -> pb.Decision:
-    """`decision` as a message."""
+    """Returns an arbiter's decision as a protobuf message."""
     return pb.Decision(
         t=decision.t,
         driving=decision.driving,
@@ -106,12 +106,12 @@ def message_from_decision(decision: Decision) -> pb.Decision:
 
 
 def decision_from_message(message: pb.Decision) -> Decision:
-    """The decision in `message`."""
+    """Returns the decision of a protobuf message."""
     return Decision(message.t, message.driving, message.reason, tuple(message.scores))
 
 
 def message_from_context(context: Context) -> pb.Context:
-    """`context` as a message."""
+    """Returns the context of a drive as a protobuf message."""
     return pb.Context(t=context.t, entries=context.entries)
 
 

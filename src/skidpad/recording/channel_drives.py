@@ -16,7 +16,7 @@ from skidpad.recording.results import Columns
 
 
 class Ending(str, Enum):
-    """Why a segment ended."""
+    """Why the drive of a segment ended."""
 
     TIME = "time"
     STALLED = "stalled"

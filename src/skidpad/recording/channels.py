@@ -138,15 +138,15 @@ class ChannelWriter:
             self.write_context(item)
 
     def write(self, channel: str, frame: ChannelFrame) -> None:
-        """Append what `channel` said."""
+        """Appends the frame of a channel."""
         self._add(self._topics[channel], frame.t, codec.message_from_frame(frame))
 
     def write_truth(self, truth: TruthFrame) -> None:
-        """Append the true world."""
+        """Appends the true world of a cycle."""
         self._add(self._truth, truth.t, codec.message_from_truth(truth))
 
     def write_decision(self, decision: Decision) -> None:
-        """Append the arbiter's word."""
+        """Appends a decision of the arbiter."""
         self._add(self._decision, decision.t, codec.message_from_decision(decision))
 
     def write_context(self, context: Context) -> None:

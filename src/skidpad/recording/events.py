@@ -52,7 +52,7 @@ class MovedOn:
 
 
 class NoticeSource(str, Enum):
-    """Who has something to say."""
+    """The part of the program that a notice comes from."""
 
     STACK = "stack"
     SUPERVISOR = "supervisor"

@@ -60,7 +60,7 @@ def require_free(folder: Path) -> Path:
 
 
 def write_secret(path: Path, content: bytes) -> None:
-    """As `write_bytes`, and at no moment may anybody else read it."""
+    """Writes a file as `write_bytes` does, and at no moment may another user read it."""
     write_atomically(path, lambda temporary: _fill_secret(temporary, content))
 
 

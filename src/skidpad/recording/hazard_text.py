@@ -59,7 +59,7 @@ class Channel:
 
 
 def encode_worlds(worlds: Sequence[Cycle], n_channels: int) -> list[str]:
-    """The lines of `worlds`."""
+    """Returns the worlds of a hazard as lines of text."""
     channels = [Channel() for _ in range(n_channels)]
     lines: list[str] = []
     last = 0

@@ -168,7 +168,7 @@ class _Decoder:
         )
 
     def finish(self) -> tuple[Cycle, ...]:
-        """All cycles."""
+        """Returns all cycles that were read."""
         self._end_cycle()
         return tuple(self.cycles)
 

@@ -40,7 +40,7 @@ class InvolvedObject:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class HazardRecord:
-    """One hazardous scene."""
+    """Record of one hazardous scene, with the worlds around it."""
 
     id: str
     type: HazardType
@@ -73,7 +73,7 @@ class HazardWriter:
         self._text.write(HEADER + "\n")
 
     def write(self, record: HazardRecord) -> None:
-        """Append one record."""
+        """Appends a record to the text and its row to the index."""
         text = encode_record(record)
         offset = self._text.tell()
         self._text.write(text)

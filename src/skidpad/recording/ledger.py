@@ -37,7 +37,7 @@ class HasOutcome(Protocol):
 
     @property
     def outcome(self) -> str:
-        """core.Outcome."""
+        """The outcome of a run, as `core.Outcome` names it."""
         ...
 
 

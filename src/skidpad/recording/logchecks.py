@@ -1,4 +1,4 @@
-"""What a stored log must be before anybody computes with it: parts that fit, numbers that are some."""
+"""What a stored log must be before it is computed with: parts that fit, numbers that are some."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def _require_indices(log: RunLog) -> None:
 
 
 def _require_numbers(log: RunLog) -> None:
-    """ValueError unless the ego, and whoever is present, is somewhere: NaN is for what may be absent."""
+    """Raises ValueError unless the ego and all present actors have finite places."""
     here = log.present.copy()
     here[:, 0] = True
     if not all(np.isfinite(values[here]).all() for values in log.actors):

@@ -23,8 +23,8 @@ class RunKey:
     grip: str  # core.GripModel
     range: str  # core.RangeModel
     outcome: str  # core.Outcome
-    functions: str = ""  # "acc+lca"; "": nobody knows, or none
-    cruise_kmh: float | None = None  # target of free cruise; None: nobody knows
+    functions: str = ""  # "acc+lca"; "": unknown, or none
+    cruise_kmh: float | None = None  # target of free cruise; None: unknown
     traffic: str = ""  # core.TrafficStart
     version: str = ""  # of skidpad
     log_hash: str | None = None  # content hash of the tick log: the promise of reproducibility

@@ -59,7 +59,7 @@ class _Row(NamedTuple):
 
 
 def empty_objects() -> RosObjects:
-    """No objects."""
+    """Returns a table of no objects."""
     return _table([])
 
 

@@ -95,7 +95,7 @@ class ChannelTopics(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Mapping(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """The mapping file."""
+    """The file that maps topics of a bag to channels."""
 
     channels: dict[str, ChannelTopics]
     clock: Clock = Clock.HEADER

@@ -136,12 +136,12 @@ class RunLog:
 
     @property
     def contacts(self) -> tuple[ContactEvent, ...]:
-        """Contacts of the ego."""
+        """Contacts of the ego in order of time."""
         return tuple(e for e in self.events if isinstance(e, ContactEvent))
 
     @property
     def background(self) -> tuple[TrafficContact, ...]:
-        """Contacts of all others."""
+        """Contacts among background vehicles in order of time."""
         return tuple(e for e in self.events if isinstance(e, TrafficContact))
 
     @property
@@ -166,7 +166,7 @@ class RunLog:
 
     @property
     def lights(self) -> tuple[LightChange, ...]:
-        """Changes of traffic lights."""
+        """Changes of traffic lights in order of time."""
         return tuple(e for e in self.events if isinstance(e, LightChange))
 
     @property

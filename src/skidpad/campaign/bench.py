@@ -118,7 +118,7 @@ class Spans(Sink):
         self.stamps: list[int] = []
 
     def see(self, moment: Moment) -> None:
-        """One more."""
+        """Takes the time of one more tick."""
         del moment
         if len(self.stamps) == self.warm:
             self.meter.total.clear()

@@ -37,7 +37,7 @@ class TrafficRow:
 
     @property
     def per_100_km(self) -> float:
-        """Contacts among vehicles."""
+        """Contacts among vehicles per 100 km."""
         return 100.0 * self.contacts / self.km
 
     @property

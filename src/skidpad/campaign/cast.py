@@ -92,7 +92,7 @@ class Seated:
         del specs, map, settings
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
-        """Nothing pressed."""
+        """Returns a command with no pedal pressed."""
         del frame
         return VehicleCommand()
 
@@ -251,7 +251,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
 
 
 def _foreign_on_carla(spec: RunSpec) -> bool:
-    """Nobody knows which images somebody else's stack reads, and CARLA sends none on demand."""
+    """Tells whether a foreign stack drives on CARLA: which images it reads is unknown before."""
     foreign = isinstance(spec.driver, (StackDriver, AgentDriver))
     return foreign and spec.backend.backend is BackendKind.CARLA
 

@@ -104,7 +104,7 @@ class Crew:
         return VehicleCommand(brake=MINIMAL_RISK_BRAKE, steer=self.channels[0].command.steer)
 
     def _think(self, t: float, truth: WorldTruth) -> None:
-        """What every channel says at time t, and who drives."""
+        """Computes what every channel reports at time t, and which one drives."""
         v_max = inf
         if self.guide is not None and (v_max := self.guide(t)):
             for channel in self.channels:

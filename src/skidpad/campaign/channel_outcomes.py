@@ -25,7 +25,7 @@ AGAIN = 3.0  # s within which a contact with the same actor is the same collisio
 
 
 class Referee:
-    """Watches the true world; says nothing to anybody until the end."""
+    """Watches the true world and reports at the end alone."""
 
     def __init__(self, route: RoutePath, car: CarModel, dt: float) -> None:
         self.route, self.car, self.dt = route, car, dt
@@ -41,7 +41,7 @@ class Referee:
         self._front = 0.0
 
     def observe(self, truth: WorldTruth, decision: Decision) -> None:
-        """One cycle."""
+        """Takes in one cycle of the true world."""
         s = truth.states
         x, y, v = float(s.x[0]), float(s.y[0]), hypot(float(s.vx[0]), float(s.vy[0]))
         if self._place is not None:
@@ -104,7 +104,7 @@ class Referee:
         )
 
     def outcome(self, route: str, seed: int, drive_by: str) -> DriveOutcome:
-        """The row."""
+        """Returns the outcome of the drive as a row of results."""
         return DriveOutcome(
             route=route,
             seed=seed,

@@ -51,7 +51,7 @@ def route_of(spec: RunSpec) -> Route:
 
 
 def crew_of(spec: RunSpec) -> ChannelCrew:
-    """The channels of a segment."""
+    """Returns the channels of a segment."""
     if not isinstance(spec.driver, ChannelCrew):
         raise ConfigError(f"{spec.name} is driven by no channels")
     return spec.driver

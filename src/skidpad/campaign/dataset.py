@@ -98,7 +98,7 @@ class DatasetSink(Sink):
 
 
 def camera_name(id: str) -> str:
-    """`centre` of `camera/centre`."""
+    """Returns the last part of a camera's id: `centre` of `camera/centre`."""
     return id.rpartition("/")[2]
 
 

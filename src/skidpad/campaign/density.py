@@ -17,7 +17,7 @@ FROM_EGO = 60.0  # m to the ego, so that nobody appears before its bumper
 
 
 class Density:
-    """State: how many are wanted (None: as the run has them), who was sent away, who was called."""
+    """State: how many vehicles are wanted (None: as the run has them), which were sent away or called."""
 
     def __init__(self, vehicles: int = 0) -> None:
         """vehicles: that the run begins with."""
@@ -33,14 +33,14 @@ class Density:
         return [*self._call(truth), *self._leave_or_come(truth, self.wanted)]
 
     def _call(self, truth: WorldTruth) -> list[ActorCommand]:
-        """Those of the reserve who are wanted for the first time; all they need is room."""
+        """Calls vehicles of the reserve that are wanted for the first time; all they need is room."""
         assert self.wanted is not None
         reserve = [name for name in truth.table.names if name.startswith(RESERVE_NAME)]
         first, self.called = self.called, max(self.called, self.wanted - self.vehicles)
         return [ActorCommand(name, present=True) for name in reserve[first : self.called]]
 
     def _leave_or_come(self, truth: WorldTruth, wanted: int) -> list[ActorCommand]:
-        """Those who are there and those who were."""
+        """Sends vehicles away, or calls back those that were there."""
         states, names = truth.states, truth.table.names
         here = [i for i in np.flatnonzero(states.present).tolist() if i > 0]
         from_ego = np.hypot(states.x - states.x[0], states.y - states.y[0])

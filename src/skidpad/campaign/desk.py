@@ -44,7 +44,7 @@ LOW_VISIBILITY = 200.0  # m (A-220)
 
 
 class InputSource(Protocol):
-    """Where inputs come from."""
+    """Source of what a person does during a drive."""
 
     @property
     def ended(self) -> bool:
@@ -83,7 +83,7 @@ def beam_of(switch: LampSwitch, weather: Weather) -> Beam:
 
 
 class Desk:
-    """State: who drives, what is switched on, what is outside, and all inputs so far."""
+    """State: the driver in charge, what is switched on, what is outside, and all inputs so far."""
 
     def __init__(self, source: InputSource, spec: RunSpec, dt: float = DT) -> None:
         self.source, self.hands, self.course = source, Hands(dt), spec.course
@@ -178,7 +178,7 @@ class DeskDriver:
 
 
 class DeskSupervisor:
-    """Nobody puts a person back on the road; the supervisor is there again after handing back."""
+    """Puts no person back on the road; supervises again after handing back."""
 
     def __init__(self, inner: Supervising, desk: Desk) -> None:
         self.inner, self.desk = inner, desk

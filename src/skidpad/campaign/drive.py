@@ -26,7 +26,7 @@ from skidpad.simulation.recovery import Action
 
 
 class Driver(Protocol):
-    """What drives."""
+    """A driver of the ego: gives a command for each tick."""
 
     @property
     def report(self) -> StackReport:
@@ -96,7 +96,7 @@ class Sink:
 
 
 class Unsupervised:
-    """Nobody helps: the driver's command is what happens, to the end of the run."""
+    """No supervisor: the driver's command is what happens, to the end of the run."""
 
     def observe(self, truth: WorldTruth) -> Supervision:
         """The driver drives."""

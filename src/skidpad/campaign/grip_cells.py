@@ -24,7 +24,7 @@ STACK = "stack"  # what results call our own stack
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Cross:
-    """What a campaign varies."""
+    """The values that a grip campaign varies."""
 
     scenarios: Sequence[str]
     weather: Sequence[Weather]

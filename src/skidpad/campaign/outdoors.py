@@ -50,7 +50,7 @@ class ChangedBackend:
         self.inner, self.news, self.hands = inner, news, hands
 
     def reset(self, setup: Setup, seed: int) -> Frame:
-        """Begin a run."""
+        """Begins a run on the backend inside."""
         return self.inner.reset(setup, seed)
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
@@ -73,7 +73,7 @@ class ChangedBackend:
         self.inner.change(outside)
 
     def close(self) -> None:
-        """Release everything."""
+        """Releases the backend inside."""
         self.inner.close()
 
 
@@ -89,7 +89,7 @@ class FileChanges:
 
     @property
     def weather(self) -> Weather:
-        """Of the moment."""
+        """The weather of the present moment."""
         return self.outside.weather
 
     def news(self) -> Outside | None:

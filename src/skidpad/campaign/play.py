@@ -43,7 +43,7 @@ def run_to(spec: RunSpec, out: Path) -> Run:
 
 
 def run_task(task: Task) -> Run:
-    """Drive it here."""
+    """Drives a task in this process."""
     keep_server(task.run.backend)
     backend = make_backend(task.run.backend, WATCHDOG)
     driven = run(task.run, backend=backend, folder=task.out)

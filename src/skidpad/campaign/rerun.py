@@ -42,7 +42,7 @@ PICTURES = 40  # at most this many PNG files of a stretch when no film is asked 
 
 @dataclass(frozen=True, slots=True)
 class Rerun:
-    """What came of it."""
+    """Outcome of driving a stored run again."""
 
     same: bool  # the stretch up to its end has the same content hash
     pictures: tuple[Path, ...]
@@ -77,7 +77,7 @@ def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None 
 
 
 def desk_of(run: Path, spec: RunSpec) -> Desk | None:
-    """The desk of a stored run, at which everything is done again; None: nobody sat there."""
+    """Returns the desk of a stored run, at which every input is repeated; None: no person took part."""
     if not spec.inputs:
         return None
     return Desk(Recorded(read_inputs(run, spec.inputs)), spec)

@@ -186,7 +186,7 @@ class Log(Sink):
 
 
 class DeskLog(Log):
-    """The same, with the weather that a person chooses."""
+    """A log whose weather a person may change."""
 
     def __init__(self, header: LogHeader, weather: str, ticks: int, desk: Desk) -> None:
         super().__init__(header, weather, ticks)

@@ -1,4 +1,4 @@
-"""What a driver that sees is taught, from the truth: where the lane runs, and who is in it."""
+"""Labels for a driver that sees, from the truth: where the lane runs, and which vehicle is in it."""
 
 from __future__ import annotations
 

@@ -61,7 +61,7 @@ class Start(NamedTuple):
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Levels:
-    """What a map varies."""
+    """The values that a threshold map varies."""
 
     drivers: Sequence[DriverSpec]
     modes: Sequence[ActorMode]
@@ -162,7 +162,7 @@ def tasks(template: RunSpec, levels: Levels, seeds: range) -> list[Task]:
 
 
 def _driven_by(template: RunSpec, driver: DriverSpec, seed: int) -> RunSpec:
-    """Whoever sees images gets them; for all others objects are the same and much faster."""
+    """Returns the run with a driver; pixels are drawn for those that see images alone."""
     sees = isinstance(driver, CameraDriver)
     sensors = SensorLevel.PIXELS if sees else template.sensors
     return structs.replace(template, seed=seed, driver=driver, sensors=sensors)
@@ -190,7 +190,7 @@ def _run(run: RunSpec, mode: ActorMode, start: Start, braking: float, share: flo
 
 
 def title_of(start: Start) -> str:
-    """A start in words."""
+    """Returns a start of the scenario in words."""
     if start.name == CHALLENGE:
         return f"25 m at {kmh_from_mps(start.v):.0f} km/h"
     return f"{start.name.removesuffix('s')} s at {kmh_from_mps(start.v):.0f} km/h"

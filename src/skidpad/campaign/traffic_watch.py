@@ -161,7 +161,7 @@ class Watch:
 
 
 def leaders(world: World) -> tuple[NDArray[np.int64], Floats]:
-    """(n,) who is next ahead on the same lane or the one straight on, -1: none; and the gap in m."""
+    """Returns (n,) the next vehicle ahead on the lane or the one straight on, -1: none; and the gap in m."""
     assert world.traffic is not None
     placed, lanes = world.placed, world.traffic.net.lane
     there = np.flatnonzero(world.states.present & (placed["lane"] >= 0))

@@ -75,7 +75,7 @@ class Trial:
 
     @property
     def name(self) -> str:
-        """Candidate and seed."""
+        """Name of the task: candidate and seed."""
         return f"{self.candidate.scenario}-{self.number:02d}-{self.seed:06d}"
 
     @property
@@ -113,7 +113,7 @@ class TrialMetrics:
 
 
 def candidates(scenario: str) -> Iterator[Candidate]:
-    """What was tried."""
+    """Yields the candidates that were tried."""
     if scenario == CUT_IN:
         for cutin in (CutIn.ORIGINAL, CutIn.FIXED):  # without and with the spawn delay
             for v in GHOST_SPEEDS:

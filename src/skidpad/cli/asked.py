@@ -33,7 +33,7 @@ StackSettings = Annotated[
 
 
 class Drivers(Struct, frozen=True):
-    """Who drives, in turn."""
+    """The drivers of a campaign, in turn."""
 
     configs: Annotated[
         str | None,

@@ -51,7 +51,7 @@ class Change:
 
     @property
     def subject(self) -> str:
-        """`configuration 2`, `all configurations`."""
+        """The group that is compared: `configuration 2` or `all configurations`."""
         return f"configuration {self.config}" if self.config else "all configurations"
 
 
@@ -90,7 +90,7 @@ class Judged:
 
     @property
     def text(self) -> str:
-        """One sentence fragment."""
+        """The comparison as one fragment of a sentence."""
         c = self.change
         told = f"{c.subject}, {c.comparison.mean:+.3g}"
         if self.answer is Answer.UNDECIDED:

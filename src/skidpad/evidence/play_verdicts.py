@@ -18,7 +18,7 @@ NOTHING_UNDER_TEST = "none, as the file drives the ego and nothing is under test
 
 
 class PlayVerdict(str, Enum):
-    """What a run proves."""
+    """Verdict of one played run."""
 
     PASSED = "passed"
     FAILED = "failed"
@@ -55,7 +55,7 @@ class Counterpart:
 
     @property
     def name(self) -> str:
-        """Of the other actor."""
+        """Name of the other actor."""
         return self.pair.other
 
 

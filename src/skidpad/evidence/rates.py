@@ -27,7 +27,7 @@ class RateBelow:
 
     @property
     def test(self) -> tuple[str, ...]:
-        """An exact test."""
+        """Name of the exact test."""
         return (f"exact Poisson against {self.limit}",)
 
     @property

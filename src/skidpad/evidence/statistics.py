@@ -38,7 +38,7 @@ NO_LIMITS = "no limits: they need 8 units that are not all alike"
 
 
 class Interval(NamedTuple):
-    """Confidence limits."""
+    """Confidence limits of an estimate."""
 
     low: float
     high: float
@@ -311,7 +311,7 @@ def interval_text(interval: Interval | None, units: int | None = None, unit: str
 
 
 def range_text(interval: Interval) -> str:
-    """`0.1 to 1.46`."""
+    """Returns the limits as text, `0.1 to 1.46`."""
     return f"{_plain(interval.low)} to {_plain(interval.high)}"
 
 

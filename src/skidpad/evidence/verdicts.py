@@ -49,7 +49,7 @@ class Finding:
 
     @property
     def test(self) -> str:
-        """How it is tested."""
+        """Names of the tests that judge the finding."""
         return "; ".join(dict.fromkeys(phrase for c in self.criteria for phrase in c.test))
 
     @property
@@ -71,7 +71,7 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Judgement:
-    """A finding, judged."""
+    """A finding with its verdict and numbers."""
 
     finding: Finding
     verdict: Verdict

@@ -1,1 +1,1 @@
-"""How Skidpad serves pages: who may look, one guard before everything, a server that knows its port."""
+"""How Skidpad serves pages: sessions, one guard before everything, a server that knows its port."""

@@ -40,7 +40,7 @@ HEADERS = (
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Door:
-    """What is ours, and who is let in."""
+    """Holds what is ours, and which sessions are let in."""
 
     hosts: frozenset[str]  # values of the header Host, with the port
     cookie: str  # its name; cookies of all ports of a host are one jar, so it has the port in it

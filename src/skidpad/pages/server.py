@@ -25,7 +25,7 @@ OWNER = "owner"  # who is invited by the address that a command prints
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Place:
-    """Where pages are served."""
+    """Host and port at which pages are served."""
 
     host: str = LOOPBACK
     port: int = 0  # 0: any free one

@@ -1,4 +1,4 @@
-"""Who may look at a page: an invitation in the address is exchanged once for a session (R-10)."""
+"""Access to pages: an invitation in the address is exchanged once for a session (R-10)."""
 
 from __future__ import annotations
 
@@ -54,6 +54,6 @@ class Sessions:
             return None if id is None else self._admitted.get(id)
 
     def end(self, id: str) -> None:
-        """The session is over."""
+        """Ends a session that was open."""
         with self._lock:
             self._admitted.pop(id, None)

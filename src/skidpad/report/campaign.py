@@ -39,7 +39,7 @@ ENDINGS = sorted(UNITS, key=len, reverse=True)
 
 @dataclass(frozen=True)
 class Metric:
-    """A column of results."""
+    """A column of results with title and unit."""
 
     name: str
     unit: str
@@ -53,7 +53,7 @@ class Metric:
 
     @property
     def heading(self) -> str:
-        """Words and unit."""
+        """Title of the metric with its unit."""
         return f"{self.title}, {self.unit}" if self.unit else self.title
 
 
@@ -66,7 +66,7 @@ def metrics_of(rows: type[Any]) -> list[Metric]:
 
 
 def unit_of(name: str) -> str:
-    """Unit by the suffix."""
+    """Returns the unit that a column's suffix says."""
     return next((UNITS[end] for end in ENDINGS if name.endswith(end)), "")
 
 
@@ -81,7 +81,7 @@ class CampaignView(Generic[E]):
 
     @property
     def results(self) -> pl.DataFrame:
-        """Every run."""
+        """Results of every run of the campaign."""
         return self.folder.results
 
     @cached_property
@@ -116,7 +116,7 @@ class CampaignView(Generic[E]):
         return [Text(text + "no denominator counts them.", tone="warning")]
 
     def definitions(self) -> Definitions:
-        """Every metric."""
+        """Returns the definition of every metric."""
         return Definitions([(m.name, m.unit, m.meaning) for m in metrics_of(self.columns.metrics)])
 
     def provenance(self) -> list[Block]:

@@ -197,7 +197,7 @@ def _severity(record: HazardRecord) -> tuple[bool, float]:
 
 
 def hazard_card(record: HazardRecord, drawn: bool) -> Card:
-    """What was found, who is involved, and the worlds as the channels saw them."""
+    """Draws what was found, which objects are involved, and the worlds as the channels saw them."""
     duration = record.t_end - record.t_start
     facts = [
         ("rule fired", f"{record.count} cycles in {duration:.1f} s"),

@@ -53,7 +53,7 @@ class MonitoredDrive:
 
     @property
     def context(self) -> dict[str, str]:
-        """Words about the drive."""
+        """Words that describe the drive."""
         words: dict[str, str] = self.summary.get("context", {})
         return words
 

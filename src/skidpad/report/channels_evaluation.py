@@ -1,4 +1,4 @@
-"""The report of an evaluation: who finds hazards how well, against which truth (C-210 to C-218)."""
+"""The report of an evaluation: how well identifiers find hazards, against which truth (C-210 to C-218)."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ def _about_model(evaluation: Row) -> list[Block]:
 
 
 def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:
-    """Who finds hazards, and how sure."""
+    """Returns which identifiers find hazards, and how sure that is."""
     judged_by, of = _deciding(evaluation)
     items = []
     for result in judged_by:

@@ -29,7 +29,7 @@ TRUTHS = {
 
 
 def short(truth: str) -> str:
-    """Name of a truth."""
+    """Returns the short name of a truth."""
     return TRUTHS[truth].split(":")[0]
 
 
@@ -58,7 +58,7 @@ def ratio(name: str, row: Row) -> Cell:
 
 
 def count(name: str, row: Row) -> float | None:
-    """A number of events."""
+    """Returns a number of events of a row."""
     return row.get(name)
 
 
@@ -189,7 +189,7 @@ CAUSE_COLUMNS: tuple[Column[Row], ...] = (
 
 
 def causes(evaluation: Row) -> Block:
-    """Why identifiers erred (C-215)."""
+    """Draws why identifiers erred (C-215)."""
     if not evaluation["causes"]:
         return Text("No identifier made a mistake.")
     return table(CAUSE_COLUMNS, evaluation["causes"], "Causes of mistakes, most frequent first")

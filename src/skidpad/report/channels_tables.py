@@ -60,7 +60,7 @@ HAZARD_COLUMNS: tuple[Column[HazardRecord], ...] = (
 
 
 def hazard_list(records: Sequence[HazardRecord]) -> Table:
-    """One row per record."""
+    """Draws a table with one row per record."""
     return table(HAZARD_COLUMNS, records, "All hazards")
 
 

@@ -85,7 +85,7 @@ class GripCampaign(CampaignView[GripEntry]):
 
     @cached_property
     def scenarios(self) -> list[str]:
-        """Those that were driven."""
+        """Scenarios that were driven, in order."""
         return list(dict.fromkeys(s for s, _ in self.pairs))
 
     def of(self, scenario: str) -> list[Pair]:
@@ -99,7 +99,7 @@ class GripCampaign(CampaignView[GripEntry]):
 
     @cached_property
     def both(self) -> bool:
-        """Both frictions were driven."""
+        """Whether both settings of friction were driven."""
         return any(len(p.original) and len(p.reduced) for p in self.pairs.values())
 
     @cached_property
@@ -181,5 +181,5 @@ def load_grip(folder: Path) -> GripCampaign:
 
 
 def scenario_title(name: str) -> str:
-    """Name for people."""
+    """Returns the title of a scenario for readers."""
     return SCENARIOS.get(name, name)

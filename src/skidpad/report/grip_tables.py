@@ -87,7 +87,7 @@ def score_of_runs(runs: pl.DataFrame) -> tuple[float | None, Interval | None]:
 
 
 def score(friction: str, pair: Pair) -> Quantity:
-    """Mean benchmark score."""
+    """Returns the mean benchmark score with its interval."""
     value, interval = score_of_runs(pair.side(friction))
     kind = mark(pair, friction)
     return Quantity(value=value, interval=interval, kind=kind, **said(pair, friction, SCORED))
@@ -120,7 +120,7 @@ def said(pair: Pair, friction: str, column: str) -> dict[str, Any]:
 
 
 def share(found: Share, kind: str = "", **more: Any) -> Quantity:
-    """A share in percent."""
+    """Returns a share in percent."""
     if found.value is None:
         return Quantity(value=None, **more)
     limits = Interval(*(100.0 * end for end in found.interval))

@@ -61,7 +61,7 @@ class Table:
         return out.getvalue()
 
     def file_name(self) -> str:
-        """Of that CSV."""
+        """Returns the file name of the table's CSV."""
         return (anchor(self.caption) or "table") + ".csv"
 
     def csv_uri(self) -> str:
@@ -280,7 +280,7 @@ class Section:
 
 @dataclass(frozen=True, slots=True)
 class Page:
-    """A report."""
+    """A report as a sequence of sections."""
 
     title: str
     subtitle: str

@@ -56,7 +56,7 @@ class PlayRun:
 
     @property
     def verdict(self) -> PlayVerdict:
-        """What it proves."""
+        """Verdict of the run."""
         return self.judged.verdict
 
     def least(self, name: str) -> float | None:

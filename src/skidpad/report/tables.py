@@ -53,11 +53,11 @@ class Column(Generic[R]):
 
     @property
     def heading(self) -> str:
-        """Title and unit."""
+        """Title of the column with its unit."""
         return f"{self.title}, {self.unit}" if self.unit else self.title
 
     def cell(self, row: R) -> Cell:
-        """The row's cell."""
+        """Returns the cell of a row in this column."""
         content = self.of(row)
         if isinstance(content, Cell):
             return content

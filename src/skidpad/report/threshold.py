@@ -65,12 +65,12 @@ class ThresholdMap(CampaignView[ThresholdEntry]):
 
     @cached_property
     def situations(self) -> list[Situation]:
-        """All that were driven."""
+        """All situations that were driven."""
         return situations(self.results)
 
     @cached_property
     def telling(self) -> list[Situation]:
-        """Those that are completed on dry road."""
+        """Situations that are completed on dry road."""
         return [s for s in self.situations if s.tells]
 
     @cached_property
@@ -152,7 +152,7 @@ def _headline(campaign: ThresholdMap) -> Numbers:
 
 
 def title(s: Situation) -> str:
-    """A situation in words."""
+    """Returns a situation in words."""
     driver = DRIVERS.get(s.driver, s.driver)
     return f"{driver}, {s.actors} lead, {s.start}, {s.deceleration:g} m/s²"
 

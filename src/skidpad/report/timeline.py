@@ -17,7 +17,7 @@ ALARM = "#d9541e"
 
 @dataclass(frozen=True, slots=True)
 class Strip:
-    """One quantity over time."""
+    """One quantity drawn over time."""
 
     label: str
     t: Floats  # (k,) s

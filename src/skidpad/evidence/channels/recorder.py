@@ -144,7 +144,7 @@ class Recorder:
         )
 
     def take(self) -> list[HazardRecord]:
-        """Closed records, each once."""
+        """Returns the records that were closed, each once."""
         done, self.closed = self.closed, []
         return done
 

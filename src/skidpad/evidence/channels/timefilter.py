@@ -58,5 +58,5 @@ class TimeFilter(Generic[Key]):
         return done
 
     def finish(self) -> list[Event[Key]]:
-        """All that remain."""
+        """Returns all events that remain."""
         return self.advance(float("inf"))

@@ -24,7 +24,7 @@ class Stopwatch(Protocol):
     """Measures a monitor at work; the caller brings its own clock."""
 
     def begin(self, cycle: Cycle) -> None:
-        """A cycle starts."""
+        """Starts the measurements of a cycle."""
 
     def lap(self, name: str) -> None:
         """The part `name` of the cycle is done."""

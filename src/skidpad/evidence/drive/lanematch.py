@@ -29,7 +29,7 @@ class LaneMatch(NamedTuple):
     curvature: Floats  # 1/m, left positive
 
     def at(self, rows: Ints | NDArray[np.bool_]) -> LaneMatch:
-        """These points only."""
+        """Returns the match of these points only."""
         return LaneMatch(
             self.lane[rows],
             self.s[rows],

@@ -56,7 +56,7 @@ class Pairs(NamedTuple):
     along: Floats  # m along the lane between positions, not finite where no lane leads there
 
     def where(self, chosen: Mask) -> Pairs:
-        """Only those."""
+        """Returns only the chosen pairs."""
         ego, other = self.ego.at(chosen), self.other.at(chosen)
         return Pairs(self.row[chosen], self.actor[chosen], ego, other, self.along[chosen])
 

@@ -23,7 +23,7 @@ CLEAR = Rows("clear", ~RAIN.are)
 
 
 def config(name: str) -> Rows:
-    """Runs of one configuration."""
+    """Returns the runs of one configuration."""
     return rows_of("config", name, name=f"configuration {name}")
 
 

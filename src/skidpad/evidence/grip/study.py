@@ -70,7 +70,7 @@ class Pair:
     reduced: pl.DataFrame
 
     def side(self, friction: str) -> pl.DataFrame:
-        """Runs with one friction."""
+        """Returns the runs with one setting of friction."""
         return self.original if friction == ORIGINAL else self.reduced
 
     @property
@@ -141,7 +141,7 @@ class CellSeries:
     values: dict[str, Floats]
 
     def median(self, metric: str) -> Floats:
-        """Representative series (B-123)."""
+        """Returns the representative series of a metric (B-123)."""
         return median_series(self.values[metric])
 
 

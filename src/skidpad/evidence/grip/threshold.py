@@ -60,7 +60,7 @@ class Situation:
 
     @cached_property
     def levels(self) -> list[float]:
-        """Frictions, dry first."""
+        """Levels of friction, the dry road first."""
         found: list[float] = self.runs["road_mu"].unique().sort(descending=True).to_list()
         return found
 

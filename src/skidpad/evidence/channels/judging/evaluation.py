@@ -33,7 +33,7 @@ LABEL_COLUMNS = ("hazard", "start_s", "end_s", "world", "annotator", "note")
 
 @dataclass(slots=True)
 class Evaluation:
-    """All segments together."""
+    """Counts of all segments of an evaluation together."""
 
     segments: list[Segment] = field(default_factory=list)
 
@@ -61,7 +61,7 @@ class Evaluation:
         return {h: score([row[h] for row in rows]) for h in SCORED_HAZARDS}
 
     def by_route(self, identifier: str, truth: str) -> dict[str, dict[HazardType, Tally]]:
-        """Counts per route (C-216)."""
+        """Returns the counts of each route (C-216)."""
         out: dict[str, dict[HazardType, Tally]] = {}
         with_truth = [s for s in self.segments if truth in s.truths]
         for segment, row in zip(with_truth, self.tallies(identifier, truth), strict=True):

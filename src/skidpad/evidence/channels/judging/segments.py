@@ -63,7 +63,7 @@ WARM_UP = 2.0  # s at the start of a segment that are not evaluated (decision C-
 
 @dataclass(frozen=True, slots=True)
 class Segment:
-    """One recording, judged."""
+    """Judgement of one recording by every identifier."""
 
     name: str
     route: str
@@ -227,7 +227,7 @@ def _truths(
 
 
 def _why_missed(identifier: str, missed: Span, signals: Signals) -> str:
-    """The clause that kept a profile from firing; nothing of who is no profile."""
+    """Returns the clause that kept a profile from firing; a learned identifier has none."""
     if identifier not in {p.value for p in Profile}:
         return NO_RULE
     rules = {r.hazard: r for r in load_rules(Profile(identifier))}

@@ -20,7 +20,7 @@ class Weights(NamedTuple):
     jumps: float = 1.0  # of a channel's position
 
     def weigh(self, hazard: TrueHazard) -> Span:
-        """A true hazard that counts as what brought it about.
+        """Returns a true hazard that counts by the habit that brought it about.
 
         Who is tailgated has a follower's headway to thank, who tailgates the gap that somebody left him.
         """

@@ -1,4 +1,4 @@
-"""One channel's tracks of who is on its path: gap and speed by a Kalman filter, and an alarm."""
+"""One channel's tracks of vehicles on its path: gap and speed by a Kalman filter, and an alarm."""
 
 from __future__ import annotations
 
@@ -107,7 +107,7 @@ class Sighting(NamedTuple):
 
 
 class Seen(NamedTuple):
-    """What a message of a channel says of its path: the same whoever judges it."""
+    """What a message of a channel says of its path, alike for every identifier."""
 
     v_ego: float
     body: tuple[float, float, float]  # m from the ego's place: front, rear, either side

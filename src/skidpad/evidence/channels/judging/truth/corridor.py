@@ -1,4 +1,4 @@
-"""The way of an ego: where it came from and where it plans to go, and who is on it."""
+"""The way of an ego: where it came from and where it plans to go, and which vehicles are on it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Trail:
         self.places: deque[tuple[float, float]] = deque(maxlen=round(REACH / SPACING))
 
     def add(self, ego: Floats) -> None:
-        """The ego (5,) now."""
+        """Adds the present place (5,) of the ego."""
         x, y = float(ego[0]), float(ego[1])
         if self.places:
             moved = np.hypot(x - self.places[-1][0], y - self.places[-1][1])
@@ -34,7 +34,7 @@ class Trail:
 
     @property
     def points(self) -> Floats:
-        """(k, 2), oldest first."""
+        """Places of the way, (k, 2), oldest first."""
         return np.array(self.places).reshape(-1, 2)
 
 

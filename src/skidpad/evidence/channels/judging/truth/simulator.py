@@ -114,7 +114,7 @@ def _tail_marks(
 
 
 def _near(truth: TruthFrame) -> NDArray[np.int64]:
-    """Rows of those whom the ego could hit or be hit by: no path is shorter than the straight line.
+    """Returns rows of actors within reach: no path is shorter than the straight line.
 
     Who has no wheels of ours (cyclists) has no grip, NaN; as a leader he brakes as hard as any.
     """

@@ -82,7 +82,7 @@ class Drivers(Struct, frozen=True):
 
 
 class Controller(Struct, frozen=True):
-    """Who drives a scenario."""
+    """The driver of the ego in a scenario."""
 
     controller: Annotated[
         str,
@@ -160,7 +160,7 @@ def require_no_settings(words: tuple[str, ...], option: str) -> None:
 
 
 class Climate(Struct, frozen=True):
-    """In which weathers."""
+    """The weathers of a campaign."""
 
     weather: Annotated[
         str, Meta(description="all, or presets and YAML files parted by commas.")
@@ -213,7 +213,7 @@ class PlayCross(Struct, frozen=True):
     param: Annotated[tuple[str, ...], Meta(description="A parameter of the file: NAME=VALUE.")] = ()
 
     def parameters(self) -> dict[str, float | str]:
-        """Values by name."""
+        """Returns the values of scenario parameters by name."""
         values: dict[str, float | str] = {}
         for text in self.param:
             name, equals, value = text.partition("=")

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 class Subject(str, Enum):
-    """What can be measured."""
+    """The speeds that can be measured."""
 
     TICK = "tick"
     SENSORS = "sensors"

@@ -39,7 +39,7 @@ class Driving(Struct, frozen=True, kw_only=True):
 
 
 class Drive(Driving, frozen=True, kw_only=True):
-    """How and where to."""
+    """Where and how the runs of a campaign are driven."""
 
     out: Annotated[Path, Meta(description="Folder for results and report.")]
 

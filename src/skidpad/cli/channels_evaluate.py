@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Truth(str, Enum):
-    """Choices of --truth."""
+    """Values that the option --truth takes."""
 
     both = "both"
     sim = "sim"

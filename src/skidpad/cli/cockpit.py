@@ -33,7 +33,7 @@ class Pages(Struct, frozen=True, kw_only=True):
 
 
 class OnClose(str, Enum):
-    """Choices of --on-close."""
+    """Values that the option --on-close takes."""
 
     GO_ON = "go-on"
     PAUSE = "pause"
@@ -201,7 +201,7 @@ def watch(
 
 
 def place_of(pages: Pages) -> Place:
-    """Where to serve."""
+    """Returns host and port at which the pages are served."""
     from skidpad.pages.server import Place
 
     return Place(host=pages.page_host, port=pages.page_port)

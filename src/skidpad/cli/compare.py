@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 class Flaws(str, Enum):
-    """Choices of --allow."""
+    """Values that the option --allow takes."""
 
     missing = "missing"
     crashed = "crashed"
@@ -24,7 +24,7 @@ class Flaws(str, Enum):
 
 
 class Undecided(str, Enum):
-    """Choices of --undecided."""
+    """Values that the option --undecided takes."""
 
     fail = "fail"
     let_pass = "pass"

@@ -233,7 +233,7 @@ class Demo:
         return signing.add_target(current, (name, content), {}, keys, time.time())
 
     def releases(self) -> list[dict[str, Any]]:
-        """All releases so far."""
+        """Returns all releases so far."""
         found: list[dict[str, Any]] = self.call(self.maker, "GET", "/api/v1/releases").json()
         return found
 

@@ -23,7 +23,7 @@ REPEATS = 100  # the study's
 
 
 class Keep(str, Enum):
-    """Whose whole logs stay."""
+    """Which runs keep their whole logs."""
 
     SHOWN = "shown"
     ALL = "all"

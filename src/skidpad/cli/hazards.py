@@ -17,7 +17,7 @@ ID = typer.Option(None, "--id", help="Only this hazard; may be repeated.")
 
 
 class Osc(str, Enum):
-    """Choices of --osc."""
+    """Values that the option --osc takes."""
 
     v1_2 = "1.2"
     v1_0 = "1.0"

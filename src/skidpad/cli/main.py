@@ -147,7 +147,7 @@ def _on_termination(number: int, frame: object) -> NoReturn:
 
 
 def main() -> None:
-    """Run the command line."""
+    """Runs the command line and exits."""
     guarded(app)
 
 

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 class Rules(str, Enum):
-    """Choices of --rules."""
+    """Values that the option --rules takes."""
 
     tracked = "tracked"
     practical = "practical"
@@ -26,7 +26,7 @@ class Rules(str, Enum):
 
 
 class Forms(str, Enum):
-    """Choices of --forms."""
+    """Values that the option --forms takes."""
 
     corrected = "corrected"
     completed = "completed"
@@ -34,7 +34,7 @@ class Forms(str, Enum):
 
 
 class Identifier(str, Enum):
-    """Choices of --identifier."""
+    """Values that the option --identifier takes."""
 
     rules = "rules"
     learned = "learned"
@@ -42,7 +42,7 @@ class Identifier(str, Enum):
 
 
 class Wire(str, Enum):
-    """Choices of --listen."""
+    """Values that the option --listen takes."""
 
     ros2 = "ros2"
 

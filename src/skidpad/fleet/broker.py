@@ -19,7 +19,7 @@ ANSWER_MAX = 1024 * 1024  # bytes of a receipt: 2000 ids and room
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Broker:
-    """An MQTT broker."""
+    """Address and credentials of an MQTT broker."""
 
     host: str
     port: int = 1883
@@ -33,7 +33,7 @@ class Broker:
 
 
 def library() -> ModuleType:
-    """aiomqtt; MissingExtra without it."""
+    """Returns the library aiomqtt; MissingExtra without it."""
     try:
         import aiomqtt
     except ImportError as error:

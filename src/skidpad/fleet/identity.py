@@ -26,5 +26,5 @@ def token_hash(token: str) -> str:
 
 
 def digest(content: bytes) -> str:
-    """SHA-256 as hexadecimal digits."""
+    """Returns the SHA-256 of content as hexadecimal digits."""
     return hashlib.sha256(content).hexdigest()

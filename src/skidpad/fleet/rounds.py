@@ -19,12 +19,12 @@ class Rounds:
         self._thread: threading.Thread | None = None
 
     def start(self) -> None:
-        """Begin."""
+        """Starts the thread that does the rounds."""
         self._thread = threading.Thread(target=self._run, name=f"fleet-{self.name}")
         self._thread.start()
 
     def wake(self) -> None:
-        """There is something new."""
+        """Begins the next round at once."""
         self._wake.set()
 
     def close(self) -> None:

@@ -91,11 +91,11 @@ class Spool:
         return found
 
     def size(self) -> int:
-        """Bytes that wait."""
+        """Returns the bytes of all batches that wait."""
         return sum(path.stat().st_size for path in self.waiting.glob("*.batch"))
 
     def count(self) -> int:
-        """Batches that wait."""
+        """Returns the number of batches that wait."""
         return sum(1 for _ in self.waiting.glob("*.batch"))
 
 

@@ -31,7 +31,7 @@ class Node:
 
     @property
     def tag(self) -> str:
-        """Name of the element."""
+        """Name of the XML element."""
         return str(self.element.tag)
 
     @property
@@ -41,7 +41,7 @@ class Node:
         return int(line or 0)
 
     def finding(self, what: str, kind: Kind = Kind.ERROR) -> Finding:
-        """Something about this element."""
+        """Returns a finding about this element."""
         return Finding(self.file.name, self.line, self.tag, what, kind)
 
     def error(self, what: str) -> Fault:
@@ -125,7 +125,7 @@ class Node:
         return self.values[value[1:]]
 
     def number(self, name: str, default: float | None = None) -> float:
-        """A finite number."""
+        """Returns an attribute as a finite number."""
         value = self.limit(name, default)
         if not isfinite(value):
             raise self.error(f"{name} must be finite, got {value!r}")
@@ -143,7 +143,7 @@ class Node:
         return value
 
     def whole(self, name: str, default: int | None = None) -> int:
-        """A whole number."""
+        """Returns an attribute as a whole number."""
         value = self.number(name, None if default is None else float(default))
         if value != int(value):
             raise self.error(f"{name} must be a whole number, got {value:g}")
@@ -159,7 +159,7 @@ class Node:
             raise self.unsupported(f"{name}={text!r} is not supported, only {known}") from None
 
     def flag(self, name: str, default: bool) -> bool:
-        """`true` or `false`."""
+        """Returns an attribute that is `true` or `false`."""
         value = self.text(name, "true" if default else "false").lower()
         if value not in TRUE + FALSE:
             raise self.error(f"{name} must be true or false, got {value!r}")

@@ -28,7 +28,7 @@ class Fall(Enum):
 
 
 class Wetness(Enum):
-    """Water on the road."""
+    """How much water is on the road, in OpenSCENARIO's words."""
 
     DRY = "dry"
     MOIST = "moist"
@@ -74,7 +74,7 @@ class Environment:
 
 
 def compile_environment(node: Node) -> Environment:
-    """An <Environment>."""
+    """Compiles an <Environment> element."""
     weather, road, time = (node.find(t) for t in ("Weather", "RoadCondition", "TimeOfDay"))
     wetness, scale = None, None
     if road is not None:

@@ -152,7 +152,7 @@ class _Reader:
         return token
 
     def end(self) -> None:
-        """Nothing may follow."""
+        """Requires that nothing follows the expression."""
         if self.at < len(self.tokens):
             raise ExpressionError(f"{self.peek()!r} is too much")
 

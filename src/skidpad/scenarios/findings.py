@@ -10,7 +10,7 @@ from skidpad.core.errors import FileError
 
 
 class Kind(str, Enum):
-    """How bad it is."""
+    """How serious a finding is."""
 
     ERROR = "error"  # cannot mean anything
     UNSUPPORTED = "unsupported"  # sound, but unknown here; `ignore_unsupported` leaves it out

@@ -55,7 +55,7 @@ class Line:
 
     @property
     def length(self) -> float:
-        """In m."""
+        """Length of the line in m."""
         return self.s[-1]
 
     def at_length(self, s: float) -> Pose:
@@ -91,7 +91,7 @@ class Line:
         return (-distance if backwards else distance) / span
 
     def length_at(self, t: float) -> float:
-        """Length at time t."""
+        """Returns the length reached at time t."""
         assert self.t is not None
         k, u = self._find(self.t, t)
         return self.s[k] + (u * (self.s[k + 1] - self.s[k]) if k + 1 < len(self.s) else 0.0)

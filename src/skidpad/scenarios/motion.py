@@ -63,7 +63,7 @@ class Transition:
         )
 
     def over(self, p: float) -> bool:
-        """The end is reached."""
+        """Tells whether the end of the transition is reached."""
         return self.shape is Shape.STEP or p >= self.span - 1e-9
 
 

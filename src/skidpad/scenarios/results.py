@@ -20,7 +20,7 @@ TRAJECTORIES, STORY = "trajectories.csv", "storyboard.csv"
 
 
 def write_results(folder: Path, log: RunLog, played: Played) -> None:
-    """Write all three files."""
+    """Writes staging, story and trajectories of a run."""
     write_staging(folder, played.staging)
     rows = rows_csv(log_rows(log, played.boxes))
     write_bytes(folder / TRAJECTORIES, rows.encode())
@@ -43,7 +43,7 @@ def log_rows(log: RunLog, boxes: Mapping[str, Box]) -> Iterator[Row]:
 
 
 def story_csv(story: Iterable[Happening]) -> str:
-    """With the columns time,element,what."""
+    """Returns the story as CSV with the columns time,element,what."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(("time", "element", "what"))

@@ -109,7 +109,7 @@ class OfEntity:
 
 
 def route_position(node: Node, ctx: Context) -> Position:
-    """A <RoutePosition>."""
+    """Compiles a <RoutePosition> element."""
     inside = node.child("InRoutePosition").only()
     if inside.tag == "FromCurrentEntity":
         return OfEntity(ctx.entity(inside))

@@ -59,7 +59,7 @@ class Scenario:
 
     @property
     def map(self) -> RoadMap:
-        """The road."""
+        """Road network on which the scenario plays."""
         return self.network.map
 
     @property
@@ -69,7 +69,7 @@ class Scenario:
 
     @property
     def ego_entity(self) -> Entity:
-        """The ego."""
+        """Entity that is the ego."""
         return self.entities[self.ego]
 
 

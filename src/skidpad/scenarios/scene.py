@@ -54,7 +54,7 @@ class Happening:
 
 
 class Running(Protocol):
-    """An action under way."""
+    """An action that is under way."""
 
     def step(self, scene: Scene) -> bool:
         """Go on for one step; True when it is done."""
@@ -217,7 +217,7 @@ class Actor:
             self.guide.advance(self.motion)
 
     def outline(self) -> list[Point]:
-        """Corners on the ground."""
+        """Returns the corners of the body on the ground."""
         return corners(self.pose, self.entity.box)
 
     def centre(self, pose: Pose) -> Pose:
@@ -311,7 +311,7 @@ class Clock:
     runs: bool
 
     def now(self, t: float) -> float:
-        """At t s."""
+        """Returns the time of day at t s."""
         return self.moment + (t - self.since if self.runs else 0.0)
 
 

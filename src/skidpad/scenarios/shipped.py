@@ -18,7 +18,7 @@ NAMES = ("ghost_cut_in", "lead_slowdown", "front_accident")  # in the study's or
 
 @dataclass(frozen=True, slots=True)
 class Shipped:
-    """What a file declares."""
+    """Title and parameters that a shipped file declares."""
 
     parameters: Mapping[str, float]  # defaults, SI
     actors: tuple[str, ...]

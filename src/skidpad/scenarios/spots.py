@@ -34,7 +34,7 @@ class Spots(NamedTuple):
     s: Array
 
     def where(self, mask: Mask) -> Spots:
-        """Those of the mask."""
+        """Returns the spots of a mask."""
         return Spots(*(column[mask] for column in self))
 
     def free(self, actor: Actor, before: float, behind: float) -> Mask:
@@ -60,7 +60,7 @@ def spots_of(map: RoadMap) -> Spots:
 
 
 def spot_at(map: RoadMap, point: LanePoint) -> Spots:
-    """One place as spots."""
+    """Returns one place as spots."""
     values = (
         point.x, point.y, point.heading, point.road, point.lane_id, map.s_road(point), point.lane,
         point.s,
@@ -143,7 +143,7 @@ class Stretch(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Stretches:
-    """On stretches of roads."""
+    """An area that consists of stretches of roads."""
 
     parts: tuple[Stretch, ...]
 

@@ -55,16 +55,16 @@ class Told:
     player: Player
 
     def of(self, name: str) -> list[Row]:
-        """One entity's rows."""
+        """Returns the rows of one entity."""
         return [row for row in self.rows if row.name == name]
 
     def csv(self) -> str:
-        """With the columns time,id,name,x,y,z,h,speed."""
+        """Returns the rows as CSV with the columns time,id,name,x,y,z,h,speed."""
         return rows_csv(self.rows)
 
 
 def rows_csv(rows: Iterable[Row]) -> str:
-    """With the columns time,id,name,x,y,z,h,speed."""
+    """Returns rows as CSV with the columns time,id,name,x,y,z,h,speed."""
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(Row.__dataclass_fields__)
@@ -111,13 +111,13 @@ class Stage:
         s.present[i] = True
 
     def step(self, words: Sequence[ActorCommand]) -> None:
-        """One tick on."""
+        """Moves the actors on by one tick."""
         self.tick += 1
         for word in words:
             self._put(word)
 
     def truth(self) -> WorldTruth:
-        """The moment."""
+        """Returns the true world at this tick."""
         return WorldTruth(self.tick, self.table, self.states, self.mu, self.commands, {}, (), ())
 
 

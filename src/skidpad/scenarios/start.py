@@ -49,7 +49,7 @@ class Begin:
 
 @dataclass(frozen=True, slots=True)
 class Start:
-    """Everything at the begin."""
+    """Places and speeds of all entities when the scenario begins."""
 
     entities: Mapping[str, Begin]
     actions: tuple[GlobalAction, ...] = ()
@@ -188,7 +188,7 @@ class _Starting:
 
     @property
     def v_told(self) -> float:
-        """At the begin, m/s."""
+        """Speed when the scenario begins, m/s."""
         return cast("float", self._once("speed", self._speed))
 
     def _speed(self) -> float:

@@ -49,7 +49,7 @@ class Event:
 
 @dataclass(frozen=True, slots=True)
 class Manoeuvre:
-    """Events that share actors."""
+    """Events that share their actors."""
 
     path: Path
     events: tuple[Event, ...]
@@ -81,7 +81,7 @@ class Act:
 
 @dataclass(frozen=True, slots=True)
 class Story:
-    """Acts under a name."""
+    """Acts that share one name."""
 
     path: Path
     acts: tuple[Act, ...]

@@ -223,7 +223,7 @@ class ToldAct(ToldParent):
 
 
 class ToldStory(ToldParent):
-    """Acts under a name."""
+    """Acts of one story while it is played."""
 
     def __init__(self, story: Story) -> None:
         self.acts = [ToldAct(a) for a in story.acts]
@@ -244,12 +244,12 @@ class Telling:
 
     @property
     def events(self) -> list[ToldEvent]:
-        """Every event."""
+        """Every event of all stories."""
         acts = [a for s in self.stories for a in s.acts]
         return [e for a in acts for g in a.groups for m in g.manoeuvres for e in m.events]
 
     def look(self, scene: Scene) -> None:
-        """Look at all triggers."""
+        """Looks at the triggers of all stories."""
         if not self.begun:
             self.begun = True
             for story in self.stories:

@@ -50,7 +50,7 @@ class Pool:
         self.spots = spots_of(scene.network.map)
 
     def there(self, scene: Scene) -> list[Actor]:
-        """Those in the world."""
+        """Returns the vehicles of the flow that are in the world."""
         return [a for a in (scene.actors[n] for n in self.cars) if a.present]
 
     def bring(self, scene: Scene, spots: Spots) -> bool:
@@ -83,7 +83,7 @@ def vanish(scene: Scene, actor: Actor) -> None:
 
 
 def _free(scene: Scene, spots: Spots, v: float, length: float) -> Mask:
-    """Spots where somebody of this length may appear at v m/s without anybody braking hard."""
+    """Returns spots where a body of this length may appear at v m/s without hard braking of others."""
     mask = np.ones(len(spots.x), np.bool_)
     for actor in scene.actors.values():
         if actor.present:
@@ -99,7 +99,7 @@ def _room(v_behind: float, v_ahead: float) -> float:
 
 
 def _speed(scene: Scene, actor: Actor) -> float:
-    """m/s; that of who has just appeared is not measured yet."""
+    """Returns the speed in m/s; that of a vehicle that has just appeared is not measured yet."""
     return actor.guide.v if actor.name in scene.cruising else actor.v
 
 
@@ -233,7 +233,7 @@ def drive(scene: Scene) -> None:
 
 
 def lead_of(scene: Scene, actor: Actor) -> tuple[float, float]:
-    """Gap in m and speed in m/s of who is ahead in the lane; inf where nobody is."""
+    """Returns gap in m and speed in m/s of the vehicle ahead in the lane; inf where there is none."""
     base = actor.guide.base
     assert base is not None
     for distance, other in sorted(_near(scene, actor), key=lambda found: found[0]):

@@ -223,7 +223,7 @@ class OnTrajectory:
 
 
 def trajectory_position(node: Node, ctx: Context) -> Position:
-    """A <TrajectoryPosition>."""
+    """Compiles a <TrajectoryPosition> element."""
     trajectory = compile_trajectory(node.child("TrajectoryRef").only(), ctx)
     s, t = node.number("s"), node.number("t", 0.0)
     return OnTrajectory(trajectory, s, t, orientation(node))

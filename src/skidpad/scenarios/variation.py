@@ -40,7 +40,7 @@ class Spread:
     spread: float = 0.0  # normal, share of the value
 
     def draw(self, value: float, rng: np.random.Generator) -> float:
-        """One value."""
+        """Returns one value of the distribution."""
         noise = float(np.clip(rng.standard_normal(), -CUT, CUT))
         return value * (1.0 + self.spread * noise) + self.gap * float(rng.uniform(-1.0, 1.0))
 

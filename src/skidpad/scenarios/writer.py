@@ -63,7 +63,7 @@ _KINDS = {
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Sheet:
-    """What a file says besides motion. parking: where a row of those who are away begins."""
+    """What a file says besides motion. parking: where the row of absent actors begins."""
 
     title: str
     date: datetime
@@ -76,7 +76,7 @@ class Sheet:
 
     @property
     def old(self) -> bool:
-        """1.0."""
+        """Whether the file is written as version 1.0."""
         return self.version is OscVersion.V1_0
 
     def parked(self, k: int) -> tuple[float, float, float]:
@@ -86,7 +86,7 @@ class Sheet:
 
 
 def write_scenario(path: Path, entities: Sequence[Track], sheet: Sheet) -> None:
-    """Write the file."""
+    """Writes the scenario to a file."""
     write_element(path, _scenario(entities, sheet))
 
 

@@ -40,7 +40,7 @@ class Dispatcher:
             one.start()
 
     def wake(self) -> None:
-        """There is something new."""
+        """Wakes all relays, as there is something new."""
         for one in self._rounds:
             one.wake()
 

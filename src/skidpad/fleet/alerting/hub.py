@@ -1,4 +1,4 @@
-"""Who waits is woken: a count per topic that only grows, for long polls and pages."""
+"""Listeners are woken: a count per topic that only grows, for long polls and pages."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ class Hub:
         self._lock = Lock()
 
     def tell(self, topic: str) -> None:
-        """Something happened."""
+        """Counts one more event of a topic and wakes its listeners."""
         with self._lock:
             self._counts[topic] += 1
 

@@ -94,7 +94,7 @@ class Alert:
         return sum(e.what == What.ESCALATED.value for e in self.events)
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """Returns the alert as plain values for JSON."""
         r = self.row
         return {
             "id": r.id, "operator": r.operator, "vehicle": r.vehicle, "kind": r.kind,

@@ -58,7 +58,7 @@ def places_pdf(request: Request, who: PlaceReader) -> Response:
 
 @router.get("/research")
 def research(request: Request, who: Researcher) -> list[dict[str, Any]]:
-    """The anonymised export."""
+    """Returns the anonymised export for research."""
     del who
     return export(fleet_of(request))
 

@@ -61,7 +61,7 @@ class Plan(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
 
 class Finding(msgspec.Struct, frozen=True):
-    """What a look saw."""
+    """Statistics and decision of one look at a release."""
 
     decision: Decision
     drives: int

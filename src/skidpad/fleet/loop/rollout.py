@@ -39,7 +39,7 @@ class Rollout:
 
     @property
     def stage(self) -> int:
-        """Index of the stage that it has reached."""
+        """Index of the stage that the release has reached."""
         return max(int(e.detail["stage"]) for e in self.events if e.what == STAGE)
 
     @property
@@ -48,7 +48,7 @@ class Rollout:
         return self.plan.stages[self.stage]
 
     def plain(self) -> dict[str, Any]:
-        """For JSON."""
+        """Returns the release as plain values for JSON."""
         return {
             "release": self.row.id, "change": self.row.change, "payload": self.name,
             "before": self.row.before, "plan": msgspec.to_builtins(self.plan), "at": self.row.at,

@@ -36,7 +36,7 @@ SERVICE = "analysis"  # actor of what nobody asked for
 
 @dataclass(frozen=True, slots=True)
 class Analysed:
-    """What an analysis found."""
+    """Clusters and counts that an analysis found."""
 
     id: str
     hazards: int

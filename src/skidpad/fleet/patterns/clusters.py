@@ -65,7 +65,7 @@ class Case:
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """Hazards that are one."""
+    """Hazards that are taken as one."""
 
     representative: str  # id: the medoid by DTW
     members: tuple[str, ...]  # ids, nearest to the representative first

@@ -53,5 +53,5 @@ def to_plain(series: Floats) -> list[list[float]]:
 
 
 def from_plain(plain: Sequence[Sequence[float]]) -> Floats:
-    """Inverse of `to_plain`."""
+    """Returns the array of `to_plain`'s values."""
     return np.array(plain, dtype=np.float64).reshape(POINTS, len(SIGNALS))

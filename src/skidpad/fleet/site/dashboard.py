@@ -47,7 +47,7 @@ ALARM_NOTE = (
 
 @dataclass(frozen=True, slots=True)
 class Overview:
-    """What the dashboard shows."""
+    """Everything that the dashboard shows at once."""
 
     trends: list[Trend]
     rates: list[AlarmRate]

@@ -15,7 +15,7 @@ from skidpad.campaign.campaign import Campaign, uncertain_cells
 from skidpad.campaign.cluster import run_on, runner_of
 from skidpad.campaign.grip import recipe, warm_up
 from skidpad.campaign.grip_cells import Cross, cross, seeds, template
-from skidpad.campaign.grip_shown import shown
+from skidpad.campaign.grip_shown import select_shown_runs
 from skidpad.campaign.pool import local
 from skidpad.campaign.worker import Finished, Runner
 from skidpad.core.errors import OutputError
@@ -101,7 +101,7 @@ def test_a_campaign_is_not_overwritten_and_resumes_without_driving(campaign):
 
 
 def test_the_runs_that_a_report_shows_are_kept(campaign):
-    roles = shown(read_results(campaign))
+    roles = select_shown_runs(read_results(campaign))
     for row in roles.to_dicts():
         name = f"{row['scenario']}_{row['weather']}_{row['friction']}-{row['seed']:06d}"
         assert (campaign / "runs" / name / "ticks.parquet").exists()

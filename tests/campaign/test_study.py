@@ -45,7 +45,9 @@ def test_pace_changes_no_byte():
 def test_injected_dropout_blinds_about_its_share_of_time():
     assert changed("Blinking", dropout=0.2, seed=1).blind.mean() == pytest.approx(0.2, abs=0.03)
     blind, sighted = (
-        run(structs.replace(study_arms.changed("Blinking", 3, 2, dropout=p), duration=30.0))
+        run(
+            structs.replace(study_arms.make_changed_run("Blinking", 3, 2, dropout=p), duration=30.0)
+        )
         for p in (0.2, 0.0)
     )
     assert np.isfinite(blind.log.report.tier).all()
@@ -81,7 +83,7 @@ def test_rows_have_every_column_that_the_claims_ask_for(id):
 
 def test_the_plain_arm_is_our_own_stack():
     plain = structs.replace(study_arms.base_run(2), duration=10.0, seed=5)
-    wrapped = structs.replace(study_arms.changed("Changed", 5, 2), duration=10.0)
+    wrapped = structs.replace(study_arms.make_changed_run("Changed", 5, 2), duration=10.0)
     assert log_hash(run(plain).log) == log_hash(run(wrapped).log)
 
 

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from carla_programs import environment
-from skidpad.cli.carla_launcher import NAME, refused, translated
+from skidpad.cli.carla_launcher import NAME, find_refused, translate_options
 from skidpad.cli.main import app
 
 LIMIT = 600.0  # s
@@ -37,7 +37,7 @@ def launcher(folder: Path, *options: str) -> Path:
     ],
 )
 def test_options_of_unreal(given, ours):
-    assert translated(["--mu-ref", "0.9", "--unreal", *given.split()]) == [
+    assert translate_options(["--mu-ref", "0.9", "--unreal", *given.split()]) == [
         "--mu-ref",
         "0.9",
         *ours.split(),
@@ -45,9 +45,9 @@ def test_options_of_unreal(given, ours):
 
 
 def test_a_streaming_port_of_its_own_is_said():
-    assert refused(["-carla-rpc-port=2000", "-carla-streaming-port=2001"]) == ""
-    assert refused(["-carla-rpc-port=2000", "-carla-streaming-port=0"]) == ""
-    assert "2101, not 3000" in refused(["-carla-rpc-port=2100", "-carla-streaming-port=3000"])
+    assert find_refused(["-carla-rpc-port=2000", "-carla-streaming-port=2001"]) == ""
+    assert find_refused(["-carla-rpc-port=2000", "-carla-streaming-port=0"]) == ""
+    assert "2101, not 3000" in find_refused(["-carla-rpc-port=2100", "-carla-streaming-port=3000"])
 
 
 def test_a_file_of_others_stays(tmp_path):

@@ -12,7 +12,7 @@ from typer.core import TyperGroup, TyperOption
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
-from skidpad.cli.spread import described, spread
+from skidpad.cli.spread import describe_parameters, spread_fields
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import PARTED, BackendChoice, RunSpec
 
@@ -39,7 +39,7 @@ def invoke(*words: str) -> tuple[int, str]:
     small = typer.Typer()
 
     @small.command()
-    @spread(coats=2)
+    @spread_fields(coats=2)
     def command(paint: Paint, name: str = "x") -> None:
         """Paint."""
         seen.append((paint, name))
@@ -80,7 +80,7 @@ def options(path: str, kind: type[Struct]) -> dict[str, tuple[str | None, tuple[
     for name in path.split():
         assert isinstance(command, TyperGroup)
         command = command.commands[name]
-    wanted = {p.name for p in described(kind, {})}
+    wanted = {p.name for p in describe_parameters(kind, {})}
     return {
         p.name: (p.help, tuple(p.opts), p.multiple)
         for p in command.params

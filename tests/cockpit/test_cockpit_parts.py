@@ -42,8 +42,8 @@ from skidpad.cockpit.words import (
     Seek,
     Show,
     Step,
+    drop_void_inputs,
     encode,
-    settled,
 )
 from skidpad.core.errors import ConfigError, InputError, SkidpadError
 from skidpad.core.frames import RadarPoints
@@ -148,7 +148,7 @@ def test_of_many_words_of_a_kind_in_a_tick_the_last_one_counts():
         Pedals(0.1), Wheel(True), night, Lamps(LampSwitch.LOW), Pedals(0.2), Wheel(False),
         Lamps(LampSwitch.HIGH), Wheel(True), Functions(()), Functions((Function.ACC,)),
     ]  # fmt: skip
-    assert settled(given) == [
+    assert drop_void_inputs(given) == [
         Wheel(True), night, Pedals(0.2), Wheel(False), Lamps(LampSwitch.HIGH), Wheel(True),
         Functions((Function.ACC,)),
     ]  # fmt: skip

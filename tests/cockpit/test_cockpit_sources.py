@@ -18,7 +18,7 @@ from skidpad.cockpit.channel_source import ChannelSource
 from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.indicators import every, least_of, ttc_ahead
-from skidpad.cockpit.opening import opened
+from skidpad.cockpit.opening import open_source
 from skidpad.cockpit.replay import Recording
 from skidpad.cockpit.replaying import Replayer
 from skidpad.cockpit.source import index_at, timeline
@@ -77,7 +77,7 @@ def record(path, truth=True, map="figure8"):
 
 
 def test_a_recording_of_channels_is_shown_moment_by_moment(tmp_path):
-    source = opened(record(tmp_path / "a.mcap"))
+    source = open_source(record(tmp_path / "a.mcap"))
     assert isinstance(source, ChannelSource)
     assert (source.ticks, source.step) == (MOMENTS, 2)
     assert [source.tick(k) for k in (0, 1, 11)] == [0, 2, 22]
@@ -111,14 +111,14 @@ def test_a_recording_of_channels_is_shown_moment_by_moment(tmp_path):
 
 
 def test_what_a_monitor_found_stands_on_the_time_line(tmp_path):
-    source = opened(file := record(tmp_path / "a.b.mcap"))
+    source = open_source(file := record(tmp_path / "a.b.mcap"))
     line = timeline(source)
     assert (line["violated"], line["hazards"]) == ([], [])
     out = tmp_path / "a.b.monitor"
     done = CliRunner().invoke(app, ["monitor", str(file), "--out", str(out)])
     assert done.exit_code == 0, done.output
     hazards(out)  # as its writer writes one from 0.5 to 1.0 s
-    line = timeline(opened(file))
+    line = timeline(open_source(file))
     assert line["hazards"] == [(10, 20, "ego tailgated (h0001)")]
     assert (10, "hazard", "hazard: ego tailgated (h0001)") in line["events"]
     assert line["events"] == sorted(line["events"])
@@ -130,7 +130,7 @@ def test_what_a_monitor_found_stands_on_the_time_line(tmp_path):
     # a folder that is cut short is one sentence
     (out / "hazards.jsonl").write_text('{"id": "h0')
     with pytest.raises(FileError, match=r"hazards\.jsonl, line 1"):
-        opened(file)
+        open_source(file)
 
 
 def straight(x, y, v):
@@ -160,7 +160,7 @@ def test_the_time_line_shows_how_near_a_crash_it_was():
 
 
 def test_without_the_truth_the_first_channel_is_shown(tmp_path):
-    source = opened(record(tmp_path / "a.mcap", truth=False))
+    source = open_source(record(tmp_path / "a.mcap", truth=False))
     assert source.table.names == ("ego", "object 5")
     (place, _), states = lane(4, 25.0), source.moment(4).truth.states
     assert (states.x[1], states.y[1]) == pytest.approx(place[:2])
@@ -180,12 +180,12 @@ def test_a_film_of_a_recording_in_its_own_time(tmp_path):
 
 def test_what_cannot_be_replayed_is_one_sentence(tmp_path):
     with pytest.raises(FileError, match="map 'nowhere', which is not here"):
-        opened(record(tmp_path / "a.mcap", map="nowhere"))
+        open_source(record(tmp_path / "a.mcap", map="nowhere"))
     with pytest.raises(ConfigError, match="no folder of hazards"):
-        opened(tmp_path / "a.mcap", "h0001")
+        open_source(tmp_path / "a.mcap", "h0001")
     (tmp_path / "cut.mcap").write_bytes((tmp_path / "a.mcap").read_bytes()[:40])
     with pytest.raises(FileError, match=r"cut\.mcap"):
-        opened(tmp_path / "cut.mcap")
+        open_source(tmp_path / "cut.mcap")
 
 
 def hazards(folder, ids=("h0001",)):
@@ -216,7 +216,7 @@ def hazards(folder, ids=("h0001",)):
 
 def test_a_hazard_is_replayed_as_the_driving_channel_saw_it(tmp_path):
     folder, worlds = hazards(tmp_path / "found")
-    source = opened(folder)
+    source = open_source(folder)
     assert isinstance(source, Recording)
     k = index_at(source, round(1.0 / DT))
     states = source.moment(k).truth.states
@@ -224,16 +224,16 @@ def test_a_hazard_is_replayed_as_the_driving_channel_saw_it(tmp_path):
     assert (states.x[0], states.y[0]) == pytest.approx(ego[:2], abs=1.5)
     assert len(source.table) == 1 + len(worlds[0].frames[1].objects)
     assert source.seat(0).outside.weather.precipitation == 100.0
-    again = opened(folder, "h0001")  # from what was played before
+    again = open_source(folder, "h0001")  # from what was played before
     assert again.ticks == source.ticks
 
 
 def test_one_of_several_hazards_is_chosen(tmp_path):
     folder, _ = hazards(tmp_path / "found", ("h0001", "h0002"))
     with pytest.raises(ConfigError, match=r"choose one by --id; there are: h0001, h0002"):
-        opened(folder)
+        open_source(folder)
     with pytest.raises(ConfigError, match="there is no hazard 'h7'"):
-        opened(folder, "h7")
+        open_source(folder, "h7")
 
 
 @pytest.fixture(scope="module")
@@ -248,7 +248,7 @@ def two(tmp_path_factory):
 
 @pytest.mark.req("A-275")
 def test_two_runs_are_shown_side_by_side_in_step(two, tmp_path):
-    source, other = opened(two[0]), opened(two[1])
+    source, other = open_source(two[0]), open_source(two[1])
     companion = Companion(other, source.tick(0))
     plane, said = companion(source.moment(30), View.FOLLOW)
     assert plane.shape == (600, 800)
@@ -278,7 +278,7 @@ def test_a_person_drives_in_a_scenario_and_the_run_is_replayed(tmp_path):
     with pytest.raises(ConfigError, match="only on roads with background traffic"):
         drive_at_desk(wanted, Desk(Recorded(inputs), wanted), tmp_path / "wrong")
     driven = drive_at_desk(wanted, Desk(Recorded(inputs[:2]), wanted), tmp_path / "run")
-    source = opened(tmp_path / "run")
+    source = open_source(tmp_path / "run")
     assert source.ticks == len(driven.log)
     assert source.moment(20).driver.mode.startswith("MANUAL")
 

@@ -14,7 +14,7 @@ import pytest
 
 import coverage_table as coverage
 from skidpad.core.randomness import stream
-from skidpad.evidence.contrasts import Amount, Contrast, paired
+from skidpad.evidence.contrasts import Amount, Contrast, contrast_pairs
 from skidpad.evidence.statistics import (
     CONFIDENCE,
     event_rate,
@@ -125,7 +125,7 @@ class Drawn:
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
         del table
-        return paired("d", self.values, self.margin)
+        return contrast_pairs("d", self.values, self.margin)
 
 
 TABLE = pl.DataFrame({"seed": [1]})

@@ -117,13 +117,13 @@ def events() -> list[bytes]:
 
 def look(path: Path) -> object:
     """What the cockpit asks of a run that is opened."""
-    from skidpad.cockpit.opening import opened
+    from skidpad.cockpit.opening import open_source
 
     folder = path.parent / "runs" / "a"
     folder.mkdir(parents=True, exist_ok=True)
     for name, content in drive().items():
         (folder / name).write_bytes(path.read_bytes() if name == path.name else content)
-    source = opened(folder)
+    source = open_source(folder)
     with np.errstate(all="ignore"):
         for k in {0, source.ticks // 2, source.ticks - 1}:
             source.moment(k), source.crash(k), source.collisions(k), source.seat(k)

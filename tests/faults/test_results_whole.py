@@ -15,7 +15,7 @@ from skidpad.evidence.channels.monitor import MonitorSettings
 from skidpad.live.watch import watch_whole
 from skidpad.recording.channels import ChannelWriter
 from skidpad.recording.files import write_atomically, write_bytes
-from skidpad.recording.folders import ResultKind, require_kind, staged
+from skidpad.recording.folders import ResultKind, prepare_files, require_kind
 
 WORLD = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(50.0, 3.5, 0, 15, 0)]))
 EYES = (Eyes("left", 0.03), Eyes("right", 0.03))
@@ -83,14 +83,14 @@ def test_folders_of_one_kind_are_known_by_their_marks(tmp_path, kind):
 
 
 def on_a_full_disk(folder):
-    with staged(folder, ("a", "mark")) as part:
+    with prepare_files(folder, ("a", "mark")) as part:
         (part / "a").write_text("second")
         raise OSError(28, os.strerror(28))
 
 
 def test_files_of_one_result_appear_together_and_stale_ones_go(tmp_path):
     folder = tmp_path / "out"
-    with staged(folder, ("a", "b", "mark")) as part:
+    with prepare_files(folder, ("a", "b", "mark")) as part:
         for name in ("a", "b", "mark"):
             (part / name).write_text("first")
     with pytest.raises(OutputError, match="disk is full"):
@@ -98,7 +98,7 @@ def test_files_of_one_result_appear_together_and_stale_ones_go(tmp_path):
     assert {p.name: p.read_text() for p in folder.iterdir()} == dict.fromkeys("ab", "first") | {
         "mark": "first"
     }
-    with staged(folder, ("a", "b", "mark")) as part:
+    with prepare_files(folder, ("a", "b", "mark")) as part:
         (part / "mark").write_text("third")
     assert {p.name: p.read_text() for p in folder.iterdir()} == {"mark": "third"}
 

@@ -14,7 +14,7 @@ from skidpad.cli.fleet_demo import (
     SEED,
     Demo,
     drive,
-    enrolled,
+    enrol_fleet,
     play,
     rule_sets,
     serving,
@@ -53,7 +53,7 @@ def test_the_rule_sets_of_the_demo_are_valid_and_differ():
 @pytest.mark.req("C-176", "C-178", "C-190", "C-191", "C-192")
 def test_the_demo_takes_back_the_bad_update_and_decides_by_what_was_driven(tmp_path):
     """Four vehicles, ten seconds each; every drive has a seed of its own."""
-    maker, _, cars = enrolled(tmp_path, 4)
+    maker, _, cars = enrol_fleet(tmp_path, 4)
     said: list[str] = []
     with serving(tmp_path / "data", 0) as address:
         demo = Demo(

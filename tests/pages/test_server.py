@@ -9,7 +9,7 @@ import sys
 import pytest
 
 from skidpad.core.errors import ConfigError, SkidpadError
-from skidpad.pages.server import Place, Server, bound, host_headers
+from skidpad.pages.server import Place, Server, bind_socket, host_headers
 
 pytest.importorskip("nicegui", reason="nicegui is not installed (extra cockpit)")
 
@@ -63,13 +63,13 @@ def test_a_port_in_use_is_one_sentence():
             ConfigError, match=f"^port {port} of 127.0.0.1 is in use: .*, or 0 for any free one$"
         ):
             Server(hello, Place(port=port))
-    first = bound("127.0.0.1", 0)
+    first = bind_socket("127.0.0.1", 0)
     with pytest.raises(ConfigError, match="is in use"):  # also by one that was not started yet
-        bound("127.0.0.1", first.getsockname()[1])
+        bind_socket("127.0.0.1", first.getsockname()[1])
     first.close()
     for wrong in (-1, 65536):
         with pytest.raises(ConfigError, match="port must be between 0 and 65535"):
-            bound("127.0.0.1", wrong)
+            bind_socket("127.0.0.1", wrong)
 
 
 def test_a_server_that_cannot_begin_says_so():

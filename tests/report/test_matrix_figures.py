@@ -27,7 +27,7 @@ from skidpad.report.matrix_tables import (
     per_weather,
     possible_part,
 )
-from skidpad.report.published import Source, published
+from skidpad.report.published import Source, read_published
 
 CONFIGS = ("1", "2", "3", "4")
 
@@ -101,7 +101,7 @@ def test_published_numbers_stand_in_their_own_section_with_what_differs_said_fir
     assert "Not the published experiment: that had" in section
     assert "vehicles at fixed places" in section
     assert "the map Town04 (here: figure8)" in section
-    table = published(Source.MATRIX).filter(
+    table = read_published(Source.MATRIX).filter(
         pl.col("config_id") == 0, weather="Clear Sky", time_of_day="Sunrise"
     )
     assert f"published {table['collisions'][0]:g}" in unescape(section)

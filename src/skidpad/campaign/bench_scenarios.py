@@ -84,7 +84,7 @@ def measure(seconds: float = SECONDS, repeats: int = REPEATS) -> list[ScenarioCo
         )
         return [
             _fast("played by itself", lambda: _by_itself(small, seconds), repeats),
-            _fast("played as `play` does", lambda: _driven(spec), repeats),
+            _fast("played as `play` does", lambda: _drive_spec(spec), repeats),
             _short(f"{CHECKS} checks", lambda: _checks(small, CHECKS), repeats, CHECKS_TARGET),
             _short("a check of 5 MB", lambda: _checks(large, 1), repeats, LARGE_TARGET),
         ]
@@ -110,7 +110,7 @@ def _by_itself(file: Path, seconds: float) -> float:
     return seconds / ((process_time_ns() - begin) * NS)
 
 
-def _driven(spec: RunSpec) -> float:
+def _drive_spec(spec: RunSpec) -> float:
     """From the first moment to the last, with the backend and the log in memory."""
     clock = Spans(Meter(), 0)
     run(spec, stage=stage_of(spec), sinks=(clock,))

@@ -32,7 +32,7 @@ from skidpad.core.run import (
 )
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
-from skidpad.core.told import told
+from skidpad.core.told import describe_value
 from skidpad.core.vocabulary import Control, Outcome
 from skidpad.physics.types import EGO_TYPE, vehicle_type
 from skidpad.roads.bundled import load_map
@@ -147,7 +147,9 @@ def _number_of(played: scenarios.Scenario, name: str) -> float | None:
     except ValueError:
         value = nan
     if not isfinite(value):
-        raise FileError(f"property {name} of the ego must be a number, got {told(text, 100)}")
+        raise FileError(
+            f"property {name} of the ego must be a number, got {describe_value(text, 100)}"
+        )
     return value
 
 
@@ -216,17 +218,19 @@ def check_scenario(course: Scenario) -> scenarios.Compiled:
         maps=[Path(folder) for folder in course.maps],
         ignore_unsupported=course.ignore_unsupported,
         lenient=course.lenient,
-        names=Names({**FILE_DRIVERS, **_registered(course.register)}, strict=course.strict),
+        names=Names({**FILE_DRIVERS, **_load_registered(course.register)}, strict=course.strict),
     )
 
 
-def _registered(texts: Sequence[str]) -> dict[str, type[Any]]:
+def _load_registered(texts: Sequence[str]) -> dict[str, type[Any]]:
     """The classes that a user gives names: NAME=module:Class."""
     found = {}
     for text in texts:
         name, equals, where = text.partition("=")
         if not equals or not name:
-            raise ConfigError(f"--register takes NAME=module:Class, got {told(text, 200)}")
+            raise ConfigError(
+                f"--register takes NAME=module:Class, got {describe_value(text, 200)}"
+            )
         found[name] = import_class(where, "class")
     return found
 

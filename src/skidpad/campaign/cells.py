@@ -10,7 +10,7 @@ from msgspec import structs
 
 from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.run import REFERENCE, AdasDriver, DriverSpec, ReferenceDriver, RunSpec
-from skidpad.core.told import told
+from skidpad.core.told import describe_value
 from skidpad.core.weather import RANGES, Weather
 from skidpad.stack.configurations import (
     CONFIGURATIONS,
@@ -35,7 +35,7 @@ def published_drivers(numbers: str) -> list[AdasDriver]:
         if text.strip() not in known:
             allowed = ", ".join([*map(str, CONFIGURATIONS), REFERENCE])
             raise ConfigError(
-                f"unknown configuration {told(text.strip(), 100)}; choose among: {allowed}"
+                f"unknown configuration {describe_value(text.strip(), 100)}; choose among: {allowed}"
             )
         drivers.append(AdasDriver(label=text.strip(), functions=functions_of(int(text.strip()))))
     return drivers
@@ -82,7 +82,7 @@ def sweep(weather: Sequence[Weather], text: str) -> list[Weather]:
     if not equals or name not in RANGES:
         raise ConfigError(
             f"--sweep takes FIELD=FROM:TO:STEP with a weather field ({', '.join(RANGES)}), "
-            f"got {told(text, 100)}"
+            f"got {describe_value(text, 100)}"
         )
     values = _steps(f"--sweep {name}", span)
     for value in values:
@@ -105,12 +105,14 @@ def _steps(option: str, span: str) -> list[float]:
         start, stop, step = (float(part) for part in span.split(":"))
     except ValueError:
         raise ConfigError(
-            f"{option} takes three numbers FROM:TO:STEP, got {told(span, 100)}"
+            f"{option} takes three numbers FROM:TO:STEP, got {describe_value(span, 100)}"
         ) from None
     if not (step > 0.0 and start <= stop and isfinite(stop - start)):
-        raise ConfigError(f"{option} needs A <= B and STEP > 0, got {told(span, 100)}")
+        raise ConfigError(f"{option} needs A <= B and STEP > 0, got {describe_value(span, 100)}")
     if (stop - start) / step > SWEEP_MAX:
-        raise ConfigError(f"{option} makes more than {SWEEP_MAX} values, got {told(span, 100)}")
+        raise ConfigError(
+            f"{option} makes more than {SWEEP_MAX} values, got {describe_value(span, 100)}"
+        )
     return [start + k * step for k in range(int((stop - start) / step + 1e-9) + 1)]
 
 

@@ -20,7 +20,7 @@ from skidpad import __version__
 from skidpad.campaign.channel_drive import drive_segment
 from skidpad.campaign.channel_routes import driven_routes
 from skidpad.campaign.channel_world import crew_of, route_of
-from skidpad.campaign.keeping import housed
+from skidpad.campaign.keeping import with_kept_map
 from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.campaign.runfolder import Stopwatch
 from skidpad.core.errors import require_range
@@ -70,7 +70,7 @@ def drive_one(
     folder = out / spec.cell
     folder.mkdir(parents=True, exist_ok=True)
     recording = folder / f"{spec.name}.mcap"
-    outcome = drive_segment(housed(spec, out), recording, links)
+    outcome = drive_segment(with_kept_map(spec, out), recording, links)
     timing, digest = watch.timing(outcome.driven_s), recording_hash(recording)
     outcome = replace(outcome, content_hash=digest, cpu_s=round(timing.cpu_s, 2))
     record = msgspec.json.encode(DriveRecord(spec.to_plain(), outcome))
@@ -109,6 +109,6 @@ RECIPE = Recipe(
 )
 
 
-def linked(links: Links) -> Recipe[RunSpec, DriveKey, DriveMetrics]:
+def recipe_with_links(links: Links) -> Recipe[RunSpec, DriveKey, DriveMetrics]:
     """The recipe with these listeners at every drive."""
     return replace(RECIPE, drive=partial(drive_one, links=links))

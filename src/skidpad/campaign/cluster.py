@@ -20,7 +20,7 @@ from multiprocessing.connection import wait
 from typing import Any
 
 from skidpad.campaign.pool import ATTEMPTS, SINGLE_THREADED, warm
-from skidpad.campaign.worker import Finished, Job, Runner, Worker, given
+from skidpad.campaign.worker import Finished, Job, Runner, Worker, give_job
 from skidpad.core.errors import BackendError, ConfigError, MissingExtra
 from skidpad.core.vocabulary import Outcome
 
@@ -39,7 +39,7 @@ def work(job: Job, warm_up: Callable[[], None] | None) -> Finished:
     os.environ.update(dict.fromkeys(SINGLE_THREADED, "1"))
     if warm_up is not None:
         _warm_once(warm_up)
-    worker: Worker = given(getattr(_here, "worker", None), job)
+    worker: Worker = give_job(getattr(_here, "worker", None), job)
     finished = None
     while finished is None:
         wait(worker.signs, worker.patience())

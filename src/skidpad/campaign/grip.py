@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 from skidpad import __version__
 from skidpad.campaign.grip_cells import Cross, cross, scenario_of, template
-from skidpad.campaign.grip_shown import CELL, shown, write_stopping
+from skidpad.campaign.grip_shown import CELL, select_shown_runs, write_stopping
 from skidpad.campaign.keeping import keep_road
 from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.campaign.runfolder import (
@@ -66,7 +66,7 @@ class Judged:
     timing: Timing
 
 
-def judged(out: Path, cell: RunSpec, keep: bool = False) -> Judged:
+def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> Judged:
     """In a worker: drive a run of the catalogue; with `keep`, or when it failed, into its folder."""
     from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.run import run
@@ -97,7 +97,7 @@ def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey
     """In a worker: drive a cell and write its series, with `keep` its log too."""
     from skidpad.evidence.grip.scores import grip_series
 
-    found = judged(out, cell, keep)
+    found = drive_and_judge(out, cell, keep)
     write_series(series_path(out, cell.cell, cell.seed), grip_series(found.driven.log))
     return Driven(
         key=grip_key(cell, found.driven.outcome, found.log_hash),
@@ -127,7 +127,7 @@ def grip_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> Gr
 
 def finish(cells: Sequence[RunSpec], out: Path, runner: Runner) -> None:
     """Keep the logs of what the report shows (a drive is the same whenever it is driven)."""
-    wanted = set(shown(read_results(out)).select(*CELL, "seed").iter_rows())
+    wanted = set(select_shown_runs(read_results(out)).select(*CELL, "seed").iter_rows())
     work = partial(drive_one, out, keep=True)
     jobs = [
         Job(c.name, work, c, c.deadline_s)

@@ -16,7 +16,7 @@ from skidpad.recording.grip import STOPPING
 CELL = ("scenario", "cutin", "overlay", "weather", "friction")
 
 
-def shown(results: pl.DataFrame) -> pl.DataFrame:
+def select_shown_runs(results: pl.DataFrame) -> pl.DataFrame:
     """Of each cell the run with the median and with the least distance; columns CELL, seed, role."""
     finished = results.drop_nulls("min_cvip_m")
     order = finished.sort("completion", "min_cvip_m", "seed").group_by(CELL, maintain_order=True)

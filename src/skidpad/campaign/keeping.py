@@ -35,7 +35,7 @@ def road_file(course: Roads) -> str:
     return str(made)
 
 
-def kept(tasks: Sequence[RunSpec]) -> tuple[list[RunSpec], dict[str, Path]]:
+def keep_maps(tasks: Sequence[RunSpec]) -> tuple[list[RunSpec], dict[str, Path]]:
     """The runs with their maps named as the folder keeps them, and the files by these names."""
     names: dict[str, str] = {}
     files: dict[str, Path] = {}
@@ -69,7 +69,7 @@ def keep_road(folder: Path, road: str) -> None:
         keep_files(folder, {kept_name(Path(road)): Path(road)})
 
 
-def housed(run: RunSpec, folder: Path) -> RunSpec:
+def with_kept_map(run: RunSpec, folder: Path) -> RunSpec:
     """The run with the map that the campaign in `folder` keeps of it."""
     if not isinstance(run.course, (Roads, Route)) or not is_file(folder / run.course.map):
         return run

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from skidpad import __version__
 from skidpad.campaign.cells import named
-from skidpad.campaign.keeping import housed, road_file
+from skidpad.campaign.keeping import road_file, with_kept_map
 from skidpad.campaign.pace import Pace
 from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.campaign.runfolder import Stopwatch, fresh_folder, last_line, write_config, write_run
@@ -66,7 +66,7 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
     watch, pace = Stopwatch(), Pace(DT)
     keep_server(cell.backend)
     backend = make_backend(cell.backend, WATCHDOG)
-    here = housed(cell, out)
+    here = with_kept_map(cell, out)
     driven = run(here, backend=backend, folder=folder, sinks=(pace,))
     timing = watch.timing(len(driven.log) * DT, pace.slow_pct)
     digest = write_run(folder, driven.log, driven.error)
@@ -152,7 +152,7 @@ def time_of_day(weather: Weather) -> str:
     return next((t for t in TIMES_OF_DAY if weather.name.endswith(t)), "")
 
 
-def unharmed(metrics: Metrics) -> bool | None:
+def is_unharmed(metrics: Metrics) -> bool | None:
     """No fatal collision."""
     return None if metrics.fatal_collisions is None else metrics.fatal_collisions == 0
 
@@ -169,7 +169,7 @@ RECIPE = Recipe(
     key=run_key,
     drive=drive_one,
     warm_up=warm_up,
-    success=unharmed,
+    success=is_unharmed,
     drive_of=drive_of,
     success_means="without an intervention",
 )

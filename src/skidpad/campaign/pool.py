@@ -22,7 +22,7 @@ from skidpad.campaign.worker import (
     Runner,
     Worker,
     die_with_parent,
-    given,
+    give_job,
 )
 
 ATTEMPTS = 2  # a run that killed its worker gets one more try
@@ -73,7 +73,7 @@ def _supervise(crew: list[Worker | None], queue: _Queue) -> Iterator[Finished]:
     while True:
         for place, worker in enumerate(crew):
             if (worker is None or worker.job is None) and queue.waiting:
-                crew[place] = given(worker, queue.next())
+                crew[place] = give_job(worker, queue.next())
         busy = {place: w for place, w in enumerate(crew) if w is not None and w.job is not None}
         if not busy:
             return

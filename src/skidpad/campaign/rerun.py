@@ -23,7 +23,7 @@ from skidpad.campaign.cast import stage_of
 from skidpad.campaign.channel_drive import drive_segment
 from skidpad.campaign.desk import Desk, Recorded
 from skidpad.campaign.drive import Moment, Sink, Timer
-from skidpad.campaign.keeping import housed
+from skidpad.campaign.keeping import with_kept_map
 from skidpad.campaign.run import run as drive_again
 from skidpad.campaign.stored import read_run, read_segment
 from skidpad.campaign.views import SIZE, twelve_views
@@ -53,7 +53,7 @@ class Rerun:
 def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None = None) -> Rerun:
     """Drive the run in folder `run` again up to `end_s`, keeping what happens from `begin_s` on."""
     stored = read_log(run)
-    spec = housed(read_run(run), run.resolve().parents[1])
+    spec = with_kept_map(read_run(run), run.resolve().parents[1])
     if not len(stored):
         raise FileError(f"{run} holds a run that ended before its first tick")
     last = float(stored.t[-1])
@@ -85,7 +85,7 @@ def desk_of(run: Path, spec: RunSpec) -> Desk | None:
 
 def same_segment(recording: Path) -> bool:
     """Drive the segment of a recording of channels again, all of it; the contents are the same."""
-    spec = housed(read_segment(recording), recording.resolve().parents[1])
+    spec = with_kept_map(read_segment(recording), recording.resolve().parents[1])
     with TemporaryDirectory() as folder:
         again = Path(folder) / "again.mcap"
         drive_segment(spec, again)

@@ -124,7 +124,7 @@ def drive(
         ...             duration=60, sensors="objects", stack_settings={"cruise_kmh": 60})
         >>> run.outcome.value, len(run.log.contacts)
     """
-    driver, kind = _named(stack, dict(stack_settings or {}))
+    driver, kind = _name_driver(stack, dict(stack_settings or {}))
     words = [v.value for v in SensorLevel], [v.value for v in TrafficStart]
     spec = RunSpec(
         driver=driver,
@@ -144,7 +144,7 @@ def drive(
     return run(spec, kind, folder=None if out is None else Path(out))
 
 
-def _named(
+def _name_driver(
     stack: type[Stack] | str | int, options: dict[str, Any]
 ) -> tuple[DriverSpec, type[Stack] | None]:
     if isinstance(stack, int):

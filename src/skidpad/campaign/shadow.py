@@ -11,7 +11,7 @@ from msgspec import structs
 from skidpad.campaign.backends import keep_server
 from skidpad.campaign.cast import StackAtWheel, driver_of, stage_of, with_sensors
 from skidpad.campaign.drive import Moment, Sink
-from skidpad.campaign.keeping import housed
+from skidpad.campaign.keeping import with_kept_map
 from skidpad.campaign.rerun import desk_of
 from skidpad.campaign.run import run as drive_again
 from skidpad.campaign.stored import read_run
@@ -60,7 +60,7 @@ def ride_along(folder: Path, shadow: DriverSpec) -> Shadowed:
 
     ConfigError for channels, passengers, and a shadow that asks for sensors of the driver's names.
     """
-    spec = housed(read_run(folder), folder.resolve().parents[1])
+    spec = with_kept_map(read_run(folder), folder.resolve().parents[1])
     for driver in (spec.driver, shadow):
         if isinstance(driver, (ChannelCrew, Passenger)):
             raise ConfigError(

@@ -13,7 +13,7 @@ from skidpad.campaign.runfolder import CONFIG
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.reading import UNUSABLE, decode_yaml, read_bytes
 from skidpad.core.run import VERSION, RunSpec, run_from_plain
-from skidpad.core.told import told
+from skidpad.core.told import describe_value
 from skidpad.recording.channel_drives import read_record
 from skidpad.scenarios.variation import CutIn
 from skidpad.stack.configurations import functions_of
@@ -51,7 +51,7 @@ def _read_description(plain: Plain, older: Callable[[Plain], Plain], path: Path)
     except ConfigError as error:
         raise FileError(f"{path}: {error}") from None
     except UNUSABLE as error:
-        raise FileError(f"{path} does not describe a run: {told(error, 400)}") from None
+        raise FileError(f"{path} does not describe a run: {describe_value(error, 400)}") from None
 
 
 def from_version_1(plain: Plain) -> Plain:

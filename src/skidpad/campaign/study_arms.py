@@ -51,7 +51,7 @@ def base_run(
     )
 
 
-def changed(stack: str, seed: int, configuration: int, **change: Any) -> RunSpec:
+def make_changed_run(stack: str, seed: int, configuration: int, **change: Any) -> RunSpec:
     """The same with a changed stack of `study_stacks`; cruise_kmh is an option of the stack."""
     base = base_run(configuration)
     options = {"configuration": configuration, "profile": base.profile}
@@ -81,7 +81,7 @@ def speed_and_dropout(seeds: Sequence[int]) -> list[Variant]:
     """F-08: cruise target x share of time without any sensing, configuration 2."""
     return [
         Variant(
-            changed("Blinking", seed, 2, cruise_kmh=target, dropout=share),
+            make_changed_run("Blinking", seed, 2, cruise_kmh=target, dropout=share),
             {"target_kmh": target, "dropout_injected": share},
         )
         for seed in seeds
@@ -97,7 +97,7 @@ def by_stacks(
 
     def make(seeds: Sequence[int]) -> list[Variant]:
         return [
-            Variant(changed(stack, seed, configuration), {"variant": name})
+            Variant(make_changed_run(stack, seed, configuration), {"variant": name})
             for seed in seeds
             for name, stack in arms.items()
         ]
@@ -155,7 +155,7 @@ def recovery(seeds: Sequence[int]) -> list[Variant]:
 def noise(seeds: Sequence[int]) -> list[Variant]:
     """Perception noise of cited sizes, all else a clear noon (A-230)."""
     return [
-        Variant(changed("Noisy", seed, 2, noise=asdict(strength)), {"variant": name})
+        Variant(make_changed_run("Noisy", seed, 2, noise=asdict(strength)), {"variant": name})
         for seed in seeds
         for name, strength in NOISE.items()
     ]

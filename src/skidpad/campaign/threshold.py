@@ -10,7 +10,7 @@ from pathlib import Path
 import polars as pl
 
 from skidpad import __version__
-from skidpad.campaign.grip import judged
+from skidpad.campaign.grip import drive_and_judge
 from skidpad.campaign.grip_cells import template
 from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.campaign.runfolder import last_line
@@ -55,7 +55,7 @@ def warm_up() -> None:
 
 def drive_one(out: Path, task: Task, *, keep: bool = False) -> Driven[ThresholdKey, GripMetrics]:
     """In a worker: drive a run, with `keep` into a folder of its own."""
-    found = judged(out, task.run, keep)
+    found = drive_and_judge(out, task.run, keep)
     return Driven(
         key=threshold_key(task, found.driven.outcome, found.log_hash),
         metrics=found.metrics,

@@ -25,7 +25,7 @@ from skidpad.core.run import (
     RunSpec,
     Scenario,
 )
-from skidpad.core.told import told
+from skidpad.core.told import describe_value
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.physics.grip import statistical_ratio
 from skidpad.physics.presets import preset
@@ -103,7 +103,7 @@ def number(option: str, text: str, allowed: tuple[float, float], otherwise: str 
         value = float("nan")
     if not isfinite(value):
         raise ConfigError(
-            f"{option} takes numbers between {low:g} and {high:g}{otherwise}, got {told(text, 100)}"
+            f"{option} takes numbers between {low:g} and {high:g}{otherwise}, got {describe_value(text, 100)}"
         )
     require_range(option, value, low, high)
     return value

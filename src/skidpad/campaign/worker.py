@@ -16,7 +16,7 @@ from multiprocessing.context import SpawnProcess
 from typing import Any
 
 from skidpad.core.errors import SkidpadError
-from skidpad.core.told import clean, told
+from skidpad.core.told import clean, describe_value
 from skidpad.core.vocabulary import Outcome
 
 LONGEST_STORY = 20_000  # characters of a traceback
@@ -136,7 +136,7 @@ class Worker:
             self._end = self.process.sentinel
 
 
-def given(worker: Worker | None, job: Job) -> Worker:
+def give_job(worker: Worker | None, job: Job) -> Worker:
     """A worker that has begun the job: this one, or a new one when it died idle, no fault of the job."""
     if worker is not None:
         try:
@@ -210,7 +210,9 @@ def _send(pipe: Connection, answer: _Answer) -> None:
     except (EOFError, OSError):  # the parent is gone
         os._exit(1)
     except Exception as error:
-        pipe.send(replace(answer, value=None, error=f"its result cannot be sent: {told(error)}"))
+        pipe.send(
+            replace(answer, value=None, error=f"its result cannot be sent: {describe_value(error)}")
+        )
 
 
 def die_with_parent() -> None:

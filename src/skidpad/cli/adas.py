@@ -11,11 +11,11 @@ from msgspec import structs
 
 from skidpad.cli.asked import Climate, Drivers, Tuned
 from skidpad.cli.campaigns import FirstSeed, How, Seeds
-from skidpad.cli.spread import spread
+from skidpad.cli.spread import spread_fields
 from skidpad.core.run import BackendChoice, BackendKind, Roads, RunSpec
 
 
-@spread()
+@spread_fields()
 def adas(
     how: How,
     drivers: Drivers,
@@ -51,7 +51,7 @@ def adas(
     ] = 0,
 ) -> None:
     """Drive configurations x weathers x seeds; prints the answer and the path of the report."""
-    from skidpad.cli.carla_backend import checked, drives_alone
+    from skidpad.cli.carla_backend import check_backend, drives_alone
     from skidpad.roads.map_files import require_map
 
     # what is misspelt is said before kernels and tables load
@@ -60,15 +60,15 @@ def adas(
     if backend.backend is BackendKind.EMBEDDED:
         require_map(roads.map)
     from skidpad.campaign.campaign import Campaign
-    from skidpad.campaign.keeping import found_again, kept
+    from skidpad.campaign.keeping import found_again, keep_maps
     from skidpad.campaign.matrix import RECIPE
     from skidpad.cli.adas_plan import on_pixels, plan
     from skidpad.recording.matrix import PIXELS
 
-    run = structs.replace(run, course=roads, backend=checked(backend), seed=first_seed)
+    run = structs.replace(run, course=roads, backend=check_backend(backend), seed=first_seed)
     run = found_again(run, how.folder)
     alone = drives_alone(run.backend)
-    cells, files = kept(plan(run, chosen, weathers, seeds))
+    cells, files = keep_maps(plan(run, chosen, weathers, seeds))
     campaign = Campaign(RECIPE, cells, alone=alone, files=files, distinct=distinct)
     twins = on_pixels(cells, parity_seeds)
     parts = {PIXELS: Campaign(RECIPE, twins, alone=alone, files=files)} if twins else {}
@@ -125,13 +125,13 @@ def _reports() -> dict[str, Callable[[Path], object]]:
 def _report_run(run: Path) -> str:
     """The page of one run: with its verdict where it plays a scenario, else its crash cards."""
     from skidpad.cli.expected import played_report
-    from skidpad.cli.show import opened
+    from skidpad.cli.show import open_run
     from skidpad.recording.staging import STAGING
     from skidpad.report.crash_page import write_crashes
 
     if (run / STAGING).is_file():
         return played_report(run)
-    page = write_crashes(run, opened(run)[1])
+    page = write_crashes(run, open_run(run)[1])
     if page is None:
         return f"{run}: no crash, so there is no page; skidpad show {run} prints its metrics"
     return f"crash cards in {page}"

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from skidpad.campaign.traffic_asked import TrafficBench
-from skidpad.cli.spread import spread
+from skidpad.cli.spread import spread_fields
 from skidpad.core.setup import DT
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class Subject(str, Enum):
     SCENARIOS = "scenarios"
 
 
-@spread()
+@spread_fields()
 def bench(
     traffic: TrafficBench,
     subject: Annotated[Subject, typer.Argument(help="What to measure.")] = Subject.TICK,
@@ -130,7 +130,7 @@ def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
     return {"unit": "min", "minutes": minutes, "how": how, "target": matrix.TARGET}
 
 
-def _seen(seen: Seen) -> Iterator[str]:
+def _describe_seen(seen: Seen) -> Iterator[str]:
     """Headways in steady following, and who stood long and for what."""
     from skidpad.campaign.traffic_watch import LONG, headways_of
 
@@ -191,6 +191,6 @@ def _traffic(asked: TrafficBench, quiet: bool) -> dict[str, Any]:
                 f"{row.mean_speed_kmh:8.1f} {changes:11.2f} {row.static:9} {row.put_back:9}"
                 f"{row.seen.moved:7}"
             )
-            for line in _seen(row.seen):
+            for line in _describe_seen(row.seen):
                 typer.echo(f"  {line}")
     return {"map": asked.map, "vehicles": asked.vehicles, "rows": rows}

@@ -13,7 +13,7 @@ from skidpad.core.run import BackendChoice, BackendKind
 from skidpad.roads.map_files import bundled_maps
 
 
-def checked(choice: BackendChoice) -> BackendChoice:
+def check_backend(choice: BackendChoice) -> BackendChoice:
     """The choice, if it can be driven on: a CARLA server that runs already must answer now."""
     if choice.backend is BackendKind.EMBEDDED:
         return BackendChoice()

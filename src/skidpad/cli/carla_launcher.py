@@ -48,11 +48,11 @@ def carla_launcher(
     typer.echo(f"export CARLA_ROOT={shlex.quote(str(folder.resolve()))}")
 
 
-def translated(arguments: list[str]) -> list[str]:
+def translate_options(arguments: list[str]) -> list[str]:
     """Options of `skidpad carla-server` for what the script passes on: ours first, then Unreal's."""
     at = arguments.index(UNREAL) if UNREAL in arguments else 0
     own, given = arguments[:at], arguments[at + 1 :]
-    if problem := refused(given):
+    if problem := find_refused(given):
         typer.echo(f"skidpad: {problem}", err=True)
     return own + server_options(given)
 
@@ -68,7 +68,7 @@ def server_options(given: list[str]) -> list[str]:
     return found
 
 
-def refused(given: list[str]) -> str:
+def find_refused(given: list[str]) -> str:
     """What is asked for and cannot be had; empty when all is well."""
     ports = [int(p[1]) for p in map(PORT.fullmatch, given) if p] or [2000]
     streams = [int(s[1]) for s in map(STREAMING.fullmatch, given) if s]

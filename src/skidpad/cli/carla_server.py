@@ -8,12 +8,12 @@ from contextlib import suppress
 
 import typer
 
-from skidpad.cli.spread import spread
+from skidpad.cli.spread import spread_fields
 from skidpad.core.errors import MissingExtra, require_choice
 from skidpad.simulation.carla_server.options import ServerOptions
 
 
-@spread()
+@spread_fields()
 def carla_server(options: ServerOptions) -> None:
     """Serve unmodified CARLA 0.9.16 clients: no GPU, no download."""
     try:

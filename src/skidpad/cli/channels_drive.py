@@ -9,14 +9,14 @@ import typer
 from msgspec import structs
 
 from skidpad.cli.campaigns import How
-from skidpad.cli.spread import spread
+from skidpad.cli.spread import spread_fields
 from skidpad.core.run import BackendChoice, ChannelCrew
 from skidpad.live.settings import Links
 
 FOLDERS = typer.Argument(help="Folders of `skidpad channels drive`.")
 
 
-@spread()
+@spread_fields()
 def drive(
     how: How,
     crew: ChannelCrew,
@@ -44,7 +44,7 @@ def drive(
 ) -> None:
     """Drive channels over routes on a simulator; one recording per ten minutes."""
     from skidpad.campaign.channel_routes import Condition, chosen_routes
-    from skidpad.cli.carla_backend import checked, drives_alone
+    from skidpad.cli.carla_backend import check_backend, drives_alone
     from skidpad.core.errors import require_choice
     from skidpad.core.vocabulary import Stratum
 
@@ -57,8 +57,8 @@ def drive(
     )
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.channel_world import route_of
-    from skidpad.campaign.channels import linked, segments
-    from skidpad.campaign.keeping import found_again, kept
+    from skidpad.campaign.channels import recipe_with_links, segments
+    from skidpad.campaign.keeping import found_again, keep_maps
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.channel_presets import senses_of
 
@@ -67,11 +67,11 @@ def drive(
     routes = [found_again(chosen, how.folder) for chosen in routes]
     for chosen in routes:
         load_map(route_of(chosen).map)
-    template = structs.replace(routes[0], driver=crew, seed=seed, backend=checked(backend))
-    tasks, files = kept(segments(routes, hours, template))
+    template = structs.replace(routes[0], driver=crew, seed=seed, backend=check_backend(backend))
+    tasks, files = keep_maps(segments(routes, hours, template))
     # topics and the scene's port are one drive's at a time
     alone = drives_alone(template.backend) or bool(links.publish)
-    campaign = Campaign(linked(links), tasks, alone=alone, files=files)
+    campaign = Campaign(recipe_with_links(links), tasks, alone=alone, files=files)
     summary = how(campaign, totals)
     if summary is not None and summary.failed:
         raise typer.Exit(1)

@@ -190,12 +190,12 @@ def _segments(tasks: list[_Task], workers: int) -> list[Segment]:
 
     workers = min(workers or os.cpu_count() or 1, len(tasks))
     if workers == 1:
-        return list(_told(map(judge_one, tasks)))
+        return list(_report_segments(map(judge_one, tasks)))
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
-        return list(_told(pool.map(judge_one, tasks)))
+        return list(_report_segments(pool.map(judge_one, tasks)))
 
 
-def _told(segments: Iterable[Segment]) -> Iterator[Segment]:
+def _report_segments(segments: Iterable[Segment]) -> Iterator[Segment]:
     for segment in segments:
         typer.echo(f"{segment.name}: {segment.t.size} cycles")
         yield segment

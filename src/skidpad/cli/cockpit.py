@@ -10,7 +10,7 @@ import typer
 from msgspec import Meta, Struct, structs
 
 from skidpad.cli.asked import Drivers, Tuned
-from skidpad.cli.spread import spread
+from skidpad.cli.spread import spread_fields
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import BackendChoice, BackendKind, Roads, RunSpec, Scenario
 from skidpad.core.setup import VEHICLES_MAX
@@ -39,7 +39,7 @@ class OnClose(str, Enum):
     PAUSE = "pause"
 
 
-@spread(duration=3600.0)
+@spread_fields(duration=3600.0)
 def drive(
     drivers: Drivers,
     run: RunSpec,
@@ -72,7 +72,7 @@ def drive(
     ] = None,
 ) -> None:
     """Drive in a browser: watch the stack, take over, change weather and grip; keeps a run."""
-    from skidpad.cli.carla_backend import checked
+    from skidpad.cli.carla_backend import check_backend
     from skidpad.physics.presets import find_weather
     from skidpad.roads.map_files import require_map
 
@@ -85,7 +85,7 @@ def drive(
         course=Scenario(file=scenario) if scenario else with_reserve(roads, backend, more),
         weather=find_weather(weather),
         seed=seed,
-        backend=checked(backend),
+        backend=check_backend(backend),
     )
     if isinstance(spec.course, Roads) and spec.backend.backend is BackendKind.EMBEDDED:
         require_map(spec.course.map)
@@ -132,7 +132,7 @@ def with_reserve(roads: Roads, backend: BackendChoice, more: int | None) -> Road
     return structs.replace(roads, reserve=min(room, RESERVE) if more is None else more)
 
 
-@spread()
+@spread_fields()
 def replay(
     run: Annotated[
         Path,
@@ -163,7 +163,7 @@ def replay(
         require_run(folder, ".mcap", "hazards.txt")
     from skidpad.cockpit.about import About
     from skidpad.cockpit.film import stretch_of, write_film
-    from skidpad.cockpit.opening import opened
+    from skidpad.cockpit.opening import open_source
     from skidpad.cockpit.producer import Producer
     from skidpad.cockpit.replaying import replay_job
     from skidpad.cockpit.serving import serve
@@ -171,8 +171,8 @@ def replay(
     from skidpad.cockpit.studio import View
     from skidpad.core.errors import require_choice
 
-    source = opened(run, hazard)
-    other = None if beside is None else opened(beside)
+    source = open_source(run, hazard)
+    other = None if beside is None else open_source(beside)
     if film is not None:
         seen = View(require_choice("--view", view, [v.value for v in View]))
         typer.echo(write_film(source, stretch_of(source, begin, end), seen, film, other))
@@ -183,7 +183,7 @@ def replay(
     typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
 
 
-@spread()
+@spread_fields()
 def watch(
     folder: Annotated[Path, typer.Argument(help="A campaign's folder, running or finished.")],
     pages: Pages,

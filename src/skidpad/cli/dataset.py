@@ -9,13 +9,13 @@ import typer
 from msgspec import structs
 
 from skidpad.cli.asked import Controller, Tuned
-from skidpad.cli.spread import spread
+from skidpad.cli.spread import spread_fields
 from skidpad.core.run import Roads, RunSpec
 
 COURSES = "road"
 
 
-@spread(duration=60.0)
+@spread_fields(duration=60.0)
 def export_dataset(
     controller: Controller,
     run: RunSpec,

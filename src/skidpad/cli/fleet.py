@@ -359,12 +359,12 @@ def demo(
     from skidpad.recording.files import require_free
 
     with fleet_extra():
-        from skidpad.cli.fleet_demo import Demo, enrolled, open_recorded, play, pool, serving
+        from skidpad.cli.fleet_demo import Demo, enrol_fleet, open_recorded, play, pool, serving
     if recorded:
         with open_recorded(require_free(out), port, typer.echo):
             _stay(stay)
         return
-    maker, operator, cars = enrolled(require_free(out), vehicles)
+    maker, operator, cars = enrol_fleet(require_free(out), vehicles)
     with serving(out / "data", port) as address, pool(workers) as drives:
         story = Demo(out, address, maker, cars, seconds, drives, typer.echo)
         for one in play(story):

@@ -253,7 +253,7 @@ def _finding(f: dict[str, Any]) -> str:
     )
 
 
-def enrolled(out: Path, n: int) -> tuple[str, str, list[Car]]:
+def enrol_fleet(out: Path, n: int) -> tuple[str, str, list[Car]]:
     """Make the store, the off-line keys and n vehicles; credentials of maker and operator."""
     import time
 

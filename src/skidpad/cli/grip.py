@@ -11,7 +11,7 @@ from msgspec import structs
 
 from skidpad.cli.asked import MAPS, Controller, GripCross, MapAsked, Tuned
 from skidpad.cli.campaigns import FirstSeed, How
-from skidpad.cli.spread import spread
+from skidpad.cli.spread import spread_fields
 from skidpad.core.errors import require_choice
 from skidpad.core.run import BackendChoice, Friction, RunSpec, Scenario
 from skidpad.core.vocabulary import Outcome, SensorLevel
@@ -29,7 +29,7 @@ class Keep(str, Enum):
     ALL = "all"
 
 
-@spread(sensors=SensorLevel.OBJECTS, duration=120.0)
+@spread_fields(sensors=SensorLevel.OBJECTS, duration=120.0)
 def grip(
     how: How,
     cross: GripCross,
@@ -51,9 +51,9 @@ def grip(
     ] = Keep.SHOWN,
 ) -> None:
     """Drive scenarios x weathers x frictions x seeds; prints the answer and the path of the report."""
-    from skidpad.cli.carla_backend import checked, drives_alone
+    from skidpad.cli.carla_backend import check_backend, drives_alone
 
-    run = structs.replace(run, backend=checked(backend), seed=first_seed)
+    run = structs.replace(run, backend=check_backend(backend), seed=first_seed)
     alone, keep_all = drives_alone(run.backend), keep is Keep.ALL
     if map.map_of is not None:
         require_choice("--map-of", map.map_of, MAPS)

@@ -38,7 +38,7 @@ def _vary_run(ask: GripCross, run: RunSpec) -> Cross:
         raise ConfigError("--four-cells drives with and without drops: leave --overlay away")
     if (run.overlay or ask.four_cells) and run.sensors is not SensorLevel.PIXELS:
         raise ConfigError("--overlay and --four-cells draw on images: they need --sensors pixels")
-    chosen = list(NAMES) if ask.scenarios == "all" else parted(ask.scenarios)
+    chosen = list(NAMES) if ask.scenarios == "all" else split_words(ask.scenarios)
     for name in chosen:
         require_choice("scenario", name, NAMES)
     frictions = _choices("--friction", ask.friction, Friction)
@@ -58,7 +58,7 @@ def _vary_run(ask: GripCross, run: RunSpec) -> Cross:
     )
 
 
-def parted(text: str) -> list[str]:
+def split_words(text: str) -> list[str]:
     """Different words parted by commas; ConfigError for the same twice, or none."""
     parts = [part.strip() for part in text.split(",") if part.strip()]
     if len(set(parts)) != len(parts) or not parts:
@@ -68,11 +68,11 @@ def parted(text: str) -> list[str]:
 
 def _choices(option: str, text: str, kind: type[Choice]) -> list[Choice]:
     allowed = [member.value for member in kind]
-    return [kind(require_choice(option, part, allowed)) for part in parted(text)]
+    return [kind(require_choice(option, part, allowed)) for part in split_words(text)]
 
 
 def grip_weathers(text: str) -> list[Weather]:
     """`all` is the eleven published presets; else names or YAML files, parted by commas."""
     if text == "all":
         return [w for w in preset_groups()[GRIP].values() if w.name != SNOW]
-    return [find_weather(part) for part in parted(text)]
+    return [find_weather(part) for part in split_words(text)]

@@ -13,7 +13,7 @@ import skidpad
 from skidpad.cli.adas import adas, report, show
 from skidpad.cli.bench import bench
 from skidpad.cli.campaigns import Drive, Estimate
-from skidpad.cli.carla_launcher import carla_launcher, translated
+from skidpad.cli.carla_launcher import carla_launcher, translate_options
 from skidpad.cli.channels import channels
 from skidpad.cli.channels_drive import drive, outcomes
 from skidpad.cli.channels_evaluate import evaluate, train
@@ -33,7 +33,7 @@ from skidpad.cli.play import play, play_folder
 from skidpad.cli.profiles import profiles
 from skidpad.cli.rerun import rerun, study
 from skidpad.cli.shadow import shadow
-from skidpad.cli.spread import spread
+from skidpad.cli.spread import spread_fields
 from skidpad.cli.view import view
 from skidpad.core.errors import InputError, SkidpadError
 from skidpad.core.told import clean
@@ -71,7 +71,7 @@ estimate = typer.Typer(
     no_args_is_help=True,
 )
 campaign.add_typer(estimate)
-driving, estimating = spread({"how": Drive}), spread({"how": Estimate})
+driving, estimating = spread_fields({"how": Drive}), spread_fields({"how": Estimate})
 app.command()(driving(adas))
 app.command()(driving(grip))
 channels.command()(driving(drive))
@@ -135,7 +135,7 @@ def carla_unreal(context: typer.Context) -> None:
     """Serve CARLA's clients with Unreal's options: what CarlaUE4.sh of carla-launcher runs."""
     from skidpad.cli.carla_server import command
 
-    command(translated(context.args))
+    command(translate_options(context.args))
 
 
 arrange_help(app)
@@ -148,10 +148,10 @@ def _on_termination(number: int, frame: object) -> NoReturn:
 
 def main() -> None:
     """Runs the command line and exits."""
-    guarded(app)
+    run_guarded(app)
 
 
-def guarded(command: Callable[[], object]) -> None:
+def run_guarded(command: Callable[[], object]) -> None:
     """Run a command; input that cannot be used ends with one sentence and exit code 2.
 
     SIGTERM ends it as Ctrl-C does: what is under way is dropped, what is done is kept.

@@ -12,7 +12,7 @@ from msgspec import structs
 from skidpad.cli.asked import OF_FILE, Controller, PlayCross, Tuned
 from skidpad.cli.campaigns import Drive, Driving, How, Seeds
 from skidpad.cli.expected import Expected, exit_by_verdicts, played_report
-from skidpad.cli.spread import spread
+from skidpad.cli.spread import spread_fields
 from skidpad.core.run import BackendChoice, RunSpec, Scenario
 from skidpad.core.vocabulary import SensorLevel
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from skidpad.report.play_runs import Played
 
 PLAIN = "clear-noon"  # what a file leaves open of the weather
-scenario_options = spread(sensors=SensorLevel.OBJECTS, duration=120.0)
+scenario_options = spread_fields(sensors=SensorLevel.OBJECTS, duration=120.0)
 
 
 @scenario_options
@@ -125,14 +125,14 @@ def _template(
     tuned: Tuned,
     backend: BackendChoice,
 ) -> RunSpec:
-    from skidpad.cli.carla_backend import checked
+    from skidpad.cli.carla_backend import check_backend
     from skidpad.physics.presets import find_weather
 
     return structs.replace(
         tuned.resolve(run, grip=cross.frictions()[1]),
         driver=controller.chosen(),
         course=structs.replace(scenario, parameters=cross.parameters()),
-        backend=checked(backend),
+        backend=check_backend(backend),
         weather=find_weather(PLAIN),
     )
 

@@ -32,7 +32,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.stack.settings import grip_of
 
 
-def opened(run: Path) -> tuple[RunLog, RoadMap]:
+def open_run(run: Path) -> tuple[RunLog, RoadMap]:
     """The log of a run's folder, and the map that it was driven on."""
     log = read_log(run)
     return log, load_road(run, log.header)
@@ -42,7 +42,7 @@ def compare_runs(a: Path, b: Path) -> None:
     """Print the metrics of two runs, of a campaign or driven by hand, and B - A."""
     found = []
     for run in (a, b):
-        log, road_map = opened(run)
+        log, road_map = open_run(run)
         if road_map.content_hash != log.header.map_hash:
             raise FileError(f"{run}: the map {log.header.map} is another one today")
         found.append(asdict(run_metrics(log, road_map)))
@@ -58,7 +58,7 @@ def compare_runs(a: Path, b: Path) -> None:
 
 def show(run: Path) -> None:
     """Print it."""
-    log, road_map = opened(run)
+    log, road_map = open_run(run)
     console = table_console()
     console.print(f"[bold]{run.name}[/] on {log.header.map}, {len(log) * log.header.dt:g} s")
     for name, value in log.header.about.items():

@@ -29,7 +29,7 @@ from skidpad.core.run import PARTED
 Command = Callable[..., Any]
 
 
-def spread(
+def spread_fields(
     kinds: Mapping[str, type[Struct]] | None = None, **defaults: Any
 ) -> Callable[[Command], Command]:
     """Spread the command's Struct parameters into options, with these defaults over the fields'.
@@ -45,7 +45,7 @@ def spread(
             hint = (kinds or {}).get(parameter.name, hints[parameter.name])
             if isinstance(hint, type) and issubclass(hint, Struct):
                 groups[parameter.name] = hint
-                parameters += described(hint, defaults, OPTIONS.get(parameter.name))
+                parameters += describe_parameters(hint, defaults, OPTIONS.get(parameter.name))
             else:
                 kind = inspect.Parameter.KEYWORD_ONLY
                 parameters.append(parameter.replace(annotation=hint, kind=kind))
@@ -63,7 +63,7 @@ class Described(NamedTuple):
     default: Any
 
 
-def _described(kind: type[Struct]) -> dict[str, Described]:
+def _describe_fields(kind: type[Struct]) -> dict[str, Described]:
     hints = get_type_hints(kind, include_extras=True)
     found = {}
     for field in structs.fields(kind):
@@ -75,7 +75,7 @@ def _described(kind: type[Struct]) -> dict[str, Described]:
     return found
 
 
-def described(
+def describe_parameters(
     kind: type[Struct], defaults: dict[str, Any], panel: str | None = None
 ) -> list[inspect.Parameter]:
     """A parameter for every field of `kind` that has a description; panel: its heading in help."""
@@ -83,14 +83,14 @@ def described(
         inspect.Parameter(
             field.name,
             inspect.Parameter.KEYWORD_ONLY,
-            default=_shown(defaults.get(field.name, field.default), field.meta),
+            default=_format_default(defaults.get(field.name, field.default), field.meta),
             annotation=_option(field, panel),
         )
-        for field in _described(kind).values()
+        for field in _describe_fields(kind).values()
     ]
 
 
-def _shown(default: Any, meta: Meta) -> Any:
+def _format_default(default: Any, meta: Meta) -> Any:
     """A default as typer takes it."""
     if isinstance(default, Enum):
         return default.value
@@ -126,7 +126,7 @@ def _gathering(
     command: Command, groups: dict[str, type[Struct]], parameters: list[inspect.Parameter]
 ) -> Command:
     """The command with these parameters, which gathers them into its Structs again."""
-    fields = {name: _described(kind) for name, kind in groups.items()}
+    fields = {name: _describe_fields(kind) for name, kind in groups.items()}
 
     def call(**values: Any) -> Any:
         given = {

@@ -17,7 +17,7 @@ from skidpad.campaign.threshold_cells import (
     tasks,
 )
 from skidpad.cli.asked import MAPS, OURS, Controller, GripCross, MapAsked
-from skidpad.cli.grip_plan import parted
+from skidpad.cli.grip_plan import split_words
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import ActorMode, RunSpec
 from skidpad.physics.presets import find_weather
@@ -40,17 +40,17 @@ def plan_map(
         raise ConfigError("--map-of threshold drives on a clear day: leave --overlay away")
     shares = default_shares()
     if ask.levels is not None:
-        given = {number("--levels", text, LEVEL_RANGE) for text in parted(ask.levels)}
+        given = {number("--levels", text, LEVEL_RANGE) for text in split_words(ask.levels)}
         shares = sorted(given, reverse=True)
     if shares[0] != 1.0 or len(shares) < 2:
         raise ConfigError("--levels needs dry road, 1, and at least one level below it")
     levels = Levels(
-        drivers=[driver_named(name) for name in parted(ask.drivers)],
+        drivers=[driver_named(name) for name in split_words(ask.drivers)],
         modes=list(ActorMode),
-        starts=[start_of_text(text) for text in parted(ask.headways)],
+        starts=[start_of_text(text) for text in split_words(ask.headways)],
         decelerations=[
             number("--decelerations", text, DECELERATION_RANGE)
-            for text in parted(ask.decelerations)
+            for text in split_words(ask.decelerations)
         ],
         shares=shares,
     )

@@ -196,7 +196,7 @@ class Bridge:
         now = self._present()
         name = now.name if now.name.endswith(CUSTOM) else now.name + CUSTOM
         fields = {k: float(v) for k, v in value.items() if k in now.values()}
-        return self._acting(called(replace(now, name=name, title="", **fields)))
+        return self._acting(find_preset(replace(now, name=name, title="", **fields)))
 
     def _present(self) -> Weather:
         return self._sky().weather
@@ -239,7 +239,7 @@ def next_hour(weather: Weather) -> float:
     return NOON if weather.sun_altitude_deg < MORNING else NIGHT
 
 
-def called(weather: Weather) -> Weather:
+def find_preset(weather: Weather) -> Weather:
     """The preset that this weather is, or itself."""
     known = all_presets().values()
     return next((one for one in known if one.values() == weather.values()), weather)

@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.campaign.drive import Moment
-from skidpad.campaign.keeping import housed
+from skidpad.campaign.keeping import with_kept_map
 from skidpad.campaign.stored import read_segment
 from skidpad.cockpit.indicators import every, least_of, ttc_ahead
 from skidpad.cockpit.marks import RADAR_MOUNT
-from skidpad.cockpit.monitored import judged
+from skidpad.cockpit.monitored import read_judgements
 from skidpad.cockpit.source import Curves, Said, Seat
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
 from skidpad.core.errors import FileError, InputError
@@ -94,7 +94,7 @@ class ChannelSource:
         outside = Outside(weather=weather, grip=GripModel.PHYSICAL, range_model=RangeModel.NONE)
         self._seat = Seat(-1, outside, False, "keyboard", None, None)
         self._build()
-        self._judged = judged(path, [self.tick(k) for k in range(self.ticks)])
+        self._judged = read_judgements(path, [self.tick(k) for k in range(self.ticks)])
         self.marks = sorted(self._switches() + self._judged.marks)
 
     def _build(self) -> None:
@@ -319,7 +319,7 @@ def _mode(decision: Decision | None) -> str:
 def _where(path: Path, context: dict[str, str]) -> tuple[RoadMap, Weather, int]:
     """Map, weather and seed: of the file beside the recording, else of its own words."""
     if path.with_suffix(".json").is_file():
-        spec = housed(read_segment(path), path.resolve().parents[1])
+        spec = with_kept_map(read_segment(path), path.resolve().parents[1])
         assert isinstance(spec.course, Route)
         return load_map(spec.course.map), spec.weather, spec.seed
     name = context.get("map", "")

@@ -47,8 +47,8 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
                 "functions": functions_on(spec, desk),
                 "crowd": crowd(spec, desk),
             },
-            "rtf": hud.rounded(time.rtf),
-            "slow_pct": hud.rounded(100.0 * time.slow / max(time.ticks, 1), 1),
+            "rtf": hud.round_value(time.rtf),
+            "slow_pct": hud.round_value(100.0 * time.slow / max(time.ticks, 1), 1),
             "rate": link.rate,
             "paused": link.paused,
         }

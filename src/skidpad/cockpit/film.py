@@ -83,7 +83,7 @@ def frames(
             hud.motion(moment),
             hud.opinion(moment),
             moment.truth.tick,
-            hud.happened(moment),
+            hud.list_events(moment),
         )
         yield (
             picture if companion is None else np.hstack([picture, _other(companion, moment, view)])

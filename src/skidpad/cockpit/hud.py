@@ -22,7 +22,7 @@ def _title(tier: Tier) -> str:
 TIERS = tuple("No action" if tier is Tier.NONE else _title(tier) for tier in Tier)
 
 
-def rounded(value: float | None, digits: int = 2) -> float | None:
+def round_value(value: float | None, digits: int = 2) -> float | None:
     """A number for the page; None stays None, and NaN is None."""
     if value is None or value != value:
         return None
@@ -34,16 +34,16 @@ def motion(moment: Moment) -> dict[str, Any]:
     ego, truth = moment.frame.ego, moment.truth
     throttle, brake, steer, handbrake, reverse = truth.commands[0].tolist()
     return {
-        "speed_kmh": rounded(kmh_from_mps(ego.speed), 1),
+        "speed_kmh": round_value(kmh_from_mps(ego.speed), 1),
         "gear": ego.gear,
-        "throttle": rounded(throttle),
-        "brake": rounded(brake),
-        "steer": rounded(steer, 3),
+        "throttle": round_value(throttle),
+        "brake": round_value(brake),
+        "steer": round_value(steer, 3),
         "handbrake": bool(handbrake),
         "reverse": bool(reverse),
-        "mu": [rounded(v) for v in truth.mu[0].tolist()],
-        "x": rounded(float(truth.states.x[0])),
-        "y": rounded(float(truth.states.y[0])),
+        "mu": [round_value(v) for v in truth.mu[0].tolist()],
+        "x": round_value(float(truth.states.x[0])),
+        "y": round_value(float(truth.states.y[0])),
     }
 
 
@@ -54,14 +54,14 @@ def opinion(moment: Moment) -> dict[str, Any]:
         "mode": moment.driver.mode,
         "tier": None if r.tier is None else int(r.tier),
         "status": None if r.status is None else r.status.name.replace("_", " ").lower(),
-        "distance": rounded(r.distance, 1),
-        "time_gap": rounded(r.time_gap, 1),
-        "bumper": rounded(r.bumper, 1),
-        "roof": rounded(r.roof, 1),
-        "radar": rounded(r.radar_lane, 1),
-        "radar_limit": rounded(velocity_limit(moment.frame.ego.speed), 1),
+        "distance": round_value(r.distance, 1),
+        "time_gap": round_value(r.time_gap, 1),
+        "bumper": round_value(r.bumper, 1),
+        "roof": round_value(r.roof, 1),
+        "radar": round_value(r.radar_lane, 1),
+        "radar_limit": round_value(velocity_limit(moment.frame.ego.speed), 1),
         "light": None if r.light_state is None else r.light_state.name.lower(),
-        "light_at": rounded(r.light_distance, 0),
+        "light_at": round_value(r.light_distance, 0),
     }
 
 
@@ -79,7 +79,7 @@ def seat(desk: Desk) -> dict[str, Any]:
     return {
         "manual": desk.manual,
         "method": desk.pedals.method.value,
-        "pressed_s": rounded(desk.hands.pressed),
+        "pressed_s": round_value(desk.hands.pressed),
         "functions": None if desk.functions is None else sorted(f.value for f in desk.functions),
         "lamps": "sun" if desk.switch is None else desk.switch.value,
         "beam": None if beam is None else Beam(beam).name.lower(),
@@ -90,7 +90,7 @@ def seat(desk: Desk) -> dict[str, Any]:
     }
 
 
-def happened(moment: Moment) -> list[str]:
+def list_events(moment: Moment) -> list[str]:
     """Events of this tick in words."""
     truth, frame = moment.truth, moment.frame
     told = [f"contact with {c.static or truth.table.names[c.actor]}" for c in truth.contacts]

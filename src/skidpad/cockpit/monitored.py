@@ -28,7 +28,7 @@ class Judged(NamedTuple):
         return [(first, "hazard", f"hazard: {text}") for first, _, text in self.hazards]
 
 
-def judged(recording: Path, ticks: Sequence[int]) -> Judged:
+def read_judgements(recording: Path, ticks: Sequence[int]) -> Judged:
     """What the folder NAME.monitor beside a recording with moments at `ticks` says."""
     folder = recording.with_suffix(MONITORED)
     hazards, violated = [], np.zeros(len(ticks), dtype=np.int64)

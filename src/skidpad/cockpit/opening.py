@@ -21,16 +21,16 @@ RECORDING = ".mcap"
 REPLAYS, SCENARIOS = "replays", "scenarios"  # folders within that of the hazards
 
 
-def opened(path: Path, hazard: str | None = None) -> Source:
+def open_source(path: Path, hazard: str | None = None) -> Source:
     """What lies at a path. hazard: the id of one, in a folder of hazards."""
     if (path / TEXT_FILE).is_file():
-        return Recording(played(path, hazard))
+        return Recording(play_hazard(path, hazard))
     if hazard is not None:
         raise ConfigError(f"--id names a hazard, and {path} is no folder of hazards")
     return ChannelSource(path) if path.suffix == RECORDING else Recording(path)
 
 
-def played(folder: Path, id: str | None) -> Path:
+def play_hazard(folder: Path, id: str | None) -> Path:
     """The folder of a run in which a hazard's scenario is played; driven if it is not there yet."""
     records = {record.id: record for record in read_hazards(folder)}
     if id is None and len(records) == 1:

@@ -11,7 +11,7 @@ from typing import Any
 from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.film import write_film
-from skidpad.cockpit.opening import opened
+from skidpad.cockpit.opening import open_source
 from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import MAIN, View
@@ -28,8 +28,8 @@ TAKES_WITHIN = 0.25  # s that the page is given to take a picture before the nex
 
 def replay_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
     """Show a run, perhaps with another one beside it, until the page ends it."""
-    source = opened(Path(about["path"]), about["hazard"])
-    other = None if about["beside"] is None else opened(Path(about["beside"]))
+    source = open_source(Path(about["path"]), about["hazard"])
+    other = None if about["beside"] is None else open_source(Path(about["beside"]))
     feed, link = Feed(feed_name), Link(pipe)
     try:
         Replayer(source, feed, link, other=other).run()

@@ -63,7 +63,7 @@ class Screen(Sink):
         self.collisions += len(moment.truth.contacts)
         if moment.truth.contacts:
             self.crash = moment.truth.states.pose(0)
-        self.events.extend((t, text) for text in hud.happened(moment))
+        self.events.extend((t, text) for text in hud.list_events(moment))
         if perf_counter() - self._at < 1.0 / MOST_PER_SECOND:
             return
         if self.feed.taken < self.feed.last:

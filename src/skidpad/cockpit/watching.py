@@ -84,8 +84,8 @@ def standing(folder: Path) -> Standing:
     counted = [one for one in lines if one.key.outcome not in LEFT_OUT]
     cells: dict[str, list[bool]] = {}
     for one in counted:
-        cells.setdefault(cell_of(one.run), []).append(not crashed(one))
-    crashes = [one.run for one in in_order if crashed(one)]
+        cells.setdefault(cell_of(one.run), []).append(not has_crashed(one))
+    crashes = [one.run for one in in_order if has_crashed(one)]
     last = crashes[-1] if crashes else ""
     run = inside(folder / RUNS, last) if last else None
     return Standing(
@@ -99,7 +99,7 @@ def standing(folder: Path) -> Standing:
     )
 
 
-def crashed(line: Line) -> bool:
+def has_crashed(line: Line) -> bool:
     """The ego hit something."""
     if line.key.outcome == Outcome.COLLISION.value:
         return True

@@ -148,13 +148,13 @@ class Live:
         del tick
         self.link.drain()
         inputs, self.link.inputs = self.link.inputs, []
-        return settled(inputs)
+        return drop_void_inputs(inputs)
 
 
 LAST_COUNTS = (Pedals, Sky, Lamps, Functions, Crowd)
 
 
-def settled(inputs: Sequence[Input]) -> list[Input]:
+def drop_void_inputs(inputs: Sequence[Input]) -> list[Input]:
     """The inputs without those that a later one of the same kind makes void."""
     kept: list[Any] = []
     for one in inputs:

@@ -69,7 +69,7 @@ def angles_to_carla(angle: Floats) -> Floats:
     return -angle
 
 
-def mirrored(value: float) -> float:
+def mirror_value(value: float) -> float:
     """A steer, azimuth, yaw rate, lateral offset, curvature or y, in either direction."""
     return -value
 

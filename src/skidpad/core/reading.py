@@ -83,10 +83,10 @@ def decode_yaml(data: bytes, where: str, kind: Any = None) -> Any:
         raise
     except UNUSABLE as error:
         raise unusable(where, "YAML", error) from None
-    return plain if kind is None else converted(plain, kind, where)
+    return plain if kind is None else convert_plain(plain, kind, where)
 
 
-def converted(plain: Any, kind: Any, where: str) -> Any:
+def convert_plain(plain: Any, kind: Any, where: str) -> Any:
     """Plain data as a value of type `kind`; ConfigError that says what does not fit."""
     try:
         return msgspec.convert(plain, kind)

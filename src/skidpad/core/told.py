@@ -20,7 +20,7 @@ def on_a_line(error: BaseException, longest: int = OF_A_LIBRARY) -> str:
     return clean(" ".join(str(error).split()) or type(error).__name__, longest)
 
 
-def told(value: object, longest: int = LONGEST) -> str:
+def describe_value(value: object, longest: int = LONGEST) -> str:
     """`repr(value)`, cleaned; the name of its type where that raises."""
     try:
         return clean(repr(value), longest)

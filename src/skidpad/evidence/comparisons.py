@@ -7,7 +7,7 @@ import re
 from collections.abc import Callable
 
 from skidpad.core.errors import ConfigError, require_choice
-from skidpad.core.told import told
+from skidpad.core.told import describe_value
 
 OPERATORS: dict[str, Callable[[float, float], bool]] = {
     ">=": operator.ge,
@@ -24,13 +24,15 @@ def parse_comparison(
     """A name among `known`, a comparison and a number; ConfigError says what `option` takes."""
     match = RULE.match(text)
     if not match:
-        raise ConfigError(f"{option} takes COLUMN > NUMBER (or >=, <, <=), got {told(text, 200)}")
+        raise ConfigError(
+            f"{option} takes COLUMN > NUMBER (or >=, <, <=), got {describe_value(text, 200)}"
+        )
     column, sign, number = match.groups()
     require_choice("column", column, known)
     try:
         limit = float(number)
     except ValueError:
         raise ConfigError(
-            f"{option}: {told(number, 100)} is no number, in {told(text, 200)}"
+            f"{option}: {describe_value(number, 100)} is no number, in {describe_value(text, 200)}"
         ) from None
     return column, OPERATORS[sign], limit

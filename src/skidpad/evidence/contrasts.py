@@ -151,7 +151,7 @@ class Paired:
             Claim.OFTEN_OTHER: (d != 0.0).cast(pl.Float64) - bound,
         }[self.claim]
         margin = bound if self.claim is Claim.MORE else 0.0
-        return paired(self.label, per_seed(pairs, shown), margin, same)
+        return contrast_pairs(self.label, per_seed(pairs, shown), margin, same)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -188,7 +188,7 @@ class Outweighs:
         if not len(first) or len(first) != len(second):
             return None
         label = f"{self.column}, effect of {self.factor} minus effect of {self.other}"
-        return paired(label, first - second.abs(), self.margin.value)
+        return contrast_pairs(label, first - second.abs(), self.margin.value)
 
 
 def highest(column: str) -> Rows:
@@ -232,7 +232,7 @@ class Mean:
         rows = rows.with_columns(shown=self.value.cast(pl.Float64), counts=where)
         rows = rows.filter("counts").drop_nulls("shown")
         values = per_seed(rows, pl.col("shown")) if "seed" in self.by else rows["shown"]
-        return paired(self.label, values, self.margin.value) if len(values) else None
+        return contrast_pairs(self.label, values, self.margin.value) if len(values) else None
 
 
 @dataclass(frozen=True, slots=True)
@@ -265,7 +265,7 @@ class Never:
         return Contrast(label, value, sure, p_claimed, p_against, 0.0, judged, judged, words=words)
 
 
-def finished(table: pl.DataFrame) -> pl.DataFrame:
+def drop_unfinished(table: pl.DataFrame) -> pl.DataFrame:
     """Without the runs that leave every denominator (L-7)."""
     return table.filter(~pl.col("outcome").is_in(NOT_RUN)) if "outcome" in table.columns else table
 
@@ -323,7 +323,9 @@ def paired_runs(
     return both.with_columns(difference=pl.col("value") - pl.col("value_less")), same
 
 
-def paired(label: str, values: ArrayLike, margin: float, identical: bool = False) -> Contrast:
+def contrast_pairs(
+    label: str, values: ArrayLike, margin: float, identical: bool = False
+) -> Contrast:
     """A contrast from values that are claimed positive: differences of runs that share a seed."""
     c = compare_pairs(values)
     below = compare_pairs(np.asarray(values, dtype=np.float64) - margin) if margin else c

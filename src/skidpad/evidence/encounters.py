@@ -46,11 +46,11 @@ def encounter(log: RunLog, ego: int, other: int, since: float = 0.0) -> Encounte
     both = together(log, ego, other)
     if not both.any():
         return None
-    one, two = _cut(body(log, ego), both), _cut(body(log, other), both)
+    one, two = _select_rows(body(log, ego), both), _select_rows(body(log, other), both)
     crossed = crossing(one, two, log.t[both])
     later = log.t[both] >= since - 1e-9
     met = (crossed is not None and abs(crossed) <= LEFT) or _in_play(
-        _cut(one, later), _cut(two, later), crossed is None
+        _select_rows(one, later), _select_rows(two, later), crossed is None
     )
     return Encounter(met, float(box_distance(one, two).min()), crossed)
 
@@ -62,7 +62,7 @@ def _in_play(one: Body, two: Body, ways_apart: bool) -> bool:
     return ways_apart and bool(near.any())
 
 
-def _cut(one: Body, rows: Mask | NDArray[np.int64]) -> Body:
+def _select_rows(one: Body, rows: Mask | NDArray[np.int64]) -> Body:
     x, y, yaw, vx, vy, ax, ay = (column[rows] for column in one[:7])
     return Body(x, y, yaw, vx, vy, ax, ay, one.length, one.width)
 
@@ -161,7 +161,7 @@ def box_distance(one: Body, other: Body) -> Floats:
 def crossing(one: Body, other: Body, t: Floats) -> float | None:
     """Least time between both at the same place, s, positive where `one` comes later; None: no place."""
     a, b = _places(one), _places(other)
-    first, second = _cut(one, a), _cut(other, b)
+    first, second = _select_rows(one, a), _select_rows(other, b)
     x, y, yaw = first.x[:, None], first.y[:, None], first.yaw[:, None]
     shared = _overlap(x, y, yaw, second.x, second.y, second.yaw, one, other)
     shared &= _overlap(second.x, second.y, second.yaw, x, y, yaw, other, one)

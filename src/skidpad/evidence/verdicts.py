@@ -17,7 +17,7 @@ from math import ceil
 import polars as pl
 
 from skidpad.core.wording import count_text
-from skidpad.evidence.contrasts import Contrast, Criterion, finished
+from skidpad.evidence.contrasts import Contrast, Criterion, drop_unfinished
 from skidpad.evidence.statistics import EVER_SIGNIFICANT, holm, interval_text, p_text
 
 ALPHA = 0.05
@@ -65,7 +65,7 @@ class Finding:
 
     def contrasts(self, table: pl.DataFrame) -> list[Contrast]:
         """One per criterion, or none at all: a claim is judged whole."""
-        drawn = [c for criterion in self.criteria if (c := criterion.draw(finished(table)))]
+        drawn = [c for criterion in self.criteria if (c := criterion.draw(drop_unfinished(table)))]
         return drawn if len(drawn) == len(self.criteria) else []
 
 

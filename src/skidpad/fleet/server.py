@@ -16,7 +16,7 @@ from skidpad.fleet.site.dashboard import MapLines
 from skidpad.fleet.site.login import log_in_page
 from skidpad.fleet.upkeep import Upkeep
 from skidpad.pages.guard import Door, Guard
-from skidpad.pages.server import bound, host_headers
+from skidpad.pages.server import bind_socket, host_headers
 from skidpad.pages.sessions import Sessions
 
 CLOSING_S = 10  # s that open requests get when the server ends
@@ -37,7 +37,7 @@ class Listen:
 
 def run(fleet: Fleet, listen: Listen, lines: MapLines, say: Callable[[str], None]) -> None:
     """Serve until a signal ends it."""
-    one = bound(listen.host, listen.port)
+    one = bind_socket(listen.host, listen.port)
     port = int(one.getsockname()[1])
     sessions = Sessions(INVITED_S)
     door = Door(

@@ -15,11 +15,11 @@ from skidpad.core.errors import FileError, OutputError
 from skidpad.evidence.channels.indicators.panel import no_lap
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.evidence.channels.recorder import CycleEvidence
-from skidpad.evidence.channels.summary import Watched, columns, watched
+from skidpad.evidence.channels.summary import Watched, columns, summarise_drive
 from skidpad.evidence.channels.timing import MODULES
 from skidpad.recording.channels import ChannelSource, Losses, Message
 from skidpad.recording.cycles import cycles
-from skidpad.recording.folders import ResultKind, require_kind, staged
+from skidpad.recording.folders import ResultKind, prepare_files, require_kind
 from skidpad.recording.hazards import INDEX_FILE, TEXT_FILE, HazardWriter
 from skidpad.recording.indicators import FILE as INDICATORS
 from skidpad.recording.indicators import IndicatorLog
@@ -96,7 +96,7 @@ def watch(
             writer.write(record)
     if not seen:
         raise FileError("the recording holds no cycle that can be evaluated")
-    found = watched(monitor, source.losses, seen[-1] - seen[0], len(seen))
+    found = summarise_drive(monitor, source.losses, seen[-1] - seen[0], len(seen))
     log.write(folder)
     write_summary(folder, found.summary)
     if timer:
@@ -122,7 +122,7 @@ def watch_whole(
         raise OutputError(
             f"{folder} holds what was found in another recording; choose another --out"
         )
-    with staged(folder, FILES) as part:
+    with prepare_files(folder, FILES) as part:
         found = watch(source, part, settings, timer, alarms)
         if recording:
             write_summary(part, found.summary | {"recording": recording})

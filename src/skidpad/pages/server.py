@@ -45,7 +45,7 @@ class Server:
             import uvicorn
         except ImportError as error:
             raise MissingExtra("serving pages", "cockpit") from error
-        self._socket = bound(place.host, place.port)
+        self._socket = bind_socket(place.host, place.port)
         self.host, self.port = place.host, int(self._socket.getsockname()[1])
         self.sessions = Sessions()
         door = Door(
@@ -105,7 +105,7 @@ class Server:
         self.stop()
 
 
-def bound(host: str, port: int) -> socket.socket:
+def bind_socket(host: str, port: int) -> socket.socket:
     """A socket at this place; ConfigError in one sentence when it cannot be had."""
     if not 0 <= port <= 65535:
         raise ConfigError(f"port must be between 0 and 65535, got {port}")

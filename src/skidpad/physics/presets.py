@@ -11,7 +11,7 @@ from typing import Any
 import msgspec
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.reading import converted, decode_yaml, read_bytes
+from skidpad.core.reading import convert_plain, decode_yaml, read_bytes
 from skidpad.core.weather import Weather
 
 MATRIX, GRIP = "matrix", "grip"
@@ -30,7 +30,7 @@ def _weather(fields: Any, where: str) -> Weather:
         raise ConfigError(
             f"{where}: unknown field {unknown[0]!r:.100}; known are {', '.join(known)}"
         )
-    weather: Weather = converted(fields, Weather, where)
+    weather: Weather = convert_plain(fields, Weather, where)
     return weather
 
 

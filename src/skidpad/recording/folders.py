@@ -44,7 +44,7 @@ def require_kind(folder: Path, *allowed: ResultKind) -> None:
 
 
 @contextmanager
-def staged(folder: Path, names: Sequence[str]) -> Iterator[Path]:
+def prepare_files(folder: Path, names: Sequence[str]) -> Iterator[Path]:
     """A place for the files of a result; they replace those in `folder` when all are complete.
 
     names: all files that such a result may have, the one that marks it last. What an earlier

@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from skidpad.core.reading import converted
+from skidpad.core.reading import convert_plain
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator, Threshold, load_thresholds
 from skidpad.evidence.channels.timing import TIMES
@@ -114,7 +114,7 @@ class _Summary(msgspec.Struct):
 def load_drive(folder: Path) -> MonitoredDrive:
     """Read the output folder of `skidpad monitor`; InputError when it is none that can be shown."""
     summary = read_summary(folder)
-    converted(summary, _Summary, str(folder / SUMMARY))
+    convert_plain(summary, _Summary, str(folder / SUMMARY))
     return MonitoredDrive(
         name=folder.name,
         summary=summary,

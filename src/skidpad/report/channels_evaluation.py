@@ -10,7 +10,7 @@ import msgspec
 import polars as pl
 
 from skidpad import __version__
-from skidpad.core.reading import converted, decode_json, read_bytes
+from skidpad.core.reading import convert_plain, decode_json, read_bytes
 from skidpad.evidence.channels.findings import FINDINGS
 from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
 from skidpad.evidence.channels.judging.segments import TOLD
@@ -79,7 +79,7 @@ def _read(source: Path) -> Row:
     """InputError when it cannot be shown."""
     data = read_bytes(source, "an evaluation")
     evaluation: Row = decode_json(data, str(source), dict[str, Any])
-    converted(evaluation, _Evaluation, str(source))
+    convert_plain(evaluation, _Evaluation, str(source))
     return evaluation
 
 

@@ -12,7 +12,7 @@ import polars as pl
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.judging.facts import CAUSE_PREFIX, ViolationCause
 from skidpad.report.page import Block, Cell, words
-from skidpad.report.published import Source, published
+from skidpad.report.published import Source, read_published
 from skidpad.report.tables import Column, Format, table
 
 Row = dict[str, Any]
@@ -105,7 +105,7 @@ def _our_causes(segments: pl.DataFrame, names: list[str]) -> list[Block]:
 def _town_rows() -> list[Row]:
     """Rows of the published towns."""
     towns: dict[int, Row] = {}
-    for r in published(Source.VIOLATIONS_BY_TOWN).to_dicts():
+    for r in read_published(Source.VIOLATIONS_BY_TOWN).to_dicts():
         row = towns.setdefault(r["town"], {"route": f"town {r['town']}", "causes": {}})
         row[PREFIX + r["spi"]] = r["threshold_violations"]
         row["causes"][r["spi"]] = r["cause"] or ""
@@ -114,7 +114,7 @@ def _town_rows() -> list[Row]:
 
 def _cause_table(names: list[str]) -> list[Block]:
     """Which causes the source gives, with their violations over all towns."""
-    known = published(Source.VIOLATIONS_BY_TOWN).drop_nulls("cause")
+    known = read_published(Source.VIOLATIONS_BY_TOWN).drop_nulls("cause")
     known = known.filter(pl.col("spi").is_in(names))
     rows = (
         known.group_by("cause", "spi")
@@ -230,7 +230,7 @@ def _merge_segments(segments: pl.DataFrame, module: str) -> Row:
 
 def _published_times(modules: list[str]) -> list[Row]:
     """The same of the published towns."""
-    known = published(Source.TIMING)
+    known = read_published(Source.TIMING)
     rows: list[Row] = []
     for town in known["town"].unique().sort():
         for module in modules:

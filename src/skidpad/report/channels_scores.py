@@ -9,7 +9,7 @@ from typing import Any
 from skidpad.evidence.channels.matching import percent
 from skidpad.evidence.statistics import Interval
 from skidpad.report.page import Block, Cell, Table, Text, words
-from skidpad.report.published import Source, published, published_rows
+from skidpad.report.published import Source, published_rows, read_published
 from skidpad.report.tables import Column, Format, table
 
 Row = Mapping[str, Any]  # of evaluation.json
@@ -170,7 +170,7 @@ def routes(evaluation: Row, truth: str) -> Table:
 def _published_towns() -> list[Row]:
     towns: dict[str, dict[str, list[int]]] = {}
     ours = {theirs: ours for ours, theirs in HAZARDS.items()}
-    for r in published(Source.HAZARDS_BY_TOWN).to_dicts():
+    for r in read_published(Source.HAZARDS_BY_TOWN).to_dicts():
         numbers = [r["true_positives"], r["false_positives"], r["false_negatives"]]
         towns.setdefault(f"town {r['town']}", {})[ours[r["hazard"]]] = numbers
     marks = {"identifier": "published", "kind": "published"}

@@ -20,7 +20,7 @@ from skidpad.evidence.channels.timing import timing_statistics
 from skidpad.recording.hazards import HazardRecord
 from skidpad.report.channels_data import MonitoredDrive
 from skidpad.report.page import Block, Cell, Node, Table, Text, Tree, words
-from skidpad.report.published import Source, published, published_rows
+from skidpad.report.published import Source, published_rows, read_published
 from skidpad.report.tables import Column, Format, Quantity, table
 
 Row = dict[str, Any]  # of the monitor's summary
@@ -184,7 +184,7 @@ def timing(drive: MonitoredDrive) -> list[Block]:
 
 def _published_time(module: str) -> str:
     name = PUBLISHED_MODULES.get(module, "")
-    rows = published(Source.TIMING).filter(pl.col("statistic") == "mean_ms")
+    rows = read_published(Source.TIMING).filter(pl.col("statistic") == "mean_ms")
     known = sorted(rows.filter(pl.col("module") == name)["value"].to_list())
     return f"{known[0]:.2f} to {known[-1]:.2f}" if known else ""
 

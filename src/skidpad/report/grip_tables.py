@@ -18,7 +18,7 @@ from skidpad.evidence.grip.study import (
     Pair,
     Share,
     changed_outcome,
-    compared,
+    compare_pair,
     completion,
     completion_p,
     mean_interval,
@@ -49,8 +49,8 @@ def completion_tables(campaign: GripCampaign) -> list[Block]:
     happened = "of runs in which the scenario happened"
     columns = (
         Column[Pair]("weather", lambda pair: pair.weather),
-        Column("original", partial(completed, ORIGINAL), f"{without} untouched", "%", SHARE),
-        Column("reduced", partial(completed, REDUCED), f"{without} reduced", "%", SHARE),
+        Column("original", partial(completion_share, ORIGINAL), f"{without} untouched", "%", SHARE),
+        Column("reduced", partial(completion_share, REDUCED), f"{without} reduced", "%", SHARE),
         Column("McNemar", paired_test, "exact p of the paired outcomes"),
         Column("original if triggered", partial(if_triggered, ORIGINAL), happened, "%", SHARE),
         Column("reduced if triggered", partial(if_triggered, REDUCED), happened, "%", SHARE),
@@ -67,10 +67,10 @@ def completion_tables(campaign: GripCampaign) -> list[Block]:
     ]
 
 
-def completed(friction: str, pair: Pair) -> Quantity:
+def completion_share(friction: str, pair: Pair) -> Quantity:
     """Share without an accident, in percent."""
     found = completion(pair.side(friction))
-    return share(found, kind=mark(pair, friction), **said(pair, friction, COMPLETED))
+    return share(found, kind=mark(pair, friction), **find_published(pair, friction, COMPLETED))
 
 
 def if_triggered(friction: str, pair: Pair) -> Quantity:
@@ -90,7 +90,9 @@ def score(friction: str, pair: Pair) -> Quantity:
     """Returns the mean benchmark score with its interval."""
     value, interval = score_of_runs(pair.side(friction))
     kind = mark(pair, friction)
-    return Quantity(value=value, interval=interval, kind=kind, **said(pair, friction, SCORED))
+    return Quantity(
+        value=value, interval=interval, kind=kind, **find_published(pair, friction, SCORED)
+    )
 
 
 def paired_test(pair: Pair) -> Cell:
@@ -110,7 +112,7 @@ def mark(pair: Pair, friction: str) -> str:
     return "bad" if after < before else "good"
 
 
-def said(pair: Pair, friction: str, column: str) -> dict[str, Any]:
+def find_published(pair: Pair, friction: str, column: str) -> dict[str, Any]:
     """The published value of a cell and whether we doubt it."""
     rows = published_rows(Source.COMPLETION, "scenario", "preset", "friction_mode")
     row = rows.get((pair.scenario, pair.weather, friction))
@@ -176,7 +178,7 @@ def change_tables(campaign: GripCampaign) -> list[Block]:
     """What else changes: outcome, delay, control (B-142 to B-145, B-149)."""
 
     def difference_of(column: str, pair: Pair) -> Quantity:
-        return difference(compared(pair, column))
+        return difference(compare_pair(pair, column))
 
     def delay(pair: Pair) -> Quantity:
         return late(campaign.delays.get((pair.scenario, pair.weather), np.empty(0)))
@@ -185,9 +187,9 @@ def change_tables(campaign: GripCampaign) -> list[Block]:
         Column[Pair]("weather", lambda pair: pair.weather),
         Column[Pair]("other outcome", lambda pair: share(changed_outcome(pair)),
                      "pairs of which one collided and the other did not (B-143)", "%", SHARE),
-        Column("ego out of control", partial(lost, "loss_of_control_ego"),
+        Column("ego out of control", partial(control_lost_cell, "loss_of_control_ego"),
                "original and reduced (B-145)", "%"),
-        Column("others out of control", partial(lost, "loss_of_control_npc"),
+        Column("others out of control", partial(control_lost_cell, "loss_of_control_npc"),
                "original and reduced, before any contact (B-145)", "%"),
         Column("delay", delay,
                "constant shift of the speed series, where one explains it (B-142)", "s", DELAY),
@@ -207,7 +209,7 @@ def change_tables(campaign: GripCampaign) -> list[Block]:
     return tables
 
 
-def lost(column: str, pair: Pair) -> Cell:
+def control_lost_cell(column: str, pair: Pair) -> Cell:
     """Shares out of control, before and after."""
     before, after = (
         100.0 * float(side[column].mean() or 0.0)  # type: ignore[arg-type]

@@ -15,7 +15,7 @@ from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics
 from skidpad.recording.results import schema
 from skidpad.report.campaign import CampaignView
-from skidpad.report.published import Source, published, published_matrix
+from skidpad.report.published import Source, published_matrix, read_published
 
 CONFIGS = {
     "0": "0 · baseline, no ADAS",
@@ -324,5 +324,7 @@ PRELIMINARY = (
 
 def published_preliminary() -> list[tuple[str, float, float]]:
     """(quantity, preliminary, final) as means over the runs that both published scripts share."""
-    means = published(Source.PRELIMINARY).select(pl.selectors.numeric().mean()).row(0, named=True)
+    means = (
+        read_published(Source.PRELIMINARY).select(pl.selectors.numeric().mean()).row(0, named=True)
+    )
     return [(label, means[before], means[after]) for label, before, after in PRELIMINARY]

@@ -8,7 +8,7 @@ import polars as pl
 
 from skidpad.report.matrix_data import Matrix, WeatherGroup
 from skidpad.report.page import Block, Text
-from skidpad.report.published import Source, published
+from skidpad.report.published import Source, read_published
 from skidpad.report.tables import Column, Format, Quantity, table
 
 BEHIND = 0.9  # times real time, below which a tick counts as slow
@@ -55,7 +55,7 @@ def real_time_blocks(matrix: Matrix) -> list[Block]:
 
 def _published_table() -> Block:
     """The published factors and shares of slow ticks, each by where it was measured."""
-    rows = published(Source.REAL_TIME).filter(
+    rows = read_published(Source.REAL_TIME).filter(
         pl.col("quantity").is_in(["mean_rtf", SLOW])
         & pl.col("stage").is_in(["preliminary", "final"])
     )

@@ -245,7 +245,7 @@ def _plain_verdict(run: PlayRun) -> Cell:
     return Cell(run.verdict.value, kind=KINDS[run.verdict], hint="; ".join(run.judged.reasons))
 
 
-def _bounded(value: float | None, spec: str) -> Cell:
+def _format_bounded(value: float | None, spec: str) -> Cell:
     """Return a number as a cell, where a large one says no more than that it is large."""
     if value is None:
         return Cell("-", kind="muted")
@@ -258,9 +258,9 @@ def _contact_speed(run: PlayRun) -> float | None:
 
 MEASURES: list[Column[PlayRun]] = [
     Column("least gap", lambda r: r.least("min_gap_m"), unit="m", format=Format(".1f", absent="-")),
-    Column("least TTC", lambda r: _bounded(r.least("min_ttc_s"), ".2f"), unit="s"),
+    Column("least TTC", lambda r: _format_bounded(r.least("min_ttc_s"), ".2f"), unit="s"),
     Column(
-        "required deceleration", lambda r: _bounded(r.most("max_required_mps2"), ".1f"),
+        "required deceleration", lambda r: _format_bounded(r.most("max_required_mps2"), ".1f"),
         unit="m/s²",
     ),
     Column("speed at contact", _contact_speed, unit="km/h", format=Format(".0f", absent="-")),
@@ -292,10 +292,10 @@ COUNTERPARTS: list[Column[Of]] = [
     Column("in play", lambda o: Cell("yes" if o[1].encounter.met else "no")),
     Column("least distance", lambda o: o[1].encounter.distance, unit="m", format=Format(".1f")),
     Column("least gap", lambda o: o[1].pair.min_gap_m, unit="m", format=Format(".1f", absent="-")),
-    Column("least TTC", lambda o: _bounded(o[1].pair.min_ttc_s, ".2f"), unit="s"),
+    Column("least TTC", lambda o: _format_bounded(o[1].pair.min_ttc_s, ".2f"), unit="s"),
     Column("least PET", lambda o: o[1].pair.min_pet_s, unit="s", format=Format(".2f", absent="-")),
     Column(
-        "required deceleration", lambda o: _bounded(o[1].pair.max_required_mps2, ".1f"),
+        "required deceleration", lambda o: _format_bounded(o[1].pair.max_required_mps2, ".1f"),
         unit="m/s²",
     ),
     Column("speed at contact", _speed_of_contact, unit="km/h", format=Format(".0f", absent="-")),

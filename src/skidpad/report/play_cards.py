@@ -92,7 +92,7 @@ def _unit(value: float | None, unit: str) -> str | None:
 def chart(run: PlayRun, log: RunLog) -> Figure:
     """Return speeds, gaps, times to collision and events over time."""
     strips = [_speed(log, EGO, "speed of the ego")]
-    for other in _chosen(run):
+    for other in _choose_counterparts(run):
         strips += _of_other(log, other)
     assert run.folder is not None
     events = list(_events(run.folder / STORY, log.t))
@@ -112,7 +112,7 @@ def chart(run: PlayRun, log: RunLog) -> Figure:
     )
 
 
-def _chosen(run: PlayRun) -> list[Counterpart]:
+def _choose_counterparts(run: PlayRun) -> list[Counterpart]:
     """Return the counterparts that matter: those hit, then partners, then the nearest."""
     order = sorted(
         run.others,

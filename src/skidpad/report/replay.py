@@ -30,17 +30,17 @@ def replay(
     stride = max(round(STEP_S / dt), 1)
     first = max(row - round(before_s / dt) // stride * stride, row % stride)
     rows = np.arange(first, min(row + round(after_s / dt), len(log) - 1) + 1, stride)
-    return _cut(log, road_map, rows, row, np.array([row]))
+    return _cut_log(log, road_map, rows, row, np.array([row]))
 
 
 def replay_run(log: RunLog, road_map: RoadMap, mark: int | None = None) -> dict[str, Any]:
     """A whole run, with `FRAMES` frames at most; mark: the row that is shown first and marked."""
     stride = max(round(STEP_S / log.header.dt), -(-len(log) // FRAMES))
     rows = np.arange(0, len(log), stride)
-    return _cut(log, road_map, rows, mark, rows)
+    return _cut_log(log, road_map, rows, mark, rows)
 
 
-def _cut(
+def _cut_log(
     log: RunLog,
     road_map: RoadMap,
     rows: NDArray[np.int64],

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from skidpad.core.errors import FileError
 from skidpad.core.reading import UNUSABLE, read_arrays, read_bytes, unusable
 from skidpad.core.setup import LanePosition
-from skidpad.core.told import told
+from skidpad.core.told import describe_value
 from skidpad.roads.checked import EXTENT, check_arrays
 from skidpad.roads.lanes import LaneSamples, LaneTable, SignalTable
 from skidpad.roads.roadside import (
@@ -90,7 +90,9 @@ def load_baked(path: Path) -> BakedMap:
     try:
         about = json.loads(str(arrays.pop("about")))
         if about["format"] != FORMAT:
-            raise FileError(f"{where}: baked in format {told(about['format'], 100)}, need {FORMAT}")
+            raise FileError(
+                f"{where}: baked in format {describe_value(about['format'], 100)}, need {FORMAT}"
+            )
         start = about["ego_start"]
         baked = BakedMap(
             name=str(about["name"]),

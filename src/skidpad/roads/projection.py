@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import isfinite, radians
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.told import told
+from skidpad.core.told import describe_value
 
 EARTH_RADIUS = 6_378_137.0  # m, equator of WGS 84, for maps without a projection
 # What places on the ground depend on. Heights (geoid grids, vunits) are the map's own, and files are
@@ -33,10 +33,10 @@ def map_place(projection: str, latitude: float, longitude: float) -> tuple[float
         x, y = Proj(" ".join(words))(longitude, latitude, errcheck=True)
         why = "" if isfinite(x + y) else "there is no such place"
     except ProjError as error:
-        why = told(str(error), 200)
+        why = describe_value(str(error), 200)
     if why:
         raise ConfigError(
             f"latitude {latitude:g}, longitude {longitude:g} cannot be put on the map, whose geoReference "
-            f"is {told(projection, 200)}: {why}"
+            f"is {describe_value(projection, 200)}: {why}"
         )
     return float(x), float(y)

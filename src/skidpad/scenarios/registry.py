@@ -12,7 +12,7 @@ from math import inf, isfinite
 from typing import Any
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.told import told
+from skidpad.core.told import describe_value
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.findings import Finding, Kind
 from skidpad.scenarios.scene import Scene
@@ -108,7 +108,9 @@ def call(name: str, function: Callable[..., Any], *args: Any) -> Any:
     except ConfigError:
         raise
     except Exception as error:
-        raise ConfigError(f"{name!r}, as it is registered, failed: {told(error)}") from error
+        raise ConfigError(
+            f"{name!r}, as it is registered, failed: {describe_value(error)}"
+        ) from error
 
 
 @dataclass(frozen=True, slots=True)
@@ -135,7 +137,9 @@ class ActiveController:
         """Return what it asks for, m/s^2; ConfigError for what is no number."""
         a = call(self.name, self.inner.update, scene, actor)
         if not isinstance(a, (int, float)) or not isfinite(a):
-            raise ConfigError(f"controller {self.name!r} must return m/s^2, got {told(a, 100)}")
+            raise ConfigError(
+                f"controller {self.name!r} must return m/s^2, got {describe_value(a, 100)}"
+            )
         return float(a)
 
 

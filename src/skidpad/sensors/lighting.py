@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.inputs import Beam
-from skidpad.core.lefthanded import mirrored
+from skidpad.core.lefthanded import mirror_value
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import extinction
 
@@ -47,7 +47,7 @@ def lighting(weather: Weather, beam: Beam | None = None) -> Lighting:
     if beam is None:
         beam = Beam.LOW if weather.is_night else Beam.OFF
     altitude = radians(weather.sun_altitude_deg)
-    azimuth = radians(mirrored(weather.sun_azimuth_deg))
+    azimuth = radians(mirror_value(weather.sun_azimuth_deg))
     direction = np.array(
         [cos(altitude) * cos(azimuth), cos(altitude) * sin(azimuth), sin(altitude)]
     )

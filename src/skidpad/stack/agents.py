@@ -22,7 +22,7 @@ from skidpad.core.frames import LidarPoints, SensorFrame
 from skidpad.core.geodesy import geolocation
 from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import (
-    mirrored,
+    mirror_value,
     pose_from_carla,
     pose_to_carla,
     turn_from_carla,
@@ -126,7 +126,7 @@ class AgentStack:
         return VehicleCommand(
             throttle=float(control.throttle),
             brake=float(control.brake),
-            steer=mirrored(float(control.steer)),
+            steer=mirror_value(float(control.steer)),
             handbrake=bool(getattr(control, "hand_brake", False)),
             reverse=bool(getattr(control, "reverse", False)),
         )

@@ -30,7 +30,7 @@ from skidpad.core.specs import (
     SensorSpec,
 )
 from skidpad.core.states import StackReport, VehicleCommand
-from skidpad.core.told import clean, told
+from skidpad.core.told import clean, describe_value
 from skidpad.stack.interface import Stack
 
 if TYPE_CHECKING:  # kernels come with it, and a name that is wrong is said before they load
@@ -99,7 +99,9 @@ def _from_file(path: Path, what: str) -> ModuleType:
     try:
         spec.loader.exec_module(module)
     except FOREIGN as error:
-        raise ConfigError(f"{what} file {str(path)!r} cannot be imported: {told(error)}") from error
+        raise ConfigError(
+            f"{what} file {str(path)!r} cannot be imported: {describe_value(error)}"
+        ) from error
     return module
 
 
@@ -107,7 +109,9 @@ def _from_module(name: str, what: str) -> ModuleType:
     try:
         return import_module(name)
     except FOREIGN as error:  # an import runs foreign code: anything can happen
-        raise ConfigError(f"{what} module {name!r} cannot be imported: {told(error)}") from error
+        raise ConfigError(
+            f"{what} module {name!r} cannot be imported: {describe_value(error)}"
+        ) from error
 
 
 class GuardedStack:
@@ -134,7 +138,7 @@ class GuardedStack:
         except (StackError, ConfigError):
             raise
         except FOREIGN as error:
-            raise StackError(f"{self.name} could not be built: {told(error)}") from error
+            raise StackError(f"{self.name} could not be built: {describe_value(error)}") from error
 
     def tick(self, frame: SensorFrame) -> VehicleCommand:
         """The stack's command, checked."""
@@ -142,7 +146,9 @@ class GuardedStack:
         try:
             command = self._call(self.stack.tick, frame)
         except FOREIGN as error:
-            raise StackError(f"{self.name} raised in tick {frame.tick}: {told(error)}") from error
+            raise StackError(
+                f"{self.name} raised in tick {frame.tick}: {describe_value(error)}"
+            ) from error
         if not isinstance(command, VehicleCommand):
             raise StackError(
                 f"{self.name} must return a VehicleCommand, got {type(command).__name__} "
@@ -168,7 +174,7 @@ class GuardedStack:
             report = self._call(getattr, self.stack, "report", NO_REPORT)
         except FOREIGN as error:
             raise StackError(
-                f"{self.name}.report raised in tick {self._tick}: {told(error)}"
+                f"{self.name}.report raised in tick {self._tick}: {describe_value(error)}"
             ) from error
         if not isinstance(report, StackReport):
             return NO_REPORT
@@ -188,7 +194,7 @@ class GuardedStack:
         try:
             wanted = self._call(_sensors_of, self.stack)
         except FOREIGN as error:
-            raise StackError(f"{self.name}.sensors() raised: {told(error)}") from error
+            raise StackError(f"{self.name}.sensors() raised: {describe_value(error)}") from error
         _check_sensors(self.name, wanted, self._taken)
         return wanted
 
@@ -236,12 +242,12 @@ def _check(name: str, command: VehicleCommand, tick: int) -> None:
         if not _is_number(value) or not isfinite(value) or not low <= value <= 1.0:
             raise StackError(
                 f"{name}: {what} must be between {low:g} and 1, "
-                f"got {told(value, 100)} in tick {tick}"
+                f"got {describe_value(value, 100)} in tick {tick}"
             )
     for what, switch in (("handbrake", command.handbrake), ("reverse", command.reverse)):
         if not isinstance(switch, SWITCHES):
             raise StackError(
-                f"{name}: {what} must be true or false, got {told(switch, 100)} in tick {tick}"
+                f"{name}: {what} must be true or false, got {describe_value(switch, 100)} in tick {tick}"
             )
 
 
@@ -259,7 +265,7 @@ def _check_report(name: str, report: StackReport, tick: int) -> None:
         if not _is_number(value) or (whole and abs(value) > INT_MAX):
             raise StackError(
                 f"{name}: report.{field} must be a number or None, "
-                f"got {told(value, 100)} in tick {tick}"
+                f"got {describe_value(value, 100)} in tick {tick}"
             )
 
 
@@ -267,7 +273,8 @@ def _check_sensors(name: str, wanted: Sequence[SensorSpec], taken: Collection[st
     for k, spec in enumerate(wanted):
         if not isinstance(spec, ASKABLE):
             raise StackError(
-                f"{name}.sensors() must name cameras, lidars, point sensors and eyes, got {told(spec)}"
+                f"{name}.sensors() must name cameras, lidars, point sensors and eyes,"
+                f" got {describe_value(spec)}"
             )
         if spec.id in taken or spec.id in {other.id for other in wanted[:k]}:
             raise StackError(f"{name}.sensors(): there is a sensor {spec.id!r} already")

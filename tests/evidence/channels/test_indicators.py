@@ -230,7 +230,7 @@ def test_well_separated_objects_are_paired_as_by_the_best_assignment():
 def test_as_many_objects_are_paired_as_possible(a, b):
     a, b = a / 200, b / 200
     d = np.hypot(*(a[:, None] - b[None]).transpose(2, 0, 1))
-    nearest_first, pairs = similarity.pair_points(a, b, 4.0), similarity.paired(a, b, 4.0)
+    nearest_first, pairs = similarity.pair_points(a, b, 4.0), similarity.match_points(a, b, 4.0)
     most = maximum_bipartite_matching(csr_matrix(d <= 4.0), perm_type="column")
     assert len(pairs) == (most >= 0).sum() >= len(nearest_first)
     assert len(set(pairs[:, 0])) == len(set(pairs[:, 1])) == len(pairs)
@@ -243,7 +243,7 @@ def test_as_many_objects_are_paired_as_possible(a, b):
 def test_nobody_is_left_out_because_a_neighbour_was_nearer_to_the_middle():
     a, b = np.array([[0.0, 0.0], [3.5, 0.0]]), np.array([[-3.5, 0.0], [0.5, 0.0]])
     assert len(similarity.pair_points(a, b, 4.0)) == 1
-    assert similarity.paired(a, b, 4.0).tolist() == [[1, 1], [0, 0]]
+    assert similarity.match_points(a, b, 4.0).tolist() == [[1, 1], [0, 0]]
 
 
 @pytest.mark.req("C-055", "C-057", "C-058", "C-060")

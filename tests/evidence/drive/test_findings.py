@@ -9,7 +9,14 @@ import numpy as np
 import polars as pl
 import pytest
 
-from skidpad.evidence.contrasts import Amount, Contrast, distinct, paired, paired_runs, per_seed
+from skidpad.evidence.contrasts import (
+    Amount,
+    Contrast,
+    contrast_pairs,
+    distinct,
+    paired_runs,
+    per_seed,
+)
 from skidpad.evidence.drive.findings import FINDINGS
 from skidpad.evidence.rates import RateBelow, rate_below
 from skidpad.evidence.statistics import event_rate
@@ -285,7 +292,7 @@ class Given:
     amounts: tuple[Amount, ...] = ()
 
     def draw(self, table: pl.DataFrame) -> Contrast | None:
-        return paired("d", self.values, self.margin)
+        return contrast_pairs("d", self.values, self.margin)
 
 
 def test_holm_makes_a_claim_harder_in_a_long_report() -> None:

@@ -4,7 +4,13 @@ import numpy as np
 import polars as pl
 import pytest
 
-from skidpad.evidence.grip.study import Pair, changed_outcome, compared, completion, completion_p
+from skidpad.evidence.grip.study import (
+    Pair,
+    changed_outcome,
+    compare_pair,
+    completion,
+    completion_p,
+)
 
 N = 40
 
@@ -55,7 +61,7 @@ def test_losses_and_gains_that_cancel_change_outcomes_but_not_completion():
 @pytest.mark.parametrize("column", ["steer_std", "steer_corrections"])
 def test_harder_control_shows_with_interval_and_effect_size(column):
     scale = 1.0 if column == "steer_std" else 20.0
-    found, nothing = compared(pair(wider=0.004), column), compared(pair(), column)
+    found, nothing = compare_pair(pair(wider=0.004), column), compare_pair(pair(), column)
     assert found is not None
     assert nothing is not None
     assert found.mean == pytest.approx(0.004 * scale, rel=0.1)
@@ -70,6 +76,6 @@ def test_pairing_takes_the_seeds_own_level_out():
     p = pair(wider=0.002)
     unpaired = p.original["steer_std"].std()
     assert unpaired > 0.002  # hidden between seeds
-    found = compared(p, "steer_std")
+    found = compare_pair(p, "steer_std")
     assert found is not None
     assert found.interval.low > 0.001

@@ -46,7 +46,7 @@ def share_above(label: str, hits: pl.Expr, cases: pl.Expr, limit: float | pl.Exp
     return mean_above(label, hits - limit * cases, where=cases > 0.0)
 
 
-def counted(kind: str, *hazards: HazardType) -> pl.Expr:
+def sum_counts(kind: str, *hazards: HazardType) -> pl.Expr:
     """tp, fp or fn of a segment."""
     return sum((pl.col(f"{kind}_{h.value}").cast(pl.Float64) for h in hazards), pl.lit(0.0))
 
@@ -55,7 +55,7 @@ def errors_above(hard: HazardType, easy: HazardType) -> Mean:
     """The share of errors is larger for `hard`: errors less the share of `easy`, per segment."""
     (wrong, cases), (wrong_easy, cases_easy) = (
         (fp + fn, tp + fp + fn)
-        for tp, fp, fn in ([counted(k, h) for k in ("tp", "fp", "fn")] for h in (hard, easy))
+        for tp, fp, fn in ([sum_counts(k, h) for k in ("tp", "fp", "fn")] for h in (hard, easy))
     )
     share = pl.when(cases_easy.sum() > 0.0).then(wrong_easy.sum() / cases_easy.sum())
     return share_above(f"errors, {hard.value} above {easy.value}", wrong, cases, share)
@@ -67,7 +67,7 @@ def violations(*indicators: Indicator) -> pl.Expr:
     return sum(columns, pl.lit(0.0)) / len(indicators)
 
 
-HITS, FALSE, MISSED = (counted(kind, *SCORED_HAZARDS) for kind in ("tp", "fp", "fn"))
+HITS, FALSE, MISSED = (sum_counts(kind, *SCORED_HAZARDS) for kind in ("tp", "fp", "fn"))
 AT_NIGHT = pl.col("night").cast(pl.Boolean)
 LOST_PER_HOUR = pl.col(f"world_{LOCALISATION.value}").cast(pl.Float64) / pl.col("hours")
 DRIVES = "drives with truth (`skidpad channels drive`, then `evaluate`)"
@@ -93,9 +93,9 @@ FINDINGS: tuple[Finding, ...] = (
         f"{DRIVES} in which the rule found a hazard",
         (
             RateBelow(
-                what="the false localisation alarms", events=counted("fp", LOCALISATION).sum(),
+                what="the false localisation alarms", events=sum_counts("fp", LOCALISATION).sum(),
                 limit=FALSE_PER_HOUR, exposure=pl.col("hours").sum(),
-                given=counted("tp", LOCALISATION).sum(),
+                given=sum_counts("tp", LOCALISATION).sum(),
             ),
         ),
         built_in="positions jump by more than the rule's limit or hardly at all",
@@ -111,7 +111,7 @@ FINDINGS: tuple[Finding, ...] = (
         (
             share_above(
                 "explained false alarms less half of them",
-                pl.col("false_tailgating_explained").cast(pl.Float64), counted("fp", TAILGATING),
+                pl.col("false_tailgating_explained").cast(pl.Float64), sum_counts("fp", TAILGATING),
                 0.5,
             ),
         ),

@@ -215,7 +215,7 @@ def _mean(values: Sequence[float | None]) -> float | None:
     return sum(known) / len(known) if known else None
 
 
-def merged(spans: Iterable[Span], pause: float = 2.0) -> list[Span]:
+def merge_spans(spans: Iterable[Span], pause: float = 2.0) -> list[Span]:
     """Spans of one hazard whose pause is under `pause` s, as one (decision C-5)."""
     out: list[Span] = []
     for s in sorted(spans, key=lambda s: (s.hazard.value, s.t_start)):

@@ -40,7 +40,7 @@ def columns(monitor: Monitor) -> list[Column]:
     ]
 
 
-def watched(monitor: Monitor, losses: Losses, seconds: float, n: int) -> Watched:
+def summarise_drive(monitor: Monitor, losses: Losses, seconds: float, n: int) -> Watched:
     """The outcome of a drive of n cycles that has ended."""
     hazards, violations = drive_events(monitor)
     beyond = _count_keys([e.key for e in violations])

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import polars as pl
 
-from skidpad.evidence.contrasts import Claim, Mean, Paired, finished, rows_of
+from skidpad.evidence.contrasts import Claim, Mean, Paired, drop_unfinished, rows_of
 from skidpad.evidence.drive.crash_findings import CRASH_FINDINGS
 from skidpad.evidence.drive.sides import (
     ASSISTED,
@@ -33,7 +33,7 @@ def astray(table: pl.DataFrame) -> str:
     """
     if "off_lanes_pct" not in table.columns:
         return ""
-    known = finished(table).drop_nulls("off_lanes_pct")
+    known = drop_unfinished(table).drop_nulls("off_lanes_pct")
     share = float(known["off_lanes_pct"].mean() or 0.0)  # type: ignore[arg-type]
     if share <= OFF_LANES_MAX_PCT:
         return ""

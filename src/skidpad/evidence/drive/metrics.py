@@ -72,7 +72,7 @@ def summarise(
     if where is None:
         where = np.ones(len(drive.log), dtype=np.bool_)
     here = [c for c in crashes if where[drive.row(c.tick)]]
-    return combined(
+    return combine_metrics(
         _collisions(drive, here, where),
         _severity(drive, here, where),
         _lanes(drive, highway, where),
@@ -85,7 +85,7 @@ def summarise(
     )
 
 
-def combined(*parts: Metrics) -> Metrics:
+def combine_metrics(*parts: Metrics) -> Metrics:
     """One row from partial ones, each of which sets its own columns."""
     names = [f.name for f in fields(Metrics)]
     set_by = {n: getattr(p, n) for p in parts for n in names if getattr(p, n) is not None}

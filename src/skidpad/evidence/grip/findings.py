@@ -44,12 +44,12 @@ def frictions(
     )
 
 
-def raised(where: Rows, column: str, margin: Amount = SHARE) -> Paired:
+def claims_more(where: Rows, column: str, margin: Amount = SHARE) -> Paired:
     """`column` is larger with reduced than with original friction."""
     return Paired(column=column, more=REDUCED, less=ORIGINAL, by=BY, amount=margin, where=where)
 
 
-def kept(scenario: str, *weathers: str) -> Paired:
+def claims_kept(scenario: str, *weathers: str) -> Paired:
     """Friction takes less completion than the margin."""
     return frictions(scene(scenario, *weathers), claim=Claim.HARDLY_MORE)
 
@@ -95,7 +95,7 @@ FINDINGS: tuple[Finding, ...] = (
                 value=1.0 - pl.col("completion").cast(pl.Float64) - CERTAIN,
                 where=(scene(LEAD, "icy_70", "icy_100").are & REDUCED.are), by=BY,
             ),
-            kept(LEAD, "icy_10", "icy_30"),
+            claims_kept(LEAD, "icy_10", "icy_30"),
         ),
     ),
     Finding(
@@ -118,8 +118,8 @@ FINDINGS: tuple[Finding, ...] = (
         "completion gained; runs in which the other vehicle loses control",
         "cut-in in icy_70 or icy_100",
         (
-            raised(scene(CUT_IN, "icy_70", "icy_100"), "completion"),
-            raised(scene(CUT_IN, "icy_70", "icy_100"), "loss_of_control_npc"),
+            claims_more(scene(CUT_IN, "icy_70", "icy_100"), "completion"),
+            claims_more(scene(CUT_IN, "icy_70", "icy_100"), "loss_of_control_npc"),
         ),
     ),
     Finding(
@@ -135,7 +135,7 @@ FINDINGS: tuple[Finding, ...] = (
     Finding(
         "BF-07", "Rain hurts only the front accident.", "completion lost in rain, by scenario",
         "all scenarios in rain",
-        (frictions(scene(FRONT, *RAIN)), kept(CUT_IN, *RAIN), kept(LEAD, *RAIN)),
+        (frictions(scene(FRONT, *RAIN)), claims_kept(CUT_IN, *RAIN), claims_kept(LEAD, *RAIN)),
     ),
     Finding(
         "BF-09", "With less grip the same events happen later by a constant shift.",
@@ -160,12 +160,12 @@ FINDINGS: tuple[Finding, ...] = (
     Finding(
         "BF-11", "With reduced friction steering spreads wider.",
         "deviation of the steering command", "front accident at icy_100 and rain_100",
-        (raised(scene(FRONT, "icy_100", "rain_100"), "steer_std", STEER),),
+        (claims_more(scene(FRONT, "icy_100", "rain_100"), "steer_std", STEER),),
     ),
     Finding(
         "BF-12", "In the cut-in on ice the other vehicle spins out.",
         "runs in which another vehicle loses control", "cut-in in icy_30, icy_70 or icy_100",
-        (raised(scene(CUT_IN, "icy_30", "icy_70", "icy_100"), "loss_of_control_npc"),),
+        (claims_more(scene(CUT_IN, "icy_30", "icy_70", "icy_100"), "loss_of_control_npc"),),
     ),
     Finding(
         "BF-13", "Nothing changes at ratio 1.", "change of completion at rain_0 and icy_0",

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.geometry import kmh_from_mps
-from skidpad.core.lefthanded import mirrored
+from skidpad.core.lefthanded import mirror_value
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import ActorKind, Outcome
 from skidpad.recording.grip import GripMetrics
@@ -54,7 +54,7 @@ def grip_series(log: RunLog) -> NDArray[np.float32]:
     out = np.zeros((len(log), 9), dtype=np.float32)
     out[:, 0], out[:, 1], out[:, 2] = a.y[:, EGO], a.x[:, EGO], log.v_ego
     out[:, 3] = centre_distance(log)
-    out[:, 4] = mirrored(1.0) * log.requested.steer
+    out[:, 4] = mirror_value(1.0) * log.requested.steer
     out[:, 5], out[:, 6] = log.requested.brake > 0.0, log.requested.throttle
     if a.x.shape[1] > 1:
         out[:, 7], out[:, 8] = a.y[:, 1], a.x[:, 1]

@@ -127,7 +127,7 @@ def mean_interval(values: pl.Series) -> tuple[float, Interval | None] | None:
     return float(known.mean()), mean_limits(known)
 
 
-def compared(pair: Pair, column: str) -> Comparison | None:
+def compare_pair(pair: Pair, column: str) -> Comparison | None:
     """Reduced minus original, paired by seed."""
     both = pair.common.drop_nulls([column, f"{column}_reduced"])
     difference = both[f"{column}_reduced"].cast(pl.Float64) - both[column].cast(pl.Float64)

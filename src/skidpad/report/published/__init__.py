@@ -38,7 +38,7 @@ KINDS = {"Clear Sky": "clear", "Heavy Rain": "rain"}
 COLUMNS = {"collisions": "fatal_collisions", "speed_kmh": "mean_speed_kmh"}
 
 
-def published(source: Source) -> pl.DataFrame:
+def read_published(source: Source) -> pl.DataFrame:
     """A table as copied."""
     text = (files(__name__) / f"{source.value}.csv").read_bytes()
     return pl.read_csv(text, infer_schema_length=None)
@@ -47,14 +47,16 @@ def published(source: Source) -> pl.DataFrame:
 @cache
 def published_rows(source: Source, *keys: str) -> dict[Any, dict[str, Any]]:
     """Rows of a table by the values of these columns: a tuple, or one value for one column."""
-    rows = published(source).to_dicts()
+    rows = read_published(source).to_dicts()
     return {tuple(r[k] for k in keys) if len(keys) > 1 else r[keys[0]]: r for r in rows}
 
 
 def published_matrix() -> pl.DataFrame:
     """The 30 cells with the column names of results.parquet; null where nothing was published."""
-    cells = _cells(published(Source.MATRIX)).drop("config_features", "source")
-    speeds = published(Source.SPEEDS).filter(pl.col("source").is_in(["Table 15", "section 6.1.1"]))
+    cells = _cells(read_published(Source.MATRIX)).drop("config_features", "source")
+    speeds = read_published(Source.SPEEDS).filter(
+        pl.col("source").is_in(["Table 15", "section 6.1.1"])
+    )
     speeds = _cells(speeds).select("config", "weather", "mean_speed_kmh")
     return cells.join(speeds, on=["config", "weather"], how="left").sort("config", "weather")
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.core.lefthanded import mirrored
+from skidpad.core.lefthanded import mirror_value
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import ActorStates, VehicleCommand
 from skidpad.roads.queries import RoadMap
@@ -48,7 +48,7 @@ class ActorSet:
         """Pedals and steer of a vehicle."""
         control = self._carla.VehicleControl(
             throttle=c.throttle,
-            steer=mirrored(c.steer),
+            steer=mirror_value(c.steer),
             brake=c.brake,
             hand_brake=c.handbrake,
             reverse=c.reverse,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from skidpad.core.geometry import Pose, wrap_angle
-from skidpad.core.lefthanded import mirrored, turn_from_carla
+from skidpad.core.lefthanded import mirror_value, turn_from_carla
 from skidpad.core.states import ActorStates, Floats, VehicleCommand
 from skidpad.simulation.carla.actor_rows import ActorRow
 from skidpad.simulation.carla.axes import from_transform, from_vector
@@ -55,7 +55,7 @@ def read_commands(players: Sequence[ActorRow], ego: VehicleCommand, out: Floats)
         if i == EGO or player.actor is None or not player.is_vehicle:
             continue
         c = player.actor.get_control()
-        out[i] = (c.throttle, c.brake, mirrored(c.steer), c.hand_brake, c.reverse)
+        out[i] = (c.throttle, c.brake, mirror_value(c.steer), c.hand_brake, c.reverse)
     out[EGO] = (ego.throttle, ego.brake, ego.steer, ego.handbrake, ego.reverse)
 
 

@@ -12,7 +12,7 @@ from typing import Any
 from skidpad.core.errors import BackendError
 from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import (
-    mirrored,
+    mirror_value,
     pose_from_carla,
     pose_to_carla,
     turn_from_carla,
@@ -93,7 +93,7 @@ def iso_torque(value: Any, field: str) -> Vector:
 
 def iso_steer(steer: float) -> float:
     """A steer command or angle, right positive, as ISO; and back."""
-    return mirrored(steer)
+    return mirror_value(steer)
 
 
 def iso_to_wire(v: Vector) -> Vector:
@@ -103,7 +103,7 @@ def iso_to_wire(v: Vector) -> Vector:
 
 def yaw_to_wire(yaw: float) -> float:
     """A yaw in rad as CARLA's degrees."""
-    return mirrored(degrees(yaw))
+    return mirror_value(degrees(yaw))
 
 
 def pose(value: Any, field: str) -> Pose:

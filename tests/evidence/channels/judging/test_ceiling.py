@@ -7,7 +7,7 @@ import pytest
 
 from channel_worlds import Eyes, World, drive
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.judging.ceiling import NAME, ceiling, smoothed
+from skidpad.evidence.channels.judging.ceiling import NAME, ceiling, smooth_states
 from skidpad.evidence.channels.judging.segments import TOLD, judge
 from skidpad.evidence.channels.matching import tally
 from skidpad.recording.cycles import cycles
@@ -63,14 +63,14 @@ def test_no_truth_no_ceiling():
 def test_a_line_is_smoothed_to_itself_and_noise_shrinks():
     t = np.arange(60) * 0.1
     line = np.column_stack([3.0 + 2.0 * t, 1.0 - t, 0.3 + 0.0 * t, 2.0 + 0.0 * t, -1.0 + 0.0 * t])
-    assert smoothed(t, line) == pytest.approx(line)
+    assert smooth_states(t, line) == pytest.approx(line)
     rng = np.random.default_rng(1)
     noisy = line.copy()
     noisy[:, :2] += rng.normal(0.0, 0.3, (60, 2))
     noisy[20:24] = np.nan  # four cycles without it
-    out = smoothed(t, noisy)
+    out = smooth_states(t, noisy)
     assert np.isfinite(out[10:50]).all()
     assert np.abs(out[10:50, :2] - line[10:50, :2]).std() < 0.12
     lone = np.full((60, 5), np.nan)
     lone[30] = line[30]
-    assert np.isnan(smoothed(t, lone)).all()
+    assert np.isnan(smooth_states(t, lone)).all()

@@ -29,7 +29,7 @@ from skidpad.evidence.channels.matching import (
     Tally,
     macro,
     match,
-    merged,
+    merge_spans,
     micro,
     percent,
     score,
@@ -346,7 +346,7 @@ def test_lead_time_is_positive_when_the_rule_was_first():
 @pytest.mark.req("C-140")
 def test_spans_with_short_pauses_are_one():
     rows = [Span(TAILGATED, 0, 1), Span(TAILGATED, 2.9, 4), Span(TAILGATED, 6.0, 7)]
-    assert [(s.t_start, s.t_end) for s in merged(rows)] == [(0, 4), (6.0, 7)]
+    assert [(s.t_start, s.t_end) for s in merge_spans(rows)] == [(0, 4), (6.0, 7)]
 
 
 @pytest.mark.req("C-211", "C-213", "C-215")

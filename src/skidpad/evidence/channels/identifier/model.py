@@ -145,7 +145,7 @@ def model_bytes(model: Model) -> bytes:
                     "confirm": detector.confirm,
                 }
             )
-            own = placed(detector.forest, _places_in(model.features))
+            own = place_features(detector.forest, _places_in(model.features))
             for name, array in own._asdict().items():
                 arrays[f"{number}_{name}"] = array
     routes = sorted({f"{t}/{r}" for t, r in model.detectors})
@@ -161,7 +161,7 @@ def model_bytes(model: Model) -> bytes:
     return buffer.getvalue()
 
 
-def placed(forest: Forest, places: NDArray[np.int64]) -> Forest:
+def place_features(forest: Forest, places: NDArray[np.int64]) -> Forest:
     """The forest with its features counted elsewhere: feature i is at places[i]."""
     inner = forest.feature >= 0
     feature = np.where(inner, places[np.maximum(forest.feature, 0)], forest.feature)
@@ -206,7 +206,7 @@ def _model(arrays: dict[str, Any]) -> Model:
         )
         key = str(entry["truth"]), str(entry["without_route"])
         detectors[key][HazardType(entry["hazard"])] = Detector(
-            placed(check_forest(forest, len(places)), places),
+            place_features(check_forest(forest, len(places)), places),
             float(entry["limit"]),
             int(entry["confirm"]),
         )

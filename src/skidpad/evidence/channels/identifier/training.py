@@ -20,7 +20,7 @@ from skidpad.evidence.channels.identifier.model import (
     Detector,
     Model,
     events_of,
-    placed,
+    place_features,
     probability_of,
 )
 from skidpad.evidence.channels.matching import Span, tally
@@ -148,7 +148,7 @@ def _fit_trees(drives: Sequence[TrainingDrive], truth: str, hazard: HazardType) 
     x[:, np.isnan(x).all(axis=0)] = 0.0  # never evaluated: nothing to split by
     with threadpool_limits(1):  # the same sums on every machine
         machine.fit(x, y, sample_weight=np.concatenate(weights))
-    return placed(forest_of(machine), _PLACES)
+    return place_features(forest_of(machine), _PLACES)
 
 
 def forest_of(machine: Any) -> Forest:

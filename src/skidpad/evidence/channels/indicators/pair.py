@@ -57,7 +57,7 @@ class PairIndicators:
 
     def similarity(self, a: ChannelFrame, b: ChannelFrame) -> Values:
         """Agreement of ego poses and of objects now; pairs the objects for `prediction` too."""
-        self.matched = similarity.paired(a.objects, b.objects, self.settings.pairing_distance)
+        self.matched = similarity.match_points(a.objects, b.objects, self.settings.pairing_distance)
         location, orientation, area = similarity.object_similarity(
             a.objects, self.a.areas, b.objects, self.b.areas, self.matched
         )

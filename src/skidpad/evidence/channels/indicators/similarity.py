@@ -91,7 +91,7 @@ def pair_points(a: Floats, b: Floats, max_distance: float) -> Counts:
     return pairs[:k]
 
 
-def paired(a: Floats, b: Floats, max_distance: float) -> Counts:
+def match_points(a: Floats, b: Floats, max_distance: float) -> Counts:
     """`pair_points`, or the best assignment where taking the nearest first leaves a pair out."""
     pairs: Counts = pair_points(a, b, max_distance)
     if len(pairs) == min(len(a), len(b)):

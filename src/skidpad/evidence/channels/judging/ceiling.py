@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import Cycle, TruthFrame
 from skidpad.evidence.channels.judging.truth.marks import World, offsets
-from skidpad.evidence.channels.judging.truth.marks import merged as hazards_of
+from skidpad.evidence.channels.judging.truth.marks import merge_marks as hazards_of
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
-from skidpad.evidence.channels.matching import Span, merged
+from skidpad.evidence.channels.matching import Span, merge_spans
 
 Floats = NDArray[np.float64]
 NEAR = 3.0  # m between an object and the actor that it is
@@ -49,7 +49,7 @@ def ceiling(cycles: Sequence[Cycle], channels: Sequence[str]) -> tuple[Span, ...
         for mark in offsets(_offset(known, a, b), f"{channels[a]}+{channels[b]}")
     ]
     found += [Span(h.hazard, h.t_start, h.t_end) for h in hazards_of(marks, World.SIM)]
-    return tuple(sorted(merged(found), key=lambda s: s.t_start))
+    return tuple(sorted(merge_spans(found), key=lambda s: s.t_start))
 
 
 def _offset(cycles: Sequence[Cycle], a: int, b: int) -> Floats:
@@ -72,10 +72,10 @@ def _smoothed_egos(cycles: Sequence[Cycle], c: int) -> Floats:
     rows = [f.ego if (f := k.frames[c]) is not None else np.full(5, np.nan) for k in cycles]
     raw = np.array(rows).reshape(-1, 5)
     t = np.array([k.t for k in cycles])
-    return smoothed(t, raw)
+    return smooth_states(t, raw)
 
 
-def smoothed(t: Floats, states: Floats) -> Floats:
+def smooth_states(t: Floats, states: Floats) -> Floats:
     """States (k, 5) by straight lines through 1 s before and after; NaN where too little is known.
 
     Velocity is the line's slope; the heading stays as it was said.
@@ -103,7 +103,7 @@ def _perceived_truth(cycles: Sequence[Cycle], c: int, egos: Floats) -> list[Trut
     """What the channel knows of the true actors, in the form of the truth."""
     t = np.array([k.t for k in cycles])
     tracks = _tracks(cycles, c)
-    states = {actor: smoothed(t, raw) for actor, raw in tracks.items()}
+    states = {actor: smooth_states(t, raw) for actor, raw in tracks.items()}
     out: list[TruthFrame | None] = []
     for k, cycle in enumerate(cycles):
         truth = cycle.truth

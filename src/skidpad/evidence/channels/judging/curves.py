@@ -69,7 +69,7 @@ class Swept(NamedTuple):
     points: tuple[Point, ...]
 
 
-def swept(
+def sweep_counts(
     sweeps: Mapping[str, Mapping[HazardType, Sweep]], truths: Mapping[str, Sequence[Span]]
 ) -> Iterator[Swept]:
     """The curves of all identifiers against all truths."""

@@ -7,7 +7,7 @@ from dataclasses import replace
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.identifier.model import Model, probability_of
 from skidpad.evidence.channels.judging.causes import NO_RULE, mistakes
-from skidpad.evidence.channels.judging.curves import Sweep, of_learned, spans, swept
+from skidpad.evidence.channels.judging.curves import Sweep, of_learned, spans, sweep_counts
 from skidpad.evidence.channels.judging.segments import Segment, evaluated_from
 from skidpad.evidence.channels.matching import Span
 
@@ -42,6 +42,6 @@ def with_model(segment: Segment, model: Model) -> Segment:
     return replace(
         segment,
         detected={**segment.detected, **found},
-        points=(*segment.points, *swept(sweeps, segment.truths)),
+        points=(*segment.points, *sweep_counts(sweeps, segment.truths)),
         mistakes=(*segment.mistakes, *made),
     )

@@ -39,7 +39,7 @@ from skidpad.evidence.channels.judging.curves import (
     look,
     of_distances,
     of_rules,
-    swept,
+    sweep_counts,
     told_the_grip,
     with_limit,
 )
@@ -48,7 +48,7 @@ from skidpad.evidence.channels.judging.truth.marks import TrueHazard
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
 from skidpad.evidence.channels.judging.truth.worldmodel import world_model_truth
 from skidpad.evidence.channels.judging.weights import Weights, weights_from
-from skidpad.evidence.channels.matching import Span, match, merged
+from skidpad.evidence.channels.matching import Span, match, merge_spans
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.evidence.channels.timefilter import TimeFilter
 from skidpad.evidence.channels.timing import Stopwatch
@@ -132,7 +132,7 @@ def judge(
         detected[TOLD] = _in_order([*_places(detected[Profile.TRACKED.value]), *told])
         detected[CEILING] = tuple(s for s in ceiling(cycles, channels) if s.t_end >= begin)
     if marked := tuple(labels):
-        found["labels"] = tuple(merged(marked))
+        found["labels"] = tuple(merge_spans(marked))
     duration = cycles[-1].t - begin if cycles else 0.0
     motion = moments(cycles, [values[Signal.SAFETY_SCORE] for _, values in seen.signals])
     why = partial(_why_missed, signals=seen.signals)
@@ -145,7 +145,7 @@ def judge(
         candidates=candidates,
         unseen=unseen,
         curve={f: _apply_scaled(t, table, curve, f, begin) for f in CURVE_FACTORS if curve},
-        points=tuple(swept(sweeps, found)),
+        points=tuple(sweep_counts(sweeps, found)),
         mistakes=tuple(mistakes(detected, found, t, motion, why)),
         facts=seen.facts | {"unseen": float(unseen), "unseen_found": float(unseen_found)},
         context=dict(context or {}),

@@ -83,7 +83,7 @@ def lasting(marks: list[Mark], duration: float) -> list[Mark]:
     return kept
 
 
-def merged(marks: list[Mark], world: World) -> list[TrueHazard]:
+def merge_marks(marks: list[Mark], world: World) -> list[TrueHazard]:
     """Marks of one hazard whose pause is under 2 s, as one (C-140, C-141)."""
     out: list[TrueHazard] = []
     for hazard in HazardType:

@@ -17,7 +17,7 @@ from skidpad.evidence.channels.judging.truth.marks import (
     TrueHazard,
     World,
     lasting,
-    merged,
+    merge_marks,
     offsets,
 )
 
@@ -47,7 +47,7 @@ def simulator_truth(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[Tr
             marks.extend(_tail_marks(k, cycle.t, truth, path, cycle.frames))
     marks = lasting(marks, MIN_DURATION)
     marks.extend(_position_errors(known, channels))
-    return merged(marks, World.SIM)
+    return merge_marks(marks, World.SIM)
 
 
 class _DrivenPath:

@@ -22,7 +22,7 @@ from skidpad.evidence.channels.judging.truth.marks import (
     TrueHazard,
     World,
     lasting,
-    merged,
+    merge_marks,
 )
 
 Floats = NDArray[np.float64]
@@ -46,7 +46,7 @@ def world_model_truth(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[
                 if len(frame.plan) >= 2:
                     marks.extend(_sweeps(cycle, frame, trail, channels))
         marks.extend(_apart(cycle, channels))
-    return merged(lasting(marks, PERSISTENCE), World.CHANNELS)
+    return merge_marks(lasting(marks, PERSISTENCE), World.CHANNELS)
 
 
 def _apart(cycle: Cycle, channels: Sequence[str]) -> list[Mark]:

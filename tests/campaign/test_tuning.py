@@ -7,7 +7,7 @@ from skidpad.campaign.cells import FIRST_SEED
 from skidpad.campaign.tuning import RECIPE, SEEDS, Candidate, candidates, summary, trials
 from skidpad.campaign.worker import Finished
 from skidpad.recording.results import read_results
-from skidpad.scenarios.shipped import NAMES, shipped
+from skidpad.scenarios.shipped import NAMES, find_shipped
 from skidpad.scenarios.variation import CUT_IN, CutIn, variant_parameters
 
 FEW = SEEDS[:3]
@@ -26,7 +26,7 @@ def test_no_report_can_reach_a_tuning_seed():
 @pytest.mark.req("X-8", "B-074")
 @pytest.mark.parametrize("name", NAMES)
 def test_what_ships_is_one_of_the_candidates(name):
-    nominal = dict(shipped(name).parameters)
+    nominal = dict(find_shipped(name).parameters)
     if name == CUT_IN:
         nominal |= variant_parameters(CutIn.FIXED)
     near = [

@@ -14,7 +14,7 @@ from programs import require_program
 pytest.importorskip("aiomqtt", reason="aiomqtt, for mosquitto, is not installed")
 from skidpad.cli.fleet_links import broker_of
 from skidpad.core.errors import BackendError, ConfigError
-from skidpad.fleet.broker import ANSWERS, TOPIC, Broker, connected, request_properties
+from skidpad.fleet.broker import ANSWERS, TOPIC, Broker, connect_to, request_properties
 from skidpad.fleet.mqtt import BatchListener
 from skidpad.fleet.spool import Spool
 from skidpad.fleet.uploader import mqtt_poster, send
@@ -83,7 +83,7 @@ def test_the_fleet_answers_to_vehicles_and_publishes_nowhere_else(listening, bro
     where = f"{ANSWERS}/{'0' * 32}"
 
     async def heard() -> list[str]:
-        async with connected(broker, WAIT_S, waiting=8) as client:
+        async with connect_to(broker, WAIT_S, waiting=8) as client:
             await client.subscribe("skidpad/#", qos=1)
             for target in ("skidpad/red/alerts", f"{ANSWERS}/x", where):
                 about = request_properties(target, {"key": "key-0000-1"})

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skidpad.core.errors import ConfigError
-from skidpad.fleet.loop.plan import Decision, Plan, chosen, look
+from skidpad.fleet.loop.plan import Decision, Plan, choose_vehicles, look
 
 PLAN = Plan(stages=(0.2, 1.0), least_drives=10, looks=3, margin=0.5)
 
@@ -56,10 +56,10 @@ def test_a_plan_that_could_never_decide_is_refused():
 def test_stages_hold_the_earlier_ones_and_releases_choose_anew():
     vehicles = [f"{k:032x}" for k in range(4000)]
     for share in (0.1, 0.5):
-        on = chosen("a", vehicles, share)
+        on = choose_vehicles("a", vehicles, share)
         assert abs(len(on) / 4000 - share) < 0.04  # fixed hashes, no chance
-        assert on <= chosen("a", vehicles, 0.6)
-        assert on != chosen("b", vehicles, share)
-    assert chosen("a", vehicles, 1.0) == set(vehicles)
-    assert len(chosen("a", vehicles[:3], 1e-9)) == 1
-    assert chosen("a", [], 0.5) == set()
+        assert on <= choose_vehicles("a", vehicles, 0.6)
+        assert on != choose_vehicles("b", vehicles, share)
+    assert choose_vehicles("a", vehicles, 1.0) == set(vehicles)
+    assert len(choose_vehicles("a", vehicles[:3], 1e-9)) == 1
+    assert choose_vehicles("a", [], 0.5) == set()

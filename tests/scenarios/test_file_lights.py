@@ -15,7 +15,7 @@ from skidpad.recording.logfiles import read_log
 from skidpad.recording.runlog import RunLog
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import LanePoint
-from skidpad.scenarios.signals import shown
+from skidpad.scenarios.signals import read_signal_state
 
 TOWN = '<LogicFile filepath="town.xodr"/>'
 LIGHT, BEFORE = 1001, 60.0  # signal of a crossing; m
@@ -99,4 +99,4 @@ def test_a_condition_sees_the_roads_own_light(tmp_path):
     ],
 )  # fmt: skip
 def test_a_state_is_a_colour_three_lamps_or_a_word(state, seen):
-    assert shown(state) is seen
+    assert read_signal_state(state) is seen

@@ -29,7 +29,7 @@ from skidpad.core.told import describe_value
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.physics.grip import statistical_ratio
 from skidpad.physics.presets import preset
-from skidpad.scenarios.shipped import shipped
+from skidpad.scenarios.shipped import find_shipped
 from skidpad.scenarios.variation import drawn_parameters, drawn_skill
 from skidpad.stack.settings import settings_of
 
@@ -90,7 +90,7 @@ def start_of_text(text: str) -> Start:
     if text == CHALLENGE:
         return Start(CHALLENGE, CHALLENGE_V, CHALLENGE_S - HALVES)
     headway = number("--headways", text, HEADWAY_RANGE, f" or {CHALLENGE}")
-    v = shipped(LEAD).parameters["EgoSpeed"]
+    v = find_shipped(LEAD).parameters["EgoSpeed"]
     return Start(f"{headway:g}s", v, headway * v)
 
 

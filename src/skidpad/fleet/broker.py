@@ -41,7 +41,7 @@ def library() -> ModuleType:
     return aiomqtt
 
 
-def connected(
+def connect_to(
     broker: Broker, timeout_s: float, largest: int = ANSWER_MAX, waiting: int = 1
 ) -> AbstractAsyncContextManager[Any]:
     """A connection as MQTT 5.

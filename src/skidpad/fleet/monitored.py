@@ -75,14 +75,14 @@ def hazard_batches(folder: Path) -> Iterator[bytes]:
     batch: list[bytes] = []
     for record in rest.split(b"\nZ\n")[:-1]:
         if batch and (len(batch) == RECORDS or sum(map(len, batch)) + len(record) > BYTES):
-            yield _joined(batch)
+            yield _join_batch(batch)
             batch = []
         batch.append(record + b"\nZ\n")
     if batch:
-        yield _joined(batch)
+        yield _join_batch(batch)
 
 
-def _joined(batch: list[bytes]) -> bytes:
+def _join_batch(batch: list[bytes]) -> bytes:
     return HEADER.encode() + b"\n" + b"".join(batch)
 
 

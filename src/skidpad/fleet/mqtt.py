@@ -18,8 +18,8 @@ from typing import Any
 
 from skidpad.core.errors import SkidpadError
 from skidpad.fleet.api.guard import Guard
-from skidpad.fleet.broker import ANSWERS, TOPIC, Broker, connected, library, properties
-from skidpad.fleet.checking import DRIVE, KEY, TIME_MAX, Told, checked
+from skidpad.fleet.broker import ANSWERS, TOPIC, Broker, connect_to, library, properties
+from skidpad.fleet.checking import DRIVE, KEY, TIME_MAX, Told, check_batch
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.intake import plain
 from skidpad.fleet.words import Action, Kind, Refused
@@ -67,7 +67,7 @@ class BatchListener:
         failures = (library().MqttError, OSError, TimeoutError)
         while True:
             try:
-                async with connected(
+                async with connect_to(
                     self.broker, self.timeout_s, self.fleet.limits.body + ROOM, WAITING
                 ) as client:
                     await client.subscribe(f"{TOPIC}/+", qos=1)
@@ -108,8 +108,8 @@ class BatchListener:
                 raise Refused(403, f"the role {who.role.value} may not {Action.REPORT.value}")
             if len(message.payload) > self.fleet.limits.body:
                 raise Refused(413, f"a body may have {self.fleet.limits.body} bytes")
-            about = _told(str(message.topic), told)
-            batch = await asyncio.to_thread(checked, self.fleet, who, about, message.payload)
+            about = _read_properties(str(message.topic), told)
+            batch = await asyncio.to_thread(check_batch, self.fleet, who, about, message.payload)
             return 200, plain(await asyncio.wrap_future(self.fleet.intake.submit(batch)))
         except Refused as error:
             return error.status, {"detail": str(error)}
@@ -120,7 +120,7 @@ class BatchListener:
             return 500, {"detail": "the fleet failed; try again"}
 
 
-def _told(topic: str, told: dict[str, str]) -> Told:
+def _read_properties(topic: str, told: dict[str, str]) -> Told:
     """What stands beside the body; Refused (422) when it is not what it must be."""
     kind, key, drive = topic.rpartition("/")[2], told.get("key", ""), told.get("drive", "")
     if kind not in {k.value for k in Kind}:

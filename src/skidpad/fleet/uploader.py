@@ -12,7 +12,7 @@ from typing import Any
 import httpx
 
 from skidpad.core.errors import BackendError
-from skidpad.fleet.broker import ANSWERS, TOPIC, Broker, connected, library, request_properties
+from skidpad.fleet.broker import ANSWERS, TOPIC, Broker, connect_to, library, request_properties
 from skidpad.fleet.identity import new_id
 from skidpad.fleet.spool import Spool, Waiting
 
@@ -77,7 +77,7 @@ async def _through(
     broker: Broker, batch: Waiting, told: dict[str, str], timeout_s: float
 ) -> dict[str, Any]:
     where = f"{ANSWERS}/{new_id()}"
-    async with connected(broker, timeout_s) as client:
+    async with connect_to(broker, timeout_s) as client:
         await client.subscribe(where, qos=1)
         about = request_properties(where, told)
         topic = f"{TOPIC}/{batch.kind.value}"

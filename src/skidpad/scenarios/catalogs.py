@@ -8,7 +8,7 @@ from pathlib import Path
 from skidpad.core.errors import FileError
 from skidpad.scenarios.document import Node, parse
 from skidpad.scenarios.findings import Finding, Kind
-from skidpad.scenarios.parameters import assignments, declared, inner
+from skidpad.scenarios.parameters import assignments, inner, read_declarations
 from skidpad.scenarios.schema import violations
 
 DEPTH_MAX = 8  # references from entry to entry
@@ -75,7 +75,7 @@ class Catalogs:
         if found is None:
             raise reference.error(f"catalog {catalog!r} has no entry {name!r}")
         given = assignments(reference)
-        values = declared(found, reference.values, given)
+        values = read_declarations(found, reference.values, given)
         return found.scoped(values | given)
 
     def resolved(self, node: Node, kind: str | None = None) -> Node:
@@ -99,7 +99,7 @@ def _catalog(folder: Path, name: str) -> Node | None:
     files = sorted(folder.glob("*.xosc"), key=lambda p: (p.stem != name, p.name))
     for file in files:
         try:
-            root = _parsed(file, file.stat().st_mtime_ns)
+            root = _parse_catalog(file, file.stat().st_mtime_ns)
         except FileError:
             continue  # another catalog's file; if it is the wanted one, the reference says so
         body = root.find("Catalog")
@@ -109,5 +109,5 @@ def _catalog(folder: Path, name: str) -> Node | None:
 
 
 @lru_cache(maxsize=256)
-def _parsed(file: Path, changed: int) -> Node:  # noqa: ARG001  part of the key
+def _parse_catalog(file: Path, changed: int) -> Node:  # noqa: ARG001  part of the key
     return parse(file)

@@ -40,11 +40,11 @@ def choices(file: Path) -> list[Choice]:
     if not scenario.is_file():
         raise node.child("ScenarioFile").error("there is no such file")
     drawn = node.find("Stochastic")
-    values = _combined(node.child("Deterministic")) if drawn is None else _draws(drawn)
+    values = _combine_parameters(node.child("Deterministic")) if drawn is None else _draws(drawn)
     return [Choice(scenario.resolve(), found) for found in values]
 
 
-def _combined(node: Node) -> list[dict[str, str]]:
+def _combine_parameters(node: Node) -> list[dict[str, str]]:
     factors: list[list[dict[str, str]]] = []
     for one in node.children("DeterministicSingleParameterDistribution"):
         name = one.plain("parameterName")
@@ -103,7 +103,7 @@ def _draws(node: Node) -> Iterator[dict[str, str]]:
 def _draw(node: Node) -> Draw:
     if node.tag == "ProbabilityDistributionSet":
         elements = list(node.children("Element"))
-        return _weighted(
+        return _draw_weighted(
             [e.text("value") for e in elements], [e.number("weight") for e in elements]
         )
     low, high = _range(node)
@@ -123,13 +123,13 @@ def _draw(node: Node) -> Draw:
         return _within(node, low, high, lambda rng: float(rng.poisson(mean)))
     if node.tag == "Histogram":
         bins = list(node.children("HistogramBin"))
-        which = _weighted(list(range(len(bins))), [b.number("weight") for b in bins])
+        which = _draw_weighted(list(range(len(bins))), [b.number("weight") for b in bins])
         edges = [_range(b) for b in bins]
         return lambda rng: float(rng.uniform(*edges[int(which(rng))]))
     raise node.unsupported()
 
 
-def _weighted(values: Sequence[str] | Sequence[int], weights: Sequence[float]) -> Draw:
+def _draw_weighted(values: Sequence[str] | Sequence[int], weights: Sequence[float]) -> Draw:
     shares = np.array(weights) / sum(weights)
     return lambda rng: values[int(rng.choice(len(values), p=shares))]
 

@@ -121,7 +121,7 @@ def compile_entities(root: Node, catalogs: Catalogs) -> Entities:
     for one in node.children("ScenarioObject"):
         try:
             findings += _controllers(one, catalogs)
-            entity = described(one, one.text("name"), catalogs)
+            entity = compile_entity_object(one, one.text("name"), catalogs)
             if entity.name in found:
                 raise one.error(f"there are two entities {entity.name!r}")
             found[entity.name] = entity
@@ -147,7 +147,7 @@ def _inner_trailers(node: Node, tractor: Entity, catalogs: Catalogs) -> Iterator
         inner = None if body is None else catalogs.resolved(body).find("Trailer", "Trailer")
         if inner is None:
             return
-        tractor = described(inner, tractor.coupling.trailer, catalogs)
+        tractor = compile_entity_object(inner, tractor.coupling.trailer, catalogs)
         yield tractor
         node = inner
 
@@ -177,7 +177,7 @@ def _members(node: Node, known: Mapping[str, Entity]) -> Iterator[str]:
     yield from (name for name, entity in known.items() if entity.body in kinds)
 
 
-def described(node: Node, name: str, catalogs: Catalogs) -> Entity:
+def compile_entity_object(node: Node, name: str, catalogs: Catalogs) -> Entity:
     """The vehicle, pedestrian or object inside an element, or that it refers to."""
     found = next((n for n in node.children() if n.tag != "ObjectController"), None)
     if found is None:

@@ -179,13 +179,13 @@ def clothoid(
     count = min(max(int(length / STEP), 4), STEPS_MAX)
     s = np.linspace(0.0, length, count + 1)
     heading = start.yaw + s * (curvature + 0.5 * rate * s)
-    x, y = _integrated(start.x, np.cos(heading), s), _integrated(start.y, np.sin(heading), s)
+    x, y = _integrate(start.x, np.cos(heading), s), _integrate(start.y, np.sin(heading), s)
     t = [None] * len(s) if times is None else np.linspace(*times, len(s)).tolist()
     rows = zip(x.tolist(), y.tolist(), heading.tolist(), t, strict=True)
     return [Vertex(px, py, start.z, h, when) for px, py, h, when in rows]
 
 
-def _integrated(
+def _integrate(
     start: float, rate: NDArray[np.float64], s: NDArray[np.float64]
 ) -> NDArray[np.float64]:
     """Integral of samples by the rule of Gregory: trapezoids with their end slopes."""

@@ -20,7 +20,7 @@ RULES: Mapping[str, Callable[[float | str, float | str], bool]] = {
 }
 
 
-def compared(rule: str, left: str, right: str) -> bool:
+def holds_between(rule: str, left: str, right: str) -> bool:
     """Texts by a rule: as numbers or moments where both are, else letter by letter."""
     for read in (float, moment):
         try:
@@ -32,7 +32,7 @@ def compared(rule: str, left: str, right: str) -> bool:
 
 def root_values(root: Node, given: Mapping[str, float | str]) -> dict[str, str]:
     """The parameters of a file, some of them overridden from outside."""
-    values = declared(root, {}, given)
+    values = read_declarations(root, {}, given)
     for name in given:
         if name not in values:
             known = ", ".join(values) or "none"
@@ -40,7 +40,7 @@ def root_values(root: Node, given: Mapping[str, float | str]) -> dict[str, str]:
     return values
 
 
-def declared(
+def read_declarations(
     node: Node, outer: Mapping[str, str], given: Mapping[str, float | str]
 ) -> dict[str, str]:
     """Parameters in scope inside an element that may declare some; given: assigned values."""
@@ -64,7 +64,7 @@ def inner(node: Node) -> Node:
     """An element with its own declarations in scope."""
     if node.find("ParameterDeclarations") is None:
         return node
-    return node.scoped(declared(node, node.values, {}))
+    return node.scoped(read_declarations(node, node.values, {}))
 
 
 def assignments(node: Node) -> dict[str, str]:
@@ -114,5 +114,7 @@ def _require_constraints(node: Node, name: str, text: str) -> None:
         for one in group:
             if one.text("rule") not in RULES:
                 raise one.unsupported(f"rule={one.text('rule')!r} is not supported")
-    if not any(all(compared(c.text("rule"), text, c.text("value")) for c in g) for g in groups):
+    if not any(
+        all(holds_between(c.text("rule"), text, c.text("value")) for c in g) for g in groups
+    ):
         raise node.error(f"{name} = {text} meets none of its constraint groups")

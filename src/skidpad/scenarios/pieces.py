@@ -37,7 +37,7 @@ def pieces(vertices: Sequence[Vertex], sparse: bool = False) -> list[list[Vertex
     Vertices that say no more than their neighbours are left out where they are near; sparse:
     everywhere. Times must rise.
     """
-    kept = thinned(vertices, sparse)
+    kept = thin_vertices(vertices, sparse)
     found = [kept[:1]]
     closed = False  # a near vertex ends a piece
     for before, vertex in pairwise(kept):
@@ -48,7 +48,7 @@ def pieces(vertices: Sequence[Vertex], sparse: bool = False) -> list[list[Vertex
     return found
 
 
-def thinned(vertices: Sequence[Vertex], sparse: bool = False) -> list[Vertex]:
+def thin_vertices(vertices: Sequence[Vertex], sparse: bool = False) -> list[Vertex]:
     """Without the vertices between which motion is as even without them."""
     table = np.array(vertices)
     kept, i, last = [0], 0, len(vertices) - 1

@@ -127,7 +127,7 @@ def check(
     try:
         findings += violations(root.element, file.name, _minor_revision(root))
         findings += fill_in(root) if lenient else ()
-        scenario = _compiled(
+        scenario = _compile_scenario(
             root, _Wish(parameters, ego, maps, allowed, names or Names()), findings
         )
     except Fault as fault:
@@ -169,7 +169,7 @@ class _Wish:
     names: Names
 
 
-def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | None:
+def _compile_scenario(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | None:
     values = root_values(root, wish.parameters)
     root = root.scoped(values)
     findings += oddities(root)
@@ -190,7 +190,7 @@ def _compiled(root: Node, wish: _Wish, findings: list[Finding]) -> Scenario | No
     ctx.names = wish.names
     ctx.controllers, unknown = _entity_controllers(root, catalogs, wish.names)
     board = root.child("Storyboard")
-    ctx.added = _added(board)
+    ctx.added = _added_entities(board)
     signals = ctx.attempt(lambda: compile_signals(root.find("RoadNetwork"))) or ()
     start = compile_start(board.child("Init"), ctx)
     storyboard = compile_storyboard(board, ctx)
@@ -237,7 +237,7 @@ def _entity_controllers(
     return known, unknown
 
 
-def _added(board: Node) -> frozenset[str]:
+def _added_entities(board: Node) -> frozenset[str]:
     """Entities that events put into the world."""
     found = board.element.iterfind("Story//EntityAction[AddEntityAction]")
     return frozenset(node.get("entityRef", "") for node in found)

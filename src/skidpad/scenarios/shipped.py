@@ -30,7 +30,7 @@ def scenario_file(name: str) -> Path:
 
 
 @cache
-def shipped(name: str) -> Shipped:
+def find_shipped(name: str) -> Shipped:
     """The scenario with this name."""
     root = etree.parse(str(scenario_file(name))).getroot()
     declared = root.iterfind("ParameterDeclarations/ParameterDeclaration")

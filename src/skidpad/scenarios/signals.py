@@ -91,7 +91,7 @@ def _delay(node: Node, nodes: Mapping[str, Node]) -> float:
         node = nodes[reference]
 
 
-def shown(state: str) -> LightState | None:
+def read_signal_state(state: str) -> LightState | None:
     """What a light shows: a colour, or three lamps from the top (`on;off;off`).
 
     The standard leaves states to the road's own signals; other words are for conditions alone: None.
@@ -107,7 +107,9 @@ def shown(state: str) -> LightState | None:
 
 def held_lights(scene: Scene) -> tuple[tuple[int, LightState], ...]:
     """Signals that the file has set, by the road's ids, in colours; `id=7` as CARLA's files have it."""
-    states = ((id_number(n.removeprefix("id=")), shown(s)) for n, s in scene.signals.items())
+    states = (
+        (id_number(n.removeprefix("id=")), read_signal_state(s)) for n, s in scene.signals.items()
+    )
     return tuple((id, state) for id, state in states if state is not None)
 
 

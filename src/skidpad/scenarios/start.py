@@ -17,7 +17,7 @@ from skidpad.scenarios.actions.distance import KeepGap
 from skidpad.scenarios.actions.lateral import LaneChange, LaneOffset
 from skidpad.scenarios.actions.private import private_action
 from skidpad.scenarios.actions.routing import FollowTrajectory, Teleport
-from skidpad.scenarios.actions.speed import Speed, limited
+from skidpad.scenarios.actions.speed import Speed, limit_speed
 from skidpad.scenarios.actions.world import (
     AddEntity,
     DeleteEntity,
@@ -91,7 +91,7 @@ def compile_start(init: Node, ctx: Context) -> Start:
         elif action is not None:
             worldwide.append(action)
     begins = dict(_worked_out(init, wishes, gone, ctx))
-    return Start(begins, tuple(worldwide), environment, dict(_handed(wishes)))
+    return Start(begins, tuple(worldwide), environment, dict(_handed_over(wishes)))
 
 
 def _private(node: Node, ctx: Context, wishes: dict[str, _Wish]) -> None:
@@ -107,7 +107,7 @@ def _private(node: Node, ctx: Context, wishes: dict[str, _Wish]) -> None:
                 wish.actions.append(action)
 
 
-def _handed(wishes: Mapping[str, _Wish]) -> Iterator[tuple[str, bool]]:
+def _handed_over(wishes: Mapping[str, _Wish]) -> Iterator[tuple[str, bool]]:
     for name, wish in wishes.items():
         flat: list[Any] = []
         for action in wish.actions:
@@ -198,7 +198,7 @@ class _Starting:
         if self.wish.speed is None:
             return 0.0
         v = self.wish.speed.target.speed(self.scene)
-        return limited(v, self.entity.performance)
+        return limit_speed(v, self.entity.performance)
 
 
 _ASKED = object()

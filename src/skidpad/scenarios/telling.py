@@ -81,7 +81,7 @@ class ToldEvent(Told):
         for action in self.event.actions:
             scene.states[action.path] = State.RUNNING
             scene.moved(action.path, Move.START)
-            self.going.append((action.path, list(_begun(action, actors, scene))))
+            self.going.append((action.path, list(_begin_action(action, actors, scene))))
 
     def step(self, scene: Scene) -> None:
         """Go on with the actions under way."""
@@ -117,7 +117,7 @@ def _let_go(action: Running, scene: Scene) -> None:
         actor.let_go(action, scene.network)
 
 
-def _begun(action: NamedAction, actors: Iterable[str], scene: Scene) -> Iterable[Running]:
+def _begin_action(action: NamedAction, actors: Iterable[str], scene: Scene) -> Iterable[Running]:
     if action.worldwide is not None:
         yield action.worldwide.happen(scene)
     if action.private is not None:

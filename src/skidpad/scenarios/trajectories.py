@@ -75,7 +75,7 @@ def _polyline(shape: Node) -> tuple[list[Node], Shape]:
         raise shape.error("needs at least one <Vertex>")
     times = [n.number("time") if n.has("time") else None for n in nodes]
     places = [n.child("Position") for n in nodes]
-    named = [_named(p.only()) for p in places]
+    named = [_has_heading(p.only()) for p in places]
     _check_times(shape, times)
 
     def make(poses: Sequence[Pose]) -> list[Vertex]:
@@ -85,7 +85,7 @@ def _polyline(shape: Node) -> tuple[list[Node], Shape]:
     return places, make
 
 
-def _named(place: Node) -> bool:
+def _has_heading(place: Node) -> bool:
     """A heading is said; that of a place on a road counts as such."""
     return place.tag != "WorldPosition" or place.has("h")
 
@@ -145,7 +145,7 @@ def _spline(shape: Node) -> tuple[list[Node], Shape]:
         turn, length = node.number("hOffset", 0.0), node.number("length")
         segments.append(Segment(begins, turn, curvatures, length, times))
     places = [p for n in nodes if (p := n.find("PositionStart")) is not None]
-    return places, lambda poses: list(_joined(segments, poses))
+    return places, lambda poses: list(_join_segments(segments, poses))
 
 
 def _begins(segment: Node) -> bool:
@@ -153,7 +153,7 @@ def _begins(segment: Node) -> bool:
     return segment.find("PositionStart") is not None
 
 
-def _joined(segments: Sequence[Segment], poses: Sequence[Pose]) -> Iterator[Vertex]:
+def _join_segments(segments: Sequence[Segment], poses: Sequence[Pose]) -> Iterator[Vertex]:
     own = iter(poses)
     pose = poses[0]
     for segment in segments:

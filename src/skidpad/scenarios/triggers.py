@@ -136,12 +136,14 @@ def compile_trigger(node: Node | None, ctx: Context) -> Trigger:
         return EMPTY
     groups = []
     for group in node.children("ConditionGroup"):
-        found = [ctx.attempt(partial(_timed, c, ctx)) for c in group.children("Condition")]
+        found = [
+            ctx.attempt(partial(_timed_condition, c, ctx)) for c in group.children("Condition")
+        ]
         groups.append(tuple(c or Timed("", Never(), Edge.NONE, 0.0) for c in found))
     return Trigger(tuple(g for g in groups if g))
 
 
-def _timed(node: Node, ctx: Context) -> Timed:
+def _timed_condition(node: Node, ctx: Context) -> Timed:
     edge = node.choice("conditionEdge", Edge, Edge.NONE)
     delay = node.number("delay", 0.0)
     if delay < 0.0:

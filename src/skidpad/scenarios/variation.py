@@ -15,7 +15,7 @@ import numpy as np
 
 from skidpad.core.randomness import stream
 from skidpad.core.setup import DT
-from skidpad.scenarios.shipped import NAMES, shipped
+from skidpad.scenarios.shipped import NAMES, find_shipped
 
 CUT = 2.5  # deviations
 SKILL_SPREAD = 0.15  # of the gains of scripted drivers
@@ -82,7 +82,7 @@ def drawn_parameters(
 
     nominal: values drawn around in place of the file's.
     """
-    values = dict(shipped(name).parameters)
+    values = dict(find_shipped(name).parameters)
     if name == CUT_IN:
         values |= variant_parameters(variant)
     values |= nominal
@@ -100,10 +100,10 @@ def drawn_skill(name: str, seed: int) -> dict[str, float]:
     spread = Spread(spread=SKILL_SPREAD)
     return {
         actor: spread.draw(1.0, stream(seed, "scenario", name, "driver", actor))
-        for actor in shipped(name).actors
+        for actor in find_shipped(name).actors
     }
 
 
-def described() -> dict[str, Any]:
+def describe_shipped() -> dict[str, Any]:
     """Nominal parameters by scenario, for reports."""
-    return {name: dict(shipped(name).parameters) for name in NAMES}
+    return {name: dict(find_shipped(name).parameters) for name in NAMES}

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import httpx
 
 from skidpad.core.errors import BackendError, ConfigError
-from skidpad.fleet.broker import Broker, connected, library
+from skidpad.fleet.broker import Broker, connect_to, library
 from skidpad.fleet.identity import digest
 from skidpad.pages.server import is_local
 
@@ -92,6 +92,6 @@ class Mqtt:
             raise BackendError(f"mqtt: {error}") from error
 
     async def _publish(self, alert: dict[str, Any]) -> None:
-        async with connected(self.broker, self.timeout_s) as client:
+        async with connect_to(self.broker, self.timeout_s) as client:
             topic = f"skidpad/{alert['operator']}/alerts"
             await client.publish(topic, json.dumps(alert), qos=1)

@@ -72,22 +72,22 @@ async def list_alerts(
 @router.post("/{alert}/acknowledge")
 def acknowledge(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
     """Take it up."""
-    return answered(fleet_of(request), who, alert, What.ACKNOWLEDGED)
+    return keep_answer(fleet_of(request), who, alert, What.ACKNOWLEDGED)
 
 
 @router.post("/{alert}/escalate")
 def escalate(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
     """Hand it one level up; it is relayed again."""
-    return answered(fleet_of(request), who, alert, What.ESCALATED)
+    return keep_answer(fleet_of(request), who, alert, What.ESCALATED)
 
 
 @router.post("/{alert}/close")
 def close(request: Request, who: Answerer, alert: str) -> dict[str, Any]:
     """Nothing more is to be done."""
-    return answered(fleet_of(request), who, alert, What.CLOSED)
+    return keep_answer(fleet_of(request), who, alert, What.CLOSED)
 
 
-def answered(fleet: Fleet, who: Principal, alert: str, what: What) -> dict[str, Any]:
+def keep_answer(fleet: Fleet, who: Principal, alert: str, what: What) -> dict[str, Any]:
     """Keep an answer to an alert and tell whoever waits; the alert as it is now."""
     with fleet.engine.begin() as connection:
         answer(connection, alert_of(connection, who, alert), what, who, fleet.clock())
@@ -101,10 +101,12 @@ def answered(fleet: Fleet, who: Principal, alert: str, what: What) -> dict[str, 
 @router.post("/{alert}/order/{to}")
 def order(request: Request, who: Teleoperator, alert: str, to: Order, key: Key) -> dict[str, Any]:
     """Order the vehicle to stop, slow down or go on; void unless it is fetched within 2 s."""
-    return ordered(fleet_of(request), who, alert, (to, key))
+    return keep_order(fleet_of(request), who, alert, (to, key))
 
 
-def ordered(fleet: Fleet, who: Principal, alert: str, asked: tuple[Order, str]) -> dict[str, Any]:
+def keep_order(
+    fleet: Fleet, who: Principal, alert: str, asked: tuple[Order, str]
+) -> dict[str, Any]:
     """Give an order (what, and the request's key) and tell the vehicle that waits."""
     with fleet.engine.begin() as connection:
         order = give_order(connection, who, alert, asked, fleet.clock())

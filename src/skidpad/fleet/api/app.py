@@ -52,20 +52,20 @@ def add_api(app: FastAPI, fleet: Fleet) -> None:
         """What can be asked, as OpenAPI; it holds no record and needs no credential."""
         return get_openapi(title="Skidpad fleet", version=skidpad.__version__, routes=ROUTES)
 
-    app.add_exception_handler(Refused, _refused)
-    app.add_exception_handler(SkidpadError, _failed)
+    app.add_exception_handler(Refused, _answer_refusal)
+    app.add_exception_handler(SkidpadError, _answer_failure)
     app.add_exception_handler(DataError, _unkept)
     app.add_exception_handler(IntegrityError, _meanwhile)
 
 
-async def _refused(request: Request, error: Exception) -> JSONResponse:
+async def _answer_refusal(request: Request, error: Exception) -> JSONResponse:
     del request
     status = error.status if isinstance(error, Refused) else 500
     headers = {401: {"WWW-Authenticate": "Bearer"}, 429: {"Retry-After": "1"}}.get(status)
     return JSONResponse({"detail": str(error)}, status, headers)
 
 
-async def _failed(request: Request, error: Exception) -> JSONResponse:
+async def _answer_failure(request: Request, error: Exception) -> JSONResponse:
     """What was kept cannot be used: one sentence, without a place on disk."""
     del request
     return JSONResponse({"detail": str(error)}, 422)

@@ -58,7 +58,7 @@ def _bytes(text: str) -> bytes:
         raise Refused(422, "a payload must be base64") from error
 
 
-def _parsed(body: bytes, type: Any) -> Any:
+def _parse_body(body: bytes, type: Any) -> Any:
     try:
         return msgspec.json.decode(body, type=type)
     except (msgspec.MsgspecError, ValueError, RecursionError) as error:
@@ -69,7 +69,7 @@ def _parsed(body: bytes, type: Any) -> Any:
 async def new_change(request: Request, who: Changer) -> dict[str, str]:
     """Propose a change with the hazards that led to it; the payload is checked by its reader."""
     fleet = fleet_of(request)
-    text = _parsed(await read_body(request, fleet.limits), ProposalText)
+    text = _parse_body(await read_body(request, fleet.limits), ProposalText)
     proposal = Proposal(
         kind=text.kind,
         content=_bytes(text.payload),
@@ -81,7 +81,7 @@ async def new_change(request: Request, who: Changer) -> dict[str, str]:
 
 
 @router.get("/changes/{change}")
-def traced(request: Request, who: Reader, change: str) -> dict[str, Any]:
+def trace_change(request: Request, who: Reader, change: str) -> dict[str, Any]:
     """One record: hazards, analysis, change, releases, looks, re-evaluation."""
     with fleet_of(request).engine.connect() as connection:
         return trace(connection, who, change)
@@ -100,7 +100,7 @@ async def evaluate(request: Request, who: Changer, change: str) -> list[dict[str
     fleet = fleet_of(request)
     with fleet.engine.connect() as connection:
         trace(connection, who, change)
-    before = _parsed(await read_body(request, fleet.limits), Before)
+    before = _parse_body(await read_body(request, fleet.limits), Before)
     told = (before.kind, _bytes(before.payload))
     return await run_in_threadpool(re_evaluate, fleet, who, change, told)
 
@@ -116,7 +116,7 @@ def update_list(request: Request, who: Changer) -> Response:
 async def new_release(request: Request, who: Changer) -> dict[str, str]:
     """Publish a signed change and begin its first stage; the plan is fixed with it."""
     fleet = fleet_of(request)
-    text = _parsed(await read_body(request, fleet.limits), ReleaseText)
+    text = _parse_body(await read_body(request, fleet.limits), ReleaseText)
     targets = _bytes(text.targets)
     id = await run_in_threadpool(release, fleet, who, text.change, targets, text.plan)
     return {"release": id}

@@ -70,13 +70,13 @@ def export_scenario(fleet: Fleet, who: Principal, hazard: str) -> bytes:
         hazard_row(connection, who, hazard)
         found = record_of(connection, fleet.blobs, hazard)
     with TemporaryDirectory() as folder:
-        content = _zipped(fleet.exporter(found, Path(folder)))
+        content = _zip_files(fleet.exporter(found, Path(folder)))
     with fleet.engine.begin() as connection:
         add_event(connection, ("hazard", hazard), "scenario exported", (who.id, fleet.clock()))
     return content
 
 
-def _zipped(files: tuple[Path, Path]) -> bytes:
+def _zip_files(files: tuple[Path, Path]) -> bytes:
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w", zipfile.ZIP_DEFLATED) as archive:
         for file in files:

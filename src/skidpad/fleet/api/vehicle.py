@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Header, Request
 from starlette.concurrency import run_in_threadpool
 
 from skidpad.fleet.api.guard import Needs, fleet_of
-from skidpad.fleet.checking import DRIVE, KEY, TIME_MAX, Told, checked
+from skidpad.fleet.checking import DRIVE, KEY, TIME_MAX, Told, check_batch
 from skidpad.fleet.store.intake import plain
 from skidpad.fleet.words import Action, Kind, Limits, Principal, Refused
 
@@ -45,9 +45,9 @@ async def upload(
 
     about = Told(kind, key, drive, vehicle_time)
     if len(body) <= INLINE:
-        batch = checked(fleet, who, about, body)
+        batch = check_batch(fleet, who, about, body)
     else:
-        batch = await run_in_threadpool(checked, fleet, who, about, body)
+        batch = await run_in_threadpool(check_batch, fleet, who, about, body)
     return plain(await asyncio.wrap_future(fleet.intake.submit(batch)))
 
 

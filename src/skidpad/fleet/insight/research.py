@@ -55,14 +55,14 @@ def _publish_due(fleet: Fleet) -> None:
             select(events.c.subject).where(events.c.kind == KIND, events.c.what == PUBLISHED)
         ).scalars()
         newest = max((int(hour) for hour in done), default=-1)
-        table = _gathered(connection, (newest + 1) * HOUR, last * HOUR)
+        table = _gather_rows(connection, (newest + 1) * HOUR, last * HOUR)
         for hour in sorted(table):
             add_event(connection, (KIND, str(hour)), PUBLISHED, (SERVICE, now), rows=table[hour])
         if last - 1 > newest and last - 1 not in table:  # hours without a row are published, too
             add_event(connection, (KIND, str(last - 1)), PUBLISHED, (SERVICE, now), rows=[])
 
 
-def _gathered(
+def _gather_rows(
     connection: Connection, since: float, until: float
 ) -> dict[int, list[dict[str, Any]]]:
     """Rows by hour of the server's time within [since, until)."""

@@ -89,7 +89,7 @@ def look(differences: Sequence[float], plan: Plan, looks_left: int) -> Finding:
     return Finding(decision, d.size, seen.mean, low, high, seen.p_greater, shifted.p_less, reason)
 
 
-def chosen(release: str, vehicles: Iterable[str], share: float) -> frozenset[str]:
+def choose_vehicles(release: str, vehicles: Iterable[str], share: float) -> frozenset[str]:
     """Those vehicles that are among the share of a stage: by a hash, so stages hold earlier ones.
 
     However small the share, at least one vehicle is.

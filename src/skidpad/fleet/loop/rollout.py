@@ -12,7 +12,7 @@ from sqlalchemy.exc import IntegrityError
 
 from skidpad.fleet.identity import new_id
 from skidpad.fleet.loop.changes import change_row, evaluations_of, payload_of
-from skidpad.fleet.loop.plan import Decision, Finding, Plan, chosen, look
+from skidpad.fleet.loop.plan import Decision, Finding, Plan, choose_vehicles, look
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.events import Event, add_event, events_of
 from skidpad.fleet.store.loop import changes, looks, releases
@@ -125,7 +125,7 @@ def running_on(connection: Connection, one: Rollout) -> frozenset[str]:
     ids = connection.execute(
         select(vehicles.c.id).where(vehicles.c.manufacturer == one.row.tenant)
     ).scalars()
-    return chosen(one.row.id, ids, one.share)
+    return choose_vehicles(one.row.id, ids, one.share)
 
 
 def under_way(connection: Connection) -> list[tuple[str, str]]:
@@ -150,7 +150,7 @@ def look_at(fleet: Fleet, who: Principal, id: str) -> Finding | None:
         one = rollout_of(connection, who.tenant, id)
         if one.ended is not None:
             raise Refused(409, f"this release was {one.ended} already")
-        differences, hours = _driven(connection, one)
+        differences, hours = _driven_differences(connection, one)
         looks_so_far = [e for e in one.events if e.what == LOOKED]
         seen = sum(int(e.detail["new_drives"]) for e in looks_so_far)
         new = len(differences) - seen
@@ -187,7 +187,7 @@ def _conclude(
         add_event(connection, subject, STAGE, by, stage=one.stage + 1)
 
 
-def _driven(connection: Connection, one: Rollout) -> tuple[list[float], float]:
+def _driven_differences(connection: Connection, one: Rollout) -> tuple[list[float], float]:
     """Differences of errors of the drives under a release, of chosen vehicles, and their hours."""
     rows = connection.execute(
         select(drives.c.vehicle, drives.c.seconds, drives.c.summary)

@@ -31,15 +31,15 @@ def series_of(record: HazardRecord) -> Floats:
     rows = [monitor.update(cycle).signals.values for cycle in record.worlds]
     if not rows:
         return np.tile([neutral for _, _, neutral in SIGNALS], (POINTS, 1))
-    table = np.array([[_scaled(row[s], by, rest) for s, by, rest in SIGNALS] for row in rows])
-    return _resampled(table)
+    table = np.array([[_scale_value(row[s], by, rest) for s, by, rest in SIGNALS] for row in rows])
+    return _resample_table(table)
 
 
-def _scaled(value: float, by: float, neutral: float) -> float:
+def _scale_value(value: float, by: float, neutral: float) -> float:
     return neutral if np.isnan(value) else float(np.clip(value / by, 0.0, 1.0))
 
 
-def _resampled(table: Floats) -> Floats:
+def _resample_table(table: Floats) -> Floats:
     """Means of POINTS equal stretches of a table (n, k); a short one repeats its rows."""
     edges = np.linspace(0.0, len(table), POINTS + 1)
     first = np.floor(edges[:-1]).astype(int)

@@ -8,7 +8,7 @@ from starlette.requests import Request
 
 from skidpad.fleet.alerting.keeping import What
 from skidpad.fleet.alerting.orders import Order
-from skidpad.fleet.api.alerts import answered, ordered
+from skidpad.fleet.api.alerts import keep_answer, keep_order
 from skidpad.fleet.api.hazards import export_scenario
 from skidpad.fleet.api.recurring import TriageText, triage
 from skidpad.fleet.identity import new_id
@@ -33,7 +33,7 @@ def person(fleet: Fleet, id: str) -> Principal:
     return who
 
 
-def granted(fleet: Fleet, id: str, action: Action) -> Principal:
+def require_right(fleet: Fleet, id: str, action: Action) -> Principal:
     """The person, if their role may; Refused (401, 403) otherwise."""
     who = person(fleet, id)
     if not who.may(action):
@@ -43,24 +43,24 @@ def granted(fleet: Fleet, id: str, action: Action) -> Principal:
 
 def click_answer(fleet: Fleet, id: str, alert: str, what: What) -> dict[str, Any]:
     """Acknowledge, escalate or close an alert."""
-    return answered(fleet, granted(fleet, id, Action.ANSWER_ALERTS), alert, what)
+    return keep_answer(fleet, require_right(fleet, id, Action.ANSWER_ALERTS), alert, what)
 
 
 def click_order(fleet: Fleet, id: str, alert: str, what: Order) -> dict[str, Any]:
     """Order the vehicle of an alert to stop, slow down or go on."""
-    return ordered(fleet, granted(fleet, id, Action.GUIDE), alert, (what, new_id()))
+    return keep_order(fleet, require_right(fleet, id, Action.GUIDE), alert, (what, new_id()))
 
 
 def click_triage(fleet: Fleet, id: str, subject: str, text: TriageText) -> dict[str, Any]:
     """Set state, owner and release of a recurring hazard."""
-    return triage(fleet, granted(fleet, id, Action.TRIAGE), subject, text)
+    return triage(fleet, require_right(fleet, id, Action.TRIAGE), subject, text)
 
 
 def click_export(fleet: Fleet, id: str, hazard: str) -> bytes:
     """Return the scenario of a hazard as .zip."""
-    return export_scenario(fleet, granted(fleet, id, Action.EXPORT_SCENARIO), hazard)
+    return export_scenario(fleet, require_right(fleet, id, Action.EXPORT_SCENARIO), hazard)
 
 
 def click_analyse(fleet: Fleet, id: str) -> int:
     """Look for recurring hazards; how many clusters were found."""
-    return len(analyse(fleet, granted(fleet, id, Action.ANALYSE)).clusters)
+    return len(analyse(fleet, require_right(fleet, id, Action.ANALYSE)).clusters)

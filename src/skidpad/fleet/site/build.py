@@ -11,7 +11,7 @@ from starlette.requests import Request
 from skidpad.fleet.api.app import add_api
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.alerts import alerts_of, draw_alerts
-from skidpad.fleet.site.dashboard import MapLines, draw_overview, draw_replay, overview, replayed
+from skidpad.fleet.site.dashboard import MapLines, draw_overview, draw_replay, overview, read_replay
 from skidpad.fleet.site.frame import STYLE, page
 from skidpad.fleet.site.reports import (
     case_of,
@@ -66,7 +66,7 @@ def pages_of(fleet: Fleet, lines: MapLines) -> dict[str, Page]:
         ),
         "/replay/{hazard}": Page(
             Action.READ_HAZARDS, "Replay",
-            lambda who, request: replayed(fleet, lines, who, request), draw_replay,
+            lambda who, request: read_replay(fleet, lines, who, request), draw_replay,
         ),
         "/alerts": Page(
             Action.READ_ALERTS, "Alerts", read(alerts_of),

@@ -178,7 +178,7 @@ def _clusters(ui: Any, found: list[Work], again: Callable[[], int]) -> None:
         draw_top(ui, found, CLUSTERS)
 
 
-def replayed(
+def read_replay(
     fleet: Fleet, lines: MapLines, who: Principal, request: Request
 ) -> tuple[dict[str, Any], HazardRecord, Sequence[Line]]:
     """Row and record of a hazard that `who` may see, and the roads around it."""

@@ -172,7 +172,7 @@ class Intake:
             }  # fmt: skip
             connection.execute(drives.insert(), drive)
             return True, ()
-        known = _known(connection, batch)
+        known = _known_records(connection, batch)
         fresh = {f.digest: f for f in batch.found if f.digest not in known}
         if fresh:
             rows = [owned | _hazard_row(found) for found in fresh.values()]
@@ -199,7 +199,7 @@ def _hazard_row(found: Found) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _known(connection: Connection, batch: Batch) -> dict[str, str]:
+def _known_records(connection: Connection, batch: Batch) -> dict[str, str]:
     """Id by digest of those records of the batch that are kept."""
     asked = [found.digest for found in batch.found]
     known: dict[str, str] = {}
@@ -210,7 +210,7 @@ def _known(connection: Connection, batch: Batch) -> dict[str, str]:
 
 
 def _ids(connection: Connection, batch: Batch) -> tuple[str, ...]:
-    known = _known(connection, batch)
+    known = _known_records(connection, batch)
     return tuple(known[found.digest] for found in batch.found)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sqlalchemy import Column, Double, ForeignKey, Index, Integer, Table, Text, UniqueConstraint
 
-from skidpad.fleet.store.tables import DIGEST, ID, NAME, _id, _owned, _time, _to, metadata
+from skidpad.fleet.store.tables import DIGEST, ID, NAME, _id, _owner_columns, _time, _to, metadata
 
 series = Table(  # what was computed of a record; computing it again gives the same
     "series",
@@ -40,7 +40,7 @@ alerts = Table(
     "alerts",
     metadata,
     _id(),
-    *_owned(),
+    *_owner_columns(),
     Column("key", NAME, nullable=False),
     Column("digest", DIGEST, nullable=False),
     Column("kind", NAME, nullable=False),
@@ -55,7 +55,7 @@ orders = Table(
     "orders",
     metadata,
     _id(),
-    *_owned(),
+    *_owner_columns(),
     _to("alert", "alerts", null=True),
     Column("what", NAME, nullable=False),
     Column("actor", NAME, nullable=False),

@@ -88,7 +88,7 @@ OWNERS = ("operator", "manufacturer")
 OWNED = (*OWNERS, "vehicle")  # columns that row rights are told by
 
 
-def _owned() -> list[Column[str]]:
+def _owner_columns() -> list[Column[str]]:
     return [_to("operator", "tenants"), _to("manufacturer", "tenants"), _to("vehicle", "vehicles")]
 
 
@@ -96,7 +96,7 @@ hazards = Table(
     "hazards",
     metadata,
     _id(),
-    *_owned(),
+    *_owner_columns(),
     _to("batch", "batches"),
     Column("start", Integer, nullable=False),  # of the record in the unpacked batch
     Column("size", Integer, nullable=False),
@@ -121,7 +121,7 @@ drives = Table(
     "drives",
     metadata,
     _id(),
-    *_owned(),
+    *_owner_columns(),
     _to("batch", "batches"),
     Column("drive", DIGEST, nullable=False),
     Column("seconds", Double, nullable=False),

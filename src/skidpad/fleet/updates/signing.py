@@ -74,12 +74,14 @@ def make_root(signers: dict[str, list[CryptoSigner]], online: CryptoSigner, now:
         root.roles[role].threshold = THRESHOLD
     for role in ("snapshot", "timestamp"):
         root.add_key(online.public_key, role)
-    return _signed(Metadata(root), signers["root"][:THRESHOLD])
+    return _sign_metadata(Metadata(root), signers["root"][:THRESHOLD])
 
 
 def empty_targets(signers: Sequence[CryptoSigner], now: float) -> bytes:
     """The first list of updates, which names none."""
-    return _signed(Metadata(Targets(version=1, expires=instant(now) + TARGETS_VALID)), signers)
+    return _sign_metadata(
+        Metadata(Targets(version=1, expires=instant(now) + TARGETS_VALID)), signers
+    )
 
 
 def add_target(
@@ -98,10 +100,10 @@ def add_target(
     targets.targets[name] = target
     targets.version += 1
     targets.expires = instant(now) + TARGETS_VALID
-    return _signed(Metadata(targets), signers)
+    return _sign_metadata(Metadata(targets), signers)
 
 
-def _signed(metadata: Metadata[Any], signers: Sequence[CryptoSigner]) -> bytes:
+def _sign_metadata(metadata: Metadata[Any], signers: Sequence[CryptoSigner]) -> bytes:
     for signer in signers:
         metadata.sign(signer, append=True)
     return metadata.to_bytes()

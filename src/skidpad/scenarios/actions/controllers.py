@@ -171,13 +171,13 @@ def compile_visibility(node: Node, ctx: Context) -> Visibility:
 
 def compile_controller(node: Node, ctx: Context) -> PrivateAction:
     """A <ControllerAction>: one of these, or before 1.1 several."""
-    made = [TABLE[child.tag](child, ctx) for child in node.children() if _known(child)]
+    made = [TABLE[child.tag](child, ctx) for child in node.children() if _is_known(child)]
     if not made:
         raise node.error("needs an action")
     return made[0] if len(made) == 1 else Several(tuple(made))
 
 
-def _known(node: Node) -> bool:
+def _is_known(node: Node) -> bool:
     if node.tag not in TABLE:
         raise node.unsupported()
     return True

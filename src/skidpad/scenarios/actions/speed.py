@@ -56,7 +56,7 @@ class Speed:
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From the speed demanded so far."""
         v, limits = actor.guide.v, actor.entity.performance
-        end = limited(self.target.speed(scene), limits)
+        end = limit_speed(self.target.speed(scene), limits)
         if self.dynamics.dimension is Dimension.DISTANCE:
             span = over_distance(v, end, self.dynamics)
         else:
@@ -69,7 +69,7 @@ class Speed:
         return going
 
 
-def limited(v: float, limits: Performance) -> float:
+def limit_speed(v: float, limits: Performance) -> float:
     """A speed that the entity can reach."""
     return copysign(min(abs(v), limits.v_max), v)
 
@@ -111,7 +111,7 @@ class ChangeOfSpeed:
         if self.follow is None:
             return self.change.over(t)
         if self.change.over(t):
-            v = limited(self.follow.speed(scene), self.actor.entity.performance)
+            v = limit_speed(self.follow.speed(scene), self.actor.entity.performance)
             guide.v, guide.a = v, 0.0
         return False
 
@@ -151,7 +151,7 @@ class Profile:
         own, v = actor.entity.performance, actor.guide.v
         pieces: list[Piece] = []
         for entry, duration in self.entries:
-            end = limited(base + entry, own)
+            end = limit_speed(base + entry, own)
             most = (self.limits.a_max, own.a_max) if end > v else (self.limits.b_max, own.b_max)
             pieces += smooth_pieces(v, end, min(*most, DEFAULT_CHANGE), self.jerk, duration)
             v = end
@@ -165,7 +165,7 @@ class Profile:
         b = min(self.limits.b_max, own.b_max, DEFAULT_CHANGE)
         times, speeds = [scene.t], [actor.guide.v]
         for entry, duration in self.entries:
-            v = limited(base + entry, own)
+            v = limit_speed(base + entry, own)
             needed = abs(v - speeds[-1]) / (a if v > speeds[-1] else b)
             times.append(times[-1] + (needed if duration is None else duration))
             speeds.append(v)

@@ -11,7 +11,7 @@ from skidpad.roads.opendrive.document import id_number
 from skidpad.scenarios.actions.base import GlobalAction
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
-from skidpad.scenarios.entities import Entity, described, of_category
+from skidpad.scenarios.entities import Entity, compile_entity_object, of_category
 from skidpad.scenarios.findings import Kind
 from skidpad.scenarios.positions import position
 from skidpad.scenarios.scene import DONE, Flow, Running, Scene
@@ -67,7 +67,7 @@ def _count(node: Node, name: str, ctx: Context) -> int:
     return int(min(value, MOST))
 
 
-def _hired(node: Node, count: int, ctx: Context) -> tuple[str, ...]:
+def _draw_vehicles(node: Node, count: int, ctx: Context) -> tuple[str, ...]:
     """Vehicles that may come, shared out by the weights of a distribution; cars without one."""
     kinds = list(_kinds(node, ctx))
     total = sum(weight for weight, _ in kinds)
@@ -94,7 +94,7 @@ def _kinds(node: Node, ctx: Context) -> Iterator[tuple[float, Entity]]:
             for one in entry.child("EntityDistribution").children("EntityDistributionEntry"):
                 template = one.child("ScenarioObjectTemplate")
                 weight = _size(entry, "weight") * _size(one, "weight")
-                yield weight, described(template, "", ctx.catalogs)
+                yield weight, compile_entity_object(template, "", ctx.catalogs)
     elif shares is not None:
         for one in shares.children("VehicleCategoryDistributionEntry"):
             yield _size(one, "weight"), of_category(one, "", one.text("category"))
@@ -122,7 +122,7 @@ def _disc(node: Node, ctx: Context) -> Disc:
 
 def _source(node: Node, ctx: Context) -> Callable[[str, Scene], Sourcing]:
     region, rate, speeds = _disc(node, ctx), _size(node, "rate"), _speeds(node)
-    cars = _hired(node, min(ceil(min(rate * OF_A_SOURCE, MOST)) + 1, MOST), ctx)
+    cars = _draw_vehicles(node, min(ceil(min(rate * OF_A_SOURCE, MOST)) + 1, MOST), ctx)
     return lambda name, scene: Sourcing(name, Pool(name, cars, speeds, scene), region, rate)
 
 
@@ -142,7 +142,7 @@ def _swarm(node: Node, ctx: Context) -> Callable[[str, Scene], Filling]:
     directions = None
     if ways is not None:
         directions = Directions(entity, _size(ways, "same"), _size(ways, "opposite"))
-    cars = _hired(node, _count(node, "numberOfVehicles", ctx), ctx)
+    cars = _draw_vehicles(node, _count(node, "numberOfVehicles", ctx), ctx)
     return lambda name, scene: Filling(
         name, Pool(name, cars, speeds, scene), whole, replace(whole, rim=RIM), directions
     )
@@ -150,7 +150,7 @@ def _swarm(node: Node, ctx: Context) -> Callable[[str, Scene], Filling]:
 
 def _area(node: Node, ctx: Context) -> Callable[[str, Scene], Filling]:
     region = _region(node.child("TrafficArea"), ctx)
-    cars = _hired(node, _count(node, "numberOfEntities", ctx), ctx)
+    cars = _draw_vehicles(node, _count(node, "numberOfEntities", ctx), ctx)
     later = region if node.flag("continuous", default=False) else None
     return lambda name, scene: Filling(name, Pool(name, cars, Speeds(), scene), region, later)
 

@@ -13,9 +13,9 @@ from skidpad.scenarios.criteria import is_criterion
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.environment import moment_of
 from skidpad.scenarios.findings import Kind
-from skidpad.scenarios.parameters import compared
+from skidpad.scenarios.parameters import holds_between
 from skidpad.scenarios.scene import Move, Path, Scene, State
-from skidpad.scenarios.signals import shown
+from skidpad.scenarios.signals import read_signal_state
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,7 +49,7 @@ class Value:
 
     def _holds(self, scene: Scene) -> bool:
         values = scene.variables if self.variable else scene.parameters
-        return compared(self.rule, values[self.name], self.value)
+        return holds_between(self.rule, values[self.name], self.value)
 
 
 def _value(node: Node, ctx: Context) -> Condition:
@@ -131,7 +131,7 @@ class Signal:
 
     def probe(self) -> Probe:
         """As it is now."""
-        wanted, id = shown(self.state), id_number(self.name.removeprefix("id="))
+        wanted, id = read_signal_state(self.state), id_number(self.name.removeprefix("id="))
 
         def holds(scene: Scene) -> bool:
             if self.name in scene.signals:
@@ -170,7 +170,7 @@ class UserValue:
 
     def probe(self) -> Probe:
         """As it is now."""
-        return lambda scene: compared(self.rule, str(self.read(scene)), self.value)
+        return lambda scene: holds_between(self.rule, str(self.read(scene)), self.value)
 
 
 def _of_user(node: Node, ctx: Context) -> Condition:

@@ -89,7 +89,7 @@ class BatchListener:
 
     async def _answer(self, client: Any, message: Any) -> None:
         where = str(getattr(message.properties, "ResponseTopic", ""))
-        status, content = await self._taken(message)
+        status, content = await self._take_message(message)
         if not re.fullmatch(ANSWER, where):  # else anybody could have the fleet publish anywhere
             return
         about = properties(CorrelationData=getattr(message.properties, "CorrelationData", b""))
@@ -99,7 +99,7 @@ class BatchListener:
         except (library().MqttError, OSError) as error:
             log.warning("mqtt: an answer was lost (%s)", error)
 
-    async def _taken(self, message: Any) -> tuple[int, dict[str, Any]]:
+    async def _take_message(self, message: Any) -> tuple[int, dict[str, Any]]:
         """Status and content as over HTTPS."""
         told = dict(getattr(message.properties, "UserProperty", []))
         try:

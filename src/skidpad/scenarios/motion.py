@@ -153,7 +153,7 @@ class Guide:
         squeezed = max(1.0 - self.base.curvature * self.offset, SQUEEZED)
         distance = self.along * ((forward if way >= 0.0 else -forward) + leap) / squeezed
         self._move(distance)
-        return self._posed()
+        return self._current_pose()
 
     def _move(self, distance: float) -> None:
         assert self.base is not None
@@ -181,7 +181,7 @@ class Guide:
                 low, found = middle, further
         return found
 
-    def _posed(self) -> Pose:
+    def _current_pose(self) -> Pose:
         assert self.base is not None
         pose = self.base.pose.moved(left=self.offset)
         turn = self.turn

@@ -232,7 +232,7 @@ class Actor:
         if not self.present or not self.driven_by_file:
             return None
         if self.driver is None or self.placed_by_file:
-            return self._placed(t + dt, dt)
+            return self._place_command(t + dt, dt)
         if self.track is not None:
             demand = track_demand(self.track, self.motion, t, dt, self.centre)
         else:
@@ -245,7 +245,7 @@ class Actor:
         """What a driver does, with the inputs that the file works itself."""
         return replace(command, **self.worked) if self.worked else command
 
-    def _placed(self, t: float, dt: float) -> ActorCommand:
+    def _place_command(self, t: float, dt: float) -> ActorCommand:
         if self.track is not None:
             pose, v, _ = self.track.at(t)
             v = v if self.track.timed else self.guide.v

@@ -96,10 +96,10 @@ class Stage:
         self.mu, self.commands = np.ones((n, 4)), np.zeros((n, 5))
         for actor in actors:
             assert isinstance(actor.place, Pose)
-            self._put(ActorCommand(actor.name, place=actor.place, speed=actor.speed))
+            self._apply_command(ActorCommand(actor.name, place=actor.place, speed=actor.speed))
             self.states.present[self.index[actor.name]] = actor.present
 
-    def _put(self, word: ActorCommand) -> None:
+    def _apply_command(self, word: ActorCommand) -> None:
         i, s = self.index[word.actor], self.states
         if word.present is not None:
             s.present[i] = word.present
@@ -114,7 +114,7 @@ class Stage:
         """Moves the actors on by one tick."""
         self.tick += 1
         for word in words:
-            self._put(word)
+            self._apply_command(word)
 
     def truth(self) -> WorldTruth:
         """Returns the true world at this tick."""

@@ -78,12 +78,12 @@ class UpdateClient:
             ) from error
 
     @property
-    def _trusted(self) -> Path:
+    def _trusted_root(self) -> Path:
         return self.folder / "trusted_time"
 
     def _check_clock(self) -> None:
         """A clock set back would let expired metadata pass."""
-        trusted = float(self._trusted.read_text()) if self._trusted.exists() else 0.0
+        trusted = float(self._trusted_root.read_text()) if self._trusted_root.exists() else 0.0
         if self.clock() + SKEW_S < trusted:
             raise UpdateRefused(
                 f"the clock is {trusted - self.clock():.0f} s behind the last signed time it saw"
@@ -94,6 +94,6 @@ class UpdateClient:
             (self.folder / "metadata" / "timestamp.json").read_bytes()
         )
         signed = float(stamp.signed.unrecognized_fields.get(SIGNED_AT, 0.0))
-        before = float(self._trusted.read_text()) if self._trusted.exists() else 0.0
-        write_bytes(self._trusted, repr(max(before, signed)).encode())
+        before = float(self._trusted_root.read_text()) if self._trusted_root.exists() else 0.0
+        write_bytes(self._trusted_root, repr(max(before, signed)).encode())
         self._check_clock()

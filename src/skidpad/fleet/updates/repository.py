@@ -110,7 +110,7 @@ class Repository:
 
     def _stamp(self, version: int | None = None) -> None:
         """Sign the timestamp anew, and a snapshot that is about to expire."""
-        now, old = self.clock(), self._stamped()
+        now, old = self.clock(), self._sign_timestamp()
         version = version or (old.signed.snapshot_meta.version if old else 1)
         path = self.folder / "metadata" / f"{version}.snapshot.json"
         snapshot: Metadata[Snapshot] = Metadata.from_bytes(path.read_bytes())
@@ -131,17 +131,17 @@ class Repository:
         metadata.sign(load_key(self._online))
         self._write(name, metadata.to_bytes())
 
-    def _stamped(self) -> Metadata[Timestamp] | None:
+    def _sign_timestamp(self) -> Metadata[Timestamp] | None:
         path = self.folder / "metadata" / "timestamp.json"
         return Metadata.from_bytes(path.read_bytes()) if path.exists() else None
 
     def _age(self) -> float:
-        stamp = self._stamped()
+        stamp = self._sign_timestamp()
         signed = stamp.signed.unrecognized_fields[SIGNED_AT] if stamp else self.clock()
         return self.clock() - float(signed)
 
     def _version(self, role: str, of: str) -> int:
-        stamp = self._stamped()
+        stamp = self._sign_timestamp()
         if stamp is None:
             raise absent()
         name = f"{stamp.signed.snapshot_meta.version}.{role}.json"

@@ -131,7 +131,7 @@ class GapKept:
         tension = limits.a_max if excess < 0.0 else limits.b_max
         stiffness = min(tension, 1e3) * SPRING
         a = excess * stiffness - (guide.v - v_other) * 2.0 * sqrt(stiffness)
-        guide.a = self._eased(guide.a, min(max(a, -limits.b_max), limits.a_max), scene.dt)
+        guide.a = self._limit_jerk(guide.a, min(max(a, -limits.b_max), limits.a_max), scene.dt)
         v = guide.v + guide.a * scene.dt
         guide.v = copysign(min(abs(v), limits.v_max), v)
         return False
@@ -140,7 +140,7 @@ class GapKept:
         """It has the other one's speed, which a distance at once asks of what drives on its tyres."""
         return not self.action.limits.none or abs(self.actor.motion.speed - v_other) < STEADY
 
-    def _eased(self, now: float, wanted: float, dt: float) -> float:
+    def _limit_jerk(self, now: float, wanted: float, dt: float) -> float:
         """An acceleration that grows no faster than the file allows; it may end at once, as in esmini."""
         rates = self.action.limits
         if wanted < 0.0:

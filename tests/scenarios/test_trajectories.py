@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import re
-from math import cos, hypot, pi, sin
+from math import cos, hypot, pi, sin, sqrt
 
 import pytest
 from tests.scenarios.files import (
@@ -189,6 +189,11 @@ def place(tmp_path, position, ego=None):
         (f'<TrajectoryPosition s="15" t="1"><TrajectoryRef><Trajectory name="t" closed="false">'
          f'<Shape>{polyline((None, world(10, 0)), (None, world(40, 0)))}</Shape></Trajectory>'
          f'</TrajectoryRef></TrajectoryPosition>', 25.0, 1.0, 0.0),
+        # t and the heading count from the tangent, whatever the vertices' own headings say
+        (f'<TrajectoryPosition s="15" t="1"><TrajectoryRef><Trajectory name="t" closed="false">'
+         f'<Shape>{polyline((None, world(10, 0, 0.0)), (None, world(40, 30, pi)))}</Shape>'
+         f'</Trajectory></TrajectoryRef></TrajectoryPosition>',
+         10.0 + 14.0 / sqrt(2.0), 16.0 / sqrt(2.0), pi / 4),
         (f'<RoutePosition><RouteRef><Route name="r" closed="false">'
          f'<Waypoint routeStrategy="shortest"><Position>{on_lane(-1, 10)}</Position></Waypoint>'
          f'<Waypoint routeStrategy="shortest"><Position>{on_lane(-1, 900)}</Position></Waypoint>'

@@ -109,7 +109,7 @@ class LaneMatch:
             self._on_highway = np.isin(self.map.lanes.road, list(view.highway))
         return first_in_lane(
             self.map.held, self._on_highway, points, chosen,
-            (pose.x, pose.y, pose.z, pose.yaw), view.ego.lane, view.ego.s,
+            (pose.x, pose.y, pose.z, pose.yaw), view.ego.lane, view.ego.s, MOUNT, LOOK_BEYOND,
         )  # fmt: skip
 
 
@@ -122,23 +122,25 @@ def first_in_lane(
     ego: tuple[float, float, float, float],
     ego_lane: int,
     ego_s: float,
+    mount: float,
+    look_beyond: float,
 ) -> int:
     """The first of the chosen rows of `points` that lies in the ego's lane or where it leads, or -1.
 
-    on_highway: by lane; ego: x, y, z and yaw. The look ahead reads one place per branch, the
-    point's range + 10 m on, as A-078 is written: a target whose road ends before that place is
-    missed.
+    on_highway: by lane; ego: x, y, z and yaw; mount, look_beyond: m, `MOUNT` and `LOOK_BEYOND`. The
+    look ahead reads one place per branch, the point's range + 10 m on, as A-078 is written: a target
+    whose road ends before that place is missed.
     """
     a = map.value
     lane, s = _onto_highway(a, on_highway, ego_lane, ego_s)
-    x, y = ego[0] + MOUNT * cos(ego[3]), ego[1] + MOUNT * sin(ego[3])
+    x, y = ego[0] + mount * cos(ego[3]), ego[1] + mount * sin(ego[3])
     for i in chosen:
         r, bearing = float(points.range[i]), ego[3] + float(points.azimuth[i])
         target, at, _ = project_kernel(a, x + r * cos(bearing), y + r * sin(bearing), ego[2], True)
         if target < 0:
             continue
         target, _ = _onto_highway(a, on_highway, target, at)
-        if _is_same(a, target, lane) or _leads_to(a, lane, s + (r + LOOK_BEYOND), target):
+        if _is_same(a, target, lane) or _leads_to(a, lane, s + (r + look_beyond), target):
             return int(i)
     return -1
 

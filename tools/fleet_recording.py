@@ -1,7 +1,9 @@
 """Makes the fleet that `skidpad fleet demo --recorded` opens, from a finished demo folder.
 
     skidpad fleet demo --out DIR --vehicles 6 --no-stay
-    python tools/fleet_recording.py DIR
+    python tools/fleet_recording.py DIR --commit COMMIT
+
+COMMIT is what drove the demo; date and numbers are read from its store.
 
 Keys are left out; the store is written anew without its journal.
 """
@@ -12,7 +14,6 @@ import argparse
 import json
 import shutil
 import sqlite3
-import subprocess
 import tarfile
 import tempfile
 from datetime import datetime, timezone
@@ -28,7 +29,7 @@ def main() -> int:
     """Write archive and provenance; 1 when the archive is too large."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folder", type=Path, help="of a finished demo")
-    parser.add_argument("--vehicles", type=int, default=6)
+    parser.add_argument("--commit", required=True, help="that the demo was driven at")
     asked = parser.parse_args()
     with tempfile.TemporaryDirectory() as name:
         copy = Path(name) / "data"
@@ -36,21 +37,19 @@ def main() -> int:
         shutil.copytree(asked.folder / "data", copy, ignore=left_out)
         with sqlite3.connect(asked.folder / "data" / "fleet.sqlite") as store:
             store.execute("VACUUM INTO ?", (str(copy / "fleet.sqlite"),))
-            drives, hazards = (
+            vehicles, drives, hazards = (
                 store.execute(f"SELECT count(*) FROM {table}").fetchone()[0]
-                for table in ("drives", "hazards")
+                for table in ("vehicles", "drives", "hazards")
             )
+            last = store.execute("SELECT max(at) FROM drives").fetchone()[0]
         with tarfile.open(ARCHIVE, "w:gz") as archive:
             for path in sorted(copy.iterdir()):
                 archive.add(path, path.name, filter=_without_owner)
-    commit = subprocess.run(
-        ["git", "describe", "--always"], capture_output=True, text=True, check=True
-    ).stdout.strip()
     about = {
-        "date": f"{datetime.now(timezone.utc):%Y-%m-%d}",
-        "commit": commit,
-        "command": f"skidpad fleet demo --out DIR --vehicles {asked.vehicles} --no-stay",
-        "vehicles": asked.vehicles,
+        "date": f"{datetime.fromtimestamp(last, timezone.utc):%Y-%m-%d}",
+        "commit": asked.commit,
+        "command": f"skidpad fleet demo --out DIR --vehicles {vehicles} --no-stay",
+        "vehicles": vehicles,
         "drives": drives,
         "hazards": hazards,
         "first_seed": SEED,

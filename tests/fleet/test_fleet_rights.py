@@ -12,6 +12,7 @@ EXPECTED = {
     Action.READ_HAZARDS: "mov",
     Action.EXPORT_SCENARIO: "mo",
     Action.READ_TRENDS: "mo",
+    Action.ANALYSE: "mo",
     Action.TRIAGE: "mo",
     Action.READ_ALERTS: "ot",
     Action.ANSWER_ALERTS: "ot",
@@ -31,3 +32,7 @@ EXPECTED = {
 @pytest.mark.parametrize("action", EXPECTED)
 def test_each_role_has_the_rights_that_its_work_needs_and_no_others(action: Action) -> None:
     assert {role.value[0] for role in RIGHTS[action]} == set(EXPECTED[action])
+
+
+def test_every_right_stands_in_the_table() -> None:
+    assert set(EXPECTED) == set(Action) == set(RIGHTS)

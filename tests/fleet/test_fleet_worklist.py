@@ -70,6 +70,7 @@ def test_a_hazard_appears_is_fixed_by_a_release_and_reopened_when_it_recurs(worl
     for name, status in (("red teleoperator", 403), ("red-1", 403), ("bolt", 404), (None, 401)):
         assert world.post(name, f"{place}/state", json=fixed).status_code == status, name
     assert world.post("axle", f"{place}/state", json={"state": "open", "owner": "Ada"}).is_success
+    world.clock.now += 1.0
     assert listed(world, state="open", owner="Ada")[0]["subject"] == one["subject"]
     assert listed(world, state="new") == []
     # what cannot be said is refused with one sentence
@@ -102,10 +103,31 @@ def test_a_hazard_appears_is_fixed_by_a_release_and_reopened_when_it_recurs(worl
     assert [e["state"] for e in events] == ["open", "fixed", "reopened"]
     assert [e["actor"] for e in events[:2]] == [world.accounts["axle"].principal.id] * 2
     assert events[1]["note"] == "later braking"
-    assert start < events[0]["at"] < events[1]["at"] + 1.0 < events[2]["at"]
+    assert start < events[0]["at"] < events[1]["at"] < events[2]["at"]
+    # the operator of the same vehicle triages for itself
+    assert world.post("red operator", "/api/v1/analyses").is_success
+    (theirs,) = world.get("red operator", "/api/v1/recurring").json()
+    assert (theirs["subject"], theirs["state"], theirs["owner"]) == (one["subject"], "new", "")
+    assert world.get("red operator", f"{place}/events").json() == []
     # one click to the scenario
     scenario = world.post("axle", f"/api/v1/hazards/{one['representative']}/scenario")
     assert scenario.headers["content-type"] == "application/zip"
+
+
+def test_a_fixed_hazard_that_recurs_with_a_later_release_is_reopened(world):
+    world.clock.now = 20_000 * 86_400.0
+    for k in range(3):
+        drive(world, k, "1.0", record(k))
+    (one,) = listed(world)
+    fixed = {"state": "fixed", "owner": "Ada", "release": "1.1"}
+    assert world.post("axle", f"/api/v1/recurring/{one['subject']}/state", json=fixed).is_success
+    world.clock.now += 100.0
+    drive(world, 10, "1.1")
+    drive(world, 11, "1.0", record(4))
+    assert listed(world)[0]["state"] == "fixed", "a release without the fix says nothing"
+    drive(world, 12, "1.2", record(5))
+    (one,) = listed(world)
+    assert (one["state"], one["release"]) == ("reopened", "1.1")
 
 
 def test_risk_times_precision_ranks_and_an_alarm_without_a_score_counts_in_full(world):

@@ -11,7 +11,7 @@ from starlette.concurrency import run_in_threadpool
 from skidpad.core.told import on_a_line
 from skidpad.fleet.api.guard import Needs, fleet_of
 from skidpad.fleet.api.vehicle import read_body
-from skidpad.fleet.insight.triage import KIND, Standing, State, set_standing
+from skidpad.fleet.insight.triage import Standing, State, set_standing, subject_key
 from skidpad.fleet.insight.worklist import Work, WorkFilter, rank_work
 from skidpad.fleet.patterns.analysis import newest_clusters
 from skidpad.fleet.service import CAME, Fleet
@@ -94,10 +94,8 @@ def list_events(request: Request, who: Reader, subject: str) -> list[dict[str, A
     fleet = fleet_of(request)
     require_subject(fleet, who, subject)
     with fleet.engine.connect() as connection:
-        found = events_of(connection, [subject])
-    return [
-        {"state": e.what, "at": e.at, "actor": e.actor} | e.detail for e in found if e.kind == KIND
-    ]
+        found = events_of(connection, [subject_key(who, subject)])
+    return [{"state": e.what, "at": e.at, "actor": e.actor} | e.detail for e in found]
 
 
 def _plain(one: Work) -> dict[str, Any]:

@@ -23,7 +23,7 @@ class State(str, Enum):
     OPEN = "open"  # true, and has an owner
     REJECTED = "rejected"  # no hazard
     FIXED = "fixed"  # by a release
-    REOPENED = "reopened"  # alarms came from drives with the release that should have fixed it
+    REOPENED = "reopened"  # alarms came from drives with the release that fixed it, or a later one
 
 
 SETTABLE = (State.OPEN, State.REJECTED, State.FIXED)
@@ -40,16 +40,23 @@ class Standing:
     actor: str = ""
 
 
-def read_standings(connection: Connection, subjects: Iterable[str]) -> dict[str, Standing]:
-    """Return the standing of each subject that has events; the others are new."""
-    ids, found = list(subjects), {}
-    for start in range(0, len(ids), CHUNK):
-        for event in events_of(connection, ids[start : start + CHUNK]):
-            if event.kind == KIND:
-                d = event.detail
-                found[event.subject] = Standing(
-                    State(event.what), d["owner"], d["release"], event.at, event.actor
-                )
+def subject_key(who: Principal, subject: str) -> str:
+    """Return the subject of events: each organisation triages for itself, as a maker or as an operator."""
+    return f"{who.tenant} {who.role.value} {subject}"
+
+
+def read_standings(
+    connection: Connection, who: Principal, subjects: Iterable[str]
+) -> dict[str, Standing]:
+    """Return the standing of each subject that has events of this organisation; the others are new."""
+    by_key, found = {subject_key(who, s): s for s in subjects}, {}
+    keys = list(by_key)
+    for start in range(0, len(keys), CHUNK):
+        for event in events_of(connection, keys[start : start + CHUNK]):
+            d = event.detail
+            found[by_key[event.subject]] = Standing(
+                State(event.what), d["owner"], d["release"], event.at, event.actor
+            )
     return found
 
 
@@ -74,18 +81,21 @@ def set_standing(
     for name, text in (("owner", standing.owner), ("release", standing.release), ("note", note)):
         if len(text) > TEXT_MAX:
             raise Refused(422, f"{name} has at most {TEXT_MAX} characters, got {len(text)}")
-    _add(connection, subject, standing, who.id, at, note)
+    _add(connection, subject_key(who, subject), standing, (who.id, at), note)
 
 
-def reopen(connection: Connection, recurred: Sequence[tuple[str, Standing]], at: float) -> None:
-    """Keep that these fixed hazards came back in drives with the release that should have fixed them."""
-    for subject, was in recurred:
+def reopen(
+    connection: Connection, who: Principal, recurred: Sequence[tuple[str, Standing, str]], at: float
+) -> None:
+    """Keep that fixed hazards came back; each with its standing and the release that was driven."""
+    for subject, was, driven in recurred:
         again = Standing(State.REOPENED, was.owner, was.release)
-        _add(connection, subject, again, "analysis", at, f"alarms from drives with {was.release}")
+        note = f"alarms from drives with {driven}"
+        _add(connection, subject_key(who, subject), again, ("analysis", at), note)
 
 
 def _add(
-    connection: Connection, subject: str, standing: Standing, actor: str, at: float, note: str
+    connection: Connection, key: str, standing: Standing, by: tuple[str, float], note: str
 ) -> None:
     detail = {"owner": standing.owner, "release": standing.release, "note": note}
-    add_event(connection, (KIND, subject), standing.state.value, (actor, at), **detail)
+    add_event(connection, (KIND, key), standing.state.value, by, **detail)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import islice
 from typing import Any
 
-from sqlalchemy import Connection, select
+from sqlalchemy import Connection, func, select
 
 from skidpad.fleet.insight.precision import Precision, measured_precision
 from skidpad.fleet.insight.triage import Standing, State, read_standings, reopen
@@ -105,7 +105,7 @@ def rank_work(
     groups = [
         (c, sorted((found[i] for i in c["members"] if i in found), key=_age)) for c in clusters
     ]
-    standings = read_standings(connection, [alarms[0].id for _, alarms in groups if alarms])
+    standings = read_standings(connection, who, [alarms[0].id for _, alarms in groups if alarms])
     listed = []
     for cluster, alarms in groups:
         if not alarms or wanted.map not in (None, cluster.get("map")):
@@ -123,14 +123,31 @@ def rank_work(
 def reopen_recurred(
     connection: Connection, who: Principal, clusters: Sequence[dict[str, Any]], at: float
 ) -> int:
-    """Reopen the fixed ones with later alarms from drives with the release; say how many."""
+    """Reopen the fixed ones with later alarms from drives with the release; say how many.
+
+    A release that was first driven after the fixing one counts as holding the fix.
+    """
+    first = _first_drives(connection, who)
     recurred = []
     for one in rank_work(connection, who, clusters, WorkFilter(state=State.FIXED)):
         fixed = one.standing
-        if any(a.release == fixed.release and a.at > (fixed.at or 0.0) for a in one.alarms):
-            recurred.append((one.subject, fixed))
-    reopen(connection, recurred, at)
+        fixed_from = first.get(fixed.release)
+        for alarm in one.alarms:
+            holds_fix = alarm.release == fixed.release or (
+                fixed_from is not None and first.get(alarm.release, fixed_from) > fixed_from
+            )
+            if holds_fix and alarm.at > (fixed.at or 0.0):
+                recurred.append((one.subject, fixed, alarm.release))
+                break
+    reopen(connection, who, recurred, at)
     return len(recurred)
+
+
+def _first_drives(connection: Connection, who: Principal) -> dict[str, float]:
+    """When the first drive with each release came in, s; "": what vehicles came with is left out."""
+    query = select(drives.c.release, func.min(drives.c.at)).where(visible(who, drives))
+    rows = connection.execute(query.group_by(drives.c.release))
+    return {release: at for release, at in rows if release}
 
 
 def _age(alarm: Alarm) -> tuple[float, str]:

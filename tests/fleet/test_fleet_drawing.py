@@ -8,6 +8,7 @@ import pytest
 
 from fleet_world import record
 from skidpad.evidence.statistics import Interval
+from skidpad.fleet.alerting.keeping import Body
 from skidpad.fleet.insight.trends import Trend
 from skidpad.fleet.site.charts import trend_svg
 from skidpad.fleet.site.drawing import (
@@ -19,6 +20,9 @@ from skidpad.fleet.site.drawing import (
     replay_legend,
     replay_svg,
     scale_m,
+    scene_legend,
+    scene_svg,
+    scene_text,
 )
 
 DAY = 86_400.0
@@ -86,3 +90,20 @@ def test_a_replay_marks_what_the_hazard_is_about_where_it_is_now():
         assert texts(svg) == ["20 m"]
     assert "channel a" in replay_legend(one)
     assert "channel b" in replay_legend(one)
+
+
+def test_the_scene_of_an_alert_has_roads_a_scale_its_heading_and_the_nearest_object_marked():
+    ego, far, close = Body(100.0, 50.0, 0.0), Body(130.0, 50.0, 0.0), Body(109.0, 48.0, 0.0)
+    svg = scene_svg(ego, [far, close], "scene", [[(40.0, 50.0), (160.0, 50.0)]])
+    assert texts(svg) == ["20 m"]
+    assert svg.count("<polygon") == 3
+    assert 'points="40.0,-50.0 160.0,-50.0"' in svg  # the road
+    assert 'points="102.2,-50.0 111.2,-50.0"' in svg  # ahead of its nose
+    assert re.findall(r'class="hazard" cx="([^"]*)" cy="([^"]*)"', svg) == [("109.0", "-48.0")]
+    assert scene_text(ego, [far, close]) == "nearest object: 9.0 m ahead, 2.0 m to the right"
+    turned = Body(100.0, 50.0, 3.141592653589793)
+    assert scene_text(turned, [close]) == "nearest object: 9.0 m behind, 2.0 m to the left"
+    alone = scene_svg(ego, [], "scene")
+    assert "hazard" not in alone
+    assert scene_text(ego, []) == "no other object was shown"
+    assert "circle: the nearest" in scene_legend()

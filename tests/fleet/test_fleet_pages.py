@@ -332,7 +332,7 @@ def teleoperator(browser, address, tokens) -> None:
         json=ALERT,
     )
     assert raised.status_code == 200
-    page.get_by_text("1 open alerts").wait_for()
+    page.get_by_text("1 open alert").wait_for()
     page.get_by_text("<b>car</b> ahead stopped").wait_for()  # as text, not as markup
     page.get_by_role("button", name="Acknowledge").click()
     page.get_by_text("8.0 m/s, acknowledged").wait_for()

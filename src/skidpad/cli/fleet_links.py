@@ -14,8 +14,7 @@ if TYPE_CHECKING:
     from skidpad.fleet.alerting.relays import Relay
     from skidpad.fleet.broker import Broker
     from skidpad.fleet.service import Places
-    from skidpad.fleet.site.dashboard import MapLines
-    from skidpad.fleet.site.drawing import Line
+    from skidpad.fleet.site.drawing import Line, MapLines
     from skidpad.fleet.uploader import Post
     from skidpad.roads.queries import RoadMap
 

@@ -12,7 +12,7 @@ import uvicorn
 
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.build import make_site
-from skidpad.fleet.site.dashboard import MapLines
+from skidpad.fleet.site.drawing import MapLines
 from skidpad.fleet.site.login import log_in_page
 from skidpad.fleet.upkeep import Upkeep
 from skidpad.pages.guard import Door, Guard

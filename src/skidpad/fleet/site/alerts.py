@@ -11,7 +11,7 @@ from skidpad.fleet.alerting.keeping import Alert, Scene, What, newest_alerts
 from skidpad.fleet.alerting.orders import Order
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.acting import click_answer, click_order, person
-from skidpad.fleet.site.drawing import scene_svg
+from skidpad.fleet.site.drawing import MapLines, near, scene_legend, scene_svg, scene_text
 from skidpad.fleet.site.frame import say
 from skidpad.fleet.words import Action, Principal, Refused
 
@@ -38,15 +38,17 @@ def alerts_of(fleet: Fleet, who: Principal) -> tuple[int, Principal, list[Alert]
         return seen, now, newest_alerts(connection, now)
 
 
-def draw_alerts(fleet: Fleet, ui: Any, seen: int, who: Principal, found: list[Alert]) -> None:
+def draw_alerts(
+    fleet: Fleet, lines: MapLines, ui: Any, seen: int, who: Principal, found: list[Alert]
+) -> None:
     """The newest alerts; what changes is pushed to the page within half a second."""
     topic = f"alerts {who.tenant}"
 
     @ui.refreshable  # type: ignore[untyped-decorator]
     def cards(now: Principal, known: list[Alert]) -> None:
-        ui.label(f"{sum(not a.closed for a in known)} open alerts")
+        ui.label(open_text(sum(not a.closed for a in known)))
         for alert in known[:SHOWN]:
-            _card(fleet, ui, now, alert)
+            _card(fleet, lines, ui, now, alert)
 
     async def look() -> None:
         nonlocal seen
@@ -64,16 +66,23 @@ def draw_alerts(fleet: Fleet, ui: Any, seen: int, who: Principal, found: list[Al
     timer = ui.timer(LOOK_S, look)
 
 
-def _card(fleet: Fleet, ui: Any, who: Principal, alert: Alert) -> None:
+def open_text(n: int) -> str:
+    """Returns how many alerts are open, in words."""
+    return f"{n} open alert{'' if n == 1 else 's'}"
+
+
+def _card(fleet: Fleet, lines: MapLines, ui: Any, who: Principal, alert: Alert) -> None:
     id, scene = alert.row.id, msgspec.json.decode(alert.row.scene, type=Scene)
     with ui.element("div").classes("card"):
         state = "closed" if alert.closed else f"level {alert.level}"
         ui.label(f"{alert.row.kind.replace('_', ' ')}: {alert.row.text} ({state})")
-        taken = "acknowledged" if alert.acknowledged_by else "nobody took it up yet"
+        taken = "acknowledged" if alert.acknowledged_by else "not taken up yet"
         ui.label(f"{scene.map}, {scene.v:.1f} m/s, {taken}").classes("dim")
-        ui.html(scene_svg(scene.ego, scene.objects, f"scene of alert {id}"), sanitize=False).style(
-            "max-width: 420px"
-        )
+        ego, roads = scene.ego, near(lines(scene.map), scene.ego.x, scene.ego.y)
+        picture = scene_svg(ego, scene.objects, f"scene of alert {id}", roads)
+        ui.html(picture, sanitize=False).style("max-width: 420px")
+        ui.html(scene_legend(), sanitize=False).classes("dim")
+        ui.label(scene_text(ego, scene.objects))
         ui.label("; ".join(e.what for e in alert.events) or "new").classes("dim")
         if alert.closed:
             return

@@ -11,7 +11,8 @@ from starlette.requests import Request
 from skidpad.fleet.api.app import add_api
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.alerts import alerts_of, draw_alerts
-from skidpad.fleet.site.dashboard import MapLines, draw_overview, draw_replay, overview, read_replay
+from skidpad.fleet.site.dashboard import draw_overview, draw_replay, overview, read_replay
+from skidpad.fleet.site.drawing import MapLines
 from skidpad.fleet.site.frame import STYLE, page
 from skidpad.fleet.site.reports import (
     case_of,
@@ -70,7 +71,7 @@ def pages_of(fleet: Fleet, lines: MapLines) -> dict[str, Page]:
         ),
         "/alerts": Page(
             Action.READ_ALERTS, "Alerts", read(alerts_of),
-            lambda ui, found: draw_alerts(fleet, ui, *found),
+            lambda ui, found: draw_alerts(fleet, lines, ui, *found),
         ),
         "/places": Page(Action.READ_PLACES, "Places", read(places_of), draw_places),
         "/case": Page(Action.READ_SAFETY_CASE, "Safety case", read(case_of), draw_case),

@@ -19,6 +19,7 @@ from skidpad.fleet.site.charts import trend_svg
 from skidpad.fleet.site.drawing import (
     Dot,
     Line,
+    MapLines,
     kinds_legend,
     map_svg,
     moment_text,
@@ -32,7 +33,6 @@ from skidpad.fleet.store.reading import Wanted, hazard_row, hazard_rows, record_
 from skidpad.fleet.words import Principal, Refused
 from skidpad.recording.hazards import HazardRecord
 
-MapLines = Callable[[str], Sequence[Line]]  # roads of a map by its name, m
 SHOWN = 6  # trends
 MAPS = 3
 CLUSTERS = 5

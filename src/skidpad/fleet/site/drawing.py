@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from html import escape
-from math import cos, floor, isfinite, log10, sin
+from math import cos, floor, hypot, isfinite, log10, sin
 
 from skidpad.core.channels import ChannelFrame
 from skidpad.fleet.alerting.keeping import Body
 from skidpad.recording.hazards import HazardRecord
 
 Line = Sequence[tuple[float, float]]  # m
+MapLines = Callable[[str], Sequence[Line]]  # roads of a map by its name
 COLOURS = ("#ff8552", "#4d9dff", "#4fce7f", "#d98cff")  # of channels
 KINDS = {
     "ego_tailgating": "#ff8552", "ego_tailgated": "#ffd166", "inconsistent_localisation": "#4d9dff",
@@ -124,10 +125,44 @@ def _points(line: Line) -> str:
     return " ".join(f"{x:.1f},{-y:.1f}" for x, y in line)
 
 
-def scene_svg(ego: Body, objects: Iterable[Body], name: str) -> str:
-    """What a vehicle showed at the moment of its alert."""
-    body = "".join(_body(o, "#9aa5b1") for o in objects) + _body(ego, COLOURS[0])
-    return _svg((ego.x - REACH, ego.y - REACH, 2 * REACH, 2 * REACH), body, name)
+def scene_svg(ego: Body, objects: Sequence[Body], name: str, roads: Sequence[Line] = ()) -> str:
+    """What a vehicle showed at the moment of its alert: roads, itself, others, and the nearest of them."""
+    box = ego.x - REACH, ego.y - REACH, 2 * REACH, 2 * REACH
+    body = _roads(roads) + "".join(_body(o, "#9aa5b1") for o in objects) + _body(ego, COLOURS[0])
+    nose = ego.length / 2 * cos(ego.heading), ego.length / 2 * sin(ego.heading)
+    way = (ego.x + nose[0], ego.y + nose[1]), (ego.x + 5 * nose[0], ego.y + 5 * nose[1])
+    body += f'<polyline points="{_points(way)}" stroke="{COLOURS[0]}" stroke-width="0.8"/>'
+    if (nearest := nearest_of(ego, objects)) is not None:
+        body += (
+            f'<circle class="hazard" cx="{nearest.x:.1f}" cy="{-nearest.y:.1f}" r="5" fill="none" '
+            f'stroke="{HAZARD}" stroke-width=".7"/>'
+        )
+    return _svg(box, body + _scale(box), name)
+
+
+def nearest_of(ego: Body, objects: Iterable[Body]) -> Body | None:
+    """Returns the object whose centre is nearest to the ego's; None when it showed none."""
+    return min(objects, key=lambda o: hypot(o.x - ego.x, o.y - ego.y), default=None)
+
+
+def scene_text(ego: Body, objects: Iterable[Body]) -> str:
+    """Returns in words where the nearest object is, by centres and the ego's heading."""
+    nearest = nearest_of(ego, objects)
+    if nearest is None:
+        return "no other object was shown"
+    x, y = nearest.x - ego.x, nearest.y - ego.y
+    ahead = x * cos(ego.heading) + y * sin(ego.heading)
+    left = y * cos(ego.heading) - x * sin(ego.heading)
+    along = f"{abs(ahead):.1f} m {'ahead' if ahead >= 0.0 else 'behind'}"
+    return f"nearest object: {along}, {abs(left):.1f} m to the {'left' if left >= 0.0 else 'right'}"
+
+
+def scene_legend() -> str:
+    """The legend of an alert's scene."""
+    return legend_html(
+        [("the vehicle; the line is its heading", COLOURS[0]), ("what it showed", "#9aa5b1"),
+         ("circle: the nearest", HAZARD)]
+    )  # fmt: skip
 
 
 def _body(o: Body, colour: str) -> str:

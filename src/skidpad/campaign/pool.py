@@ -57,15 +57,9 @@ class _Queue:
 
 def run_jobs(jobs: Iterable[Job], workers: int) -> Iterator[Finished]:
     """Run all jobs on `workers` processes; yield each as it ends, in order of ending."""
-    queue = _Queue(deque(jobs))
-    crew: list[Worker | None] = [None] * min(max(workers, 1), len(queue.waiting))
-    with single_threaded():
-        try:
-            yield from _supervise(crew, queue)
-        finally:
-            for worker in crew:
-                if worker is not None:
-                    worker.dismiss()
+    waiting = list(jobs)
+    with keep_workers(min(workers, len(waiting))) as run:
+        yield from run(waiting)
 
 
 def _supervise(crew: list[Worker | None], queue: _Queue) -> Iterator[Finished]:
@@ -92,6 +86,19 @@ def _supervise(crew: list[Worker | None], queue: _Queue) -> Iterator[Finished]:
                 if queue.again(finished.job):
                     continue
             yield replace(finished, attempts=queue.attempts[finished.job.key])
+
+
+@contextmanager
+def keep_workers(workers: int) -> Iterator[Runner]:
+    """Keep worker processes from one batch of jobs to the next, for many small batches."""
+    crew: list[Worker | None] = [None] * max(workers, 1)
+    with single_threaded():
+        try:
+            yield lambda jobs: _supervise(crew, _Queue(deque(jobs)))
+        finally:
+            for worker in crew:
+                if worker is not None:
+                    worker.dismiss()
 
 
 def warm(compile_all: Callable[[], None]) -> None:

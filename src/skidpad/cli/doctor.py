@@ -32,6 +32,7 @@ EXTRAS = (
     Extra("cluster", "distributed", "distributed", "--cluster: campaigns on many machines"),
     Extra("ros", "rosbags", "rosbags", "skidpad monitor on ROS 2 bags"),
     Extra("learn", "sklearn", "scikit-learn", "--identifier learned"),
+    Extra("search", "optuna", "optuna", "search --method tpe"),
     Extra("osi", "osi3", "osi-python", "skidpad export --osi: traces of ASAM OSI"),
     Extra("cockpit", "nicegui", "nicegui", "skidpad drive, replay, watch: pages in a browser"),
     Extra("fleet", "fastapi", "fastapi", "skidpad fleet: what many vehicles report"),

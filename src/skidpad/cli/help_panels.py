@@ -10,6 +10,7 @@ COMMANDS: dict[str, dict[str, str]] = {
     "Drive a campaign": {
         "adas": "adas --sensors objects --seeds 10 --out out/mine",
         "grip": "grip --scenarios front_accident --seeds 20 --out out/grip",
+        "search": "search lead_slowdown --vary LeadS=110:140 --vary Deceleration=2:9 --out out/search",
         "study": "study F-08 --seeds 10",
         "campaign": "campaign estimate adas --sensors objects --seeds 50",
         "export-dataset": "export-dataset --weather rain-night --seeds 3 --out out/images",
@@ -62,6 +63,7 @@ OPTIONS = {
     "roads": "Road and traffic",
     "scenario": "Scenario",
     "expected": "Verdicts",
+    "varied": "Search",
     "backend": "Simulator",
     "pages": "Page",
     "map": "Threshold map",

@@ -32,6 +32,7 @@ from skidpad.cli.monitor import monitor, safety_case
 from skidpad.cli.play import play, play_folder
 from skidpad.cli.profiles import profiles
 from skidpad.cli.rerun import rerun, study
+from skidpad.cli.search import search
 from skidpad.cli.shadow import shadow
 from skidpad.cli.spread import spread_fields
 from skidpad.cli.view import view
@@ -95,6 +96,7 @@ app.add_typer(hazards)
 app.add_typer(fleet)
 app.command()(friction)
 app.command()(play)
+app.command()(search)
 app.add_typer(campaign)
 app.command()(monitor)
 app.command("safety-case")(safety_case)

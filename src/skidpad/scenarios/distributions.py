@@ -36,12 +36,19 @@ def is_distribution(file: Path) -> bool:
 def choices(file: Path) -> list[Choice]:
     """All choices that a file makes: every combination of sets and ranges, or as many draws."""
     node = inner(parse(file)).child("ParameterValueDistribution")
-    scenario = file.parent / node.child("ScenarioFile").text("filepath").replace("\\", "/")
-    if not scenario.is_file():
-        raise node.child("ScenarioFile").error("there is no such file")
+    scenario = scenario_of_choices(file, node)
     drawn = node.find("Stochastic")
     values = _combine_parameters(node.child("Deterministic")) if drawn is None else _draws(drawn)
-    return [Choice(scenario.resolve(), found) for found in values]
+    return [Choice(scenario, found) for found in values]
+
+
+def scenario_of_choices(file: Path, node: Node) -> Path:
+    """Return the scenario that a file of distributions names; FileError where it is not there."""
+    named = node.child("ScenarioFile")
+    scenario = file.parent / named.text("filepath").replace("\\", "/")
+    if not scenario.is_file():
+        raise named.error("there is no such file")
+    return scenario.resolve()
 
 
 def _combine_parameters(node: Node) -> list[dict[str, str]]:

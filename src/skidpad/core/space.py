@@ -1,0 +1,152 @@
+"""A space of values: what varies, in what ranges, and how likely each value is.
+
+Whoever searches sees the unit cube only: a coordinate in [0, 1] is the share of the distribution that
+lies below a value, so that uniform coordinates draw values as likely as the distributions say.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+from msgspec import Struct
+from scipy.special import ndtr, ndtri
+
+from skidpad.core.errors import ConfigError
+
+DIGITS = 9  # significant ones of a value, as files write it
+EDGE = 1e-12  # coordinates stay this far from 0 and 1, where a normal has no value
+
+
+class Uniform(Struct, frozen=True, tag="uniform", forbid_unknown_fields=True):
+    """Every value of a range is as likely as any other."""
+
+    low: float
+    high: float
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The ends of the range."""
+        return self.low, self.high
+
+    def value(self, u: float) -> float:
+        """Return the value below which the share `u` lies."""
+        return self.low + u * (self.high - self.low)
+
+    def likelihood(self, value: float) -> float:
+        """Return the density relative to that of the likeliest value, 0 to 1."""
+        return 1.0 if self.low <= value <= self.high else 0.0
+
+
+class Normal(Struct, frozen=True, tag="normal", forbid_unknown_fields=True):
+    """A normal distribution, cut to a range; of the logarithm where `is_log`."""
+
+    mean: float
+    sigma: float
+    low: float | None = None  # None: no end
+    high: float | None = None
+    is_log: bool = False
+
+    @property
+    def range(self) -> tuple[float, float]:
+        """The ends of the range; infinite where there is none."""
+        lowest = 0.0 if self.is_log else -math.inf
+        return (
+            lowest if self.low is None else self.low,
+            math.inf if self.high is None else self.high,
+        )
+
+    def value(self, u: float) -> float:
+        """Return the value below which the share `u` lies."""
+        low, high = self.range
+        below, above = ndtr(self._z(low)), ndtr(self._z(high))
+        inner = self.mean + self.sigma * float(ndtri(below + u * (above - below)))
+        return min(max(math.exp(inner) if self.is_log else inner, low), high)
+
+    def likelihood(self, value: float) -> float:
+        """Return the density of z, or of the logarithm, relative to the likeliest value, 0 to 1."""
+        low, high = self.range
+        if not low <= value <= high:
+            return 0.0
+        nearest = min(max(0.0, self._z(low)), self._z(high))
+        return math.exp(0.5 * (nearest**2 - self._z(value) ** 2))
+
+    def _z(self, value: float) -> float:
+        if self.is_log:
+            value = math.log(value) if value > 0.0 else -math.inf
+        return (value - self.mean) / self.sigma
+
+
+class Choice(Struct, frozen=True, tag="choice", forbid_unknown_fields=True):
+    """One of several words, each with its weight."""
+
+    words: tuple[str, ...]
+    weights: tuple[float, ...] = ()  # (): alike
+
+    def value(self, u: float) -> str:
+        """Return the word below which the share `u` lies."""
+        reached = 0.0
+        for word, share in zip(self.words, self._shares(), strict=True):
+            reached += share
+            if u < reached:
+                return word
+        return self.words[-1]
+
+    def likelihood(self, value: str) -> float:
+        """Return the weight of a word relative to that of the likeliest, 0 to 1."""
+        shares = self._shares()
+        return shares[self.words.index(value)] / max(shares) if value in self.words else 0.0
+
+    def _shares(self) -> list[float]:
+        weights = self.weights or (1.0,) * len(self.words)
+        return [weight / sum(weights) for weight in weights]
+
+
+Law = Uniform | Normal | Choice
+Value = float | str
+
+
+class Variable(Struct, frozen=True, forbid_unknown_fields=True):
+    """A parameter of the scenario, `weather`, or `weather.FIELD`, and how its values are distributed.
+
+    source: where the distribution was read; "" for an assumption of whoever asks.
+    """
+
+    name: str
+    law: Law
+    source: str = ""
+
+    def value(self, u: float) -> Value:
+        """Return the value of a coordinate in [0, 1], as files write it."""
+        found = self.law.value(min(max(u, EDGE), 1.0 - EDGE))
+        return found if isinstance(found, str) else float(f"{found:.{DIGITS}g}")
+
+    def likelihood(self, value: Value) -> float:
+        """Return how likely a value is beside the likeliest one, 0 to 1."""
+        return self.law.likelihood(value)  # type: ignore[arg-type]
+
+
+class Space(Struct, frozen=True, forbid_unknown_fields=True):
+    """All variables, in order: coordinate k is that of variable k."""
+
+    variables: tuple[Variable, ...]
+
+    def __post_init__(self) -> None:
+        names = [v.name for v in self.variables]
+        if not names:
+            raise ConfigError("nothing varies: give --vary NAME=LOW:HIGH, or a distribution file")
+        if len(set(names)) < len(names):
+            raise ConfigError(f"a name varies twice: {', '.join(names)}")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the variables in order."""
+        return tuple(v.name for v in self.variables)
+
+    def values(self, unit: Sequence[float]) -> dict[str, Value]:
+        """Return the values of a point of the unit cube, by name."""
+        return {v.name: v.value(u) for v, u in zip(self.variables, unit, strict=True)}
+
+    def likelihood(self, values: Mapping[str, Value]) -> float:
+        """Return how likely the values are beside the likeliest ones, 0 to 1."""
+        return math.prod(v.likelihood(values[v.name]) for v in self.variables)

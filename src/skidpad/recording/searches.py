@@ -1,0 +1,168 @@
+"""What a search leaves in its folder: what was searched, every trial, and what was found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from msgspec import Struct
+
+from skidpad.core.errors import FileError
+from skidpad.core.reading import decode_json, read_bytes
+from skidpad.core.run import RunSpec, run_from_plain
+from skidpad.core.space import Space, Value
+
+SEARCH, TRIALS = "search.json", "trials.jsonl"
+FOUND, FAILURES, CHOICES = "found.json", "failures", "failures.xosc"
+LARGEST = 1024**3  # bytes of a file
+FRONT = "front"  # of the ego
+
+
+class Search(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is searched, and how; `search.json` in the folder."""
+
+    run: dict[str, Any]  # the template, as config.yaml holds runs
+    space: Space
+    method: str
+    objective: str
+    budget: int
+    seed: int
+
+    @property
+    def template(self) -> RunSpec:
+        """The run whose values vary."""
+        return run_from_plain(self.run, SEARCH)
+
+
+class Trial(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What a point of the space came to.
+
+    Attributes:
+        number: in the order of the search, from 0.
+        unit: the point in the unit cube.
+        values: what it stands for, by name of variable.
+        margin: 0 or below for a failure (`search.margin`).
+        simulated_s: how long the run was; 0 where it could not be driven.
+        min_gap_m, min_ttc_s, max_drac_mps2: over all others; None where they never applied.
+        contact_kmh: graded speed of the hardest contact (decision T-4): delta-v, else closing speed.
+        contact_s: when it happened.
+        other: what was touched.
+        side: of the ego, on which it was touched.
+        departed_s: when all wheels had left every lane.
+        motion: hash of what moved (decision T-3): equal drives are one.
+        fault: why it could not be driven, or how the stack failed; "" where neither.
+    """
+
+    number: int
+    unit: tuple[float, ...]
+    values: dict[str, Value]
+    margin: float
+    simulated_s: float = 0.0
+    min_gap_m: float | None = None
+    min_ttc_s: float | None = None
+    max_drac_mps2: float | None = None
+    contact_kmh: float | None = None
+    contact_s: float | None = None
+    other: str = ""
+    side: str = ""
+    departed_s: float | None = None
+    motion: str = ""
+    fault: str = ""
+
+    @property
+    def is_failure(self) -> bool:
+        """Whether it is a contact above 5 km/h or a departure."""
+        return self.margin <= 0.0 and not self.fault
+
+    @property
+    def kind(self) -> str:
+        """What failed in a few words, such as "front into lead"; failures of one kind are a group."""
+        if not self.is_failure:
+            return "no failure"
+        if not self.other:
+            return "departure from the road"
+        if self.side == FRONT:
+            return f"front into {self.other}"
+        return f"{self.other} into the {self.side}"
+
+
+class Change(Struct, frozen=True, forbid_unknown_fields=True):
+    """One value that parts a failure from a harmless run."""
+
+    name: str
+    harmless: Value
+    failing: Value
+
+
+class Judged(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A failure, and what the reference driver did in the same place.
+
+    Attributes:
+        trial: the failure.
+        reference: of the same values with the reference driver at the wheel.
+        likelihood: of the values beside the likeliest ones, 0 to 1.
+    """
+
+    trial: Trial
+    reference: Trial
+    likelihood: float
+
+    @property
+    def is_avoidable(self) -> bool:
+        """Whether the reference driver touches nothing and stays on the road with the same values."""
+        r = self.reference
+        return r.contact_kmh is None and r.departed_s is None and not r.fault
+
+
+class Group(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """Failures of one kind: the same side of the ego against the same other, or a departure.
+
+    Attributes:
+        kind: in words.
+        failures: of this kind, the likeliest first.
+        changes: the fewest values that part the first of them from a harmless run, each as near as
+            bisection brought it; () where no harmless run was found.
+        failing, harmless: the two runs on both sides of that border.
+    """
+
+    kind: str
+    failures: tuple[Judged, ...]
+    changes: tuple[Change, ...] = ()
+    failing: Trial | None = None
+    harmless: Trial | None = None
+
+
+class Findings(Struct, frozen=True, forbid_unknown_fields=True):
+    """Everything that was found: `found.json` in the folder of a search."""
+
+    judged: tuple[Judged, ...]
+    groups: tuple[Group, ...]
+
+
+def read_search(out: Path) -> Search:
+    """Return what was searched in a folder; FileError where it holds no search."""
+    path = out / SEARCH
+    if not path.is_file():
+        raise FileError(f"{out} holds no search: it has no {SEARCH}")
+    return decode_json(read_bytes(path, SEARCH), str(path), Search)
+
+
+def read_trials(out: Path) -> list[Trial]:
+    """Return the trials of a folder in order; a last line that was cut off is left out."""
+    path = out / TRIALS
+    if not path.is_file():
+        return []
+    lines = read_bytes(path, TRIALS, LARGEST).split(b"\n")[:-1]
+    return [decode_json(line, f"{path} line {k + 1}", Trial) for k, line in enumerate(lines)]
+
+
+def failure_folder(out: Path, number: int) -> Path:
+    """Return the folder of a failure that is kept as a run."""
+    return out / FAILURES / f"{number:05d}"
+
+
+def read_findings(out: Path) -> Findings:
+    """Return what was found in a folder; FileError where the search has not come to its end."""
+    path = out / FOUND
+    found: Findings = decode_json(read_bytes(path, FOUND, LARGEST), str(path), Findings)
+    return found

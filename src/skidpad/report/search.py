@@ -1,0 +1,327 @@
+"""The page of a search: what fails, how it could have been avoided, and how well the space was covered."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from scipy.stats import ks_2samp
+
+from skidpad.core.run import AdasDriver, DriverSpec
+from skidpad.core.space import Choice, Normal, Variable
+from skidpad.core.wording import count_text
+from skidpad.recording.searches import (
+    Change,
+    Findings,
+    Group,
+    Judged,
+    Search,
+    Trial,
+    failure_folder,
+    read_findings,
+    read_search,
+    read_trials,
+)
+from skidpad.report.figures import INK, PALETTE, canvas, svg_of
+from skidpad.report.page import (
+    REPORT,
+    Answer,
+    Answers,
+    Block,
+    Cell,
+    Figure,
+    Page,
+    Section,
+    Table,
+    Text,
+    write_report_page,
+)
+
+LISTED = 20  # failures in the table
+
+
+def write_search_report(out: Path) -> str:
+    """Write the page of a search; returns the text to print."""
+    search, trials, findings = read_search(out), read_trials(out), read_findings(out)
+    write_report_page(search_page(out, search, trials, findings), out)
+    lines = [answer(search, trials, findings)]
+    lines += [group_sentence(g) for g in findings.groups]
+    lines += [f"page: {out / REPORT}"]
+    if findings.groups:
+        first = failure_folder(out, findings.groups[0].failures[0].trial.number)
+        lines += [f"next: skidpad replay {first}"]
+    return "\n".join(lines)
+
+
+def search_page(out: Path, search: Search, trials: Sequence[Trial], findings: Findings) -> Page:
+    """Return the page of a search."""
+    sections = [
+        Section("Answer", [_answers(search, trials, findings)]),
+        Section("Failures", _failures(out, findings)),
+        Section("Coverage", _coverage(search, trials)),
+        Section("What was searched", [_variables(search, trials), Text(_method(search), "note")]),
+    ]
+    course = search.template.course
+    title = f"Search: {getattr(course, 'title', 'scenario')}"
+    run = search.template
+    subtitle = f"{driver_text(run.driver)}, {count_text(search.budget, 'run')}"
+    return Page(title=title, subtitle=subtitle, sections=sections)
+
+
+def answer(search: Search, trials: Sequence[Trial], findings: Findings) -> str:
+    """Return the answer in one or two sentences."""
+    failing = [t for t in trials if t.is_failure]
+    driver, runs = driver_text(search.template.driver), count_text(len(trials), "run")
+    if not failing:
+        nearest = min(trials, key=lambda t: t.margin)
+        near = "nothing came near"
+        if nearest.min_gap_m is not None:
+            near = f"the nearest came to a gap of {nearest.min_gap_m:.1f} m"
+        return f"No failure of {driver} in {runs}; {near}. This is no proof that there is none."
+    avoided = [one for one in findings.judged if one.is_avoidable]
+    known = f"The reference driver avoids {len(avoided)} of the {len(findings.judged)} that differ"
+    kinds = f", which are of {count_text(len(findings.groups), 'kind')}" if avoided else ""
+    return (
+        f"{count_text(len(failing), 'failure')} of {driver} in {runs}, the first in run "
+        f"{failing[0].number + 1}. {known}{kinds}."
+    )
+
+
+def driver_text(driver: DriverSpec) -> str:
+    """Return who drives in words: our stack with its functions, or the label of another driver."""
+    if isinstance(driver, AdasDriver):
+        return (
+            f"our stack ({', '.join(sorted(f.value for f in driver.functions)) or 'no function'})"
+        )
+    return driver.label
+
+
+def group_sentence(group: Group) -> str:
+    """Return a group in one sentence: what, how often, and what would have been enough."""
+    worst = max(group.failures, key=lambda one: one.trial.contact_kmh or 0.0).trial
+    speed = "" if worst.contact_kmh is None else f", up to {worst.contact_kmh:.0f} km/h"
+    text = f"{group.kind}: {count_text(len(group.failures), 'failure')}{speed}"
+    if group.changes:
+        text += f"; harmless with {' and '.join(change_text(c) for c in group.changes)}"
+    return text
+
+
+def change_text(change: Change) -> str:
+    """Return a change in words, as "LeadS 118.2 instead of 117.9"."""
+    return f"{change.name} {_precise(change.harmless)} instead of {_precise(change.failing)}"
+
+
+def _precise(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.5g}"
+
+
+def _value(value: float | str) -> str:
+    return value if isinstance(value, str) else f"{value:.4g}"
+
+
+def _answers(search: Search, trials: Sequence[Trial], findings: Findings) -> Answers:
+    unavoidable = [one for one in findings.judged if not one.is_avoidable]
+    faults = [t for t in trials if t.fault]
+    items = [
+        Answer(
+            "Where does it fail?",
+            answer(search, trials, findings),
+            [group_sentence(g) for g in findings.groups],
+            _progress(trials),
+        ),
+        Answer(
+            "What was not counted?",
+            f"{count_text(len(unavoidable), 'failure')} that the reference driver does not avoid, and "
+            f"{count_text(len(faults), 'run')} that could not be driven.",
+            sorted({t.fault for t in faults})[:5],
+        ),
+    ]
+    return Answers(items)
+
+
+def _failures(out: Path, findings: Findings) -> list[Block]:
+    blocks: list[Block] = []
+    for group in findings.groups:
+        blocks += [Text(group_sentence(group), "lead")]
+        blocks += [_failure_table(out, group.failures, group.kind)]
+    hard = [one for one in findings.judged if not one.is_avoidable]
+    if hard:
+        blocks += [
+            Text(
+                "The reference driver touches something or leaves the road in these as well, so they say "
+                "nothing against the driver that was searched.",
+                "note",
+            ),
+            _failure_table(out, hard, "not avoided by the reference driver"),
+        ]
+    return blocks or [Text("There is none to show.")]
+
+
+def _failure_table(out: Path, ones: Sequence[Judged], caption: str) -> Table:
+    columns = [
+        ("run", "number in the search; a link where the run is kept"),
+        ("contact, km/h", "larger delta-v of the two, else closing speed"),
+        ("at, s", "of the contact, or of the departure"),
+        ("reference", "what the reference driver came to with the same values: least gap, m"),
+        ("likelihood", "density of the values beside that of the likeliest ones"),
+        ("values", "of what varied"),
+    ]
+    rows = [_failure_row(out, one) for one in ones[:LISTED]]
+    rest = f"{len(ones)} failures; the likeliest {LISTED} are listed, all in trials.jsonl."
+    return Table(columns, rows, caption=caption, note=rest if len(ones) > LISTED else "")
+
+
+def _failure_row(out: Path, one: Judged) -> list[Cell]:
+    trial, folder = one.trial, failure_folder(out, one.trial.number)
+    href = folder.relative_to(out).as_posix() + f"/{REPORT}" if folder.is_dir() else ""
+    values = ", ".join(f"{name} {_value(v)}" for name, v in trial.values.items())
+    return [
+        Cell(str(trial.number + 1), trial.number, href=href),
+        _number(trial.contact_kmh, ".1f"),
+        _number(trial.contact_s if trial.departed_s is None else trial.departed_s, ".2f"),
+        _reference_cell(one.reference),
+        _number(one.likelihood, ".3g"),
+        Cell(values),
+    ]
+
+
+def _reference_cell(reference: Trial) -> Cell:
+    """Return what the reference driver came to with the values of a failure."""
+    if reference.fault:
+        return Cell("not driven", -2.0)
+    if reference.departed_s is not None:
+        return Cell("leaves the road", -1.5)
+    if reference.contact_kmh is not None:
+        return Cell(f"contact, {reference.contact_kmh:.1f} km/h", -1.0)
+    return _number(reference.min_gap_m, ".2f")
+
+
+def _number(value: float | None, spec: str) -> Cell:
+    return Cell("-") if value is None else Cell(f"{value:{spec}}", value)
+
+
+def _progress(trials: Sequence[Trial]) -> Figure:
+    """Margin of every run in turn, failures marked."""
+    margins = np.array([t.margin for t in trials])
+    bad = np.array([t.is_failure for t in trials])
+    with canvas(height=2.8) as (figure, (axes,)):
+        at = np.arange(1, len(trials) + 1)
+        axes.scatter(at[~bad], margins[~bad], s=6, color=PALETTE[5], label="no failure")
+        axes.scatter(at[bad], margins[bad], s=14, color=PALETTE[1], marker="x", label="failure")
+        axes.plot(
+            at, np.minimum.accumulate(margins), color=INK, linewidth=1.0, label="least so far"
+        )
+        axes.axhline(0.0, color=INK, linewidth=0.6)
+        axes.set_xlabel("run")
+        axes.set_ylabel("margin")
+        figure.legend(loc="outside upper center", ncols=3)
+        return Figure(
+            svg_of(figure),
+            "Margin of each run: 2 without conflict, 1 to 2 by gap, TTC and braking, 0 to 1 a contact "
+            "below 5 km/h, at most 0 a failure.",
+        )
+
+
+def influence(search: Search, trials: Sequence[Trial]) -> dict[str, float]:
+    """Return how far the coordinates of failures and of other runs differ, by variable: 0 to 1.
+
+    It is the largest difference of the two distribution functions (Kolmogorov and Smirnov); 0 where
+    there is no failure or nothing else.
+    """
+    bad = np.array([t.is_failure for t in trials])
+    unit = np.array([t.unit for t in trials])
+    if not bad.any() or bad.all():
+        return dict.fromkeys(search.space.names, 0.0)
+    return {
+        name: float(ks_2samp(unit[bad, k], unit[~bad, k]).statistic)
+        for k, name in enumerate(search.space.names)
+    }
+
+
+def _coverage(search: Search, trials: Sequence[Trial]) -> list[Block]:
+    ranked = sorted(influence(search, trials).items(), key=lambda item: -item[1])
+    names = [name for name, _ in ranked]
+    pairs = [(names[0], n) for n in names[1:4]] or [(names[0], names[0])]
+    with canvas(width=8.4, height=3.0, columns=len(pairs)) as (figure, axes):
+        for axis, (x, y) in zip(axes, pairs, strict=True):
+            _draw_pair(axis, search, trials, x, y)
+        figure.legend(*axes[0].get_legend_handles_labels(), loc="outside upper center", ncols=2)
+        picture = svg_of(figure)
+    caption = "Every run by its values; where failures differ most from other runs comes first."
+    return [Figure(picture, caption)]
+
+
+def _draw_pair(axis, search: Search, trials: Sequence[Trial], x: str, y: str) -> None:  # type: ignore[no-untyped-def]
+    for bad, marker, colour, label in (
+        (False, ".", PALETTE[5], "no failure"),
+        (True, "x", PALETTE[1], "failure"),
+    ):
+        chosen = [t for t in trials if t.is_failure is bad]
+        axis.scatter(
+            [_place(search, x, t) for t in chosen], [_place(search, y, t) for t in chosen],
+            marker=marker, s=12, color=colour, label=label, linewidths=0.8,
+        )  # fmt: skip
+    for name, set_label, set_ticks in (
+        (x, axis.set_xlabel, axis.set_xticks),
+        (y, axis.set_ylabel, axis.set_yticks),
+    ):
+        set_label(name)
+        law = _variable(search, name).law
+        if isinstance(law, Choice):
+            set_ticks(range(len(law.words)), law.words)
+
+
+def _variable(search: Search, name: str) -> Variable:
+    return next(v for v in search.space.variables if v.name == name)
+
+
+def _place(search: Search, name: str, trial: Trial) -> float:
+    value, law = trial.values[name], _variable(search, name).law
+    return float(law.words.index(str(value))) if isinstance(law, Choice) else float(value)
+
+
+def _variables(search: Search, trials: Sequence[Trial]) -> Table:
+    shares = influence(search, trials)
+    columns = [
+        ("variable", "parameter of the scenario, weather, or a field of the weather"),
+        ("distribution", "values are drawn as likely as it says"),
+        ("source", "where it was read"),
+        ("influence", "largest difference of the distributions of failures and other runs, 0 to 1"),
+    ]
+    rows = [
+        [
+            Cell(v.name),
+            Cell(law_text(v)),
+            Cell(v.source or "assumption"),
+            Cell(f"{shares[v.name]:.2f}", shares[v.name]),
+        ]
+        for v in search.space.variables
+    ]
+    return Table(columns, rows, caption="what varied")
+
+
+def law_text(variable: Variable) -> str:
+    """Return the distribution of a variable in words."""
+    law = variable.law
+    if isinstance(law, Choice):
+        weights = law.weights or (1.0,) * len(law.words)
+        return ", ".join(
+            f"{w} ({x / sum(weights):.0%})" for w, x in zip(law.words, weights, strict=True)
+        )
+    ends = [f"{end:g}" for end in law.range]
+    if isinstance(law, Normal):
+        name = "log-normal" if law.is_log else "normal"
+        cut = "" if (law.low, law.high) == (None, None) else f", within {ends[0]} to {ends[1]}"
+        return f"{name}, mean {law.mean:g}, sigma {law.sigma:g}{cut}"
+    return f"{ends[0]} to {ends[1]}, uniform"
+
+
+def _method(search: Search) -> str:
+    run = search.template
+    return (
+        f"Method {search.method}, objective {search.objective}, seed {search.seed}; "
+        f"weather {run.weather.name}, noise seed {run.seed}, "
+        f"at most {run.duration:g} s a run. A failure is a contact above 5 km/h (with a person or a "
+        "two-wheeler any), or a departure with all wheels off every lane. The same seed finds the same."
+    )

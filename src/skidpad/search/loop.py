@@ -1,0 +1,107 @@
+"""The search itself: ask a method for points, drive them, tell it, until the budget is spent.
+
+Every trial is a line of `trials.jsonl`. A search that is resumed asks its method for the same points
+again and reads what they came to, so it goes on as if it had never stopped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from skidpad.campaign.worker import Job, Runner
+from skidpad.core.errors import FileError, OutputError
+from skidpad.recording.files import write_bytes
+from skidpad.recording.searches import SEARCH, TRIALS, Search, Trial, read_search, read_trials
+from skidpad.search.methods import batch_sizes, make_method
+from skidpad.search.trial import Point, drive_point, unit_tuple
+
+DEADLINE_S = 600.0  # of one run
+
+
+def write_search(out: Path, search: Search, *, resume: bool) -> list[Trial]:
+    """Write what is searched into a folder; return the trials that it holds already.
+
+    Raises:
+        OutputError: the folder holds another search, or this one and `resume` is false.
+    """
+    path = out / SEARCH
+    if path.is_file():
+        if not resume:
+            raise OutputError(f"{out} holds a search already: give --resume, or another --out")
+        if msgspec.json.encode(read_search(out)) != msgspec.json.encode(search):
+            raise OutputError(f"{out} holds another search than this one: give another --out")
+        return read_trials(out)
+    if out.exists() and any(out.iterdir()):
+        raise OutputError(f"{out} is not empty and holds no search: give another --out")
+    out.mkdir(parents=True, exist_ok=True)
+    write_bytes(path, msgspec.json.format(msgspec.json.encode(search)))
+    return []
+
+
+def search(found: Search, out: Path, runner: Runner, known: Sequence[Trial]) -> Iterator[Trial]:
+    """Drive the search to its end, one trial after the other in their order.
+
+    Args:
+        found: what is searched.
+        out: its folder, written by `write_search`.
+        runner: drives a batch, on this machine or a cluster.
+        known: trials of an earlier stretch, as `write_search` returns them.
+    """
+    template, space = found.template, found.space
+    method = make_method(found.method, len(space.variables), found.seed, found.budget)
+    stored = {trial.number: trial for trial in known}
+    _rewrite(out, known)
+    number = 0
+    with (out / TRIALS).open("ab", buffering=0) as file:
+        for size in batch_sizes(found.budget):
+            points = method.ask(size)
+            batch = [
+                Point(template, space, number + k, unit_tuple(p), found.objective)
+                for k, p in enumerate(points)
+            ]
+            new = [p for p in batch if not _is_known(stored, p, out)]
+            stored |= {trial.number: trial for trial in drive_all(new, runner)}
+            trials = [stored[p.number] for p in batch]
+            for trial in trials:
+                if trial.number in {p.number for p in new}:
+                    file.write(msgspec.json.encode(trial) + b"\n")
+                yield trial
+            method.tell(points, np.array([trial.margin for trial in trials]))
+            number += size
+
+
+def _rewrite(out: Path, known: Sequence[Trial]) -> None:
+    """Write the trials that can be read, so that a line that was cut off is gone."""
+    if known:
+        write_bytes(out / TRIALS, b"".join(msgspec.json.encode(t) + b"\n" for t in known))
+
+
+def _is_known(stored: dict[int, Trial], point: Point, out: Path) -> bool:
+    trial = stored.get(point.number)
+    if trial is not None and trial.unit != point.unit:
+        raise FileError(
+            f"{out / TRIALS}: trial {point.number} is not what this version asks for; "
+            "search anew into another folder"
+        )
+    return trial is not None
+
+
+def drive_all(points: Sequence[Point], runner: Runner) -> list[Trial]:
+    """Drive points side by side; a run that killed its worker or hung is a fault. In their order."""
+    by_key = {str(p.number): p for p in points}
+    jobs = [Job(key, drive_point, p, DEADLINE_S) for key, p in by_key.items()]
+    found = {}
+    for done in runner(jobs):
+        point = by_key[done.job.key]
+        found[point.number] = done.value if done.failure is None else _lost(point, done.detail)
+    return [found[p.number] for p in points]
+
+
+def _lost(point: Point, detail: str) -> Trial:
+    values = point.space.values(point.unit)
+    last = detail.strip().rpartition("\n")[2] or "the run was lost"
+    return Trial(number=point.number, unit=point.unit, values=values, margin=2.0, fault=last)

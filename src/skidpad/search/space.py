@@ -1,0 +1,113 @@
+"""From words to a space, and from a point of it to a run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import replace
+
+from msgspec import structs
+
+from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.space import Choice, Law, Normal, Space, Uniform, Value, Variable
+from skidpad.core.told import describe_value
+from skidpad.core.weather import RANGES, Weather
+from skidpad.physics.presets import find_weather
+
+WEATHER = "weather"  # name of a variable that chooses presets; "weather.FIELD": one of its fields
+NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+UNIFORM = re.compile(rf"({NUMBER}):({NUMBER})")
+DRAWN = re.compile(rf"(normal|lognormal)\(({NUMBER}),({NUMBER})(?:,({NUMBER}):({NUMBER}))?\)")
+HOW = (
+    "NAME=LOW:HIGH, NAME=normal(MEAN,SIGMA), NAME=lognormal(MEAN,SIGMA) of the logarithm, either with "
+    "a range after a comma, as normal(3,1,0:8), or NAME=one|other|third"
+)
+
+
+def parse_variable(text: str) -> Variable:
+    """Return the variable of one `--vary`.
+
+    Raises:
+        ConfigError: the text is none of the forms, a range is empty or a sigma is not positive.
+    """
+    name, equals, words = (part.strip() for part in text.partition("="))
+    if not name or not equals:
+        raise ConfigError(f"--vary takes {HOW}; got {describe_value(text, 100)}")
+    return Variable(name, _parse_law(name, words.replace(" ", "")))
+
+
+def _parse_law(name: str, words: str) -> Law:
+    if found := UNIFORM.fullmatch(words):
+        return _checked(name, Uniform(float(found[1]), float(found[2])))
+    if found := DRAWN.fullmatch(words):
+        low, high = (float(found[k]) if found[k] else None for k in (4, 5))
+        is_log = found[1] == "lognormal"
+        return _checked(name, Normal(float(found[2]), float(found[3]), low, high, is_log))
+    if "|" in words and all(words.split("|")):
+        return Choice(tuple(words.split("|")))
+    raise ConfigError(f"--vary {name}: takes {HOW}; got {describe_value(words, 100)}")
+
+
+def _checked(name: str, law: Uniform | Normal) -> Law:
+    low, high = law.range
+    if not low < high:
+        raise ConfigError(f"--vary {name}: the range {low:g}:{high:g} is empty")
+    if isinstance(law, Normal) and not law.sigma > 0.0:
+        raise ConfigError(f"--vary {name}: sigma must be above 0, got {law.sigma:g}")
+    return law
+
+
+def apply_values(template: RunSpec, values: Mapping[str, Value]) -> RunSpec:
+    """Return the run with these values in its scenario and its weather."""
+    course = template.course
+    assert isinstance(course, Scenario)
+    parameters = {n: v for n, v in values.items() if n.partition(".")[0] != WEATHER}
+    weather = template.weather
+    if WEATHER in values:
+        weather = find_weather(str(values[WEATHER]))
+    fields = {n.partition(".")[2]: v for n, v in values.items() if n.startswith(f"{WEATHER}.")}
+    return structs.replace(
+        template,
+        course=structs.replace(course, parameters={**course.parameters, **parameters}),
+        weather=_with_fields(weather, fields),
+    )
+
+
+def _with_fields(weather: Weather, fields: Mapping[str, Value]) -> Weather:
+    return replace(weather, **fields) if fields else weather  # type: ignore[arg-type]
+
+
+def _require_weather(variable: Variable) -> None:
+    word, dot, name = variable.name.partition(".")
+    if word != WEATHER:
+        return
+    if not dot:
+        if not isinstance(variable.law, Choice):
+            raise ConfigError(
+                "--vary weather takes presets, as weather=clear-noon|rain-noon|icy_30"
+            )
+        for preset in variable.law.words:
+            find_weather(preset)
+        return
+    require_choice("--vary weather.FIELD", name, tuple(RANGES))
+    low, high = RANGES[name]
+    if isinstance(variable.law, Choice):
+        raise ConfigError(f"--vary {variable.name}: takes a range of numbers")
+    lowest, highest = variable.law.range
+    if lowest < low or highest > high:
+        raise ConfigError(
+            f"--vary {variable.name}: must lie within {low:g}:{high:g}, got {lowest:g}:{highest:g}"
+        )
+
+
+def parse_space(texts: Iterable[str]) -> Space:
+    """Return the space of all `--vary`, as `parse_variable` reads each."""
+    return check_space(Space(tuple(parse_variable(text) for text in texts)))
+
+
+def check_space(space: Space) -> Space:
+    """Return the space; ConfigError for a weather that is none, or values outside a field's range."""
+    for variable in space.variables:
+        _require_weather(variable)
+    return space

@@ -1,0 +1,103 @@
+"""One trial of a search: a point of the space, driven once, and what it came to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import atan2, cos, pi, sin
+
+from msgspec import structs
+
+from skidpad.campaign.run import Run, run
+from skidpad.core.errors import InputError
+from skidpad.core.run import ReferenceDriver, RunSpec
+from skidpad.core.space import Space
+from skidpad.core.vocabulary import Outcome
+from skidpad.evidence.drive.severity import Contact
+from skidpad.recording.motion import motion_hash
+from skidpad.recording.runlog import RunLog
+from skidpad.recording.searches import FRONT, Trial
+from skidpad.roads.bundled import load_map
+from skidpad.search.margin import NO_CONFLICT, Closeness, closeness
+from skidpad.search.space import apply_values
+
+SIDES = (FRONT, "left side", "rear", "right side")  # of the ego, from ahead to the left
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """What a worker is given."""
+
+    template: RunSpec
+    space: Space
+    number: int
+    unit: tuple[float, ...]
+    objective: str
+
+    def spec(self) -> RunSpec:
+        """Return the run of the point."""
+        return apply_values(self.template, self.space.values(self.unit))
+
+
+def drive_point(point: Point) -> Trial:
+    """Drive a point in this process and return its trial; a file that refuses its values is a fault."""
+    values = point.space.values(point.unit)
+    blank = Trial(number=point.number, unit=point.unit, values=values, margin=NO_CONFLICT)
+    try:
+        driven = run(point.spec())
+    except InputError as error:
+        return structs.replace(blank, fault=str(error))
+    return describe_run(blank, driven, point.objective)
+
+
+def describe_run(blank: Trial, driven: Run, objective: str) -> Trial:
+    """Return `blank` with everything that a run says."""
+    log = driven.log
+    if driven.outcome is Outcome.AGENT_ERROR or not len(log):
+        last = driven.error.strip().rpartition("\n")[2]
+        return structs.replace(blank, fault=last or "the run ended before its first tick")
+    near = closeness(log, load_map(driven.road), driven.off_road, objective)
+    return structs.replace(blank, simulated_s=float(log.t[-1]), **_columns(log, near))
+
+
+def _columns(log: RunLog, near: Closeness) -> dict[str, object]:
+    columns: dict[str, object] = {
+        name: getattr(near, name)
+        for name in ("margin", "min_gap_m", "min_ttc_s", "max_drac_mps2", "departed_s")
+    }
+    columns["motion"] = motion_hash(log)
+    if near.contact is not None:
+        contact = near.contact
+        columns |= {
+            "contact_kmh": contact.v_graded * 3.6,
+            "contact_s": contact.tick * log.header.dt,
+            "other": contact.other,
+            "side": side_of(log, contact),
+        }
+    return columns
+
+
+def side_of(log: RunLog, contact: Contact) -> str:
+    """Return the side of the ego on which another actor was; the front for what stands."""
+    if contact.actor < 0:
+        return SIDES[0]
+    row = max(int(log.tick.searchsorted(contact.tick)) - 1, 0)
+    a, i = log.actors, contact.actor
+    dx, dy, yaw = (float(v) for v in (
+        a.x[row, i] - a.x[row, 0], a.y[row, i] - a.y[row, 0], a.yaw[row, 0],
+    ))  # fmt: skip
+    ahead, left = dx * cos(yaw) + dy * sin(yaw), dy * cos(yaw) - dx * sin(yaw)
+    length = 0.5 * float(log.table.length[0] + log.table.length[i])
+    width = 0.5 * float(log.table.width[0] + log.table.width[i])
+    turn = atan2(left / width, ahead / length)  # as if both were squares
+    return SIDES[round(turn / (0.5 * pi)) % 4]
+
+
+def with_reference(template: RunSpec) -> RunSpec:
+    """Return the same run with the reference driver at the wheel (decision T-5)."""
+    return structs.replace(template, driver=ReferenceDriver())
+
+
+def unit_tuple(point: Iterable[float]) -> tuple[float, ...]:
+    """Return a point as trials store it."""
+    return tuple(float(x) for x in point)

@@ -1,6 +1,6 @@
 """A space of values: what varies, in what ranges, and how likely each value is.
 
-Whoever searches sees the unit cube only: a coordinate in [0, 1] is the share of the distribution that
+Methods of search see the unit cube only: a coordinate in [0, 1] is the share of the distribution that
 lies below a value, so that uniform coordinates draw values as likely as the distributions say.
 """
 
@@ -109,7 +109,7 @@ Value = float | str
 class Variable(Struct, frozen=True, forbid_unknown_fields=True):
     """A parameter of the scenario, `weather`, or `weather.FIELD`, and how its values are distributed.
 
-    source: where the distribution was read; "" for an assumption of whoever asks.
+    source: where the distribution was read; "" for an assumption.
     """
 
     name: str

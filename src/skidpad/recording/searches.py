@@ -144,7 +144,8 @@ def read_search(out: Path) -> Search:
     path = out / SEARCH
     if not path.is_file():
         raise FileError(f"{out} holds no search: it has no {SEARCH}")
-    return decode_json(read_bytes(path, SEARCH), str(path), Search)
+    found: Search = decode_json(read_bytes(path, SEARCH), str(path), Search)
+    return found
 
 
 def read_trials(out: Path) -> list[Trial]:

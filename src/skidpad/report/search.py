@@ -89,7 +89,7 @@ def answer(search: Search, trials: Sequence[Trial], findings: Findings) -> str:
 
 
 def driver_text(driver: DriverSpec) -> str:
-    """Return who drives in words: our stack with its functions, or the label of another driver."""
+    """Return the driver in words: our stack with its functions, or the label of another driver."""
     if isinstance(driver, AdasDriver):
         return (
             f"our stack ({', '.join(sorted(f.value for f in driver.functions)) or 'no function'})"

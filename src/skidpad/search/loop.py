@@ -97,11 +97,11 @@ def drive_all(points: Sequence[Point], runner: Runner) -> list[Trial]:
     found = {}
     for done in runner(jobs):
         point = by_key[done.job.key]
-        found[point.number] = done.value if done.failure is None else _lost(point, done.detail)
+        found[point.number] = done.value if done.failure is None else _blank_trial(point, done.detail)
     return [found[p.number] for p in points]
 
 
-def _lost(point: Point, detail: str) -> Trial:
+def _blank_trial(point: Point, detail: str) -> Trial:
     values = point.space.values(point.unit)
     last = detail.strip().rpartition("\n")[2] or "the run was lost"
     return Trial(number=point.number, unit=point.unit, values=values, margin=2.0, fault=last)

@@ -72,12 +72,12 @@ def _by_braking(found: Sequence[Pair]) -> float:
     return 1.0 if worst is None else BRAKING_SCALE / (BRAKING_SCALE + max(worst, 0.0))
 
 
-def _combined(found: Sequence[Pair]) -> float:
+def _by_all(found: Sequence[Pair]) -> float:
     return (_by_gap(found) + _by_ttc(found) + _by_braking(found)) / 3.0
 
 
 OBJECTIVES: Mapping[str, Callable[[Sequence[Pair]], float]] = {
-    "combined": _combined,  # the mean of the three below
+    "combined": _by_all,  # the mean of the three below
     "gap": _by_gap,  # the least gap, bumper to bumper
     "ttc": _by_ttc,  # the least time to collision
     "braking": _by_braking,  # the largest deceleration that avoided a contact

@@ -27,7 +27,7 @@ FOUND = 0.5  # share of failures in a population from which on a descent has don
 
 
 class Method(Protocol):
-    """One way to search."""
+    """One way to choose the next points of a search."""
 
     def ask(self, count: int) -> Floats:
         """Return the next points, (count, d), each in [0, 1]."""
@@ -46,11 +46,11 @@ class Random:
         self.rng, self.d = np.random.default_rng(seed), dimensions
 
     def ask(self, count: int) -> Floats:
-        """Return uniform points."""
+        """Return independent, uniform points."""
         return self.rng.random((count, self.d))
 
     def tell(self, points: Floats, margins: Floats) -> None:
-        """Learn nothing."""
+        """Learn nothing: points do not depend on margins."""
 
 
 class Halton:
@@ -67,7 +67,7 @@ class Halton:
         return np.asarray(self.sequence.random(count))
 
     def tell(self, points: Floats, margins: Floats) -> None:
-        """Learn nothing."""
+        """Learn nothing: points do not depend on margins."""
 
 
 class Descents:
@@ -142,7 +142,7 @@ class Parzen:
         return np.array([[t.params[name] for name in self.laws] for t in self.open])
 
     def tell(self, points: Floats, margins: Floats) -> None:
-        """Let the estimators learn."""
+        """Let the estimators learn from the margins."""
         del points  # each belongs to an open trial
         for trial, margin in zip(self.open, margins.tolist(), strict=True):
             self.study.tell(trial, margin)

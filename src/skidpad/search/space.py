@@ -39,17 +39,17 @@ def parse_variable(text: str) -> Variable:
 
 def _parse_law(name: str, words: str) -> Law:
     if found := UNIFORM.fullmatch(words):
-        return _checked(name, Uniform(float(found[1]), float(found[2])))
+        return _require_range(name, Uniform(float(found[1]), float(found[2])))
     if found := DRAWN.fullmatch(words):
         low, high = (float(found[k]) if found[k] else None for k in (4, 5))
         is_log = found[1] == "lognormal"
-        return _checked(name, Normal(float(found[2]), float(found[3]), low, high, is_log))
+        return _require_range(name, Normal(float(found[2]), float(found[3]), low, high, is_log))
     if "|" in words and all(words.split("|")):
         return Choice(tuple(words.split("|")))
     raise ConfigError(f"--vary {name}: takes {HOW}; got {describe_value(words, 100)}")
 
 
-def _checked(name: str, law: Uniform | Normal) -> Law:
+def _require_range(name: str, law: Uniform | Normal) -> Law:
     low, high = law.range
     if not low < high:
         raise ConfigError(f"--vary {name}: the range {low:g}:{high:g} is empty")

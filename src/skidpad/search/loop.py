@@ -97,7 +97,9 @@ def drive_all(points: Sequence[Point], runner: Runner) -> list[Trial]:
     found = {}
     for done in runner(jobs):
         point = by_key[done.job.key]
-        found[point.number] = done.value if done.failure is None else _blank_trial(point, done.detail)
+        found[point.number] = (
+            done.value if done.failure is None else _blank_trial(point, done.detail)
+        )
     return [found[p.number] for p in points]
 
 

@@ -46,7 +46,7 @@ class Random:
         self.rng, self.d = np.random.default_rng(seed), dimensions
 
     def ask(self, count: int) -> Floats:
-        """Return independent, uniform points."""
+        """Return points that are independent and uniform."""
         return self.rng.random((count, self.d))
 
     def tell(self, points: Floats, margins: Floats) -> None:
@@ -58,7 +58,7 @@ class Halton:
 
     def __init__(self, dimensions: int, seed: int, budget: int) -> None:
         del budget
-        # the keyword was renamed with scipy 1.15
+        # scipy below 1.15 knows this keyword only; newer ones take it as well
         rng = np.random.default_rng(seed)
         self.sequence = qmc.Halton(dimensions, scramble=True, seed=rng)
 

@@ -146,7 +146,18 @@ CAME = Moment(0.1, 3.7)
             a_story(off_lane()),
             ("The ego drove at 65 km/h and hit the guardrail, 1.9 m left of the middle of its lane; "
             "the bend of 84 m takes 3.9 m/s² at that speed, less than the 7.8 m/s² that the tyres "
-            "hold."),
+            "hold, so the bend alone does not explain it."),
+        ),
+        (
+            a_story(
+                off_lane(
+                    v_ego=149.0 / KMH, v_closing=106.0 / KMH, contact=contact(163.0, None, 106.0),
+                ),
+                braked=Moment(0.05, np.nan, 149.0 / KMH),
+            ),
+            ("The ego drove at 149 km/h and hit the guardrail, 1.9 m left of the middle of its lane; "
+            "it was stopped and thrown back, a change of velocity of 163 km/h; the bend of 84 m takes "
+            "20.4 m/s² at that speed, more than the 7.8 m/s² that the tyres hold."),
         ),
         (
             a_story(
@@ -219,6 +230,20 @@ def test_a_standing_vehicle_has_its_speed() -> None:
     found = dict(facts(a_crash(v_other=0.0, v_closing=0.0)))
     assert (found["other"], found["closing"]) == ("0 km/h", "0 km/h")
     assert found["delta-v, larger of the two"] == "30 km/h"
+
+
+def test_speeds_at_a_guardrail_say_what_they_are_and_agree() -> None:
+    end = off_lane(v_ego=149.0 / KMH, v_closing=106.0 / KMH, contact=contact(163.0, None, 106.0))
+    assert facts(end)[:3] == [
+        ("ego", "149 km/h"),
+        ("of it square to the guardrail", "106 km/h"),
+        ("delta-v, thrown back", "163 km/h"),
+    ]
+    assert facts(off_lane())[:3] == [
+        ("ego", "65 km/h"),
+        ("of it square to the guardrail", "1 km/h"),
+        ("delta-v", "1 km/h"),
+    ]
 
 
 def test_tags_name_the_class_and_what_it_is_graded_by() -> None:

@@ -15,7 +15,13 @@ from skidpad.evidence.drive.prepared import Drive
 from skidpad.evidence.drive.severity import Contact
 from skidpad.evidence.drive.story import Arrival, Sighting, Story, tell_story
 from skidpad.recording.campaigns import snapshot
-from skidpad.report.causes import format_gap, format_metres, format_speed, write_cause
+from skidpad.report.causes import (
+    format_gap,
+    format_metres,
+    format_speed,
+    is_thrown_back,
+    write_cause,
+)
 from skidpad.report.page import Card, Event, Image
 from skidpad.report.replay import replay
 from skidpad.roads.queries import RoadMap
@@ -113,8 +119,8 @@ def facts(crash: Crash) -> list[tuple[str, str]]:
     rows = [
         ("ego", crash.v_ego, format_speed),
         ("other", crash.v_other, format_speed),
-        ("closing", crash.v_closing, format_speed),
-        (_delta_v_name(contact), delta_v, format_speed),
+        (_closing_name(contact), crash.v_closing, format_speed),
+        (_delta_v_name(crash), delta_v, format_speed),
         ("offset in lane", crash.lane_offset, lambda m: f"{round(m, 2) + 0.0:.2f} m"),
         ("bend radius", crash.bend_radius, "{:.0f} m".format),
         ("friction", crash.mu, "{:.2f}".format),
@@ -124,8 +130,18 @@ def facts(crash: Crash) -> list[tuple[str, str]]:
     return [(name, write(value)) for name, value, write in rows if value is not None]
 
 
-def _delta_v_name(contact: Contact | None) -> str:
-    return "delta-v" if contact is None or contact.actor < 0 else "delta-v, larger of the two"
+def _closing_name(contact: Contact | None) -> str:
+    """What stands is hit by the part of the ego's speed that is square to the piece hit first."""
+    if contact is None or contact.actor >= 0:
+        return "closing"
+    return f"of it square to the {contact.other}"
+
+
+def _delta_v_name(crash: Crash) -> str:
+    contact = crash.contact
+    if contact is not None and contact.actor >= 0:
+        return "delta-v, larger of the two"
+    return "delta-v, thrown back" if is_thrown_back(crash) else "delta-v"
 
 
 def timeline(story: Story) -> list[Event]:
@@ -164,7 +180,7 @@ def _news_event(s: Sighting, story: Story) -> Event:
         to = f" to {s.to}" if s.to and s.to != story.crash.other else ""
         parts.append(f"true gap {format_metres(s.gap)}{to}")
     elif s.distance is not None:
-        parts.append("nothing ahead in the lane within 80 m")
+        parts.append("no vehicle ahead in the lane within 80 m (centre to centre)")
     if s.tier is not None:
         parts.append(TIERS[s.tier])
     if s == story.first:

@@ -13,6 +13,7 @@ from skidpad.evidence.drive.story import Arrival, Moment, Sighting, Story
 LATE = 1.0  # s without a report that are worth a word
 STANDS = 1.0  # m/s
 STRAIGHT = 1000.0  # m, a wider bend is none
+BRIEF = 0.1  # s of braking that are worth a word
 ASIDE = 0.5  # m beside the middle of the lane that are worth a word
 REPORTERS = {
     DetectionStatus.FUSION_DETECT: "the cameras",
@@ -141,14 +142,31 @@ def _describe_departure(story: Story) -> list[str]:
         side = "left" if crash.lane_offset > 0.0 else "right"
         text += f", {format_metres(abs(crash.lane_offset))} {side} of the middle of its lane"
     brake = ""
-    if braked is not None:
+    if braked is not None and braked.before >= BRIEF:
         brake = f"it had been braking for {format_seconds(braked.before)}, from {format_speed(braked.v)}"
     return [
         text,
+        _describe_rebound(crash),
         _describe_bend(crash),
         brake,
         "" if wrong is None else _describe_report(wrong, crash.other),
     ]
+
+
+def is_thrown_back(crash: Crash) -> bool:
+    """Whether what stands changed the ego's velocity by more than its speed."""
+    contact = crash.contact
+    if contact is None or contact.actor >= 0 or contact.delta_v is None:
+        return False
+    return contact.delta_v > crash.v_ego
+
+
+def _describe_rebound(crash: Crash) -> str:
+    """Why a delta-v is larger than the speed that was lost."""
+    if not is_thrown_back(crash) or crash.contact is None:
+        return ""
+    back = format_speed(crash.contact.delta_v)
+    return f"it was stopped and thrown back, a change of velocity of {back}"
 
 
 def _describe_bend(crash: Crash) -> str:
@@ -159,8 +177,9 @@ def _describe_bend(crash: Crash) -> str:
     if crash.mu is None:
         return text
     holds = crash.mu * G
-    than = "more" if takes > holds else "less"
-    return f"{text}, {than} than the {holds:.1f} m/s² that the tyres hold"
+    if takes > holds:
+        return f"{text}, more than the {holds:.1f} m/s² that the tyres hold"
+    return f"{text}, less than the {holds:.1f} m/s² that the tyres hold, so the bend alone does not explain it"
 
 
 def format_speed(v: float | None) -> str:

@@ -402,6 +402,26 @@ def test_being_hit_from_the_side_is_not_rear_ended() -> None:
     assert (c.striker, c.rear_ended) == (Striker.OTHER, False)
 
 
+@pytest.mark.parametrize(("v_across", "striker"), [(1.0, Striker.EGO), (0.0, Striker.OTHER)])
+def test_a_slower_car_touched_sideways_is_not_rear_ended(v_across: float, striker: Striker) -> None:
+    """The ego overtakes at 24 m/s; the other drives 15 and stands half a length back."""
+
+    def rows(k: int) -> list[dict[str, float]]:
+        ego = {"x": 50.0 + 24.0 * DT * k, "vx": 24.0, "vy": v_across}
+        return [ego, {"x": 54.0 + 15.0 * DT * k, "y": 2.2, "vx": 15.0, "vy": -0.5}]
+
+    log = drive(
+        20,
+        rows,
+        contacts=[hit(tick=14)],
+        supervision=lambda k: Supervision.BRAKE if k > 14 else Supervision.NONE,
+    )
+    (c,) = find_crashes(prepare(log, straight_map()))
+    assert (c.striker, c.rear_ended) == (striker, False)
+    assert c.v_other is not None
+    assert c.v_other < c.v_ego
+
+
 @pytest.mark.req("A-189", "A-193")
 def test_contacts_in_the_cool_down_are_logged_and_not_fatal() -> None:
     late = ContactEvent(45, -1, "guardrail", 5.0, 1.0, 0.0, 0.0)

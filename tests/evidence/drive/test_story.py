@@ -147,6 +147,16 @@ def test_a_distance_to_nothing_is_wrong_and_matters_when_the_stack_braked_hard_f
     assert (hard.worst.distance, hard.worst.gap) == (11.9, None)
 
 
+@pytest.mark.parametrize(("measured", "is_wrong"), [(78.9, False), (80.0 - LENGTH - 1.0, True)])
+def test_a_report_beyond_what_the_truth_looks_at_is_not_wrong(
+    measured: float, is_wrong: bool
+) -> None:
+    """Leads are sought within 80 m from centre to centre: a gap of 79 m may well be right."""
+    rows: Rows = lambda k: [ego(k), car(50.0 + V * k * DT - 8.0)]  # noqa: E731
+    far = dataclasses.replace(RADAR, distance=measured)
+    assert told(crashed(rows, lambda _k: far)).news[-1].is_wrong is is_wrong
+
+
 def test_a_lead_that_leaves_uncovers_the_vehicle_that_is_hit() -> None:
     def rows(k: int) -> list[dict[str, float]]:
         return [ego(k), ahead(k, 30.0), ahead(k, 10.0, 0.0 if k < HIT - 30 else WIDTH)]

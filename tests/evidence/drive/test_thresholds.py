@@ -133,7 +133,7 @@ def test_behind_is_within_60_degrees_of_straight_back(angle: float, behind: bool
 
     def rows(_k: int) -> list[dict[str, float]]:
         c, s = math.cos(away), math.sin(away)
-        return [{"x": 50.0}, {"x": 50.0 + 4 * c, "y": 4 * s, "vx": -9 * c, "vy": -9 * s}]
+        return [{"x": 50.0}, {"x": 50.0 + 12 * c, "y": 12 * s, "vx": -9 * c, "vy": -9 * s}]
 
     log = drive(
         9,

@@ -211,14 +211,34 @@ def _bend_radius(drive: Drive, at: int) -> float | None:
 
 
 def _who(log: RunLog, at: int, other: int) -> tuple[bool, Striker]:
-    """Whether the other car stood behind, and which of the two approached faster."""
+    """Whether the other car stood behind, and which of the two approached faster.
+
+    Cars that stood side by side just before met sideways: neither was behind, and what counts is
+    how fast each moved across.
+    """
     a, k = log.actors, max(at - 1, 0)
     to = np.array([a.x[k, other] - a.x[k, 0], a.y[k, other] - a.y[k, 0]], dtype=np.float64)
+    along = np.array([np.cos(a.yaw[k, 0]), np.sin(a.yaw[k, 0])], dtype=np.float64)
+    if _are_side_by_side(log, k, other):
+        to -= float(to @ along) * along
     to /= max(float(np.hypot(*to)), 1e-9)
-    ahead = to[0] * np.cos(a.yaw[k, 0]) + to[1] * np.sin(a.yaw[k, 0])
+    ahead = float(to @ along)
     ego = a.vx[k, 0] * to[0] + a.vy[k, 0] * to[1]
     them = -(a.vx[k, other] * to[0] + a.vy[k, other] * to[1])
     return bool(ahead < BEHIND), Striker.OTHER if them > ego else Striker.EGO
+
+
+def _are_side_by_side(log: RunLog, row: int, other: int) -> bool:
+    """Whether two cars overlap along the ego's axis, and by more than across it."""
+    a, table = log.actors, log.table
+    dx, dy = a.x[row, other] - a.x[row, 0], a.y[row, other] - a.y[row, 0]
+    yaw, turned = float(a.yaw[row, 0]), float(a.yaw[row, other] - a.yaw[row, 0])
+    along, across = dx * np.cos(yaw) + dy * np.sin(yaw), dy * np.cos(yaw) - dx * np.sin(yaw)
+    c, s = abs(np.cos(turned)), abs(np.sin(turned))
+    length, width = table.length[other], table.width[other]
+    apart_along = abs(along) - (table.length[0] + length * c + width * s) / 2.0
+    apart_across = abs(across) - (table.width[0] + length * s + width * c) / 2.0
+    return bool(apart_along < min(0.0, apart_across))
 
 
 def _grip(log: RunLog, row: int) -> float | None:

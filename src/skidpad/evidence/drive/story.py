@@ -51,7 +51,7 @@ class Sighting:
     status: DetectionStatus | None
     tier: Tier | None
     distance: float | None  # m, measured
-    gap: float | None  # m, true; None: nothing was ahead in the lane within 80 m
+    gap: float | None  # m, true; None: no vehicle ahead in the lane within 80 m, centre to centre
     to: str  # the vehicle that the gap is to
     is_wrong: bool  # measured and true do not belong together
 
@@ -128,6 +128,9 @@ class _Way:
 
     def __init__(self, drive: Drive, at: int, actor: int | None) -> None:
         self.drive, self.at, self.actor = drive, at, actor
+        half_lengths = np.asarray(drive.log.table.length, np.float64) / 2.0
+        # a lead is sought within 80 m from centre to centre, so of a longer gap nothing is known
+        self.reach = LEAD_RANGE - float(half_lengths[EGO] + half_lengths.max())
         lead = drive.lead
         self.gap: Floats = np.full(at + 1, np.nan)
         self.ahead: Mask = np.zeros(at + 1, dtype=np.bool_)
@@ -171,7 +174,7 @@ class _Way:
             for gap in gaps
             if not np.isnan(gap)
         ]
-        return min(errors, default=max(LEAD_RANGE - measured, 0.1))
+        return min(errors, default=max(self.reach - measured, 0.0))
 
     def sighting(self, row: int) -> Sighting:
         """Returns what the stack said in a row, beside the truth."""

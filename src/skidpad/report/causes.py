@@ -179,7 +179,8 @@ def _describe_bend(crash: Crash) -> str:
     holds = crash.mu * G
     if takes > holds:
         return f"{text}, more than the {holds:.1f} m/s² that the tyres hold"
-    return f"{text}, less than the {holds:.1f} m/s² that the tyres hold, so the bend alone does not explain it"
+    less = f"{text}, less than the {holds:.1f} m/s² that the tyres hold"
+    return f"{less}, so the bend alone does not explain it"
 
 
 def format_speed(v: float | None) -> str:

@@ -6,7 +6,7 @@ import pytest
 from test_matrix_report import key
 
 from skidpad.evidence.drive.findings import FINDINGS
-from skidpad.evidence.verdicts import judge
+from skidpad.evidence.verdicts import Verdict, judge
 from skidpad.recording.matrix import MATRIX, Metrics
 from skidpad.recording.results import Timing
 from skidpad.report.matrix import write_report
@@ -46,12 +46,12 @@ def metrics(barriers=0, struck=0, hit=0, speed=40.0):
     )
 
 
-def campaign(folder, of, seeds=10, alike=True):
-    """Runs of configurations 0 to 4 in six weathers; of(config, kind) has the metrics of each."""
+def campaign(folder, of, seeds=10, alike=True, configs="01234"):
+    """Runs of configurations in six weathers; of(config, kind) has the metrics of each."""
     rows = []
     for weather in WEATHERS:
         kind, time = weather.split("-")
-        for config in "01234":
+        for config in configs:
             for seed in range(1, seeds + 1):
                 drive = f"{config}{kind}{'' if alike else time}{seed}"
                 rows.append((key(config, weather, seed, log_hash=drive), of(config, kind)))
@@ -78,18 +78,38 @@ def told(matrix, crashes=None):
 def test_the_first_answer_names_the_safest_functions_in_each_weather_and_how_sure_that_is(tmp_path):
     first = told(campaign(tmp_path, clear_cut))[0]
     assert first.sentence == (
-        "Fewest crashes: in clear sky configurations 1 and 2 with 0.00 per run; "
-        "in heavy rain configuration 1 with 0.00 per run."
+        "Fewest crashes: in clear sky configuration 1 (ACC) and configuration 2 (ACC and lane "
+        "centring) with 0.00 per run; in heavy rain configuration 1 (ACC) with 0.00 per run."
     )
     clear, rain = first.lines
     # twelve comparisons of ten seeds, the two signs of each equally extreme: 12 * 2 / 2^10
     assert clear == (
         "Clear sky: configuration 1 has fewer than configurations 3 and 4 (p at most 0.023); "
-        "10 seeds cannot tell configuration 1 from configuration 2."
+        "10 seeds cannot tell configuration 1 from configuration 2; "
+        "none in 10 seeds allows one in 26 % of seeds."
     )
     assert rain == (
-        "Heavy rain: configuration 1 has fewer than configurations 2 to 4 (p at most 0.023)."
+        "Heavy rain: configuration 1 has fewer than configurations 2 to 4 (p at most 0.023); "
+        "none in 10 seeds allows one in 26 % of seeds."
     )
+
+
+@pytest.mark.req("R-7", "T-5")
+def test_the_first_answer_is_about_functions_and_the_reference_driver_stands_beside_them(tmp_path):
+    """A model of a human without a crash hides no comparison of the functions."""
+
+    def of(config, kind):
+        return metrics() if config == "reference" else metrics(barriers=int(config))
+
+    first = told(campaign(tmp_path, of, configs=("3", "4", "reference")))[0]
+    assert first.sentence == (
+        "Fewest crashes: in clear sky configuration 3 (ACC, lane centring, light assist and resume) "
+        "with 3.00 per run; in heavy rain configuration 3 (ACC, lane centring, light assist and "
+        "resume) with 3.00 per run. "
+        "The reference driver, a model of a careful human, had 0.00 in clear sky and 0.00 in heavy "
+        "rain."
+    )
+    assert first.lines[0].startswith("Clear sky: configuration 3 has fewer than configuration 4 ")
 
 
 @pytest.mark.req("R-7")
@@ -97,13 +117,18 @@ def test_the_second_answer_says_what_rain_changes_for_each_configuration(tmp_pat
     second = told(campaign(tmp_path, clear_cut))[1]
     assert second.sentence == (
         "Heavy rain against clear sky: more crashes with configurations 2 and 4; "
-        "no difference that 10 seeds can show with configurations 1 and 3."
+        "no difference that 10 seeds can show with configurations 1 and 3. "
+        "Where no difference shows, the numbers below may differ by chance."
     )
     assert second.lines[3] == (
-        "4 · + 80 km/h limiter: crashes per run 2.00 in clear sky, 5.00 in heavy rain; "
+        "4 · + 80 km/h limiter: crashes per run 2.00 → 5.00; "
         "mean speed 35.0 → 35.0 km/h; dropout 5.0 → 5.0 %."
     )
     assert second.lines[4] == (
+        "Arrows lead from clear sky to heavy rain. "
+        "Dropout is the time without a target, or with one held from memory."
+    )
+    assert second.lines[5] == (
         "Within “Clear Sky: sunrise, noon and night” and “Heavy Rain: sunrise, noon and night” "
         "every drive moved alike, seed for seed: one column each."
     )
@@ -112,9 +137,16 @@ def test_the_second_answer_says_what_rain_changes_for_each_configuration(tmp_pat
 def test_the_third_answer_names_the_commonest_kind_of_the_worst_configuration(tmp_path):
     third = told(campaign(tmp_path, clear_cut))[2]
     assert third.sentence == (
-        "Configuration 3 had most crashes (140 in 20 drives; next configuration 4 with 70 in 20), "
-        "mostly of the kind “into a barrier” (120)."
+        "190 of 250 crashes were of the kind “into a barrier”, 110 of them in heavy rain. "
+        "Configuration 3 had most (140 in 20 drives; next configuration 4 with 70 in 20)."
     )
+    assert third.lines[0].startswith(f"Of the sources' {len(CLAIMS)} claims: ")
+    decided = judge(CLAIMS, [campaign(tmp_path, clear_cut).results] * len(CLAIMS))
+    named = [j for j in decided if j.verdict is Verdict.CONTRADICTED][:3]
+    assert named
+    assert list(third.lines[1 : 1 + len(named)]) == [
+        f"Contradicted: “{j.finding.claim.rstrip('.')}” ({j.finding.id})." for j in named
+    ]
 
 
 @pytest.mark.req("R-7", "X-9")
@@ -167,6 +199,14 @@ def test_weathers_that_every_configuration_drove_alike_are_one_column_and_count_
     ]  # fmt: skip
     assert len(count_table(six, EVENTS, "").columns) == 8
     assert (len(one.cell("3")), len(six.cell("3"))) == (12, 36)
+
+
+def test_the_subtitle_says_how_many_weathers_differ_and_what_the_sensors_are(tmp_path):
+    matrix = campaign(tmp_path, clear_cut, 6)
+    assert matrix.subtitle.startswith(
+        "5 configurations in 6 weathers (2 that differ), 6 seeds of each"
+    )
+    assert re.search(r"sensors (on|from) ", matrix.subtitle)
 
 
 def test_a_cell_that_drives_as_another_has_its_seeds(tmp_path):

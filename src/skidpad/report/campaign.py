@@ -54,6 +54,8 @@ class Metric:
     @property
     def heading(self) -> str:
         """Title of the metric with its unit."""
+        if self.unit and self.title.endswith(" per 100"):
+            return f"{self.title} {self.unit}"
         return f"{self.title}, {self.unit}" if self.unit else self.title
 
 

@@ -88,12 +88,12 @@ def _first(
     return [
         *matrix.missing(),
         answers(matrix, judged, crashes),
+        Text(GRADED if matrix.has_grades else UNGRADED),
         *baseline_text(matrix),
         headline_numbers(matrix),
         headline_table(matrix),
         matrix_figures.speed_figure(matrix),
         *worst_of_each(crashes),
-        Text(GRADED if matrix.has_grades else UNGRADED),
         Text(LEAD),
         *_alike(matrix),
     ]
@@ -129,7 +129,8 @@ def _verdicts(matrix: Matrix, judged: Sequence[Judgement]) -> list[Block]:
         "below its margin supports nothing, is shared by all reports and was settled after results "
         "of the friction campaign had been seen. "
         "By construction: both sides must be the same drive. Same drives: they happened to be, what "
-        "differs never came into play. A v behind an id: the same claim for crashes with vehicles alone."
+        "differs never came into play. A v behind an id: the same claim for crashes with vehicles alone. "
+        "The sources call an intervention a fatal collision, so claims and columns carry that name."
     )
     own = ", ".join(f.id for f in CLAIMS if f.study)
     rest = Text(f"Claims that need runs of their own are judged by `skidpad study`: {own}.")

@@ -8,8 +8,8 @@ import polars as pl
 
 from skidpad.core.wording import count_text, list_text
 from skidpad.evidence.statistics import Interval, Rate, p_text, seeds_for_verdict
-from skidpad.evidence.verdicts import Judgement
-from skidpad.report.cards import headline
+from skidpad.evidence.verdicts import Judgement, Verdict
+from skidpad.report.cards import headline, severity
 from skidpad.report.crashes import Cell, Found
 from skidpad.report.figures import (
     POINTS_REACH,
@@ -23,10 +23,12 @@ from skidpad.report.matrix_data import (
     BASELINE,
     EVENT,
     EVENTS,
+    REFERENCE,
     Matrix,
     WeatherGroup,
     config_list,
     config_title,
+    functions_list,
     rate_by_seed,
 )
 from skidpad.report.matrix_kinds import count, kinds_of
@@ -34,6 +36,8 @@ from skidpad.report.page import Answer, Answers, Figure
 from skidpad.report.verdicts import tally_text, unjudged_text
 
 MEANS = (("mean_speed_kmh", "mean speed", "km/h"), ("dropout_pct", "dropout", "%"))
+DECIDED = (Verdict.CONTRADICTED, Verdict.SUPPORTED)
+DECIDED_MAX = 3  # claims that the first page names
 COLOURS = {"clear sky": 1, "heavy rain": 0}  # of the palette
 FIRST_COLOUR = 2  # of kinds: those before are weathers
 MARKERS = "ovsD^P*X"
@@ -71,19 +75,23 @@ def terminal_answer(matrix: Matrix) -> list[str]:
 
 
 def _functions(matrix: Matrix) -> Answer:
-    """The configuration with the fewest interventions in each weather, and how sure that is."""
+    """The functions with the fewest crashes in each weather, and how sure that is.
+
+    The reference driver is a model of a human and has no functions, so it is told beside them.
+    """
     differences = by_configuration(matrix, matrix.climates)
     rates = {g: _rates(matrix, g) for g in matrix.climates}
-    best = {g: min(r, key=lambda c: r[c].rate) for g, r in rates.items() if r}
-    parts = [_fewest(g, rates[g], rates[g][c].rate) for g, c in best.items()]
-    sentence = f"Fewest {EVENTS}: {'; '.join(parts)}."
+    judged = {g: {c: r[c] for c in r if c != REFERENCE} or r for g, r in rates.items()}
+    best = {g: min(r, key=lambda c: r[c].rate) for g, r in judged.items() if r}
+    parts = [_fewest(g, judged[g], judged[g][c].rate) for g, c in best.items()]
+    sentence = f"Fewest {EVENTS}: {'; '.join(parts)}.{_beside_reference(rates, judged)}"
     least = seeds_for_verdict(len(differences))
     if len(matrix.comparison_configs) < 2:
         lines = []
     elif matrix.seeds < least:
         lines = [_too_few_seeds(matrix.seeds, least)]
     else:
-        lines = [_sureness(matrix, g, c, differences) for g, c in best.items()]
+        lines = [_sureness(matrix, g, c, differences, judged[g][c]) for g, c in best.items()]
     return Answer(
         "Which functions crash least, in which weather, and how sure is that?",
         sentence,
@@ -95,7 +103,21 @@ def _functions(matrix: Matrix) -> Answer:
 def _fewest(group: WeatherGroup, rates: dict[str, Rate], least: float) -> str:
     """All configurations that share the least rate of a group."""
     found = [c for c, rate in rates.items() if rate.rate == least]
-    return f"in {group.name} {config_list(found)} with {least:.2f} per run"
+    return f"in {group.name} {functions_list(found)} with {least:.2f} per run"
+
+
+def _beside_reference(
+    rates: dict[WeatherGroup, dict[str, Rate]], judged: dict[WeatherGroup, dict[str, Rate]]
+) -> str:
+    """A sentence with the rates of the reference driver where functions are judged without it."""
+    told = [
+        f"{r[REFERENCE].rate:.2f} in {g.name}"
+        for g, r in rates.items()
+        if REFERENCE in r and REFERENCE not in judged[g]
+    ]
+    if not told:
+        return ""
+    return f" The reference driver, a model of a careful human, had {list_text(told)}."
 
 
 def _too_few_seeds(seeds: int, least: int) -> str:
@@ -116,6 +138,7 @@ def _sureness(
     group: WeatherGroup,
     best: str,
     differences: dict[tuple[WeatherGroup, str, str], Contrast],
+    rate: Rate,
 ) -> str:
     """Which others the best one of a group surely beats, and which it cannot be told from."""
     others = {
@@ -135,6 +158,9 @@ def _sureness(
         told.append(f"{seeds} cannot tell {_in_words(best)} from {config_list(open_)}")
     if same:
         told.append(f"{_in_words(best)} drove exactly as {config_list(same)}")
+    if not rate.events:
+        share = 100 * rate.most_runs
+        told.append(f"none in {count_text(rate.runs, 'seed')} allows one in {share:.0f} % of seeds")
     return f"{_first_word_large(group.name)}: {'; '.join(told)}."
 
 
@@ -148,6 +174,10 @@ def _in_words(config: str) -> str:
 
 def _first_word_large(text: str) -> str:
     return text[:1].upper() + text[1:]
+
+
+def _first_word_small(text: str) -> str:
+    return text[:1].lower() + text[1:]
 
 
 def weather_series(group: WeatherGroup, k: int, **values: Sequence[float | None]) -> Series:
@@ -165,7 +195,11 @@ def _rate_figure(matrix: Matrix, rates: dict[WeatherGroup, dict[str, Rate]]) -> 
         values = [r.rate if r else None for r in found]
         series.append(weather_series(group, k, values=values, low=low, high=high))
     rows = [config_title(c) for c in matrix.comparison_configs]
-    caption = f"{EVENTS.capitalize()} per run; lines are 95 % intervals, hollow points have none."
+    caption = (
+        f"{EVENTS.capitalize()} per run of {matrix.duration:g} s; lines are 95 % intervals. A hollow "
+        f"point has none: fewer than two seeds had a {EVENT}, which is too few for an interval and no "
+        "proof of zero."
+    )
     caption += cut_note(series, POINTS_REACH)
     return Figure(points_with_intervals(rows, series, f"{EVENTS} per run"), caption)
 
@@ -192,11 +226,13 @@ def _weather(matrix: Matrix) -> Answer:
     told = [_changes(matrix, group, changes) for group in rest]
     if matrix.seeds < least:
         told = [_too_few_seeds(matrix.seeds, least).replace("configurations", "weathers")]
+    elif any(not d.is_sure and not d.identical for d in changes.values()):
+        told.append("Where no difference shows, the numbers below may differ by chance.")
     lines = [_levels(matrix, c) for c in matrix.comparison_configs]
     return Answer(
         question,
         " ".join(told),
-        [*lines, *_times_of_day(matrix)],
+        [*lines, *_meaning(matrix), *_times_of_day(matrix)],
         _change_figure(matrix, rest, changes) if matrix.seeds > 1 else None,
     )
 
@@ -227,20 +263,31 @@ def _changes(
 def _levels(matrix: Matrix, config: str) -> str:
     """A configuration in every climate: interventions per run, speed, dropout."""
     groups = {g: matrix.within(config, g) for g in matrix.climates}
-    rates = [
-        f"{rate.rate:.2f} in {g.name}"
-        for g, runs in groups.items()
-        if (rate := rate_by_seed(runs, EVENTS)) is not None
-    ]
-    parts = [f"{EVENTS} per run {', '.join(rates)}"]
+    rates = {g: rate for g, r in groups.items() if (rate := rate_by_seed(r, EVENTS)) is not None}
+    between = " → " if len(groups) == 2 else ", "
+    if len(rates) == len(groups) == 2:
+        told = between.join(f"{rate.rate:.2f}" for rate in rates.values())
+    else:
+        told = ", ".join(f"{rate.rate:.2f} in {g.name}" for g, rate in rates.items())
+    parts = [f"{EVENTS} per run {told}"]
     for column, title, unit in MEANS:
         values = [runs[column].drop_nulls() for runs in groups.values()]
         if all(len(v) for v in values):
-            between = " → " if len(values) == 2 else ", "
             parts.append(
                 f"{title} {between.join(f'{float(v.to_numpy().mean()):.1f}' for v in values)} {unit}"
             )
     return f"{config_title(config)}: {'; '.join(parts)}."
+
+
+def _meaning(matrix: Matrix) -> list[str]:
+    """What the arrows and the word dropout mean."""
+    told = []
+    if len(matrix.climates) == 2:
+        first, second = matrix.climates
+        told.append(f"Arrows lead from {first.name} to {second.name}.")
+    if matrix.finished["dropout_pct"].count():
+        told.append("Dropout is the time without a target, or with one held from memory.")
+    return [" ".join(told)] if told else []
 
 
 def _times_of_day(matrix: Matrix) -> list[str]:
@@ -284,15 +331,13 @@ def _next(matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[
     worst = max(totals, key=lambda c: totals[c] / max(1, len(runs[c])))
     if not totals[worst]:
         sentence = f"No configuration had a {EVENT}: drive harder conditions or more seeds."
-        return Answer("What should be looked at next?", sentence, [_claims(matrix, judged)])
-    kinds = {kind.title: count(kind, runs[worst]) for kind in kinds_of(matrix.has_grades)}
-    most = max(kinds, key=lambda title: kinds[title])
+        return Answer("What should be looked at next?", sentence, _claims(matrix, judged))
     sentence = (
-        f"{_first_word_large(_in_words(worst))} had most {EVENTS} ({totals[worst]} in "
-        f"{count_text(len(runs[worst]), 'drive')}{_next_most(totals, runs, worst)}), mostly of the "
-        f"kind “{most}” ({kinds[most]})."
+        f"{_commonest(matrix, sum(totals.values()))} {_first_word_large(_in_words(worst))} had most "
+        f"({totals[worst]} in {count_text(len(runs[worst]), 'drive')}"
+        f"{_next_most(totals, runs, worst)})."
     )
-    lines = [*_hardest(matrix, crashes), _claims(matrix, judged)]
+    lines = [*_hardest(matrix, crashes), *_claims(matrix, judged)]
     series = [
         Series(
             kind.title,
@@ -318,9 +363,32 @@ def _next_most(totals: dict[str, int], runs: dict[str, pl.DataFrame], worst: str
     return f"; next {_in_words(second)} with {totals[second]} in {len(runs[second])}"
 
 
-def _claims(matrix: Matrix, judged: Sequence[Judgement]) -> str:
-    """What became of the sources' claims."""
-    return unjudged_text(judged) if matrix.seeds == 1 else tally_text(judged)
+def _commonest(matrix: Matrix, total: int) -> str:
+    """The kind that most crashes were of, and the climate in which most of these happened."""
+    compared = [matrix.cell(c) for c in matrix.comparison_configs]
+    kinds = {k: sum(count(k, r) for r in compared) for k in kinds_of(matrix.has_grades)}
+    most = max(kinds, key=lambda kind: kinds[kind])
+    told = f"{kinds[most]} of {count_text(total, EVENT, EVENTS)} were of the kind “{most.title}”"
+    if len(matrix.climates) < 2:
+        return f"{told}."
+    within = {
+        g: sum(count(most, matrix.within(c, g)) for c in matrix.comparison_configs)
+        for g in matrix.climates
+    }
+    where = max(within, key=lambda g: within[g])
+    return f"{told}, {within[where]} of them in {where.name}."
+
+
+def _claims(matrix: Matrix, judged: Sequence[Judgement]) -> list[str]:
+    """What became of the sources' claims; those that were decided are named."""
+    if matrix.seeds == 1:
+        return [unjudged_text(judged)]
+    decided = [j for verdict in DECIDED for j in judged if j.verdict is verdict]
+    named = [
+        f"{j.verdict.value.capitalize()}: “{j.finding.claim.rstrip('.')}” ({j.finding.id})."
+        for j in decided[:DECIDED_MAX]
+    ]
+    return [tally_text(judged), *named]
 
 
 def _hardest(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[str]:
@@ -328,7 +396,9 @@ def _hardest(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[str]:
     found = [(cell, items[0]) for cell, items in crashes.items() if cell[0] != BASELINE and items]
     if not found:
         return []
-    (config, weather), (crash, _, _, run) = max(found, key=lambda f: f[1][0].v_closing or 0.0)
+    (config, weather), (crash, _, _, run) = max(found, key=lambda f: severity(f[1][0]))
     group = next(g for g in matrix.weather_groups if weather in g.weathers)
     where = f"{_in_words(config)} in {group.name}, run {run.name} at {crash.t:.0f} s"
-    return [f"The hardest crash: {headline(crash)}, {where}. Its card stands below."]
+    return [
+        f"The hardest crash: {_first_word_small(headline(crash))}, {where}. Its card stands below."
+    ]

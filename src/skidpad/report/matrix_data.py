@@ -25,6 +25,14 @@ CONFIGS = {
     "4": "4 · + 80 km/h limiter",
     "reference": "reference driver (a model)",
 }
+FUNCTIONS = {
+    "0": "no assistance",
+    "1": "ACC",
+    "2": "ACC and lane centring",
+    "3": "ACC, lane centring, light assist and resume",
+    "4": "ACC, lane centring, light assist, resume and the 80 km/h limiter",
+}
+REFERENCE = "reference"  # a model of a human: no functions
 IN_SENTENCES = {"reference": "the reference driver"}
 BASELINE = "0"  # no driver at the pedals
 MOTION = "motion_hash"  # of a drive: poses, contacts and commands
@@ -38,6 +46,12 @@ WEATHERS = {
     "rain-sunrise": "Heavy Rain - Sunrise",
     "rain-noon": "Heavy Rain - Noon",
     "rain-night": "Heavy Rain - Night",
+}
+
+
+SENSOR_LEVELS = {
+    "objects": "sensors from boxes of objects, without images",
+    "pixels": "sensors on camera images",
 }
 
 
@@ -250,12 +264,16 @@ class Matrix(CampaignView[MatrixEntry]):
     @property
     def subtitle(self) -> str:
         """One sentence: what was driven."""
-        levels = " and ".join(sorted(self.results["sensors"].unique().to_list()))
+        levels = " and ".join(
+            SENSOR_LEVELS.get(level, f"sensors as {level}")
+            for level in sorted(self.results["sensors"].unique().to_list())
+        )
+        alike = len(self.weather_groups)
+        apart = f" ({alike} that differ)" if 1 < alike < len(self.weathers) else ""
         return (
             f"{count_text(len(self.configs), 'configuration')} in "
-            f"{count_text(len(self.weathers), 'weather')}, "
-            f"{count_text(self.seeds, 'run')} per cell, on {self.values('map')}, "
-            f"sensors as {levels}."
+            f"{count_text(len(self.weathers), 'weather')}{apart}, "
+            f"{count_text(self.seeds, 'seed')} of each, on {self.values('map')}, {levels}."
         )
 
 
@@ -295,6 +313,16 @@ def config_list(configs: Sequence[str]) -> str:
     if len(numbers) > 2 and int(numbers[-1]) - int(numbers[0]) == len(numbers) - 1:
         return list_text([f"{word}{numbers[0]} to {numbers[-1]}", *names])
     return list_text([word + list_text(numbers), *names] if names else [word + list_text(numbers)])
+
+
+def functions_list(configs: Sequence[str]) -> str:
+    """`configuration 2 (ACC and lane centring)`: the configurations with what they consist of."""
+    return list_text(
+        [
+            f"{config_list([c])} ({FUNCTIONS[c]})" if c in FUNCTIONS else config_list([c])
+            for c in configs
+        ]
+    )
 
 
 def weather_title(weather: str) -> str:

@@ -100,7 +100,8 @@ def speed_figure(matrix: Matrix) -> Figure:
                 points[config, group] = ([mean], [rate.rate])
     caption = (
         f"{EVENTS.capitalize()} against mean speed: the colour is the configuration, the mark the "
-        "weather. What merely drives slower moves to the left as it moves down."
+        "weather. A configuration that crashes less only because it drives slower lies lower and "
+        "further left."
     )
     return Figure(_draw_marks(matrix, points, "mean speed, km/h"), caption)
 

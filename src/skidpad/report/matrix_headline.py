@@ -53,7 +53,7 @@ def headline_numbers(matrix: Matrix) -> Numbers:
         [
             Number(f"{hits:,}", contacts, per_100_km(hits)),
             Number(f"{left:,}", "departures from the road", per_100_km(left)),
-            Number(f"{put_back:,}", "interventions", f"{first:,} of them first of a chain"),
+            Number(f"{put_back:,}", "interventions", _chains(put_back, first)),
             Number(
                 f"{len(t):,}",
                 "different drives",
@@ -62,6 +62,14 @@ def headline_numbers(matrix: Matrix) -> Numbers:
             Number(f"{km:,.0f} km", "driven", f"{hours:.1f} h of simulated time"),
         ]
     )
+
+
+def _chains(put_back: int, first: int) -> str:
+    """How many interventions followed on another one."""
+    followed = put_back - first
+    if not put_back:
+        return ""
+    return f"{followed:,} of them soon after another" if followed else "none soon after another"
 
 
 def headline_table(matrix: Matrix) -> Table:
@@ -128,7 +136,7 @@ def _first(matrix: Matrix, config: str) -> Cell:
     median, limits = median_time(times, end)
     told = "" if limits is None else " to ".join(_time(t, end) for t in limits)
     if limits is not None and not np.isfinite(limits[0]):
-        told = "95 % beyond the run"
+        told = f"95 %: > {end:.0f}"
     hint = count_text(len(runs), "run")
     return Cell(_time(median, end), note=told, sort=min(median, end), hint=hint)
 

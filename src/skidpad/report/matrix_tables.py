@@ -73,6 +73,7 @@ GRADES = (
     ("contacts_heavy", "above 20 km/h", "the same"),
     ("contacts_vulnerable", "with persons or two wheels", "of these"),
     ("contacts_static", "with what stands", "barriers, posts"),
+    ("contacts_repeated", "the same one again", "touched once more within 8 s, graded once"),
 )
 COUNTS = frozenset(  # events of which a mean is a rate
     (
@@ -82,11 +83,22 @@ COUNTS = frozenset(  # events of which a mean is a rate
     )
 )
 
+GRADES_NOTE = (
+    "Classes are of contacts with road users, by the larger change of speed of the two; persons and two "
+    "wheels are among them and never in the lowest. The three classes, what stands and repeated "
+    "touches add up to all contacts."
+)
 BACKGROUND = (
     ("traffic_contacts", "contacts", "of two background vehicles, first touch"),
     ("traffic_contacts_after_ego", "soon after the ego's", "within 20 s of a contact of the ego"),
     ("traffic_put_back", "put back", "stood without a cause or left the lane for 10 s"),
     ("traffic_moved", "moved", "far from the ego, and entered anew nearer to it"),
+)
+
+BACKGROUND_NOTE = (
+    "Contacts of two background vehicles with each other. Put back: a vehicle that stood without a "
+    "cause or left the lane for 10 s. Moved: taken from far away and entered anew nearer to the ego, "
+    "which keeps the traffic around it dense."
 )
 
 
@@ -258,10 +270,14 @@ def kinds_table(matrix: Matrix) -> Table:
 def grades_table(matrix: Matrix) -> Table:
     """How hard the contacts were."""
     grades = GRADES if matrix.has_grades else ()
-    return _counts(matrix, (CONTACTS, *grades), "What the contacts were: counts, every drive once")
+    note = GRADES_NOTE if grades else ""
+    caption = "What the contacts were: counts, every drive once"
+    return _counts(matrix, (CONTACTS, *grades), caption, note)
 
 
-def _counts(matrix: Matrix, kinds: Sequence[tuple[str, str, str]], caption: str) -> Table:
+def _counts(
+    matrix: Matrix, kinds: Sequence[tuple[str, str, str]], caption: str, note: str = ""
+) -> Table:
     def name(config: str) -> Cell:
         runs = matrix.cell(config)
         note = f"{count_text(len(runs), 'run')}, {runs['distance_km'].sum():,.0f} km"
@@ -274,7 +290,7 @@ def _counts(matrix: Matrix, kinds: Sequence[tuple[str, str, str]], caption: str)
         Column("configuration", name),
         *(Column[str](title, partial(count, kind), words) for kind, title, words in kinds),
     ]
-    return table(columns, matrix.configs, caption)
+    return table(columns, matrix.configs, caption, note)
 
 
 def background_table(matrix: Matrix) -> Table:
@@ -300,7 +316,9 @@ def background_table(matrix: Matrix) -> Table:
         ),
         Column[WeatherGroup]("per 100 km", rate, "of the contacts, exact 95 % interval"),
     ]
-    return table(columns, matrix.weather_groups, "Contacts among background vehicles")
+    return table(
+        columns, matrix.weather_groups, "Contacts among background vehicles", BACKGROUND_NOTE
+    )
 
 
 def per_weather(matrix: Matrix) -> list[Block]:

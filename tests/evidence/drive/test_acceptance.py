@@ -4,7 +4,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from skidpad.evidence.drive.acceptance import ACCEPTANCE
+from skidpad.evidence.drive.acceptance import ACCEPTANCE, broken_cells
 from skidpad.evidence.verdicts import judge
 
 BY_ID = {f.id: f for f in ACCEPTANCE}
@@ -53,6 +53,17 @@ def test_a_claim_that_one_case_decides_counts_cases_in_words():
     (judged,) = judge([BY_ID["A-276"]], [matrix(once, FEW)])
     assert "cells that break it over all seeds: 2 of 4; one is enough" in judged.text
     assert "0.5" not in judged.text
+
+
+@pytest.mark.req("A-276")
+def test_a_cell_that_drove_as_an_earlier_one_counts_once():
+    once = matrix({"0": 5, "4": 1}, FEW)
+    night = once.filter(pl.col("weather") == "clear-noon").with_columns(
+        weather=pl.lit("clear-night")
+    )
+    assert broken_cells(once) == broken_cells(pl.concat([once, night])) == (2, 4)
+    other = night.with_columns(log_hash=pl.lit("n") + pl.col("log_hash"))
+    assert broken_cells(pl.concat([once, other])) == (3, 6)
 
 
 @pytest.mark.req("A-277")

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import polars as pl
 
-from skidpad.evidence.contrasts import Amount, Never
+from skidpad.evidence.contrasts import Amount, Never, distinct
 from skidpad.evidence.drive.sides import INVASIONS, POINT, config, configs, variants
 from skidpad.evidence.rates import RateBelow
 from skidpad.evidence.verdicts import Finding
@@ -16,10 +16,13 @@ INVASIONS_MAX = Amount(2.0, "markings per run")  # in configurations 2 to 4 (A-2
 
 
 def broken_cells(table: pl.DataFrame) -> tuple[int, int]:
-    """Cells of configuration 0 without or of 4 with a collision, and all of both."""
-    cells = table.group_by("config", "weather", maintain_order=True).agg(
-        pl.col("fatal_collisions").sum()
-    )
+    """Cells of configuration 0 without or of 4 with a collision, and all of both.
+
+    A cell whose every drive moved as in an earlier weather is that cell again, and counts once (T-3).
+    """
+    cell = ["config", "weather"]
+    cells = table.group_by(cell, maintain_order=True).agg(pl.col("fatal_collisions").sum())
+    cells = cells.join(distinct(table), on=cell, how="semi")
     judged = cells.filter(pl.col("config").is_in(["0", "4"]))
     if judged["config"].n_unique() < 2:
         return 0, 0

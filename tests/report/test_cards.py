@@ -46,7 +46,7 @@ def a_crash(**changes: object) -> Crash:
     """The ego at 90 km/h into traffic_17, which drives 50."""
     values = {
         "tick": 100, "t": 5.0, "kind": CrashKind.VEHICLE, "weather": "clear-noon",
-        "other": "traffic_17", "actor": 17, "striker": Striker.EGO, "rear_ended": False,
+        "other": "traffic_17", "actor": 17, "striker": Striker.EGO, "rear_ended": False, "sideways": False,
         "bend_exit": False, "follows": False, "v_ego": 90.0 / KMH, "v_other": 50.0 / KMH,
         "v_closing": 40.0 / KMH, "impulse": 9000.0, "contact": contact(), "x": 0.0, "y": 0.0,
         "lane_offset": 0.1, "bend_radius": None, "mu": 0.8, "brake_max": 0.0, "unseen": 0.0,
@@ -137,6 +137,15 @@ CAME = Moment(0.1, 3.7)
             ("traffic_17 drove into the ego from behind, 40 km/h faster, while it braked from 80 "
             "km/h; the radar had reported 11.9 m, 0.2 s before, the true gap was 64.8 m to "
             "traffic_3."),
+        ),
+        (
+            a_story(a_crash(sideways=True, lane_offset=1.34), worst=PHANTOM),
+            ("The ego at 90 km/h moved sideways into traffic_17 at 50 km/h beside it; the ego was 1.3 "
+            "m left of the middle of its lane."),
+        ),
+        (
+            a_story(a_crash(sideways=True, striker=Striker.OTHER)),
+            "traffic_17 at 50 km/h moved sideways into the ego at 90 km/h beside it.",
         ),
         (
             a_story(a_crash(striker=Striker.OTHER, v_ego=0.0, v_closing=None)),

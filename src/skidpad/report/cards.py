@@ -88,6 +88,8 @@ def headline(crash: Crash) -> str:
     if crash.kind is CrashKind.STATIC:
         return f"Into the {crash.other} at {format_speed(crash.v_ego)}{alone}"
     closing = "" if crash.v_closing is None else f", closing at {format_speed(crash.v_closing)}"
+    if crash.sideways:
+        return f"Sideways against {crash.other}{closing}"
     if crash.rear_ended:
         return f"Struck from behind by {crash.other}{closing}"
     who = "Ego into" if crash.striker is not Striker.OTHER else "Hit by"

@@ -28,7 +28,10 @@ def write_cause(story: Story) -> str:
     crash = story.crash
     if crash.kind is CrashKind.VEHICLE:
         struck = crash.rear_ended or crash.striker is Striker.OTHER
-        parts = _describe_struck(story) if struck else _describe_striking(story)
+        if crash.sideways:
+            parts = _describe_sideways(story)
+        else:
+            parts = _describe_struck(story) if struck else _describe_striking(story)
     elif crash.kind is CrashKind.WRONG_WAY:
         parts = [f"The ego faced against the direction of its lane at {format_speed(crash.v_ego)}"]
     else:
@@ -39,6 +42,25 @@ def write_cause(story: Story) -> str:
         )
     text = "; ".join(part for part in parts if part) + "."
     return "The " + text[4:] if text.startswith("the ") else text
+
+
+def _describe_sideways(story: Story) -> list[str]:
+    """The two drove side by side, and one moved across faster than the other."""
+    crash = story.crash
+    ego, other = f"the ego at {format_speed(crash.v_ego)}", crash.other
+    if crash.v_other is not None:
+        other += f" at {format_speed(crash.v_other)}"
+    first, second = (other, ego) if crash.striker is Striker.OTHER else (ego, other)
+    text = f"{first} moved sideways into {second} beside it"
+    return [text, _describe_offset(crash)]
+
+
+def _describe_offset(crash: Crash) -> str:
+    """Where in its lane the ego was, when that is worth a word."""
+    if crash.lane_offset is None or abs(crash.lane_offset) <= ASIDE:
+        return ""
+    side = "left" if crash.lane_offset > 0.0 else "right"
+    return f"the ego was {format_metres(abs(crash.lane_offset))} {side} of the middle of its lane"
 
 
 def _describe_struck(story: Story) -> list[str]:

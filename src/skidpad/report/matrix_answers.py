@@ -6,21 +6,18 @@ from collections.abc import Sequence
 
 import polars as pl
 
-from skidpad.core.wording import count_text, list_text
+from skidpad.core.wording import capitalize_first, count_text, list_text
 from skidpad.evidence.statistics import Interval, Rate, p_text, seeds_for_verdict
-from skidpad.evidence.verdicts import Judgement, Verdict
-from skidpad.report.cards import headline, severity
+from skidpad.evidence.verdicts import Judgement
 from skidpad.report.crashes import Cell, Found
 from skidpad.report.figures import (
     POINTS_REACH,
     Series,
     cut_note,
     points_with_intervals,
-    stacked_bars,
 )
 from skidpad.report.matrix_contrasts import Contrast, by_configuration, by_weather
 from skidpad.report.matrix_data import (
-    BASELINE,
     EVENT,
     EVENTS,
     REFERENCE,
@@ -31,15 +28,11 @@ from skidpad.report.matrix_data import (
     functions_list,
     rate_by_seed,
 )
-from skidpad.report.matrix_kinds import count, kinds_of
+from skidpad.report.matrix_next import look_next
 from skidpad.report.page import Answer, Answers, Figure
-from skidpad.report.verdicts import tally_text, unjudged_text
 
 MEANS = (("mean_speed_kmh", "mean speed", "km/h"), ("dropout_pct", "dropout", "%"))
-DECIDED = (Verdict.CONTRADICTED, Verdict.SUPPORTED)
-DECIDED_MAX = 3  # claims that the first page names
 COLOURS = {"clear sky": 1, "heavy rain": 0}  # of the palette
-FIRST_COLOUR = 2  # of kinds: those before are weathers
 MARKERS = "ovsD^P*X"
 
 
@@ -49,7 +42,7 @@ def answers(
     """Three questions, each with its picture."""
     if not len(matrix.finished):
         return Answers([Answer("What happened?", "No run was finished.")])
-    return Answers([_functions(matrix), _weather(matrix), _next(matrix, judged, crashes)])
+    return Answers([_functions(matrix), _weather(matrix), look_next(matrix, judged, crashes)])
 
 
 def terminal_answer(matrix: Matrix) -> list[str]:
@@ -161,7 +154,7 @@ def _sureness(
     if not rate.events:
         share = 100 * rate.most_runs
         told.append(f"none in {count_text(rate.runs, 'seed')} allows one in {share:.0f} % of seeds")
-    return f"{_first_word_large(group.name)}: {'; '.join(told)}."
+    return f"{capitalize_first(group.name)}: {'; '.join(told)}."
 
 
 def _at_most(p: float) -> str:
@@ -170,14 +163,6 @@ def _at_most(p: float) -> str:
 
 def _in_words(config: str) -> str:
     return config_list([config])
-
-
-def _first_word_large(text: str) -> str:
-    return text[:1].upper() + text[1:]
-
-
-def _first_word_small(text: str) -> str:
-    return text[:1].lower() + text[1:]
 
 
 def weather_series(group: WeatherGroup, k: int, **values: Sequence[float | None]) -> Series:
@@ -257,7 +242,7 @@ def _changes(
         if configs
     ]
     base = matrix.climates[0].name
-    return f"{_first_word_large(group.name)} against {base}: {'; '.join(parts)}."
+    return f"{capitalize_first(group.name)} against {base}: {'; '.join(parts)}."
 
 
 def _levels(matrix: Matrix, config: str) -> str:
@@ -319,86 +304,3 @@ def _change_figure(
         f"corrected for all {len(changes)}.{cut_note(series, POINTS_REACH)}"
     )
     return Figure(points_with_intervals(rows, series, label, origin=0.0), caption)
-
-
-# --- what to look at next
-
-
-def _next(matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[Found]]) -> Answer:
-    """The commonest kind of intervention, the hardest crash, and what these runs leave open."""
-    runs = {c: matrix.cell(c) for c in matrix.comparison_configs}
-    totals = {c: int(r[EVENTS].sum()) for c, r in runs.items()}
-    worst = max(totals, key=lambda c: totals[c] / max(1, len(runs[c])))
-    if not totals[worst]:
-        sentence = f"No configuration had a {EVENT}: drive harder conditions or more seeds."
-        return Answer("What should be looked at next?", sentence, _claims(matrix, judged))
-    sentence = (
-        f"{_commonest(matrix, sum(totals.values()))} {_first_word_large(_in_words(worst))} had most "
-        f"({totals[worst]} in {count_text(len(runs[worst]), 'drive')}"
-        f"{_next_most(totals, runs, worst)})."
-    )
-    lines = [*_hardest(matrix, crashes), *_claims(matrix, judged)]
-    series = [
-        Series(
-            kind.title,
-            [count(kind, runs[c]) / max(1, len(runs[c])) for c in matrix.comparison_configs],
-            colour=FIRST_COLOUR + k,
-        )
-        for k, kind in enumerate(kinds_of(matrix.has_grades))
-    ]
-    rows = [config_title(c) for c in matrix.comparison_configs]
-    figure = Figure(
-        stacked_bars(rows, series, f"{EVENTS} per run"),
-        f"What the {EVENTS} were, every drive once.",
-    )
-    return Answer("What should be looked at next?", sentence, lines, figure)
-
-
-def _next_most(totals: dict[str, int], runs: dict[str, pl.DataFrame], worst: str) -> str:
-    """The configuration that comes next, so that a reader sees how close it is."""
-    others = [c for c in totals if c != worst and len(runs[c])]
-    if not others:
-        return ""
-    second = max(others, key=lambda c: totals[c] / len(runs[c]))
-    return f"; next {_in_words(second)} with {totals[second]} in {len(runs[second])}"
-
-
-def _commonest(matrix: Matrix, total: int) -> str:
-    """The kind that most crashes were of, and the climate in which most of these happened."""
-    compared = [matrix.cell(c) for c in matrix.comparison_configs]
-    kinds = {k: sum(count(k, r) for r in compared) for k in kinds_of(matrix.has_grades)}
-    most = max(kinds, key=lambda kind: kinds[kind])
-    told = f"{kinds[most]} of {count_text(total, EVENT, EVENTS)} were of the kind “{most.title}”"
-    if len(matrix.climates) < 2:
-        return f"{told}."
-    within = {
-        g: sum(count(most, matrix.within(c, g)) for c in matrix.comparison_configs)
-        for g in matrix.climates
-    }
-    where = max(within, key=lambda g: within[g])
-    return f"{told}, {within[where]} of them in {where.name}."
-
-
-def _claims(matrix: Matrix, judged: Sequence[Judgement]) -> list[str]:
-    """What became of the sources' claims; those that were decided are named."""
-    if matrix.seeds == 1:
-        return [unjudged_text(judged)]
-    decided = [j for verdict in DECIDED for j in judged if j.verdict is verdict]
-    named = [
-        f"{j.verdict.value.capitalize()}: “{j.finding.claim.rstrip('.')}” ({j.finding.id})."
-        for j in decided[:DECIDED_MAX]
-    ]
-    return [tally_text(judged), *named]
-
-
-def _hardest(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[str]:
-    """The hardest crash of all compared configurations."""
-    found = [(cell, items[0]) for cell, items in crashes.items() if cell[0] != BASELINE and items]
-    if not found:
-        return []
-    (config, weather), (crash, _, _, run) = max(found, key=lambda f: severity(f[1][0]))
-    group = next(g for g in matrix.weather_groups if weather in g.weathers)
-    where = f"{_in_words(config)} in {group.name}, run {run.name} at {crash.t:.0f} s"
-    return [
-        f"The hardest crash: {_first_word_small(headline(crash))}, {where}. Its card stands below."
-    ]

@@ -417,7 +417,7 @@ def test_a_slower_car_touched_sideways_is_not_rear_ended(v_across: float, strike
         supervision=lambda k: Supervision.BRAKE if k > 14 else Supervision.NONE,
     )
     (c,) = find_crashes(prepare(log, straight_map()))
-    assert (c.striker, c.rear_ended) == (striker, False)
+    assert (c.striker, c.rear_ended, c.sideways) == (striker, False, True)
     assert c.v_other is not None
     assert c.v_other < c.v_ego
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import polars as pl
 
-from skidpad.evidence.contrasts import Amount, Never, distinct
+from skidpad.evidence.contrasts import Amount, Never, drive_hash
 from skidpad.evidence.drive.sides import INVASIONS, POINT, config, configs, variants
 from skidpad.evidence.rates import RateBelow
 from skidpad.evidence.verdicts import Finding
@@ -18,17 +18,33 @@ INVASIONS_MAX = Amount(2.0, "markings per run")  # in configurations 2 to 4 (A-2
 def broken_cells(table: pl.DataFrame) -> tuple[int, int]:
     """Cells of configuration 0 without or of 4 with a collision, and all of both.
 
-    A cell whose every drive moved as in an earlier weather is that cell again, and counts once (T-3).
+    A cell whose every drive moved as in another weather is that cell again, and counts once (T-3).
     """
-    cell = ["config", "weather"]
-    cells = table.group_by(cell, maintain_order=True).agg(pl.col("fatal_collisions").sum())
-    cells = cells.join(distinct(table), on=cell, how="semi")
+    cells = (
+        table.with_columns(drive=drive_hash(table))
+        .group_by("config", "weather", maintain_order=True)
+        .agg(pl.col("fatal_collisions").sum(), pl.struct("seed", "drive").alias("drive"))
+    )
+    cells = cells.filter(pl.Series(_are_new(cells), dtype=pl.Boolean))
     judged = cells.filter(pl.col("config").is_in(["0", "4"]))
     if judged["config"].n_unique() < 2:
         return 0, 0
     without = pl.col("fatal_collisions") == 0
     broken = (config("0").are & without) | (config("4").are & ~without)
     return len(judged.filter(broken)), len(judged)
+
+
+def _are_new(cells: pl.DataFrame) -> list[bool]:
+    """Whether each cell has a drive that no other cell of its configuration has; the larger one stays."""
+    drives = [{(d["seed"], d["drive"]) for d in row} for row in cells["drive"].to_list()]
+    configs, order = cells["config"].to_list(), range(len(cells))
+
+    def contains(k: int, other: int) -> bool:
+        """Whether a cell stands within another one, of two equal ones the later."""
+        known = configs[k] == configs[other] and None not in {drive for _, drive in drives[k]}
+        return known and (drives[k] < drives[other] or (drives[k] == drives[other] and other < k))
+
+    return [not any(contains(k, other) for other in order if other != k) for k in order]
 
 
 ACCEPTANCE: tuple[Finding, ...] = (

@@ -57,6 +57,7 @@ class Crash:
     actor: int | None  # its row in the log; None for what is no actor
     striker: Striker | None
     rear_ended: bool
+    sideways: bool  # the two stood side by side just before
     bend_exit: bool  # off the road in a bend without a lead (decision M-6)
     follows: bool  # soon and near after a relocation: no first of its chain
     v_ego: float  # m/s just before
@@ -112,6 +113,7 @@ def _crash(drive: Drive, row: int, contact: ContactEvent | None) -> Crash:
     log = drive.log
     at = row if contact is None else drive.row(contact.tick)
     other = contact.actor if contact is not None and contact.actor > 0 else None
+    sideways = other is not None and _are_side_by_side(log, max(at - 1, 0), other)
     behind, struck = (False, None) if other is None else _who(log, at, other)
     before = max(at - 1, 0)  # the contact itself changes the speeds
     static = "something" if contact is None else contact.static
@@ -123,6 +125,7 @@ def _crash(drive: Drive, row: int, contact: ContactEvent | None) -> Crash:
         actor=other,
         striker=struck,
         rear_ended=behind and struck is Striker.OTHER,
+        sideways=sideways,
         bend_exit=other is None and _is_bend_exit(drive, at),
         v_other=None if other is None else _speed(log, before, other),
         contact=contact,
@@ -162,6 +165,7 @@ def _event(
     actor: int | None = None,
     striker: Striker | None = None,
     rear_ended: bool = False,
+    sideways: bool = False,
     bend_exit: bool = False,
     v_other: float | None = None,
     contact: ContactEvent | None = None,
@@ -179,6 +183,7 @@ def _event(
         actor=actor,
         striker=striker,
         rear_ended=rear_ended,
+        sideways=sideways,
         bend_exit=bend_exit,
         follows=_follows(drive, at),
         v_ego=float(drive.v[max(at - 1, 0)]),

@@ -32,6 +32,7 @@ from skidpad.cli.monitor import monitor, safety_case
 from skidpad.cli.play import play, play_folder
 from skidpad.cli.profiles import profiles
 from skidpad.cli.rerun import rerun, study
+from skidpad.cli.risk import risk
 from skidpad.cli.search import search
 from skidpad.cli.shadow import shadow
 from skidpad.cli.spread import spread_fields
@@ -97,6 +98,7 @@ app.add_typer(fleet)
 app.command()(friction)
 app.command()(play)
 app.command()(search)
+app.command()(risk)
 app.add_typer(campaign)
 app.command()(monitor)
 app.command("safety-case")(safety_case)

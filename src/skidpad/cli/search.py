@@ -18,7 +18,7 @@ from skidpad.core.vocabulary import SensorLevel
 
 if TYPE_CHECKING:
     from skidpad.campaign.worker import Runner
-    from skidpad.core.space import Space
+    from skidpad.core.space import Space, Variable
     from skidpad.recording.searches import Search, Trial
 
 scenario_options = spread_fields(sensors=SensorLevel.OBJECTS, duration=60.0)
@@ -86,7 +86,7 @@ def search(
     require_choice("--objective", varied.objective, tuple(OBJECTIVES))
     played, space = _space(file, varied)
     template = template_of(played, cross, controller, run, scenario, tuned)
-    _try_parameters(template, space)
+    require_parameters(template, space)
     found = Search(
         run=template.to_plain(), space=space, method=varied.method, objective=varied.objective,
         budget=varied.budget, seed=varied.search_seed,
@@ -123,12 +123,21 @@ def _drive(found: Search, out: Path, runner: Runner, known: Sequence[Trial]) -> 
 
 def _space(file: Path, varied: Varied) -> tuple[Path, Space]:
     """Return the scenario and what varies in it; `--vary` comes over what a file says."""
-    from skidpad.core.errors import FileError
     from skidpad.core.space import Space
+    from skidpad.search.space import check_space, parse_variable
+
+    scenario, of_file = read_varied(file)
+    given = [parse_variable(text) for text in varied.vary]
+    kept = [v for v in of_file if v.name not in {g.name for g in given}]
+    return scenario, check_space(Space((*kept, *given)))
+
+
+def read_varied(file: Path) -> tuple[Path, tuple[Variable, ...]]:
+    """Return the scenario that a file is or names, and what the file itself says that varies."""
+    from skidpad.core.errors import FileError
     from skidpad.scenarios.distributions import is_distribution
     from skidpad.scenarios.shipped import NAMES, scenario_file
     from skidpad.search.files import read_space
-    from skidpad.search.space import check_space, parse_space, parse_variable
 
     if not file.exists() and str(file) in NAMES:
         file = scenario_file(str(file))
@@ -137,11 +146,9 @@ def _space(file: Path, varied: Varied) -> tuple[Path, Space]:
             f"scenario {file}: there is no such file; the catalogue has {', '.join(NAMES)}"
         )
     if not is_distribution(file):
-        return file, parse_space(varied.vary)
+        return file, ()
     scenario, space = read_space(file)
-    given = {v.name: v for v in map(parse_variable, varied.vary)}
-    kept = [v for v in space.variables if v.name not in given]
-    return scenario, check_space(Space((*kept, *given.values())))
+    return scenario, space.variables
 
 
 def template_of(
@@ -177,7 +184,7 @@ def template_of(
     return found
 
 
-def _try_parameters(template: RunSpec, space: Space) -> None:
+def require_parameters(template: RunSpec, space: Space) -> None:
     """Raise FileError where the file declares no parameter of a name that varies."""
     from skidpad.campaign.cast import load_scenario
     from skidpad.campaign.grip_cells import scenario_of

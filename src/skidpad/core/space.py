@@ -37,6 +37,18 @@ class Uniform(Struct, frozen=True, tag="uniform", forbid_unknown_fields=True):
         """Return the density relative to that of the likeliest value, 0 to 1."""
         return 1.0 if self.low <= value <= self.high else 0.0
 
+    def scaled(self, factor: float) -> Uniform:
+        """Return the distribution of `factor` times the value."""
+        return Uniform(*sorted((self.low * factor, self.high * factor)))
+
+    def share_below(self, value: float) -> float:
+        """Return the share of the distribution below a value: the inverse of `value`."""
+        return min(max((value - self.low) / (self.high - self.low), 0.0), 1.0)
+
+    def density(self, value: float) -> float:
+        """Return the density at a value."""
+        return self.likelihood(value) / (self.high - self.low)
+
 
 class Normal(Struct, frozen=True, tag="normal", forbid_unknown_fields=True):
     """A normal distribution, cut to a range; of the logarithm where `is_log`."""
@@ -70,6 +82,28 @@ class Normal(Struct, frozen=True, tag="normal", forbid_unknown_fields=True):
             return 0.0
         nearest = min(max(0.0, self._z(low)), self._z(high))
         return math.exp(0.5 * (nearest**2 - self._z(value) ** 2))
+
+    def scaled(self, factor: float) -> Normal:
+        """Return the distribution of `factor` times the value, a factor above 0."""
+        low, high = (None if end is None else end * factor for end in (self.low, self.high))
+        if self.is_log:
+            return Normal(self.mean + math.log(factor), self.sigma, low, high, True)
+        return Normal(self.mean * factor, self.sigma * factor, low, high)
+
+    def share_below(self, value: float) -> float:
+        """Return the share of the distribution below a value: the inverse of `value`."""
+        low, high = self.range
+        below, above = ndtr(self._z(low)), ndtr(self._z(high))
+        return float((ndtr(self._z(min(max(value, low), high))) - below) / (above - below))
+
+    def density(self, value: float) -> float:
+        """Return the density at a value."""
+        low, high = self.range
+        if not low <= value <= high or (self.is_log and value <= 0.0):
+            return 0.0
+        mass = float(ndtr(self._z(high)) - ndtr(self._z(low)))
+        bell = math.exp(-0.5 * self._z(value) ** 2) / math.sqrt(2.0 * math.pi)
+        return bell / (mass * self.sigma * (value if self.is_log else 1.0))
 
     def _z(self, value: float) -> float:
         if self.is_log:

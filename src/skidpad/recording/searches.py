@@ -148,12 +148,12 @@ def read_search(out: Path) -> Search:
     return found
 
 
-def read_trials(out: Path) -> list[Trial]:
+def read_trials(out: Path, name: str = TRIALS) -> list[Trial]:
     """Return the trials of a folder in order; a last line that was cut off is left out."""
-    path = out / TRIALS
+    path = out / name
     if not path.is_file():
         return []
-    lines = read_bytes(path, TRIALS, LARGEST).split(b"\n")[:-1]
+    lines = read_bytes(path, name, LARGEST).split(b"\n")[:-1]
     return [decode_json(line, f"{path} line {k + 1}", Trial) for k, line in enumerate(lines)]
 
 

@@ -13,7 +13,7 @@ from skidpad.recording.searches import Trial
 from skidpad.scenarios.distributions import scenario_of_choices
 from skidpad.scenarios.document import Node, parse
 from skidpad.scenarios.parameters import inner
-from skidpad.search.space import check_space
+from skidpad.search.space import SEED, WEATHER, check_space
 
 TOP = "ParameterValueDistribution"
 
@@ -80,7 +80,7 @@ def write_choices(path: Path, scenario: str, trials: Sequence[Trial]) -> None:
     for trial in trials:
         one = ElementTree.SubElement(sets, "ParameterValueSet")
         for name, value in trial.values.items():
-            if name.partition(".")[0] != "weather":
+            if name != SEED and name.partition(".")[0] != WEATHER:
                 text = value if isinstance(value, str) else repr(value)
                 ElementTree.SubElement(one, "ParameterAssignment", parameterRef=name, value=text)
     ElementTree.indent(root)

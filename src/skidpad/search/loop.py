@@ -6,15 +6,17 @@ again and reads what they came to, so it goes on as if it had never stopped.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
 import msgspec
 import numpy as np
+from msgspec import Struct
 
 from skidpad.campaign.worker import Job, Runner
 from skidpad.core.errors import FileError, OutputError
 from skidpad.recording.files import write_bytes
+from skidpad.recording.risks import RISK, RISK_RUNS, Risk, read_risk
 from skidpad.recording.searches import SEARCH, TRIALS, Search, Trial, read_search, read_trials
 from skidpad.search.methods import batch_sizes, make_method
 from skidpad.search.trial import Point, drive_point, unit_tuple
@@ -28,17 +30,27 @@ def write_search(out: Path, search: Search, *, resume: bool) -> list[Trial]:
     Raises:
         OutputError: the folder holds another search, or this one and `resume` is false.
     """
-    path = out / SEARCH
-    if path.is_file():
+    return _begin(out, SEARCH, search, read_search, TRIALS, resume)
+
+
+def begin_risk(out: Path, asked: Risk, *, resume: bool) -> list[Trial]:
+    """Write what is asked into a folder; return the runs that it holds already; as `write_search`."""
+    return _begin(out, RISK, asked, read_risk, RISK_RUNS, resume)
+
+
+def _begin(
+    out: Path, name: str, asked: Struct, read: Callable[[Path], Struct], runs: str, resume: bool
+) -> list[Trial]:
+    if (out / name).is_file():
         if not resume:
-            raise OutputError(f"{out} holds a search already: give --resume, or another --out")
-        if msgspec.json.encode(read_search(out)) != msgspec.json.encode(search):
-            raise OutputError(f"{out} holds another search than this one: give another --out")
-        return read_trials(out)
+            raise OutputError(f"{out} holds results already: give --resume, or another --out")
+        if msgspec.json.encode(read(out)) != msgspec.json.encode(asked):
+            raise OutputError(f"{out} was begun with other options: give another --out")
+        return read_trials(out, runs)
     if out.exists() and any(out.iterdir()):
-        raise OutputError(f"{out} is not empty and holds no search: give another --out")
+        raise OutputError(f"{out} is not empty and holds no {name}: give another --out")
     out.mkdir(parents=True, exist_ok=True)
-    write_bytes(path, msgspec.json.format(msgspec.json.encode(search)))
+    write_bytes(out / name, msgspec.json.format(msgspec.json.encode(asked)))
     return []
 
 

@@ -15,6 +15,7 @@ from skidpad.core.told import describe_value
 from skidpad.core.weather import RANGES, Weather
 from skidpad.physics.presets import find_weather
 
+SEED = "seed"  # name of the variable that draws sensor noise: whole numbers of a range
 WEATHER = "weather"  # name of a variable that chooses presets; "weather.FIELD": one of its fields
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 UNIFORM = re.compile(rf"({NUMBER}):({NUMBER})")
@@ -62,7 +63,8 @@ def apply_values(template: RunSpec, values: Mapping[str, Value]) -> RunSpec:
     """Return the run with these values in its scenario and its weather."""
     course = template.course
     assert isinstance(course, Scenario)
-    parameters = {n: v for n, v in values.items() if n.partition(".")[0] != WEATHER}
+    own = {n for n in values if n == SEED or n.partition(".")[0] == WEATHER}
+    parameters = {n: v for n, v in values.items() if n not in own}
     weather = template.weather
     if WEATHER in values:
         weather = find_weather(str(values[WEATHER]))
@@ -71,6 +73,7 @@ def apply_values(template: RunSpec, values: Mapping[str, Value]) -> RunSpec:
         template,
         course=structs.replace(course, parameters={**course.parameters, **parameters}),
         weather=_with_fields(weather, fields),
+        seed=int(values.get(SEED, template.seed)),
     )
 
 
@@ -78,8 +81,10 @@ def _with_fields(weather: Weather, fields: Mapping[str, Value]) -> Weather:
     return replace(weather, **fields) if fields else weather  # type: ignore[arg-type]
 
 
-def _require_weather(variable: Variable) -> None:
+def _require_own(variable: Variable) -> None:
     word, dot, name = variable.name.partition(".")
+    if variable.name == SEED and isinstance(variable.law, Choice):
+        raise ConfigError("--vary seed: takes a range, as seed=1:1000000")
     if word != WEATHER:
         return
     if not dot:
@@ -109,5 +114,5 @@ def parse_space(texts: Iterable[str]) -> Space:
 def check_space(space: Space) -> Space:
     """Return the space; ConfigError for a weather that is none, or values outside a field's range."""
     for variable in space.variables:
-        _require_weather(variable)
+        _require_own(variable)
     return space

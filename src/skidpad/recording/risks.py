@@ -1,0 +1,128 @@
+"""What `skidpad risk` leaves in its folder: what was asked, every run, and what came of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+from msgspec import Struct
+
+from skidpad.core.errors import FileError
+from skidpad.core.reading import decode_json, read_bytes
+from skidpad.core.run import RunSpec, run_from_plain
+from skidpad.core.space import Space
+
+RISK, RISK_RUNS, RISK_FOUND = "risk.json", "runs.jsonl", "probability.json"
+SCALES = (0.5, 0.9, 1.1, 2.0)  # of the values of an input, to see what hangs on it
+LARGEST = 1024**3  # bytes of a file
+
+
+class Rate(Struct, frozen=True, forbid_unknown_fields=True):
+    """How often the encounter happens. source: where it was read; "" for an assumption."""
+
+    value: float
+    source: str = ""
+
+
+class Risk(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What is asked; `risk.json` in the folder.
+
+    Attributes:
+        run: the template, as config.yaml holds runs.
+        space: the exposure: what varies in an encounter, and how.
+        per_hour, per_100km: how often the encounter happens; None: not given.
+        repetitions, per_level: of subset simulation.
+        samples: of importance sampling.
+        seed: of all draws.
+    """
+
+    run: dict[str, Any]
+    space: Space
+    per_hour: Rate | None
+    per_100km: Rate | None
+    repetitions: int
+    per_level: int
+    samples: int
+    seed: int
+
+    @property
+    def template(self) -> RunSpec:
+        """The run whose values vary."""
+        return run_from_plain(self.run, RISK)
+
+    @property
+    def assumptions(self) -> list[str]:
+        """Names of the inputs for which no source is given."""
+        names = [v.name for v in self.space.variables if not v.source]
+        rates = {"encounters per hour": self.per_hour, "encounters per 100 km": self.per_100km}
+        return names + [
+            name for name, rate in rates.items() if rate is not None and not rate.source
+        ]
+
+
+class Probability(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A probability by one method, with its 95 % interval; null where there is no upper end."""
+
+    method: str
+    p: float
+    low: float
+    high: float | None
+    runs: int
+    simulated_s: float
+
+
+class Influence(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What other values of one input do to the probability.
+
+    factors: times the probability as asked, with all values times SCALES; None where the runs cannot
+        tell.
+    why_not: the last reason for a None.
+    """
+
+    name: str
+    factors: tuple[float | None, ...]
+    why_not: str = ""
+
+
+class RiskFound(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What came of it: `probability.json`.
+
+    Attributes:
+        probabilities: by method.
+        p, low, high: the answer, with the interval that holds those of both methods.
+        why_not: why nothing is determined; "" where it is.
+        levels: of the first repetition, margins that bound its events.
+        ancestors: different first samples from which each repetition's failures stem.
+        effective: failures of equal weight that tell as much as those of importance sampling.
+        kinds: share of the probability by kind of failure.
+        influences: of each numeric input.
+        faults: runs that could not be driven.
+    """
+
+    probabilities: tuple[Probability, ...]
+    p: float
+    low: float
+    high: float | None
+    why_not: str
+    levels: tuple[float, ...]
+    ancestors: tuple[int, ...]
+    effective: float
+    kinds: dict[str, float]
+    influences: tuple[Influence, ...]
+    faults: int
+
+
+def read_risk(out: Path) -> Risk:
+    """Return what was asked in a folder; FileError where it holds no such question."""
+    path = out / RISK
+    if not path.is_file():
+        raise FileError(f"{out} holds no risk: it has no {RISK}")
+    asked: Risk = decode_json(read_bytes(path, RISK), str(path), Risk)
+    return asked
+
+
+def read_risk_found(out: Path) -> RiskFound:
+    """Return what came of it; FileError where it has not come to its end."""
+    path = out / RISK_FOUND
+    found: RiskFound = decode_json(read_bytes(path, RISK_FOUND), str(path), RiskFound)
+    return found

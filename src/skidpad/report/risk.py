@@ -1,0 +1,256 @@
+"""The page of `skidpad risk`: how probable a crash is, how sure that is, and what it hangs on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil, log
+from pathlib import Path
+
+from skidpad.core.wording import count_text
+from skidpad.recording.risks import (
+    RISK_RUNS,
+    SCALES,
+    Influence,
+    Probability,
+    Rate,
+    Risk,
+    RiskFound,
+    read_risk,
+    read_risk_found,
+)
+from skidpad.recording.searches import Trial, read_trials
+from skidpad.report.figures import INK, PALETTE, canvas, svg_of
+from skidpad.report.page import (
+    REPORT,
+    Answer,
+    Answers,
+    Block,
+    Cell,
+    Figure,
+    Page,
+    Section,
+    Table,
+    Text,
+    write_report_page,
+)
+from skidpad.report.search import driver_text, law_text
+
+CRASH = (
+    "A crash is a contact above 5 km/h (with a person or a two-wheeler any), or a departure with all "
+    "wheels off every lane."
+)
+SUBSET = "subset simulation"
+AIMED = 0.45  # relative half-width, a little below the largest that determines something
+SCALED = "times the probability when all values of the input are multiplied so"
+INTERVALS = (
+    "counting: exact; subset simulation: Student's of the logarithm over its repetitions; importance "
+    "sampling: normal of the logarithm"
+)
+
+
+def write_risk_report(out: Path) -> str:
+    """Write the page; returns the text to print."""
+    asked, found = read_risk(out), read_risk_found(out)
+    write_report_page(risk_page(asked, found, read_trials(out, RISK_RUNS)), out)
+    lines = [answer(asked, found), *rate_lines(asked, found)]
+    return "\n".join([*lines, f"page: {out / REPORT}"])
+
+
+def risk_page(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Page:
+    """Return the page of a question and what came of it."""
+    run = asked.template
+    title = f"Risk: {getattr(run.course, 'title', 'scenario')}"
+    subtitle = f"{driver_text(run.driver)}, {count_text(len(trials), 'run')}"
+    sections = [
+        Section("Answer", [_answers(asked, found, trials)]),
+        Section("Methods", _methods(found)),
+        Section("What it hangs on", [_inputs(asked, found)]),
+        Section("Limits of this answer", [Text(_limits(asked, found))]),
+    ]
+    return Page(title=title, subtitle=subtitle, sections=sections)
+
+
+def answer(asked: Risk, found: RiskFound) -> str:
+    """Return the answer in one or two sentences."""
+    who = driver_text(asked.template.driver)
+    given = "given this exposure model"
+    if found.high is not None and found.p == 0.0:
+        text = (
+            f"No crash of {who} was reached; counting bounds it at {found.high:.2g} per encounter"
+        )
+        return f"{text}, {given}."
+    ends = f"[{found.low:.2g}, {'no end' if found.high is None else f'{found.high:.2g}'}]"
+    if found.why_not:
+        return (
+            f"Not determined, as {found.why_not}. The best guess for a crash of {who} is {found.p:.2g} "
+            f"{ends} per encounter, {given}.{_advice(asked, found)}"
+        )
+    word = "Illustrative: a" if asked.assumptions else "A"
+    return (
+        f"{word} crash of {who} has a probability of {found.p:.2g} {ends} per encounter, {given}."
+    )
+
+
+def _advice(asked: Risk, found: RiskFound) -> str:
+    """Return how many runs of a level would narrow subset simulation enough; "" where that is not it."""
+    subset = next((e for e in found.probabilities if e.method == SUBSET and e.p > 0.0), None)
+    if subset is None or subset.high is None or SUBSET not in found.why_not:
+        return ""
+    factor = (log(subset.high / subset.p) / log(1.0 + AIMED)) ** 2
+    wanted = 50 * ceil(asked.per_level * factor / 50)
+    return f" About --per-level {wanted} would narrow it enough."
+
+
+def rate_lines(asked: Risk, found: RiskFound) -> list[str]:
+    """Return the answer per hour and per 100 km, where the exposure says how often encounters happen."""
+    rates = (("hour", asked.per_hour), ("100 km", asked.per_100km))
+    return [_rate_text(unit, rate, found) for unit, rate in rates if rate is not None]
+
+
+def _rate_text(unit: str, rate: Rate, found: RiskFound) -> str:
+    high = "no end" if found.high is None else f"{found.high * rate.value:.2g}"
+    return (
+        f"Per {unit}, with {rate.value:g} encounters: {found.p * rate.value:.2g} crashes "
+        f"[{found.low * rate.value:.2g}, {high}]."
+    )
+
+
+def _answers(asked: Risk, found: RiskFound, trials: Sequence[Trial]) -> Answers:
+    lines = rate_lines(asked, found)
+    if asked.assumptions:
+        lines += [f"Inputs without a source: {', '.join(asked.assumptions)}."]
+    kinds = [f"{kind}: {share:.0%} of the probability" for kind, share in found.kinds.items()]
+    brute = brute_force_runs(found)
+    cost = ""
+    if brute is not None:
+        about = float(f"{brute:.2g}")
+        cost = (
+            f"Counting alone would need about {about:,.0f} runs for the same interval (calculated)."
+        )
+    return Answers([
+        Answer("How probable is a crash?", answer(asked, found), lines, _estimates(found)),
+        Answer("What happens then?", kinds[0] if kinds else "No crash was reached.", kinds[1:]),
+        Answer("What did it cost?", f"{count_text(len(trials), 'run')}. {cost}".strip()),
+    ])  # fmt: skip
+
+
+def brute_force_runs(found: RiskFound) -> float | None:
+    """Return how many independent draws would give as narrow an interval; None without an interval.
+
+    By the normal approximation of a share: n = (1 - p) / p (1.96 / w)^2 with the relative half-width w.
+    """
+    if not found.high or found.p <= 0.0:
+        return None
+    w = found.high / found.p - 1.0
+    return (1.0 - found.p) / found.p * (1.96 / w) ** 2 if w > 0.0 else None
+
+
+def _estimates(found: RiskFound) -> Figure | None:
+    """Return each method's probability with its interval on a logarithmic axis."""
+    ones = [e for e in found.probabilities if e.p > 0.0]
+    if not ones:
+        return None
+    with canvas(height=0.7 + 0.45 * len(ones)) as (figure, (axes,)):
+        for k, e in enumerate(reversed(ones)):
+            low, high = max(e.low, 1e-12), e.high if e.high is not None else 1.0
+            axes.plot([low, high], [k, k], color=PALETTE[0], linewidth=2)
+            axes.plot([e.p], [k], "o", color=INK)
+        axes.set_yticks(range(len(ones)), [e.method for e in reversed(ones)])
+        axes.set_xscale("log")
+        axes.set_ylim(-0.6, len(ones) - 0.4)
+        axes.set_xlabel("probability of a crash per encounter")
+        return Figure(svg_of(figure), "Each method with its 95 % interval.")
+
+
+def _methods(found: RiskFound) -> list[Block]:
+    columns = [
+        ("method", ""),
+        ("probability", "per encounter"),
+        ("95 % interval", INTERVALS),
+        ("half-width", "upper end over the estimate, less 1"),
+        ("runs", "what the method builds on included"),
+        ("simulated h", ""),
+    ]  # fmt: skip
+    rows = [_method_row(e) for e in found.probabilities]
+    blocks: list[Block] = [Table(columns, rows, caption="by each method")]
+    if found.levels:
+        events = ", ".join(f"{level:.2f}" for level in found.levels)
+        least = min(found.ancestors)
+        blocks += [
+            Text(
+                f"Subset simulation went through margins {events} (first repetition). Its failures stem "
+                f"from at least {least} different first samples in each repetition; importance sampling "
+                f"tells as much as {found.effective:.0f} failures of equal weight."
+            )
+        ]
+    return blocks
+
+
+def _method_row(e: Probability) -> list[Cell]:
+    high = "no end" if e.high is None else f"{e.high:.2g}"
+    width = None if e.p == 0.0 or e.high is None else e.high / e.p - 1.0
+    return [
+        Cell(e.method),
+        Cell(f"{e.p:.2g}", e.p),
+        Cell(f"[{e.low:.2g}, {high}]"),
+        Cell("-") if width is None else Cell(f"{width:.0%}", width),
+        Cell(str(e.runs), e.runs),
+        Cell(f"{e.simulated_s / 3600.0:.1f}", e.simulated_s),
+    ]
+
+
+def _inputs(asked: Risk, found: RiskFound) -> Table:
+    columns = [
+        ("input", ""),
+        ("distribution", ""),
+        ("source", "where it was read"),
+        *((f"x {scale:g}", SCALED) for scale in SCALES),
+    ]
+    by_name = {i.name: i for i in found.influences}
+    rows = [
+        [
+            Cell(v.name),
+            Cell(law_text(v)),
+            Cell(v.source or "assumption"),
+            *_influence_cells(by_name.get(v.name)),
+        ]
+        for v in asked.space.variables
+    ]
+    for unit, rate in (("hour", asked.per_hour), ("100 km", asked.per_100km)):
+        if rate is not None:
+            name, source = Cell(f"encounters per {unit}"), Cell(rate.source or "assumption")
+            scales = [Cell(f"{scale:g}", scale) for scale in SCALES]
+            rows.append([name, Cell(f"{rate.value:g}"), source, *scales])
+    note = (
+        "The last columns say how many times as probable a crash is when all values of an input are "
+        "multiplied so. A dash: these runs cannot tell; drive again with other values."
+    )
+    return Table(columns, rows, caption="the exposure model, and what hangs on it", note=note)
+
+
+def _influence_cells(one: Influence | None) -> list[Cell]:
+    if one is None:
+        return [Cell("-") for _ in SCALES]
+    return [
+        Cell("-", hint=one.why_not, kind="muted")
+        if factor is None
+        else Cell(f"{factor:.2g}", factor)
+        for factor in one.factors
+    ]
+
+
+def _limits(asked: Risk, found: RiskFound) -> str:
+    run = asked.template
+    noise = (
+        "Sensor noise is drawn anew in each run."
+        if "seed" in asked.space.names
+        else f"Sensor noise is that of seed {run.seed} in every run; --vary seed=1:1000000 draws it."
+    )
+    faults = "" if not found.faults else f" {count_text(found.faults, 'run')} could not be driven."
+    return (
+        f"{CRASH} The answer holds for encounters that vary as the table says and not otherwise; inputs "
+        "are independent of each other. Two methods agree when the interval of their ratio contains 1 "
+        "and lies within 0.5 to 2, each with a half-width of at most 50 %; the interval of the answer "
+        f"holds those of both. Failures in a region that no repetition entered are missed. {noise}"
+        f"{faults}\n\nWeather {run.weather.name}, profile {run.profile}, at most {run.duration:g} s a run."
+    )

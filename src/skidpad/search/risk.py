@@ -1,0 +1,195 @@
+"""The probability of a failure per encounter: runs behind the methods of `search.probability`."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from pathlib import Path
+
+import msgspec
+import numpy as np
+from scipy.special import ndtr
+
+from skidpad.campaign.worker import Runner
+from skidpad.core.space import Choice, Variable
+from skidpad.recording.files import write_bytes
+from skidpad.recording.risks import (
+    RISK_FOUND,
+    RISK_RUNS,
+    SCALES,
+    Influence,
+    Probability,
+    Risk,
+    RiskFound,
+)
+from skidpad.recording.searches import Trial
+from skidpad.search.loop import drive_all
+from skidpad.search.probability import (
+    Estimate,
+    Floats,
+    Weighted,
+    compare_estimates,
+    counting_estimate,
+    explore,
+    importance_estimate,
+    joint_interval,
+    sample_mixture,
+    subset_estimate,
+)
+from skidpad.search.trial import Point, unit_tuple
+
+OBJECTIVE = "combined"
+LEAST_EFFECTIVE = 30.0  # failures of equal weight below which a changed input is not judged
+OUTSIDE = 0.01  # share of a changed input that may lie where none was drawn
+ENOUGH = 100  # counted failures from which on counting alone determines the result: +-20 %
+
+
+class LimitOfRuns:
+    """The margin of runs as a limit: drives what is not known yet, and keeps every run on disk."""
+
+    def __init__(
+        self, asked: Risk, out: Path, runner: Runner, known: Sequence[Trial],
+        on_run: Callable[[int], None],
+    ) -> None:  # fmt: skip
+        """known: runs of an earlier stretch, in order. on_run: is called with the runs so far."""
+        self.asked, self.out, self.runner, self.on_run = asked, out, runner, on_run
+        self.template = asked.template
+        self.trials: list[Trial] = []
+        self.known = {t.number: t for t in known}
+        if known:  # so that a line that was cut off is gone
+            write_bytes(out / RISK_RUNS, b"".join(msgspec.json.encode(t) + b"\n" for t in known))
+
+    def __call__(self, z: Floats) -> Floats:
+        """Return the margins of samples (n, d) in their order; the same sample is driven once."""
+        first = len(self.trials)
+        points = [
+            Point(self.template, self.asked.space, first + k, unit_tuple(u), OBJECTIVE)
+            for k, u in enumerate(ndtr(z))
+        ]
+        new = [p for p in points if not self._is_known(p)]
+        found = {t.number: t for t in drive_all(new, self.runner)}
+        with (self.out / RISK_RUNS).open("ab") as file:
+            file.writelines(msgspec.json.encode(found[p.number]) + b"\n" for p in new)
+        self.trials += [found.get(p.number) or self.known[p.number] for p in points]
+        self.on_run(len(self.trials))
+        return np.array([t.margin for t in self.trials[first:]])
+
+    def _is_known(self, point: Point) -> bool:
+        trial = self.known.get(point.number)
+        return trial is not None and trial.unit == point.unit
+
+    def simulated_s(self, first: int, last: int | None = None) -> float:
+        """Return the simulated seconds of a stretch of runs."""
+        return sum(t.simulated_s for t in self.trials[first:last])
+
+
+def estimate_risk(
+    asked: Risk, out: Path, runner: Runner, known: Sequence[Trial], on_run: Callable[[int], None]
+) -> RiskFound:
+    """Drive everything that the question needs, write what came of it and return it."""
+    limit = LimitOfRuns(asked, out, runner, known, on_run)
+    rng = np.random.default_rng(asked.seed)
+    found = explore(limit, len(asked.space.variables), rng, asked.repetitions, asked.per_level)
+    explored, first = len(limit.trials), len(found.first)
+    counted, subset = counting_estimate(found.first), subset_estimate(found)
+    if counted.p * first >= ENOUGH:
+        samples = Weighted(np.empty((first, 0)), np.ones(first), found.first)
+        answer = Answer(counted.p, counted.low, counted.high, "", (counted,))
+        trials = limit.trials[:first]
+    elif len(found.failing):
+        samples = sample_mixture(limit, found.failing, rng, asked.samples)
+        weighted = importance_estimate(samples, explored)
+        ends = joint_interval(weighted, subset)
+        why_not = compare_estimates(weighted, subset).why_not
+        answer = Answer(weighted.p, *ends, why_not, (counted, subset, weighted))
+        trials = limit.trials[explored:]
+    else:
+        samples, trials = Weighted(np.empty((0, 0)), np.empty(0), np.empty(0)), []
+        answer = Answer(0.0, 0.0, counted.high, "no failure was reached", (counted, subset))
+    seconds = {
+        counted.method: limit.simulated_s(0, first), subset.method: limit.simulated_s(0, explored)
+    }  # fmt: skip
+    result = RiskFound(
+        probabilities=tuple(
+            _plain(e, seconds.get(e.method, limit.simulated_s(0))) for e in answer.estimates
+        ),
+        p=answer.p,
+        low=answer.low,
+        high=_end(answer.high),
+        why_not=answer.why_not,
+        levels=tuple(found.chains[0].levels),
+        ancestors=tuple(c.ancestors for c in found.chains),
+        effective=samples.effective,
+        kinds=_kinds(trials, samples),
+        influences=tuple(
+            influence_of(v, k, trials, samples) for k, v in enumerate(asked.space.variables)
+        ),
+        faults=sum(bool(t.fault) for t in limit.trials),
+    )
+    write_bytes(out / RISK_FOUND, msgspec.json.format(msgspec.json.encode(result)))
+    return result
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A probability, its interval, why it is not determined, and the estimates behind it."""
+
+    p: float
+    low: float
+    high: float
+    why_not: str
+    estimates: tuple[Estimate, ...]
+
+
+def _plain(e: Estimate, simulated_s: float) -> Probability:
+    return Probability(
+        method=e.method, p=e.p, low=e.low, high=_end(e.high), runs=e.runs, simulated_s=simulated_s
+    )
+
+
+def _end(value: float) -> float | None:
+    return value if isfinite(value) else None
+
+
+def _kinds(trials: Sequence[Trial], samples: Weighted) -> dict[str, float]:
+    """Return the share of the probability by kind of failure, the largest first."""
+    shares: dict[str, float] = defaultdict(float)
+    for trial, weight in zip(trials, samples.weights, strict=True):
+        if trial.is_failure:
+            shares[trial.kind] += float(weight)
+    total = sum(shares.values())
+    return {k: v / total for k, v in sorted(shares.items(), key=lambda item: -item[1])}
+
+
+def influence_of(
+    variable: Variable, axis: int, trials: Sequence[Trial], samples: Weighted
+) -> Influence:
+    """Return what other values of one input do, by weighing the same runs anew.
+
+    The runs cannot tell where changed values lie outside of what was drawn, or where too few failures
+    carry the weight.
+    """
+    law = variable.law
+    if isinstance(law, Choice):
+        nothing = (None,) * len(SCALES)
+        return Influence(name=variable.name, factors=nothing, why_not="a choice has no multiples")
+    failing = [(t, w) for t, w in zip(trials, samples.weights, strict=True) if t.is_failure]
+    weights = np.array([w for _, w in failing])
+    values = [law.value(t.unit[axis]) for t, _ in failing]
+    factors: list[float | None] = []
+    why_not = ""
+    for scale in SCALES:
+        changed = law.scaled(scale)
+        low, high = law.range
+        outside = changed.share_below(low) + 1.0 - changed.share_below(high)
+        anew = weights * [changed.density(v) / law.density(v) for v in values]
+        effective = float(anew.sum() ** 2 / (anew**2).sum()) if anew.any() else 0.0
+        if outside > OUTSIDE:
+            why_not = f"with x {scale:g} {outside:.0%} of the values were never drawn"
+        elif effective < LEAST_EFFECTIVE:
+            why_not = f"with x {scale:g} only {effective:.0f} failures carry the weight"
+        is_known = outside <= OUTSIDE and effective >= LEAST_EFFECTIVE
+        factors.append(float(anew.sum() / weights.sum()) if is_known else None)
+    return Influence(name=variable.name, factors=tuple(factors), why_not=why_not)

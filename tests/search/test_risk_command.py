@@ -81,7 +81,7 @@ def test_weighing_anew_is_the_probability_with_the_changed_input():
     )
     share = 1.0 - law.share_below(11.0)
     for scale, factor in zip(SCALES, found.factors, strict=True):
-        expected = (1.0 - law.scaled(scale).share_below(11.0)) / share
+        expected = (1.0 - law.scale_by(scale).share_below(11.0)) / share
         assert factor is None or factor == pytest.approx(expected, rel=0.15)
     assert found.factors[1] is not None
     assert found.factors[2] is not None

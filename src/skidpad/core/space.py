@@ -37,7 +37,7 @@ class Uniform(Struct, frozen=True, tag="uniform", forbid_unknown_fields=True):
         """Return the density relative to that of the likeliest value, 0 to 1."""
         return 1.0 if self.low <= value <= self.high else 0.0
 
-    def scaled(self, factor: float) -> Uniform:
+    def scale_by(self, factor: float) -> Uniform:
         """Return the distribution of `factor` times the value."""
         return Uniform(*sorted((self.low * factor, self.high * factor)))
 
@@ -83,7 +83,7 @@ class Normal(Struct, frozen=True, tag="normal", forbid_unknown_fields=True):
         nearest = min(max(0.0, self._z(low)), self._z(high))
         return math.exp(0.5 * (nearest**2 - self._z(value) ** 2))
 
-    def scaled(self, factor: float) -> Normal:
+    def scale_by(self, factor: float) -> Normal:
         """Return the distribution of `factor` times the value, a factor above 0."""
         low, high = (None if end is None else end * factor for end in (self.low, self.high))
         if self.is_log:

@@ -32,7 +32,7 @@ def read_exposure(path: Path) -> Exposure:
     """Return the exposure model of a YAML file.
 
         variables:
-          LeadS: {law: "normal(128,6,100:160)", source: "who measured it, table, year"}
+          LeadS: {law: "normal(128,6,100:160)", source: "author, year, table"}
           weather: {law: "clear-noon|rain-noon"}
         per_hour: {value: 0.4, source: "..."}      # encounters per hour; per_100km likewise
 

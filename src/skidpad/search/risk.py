@@ -181,7 +181,7 @@ def influence_of(
     factors: list[float | None] = []
     why_not = ""
     for scale in SCALES:
-        changed = law.scaled(scale)
+        changed = law.scale_by(scale)
         low, high = law.range
         outside = changed.share_below(low) + 1.0 - changed.share_below(high)
         anew = weights * [changed.density(v) / law.density(v) for v in values]

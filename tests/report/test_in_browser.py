@@ -68,6 +68,18 @@ def test_a_table_with_long_remarks_is_whole_on_a_screen_of_1400_pixels(tmp_path)
     assert 'data-cut="0"' in dom(path, measured, "1400,900")
 
 
+def test_a_table_wider_than_a_phone_says_that_it_can_be_dragged(tmp_path):
+    path = tmp_path / "report.html"
+    wide, narrow = (
+        Table([(f"column {k}", "") for k in range(n)], [[Cell("1")] * n], f"{n}") for n in (7, 2)
+    )
+    write_page(Page(title="t", subtitle="", sections=[Section("s", [wide, narrow])]), path)
+    hints = "[...document.querySelectorAll('.scroll')].map(e => getComputedStyle(e, '::before').content)"
+    shown = dom(path, f"document.documentElement.dataset.hints = {hints}.join('|')", "390,844")
+    found = re.search(r'data-hints="([^"]*)"', shown).group(1).replace("&quot;", "")
+    assert found == "drag sideways to see all of it|none"
+
+
 @pytest.mark.parametrize("size", ["1400,900", "1000,900"])
 def test_no_table_of_the_matrix_page_is_cut(tmp_path, size):
     campaign(tmp_path, clear_cut, seeds=9)

@@ -86,11 +86,11 @@ def test_the_first_answer_names_the_safest_functions_in_each_weather_and_how_sur
     assert clear == (
         "Clear sky: configuration 1 has fewer than configurations 3 and 4 (p at most 0.023); "
         "10 seeds cannot tell configuration 1 from configuration 2; "
-        "none in 10 seeds allows one in 26 % of seeds."
+        "no crash in 10 seeds still allows crashes in up to 26 % of seeds (95 %)."
     )
     assert rain == (
         "Heavy rain: configuration 1 has fewer than configurations 2 to 4 (p at most 0.023); "
-        "none in 10 seeds allows one in 26 % of seeds."
+        "no crash in 10 seeds still allows crashes in up to 26 % of seeds (95 %)."
     )
 
 

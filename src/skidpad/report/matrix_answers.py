@@ -153,7 +153,8 @@ def _sureness(
         told.append(f"{_in_words(best)} drove exactly as {config_list(same)}")
     if not rate.events:
         share = 100 * rate.most_runs
-        told.append(f"none in {count_text(rate.runs, 'seed')} allows one in {share:.0f} % of seeds")
+        none = f"no {EVENT} in {count_text(rate.runs, 'seed')}"
+        told.append(f"{none} still allows {EVENTS} in up to {share:.0f} % of seeds (95 %)")
     return f"{capitalize_first(group.name)}: {'; '.join(told)}."
 
 

@@ -19,7 +19,7 @@ from test_fleet_upload import served
 
 from chromium import CHROMIUM, FLAGS
 from fleet_world import make_world, packed, record
-from skidpad.cli.fleet_links import map_lines
+from skidpad.cli.fleet_links import map_lines, open_maps
 from skidpad.core.errors import FileError, InputError
 from skidpad.fleet.alerting.keeping import What
 from skidpad.fleet.alerting.orders import Order
@@ -186,7 +186,7 @@ def test_a_log_in_page_asks_in_one_sentence_and_shows_what_was_wrong_as_text():
 def test_roads_are_those_of_ones_own_maps_and_of_bundled_ones(tmp_path):
     """A name leads to no file: maps are read when the service starts."""
     written(tmp_path, "elsewhere.xodr")
-    own, bundled = map_lines(tmp_path), map_lines(None)
+    own, bundled = map_lines(open_maps(tmp_path)), map_lines(open_maps(None))
     outside = RADIUS + WIDTH + 1.0  # the middle of the 2 m beside the street
     xs = [x for line in own("elsewhere") for x, _ in line]
     assert max(xs) == pytest.approx(STRAIGHT + outside, abs=0.1)
@@ -196,10 +196,10 @@ def test_roads_are_those_of_ones_own_maps_and_of_bundled_ones(tmp_path):
         assert not bundled(name)
     assert not own("../elsewhere")
     with pytest.raises(FileError, match="no such folder"):
-        map_lines(tmp_path / "nowhere")
+        open_maps(tmp_path / "nowhere")
     (tmp_path / "broken.xodr").write_text("<OpenDRIVE>")
     with pytest.raises(InputError, match=r"broken\.xodr"):
-        map_lines(tmp_path)
+        open_maps(tmp_path)
 
 
 @pytest.mark.slow

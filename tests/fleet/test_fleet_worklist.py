@@ -8,9 +8,13 @@ import json
 import pytest
 
 from fleet_world import packed, record, replace
+from skidpad.cli.fleet_links import open_maps, place_finder
 from skidpad.core.vocabulary import HazardType
 from skidpad.fleet.insight.worklist import rank_work
-from skidpad.fleet.site.work import work_text
+from skidpad.fleet.patterns import analysis
+from skidpad.fleet.patterns.analysis import newest_clusters
+from skidpad.fleet.patterns.recurrence import name_subjects
+from skidpad.fleet.site.work import work_text, work_title
 
 
 def test_many_alarms_that_are_rarely_true_stand_below_few_that_often_are(world):
@@ -149,3 +153,77 @@ def test_risk_times_precision_ranks_and_an_alarm_without_a_score_counts_in_full(
     assert ranked[1].weight == pytest.approx(0.9 * ranked[1].precision.share)
     assert ranked[0].mean_risk is None
     assert ranked[2].weight == pytest.approx(0.2 * ranked[2].precision.share)
+
+
+@pytest.mark.req("C-193")
+def test_a_state_outlives_the_first_alarm_of_its_hazard(world, monkeypatch):
+    """What an analysis no longer looks at takes no state with it."""
+    monkeypatch.setattr(analysis, "HAZARDS_MAX", 4)
+    for k in range(4):
+        drive(world, k, "1.0", record(k))
+        world.clock.now += 10.0
+    (one,) = listed(world)
+    state = {"state": "open", "owner": "Ada"}
+    assert world.post("axle", f"/api/v1/recurring/{one['subject']}/state", json=state).is_success
+    for k in range(4, 10):  # two at a time: each analysis still knows two of the ones before
+        drive(world, k, "1.0", record(k))
+        world.clock.now += 10.0
+        if k % 2:
+            (one,) = listed(world)
+            assert (one["state"], one["owner"], one["alarms"]) == ("open", "Ada", 4)
+    events = world.get("axle", f"/api/v1/recurring/{one['subject']}/events").json()
+    assert [e["state"] for e in events] == ["open"]
+    # who looks with other rights has states of its own
+    world.clock.now += 1.0
+    assert world.post("red operator", "/api/v1/analyses").is_success
+    (theirs,) = world.get("red operator", "/api/v1/recurring").json()
+    assert theirs["state"] == "new"
+
+
+def test_a_group_is_what_most_of_its_alarms_belonged_to():
+    known = dict.fromkeys("abcd", "a") | dict.fromkeys("xy", "x")
+    assert name_subjects([["c", "d", "e"]], known) == ["a"]
+    assert name_subjects([["a", "x", "y"]], known) == ["x"]
+    assert name_subjects([["p", "q"]], known) == ["p"]
+    # where one becomes two, the first keeps the subject and the other gets a new one
+    assert name_subjects([["b", "c"], ["d", "e"]], known) == ["a", "d"]
+    assert name_subjects([["b", "c"], ["a", "d"]], known) == ["a", "d"]
+
+
+def test_the_work_list_is_filtered_by_severity_and_by_the_kind_of_road(world):
+    def scored(number, score, **words):
+        return replace(record(number, **words), extremes={"safety_score": score})
+
+    world.fleet.locate = place_finder(open_maps(None))
+    street, off = (121.0, 4.0), (400.0, 400.0)
+    sent = [*(scored(k, 0.3, place=street) for k in range(3)),
+            *(scored(10 + k, 0.7, place=off) for k in range(3)),
+            *(record(20 + k, place=street, map="nowhere") for k in range(3))]  # fmt: skip
+    drive(world, 1, "1.0", *sent)
+    found = {w["severity"]: w for w in listed(world)}
+    assert set(found) == {"severe", "notable", "not scored"}
+    assert found["severe"]["place"] == "road 2, 61 m from junction 9003"
+    assert found["severe"]["road"] == "street up to 60 km/h"
+    for other in ("notable", "not scored"):
+        assert (found[other]["place"], found[other]["road"]) == (None, None)
+    for filters, wanted in (
+        ({"severity": "notable"}, ["notable"]),
+        ({"severity": "slight"}, []),
+        ({"road": "street up to 60 km/h"}, ["severe"]),
+        ({"road": "junction"}, []),
+    ):
+        assert [w["severity"] for w in listed(world, **filters)] == wanted, filters
+    assert world.get("axle", "/api/v1/recurring", severity="dire").status_code == 422
+    with world.fleet.engine.connect() as connection:
+        who = world.accounts["axle"].principal
+        work = rank_work(
+            connection, who, newest_clusters(connection, who), locate=world.fleet.locate
+        )
+    titles = {one.severity.value: work_title(one) for one in work}
+    assert titles["severe"] == (
+        "3 x ego tailgating, 1 vehicle, town, road 2, 61 m from junction 9003"
+    )
+    assert titles["notable"].endswith("town, x 400 m, y 400 m")
+    assert work_text(next(w for w in work if w.severity.value == "severe")).startswith(
+        "severe, mean risk 0.70; "
+    )

@@ -16,6 +16,8 @@ from skidpad.cli.fleet_links import (
     committing,
     fleet_extra,
     map_lines,
+    open_maps,
+    place_finder,
     posting,
     relays,
 )
@@ -89,16 +91,17 @@ def serve(
     from skidpad.scenarios.hazard_export import export_hazard
 
     _check_exposure(host, certificate, key)
-    places, roads = _places(data, database, blobs), map_lines(maps)
+    places, known_maps = _places(data, database, blobs), open_maps(maps)
     broker = None if mqtt is None else broker_of(mqtt, mqtt_ca, mqtt_user, mqtt_password_file)
     known = relays(places, webhook or [], webhook_host or [], broker)
-    service = open_fleet(places, exporter=export_hazard, relays=known)
+    locate = place_finder(known_maps)
+    service = open_fleet(places, exporter=export_hazard, relays=known, locate=locate)
     batches = None if broker is None else BatchListener(service, broker)
     try:
         if batches is not None:
             batches.start()
         listen = Listen(host, port, certificate, key, tuple(name or ()))
-        run(service, listen, roads, typer.echo)
+        run(service, listen, map_lines(known_maps), typer.echo)
     finally:
         if batches is not None:
             batches.close()

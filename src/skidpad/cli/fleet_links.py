@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -11,12 +11,15 @@ if TYPE_CHECKING:
     import httpx
     from sqlalchemy import Connection
 
+    from skidpad.core.localities import Locality, Locate
     from skidpad.fleet.alerting.relays import Relay
     from skidpad.fleet.broker import Broker
     from skidpad.fleet.service import Places
     from skidpad.fleet.site.drawing import Line, MapLines
     from skidpad.fleet.uploader import Post
     from skidpad.roads.queries import RoadMap
+
+    Maps = Callable[[str], RoadMap | None]
 
 
 @contextmanager
@@ -135,8 +138,8 @@ def token_of(file: Path) -> str:
         raise FileError(f"{file}: cannot be read as a credential ({error})") from error
 
 
-def map_lines(folder: Path | None) -> MapLines:
-    """Roads of a map by its name: those of the OpenDRIVE files in `folder`, else of bundled maps.
+def open_maps(folder: Path | None) -> Maps:
+    """Maps by name: those of the OpenDRIVE files in `folder`, else bundled ones; None for others.
 
     FileError for what is no folder, InputError for a file in it that cannot be read.
     """
@@ -146,14 +149,46 @@ def map_lines(folder: Path | None) -> MapLines:
     if folder is not None and not folder.is_dir():
         raise FileError(f"--maps {folder}: there is no such folder")
     files = sorted(folder.glob("*.xodr")) if folder is not None else []
-    found = {file.stem: _lines_of(load_map(file)) for file in files}
+    found = {file.stem: load_map(file) for file in files}
+
+    def load(name: str) -> RoadMap | None:
+        if name not in found and name in bundled_maps():
+            found[name] = load_map(name)
+        return found.get(name)
+
+    return load
+
+
+def map_lines(maps: Maps) -> MapLines:
+    """Roads of a map by its name; none of a map that is not known."""
+    known: dict[str, list[Line]] = {}
 
     def lines(name: str) -> Sequence[Line]:
-        if name not in found and name in bundled_maps():
-            found[name] = _lines_of(load_map(name))
-        return found.get(name, ())
+        map = maps(name)
+        if map is None:
+            return ()
+        if name not in known:
+            known[name] = _lines_of(map)
+        return known[name]
 
     return lines
+
+
+def place_finder(maps: Maps) -> Locate:
+    """Which road, lane and junction a point of a map is at; None where the map is not known."""
+    from skidpad.roads.localities import Localities
+
+    known: dict[str, Localities] = {}
+
+    def locate(name: str, x: float, y: float) -> Locality | None:
+        map = maps(name)
+        if map is None:
+            return None
+        if name not in known:
+            known[name] = Localities(map)
+        return known[name].find(x, y)
+
+    return locate
 
 
 def _lines_of(map: RoadMap) -> list[Line]:

@@ -11,6 +11,7 @@ from pathlib import Path
 from sqlalchemy import Engine
 
 from skidpad.core.errors import OutputError
+from skidpad.core.localities import Locate
 from skidpad.fleet.alerting.dispatcher import Dispatcher
 from skidpad.fleet.alerting.hub import Hub
 from skidpad.fleet.alerting.orders import Signer
@@ -54,6 +55,7 @@ class Fleet:
     limits: Limits
     rate: Rate  # of all links together
     exporter: Exporter | None = None  # handed in: this house knows no scenarios
+    locate: Locate | None = None  # handed in likewise: which road a point is on
     owners: dict[str, tuple[str, str]] = field(default_factory=dict)  # tenants of a vehicle: facts
 
     def repository(self, tenant: str) -> Repository:
@@ -78,6 +80,7 @@ def open_fleet(
     limits: Limits | None = None,
     exporter: Exporter | None = None,
     relays: Sequence[Relay] = (),
+    locate: Locate | None = None,
 ) -> Fleet:
     """Open the store at `places`, made or brought to this version where needed."""
     engine, limits = open_store(places), limits or Limits()
@@ -96,6 +99,7 @@ def open_fleet(
         limits=limits,
         rate=Rate(limits.requests_per_s, limits.burst),
         exporter=exporter,
+        locate=locate,
     )
 
 

@@ -8,11 +8,12 @@ import msgspec
 from fastapi import APIRouter, Depends, Query, Request
 from starlette.concurrency import run_in_threadpool
 
+from skidpad.core.localities import RoadKind
 from skidpad.core.told import on_a_line
 from skidpad.fleet.api.guard import Needs, fleet_of
 from skidpad.fleet.api.vehicle import read_body
 from skidpad.fleet.insight.triage import Standing, State, set_standing, subject_key
-from skidpad.fleet.insight.worklist import Work, WorkFilter, rank_work
+from skidpad.fleet.insight.worklist import Severity, Work, WorkFilter, rank_work
 from skidpad.fleet.patterns.analysis import newest_clusters
 from skidpad.fleet.service import CAME, Fleet
 from skidpad.fleet.store.events import events_of
@@ -37,7 +38,7 @@ class TriageText(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 def work_list(fleet: Fleet, who: Principal, wanted: WorkFilter) -> list[Work]:
     """Return the recurring hazards of the newest analysis, ranked."""
     with fleet.engine.connect() as connection:
-        return rank_work(connection, who, newest_clusters(connection, who), wanted)
+        return rank_work(connection, who, newest_clusters(connection, who), wanted, fleet.locate)
 
 
 def require_subject(fleet: Fleet, who: Principal, subject: str) -> None:
@@ -65,13 +66,15 @@ def list_work(
     map: Word = None,
     weather: Word = None,
     release: Word = None,
+    severity: Severity | None = None,
+    road: RoadKind | None = None,
     since: Seconds = None,
     before: Seconds = None,
 ) -> list[dict[str, Any]]:
     """The recurring hazards of the newest analysis, most likely true risk first."""
     wanted = WorkFilter(
-        state=state, owner=owner, map=map, weather=weather, release=release, since=since,
-        before=before,
+        state=state, owner=owner, map=map, weather=weather, release=release,
+        severity=severity, road=road, since=since, before=before,
     )  # fmt: skip
     return [_plain(one) for one in work_list(fleet_of(request), who, wanted)]
 
@@ -106,6 +109,9 @@ def _plain(one: Work) -> dict[str, Any]:
         "map": one.cluster["map"],
         "x": one.cluster["x"],
         "y": one.cluster["y"],
+        "place": None if one.place is None else one.place.describe(),
+        "road": None if one.place is None else one.place.kind.value,
+        "severity": one.severity.value,
         "alarms": len(one.alarms),
         "vehicles": one.cluster["vehicles"],
         "mean_risk": risk,

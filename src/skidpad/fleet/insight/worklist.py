@@ -5,11 +5,13 @@ from __future__ import annotations
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import Enum
 from itertools import islice
 from typing import Any
 
 from sqlalchemy import Connection, func, select
 
+from skidpad.core.localities import Locality, Locate, RoadKind
 from skidpad.fleet.insight.precision import Precision, measured_precision
 from skidpad.fleet.insight.triage import Standing, State, read_standings, reopen
 from skidpad.fleet.store.rights import visible
@@ -17,6 +19,16 @@ from skidpad.fleet.store.tables import drives, hazards
 from skidpad.fleet.words import Principal
 
 CHUNK = 500  # ids of one query
+SEVERE_FROM, NOTABLE_FROM = 0.5, 0.2  # risk; assumption
+
+
+class Severity(str, Enum):
+    """How hard the worst alarm of a recurring hazard was."""
+
+    SEVERE = "severe"  # risk 0.5 and above: a safety score of at most 0.5
+    NOTABLE = "notable"  # risk 0.2 to 0.5
+    SLIGHT = "slight"
+    UNSCORED = "not scored"  # the rules keep no score of this kind
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,11 +47,22 @@ class Alarm:
 class Work:
     """One recurring hazard: its alarms, how much of it is likely true, and what became of it."""
 
-    subject: str  # id of its first alarm: analyses come and go, facts stay
+    subject: str  # what it is known by: analyses and single alarms come and go
     cluster: dict[str, Any]
     alarms: tuple[Alarm, ...]  # by time
     precision: Precision | None  # as measured for its kind under these rules; None: not measured
     standing: Standing
+    place: Locality | None = None  # None: no road of a known map is near
+
+    @property
+    def severity(self) -> Severity:
+        """The class of the largest risk of its alarms."""
+        known = [alarm.risk for alarm in self.alarms if alarm.risk is not None]
+        if not known:
+            return Severity.UNSCORED
+        if max(known) >= SEVERE_FROM:
+            return Severity.SEVERE
+        return Severity.NOTABLE if max(known) >= NOTABLE_FROM else Severity.SLIGHT
 
     @property
     def first(self) -> float:
@@ -90,6 +113,8 @@ class WorkFilter:
     map: str | None = None
     weather: str | None = None
     release: str | None = None
+    severity: Severity | None = None
+    road: RoadKind | None = None
     since: float | None = None  # s, server
     before: float | None = None
 
@@ -99,24 +124,25 @@ def rank_work(
     who: Principal,
     clusters: Sequence[dict[str, Any]],
     wanted: WorkFilter = WorkFilter(),  # frozen
+    locate: Locate | None = None,
 ) -> list[Work]:
     """Return the clusters as far as `wanted`, the one with most risk that is likely true first."""
     found = _read_alarms(connection, who, [id for c in clusters for id in c["members"]])
     groups = [
         (c, sorted((found[i] for i in c["members"] if i in found), key=_age)) for c in clusters
     ]
-    standings = read_standings(connection, who, [alarms[0].id for _, alarms in groups if alarms])
+    subjects = [c.get("subject") or alarms[0].id for c, alarms in groups if alarms]
+    standings = read_standings(connection, who, subjects)
     listed = []
-    for cluster, alarms in groups:
-        if not alarms or wanted.map not in (None, cluster.get("map")):
+    for (cluster, alarms), subject in zip([g for g in groups if g[1]], subjects, strict=True):
+        kept = tuple(alarm for alarm in alarms if _is_wanted(alarm, wanted))
+        if not kept:
             continue
-        standing = standings.get(alarms[0].id, Standing())
-        if wanted.state not in (None, standing.state) or wanted.owner not in (None, standing.owner):
-            continue
-        kept = [alarm for alarm in alarms if _is_wanted(alarm, wanted)]
-        if kept:
-            precision = measured_precision(kept[-1].rules, cluster["type"])
-            listed.append(Work(alarms[0].id, cluster, tuple(kept), precision, standing))
+        precision = measured_precision(kept[-1].rules, cluster["type"])
+        place = None if locate is None else _locate(locate, cluster)
+        one = Work(subject, cluster, kept, precision, standings.get(subject, Standing()), place)
+        if _matches(one, wanted):
+            listed.append(one)
     return sorted(listed, key=lambda w: (-w.weight, w.cluster["id"]))
 
 
@@ -148,6 +174,23 @@ def _first_drives(connection: Connection, who: Principal) -> dict[str, float]:
     query = select(drives.c.release, func.min(drives.c.at)).where(visible(who, drives))
     rows = connection.execute(query.group_by(drives.c.release))
     return {release: at for release, at in rows if release}
+
+
+def _locate(locate: Locate, cluster: dict[str, Any]) -> Locality | None:
+    if "map" not in cluster:
+        return None
+    return locate(cluster["map"], cluster["x"], cluster["y"])
+
+
+def _matches(one: Work, wanted: WorkFilter) -> bool:
+    """Whether a recurring hazard as a whole is one that is wanted."""
+    return (
+        wanted.map in (None, one.cluster.get("map"))
+        and wanted.state in (None, one.standing.state)
+        and wanted.owner in (None, one.standing.owner)
+        and wanted.severity in (None, one.severity)
+        and (wanted.road is None or (one.place is not None and one.place.kind is wanted.road))
+    )
 
 
 def _age(alarm: Alarm) -> tuple[float, str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -21,6 +22,7 @@ from skidpad.fleet.patterns.clusters import (
     find_clusters,
     recurring,
 )
+from skidpad.fleet.patterns.recurrence import keep_subjects, name_subjects, read_subjects
 from skidpad.fleet.patterns.series import VERSION, from_plain, series_of, to_plain
 from skidpad.fleet.service import CAME, Fleet
 from skidpad.fleet.store.events import add_event
@@ -57,32 +59,55 @@ def analyse(fleet: Fleet, who: Principal, settings: ClusterSettings = STANDARD) 
             "hazards": len(cases), "at": at, "role": who.role.value,
         }  # fmt: skip
         connection.execute(analyses.insert(), row)
-        for rank, cluster in enumerate(found):
+        plain = _with_subjects(connection, who, (id, at), cases, found)
+        for rank, cluster in enumerate(plain):
             connection.execute(
                 clusters.insert(),
                 {
                     "id": new_id(), "tenant": who.tenant, "analysis": id, "rank": rank,
-                    "representative": cluster.representative,
+                    "representative": cluster["representative"],
                     "content": msgspec.json.encode(cluster).decode(),
                 },
             )  # fmt: skip
         keys = [{"key": list(key), "hazards": ids} for key, ids in list(often.items())[:200]]
-        plain = [msgspec.to_builtins(cluster) | {"id": id} for cluster in found]
-        reopened = reopen_recurred(connection, who, plain, at)
+        reopened = reopen_recurred(connection, who, [c | {"id": id} for c in plain], at)
         told = {"reopened": reopened, "unreadable": unreadable, "recurring": keys}
         add_event(connection, ("analysis", id), "analysed", (who.id, at), **told)
     fleet.hub.tell(f"{CAME} {who.tenant}")
     return Analysed(id, len(cases), unreadable, found)
 
 
+def _with_subjects(
+    connection: Connection,
+    who: Principal,
+    analysis: tuple[str, float],
+    cases: Sequence[Case],
+    found: Sequence[Cluster],
+) -> list[dict[str, Any]]:
+    """The clusters with the recurring hazard that each is, which their alarms are kept with."""
+    age = {case.id: k for k, case in enumerate(reversed(cases))}
+    groups = [sorted(cluster.members, key=age.__getitem__) for cluster in found]
+    known = read_subjects(connection, who, [id for group in groups for id in group])
+    subjects = name_subjects(groups, known)
+    joined = {
+        id: subject for group, subject in zip(groups, subjects, strict=True) for id in group
+        if known.get(id) != subject
+    }  # fmt: skip
+    keep_subjects(connection, analysis, joined)
+    return [
+        msgspec.to_builtins(cluster) | {"subject": subject}
+        for cluster, subject in zip(found, subjects, strict=True)
+    ]
+
+
 def gather(fleet: Fleet, who: Principal) -> tuple[list[Case], int]:
-    """The newest visible hazards with their series, and how many could not be read."""
+    """The newest visible hazards with their series, newest first, and how many could not be read."""
     there = (series.c.digest == hazards.c.digest) & (series.c.version == VERSION)
     query = (
         select(hazards, series.c.content.label("course"))
         .outerjoin(series, there)
         .where(visible(who, hazards))
-        .order_by(hazards.c.at.desc())
+        .order_by(hazards.c.at.desc(), hazards.c.id.desc())
     )
     with fleet.engine.connect() as connection:
         rows = connection.execute(query.limit(HAZARDS_MAX)).all()

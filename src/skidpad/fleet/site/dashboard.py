@@ -65,7 +65,7 @@ def overview(fleet: Fleet, lines: MapLines, who: Principal) -> Overview:
     found = trends(fleet, who)
     with fleet.engine.connect() as connection:
         rates, clusters = alarm_rates(connection, who), newest_clusters(connection, who)
-        work = rank_work(connection, who, clusters)
+        work = rank_work(connection, who, clusters, locate=fleet.locate)
         newest = hazard_rows(connection, who, Wanted())
     names = list(dict.fromkeys(row["map"] for row in newest if row["map"]))
     roads = {name: lines(name) for name in names[:MAPS]}

@@ -11,9 +11,10 @@ from starlette.concurrency import run_in_threadpool
 from starlette.requests import Request
 
 from skidpad.core.errors import SkidpadError
+from skidpad.core.localities import RoadKind
 from skidpad.fleet.api.recurring import TriageText, work_list
 from skidpad.fleet.insight.triage import SETTABLE, State
-from skidpad.fleet.insight.worklist import Work, WorkFilter
+from skidpad.fleet.insight.worklist import NOTABLE_FROM, SEVERE_FROM, Severity, Work, WorkFilter
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.acting import click_export, click_triage
 from skidpad.fleet.site.frame import say
@@ -27,6 +28,7 @@ PERIODS = {"7 days": 7, "30 days": 30, "90 days": 90}  # by the word of the filt
 WORK_NOTE = (
     "Ranked by risk times the measured precision of the kind of alarm. Risk is 1 less the least safety"
     " score of the alarm. Alarms without a score, and kinds without a measured precision, count in full."
+    f" Severity is of the worst alarm: severe from risk {SEVERE_FROM:g} on, notable from {NOTABLE_FROM:g}."
 )
 
 
@@ -50,6 +52,8 @@ def work_of(fleet: Fleet, who: Principal, request: Request) -> WorkPage:
         "map": _words(w.cluster["map"] for w in everything),
         "weather": _words(a.weather for w in everything for a in w.alarms),
         "release": _words(a.release for w in everything for a in w.alarms),
+        "severity": [s.value for s in Severity if s in {w.severity for w in everything}],
+        "road": [k.value for k in RoadKind if k in {w.place.kind for w in everything if w.place}],
         "period": list(PERIODS),
     }
     chosen = {k: v for k, v in chosen.items() if v in choices.get(k, ())}
@@ -60,6 +64,8 @@ def work_of(fleet: Fleet, who: Principal, request: Request) -> WorkPage:
         map=chosen.get("map"),
         weather=chosen.get("weather"),
         release=chosen.get("release"),
+        severity=Severity(chosen["severity"]) if "severity" in chosen else None,
+        road=RoadKind(chosen["road"]) if "road" in chosen else None,
         since=None if days is None else fleet.clock() - days * DAY,
     )
     return WorkPage(fleet, who, chosen, choices, work_list(fleet, who, wanted))
@@ -139,7 +145,8 @@ def work_title(one: Work) -> str:
     """Return how many alarms of which kind there are, of how many vehicles, and where."""
     c, n = one.cluster, len(one.alarms)
     vehicles = f"{c['vehicles']} vehicle{'' if c['vehicles'] == 1 else 's'}"
-    where = f"{c['map']} at x {c['x']:.0f} m, y {c['y']:.0f} m"
+    point = f"x {c['x']:.0f} m, y {c['y']:.0f} m"
+    where = f"{c['map']}, {point if one.place is None else one.place.describe()}"
     return f"{n} x {c['type'].replace('_', ' ')}, {vehicles}, {where}"
 
 
@@ -151,7 +158,7 @@ def work_text(one: Work) -> str:
         if measured is None
         else f"about {one.likely_true:.1f} likely true ({measured.describe()})"
     )
-    mean = "" if risk is None else f"mean risk {risk:.2f}; "
+    mean = "" if risk is None else f"{one.severity.value}, mean risk {risk:.2f}; "
     first, last = (
         f"{datetime.fromtimestamp(at, timezone.utc):%Y-%m-%d}" for at in (one.first, one.last)
     )

@@ -36,6 +36,17 @@ clusters = Table(
     Column("content", Text, nullable=False),  # JSON
     Index("clusters_by_analysis", "analysis", "rank"),
 )
+recurrences = (
+    Table(  # which recurring hazard a hazard belongs to; the newest analysis that says so counts
+        "recurrences",
+        metadata,
+        Column("analysis", ID, ForeignKey("analyses.id"), primary_key=True),
+        Column("hazard", ID, ForeignKey("hazards.id"), primary_key=True),
+        Column("subject", ID, nullable=False),
+        _time(),
+        Index("recurrences_by_hazard", "hazard", "at"),
+    )
+)
 alerts = Table(
     "alerts",
     metadata,

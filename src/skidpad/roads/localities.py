@@ -11,7 +11,7 @@ NEAR = 20.0  # m beyond which a point is on no road
 
 
 class Localities:
-    """Finds the places of points on one map, seen from above."""
+    """Finds the places of points on one map, seen from above: heights of bridges are not told apart."""
 
     def __init__(self, map: RoadMap) -> None:
         samples, lanes = map.samples, map.lanes

@@ -48,8 +48,8 @@ def read_subjects(connection: Connection, who: Principal, ids: Sequence[str]) ->
     found: dict[str, str] = {}
     rest = iter(ids)
     while some := list(islice(rest, CHUNK)):
-        for hazard, subject in connection.execute(query.where(recurrences.c.hazard.in_(some))):
-            found[hazard] = subject
+        rows = connection.execute(query.where(recurrences.c.hazard.in_(some)))
+        found |= {row.hazard: row.subject for row in rows}
     return found
 
 

@@ -110,7 +110,7 @@ def tables(trials: int) -> str:
 
 def _band(trials: int) -> float:
     """The largest share within the binomial band of 5 %, in percent."""
-    return 100.0 * (ALPHA + 2.0 * (ALPHA * (1.0 - ALPHA) / trials) ** 0.5)
+    return float(100.0 * (ALPHA + 2.0 * (ALPHA * (1.0 - ALPHA) / trials) ** 0.5))
 
 
 def _percent(share: float) -> str:

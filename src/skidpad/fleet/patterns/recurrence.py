@@ -38,7 +38,7 @@ def name_subjects(groups: Sequence[Sequence[str]], known: Mapping[str, str]) -> 
 
 
 def read_subjects(connection: Connection, who: Principal, ids: Sequence[str]) -> dict[str, str]:
-    """Returns the subject of each hazard that an analysis by the rights of `who` gave one."""
+    """Returns the subject of each hazard that an analysis with the same rights gave one."""
     query = (
         select(recurrences.c.hazard, recurrences.c.subject)
         .join(analyses, analyses.c.id == recurrences.c.analysis)

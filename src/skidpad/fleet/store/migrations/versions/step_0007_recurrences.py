@@ -24,5 +24,5 @@ def upgrade() -> None:
 
 
 def downgrade() -> None:
-    """Facts are never removed."""
+    """Refuses, as facts are never removed."""
     raise NotImplementedError("facts of the fleet are only ever added")

@@ -54,3 +54,9 @@ def test_the_csv_holds_every_number_with_its_limits_and_the_published_value():
 )
 def test_digits_follow_the_size(value, text):
     assert number(value) == text
+
+
+def test_a_published_value_has_no_more_digits_than_can_be_compared():
+    drive = Drive("dry", 0, Quantity(value=55.77, published=33.5512))
+    assert table(COLUMNS, [drive]).rows[0][2].note == "published 33.55"
+    assert table(COLUMNS, [drive]).rows[0][2].published == 33.5512

@@ -90,7 +90,7 @@ def quantity_cell(q: Quantity, style: Format) -> Cell:
     told = [] if q.interval is None or q.value is None else [_limits(q, style)]
     told += [line for line in (*([] if told else [q.remark]), *q.lines) if line]
     if q.published is not None:
-        told.append(f"published {q.published:g}{' ?' if q.doubted else ''}")
+        told.append(f"published {q.published:.4g}{' ?' if q.doubted else ''}")
     if q.value is None:
         note = "\n".join(told)
         return Cell(style.absent, published=q.published, note=note, kind="muted", hint=q.hint)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from math import isfinite
+from pathlib import Path
 from typing import Annotated
 
 from msgspec import Meta, Struct
@@ -187,17 +188,23 @@ class Tuned(Struct, frozen=True):
     set: Annotated[
         tuple[str, ...], Meta(description="Single settings over the profile: name=value.")
     ] = ()
+    surface: Annotated[
+        Path | None,
+        Meta(description="YAML with puddles, ice, snow or friction of parts of the road."),
+    ] = None
 
     def resolve(self, run: RunSpec, **more: str | None) -> RunSpec:
         """`run` with all its settings written out. more: settings given by name, None: not given."""
         from msgspec import structs
 
+        from skidpad.campaign.surfaces import read_surface
         from skidpad.stack.settings import load_profile, parse_assignments
 
         values = parse_assignments(self.set)
         values |= parse_assignments(f"{k}={v}" for k, v in more.items() if v is not None)
         settings = load_profile(run.profile, values).as_plain()
-        return structs.replace(run, settings=settings)
+        surface = () if self.surface is None else read_surface(self.surface)
+        return structs.replace(run, settings=settings, surface=surface)
 
 
 class PlayCross(Struct, frozen=True):

@@ -14,6 +14,7 @@ from msgspec import Meta, Struct
 
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.names import path_part, slug
+from skidpad.core.surface import SurfacePatch
 from skidpad.core.told import on_a_line
 from skidpad.core.vocabulary import SensorLevel, Stratum, TrafficStart
 from skidpad.core.weather import Weather
@@ -316,6 +317,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     ] = Render.NEEDED
     overlay: Annotated[bool, Meta(description="Rain drops on the cameras (pixels).")] = False
     backend: BackendChoice = BackendChoice()
+    surface: tuple[SurfacePatch, ...] = ()  # what lies on parts of the road
     inputs: str = (
         ""  # SHA-256 of what a person did meanwhile (inputs.jsonl); "": no person took part
     )
@@ -327,6 +329,8 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise ConfigError(
                 "traffic pack and risky drivers are kept together by the embedded simulator alone"
             )
+        if self.surface and self.backend.backend is BackendKind.CARLA:
+            raise ConfigError("--surface needs the embedded simulator")
         if isinstance(self.driver, CameraDriver) and self.sensors is not SensorLevel.PIXELS:
             raise ConfigError("the camera driver sees images: it needs --sensors pixels")
         if isinstance(self.driver, Passenger) and not isinstance(self.course, Scenario):
@@ -375,6 +379,8 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     def to_plain(self) -> dict[str, Any]:
         """The whole value as plain data, as it stands in config.yaml."""
         plain: dict[str, Any] = msgspec.to_builtins(self, order="deterministic")
+        if not self.surface:  # so that runs without one are described as before
+            del plain["surface"]
         return {"version": VERSION, **plain}
 
 

@@ -67,9 +67,14 @@ class TrafficSetup:
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class FrictionPatch:
-    """A stretch of lane or an area with its own friction ratio, felt wheel by wheel."""
+    """A stretch of road or an area with friction of its own, felt wheel by wheel."""
 
-    mu_ratio: float  # of the friction that the surface would have without it
+    mu_ratio: float | None = None  # of the friction that the surface would have without it; or:
+    water_mm: float = 0.0  # what lies there; where the weather's is deeper, that counts
+    ice_mm: float = 0.0
+    snow_mm: float = 0.0
+    name: str = ""
+    circle: tuple[float, float, float] | None = None  # world x, y and radius in m; or:
     polygon: tuple[tuple[float, float], ...] = ()  # world x, y in m; or:
     road: int | None = None
     lane: int | None = None

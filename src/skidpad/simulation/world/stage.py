@@ -27,7 +27,7 @@ def staged(setup: Setup, seed: int) -> World:
     drivers = Traffic(map, traffic, seed, care_of(setup, traffic.slow_in_weather))
     world.let_drive(drivers)
     if setup.patches:
-        world.patches = Patches(map, setup.patches)
+        world.patches = Patches(map, setup.patches, setup.weather, grip)
     ids = world.enter([role.newcomer(i) for i, role in enumerate(roles)])
     world.book = ContactBook(world.obstacles.names, setup.dt)
     for id, role in zip(ids, roles, strict=True):

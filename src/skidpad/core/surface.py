@@ -1,0 +1,84 @@
+"""What lies on parts of the road: puddles, ice, snow, or a share of the friction, by area."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from msgspec import Struct
+
+from skidpad.core.errors import ConfigError, require_range
+from skidpad.core.setup import FrictionPatch
+
+FRICTION = (0.01, 1.5)  # times the friction that is there without the patch
+WATER_MM = (0.0, 2.0)  # deepest film for which the friction of wet roads holds (docs/physics.md)
+ICE_MM = (0.0, 20.0)
+SNOW_MM = (0.0, 2000.0)
+RADIUS = (0.1, 1000.0)  # m
+
+
+class SurfacePatch(
+    Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, omit_defaults=True
+):
+    """One area with something on it. What is there and where it is are each said in one way.
+
+    Attributes:
+        name: what pages call it.
+        friction: times the friction that the weather leaves there.
+        water_mm, ice_mm, snow_mm: depth, mm; where the weather's is more, that counts.
+        circle: x, y of the middle and the radius, m, in the map's plane.
+        polygon: corners x, y, m, in the map's plane, at least three.
+        road: OpenDRIVE id; the area is a stretch of it.
+        lane: OpenDRIVE id of a lane of it; None: all driving lanes.
+        s: from and to along the road, m; None: the whole road.
+        side: half of each lane, seen in its driving direction.
+    """
+
+    name: str = ""
+    friction: float | None = None
+    water_mm: float = 0.0
+    ice_mm: float = 0.0
+    snow_mm: float = 0.0
+    circle: tuple[float, float, float] | None = None
+    polygon: tuple[tuple[float, float], ...] = ()
+    road: int | None = None
+    lane: int | None = None
+    s: tuple[float, float] | None = None
+    side: Literal["both", "left", "right"] = "both"
+
+    def __post_init__(self) -> None:
+        self._require_what()
+        self._require_where()
+
+    def _require_what(self) -> None:
+        deep = {"water_mm": WATER_MM, "ice_mm": ICE_MM, "snow_mm": SNOW_MM}
+        for name, (low, high) in deep.items():
+            require_range(name, getattr(self, name), low, high)
+        lies = self.water_mm > 0.0 or self.ice_mm > 0.0 or self.snow_mm > 0.0
+        if lies is (self.friction is not None):
+            raise ConfigError("needs either friction or a depth: water_mm, ice_mm, snow_mm")
+        if self.friction is not None:
+            require_range("friction", self.friction, *FRICTION)
+
+    def _require_where(self) -> None:
+        areas = (self.circle is not None, bool(self.polygon), self.road is not None)
+        if sum(areas) != 1:
+            raise ConfigError("needs one of circle, polygon and road")
+        if self.road is None and (
+            self.lane is not None or self.s is not None or self.side != "both"
+        ):
+            raise ConfigError("lane, s and side go with a road")
+        if self.polygon and len(self.polygon) < 3:
+            raise ConfigError(f"polygon needs at least 3 corners, got {len(self.polygon)}")
+        if self.circle is not None:
+            require_range("circle's radius", self.circle[2], *RADIUS)
+        if self.s is not None and not 0.0 <= self.s[0] < self.s[1]:
+            raise ConfigError(f"s must run from 0 or more to more, got {list(self.s)}")
+
+    def to_patch(self) -> FrictionPatch:
+        """Return the patch as a set-up takes it."""
+        low, high = (0.0, float("inf")) if self.s is None else self.s
+        return FrictionPatch(
+            name=self.name, mu_ratio=self.friction, water_mm=self.water_mm, ice_mm=self.ice_mm,
+            snow_mm=self.snow_mm, circle=self.circle, polygon=self.polygon, road=self.road,
+            lane=self.lane, s_from=low, s_to=high, side=self.side,
+        )  # fmt: skip

@@ -1,0 +1,83 @@
+"""`--surface`: a run on a surface is felt, stored and driven again; without one nothing moves."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+from msgspec import structs
+from typer.testing import CliRunner
+
+from skidpad.campaign.cast import stage_of
+from skidpad.campaign.run import run
+from skidpad.campaign.surfaces import read_surface
+from skidpad.cli.main import app
+from skidpad.core.errors import ConfigError
+from skidpad.core.run import BackendChoice, BackendKind, RunSpec, Scenario, run_from_plain
+from skidpad.core.states import VehicleCommand
+from skidpad.core.surface import SurfacePatch
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.simulation.embedded.engine import EmbeddedBackend
+
+EXAMPLE = Path(__file__).parents[2] / "examples" / "puddle.yaml"
+SPEC = RunSpec(course=Scenario(file="lead_slowdown"), sensors=SensorLevel.OBJECTS, duration=12.0)
+
+
+def brake(*surface):
+    """Brake alone from 20 m/s for 2 s: the turn in rad, and friction at the wheels in the first tick."""
+    stage = stage_of(structs.replace(SPEC, surface=surface))
+    backend = EmbeddedBackend()
+    backend.reset(replace(stage.setup, ego=replace(stage.setup.ego, speed=20.0), actors=()), 1)
+    start, mu = float(backend.truth().states.yaw[0]), None
+    for _ in range(40):
+        backend.step(VehicleCommand(brake=0.6))
+        mu = np.array(backend.truth().mu[0]) if mu is None else mu
+    return float(backend.truth().states.yaw[0]) - start, mu
+
+
+def test_split_friction_turns_a_braking_car_towards_the_grip():
+    """Ice under the right wheels: the left ones brake harder, so the car turns left (counterclockwise)."""
+    straight, dry = brake()
+    turned, mu = brake(SurfacePatch(ice_mm=3.0, road=1, side="right"))
+    assert abs(straight) < 0.005
+    assert turned > 0.03
+    assert mu[[0, 2]] == pytest.approx(dry[[0, 2]])
+    assert (mu[[1, 3]] < 0.2 * mu[[0, 2]]).all()
+
+
+def test_a_surface_reaches_the_log_and_the_description_of_the_run(tmp_path):
+    out = tmp_path / "out"
+    call = [
+        "play",
+        "lead_slowdown",
+        "--surface",
+        str(EXAMPLE),
+        "--duration",
+        "8",
+        "--out",
+        str(out),
+    ]
+    done = CliRunner().invoke(app, call, catch_exceptions=False)
+    assert done.exit_code in (0, 1), done.output
+    plain = yaml.safe_load((out / "config.yaml").read_text())
+    spec = run_from_plain(plain, "config.yaml")
+    assert spec.surface == read_surface(EXAMPLE)
+    log = read_log(out)
+    assert log_hash(run(spec).log) == log_hash(log)
+    assert log_hash(run(structs.replace(spec, surface=())).log) != log_hash(log)
+
+
+def test_a_run_without_a_surface_is_described_as_before():
+    assert "surface" not in SPEC.to_plain()
+    assert run_from_plain(SPEC.to_plain(), "here") == SPEC
+
+
+def test_carla_has_no_surfaces():
+    with pytest.raises(ConfigError, match="needs the embedded simulator"):
+        structs.replace(
+            SPEC,
+            surface=read_surface(EXAMPLE),
+            backend=BackendChoice(backend=BackendKind.CARLA),
+        )

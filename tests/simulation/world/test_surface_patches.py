@@ -1,0 +1,139 @@
+"""Surfaces: what a patch says acts at each wheel, by the physical model and at the speed driven."""
+
+from dataclasses import replace
+from math import hypot
+
+import numpy as np
+import pytest
+
+from skidpad.campaign.surfaces import read_surface
+from skidpad.core.errors import ConfigError
+from skidpad.core.setup import FrictionPatch
+from skidpad.core.surface import SurfacePatch
+from skidpad.core.vocabulary import GripModel
+from skidpad.physics.grip import grip_params, mu_at, physical_params, road_surface
+from skidpad.physics.presets import find_weather
+from skidpad.roads.bundled import load_map
+from skidpad.simulation.world.patches import Patches
+
+ROAD = load_map("straight")
+X, Y, Z = (float(v[500]) for v in (ROAD.samples.x, ROAD.samples.y, ROAD.samples.z))
+PLACE = ROAD.project(X, Y, Z)
+
+
+def patches(*found, weather="clear-noon", model=GripModel.PHYSICAL):
+    outside = find_weather(weather)
+    return Patches(ROAD, found, outside, grip_params(outside, model))
+
+
+@pytest.mark.parametrize("v", [0.0, 15.0, 30.0])
+@pytest.mark.parametrize("weather", ["clear-noon", "rain-noon"])
+def test_water_lowers_friction_as_a_road_with_that_film_does(weather, v):
+    found = patches(FrictionPatch(water_mm=2.0, circle=(X, Y, 3.0)), weather=weather)
+    outside = find_weather(weather)
+    road = road_surface(outside)
+    deep = physical_params(replace(road, film_mm=max(road.film_mm, 2.0)))
+    expected = mu_at(deep, v) / mu_at(grip_params(outside, GripModel.PHYSICAL), v)
+    assert found.ratio_at(X, Y, Z, v) == pytest.approx(expected)
+    assert found.ratio_at(X + 3.1, Y, Z, v) == 1.0
+
+
+def test_a_film_that_the_weather_has_already_changes_nothing():
+    outside = find_weather("rain-noon")
+    thin = 0.5 * road_surface(outside).film_mm
+    found = patches(FrictionPatch(water_mm=thin, circle=(X, Y, 3.0)), weather="rain-noon")
+    assert found.ratio_at(X, Y, Z, 20.0) == pytest.approx(1.0)
+
+
+def test_ice_on_a_dry_road_is_as_slippery_as_an_icy_road():
+    found = patches(FrictionPatch(ice_mm=3.0, circle=(X, Y, 3.0)))
+    icy = physical_params(replace(road_surface(find_weather("clear-noon")), ice_mm=3.0))
+    dry = grip_params(find_weather("clear-noon"), GripModel.PHYSICAL)
+    assert found.ratio_at(X, Y, Z) * mu_at(dry, 0.0) == pytest.approx(mu_at(icy, 0.0))
+    assert mu_at(icy, 0.0) < 0.15
+
+
+def test_the_slippery_one_of_two_patches_counts():
+    found = patches(
+        FrictionPatch(mu_ratio=0.7, circle=(X, Y, 5.0)),
+        FrictionPatch(mu_ratio=0.4, circle=(X, Y, 1.0)),
+    )
+    assert found.ratio_at(X, Y, Z) == 0.4
+    assert found.ratio_at(X + 2.0, Y, Z) == 0.7
+
+
+def test_a_stretch_covers_its_lane_its_side_and_nothing_else():
+    stretch = FrictionPatch(
+        mu_ratio=0.5, road=PLACE.road, lane=PLACE.lane_id, side="right",
+        s_from=ROAD.s_road(PLACE) - 5.0, s_to=ROAD.s_road(PLACE) + 5.0,
+    )  # fmt: skip
+    found = patches(stretch)
+    heading = float(ROAD.samples.heading[500])
+    right = (X + np.sin(heading), Y - np.cos(heading))
+    left = (X - np.sin(heading), Y + np.cos(heading))
+    assert found.ratio_at(*right, Z) == 0.5
+    assert found.ratio_at(*left, Z) == 1.0
+    ahead = right[0] + 7.0 * np.cos(heading), right[1] + 7.0 * np.sin(heading)
+    assert found.ratio_at(*ahead, Z) == 1.0
+
+
+def test_vehicles_far_from_every_patch_are_not_looked_at(monkeypatch):
+    """The bounds leave out only where nothing is: the same shares with them and without."""
+    found = patches(FrictionPatch(mu_ratio=0.5, circle=(X, Y, 4.0)))
+    found.fit([])
+    low_x, low_y, high_x, high_y = found.bounds[0]
+    rng = np.random.default_rng(3)
+    for _ in range(300):
+        x, y = X + rng.uniform(-40, 40), Y + rng.uniform(-40, 40)
+        inside = low_x <= x <= high_x and low_y <= y <= high_y
+        if found.ratio_at(x, y, Z) < 1.0:
+            assert inside
+            assert hypot(x - X, y - Y) <= 4.0
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("puddles: []", "must be a mapping with `patches`"),
+        ("patches: []", "a list of at least one patch"),
+        ("patches: [{water_mm: 1}]", "patches[0]: needs one of circle, polygon and road"),
+        ("patches: [{circle: [0, 0, 1]}]", "needs either friction or a depth"),
+        ("patches: [{friction: 0.5, ice_mm: 1, road: 1}]", "needs either friction or a depth"),
+        ("patches: [{water_mm: 3, road: 1}]", "water_mm must be between 0 and 2, got 3"),
+        ("patches: [{friction: 0, road: 1}]", "friction must be between 0.01 and 1.5, got 0"),
+        ("patches: [{friction: 0.5, circle: [0, 0, 1], side: left}]", "go with a road"),
+        ("patches: [{friction: 0.5, road: 1, s: [5, 5]}]", "s must run from 0 or more to more"),
+        ("patches: [{friction: 0.5, polygon: [[0, 0], [1, 1]]}]", "at least 3 corners, got 2"),
+        ("patches: [{mud: 1}]", "mud"),
+        ("patches: [{friction: 0.5, road: 1, side: middle}]", "middle"),
+    ],
+)
+def test_a_wrong_file_is_refused_in_one_sentence(text, complaint, tmp_path):
+    path = tmp_path / "surface.yaml"
+    path.write_text(text)
+    with pytest.raises(ConfigError) as caught:
+        read_surface(path)
+    assert complaint in str(caught.value)
+    assert "surface.yaml" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("patch", "complaint"),
+    [
+        (FrictionPatch(mu_ratio=0.5, road=77, name="ice"), "(ice): map straight has no road 77"),
+        (FrictionPatch(mu_ratio=0.5, road=PLACE.road, s_from=1e5, s_to=2e5), "runs from 0.0 to"),
+        (FrictionPatch(mu_ratio=0.5, road=PLACE.road, lane=9, s_to=10.0), "has lanes"),
+    ],
+)
+def test_a_patch_on_no_road_of_the_map_says_what_there_is(patch, complaint):
+    with pytest.raises(ConfigError) as caught:
+        patches(patch)
+    assert complaint in str(caught.value)
+
+
+def test_a_patch_is_written_as_it_was_read():
+    patch = SurfacePatch(name="a", water_mm=1.0, road=1, s=(3.0, 9.0), side="left")
+    assert patch.to_patch() == FrictionPatch(
+        name="a", water_mm=1.0, road=1, s_from=3.0, s_to=9.0, side="left"
+    )

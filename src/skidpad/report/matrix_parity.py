@@ -96,24 +96,44 @@ def parity_section(parity: Parity | None) -> list[Block]:
 
 def parity_text(parity: Parity) -> str:
     """Crashes at both levels over the compared configurations, and how many drives moved alike."""
-    twins = [t for t in parity.twins if t.pixels["config"] != BASELINE]
-    on_pixels, on_objects = (
-        sum(int(row[EVENTS] or 0) for row in rows)  # type: ignore[call-overload]
-        for rows in ([t.pixels for t in twins], [t.objects for t in twins])
-    )
-    alike = [t for t in twins if t.pixels["motion_hash"] == t.objects["motion_hash"] is not None]
-    seeds = count_text(len({t.pixels["seed"] for t in twins}), "seed")
-    same = f"{len(alike)} of the pairs moved alike to the last bit"
+    drives = _by_objects(parity)
+    on_objects = sum(int(d[0].objects[EVENTS] or 0) for d in drives)  # type: ignore[call-overload]
+    on_pixels = sum(sum(_number(t.pixels, EVENTS) or 0.0 for t in d) / len(d) for d in drives)
+    alike = [d for d in drives if all(_is_same_drive(t) for t in d)]
+    seeds = count_text(len({d[0].pixels["seed"] for d in drives}), "seed")
+    same = f"{len(alike)} moved alike to the last bit at both levels"
     if alike:
-        drivers = list(dict.fromkeys(str(t.pixels["config"]) for t in alike))
+        drivers = list(dict.fromkeys(str(d[0].pixels["config"]) for d in alike))
         same += f", with {config_list(drivers)}"
+    several = [d for d in drives if len(d) > 1]
+    mean = (
+        " Where one drive on objects has several on pixels, as images differ between times of day, "
+        "their mean counts."
+    )
     return (
         f"This page is about the object level: sensors from boxes, without images. {seeds} of it "
-        f"drove once more on camera images. In {count_text(len(twins), 'pair')} of different drives "
-        f"of the compared configurations there were {count_text(on_pixels, 'crash', 'crashes')} on "
-        f"pixels and {count_text(on_objects, 'crash', 'crashes')} on objects; {same}. One seed shows "
-        "how the levels differ and not how often."
+        f"drove once more on camera images. {count_text(len(drives), 'different drive')} of the "
+        f"compared configurations had {count_text(on_objects, 'crash', 'crashes')} on objects and "
+        f"{on_pixels:.3g} on pixels; {same}.{mean if several else ''} One seed shows how the levels "
+        "differ and not how often."
     )
+
+
+def _by_objects(parity: Parity) -> list[list[Twin]]:
+    """Pairs of the compared configurations, those together that share their drive on objects."""
+    found: dict[tuple[object, ...], list[Twin]] = {}
+    for twin in parity.twins:
+        if twin.pixels["config"] == BASELINE:
+            continue
+        drive = twin.objects[parity.matrix.drive_column]
+        apart = twin.weathers if drive is None else ()
+        key = (twin.pixels["config"], twin.pixels["seed"], drive, apart)
+        found.setdefault(key, []).append(twin)
+    return list(found.values())
+
+
+def _is_same_drive(twin: Twin) -> bool:
+    return twin.pixels["motion_hash"] == twin.objects["motion_hash"] is not None
 
 
 def _number(row: dict[str, object], column: str) -> float | None:

@@ -3,9 +3,11 @@
 import random
 
 import msgspec
+import numpy as np
 import pytest
 from producers import bridge
 
+from skidpad.cockpit.hud import stopping_distance
 from skidpad.cockpit.words import Word, encode
 from skidpad.core.inputs import Sky
 from skidpad.core.run import Function
@@ -76,3 +78,12 @@ def test_no_word_of_a_page_ends_a_drive():
         assert 0.0 < mu_at(grip_params(sky.weather, sky.grip), 20.0) < 2.0
     for word in made.producer.words:  # what is sent can be read at the other end
         msgspec.json.decode(encode(word), type=Word)
+
+
+@pytest.mark.parametrize(
+    ("mu", "way"),
+    [([0.1] * 4, 318.6), ([0.9, 0.9, 0.3, 0.3], 53.1), ([np.nan] * 4, None), ([0.0] * 4, None)],
+)
+def test_the_way_of_a_full_braking_follows_from_speed_and_present_grip(mu, way):
+    found = stopping_distance(25.0, np.array(mu, np.float32))
+    assert found == (None if way is None else pytest.approx(way, abs=0.1))

@@ -148,7 +148,7 @@ export default {
         ["time gap", unit(s.time_gap, "s")], ["bumper, roof", `${unit(s.bumper, "")} ${unit(s.roof, "m")}`],
         ["radar", unit(s.radar, "m")], ["radar limit", unit(s.radar_limit, "m/s")],
         ["light", s.light ? `${s.light} at ${s.light_at} m` : "-"], ["weather", seat.weather],
-        ["grip", seat.grip || ""], ["collisions", h.collisions], ["real time", h.rtf ? `${h.rtf.toFixed(2)} x` : h.kind === "replay" ? `${h.rate} x` : "-"],
+        ["grip", seat.grip || ""], ["stop in", unit(m.stop_m, "m")], ["collisions", h.collisions], ["real time", h.rtf ? `${h.rtf.toFixed(2)} x` : h.kind === "replay" ? `${h.rate} x` : "-"],
         ["pictures", `${this.shownAt.length}/s, ${h.dropped} dropped`], ["drives", seat.manual ? `you, by ${seat.method}` : "the stack"],
         ["on", seat.functions ? seat.functions.join(" ") || "nothing" : "-"]]);
       [...r.tiers.children].forEach((li, i) => li.classList.toggle("lit", i === s.tier));

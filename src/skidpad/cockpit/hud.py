@@ -5,9 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.campaign.desk import Desk
 from skidpad.campaign.drive import Moment
+from skidpad.core.constants import G
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.inputs import Beam
 from skidpad.core.vocabulary import Supervision, Tier
@@ -29,6 +31,13 @@ def round_value(value: float | None, digits: int = 2) -> float | None:
     return round(float(value), digits)
 
 
+def stopping_distance(v: float, mu: NDArray[np.float32]) -> float | None:
+    """Returns the way in m of a full braking from v (m/s) on what the tyres find now; None without grip."""
+    known = mu[np.isfinite(mu)]
+    grip = float(known.mean()) if known.size else 0.0
+    return None if grip <= 0.0 else v * v / (2.0 * grip * G)
+
+
 def motion(moment: Moment) -> dict[str, Any]:
     """How the ego moves and what moves it."""
     ego, truth = moment.frame.ego, moment.truth
@@ -42,6 +51,7 @@ def motion(moment: Moment) -> dict[str, Any]:
         "handbrake": bool(handbrake),
         "reverse": bool(reverse),
         "mu": [round_value(v) for v in truth.mu[0].tolist()],
+        "stop_m": round_value(stopping_distance(ego.speed, truth.mu[0]), 0),
         "x": round_value(float(truth.states.x[0])),
         "y": round_value(float(truth.states.y[0])),
     }

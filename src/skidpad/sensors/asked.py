@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from functools import partial
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import BackendError, ConfigError
-from skidpad.core.frames import CameraImage, LidarPoints
+from skidpad.core.frames import CameraImage, GnssFix, ImuReading, LidarPoints
+from skidpad.core.sensor_types import Measure, find_sensor_type
 from skidpad.core.setup import Setup
-from skidpad.core.specs import (
-    GNSS,
-    IMU,
-    SPEEDOMETER,
-    CameraSpec,
-    EyesSpec,
-    LidarSpec,
-    PointSensorSpec,
-    SensorSpec,
-)
+from skidpad.core.sight import DriverView
+from skidpad.core.specs import CameraSpec, EyesSpec, LidarSpec, PointSensorSpec, SensorSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, RangeModel
 from skidpad.physics.optics import extinction
@@ -39,6 +31,33 @@ class GeoMap(SceneMap, Protocol):
     geo_reference: str
 
 
+class SensorHost(Protocol):
+    """What a sensor is given to measure with: the world of the present tick, and the run."""
+
+    @property
+    def tick(self) -> int:
+        """The number of the present tick."""
+
+    @property
+    def seed(self) -> int:
+        """The seed of the run, for noise."""
+
+    @property
+    def setup(self) -> Setup:
+        """Map, weather, settings and the length of a tick."""
+
+    @property
+    def table(self) -> ActorTable:
+        """Sizes and kinds of all actors; row 0 is the ego."""
+
+    @property
+    def states(self) -> ActorStates:
+        """Where all actors are in this tick, and how they move."""
+
+    def scene(self) -> LiveScene:
+        """Returns the map's surfaces with all actors where they are now."""
+
+
 class AskedSensors:
     """The readings that go to `frame.extra`: exact, and made only when somebody reads them.
 
@@ -52,6 +71,7 @@ class AskedSensors:
         table: ActorTable,
         setup: Setup,
         lidar: Callable[[LidarSpec], LidarPoints] | None = None,
+        seed: int = 0,
     ) -> None:
         """lidar: where a simulator has lidars of its own; None: rays through the map's scene."""
         self.tick = -1
@@ -60,16 +80,12 @@ class AskedSensors:
         self.air = 0.0  # 1/m, extinction of light
         if setup.range_model is RangeModel.PHYSICAL:
             self.air = extinction(setup.weather)
-        self._map, self._table, self._dt = map, table, setup.dt
-        self._origin = inertial.map_origin(map.geo_reference) or (0.0, 0.0)
-        self._lidar = lidar
-        self._scene: LiveScene | None = None  # for the first lidar that is read
+        self.map, self.table, self.setup, self.seed = map, table, setup, seed
+        self.origin = inertial.map_origin(map.geo_reference) or (0.0, 0.0)
+        self.server_lidar = lidar
+        self.eyes: list[Eyes] = []
+        self._scene: LiveScene | None = None  # for the first sensor that casts rays
         self._placed = -1
-        self._eyes = {
-            s.id: Eyes(s, map.roadside, table, setup)
-            for s in setup.specs
-            if s.id in setup.asked and isinstance(s, EyesSpec)
-        }
         self.readers = {s.id: self._reader(s) for s in setup.specs if s.id in setup.asked}
 
     def read(
@@ -85,40 +101,67 @@ class AskedSensors:
         braking: (n,) whose brake lamps are on. Eyes look in every tick, as they see late.
         """
         self.tick, self.states, self.images = tick, states, images
-        for eyes in self._eyes.values():
+        for eyes in self.eyes:
             eyes.look(tick, states, lights, braking)
         return Readings(self, tick)
 
-    def _reader(self, spec: SensorSpec) -> Callable[[], Any]:
-        if isinstance(spec, CameraSpec):
-            return partial(self._image, spec.id)
-        if isinstance(spec, LidarSpec) and self._lidar is not None:
-            return partial(self._lidar, spec)
-        if isinstance(spec, LidarSpec):
-            return partial(self._points, Lidar(spec, self._dt, self.air))
-        if isinstance(spec, EyesSpec):
-            return self._eyes[spec.id].view
-        if isinstance(spec, PointSensorSpec):
-            if spec.kind == GNSS:
-                return lambda: inertial.gnss(self.states.pose(EGO) @ spec.mount, self._origin)
-            if spec.kind == IMU:
-                return lambda: inertial.imu(spec.mount, self.states, EGO)
-            if spec.kind == SPEEDOMETER:
-                return lambda: inertial.speed(self.states, EGO)
-        raise ConfigError(f"no sensor like {spec} can be asked for")
-
-    def _image(self, id: str) -> CameraImage:
-        if id not in self.images:
-            raise ConfigError(f"camera {id!r} delivers no image: run with --sensors pixels")
-        return self.images[id]
-
-    def _points(self, lidar: Lidar) -> LidarPoints:
+    def scene(self) -> LiveScene:
+        """Returns the map's surfaces with all actors where they are now."""
         if self._scene is None:
-            self._scene = LiveScene(self._map, self._table)
+            self._scene = LiveScene(self.map, self.table)
         if self._placed != self.tick:
-            self._scene.place(self.states, self._dt)
+            self._scene.place(self.states, self.setup.dt)
             self._placed = self.tick
-        return lidar.measure(self.tick, self.states.pose(EGO), self._scene, EGO)
+        return self._scene
+
+    def _reader(self, spec: SensorSpec) -> Measure:
+        kind = find_sensor_type(spec)
+        if kind is None:
+            raise ConfigError(f"no sensor like {spec} can be asked for")
+        return kind.make(spec, self)
+
+
+def make_camera(spec: CameraSpec, sensors: AskedSensors) -> Callable[[], CameraImage]:
+    """Returns what reads a camera's image of the tick."""
+
+    def image() -> CameraImage:
+        if spec.id not in sensors.images:
+            raise ConfigError(f"camera {spec.id!r} delivers no image: run with --sensors pixels")
+        return sensors.images[spec.id]
+
+    return image
+
+
+def make_lidar(spec: LidarSpec, sensors: AskedSensors) -> Callable[[], LidarPoints]:
+    """Returns what scans with a lidar: a simulator's own where it has one."""
+    server = sensors.server_lidar
+    if server is not None:
+        return lambda: server(spec)
+    lidar = Lidar(spec, sensors.setup.dt, sensors.air)
+    return lambda: lidar.measure(sensors.tick, sensors.states.pose(EGO), sensors.scene(), EGO)
+
+
+def make_gnss(spec: PointSensorSpec, sensors: AskedSensors) -> Callable[[], GnssFix]:
+    """Returns what locates the antenna."""
+    return lambda: inertial.gnss(sensors.states.pose(EGO) @ spec.mount, sensors.origin)
+
+
+def make_imu(spec: PointSensorSpec, sensors: AskedSensors) -> Callable[[], ImuReading]:
+    """Returns what measures force and turn."""
+    return lambda: inertial.imu(spec.mount, sensors.states, EGO)
+
+
+def make_speedometer(spec: PointSensorSpec, sensors: AskedSensors) -> Callable[[], float]:
+    """Returns what measures the speed along the body."""
+    del spec
+    return lambda: inertial.speed(sensors.states, EGO)
+
+
+def make_eyes(spec: EyesSpec, sensors: AskedSensors) -> Callable[[], DriverView]:
+    """Returns the view of a driver's eyes, which look in every tick."""
+    eyes = Eyes(spec, sensors.map.roadside, sensors.table, sensors.setup)
+    sensors.eyes.append(eyes)
+    return eyes.view
 
 
 class Readings(Mapping[str, Any]):

@@ -19,16 +19,8 @@ import numpy as np
 
 from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.frames import SensorFrame
-from skidpad.core.specs import (
-    GNSS,
-    IMU,
-    SPEEDOMETER,
-    CameraSpec,
-    EyesSpec,
-    LidarSpec,
-    PointSensorSpec,
-    SensorSpec,
-)
+from skidpad.core.sensor_types import SENSORS, find_sensor_type
+from skidpad.core.specs import PointSensorSpec, SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.told import clean, describe_value
 from skidpad.stack.interface import Stack
@@ -44,13 +36,6 @@ OWN = "skidpad.stack.adas"  # a module of stacks that need no guarding: they run
 INT_MAX = 2**31 - 1  # the log's whole numbers have 32 bits
 LONGEST_MODE = 200  # characters
 NO_REPORT = StackReport()
-ASKABLE = (
-    CameraSpec,
-    LidarSpec,
-    PointSensorSpec,
-    EyesSpec,
-)  # there is one radar, and every stack has it
-ASKABLE_KINDS = (GNSS, IMU, SPEEDOMETER)
 
 
 def load_stack(where: str) -> type[Stack]:
@@ -271,15 +256,16 @@ def _check_report(name: str, report: StackReport, tick: int) -> None:
 
 def _check_sensors(name: str, wanted: Sequence[SensorSpec], taken: Collection[str]) -> None:
     for k, spec in enumerate(wanted):
-        if not isinstance(spec, ASKABLE):
+        kind = find_sensor_type(spec)
+        if kind is None and isinstance(spec, PointSensorSpec):
+            words = ", ".join(k.word for k in SENSORS.entries() if k.word)
             raise StackError(
-                f"{name}.sensors() must name cameras, lidars, point sensors and eyes,"
-                f" got {describe_value(spec)}"
+                f"{name}.sensors(): sensor {spec.id!r} has kind {spec.kind!r}; choose one of: {words}"
+            )
+        if kind is None:  # there is one common radar, and every stack has it
+            raise StackError(
+                f"{name}.sensors() must return specs of registered sensors "
+                f"({', '.join(SENSORS.names())}), got {describe_value(spec)}"
             )
         if spec.id in taken or spec.id in {other.id for other in wanted[:k]}:
             raise StackError(f"{name}.sensors(): there is a sensor {spec.id!r} already")
-        if isinstance(spec, PointSensorSpec) and spec.kind not in ASKABLE_KINDS:
-            known = ", ".join(ASKABLE_KINDS)
-            raise StackError(
-                f"{name}.sensors(): sensor {spec.id!r} has kind {spec.kind!r}; choose one of: {known}"
-            )

@@ -35,7 +35,7 @@ class Reader:
             self._objects = Objects(map, table, setup, seed)
         self._asked: AskedSensors | None = None
         if setup.asked:
-            self._asked = AskedSensors(map, table, setup, self._lidar)
+            self._asked = AskedSensors(map, table, setup, self._lidar, seed)
         radar = next((s for s in setup.specs if isinstance(s, RadarSpec)), None)
         self._radar_id = None if radar is None else radar.id
         self._radar_limit = inf

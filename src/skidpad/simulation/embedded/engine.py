@@ -50,11 +50,11 @@ class EmbeddedBackend:
     def reset(self, setup: Setup, seed: int) -> Frame:
         """Begin a run: everything is built anew (decision X-12)."""
         self._world, self._noise = staged(setup, seed), setup.localisation_noise
-        self._setup = setup
+        self._setup, self._seed = setup, seed
         self._unseen = np.zeros(len(self.world.table), dtype=np.bool_)
         self._localisation = stream(seed, "ego", "localisation")
         self.sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
-        self._asked = AskedSensors(self.map, self.world.table, setup) if setup.asked else None
+        self._asked = self._make_asked() if setup.asked else None
         return self._frame()
 
     def step(self, command: VehicleCommand, actor_commands: Sequence[ActorCommand] = ()) -> Frame:
@@ -100,7 +100,10 @@ class EmbeddedBackend:
         changed = replace(self._setup, weather=weather, range_model=range_model, mu_ref=mu_ref)
         self._setup = changed
         if self._asked is not None:
-            self._asked = AskedSensors(self.map, self.world.table, self._setup)
+            self._asked = self._make_asked()
+
+    def _make_asked(self) -> AskedSensors:
+        return AskedSensors(self.map, self.world.table, self._setup, seed=self._seed)
 
     def close(self) -> None:
         """Forget the run."""

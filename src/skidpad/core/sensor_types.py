@@ -1,0 +1,109 @@
+"""The sensors that a stack can ask for, as entries of a registry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from importlib import import_module
+from typing import Any, Protocol
+
+from skidpad.core.frames import CameraImage, GnssFix, ImuReading, LidarPoints
+from skidpad.core.geometry import Pose
+from skidpad.core.registry import Registry
+from skidpad.core.sight import DriverView
+from skidpad.core.specs import (
+    GNSS,
+    IMU,
+    SPEEDOMETER,
+    CameraSpec,
+    EyesSpec,
+    LidarSpec,
+    PointSensorSpec,
+)
+
+
+class AnySpec(Protocol):
+    """What the spec of every sensor has: its id in the frame, and where it is mounted."""
+
+    @property
+    def id(self) -> str:
+        """The key of its readings in `frame.extra`."""
+
+    @property
+    def mount(self) -> Pose:
+        """Its pose relative to the vehicle's origin."""
+
+
+Measure = Callable[[], Any]  # returns the reading of the present tick
+
+
+@dataclass(frozen=True, slots=True)
+class SensorType:
+    """A kind of sensor that a stack can ask for in `sensors()`.
+
+    Attributes:
+        name: The name of the kind.
+        title: A few words for tables and pages.
+        units: What a reading holds, with units.
+        spec: The class of its specs, a frozen dataclass with `id` and `mount`.
+        reading: The class of its readings: plain data and arrays.
+        factory: `factory(spec, host)` returns a function that measures when the stack reads it;
+            `host` is a `skidpad.sensors.asked.SensorHost`. A text "module:function" names one
+            that is imported when it is needed.
+        word: The `kind` of a PointSensorSpec; empty for all others.
+        numbers: Sums a reading up as one number per quantity ("name_unit"), written in each tick
+            to `readings.parquet` in the run's folder; None: the readings are not recorded.
+    """
+
+    name: str
+    title: str
+    units: str
+    spec: type[Any]
+    reading: type[Any]
+    factory: Callable[[Any, Any], Measure] | str
+    word: str = ""
+    numbers: Callable[[Any], Mapping[str, float]] | None = None
+
+    def make(self, spec: AnySpec, host: object) -> Measure:
+        """Returns what measures for this spec in one run."""
+        factory = self.factory
+        if isinstance(factory, str):
+            module, _, name = factory.partition(":")
+            factory = getattr(import_module(module), name)
+        return factory(spec, host)
+
+    def describes(self, spec: object) -> bool:
+        """Tells whether a spec is of this kind."""
+        if not isinstance(spec, self.spec):
+            return False
+        return not self.word or getattr(spec, "kind", "") == self.word
+
+
+def _own_types() -> tuple[SensorType, ...]:
+    at = "skidpad.sensors.asked:"
+    point = PointSensorSpec
+    return (
+        SensorType("camera", "Camera", "pixels", CameraSpec, CameraImage, at + "make_camera"),
+        SensorType(
+            "lidar", "Rotating lidar", "m, intensity 0 to 1", LidarSpec, LidarPoints,
+            at + "make_lidar",
+        ),
+        SensorType(GNSS, "GNSS antenna", "deg, deg, m", point, GnssFix, at + "make_gnss", GNSS),
+        SensorType(
+            IMU, "Inertial unit", "m/s^2, rad/s, rad", point, ImuReading, at + "make_imu", IMU
+        ),
+        SensorType(
+            SPEEDOMETER, "Speedometer", "m/s", point, float, at + "make_speedometer", SPEEDOMETER
+        ),
+        SensorType(
+            "eyes", "Eyes of a human driver", "m, m/s, rad", EyesSpec, DriverView, at + "make_eyes"
+        ),
+    )  # fmt: skip
+
+
+SENSORS = Registry("sensor", "skidpad.sensors", SensorType, _own_types)
+
+
+def find_sensor_type(spec: object) -> SensorType | None:
+    """Returns the kind of sensor that a spec describes; None: no registered kind has such specs."""
+    return next((kind for kind in SENSORS.entries() if kind.describes(spec)), None)

@@ -26,5 +26,5 @@ def drive_at_desk(spec: RunSpec, desk: Desk, folder: Path, sinks: Sequence[Sink]
     if text:
         write_bytes(folder / INPUTS, text)
     write_config(folder, structs.replace(spec, inputs=inputs_hash(text)).to_plain())
-    write_run(folder, driven.log, driven.error)
+    write_run(folder, driven)
     return driven

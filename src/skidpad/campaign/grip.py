@@ -87,7 +87,7 @@ def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> Judged:
     )
     if keep or driven.error:
         write_config(folder, cell.to_plain())
-        write_run(folder, driven.log, driven.error)
+        write_run(folder, driven)
         write_played(folder, driven)
         keep_road(out, driven.road)
     return Judged(driven, metrics, log_hash(driven.log), watch.timing())

@@ -69,7 +69,7 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
     here = with_kept_map(cell, out)
     driven = run(here, backend=backend, folder=folder, sinks=(pace,))
     timing = watch.timing(len(driven.log) * DT, pace.slow_pct)
-    digest = write_run(folder, driven.log, driven.error)
+    digest = write_run(folder, driven)
     metrics = Metrics()
     if len(driven.log):  # a stack may fail before it has answered once
         metrics = run_metrics(

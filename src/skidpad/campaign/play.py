@@ -48,7 +48,7 @@ def run_task(task: Task) -> Run:
     backend = make_backend(task.run.backend, WATCHDOG)
     driven = run(task.run, backend=backend, folder=task.out)
     write_config(task.out, task.run.to_plain())
-    write_run(task.out, driven.log, driven.error)
+    write_run(task.out, driven)
     write_played(task.out, driven)
     keep_road(task.out, driven.road)
     return driven

@@ -17,6 +17,7 @@ from skidpad.campaign.cast import StackAtWheel, Stage, driver_of, stage_of, with
 from skidpad.campaign.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
 from skidpad.campaign.drive import Driver, Moment, Sink, ticks
 from skidpad.campaign.outdoors import ChangedBackend, FileChanges
+from skidpad.campaign.readings import ReadingsRecorder
 from skidpad.campaign.snapshots import Snapshots
 from skidpad.core.errors import StackError, require_choice
 from skidpad.core.run import (
@@ -37,6 +38,7 @@ from skidpad.core.weather import Weather
 from skidpad.evidence.drive.background import UNSEEN
 from skidpad.physics.presets import find_weather
 from skidpad.recording.events import NoticeSource, Relocation
+from skidpad.recording.readings import SensorReadings
 from skidpad.recording.runlog import LogHeader, RunLog
 from skidpad.recording.ticks import TickLog
 from skidpad.roads.queries import RoadMap
@@ -65,6 +67,7 @@ class Run:
         off_road: (T,) for every tick, whether the ego has all wheels off every lane.
         road: the map's name, or its file.
         played: the story of a scenario, where one was played.
+        readings: numbers of the further sensors that the stack asked for, where they give any.
     """
 
     log: RunLog
@@ -76,6 +79,7 @@ class Run:
     off_road: NDArray[np.bool_] | None = None
     road: str = ""
     played: Played | None = None
+    readings: SensorReadings | None = None
 
 
 def drive(
@@ -258,6 +262,7 @@ class OpenRun:
         self.log.changes = changes
         self.snapshots = Snapshots(folder, spec.driver.label, spec.weather.name, stage.setup.dt)
         self.sinks = (self.log, self.snapshots, *sinks)
+        self.recorder: ReadingsRecorder | None = None
         self.failure: StackError | None = None
         if desk is not None:
             at_wheel = partial(DeskDriver, desk=desk)
@@ -284,6 +289,7 @@ class OpenRun:
             off_road(finished, stage.map),
             str(stage.setup.map),
             None if stage.player is None else stage.player.played,
+            None if self.recorder is None else self.recorder.finish(),
         )
 
     def _drive(
@@ -299,11 +305,13 @@ class OpenRun:
                 sink.begin(backend.truth().table)
             self._failed(error)
             return
+        recorder = ReadingsRecorder(setup)
+        sinks = self.sinks
+        if recorder.is_needed:
+            self.recorder, sinks = recorder, (*sinks, recorder)
         frame = backend.reset(setup, self.spec.seed)
         wheel = driver if at_wheel is None else at_wheel(driver)
-        failure = yield from ticks(
-            backend, frame, wheel, stage.supervisor, stage.script, self.sinks
-        )
+        failure = yield from ticks(backend, frame, wheel, stage.supervisor, stage.script, sinks)
         driver.stack.close()
         if failure is not None:
             self._failed(failure)

@@ -16,8 +16,8 @@ from skidpad.evidence.pairs import Pair, pairs, pairs_of_others
 from skidpad.recording.campaigns import RUNS
 from skidpad.recording.files import output_error, write_bytes
 from skidpad.recording.logfiles import write_log
+from skidpad.recording.readings import write_readings
 from skidpad.recording.results import Timing
-from skidpad.recording.runlog import RunLog
 from skidpad.scenarios.results import write_results
 
 if TYPE_CHECKING:
@@ -60,11 +60,13 @@ def write_config(folder: Path, config: dict[str, Any]) -> None:
     write_bytes(folder / CONFIG, yaml.safe_dump(config, sort_keys=False).encode())
 
 
-def write_run(folder: Path, log: RunLog, error: str) -> str:
-    """Write log, events and the stack's error; returns the log's content hash."""
-    digest = write_log(folder, log)
-    if error:
-        write_bytes(folder / ERROR, error.encode())
+def write_run(folder: Path, driven: Run) -> str:
+    """Write log, events, sensor readings and the stack's error; returns the log's content hash."""
+    digest = write_log(folder, driven.log)
+    if driven.readings is not None:
+        write_readings(folder, driven.readings)
+    if driven.error:
+        write_bytes(folder / ERROR, driven.error.encode())
     return digest
 
 

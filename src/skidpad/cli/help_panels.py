@@ -43,6 +43,7 @@ COMMANDS: dict[str, dict[str, str]] = {
         "map": "map info figure8",
         "profiles": "profiles diff recommended thesis_text",
         "bench": "bench tick",
+        "extensions": "extensions sensors",
         "doctor": "doctor",
     },
     "CARLA": {

@@ -22,6 +22,7 @@ from skidpad.cli.cockpit import replay, watch
 from skidpad.cli.compare import compare
 from skidpad.cli.dataset import export_dataset
 from skidpad.cli.export import export
+from skidpad.cli.extensions import extensions
 from skidpad.cli.fleet import fleet
 from skidpad.cli.friction import friction
 from skidpad.cli.grip import grip
@@ -90,6 +91,7 @@ app.command()(export)
 app.command("export-dataset")(export_dataset)
 app.add_typer(profiles)
 app.add_typer(maps)
+app.command()(extensions)
 for reader in (outcomes, evaluate, train):
     channels.command()(reader)
 app.add_typer(channels)

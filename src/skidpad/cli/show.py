@@ -24,6 +24,7 @@ from skidpad.physics.types import vehicle_types
 from skidpad.recording.fingerprint import comparison_text, fingerprint
 from skidpad.recording.logfiles import driven_on, log_hash, read_log
 from skidpad.recording.matrix import Metrics
+from skidpad.recording.readings import read_readings, summarise_readings
 from skidpad.recording.results import definitions_of
 from skidpad.recording.runlog import RunLog
 from skidpad.report.cards import contact_text, headline, timeline
@@ -90,6 +91,7 @@ def show(run: Path) -> None:
         console.print("\n[bold]All contacts[/]")
     for contact in contacts:
         console.print(f"  {contact.tick * log.header.dt:8.2f} s  {contact_text(contact)}")
+    show_readings(run)
     grips = vehicle_grips(run, log)
     if grips:
         console.print("\n[bold]Tyre friction of each vehicle, at standstill[/]")
@@ -98,6 +100,19 @@ def show(run: Path) -> None:
         for row in grips:
             shown.add_row(*row)
         console.print(shown)
+
+
+def show_readings(run: Path) -> None:
+    """Print mean, least and largest value of what the stack's further sensors recorded."""
+    readings = read_readings(run)
+    if readings is None:
+        return
+    table_console().print("\n[bold]Readings of further sensors[/]")
+    shown = Table("sensor", "type", "quantity", "mean", "least", "most", box=None, pad_edge=False)
+    for row in summarise_readings(readings):
+        values = (_text(v) for v in (row.mean, row.least, row.most))
+        shown.add_row(row.sensor.id, row.sensor.title, row.quantity, *values)
+    table_console().print(shown)
 
 
 def vehicle_grips(run: Path, log: RunLog) -> list[tuple[str, ...]]:

@@ -1,0 +1,40 @@
+"""`skidpad extensions`: what can be added to Skidpad, and what is registered."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from skidpad.core.registry import Registry
+
+
+def extensions(
+    kind: Annotated[
+        str, typer.Argument(help="One kind alone, e.g. sensors; none: all kinds.")
+    ] = "",
+) -> None:
+    """List what packages can add, what is registered, and which package added it."""
+    from skidpad.core.errors import require_choice
+
+    points = extension_points()
+    names = [registry.group.partition(".")[2] for registry in points]
+    chosen = [require_choice("kind", kind, names)] if kind else names
+    for name, registry in zip(names, points, strict=True):
+        if name not in chosen:
+            continue
+        typer.echo(f"{name} (entry points {registry.group})")
+        for source in registry.sources().values():
+            entry = source.load()
+            units = getattr(entry, "units", "")
+            by = "" if source.package == "skidpad" else f"  [package {source.package}]"
+            unit = f" ({units})" if units else ""
+            typer.echo(f"  {entry.name:<22}{entry.title}{unit}{by}")
+
+
+def extension_points() -> tuple[Registry[Any], ...]:
+    """Returns every registry that installed packages can add to, as help and docs show them."""
+    from skidpad.core.sensor_types import SENSORS
+
+    return (SENSORS,)

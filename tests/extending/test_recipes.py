@@ -1,0 +1,86 @@
+"""Every recipe of docs/extending.md works as printed: its package is installed and then removed."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from configparser import ConfigParser
+from pathlib import Path
+
+import pytest
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
+RECIPE = re.compile(r"^## (An? .+?)\n(.*?)(?=^## |\Z)", re.DOTALL | re.MULTILINE)
+BLOCK = re.compile(r"```(\w+)(?: title=\"([\w./-]+)\")?\n(.*?)```", re.DOTALL)
+RECIPES = dict(RECIPE.findall(PAGE.read_text(encoding="utf-8")))
+ENTRY_POINTS = 'project.entry-points."'
+
+
+def install(package: Path, packages: Path) -> None:
+    """Installs a package of plain modules as pip does, without network and build tools.
+
+    Modules are copied, and names, version and entry points go into a .dist-info folder.
+    """
+    toml = ConfigParser()
+    toml.read(package / "pyproject.toml", encoding="utf-8")
+    name, version = (toml["project"][key].strip('"') for key in ("name", "version"))
+    about = packages / f"{name.replace('-', '_')}-{version}.dist-info"
+    about.mkdir(parents=True)
+    for module in package.glob("*.py"):
+        (packages / module.name).write_bytes(module.read_bytes())
+    (about / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: {version}\n")
+    lines = []
+    for section in toml.sections():
+        if section.startswith(ENTRY_POINTS):
+            lines.append(f"[{section[len(ENTRY_POINTS) : -1]}]")
+            lines += [f"{key} = {value[1:-1]}" for key, value in toml[section].items()]
+    (about / "entry_points.txt").write_text("\n".join(lines) + "\n")
+
+
+def call(folder: Path, *arguments: str, packages: Path | None = None) -> str:
+    """Runs Python in `folder`; packages: where recipes are installed."""
+    paths = [os.environ.get("PYTHONPATH", ""), str(PAGE.parents[1] / "src")]
+    paths += [] if packages is None else [str(packages)]
+    environment = {
+        **os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths)), "COLUMNS": "120",
+    }  # fmt: skip
+    done = subprocess.run(
+        [sys.executable, *arguments],
+        cwd=folder, env=environment, capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, f"{arguments}\n{done.stdout}\n{done.stderr}"
+    return done.stdout + done.stderr
+
+
+def follow(text: str, folder: Path, packages: Path) -> list[str]:
+    """Writes the files and runs the commands of a recipe; returns its commands of Skidpad."""
+    followed = []
+    for language, title, block in BLOCK.findall(text):
+        if title:
+            (folder / title).parent.mkdir(parents=True, exist_ok=True)
+            (folder / title).write_text(block, encoding="utf-8")
+        printed = ""
+        for line in block.splitlines() if language == "console" else ():
+            if line.startswith("$ pip install "):
+                install(folder / line.split()[-1], packages)
+            elif line.startswith("$ skidpad "):
+                followed.append(line[2:])
+                printed = call(folder, "-m", *line[2:].split(), packages=packages)
+            else:  # what the command prints, apart from the width of columns
+                words = line.split()
+                shown = [p.split()[: len(words)] for p in printed.splitlines()]
+                assert words in shown, f"{line!r} is not in:\n{printed}"
+    return followed
+
+
+@pytest.mark.parametrize("title", RECIPES)
+def test_a_recipe_works_as_printed_and_its_runs_open_without_it(title: str, tmp_path: Path) -> None:
+    packages = tmp_path / "packages"
+    commands = follow(RECIPES[title], tmp_path, packages)
+    assert commands
+    for command in commands:
+        if command.startswith("skidpad show "):  # with the package removed
+            with_it = call(tmp_path, "-m", *command.split(), packages=packages)
+            assert call(tmp_path, "-m", *command.split()) == with_it

@@ -80,6 +80,9 @@ def test_a_recipe_works_as_printed_and_its_runs_open_without_it(title: str, tmp_
     packages = tmp_path / "packages"
     commands = follow(RECIPES[title], tmp_path, packages)
     assert commands
+    page = tmp_path / "out" / "behind" / "report.html"
+    if page.is_file():
+        assert "Radar to the rear" in page.read_text(encoding="utf-8")
     for command in commands:
         if command.startswith("skidpad show "):  # with the package removed
             with_it = call(tmp_path, "-m", *command.split(), packages=packages)

@@ -46,7 +46,7 @@ class ReadingsRecorder(Sink):
         self._rows.append(row)
 
     def finish(self) -> SensorReadings:
-        """Returns what was recorded."""
+        """Returns the table of all recorded ticks."""
         sensors = {
             id: RecordedSensor(id, kind.name, kind.title, kind.units)
             for id, kind in self._kinds.items()

@@ -91,7 +91,7 @@ class Registry(Generic[E]):
         """Returns all entries, which loads every package that adds one."""
         return tuple(source.load() for source in self.sources().values())
 
-    def added(self) -> tuple[E, ...]:
+    def foreign_entries(self) -> tuple[E, ...]:
         """Returns the entries of other packages."""
         return tuple(s.load() for s in self.sources().values() if s.package != "skidpad")
 

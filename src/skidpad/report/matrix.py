@@ -18,6 +18,7 @@ from skidpad.report.matrix_factors import factors
 from skidpad.report.matrix_headline import headline_numbers, headline_table
 from skidpad.report.matrix_parity import Parity, load_parity, parity_section
 from skidpad.report.matrix_published import beside_published
+from skidpad.report.matrix_readings import reading_blocks
 from skidpad.report.matrix_real_time import real_time_blocks
 from skidpad.report.matrix_sides import side_blocks
 from skidpad.report.matrix_steps import step_blocks
@@ -68,6 +69,7 @@ def build_page(matrix: Matrix) -> Page:
         Section("Every crash", crash_sections(matrix, crashes)),
         Section("Beside the published numbers", beside_published(matrix)),
         Section("Pixels against objects", parity_section(parity)),
+        *([Section("Further sensors", read)] if (read := reading_blocks(matrix)) else []),
         Section("All metrics", matrix_tables.per_weather(matrix)),
         Section("Real time", real_time_blocks(matrix)),
         Section("Definitions", [matrix.definitions()]),

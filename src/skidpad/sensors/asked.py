@@ -1,4 +1,4 @@
-"""Sensors that a stack asked for besides the common ones: by id, read when somebody looks."""
+"""Sensors that a stack asked for besides the common ones: by id, measured when they are read."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class SensorHost(Protocol):
 
 
 class AskedSensors:
-    """The readings that go to `frame.extra`: exact, and made only when somebody reads them.
+    """The readings that go to `frame.extra`: exact, and made only when they are read.
 
     A lidar's intensity falls with the air's extinction where the range model is physical. Lidars
     need no images, so they work at the object level, too.

@@ -13,7 +13,7 @@ import msgspec
 import polars as pl
 
 from skidpad.core.reading import decode_json
-from skidpad.recording.files import read_parquet, write_parquet
+from skidpad.recording.files import read_parquet, require_columns, write_parquet
 
 READINGS = "readings.parquet"
 KEY = "sensors"  # of the footer
@@ -79,7 +79,8 @@ def read_readings(folder: Path) -> SensorReadings | None:
         return None
     table, about = read_parquet(path)
     sensors = decode_json(about.get(KEY, "[]").encode(), str(path), tuple[RecordedSensor, ...])
-    return SensorReadings(sensors, table)
+    columns = {f"{s.id}.{quantity}": pl.Float64 for s in sensors for quantity in s.quantities}
+    return SensorReadings(sensors, require_columns(table, {"tick": pl.Int64, **columns}, path))
 
 
 def summarise_readings(readings: SensorReadings) -> list[ReadingSummary]:

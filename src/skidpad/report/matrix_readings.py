@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from skidpad.recording.readings import read_readings, summarise_readings
 from skidpad.report.matrix_data import Matrix
-from skidpad.report.page import Block, Table
+from skidpad.report.page import Block, Cell, Table
 
 COLUMNS = (
     ("configuration", ""),
@@ -20,16 +20,16 @@ COLUMNS = (
 
 def reading_blocks(matrix: Matrix) -> list[Block]:
     """Returns one table from the first run of each cell; nothing where no sensor was recorded."""
-    rows: list[tuple[str, ...]] = []
+    rows: list[list[Cell]] = []
     first = matrix.results.sort("seed").unique(["config", "weather"], keep="first")
     first = first.sort("config", "weather")
     for run, name in zip(first.iter_rows(named=True), matrix.names(first), strict=True):
         folder = None if name is None else matrix.folder.log(name)
         readings = None if folder is None else read_readings(folder)
         for s in () if readings is None else summarise_readings(readings):
-            numbers = ("-" if v is None else f"{v:.4g}" for v in (s.mean, s.least, s.most))
-            sensor = (s.sensor.id, s.sensor.title, s.quantity)
-            rows.append((run["config"], run["weather"], *sensor, *numbers))
+            words = (run["config"], run["weather"], s.sensor.id, s.sensor.title, s.quantity)
+            numbers = (Cell("-" if v is None else f"{v:.4g}", v) for v in (s.mean, s.least, s.most))
+            rows.append([*(Cell(word) for word in words), *numbers])
     return [Table(COLUMNS, rows, "Readings of further sensors, first seed of each weather")] * bool(
         rows
     )

@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 from math import isfinite
-from numbers import Real
 
 from skidpad.campaign.drive import Moment, Sink
-from skidpad.core.errors import ConfigError
 from skidpad.core.sensor_types import SensorType, find_sensor_type
 from skidpad.core.setup import Setup
-from skidpad.core.told import describe_value
 from skidpad.recording.readings import RecordedSensor, SensorReadings, tabulate_readings
 
 
@@ -36,11 +33,6 @@ class ReadingsRecorder(Sink):
         for id, kind in self._kinds.items():
             assert kind.numbers is not None
             for quantity, value in kind.numbers(moment.frame.extra[id]).items():
-                if not isinstance(value, Real):
-                    raise ConfigError(
-                        f"sensor {kind.name!r}: {quantity} must be a number to be recorded, "
-                        f"got {describe_value(value, 100)}"
-                    )
                 if isfinite(value):
                     row[f"{id}.{quantity}"] = float(value)
         self._rows.append(row)

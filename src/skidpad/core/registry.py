@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
-from functools import cache
+from functools import cache, partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, Protocol, TypeVar
 
@@ -41,6 +41,10 @@ class Source(Generic[E]):
     load: Callable[[], E]
 
 
+def _as_is(entry: E) -> E:
+    return entry
+
+
 class Registry(Generic[E]):
     """Entries of one kind by name: those of Skidpad, then those of installed packages.
 
@@ -60,7 +64,7 @@ class Registry(Generic[E]):
     def sources(self) -> Mapping[str, Source[E]]:
         """Returns all names with their sources; ConfigError where two packages use one name."""
         if self._sources is None:
-            found = {e.name: Source(e.name, "skidpad", lambda e=e: e) for e in self._own()}
+            found = {e.name: Source(e.name, "skidpad", partial(_as_is, e)) for e in self._own()}
             for point in sorted(entry_points(group=self.group), key=lambda p: p.name):
                 package = "?" if point.dist is None else point.dist.name
                 if point.name in found:

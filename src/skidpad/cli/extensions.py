@@ -36,5 +36,11 @@ def extensions(
 def extension_points() -> tuple[Registry[Any], ...]:
     """Returns every registry that installed packages can add to, as help and docs show them."""
     from skidpad.core.sensor_types import SENSORS
+    from skidpad.physics.presets import WEATHERS
+    from skidpad.scenarios.registry import SCENARIO_NAMES
 
-    return (SENSORS,)
+    try:
+        from skidpad.fleet.alerting.relay_types import RELAYS
+    except ImportError:  # the optional part `fleet` is not installed
+        return (SENSORS, WEATHERS, SCENARIO_NAMES)
+    return (SENSORS, WEATHERS, SCENARIO_NAMES, RELAYS)

@@ -69,6 +69,10 @@ def serve(
     webhook_host: Annotated[
         list[str] | None, typer.Option(help="A host that webhooks may lead to.")
     ] = None,
+    relay: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=SETTING of another alert relay; see `skidpad extensions relays`."),
+    ] = None,
     mqtt: Annotated[
         str | None,
         typer.Option(help="HOST[:PORT] of an MQTT 5 broker: alerts go out, batches come in."),
@@ -93,7 +97,7 @@ def serve(
     _check_exposure(host, certificate, key)
     places, known_maps = _places(data, database, blobs), open_maps(maps)
     broker = None if mqtt is None else broker_of(mqtt, mqtt_ca, mqtt_user, mqtt_password_file)
-    known = relays(places, webhook or [], webhook_host or [], broker)
+    known = relays(places, webhook or [], webhook_host or [], broker, relay or [])
     locate = place_finder(known_maps)
     service = open_fleet(places, exporter=export_hazard, relays=known, locate=locate)
     batches = None if broker is None else BatchListener(service, broker)

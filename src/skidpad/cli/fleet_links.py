@@ -49,26 +49,28 @@ def committing(places: Places) -> Iterator[Connection]:
 
 
 def relays(
-    places: Places, webhooks: list[str], hosts: list[str], broker: Broker | None
+    places: Places,
+    webhooks: Sequence[str],
+    hosts: Sequence[str],
+    broker: Broker | None,
+    others: Sequence[str] = (),
 ) -> list[Relay]:
-    """Where alerts are relayed to; ConfigError for what must not be."""
+    """Makes the relays of alerts. others: NAME=SETTING of registered kinds.
+
+    Raises ConfigError for an unknown kind or a setting that cannot be used.
+    """
     import time
 
-    from skidpad.core.errors import ConfigError
-    from skidpad.fleet.alerting.relays import Mqtt, Webhook
+    from skidpad.fleet.alerting.relay_types import RelayHost, make_relays
     from skidpad.fleet.store.accounts import tenant_id
 
-    found: list[Relay] = []
-    if webhooks:
+    def find_operator(tenant: str) -> str:
         with committing(places) as connection:
-            for text in webhooks:
-                tenant, equals, url = text.partition("=")
-                if not equals:
-                    raise ConfigError(f"--webhook must read TENANT=URL, got {text!r}")
-                found.append(Webhook(tenant_id(connection, tenant, time.time()), url, hosts))
-    if broker is not None:
-        found.append(Mqtt(broker))
-    return found
+            return tenant_id(connection, tenant, time.time())
+
+    asked = [f"webhook={text}" for text in webhooks]
+    asked += ["mqtt"] if broker is not None else []
+    return make_relays([*asked, *others], RelayHost(find_operator, hosts, broker))
 
 
 def broker_of(mqtt: str, ca: Path | None, user: str | None, password: Path | None) -> Broker:

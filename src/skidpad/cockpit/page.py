@@ -19,7 +19,7 @@ from skidpad.cockpit.hud import TIERS
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.core.weather import RANGES
-from skidpad.physics.presets import preset_groups
+from skidpad.physics.presets import all_presets
 from skidpad.sensors.finish.extras import Extra
 
 STYLE = resources.files("skidpad.cockpit").joinpath("cockpit.css").read_text(encoding="utf-8")
@@ -219,7 +219,7 @@ def _has(names: list[str] | None, name: str) -> bool | None:
 
 def weather_controls(panel: Panel) -> None:
     """Weather by name and by slider, and how it acts."""
-    names = [name for group in preset_groups().values() for name in group]
+    names = list(all_presets())
     with ui.element("div").classes("selects"):
         weather = ui.select(
             names,

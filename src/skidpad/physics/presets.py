@@ -12,6 +12,7 @@ import msgspec
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.reading import convert_plain, decode_yaml, read_bytes
+from skidpad.core.registry import Registry
 from skidpad.core.weather import Weather
 
 MATRIX, GRIP = "matrix", "grip"
@@ -48,23 +49,28 @@ def preset_groups() -> dict[str, dict[str, Weather]]:
     }
 
 
+def _own_presets() -> tuple[Weather, ...]:
+    return tuple(w for members in preset_groups().values() for w in members.values())
+
+
+WEATHERS = Registry("weather", "skidpad.weathers", Weather, _own_presets)
+
+
 def all_presets() -> dict[str, Weather]:
-    """Every preset by its name."""
-    return {name: w for members in preset_groups().values() for name, w in members.items()}
+    """Returns every preset by its name: those of Skidpad, then those of installed packages."""
+    return {weather.name: weather for weather in WEATHERS.entries()}
 
 
 def preset_name(text: str) -> str | None:
     """The preset's own spelling of `text`, where `-` and `_` are one; None: no such preset."""
     wanted = text.strip().lower().replace("_", "-")
-    return next((name for name in all_presets() if name.replace("_", "-") == wanted), None)
+    return next((name for name in WEATHERS.names() if name.replace("_", "-") == wanted), None)
 
 
 def preset(name: str) -> Weather:
     """The preset with this name; ConfigError lists all names."""
     known = preset_name(name)
-    if known is None:
-        raise ConfigError(f"unknown weather {name!r}; choose one of: {', '.join(all_presets())}")
-    return all_presets()[known]
+    return WEATHERS.get(name if known is None else known)
 
 
 def load_weather(path: Path) -> Weather:

@@ -12,6 +12,7 @@ from math import inf, isfinite
 from typing import Any
 
 from skidpad.core.errors import ConfigError
+from skidpad.core.registry import Registry
 from skidpad.core.told import describe_value
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.findings import Finding, Kind
@@ -68,7 +69,30 @@ def _number(properties: Mapping[str, str], name: str, default: float) -> float:
     return value
 
 
+@dataclass(frozen=True, slots=True)
+class ScenarioName:
+    """A name that scenario files may use, as `register` describes it.
+
+    Attributes:
+        name: As files write it.
+        title: A few words for tables.
+        made: A class with `update` (controller), `act` (action) or `value` (condition).
+        units: What a controller, action or value takes or gives, with units.
+    """
+
+    name: str
+    title: str
+    made: Make
+    units: str = ""
+
+
+def _own_names() -> tuple[ScenarioName, ...]:
+    title, units = "Controller: Intelligent Driver Model", "setSpeed in m/s, timeGap in s"
+    return tuple(ScenarioName(name, title, made, units) for name, made in BUILT_IN.items())
+
+
 BUILT_IN: Mapping[str, Make] = {"ACC": Acc, "ACCController": Acc}
+SCENARIO_NAMES = Registry("scenario name", "skidpad.scenario_names", ScenarioName, _own_names)
 
 
 @dataclass
@@ -81,7 +105,10 @@ class Names:
 
     def find(self, name: str) -> Make | None:
         """Return the class of this name."""
-        return {**BUILT_IN, **REGISTERED, **self.given}.get(name)
+        found = {**BUILT_IN, **REGISTERED, **self.given}.get(name)
+        if found is None and name in SCENARIO_NAMES.sources():
+            found = SCENARIO_NAMES.get(name).made
+        return found
 
     def unknown(self, node: Node, what: str, name: str) -> Finding:
         """Return what is said of a name that is not registered."""

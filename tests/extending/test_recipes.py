@@ -83,7 +83,35 @@ def test_a_recipe_works_as_printed_and_its_runs_open_without_it(title: str, tmp_
     page = tmp_path / "out" / "behind" / "report.html"
     if page.is_file():
         assert "Radar to the rear" in page.read_text(encoding="utf-8")
+    if "crowd.xosc" in RECIPES[title]:
+        story = (tmp_path / "out" / "crowd").rglob("*")
+        texts = [p.read_text("utf-8") for p in story if p.suffix in (".csv", ".json", ".jsonl")]
+        assert any("slow_all" in text for text in texts)
     for command in commands:
         if command.startswith("skidpad show "):  # with the package removed
             with_it = call(tmp_path, "-m", *command.split(), packages=packages)
             assert call(tmp_path, "-m", *command.split()) == with_it
+
+
+def test_the_relay_of_the_recipe_takes_alerts(tmp_path: Path) -> None:
+    pytest.importorskip("httpx")
+    follow(RECIPES["An alert relay"], tmp_path, tmp_path / "packages")
+    use = """
+from skidpad.cli.fleet_links import relays
+from skidpad.core.errors import ConfigError
+from skidpad.fleet.service import Places
+from pathlib import Path
+
+relay, = relays(Places(data=Path(".")), [], [], None, ["file=alerts.jsonl"])
+relay.send({"id": "a"})
+relay.send({"id": "b"})
+for wrong in ("file=nowhere/alerts.jsonl", "flie=x"):
+    try:
+        relays(Places(data=Path(".")), [], [], None, [wrong])
+    except ConfigError as error:
+        print(error)
+"""
+    said = call(tmp_path, "-c", use, packages=tmp_path / "packages")
+    assert (tmp_path / "alerts.jsonl").read_text() == '{"id": "a"}\n{"id": "b"}\n'
+    assert "there is no folder nowhere" in said
+    assert "unknown alert relay 'flie'; choose one of: webhook, mqtt, file; did you mean" in said

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from skidpad.campaign.bench_traffic import background_world
+from skidpad.campaign.headways import headways_of
 from skidpad.campaign.traffic_asked import TrafficBench
 from skidpad.campaign.traffic_watch import (
     LONG,
     Seen,
     Watch,
-    headways_of,
     leaders,
     overlaps,
     times_to_neighbours,
@@ -81,6 +81,41 @@ def test_leaders_and_times_are_those_of_the_lane() -> None:
     time = gap[i] / world.placed["speed"][i]
     assert times_to_neighbours(world)[j] <= time
     assert headways_of([0.5, 1.5, 2.5, 1.5])["share_below_2_s"] == 0.75
+
+
+@pytest.mark.parametrize(
+    ("wanted", "own", "lead", "counted"),
+    [
+        (30.0, 25.0, 25.0, True),
+        (26.0, 25.0, 25.0, False),  # nobody holds it up
+        (30.0, 25.4, 25.0, True),
+        (30.0, 25.6, 25.0, False),  # still closing in
+    ],
+)
+def test_followers_are_held_up_and_no_longer_close_in(
+    wanted: float, own: float, lead: float, counted: bool
+) -> None:
+    """A vehicle 30 m behind a leader, both 4 m long or more, on a motorway."""
+    world, seen = world_of(vehicles=2), Seen()
+    watch = Watch(world, seen, "clear-noon", 900_000)
+    assert world.traffic is not None
+    halves = world.placed["half_length"][:2].copy()
+    for tick in range(10, 100, 10):
+        world.tick = tick
+        world.placed["present"][:2] = world.states.present[:2] = True
+        world.placed["lane"][1] = world.placed["lane"][0]
+        world.placed["sample"][1] = world.placed["sample"][0]
+        world.placed["s"][1] = world.placed["s"][0] + 30.0 + halves.sum()
+        world.placed["speed"][:2] = own, lead
+        world.placed["ax"][:2] = 0.0
+        world.traffic.drivers.state["v_desired"][0] = wanted
+        watch.look()
+    assert len(seen.fast) == 2  # of 9 looks: the first finds the leader, and 3.5 s are 7 of 0.5 s
+    assert seen.fast[0] == pytest.approx(30.0 / own)
+    assert len(seen.followers_fast) == (2 if counted else 0)
+    if counted:
+        fronts = 30.0 / own + 2.0 * halves[1] / own
+        assert seen.followers_fast_fronts[0] == pytest.approx(fronts)
 
 
 def test_who_stands_long_is_listed_with_the_cause() -> None:

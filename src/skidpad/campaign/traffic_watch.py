@@ -1,18 +1,19 @@
 """What is seen of background traffic from outside: overlaps, headways, standing, moves.
 
 Nothing here asks the drivers or the contact solver: bodies are rectangles in the plane, leaders are
-found by lane and place. Only the cause of standing is the drivers' own word.
+found by lane and place. Only the cause of standing and the desired speed of followers are the
+drivers' own word.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.campaign.headways import field_sources, headways_of, judge
 from skidpad.simulation.world.traffic.manager import CHECK_PERIOD
 from skidpad.simulation.world.traffic.state import Held
 from skidpad.simulation.world.world import World
@@ -22,12 +23,14 @@ Floats = NDArray[np.float64]
 # Steady following: speeds within 1.52 m/s and accelerations within 0.75 m/s^2 for 3.5 s (Parashar et
 # al. 2025, Communications in Transportation Research, 10.1016/j.commtr.2025.100169, from NGSIM I-80).
 STEADY_SPEED, STEADY_ACCELERATION, STEADY_TIME = 1.52, 0.75, 3.5  # m/s, m/s^2, s
-CUT_OFF = 5.0  # s: a vehicle farther behind follows none (King et al. 2022, see headways.csv)
+# Followers, as sources that part them from free drivers count them: in steady following, held up (they
+# would drive at least this much faster than their leader), and no longer closing in. Both are ours.
+HELD_UP, NOT_CLOSING = 1.05, 0.5  # over the leader's speed; m/s
+CUT_OFF = 5.0  # s: a vehicle farther behind follows none (King et al. 2022, see `headways.csv`)
 SLOWEST = 5.0  # m/s: slower traffic is a queue
 LOOK = 10  # ticks between two looks at headways
 FAST_ROAD = 80.0 / 3.6 - 0.1  # m/s: limits from here on are those of motorways
 STANDING = 0.5  # m/s
-QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 LONG = 120.0  # s of standing that are listed
 STOREY = 2.5  # m of height between roads that cross
 CLOSE = 3.0  # s between neighbours, either may be the follower
@@ -55,6 +58,9 @@ class Seen:
     moved_close: int = 0  # of these with another one within CLOSE s before or after
     fast: list[float] = field(default_factory=list)  # s, headways in steady following
     slow: list[float] = field(default_factory=list)  # likewise, on roads below FAST_ROAD
+    followers_fast: list[float] = field(default_factory=list)  # s, of followers alone
+    followers_fast_fronts: list[float] = field(default_factory=list)  # likewise, front to front
+    followers_slow: list[float] = field(default_factory=list)
     stands: list[Stand] = field(default_factory=list)
 
     def summary(self) -> dict[str, Any]:
@@ -65,21 +71,23 @@ class Seen:
             "moved_close": self.moved_close,
             "headways_fast": headways_of(self.fast),
             "headways_town": headways_of(self.slow),
+            "followers_fast": headways_of(self.followers_fast),
+            "followers_fast_fronts": headways_of(self.followers_fast_fronts),
+            "followers_town": headways_of(self.followers_slow),
+            "field": self.beside_field(),
             "stands": [asdict(stand) for stand in self.stands],
         }
 
-
-def headways_of(seconds: Sequence[float]) -> dict[str, Any]:
-    """Number, quantiles in s and the shares below 1 and 2 s of headways in steady following."""
-    if not seconds:
-        return {"samples": 0}
-    found = np.array(seconds)
-    return {
-        "samples": len(found),
-        "quantiles_s": [round(float(q), 3) for q in np.quantile(found, QUANTILES)],
-        "share_below_1_s": round(float(np.mean(found < 1.0)), 4),
-        "share_below_2_s": round(float(np.mean(found < 2.0)), 4),
-    }
+    def beside_field(self) -> list[dict[str, Any]]:
+        """Followers beside each source that gives a distribution of them."""
+        result = []
+        for source in field_sources():
+            if source.kind != "followers":
+                continue
+            fast = self.followers_fast if source.headway == "gap" else self.followers_fast_fronts
+            ours = fast if source.road == "motorway" else self.followers_slow
+            result.append({"road": source.road, **judge(ours, source)})
+        return result
 
 
 class Watch:
@@ -158,6 +166,25 @@ class Watch:
             if self._steady[i] >= STEADY_TIME and headway <= CUT_OFF:
                 fast = limit[w.placed["sample"][i]] >= FAST_ROAD
                 (self.seen.fast if fast else self.seen.slow).append(headway)
+                if self._is_follower(i, j):
+                    self._note_follower(i, j, headway, bool(fast))
+
+    def _is_follower(self, i: int, j: int) -> bool:
+        """Whether vehicle i, in steady following, is held up by j and no longer closes in."""
+        w, v = self.world, self.world.placed["speed"]
+        assert w.traffic is not None
+        wanted = w.traffic.drivers.state["v_desired"][i]
+        return bool(wanted >= HELD_UP * v[j] and abs(v[i] - v[j]) <= NOT_CLOSING)
+
+    def _note_follower(self, i: int, j: int, headway: float, fast: bool) -> None:
+        if not fast:
+            self.seen.followers_slow.append(headway)
+            return
+        length = 2.0 * float(self.world.placed["half_length"][j])
+        self.seen.followers_fast.append(headway)
+        self.seen.followers_fast_fronts.append(
+            headway + length / float(self.world.placed["speed"][i])
+        )
 
 
 def leaders(world: World) -> tuple[NDArray[np.int64], Floats]:

@@ -132,9 +132,15 @@ def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
 
 def _describe_seen(seen: Seen) -> Iterator[str]:
     """Headways in steady following, and who stood long and for what."""
-    from skidpad.campaign.traffic_watch import LONG, headways_of
+    from skidpad.campaign.headways import headways_of
+    from skidpad.campaign.traffic_watch import LONG
 
-    for road, headways in (("from 80 km/h on", seen.fast), ("below 80 km/h", seen.slow)):
+    for road, headways in (
+        ("from 80 km/h on", seen.fast),
+        ("from 80 km/h on, followers alone", seen.followers_fast),
+        ("below 80 km/h", seen.slow),
+        ("below 80 km/h, followers alone", seen.followers_slow),
+    ):
         if headways:
             found = headways_of(headways)
             quantiles = ", ".join(f"{q:.2f}" for q in found["quantiles_s"])

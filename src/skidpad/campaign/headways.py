@@ -1,0 +1,109 @@
+"""Headways of the field beside those of background traffic.
+
+The field's are inputs (`headways.csv`): one source per road type is there to be fitted, another one to
+judge by. What a source gives as mean and deviation is taken for log-normal (ours), which Ismail and
+others found to fit best; only abstracts could be read.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib import resources
+from math import exp, log, sqrt
+from statistics import NormalDist
+from typing import Any
+
+import numpy as np
+
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
+QUANTILE_TOLERANCE = 0.15  # of the field's quantile (issue: at most 15 %)
+SHARE_TOLERANCE = 0.05  # of all headways
+
+
+@dataclass(frozen=True, slots=True)
+class LogNormal:
+    """A distribution of headways in s."""
+
+    median: float
+    sigma: float  # of the logarithm
+
+    def quantile(self, share: float) -> float:
+        """Headway in s below which this share lies."""
+        return self.median * exp(self.sigma * NormalDist().inv_cdf(share))
+
+    def share_below(self, headway: float) -> float:
+        """Share of headways below this one."""
+        return NormalDist().cdf(log(headway / self.median) / self.sigma)
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """What one source says of headways on one type of road."""
+
+    road: str  # motorway, town
+    role: str  # fit, judge, beside
+    headway: str  # gap: from bumper to bumper; front to front; not said
+    kind: str  # of drivers
+    mean: float | None  # s
+    deviation: float | None  # s
+    below_1_s: float | None  # share
+    below_2_s: float | None
+    name: str
+    read: str  # what of it could be read
+
+    def distribution(self) -> LogNormal:
+        """Log-normal with the source's mean and deviation, else through its two shares."""
+        if self.mean is not None and self.deviation is not None:
+            variance = log(1.0 + (self.deviation / self.mean) ** 2)
+            return LogNormal(self.mean * exp(-0.5 * variance), sqrt(variance))
+        if self.below_1_s is None or self.below_2_s is None:
+            raise ValueError(f"{self.name}: neither mean and deviation nor two shares are known")
+        z_1, z_2 = (NormalDist().inv_cdf(share) for share in (self.below_1_s, self.below_2_s))
+        sigma = log(2.0) / (z_2 - z_1)
+        return LogNormal(exp(-z_1 * sigma), sigma)
+
+
+def field_sources() -> list[Source]:
+    """Every source, in the order of the table."""
+    text = resources.files(__package__).joinpath("headways.csv").read_text(encoding="utf-8")
+    sources = []
+    for row in csv.DictReader(text.splitlines()):
+        shares = (row[c] for c in ("mean_s", "deviation_s", "below_1_s", "below_2_s"))
+        numbers = (float(cell) if cell else None for cell in shares)
+        who = row["road"], row["role"], row["headway"], row["kind"]
+        sources.append(Source(*who, *numbers, row["source"], row["read"]))
+    return sources
+
+
+def headways_of(seconds: Sequence[float]) -> dict[str, Any]:
+    """Number, quantiles in s and the shares below 1 and 2 s of headways."""
+    if not seconds:
+        return {"samples": 0}
+    found = np.array(seconds)
+    return {
+        "samples": len(found),
+        "quantiles_s": [round(float(q), 3) for q in np.quantile(found, QUANTILES)],
+        "share_below_1_s": round(float(np.mean(found < 1.0)), 4),
+        "share_below_2_s": round(float(np.mean(found < 2.0)), 4),
+    }
+
+
+def judge(seconds: Sequence[float], source: Source) -> dict[str, Any]:
+    """Headways beside those of a source: relative differences of quantiles, and whether they hold."""
+    ours, field = headways_of(seconds), source.distribution()
+    result: dict[str, Any] = {
+        "source": source.name,
+        "role": source.role,
+        "field_s": [round(field.quantile(q), 3) for q in QUANTILES],
+        "field_below_1_s": round(field.share_below(1.0), 4),
+    }
+    if not ours["samples"]:
+        return {**result, "holds": None}
+    pairs = zip(ours["quantiles_s"], result["field_s"], strict=True)
+    result["differences"] = [round(mine / theirs - 1.0, 3) for mine, theirs in pairs]
+    result["difference_below_1_s"] = round(ours["share_below_1_s"] - result["field_below_1_s"], 4)
+    near = all(abs(d) <= QUANTILE_TOLERANCE for d in result["differences"])
+    result["holds"] = near and abs(result["difference_below_1_s"]) <= SHARE_TOLERANCE
+    return result

@@ -1,8 +1,10 @@
 """Headways of the field beside those of background traffic.
 
 The field's are inputs (`headways.csv`): one source per road type is there to be fitted, another one to
-judge by. What a source gives as mean and deviation is taken for log-normal (ours), which Ismail and
-others found to fit best; only abstracts could be read.
+judge by. Mean and deviation of a source are taken for those of a log-normal distribution (ours).
+"Statistical Models for Preferred Time Headway and Time Headway of Drivers in Steady State
+Car-Following" (9th Int. Conf. on Applications of Advanced Technology in Transportation, ASCE 2006)
+found a shifted one to fit best. Only abstracts could be read.
 """
 
 from __future__ import annotations
@@ -68,13 +70,26 @@ class Source:
 def field_sources() -> list[Source]:
     """Every source, in the order of the table."""
     text = resources.files(__package__).joinpath("headways.csv").read_text(encoding="utf-8")
-    sources = []
-    for row in csv.DictReader(text.splitlines()):
-        shares = (row[c] for c in ("mean_s", "deviation_s", "below_1_s", "below_2_s"))
-        numbers = (float(cell) if cell else None for cell in shares)
-        who = row["road"], row["role"], row["headway"], row["kind"]
-        sources.append(Source(*who, *numbers, row["source"], row["read"]))
-    return sources
+    return [_source(row) for row in csv.DictReader(text.splitlines())]
+
+
+def _source(row: dict[str, str]) -> Source:
+    return Source(
+        row["road"],
+        row["role"],
+        row["headway"],
+        row["kind"],
+        _number(row["mean_s"]),
+        _number(row["deviation_s"]),
+        _number(row["below_1_s"]),
+        _number(row["below_2_s"]),
+        row["source"],
+        row["read"],
+    )
+
+
+def _number(cell: str) -> float | None:
+    return float(cell) if cell else None
 
 
 def headways_of(seconds: Sequence[float]) -> dict[str, Any]:

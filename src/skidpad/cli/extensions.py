@@ -36,11 +36,12 @@ def extensions(
 def extension_points() -> tuple[Registry[Any], ...]:
     """Returns every registry that installed packages can add to, as help and docs show them."""
     from skidpad.core.sensor_types import SENSORS
+    from skidpad.evidence.channels.indicators.added import INDICATORS
     from skidpad.physics.presets import WEATHERS
     from skidpad.scenarios.registry import SCENARIO_NAMES
 
     try:
         from skidpad.fleet.alerting.relay_types import RELAYS
     except ImportError:  # the optional part `fleet` is not installed
-        return (SENSORS, WEATHERS, SCENARIO_NAMES)
-    return (SENSORS, WEATHERS, SCENARIO_NAMES, RELAYS)
+        return (SENSORS, INDICATORS, WEATHERS, SCENARIO_NAMES)
+    return (SENSORS, INDICATORS, WEATHERS, SCENARIO_NAMES, RELAYS)

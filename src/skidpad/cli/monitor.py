@@ -12,7 +12,6 @@ if TYPE_CHECKING:
     import polars as pl
 
     from skidpad.core.vocabulary import HazardType
-    from skidpad.evidence.channels.indicators.catalogue import Indicator
     from skidpad.evidence.channels.summary import Watched
     from skidpad.recording.channels import ChannelSource
 
@@ -158,13 +157,13 @@ def _source(file: Path | None, mapping: Path | None, domain: int, wait: float) -
     return RosTopics(load_mapping(mapping), domain, patience=wait, silence=wait)
 
 
-def _rule(name: str) -> HazardType | Indicator:
+def _rule(name: str) -> HazardType | AnyIndicator:
     from skidpad.core.errors import ConfigError
     from skidpad.core.vocabulary import HazardType
     from skidpad.evidence.channels.indicators.catalogue import Indicator, load_thresholds
 
     by_label = {entry.label: i for i, entry in load_thresholds().items() if entry.threshold}
-    known: dict[str, HazardType | Indicator] = {h.value: h for h in HazardType}
+    known: dict[str, HazardType | AnyIndicator] = {h.value: h for h in HazardType}
     known |= {i.value: i for i in by_label.values()} | dict(by_label)
     if name not in known:
         raise ConfigError(
@@ -174,7 +173,7 @@ def _rule(name: str) -> HazardType | Indicator:
     return known[name]
 
 
-def _events(found: Watched, rule: HazardType | Indicator) -> int:
+def _events(found: Watched, rule: HazardType | AnyIndicator) -> int:
     from skidpad.core.vocabulary import HazardType
 
     if isinstance(rule, HazardType):

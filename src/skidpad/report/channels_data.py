@@ -14,7 +14,11 @@ from numpy.typing import NDArray
 
 from skidpad.core.reading import convert_plain
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.indicators.catalogue import Indicator, Threshold, load_thresholds
+from skidpad.evidence.channels.indicators.catalogue import (
+    AnyIndicator,
+    Threshold,
+    load_thresholds,
+)
 from skidpad.evidence.channels.timing import TIMES
 from skidpad.recording.hazards import HazardRecord, read_hazards
 from skidpad.recording.indicators import read_indicators
@@ -27,7 +31,7 @@ Floats = NDArray[np.float64]
 class Trace:
     """One indicator of one channel or pair over the drive."""
 
-    indicator: Indicator
+    indicator: AnyIndicator
     subject: str
     t: Floats  # (k,) s
     value: Floats  # (k,), NaN: not evaluated
@@ -43,7 +47,7 @@ class MonitoredDrive:
     table: pl.DataFrame  # indicators.parquet
     records: tuple[HazardRecord, ...]
     timing: pl.DataFrame | None
-    thresholds: dict[Indicator, Threshold]
+    thresholds: dict[AnyIndicator, Threshold]
 
     @property
     def channels(self) -> Sequence[str]:
@@ -57,7 +61,7 @@ class MonitoredDrive:
         words: dict[str, str] = self.summary.get("context", {})
         return words
 
-    def traces(self, indicator: Indicator) -> list[Trace]:
+    def traces(self, indicator: AnyIndicator) -> list[Trace]:
         """The indicator's course, one per channel or pair."""
         rows = self.table.filter(pl.col("indicator") == indicator.value)
         return [
@@ -83,7 +87,7 @@ class _Event(msgspec.Struct):
 
 
 class _Audit(msgspec.Struct):
-    indicator: Indicator
+    indicator: str
     subject: str
     claim: str | None
     threshold: float | None

@@ -7,7 +7,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS
-from skidpad.evidence.channels.indicators.catalogue import Bound, Indicator
+from skidpad.evidence.channels.indicators.catalogue import AnyIndicator, Bound, Indicator
 from skidpad.evidence.channels.timing import BUDGET_MS, MODULES, time_by_objects
 from skidpad.report.channels_data import MonitoredDrive, Trace
 from skidpad.report.figures import Chart, Curve, curves, lines
@@ -38,7 +38,7 @@ def drive_timeline(drive: MonitoredDrive) -> str:
     return timelines(strips, marks, float(t.min()), float(t.max()))  # type: ignore[arg-type]
 
 
-def _strip(drive: MonitoredDrive, indicator: Indicator) -> Strip | None:
+def _strip(drive: MonitoredDrive, indicator: AnyIndicator) -> Strip | None:
     traces = drive.traces(indicator)
     if not traces:
         return None
@@ -57,7 +57,7 @@ def _strip(drive: MonitoredDrive, indicator: Indicator) -> Strip | None:
     )
 
 
-def _label(indicator: Indicator) -> str:
+def _label(indicator: AnyIndicator) -> str:
     name = words(indicator.value)
     return name.replace("object motion prediction", "motion").replace(" planned", "")
 

@@ -12,7 +12,6 @@ from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.case import NodeEvidence, Nodes, evidence_of, node_evidence
 from skidpad.evidence.channels.indicators.catalogue import (
     Argument,
-    Indicator,
     Statement,
     safety_case,
 )
@@ -121,13 +120,14 @@ def _indicator_columns(drive: MonitoredDrive) -> tuple[Column[Row], ...]:
     )
     found = {(r["indicator"], r["subject"]): r for r in values.to_dicts()}
     cycles = max(drive.summary["cycles"], 1)
+    meanings = {indicator.value: entry for indicator, entry in drive.thresholds.items()}
 
     def statistic(name: str, row: Row) -> float | None:
         return found.get((row["indicator"], row["subject"]), {}).get(name)
 
     def name(row: Row) -> Cell:
-        meaning = drive.thresholds[Indicator(row["indicator"])].meaning
-        return Cell(words(row["indicator"]), hint=meaning)
+        entry = meanings.get(row["indicator"])  # None: of a package that is not installed
+        return Cell(words(row["indicator"]), hint="" if entry is None else entry.meaning)
 
     def violations(row: Row) -> Quantity:
         events, share = row["violation_events"], row["violation_cycles"] / cycles

@@ -28,6 +28,7 @@ from skidpad.evidence.channels.hazards import (
 from skidpad.evidence.channels.identifier.features import feature_row
 from skidpad.evidence.channels.identifier.model import Detector, Identify, LearnedIdentifier
 from skidpad.evidence.channels.indicators.catalogue import (
+    AnyIndicator,
     Bound,
     Indicator,
     Threshold,
@@ -70,7 +71,7 @@ class MonitorSettings:
     indicators: IndicatorSettings = field(default_factory=IndicatorSettings)
     profile: Profile = Profile.TRACKED
     rules: tuple[Rule, ...] = ()  # empty: the built-in ones of the profile
-    thresholds: Mapping[Indicator, Threshold] = field(default_factory=load_thresholds)
+    thresholds: Mapping[AnyIndicator, Threshold] = field(default_factory=load_thresholds)
     identify: Identify = Identify.RULES
     detectors: Mapping[HazardType, Detector] = field(default_factory=dict)
     keep_worlds: bool = True  # gather records of hazards

@@ -5,15 +5,19 @@ Every threshold is configuration (C-103): `load_thresholds` takes a file of the 
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
 from enum import Enum
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
 import msgspec
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.reading import decode_yaml, read_bytes
+from skidpad.core.registry import Registry
 
 
 class Scope(str, Enum):
@@ -69,8 +73,18 @@ class Indicator(str, Enum):
     AGREEMENT = "channel_agreement"
 
 
-CHANNEL_INDICATORS = tuple(Indicator)[:8]
-PAIR_INDICATORS = tuple(Indicator)[8:]
+class AddedName(str):
+    """The name of an indicator that a package added; `value` is its name in recordings."""
+
+    __slots__ = ()
+
+    @property
+    def value(self) -> str:
+        """The name in recordings, as of an `Indicator`."""
+        return str(self)
+
+
+AnyIndicator = Indicator | AddedName
 
 
 class Threshold(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -96,24 +110,103 @@ class Threshold(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         return value < self.threshold if self.bound is Bound.LOWER else value > self.threshold
 
 
-def load_thresholds(path: Path | None = None) -> dict[Indicator, Threshold]:
-    """Thresholds of all indicators: the built-in ones, or those of the file at `path`."""
-    if path is None:
-        return dict(_own_thresholds())
-    return _thresholds(read_bytes(path, "thresholds"), str(path))
+def built_in_thresholds() -> dict[Indicator, Threshold]:
+    """Returns the bounds of Skidpad's own indicators, in the order of their table."""
+    return dict(_own_thresholds())
+
+
+def load_thresholds(path: Path | None = None) -> dict[AnyIndicator, Threshold]:
+    """Returns the bounds of all indicators: the built-in ones, changed by the file at `path`.
+
+    An indicator that the file does not name keeps its built-in bound, so files that are older than
+    an indicator can still be used. ConfigError for a name that no indicator has.
+    """
+    table: dict[AnyIndicator, Threshold] = {**_own_thresholds()}
+    table |= {added.key: added.default_threshold() for added in INDICATORS.foreign_entries()}
+    if path is not None:
+        given = decode_yaml(read_bytes(path, "thresholds"), str(path), dict[str, Threshold])
+        known = {indicator.value: indicator for indicator in table}
+        for name, threshold in given.items():
+            if name not in known:
+                raise ConfigError(
+                    f"{path}: unknown indicator {name!r}; choose of: {', '.join(known)}"
+                )
+            table[known[name]] = threshold
+    return table
 
 
 @cache
 def _own_thresholds() -> dict[Indicator, Threshold]:
-    return _thresholds(_built_in("thresholds.yaml"), "thresholds.yaml")
-
-
-def _thresholds(data: bytes, name: str) -> dict[Indicator, Threshold]:
-    table: dict[Indicator, Threshold] = decode_yaml(data, name, dict[Indicator, Threshold])
-    missing = [i.value for i in Indicator if i not in table]
-    if missing:
-        raise ConfigError(f"{name}: no entry for {', '.join(missing)}")
+    data = _built_in("thresholds.yaml")
+    table: dict[Indicator, Threshold] = decode_yaml(
+        data, "thresholds.yaml", dict[Indicator, Threshold]
+    )
     return table
+
+
+@dataclass(frozen=True, slots=True)
+class IndicatorType:
+    """An indicator of the monitor.
+
+    Attributes:
+        name: Its name in recordings; the name of the entry point.
+        title: A few words for tables.
+        units: The unit of its value.
+        scope: CHANNEL for a value per channel, PAIR for one per pair of channels.
+        meaning: What a violation points at.
+        bound: The side of the threshold on which it raises an alarm.
+        threshold: The bound itself; None with Bound.NONE.
+        factory: `factory()` is called once per channel or pair and returns a function, which is
+            called with a ChannelFrame, or with those of both channels, in every cycle in which
+            they have one. It returns the value, or NaN where it cannot be evaluated. None: the
+            indicator is computed by Skidpad itself.
+        category: The group of the indicator.
+    """
+
+    name: str
+    title: str
+    units: str
+    scope: Scope
+    meaning: str
+    bound: Bound = Bound.NONE
+    threshold: float | None = None
+    factory: Callable[[], Callable[..., float]] | None = None
+    category: Category = Category.SIMILARITY
+
+    @property
+    def key(self) -> AddedName:
+        """The name as thresholds and layouts use it."""
+        return AddedName(self.name)
+
+    def default_threshold(self) -> Threshold:
+        """Returns what a file of thresholds says of it when it does not name it."""
+        return Threshold(
+            label=self.title,
+            scope=self.scope,
+            category=self.category,
+            bound=self.bound,
+            meaning=self.meaning,
+            threshold=self.threshold,
+        )
+
+    def make(self) -> Callable[..., Any]:
+        """Returns what computes the value for one channel or pair."""
+        assert self.factory is not None, "Skidpad computes its own indicators"
+        return self.factory()
+
+
+def _own_types() -> tuple[IndicatorType, ...]:
+    table = built_in_thresholds()
+    return tuple(
+        IndicatorType(
+            i.value, t.label, "", t.scope, t.meaning, t.bound, t.threshold, None, t.category
+        )
+        for i in Indicator
+        for t in [table[i]]
+    )
+
+
+INDICATORS = Registry("indicator", "skidpad.indicators", IndicatorType, _own_types)
 
 
 class Statement(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -147,3 +240,11 @@ def safety_case() -> SafetyCase:
 
 def _built_in(name: str) -> bytes:
     return files("skidpad.evidence.channels.indicators").joinpath(name).read_bytes()
+
+
+def _of_scope(scope: Scope) -> tuple[Indicator, ...]:
+    return tuple(i for i, threshold in _own_thresholds().items() if threshold.scope is scope)
+
+
+CHANNEL_INDICATORS = _of_scope(Scope.CHANNEL)  # in the order of thresholds.yaml
+PAIR_INDICATORS = _of_scope(Scope.PAIR)

@@ -1,4 +1,4 @@
-"""The values of a cycle as one row: every indicator of every channel, then of every pair."""
+"""The values of a cycle as one row: indicators of each channel, of each pair, then added ones."""
 
 from __future__ import annotations
 
@@ -13,8 +13,11 @@ from numpy.typing import NDArray
 from skidpad.core.errors import ConfigError
 from skidpad.evidence.channels.indicators.catalogue import (
     CHANNEL_INDICATORS,
+    INDICATORS,
     PAIR_INDICATORS,
-    Indicator,
+    AnyIndicator,
+    IndicatorType,
+    Scope,
 )
 
 Floats = NDArray[np.float64]
@@ -24,7 +27,7 @@ Counts = NDArray[np.int64]
 class Place(NamedTuple):
     """Whose value stands at one place of the row."""
 
-    indicator: Indicator
+    indicator: AnyIndicator
     subject: str  # channel, or pair "a+b"
 
 
@@ -35,7 +38,8 @@ class Layout:
     channels: tuple[str, ...]
     pairs: tuple[tuple[int, int], ...]  # numbers of channels
     places: tuple[Place, ...]
-    span: dict[Indicator, slice]
+    span: dict[AnyIndicator, slice]
+    added: tuple[IndicatorType, ...] = ()  # of installed packages
 
     @classmethod
     def of(cls, channels: Sequence[str]) -> Layout:
@@ -45,14 +49,21 @@ class Layout:
         pairs = tuple(combinations(range(len(channels)), 2))
         names = ["+".join(pair) for pair in combinations(channels, 2)]
         places: list[Place] = []
-        span = {}
-        for indicators, subjects in ((CHANNEL_INDICATORS, channels), (PAIR_INDICATORS, names)):
-            for indicator in indicators:
-                span[indicator] = slice(len(places), len(places) + len(subjects))
-                places += [Place(indicator, subject) for subject in subjects]
-        return cls(tuple(channels), pairs, tuple(places), span)
+        span: dict[AnyIndicator, slice] = {}
+        added = INDICATORS.foreign_entries()
+        subjects_of = {Scope.CHANNEL: list(channels), Scope.PAIR: names}
+        rows: list[tuple[AnyIndicator, Scope]] = [
+            *((indicator, Scope.CHANNEL) for indicator in CHANNEL_INDICATORS),
+            *((indicator, Scope.PAIR) for indicator in PAIR_INDICATORS),
+            *((kind.key, kind.scope) for kind in added),
+        ]
+        for indicator, scope in rows:
+            subjects = subjects_of[scope]
+            span[indicator] = slice(len(places), len(places) + len(subjects))
+            places += [Place(indicator, subject) for subject in subjects]
+        return cls(tuple(channels), pairs, tuple(places), span, added)
 
-    def indices(self, indicators: Iterable[Indicator]) -> Counts:
+    def indices(self, indicators: Iterable[AnyIndicator]) -> Counts:
         """Places of all subjects of `indicators`, in their order."""
         row = np.arange(len(self.places))
         return np.concatenate([row[self.span[i]] for i in indicators])
@@ -66,7 +77,7 @@ class Readings:
     values: Floats  # (len(layout.places),), NaN: not evaluated
     matched: tuple[Counts | None, ...]  # per pair rows (k, 2) of the objects that both report
 
-    def __getitem__(self, indicator: Indicator) -> Floats:
+    def __getitem__(self, indicator: AnyIndicator) -> Floats:
         view: Floats = self.values[self.layout.span[indicator]]
         return view
 
@@ -78,7 +89,8 @@ class Readings:
     def by_pair(self) -> Floats:
         """View (len(PAIR_INDICATORS), n pairs)."""
         n = len(CHANNEL_INDICATORS) * len(self.layout.channels)
-        return self.values[n:].reshape(len(PAIR_INDICATORS), -1)
+        end = n + len(PAIR_INDICATORS) * len(self.layout.pairs)
+        return self.values[n:end].reshape(len(PAIR_INDICATORS), -1)
 
     def shared_rows(self) -> list[set[int]]:
         """Per channel the rows of its objects that some other channel also reports."""

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.evidence.channels.frames import Usable
+from skidpad.evidence.channels.indicators.catalogue import Scope
 from skidpad.evidence.channels.indicators.channel import ChannelIndicators, Values
 from skidpad.evidence.channels.indicators.layout import Layout, Readings
 from skidpad.evidence.channels.indicators.pair import PairIndicators
@@ -36,6 +37,10 @@ class IndicatorPanel:
             PairIndicators(self.channels[a], self.channels[b], self.settings)
             for a, b in self.layout.pairs
         ]
+        of = {Scope.CHANNEL: len(self.channels), Scope.PAIR: len(self.pairs)}
+        self.added = [
+            (kind, [kind.make() for _ in range(of[kind.scope])]) for kind in self.layout.added
+        ]
 
     def update(self, messages: Sequence[Usable | None], lap: Lap = no_lap) -> Readings:
         """The values of one cycle; `lap(name)` is called when the part `name` is done.
@@ -63,8 +68,19 @@ class IndicatorPanel:
             self._store_values(values, i, channel.prediction(frame))
         for p, pair, similar in meeting:
             self._store_values(values, p, pair.prediction(similar))
+        self._add_foreign(values)
         lap("motion_prediction")
         return Readings(self.layout, values, tuple(pair.matched for pair in self.pairs))
+
+    def _add_foreign(self, row: Floats) -> None:
+        """Writes the values of the indicators that packages added."""
+        for kind, functions in self.added:
+            first = self.layout.span[kind.key].start
+            for subject, function in enumerate(functions):
+                of = (subject,) if kind.scope is Scope.CHANNEL else self.layout.pairs[subject]
+                frames = [self.channels[i].frame for i in of]
+                if all(frame is not None for frame in frames):
+                    row[first + subject] = function(*frames)
 
     def _store_values(self, row: Floats, subject: int, values: Values) -> None:
         for indicator, value in values.items():

@@ -36,7 +36,7 @@ def extensions(
 def extension_points() -> tuple[Registry[Any], ...]:
     """Returns every registry that installed packages can add to, as help and docs show them."""
     from skidpad.core.sensor_types import SENSORS
-    from skidpad.evidence.channels.indicators.added import INDICATORS
+    from skidpad.evidence.channels.indicators.catalogue import INDICATORS
     from skidpad.physics.presets import WEATHERS
     from skidpad.scenarios.registry import SCENARIO_NAMES
 

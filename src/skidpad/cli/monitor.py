@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
+    from skidpad.evidence.channels.indicators.catalogue import AnyIndicator
     import polars as pl
 
     from skidpad.core.vocabulary import HazardType
@@ -178,7 +179,7 @@ def _events(found: Watched, rule: HazardType | AnyIndicator) -> int:
 
     if isinstance(rule, HazardType):
         return found.hazards.get(rule, 0)
-    return sum(n for (indicator, _), n in found.violations.items() if indicator is rule)
+    return sum(n for (indicator, _), n in found.violations.items() if indicator == rule)
 
 
 def _print(found: Watched, out: Path) -> None:

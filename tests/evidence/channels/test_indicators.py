@@ -411,8 +411,25 @@ def test_a_thresholds_file_is_checked(tmp_path):
     path.write_text("history_comfort: {label: H, scope: channel}")
     with pytest.raises(ConfigError, match=r"t\.yaml"):
         load_thresholds(path)
+    path.write_text("speed: {label: H, scope: channel, category: comfort, bound: none, meaning: m}")
+    with pytest.raises(ConfigError, match="unknown indicator 'speed'; choose of: history_comfort"):
+        load_thresholds(path)
     with pytest.raises(ConfigError, match="pairing_distance"):
         IndicatorSettings(pairing_distance=0.9)
+
+
+@pytest.mark.req("C-103")
+def test_a_thresholds_file_older_than_an_indicator_still_loads(tmp_path):
+    path = tmp_path / "t.yaml"
+    path.write_text(
+        "history_comfort: {label: H, scope: channel, category: comfort, bound: lower,"
+        " threshold: 0.5, meaning: m}"
+    )
+    table, built_in = load_thresholds(path), load_thresholds()
+    assert table[Indicator.HISTORY_COMFORT].threshold == 0.5
+    assert list(table) == list(built_in)
+    changed = {i for i in built_in if table[i] != built_in[i]}
+    assert changed == {Indicator.HISTORY_COMFORT}
 
 
 # -- the panel

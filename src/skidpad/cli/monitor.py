@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import typer
 
 if TYPE_CHECKING:
-    from skidpad.evidence.channels.indicators.catalogue import AnyIndicator
     import polars as pl
 
     from skidpad.core.vocabulary import HazardType
+    from skidpad.evidence.channels.indicators.catalogue import AnyIndicator
     from skidpad.evidence.channels.summary import Watched
     from skidpad.recording.channels import ChannelSource
 

@@ -90,9 +90,14 @@ def test_a_recipe_works_as_printed_and_its_runs_open_without_it(title: str, tmp_
     page = tmp_path / "out" / "monitored" / "report.html"
     if page.is_file():
         assert "ego speed difference" in page.read_text(encoding="utf-8")
+        again = "from skidpad.report.channels import write_drive_report; from pathlib import Path; "
+        call(tmp_path, "-c", again + "write_drive_report(Path('out/monitored'))")  # without it
+        assert "ego speed difference" in page.read_text(encoding="utf-8")
         assert "ego_speed_difference" in (page.parent / "monitor.json").read_text("utf-8")
     for command in commands:
-        if command.startswith(("skidpad show ", "skidpad safety-case ")):  # with the package removed
+        if command.startswith(
+            ("skidpad show ", "skidpad safety-case ")
+        ):  # with the package removed
             with_it = call(tmp_path, "-m", *command.split(), packages=packages)
             assert call(tmp_path, "-m", *command.split()) == with_it
 

@@ -121,7 +121,7 @@ def load_thresholds(path: Path | None = None) -> dict[AnyIndicator, Threshold]:
     An indicator that the file does not name keeps its built-in bound, so files that are older than
     an indicator can still be used. ConfigError for a name that no indicator has.
     """
-    table: dict[AnyIndicator, Threshold] = {**_own_thresholds()}
+    table: dict[AnyIndicator, Threshold] = dict(_own_thresholds().items())
     table |= {added.key: added.default_threshold() for added in INDICATORS.foreign_entries()}
     if path is not None:
         given = decode_yaml(read_bytes(path, "thresholds"), str(path), dict[str, Threshold])

@@ -66,6 +66,10 @@ SHAPES = (
     Shape("outside of a circle", 2, outside),
     Shape("outside of a sphere", 5, outside),
 )
+HEADS = (
+    "| failures | probability | subset simulation | importance sampling | printed interval | "
+    "determined | half-widths | runs |"
+)
 COLUMNS = (
     "limit", "dimensions", "p", "repetitions", "subset", "importance", "joint", "determined",
     "joint_if_determined", "half_width_subset", "half_width_importance", "runs",
@@ -95,6 +99,25 @@ def measure(shape: Shape, p: float, asked: argparse.Namespace) -> dict[str, obje
         round(float(np.median(table[:, 4])), 3), round(float(np.median(table[:, 5])), 3),
         round(float(table[:, 6].mean())),
     ), strict=True))  # fmt: skip
+
+
+def page_table(path: Path) -> str:
+    """Return the rows of a CSV as the table of docs/search.md: shares in %, half-widths in %."""
+    lines = [HEADS, "|---|---|---|---|---|---|---|---|"]
+    with path.open(newline="") as file:
+        for row in csv.DictReader(file):
+            of = [
+                f"{100 * float(row[k]):.1f}"
+                for k in ("subset", "importance", "joint", "determined")
+            ]
+            widths = [
+                f"{100 * float(row[f'half_width_{k}']):.0f}" for k in ("subset", "importance")
+            ]
+            lines.append(
+                f"| {row['limit']}, {row['dimensions']} dimensions | {float(row['p']):.0e} | "
+                f"{' | '.join(of)} | {' and '.join(widths)} | {row['runs']} |"
+            )
+    return "\n".join(lines)
 
 
 def main() -> None:

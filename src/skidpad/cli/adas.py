@@ -95,9 +95,21 @@ def report(
     from skidpad.recording.ledger import LEDGER, campaign_command
     from skidpad.recording.logfiles import TICKS
     from skidpad.recording.results import RESULTS
+    from skidpad.recording.risks import RISK_FOUND
+    from skidpad.recording.searches import FOUND
 
     if (folder / TICKS).is_file():
         typer.echo(_report_run(folder))
+        return
+    if (folder / FOUND).is_file():
+        from skidpad.report.search import write_search_report
+
+        typer.echo(write_search_report(folder))
+        return
+    if (folder / RISK_FOUND).is_file():
+        from skidpad.report.risk import write_risk_report
+
+        typer.echo(write_risk_report(folder))
         return
     if not any((folder / name).is_file() for name in (RESULTS, LEDGER)):
         raise FileError(

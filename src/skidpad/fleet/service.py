@@ -54,7 +54,7 @@ class Fleet:
     warehouse: Warehouse
     limits: Limits
     rate: Rate  # of all links together
-    exporter: Exporter | None = None  # handed in: this house knows no scenarios
+    exporter: Exporter | None = None  # handed in: this package knows no scenarios
     locate: Locate | None = None  # handed in likewise: which road a point is on
     owners: dict[str, tuple[str, str]] = field(default_factory=dict)  # tenants of a vehicle: facts
 

@@ -57,7 +57,7 @@ class Series:
 def canvas(
     width: float = 8.4, height: float = 3.4, columns: int = 1, rows: int = 1
 ) -> Iterator[tuple[Canvas, list[Axes]]]:
-    """A figure with axes in the house style, in inches."""
+    """A figure with axes in the common style, in inches."""
     with mpl.rc_context(STYLE):
         figure = Canvas(figsize=(width, height), layout="constrained")
         axes = figure.subplots(rows, columns, sharex="col", squeeze=False)

@@ -60,7 +60,7 @@ class RoadMap:
     """One map: `samples`, `lanes`, `signals`, `roadside`, and questions about them.
 
     name: str; content_hash: str (SHA-256 over all baked arrays, decision L-6); arrays: what kernels
-    of other houses take; ego_start: where the ego starts unless told otherwise, or None;
+    of other packages take; ego_start: where the ego starts unless told otherwise, or None;
     geo_reference: the file's projection text.
     """
 

@@ -1,7 +1,7 @@
 """The places where the sources contradict themselves and the answer can change an outcome (M-14).
 
-One flat record for all houses, so that a profile is one file and `--set` one syntax. Each setting
-names its discrepancy and the house in which it acts. What is not here has one reading only, the
+One flat record for all packages, so that a profile is one file and `--set` one syntax. Each setting
+names its discrepancy and the package in which it acts. What is not here has one reading only, the
 recommended one.
 """
 

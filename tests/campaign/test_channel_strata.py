@@ -76,8 +76,8 @@ def test_a_recording_of_risky_drivers_says_how_much_each_of_them_counts(tmp_path
     rates = [senses_of(c, RISKY_JUMPS).localisation.jump_rate for c in recording.channels]
     assert rates == [20.0, 20.0]  # per hour; 1 as it occurs
     crew = Crew(run, segment_of(run))
-    crew.begin(staged(segment_of(run).setup, run.seed).table)
-    assert [s.sensing.localisation.jump_rate for s in crew.suites] == rates
+    senses = [senses_of(spec.id, spec.jumps) for spec in crew.sensors()]
+    assert [s.localisation.jump_rate for s in senses] == rates
     weights = json.loads(context["weights"])
     world = staged(segment_of(run).setup, run.seed)
     traits = world.traffic.drivers.trait

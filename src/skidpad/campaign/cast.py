@@ -31,7 +31,7 @@ from skidpad.core.run import (
     StackDriver,
 )
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
-from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
+from skidpad.core.states import ActorTable, StackReport, VehicleCommand
 from skidpad.core.told import describe_value
 from skidpad.core.vocabulary import Control, Outcome
 from skidpad.physics.types import EGO_TYPE, vehicle_type
@@ -76,9 +76,8 @@ class StackAtWheel:
     def begin(self, table: ActorTable) -> None:
         """Nothing: a stack does not know the cast."""
 
-    def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
-        """The stack's answer to the frame."""
-        del truth
+    def act(self, frame: SensorFrame) -> VehicleCommand:
+        """Returns the stack's answer to the frame."""
         if self.lens is not None:
             images, extra = self.lens.seen(frame.images), self.lens.seen(frame.extra)
             frame = replace(frame, images=images, extra=extra)

@@ -1,6 +1,6 @@
 """One segment: channels with their arbiter as a driver, their recording as a sink (decision L-5).
 
-    each 0.1 s:  view   = suite.observe(truth)         one per channel; nothing else is seen
+    each 0.1 s:  view   = frame.extra[channel]         measured by the backend; nothing else is seen
                  frame  = channel.update(view)
                  scores = safety_scores(frames)        from evidence
                  choice = arbiter.update(frames, scores)
@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import inf
 from pathlib import Path
 
@@ -29,6 +30,7 @@ from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
 from skidpad.core.frames import SensorFrame
 from skidpad.core.run import ARBITER, RunSpec
 from skidpad.core.setup import DT, ActorCommand
+from skidpad.core.specs import ChannelSpec
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind, Stratum
 from skidpad.evidence.channels.risk import safety_scores
@@ -37,8 +39,7 @@ from skidpad.live.listener import Listener
 from skidpad.live.settings import Links
 from skidpad.recording.channel_drives import DriveOutcome
 from skidpad.recording.channels import ChannelWriter, Item
-from skidpad.sensors.channel_presets import senses_of
-from skidpad.sensors.channel_suite import CYCLE, ChannelSuite
+from skidpad.sensors.channel_suite import CYCLE
 from skidpad.simulation.world.traffic.variety import risky_character
 from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Choice, Reason
 from skidpad.stack.channels.channel import Channel
@@ -46,6 +47,7 @@ from skidpad.stack.channels.settings import settings_of
 
 PERIOD = round(CYCLE / DT)  # ticks
 WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
+WARM_UP_CYCLES = round(WARM_UP / CYCLE)
 TRUTH_REACH = 120.0  # m around the ego within which the true world is recorded
 # Jumps of position in the stratum of risky drivers (assumed): each counts a twentieth there, as where,
 # how far and how long a channel jumps is what it was.
@@ -57,7 +59,7 @@ LABEL_OF = np.array([LABEL_OF_KIND[kind] for kind in ActorKind], dtype=np.int64)
 
 
 class Crew:
-    """Channels with their suites and arbiter: a driver that thinks every other tick."""
+    """Channels with their arbiter: a driver that thinks every other tick."""
 
     report = NO_REPORT
 
@@ -73,45 +75,43 @@ class Crew:
         self.ticks = 0  # driven so far
 
     def begin(self, table: ActorTable) -> None:
-        """Give every channel its sensors."""
-        self.suites = [
-            ChannelSuite(
-                name, senses_of(name, jumps_of(self.spec)), self.segment.map.roadside, table,
-                self.spec.weather, self.spec.seed, noise=self.crew.noise,
-            )
+        """Does nothing: channels do not know the actors."""
+
+    def sensors(self) -> tuple[ChannelSpec, ...]:
+        """Returns the sensors of all channels, which the backend measures."""
+        return tuple(
+            ChannelSpec(name, self.crew.noise, jumps_of(self.spec), PERIOD, -WARM_UP_CYCLES)
             for name in self.crew.channels
-        ]  # fmt: skip
+        )
 
     @property
     def cycle(self) -> int | None:
         """Number of the cycle that the last tick began, negative in the warm-up; None: it began none."""
         cycle, rest = divmod(self.ticks - 1, PERIOD)
-        return None if rest else cycle - round(WARM_UP / CYCLE)
+        return None if rest else cycle - WARM_UP_CYCLES
 
     @property
     def mode(self) -> str:
         """The driving channel; empty in a minimal-risk stop."""
         return self.decision.driving
 
-    def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
+    def act(self, frame: SensorFrame) -> VehicleCommand:
         """The driving channel's command; in a minimal-risk stop brake along the first channel's path."""
-        del frame
         self.ticks += 1
         if self.cycle is not None:
-            self._think(self.cycle * CYCLE, truth)
+            self._think(self.cycle * CYCLE, frame)
         if self.driving is not None:
             return self.channels[self.driving].command
         return VehicleCommand(brake=MINIMAL_RISK_BRAKE, steer=self.channels[0].command.steer)
 
-    def _think(self, t: float, truth: WorldTruth) -> None:
+    def _think(self, t: float, frame: SensorFrame) -> None:
         """Computes what every channel reports at time t, and which one drives."""
         v_max = inf
         if self.guide is not None and (v_max := self.guide(t)):
             for channel in self.channels:
                 channel.keep_below(v_max)
         self.frames: list[ChannelFrame] = [
-            channel.update(suite.observe(t, truth.states, truth.lights))
-            for channel, suite in zip(self.channels, self.suites, strict=True)
+            channel.update(frame.extra[channel.name]) for channel in self.channels
         ]
         scores = safety_scores(self.frames).tolist()
         names, drive_by = self.crew.channels, self.crew.drive_by
@@ -214,7 +214,10 @@ def drive_segment(
         ):
             recording = Recording(crew, writer, [*listeners, *aboard])
             sinks = (recording, RealTime(DT)) if links.live else (recording,)
-            frame = backend.reset(segment.setup, spec.seed)
+            specs = crew.sensors()
+            asked = frozenset(channel.id for channel in specs)
+            setup = replace(segment.setup, specs=specs, asked=asked)
+            frame = backend.reset(setup, spec.seed)
             street = Street(crew, recording)
             failure = loop(backend, frame, crew, Unsupervised(), street, sinks)
     finally:

@@ -159,13 +159,13 @@ class DeskDriver:
         """The run begins."""
         self.inner.begin(table)
 
-    def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
+    def act(self, frame: SensorFrame) -> VehicleCommand:
         """The person's command, or the stack's."""
         desk = self.desk
         desk.turn(frame.tick)
         if desk.switched or desk.handed_back:
             self._switch()
-        command = self.inner.drive(frame, truth)
+        command = self.inner.act(frame)
         return desk.hands.update(desk.pedals, frame.ego.speed) if desk.manual else command
 
     def _switch(self) -> None:

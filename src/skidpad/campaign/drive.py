@@ -1,7 +1,7 @@
 """The one loop: world, driver, supervisor, script, sinks. Everything that Skidpad finds out begins here.
 
     each tick:  phase   = supervisor.observe(truth)        who drives now: the driver, or recovery
-                command = driver.drive(frame, truth)       a stack is given the frame alone
+                command = driver.act(frame)                no driver is given the truth
                 action  = supervisor.act(command)
                 each sink sees the moment                  logs, recordings, snapshots, clocks
                 words   = script.step(truth)               what other actors are told, and the end
@@ -42,8 +42,8 @@ class Driver(Protocol):
         """The run begins, with these actors."""
         ...
 
-    def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
-        """The command for the coming step. Whoever passes on `truth` measures it with own sensors."""
+    def act(self, frame: SensorFrame) -> VehicleCommand:
+        """Returns the command for the coming step; the frame is all that a driver knows."""
         ...
 
 
@@ -165,7 +165,7 @@ def ticks(
         if phase is not Supervision.NONE:
             frame = replace(frame, supervision=phase)
         try:
-            command = driver.drive(frame, truth)
+            command = driver.act(frame)
             report = driver.report
         except StackError as failure:
             return failure

@@ -38,7 +38,7 @@ class Shadow(Sink):
 
     def see(self, moment: Moment) -> None:
         """Ask the shadow; while the supervisor drives, neither counts."""
-        asked = self.driver.drive(moment.frame, moment.truth)
+        asked = self.driver.act(moment.frame)
         given = moment.command
         row = (given.throttle, given.brake, asked.throttle, asked.brake)
         led = moment.frame.supervision is not Supervision.NONE

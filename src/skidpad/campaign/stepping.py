@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 from msgspec import structs
 
@@ -15,6 +14,7 @@ from skidpad.campaign.files import runs_of
 from skidpad.campaign.grip_cells import template
 from skidpad.campaign.run import OpenRun, Run
 from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.frames import SensorFrame
 from skidpad.core.run import (
     ActorMode,
     DriverSpec,
@@ -216,9 +216,9 @@ class _Wheel:
         """The run begins."""
         self.inner.begin(table)
 
-    def drive(self, frame: Any, truth: WorldTruth) -> VehicleCommand:
+    def act(self, frame: SensorFrame) -> VehicleCommand:
         """The stack's command, or the one in its place."""
-        own = self.inner.drive(frame, truth)
+        own = self.inner.act(frame)
         return own if self.command is None else self.command
 
 

@@ -15,7 +15,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.inputs import LampSwitch, Outside
 from skidpad.core.run import Function
 from skidpad.core.setup import DT
-from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
+from skidpad.core.states import ActorTable, StackReport, VehicleCommand
 from skidpad.roads.queries import RoadMap
 
 
@@ -40,7 +40,7 @@ class Said:
     def begin(self, table: ActorTable) -> None:
         """Does nothing, as a source drives no actor."""
 
-    def drive(self, frame: SensorFrame, truth: WorldTruth) -> VehicleCommand:
+    def act(self, frame: SensorFrame) -> VehicleCommand:
         """Raises NotImplementedError, as a source drives no actor."""
         raise NotImplementedError
 

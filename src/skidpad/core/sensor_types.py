@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from importlib import import_module
 from typing import Any, Protocol
 
+from skidpad.core.channels import ChannelView
 from skidpad.core.frames import CameraImage, GnssFix, ImuReading, LidarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.registry import Registry
@@ -16,6 +17,7 @@ from skidpad.core.specs import (
     IMU,
     SPEEDOMETER,
     CameraSpec,
+    ChannelSpec,
     EyesSpec,
     LidarSpec,
     PointSensorSpec,
@@ -97,6 +99,10 @@ def _own_types() -> tuple[SensorType, ...]:
         ),
         SensorType(
             "eyes", "Eyes of a human driver", "m, m/s, rad", EyesSpec, DriverView, at + "make_eyes"
+        ),
+        SensorType(
+            "channel", "All sensors of a channel", "m, m/s, rad", ChannelSpec, ChannelView,
+            at + "make_channel",
         ),
     )  # fmt: skip
 

@@ -118,4 +118,20 @@ class EyesSpec:
             )
 
 
-SensorSpec = CameraSpec | RadarSpec | LidarSpec | PointSensorSpec | EyesSpec
+@dataclass(frozen=True, slots=True)
+class ChannelSpec:
+    """The sensors of a shipped channel, measured together; their reading is a `ChannelView`.
+
+    They measure in the first tick of the run and then every `period` ticks: their noise has a
+    state, so they measure whether the reading is read or not.
+    """
+
+    id: str  # the channel's name
+    noise: float = 1.0  # factor on all errors
+    jumps: float = 1.0  # factor on how often the position jumps
+    period: int = 2  # ticks from one cycle to the next
+    first: int = 0  # number of the cycle that the first tick begins; negative before a recording
+    mount: Pose = Pose(0.0, 0.0, 0.0)
+
+
+SensorSpec = CameraSpec | RadarSpec | LidarSpec | PointSensorSpec | EyesSpec | ChannelSpec

@@ -8,21 +8,34 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.channels import ChannelView
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.frames import CameraImage, GnssFix, ImuReading, LidarPoints
 from skidpad.core.sensor_types import Measure, find_sensor_type
 from skidpad.core.setup import Setup
 from skidpad.core.sight import DriverView
-from skidpad.core.specs import CameraSpec, EyesSpec, LidarSpec, PointSensorSpec, SensorSpec
+from skidpad.core.specs import (
+    CameraSpec,
+    ChannelSpec,
+    EyesSpec,
+    LidarSpec,
+    PointSensorSpec,
+    SensorSpec,
+)
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, RangeModel
 from skidpad.physics.optics import extinction
 from skidpad.sensors import inertial
+from skidpad.sensors.channel_presets import senses_of
+from skidpad.sensors.channel_suite import CYCLE, ChannelSuite
 from skidpad.sensors.eyes import Eyes
 from skidpad.sensors.lidar import Lidar
 from skidpad.sensors.live_scene import LiveScene, SceneMap
 
 EGO = 0
+Observe = Callable[
+    [int, ActorStates, Mapping[int, LightState], NDArray[np.bool_]], None
+]  # tick, states, lights, whose brake lamps are on
 
 
 class GeoMap(SceneMap, Protocol):
@@ -83,7 +96,7 @@ class AskedSensors:
         self.map, self.table, self.setup, self.seed = map, table, setup, seed
         self.origin = inertial.map_origin(map.geo_reference) or (0.0, 0.0)
         self.server_lidar = lidar
-        self.eyes: list[Eyes] = []
+        self.observers: list[Observe] = []  # that look in every tick, in the order of the specs
         self._scene: LiveScene | None = None  # for the first sensor that casts rays
         self._placed = -1
         self.readers = {s.id: self._reader(s) for s in setup.specs if s.id in setup.asked}
@@ -98,11 +111,11 @@ class AskedSensors:
     ) -> Mapping[str, Any]:
         """Readings of this state by id, valid until the next call (decision X-11).
 
-        braking: (n,) whose brake lamps are on. Eyes look in every tick, as they see late.
+        braking: (n,) whose brake lamps are on. Eyes and channels look in every tick.
         """
         self.tick, self.states, self.images = tick, states, images
-        for eyes in self.eyes:
-            eyes.look(tick, states, lights, braking)
+        for observe in self.observers:
+            observe(tick, states, lights, braking)
         return Readings(self, tick)
 
     def scene(self) -> LiveScene:
@@ -160,8 +173,47 @@ def make_speedometer(spec: PointSensorSpec, sensors: AskedSensors) -> Callable[[
 def make_eyes(spec: EyesSpec, sensors: AskedSensors) -> Callable[[], DriverView]:
     """Returns the view of a driver's eyes, which look in every tick."""
     eyes = Eyes(spec, sensors.map.roadside, sensors.table, sensors.setup)
-    sensors.eyes.append(eyes)
+    sensors.observers.append(eyes.look)
     return eyes.view
+
+
+def make_channel(spec: ChannelSpec, sensors: AskedSensors) -> Callable[[], ChannelView]:
+    """Returns the view of a channel of its newest cycle."""
+    setup = sensors.setup
+    suite = ChannelSuite(
+        spec.id, senses_of(spec.id, spec.jumps), sensors.map.roadside, sensors.table,
+        setup.weather, sensors.seed, noise=spec.noise,
+    )  # fmt: skip
+    measured = MeasuredCycles(spec, suite)
+    sensors.observers.append(measured.observe)
+    return measured.view
+
+
+class MeasuredCycles:
+    """Measures with the sensors of a channel in every cycle of a run."""
+
+    def __init__(self, spec: ChannelSpec, suite: ChannelSuite) -> None:
+        self._spec, self._suite, self._ticks = spec, suite, 0
+        self._view: ChannelView | None = None
+
+    def observe(
+        self,
+        tick: int,
+        states: ActorStates,
+        lights: Mapping[int, LightState],
+        braking: NDArray[np.bool_],
+    ) -> None:
+        """Counts a tick of the run, and measures where it begins a cycle."""
+        del tick, braking
+        cycle, rest = divmod(self._ticks, self._spec.period)
+        self._ticks += 1
+        if not rest:
+            self._view = self._suite.observe((cycle + self._spec.first) * CYCLE, states, lights)
+
+    def view(self) -> ChannelView:
+        """Returns what the newest cycle measured."""
+        assert self._view is not None, "the first tick of a run is measured"
+        return self._view
 
 
 class Readings(Mapping[str, Any]):

@@ -132,8 +132,8 @@ class SensorFrame:
     contacts: tuple[ContactEvent, ...] = ()
     invasions: tuple[LaneInvasion, ...] = ()
     supervision: Supervision = Supervision.NONE
-    # readings of the sensors that the stack asked for, by id: CameraImage, LidarPoints, GnssFix,
-    # ImuReading, or m/s of a speedometer; each is made when it is first read
+    # readings of the sensors that the stack asked for, by id: plain data and
+    # arrays as their type in `core.sensor_types` says; each is made when it is first read
     extra: Mapping[str, Any] = field(default_factory=dict)
 
 

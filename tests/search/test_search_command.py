@@ -48,7 +48,7 @@ def test_the_answer_counts_what_the_trials_say(found):
         f"{len(failing)} failures of our stack (acc, lca, limiter, resume, tla) in 40"
     )
     assert f"the first in run {failing[0].number + 1}." in text
-    avoided = [one for one in findings.judged if one.is_avoidable]
+    avoided = [one for one in findings.judged if one.trial.is_avoidable]
     assert f"avoids {len(avoided)} of the {len({t.motion for t in failing})}" in text
     page = (out / "report.html").read_text(encoding="utf-8")
     assert text.splitlines()[0] in page

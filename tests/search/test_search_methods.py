@@ -52,3 +52,18 @@ def test_descents_find_a_small_region_sooner_than_chance():
 def test_batches_make_up_the_budget():
     assert batch_sizes(40) == [BATCH, BATCH, 8]
     assert batch_sizes(32) == [BATCH, BATCH]
+
+
+def test_a_crash_that_the_reference_driver_has_too_is_no_place_to_look():
+    from skidpad.recording.searches import Trial
+    from skidpad.search.loop import _told_margin
+
+    hit = Trial(number=0, unit=(0.5,), values={}, margin=-1.0, contact_kmh=30.0, other="lead")
+    clean = Trial(number=0, unit=(0.5,), values={}, margin=1.5)
+    assert _told_margin(Trial(**{**_fields(hit), "reference": clean})) == -1.0
+    assert _told_margin(Trial(**{**_fields(hit), "reference": hit})) == 2.0
+    assert _told_margin(clean) == 1.5
+
+
+def _fields(trial):
+    return {name: getattr(trial, name) for name in trial.__struct_fields__}

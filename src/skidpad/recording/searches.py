@@ -51,6 +51,7 @@ class Trial(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         departed_s: when all wheels had left every lane.
         motion: hash of what moved (decision T-3): equal drives are one.
         fault: why it could not be driven, or how the stack failed; "" where neither.
+        reference: of a failure, the same values with the reference driver at the wheel.
     """
 
     number: int
@@ -68,6 +69,15 @@ class Trial(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     departed_s: float | None = None
     motion: str = ""
     fault: str = ""
+    reference: Trial | None = None
+
+    @property
+    def is_avoidable(self) -> bool:
+        """Whether it is a failure, and the reference driver touches nothing and stays on the road."""
+        r = self.reference
+        if not self.is_failure or r is None:
+            return False
+        return r.contact_kmh is None and r.departed_s is None and not r.fault
 
     @property
     def is_failure(self) -> bool:
@@ -95,23 +105,10 @@ class Change(Struct, frozen=True, forbid_unknown_fields=True):
 
 
 class Judged(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A failure, and what the reference driver did in the same place.
-
-    Attributes:
-        trial: the failure.
-        reference: of the same values with the reference driver at the wheel.
-        likelihood: of the values beside the likeliest ones, 0 to 1.
-    """
+    """A failure, and how likely its values are beside the likeliest ones, 0 to 1."""
 
     trial: Trial
-    reference: Trial
     likelihood: float
-
-    @property
-    def is_avoidable(self) -> bool:
-        """Whether the reference driver touches nothing and stays on the road with the same values."""
-        r = self.reference
-        return r.contact_kmh is None and r.departed_s is None and not r.fault
 
 
 class Group(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -79,7 +79,7 @@ def answer(search: Search, trials: Sequence[Trial], findings: Findings) -> str:
         if nearest.min_gap_m is not None:
             near = f"the nearest came to a gap of {nearest.min_gap_m:.1f} m"
         return f"No failure of {driver} in {runs}; {near}. This is no proof that there is none."
-    avoided = [one for one in findings.judged if one.is_avoidable]
+    avoided = [one for one in findings.judged if one.trial.is_avoidable]
     known = f"The reference driver avoids {len(avoided)} of the {len(findings.judged)} that differ"
     kinds = f", which are of {count_text(len(findings.groups), 'kind')}" if avoided else ""
     return (
@@ -121,7 +121,7 @@ def _value(value: float | str) -> str:
 
 
 def _answers(search: Search, trials: Sequence[Trial], findings: Findings) -> Answers:
-    unavoidable = [one for one in findings.judged if not one.is_avoidable]
+    unavoidable = [one for one in findings.judged if not one.trial.is_avoidable]
     faults = [t for t in trials if t.fault]
     items = [
         Answer(
@@ -145,7 +145,7 @@ def _failures(out: Path, findings: Findings) -> list[Block]:
     for group in findings.groups:
         blocks += [Text(group_sentence(group), "lead")]
         blocks += [_failure_table(out, group.failures, group.kind)]
-    hard = [one for one in findings.judged if not one.is_avoidable]
+    hard = [one for one in findings.judged if not one.trial.is_avoidable]
     if hard:
         blocks += [
             Text(
@@ -180,15 +180,15 @@ def _failure_row(out: Path, one: Judged) -> list[Cell]:
         Cell(str(trial.number + 1), trial.number, href=href),
         _number(trial.contact_kmh, ".1f"),
         _number(trial.contact_s if trial.departed_s is None else trial.departed_s, ".2f"),
-        _reference_cell(one.reference),
+        _reference_cell(trial.reference),
         _number(one.likelihood, ".3g"),
         Cell(values),
     ]
 
 
-def _reference_cell(reference: Trial) -> Cell:
+def _reference_cell(reference: Trial | None) -> Cell:
     """Return what the reference driver came to with the values of a failure."""
-    if reference.fault:
+    if reference is None or reference.fault:
         return Cell("not driven", -2.0)
     if reference.departed_s is not None:
         return Cell("leaves the road", -1.5)

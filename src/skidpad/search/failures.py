@@ -5,7 +5,6 @@ lies to a harmless run.
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -30,7 +29,7 @@ from skidpad.recording.searches import (
 from skidpad.search.files import write_choices
 from skidpad.search.loop import drive_all
 from skidpad.search.space import apply_values
-from skidpad.search.trial import Point, unit_tuple, with_reference
+from skidpad.search.trial import Point, unit_tuple
 
 KEPT = 3  # failures of each group that are kept as runs
 HALVINGS = 7  # of the way from a harmless value to a failing one: to less than 1 % of it
@@ -45,22 +44,16 @@ def distinct_failures(trials: Iterable[Trial]) -> list[Trial]:
     return list(found.values())
 
 
-def judge_failures(found: Search, failures: Sequence[Trial], runner: Runner) -> list[Judged]:
-    """Drive every failure again with the reference driver at the wheel."""
-    points = [_point(found, t.unit, k) for k, t in enumerate(failures)]
-    template = with_reference(found.template)
-    driven = drive_all([replace(p, template=template) for p in points], runner)
-    return [
-        Judged(trial=t, reference=r, likelihood=found.space.likelihood(t.values))
-        for t, r in zip(failures, driven, strict=True)
-    ]
+def judge_failures(found: Search, failures: Sequence[Trial]) -> list[Judged]:
+    """Return the failures with the likelihood of their values."""
+    return [Judged(trial=t, likelihood=found.space.likelihood(t.values)) for t in failures]
 
 
 def group_failures(judged: Sequence[Judged]) -> list[Group]:
     """Return avoidable failures by kind, the largest group first."""
     kinds: dict[str, list[Judged]] = {}
     for one in judged:
-        if one.is_avoidable:
+        if one.trial.is_avoidable:
             kinds.setdefault(one.trial.kind, []).append(one)
     groups = [
         Group(kind=kind, failures=tuple(sorted(ones, key=_least_likely)))
@@ -130,7 +123,7 @@ def _point(found: Search, unit: Iterable[float], number: int) -> Point:
 
 def look_at_failures(found: Search, trials: Sequence[Trial], runner: Runner) -> Findings:
     """Judge all failures of a search, group them, and find the border of each group."""
-    judged = judge_failures(found, distinct_failures(trials), runner)
+    judged = judge_failures(found, distinct_failures(trials))
     groups = [find_border(found, g, trials, runner) for g in group_failures(judged)]
     return Findings(tuple(judged), tuple(groups))
 

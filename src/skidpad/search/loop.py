@@ -7,19 +7,21 @@ again and reads what they came to, so it goes on as if it had never stopped.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
 import numpy as np
-from msgspec import Struct
+from msgspec import Struct, structs
 
 from skidpad.campaign.worker import Job, Runner
 from skidpad.core.errors import FileError, OutputError
 from skidpad.recording.files import write_bytes
 from skidpad.recording.risks import RISK, RISK_RUNS, Risk, read_risk
 from skidpad.recording.searches import SEARCH, TRIALS, Search, Trial, read_search, read_trials
+from skidpad.search.margin import NO_CONFLICT
 from skidpad.search.methods import batch_sizes, make_method
-from skidpad.search.trial import Point, drive_point, unit_tuple
+from skidpad.search.trial import Point, drive_point, unit_tuple, with_reference
 
 DEADLINE_S = 600.0  # of one run
 
@@ -76,14 +78,28 @@ def search(found: Search, out: Path, runner: Runner, known: Sequence[Trial]) -> 
                 for k, p in enumerate(points)
             ]
             new = [p for p in batch if not _is_known(stored, p, out)]
-            stored |= {trial.number: trial for trial in drive_all(new, runner)}
+            stored |= {trial.number: trial for trial in _drive_with_reference(new, runner)}
             trials = [stored[p.number] for p in batch]
             for trial in trials:
                 if trial.number in {p.number for p in new}:
                     file.write(msgspec.json.encode(trial) + b"\n")
                 yield trial
-            method.tell(points, np.array([trial.margin for trial in trials]))
+            method.tell(points, np.array([_told_margin(trial) for trial in trials]))
             number += size
+
+
+def _drive_with_reference(points: Sequence[Point], runner: Runner) -> list[Trial]:
+    """Drive points, and every failure once more with the reference driver at the wheel."""
+    trials = drive_all(points, runner)
+    failing = {t.number for t in trials if t.is_failure}
+    again = [replace(p, template=with_reference(p.template)) for p in points if p.number in failing]
+    references = {t.number: t for t in drive_all(again, runner)}
+    return [structs.replace(t, reference=references.get(t.number)) for t in trials]
+
+
+def _told_margin(trial: Trial) -> float:
+    """Return what a method learns; a crash that the reference driver has as well is no place to look."""
+    return NO_CONFLICT if trial.is_failure and not trial.is_avoidable else trial.margin
 
 
 def _rewrite(out: Path, known: Sequence[Trial]) -> None:
@@ -118,4 +134,6 @@ def drive_all(points: Sequence[Point], runner: Runner) -> list[Trial]:
 def _blank_trial(point: Point, detail: str) -> Trial:
     values = point.space.values(point.unit)
     last = detail.strip().rpartition("\n")[2] or "the run was lost"
-    return Trial(number=point.number, unit=point.unit, values=values, margin=2.0, fault=last)
+    return Trial(
+        number=point.number, unit=point.unit, values=values, margin=NO_CONFLICT, fault=last
+    )

@@ -207,9 +207,10 @@ def _module_table(segments: pl.DataFrame, modules: list[str]) -> list[Block]:
         ),
     ]
     note = (
-        "The threshold of the total is 25 ms, that of a module its own maximum in the drive, which "
-        "nothing breaches. Published towns in italics, from an automotive processor (four "
-        "Cortex-A53): another machine, so they do not compare."
+        "The threshold of the total is 25 ms, that of a module its own maximum on the route, which "
+        "nothing breaches. Over all routes each drive counts against its own route's. Published "
+        "towns in italics, from an automotive processor (four Cortex-A53): another machine, so they "
+        "do not compare."
     )
     return [table(columns, rows, "Times of each module in each route", note)]
 

@@ -49,12 +49,18 @@ def timing_statistics(timing: pl.DataFrame) -> pl.DataFrame:
 
 def time_figures(t: NDArray[np.float64], module: str) -> dict[str, float]:
     """Mean, extremes and deviation of times (k,) in ms, and shares against the module's threshold."""
-    limit = BUDGET_MS if module == "total" else float(t.max())
     return {
         "mean_ms": float(t.mean()),
         "max_ms": float(t.max()),
         "min_ms": float(t.min()),
         "std_ms": float(t.std()),
+        **time_shares(t, BUDGET_MS if module == "total" else float(t.max())),
+    }
+
+
+def time_shares(t: NDArray[np.float64], limit: float) -> dict[str, float]:
+    """Percent of times (k,) in ms above the threshold, within 90 % of it and under half of it."""
+    return {
         "breaches_pct": float(100.0 * (t > limit).mean()),
         "within_90_pct": float(100.0 * ((t >= 0.9 * limit) & (t <= limit)).mean()),
         "under_50_pct": float(100.0 * (t < 0.5 * limit).mean()),

@@ -11,7 +11,7 @@ from channel_worlds import Eyes, World, drive
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.judging.evaluation import Evaluation
 from skidpad.evidence.channels.judging.kept import code_hash, segment_bytes, segment_from
-from skidpad.evidence.channels.judging.segments import judge
+from skidpad.evidence.channels.judging.segments import Segment, judge
 from skidpad.recording.cycles import cycles
 
 MADE_BY = {"code": "a", "curve": "gap"}
@@ -56,3 +56,25 @@ def test_a_damaged_file_is_not_taken(segment):
 def test_the_code_has_one_name_as_long_as_it_is_the_same():
     assert code_hash() == code_hash()
     assert len(code_hash()) == 64
+
+
+@pytest.mark.req("C-233")
+def test_shares_of_a_module_are_against_its_maximum_on_the_route():
+    """By hand: 10 ms is the greatest of the route, so 8 ms of the other drive is not within 90 %."""
+
+    def timed(name, route, total, comfort):
+        times = np.column_stack([total, comfort, comfort, comfort])
+        return Segment(name, route, 1.0, {"practical": ()}, {}, {}, 0, {}, (), times=times)
+
+    rows = Evaluation(
+        [
+            timed("a", "coast", [20.0, 26.0, 12.0, 24.0], [10.0, 9.5, 4.0, 3.0]),
+            timed("b", "coast", [20.0, 20.0, 20.0, 20.0], [8.0, 8.0, 4.0, 9.0]),
+            timed("c", "town", [1.0, 1.0, 1.0, 1.0], [8.0, 8.0, 4.0, 2.0]),
+        ]
+    ).segment_table()
+    assert rows["comfort_within_90_pct"].to_list() == [50.0, 25.0, 50.0]
+    assert rows["comfort_under_50_pct"].to_list() == [50.0, 25.0, 25.0]
+    assert rows["comfort_breaches_pct"].to_list() == [0.0, 0.0, 0.0]
+    assert rows["total_breaches_pct"].to_list() == [25.0, 0.0, 0.0]
+    assert rows["total_within_90_pct"].to_list() == [25.0, 0.0, 0.0]

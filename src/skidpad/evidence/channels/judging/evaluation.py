@@ -8,7 +8,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import polars as pl
+from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.told import on_a_line
@@ -16,6 +18,7 @@ from skidpad.core.vocabulary import HazardType, Stratum
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Profile
 from skidpad.evidence.channels.judging.causes import EXPLAINED
 from skidpad.evidence.channels.judging.curves import Point
+from skidpad.evidence.channels.judging.facts import route_shares
 from skidpad.evidence.channels.judging.segments import Segment
 from skidpad.evidence.channels.matching import (
     TOLERANCES,
@@ -28,6 +31,8 @@ from skidpad.evidence.channels.matching import (
     tally,
 )
 
+Floats = NDArray[np.float64]
+NONE: Floats = np.zeros(0)
 LABEL_COLUMNS = ("hazard", "start_s", "end_s", "world", "annotator", "note")
 
 
@@ -169,7 +174,15 @@ class Evaluation:
 
     def segment_table(self) -> pl.DataFrame:
         """One row per segment: practical rules against world-model truth, and the drive's facts."""
-        return pl.DataFrame([_facts(s) for s in self.segments], infer_schema_length=None)
+        greatest: dict[str, Floats] = {}
+        for s in self.segments:
+            if len(s.times):
+                most = s.times.max(axis=0)
+                greatest[s.route] = np.maximum(most, greatest.get(s.route, most))
+        rows = [
+            _facts(s) | route_shares(s.times, greatest.get(s.route, NONE)) for s in self.segments
+        ]
+        return pl.DataFrame(rows, infer_schema_length=None)
 
     def _result(self, identifier: str, truth: str, tolerance: float) -> dict[str, Any]:
         scores = self.scores(identifier, truth, tolerance)

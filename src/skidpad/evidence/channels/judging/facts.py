@@ -17,10 +17,11 @@ from skidpad.evidence.channels.judging.causes import V_STANDING, YAW_RATE_TURN
 from skidpad.evidence.channels.monitor import Monitor
 from skidpad.evidence.channels.recorder import CycleEvidence
 from skidpad.evidence.channels.timefilter import Event
-from skidpad.evidence.channels.timing import MODULES, time_figures
+from skidpad.evidence.channels.timing import BUDGET_MS, MODULES, time_figures, time_shares
 
 Floats = NDArray[np.float64]
 COMPARED = MODULES[:3]  # those of C-232
+TIMED = ("total", *COMPARED)
 MANY_OBJECTS = 5  # objects of the busiest channel (C-238)
 WARM_CYCLES = 20  # whose times are left out
 CYCLES_MIN = 20  # on either side of a comparison
@@ -126,10 +127,29 @@ def times_of(times: pl.DataFrame) -> dict[str, float]:
         "total_p999_ms": float(np.percentile(warm["total"].to_numpy(), 99.9)),
         "motion_prediction_share": means["motion_prediction"] / max(sum(means.values()), 1e-9),
     }
-    for module in ("total", *COMPARED):
+    for module in TIMED:
         figures = time_figures(warm[module].to_numpy(), module)
         out |= {f"{module}_{name}": value for name, value in figures.items()}
     return out
+
+
+def warm_times(times: pl.DataFrame) -> Floats:
+    """Returns the times in ms (k, 4) of TIMED, without the first cycles; none of a short drive."""
+    if len(times) <= 2 * WARM_CYCLES:
+        return np.empty((0, len(TIMED)))
+    return np.asarray(times[WARM_CYCLES:].select(TIMED).to_numpy(), dtype=np.float64)
+
+
+def route_shares(times: Floats, greatest: Floats) -> dict[str, float]:
+    """Shares of a drive's times (k, 4) against thresholds: 25 ms, and the modules' route maxima (C-233)."""
+    if not len(times):
+        return {}
+    limits = [BUDGET_MS, *greatest[1:].tolist()]
+    return {
+        f"{module}_{name}": value
+        for k, (module, limit) in enumerate(zip(TIMED, limits, strict=True))
+        for name, value in time_shares(times[:, k], limit).items()
+    }
 
 
 def _apart(values: Floats, a: NDArray[np.bool_], b: NDArray[np.bool_]) -> float | None:

@@ -21,7 +21,7 @@ from skidpad.core.errors import FileError
 from skidpad.core.reading import UNUSABLE, read_arrays
 from skidpad.evidence.channels.judging.segments import Segment
 
-ARRAYS = ("t", "rows", "motion")
+ARRAYS = ("t", "rows", "motion", "times")
 KIND = "a judged recording"
 FOLDER = Path(__file__).parents[1]  # all that judges
 

@@ -43,7 +43,7 @@ from skidpad.evidence.channels.judging.curves import (
     told_the_grip,
     with_limit,
 )
-from skidpad.evidence.channels.judging.facts import Observer, times_of
+from skidpad.evidence.channels.judging.facts import Observer, times_of, warm_times
 from skidpad.evidence.channels.judging.truth.marks import TrueHazard
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
 from skidpad.evidence.channels.judging.truth.worldmodel import world_model_truth
@@ -80,6 +80,7 @@ class Segment:
     t: Floats = field(default_factory=lambda: np.empty(0))  # (k,) s, and what an identifier sees
     rows: Floats = field(default_factory=lambda: np.empty((0, 0)))  # (k, f)
     motion: Floats = field(default_factory=lambda: np.empty((0, 3)))  # (k, 3) see causes.moments
+    times: Floats = field(default_factory=lambda: np.empty((0, 4)))  # (k, 4) ms, see warm_times
 
     @property
     def stratum(self) -> Stratum:
@@ -152,6 +153,7 @@ def judge(
         t=t,
         rows=seen.rows,
         motion=motion,
+        **({"times": warm_times(timer.table())} if timer and cycles else {}),
     )
 
 

@@ -9,12 +9,14 @@ from hypothesis import strategies as st
 
 from channel_worlds import Eyes, World, drive, frame
 from skidpad.core.channels import Cycle
+from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import Profile, Signal
 from skidpad.evidence.channels.judging.truth.simulator import would_hit
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings, drive_events
 from skidpad.evidence.channels.tracked.distance import SafeDistance
+from skidpad.evidence.channels.tracked.grip import OwnGrip, planned_acceleration
 from skidpad.evidence.channels.tracked.tracks import Lookout, Tracks
 from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, Tracked, parting
 from skidpad.recording.cycles import cycles
@@ -154,7 +156,8 @@ def test_it_is_confirmed_for_half_a_second_and_ends_when_the_gap_is_surely_long(
 
 @pytest.mark.req("C-121")
 @pytest.mark.parametrize(
-    ("offset", "alarms"), [((0.0, 0.0), 0), ((1.5, 0.0), 0), ((0.0, 2.5), 1), ((2.5, 0.0), 1)]
+    ("offset", "alarms"),
+    [((0.0, 0.0), 0), ((0.4, 0.0), 0), ((1.7, 0.0), 1), ((0.0, 2.5), 1), ((2.5, 0.0), 1)],
 )
 def test_positions_are_inconsistent_beyond_what_their_accuracy_explains(offset, alarms):
     eyes = (Eyes("a", ego_noise=0.1), Eyes("b", ego_noise=0.1, ego_offset={5.0: offset}))
@@ -201,3 +204,65 @@ def test_a_channel_whose_ego_has_no_outline_says_nothing_of_gaps_and_plans():
         signals = monitor.update(Cycle(k, 0.1 * k, (bare, bare))).signals.values
     assert np.isnan(signals[Signal.PLANS_APART])
     assert not signals[Signal.REAR_DEFICIT] > 0.0
+
+
+def shown_grip(v, got, asked, cycles=25):
+    """What a car shows that changes its speed by `got` m/s^2 where its plans ask for `asked`."""
+    own, s = OwnGrip(), np.arange(16) * 0.25
+    for k in range(cycles):
+        now = v + 0.1 * k * got
+        plan = np.column_stack([now * s + 0.5 * asked * s**2, 0 * s, s])
+        one = frame(0.1 * k, (0.0, 0.0, 0.0, now, 0.0), plan=plan)
+        own.update(0.1 * k, [one, one])
+    return own
+
+
+def test_a_car_that_gets_less_than_it_asks_for_shows_the_grip():
+    braking = shown_grip(15.0, -0.85 * 0.12 * G, -5.0)
+    assert braking.grip == pytest.approx(0.12)
+    driving = shown_grip(2.0, 0.5 * 0.12 * G, 1.5)  # half the weight on the driven axle
+    assert driving.grip == pytest.approx(0.12)
+    assert shown_grip(15.0, -4.6, -5.0).grip is None  # it gets what it asks for
+    assert shown_grip(20.0, 0.3, 1.5).grip is None  # an engine at its end
+    assert shown_grip(2.0, 0.5, 1.5, cycles=14).grip is None  # pedals are slow
+    assert shown_grip(0.0, 0.0, 1.5).grip is None  # held by its brake
+
+
+def test_a_car_that_gets_more_than_the_grip_allows_disproves_it():
+    own = shown_grip(2.0, 0.5 * 0.12 * G, 1.5)
+    for k in range(25, 45):
+        s = np.arange(16) * 0.25
+        v = 10.0 - 0.1 * (k - 25) * 4.0
+        plan = np.column_stack([v * s - 2.0 * s**2, 0 * s, s])
+        own.update(0.1 * k, [frame(0.1 * k, (0.0, 0.0, 0.0, v, 0.0), plan=plan)])
+    assert own.grip is None
+
+
+def test_plans_of_two_minds_and_broken_ones_show_nothing():
+    own = OwnGrip()
+    s = np.arange(16) * 0.25
+    for k in range(25):
+        v = 2.0 + 0.05 * k
+        go = frame(0.1 * k, (0, 0, 0, v, 0), plan=np.column_stack([v * s + s**2, 0 * s, s]))
+        stop = go._replace(plan=np.column_stack([v * s - s**2, 0 * s, s]))
+        own.update(0.1 * k, [go, stop])
+    assert own.grip is None
+    assert planned_acceleration(go._replace(plan=go.plan[:3])) is None
+    assert planned_acceleration(go._replace(plan=np.zeros((9, 3)))) is None
+    own.update(9.0, [None, go._replace(plan=np.full((9, 3), np.nan))])
+    own.update(9.1, [None, None])
+
+
+def test_a_position_that_leaves_its_odometry_is_inconsistent_though_channels_are_near():
+    """1.5 m between two channels is within what the chi-square explains; a leap of 1.5 m is not."""
+    tracked, leaps = Tracked("ab"), []
+    for k in range(40):
+        x, jump = 1.5 * k, (1.5 if k >= 20 else 0.0)
+        one, two = (frame(0.1 * k, (x, y, 0.0, 15.0, 0.0)) for y in (0.0, jump))
+        signals = tracked.update(0.1 * k, [one, two])
+        leaps.append(signals[Signal.POSITION_LEAP])
+        assert not signals[Signal.OFFSET_CHI2] > CHI2_LIMIT
+    np.testing.assert_allclose(leaps[:20], 0.0, atol=1e-9)
+    np.testing.assert_allclose(leaps[20:25], 1.5)
+    np.testing.assert_allclose(leaps[26:], 0.0, atol=1e-9)
+    assert np.isnan(tracked.update(4.0, [None, None])[Signal.POSITION_LEAP])

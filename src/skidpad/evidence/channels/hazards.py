@@ -75,13 +75,14 @@ class Signal(str, Enum):
     FRONT_DEFICIT = "front_deficit"  # m
     UNSEEN_DEFICIT = "unseen_deficit"  # m, of an object that another channel does not report
     OFFSET_CHI2 = "offset_chi2"  # of positions, greatest over pairs
+    POSITION_LEAP = "position_leap"  # m by which one leaves what odometry says, over channels
     PLANS_APART = "plans_apart"  # s until two plans share no ground, least over pairs
 
 
 NOT_TRACKED = dict.fromkeys(
     (
         Signal.REAR_DEFICIT, Signal.FRONT_DEFICIT, Signal.UNSEEN_DEFICIT, Signal.OFFSET_CHI2,
-        Signal.PLANS_APART,
+        Signal.POSITION_LEAP, Signal.PLANS_APART,
     ),
     float("nan"),
 )  # fmt: skip

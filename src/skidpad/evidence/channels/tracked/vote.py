@@ -12,6 +12,8 @@ import numpy as np
 from skidpad.core.channels import ChannelFrame
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.tracked.distance import SafeDistance
+from skidpad.evidence.channels.tracked.grip import OwnGrip
+from skidpad.evidence.channels.tracked.odometer import Odometer
 from skidpad.evidence.channels.tracked.tracks import CONFIRM, SURE, Lookout, Seen, Track, Tracks
 
 SAME = 4.0  # m between two channels' reports of one object
@@ -27,8 +29,11 @@ class Tracked:
     def __init__(
         self, channels: Sequence[str], safe: SafeDistance | None = None, sure: float = SURE
     ) -> None:
+        """safe: None: on the grip that the vehicle itself shows, on a dry road until it does."""
         self.lookouts = [Lookout() for _ in channels]
         self.tracks = [Tracks(safe or SafeDistance(), sure) for _ in channels]
+        self.own_grip = OwnGrip() if safe is None else None
+        self.odometers = [Odometer() for _ in channels]
         self.pairs = tuple(combinations(range(len(channels)), 2))
         self.offsets: list[deque[tuple[float, float, float]]] = [deque() for _ in self.pairs]
         self.apart: list[deque[tuple[float, float]]] = [deque() for _ in self.pairs]
@@ -38,6 +43,7 @@ class Tracked:
         seen = [out.see(f) for out, f in zip(self.lookouts, frames, strict=True)]
         return self.distances(t, seen, frames) | {
             Signal.OFFSET_CHI2: self._offset(t, frames),
+            Signal.POSITION_LEAP: self._leap(t, frames),
             Signal.PLANS_APART: self._plans(t, frames),
         }
 
@@ -45,6 +51,7 @@ class Tracked:
         self, t: float, seen: Sequence[Seen | None], frames: Sequence[ChannelFrame | None]
     ) -> dict[Signal, float]:
         """The first of them alone, by what lookouts have seen in the frames."""
+        self._learn_grip(t, frames)
         for tracks, one in zip(self.tracks, seen, strict=True):
             tracks.update(t, one)
         out = {
@@ -81,6 +88,21 @@ class Tracked:
             if near and other.behind is track.behind:
                 return other
         return None
+
+    def _learn_grip(self, t: float, frames: Sequence[ChannelFrame | None]) -> None:
+        """The safe distance is that of the grip which the vehicle shows, unless it was told one."""
+        if self.own_grip is None:
+            return
+        before, grip = self.own_grip.grip, self.own_grip.update(t, frames)
+        if grip != before:
+            safe = SafeDistance() if grip is None else SafeDistance.on(grip)
+            for tracks in self.tracks:
+                tracks.safe = safe
+
+    def _leap(self, t: float, frames: Sequence[ChannelFrame | None]) -> float:
+        """Greatest over channels of the m by which a position left what odometry says; NaN: unknown."""
+        leaps = [o.update(t, f) for o, f in zip(self.odometers, frames, strict=True)]
+        return max((leap for leap in leaps if leap == leap), default=nan)
 
     def _offset(self, t: float, frames: Sequence[ChannelFrame | None]) -> float:
         """Greatest chi-square over pairs of the mean offset of 0.5 s; NaN without a full window."""

@@ -113,7 +113,7 @@ def missed(results: Path) -> str:
 
 
 def curves(results: Path) -> str:
-    """Best harmonic mean on each curve, and the ceiling."""
+    """Best harmonic mean on each curve."""
     head = ["drivers", "identifier", "hazard", "limit", "precision, %", "recall, %"]
     rows: Rows = []
     parts = _read(results, "report")["strata"] | _on_ice(results)

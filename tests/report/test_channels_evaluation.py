@@ -8,8 +8,8 @@ from svg_values import curves_of, marks_of
 from channel_worlds import Eyes, World, drive
 from skidpad.core.errors import FileError, InputError
 from skidpad.evidence.channels.hazards import Signal
-from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
 from skidpad.evidence.channels.judging.evaluation import Evaluation
+from skidpad.evidence.channels.judging.reference import NAME as REFERENCE
 from skidpad.evidence.channels.judging.segments import judge
 from skidpad.recording.channel_drives import DriveOutcome, DriveRecord
 from skidpad.recording.cycles import cycles
@@ -166,19 +166,29 @@ def test_the_curve_over_the_threshold_has_recall_and_false_alarms_of_each_hazard
 def test_precision_stands_over_recall_at_each_limit_with_the_reference_as_a_star():
     # limit, right, false, -, weights found and true
     points = [[0.1, 6, 6, 0, 0.75, 1.0], [0.5, 3, 1, 0, 0.5, 1.0], [0.9, 0, 0, 0, 0.0, 1.0]]
+    hindsight = [[0.0, 8, 2, 0, 0.9, 1.0], [5.0, 5, 5, 0, 1.0, 1.0]]
     hazards = ("inconsistent_localisation", "ego_tailgating", "ego_tailgated")
-    ceiling = {h: {"recall_weighted": 0.9, "precision": 0.8} for h in hazards}
+    reference = {h: {"recall_weighted": 0.9, "precision": 0.8} for h in hazards}
     part = {
         "hours": 1.0,
-        "precision_recall": {"sim": {"tracked": dict.fromkeys(hazards, points)}},
-        "results": [{"rules": CEILING, "truth": "sim", "tolerance_s": 1.0, "hazards": ceiling}],
+        "precision_recall": {
+            "sim": {
+                "tracked": dict.fromkeys(hazards, points),
+                REFERENCE: dict.fromkeys(hazards, hindsight),
+            }
+        },
+        "results": [{"rules": REFERENCE, "truth": "sim", "tolerance_s": 1.0, "hazards": reference}],
     }
     (figure,) = precision_recall({"strata": {"natural": part}})
     lines = curves_of(figure.svg, PALETTE[0])
     assert len([line for _, line in lines if len(line) == 2]) == 3, "one per hazard"
     for _, line in lines:
         assert line == pytest.approx(np.array([[0.75, 0.5], [0.5, 0.75]]), abs=5e-3)
-    stars = marks_of(figure.svg, PALETTE[1])
+    dashed = [line for _, line in curves_of(figure.svg, PALETTE[1]) if len(line) == 2]
+    assert len(dashed) == 3
+    for line in dashed:
+        assert line == pytest.approx(np.array([[0.9, 0.8], [1.0, 0.5]]), abs=5e-3)
+    stars = marks_of(figure.svg, PALETTE[2])
     assert len(stars) == 3
     for _, at in stars:
         assert at == pytest.approx(np.array([[0.9, 0.8]]), abs=5e-3)

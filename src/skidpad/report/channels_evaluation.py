@@ -12,7 +12,7 @@ import polars as pl
 from skidpad import __version__
 from skidpad.core.reading import convert_plain, decode_json, read_bytes
 from skidpad.evidence.channels.findings import FINDINGS
-from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
+from skidpad.evidence.channels.judging.reference import NAME as REFERENCE
 from skidpad.evidence.channels.judging.segments import TOLD
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import channels_scores as scores
@@ -153,7 +153,7 @@ def _answers(evaluation: Row, judged: Sequence[Judgement]) -> Answers:
 
 def _deciding(evaluation: Row) -> tuple[list[Row], str]:
     """What identifiers came to by the truth that decides (C-3), and of what; not who is told of it."""
-    rows = [r for r in headline(evaluation) if r["rules"] not in (CEILING, TOLD)]
+    rows = [r for r in headline(evaluation) if r["rules"] not in (REFERENCE, TOLD)]
     if any(r["truth"] == "sim" for r in rows):
         return [r for r in rows if r["truth"] == "sim"], "the hazards that were really there"
     world = [r for r in rows if r["truth"] == "world"]

@@ -6,12 +6,14 @@ from collections.abc import Iterator
 from functools import partial
 from typing import Any
 
-from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
+from skidpad.evidence.channels.judging.reference import NAME as REFERENCE
 from skidpad.report.channels_scores import FEW, HAZARDS, Row, count, headline, ratio, ratio_text
 from skidpad.report.figures import Chart, Curve, curves
 from skidpad.report.page import Block, Cell, Figure, Text, words
 from skidpad.report.tables import Column, table
 
+STAR = {"marker": "*", "ms": 12, "ls": "none"}
+STYLES = ({"marker": ".", "ms": 4}, {"marker": ".", "ms": 4, "ls": "--"})  # the reference is dashed
 SHARE = (-0.03, 1.03)  # of axes
 STRATA = {
     "natural": "Natural drivers",
@@ -72,7 +74,7 @@ def _size(row: Row) -> Cell:
 
 
 def precision_recall(evaluation: Row) -> list[Block]:
-    """A chart per stratum: each identifier over its limits, the reference with hindsight as a point."""
+    """A chart per stratum: each identifier over its limits, the reference with hindsight dashed."""
     parts = evaluation.get("strata", {}) or {"natural": evaluation}
     out: list[Block] = []
     for stratum, part in parts.items():
@@ -81,7 +83,8 @@ def precision_recall(evaluation: Row) -> list[Block]:
             continue
         text = (
             f"{STRATA[stratum]}, {part['hours']:.2f} h, simulator truth: precision against recall while "
-            f"each identifier's limit varies; the star is the reference with hindsight"
+            f"each identifier's limit varies; the reference with hindsight is dashed, the star is where "
+            "its limits are the truth's"
         )
         weighted = ", recall weighted" if stratum == "risky" else ""
         out.append(Figure(_chart(part, drawn), f"{text}{weighted}."))
@@ -95,20 +98,14 @@ def _chart(part: Row, drawn: Row) -> str:
     for hazard in HAZARDS:
         lines = [
             Curve(
-                words(name), *_line(drawn[name][hazard]), colour=k, style={"marker": ".", "ms": 4}
+                words(name), *_line(drawn[name][hazard]), colour=k, style=STYLES[name == REFERENCE]
             )
             for k, name in enumerate(names)
             if hazard in drawn[name]
         ]
         lines += [
-            Curve(
-                "reference",
-                [r],
-                [p],
-                colour=len(names),
-                style={"marker": "*", "ms": 12, "ls": "none"},
-            )
-            for r, p in _ceiling(part, hazard)
+            Curve("reference, the truth's limits", [r], [p], colour=len(names), style=STAR)
+            for r, p in _at_truths_limits(part, hazard)
         ]
         charts.append(
             Chart(lines, "recall", "precision", words(hazard), y_range=SHARE, x_range=SHARE)
@@ -124,9 +121,9 @@ def _line(points: list[list[float]]) -> tuple[list[float], list[float]]:
     return [r for r, _ in known], [p for _, p in known]
 
 
-def _ceiling(part: Row, hazard: str) -> Iterator[tuple[float, float]]:
+def _at_truths_limits(part: Row, hazard: str) -> Iterator[tuple[float, float]]:
     for result in headline(part):
-        if (result["rules"], result["truth"]) == (CEILING, "sim"):
+        if (result["rules"], result["truth"]) == (REFERENCE, "sim"):
             row: Any = result["hazards"][hazard]
             known = row["recall_weighted"] is not None and row["precision"] is not None
             yield from [(row["recall_weighted"], row["precision"])] * known

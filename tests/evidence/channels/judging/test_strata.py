@@ -20,6 +20,7 @@ from skidpad.evidence.channels.judging.curves import (
     with_limit,
 )
 from skidpad.evidence.channels.judging.evaluation import Evaluation
+from skidpad.evidence.channels.judging.reference import NAME as REFERENCE
 from skidpad.evidence.channels.judging.segments import judge
 from skidpad.evidence.channels.judging.truth import marks
 from skidpad.evidence.channels.judging.weights import Weights, weights_from
@@ -141,5 +142,5 @@ def test_every_identifier_has_a_curve_with_the_counts_that_results_have():
     points = {p.limit: p for p in curve}
     assert tuple(points) == SURES
     assert (points[2.0].tp, points[2.0].fp, points[2.0].fn) == (base.tp, base.fp, base.fn)
-    assert {c.identifier for c in s.points} == {"practical", "tracked"}
+    assert {c.identifier for c in s.points} == {"practical", "tracked", REFERENCE}
     assert {c.truth for c in s.points} == {"sim", "world"}

@@ -117,7 +117,7 @@ def test_nobody_who_could_hit_is_left_out(seed, long):
     ]
     near = simulator_truth(odd, names)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(simulator, "_near", lambda truth: np.arange(len(truth.actors)))
+        patch.setattr(simulator, "_near", lambda truth, spare: np.arange(len(truth.actors)))
         assert simulator_truth(odd, names) == near
 
 

@@ -29,8 +29,6 @@ from skidpad.evidence.channels.judging.causes import (
     mistakes,
     moments,
 )
-from skidpad.evidence.channels.judging.ceiling import NAME as CEILING
-from skidpad.evidence.channels.judging.ceiling import ceiling
 from skidpad.evidence.channels.judging.curves import (
     Swept,
     Table,
@@ -44,6 +42,8 @@ from skidpad.evidence.channels.judging.curves import (
     with_limit,
 )
 from skidpad.evidence.channels.judging.facts import Observer, times_of, warm_times
+from skidpad.evidence.channels.judging.reference import NAME as REFERENCE
+from skidpad.evidence.channels.judging.reference import at_the_truths_limits, reference
 from skidpad.evidence.channels.judging.truth.marks import TrueHazard
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
 from skidpad.evidence.channels.judging.truth.worldmodel import world_model_truth
@@ -131,7 +131,8 @@ def judge(
     if "sim" in found:
         told = told_the_grip(channels, looked, grip_of(cycles), begin)
         detected[TOLD] = _in_order([*_places(detected[Profile.TRACKED.value]), *told])
-        detected[CEILING] = tuple(s for s in ceiling(cycles, channels) if s.t_end >= begin)
+        sweeps[REFERENCE] = dict(reference(cycles, channels, begin))
+        detected[REFERENCE] = at_the_truths_limits(sweeps[REFERENCE])
     if marked := tuple(labels):
         found["labels"] = tuple(merge_spans(marked))
     duration = cycles[-1].t - begin if cycles else 0.0

@@ -46,18 +46,19 @@ class Mark:
     about: str
     kind: str = ""
     seen: bool = True
+    clearance: float = 0.0  # m that are left when the leader brakes; negative: a hit
 
 
-def offsets(rows: Floats, about: str) -> list[Mark]:
-    """Jumps and drifts of an offset given as rows of t, dx, dy."""
+def offsets(rows: Floats, about: str, factor: float = 1.0) -> list[Mark]:
+    """Jumps and drifts of an offset given as rows of t, dx, dy; factor: on both limits."""
     rows = rows[np.isfinite(rows).all(axis=1)]
     marks = []
     for k, (t, dx, dy) in enumerate(rows):
         j = int(np.searchsorted(rows[:, 0], t - JUMP_TIME - 1e-6))
         change = np.hypot(rows[j:k, 1] - dx, rows[j:k, 2] - dy).max(initial=0.0)
-        if change > JUMP:
+        if change > factor * JUMP:
             marks.append(Mark(HazardType.INCONSISTENT_LOCALISATION, t, about, JUMP_KIND))
-        elif np.hypot(dx, dy) > DRIFT:
+        elif np.hypot(dx, dy) > factor * DRIFT:
             marks.append(Mark(HazardType.INCONSISTENT_LOCALISATION, t, about, DRIFT_KIND))
     return marks
 

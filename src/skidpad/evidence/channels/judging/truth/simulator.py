@@ -39,15 +39,20 @@ VEHICLES = {
 def simulator_truth(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[TrueHazard]:
     """Hazards by true states; empty when the recording holds none."""
     known = [c for c in cycles if c.truth is not None]
-    path = _DrivenPath([c.truth for c in known if c.truth is not None])
-    marks: list[Mark] = []
-    for k, cycle in enumerate(known):
-        truth = cycle.truth
-        if truth is not None and np.hypot(*truth.ego[3:]) > V_EGO_MIN:
-            marks.extend(_tail_marks(k, cycle.t, truth, path, cycle.frames))
-    marks = lasting(marks, MIN_DURATION)
+    marks = lasting(tail_marks(known, 0.0), MIN_DURATION)
     marks.extend(_position_errors(known, channels))
     return merge_marks(marks, World.SIM)
+
+
+def tail_marks(cycles: Sequence[Cycle], spare: float) -> list[Mark]:
+    """Who follows whom so that at most `spare` m would be left; every cycle must hold a truth."""
+    path = _DrivenPath([c.truth for c in cycles if c.truth is not None])
+    marks: list[Mark] = []
+    for k, cycle in enumerate(cycles):
+        truth = cycle.truth
+        if truth is not None and np.hypot(*truth.ego[3:]) > V_EGO_MIN:
+            marks.extend(_tail_marks(k, cycle.t, truth, path, cycle.frames, spare))
+    return marks
 
 
 class _DrivenPath:
@@ -70,9 +75,14 @@ class _DrivenPath:
 
 
 def _tail_marks(
-    k: int, t: float, truth: TruthFrame, path: _DrivenPath, frames: Sequence[ChannelFrame | None]
+    k: int,
+    t: float,
+    truth: TruthFrame,
+    path: _DrivenPath,
+    frames: Sequence[ChannelFrame | None],
+    spare: float,
 ) -> list[Mark]:
-    near = _near(truth)
+    near = _near(truth, spare)
     line, s_ego = path.around(k) if near.size else (None, 0.0)
     if line is None:
         return []
@@ -101,19 +111,21 @@ def _tail_marks(
         else:
             gap = (s + min(along)) - (s_ego + front)
             hazard, about = HazardType.EGO_TAILGATING, (v_other, truth.mu[i], v_ego, truth.ego_mu)
-        if would_hit(max(gap, 0.0), *map(float, about)):
+        clearance = least_gap(max(gap, 0.0), *map(float, about))
+        if clearance <= spare:
             marks.append(
                 Mark(
                     hazard,
                     t,
                     f"actor {int(truth.ids[i])}",
                     seen=_is_reported(truth.actors[i], frames),
+                    clearance=clearance,
                 )
             )
     return marks
 
 
-def _near(truth: TruthFrame) -> NDArray[np.int64]:
+def _near(truth: TruthFrame, spare: float) -> NDArray[np.int64]:
     """Returns rows of actors within reach: no path is shorter than the straight line.
 
     Who has no wheels of ours (cyclists) has no grip, NaN; as a leader he brakes as hard as any.
@@ -122,7 +134,7 @@ def _near(truth: TruthFrame) -> NDArray[np.int64]:
     v = np.maximum(np.hypot(*truth.actors[:, 3:].T), np.hypot(*truth.ego[3:]))
     stop = v * REACTION_TIME + v * v / (2.0 * G * np.fmin(truth.mu, truth.ego_mu))
     sizes = _size(truth.polygons) + _size(truth.ego_polygon)
-    return np.flatnonzero((away < REACH) & (away < stop + 2.0 * sizes))
+    return np.flatnonzero((away < REACH) & (away < stop + 2.0 * sizes + spare))
 
 
 def _size(polygons: Floats) -> Floats:
@@ -134,7 +146,14 @@ def _size(polygons: Floats) -> Floats:
 def would_hit(
     gap: float, v_leader: float, mu_leader: float, v_follower: float, mu_follower: float
 ) -> bool:
-    """Whether the follower hits a leader that brakes at 6 m/s^2 and reacts after 1 s (C-3).
+    """Whether the follower hits a leader that brakes at 6 m/s^2 and reacts after 1 s (C-3)."""
+    return least_gap(gap, v_leader, mu_leader, v_follower, mu_follower) <= 0.0
+
+
+def least_gap(
+    gap: float, v_leader: float, mu_leader: float, v_follower: float, mu_follower: float
+) -> float:
+    """Least m between both when the leader brakes at 6 m/s^2; negative: how far they would overlap.
 
     The follower then brakes at all its grip; the leader at no more than its own. gap in m.
     """
@@ -146,7 +165,7 @@ def would_hit(
     leader = v_leader * np.minimum(t, t_leader) - a_leader * np.minimum(t, t_leader) ** 2 / 2.0
     braked = np.clip(t - REACTION_TIME, 0.0, v_follower / a_follower)
     follower = v_follower * (np.minimum(t, REACTION_TIME) + braked) - a_follower * braked**2 / 2.0
-    return bool((gap + leader - follower).min() <= 0.0)
+    return float((gap + leader - follower).min())
 
 
 def _is_reported(actor: Floats, frames: Sequence[ChannelFrame | None], within: float = 3.0) -> bool:

@@ -1,26 +1,32 @@
-"""The ceiling that sensor noise sets: what the truth's own rule finds in what channels saw.
+"""The reference with hindsight: what the truth's own rule finds in what channels saw.
 
 Every channel's objects are given to the actors that they really are (true association), smoothed
 with hindsight over the whole drive, and judged by the rule of simulator truth. No identifier that
-reads the same channels can be expected to do better, for it lacks the association, the hindsight
-and the rule. What this one misses or finds too much is noise, occlusion and range.
-
-For localisation it is a reference and no bound: no channel knows its own error, so the rule's limits
-are laid on the offset of two channels, and other limits trade misses for false alarms.
+reads one channel at a time has the association, the hindsight and the rule. What this one misses or
+finds too much is noise, occlusion and range. It is no bound: identifiers may fuse channels, and other
+limits trade misses for false alarms, so it is a curve over its limit: the m that would be left when
+the leader brakes, and for localisation a factor on the truth's limits, which are laid on the offset
+of two channels, as no channel knows its own error.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.channels import Cycle, TruthFrame
-from skidpad.evidence.channels.judging.truth.marks import World, offsets
-from skidpad.evidence.channels.judging.truth.marks import merge_marks as hazards_of
-from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
+from skidpad.core.vocabulary import HazardType
+from skidpad.evidence.channels.judging.truth.marks import (
+    Mark,
+    World,
+    lasting,
+    merge_marks,
+    offsets,
+)
+from skidpad.evidence.channels.judging.truth.simulator import MIN_DURATION, tail_marks
 from skidpad.evidence.channels.matching import Span, merge_spans
 
 Floats = NDArray[np.float64]
@@ -29,27 +35,60 @@ WINDOW = 10  # cycles before and after: 1 s each way
 LEAST = 5  # cycles seen in the window, else the actor is not known
 MEDIAN = 3  # cycles before and after: a jump stays one, noise of single cycles goes
 NAME = "reference with hindsight"
+SPARES = (-20.0, -10.0, -5.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 5.0, 10.0)  # m
+FACTORS = (0.5, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
+TAILS = (HazardType.EGO_TAILGATING, HazardType.EGO_TAILGATED)
+OF_TRUTH = {HazardType.INCONSISTENT_LOCALISATION: 1.0} | dict.fromkeys(TAILS, 0.0)
+Swept = Mapping[HazardType, Mapping[float, tuple[Span, ...]]]
 
 
-def ceiling(cycles: Sequence[Cycle], channels: Sequence[str]) -> tuple[Span, ...]:
-    """Hazards by simulator truth's rule on each channel's smoothed world, all channels together."""
+def reference(cycles: Sequence[Cycle], channels: Sequence[str], begin: float) -> Swept:
+    """Hazards from `begin` on by the truth's rule on each channel's smoothed world, by limit."""
     known = [c for c in cycles if c.truth is not None]
-    found: list[Span] = []
-    for c in range(len(channels)):
-        egos = _smoothed_egos(known, c)
-        perceived = _perceived_truth(known, c, egos)
-        rows = [k._replace(truth=t) for k, t in zip(known, perceived, strict=True)]
-        found += [
-            Span(h.hazard, h.t_start, h.t_end)
-            for h in simulator_truth([r for r in rows if r.truth is not None], ())
-        ]
-    marks = [
-        mark
+    seen = [_tails(known, c) for c in range(len(channels))]
+    tails = {
+        spare: _merged(
+            mark
+            for marks in seen
+            for mark in lasting([m for m in marks if m.clearance <= spare], MIN_DURATION)
+        )
+        for spare in SPARES
+    }
+    apart = {
+        f"{channels[a]}+{channels[b]}": _offset(known, a, b)
         for a, b in combinations(range(len(channels)), 2)
-        for mark in offsets(_offset(known, a, b), f"{channels[a]}+{channels[b]}")
-    ]
-    found += [Span(h.hazard, h.t_start, h.t_end) for h in hazards_of(marks, World.SIM)]
-    return tuple(sorted(merge_spans(found), key=lambda s: s.t_start))
+    }
+    places = {
+        factor: _merged(m for name, rows in apart.items() for m in offsets(rows, name, factor))
+        for factor in FACTORS
+    }
+    limits = {HazardType.INCONSISTENT_LOCALISATION: places} | dict.fromkeys(TAILS, tails)
+    return {
+        hazard: {
+            limit: tuple(s for s in spans if s.hazard is hazard and s.t_end >= begin)
+            for limit, spans in of.items()
+        }
+        for hazard, of in limits.items()
+    }
+
+
+def at_the_truths_limits(swept: Swept) -> tuple[Span, ...]:
+    """The point of each curve at which the limits are those of the truth."""
+    spans = [s for hazard, of in swept.items() for s in of[OF_TRUTH[hazard]]]
+    return tuple(sorted(spans, key=lambda s: s.t_start))
+
+
+def _merged(marks: Iterable[Mark]) -> list[Span]:
+    """Spans of the marks, those of one hazard with short pauses as one."""
+    hazards = merge_marks(list(marks), World.SIM)
+    return merge_spans(Span(h.hazard, h.t_start, h.t_end) for h in hazards)
+
+
+def _tails(cycles: Sequence[Cycle], c: int) -> list[Mark]:
+    """Who follows whom too closely in the world of channel c, within the largest limit."""
+    perceived = _perceived_truth(cycles, c, _smoothed_egos(cycles, c))
+    rows = [k._replace(truth=t) for k, t in zip(cycles, perceived, strict=True) if t is not None]
+    return tail_marks(rows, max(SPARES))
 
 
 def _offset(cycles: Sequence[Cycle], a: int, b: int) -> Floats:

@@ -1,4 +1,4 @@
-"""The ceiling: perfect eyes reach 100 / 100, noise and blindness lower it, hindsight heals gaps."""
+"""The reference with hindsight: perfect eyes reach 100 / 100, noise lowers it, hindsight heals gaps."""
 
 from __future__ import annotations
 
@@ -7,7 +7,13 @@ import pytest
 
 from channel_worlds import Eyes, World, drive
 from skidpad.core.vocabulary import HazardType
-from skidpad.evidence.channels.judging.ceiling import NAME, ceiling, smooth_states
+from skidpad.evidence.channels.judging.reference import (
+    NAME,
+    OF_TRUTH,
+    at_the_truths_limits,
+    reference,
+    smooth_states,
+)
 from skidpad.evidence.channels.judging.segments import TOLD, judge
 from skidpad.evidence.channels.matching import tally
 from skidpad.recording.cycles import cycles
@@ -39,9 +45,26 @@ def test_perfect_eyes_reach_it_all_and_blind_ones_nothing():
 def test_positions_that_jump_are_found_as_the_truth_finds_them(offset, found):
     eyes = (Eyes("a", ego_noise=0.08), Eyes("b", ego_noise=0.08, ego_offset={4.0: offset}))
     rows = list(cycles(drive(World(), eyes, 8.0)))
-    spans = [s for s in ceiling(rows, ["a", "b"]) if s.hazard is LOCALISATION]
+    spans = [
+        s
+        for s in at_the_truths_limits(reference(rows, ["a", "b"], 0.0))
+        if s.hazard is LOCALISATION
+    ]
     assert len(spans) == found
     assert all(s.t_start == pytest.approx(4.0, abs=0.15) for s in spans)
+
+
+@pytest.mark.req("C-105", "C-214")
+def test_the_reference_is_a_curve_that_meets_the_truth_at_its_own_limit():
+    """By hand: at 15 m/s both and a dry road 7.5 m of gap leave between 0 and 10 m, so more is asked."""
+    segment = judged((Eyes("a"), Eyes("b")))
+    curves = {(c.identifier, c.hazard): c.points for c in segment.points if c.truth == "sim"}
+    points = {p.limit: (p.tp, p.fp, p.fn) for p in curves[NAME, TAILGATED]}
+    assert points[OF_TRUTH[TAILGATED]] == counts(segment) == (1, 0, 0)
+    assert points[-20.0] == (0, 0, 1)  # no gap is 20 m too short
+    found = [tp + fp for _, (tp, fp, _) in sorted(points.items())]
+    assert found == sorted(found)  # a wider limit finds no less
+    assert {h for name, h in curves if name == NAME} == set(OF_TRUTH)
 
 
 @pytest.mark.parametrize(("mu", "nominal", "told"), [(0.9, 0, 0), (0.3, 0, 1)])
@@ -54,10 +77,10 @@ def test_only_who_is_told_of_ice_finds_what_ice_makes_too_close(mu, nominal, tol
     assert [len(segment.detected[n]) for n in ("tracked", TOLD, NAME)] == [nominal, told, told]
 
 
-def test_no_truth_no_ceiling():
+def test_no_truth_no_reference():
     rows = list(cycles(drive(CLOSE, (Eyes("a"), Eyes("b")), 3.0, with_truth=False)))
     assert not {NAME, TOLD} & set(judge("s", "town", ["a", "b"], rows).detected)
-    assert ceiling(rows, ["a", "b"]) == ()
+    assert at_the_truths_limits(reference(rows, ["a", "b"], 0.0)) == ()
 
 
 def test_a_line_is_smoothed_to_itself_and_noise_shrinks():

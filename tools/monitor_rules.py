@@ -2,7 +2,7 @@
 
     python tools/monitor_rules.py DIR... --out docs/results/channels/rules.json --commit C --date D
 
-DIR: folders of `skidpad channels drive`; what is judged once stays beside its recording (.rules). Of
+DIR: folders of `skidpad channels drive`; what is judged once stays beside its recording. Of
 risky drivers each true hazard counts with its weight in the recall, precision and false alarms do not.
 """
 
@@ -18,24 +18,26 @@ from typing import Any
 
 import numpy as np
 
-from skidpad.core.channels import Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Signal
 from skidpad.evidence.channels.judging.curves import SIDES, Looked, look, spans
 from skidpad.evidence.channels.judging.kept import code_hash
-from skidpad.evidence.channels.judging.reference import reference
+from skidpad.evidence.channels.judging.reference import FACTORS, SPARES, TAILS, reference
 from skidpad.evidence.channels.judging.segments import evaluated_from, grip_of
 from skidpad.evidence.channels.judging.truth.simulator import simulator_truth
 from skidpad.evidence.channels.judging.weights import weights_from
 from skidpad.evidence.channels.matching import Span, Tally, Weighed, score, tally
 from skidpad.evidence.channels.tracked.distance import SafeDistance
-from skidpad.evidence.channels.tracked.tracks import Track
+from skidpad.evidence.channels.tracked.tracks import COAST, Track
 from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, Tracked
+from skidpad.evidence.statistics import event_rate
 from skidpad.recording.channels import McapRecording
 from skidpad.recording.context import context_of
 from skidpad.recording.cycles import cycles
 
 LOCALISATION = HazardType.INCONSISTENT_LOCALISATION
+TODAY, INNOVATION, REFERENCE = "today: a dry road, vote", "innovation", "reference "
+LIMITS = {LOCALISATION: FACTORS} | dict.fromkeys(TAILS, SPARES)
 LEAPS = (0.8, 0.9, 1.0, 1.1)  # m
 SURE_OF_MEAN = 0.95  # of a probability over the last half second
 MEMORY = 0.4  # s
@@ -43,27 +45,40 @@ Found = Mapping[str, Sequence[Span]]  # by rule
 
 
 class Fused(Tracked):
-    """Where two channels have one object, both tracks get their mean by inverse covariances."""
+    """Where channels have one object, it is judged by their mean, by inverse covariances."""
 
-    def _learn_grip(self, t: float, frames: Any) -> None:
-        super()._learn_grip(t, frames)
-        fused = {}
-        for c, tracks in enumerate(self.tracks):
-            for track in tracks:
-                others = [o for d in range(len(self.tracks)) if d != c and (o := self._same(d, track))]
-                fused[id(track)] = (track, _mean_state([track, *others]))
-        for track, (gap, v) in fused.values():
-            track.gap, track.v = gap, v
+    def _follow(self, t: float, seen: Any) -> None:
+        for tracks, one in zip(self.tracks, seen, strict=True):
+            tracks.observe(t, one)
+        own = {
+            id(k): (k.gap, k.v, k.p, fused_state([k, *self._others(c, k)]))
+            for c, tracks in enumerate(self.tracks)
+            for k in tracks
+        }
+        for tracks, one in zip(self.tracks, seen, strict=True):
+            for k in tracks:
+                gap, v, p, (k.gap, k.v, k.p) = own[id(k)]
+                if one is not None:
+                    k.judge(t, one.v_ego, tracks.safe, tracks.sure)
+                k.gap, k.v, k.p = gap, v, p
+            for key in [key for key, k in tracks.tracks.items() if t - k.t > COAST + 1e-6]:
+                del tracks.tracks[key]
+
+    def _others(self, channel: int, track: Track) -> list[Track]:
+        rest = (c for c in range(len(self.tracks)) if c != channel)
+        return [o for c in rest if (o := self._same(c, track)) is not None]
 
 
 class Integrated(Tracked):
     """A gap is short when its probability, averaged over the last half second, is above a limit."""
 
     def distances(self, t: float, seen: Any, frames: Any) -> dict[Signal, float]:
+        """1 where a gap is short, on either side."""
         super().distances(t, seen, frames)
         out = dict.fromkeys((Signal.FRONT_DEFICIT, Signal.REAR_DEFICIT, Signal.UNSEEN_DEFICIT), 0.0)
-        self.means = {
-            id(track): 0.75 * getattr(self, "means", {}).get(id(track), 0.0) + 0.25 * _probability(track)
+        self.means: dict[int, float] = {
+            id(track): 0.75 * getattr(self, "means", {}).get(id(track), 0.0)
+            + 0.25 * _probability(track)
             for tracks in self.tracks
             for track in tracks
         }
@@ -78,12 +93,13 @@ def _probability(track: Track) -> float:
     return 0.5 * (1.0 + erf(track.deficit / max(track.sigma, 1e-6) / sqrt(2.0)))
 
 
-def _mean_state(tracks: Sequence[Track]) -> tuple[float, float]:
-    """Gap and speed of one object, weighted by the inverse of each track's covariance."""
+def fused_state(tracks: Sequence[Track]) -> tuple[float, float, tuple[float, float, float]]:
+    """Gap, speed and covariances of one object, weighted by the inverse of each track's covariance."""
     weights = [np.linalg.inv([[k.p[0], k.p[2]], [k.p[2], k.p[1]]]) for k in tracks]
     states = [w @ [k.gap, k.v] for w, k in zip(weights, tracks, strict=True)]
-    gap, v = np.linalg.solve(sum(weights), sum(states))
-    return float(gap), float(v)
+    p = np.linalg.inv(np.sum(weights, axis=0))
+    gap, v = (p @ np.sum(states, axis=0)).tolist()
+    return gap, v, (float(p[0, 0]), float(p[1, 1]), float(p[0, 1]))
 
 
 def found_gaps(
@@ -92,9 +108,7 @@ def found_gaps(
     """What each rule finds of both tailgating hazards."""
     dry, told = SafeDistance(), SafeDistance.on(grip)
     rules = {
-        "today: a dry road, vote": Tracked(channels, dry),
-        "fusion by covariances": Fused(channels, dry),
-        "integrated probability": Integrated(channels, dry),
+        TODAY: Tracked(channels, dry),
         "grip from own signals": Tracked(channels),
         "own grip, fusion": Fused(channels),
         "own grip, integrated probability": Integrated(channels),
@@ -115,14 +129,14 @@ def found_places(
     t = np.array([cycle.t for cycle in looked])
     chi2 = np.array([tracked._offset(c.t, c.frames) for c in looked]) > CHI2_LIMIT
     leaps = np.array([tracked._leap(c.t, c.frames) for c in looked])
-    rules = {"today: a dry road, vote": chi2} | {
-        f"innovation over {leap:g} m, or today's": chi2 | (leaps > leap) for leap in LEAPS
+    rules = {TODAY: chi2} | {
+        f"{INNOVATION} over {leap:g} m, or today's": chi2 | (leaps > leap) for leap in LEAPS
     }
     for name, held in rules.items():
         yield name, list(spans(LOCALISATION, t, held.astype(float), 0.5, 1, begin))
 
 
-def judge(path: Path) -> dict[str, Any]:
+def judge(path: Path, with_reference: bool) -> dict[str, Any]:
     """Counts of every rule and of the reference's curve in one recording."""
     source = McapRecording(path)
     context, rows = context_of(source), list(cycles(source))
@@ -133,27 +147,40 @@ def judge(path: Path) -> dict[str, Any]:
     found: dict[str, list[Span]] = dict(found_gaps(source.channels, looked, grip_of(rows), begin))
     for name, places in found_places(source.channels, looked, begin):
         found.setdefault(name, []).extend(places)
-    for hazard, limits in reference(rows, source.channels, begin).items():
+    swept = reference(rows, source.channels, begin) if with_reference else {}
+    for hazard, limits in swept.items():
         for limit, at in limits.items():
-            found.setdefault(f"reference {limit:g}", []).extend(s for s in at if s.hazard is hazard)
-    counts = {name: _counts(at, true, hours) for name, at in found.items()}
-    return {"hours": hours, "ice": "_ice" in context.get("route", ""), "counts": counts,
+            found.setdefault(f"{REFERENCE}{limit:g}", []).extend(
+                s for s in at if s.hazard is hazard
+            )
+    counts = {name: _counts(name, at, true, hours) for name, at in found.items()}
+    return {"hours": hours, "ice": "_ice" in path.stem, "counts": counts,
             "risky": context.get("stratum") == "risky"}  # fmt: skip
 
 
-def _counts(found: Sequence[Span], true: Sequence[Span], hours: float) -> dict[str, list[float]]:
+def _counts(
+    name: str, found: Sequence[Span], true: Sequence[Span], hours: float
+) -> dict[str, list[float]]:
+    """Of the hazards that the rule judges."""
     rows = tally(found, true, hours)
-    return {h.value: [rows[h].tp, rows[h].fp, rows[h].fn, *rows[h].weighed] for h in SCORED_HAZARDS}
+    limit = name.removeprefix(REFERENCE)
+    if limit != name:
+        judged = [h for h, limits in LIMITS.items() if float(limit) in limits]
+    elif name == TODAY:
+        judged = [*SCORED_HAZARDS]
+    else:
+        judged = [LOCALISATION] if name.startswith(INNOVATION) else [*SIDES]
+    return {h.value: [rows[h].tp, rows[h].fp, rows[h].fn, *rows[h].weighed] for h in judged}
 
 
-def kept(path: Path, code: str) -> dict[str, Any]:
+def kept(path: Path, code: str, with_reference: bool) -> dict[str, Any]:
     """The counts of a recording, from before where the same code made them."""
-    file = path.with_suffix(".rules")
+    file = path.with_suffix(".reference" if with_reference else ".rules")
     if file.is_file():
         known: dict[str, Any] = json.loads(file.read_text(encoding="utf-8"))
         if known["code"] == code:
             return known
-    row = judge(path) | {"code": code}
+    row = judge(path, with_reference) | {"code": code}
     file.write_text(json.dumps(row), encoding="utf-8")
     print(path.name, flush=True)
     return row
@@ -165,10 +192,10 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     rules: dict[str, dict[str, Any]] = {}
     for name in names:
         for hazard in (h.value for h in SCORED_HAZARDS):
-            known = [_tally(row, name, hazard) for row in rows]
-            s = score(known)
-            judged = name.startswith("reference") or any(c in name for c in _of(hazard))
-            if judged:
+            if hazard in rows[0]["counts"][name]:
+                known = [_tally(row, name, hazard) for row in rows]
+                s = score(known)
+                false = event_rate([k.fp for k in known], [k.hours for k in known])
                 rules.setdefault(name, {})[hazard] = {
                     "tp": s.total.tp, "fp": s.total.fp, "fn": s.total.fn,
                     "precision": s.total.precision, "precision_interval": s.precision,
@@ -176,6 +203,50 @@ def summary(rows: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
                     "recall_weighted": s.total.weighed.recall, "recall_weighted_interval": s.weighed,
                     "effective_size": s.total.weighed.size,
                     "false_alarms_per_hour": s.total.false_alarms_per_hour,
-                    "false_alarms_interval": _rate([(k.fp, k.hours) for k in known]),
+                    "false_alarms_interval": false.interval,
                 }  # fmt: skip
     return {"hours": sum(row["hours"] for row in rows), "segments": len(rows), "rules": rules}
+
+
+def _tally(row: Mapping[str, Any], name: str, hazard: str) -> Tally:
+    tp, fp, fn, *weighed = row["counts"][name][hazard]
+    return Tally(tp, fp, fn, row["hours"], (), Weighed(*weighed))
+
+
+def main(words: Sequence[str] | None = None) -> int:
+    """Judge what is new, write the table of all."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folders", type=Path, nargs="+", help="folders with recordings")
+    parser.add_argument("--out", type=Path, help="file to write; none: only judge")
+    parser.add_argument("--commit", default="unknown", help="of the code that drove")
+    parser.add_argument("--date", default="", help="of the drives")
+    parser.add_argument(
+        "--reference", action="store_true", help="its curve, too; costs as much again"
+    )
+    asked = parser.parse_args(words)
+    paths = sorted(
+        p for f in asked.folders for p in f.rglob("*.mcap") if p.with_suffix(".json").is_file()
+    )
+    code = code_hash()
+    rows = [
+        kept(path, code, asked.reference) | {"seed": int(path.stem.rsplit("-", 1)[1])}
+        for path in paths
+    ]
+    parts = {
+        "natural": [r for r in rows if not r["ice"] and not r["risky"]],
+        "risky": [r for r in rows if r["risky"]],
+        "ice": [r for r in rows if r["ice"]],
+    }
+    if asked.out is not None:
+        table = {
+            "commit": asked.commit,
+            "date": asked.date,
+            "first_seeds": sorted({r["seed"] // 100_000 * 100_000 for r in rows}),
+            "drives": {name: summary(part) for name, part in parts.items() if part},
+        }
+        asked.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

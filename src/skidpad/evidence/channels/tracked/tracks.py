@@ -156,11 +156,16 @@ class Tracks:
 
     def update(self, t: float, seen: Seen | None) -> None:
         """One cycle; without a message tracks wait for their end."""
+        self.observe(t, seen)
+        if seen is not None:
+            for track in self:
+                track.judge(t, seen.v_ego, self.safe, self.sure)
+
+    def observe(self, t: float, seen: Seen | None) -> None:
+        """Follow the objects of one cycle without a judgement."""
         if seen is not None:
             for sighting in seen.sightings:
                 self._report(t, sighting, seen)
-            for track in self:
-                track.judge(t, seen.v_ego, self.safe, self.sure)
         for key in [k for k, track in self.tracks.items() if t - track.t > COAST + 1e-6]:
             del self.tracks[key]
 

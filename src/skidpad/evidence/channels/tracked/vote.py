@@ -52,8 +52,7 @@ class Tracked:
     ) -> dict[Signal, float]:
         """The first of them alone, by what lookouts have seen in the frames."""
         self._learn_grip(t, frames)
-        for tracks, one in zip(self.tracks, seen, strict=True):
-            tracks.update(t, one)
+        self._follow(t, seen)
         out = {
             Signal.REAR_DEFICIT: 0.0,
             Signal.FRONT_DEFICIT: 0.0,
@@ -88,6 +87,10 @@ class Tracked:
             if near and other.behind is track.behind:
                 return other
         return None
+
+    def _follow(self, t: float, seen: Sequence[Seen | None]) -> None:
+        for tracks, one in zip(self.tracks, seen, strict=True):
+            tracks.update(t, one)
 
     def _learn_grip(self, t: float, frames: Sequence[ChannelFrame | None]) -> None:
         """The safe distance is that of the grip which the vehicle shows, unless it was told one."""

@@ -18,6 +18,8 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 PAGE = ROOT / "docs" / "channels-evaluation.md"
 RESULTS = ROOT / "docs" / "results" / "channels"
+FIGURE = RESULTS / "reference.svg"
+REFERENCE = "reference "  # before the limit, in the names of rules.json
 SLOT = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 HAZARDS = ("inconsistent_localisation", "ego_tailgating", "ego_tailgated")
 FEW = 100  # of the effective size
@@ -33,6 +35,8 @@ def main(words: list[str] | None = None) -> int:
     if "--check" in words:
         return int(before != after)
     PAGE.write_text(after, encoding="utf-8")
+    if (RESULTS / "rules.json").is_file():
+        FIGURE.write_text(reference_figure(RESULTS), encoding="utf-8")
     return 0
 
 
@@ -149,9 +153,98 @@ def redundancy(results: Path) -> str:
     return when + _table(head, rows)
 
 
+def rules(results: Path) -> str:
+    """Today's rules and those that were tried, on the same drives; the judged kinds alone."""
+    told = _rules_of(results)
+    if told is None:
+        return "Not driven.\n"
+    seeds = ", ".join(map(str, told["first_seeds"]))
+    head = ["drives", "hazard", "rule", "true", "found", "false", "precision, % [95 %]",
+            "recall, % [95 %]", "false per h [95 %]"]  # fmt: skip
+    rows = [
+        [drives, _words(hazard), rule, _count_true(row), str(row["tp"]), str(row["fp"]),
+         _share(row, "precision"), _share(row, "recall"), _false_rate(row)]
+        for drives, part in told["drives"].items()
+        for hazard in HAZARDS
+        for rule, of in part["rules"].items()
+        if (row := of.get(hazard)) and row["tp"] + row["fn"] and not rule.startswith(REFERENCE)
+    ]  # fmt: skip
+    hours = ", ".join(
+        f"{p['hours']:.2f} h {n} ({p['segments']} segments)" for n, p in told["drives"].items()
+    )
+    when = f"Driven {told['date']} at commit `{told['commit']}`, seeds from {seeds}: {hours}.\n\n"
+    return when + _table(head, rows)
+
+
+def reference(results: Path) -> str:
+    """The curve of the reference with hindsight, whose figure `reference_figure` draws."""
+    told = _rules_of(results)
+    if told is None or "reference" not in told:
+        return "Not driven.\n"
+    head = ["drives", "hazard", "limit", "precision, %", "recall, %"]
+    rows = [
+        [drives, _words(hazard), f"{limit:g}", f"{100.0 * precision:.1f}", f"{100.0 * recall:.1f}"]
+        for drives, hazard, points in reference_curves(told)
+        for limit, recall, precision in points
+    ]
+    return _table(head, rows)
+
+
+def reference_curves(told: dict[str, Any]) -> Iterator[tuple[str, str, list[list[float]]]]:
+    """Per kind of drives and hazard: limit, recall and precision of every point that is one."""
+    for drives, part in told["reference"]["drives"].items():
+        for hazard in HAZARDS:
+            points = [
+                [float(name.removeprefix(REFERENCE)), row["recall"], row["precision"]]
+                for name, of in part["rules"].items()
+                if name.startswith(REFERENCE) and (row := of.get(hazard))
+                if row["recall"] is not None and row["precision"] is not None
+            ]
+            if points:
+                yield drives, hazard, points
+
+
+def reference_figure(results: Path) -> str:
+    """Precision over recall of the reference, one chart per hazard, one line per kind of drives."""
+    from skidpad.report.figures import Chart, Curve, curves
+
+    found = list(reference_curves(_rules_of(results) or {"reference": {"drives": {}}}))
+    names = list(dict.fromkeys(drives for drives, *_ in found))
+    charts = [
+        Chart(
+            [
+                Curve(
+                    drives, [p[1] for p in points], [p[2] for p in points],
+                    colour=names.index(drives), style={"marker": ".", "ms": 5},
+                )
+                for drives, of, points in found
+                if of == hazard
+            ],
+            "recall", "precision", _words(hazard), y_range=(-0.03, 1.03), x_range=(-0.03, 1.03),
+        )
+        for hazard in HAZARDS
+    ]  # fmt: skip
+    return curves(charts, width=11.0, height=3.6)
+
+
+def _rules_of(results: Path) -> Any:
+    return _read(results, "rules") if (results / "rules.json").is_file() else None
+
+
+def _count_true(row: dict[str, Any]) -> str:
+    true = row["tp"] + row["fn"]
+    return f"{true}" + (", too few" if true < FEW else "")
+
+
+def _false_rate(row: dict[str, Any]) -> str:
+    limits = row["false_alarms_interval"]
+    said = f"{row['false_alarms_per_hour']:.1f}"
+    return said if limits is None else f"{said} [{limits[0]:.1f}, {limits[1]:.1f}]"
+
+
 TABLES: dict[str, Callable[[Path], str]] = {
     "driven": driven, "scores": scores, "missed": missed, "ice": ice, "curves": curves,
-    "redundancy": redundancy,
+    "redundancy": redundancy, "rules": rules, "reference": reference,
 }  # fmt: skip
 
 

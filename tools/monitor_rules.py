@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from skidpad.campaign.channels import SEEDS_EACH
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS, Signal
 from skidpad.evidence.channels.judging.curves import SIDES, Looked, look, spans
@@ -213,38 +214,37 @@ def _tally(row: Mapping[str, Any], name: str, hazard: str) -> Tally:
     return Tally(tp, fp, fn, row["hours"], (), Weighed(*weighed))
 
 
+def judged(folders: Sequence[Path], with_reference: bool) -> dict[str, Any]:
+    """Seeds and summaries by kind of drives of all complete recordings in the folders."""
+    files = sorted(p for folder in folders for p in folder.rglob("*.mcap"))
+    paths = [p for p in files if p.with_suffix(".json").is_file()]
+    code = code_hash()
+    rows = [kept(path, code, with_reference) for path in paths]
+    seeds = {int(path.stem.rsplit("-", 1)[1]) // SEEDS_EACH * SEEDS_EACH for path in paths}
+    parts = {
+        "natural": [r for r in rows if not r["ice"] and not r["risky"]],
+        "risky": [r for r in rows if r["risky"]],
+        "on ice": [r for r in rows if r["ice"]],
+    }
+    drives = {name: summary(part) for name, part in parts.items() if part}
+    return {"first_seeds": sorted(seeds), "drives": drives}
+
+
 def main(words: Sequence[str] | None = None) -> int:
     """Judge what is new, write the table of all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folders", type=Path, nargs="+", help="folders with recordings")
-    parser.add_argument("--out", type=Path, help="file to write; none: only judge")
+    parser.add_argument(
+        "--reference", type=Path, nargs="*", default=[], help="folders for the reference's curve"
+    )
+    parser.add_argument("--out", type=Path, required=True, help="file to write")
     parser.add_argument("--commit", default="unknown", help="of the code that drove")
     parser.add_argument("--date", default="", help="of the drives")
-    parser.add_argument(
-        "--reference", action="store_true", help="its curve, too; costs as much again"
-    )
     asked = parser.parse_args(words)
-    paths = sorted(
-        p for f in asked.folders for p in f.rglob("*.mcap") if p.with_suffix(".json").is_file()
-    )
-    code = code_hash()
-    rows = [
-        kept(path, code, asked.reference) | {"seed": int(path.stem.rsplit("-", 1)[1])}
-        for path in paths
-    ]
-    parts = {
-        "natural": [r for r in rows if not r["ice"] and not r["risky"]],
-        "risky": [r for r in rows if r["risky"]],
-        "ice": [r for r in rows if r["ice"]],
-    }
-    if asked.out is not None:
-        table = {
-            "commit": asked.commit,
-            "date": asked.date,
-            "first_seeds": sorted({r["seed"] // 100_000 * 100_000 for r in rows}),
-            "drives": {name: summary(part) for name, part in parts.items() if part},
-        }
-        asked.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    table = {"commit": asked.commit, "date": asked.date, **judged(asked.folders, False)}
+    if asked.reference:
+        table["reference"] = judged(asked.reference, True)
+    asked.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
     return 0
 
 

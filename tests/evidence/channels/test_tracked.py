@@ -266,3 +266,13 @@ def test_a_position_that_leaves_its_odometry_is_inconsistent_though_channels_are
     np.testing.assert_allclose(leaps[20:25], 1.5)
     np.testing.assert_allclose(leaps[26:], 0.0, atol=1e-9)
     assert np.isnan(tracked.update(4.0, [None, None])[Signal.POSITION_LEAP])
+
+
+def test_a_car_that_slides_leaves_its_odometry_and_no_position_is_wrong():
+    tracked, alone = Tracked("ab"), Tracked("a")
+    for k in range(20):
+        slides = frame(0.1 * k, (1.5 * k, 0.4 * k, 0.0, 15.0, 0.0))  # sideways at 4 m/s
+        both = tracked.update(0.1 * k, [slides, slides])
+        one = alone.update(0.1 * k, [slides])
+    assert both[Signal.POSITION_LEAP] == pytest.approx(0.0, abs=1e-9)
+    assert one[Signal.POSITION_LEAP] == pytest.approx(2.0)  # a lone channel cannot tell

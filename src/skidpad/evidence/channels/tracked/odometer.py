@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections import deque
-from math import hypot, nan
+from collections.abc import Sequence
+from math import dist, hypot, nan
 
 import numpy as np
 
@@ -20,12 +21,12 @@ class Odometer:
         self.driven = (0.0, 0.0)  # m by odometry
         self.errors: deque[tuple[float, float, float]] = deque()  # t, position less odometry
 
-    def update(self, t: float, frame: ChannelFrame | None) -> float:
-        """m by which the position has moved beside odometry in the last half second; NaN: unknown."""
+    def update(self, t: float, frame: ChannelFrame | None) -> None:
+        """One cycle; None: no message."""
         if frame is None or not np.isfinite(frame.ego).all():
             self.before = None
             self.errors.clear()
-            return nan
+            return
         x, y, _, vx, vy = frame.ego.tolist()
         if self.before is not None:
             t0, vx0, vy0 = self.before
@@ -36,4 +37,25 @@ class Odometer:
         self.errors.append((t, *now))
         while t - self.errors[0][0] > WINDOW + 1e-6:
             self.errors.popleft()
-        return max(hypot(now[0] - ex, now[1] - ey) for _, ex, ey in self.errors)
+
+    def moves(self) -> dict[float, tuple[float, float]]:
+        """m in x and y by which the position has moved beside odometry, by the s since when."""
+        if not self.errors:
+            return {}
+        _, x, y = self.errors[-1]
+        return {t: (x - ex, y - ey) for t, ex, ey in self.errors}
+
+
+def greatest_leap(odometers: Sequence[Odometer]) -> float:
+    """m by which one channel's position left odometry and the other channels; NaN: all are silent.
+
+    What all positions do alike is an error of the odometry, as of a car that slides sideways.
+    """
+    known = [moves for o in odometers if (moves := o.moves())]
+    return max((_own_leap(i, known) for i in range(len(known))), default=nan)
+
+
+def _own_leap(i: int, known: Sequence[dict[float, tuple[float, float]]]) -> float:
+    own, rest = known[i], [*known[:i], *known[i + 1 :]]
+    apart = [max(dist(own[t], other[t]) for t in own.keys() & other.keys()) for other in rest]
+    return min([max(hypot(*move) for move in own.values()), *apart])

@@ -13,7 +13,7 @@ from skidpad.core.channels import ChannelFrame
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.tracked.distance import SafeDistance
 from skidpad.evidence.channels.tracked.grip import OwnGrip
-from skidpad.evidence.channels.tracked.odometer import Odometer
+from skidpad.evidence.channels.tracked.odometer import Odometer, greatest_leap
 from skidpad.evidence.channels.tracked.tracks import CONFIRM, SURE, Lookout, Seen, Track, Tracks
 
 SAME = 4.0  # m between two channels' reports of one object
@@ -103,9 +103,10 @@ class Tracked:
                 tracks.safe = safe
 
     def _leap(self, t: float, frames: Sequence[ChannelFrame | None]) -> float:
-        """Greatest over channels of the m by which a position left what odometry says; NaN: unknown."""
-        leaps = [o.update(t, f) for o, f in zip(self.odometers, frames, strict=True)]
-        return max((leap for leap in leaps if leap == leap), default=nan)
+        """m by which one channel left odometry and the others; NaN: unknown."""
+        for odometer, frame in zip(self.odometers, frames, strict=True):
+            odometer.update(t, frame)
+        return greatest_leap(self.odometers)
 
     def _offset(self, t: float, frames: Sequence[ChannelFrame | None]) -> float:
         """Greatest chi-square over pairs of the mean offset of 0.5 s; NaN without a full window."""

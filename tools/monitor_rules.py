@@ -174,7 +174,7 @@ def _counts(
     return {h.value: [rows[h].tp, rows[h].fp, rows[h].fn, *rows[h].weighed] for h in judged}
 
 
-def kept(path: Path, code: str, with_reference: bool) -> dict[str, Any]:
+def read_or_judge(path: Path, code: str, with_reference: bool) -> dict[str, Any]:
     """The counts of a recording, from before where the same code made them."""
     file = path.with_suffix(".reference" if with_reference else ".rules")
     if file.is_file():
@@ -214,12 +214,12 @@ def _tally(row: Mapping[str, Any], name: str, hazard: str) -> Tally:
     return Tally(tp, fp, fn, row["hours"], (), Weighed(*weighed))
 
 
-def judged(folders: Sequence[Path], with_reference: bool) -> dict[str, Any]:
+def judge_folders(folders: Sequence[Path], with_reference: bool) -> dict[str, Any]:
     """Seeds and summaries by kind of drives of all complete recordings in the folders."""
     files = sorted(p for folder in folders for p in folder.rglob("*.mcap"))
     paths = [p for p in files if p.with_suffix(".json").is_file()]
     code = code_hash()
-    rows = [kept(path, code, with_reference) for path in paths]
+    rows = [read_or_judge(path, code, with_reference) for path in paths]
     seeds = {int(path.stem.rsplit("-", 1)[1]) // SEEDS_EACH * SEEDS_EACH for path in paths}
     parts = {
         "natural": [r for r in rows if not r["ice"] and not r["risky"]],
@@ -241,9 +241,9 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--commit", default="unknown", help="of the code that drove")
     parser.add_argument("--date", default="", help="of the drives")
     asked = parser.parse_args(words)
-    table = {"commit": asked.commit, "date": asked.date, **judged(asked.folders, False)}
+    table = {"commit": asked.commit, "date": asked.date, **judge_folders(asked.folders, False)}
     if asked.reference:
-        table["reference"] = judged(asked.reference, True)
+        table["reference"] = judge_folders(asked.reference, True)
     asked.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
     return 0
 

@@ -47,7 +47,7 @@ def reference(cycles: Sequence[Cycle], channels: Sequence[str], begin: float) ->
     known = [c for c in cycles if c.truth is not None]
     seen = [_tails(known, c) for c in range(len(channels))]
     tails = {
-        spare: _merged(
+        spare: _merge_to_spans(
             mark
             for marks in seen
             for mark in lasting([m for m in marks if m.clearance <= spare], MIN_DURATION)
@@ -59,7 +59,9 @@ def reference(cycles: Sequence[Cycle], channels: Sequence[str], begin: float) ->
         for a, b in combinations(range(len(channels)), 2)
     }
     places = {
-        factor: _merged(m for name, rows in apart.items() for m in offsets(rows, name, factor))
+        factor: _merge_to_spans(
+            m for name, rows in apart.items() for m in offsets(rows, name, factor)
+        )
         for factor in FACTORS
     }
     limits = {HazardType.INCONSISTENT_LOCALISATION: places} | dict.fromkeys(TAILS, tails)
@@ -78,14 +80,14 @@ def at_the_truths_limits(swept: Swept) -> tuple[Span, ...]:
     return tuple(sorted(spans, key=lambda s: s.t_start))
 
 
-def _merged(marks: Iterable[Mark]) -> list[Span]:
+def _merge_to_spans(marks: Iterable[Mark]) -> list[Span]:
     """Spans of the marks, those of one hazard with short pauses as one."""
     hazards = merge_marks(list(marks), World.SIM)
     return merge_spans(Span(h.hazard, h.t_start, h.t_end) for h in hazards)
 
 
 def _tails(cycles: Sequence[Cycle], c: int) -> list[Mark]:
-    """Who follows whom too closely in the world of channel c, within the largest limit."""
+    """Marks of close following in the world of channel c, within the largest limit."""
     perceived = _perceived_truth(cycles, c, _smoothed_egos(cycles, c))
     rows = [k._replace(truth=t) for k, t in zip(cycles, perceived, strict=True) if t is not None]
     return tail_marks(rows, max(SPARES))

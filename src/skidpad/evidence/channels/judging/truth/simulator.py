@@ -45,7 +45,7 @@ def simulator_truth(cycles: Sequence[Cycle], channels: Sequence[str]) -> list[Tr
 
 
 def tail_marks(cycles: Sequence[Cycle], spare: float) -> list[Mark]:
-    """Who follows whom so that at most `spare` m would be left; every cycle must hold a truth."""
+    """Marks of vehicles that follow so closely that at most `spare` m are left; cycles hold a truth."""
     path = _DrivenPath([c.truth for c in cycles if c.truth is not None])
     marks: list[Mark] = []
     for k, cycle in enumerate(cycles):

@@ -39,7 +39,7 @@ SPARES = (-20.0, -10.0, -5.0, -2.0, -1.0, -0.5, 0.0, 0.5, 1.0, 2.0, 5.0, 10.0)  
 FACTORS = (0.5, 0.7, 0.8, 0.9, 1.0, 1.1, 1.25, 1.5, 2.0)
 TAILS = (HazardType.EGO_TAILGATING, HazardType.EGO_TAILGATED)
 OF_TRUTH = {HazardType.INCONSISTENT_LOCALISATION: 1.0} | dict.fromkeys(TAILS, 0.0)
-Swept = Mapping[HazardType, Mapping[float, tuple[Span, ...]]]
+Swept = Mapping[HazardType, Mapping[float, Sequence[Span]]]
 
 
 def reference(cycles: Sequence[Cycle], channels: Sequence[str], begin: float) -> Swept:

@@ -154,13 +154,15 @@ class _Starting:
     def _place(self) -> Place:
         for position in self.wish.positions:
             self._so_far = position.place(self.scene)
+        network = self.ctx.network
         for action in self.wish.actions:
-            first = action.first if isinstance(action, FollowTrajectory) else None
-            if first is not None:
-                self._so_far = self.ctx.network.place_of(first)
+            if isinstance(action, FollowTrajectory):
+                here = self._so_far = self._so_far or network.place_of(ORIGIN)
+                pose = action.first_pose(self.scene, here.pose, self.v_told)
+                self._so_far = network.place_of(pose)
             elif is_step_of_place(action):
                 self._so_far = self._place_after(action)
-        return self._so_far or self.ctx.network.place_of(ORIGIN)
+        return self._so_far or network.place_of(ORIGIN)
 
     def _place_after(self, action: PrivateAction) -> Place:
         """Where an action that takes no time puts it: along its lane, aside, or straight on."""

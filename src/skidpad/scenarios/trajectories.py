@@ -86,8 +86,8 @@ def _polyline(shape: Node) -> tuple[list[Node], Shape]:
 
 
 def _has_heading(place: Node) -> bool:
-    """A heading is said; that of a place on a road counts as such."""
-    return place.tag != "WorldPosition" or place.has("h")
+    """Returns whether a vertex says how an entity looks there; else it looks along the line."""
+    return place.has("h") if place.tag == "WorldPosition" else place.find("Orientation") is not None
 
 
 def _plain_vertex(element: etree._Element) -> Vertex | None:

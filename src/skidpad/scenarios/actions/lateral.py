@@ -23,7 +23,9 @@ class ChangeOfOffset:
     """A sideways motion under way; by_way: its shape runs over distance instead of time.
 
     to_lane: the entity goes on at the speed that it has when this action's turn comes in a step,
-    so that a change of speed later in the file acts a step later; as in esmini.
+    so that a change of speed later in the file acts a step later. A motion within the lane begins
+    at the end of the step in which the action begins, one to another lane at its beginning. Both as
+    in esmini.
     """
 
     def __init__(
@@ -47,10 +49,11 @@ class ChangeOfOffset:
         pace = v / sqrt(1.0 + slope * slope) if self.by_way else 1.0
         if not self.by_way and abs(slope) > v:
             pace = v / abs(slope)  # no actor goes sideways faster than it goes
-        self.done += pace * scene.dt
-        guide.offset, slope, bend = self.change.at(self.done)
+        begin, self.done = self.done, self.done + pace * scene.dt
+        now = self.done if self.to_lane else begin
+        guide.offset, slope, bend = self.change.at(now)
         guide.offset_rate, guide.offset_bend = slope * pace, bend * pace * pace
-        return self.change.over(self.done)
+        return self.change.over(now)
 
 
 class OffsetKept(ChangeOfOffset):

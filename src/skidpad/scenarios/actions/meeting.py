@@ -74,6 +74,7 @@ class Synchronized:
         self.goal, self.other_goal = goal, other_goal  # as they were when it began
         self.least = inf, inf  # m, of both ways so far
         self.phase, self.rising = Phase.BEGIN, False
+        self.v_moved = actor.guide.v  # m/s, of the step before
 
     def step(self, scene: Scene) -> bool:
         """Demand the speed of the end of this step."""
@@ -100,8 +101,8 @@ class Synchronized:
             guide.a = 2.0 * (own * pace / its - guide.v) / (its / pace)
             guide.v += guide.a * dt
         else:
-            v = max(self._speed(guide.v, own, its / pace, v_end, scene), 0.0)
-            guide.a, guide.v = (v - guide.v) / dt, v
+            before, v = guide.v, max(self._speed(guide.v, own, its / pace, v_end, scene), 0.0)
+            guide.a, guide.v, self.v_moved = (v - guide.v) / dt, v, before
         return False
 
     def _speed(self, v: float, own: float, time: float, v_end: float, scene: Scene) -> float:
@@ -128,7 +129,7 @@ class Synchronized:
             return v
         if self.phase in (Phase.BEGIN, Phase.WAITING):
             self.phase, self.rising = Phase.AWAY, 0.5 * (v_end + v) < own / time
-        v_road = v * self._share_of_road(scene)
+        v_road = (v if self.actor.track is None else self.v_moved) * self._share_of_road(scene)
         a, turn = away(v_road, v_end, own, time)
         if (a < 0.0) is self.rising and a != 0.0:
             self.phase = Phase.STRAIGHT
@@ -136,7 +137,10 @@ class Synchronized:
         return self._stopping(v, v_road, own, v_end, dt) if turn < 0.0 else v + a * dt
 
     def _share_of_road(self, scene: Scene) -> float:
-        """Part of its speed that runs along the road, of which esmini plans the course away."""
+        """Part of its speed that runs along the road, of which esmini plans the course away.
+
+        On a trajectory it plans with the speed of the step before.
+        """
         pose = self.actor.pose
         lane = scene.network.place_of(pose).lane
         return 1.0 if lane is None else abs(cos(pose.yaw - lane.heading))

@@ -116,14 +116,11 @@ class FollowTrajectory:
     timing: Timing | None
     s_begin: float
 
-    @property
-    def first(self) -> Pose | None:
-        """Where it is at the begin of the scenario; None where that depends on what moves."""
-        line = self.trajectory.line
-        if line is None:
-            return None
+    def first_pose(self, scene: Scene, here: Pose, v: float) -> Pose:
+        """Returns where an entity with speed v is led to at the begin of the scenario."""
+        line = self.trajectory.traced(scene, here)
         if self.timing is None or line.t is None:
-            return line.at_length(self.s_begin)
+            return PacedTrack(line, self.s_begin, 0.0, self.trajectory.closed, v).at(0.0)[0]
         return line.at_time(-self._zero(line, self.timing, 0.0) / self.timing.scale)
 
     def _zero(self, line: Line, timing: Timing, t: float) -> float:

@@ -370,10 +370,11 @@ class Scene:
         one, other = self.actors[a], self.actors[b]
         if not (one.present and other.present) or one.entity.is_ghost or other.entity.is_ghost:
             return False
-        reach = one.entity.box.length + other.entity.box.length + 2.0
-        if hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y) > reach:
+        size = one.entity.box.length + other.entity.box.length + 2.0
+        if hypot(one.pose.x - other.pose.x, one.pose.y - other.pose.y) > size:
             return False
-        if overlap(one.outline(), other.outline()) > TOUCHING:
+        reach = 0.0 if one.placed_by_file and other.placed_by_file else TOUCHING
+        if overlap(one.outline(), other.outline()) > reach:
             return False
         (low, body), (high, _) = sorted((self._stands(a), self._stands(b)))
         return high - low < body

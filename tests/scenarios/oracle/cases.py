@@ -276,6 +276,25 @@ def trajectories() -> Iterator[Case]:
     )
 
 
+def on_road(s: float, t: float) -> str:
+    return f'<RoadPosition roadId="1" s="{s}" t="{t}"/>'
+
+
+def lines_on_roads() -> Iterator[Case]:
+    """Lines whose places on roads name no heading: across the road on foot, and rear first."""
+
+    def line(*places: str) -> str:
+        points = "".join(f"<Vertex><Position>{p}</Position></Vertex>" for p in places)
+        return shape_of(f"<Polyline>{points}</Polyline>")
+
+    yield case("track_across_road", "on_foot", line(on_road(131.5, -4), on_road(131.5, 4)))
+    yield case("track_along_road", "curve", line(on_road(91, -1.75), on_road(180, -1.75)))
+    back = line(on_road(200, -1.75), on_road(100, -1.75))
+    begin = moving("ego", on_lane(-2, 100), 8) + moving("other", on_lane(-1, 200), -6, back)
+    parts = {"entities": vehicle("ego") + vehicle("other"), "init": begin, "stories": ""}
+    yield Case("init_track_rear_first", "straight", parts, 8.0)
+
+
 def begins() -> Iterator[Case]:
     """What <Init> says is so at the begin; what is put somewhere keeps its speed."""
     for name, more in (
@@ -322,6 +341,14 @@ def begins() -> Iterator[Case]:
 
 CASES: dict[str, Case] = {
     c.name: c
-    for part in (actions, trailers, meetings, trajectories, begins, conditions)
+    for part in (
+        actions,
+        trailers,
+        meetings,
+        trajectories,
+        lines_on_roads,
+        begins,
+        conditions,
+    )  # fmt: skip
     for c in part()
 }

@@ -349,6 +349,6 @@ CASES: dict[str, Case] = {
         lines_on_roads,
         begins,
         conditions,
-    )  # fmt: skip
+    )
     for c in part()
 }

@@ -142,7 +142,7 @@ def tick_cost(spec: RunSpec, seconds: float = 60.0) -> TickCost:
     backend = EmbeddedBackend()
     frame = backend.reset(stage.setup, spec.seed)
     _instrument(backend, meter)
-    driver.drive = meter.timed("stack", driver.drive)
+    driver.act = meter.timed("stack", driver.act)
     supervisor.observe = meter.timed("supervisor", supervisor.observe)
     supervisor.act = meter.timed("supervisor", supervisor.act)
     log.see = meter.timed("log", log.see)

@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from statistics import NormalDist
 
 from msgspec import Struct
-from scipy.special import ndtr, ndtri
 
 from skidpad.core.errors import ConfigError
 
 DIGITS = 9  # significant ones of a value, as files write it
+STANDARD = NormalDist()
 EDGE = 1e-12  # coordinates stay this far from 0 and 1, where a normal has no value
 
 
@@ -71,8 +72,8 @@ class Normal(Struct, frozen=True, tag="normal", forbid_unknown_fields=True):
     def value(self, u: float) -> float:
         """Return the value below which the share `u` lies."""
         low, high = self.range
-        below, above = ndtr(self._z(low)), ndtr(self._z(high))
-        inner = self.mean + self.sigma * float(ndtri(below + u * (above - below)))
+        below, above = STANDARD.cdf(self._z(low)), STANDARD.cdf(self._z(high))
+        inner = self.mean + self.sigma * STANDARD.inv_cdf(below + u * (above - below))
         return min(max(math.exp(inner) if self.is_log else inner, low), high)
 
     def likelihood(self, value: float) -> float:
@@ -93,15 +94,15 @@ class Normal(Struct, frozen=True, tag="normal", forbid_unknown_fields=True):
     def share_below(self, value: float) -> float:
         """Return the share of the distribution below a value: the inverse of `value`."""
         low, high = self.range
-        below, above = ndtr(self._z(low)), ndtr(self._z(high))
-        return float((ndtr(self._z(min(max(value, low), high))) - below) / (above - below))
+        below, above = STANDARD.cdf(self._z(low)), STANDARD.cdf(self._z(high))
+        return float((STANDARD.cdf(self._z(min(max(value, low), high))) - below) / (above - below))
 
     def density(self, value: float) -> float:
         """Return the density at a value."""
         low, high = self.range
         if not low <= value <= high or (self.is_log and value <= 0.0):
             return 0.0
-        mass = float(ndtr(self._z(high)) - ndtr(self._z(low)))
+        mass = float(STANDARD.cdf(self._z(high)) - STANDARD.cdf(self._z(low)))
         bell = math.exp(-0.5 * self._z(value) ** 2) / math.sqrt(2.0 * math.pi)
         return bell / (mass * self.sigma * (value if self.is_log else 1.0))
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 from msgspec import Struct
 
 from skidpad.core.errors import ConfigError, require_range
-from skidpad.core.setup import FrictionPatch
+
+if TYPE_CHECKING:
+    from skidpad.core.setup import FrictionPatch
 
 FRICTION = (0.01, 1.5)  # times the friction that is there without the patch
 WATER_MM = (0.0, 2.0)  # deepest film for which the friction of wet roads holds (docs/physics.md)
@@ -76,6 +78,8 @@ class SurfacePatch(
 
     def to_patch(self) -> FrictionPatch:
         """Return the patch as a set-up takes it."""
+        from skidpad.core.setup import FrictionPatch  # arrays come with it
+
         low, high = (0.0, float("inf")) if self.s is None else self.s
         return FrictionPatch(
             name=self.name, mu_ratio=self.friction, water_mm=self.water_mm, ice_mm=self.ice_mm,

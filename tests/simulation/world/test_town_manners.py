@@ -61,20 +61,6 @@ def test_who_stopped_in_a_junction_judges_gaps_anew():
     assert speed[-1, 2] > 2.0, "and then goes"
 
 
-@pytest.mark.parametrize("weather", ["clear-noon", "icy_30"])
-def test_who_is_on_the_roundabout_does_not_follow_one_that_waits_to_enter(weather):
-    """The one that waits is nearer to the merge by a car's length."""
-    around, waits = (112, 18.0, 2.0, (112, 106, 115, 107, 108)), (36, 95.2, 0.0, (36, 117, 107))
-    world = drivers_at(weather, around, waits)
-    world.traffic.drivers.state["halted"][2] = -1
-    speed, lane, contacts = drive(world, 25.0)
-    assert contacts == 0
-    passed = np.flatnonzero(lane[:, 1] == 107)
-    assert len(passed), "who has priority passes"
-    assert speed[: passed[0], 1].min() > 1.5, "without slowing down"
-    assert speed[: passed[0] - 20, 2].max() < 0.5, "and the other one waits"
-
-
 @pytest.mark.parametrize(("weather", "lets_go"), [("icy_30", True), ("clear-noon", False)])
 def test_on_ice_who_stood_long_at_a_light_is_let_go_first(weather, lets_go):
     line = 157.0

@@ -27,7 +27,6 @@ from skidpad.simulation.world.traffic.state import Drivers, View
 REACH_LIGHT = 150.0  # m
 MERGE_REACH = 60.0  # m before a merge within which the streams watch each other, at least
 MERGE_TIME = 6.0  # s before it, at speed: a gap then opens at 2 m/s^2, comfortably
-STANDS = 0.5  # m/s: whoever is slower waits at a line
 MERGE_LANES = 4  # of the other branch that are searched backwards: maps cut a road into short lanes
 YELLOW_BRAKE = 3.0  # m/s^2, drivers stop at yellow if this is enough
 STOP_MARGIN = 1.0  # m kept to a stop line, beside the IDM's standstill gap
@@ -103,22 +102,6 @@ def end_gap(view: View, d: Drivers, i: int) -> float:
 
 
 @inner_kernel
-def _is_right_of_way(view: View, j: int, theirs: int, mine: int) -> bool:
-    """Whether j stands before a junction whose lanes `theirs` and `mine` share an area.
-
-    Right of way decides between them then. A driver that followed j would wait for one that waits
-    for it, or for one behind such a one: roundabouts and crossings jammed.
-    """
-    if not view.care.on or view.placed[j].speed > STANDS:
-        return False
-    entry = view.streets.entry[theirs]
-    shares = False
-    for c in range(entry.first, entry.first + entry.size):
-        shares = shares or view.streets.conflict[c].other == mine
-    return shares
-
-
-@inner_kernel
 def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
     """Who arrives at a merge ahead just before driver i on another branch, and the gap to it."""
     net, occ = view.streets.net, view.occ
@@ -147,11 +130,7 @@ def merge_gap(view: View, d: Drivers, i: int) -> tuple[int, float]:
                     comes = (
                         here == other_lane or not d.state[j].active or leads_to(d, j, other_lane)
                     )
-                    ahead = j != i and comes and start - gap < far and 0.0 < gap < best_gap
-                    if ahead and not (
-                        here != other_lane
-                        and _is_right_of_way(view, j, other_lane, d.path[i, k - 1])
-                    ):
+                    if j != i and comes and start - gap < far and 0.0 < gap < best_gap:
                         best, best_gap = j, gap
                     entry = occ.next[entry]
                 way += row.length

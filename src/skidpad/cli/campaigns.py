@@ -73,22 +73,17 @@ class Drive(Driving, frozen=True, kw_only=True):
 
     def _run(self, campaign: Campaign[Any, Any, Any], folder: Path, out: Path) -> Summary:
         """Drive one campaign into its folder; `out` is what the user asked for."""
-        from skidpad.cli.progress import Shown, console
+        from skidpad.cli.progress import Shown, console, interruptible
 
-        with self._runner(campaign) as runner, Shown(campaign) as shown:
-            try:
-                summary = campaign.run(
-                    folder,
-                    runner,
-                    resume=self.resume,
-                    csv=self.csv,
-                    on_run=shown.ended,
-                    on_total=shown.planned_runs,
-                )
-            except KeyboardInterrupt:
-                kept = f"interrupted; what is done is kept: --out {out} --resume finishes it"
-                console.print(kept)
-                raise SystemExit(130) from None
+        with self._runner(campaign) as runner, Shown(campaign) as shown, interruptible(out):
+            summary = campaign.run(
+                folder,
+                runner,
+                resume=self.resume,
+                csv=self.csv,
+                on_run=shown.ended,
+                on_total=shown.planned_runs,
+            )
         for warning in summary.warnings():
             console.print(f"[yellow]{warning}[/]")
         return summary

@@ -39,7 +39,7 @@ def play_folder(
     seeds: Seeds = 1,
 ) -> None:
     """Play every scenario of a folder in every weather, with and without its grip."""
-    template = _template(cross, controller, run, scenario, tuned, backend)
+    template = play_template(cross, controller, run, scenario, tuned, backend)
     how(_campaign(template, cross, folder, seeds, []), played_report)
 
 
@@ -66,16 +66,10 @@ def play(
     ] = False,
 ) -> None:
     """Play a scenario, or all of a folder; ends with verdicts, a page and a table."""
-    from skidpad.core.errors import ConfigError, FileError
-    from skidpad.scenarios.shipped import NAMES, scenario_file
+    from skidpad.core.errors import ConfigError
 
-    if not file.exists() and str(file) in NAMES:
-        file = scenario_file(str(file))
-    if not file.exists():
-        raise FileError(
-            f"scenario {file}: there is no such file or folder; the catalogue has {', '.join(NAMES)}"
-        )
-    template = _template(cross, controller, run, scenario, tuned, backend)
+    file = find_scenario(file)
+    template = play_template(cross, controller, run, scenario, tuned, backend)
     expected.check()  # what cannot be read is said before anything is driven
     if check:
         _check(file, structs.replace(scenario, parameters=cross.parameters()))
@@ -89,7 +83,7 @@ def play(
         how = Drive(out=out, **structs.asdict(driving))
         _drive_all(how, template, cross, file, seeds, expected)
         return
-    runs = _runs(template, cross, [file], seeds)
+    runs = play_runs(template, cross, [file], seeds)
     if len(runs) > 1:
         raise ConfigError("one file is one run: several weathers, grips or seeds take a folder")
     driven = run_to(runs[0], out)
@@ -117,7 +111,21 @@ def _drive_all(
     exit_by_verdicts(ends[0])
 
 
-def _template(
+def find_scenario(file: Path) -> Path:
+    """Return a file or folder, also of a name of the catalogue; FileError where there is neither."""
+    from skidpad.core.errors import FileError
+    from skidpad.scenarios.shipped import NAMES, scenario_file
+
+    if not file.exists() and str(file) in NAMES:
+        return scenario_file(str(file))
+    if not file.exists():
+        raise FileError(
+            f"scenario {file}: there is no such file or folder; the catalogue has {', '.join(NAMES)}"
+        )
+    return file
+
+
+def play_template(
     cross: PlayCross,
     controller: Controller,
     run: RunSpec,
@@ -125,6 +133,7 @@ def _template(
     tuned: Tuned,
     backend: BackendChoice,
 ) -> RunSpec:
+    """Return the run that the options describe; file, weather and seed are chosen by `play_runs`."""
     from skidpad.cli.carla_backend import check_backend
     from skidpad.physics.presets import find_weather
 
@@ -150,17 +159,18 @@ def _campaign(
     hindrances = {file: _hindrance(file, template) for file in found}
     left_out += [LeftOut(str(file), why) for file, why in hindrances.items() if why]
     files = [file for file, why in hindrances.items() if not why]
-    runs = _runs(template, cross, files, seeds, folder)
+    runs = play_runs(template, cross, files, seeds, folder)
     return Campaign(RECIPE, runs, alone=drives_alone(template.backend))
 
 
-def _runs(
+def play_runs(
     template: RunSpec,
     cross: PlayCross,
     files: Sequence[Path],
     seeds: int,
     below: Path | None = None,
 ) -> list[RunSpec]:
+    """Return the runs of files in every weather, grip and seed that is asked for."""
     from skidpad.campaign.files import runs_of
     from skidpad.physics.presets import find_weather
 

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from rich.console import Console
@@ -14,6 +17,16 @@ from skidpad.core.wording import count_text
 from skidpad.recording.ledger import Entry
 
 console = Console(stderr=True)
+
+
+@contextmanager
+def interruptible(out: Path) -> Iterator[None]:
+    """Let Ctrl-C end the command with code 130 and the way to go on; `out` is what the user asked for."""
+    try:
+        yield
+    except KeyboardInterrupt:
+        console.print(f"interrupted; what is done is kept: --out {out} --resume finishes it")
+        raise SystemExit(130) from None
 
 
 class Shown(Progress):

@@ -7,14 +7,12 @@ from typing import Any
 
 from msgspec import Struct
 
-from skidpad.core.errors import FileError
-from skidpad.core.reading import decode_json, read_bytes
 from skidpad.core.run import RunSpec, run_from_plain
 from skidpad.core.space import Space
+from skidpad.recording.searches import read_stored
 
 RISK, RISK_RUNS, RISK_FOUND = "risk.json", "runs.jsonl", "probability.json"
 SCALES = (0.5, 0.9, 1.1, 2.0)  # of the values of an input, to see what hangs on it
-LARGEST = 1024**3  # bytes of a file
 
 
 class Rate(Struct, frozen=True, forbid_unknown_fields=True):
@@ -114,15 +112,9 @@ class RiskFound(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 def read_risk(out: Path) -> Risk:
     """Return what was asked in a folder; FileError where it holds no such question."""
-    path = out / RISK
-    if not path.is_file():
-        raise FileError(f"{out} holds no risk: it has no {RISK}")
-    asked: Risk = decode_json(read_bytes(path, RISK), str(path), Risk)
-    return asked
+    return read_stored(out, RISK, Risk)
 
 
 def read_risk_found(out: Path) -> RiskFound:
     """Return what came of it; FileError where it has not come to its end."""
-    path = out / RISK_FOUND
-    found: RiskFound = decode_json(read_bytes(path, RISK_FOUND), str(path), RiskFound)
-    return found
+    return read_stored(out, RISK_FOUND, RiskFound)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from msgspec import Struct
 
@@ -136,13 +136,21 @@ class Findings(Struct, frozen=True, forbid_unknown_fields=True):
     groups: tuple[Group, ...]
 
 
+S = TypeVar("S", bound=Struct)
+
+
+def read_stored(out: Path, name: str, kind: type[S]) -> S:
+    """Return the value of a JSON file in a folder; FileError where it is missing or damaged."""
+    path = out / name
+    if not path.is_file():
+        raise FileError(f"{out} has no {name}: it is no such folder, or was not driven to its end")
+    found: S = decode_json(read_bytes(path, name, LARGEST), str(path), kind)
+    return found
+
+
 def read_search(out: Path) -> Search:
     """Return what was searched in a folder; FileError where it holds no search."""
-    path = out / SEARCH
-    if not path.is_file():
-        raise FileError(f"{out} holds no search: it has no {SEARCH}")
-    found: Search = decode_json(read_bytes(path, SEARCH), str(path), Search)
-    return found
+    return read_stored(out, SEARCH, Search)
 
 
 def read_trials(out: Path, name: str = TRIALS) -> list[Trial]:
@@ -161,6 +169,4 @@ def failure_folder(out: Path, number: int) -> Path:
 
 def read_findings(out: Path) -> Findings:
     """Return what was found in a folder; FileError where the search has not come to its end."""
-    path = out / FOUND
-    found: Findings = decode_json(read_bytes(path, FOUND, LARGEST), str(path), Findings)
-    return found
+    return read_stored(out, FOUND, Findings)

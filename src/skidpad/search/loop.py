@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import msgspec
@@ -67,25 +68,55 @@ def search(found: Search, out: Path, runner: Runner, known: Sequence[Trial]) -> 
     """
     template, space = found.template, found.space
     method = make_method(found.method, len(space.variables), found.seed, found.budget)
-    stored = {trial.number: trial for trial in known}
-    _rewrite(out, known)
+    stored = StoredTrials(out / TRIALS, known, partial(_drive_with_reference, runner=runner))
     number = 0
-    with (out / TRIALS).open("ab", buffering=0) as file:
-        for size in batch_sizes(found.budget):
-            points = method.ask(size)
-            batch = [
-                Point(template, space, number + k, unit_tuple(p), found.objective)
-                for k, p in enumerate(points)
-            ]
-            new = [p for p in batch if not _is_known(stored, p, out)]
-            stored |= {trial.number: trial for trial in _drive_with_reference(new, runner)}
-            trials = [stored[p.number] for p in batch]
-            for trial in trials:
-                if trial.number in {p.number for p in new}:
-                    file.write(msgspec.json.encode(trial) + b"\n")
-                yield trial
-            method.tell(points, np.array([_told_margin(trial) for trial in trials]))
-            number += size
+    for size in batch_sizes(found.budget):
+        points = method.ask(size)
+        trials = stored.drive([
+            Point(template, space, number + k, unit_tuple(p), found.objective)
+            for k, p in enumerate(points)
+        ])  # fmt: skip
+        yield from trials
+        method.tell(points, np.array([_told_margin(trial) for trial in trials]))
+        number += size
+
+
+class StoredTrials:
+    """The trials of a folder: those of an earlier stretch are read, others driven and written down."""
+
+    def __init__(
+        self, path: Path, known: Sequence[Trial], drive: Callable[[Sequence[Point]], list[Trial]]
+    ) -> None:
+        """known: trials of `path` that can be read. drive: returns the trials of points in order."""
+        self.path, self._drive = path, drive
+        self._known = {trial.number: trial for trial in known}
+        if known:  # so that a line that was cut off is gone
+            write_bytes(path, _encode(known))
+
+    def drive(self, points: Sequence[Point]) -> list[Trial]:
+        """Return the trials of points, in their order.
+
+        Raises:
+            FileError: the file holds another point under the number of one of these.
+        """
+        new = self._drive([point for point in points if not self._holds(point)])
+        with self.path.open("ab") as file:
+            file.write(_encode(new))
+        self._known |= {trial.number: trial for trial in new}
+        return [self._known[point.number] for point in points]
+
+    def _holds(self, point: Point) -> bool:
+        trial = self._known.get(point.number)
+        if trial is not None and trial.unit != point.unit:
+            raise FileError(
+                f"{self.path}: trial {point.number} is not what this version asks for; "
+                "begin anew in another folder"
+            )
+        return trial is not None
+
+
+def _encode(trials: Sequence[Trial]) -> bytes:
+    return b"".join(msgspec.json.encode(trial) + b"\n" for trial in trials)
 
 
 def _drive_with_reference(points: Sequence[Point], runner: Runner) -> list[Trial]:
@@ -100,22 +131,6 @@ def _drive_with_reference(points: Sequence[Point], runner: Runner) -> list[Trial
 def _told_margin(trial: Trial) -> float:
     """Return what a method learns; a crash that the reference driver has as well is no place to look."""
     return NO_CONFLICT if trial.is_failure and not trial.is_avoidable else trial.margin
-
-
-def _rewrite(out: Path, known: Sequence[Trial]) -> None:
-    """Write the trials that can be read, so that a line that was cut off is gone."""
-    if known:
-        write_bytes(out / TRIALS, b"".join(msgspec.json.encode(t) + b"\n" for t in known))
-
-
-def _is_known(stored: dict[int, Trial], point: Point, out: Path) -> bool:
-    trial = stored.get(point.number)
-    if trial is not None and trial.unit != point.unit:
-        raise FileError(
-            f"{out / TRIALS}: trial {point.number} is not what this version asks for; "
-            "search anew into another folder"
-        )
-    return trial is not None
 
 
 def drive_all(points: Sequence[Point], runner: Runner) -> list[Trial]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from math import isfinite
 from pathlib import Path
 
@@ -25,7 +26,7 @@ from skidpad.recording.risks import (
     RiskFound,
 )
 from skidpad.recording.searches import Trial
-from skidpad.search.loop import drive_all
+from skidpad.search.loop import StoredTrials, drive_all
 from skidpad.search.probability import (
     Estimate,
     Floats,
@@ -54,31 +55,19 @@ class LimitOfRuns:
         on_run: Callable[[int], None],
     ) -> None:  # fmt: skip
         """known: runs of an earlier stretch, in order. on_run: is called with the runs so far."""
-        self.asked, self.out, self.runner, self.on_run = asked, out, runner, on_run
-        self.template = asked.template
+        self.asked, self.on_run, self.template = asked, on_run, asked.template
+        self.stored = StoredTrials(out / RISK_RUNS, known, partial(drive_all, runner=runner))
         self.trials: list[Trial] = []
-        self.known = {t.number: t for t in known}
-        if known:  # so that a line that was cut off is gone
-            write_bytes(out / RISK_RUNS, b"".join(msgspec.json.encode(t) + b"\n" for t in known))
 
     def __call__(self, z: Floats) -> Floats:
-        """Return the margins of samples (n, d) in their order; the same sample is driven once."""
+        """Return the margins of samples (n, d) in their order."""
         first = len(self.trials)
-        points = [
+        self.trials += self.stored.drive([
             Point(self.template, self.asked.space, first + k, unit_tuple(u), OBJECTIVE)
             for k, u in enumerate(ndtr(z))
-        ]
-        new = [p for p in points if not self._is_known(p)]
-        found = {t.number: t for t in drive_all(new, self.runner)}
-        with (self.out / RISK_RUNS).open("ab") as file:
-            file.writelines(msgspec.json.encode(found[p.number]) + b"\n" for p in new)
-        self.trials += [found.get(p.number) or self.known[p.number] for p in points]
+        ])  # fmt: skip
         self.on_run(len(self.trials))
         return np.array([t.margin for t in self.trials[first:]])
-
-    def _is_known(self, point: Point) -> bool:
-        trial = self.known.get(point.number)
-        return trial is not None and trial.unit == point.unit
 
     def simulated_s(self, first: int, last: int | None = None) -> float:
         """Return the simulated seconds of a stretch of runs."""

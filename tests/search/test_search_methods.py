@@ -67,3 +67,32 @@ def test_a_crash_that_the_reference_driver_has_too_is_no_place_to_look():
 
 def _fields(trial):
     return {name: getattr(trial, name) for name in trial.__struct_fields__}
+
+
+def test_what_cannot_be_driven_is_no_harmless_neighbour():
+    """Halving stops where neither side of the border is known; before, such a run counted as harmless."""
+    from skidpad.core.run import RunSpec, Scenario
+    from skidpad.core.space import Space, Uniform, Variable
+    from skidpad.recording.searches import Group, Search, Trial
+    from skidpad.search import failures
+
+    space = Space((Variable("x", Uniform(0.0, 1.0)),))
+    search = Search(
+        run=RunSpec(course=Scenario(file="lead_slowdown")).to_plain(), space=space, method="cma",
+        objective="combined", budget=2, seed=1,
+    )  # fmt: skip
+
+    def trial(u, margin=2.0, fault=""):
+        return Trial(number=0, unit=(u,), values={"x": u}, margin=margin, fault=fault)
+
+    def drive(points, runner):
+        del runner
+        (u,) = points[0].unit
+        return [trial(u, -1.0) if u > 0.9 else trial(u, fault="refused") if u > 0.3 else trial(u)]
+
+    failing, harmless = trial(1.0, -1.0), trial(0.0)
+    with pytest.MonkeyPatch.context() as patched:
+        patched.setattr(failures, "drive_all", drive)
+        found = failures.find_border(search, Group(kind="k", failures=(failing,)), [harmless], None)
+    assert found.harmless == harmless
+    assert found.failing == failing

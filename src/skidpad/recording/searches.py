@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -85,6 +86,11 @@ class Trial(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return self.margin <= 0.0 and not self.fault
 
     @property
+    def is_harmless(self) -> bool:
+        """Whether it was driven and is no failure."""
+        return not self.is_failure and not self.fault
+
+    @property
     def kind(self) -> str:
         """What failed in a few words, such as "front into lead"; failures of one kind are a group."""
         if not self.is_failure:
@@ -104,13 +110,6 @@ class Change(Struct, frozen=True, forbid_unknown_fields=True):
     failing: Value
 
 
-class Judged(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A failure, and how likely its values are beside the likeliest ones, 0 to 1."""
-
-    trial: Trial
-    likelihood: float
-
-
 class Group(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """Failures of one kind: the same side of the ego against the same other, or a departure.
 
@@ -123,17 +122,25 @@ class Group(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """
 
     kind: str
-    failures: tuple[Judged, ...]
+    failures: tuple[Trial, ...]
     changes: tuple[Change, ...] = ()
     failing: Trial | None = None
     harmless: Trial | None = None
 
 
 class Findings(Struct, frozen=True, forbid_unknown_fields=True):
-    """Everything that was found: `found.json` in the folder of a search."""
+    """The avoidable failures of a search by kind: `found.json` in its folder."""
 
-    judged: tuple[Judged, ...]
     groups: tuple[Group, ...]
+
+
+def distinct_failures(trials: Iterable[Trial]) -> list[Trial]:
+    """Return the failures, each drive once (decision T-3)."""
+    found: dict[str, Trial] = {}
+    for trial in trials:
+        if trial.is_failure:
+            found.setdefault(trial.motion, trial)
+    return list(found.values())
 
 
 S = TypeVar("S", bound=Struct)

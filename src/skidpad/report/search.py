@@ -15,9 +15,9 @@ from skidpad.recording.searches import (
     Change,
     Findings,
     Group,
-    Judged,
     Search,
     Trial,
+    distinct_failures,
     failure_folder,
     read_findings,
     read_search,
@@ -49,7 +49,7 @@ def write_search_report(out: Path) -> str:
     lines += [group_sentence(g) for g in findings.groups]
     lines += [f"page: {out / REPORT}"]
     if findings.groups:
-        first = failure_folder(out, findings.groups[0].failures[0].trial.number)
+        first = failure_folder(out, findings.groups[0].failures[0].number)
         lines += [f"next: skidpad replay {first}"]
     return "\n".join(lines)
 
@@ -58,7 +58,7 @@ def search_page(out: Path, search: Search, trials: Sequence[Trial], findings: Fi
     """Return the page of a search."""
     sections = [
         Section("Answer", [_answers(search, trials, findings)]),
-        Section("Failures", _failures(out, findings)),
+        Section("Failures", _failures(out, search, trials, findings)),
         Section("Coverage", _coverage(search, trials)),
         Section("What was searched", [_variables(search, trials), Text(_method(search), "note")]),
     ]
@@ -79,8 +79,9 @@ def answer(search: Search, trials: Sequence[Trial], findings: Findings) -> str:
         if nearest.min_gap_m is not None:
             near = f"the nearest came to a gap of {nearest.min_gap_m:.1f} m"
         return f"No failure of {driver} in {runs}; {near}. This is no proof that there is none."
-    avoided = [one for one in findings.judged if one.trial.is_avoidable]
-    known = f"The reference driver avoids {len(avoided)} of the {len(findings.judged)} that differ"
+    different = distinct_failures(failing)
+    avoided = [t for t in different if t.is_avoidable]
+    known = f"The reference driver avoids {len(avoided)} of the {len(different)} that differ"
     kinds = f", which are of {count_text(len(findings.groups), 'kind')}" if avoided else ""
     return (
         f"{count_text(len(failing), 'failure')} of {driver} in {runs}, the first in run "
@@ -99,7 +100,7 @@ def driver_text(driver: DriverSpec) -> str:
 
 def group_sentence(group: Group) -> str:
     """Return a group in one sentence: what, how often, and what would have been enough."""
-    worst = max(group.failures, key=lambda one: one.trial.contact_kmh or 0.0).trial
+    worst = max(group.failures, key=lambda t: t.contact_kmh or 0.0)
     speed = "" if worst.contact_kmh is None else f", up to {worst.contact_kmh:.0f} km/h"
     text = f"{group.kind}: {count_text(len(group.failures), 'failure')}{speed}"
     if group.changes:
@@ -121,7 +122,7 @@ def _value(value: float | str) -> str:
 
 
 def _answers(search: Search, trials: Sequence[Trial], findings: Findings) -> Answers:
-    unavoidable = [one for one in findings.judged if not one.trial.is_avoidable]
+    unavoidable = [t for t in distinct_failures(trials) if not t.is_avoidable]
     faults = [t for t in trials if t.fault]
     items = [
         Answer(
@@ -140,12 +141,14 @@ def _answers(search: Search, trials: Sequence[Trial], findings: Findings) -> Ans
     return Answers(items)
 
 
-def _failures(out: Path, findings: Findings) -> list[Block]:
+def _failures(
+    out: Path, search: Search, trials: Sequence[Trial], findings: Findings
+) -> list[Block]:
     blocks: list[Block] = []
     for group in findings.groups:
         blocks += [Text(group_sentence(group), "lead")]
-        blocks += [_failure_table(out, group.failures, group.kind)]
-    hard = [one for one in findings.judged if not one.trial.is_avoidable]
+        blocks += [_failure_table(out, search, group.failures, group.kind)]
+    hard = [t for t in distinct_failures(trials) if not t.is_avoidable]
     if hard:
         blocks += [
             Text(
@@ -153,12 +156,12 @@ def _failures(out: Path, findings: Findings) -> list[Block]:
                 "nothing against the driver that was searched.",
                 "note",
             ),
-            _failure_table(out, hard, "not avoided by the reference driver"),
+            _failure_table(out, search, hard, "not avoided by the reference driver"),
         ]
     return blocks or [Text("There is none to show.")]
 
 
-def _failure_table(out: Path, ones: Sequence[Judged], caption: str) -> Table:
+def _failure_table(out: Path, search: Search, failures: Sequence[Trial], caption: str) -> Table:
     columns = [
         ("run", "number in the search; a link where the run is kept"),
         ("contact, km/h", "larger delta-v of the two, else closing speed"),
@@ -167,13 +170,15 @@ def _failure_table(out: Path, ones: Sequence[Judged], caption: str) -> Table:
         ("likelihood", "density of the values beside that of the likeliest ones"),
         ("values", "of what varied"),
     ]
-    rows = [_failure_row(out, one) for one in ones[:LISTED]]
-    rest = f"{len(ones)} failures; the likeliest {LISTED} are listed, all in trials.jsonl."
-    return Table(columns, rows, caption=caption, note=rest if len(ones) > LISTED else "")
+    likelihood = {t.number: search.space.likelihood(t.values) for t in failures}
+    ranked = sorted(failures, key=lambda t: -likelihood[t.number])[:LISTED]
+    rows = [_failure_row(out, t, likelihood[t.number]) for t in ranked]
+    rest = f"{len(failures)} failures; the likeliest {LISTED} are listed, all in trials.jsonl."
+    return Table(columns, rows, caption=caption, note=rest if len(failures) > LISTED else "")
 
 
-def _failure_row(out: Path, one: Judged) -> list[Cell]:
-    trial, folder = one.trial, failure_folder(out, one.trial.number)
+def _failure_row(out: Path, trial: Trial, likelihood: float) -> list[Cell]:
+    folder = failure_folder(out, trial.number)
     href = folder.relative_to(out).as_posix() + f"/{REPORT}" if folder.is_dir() else ""
     values = ", ".join(f"{name} {_value(v)}" for name, v in trial.values.items())
     return [
@@ -181,7 +186,7 @@ def _failure_row(out: Path, one: Judged) -> list[Cell]:
         _number(trial.contact_kmh, ".1f"),
         _number(trial.contact_s if trial.departed_s is None else trial.departed_s, ".2f"),
         _reference_cell(trial.reference),
-        _number(one.likelihood, ".3g"),
+        _number(likelihood, ".3g"),
         Cell(values),
     ]
 

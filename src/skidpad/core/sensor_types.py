@@ -112,4 +112,5 @@ SENSORS = Registry("sensor", "skidpad.sensors", SensorType, _own_types)
 
 def find_sensor_type(spec: object) -> SensorType | None:
     """Returns the kind of sensor that a spec describes; None: no registered kind has such specs."""
-    return next((kind for kind in SENSORS.entries() if kind.describes(spec)), None)
+    kinds = (source.load() for source in SENSORS.sources().values())  # packages only where need be
+    return next((kind for kind in kinds if kind.describes(spec)), None)

@@ -59,6 +59,10 @@ def _least(found: Sequence[Pair], name: str) -> float | None:
     return min((v for p in found if (v := getattr(p, name)) is not None), default=None)
 
 
+def _most_braking(found: Sequence[Pair]) -> float | None:
+    return max((p.max_drac_mps2 for p in found if p.max_drac_mps2 is not None), default=None)
+
+
 def _by_gap(found: Sequence[Pair]) -> float:
     return _rising(_least(found, "min_gap_m"), GAP_SCALE)
 
@@ -68,7 +72,7 @@ def _by_ttc(found: Sequence[Pair]) -> float:
 
 
 def _by_braking(found: Sequence[Pair]) -> float:
-    worst = max((p.max_drac_mps2 for p in found if p.max_drac_mps2 is not None), default=None)
+    worst = _most_braking(found)
     return 1.0 if worst is None else BRAKING_SCALE / (BRAKING_SCALE + max(worst, 0.0))
 
 
@@ -104,9 +108,7 @@ def closeness(
         margin=_margin(hardest, departed is not None, OBJECTIVES[objective](found)),
         min_gap_m=_least(found, "min_gap_m"),
         min_ttc_s=_least(found, "min_ttc_s"),
-        max_drac_mps2=max(
-            (p.max_drac_mps2 for p in found if p.max_drac_mps2 is not None), default=None
-        ),
+        max_drac_mps2=_most_braking(found),
         contact=hardest,
         departed_s=departed,
     )

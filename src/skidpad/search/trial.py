@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from math import atan2, cos, pi, sin
+from math import atan2, pi
 
 from msgspec import structs
 
 from skidpad.campaign.run import Run, run
 from skidpad.core.errors import InputError
+from skidpad.core.geometry import Pose, kmh_from_mps
 from skidpad.core.run import ReferenceDriver, RunSpec
 from skidpad.core.space import Space
 from skidpad.core.vocabulary import Outcome
@@ -18,6 +19,7 @@ from skidpad.recording.motion import motion_hash
 from skidpad.recording.runlog import RunLog
 from skidpad.recording.searches import FRONT, Trial
 from skidpad.roads.bundled import load_map
+from skidpad.scenarios.measures import between
 from skidpad.search.margin import NO_CONFLICT, Closeness, closeness
 from skidpad.search.space import apply_values
 
@@ -69,7 +71,7 @@ def _columns(log: RunLog, near: Closeness) -> dict[str, object]:
     if near.contact is not None:
         contact = near.contact
         columns |= {
-            "contact_kmh": contact.v_graded * 3.6,
+            "contact_kmh": kmh_from_mps(contact.v_graded),
             "contact_s": contact.tick * log.header.dt,
             "other": contact.other,
             "side": side_of(log, contact),
@@ -83,10 +85,8 @@ def side_of(log: RunLog, contact: Contact) -> str:
         return SIDES[0]
     row = max(int(log.tick.searchsorted(contact.tick)) - 1, 0)
     a, i = log.actors, contact.actor
-    dx, dy, yaw = (float(v) for v in (
-        a.x[row, i] - a.x[row, 0], a.y[row, i] - a.y[row, 0], a.yaw[row, 0],
-    ))  # fmt: skip
-    ahead, left = dx * cos(yaw) + dy * sin(yaw), dy * cos(yaw) - dx * sin(yaw)
+    ego = Pose(float(a.x[row, 0]), float(a.y[row, 0]), 0.0, yaw=float(a.yaw[row, 0]))
+    ahead, left = between(ego, float(a.x[row, i]), float(a.y[row, i]))
     length = 0.5 * float(log.table.length[0] + log.table.length[i])
     width = 0.5 * float(log.table.width[0] + log.table.width[i])
     turn = atan2(left / width, ahead / length)  # as if both were squares

@@ -15,7 +15,8 @@ from skidpad.campaign.channel_world import segment_of
 from skidpad.campaign.channels import segments
 from skidpad.core.channels import TruthFrame
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import BackendChoice, BackendKind, run_from_plain
+from skidpad.core.run import run_from_plain
+from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.vocabulary import Stratum
 from skidpad.recording.channels import McapRecording
 from skidpad.recording.context import context_of

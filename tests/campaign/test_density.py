@@ -14,7 +14,8 @@ from skidpad.cli.cockpit import with_reserve as with_more
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
 from skidpad.core.inputs import Crowd, Timed
-from skidpad.core.run import BackendChoice, BackendKind, Roads
+from skidpad.core.run import Roads
+from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.vocabulary import SensorLevel, TrafficStart
 from skidpad.recording.inputs import decode_inputs, encode_inputs
 from skidpad.recording.logfiles import log_hash

@@ -28,8 +28,6 @@ from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import (
     ActorMode,
     AgentDriver,
-    BackendChoice,
-    BackendKind,
     ChannelCrew,
     Passenger,
     RunSpec,
@@ -37,6 +35,7 @@ from skidpad.core.run import (
     StackDriver,
     run_from_plain,
 )
+from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.recording.channel_drives import DriveRecord, read_record
 from skidpad.recording.logfiles import log_hash, read_log
 

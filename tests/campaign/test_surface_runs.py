@@ -14,7 +14,8 @@ from skidpad.campaign.run import run
 from skidpad.campaign.surfaces import read_surface
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import BackendChoice, BackendKind, RunSpec, Scenario, run_from_plain
+from skidpad.core.run import RunSpec, Scenario, run_from_plain
+from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import VehicleCommand
 from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import SensorLevel

@@ -14,7 +14,8 @@ from typer.testing import CliRunner
 from skidpad.cli.main import app
 from skidpad.cli.spread import describe_parameters, spread_fields
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import PARTED, BackendChoice, RunSpec
+from skidpad.core.run import PARTED, RunSpec
+from skidpad.core.simulator import BackendChoice
 
 ROOT = typer.main.get_command(app)
 DRIVING = ("adas", "grip", "play")

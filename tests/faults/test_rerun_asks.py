@@ -7,7 +7,8 @@ from typer.testing import CliRunner
 import runs
 from skidpad.cli.main import app
 from skidpad.core.errors import FileError
-from skidpad.core.run import AgentDriver, BackendChoice, BackendKind, StackDriver
+from skidpad.core.run import AgentDriver, StackDriver
+from skidpad.core.simulator import BackendChoice, BackendKind
 
 FOREIGN = (
     "from pathlib import Path\nPath(__file__).with_suffix('.ran').touch()\nclass S:\n    pass\n"

@@ -6,7 +6,7 @@ import shlex
 from typing import TYPE_CHECKING
 
 from skidpad.core.errors import require_choice
-from skidpad.core.run import BackendChoice, BackendKind
+from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 

@@ -20,7 +20,6 @@ from skidpad.core.run import (
     ActorMode,
     AdasDriver,
     AgentDriver,
-    BackendKind,
     CameraDriver,
     Passenger,
     ReferenceDriver,
@@ -31,6 +30,7 @@ from skidpad.core.run import (
     StackDriver,
 )
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
+from skidpad.core.simulator import BackendKind
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand
 from skidpad.core.told import describe_value
 from skidpad.core.vocabulary import Control, Outcome

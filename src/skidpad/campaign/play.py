@@ -13,7 +13,8 @@ from skidpad.campaign.run import Run, run
 from skidpad.campaign.runfolder import write_config, write_played, write_run
 from skidpad.campaign.worker import Job
 from skidpad.core.errors import BackendError
-from skidpad.core.run import BackendKind, RunSpec, Scenario
+from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.simulator import BackendKind
 from skidpad.recording.files import require_free
 
 

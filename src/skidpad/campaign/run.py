@@ -23,14 +23,13 @@ from skidpad.core.errors import StackError, require_choice
 from skidpad.core.run import (
     REFERENCE,
     AdasDriver,
-    BackendChoice,
-    BackendKind,
     DriverSpec,
     ReferenceDriver,
     Roads,
     RunSpec,
     StackDriver,
 )
+from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import ActorTable
 from skidpad.core.told import clean
 from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart

@@ -12,7 +12,8 @@ from msgspec import structs
 from skidpad.cli.asked import Climate, Drivers, Tuned
 from skidpad.cli.campaigns import FirstSeed, How, Seeds
 from skidpad.cli.spread import spread_fields
-from skidpad.core.run import BackendChoice, BackendKind, Roads, RunSpec
+from skidpad.core.run import Roads, RunSpec
+from skidpad.core.simulator import BackendChoice, BackendKind
 
 
 @spread_fields()

@@ -9,7 +9,7 @@ from pathlib import Path
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.names import path_part
 from skidpad.core.reading import is_file
-from skidpad.core.run import BackendChoice, BackendKind
+from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.roads.map_files import bundled_maps
 
 

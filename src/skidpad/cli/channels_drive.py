@@ -10,7 +10,8 @@ from msgspec import structs
 
 from skidpad.cli.campaigns import How
 from skidpad.cli.spread import spread_fields
-from skidpad.core.run import BackendChoice, ChannelCrew
+from skidpad.core.run import ChannelCrew
+from skidpad.core.simulator import BackendChoice
 from skidpad.live.settings import Links
 
 FOLDERS = typer.Argument(help="Folders of `skidpad channels drive`.")

@@ -12,8 +12,9 @@ from msgspec import Meta, Struct, structs
 from skidpad.cli.asked import Drivers, Tuned
 from skidpad.cli.spread import spread_fields
 from skidpad.core.errors import ConfigError, FileError
-from skidpad.core.run import BackendChoice, BackendKind, Roads, RunSpec, Scenario
+from skidpad.core.run import Roads, RunSpec, Scenario
 from skidpad.core.setup import VEHICLES_MAX
+from skidpad.core.simulator import BackendChoice, BackendKind
 
 if TYPE_CHECKING:
     from skidpad.pages.server import Place

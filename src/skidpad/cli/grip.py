@@ -13,7 +13,8 @@ from skidpad.cli.asked import MAPS, Controller, GripCross, MapAsked, Tuned
 from skidpad.cli.campaigns import FirstSeed, How
 from skidpad.cli.spread import spread_fields
 from skidpad.core.errors import require_choice
-from skidpad.core.run import BackendChoice, Friction, RunSpec, Scenario
+from skidpad.core.run import Friction, RunSpec, Scenario
+from skidpad.core.simulator import BackendChoice
 from skidpad.core.vocabulary import Outcome, SensorLevel
 
 if TYPE_CHECKING:

@@ -13,7 +13,8 @@ from skidpad.cli.asked import OF_FILE, Controller, PlayCross, Tuned
 from skidpad.cli.campaigns import Drive, Driving, How, Seeds
 from skidpad.cli.expected import Expected, exit_by_verdicts, played_report
 from skidpad.cli.spread import spread_fields
-from skidpad.core.run import BackendChoice, RunSpec, Scenario
+from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.simulator import BackendChoice
 from skidpad.core.vocabulary import SensorLevel
 
 if TYPE_CHECKING:

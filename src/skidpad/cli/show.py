@@ -12,7 +12,7 @@ from skidpad.campaign.runfolder import CONFIG
 from skidpad.campaign.stored import read_run
 from skidpad.cli.tables import table_console
 from skidpad.core.errors import FileError
-from skidpad.core.run import BackendKind
+from skidpad.core.simulator import BackendKind
 from skidpad.core.vocabulary import ActorKind
 from skidpad.evidence.drive.collisions import find_crashes
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics

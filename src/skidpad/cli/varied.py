@@ -12,7 +12,8 @@ from msgspec import Meta, Struct
 
 from skidpad.cli.campaigns import CORES, Workers
 from skidpad.cli.spread import spread_fields
-from skidpad.core.run import BackendChoice, RunSpec, Scenario
+from skidpad.core.run import RunSpec, Scenario
+from skidpad.core.simulator import BackendChoice
 from skidpad.core.vocabulary import SensorLevel
 
 if TYPE_CHECKING:

@@ -21,7 +21,7 @@ from runs import adas_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.matrix import RECIPE
 from skidpad.campaign.pool import local
-from skidpad.core.run import BackendChoice, BackendKind
+from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.recording.matrix import MatrixEntry
 from skidpad.simulation.carla_server.process import ServerProcess
 

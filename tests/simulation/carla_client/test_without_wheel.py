@@ -13,7 +13,7 @@ from skidpad.campaign.backends import carla_options
 from skidpad.campaign.starts import start_of
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.core.run import BackendChoice, BackendKind
+from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.weather import Weather
 from skidpad.roads.bundled import load_map

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import BackendChoice, BackendKind, Roads, RunSpec
+from skidpad.core.run import Roads, RunSpec
 from skidpad.core.setup import ActorSetup, LanePosition, Setup, TrafficSetup
+from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import Control, SensorLevel, TrafficStart
 from skidpad.core.weather import Weather

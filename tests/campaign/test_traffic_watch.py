@@ -87,7 +87,7 @@ def test_leaders_and_times_are_those_of_the_lane() -> None:
     ("wanted", "own", "lead", "counted"),
     [
         (30.0, 25.0, 25.0, True),
-        (26.0, 25.0, 25.0, False),  # nobody holds it up
+        (26.0, 25.0, 25.0, False),  # no leader holds it up
         (30.0, 25.4, 25.0, True),
         (30.0, 25.6, 25.0, False),  # still closing in
     ],

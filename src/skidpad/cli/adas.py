@@ -103,27 +103,25 @@ def report(
         typer.echo(_report_run(folder))
         return
     if (folder / FOUND).is_file():
-        from skidpad.report.search import write_search_report
-
-        typer.echo(write_search_report(folder))
-        return
-    if (folder / RISK_FOUND).is_file():
-        from skidpad.report.risk import write_risk_report
-
-        typer.echo(write_risk_report(folder))
-        return
-    if not any((folder / name).is_file() for name in (RESULTS, LEDGER)):
+        command = "search"
+    elif (folder / RISK_FOUND).is_file():
+        command = "risk"
+    elif any((folder / name).is_file() for name in (RESULTS, LEDGER)):
+        command = campaign_command(folder)
+    else:
         raise FileError(
             f"{folder} holds no results of a campaign; give the folder that a campaign wrote to, "
             f"or drive one: skidpad adas --out {folder}"
         )
-    typer.echo(_reports()[campaign_command(folder)](folder))
+    typer.echo(_reports()[command](folder))
 
 
 def _reports() -> dict[str, Callable[[Path], object]]:
     from skidpad.cli.channels_drive import totals
     from skidpad.cli.expected import played_report
     from skidpad.report.grip import write_grip_report
+    from skidpad.report.risk import write_risk_report
+    from skidpad.report.search import write_search_report
     from skidpad.report.threshold import write_threshold_report
 
     return {
@@ -132,6 +130,8 @@ def _reports() -> dict[str, Callable[[Path], object]]:
         "grip-threshold": write_threshold_report,
         "channels": totals,
         "play": played_report,
+        "search": write_search_report,
+        "risk": write_risk_report,
     }
 
 

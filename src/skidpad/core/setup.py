@@ -8,6 +8,7 @@ from pathlib import Path
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import VehicleCommand
+from skidpad.core.tyres import REFERENCE
 from skidpad.core.vocabulary import (
     Control,
     GripModel,
@@ -40,6 +41,7 @@ class ActorSetup:
     place: Pose | LanePosition
     speed: float = 0.0  # m/s
     driver: Control = Control.AUTOPILOT
+    tyres: str = ""  # by name, `core.tyres`; empty: those of the run (embedded backend)
     rgb: tuple[int, int, int] | None = None  # None: by index from the type's palette
     collides: bool = True  # False: it is seen and touches nothing (embedded backend)
     present: bool = True  # False: it is not there until it is told to appear (embedded backend)
@@ -98,6 +100,9 @@ class Setup:
     camera_effect: bool = True  # weather acts on RGB images
     rain_hides_night: bool = False  # in rain the camera effect of the night is left out (D-094)
     mu_ref: float = 0.9  # friction at CARLA's tire_friction 3.5 on a dry road
+    tyres: str = REFERENCE  # of vehicles that have none of their own (embedded backend)
+    tyre_stiffness: bool = False  # slip stiffness falls on water, snow and ice (embedded backend)
+    water_drag: bool = False  # wheels push water aside (embedded backend)
     stability: bool = False  # all vehicles have stability and traction control (embedded backend)
     level: SensorLevel = SensorLevel.PIXELS
     asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.states import ActorStates
-from skidpad.physics.params import WheelStates, vehicle_params
+from skidpad.physics.params import Feel, WheelStates, vehicle_params
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE, VehicleType
 from skidpad.physics.vehicle import step_vehicles
 
@@ -65,7 +65,8 @@ class Fleet:
         self.tire_friction = np.array(
             [[t.tire_friction] * 4 for t in types], dtype=np.float64
         ).reshape(n, 4)
-        self.mu = np.zeros((n, 4))  # what the tyres felt in the last step (decision L-6)
+        self.feel = Feel.dry(n)  # what the tyres felt in the last step (decision L-6)
+        self.mu = self.feel.mu
         self._flat = np.zeros(n)
 
     def __len__(self) -> int:
@@ -104,6 +105,7 @@ class Fleet:
 
         commands (n, 5): throttle, brake, steer (left positive), handbrake, reverse. mu (n, 4) of a
         tyre with tire_friction 3.5 at FL, FR, RL, RR; each wheel's own scale is applied here, once.
+        Stiffness and drag of water are those of `feel`.
         grade, bank (n,): rad, uphill and left side up positive. active: None means all present.
         """
         if commands.shape != (len(self), 5) or mu.shape != (len(self), 4):
@@ -118,7 +120,7 @@ class Fleet:
             self.wheels,
             self.params,
             commands,
-            self.mu,
+            self.feel,
             self._flat if grade is None else grade,
             self._flat if bank is None else bank,
             self.states.present if active is None else active,

@@ -13,7 +13,6 @@ Valid: film up to 2 mm, 0 to 130 km/h, road -20 to 40 C.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from math import exp, sqrt
 from typing import NamedTuple
@@ -23,6 +22,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.setup import Setup
+from skidpad.core.tyres import REFERENCE, Tyres, find_tyres
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 
@@ -46,6 +47,9 @@ WET_LOSS = 0.20  # of dry grip on a wetted texture; fit to Bosch
 WET_FILM = 0.02  # mm that takes 63 % of it: our assumption. Kulakowski and Harwood, ASTM STP 1031
 # (1990), find a significant loss between 0.025 and 0.23 mm
 V_HALF, V_HALF_FILM = 8.0, 17.5  # m/s, m/s mm: speed that halves grip on up to 1 mm, fit to Bosch
+V_HALF_WORN, V_HALF_FILM_WORN = 11.7, 1.17  # the same with 1.6 mm of tread, least squares over the
+# six worn values of Bosch's table at 0.2 and 1 mm; between, linear in the tread: our assumption
+WORN_DRY = 1.18  # dry friction of a worn tyre over that of a new one: Bosch, 1.0 over 0.85
 FILM_WEDGE = 1.0  # mm, more water than the tread takes at low speed already; fit to Bosch
 V_WEDGE = 19.8  # m/s at which 1 mm beyond that has halved grip once more; fit to Bosch
 FILM_MAX = 2.0  # mm, deepest water of that table; deeper counts as this
@@ -56,8 +60,19 @@ ICE_MU = 0.117  # sheet ice, winter tyres: 12.5 m from 12 mph, What Car? n11592;
 ICE_MU_REF_C = -5.0
 ICE_MU_PER_C = -0.006  # colder ice grips better; our assumption
 ICE_MU_RANGE = (0.05, 0.20)  # wet ice at 0 C, and below -19 C; our assumption
-SNOW_MU = 0.34  # winter tyre on snow: 29.1 m from 50 km/h, ADAC all-season tyre test, 24 April 2018
+ICE_TREAD_MM = 4.0  # of tread and less: a tyre is worn on ice; our assumption
 SNOW_COVER_MM = 5.0  # depth that hides the road; our assumption
+# Slip stiffness over that of a dry road. Burckhardt's curves have an initial slope c1 c2 - c3 of 30.2
+# (dry), 18.3 (snow), 15.3 (ice); only those of the dry road were read, so both are assumptions.
+SNOW_STIFFNESS, ICE_STIFFNESS = 0.60, 0.51
+
+# Displacement drag 0.5 C_D rho w d v^2, as AMC 25.1591 of EASA has it for aeroplane tyres; the page
+# was found, its section on drag and its 0.75 were not read, so both are an assumption.
+WATER_DRAG, WATER_DENSITY = 0.75, 1000.0  # -, kg/m^3
+CLEARED = (
+    0.2  # share of the film that a wheel leaves to the one behind it; our assumption. Metz (SAE
+)
+# 2011-01-0986 and tests at Volk Field, abstracts) finds that the clearing is significant
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,6 +95,9 @@ class GripParams(NamedTuple):
     fall: float = 0.0  # s/m, of the bare part on a dry road
     lift: float = 0.0  # (s/m)^2, one over the square of the speed that halves grip on thin water
     wedge: float = 0.0  # (s/m)^2, the same where water is deeper than the tread takes
+    firm_stiffness: float = 1.0  # slip stiffness over the dry one: the part that speed leaves
+    bare_stiffness: float = 0.0  # the part that falls as water lifts the tyre
+    film: float = 0.0  # m of water that a wheel pushes aside; 0: its drag is left out
 
 
 def rain_rate(weather: Weather) -> float:
@@ -155,48 +173,95 @@ def ice_mu(road_temperature_c: float, wet: bool) -> float:
     return min(max(ICE_MU + ICE_MU_PER_C * (temperature - ICE_MU_REF_C), low), high)
 
 
-def physical_params(surface: RoadSurface, mu_ref: float = MU_REF) -> GripParams:
+def physical_params(
+    surface: RoadSurface,
+    mu_ref: float = MU_REF,
+    tyres: Tyres | None = None,
+    *,
+    stiffness: bool = False,
+    drag: bool = False,
+) -> GripParams:
     """Grip of a surface from measurements.
 
     Wet: a loss that saturates with the film; water lifts the contact with the square of speed, and
     what the tread cannot take does so suddenly. Ice covers as it fills the texture; snow hides what
-    is below it.
+    is below it. tyres: None is the winter tyre, new. stiffness: slip stiffness falls too. drag:
+    wheels push the water aside.
     """
+    tyres = find_tyres(REFERENCE) if tyres is None else tyres
     film = min(surface.film_mm, FILM_MAX)
     bare = 1.0 - WET_LOSS * (1.0 - exp(-film / WET_FILM))
     ice_cover = min(surface.ice_mm / TEXTURE_MM, 1.0)
     snow_cover = min(surface.snow_mm / SNOW_COVER_MM, 1.0)
-    bare *= (1.0 - ice_cover) * (1.0 - snow_cover)
-    ice = ice_mu(surface.road_temperature_c, wet=film > 0.0 or surface.rain_mm_h > 0.0) / MU_REF
-    firm = ice_cover * (1.0 - snow_cover) * ice + snow_cover * SNOW_MU / MU_REF
+    open_road = (1.0 - ice_cover) * (1.0 - snow_cover)
+    dry = tyres.dry * (1.0 + (WORN_DRY - 1.0) * tyres.wear)
+    ice, snow = _on_ice(surface, tyres, wet=film > 0.0), _on_snow(tyres)
+    firm = ice_cover * (1.0 - snow_cover) * ice / dry + snow_cover * snow / dry
     thin, deep = min(film, FILM_WEDGE), max(film - FILM_WEDGE, 0.0)
-    lift = (thin / (V_HALF * thin + V_HALF_FILM)) ** 2
-    return GripParams(mu_ref, firm, bare, DRY_FALL, lift, deep / V_WEDGE**2)
+    half = V_HALF + (V_HALF_WORN - V_HALF) * tyres.wear
+    half_film = V_HALF_FILM + (V_HALF_FILM_WORN - V_HALF_FILM) * tyres.wear
+    lift = (thin / (half * thin + half_film)) ** 2
+    firm_stiffness = 1.0
+    if stiffness:
+        firm_stiffness = ice_cover * (1.0 - snow_cover) * ICE_STIFFNESS
+        firm_stiffness += snow_cover * SNOW_STIFFNESS
+    return GripParams(
+        mu_ref * (dry / MU_REF), firm, bare * open_road, DRY_FALL, lift, deep / V_WEDGE**2,
+        firm_stiffness, open_road if stiffness else 0.0, film / 1000.0 if drag else 0.0,
+    )  # fmt: skip
 
 
-def _none(_: Weather, mu_ref: float) -> GripParams:
-    return GripParams(mu_ref, 1.0, 0.0)
+def _on_ice(surface: RoadSurface, tyres: Tyres, *, wet: bool) -> float:
+    """Friction on sheet ice: that of the winter tyre, scaled by what these tyres have at -5 C."""
+    own = tyres.ice if tyres.tread_mm > ICE_TREAD_MM else tyres.worn_ice
+    ice = ice_mu(surface.road_temperature_c, wet=wet or surface.rain_mm_h > 0.0)
+    return ice * (own / ICE_MU)
 
 
-def _statistical(weather: Weather, mu_ref: float) -> GripParams:
-    return GripParams(mu_ref, statistical_ratio(weather), 0.0)
+def _on_snow(tyres: Tyres) -> float:
+    """Friction on packed snow; worn to 1.6 mm, that of a summer tyre, linear between: an assumption."""
+    worn = min(tyres.snow, find_tyres("summer").snow)
+    return tyres.snow + (worn - tyres.snow) * tyres.wear
 
 
-def _physical(weather: Weather, mu_ref: float) -> GripParams:
-    return physical_params(road_surface(weather), mu_ref)
+@dataclass(frozen=True, slots=True)
+class Road:
+    """What decides the grip of a run outside of patches, for every kind of tyre.
+
+    This is the replaceable component of B-003: weather, model and mu_ref in, grip over speed out.
+    """
+
+    weather: Weather
+    model: GripModel
+    mu_ref: float = MU_REF  # of a dry road with new winter tyres of tire_friction 3.5
+    tyres: str = REFERENCE  # of vehicles that have none of their own
+    stiffness: bool = False  # slip stiffness falls on water, snow and ice
+    drag: bool = False  # wheels push water aside
+
+    def params(self, tyres: str | None = None, surface: RoadSurface | None = None) -> GripParams:
+        """Grip of vehicles with these tyres. surface: what lies there, by the physical model."""
+        kind = find_tyres(self.tyres if tyres is None else tyres)
+        if surface is None and self.model is not GripModel.PHYSICAL:
+            ratio = 1.0 if self.model is GripModel.NONE else statistical_ratio(self.weather)
+            dry = kind.dry * (1.0 + (WORN_DRY - 1.0) * kind.wear)
+            return GripParams(self.mu_ref * (dry / MU_REF), ratio, 0.0)
+        return physical_params(
+            road_surface(self.weather) if surface is None else surface,
+            self.mu_ref, kind, stiffness=self.stiffness, drag=self.drag,
+        )  # fmt: skip
 
 
-# The replaceable component of B-003: weather and mu_ref in, grip over speed out.
-MODELS: dict[GripModel, Callable[[Weather, float], GripParams]] = {
-    GripModel.NONE: _none,
-    GripModel.STATISTICAL: _statistical,
-    GripModel.PHYSICAL: _physical,
-}
+def road_of(setup: Setup) -> Road:
+    """The road of a set-up."""
+    return Road(
+        setup.weather, setup.grip, setup.mu_ref, setup.tyres, setup.tyre_stiffness,
+        setup.water_drag,
+    )  # fmt: skip
 
 
 def grip_params(weather: Weather, model: GripModel, mu_ref: float = MU_REF) -> GripParams:
-    """Grip of this weather under this model, for `mu_at`."""
-    return MODELS[model](weather, mu_ref)
+    """Grip of this weather under this model on new winter tyres, for `mu_at`."""
+    return Road(weather, model, mu_ref).params()
 
 
 @inner_kernel
@@ -228,6 +293,35 @@ def left_at(params: GripParams, v: float) -> float:
 def mu_at(params: GripParams, v: float) -> float:
     """Friction coefficient at speed v in m/s of a tyre with tire_friction 3.5."""
     return params.mu_ref * ratio_at(params, v)
+
+
+@kernel
+def stiffness_at(params: GripParams, v: float) -> float:
+    """Slip stiffness at speed v in m/s over that on a dry road, along and across.
+
+    Water keeps a share of the contact's length off the road; the rest carries load and shears. A
+    brush's stiffness is 2 c a^2 with half the length a, so it falls with the square of the share
+    that `afloat` leaves of the friction.
+    """
+    left = afloat(params, v)
+    return params.firm_stiffness + params.bare_stiffness * left * left
+
+
+@inner_kernel
+def grip_of_row(grips: NDArray[np.float64], i: int) -> GripParams:
+    """Row i of an array whose columns are the fields of GripParams."""
+    g = grips[i]
+    return GripParams(g[0], g[1], g[2], g[3], g[4], g[5], g[6], g[7], g[8])
+
+
+@inner_kernel
+def water_drag(film: float, width: float, behind: bool) -> float:
+    """Drag of a wheel that pushes aside water of this depth in m, N over the square of the speed.
+
+    behind: in the track that another wheel has cleared.
+    """
+    depth = film * CLEARED if behind else film
+    return 0.5 * WATER_DRAG * WATER_DENSITY * width * depth
 
 
 @kernel

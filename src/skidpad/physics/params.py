@@ -28,6 +28,7 @@ class VehicleParams(NamedTuple):
     cog_height: Floats
     wheel_radius: Floats
     wheel_inertia: Floats
+    tyre_width: Floats
     drive_front: Floats
     power: Floats
     force_max: Floats
@@ -58,6 +59,19 @@ class WheelStates(NamedTuple):
     load: Floats  # (n, 4) N
 
 
+class Feel(NamedTuple):
+    """What the road does to the tyres, (n, 4) at FL, FR, RL, RR or (4,) of one vehicle."""
+
+    mu: Floats  # at nominal load
+    stiffness: Floats  # slip stiffness over that on a dry road
+    water: Floats  # N over the square of the speed in m/s, against the wheel's rolling
+
+    @classmethod
+    def dry(cls, n: int) -> Feel:
+        """Tyres of n vehicles on a road without water; their grip is to be filled."""
+        return cls(np.zeros((n, 4)), np.ones((n, 4)), np.zeros((n, 4)))
+
+
 def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
     """Parameters of these vehicles, in their order."""
 
@@ -74,6 +88,7 @@ def vehicle_params(types: Sequence[VehicleType]) -> VehicleParams:
         cog_height=column([t.cog_height for t in types]),
         wheel_radius=column([t.wheel_radius for t in types]),
         wheel_inertia=column([t.wheel_inertia for t in types]),
+        tyre_width=column([t.tyre_width for t in types]),
         drive_front=column([t.drive_share_front for t in types]),
         power=column([t.power for t in types]),
         force_max=column([t.force_max for t in types]),

@@ -11,6 +11,7 @@ import msgspec
 
 from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError, require_choice, require_range
+from skidpad.core.tyres import find_tyres
 from skidpad.core.vocabulary import ActorKind
 
 TIRE_FRICTION_REFERENCE = 3.5  # the blueprints' own tire_friction, at which mu is mu_ref (B-033)
@@ -40,6 +41,8 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     front_share: float  # of the weight at rest
     wheel_radius: float  # m, rolling
     wheel_inertia: float  # kg m^2, one wheel with its share of the drive line
+    tyre_width: float = 0.205  # m, of the tread; usual sizes of such vehicles, an assumption
+    tyres: str = ""  # by name, `core.tyres`; empty: those of the run
     drive: Drive
     power: float  # W at the wheels
     force_max: float  # N at the wheels, lowest gear
@@ -69,6 +72,8 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
         for name in ("length", "width", "height", "mass", "wheelbase", "track", "wheel_radius"):
             require_range(f"vehicle {self.title}: {name}", getattr(self, name), 0.1, 1.0e5)
         require_range(f"vehicle {self.title}: front_share", self.front_share, 0.2, 0.8)
+        if self.tyres:
+            find_tyres(self.tyres)
         if self.front_overhang + self.wheelbase > self.length:
             raise ConfigError(f"vehicle {self.title}: the rear axle lies behind the rear bumper")
 

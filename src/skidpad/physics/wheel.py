@@ -36,6 +36,7 @@ class Contact(NamedTuple):
     slip_y: float  # lateral slip that the tyre feels
     load: float  # N
     mu: float  # at nominal load
+    stiffness: float  # slip stiffness over that on a dry road
 
 
 class Tyre(NamedTuple):
@@ -86,9 +87,10 @@ def turn(c: Contact, tyre: Tyre, q: Torques, h: float) -> Turned:
     s_y = c.slip_y + (-c.v_y * per_speed - c.slip_y) * way / (1.0 + way)
     softer = tyre.stiffness * stiffness_share(share) / STIFFNESS_ALONG
     slip = sqrt(s_x * s_x + softer * softer * s_y * s_y)
-    sigma = STIFFNESS_ALONG * slip / (3.0 * mu)
+    stiffness = STIFFNESS_ALONG * c.stiffness
+    sigma = stiffness * slip / (3.0 * mu)
     if sigma < 1.0:
-        k = STIFFNESS_ALONG * c.load * brush_secant(sigma)
+        k = stiffness * c.load * brush_secant(sigma)
     else:  # towards a force against the slip itself
         softer = 1.0 - (1.0 - softer) / sigma
         k = grip * brush_curve(sigma) / sqrt(s_x * s_x + softer * softer * s_y * s_y)

@@ -11,7 +11,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.setup import FrictionPatch
 from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import GripModel
-from skidpad.physics.grip import grip_params, mu_at, physical_params, road_surface
+from skidpad.physics.grip import Road, grip_params, mu_at, physical_params, road_surface
 from skidpad.physics.presets import find_weather
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.patches import Patches
@@ -23,7 +23,7 @@ PLACE = ROAD.project(X, Y, Z)
 
 def patches(*found, weather="clear-noon", model=GripModel.PHYSICAL):
     outside = find_weather(weather)
-    return Patches(ROAD, found, outside, grip_params(outside, model))
+    return Patches(ROAD, found, Road(outside, model))
 
 
 @pytest.mark.parametrize("v", [0.0, 15.0, 30.0])

@@ -15,7 +15,7 @@ from skidpad.core.inputs import Outside
 from skidpad.core.randomness import stream
 from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
-from skidpad.physics.grip import grip_params
+from skidpad.physics.grip import road_of
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.asked import AskedSensors
 from skidpad.simulation.sensing import sensing_of
@@ -92,12 +92,18 @@ class EmbeddedBackend:
         """
         weather, range_model = outside.weather, outside.range_model
         mu_ref = self._setup.mu_ref if outside.mu_ref is None else outside.mu_ref
-        self.world.grip = grip_params(weather, outside.grip, mu_ref)
+        changed = replace(
+            self._setup,
+            weather=weather,
+            range_model=range_model,
+            grip=outside.grip,
+            mu_ref=mu_ref,
+        )
+        self.world.lay(road_of(changed))
         self.world.lights.hold(outside.lights)
         names = self.world.table.names
         self._unseen = np.array([name in outside.unseen for name in names], dtype=np.bool_)
         self.sensing.change(outside)
-        changed = replace(self._setup, weather=weather, range_model=range_model, mu_ref=mu_ref)
         self._setup = changed
         if self._asked is not None:
             self._asked = self._make_asked()

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from msgspec import structs
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.geometry import Pose
@@ -18,7 +19,7 @@ from skidpad.core.setup import (
     TrafficSetup,
 )
 from skidpad.core.vocabulary import ActorKind, TrafficStart
-from skidpad.physics.types import traffic_types, vehicle_type, vehicle_types
+from skidpad.physics.types import VehicleType, traffic_types, vehicle_type, vehicle_types
 from skidpad.roads.queries import LanePoint, RoadMap
 from skidpad.simulation.world.rows import Newcomer, Shape
 from skidpad.simulation.world.traffic.placement import (
@@ -67,6 +68,8 @@ class Role:
         """How it enters as the i-th."""
         a = self.actor
         body = SHAPES[a.type] if a.type in SHAPES else vehicle_type(a.type)
+        if a.tyres and isinstance(body, VehicleType):
+            body = structs.replace(body, tyres=a.tyres)
         return Newcomer(body, a.name, a.type, a.rgb or PALETTE[i % len(PALETTE)])
 
 

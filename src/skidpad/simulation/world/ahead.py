@@ -23,7 +23,7 @@ def vehicles_of_nobody() -> tuple[Any, ...]:
     fleet = Fleet([], DT, states=rows.states)
     active = np.zeros(0, dtype=np.bool_)
     return (
-        rows.states, fleet.wheels, fleet.params, rows.commands, fleet.mu, rows.grade, rows.bank,
+        rows.states, fleet.wheels, fleet.params, rows.commands, fleet.feel, rows.grade, rows.bank,
         active, DT, 1,
     )  # fmt: skip
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, hypot, sin
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +14,7 @@ from skidpad.core.errors import ConfigError, require_choice, require_range
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import FrictionPatch
 from skidpad.core.states import ActorStates
-from skidpad.core.weather import Weather
-from skidpad.physics.grip import GripParams, mu_at, physical_params, road_surface
+from skidpad.physics.grip import GripParams, Road, mu_at, road_surface, stiffness_at
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import LanePoint, RoadMap
 
@@ -22,26 +22,49 @@ SIDES = ("both", "left", "right")
 REACH = 12.0  # m from a vehicle's origin to its farthest wheel, and half a lane
 SPACING = 1.0  # m, the largest distance of two lane samples
 LISTED = 20  # roads that a message names
+NO_PATCH = -1.0  # stiffness and film where no patch says them
+
+
+class Wheels(Protocol):
+    """Where patches say what they do to wheels, (w, 4) each."""
+
+    @property
+    def patched(self) -> NDArray[np.float64]: ...
+    @property
+    def patch_stiffness(self) -> NDArray[np.float64]: ...
+    @property
+    def patch_film(self) -> NDArray[np.float64]: ...
 
 
 class Patches:
     """Resolves patches to friction at each wheel; fitted to the vehicles of a run."""
 
-    def __init__(
-        self, map: RoadMap, patches: Sequence[FrictionPatch], weather: Weather, grip: GripParams
-    ) -> None:
-        """weather, grip: of the road without patches.
+    def __init__(self, map: RoadMap, patches: Sequence[FrictionPatch], road: Road) -> None:
+        """road: without patches.
 
         Raises:
             ConfigError: a patch lies on no road of the map, or says nothing or two things.
         """
         self.map, self.patches = map, tuple(patches)
         self.wheels: list[list[tuple[float, float]]] = []
+        self.tyres: list[str] = []
         for k, patch in enumerate(self.patches):
             _check(k, patch, map)
-        self.covered = [_surface_grip(p, weather, grip) for p in self.patches]
         self.bounds = np.array([_bounds(p, map) for p in self.patches])
-        self.grip = grip
+        self.lay(road)
+
+    def lay(self, road: Road) -> None:
+        """The road without patches is this from now on."""
+        self.road = road
+        self._outside: dict[str, GripParams] = {}
+        self._covered: dict[str, list[GripParams | None]] = {}
+        self._know(road.tyres)
+
+    def _know(self, tyres: str) -> None:
+        """Work out what these tyres hold outside and inside of every patch."""
+        if tyres not in self._outside:
+            self._outside[tyres] = self.road.params(tyres)
+            self._covered[tyres] = [_surface_grip(p, self.road, tyres) for p in self.patches]
 
     def fit(self, types: Sequence[VehicleType]) -> None:
         """These are the vehicles from now on."""
@@ -49,9 +72,12 @@ class Patches:
             [(x, y) for x in (t.x_front_axle, t.x_rear_axle) for y in (t.track / 2, -t.track / 2)]
             for t in types
         ]
+        self.tyres = [t.tyres or self.road.tyres for t in types]
 
-    def fill(self, states: ActorStates, share: NDArray[np.float64]) -> None:
-        """Set share (w, 4) at FL, FR, RL, RR to the friction under each wheel over that without patches."""
+    def fill(self, states: ActorStates, w: Wheels) -> None:
+        """Set what patches do to each wheel at FL, FR, RL, RR: grip, stiffness, water."""
+        w.patched[:] = 1.0
+        w.patch_stiffness[:] = w.patch_film[:] = NO_PATCH
         count = len(self.wheels)
         x, y = states.x[:count, None], states.y[:count, None]
         low_x, low_y, high_x, high_y = self.bounds.T
@@ -59,26 +85,34 @@ class Patches:
         for i in np.flatnonzero(near.any(axis=1) & states.present[:count]):
             c, s = cos(states.yaw[i]), sin(states.yaw[i])
             v = float(np.hypot(states.vx[i], states.vy[i]))
-            for w, (forward, left) in enumerate(self.wheels[i]):
+            self._know(self.tyres[i])
+            for k, (forward, left) in enumerate(self.wheels[i]):
                 at = (states.x[i] + forward * c - left * s, states.y[i] + forward * s + left * c)
-                share[i, w] = self.ratio_at(float(at[0]), float(at[1]), float(states.z[i]), v)
+                found = self.felt_at(at[0], at[1], float(states.z[i]), v, self.tyres[i])
+                w.patched[i, k], w.patch_stiffness[i, k], w.patch_film[i, k] = found
 
     def ratio_at(self, x: float, y: float, z: float, v: float = 0.0) -> float:
         """Return the friction at a point of the road at a speed in m/s over that without patches.
 
         Where patches overlap the slippery one counts.
         """
-        place = self.map.project(x, y, z)
-        ratios = [
-            self._ratio(k, v) for k, p in enumerate(self.patches) if self._covers(p, x, y, place)
-        ]
-        return min(ratios, default=1.0)
+        return self.felt_at(x, y, z, v, self.road.tyres)[0]
 
-    def _ratio(self, k: int, v: float) -> float:
-        ratio, covered = self.patches[k].mu_ratio, self.covered[k]
+    def felt_at(
+        self, x: float, y: float, z: float, v: float, tyres: str
+    ) -> tuple[float, float, float]:
+        """Return share of friction, stiffness and film of the most slippery patch at a point."""
+        place = self.map.project(float(x), float(y), z)
+        under = [k for k, p in enumerate(self.patches) if self._covers(p, x, y, place)]
+        found = [self._felt(k, v, tyres) for k in under]
+        return min(found, default=(1.0, NO_PATCH, NO_PATCH))
+
+    def _felt(self, k: int, v: float, tyres: str) -> tuple[float, float, float]:
+        ratio, covered = self.patches[k].mu_ratio, self._covered[tyres][k]
         if covered is None:
-            return 1.0 if ratio is None else ratio
-        return float(mu_at(covered, v) / mu_at(self.grip, v))
+            return (1.0 if ratio is None else ratio), NO_PATCH, NO_PATCH
+        share = float(mu_at(covered, v) / mu_at(self._outside[tyres], v))
+        return share, float(stiffness_at(covered, v)), covered.film
 
     def _covers(self, patch: FrictionPatch, x: float, y: float, place: LanePoint | None) -> bool:
         if patch.circle is not None:
@@ -94,22 +128,22 @@ class Patches:
         return on_side and patch.s_from <= self.map.s_road(place) <= patch.s_to
 
 
-def _surface_grip(patch: FrictionPatch, weather: Weather, grip: GripParams) -> GripParams | None:
+def _surface_grip(patch: FrictionPatch, road: Road, tyres: str) -> GripParams | None:
     """Return the grip on what lies in a patch, at least as deep as the weather's; None: a plain ratio.
 
     Always by the physical model, which alone knows films and snow.
     """
     if patch.mu_ratio is not None:
         return None
-    road = road_surface(weather)
-    return physical_params(
+    outside = road_surface(road.weather)
+    return road.params(
+        tyres,
         replace(
-            road,
-            film_mm=max(road.film_mm, patch.water_mm),
-            ice_mm=max(road.ice_mm, patch.ice_mm),
-            snow_mm=max(road.snow_mm, patch.snow_mm),
+            outside,
+            film_mm=max(outside.film_mm, patch.water_mm),
+            ice_mm=max(outside.ice_mm, patch.ice_mm),
+            snow_mm=max(outside.snow_mm, patch.snow_mm),
         ),
-        grip.mu_ref,
     )
 
 

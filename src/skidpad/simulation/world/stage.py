@@ -5,7 +5,7 @@ from __future__ import annotations
 from skidpad.core.errors import ConfigError
 from skidpad.core.setup import Setup, TrafficSetup
 from skidpad.core.vocabulary import Control
-from skidpad.physics.grip import grip_params
+from skidpad.physics.grip import road_of
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.actors import Role, cast_of, place_of
 from skidpad.simulation.world.lights import Lights
@@ -20,15 +20,17 @@ def staged(setup: Setup, seed: int) -> World:
     """A world at the beginning of a run."""
     map = load_map(setup.map)
     roles = cast_of(map, setup, seed)
-    grip = grip_params(setup.weather, setup.grip, setup.mu_ref)
+    road = road_of(setup)
+    grip = road.params()
     conditions = Conditions(seed=seed, dt=setup.dt, grip=grip, stability=setup.stability)
     world = World(map, Lights.pretimed(map, seed, setup.dt), conditions)
     traffic = setup.traffic or TrafficSetup(vehicles=0)
     drivers = Traffic(map, traffic, seed, care_of(setup, traffic.slow_in_weather))
     world.let_drive(drivers)
     if setup.patches:
-        world.patches = Patches(map, setup.patches, setup.weather, grip)
+        world.patches = Patches(map, setup.patches, road)
     ids = world.enter([role.newcomer(i) for i, role in enumerate(roles)])
+    world.lay(road)
     world.book = ContactBook(world.obstacles.names, setup.dt)
     for id, role in zip(ids, roles, strict=True):
         world.set_collides(id, role.actor.collides)

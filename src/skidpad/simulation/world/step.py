@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.contact import Bodies, ContactLaw, Contacts, resolve_contacts
-from skidpad.physics.grip import GripParams, mu_at
-from skidpad.physics.params import VehicleParams, WheelStates
+from skidpad.physics.grip import grip_of_row, mu_at, stiffness_at, water_drag
+from skidpad.physics.params import Feel, VehicleParams, WheelStates
 from skidpad.physics.segments import Segments
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE
 from skidpad.physics.vehicle import step_vehicles
@@ -45,7 +45,10 @@ class Wheeled(NamedTuple):
     tire_friction: Floats  # (w, 4)
     patched: Floats  # (w, 4) share of the grip that friction patches leave
     road_mu: Floats  # (w, 4) of a tyre with tire_friction 3.5
-    felt: Floats  # (w, 4) at the tyres
+    grips: Floats  # (w, fields of GripParams), of each vehicle's tyres outside of patches
+    patch_stiffness: Floats  # (w, 4) slip stiffness over the dry one in patches; below 0: no patch
+    patch_film: Floats  # (w, 4) m of water in patches; below 0: no patch
+    feel: Feel  # (w, 4) at the tyres
     active: Flags  # (w,) moved by physics in this step
 
 
@@ -74,7 +77,6 @@ class Now(NamedTuple):
     dt: float  # s
     substeps: int
     lights: NDArray[np.uint8]  # (K,) LightState by signal row
-    grip: GripParams
     law: ContactLaw
     free_choice: bool  # drivers draw branches instead of taking the straightest
     care: Care  # what drivers know of weather
@@ -113,30 +115,36 @@ def advance_undriven(arena: Held[Arena], now: Now) -> tuple[int, int]:
 
 
 @kernel
-def feel_grip(rows: Rows, w: Wheeled, grip: GripParams) -> None:
-    """Friction at every wheel, with weather, patches and the tyres' own scale."""
+def feel_grip(rows: Rows, w: Wheeled) -> None:
+    """Friction, stiffness and water at every wheel, with weather, patches and the tyres' own scale."""
     s = rows.states
     for i in range(len(w.active)):
-        mu = mu_at(grip, sqrt(s.vx[i] * s.vx[i] + s.vy[i] * s.vy[i]))
+        grip = grip_of_row(w.grips, i)
+        v = sqrt(s.vx[i] * s.vx[i] + s.vy[i] * s.vy[i])
+        mu, stiffness = mu_at(grip, v), stiffness_at(grip, v)
         for k in range(4):
             w.road_mu[i, k] = mu * w.patched[i, k]
-            w.felt[i, k] = w.road_mu[i, k] * w.tire_friction[i, k] / TIRE_FRICTION_REFERENCE
+            w.feel.mu[i, k] = w.road_mu[i, k] * w.tire_friction[i, k] / TIRE_FRICTION_REFERENCE
+            own, film = w.patch_stiffness[i, k], w.patch_film[i, k]
+            w.feel.stiffness[i, k] = stiffness if own < 0.0 else own
+            depth = grip.film if film < 0.0 else film
+            w.feel.water[i, k] = water_drag(depth, w.params.tyre_width[i], k >= 2)
 
 
 @inner_kernel
 def _drive(rows: Rows, moved: Flags, w: Wheeled, now: Now) -> None:
     """Vehicles through their physics, or as they are told."""
     s = rows.states
-    feel_grip(rows, w, now.grip)
+    feel_grip(rows, w)
     for i in range(len(w.active)):
         w.active[i] = s.present[i] and rows.simulated[i] and not moved[i]
     step_vehicles(
-        s, w.wheels, w.params, rows.commands, w.felt, rows.grade, rows.bank, w.active,
+        s, w.wheels, w.params, rows.commands, w.feel, rows.grade, rows.bank, w.active,
         now.dt / now.substeps, now.substeps,
     )  # fmt: skip
     for i in range(len(w.active)):
         for k in range(4):
-            rows.mu[i, k] = w.felt[i, k]
+            rows.mu[i, k] = w.feel.mu[i, k]
         forward, left = rows.held[i, 0], rows.held[i, 1]
         if not isnan(forward):
             c, sn = cos(s.yaw[i]), sin(s.yaw[i])

@@ -20,13 +20,13 @@ from skidpad.core.setup import DT, ActorCommand
 from skidpad.core.states import LaneInvasion, VehicleCommand
 from skidpad.physics.contact import CONTACT_LAW, Contacts
 from skidpad.physics.fleet import Fleet
-from skidpad.physics.grip import GripParams
+from skidpad.physics.grip import GripParams, Road
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.ground import ROAD_NOISE, RoadSigns, read_signs
 from skidpad.simulation.world.lights import Lights
 from skidpad.simulation.world.obstacles import Obstacles, obstacles
-from skidpad.simulation.world.patches import FrictionZone, Patches, in_zone
+from skidpad.simulation.world.patches import NO_PATCH, FrictionZone, Patches, in_zone
 from skidpad.simulation.world.rows import Member, Newcomer, Rows, bodies_of, table_of
 from skidpad.simulation.world.step import (
     DECIDE,
@@ -68,7 +68,8 @@ class World:
 
     def __init__(self, map: RoadMap, lights: Lights, conditions: Conditions) -> None:
         self.map, self.lights, self.conditions = map, lights, conditions
-        self.dt, self.tick, self.grip = conditions.dt, 0, conditions.grip
+        self.dt, self.tick, self._grip = conditions.dt, 0, conditions.grip
+        self._road: Road | None = None
         self.obstacles = obstacles(map)
         self.zones: Sequence[FrictionZone] = ()
         self._zoned = False  # some were in force in the last step
@@ -166,9 +167,13 @@ class World:
             self.fleet.tire_friction,
             self.patched,
             np.zeros((w, 4)),
-            self.fleet.mu,
+            np.zeros((w, len(GripParams._fields))),
+            np.full((w, 4), NO_PATCH),
+            np.full((w, 4), NO_PATCH),
+            self.fleet.feel,
             np.zeros(w, dtype=np.bool_),
         )
+        self._fill_grips()
         arena = Arena(
             self.rows,
             self.moved,
@@ -191,6 +196,30 @@ class World:
         self._arrange(self.members)
 
     # --- control from outside
+
+    @property
+    def grip(self) -> GripParams:
+        """The grip of vehicles whose tyres are those of the run, outside of patches."""
+        return self._grip
+
+    @grip.setter
+    def grip(self, grip: GripParams) -> None:
+        if grip is not self._grip:
+            self._grip, self._road = grip, None
+            self._fill_grips()
+
+    def lay(self, road: Road) -> None:
+        """From now on the weather does this to the road, in patches too."""
+        self.grip = road.params()
+        self._road = road
+        self._fill_grips()
+        if self.patches is not None:
+            self.patches.lay(road)
+
+    def _fill_grips(self) -> None:
+        for i, body in enumerate(self.fleet.types):
+            own = self._road is not None and body.tyres
+            self.on_wheels.grips[i] = self._road.params(body.tyres) if own else self._grip
 
     def stand_among(self, found: Obstacles) -> None:
         """From now on these are what stands beside the road."""
@@ -321,7 +350,6 @@ class World:
             self.dt,
             self.fleet.steps,
             self.lights.by_row,
-            self.grip,
             CONTACT_LAW,
             self.traffic is not None and self.traffic.free_choice,
             CARELESS if self.traffic is None else self.traffic.care,
@@ -342,8 +370,7 @@ class World:
     def _feel_road(self) -> None:
         """Patches under the wheels, and zones in which tyres are others."""
         if self.patches is not None:
-            self.patched[:] = 1.0
-            self.patches.fill(self.states, self.patched)
+            self.patches.fill(self.states, self.on_wheels)
         if self.zones or self._zoned:
             self.fleet.tire_friction[:] = self.tyres
             for zone in self.zones:
@@ -353,7 +380,7 @@ class World:
     def feel_grip(self) -> None:
         """The road's friction where everybody stands, before the first step."""
         self._feel_road()
-        feel_grip(self.rows, self.on_wheels, self.grip)
+        feel_grip(self.rows, self.on_wheels)
         self.mu[: self.wheeled] = self.on_wheels.road_mu
 
     def settle(self) -> None:

@@ -75,7 +75,7 @@ def care_of(setup: Setup, slow_in_weather: bool) -> Care:
     """What the drivers of a set-up know."""
     if not slow_in_weather:
         return careless()
-    grip = grip_params(setup.weather, setup.grip, setup.mu_ref)
+    grip = road_of(setup).params()
     return Care(True, grip, sight(setup.weather), A_CHANGE, DRAWN)
 
 

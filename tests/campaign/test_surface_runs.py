@@ -82,3 +82,39 @@ def test_carla_has_no_surfaces():
             surface=read_surface(EXAMPLE),
             backend=BackendChoice(backend=BackendKind.CARLA),
         )
+
+
+def coast(*surface, **settings):
+    """Roll from 18 m/s for 2 s with hands off: the turn in rad, and the speed that is left."""
+    stage = stage_of(structs.replace(SPEC, surface=surface, settings=settings))
+    backend = EmbeddedBackend()
+    backend.reset(replace(stage.setup, ego=replace(stage.setup.ego, speed=18.0), actors=()), 1)
+    start = float(backend.truth().states.yaw[0])
+    for _ in range(40):
+        backend.step(VehicleCommand())
+    s = backend.truth().states
+    return float(s.yaw[0]) - start, float(np.hypot(s.vx[0], s.vy[0]))
+
+
+def test_a_puddle_under_the_left_wheels_pulls_a_coasting_car_to_the_left():
+    puddle = SurfacePatch(water_mm=2.0, road=1, side="left")
+    turned, v = coast(puddle, water_drag=True)
+    straight, v_dry = coast(water_drag=True)
+    without, _ = coast(puddle)
+    assert abs(straight) < 0.002
+    assert turned > straight + 0.002
+    assert abs(without - straight) < 0.2 * (turned - straight)
+    assert v < v_dry - 0.05
+
+
+def test_a_vehicle_has_tyres_of_its_own():
+    stage = stage_of(structs.replace(SPEC, settings={"tyres": "summer"}))
+    assert stage.setup.tyres == "summer"
+    icy = replace(stage.setup.weather, ice_thickness=30.0, road_temperature_c=-5.0)
+    other = replace(stage.setup.actors[0], tyres="studded")
+    backend = EmbeddedBackend()
+    backend.reset(replace(stage.setup, weather=icy, actors=(other,)), 1)
+    backend.step(VehicleCommand())
+    mu = backend.truth().mu
+    assert mu[0] == pytest.approx(0.077, abs=0.002)
+    assert (mu[1] > 0.2).all()

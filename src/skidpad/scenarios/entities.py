@@ -7,6 +7,8 @@ from dataclasses import dataclass, field, replace
 from enum import Enum
 from math import inf
 
+from skidpad.core.told import describe_value
+from skidpad.core.tyres import REFERENCE, known_tyres
 from skidpad.core.vocabulary import ActorKind
 from skidpad.scenarios.catalogs import Catalogs
 from skidpad.scenarios.document import Node
@@ -24,6 +26,7 @@ WHEELED = {
     "train": ActorKind.BUS,
     "tram": ActorKind.BUS,
 }
+TYRES = "tyres"  # property of a vehicle: the name of its tyres
 GHOST = "ghost"  # property of what is seen and touches nothing
 TWO_WHEELED = ("bicycle", "motorbike", "standup_scooter", "wheelchair")
 PROPS = (("cone", 0.6), ("box", 1.5), ("barrier", inf))  # backend's props by largest size, m
@@ -225,6 +228,11 @@ def _vehicle(name: str, node: Node, properties: Mapping[str, str]) -> Entity:
     coupling = _coupling(name, node)
     if category not in WHEELED:
         raise node.unsupported(f"vehicleCategory={category!r} is not supported")
+    if properties.get(TYRES, REFERENCE) not in known_tyres():
+        raise node.error(
+            f"property {TYRES} must be one of {', '.join(known_tyres())}, "
+            f"got {describe_value(properties[TYRES], 100)}"
+        )
     type = nearest_type(WHEELED[category], box.length, box.width, box.height)
     return Entity(name, Body.VEHICLE, type, True, box, limits, properties, coupling)
 

@@ -12,7 +12,7 @@ from skidpad.core.setup import DT, ActorCommand, ActorSetup
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Control
 from skidpad.recording.staging import Staging
-from skidpad.scenarios.entities import Box
+from skidpad.scenarios.entities import TYRES, Box
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Place
 from skidpad.scenarios.registry import control
@@ -59,6 +59,7 @@ def setups(scenario: Scenario) -> tuple[ActorSetup, tuple[ActorSetup, ...]]:
             place=place,
             speed=begin.speed,
             driver=Control.SCRIPTED,
+            tyres=entity.properties.get(TYRES, ""),
             collides=not entity.is_ghost,
             present=begin.place is not None,
         )

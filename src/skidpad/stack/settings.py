@@ -18,6 +18,7 @@ import msgspec
 
 from skidpad.core.errors import ConfigError, require_choice, require_range
 from skidpad.core.run import Friction, RunSpec
+from skidpad.core.tyres import REFERENCE, known_tyres
 from skidpad.core.vocabulary import Clearance, GripModel, RangeModel
 
 
@@ -158,6 +159,13 @@ class Settings:
         "physics",
         "friction of a dry road: winter (tyres, 0.9), summer (1.05), a number",
     )
+    tyres: str = _setting(
+        REFERENCE, "M-1", "physics", "tyres of vehicles that have none of their own"
+    )
+    tyre_stiffness: bool = _setting(
+        False, "M-1, T-11", "physics", "slip stiffness falls on water, snow and ice"
+    )
+    water_drag: bool = _setting(False, "M-1, T-11", "physics", "wheels push water aside")
     esc: bool = _setting(
         True, "M-1, R-5", "physics", "stability and traction control, brake-force distribution"
     )
@@ -299,6 +307,8 @@ def _check_type(name: str, value: Any) -> Any:
         kind = next(part for part in get_args(kind) if part is not type(None))
     if kind is bool:
         return value if isinstance(value, bool) else _switch(name, value)
+    if kind is str:
+        return require_choice(name, str(value), list(known_tyres()))
     if issubclass(kind, Enum):
         text = value.value if isinstance(value, Enum) else str(value)
         return kind(require_choice(name, text, [member.value for member in kind]))

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import cos, hypot, sin
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,22 +17,13 @@ from skidpad.physics.grip import GripParams, Road, mu_at, road_surface, stiffnes
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import LanePoint, RoadMap
 
+Floats = NDArray[np.float64]
+
 SIDES = ("both", "left", "right")
 REACH = 12.0  # m from a vehicle's origin to its farthest wheel, and half a lane
 SPACING = 1.0  # m, the largest distance of two lane samples
 LISTED = 20  # roads that a message names
 NO_PATCH = -1.0  # stiffness and film where no patch says them
-
-
-class Wheels(Protocol):
-    """Where patches say what they do to wheels, (w, 4) each."""
-
-    @property
-    def patched(self) -> NDArray[np.float64]: ...
-    @property
-    def patch_stiffness(self) -> NDArray[np.float64]: ...
-    @property
-    def patch_film(self) -> NDArray[np.float64]: ...
 
 
 class Patches:
@@ -74,10 +64,13 @@ class Patches:
         ]
         self.tyres = [t.tyres or self.road.tyres for t in types]
 
-    def fill(self, states: ActorStates, w: Wheels) -> None:
-        """Set what patches do to each wheel at FL, FR, RL, RR: grip, stiffness, water."""
-        w.patched[:] = 1.0
-        w.patch_stiffness[:] = w.patch_film[:] = NO_PATCH
+    def fill(self, states: ActorStates, share: Floats, stiffness: Floats, film: Floats) -> None:
+        """Set what patches do to the wheels, (w, 4) at FL, FR, RL, RR.
+
+        share: of the friction without patches. stiffness: over the dry one. film: of water, m.
+        """
+        share[:] = 1.0
+        stiffness[:] = film[:] = NO_PATCH
         count = len(self.wheels)
         x, y = states.x[:count, None], states.y[:count, None]
         low_x, low_y, high_x, high_y = self.bounds.T
@@ -89,7 +82,7 @@ class Patches:
             for k, (forward, left) in enumerate(self.wheels[i]):
                 at = (states.x[i] + forward * c - left * s, states.y[i] + forward * s + left * c)
                 found = self.felt_at(at[0], at[1], float(states.z[i]), v, self.tyres[i])
-                w.patched[i, k], w.patch_stiffness[i, k], w.patch_film[i, k] = found
+                share[i, k], stiffness[i, k], film[i, k] = found
 
     def ratio_at(self, x: float, y: float, z: float, v: float = 0.0) -> float:
         """Return the friction at a point of the road at a speed in m/s over that without patches.

@@ -370,7 +370,8 @@ class World:
     def _feel_road(self) -> None:
         """Patches under the wheels, and zones in which tyres are others."""
         if self.patches is not None:
-            self.patches.fill(self.states, self.on_wheels)
+            w = self.on_wheels
+            self.patches.fill(self.states, w.patched, w.patch_stiffness, w.patch_film)
         if self.zones or self._zoned:
             self.fleet.tire_friction[:] = self.tyres
             for zone in self.zones:

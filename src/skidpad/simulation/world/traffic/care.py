@@ -17,7 +17,7 @@ from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.setup import Setup
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
-from skidpad.physics.grip import GripParams, grip_params, left_at, mu_at
+from skidpad.physics.grip import GripParams, grip_params, left_at, mu_at, road_of
 from skidpad.physics.optics import sight
 from skidpad.simulation.world.traffic.idm import (
     A_EMERGENCY,

@@ -84,9 +84,8 @@ def test_side_force_over_slip_at_five_films_and_three_speeds():
         assert (np.diff(curves, axis=0) < 0.0).all()  # more water, less force at every slip
         plain = np.array([[side_force(road(f, on=False), v, s) for s in slips] for f in FILMS])
         assert (curves <= plain + 1e-9).all()
-        assert curves[1:, 0] == pytest.approx(
-            plain[1:, 0] * [stiffness_at(road(f), v) for f in FILMS[1:]], rel=0.08
-        )
+        shares = [stiffness_at(road(f), v) for f in FILMS[1:4]]  # on 2 mm it floats at once
+        assert curves[1:4, 0] == pytest.approx(plain[1:4, 0] * shares, rel=0.08)
 
 
 def test_snow_and_ice_shear():

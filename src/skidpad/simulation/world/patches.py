@@ -81,7 +81,7 @@ class Patches:
             self._know(self.tyres[i])
             for k, (forward, left) in enumerate(self.wheels[i]):
                 at = (states.x[i] + forward * c - left * s, states.y[i] + forward * s + left * c)
-                found = self.felt_at(at[0], at[1], float(states.z[i]), v, self.tyres[i])
+                found = self.effect_at(at[0], at[1], float(states.z[i]), v, self.tyres[i])
                 share[i, k], stiffness[i, k], film[i, k] = found
 
     def ratio_at(self, x: float, y: float, z: float, v: float = 0.0) -> float:
@@ -89,18 +89,18 @@ class Patches:
 
         Where patches overlap the slippery one counts.
         """
-        return self.felt_at(x, y, z, v, self.road.tyres)[0]
+        return self.effect_at(x, y, z, v, self.road.tyres)[0]
 
-    def felt_at(
+    def effect_at(
         self, x: float, y: float, z: float, v: float, tyres: str
     ) -> tuple[float, float, float]:
         """Return share of friction, stiffness and film of the most slippery patch at a point."""
         place = self.map.project(float(x), float(y), z)
         under = [k for k, p in enumerate(self.patches) if self._covers(p, x, y, place)]
-        found = [self._felt(k, v, tyres) for k in under]
+        found = [self._effect(k, v, tyres) for k in under]
         return min(found, default=(1.0, NO_PATCH, NO_PATCH))
 
-    def _felt(self, k: int, v: float, tyres: str) -> tuple[float, float, float]:
+    def _effect(self, k: int, v: float, tyres: str) -> tuple[float, float, float]:
         ratio, covered = self.patches[k].mu_ratio, self._covered[tyres][k]
         if covered is None:
             return (1.0 if ratio is None else ratio), NO_PATCH, NO_PATCH

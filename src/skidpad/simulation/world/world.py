@@ -217,9 +217,10 @@ class World:
             self.patches.lay(road)
 
     def _fill_grips(self) -> None:
+        road = self._road
         for i, body in enumerate(self.fleet.types):
-            own = self._road is not None and body.tyres
-            self.on_wheels.grips[i] = self._road.params(body.tyres) if own else self._grip
+            own = None if road is None or not body.tyres else road.params(body.tyres)
+            self.on_wheels.grips[i] = self._grip if own is None else own
 
     def stand_among(self, found: Obstacles) -> None:
         """From now on these are what stands beside the road."""

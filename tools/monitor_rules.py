@@ -12,11 +12,15 @@ import argparse
 import json
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from math import erf, sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter, uniform_filter1d
 
 from skidpad.campaign.channels import SEEDS_EACH
 from skidpad.core.vocabulary import HazardType
@@ -35,13 +39,22 @@ from skidpad.evidence.statistics import event_rate
 from skidpad.recording.channels import McapRecording
 from skidpad.recording.context import context_of
 from skidpad.recording.cycles import cycles
+from skidpad.roads.bundled import bundled_maps, load_map
+from skidpad.roads.queries import RoadMap
+from skidpad.stack.channels.channel import CYCLE
 
 LOCALISATION = HazardType.INCONSISTENT_LOCALISATION
 TODAY, INNOVATION, REFERENCE = "today: a dry road, vote", "innovation", "reference "
 LIMITS = {LOCALISATION: FACTORS} | dict.fromkeys(TAILS, SPARES)
+OWN_GRIP = "grip from own signals"
 LEAPS = (0.8, 0.9, 1.0, 1.1)  # m
 SURE_OF_MEAN = 0.95  # of a probability over the last half second
 MEMORY = 0.4  # s
+SMOOTHED = (1.0, 2.0)  # s of cycles whose majority decides, half of them later: the delay is half
+OFF_CENTRE, MEAN_S = 0.8, 0.5  # m from the lane's centre by which the map doubts a position; s
+MATCHED = "matched to the map"
+OFF_ROAD = 5.0  # m, of a place that no lane is near
+Floats = NDArray[np.float64]
 Found = Mapping[str, Sequence[Span]]  # by rule
 
 
@@ -110,7 +123,7 @@ def found_gaps(
     dry, told = SafeDistance(), SafeDistance.on(grip)
     rules = {
         TODAY: Tracked(channels, dry),
-        "grip from own signals": Tracked(channels),
+        OWN_GRIP: Tracked(channels),
         "own grip, fusion": Fused(channels),
         "own grip, integrated probability": Integrated(channels),
         "told the grip": Tracked(channels, told),
@@ -120,10 +133,31 @@ def found_gaps(
         rows = [rule.distances(*cycle) for cycle in looked]
         short = {h: np.array([float(row[s] > 0.0) for row in rows]) for h, s in SIDES.items()}
         yield name, [s for h, p in short.items() for s in spans(h, t, p, 0.5, 1, begin)]
+        if name == OWN_GRIP:
+            for length in SMOOTHED:
+                smooth = {h: smoothed(p, length) for h, p in short.items()}
+                found = [s for h, p in smooth.items() for s in spans(h, t, p, 0.5, 1, begin)]
+                yield f"own grip, smoothed over {length:g} s", found
+
+
+def smoothed(short: Floats, length: float) -> Floats:
+    """Whether a gap is short in most of the cycles around each one (fixed-lag smoothing)."""
+    return median_filter(short, size=round(length / CYCLE) | 1, mode="nearest")
+
+
+def off_centre(map: RoadMap, looked: Sequence[Looked]) -> Floats:
+    """(T,) m by which the channel that is farthest from a lane's centre lies off it, mean of 0.5 s."""
+    worst = np.zeros(len(looked))
+    for k, cycle in enumerate(looked):
+        for frame in cycle.frames:
+            if frame is not None and np.isfinite(frame.ego[:2]).all():
+                point = map.project(float(frame.ego[0]), float(frame.ego[1]), 0.0)
+                worst[k] = max(worst[k], OFF_ROAD if point is None else abs(point.offset))
+    return uniform_filter1d(worst, size=round(MEAN_S / CYCLE), mode="nearest")
 
 
 def found_places(
-    channels: Sequence[str], looked: Sequence[Looked], begin: float
+    channels: Sequence[str], looked: Sequence[Looked], begin: float, map: RoadMap | None = None
 ) -> Iterator[tuple[str, list[Span]]]:
     """What each rule finds of inconsistent positions."""
     tracked = Tracked(channels)
@@ -133,6 +167,10 @@ def found_places(
     rules = {TODAY: chi2} | {
         f"{INNOVATION} over {leap:g} m, or today's": chi2 | (leaps > leap) for leap in LEAPS
     }
+    if map is not None:
+        doubt = off_centre(map, looked) > OFF_CENTRE
+        rules[f"{MATCHED}, innovation alone"] = chi2 | ((leaps > 1.0) & doubt)
+        rules[f"{MATCHED}, innovation and today's"] = (chi2 | (leaps > 1.0)) & doubt
     for name, held in rules.items():
         yield name, list(spans(LOCALISATION, t, held.astype(float), 0.5, 1, begin))
 
@@ -146,7 +184,8 @@ def judge(path: Path, with_reference: bool) -> dict[str, Any]:
     true = [weigh(h) for h in simulator_truth(rows, source.channels) if h.t_end >= begin]
     hours = max(rows[-1].t - begin, 0.0) / 3600.0 if rows else 0.0
     found: dict[str, list[Span]] = dict(found_gaps(source.channels, looked, grip_of(rows), begin))
-    for name, places in found_places(source.channels, looked, begin):
+    map = load_map(context["map"]) if context.get("map") in bundled_maps() else None
+    for name, places in found_places(source.channels, looked, begin, map):
         found.setdefault(name, []).extend(places)
     swept = reference(rows, source.channels, begin) if with_reference else {}
     for hazard, limits in swept.items():
@@ -170,7 +209,7 @@ def _counts(
     elif name == TODAY:
         judged = [*SCORED_HAZARDS]
     else:
-        judged = [LOCALISATION] if name.startswith(INNOVATION) else [*SIDES]
+        judged = [LOCALISATION] if name.startswith((INNOVATION, MATCHED)) else [*SIDES]
     return {h.value: [rows[h].tp, rows[h].fp, rows[h].fn, *rows[h].weighed] for h in judged}
 
 
@@ -214,12 +253,19 @@ def _tally(row: Mapping[str, Any], name: str, hazard: str) -> Tally:
     return Tally(tp, fp, fn, row["hours"], (), Weighed(*weighed))
 
 
-def judge_folders(folders: Sequence[Path], with_reference: bool) -> dict[str, Any]:
+def judge_folders(
+    folders: Sequence[Path], with_reference: bool, workers: int = 1
+) -> dict[str, Any]:
     """Seeds and summaries by kind of drives of all complete recordings in the folders."""
     files = sorted(p for folder in folders for p in folder.rglob("*.mcap"))
     paths = [p for p in files if p.with_suffix(".json").is_file()]
     code = code_hash()
-    rows = [read_or_judge(path, code, with_reference) for path in paths]
+    judge_one = partial(read_or_judge, code=code, with_reference=with_reference)
+    if workers > 1:
+        with ProcessPoolExecutor(workers) as pool:
+            rows = list(pool.map(judge_one, paths))
+    else:
+        rows = [judge_one(path) for path in paths]
     seeds = {int(path.stem.rsplit("-", 1)[1]) // SEEDS_EACH * SEEDS_EACH for path in paths}
     parts = {
         "natural": [r for r in rows if not r["ice"] and not r["risky"]],
@@ -240,10 +286,15 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, help="file to write")
     parser.add_argument("--commit", default="unknown", help="of the code that drove")
     parser.add_argument("--date", default="", help="of the drives")
+    parser.add_argument("--workers", type=int, default=1, help="processes that judge")
     asked = parser.parse_args(words)
-    table = {"commit": asked.commit, "date": asked.date, **judge_folders(asked.folders, False)}
+    table = {
+        "commit": asked.commit,
+        "date": asked.date,
+        **judge_folders(asked.folders, False, asked.workers),
+    }
     if asked.reference:
-        table["reference"] = judge_folders(asked.reference, True)
+        table["reference"] = judge_folders(asked.reference, True, asked.workers)
     asked.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
     return 0
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+from math import cos, sin
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +13,10 @@ from svg_values import curves_of
 import channels_tables as tables
 import monitor_rules
 from channel_worlds import Eyes, World, drive
+from skidpad.evidence.channels.judging.curves import Looked
 from skidpad.evidence.channels.tracked.tracks import Track
 from skidpad.report.figures import PALETTE
+from skidpad.roads.bundled import load_map
 
 TAILGATED = "ego_tailgated"
 FOLLOWED = World((0, 0, 0, 15.0, 0), np.array([(-10.5, 0, 0, 15.7, 0), (60.0, 3.5, 0, 15.0, 0)]))
@@ -99,3 +103,24 @@ def test_fused_tracks_weigh_by_their_covariances():
     gap, v, p = monitor_rules.fused_state([one, two])
     assert (gap, v) == pytest.approx((9.0, 11.0))
     assert p == pytest.approx((0.75, 0.75, 0.0))
+
+
+def test_smoothing_bridges_a_gap_and_drops_a_flicker():
+    """By hand: 11 cycles of 0.1 s decide, so that 3 of them are no gap and 7 with a hole are one."""
+    flicker = np.array([0.0] * 20 + [1.0] * 3 + [0.0] * 20)
+    assert not monitor_rules.smoothed(flicker, 1.0).any()
+    held = np.array([0.0] * 10 + [1.0] * 7 + [0.0] * 2 + [1.0] * 7 + [0.0] * 10)
+    assert monitor_rules.smoothed(held, 1.0)[15:21].all()
+
+
+def test_the_map_doubts_the_channel_that_is_off_its_lane():
+    """On figure8, 0.6 m left of a lane's centre for a second, then on it."""
+    map = load_map("figure8")
+    beside = map.at(0, 20.0)
+    lane = map.project(beside.x, beside.y, 0.0)
+    left = (lane.x - 0.6 * sin(lane.heading), lane.y + 0.6 * cos(lane.heading))
+    places = [left] * 10 + [(lane.x, lane.y)] * 20
+    frames = [SimpleNamespace(ego=np.array(place)) for place in places]
+    off = monitor_rules.off_centre(map, [Looked(0.0, [], [frame]) for frame in frames])
+    assert off[2:7] == pytest.approx(0.6, abs=0.05)
+    assert off[20:] == pytest.approx(0.0, abs=0.05)

@@ -142,7 +142,8 @@ def found_gaps(
 
 def smoothed(short: Floats, length: float) -> Floats:
     """Whether a gap is short in most of the cycles around each one (fixed-lag smoothing)."""
-    return median_filter(short, size=round(length / CYCLE) | 1, mode="nearest")
+    majority: Floats = median_filter(short, size=round(length / CYCLE) | 1, mode="nearest")
+    return majority
 
 
 def off_centre(map: RoadMap, looked: Sequence[Looked]) -> Floats:
@@ -153,7 +154,8 @@ def off_centre(map: RoadMap, looked: Sequence[Looked]) -> Floats:
             if frame is not None and np.isfinite(frame.ego[:2]).all():
                 point = map.project(float(frame.ego[0]), float(frame.ego[1]), 0.0)
                 worst[k] = max(worst[k], OFF_ROAD if point is None else abs(point.offset))
-    return uniform_filter1d(worst, size=round(MEAN_S / CYCLE), mode="nearest")
+    mean: Floats = uniform_filter1d(worst, size=round(MEAN_S / CYCLE), mode="nearest")
+    return mean
 
 
 def found_places(

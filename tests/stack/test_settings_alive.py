@@ -169,6 +169,11 @@ def figure8():
     return load_map("figure8")
 
 
+def lane_friction(settings: Settings) -> float | None:
+    """Friction that a map's materials replace, None where they are not read."""
+    return stage_of(cell(settings)).setup.material_base
+
+
 def recovery(settings: Settings) -> list[Any]:
     """A contact with a car standing 10 m ahead, until the ego drives again."""
     start = figure8().ahead(figure8().place(figure8().ego_start), 300.0)
@@ -201,6 +206,7 @@ OTHERS: dict[str, Scenario] = {
     "tyres": Scenario("summer_1.6mm", short_drive("icy_30")),
     "tyre_stiffness": Scenario(True, short_drive("rain-noon")),
     "water_drag": Scenario(True, short_drive("rain-noon")),
+    "lane_material": Scenario(True, lane_friction),
     "esc": Scenario(False, short_drive("icy_30")),
     "camera": Scenario(False, lambda s: pictures(s, "rain-noon", "rgb_front")),
     "night_rain": Scenario("rain_only", lambda s: pictures(s, "rain-night", "rgb_front")),

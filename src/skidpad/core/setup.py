@@ -103,6 +103,8 @@ class Setup:
     tyres: str = REFERENCE  # of vehicles that have none of their own (embedded backend)
     tyre_stiffness: bool = False  # slip stiffness falls on water, snow and ice (embedded backend)
     water_drag: bool = False  # wheels push water aside (embedded backend)
+    # mu_ref that <material friction> of the map replaces; None: it is not read (embedded backend)
+    material_base: float | None = None
     stability: bool = False  # all vehicles have stability and traction control (embedded backend)
     level: SensorLevel = SensorLevel.PIXELS
     asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)

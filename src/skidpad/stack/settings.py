@@ -166,6 +166,12 @@ class Settings:
         False, "M-1, T-11", "physics", "slip stiffness falls on water, snow and ice"
     )
     water_drag: bool = _setting(False, "M-1, T-11", "physics", "wheels push water aside")
+    lane_material: bool = _setting(
+        False,
+        "M-1, T-11",
+        "physics",
+        "<material friction> of OpenDRIVE replaces mu_ref on its lane",
+    )
     esc: bool = _setting(
         True, "M-1, R-5", "physics", "stability and traction control, brake-force distribution"
     )

@@ -200,8 +200,8 @@ def _without_namespace(root: Node) -> None:
         element.tag = etree.QName(element).localname
 
 
-def parse(text: bytes, file: str) -> Document:
-    """Records of an OpenDRIVE file; without entities, networks or huge trees."""
+def parse_root(text: bytes, file: str) -> Node:
+    """Return the root of an OpenDRIVE file; without entities, networks or huge trees."""
     if len(text) > SIZE_MAX:
         raise FileError(f"{file}: {len(text)} bytes are more than the allowed {SIZE_MAX}")
     parser = etree.XMLParser(resolve_entities=False, no_network=True, huge_tree=False)
@@ -215,6 +215,12 @@ def parse(text: bytes, file: str) -> Document:
         raise FileError(f"{file}: not OpenDRIVE, its root element is <{root.tag}>")
     if root.getroottree().docinfo.internalDTD is not None:
         raise FileError(f"{file}: a document type declaration is not allowed")
+    return root
+
+
+def parse(text: bytes, file: str) -> Document:
+    """Records of an OpenDRIVE file."""
+    root = parse_root(text, file)
     read = Reader(file, _shift(Reader(file), root.find("header/offset")))
     roads: dict[int, RoadRecord] = {}
     for node in root.findall("road"):

@@ -18,6 +18,8 @@ from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import LanePoint, RoadMap
 
 Floats = NDArray[np.float64]
+# by road and lane: from and to along the road in m, and the share of the friction there
+LaneFrictions = dict[tuple[int, int], list[tuple[float, float, float]]]
 
 SIDES = ("both", "left", "right")
 REACH = 12.0  # m from a vehicle's origin to its farthest wheel, and half a lane
@@ -29,8 +31,14 @@ NO_PATCH = -1.0  # stiffness and film where no patch says them
 class Patches:
     """Resolves patches to friction at each wheel; fitted to the vehicles of a run."""
 
-    def __init__(self, map: RoadMap, patches: Sequence[FrictionPatch], road: Road) -> None:
-        """road: without patches.
+    def __init__(
+        self,
+        map: RoadMap,
+        patches: Sequence[FrictionPatch],
+        road: Road,
+        lanes: LaneFrictions | None = None,
+    ) -> None:
+        """road: without patches. lanes: shares of its friction that materials make, under them.
 
         Raises:
             ConfigError: a patch lies on no road of the map, or says nothing or two things.
@@ -40,7 +48,9 @@ class Patches:
         self.tyres: list[str] = []
         for k, patch in enumerate(self.patches):
             _check(k, patch, map)
-        self.bounds = np.array([_bounds(p, map) for p in self.patches])
+        self.lanes = lanes or {}
+        everywhere = [(-np.inf, -np.inf, np.inf, np.inf)] if self.lanes else []
+        self.bounds = np.array([*everywhere, *(_bounds(p, map) for p in self.patches)])
         self.lay(road)
 
     def lay(self, road: Road) -> None:
@@ -94,11 +104,23 @@ class Patches:
     def effect_at(
         self, x: float, y: float, z: float, v: float, tyres: str
     ) -> tuple[float, float, float]:
-        """Return share of friction, stiffness and film of the most slippery patch at a point."""
+        """Return share of friction, stiffness and film of the most slippery patch at a point.
+
+        The lane's material multiplies the share, whatever lies on it.
+        """
         place = self.map.project(float(x), float(y), z)
         under = [k for k, p in enumerate(self.patches) if self._covers(p, x, y, place)]
         found = [self._effect(k, v, tyres) for k in under]
-        return min(found, default=(1.0, NO_PATCH, NO_PATCH))
+        share, stiffness, film = min(found, default=(1.0, NO_PATCH, NO_PATCH))
+        return share * self._of_lane(place), stiffness, film
+
+    def _of_lane(self, place: LanePoint | None) -> float:
+        """Return the share that the material of the lane under a point makes."""
+        if not self.lanes or place is None or abs(place.offset) > place.width / 2.0:
+            return 1.0
+        s = self.map.s_road(place)
+        stretches = self.lanes.get((place.road, place.lane_id), ())
+        return next((share for low, high, share in stretches if low <= s < high), 1.0)
 
     def _effect(self, k: int, v: float, tyres: str) -> tuple[float, float, float]:
         ratio, covered = self.patches[k].mu_ratio, self._covered[tyres][k]

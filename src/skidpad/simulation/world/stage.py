@@ -9,7 +9,7 @@ from skidpad.physics.grip import road_of
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.actors import Role, cast_of, place_of
 from skidpad.simulation.world.lights import Lights
-from skidpad.simulation.world.patches import Patches
+from skidpad.simulation.world.patches import LaneFrictions, Patches
 from skidpad.simulation.world.touch import ContactBook
 from skidpad.simulation.world.traffic.care import care_of
 from skidpad.simulation.world.traffic.manager import Traffic
@@ -27,8 +27,9 @@ def staged(setup: Setup, seed: int) -> World:
     traffic = setup.traffic or TrafficSetup(vehicles=0)
     drivers = Traffic(map, traffic, seed, care_of(setup, traffic.slow_in_weather))
     world.let_drive(drivers)
-    if setup.patches:
-        world.patches = Patches(map, setup.patches, road)
+    lanes = lane_frictions(setup)
+    if setup.patches or lanes:
+        world.patches = Patches(map, setup.patches, road, lanes)
     ids = world.enter([role.newcomer(i) for i, role in enumerate(roles)])
     world.lay(road)
     world.book = ContactBook(world.obstacles.names, setup.dt)
@@ -48,6 +49,21 @@ def staged(setup: Setup, seed: int) -> World:
             _engage(world, drivers, id, role)
     world.feel_grip()
     return world
+
+
+def lane_frictions(setup: Setup) -> LaneFrictions:
+    """Return what the map's materials make of the friction that the set-up gives every lane."""
+    if setup.material_base is None:
+        return {}
+    from skidpad.roads.opendrive.materials import read_materials  # lxml comes with it
+
+    found: LaneFrictions = {}
+    for m in read_materials(setup.map):
+        stretch = (m.s_from, m.s_to, m.friction / setup.material_base)
+        found.setdefault((m.road, m.lane), []).append(stretch)
+    if not found:
+        raise ConfigError(f"lane_material: map {setup.map} says no <material friction>")
+    return found
 
 
 def _engage(world: World, traffic: Traffic, id: int, role: Role) -> None:

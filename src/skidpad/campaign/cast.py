@@ -251,6 +251,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         tyre_stiffness=s.tyre_stiffness,
         water_drag=s.water_drag,
         material_base=s.mu_ref if s.lane_material else None,
+        lidar=s.lidar,
         stability=s.esc,
         level=spec.sensors,
         render_all=spec.render is Render.ALL or _foreign_on_carla(spec),

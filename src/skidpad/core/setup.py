@@ -12,6 +12,7 @@ from skidpad.core.tyres import REFERENCE
 from skidpad.core.vocabulary import (
     Control,
     GripModel,
+    LidarModel,
     RangeModel,
     SensorLevel,
     Stratum,
@@ -105,6 +106,7 @@ class Setup:
     water_drag: bool = False  # wheels push water aside (embedded backend)
     # mu_ref that <material friction> of the map replaces; None: it is not read (embedded backend)
     material_base: float | None = None
+    lidar: LidarModel = LidarModel.EXACT  # of the lidars that a stack asks for (embedded backend)
     stability: bool = False  # all vehicles have stability and traction control (embedded backend)
     level: SensorLevel = SensorLevel.PIXELS
     asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)

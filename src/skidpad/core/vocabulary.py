@@ -196,6 +196,13 @@ class RangeModel(str, Enum):
     PHYSICAL = "physical"
 
 
+class LidarModel(str, Enum):
+    """What a lidar's beam knows of the air: `exact` returns every surface, `physical` has a threshold."""
+
+    EXACT = "exact"
+    PHYSICAL = "physical"
+
+
 class SensorLevel(str, Enum):
     """Real images and radar points, or geometric detection from boxes (decision M-3)."""
 

@@ -7,9 +7,17 @@ use these under `RangeModel.PHYSICAL`.
 from __future__ import annotations
 
 from math import exp, inf, log, log10, radians, sin, sqrt
+from typing import NamedTuple
 
 from skidpad.core.inputs import Beam
 from skidpad.core.weather import Weather
+from skidpad.physics.droplets import (
+    FOG_BACKSCATTER,
+    Drops,
+    drop_extinction,
+    rain_drops,
+    snow_flakes,
+)
 from skidpad.physics.grip import rain_rate
 
 CONTRAST_SEEN = 0.05  # least contrast of the meteorological optical range, WMO-No. 8, 9.1
@@ -68,6 +76,34 @@ def transmission(weather: Weather, distance: float) -> float:
     """Share of light left after `distance` m; fog begins at the weather's fog_distance."""
     fog = fog_extinction(weather) * max(distance - weather.fog_distance, 0.0)
     return exp(-fog - rain_extinction(rain_rate(weather)) * distance)
+
+
+class LidarAir(NamedTuple):
+    """What a lidar's beam meets on its way."""
+
+    fog: float = 0.0  # 1/m, extinction of fog and clear air
+    fog_start: float = 0.0  # m, where they begin
+    falling: float = 0.0  # 1/m, extinction of rain or snow
+    backscatter: float = 0.0  # 1/m/sr, of fog
+    drops: Drops = Drops()
+
+
+def snow_rate(weather: Weather) -> float:
+    """Snowfall in mm/h of water: precipitation in air at or below freezing, an assumption."""
+    return rain_rate(weather) if weather.air_temperature_c <= 0.0 else 0.0
+
+
+def lidar_air(weather: Weather) -> LidarAir:
+    """What this weather puts into a lidar's way.
+
+    Rain takes what it takes from visible light (`rain_extinction`): drops are far larger than both
+    waves. Fog likewise: its extinction at 905 nm is taken as that of visible light.
+    """
+    fog, snow = fog_extinction(weather), snow_rate(weather)
+    drops = snow_flakes(snow) if snow > 0.0 else rain_drops(rain_rate(weather))
+    falling = drop_extinction(drops) if snow > 0.0 else rain_extinction(rain_rate(weather))
+    sight = -log(CONTRAST_SEEN) / fog
+    return LidarAir(fog, weather.fog_distance, falling, FOG_BACKSCATTER / sight, drops)
 
 
 def daylight(weather: Weather) -> float:

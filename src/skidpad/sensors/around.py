@@ -67,13 +67,20 @@ def look_around(scene: LiveScene, pose: Pose, fan: Fan, reach: float, hidden: in
         part = _cast_sector(scene, facing, u, v, reach, hidden)
         _settle(part, u, v, mine, hits, distance)
     ray = np.flatnonzero(distance <= reach)
-    column, channel, key = fan.column[ray], fan.channel[ray], hits.key[ray].astype(np.int64)
+    key = hits.key[ray].astype(np.int64)
+    direction = directions(fan, ray)
+    return Seen(ray, distance[ray], direction, hits.cosine[ray], key >> 8 & 0xFF, key >> 16)
+
+
+def directions(fan: Fan, ray: Ints) -> Floats:
+    """Unit vectors of these rays, (m, 3): forward, left, up."""
+    column, channel = fan.column[ray], fan.channel[ray]
     flat = np.cos(fan.elevation)[channel]
     direction = np.empty((len(ray), 3))
     direction[:, 0] = np.cos(fan.azimuth)[column] * flat
     direction[:, 1] = np.sin(fan.azimuth)[column] * flat
     direction[:, 2] = np.sin(fan.elevation)[channel]
-    return Seen(ray, distance[ray], direction, hits.cosine[ray], key >> 8 & 0xFF, key >> 16)
+    return direction
 
 
 def _cast_sector(

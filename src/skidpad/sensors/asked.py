@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from skidpad.core.channels import ChannelView
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.frames import CameraImage, GnssFix, ImuReading, LidarPoints
+from skidpad.core.randomness import stream_key
 from skidpad.core.sensor_types import Measure, find_sensor_type
 from skidpad.core.setup import Setup
 from skidpad.core.sight import DriverView
@@ -23,13 +24,14 @@ from skidpad.core.specs import (
     SensorSpec,
 )
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import LightState, RangeModel
-from skidpad.physics.optics import extinction
+from skidpad.core.vocabulary import LidarModel, LightState, RangeModel
+from skidpad.physics.optics import LidarAir, extinction, lidar_air
 from skidpad.sensors import inertial
 from skidpad.sensors.channel_presets import senses_of
 from skidpad.sensors.channel_suite import CYCLE, ChannelSuite
 from skidpad.sensors.eyes import Eyes
 from skidpad.sensors.lidar import Lidar
+from skidpad.sensors.lidar_returns import ReturnModel
 from skidpad.sensors.live_scene import LiveScene, SceneMap
 
 EGO = 0
@@ -150,7 +152,13 @@ def make_lidar(spec: LidarSpec, sensors: AskedSensors) -> Callable[[], LidarPoin
     server = sensors.server_lidar
     if server is not None:
         return lambda: server(spec)
-    lidar = Lidar(spec, sensors.setup.dt, sensors.air)
+    returns, setup = None, sensors.setup
+    if setup.lidar is LidarModel.PHYSICAL:
+        physical = setup.range_model is RangeModel.PHYSICAL
+        air = lidar_air(setup.weather) if physical else LidarAir()
+        returns = ReturnModel(air, spec.range)
+    key = stream_key(sensors.seed, "lidar", spec.id)
+    lidar = Lidar(spec, setup.dt, sensors.air, returns, key)
     return lambda: lidar.measure(sensors.tick, sensors.states.pose(EGO), sensors.scene(), EGO)
 
 

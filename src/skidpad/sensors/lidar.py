@@ -1,6 +1,9 @@
 """A rotating lidar as exact ray samples, with the class and actor that every ray met.
 
-No noise and no drop-off: intensity falls with the air's extinction only.
+Without a model of returns there is no noise and no drop-off: intensity falls with the air's extinction
+only, one way, as with CARLA's `atmosphere_attenuation_rate`. With one (`lidar_returns`) that law is
+replaced, never applied beside it: intensity falls with reflectivity and the extinction of both ways,
+which is CARLA's law at twice the rate, and a threshold takes the place of CARLA's drop-off.
 """
 
 from __future__ import annotations
@@ -13,15 +16,31 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.frames import LidarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import LidarSpec
-from skidpad.sensors.around import SECTORS, STEEPEST_DEG, Fan, look_around, sectors_of
+from skidpad.sensors.around import (
+    SECTORS,
+    STEEPEST_DEG,
+    Fan,
+    Seen,
+    directions,
+    look_around,
+    sectors_of,
+)
+from skidpad.sensors.lidar_returns import ReturnModel
 from skidpad.sensors.live_scene import LiveScene
 
 
 class Lidar:
     """One lidar; `measure` returns the part of the turn that one tick covers."""
 
-    def __init__(self, spec: LidarSpec, dt: float, extinction: float = 0.0) -> None:
-        """extinction: of light in the air, 1/m."""
+    def __init__(
+        self,
+        spec: LidarSpec,
+        dt: float,
+        extinction: float = 0.0,
+        returns: ReturnModel | None = None,
+        key: int = 0,
+    ) -> None:
+        """extinction: of light in the air, 1/m. returns: instead of it. key: of their random numbers."""
         steepest = max(abs(spec.upper_fov_deg), abs(spec.lower_fov_deg))
         if steepest > STEEPEST_DEG:
             raise ConfigError(
@@ -29,6 +48,7 @@ class Lidar:
                 f"got {spec.lower_fov_deg:g} to {spec.upper_fov_deg:g}"
             )
         self.spec, self._extinction = spec, extinction
+        self._returns, self._key = returns, key
         self._sweep = 2.0 * pi * spec.rotation_hz * dt
         self._columns = max(1, round(spec.points_per_second * dt / spec.channels))
         angles = np.linspace(spec.upper_fov_deg, spec.lower_fov_deg, spec.channels)
@@ -46,10 +66,33 @@ class Lidar:
         fan = Fan(azimuth, self._elevation, column, channel)
         pose = pose_world_carrier @ self.spec.mount
         seen = look_around(scene, pose, fan, self.spec.range, carrier)
+        if self._returns is not None:
+            return self._weathered(self._returns, fan, seen, tick)
         return LidarPoints(
             (seen.direction * seen.distance[:, None]).astype(np.float32),
             np.exp(-self._extinction * seen.distance).astype(np.float32),
             seen.cosine.astype(np.float32),
             seen.label.astype(np.uint8),
             seen.instance.astype(np.uint16),
+        )
+
+    def _weathered(self, model: ReturnModel, fan: Fan, seen: Seen, tick: int) -> LidarPoints:
+        """What is noticed of the beams of a tick; false returns have class 0 and no actor."""
+        n = len(fan.column)
+        distance, label = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
+        cosine, instance = np.zeros(n), np.zeros(n, dtype=np.int64)
+        for column, values in (
+            (distance, seen.distance), (label, seen.label), (cosine, seen.cosine),
+            (instance, seen.instance),
+        ):  # fmt: skip
+            column[seen.ray] = values
+        found = model.measure(distance, label, np.random.default_rng([self._key, tick]))
+        label[found.false] = cosine[found.false] = instance[found.false] = 0
+        ray = np.flatnonzero(np.isfinite(found.distance))
+        return LidarPoints(
+            (directions(fan, ray) * found.distance[ray][:, None]).astype(np.float32),
+            np.minimum(found.intensity[ray], 1.0).astype(np.float32),
+            cosine[ray].astype(np.float32),
+            label[ray].astype(np.uint8),
+            instance[ray].astype(np.uint16),
         )

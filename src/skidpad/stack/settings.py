@@ -19,7 +19,7 @@ import msgspec
 from skidpad.core.errors import ConfigError, require_choice, require_range
 from skidpad.core.run import Friction, RunSpec
 from skidpad.core.tyres import REFERENCE, known_tyres
-from skidpad.core.vocabulary import Clearance, GripModel, RangeModel
+from skidpad.core.vocabulary import Clearance, GripModel, LidarModel, RangeModel
 
 
 class RoofCorridor(str, Enum):
@@ -171,6 +171,12 @@ class Settings:
         "M-1, T-11",
         "physics",
         "<material friction> of OpenDRIVE replaces mu_ref on its lane",
+    )
+    lidar: LidarModel = _setting(
+        LidarModel.EXACT,
+        "M-1, T-11",
+        "sensors",
+        "lost and false returns of lidars in rain, fog, snow",
     )
     esc: bool = _setting(
         True, "M-1, R-5", "physics", "stability and traction control, brake-force distribution"

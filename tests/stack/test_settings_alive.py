@@ -31,6 +31,7 @@ from skidpad.campaign.run import run
 from skidpad.core.geometry import Pose
 from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
+from skidpad.core.specs import LidarSpec
 from skidpad.core.states import ContactEvent, VehicleCommand
 from skidpad.core.vocabulary import Control, SemanticClass, SensorLevel
 from skidpad.core.weather import Weather
@@ -174,6 +175,18 @@ def lane_friction(settings: Settings) -> float | None:
     return stage_of(cell(settings)).setup.material_base
 
 
+def lidar(settings: Settings) -> bytes:
+    """What a lidar that a stack asks for returns in rain at the start."""
+    ready = cell(settings, "rain-noon")
+    spec = LidarSpec("lidar", Pose(0.0, 0.0, 2.0), range=80.0)
+    setup = stage_of(ready).setup
+    setup = replace(setup, specs=(*setup.specs, spec), asked=frozenset({"lidar"}))
+    backend = EmbeddedBackend()
+    found = backend.reset(setup, ready.seed).extra["lidar"].xyz.tobytes()
+    backend.close()
+    return found
+
+
 def recovery(settings: Settings) -> list[Any]:
     """A contact with a car standing 10 m ahead, until the ego drives again."""
     start = figure8().ahead(figure8().place(figure8().ego_start), 300.0)
@@ -206,6 +219,7 @@ OTHERS: dict[str, Scenario] = {
     "tyres": Scenario("summer_1.6mm", short_drive("icy_30")),
     "tyre_stiffness": Scenario(True, short_drive("rain-noon")),
     "water_drag": Scenario(True, short_drive("rain-noon")),
+    "lidar": Scenario("physical", lidar),
     "lane_material": Scenario(True, lane_friction),
     "esc": Scenario(False, short_drive("icy_30")),
     "camera": Scenario(False, lambda s: pictures(s, "rain-noon", "rgb_front")),

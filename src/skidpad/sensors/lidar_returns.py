@@ -32,7 +32,11 @@ DIVERGENCE = 3e-3  # rad, full angle of the beam (LISA)
 NEAREST = 1.5  # m, of a drop that is noticed (LISA)
 ACCURACY = 0.09  # m, range noise at a power of half the threshold: accuracy / sqrt(2 SNR) (LISA)
 PULSE = 2e-8 * 299_792_458.0  # m, length of a pulse of 20 ns (Hahner et al.)
-MEETS = (0.9, 1.0)  # m, from and to which receiver and beam come to overlap (Hahner et al.)
+MEETS = (
+    0.9,
+    10.0,
+)  # m, from and to which receiver and beam come to overlap: the first value is that
+# of Hahner et al., the second the bound that they name for most sensors (their own value is 1 m)
 FOG_SPREAD, FOG_SHAPE = (
     10.0,
     (2.0, 20.0),
@@ -93,12 +97,10 @@ class ReturnModel:
             power[at], found[at], false[at] = strength, where, True
             intensity[at] = strength * where * where
         found[power < self.least] = np.inf
-        noise = (
-            ACCURACY
-            * rng.standard_normal(n)
-            * np.sqrt(0.5 * self.least / np.maximum(power, self.least))
-        )
-        return Returns(found + np.where(false, 0.0, noise), intensity, false)
+        kept = np.flatnonzero(np.isfinite(found) & ~false)
+        noise = ACCURACY * np.sqrt(0.5 * self.least / power[kept])
+        found[kept] += noise * rng.standard_normal(len(kept))
+        return Returns(found, intensity, false)
 
     def _fog(
         self, distance: Floats, rng: np.random.Generator

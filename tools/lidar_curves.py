@@ -16,6 +16,7 @@ import numpy as np
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.droplets import (
     FOG_BACKSCATTER,
+    SMALLEST_MM,
     Drops,
     drop_extinction,
     rain_drops,
@@ -23,7 +24,7 @@ from skidpad.physics.droplets import (
 )
 from skidpad.physics.optics import CONTRAST_SEEN, LidarAir, rain_extinction
 from skidpad.sensors import lidar_returns
-from skidpad.sensors.lidar_returns import DIVERGENCE, NEAREST, ON_GROUND, OTHER, SMALLEST_MM, WHITE
+from skidpad.sensors.lidar_returns import DIVERGENCE, NEAREST, ON_GROUND, OTHER, WHITE
 
 REACH, DISTANCE, BEAMS = 100.0, 30.0, 40_000
 FIELDS = (
@@ -91,7 +92,7 @@ def rows() -> list[dict[str, object]]:
     falls += [("snow", r, snow_flakes(r), drop_extinction(snow_flakes(r))) for r in (0.5, 2.5, 5.0)]
     for kind, amount, drops, alpha in falls:
         air = LidarAir(falling=alpha, drops=drops)
-        values = (
+        values: tuple[float | None, ...] = (
             1000.0 * alpha, 1000.0 * drop_extinction(drops), farthest(air), lisa_range(alpha), None,
             false_share(air, DISTANCE), lisa_false_share(drops, alpha), false_share(air, inf),
         )  # fmt: skip

@@ -33,14 +33,14 @@ def fresnel(index: float) -> float:
 
 
 def rain_drops(rate: float) -> Drops:
-    """Rain of `rate` mm/h."""
+    """Return the drops of rain of `rate` mm/h."""
     if rate <= 0.0:
         return Drops()
     return Drops(8000.0, 4.1 * rate**-0.21, fresnel(RAIN_INDEX))
 
 
 def snow_flakes(rate: float) -> Drops:
-    """Snowfall of `rate` mm/h of water."""
+    """Return the flakes of snowfall of `rate` mm/h of water."""
     if rate <= 0.0:
         return Drops()
     return Drops(7.6e3 * rate**-0.87, 2.55 * rate**-0.48, fresnel(ICE_INDEX))

@@ -67,7 +67,7 @@ class Lidar:
         pose = pose_world_carrier @ self.spec.mount
         seen = look_around(scene, pose, fan, self.spec.range, carrier)
         if self._returns is not None:
-            return self._weathered(self._returns, fan, seen, tick)
+            return self._through_weather(self._returns, fan, seen, tick)
         return LidarPoints(
             (seen.direction * seen.distance[:, None]).astype(np.float32),
             np.exp(-self._extinction * seen.distance).astype(np.float32),
@@ -76,7 +76,7 @@ class Lidar:
             seen.instance.astype(np.uint16),
         )
 
-    def _weathered(self, model: ReturnModel, fan: Fan, seen: Seen, tick: int) -> LidarPoints:
+    def _through_weather(self, model: ReturnModel, fan: Fan, seen: Seen, tick: int) -> LidarPoints:
         """What is noticed of the beams of a tick; false returns have class 0 and no actor."""
         n = len(fan.column)
         distance, label = np.full(n, np.inf), np.zeros(n, dtype=np.int64)

@@ -60,7 +60,7 @@ class Returns(NamedTuple):
 
 
 def reflectivities() -> Floats:
-    """By label."""
+    """Return the reflectivities of all classes, by label."""
     table = np.full(256, OTHER)
     table[[int(c) for c in GROUND]] = ON_GROUND
     table[int(SemanticClass.TRAFFIC_SIGN)] = SIGN
@@ -78,7 +78,7 @@ class ReturnModel:
         self._reflects = reflectivities()
 
     def optical_depth(self, distance: Floats) -> Floats:
-        """Nepers one way."""
+        """Return the nepers of one way through the air."""
         through = np.maximum(distance - self.air.fog_start, 0.0)
         return self.air.fog * through + self.air.falling * distance
 
@@ -143,7 +143,7 @@ class DropReturns:
         places = np.array([self._places(air.drops, p) for p in self.powers]).cumsum(axis=1)
         self.places = places / np.maximum(places[:, -1:], 1e-300)
 
-    def _needed(self, power: float) -> Floats:
+    def _diameter_for(self, power: float) -> Floats:
         """Diameter in mm of a drop at each distance that returns this power."""
         beam = 1e3 * np.tan(DIVERGENCE) * self.r
         return np.asarray(beam * np.sqrt(power / np.maximum(self.most, 1e-300)))
@@ -151,13 +151,13 @@ class DropReturns:
     def _stronger(self, drops: Drops, power: float) -> Floats:
         """Mean number of stronger drops per metre of the beam."""
         area = 0.25 * np.pi * (np.tan(DIVERGENCE) * self.r) ** 2
-        diameter = np.maximum(self._needed(power), SMALLEST_MM)
+        diameter = np.maximum(self._diameter_for(power), SMALLEST_MM)
         number = drops.density / drops.slope * np.exp(-drops.slope * diameter)
         return np.where(power < self.most, area * number, 0.0)
 
     def _places(self, drops: Drops, power: float) -> Floats:
         """Where a drop of just this power is, unnormalised."""
-        diameter = self._needed(power)
+        diameter = self._diameter_for(power)
         density = self.r**2 * diameter * np.exp(-drops.slope * diameter)
         return np.where((power < self.most) & (diameter > SMALLEST_MM), density, 0.0)
 

@@ -54,7 +54,7 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
         }
         return Shown(desk.outside, told)
 
-    screen = Screen(feed, link, stage_of(spec).map, shown, spec.seed)
+    screen = Screen(feed, link, stage_of(spec).map, shown, spec.seed, spec.surface)
     time = RealTime(link, screen.show, own_gc=about["own_gc"])
     try:
         driven = drive_at_desk(spec, desk, folder, (screen, time))

@@ -14,12 +14,14 @@ from PIL import Image
 from skidpad.campaign.drive import Moment
 from skidpad.cockpit import hud
 from skidpad.cockpit.companion import Companion
-from skidpad.cockpit.marks import LightAhead, marks_of
+from skidpad.cockpit.marks import LightAhead, marks_of, patch_marks
 from skidpad.cockpit.pictures import Picture, colours, draw
 from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import Studio, View, plane
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
+from skidpad.recording.surfaces import read_run_surface
+from skidpad.roads.surface_outlines import outline_patches
 from skidpad.simulation.world.world import BRAKING
 
 SHADOW = (0, 0, 0)
@@ -67,6 +69,7 @@ def frames(
     studio = Studio(source.map, source.table, first, source.seed)
     companion = None if other is None else Companion(other, source.tick(0))
     camera, light = studio.suite.cameras[view.value], LightAhead(source.map)
+    outlines = outline_patches(source.map, read_run_surface(source.folder))
     for k in moments:
         moment = source.moment(k)
         studio.change(source.seat(k).outside)
@@ -76,7 +79,8 @@ def frames(
         images = studio.look(truth.tick, truth.states, truth.lights, braking, crash)
         picture = colours(plane(images[view.value]))
         seen = marks_of(camera, moment.frame.radar, moment.report, light.mark(camera, moment))
-        draw(picture, *msgspec.to_builtins(seen))
+        patches = patch_marks(camera, outlines, truth.states.pose(0))
+        draw(picture, *msgspec.to_builtins(seen._replace(patches=patches)))
         _inset(picture, {v: colours(plane(images[v.value])) for v, _ in INSETS})
         _say(
             picture,

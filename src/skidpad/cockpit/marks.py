@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -14,6 +15,7 @@ from skidpad.core.specs import CameraSpec, RadarSpec
 from skidpad.core.states import StackReport
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import SignalHead
+from skidpad.roads.surface_outlines import PatchOutline
 from skidpad.sensors.twelve import RADAR_ID, twelve_sensors
 from skidpad.sensors.view import camera_view
 from skidpad.stack.perception.lane_view import LaneView
@@ -25,6 +27,9 @@ LEAD_HALF_WIDTH, LEAD_HEIGHT = 1.0, 1.5  # m, of the bracket at the measured dis
 BODY = Pose(0.0, 0.0)
 LIGHT_AGREES = 2.0  # m between the stop line that a stack reports and that of the light shown
 HEAD_WIDE, HEAD_HIGH = 1.2, 2.0  # lamp diameters from a head's middle to the edges of its frame
+NEAR = 0.5  # m before a camera, from which on things are drawn
+PATCH_REACH = 150.0  # m
+PX_MOST = 20_000.0  # beyond the edge of a picture, so that whole numbers of 16 bits hold it
 LIGHT_LEAST = 5  # px, half of the smallest frame
 
 
@@ -43,6 +48,9 @@ class Marks(NamedTuple):
     lead: tuple[int, int, int, int] | None  # bracket: left, top, right, bottom
     label: str
     light: LightMark | None = None
+    patches: list[
+        tuple[str, list[tuple[int, int]]]
+    ] = []  # kind and corners of what lies on the road
 
 
 RADAR_MOUNT = next(
@@ -61,6 +69,38 @@ def project(camera: CameraSpec, points: Floats, body: Pose = BODY) -> Floats:
     u = view.cx + view.focal * p[:, 0] / depth
     v = view.cy + view.focal * p[:, 1] / depth
     return np.stack([u, v, p[:, 2]], axis=1)
+
+
+def patch_marks(
+    camera: CameraSpec, outlines: Sequence[PatchOutline], ego: Pose
+) -> list[tuple[str, list[tuple[int, int]]]]:
+    """Return the polygons of what lies on the road, as a camera of the ego sees them."""
+    view = camera_view(camera, ego)
+    found = []
+    for outline in outlines:
+        if np.hypot(*(outline.corners[:, :2] - (ego.x, ego.y)).T).min() > PATCH_REACH:
+            continue
+        p = _before_camera((outline.corners - view.centre) @ view.rotation.T)
+        if len(p) < 3:
+            continue
+        u, v = view.cx + view.focal * p[:, 0] / p[:, 2], view.cy + view.focal * p[:, 1] / p[:, 2]
+        found.append((outline.kind, [(_px(a), _px(b)) for a, b in zip(u, v, strict=True)]))
+    return found
+
+
+def _before_camera(p: Floats) -> Floats:
+    """Return the part of a polygon (n, 3) in a camera's axes that lies before it."""
+    kept = []
+    for a, b in zip(p, np.roll(p, -1, axis=0), strict=True):
+        if a[2] >= NEAR:
+            kept.append(a)
+        if (a[2] >= NEAR) != (b[2] >= NEAR):
+            kept.append(a + (b - a) * (NEAR - a[2]) / (b[2] - a[2]))
+    return np.array(kept).reshape(-1, 3)
+
+
+def _px(value: float) -> int:
+    return int(min(max(value, -PX_MOST), PX_MOST))
 
 
 def marks_of(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import struct
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import cv2
@@ -18,6 +18,13 @@ Picture = NDArray[np.uint8]  # (H, W, 3) blue, green, red, as OpenCV wants it
 QUALITY = 80  # of JPEG
 LIGHTS = {"red": (60, 60, 255), "yellow": (60, 220, 255), "green": (110, 220, 60)}  # the same order
 LIGHT_OFF = (200, 200, 200)
+SURFACES = {  # blue, green, red
+    "water": (200, 130, 40),
+    "ice": (235, 215, 150),
+    "snow": (245, 245, 245),
+    "friction": (170, 80, 150),
+}
+COAT = 0.3  # of a patch's colour over the road
 CLOSING, STEADY, LEAD = (82, 133, 255), (235, 235, 235), (127, 206, 79)  # blue, green, red
 
 
@@ -50,8 +57,10 @@ def draw(
     lead: list[int] | None,
     label: str,
     light: list[Any] | None,
+    patches: Sequence[tuple[str, list[list[int]]]] = (),
 ) -> None:
-    """Radar points, the bracket at the measured distance and the light ahead, in place."""
+    """Patches of road, radar points, the bracket at the measured distance and the light, in place."""
+    draw_patches(picture, patches)
     if light is not None:
         draw_light(picture, *light)
     for u, v, closing in points:
@@ -66,6 +75,16 @@ def draw(
             cv2.line(picture, (x, y), (x, y + down * arm), LEAD, 2, cv2.LINE_AA)
     at = (left, max(top - 8, 14))
     cv2.putText(picture, label, at, cv2.FONT_HERSHEY_SIMPLEX, 0.5, LEAD, 1, cv2.LINE_AA)
+
+
+def draw_patches(picture: Picture, patches: Sequence[tuple[str, list[list[int]]]]) -> None:
+    """What lies on the road: a thin coat of colour within a line, in place."""
+    for kind, corners in patches:
+        area = np.array(corners, dtype=np.int32)
+        coat = picture.copy()
+        cv2.fillPoly(coat, [area], SURFACES[kind])
+        cv2.addWeighted(coat, COAT, picture, 1.0 - COAT, 0.0, dst=picture)
+        cv2.polylines(picture, [area], True, SURFACES[kind], 1, cv2.LINE_AA)
 
 
 def draw_light(picture: Picture, frames: list[list[int]], state: str, label: str) -> None:

@@ -19,6 +19,7 @@ from skidpad.cockpit.words import Link
 from skidpad.core.errors import OutputError
 from skidpad.core.inputs import Beam
 from skidpad.core.setup import DT
+from skidpad.recording.surfaces import read_run_surface
 
 PATIENCE = 0.02  # s between two looks at the words
 FILMS = "films"  # folder within the run's
@@ -50,7 +51,8 @@ class Replayer:
         self.k = 0
         self.note = ""  # what the page is told beside everything else
         self.dt = source.step * DT
-        self.screen = Screen(feed, link, source.map, self._shown, source.seed)
+        surface = read_run_surface(source.folder)
+        self.screen = Screen(feed, link, source.map, self._shown, source.seed, surface)
         self.screen.begin(source.table)
         if other is not None:
             self.screen.beside = Companion(other, source.tick(0))

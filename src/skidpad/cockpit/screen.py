@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -12,14 +12,16 @@ import msgspec
 from skidpad.campaign.drive import Moment, Sink
 from skidpad.cockpit import hud
 from skidpad.cockpit.feed import Feed
-from skidpad.cockpit.marks import LightAhead, marks_of
+from skidpad.cockpit.marks import LightAhead, Marks, marks_of, patch_marks
 from skidpad.cockpit.studio import MAIN, Studio, View, plane
 from skidpad.cockpit.words import Link
 from skidpad.core.geometry import Pose
 from skidpad.core.inputs import Outside
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable
+from skidpad.core.surface import SurfacePatch
 from skidpad.roads.queries import RoadMap
+from skidpad.roads.surface_outlines import outline_patches
 from skidpad.sensors.finish.extras import Extra
 from skidpad.simulation.world.world import BRAKING
 
@@ -43,8 +45,16 @@ class Screen(Sink):
     """Draws the views that are looked at, when the page has taken the picture before."""
 
     def __init__(
-        self, feed: Feed, link: Link, map: RoadMap, ask: Callable[[], Shown], seed: int = 0
+        self,
+        feed: Feed,
+        link: Link,
+        map: RoadMap,
+        ask: Callable[[], Shown],
+        seed: int = 0,
+        surface: Sequence[SurfacePatch] = (),
     ) -> None:
+        """surface: what lies on parts of the road."""
+        self.outlines = outline_patches(map, surface)
         self.feed, self.link, self.map, self.ask, self.seed = feed, link, map, ask, seed
         self.shown = self.dropped = self.collisions = 0
         self.events: deque[tuple[float, str]] = deque(maxlen=TOLD_EVENTS)
@@ -94,10 +104,15 @@ class Screen(Sink):
 
     def _describe_moment(self, moment: Moment, shown: Shown) -> dict[str, Any]:
         frame, marks = moment.frame, {}
-        if self.link.main in MARKED:
-            camera = self.cameras[self.link.main.value]
-            light = self.light.mark(camera, moment)
-            marks[camera.id] = marks_of(camera, frame.radar, moment.report, light)
+        ego = moment.truth.states.pose(0)
+        for view in {self.link.main, View.TOP} & {*MARKED, View.TOP}:
+            camera = self.cameras[view.value]
+            patches = patch_marks(camera, self.outlines, ego)
+            seen = Marks([], None, "")
+            if view in MARKED:
+                light = self.light.mark(camera, moment)
+                seen = marks_of(camera, frame.radar, moment.report, light)
+            marks[camera.id] = seen._replace(patches=patches)
         return {
             "tick": frame.tick,
             "t": round(frame.tick * DT, 2),

@@ -23,6 +23,7 @@ from skidpad.report.causes import (
     write_cause,
 )
 from skidpad.report.page import Card, Event, Image
+from skidpad.recording.surfaces import read_run_surface
 from skidpad.report.replay import replay
 from skidpad.roads.queries import RoadMap
 
@@ -74,7 +75,7 @@ def crash_card(crash: Crash, drive: Drive, road_map: RoadMap, run: Path) -> Card
         cause=write_cause(story),
         events=timeline(story),
         images=pictures(run, crash.t),
-        replay=replay(drive.log, road_map, drive.row(crash.tick)),
+        replay=replay(drive.log, road_map, drive.row(crash.tick), surface=read_run_surface(run)),
     )
 
 

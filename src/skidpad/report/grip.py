@@ -31,6 +31,7 @@ from skidpad.report.page import (
     Text,
     write_report_page,
 )
+from skidpad.recording.surfaces import read_run_surface
 from skidpad.report.replay import replay
 from skidpad.report.verdicts import least_seeds_text, seeds_text, tally_text, verdict_blocks
 from skidpad.roads.bundled import kept_map
@@ -208,6 +209,6 @@ def _card(campaign: GripCampaign, run: pl.DataFrame, role: str) -> list[Card]:
             title=f"{row['friction']} friction, {role} run: {row['outcome']}",
             subtitle=f"{name}, around {log.t[at]:.1f} s",
             facts=facts,
-            replay=replay(log, road_map, at),
+            replay=replay(log, road_map, at, surface=read_run_surface(folder)),
         )
     ]

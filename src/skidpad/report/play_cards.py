@@ -17,6 +17,7 @@ from skidpad.recording.logfiles import read_log
 from skidpad.recording.runlog import RunLog
 from skidpad.report.page import Card, Figure, anchor
 from skidpad.report.play_runs import PlayRun, find_road
+from skidpad.recording.surfaces import read_run_surface
 from skidpad.report.replay import replay_run
 from skidpad.report.timeline import Mark, Strip, timelines
 
@@ -50,7 +51,12 @@ def run_card(run: PlayRun, out: Path) -> Card:
         tags=[run.verdict.value],
         facts=facts(run),
         chain=list(run.judged.reasons),
-        replay=replay_run(log, road, None if at is None else min(at, len(log) - 1)),
+        replay=replay_run(
+            log,
+            road,
+            None if at is None else min(at, len(log) - 1),
+            read_run_surface(run.folder),
+        ),
         charts=[chart(run, log)],
         id=run_anchor(run),
     )

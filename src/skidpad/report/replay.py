@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from skidpad.core.surface import SurfacePatch
 from skidpad.recording.runlog import RunLog
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
+from skidpad.roads.surface_outlines import outline_patches
 
 UNIT = 0.05  # m, coordinates are whole numbers of this
 REACH = 90.0  # m around the event that is kept
@@ -23,21 +26,31 @@ Floats = NDArray[np.float64]
 
 
 def replay(
-    log: RunLog, road_map: RoadMap, row: int, before_s: float = BEFORE_S, after_s: float = AFTER_S
+    log: RunLog,
+    road_map: RoadMap,
+    row: int,
+    before_s: float = BEFORE_S,
+    after_s: float = AFTER_S,
+    surface: Sequence[SurfacePatch] = (),
 ) -> dict[str, Any]:
-    """The seconds around `row`, ego-centred: lanes, barriers and the actors near the ego."""
+    """The seconds around `row`, ego-centred: lanes, patches, barriers and the actors near the ego."""
     dt = log.header.dt
     stride = max(round(STEP_S / dt), 1)
     first = max(row - round(before_s / dt) // stride * stride, row % stride)
     rows = np.arange(first, min(row + round(after_s / dt), len(log) - 1) + 1, stride)
-    return _cut_log(log, road_map, rows, row, np.array([row]))
+    return _cut_log(log, road_map, rows, row, np.array([row]), surface)
 
 
-def replay_run(log: RunLog, road_map: RoadMap, mark: int | None = None) -> dict[str, Any]:
+def replay_run(
+    log: RunLog,
+    road_map: RoadMap,
+    mark: int | None = None,
+    surface: Sequence[SurfacePatch] = (),
+) -> dict[str, Any]:
     """A whole run, with `FRAMES` frames at most; mark: the row that is shown first and marked."""
     stride = max(round(STEP_S / log.header.dt), -(-len(log) // FRAMES))
     rows = np.arange(0, len(log), stride)
-    return _cut_log(log, road_map, rows, mark, rows)
+    return _cut_log(log, road_map, rows, mark, rows, surface)
 
 
 def _cut_log(
@@ -46,6 +59,7 @@ def _cut_log(
     rows: NDArray[np.int64],
     mark: int | None,
     stops: NDArray[np.int64],
+    surface: Sequence[SurfacePatch],
 ) -> dict[str, Any]:
     """These rows; lanes and barriers near the ego's places in `stops`."""
     a = log.actors
@@ -69,6 +83,7 @@ def _cut_log(
         "frames": frames,
         "lanes": lane_borders(road_map, way),
         "walls": barriers(road_map, way),
+        **patches(road_map, surface, way),
     }
 
 
@@ -128,3 +143,16 @@ def barriers(road_map: RoadMap, way: Floats) -> list[list[int]]:
         runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
         stretches += [_whole(barrier.points[run, :2] - way[0, :2]) for run in runs if run.size > 1]
     return stretches
+
+
+def patches(road_map: RoadMap, surface: Sequence[SurfacePatch], way: Floats) -> dict[str, Any]:
+    """Return what lies on the road within reach of a way (n, 3); nothing without a surface.
+
+    `patches` holds [kind, [x, y, ...]] of each polygon, from the way's first place.
+    """
+    found = [
+        [outline.kind, _whole(outline.corners[:, :2] - way[0, :2])]
+        for outline in outline_patches(road_map, surface)
+        if _near(outline.corners, way).any() or _near(outline.corners.mean(axis=0)[None], way)[0]
+    ]
+    return {"patches": found} if found else {}

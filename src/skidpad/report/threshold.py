@@ -34,6 +34,7 @@ from skidpad.report.page import (
     Text,
     write_report_page,
 )
+from skidpad.recording.surfaces import read_run_surface
 from skidpad.report.replay import replay
 from skidpad.report.tables import Column, Format, Quantity, table
 from skidpad.report.threshold_figures import curve_figures, map_figure
@@ -272,6 +273,5 @@ def _card(campaign: ThresholdMap, s: Situation, run: pl.DataFrame) -> list[Card]
     if row["impact_kmh"] is not None:
         facts.append(("closing speed", f"{row['impact_kmh']:.0f} km/h"))
     at = len(log) - 1
-    return [
-        Card(title(s), f"{name}, at {log.t[at]:.1f} s", facts=facts, replay=replay(log, road, at))
-    ]
+    shown = replay(log, road, at, surface=read_run_surface(folder))
+    return [Card(title(s), f"{name}, at {log.t[at]:.1f} s", facts=facts, replay=shown)]

@@ -1,6 +1,8 @@
 // Top-down replays. Data: {dt, unit, lanes: [[x, y, ...]], walls: [[x, y, ...]], size: [[length, width]],
+// patches: [[kind, [x, y, ...]]] where something lies on the road,
 // ego: index, t0, mark: frame of the event, frames: [[x, y, yaw_mrad, ...per actor]], names: [...]};
 // coordinates are integers in `unit` metres; an actor that is absent has null.
+const SURFACES = {water: "#1d4f7c", ice: "#7fb8c9", snow: "#aab4bd", friction: "#6b4a78"};
 for (const figure of document.querySelectorAll(".replay")) {
   const canvas = figure.querySelector("canvas"), data = JSON.parse(figure.querySelector("script").textContent);
   const bar = document.createElement("div"), button = document.createElement("button");
@@ -16,11 +18,17 @@ for (const figure of document.querySelectorAll(".replay")) {
     for (let i = 0; i < points.length; i += 2) c.lineTo(points[i] * u, points[i + 1] * u);
     c.stroke();
   };
+  const fill = (points, colour) => {
+    c.beginPath(); c.fillStyle = colour;
+    for (let i = 0; i < points.length; i += 2) c.lineTo(points[i] * u, points[i + 1] * u);
+    c.fill();
+  };
   const draw = () => {
     const f = data.frames[k], e = 3 * data.ego, ex = f[e] * u, ey = f[e + 1] * u, yaw = f[e + 2] / 1000;
     const scale = canvas.width / span;
     c.setTransform(1, 0, 0, 1, 0, 0); c.fillStyle = "#10151b"; c.fillRect(0, 0, canvas.width, canvas.height);
     c.translate(canvas.width * .38, canvas.height / 2); c.scale(scale, -scale); c.rotate(-yaw); c.translate(-ex, -ey);
+    for (const [kind, points] of data.patches ?? []) fill(points, SURFACES[kind]);
     for (const lane of data.lanes) line(lane, "#39444f", .15);
     for (const wall of data.walls ?? []) line(wall, "#8996a3", .3);
     data.size.forEach(([l, w], i) => {

@@ -1,0 +1,86 @@
+"""Where the patches of a surface lie on a map, as polygons to be drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.surface import SurfacePatch
+from skidpad.roads.queries import RoadMap
+
+Floats = NDArray[np.float64]
+CORNERS = 32  # of a circle
+STEP = 4  # samples of a lane between two corners
+WATER, ICE, SNOW, FRICTION = "water", "ice", "snow", "friction"
+
+
+class PatchOutline(NamedTuple):
+    """One piece of a patch."""
+
+    kind: str  # water, ice, snow or friction
+    name: str
+    corners: Floats  # (n, 3) m
+
+
+def patch_kind(patch: SurfacePatch) -> str:
+    """Return what lies there: ice hides water, snow hides both."""
+    if patch.snow_mm > 0.0:
+        return SNOW
+    if patch.ice_mm > 0.0:
+        return ICE
+    return WATER if patch.water_mm > 0.0 else FRICTION
+
+
+def outline_patches(map: RoadMap, surface: Sequence[SurfacePatch]) -> list[PatchOutline]:
+    """Return the polygons of all patches: one for an area, one per lane for a stretch of road."""
+    return [
+        PatchOutline(patch_kind(patch), patch.name, corners)
+        for patch in surface
+        for corners in _pieces(map, patch)
+    ]
+
+
+def _pieces(map: RoadMap, patch: SurfacePatch) -> Iterator[Floats]:
+    if patch.circle is not None:
+        x, y, radius = patch.circle
+        turn = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
+        yield _on_road(map, np.column_stack([x + radius * np.cos(turn), y + radius * np.sin(turn)]))
+    elif patch.polygon:
+        yield _on_road(map, np.array(patch.polygon, dtype=np.float64))
+    else:
+        yield from _stretches(map, patch)
+
+
+def _on_road(map: RoadMap, corners: Floats) -> Floats:
+    """Return corners (n, 2) with the height of the lane that is nearest to their middle."""
+    s, (x, y) = map.samples, corners.mean(axis=0)
+    nearest = int(np.argmin((s.x - x) ** 2 + (s.y - y) ** 2))
+    return np.column_stack([corners, np.full(len(corners), s.z[nearest])])
+
+
+def _stretches(map: RoadMap, patch: SurfacePatch) -> Iterator[Floats]:
+    s, lanes = map.samples, map.lanes
+    low, high = (0.0, np.inf) if patch.s is None else patch.s
+    left, right = (0.5 if patch.side != "right" else 0.0), (-0.5 if patch.side != "left" else 0.0)
+    for lane in np.flatnonzero(lanes.road == patch.road):
+        if patch.lane not in (None, int(lanes.lane_id[lane])):
+            continue
+        rows = np.arange(int(lanes.first[lane]), int(lanes.first[lane]) + int(lanes.size[lane]))
+        rows = rows[(s.s_road[rows] >= low) & (s.s_road[rows] <= high)]
+        if len(rows) < 2:
+            continue
+        some = np.unique(np.append(rows[::STEP], rows[-1]))
+        edges = [
+            np.column_stack(
+                [
+                    s.x[some] - side * s.width[some] * np.sin(s.heading[some]),
+                    s.y[some] + side * s.width[some] * np.cos(s.heading[some]),
+                    s.z[some],
+                ]
+            )
+            for side in (left, right)
+        ]
+        yield np.concatenate([edges[0], edges[1][::-1]])

@@ -530,7 +530,7 @@ def test_the_light_that_the_stack_reports_is_framed_where_it_is_seen(feed):
     run(wanted, desk=desk, sinks=(at := AtLight(screen),))
     packet = feed.take()
     told = msgspec.json.decode(packet.told)
-    *_, (frames, state, label) = told["marks"]["driver"]
+    *_, (frames, state, label), _ = told["marks"]["driver"]
     assert label == f"red {at.moment.report.light_distance:.0f} m"
     assert state == "red"
     # by another route: where a camera for classes in the same place sees a traffic light

@@ -41,6 +41,9 @@ class LightMark(NamedTuple):
     label: str
 
 
+PatchMark = tuple[str, list[tuple[int, int]]]  # kind and corners of what lies on the road
+
+
 class Marks(NamedTuple):
     """What is drawn into one view, in px."""
 
@@ -48,9 +51,7 @@ class Marks(NamedTuple):
     lead: tuple[int, int, int, int] | None  # bracket: left, top, right, bottom
     label: str
     light: LightMark | None = None
-    patches: list[
-        tuple[str, list[tuple[int, int]]]
-    ] = []  # kind and corners of what lies on the road
+    patches: Sequence[PatchMark] = ()
 
 
 RADAR_MOUNT = next(
@@ -71,9 +72,7 @@ def project(camera: CameraSpec, points: Floats, body: Pose = BODY) -> Floats:
     return np.stack([u, v, p[:, 2]], axis=1)
 
 
-def patch_marks(
-    camera: CameraSpec, outlines: Sequence[PatchOutline], ego: Pose
-) -> list[tuple[str, list[tuple[int, int]]]]:
+def patch_marks(camera: CameraSpec, outlines: Sequence[PatchOutline], ego: Pose) -> list[PatchMark]:
     """Return the polygons of what lies on the road, as a camera of the ego sees them."""
     view = camera_view(camera, ego)
     found = []

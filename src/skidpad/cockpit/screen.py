@@ -108,10 +108,13 @@ class Screen(Sink):
         for view in {self.link.main, View.TOP} & {*MARKED, View.TOP}:
             camera = self.cameras[view.value]
             patches = patch_marks(camera, self.outlines, ego)
-            seen = Marks([], None, "")
             if view in MARKED:
                 light = self.light.mark(camera, moment)
                 seen = marks_of(camera, frame.radar, moment.report, light)
+            elif patches:
+                seen = Marks([], None, "")
+            else:
+                continue
             marks[camera.id] = seen._replace(patches=patches)
         return {
             "tick": frame.tick,

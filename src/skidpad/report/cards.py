@@ -15,6 +15,7 @@ from skidpad.evidence.drive.prepared import Drive
 from skidpad.evidence.drive.severity import Contact
 from skidpad.evidence.drive.story import Arrival, Sighting, Story, tell_story
 from skidpad.recording.campaigns import snapshot
+from skidpad.recording.surfaces import read_run_surface
 from skidpad.report.causes import (
     format_gap,
     format_metres,
@@ -23,7 +24,6 @@ from skidpad.report.causes import (
     write_cause,
 )
 from skidpad.report.page import Card, Event, Image
-from skidpad.recording.surfaces import read_run_surface
 from skidpad.report.replay import replay
 from skidpad.roads.queries import RoadMap
 

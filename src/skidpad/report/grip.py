@@ -14,6 +14,7 @@ from skidpad.evidence.grip.study import ORIGINAL, REDUCED, Share, completion, co
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.grip import read_stopping
 from skidpad.recording.logfiles import read_log
+from skidpad.recording.surfaces import read_run_surface
 from skidpad.report import grip_figures, grip_tables
 from skidpad.report.grip_data import GripCampaign, load_grip, scenario_title
 from skidpad.report.grip_rain import rain_tables
@@ -31,7 +32,6 @@ from skidpad.report.page import (
     Text,
     write_report_page,
 )
-from skidpad.recording.surfaces import read_run_surface
 from skidpad.report.replay import replay
 from skidpad.report.verdicts import least_seeds_text, seeds_text, tally_text, verdict_blocks
 from skidpad.roads.bundled import kept_map

@@ -15,9 +15,9 @@ from skidpad.evidence.pairs import EGO, body, following, together
 from skidpad.evidence.play_verdicts import Counterpart
 from skidpad.recording.logfiles import read_log
 from skidpad.recording.runlog import RunLog
+from skidpad.recording.surfaces import read_run_surface
 from skidpad.report.page import Card, Figure, anchor
 from skidpad.report.play_runs import PlayRun, find_road
-from skidpad.recording.surfaces import read_run_surface
 from skidpad.report.replay import replay_run
 from skidpad.report.timeline import Mark, Strip, timelines
 

@@ -16,6 +16,7 @@ from skidpad.evidence.grip.threshold import JUDGED, Situation, situations
 from skidpad.evidence.verdicts import Judgement, Verdict
 from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.logfiles import read_log
+from skidpad.recording.surfaces import read_run_surface
 from skidpad.recording.threshold import THRESHOLD, ThresholdEntry
 from skidpad.report.campaign import CampaignView
 from skidpad.report.grip_tables import share
@@ -34,7 +35,6 @@ from skidpad.report.page import (
     Text,
     write_report_page,
 )
-from skidpad.recording.surfaces import read_run_surface
 from skidpad.report.replay import replay
 from skidpad.report.tables import Column, Format, Quantity, table
 from skidpad.report.threshold_figures import curve_figures, map_figure

@@ -65,7 +65,7 @@ def _stretches(map: RoadMap, patch: SurfacePatch) -> Iterator[Floats]:
     s, lanes = map.samples, map.lanes
     low, high = (0.0, np.inf) if patch.s is None else patch.s
     left, right = (0.5 if patch.side != "right" else 0.0), (-0.5 if patch.side != "left" else 0.0)
-    for lane in np.flatnonzero(lanes.road == patch.road):
+    for lane in np.flatnonzero((lanes.road == patch.road) & (map.arrays.drivable == 1)):
         if patch.lane not in (None, int(lanes.lane_id[lane])):
             continue
         rows = np.arange(int(lanes.first[lane]), int(lanes.first[lane]) + int(lanes.size[lane]))

@@ -255,7 +255,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         stability=s.esc,
         level=spec.sensors,
         render_all=spec.render is Render.ALL or _foreign_on_carla(spec),
-        patches=tuple(patch.to_patch() for patch in spec.surface),
+        patches=spec.surface,
     )
 
 

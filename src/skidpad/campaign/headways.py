@@ -13,31 +13,16 @@ import csv
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib import resources
-from math import exp, log, sqrt
-from statistics import NormalDist
+from math import log, sqrt
 from typing import Any
 
 import numpy as np
 
+from skidpad.core.space import STANDARD, Normal
+
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)
 QUANTILE_TOLERANCE = 0.15  # of the field's quantile (issue: at most 15 %)
 SHARE_TOLERANCE = 0.05  # of all headways
-
-
-@dataclass(frozen=True, slots=True)
-class LogNormal:
-    """A distribution of headways in s."""
-
-    median: float
-    sigma: float  # of the logarithm
-
-    def quantile(self, share: float) -> float:
-        """Headway in s below which this share lies."""
-        return self.median * exp(self.sigma * NormalDist().inv_cdf(share))
-
-    def share_below(self, headway: float) -> float:
-        """Share of headways below this one."""
-        return NormalDist().cdf(log(headway / self.median) / self.sigma)
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,16 +40,16 @@ class Source:
     name: str
     read: str  # what of it could be read
 
-    def distribution(self) -> LogNormal:
-        """Log-normal with the source's mean and deviation, else through its two shares."""
+    def distribution(self) -> Normal:
+        """Return the log-normal of the source's mean and deviation, else through its two shares."""
         if self.mean is not None and self.deviation is not None:
             variance = log(1.0 + (self.deviation / self.mean) ** 2)
-            return LogNormal(self.mean * exp(-0.5 * variance), sqrt(variance))
+            return Normal(log(self.mean) - 0.5 * variance, sqrt(variance), is_log=True)
         if self.below_1_s is None or self.below_2_s is None:
             raise ValueError(f"{self.name}: neither mean and deviation nor two shares are known")
-        z_1, z_2 = (NormalDist().inv_cdf(share) for share in (self.below_1_s, self.below_2_s))
+        z_1, z_2 = (STANDARD.inv_cdf(share) for share in (self.below_1_s, self.below_2_s))
         sigma = log(2.0) / (z_2 - z_1)
-        return LogNormal(exp(-z_1 * sigma), sigma)
+        return Normal(-z_1 * sigma, sigma, is_log=True)
 
 
 def field_sources() -> list[Source]:
@@ -111,7 +96,7 @@ def judge(seconds: Sequence[float], source: Source) -> dict[str, Any]:
     result: dict[str, Any] = {
         "source": source.name,
         "role": source.role,
-        "field_s": [round(field.quantile(q), 3) for q in QUANTILES],
+        "field_s": [round(field.value(q), 3) for q in QUANTILES],
         "field_below_1_s": round(field.share_below(1.0), 4),
     }
     if not ours["samples"]:

@@ -8,6 +8,7 @@ from pathlib import Path
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import SensorSpec
 from skidpad.core.states import VehicleCommand
+from skidpad.core.surface import SurfacePatch
 from skidpad.core.tyres import REFERENCE
 from skidpad.core.vocabulary import (
     Control,
@@ -69,24 +70,6 @@ class TrafficSetup:
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class FrictionPatch:
-    """A stretch of road or an area with friction of its own, felt wheel by wheel."""
-
-    mu_ratio: float | None = None  # of the friction that the surface would have without it; or:
-    water_mm: float = 0.0  # what lies there; where the weather's is deeper, that counts
-    ice_mm: float = 0.0
-    snow_mm: float = 0.0
-    name: str = ""
-    circle: tuple[float, float, float] | None = None  # world x, y and radius in m; or:
-    polygon: tuple[tuple[float, float], ...] = ()  # world x, y in m; or:
-    road: int | None = None
-    lane: int | None = None
-    s_from: float = 0.0
-    s_to: float = 0.0
-    side: str = "both"  # "left" or "right" half of the lane for split-mu
-
-
-@dataclass(frozen=True, slots=True, kw_only=True)
 class Setup:
     """Everything that a backend needs to begin a run."""
 
@@ -111,7 +94,7 @@ class Setup:
     level: SensorLevel = SensorLevel.PIXELS
     asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)
     render_all: bool = False  # every image every tick, read or not
-    patches: tuple[FrictionPatch, ...] = ()
+    patches: tuple[SurfacePatch, ...] = ()
     localisation_noise: float = 0.0  # m, standard deviation of the ego's x and y; 0: exact (L-3)
     dt: float = DT
 

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Literal
+from math import inf
+from typing import Literal
 
 from msgspec import Struct
 
 from skidpad.core.errors import ConfigError, require_range
-
-if TYPE_CHECKING:
-    from skidpad.core.setup import FrictionPatch
 
 FRICTION = (0.01, 1.5)  # times the friction that is there without the patch
 WATER_MM = (0.0, 2.0)  # deepest film for which the friction of wet roads holds (docs/physics.md)
@@ -76,13 +74,7 @@ class SurfacePatch(
         if self.s is not None and not 0.0 <= self.s[0] < self.s[1]:
             raise ConfigError(f"s must run from 0 or more to more, got {list(self.s)}")
 
-    def to_patch(self) -> FrictionPatch:
-        """Return the patch as a set-up takes it."""
-        from skidpad.core.setup import FrictionPatch  # arrays come with it
-
-        low, high = (0.0, float("inf")) if self.s is None else self.s
-        return FrictionPatch(
-            name=self.name, mu_ratio=self.friction, water_mm=self.water_mm, ice_mm=self.ice_mm,
-            snow_mm=self.snow_mm, circle=self.circle, polygon=self.polygon, road=self.road,
-            lane=self.lane, s_from=low, s_to=high, side=self.side,
-        )  # fmt: skip
+    @property
+    def stretch(self) -> tuple[float, float]:
+        """From and to along its road, m; without `s` the whole road."""
+        return (0.0, inf) if self.s is None else self.s

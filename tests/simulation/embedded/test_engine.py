@@ -12,8 +12,9 @@ import pytest
 
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.core.setup import ActorCommand, ActorSetup, FrictionPatch, Setup, TrafficSetup
+from skidpad.core.setup import ActorCommand, ActorSetup, Setup, TrafficSetup
 from skidpad.core.states import VehicleCommand
+from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import Control, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.types import EGO_TYPE
@@ -204,14 +205,14 @@ def test_drifting_over_a_marking_is_one_invasion() -> None:
 
 
 def test_patches_are_felt_wheel_by_wheel() -> None:
-    icy = FrictionPatch(mu_ratio=0.1, road=START.road, lane=START.lane_id, s_to=1e4, side="right")
+    icy = SurfacePatch(friction=0.1, road=START.road, lane=START.lane_id, side="right")
     backend = EmbeddedBackend()
     backend.reset(replace(ALONE, ego=replace(EGO, speed=10.0), patches=(icy,)), 0)
     backend.step(VehicleCommand())
     mu = backend.truth().mu[0]
     assert mu[[1, 3]] == pytest.approx(0.1 * mu[[0, 2]])
     with pytest.raises(ConfigError, match=r"patches\[0\]"):
-        backend.reset(replace(ALONE, patches=(FrictionPatch(mu_ratio=0.5),)), 0)
+        backend.reset(replace(ALONE, patches=(SurfacePatch(friction=0.5, road=999),)), 0)
 
 
 @pytest.mark.req("A-208")

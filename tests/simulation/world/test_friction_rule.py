@@ -10,7 +10,8 @@ import pytest
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.friction import FRICTION_RULE
 from skidpad.core.geometry import Pose
-from skidpad.core.setup import ActorSetup, FrictionPatch, LanePosition, Setup
+from skidpad.core.setup import ActorSetup, LanePosition, Setup
+from skidpad.core.surface import SurfacePatch
 from skidpad.core.tyres import find_tyres
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import RoadSurface, physical_params, ratio_at, road_surface
@@ -38,13 +39,13 @@ def road(tmp_path_factory):
 
 
 def patch(**what):
-    return FrictionPatch(road=1, s_from=0.0, s_to=1e6, **what)
+    return SurfacePatch(road=1, **what)
 
 
 def felt(road, words):
     """Friction at the ego's wheels, as the world has it."""
-    patches = {DEPTH: [{"water_mm": DEEP}], PATCH: [{"mu_ratio": SHARE}],
-               TWO: [{"mu_ratio": OTHER}, {"mu_ratio": THIN}]}  # fmt: skip
+    patches = {DEPTH: [{"water_mm": DEEP}], PATCH: [{"friction": SHARE}],
+               TWO: [{"friction": OTHER}, {"friction": THIN}]}  # fmt: skip
     mu_ref = MU if M in words else 0.9
     setup = Setup(
         map=road, weather=WET if SKY in words else Weather(), specs=(),

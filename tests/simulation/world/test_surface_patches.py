@@ -8,7 +8,6 @@ import pytest
 
 from skidpad.campaign.surfaces import read_surface
 from skidpad.core.errors import ConfigError
-from skidpad.core.setup import FrictionPatch
 from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.grip import Road, grip_params, mu_at, physical_params, road_surface
@@ -29,7 +28,7 @@ def patches(*found, weather="clear-noon", model=GripModel.PHYSICAL):
 @pytest.mark.parametrize("v", [0.0, 15.0, 30.0])
 @pytest.mark.parametrize("weather", ["clear-noon", "rain-noon"])
 def test_water_lowers_friction_as_a_road_with_that_film_does(weather, v):
-    found = patches(FrictionPatch(water_mm=2.0, circle=(X, Y, 3.0)), weather=weather)
+    found = patches(SurfacePatch(water_mm=2.0, circle=(X, Y, 3.0)), weather=weather)
     outside = find_weather(weather)
     road = road_surface(outside)
     deep = physical_params(replace(road, film_mm=max(road.film_mm, 2.0)))
@@ -41,12 +40,12 @@ def test_water_lowers_friction_as_a_road_with_that_film_does(weather, v):
 def test_a_film_that_the_weather_has_already_changes_nothing():
     outside = find_weather("rain-noon")
     thin = 0.5 * road_surface(outside).film_mm
-    found = patches(FrictionPatch(water_mm=thin, circle=(X, Y, 3.0)), weather="rain-noon")
+    found = patches(SurfacePatch(water_mm=thin, circle=(X, Y, 3.0)), weather="rain-noon")
     assert found.ratio_at(X, Y, Z, 20.0) == pytest.approx(1.0)
 
 
 def test_ice_on_a_dry_road_is_as_slippery_as_an_icy_road():
-    found = patches(FrictionPatch(ice_mm=3.0, circle=(X, Y, 3.0)))
+    found = patches(SurfacePatch(ice_mm=3.0, circle=(X, Y, 3.0)))
     icy = physical_params(replace(road_surface(find_weather("clear-noon")), ice_mm=3.0))
     dry = grip_params(find_weather("clear-noon"), GripModel.PHYSICAL)
     assert found.ratio_at(X, Y, Z) * mu_at(dry, 0.0) == pytest.approx(mu_at(icy, 0.0))
@@ -55,17 +54,17 @@ def test_ice_on_a_dry_road_is_as_slippery_as_an_icy_road():
 
 def test_the_slippery_one_of_two_patches_counts():
     found = patches(
-        FrictionPatch(mu_ratio=0.7, circle=(X, Y, 5.0)),
-        FrictionPatch(mu_ratio=0.4, circle=(X, Y, 1.0)),
+        SurfacePatch(friction=0.7, circle=(X, Y, 5.0)),
+        SurfacePatch(friction=0.4, circle=(X, Y, 1.0)),
     )
     assert found.ratio_at(X, Y, Z) == 0.4
     assert found.ratio_at(X + 2.0, Y, Z) == 0.7
 
 
 def test_a_stretch_covers_its_lane_its_side_and_nothing_else():
-    stretch = FrictionPatch(
-        mu_ratio=0.5, road=PLACE.road, lane=PLACE.lane_id, side="right",
-        s_from=ROAD.s_road(PLACE) - 5.0, s_to=ROAD.s_road(PLACE) + 5.0,
+    stretch = SurfacePatch(
+        friction=0.5, road=PLACE.road, lane=PLACE.lane_id, side="right",
+        s=(ROAD.s_road(PLACE) - 5.0, ROAD.s_road(PLACE) + 5.0),
     )  # fmt: skip
     found = patches(stretch)
     heading = float(ROAD.samples.heading[500])
@@ -79,7 +78,7 @@ def test_a_stretch_covers_its_lane_its_side_and_nothing_else():
 
 def test_vehicles_far_from_every_patch_are_not_looked_at(monkeypatch):
     """The bounds leave out only where nothing is: the same shares with them and without."""
-    found = patches(FrictionPatch(mu_ratio=0.5, circle=(X, Y, 4.0)))
+    found = patches(SurfacePatch(friction=0.5, circle=(X, Y, 4.0)))
     found.fit([])
     low_x, low_y, high_x, high_y = found.bounds[0]
     rng = np.random.default_rng(3)
@@ -121,19 +120,12 @@ def test_a_wrong_file_is_refused_in_one_sentence(text, complaint, tmp_path):
 @pytest.mark.parametrize(
     ("patch", "complaint"),
     [
-        (FrictionPatch(mu_ratio=0.5, road=77, name="ice"), "(ice): map straight has no road 77"),
-        (FrictionPatch(mu_ratio=0.5, road=PLACE.road, s_from=1e5, s_to=2e5), "runs from 0.0 to"),
-        (FrictionPatch(mu_ratio=0.5, road=PLACE.road, lane=9, s_to=10.0), "has lanes"),
+        (SurfacePatch(friction=0.5, road=77, name="ice"), "(ice): map straight has no road 77"),
+        (SurfacePatch(friction=0.5, road=PLACE.road, s=(1e5, 2e5)), "runs from 0.0 to"),
+        (SurfacePatch(friction=0.5, road=PLACE.road, lane=9, s=(0.0, 10.0)), "has lanes"),
     ],
 )
 def test_a_patch_on_no_road_of_the_map_says_what_there_is(patch, complaint):
     with pytest.raises(ConfigError) as caught:
         patches(patch)
     assert complaint in str(caught.value)
-
-
-def test_a_patch_is_written_as_it_was_read():
-    patch = SurfacePatch(name="a", water_mm=1.0, road=1, s=(3.0, 9.0), side="left")
-    assert patch.to_patch() == FrictionPatch(
-        name="a", water_mm=1.0, road=1, s_from=3.0, s_to=9.0, side="left"
-    )

@@ -9,10 +9,10 @@ from math import cos, hypot, sin
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.errors import ConfigError, require_choice, require_range
+from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
-from skidpad.core.setup import FrictionPatch
 from skidpad.core.states import ActorStates
+from skidpad.core.surface import SurfacePatch
 from skidpad.physics.grip import GripParams, Road, mu_at, road_surface, stiffness_at
 from skidpad.physics.types import VehicleType
 from skidpad.roads.queries import LanePoint, RoadMap
@@ -21,7 +21,6 @@ Floats = NDArray[np.float64]
 # by road and lane: from and to along the road in m, and the share of the friction there
 LaneFrictions = dict[tuple[int, int], list[tuple[float, float, float]]]
 
-SIDES = ("both", "left", "right")
 REACH = 12.0  # m from a vehicle's origin to its farthest wheel, and half a lane
 SPACING = 1.0  # m, the largest distance of two lane samples
 LISTED = 20  # roads that a message names
@@ -34,14 +33,14 @@ class Patches:
     def __init__(
         self,
         map: RoadMap,
-        patches: Sequence[FrictionPatch],
+        patches: Sequence[SurfacePatch],
         road: Road,
         lanes: LaneFrictions | None = None,
     ) -> None:
         """road: without patches. lanes: shares of its friction that materials make, under them.
 
         Raises:
-            ConfigError: a patch lies on no road of the map, or says nothing or two things.
+            ConfigError: a patch lies on no road of the map, or none of its lanes has such a stretch.
         """
         self.map, self.patches = map, tuple(patches)
         self.wheels: list[list[tuple[float, float]]] = []
@@ -123,13 +122,13 @@ class Patches:
         return next((share for low, high, share in stretches if low <= s < high), 1.0)
 
     def _effect(self, k: int, v: float, tyres: str) -> tuple[float, float, float]:
-        ratio, covered = self.patches[k].mu_ratio, self._covered[tyres][k]
+        ratio, covered = self.patches[k].friction, self._covered[tyres][k]
         if covered is None:
             return (1.0 if ratio is None else ratio), NO_PATCH, NO_PATCH
         share = float(mu_at(covered, v) / mu_at(self._outside[tyres], v))
         return share, float(stiffness_at(covered, v)), covered.film
 
-    def _covers(self, patch: FrictionPatch, x: float, y: float, place: LanePoint | None) -> bool:
+    def _covers(self, patch: SurfacePatch, x: float, y: float, place: LanePoint | None) -> bool:
         if patch.circle is not None:
             middle_x, middle_y, radius = patch.circle
             return hypot(x - middle_x, y - middle_y) <= radius
@@ -140,15 +139,16 @@ class Patches:
         if abs(place.offset) > place.width / 2.0:
             return False
         on_side = patch.side == "both" or (place.offset > 0.0) == (patch.side == "left")
-        return on_side and patch.s_from <= self.map.s_road(place) <= patch.s_to
+        low, high = patch.stretch
+        return on_side and low <= self.map.s_road(place) <= high
 
 
-def _surface_grip(patch: FrictionPatch, road: Road, tyres: str) -> GripParams | None:
+def _surface_grip(patch: SurfacePatch, road: Road, tyres: str) -> GripParams | None:
     """Return the grip on what lies in a patch, at least as deep as the weather's; None: a plain ratio.
 
     Always by the physical model, which alone knows films and snow.
     """
-    if patch.mu_ratio is not None:
+    if patch.friction is not None:
         return None
     outside = road_surface(road.weather)
     return road.params(
@@ -162,7 +162,7 @@ def _surface_grip(patch: FrictionPatch, road: Road, tyres: str) -> GripParams | 
     )
 
 
-def _bounds(patch: FrictionPatch, map: RoadMap) -> tuple[float, float, float, float]:
+def _bounds(patch: SurfacePatch, map: RoadMap) -> tuple[float, float, float, float]:
     """Return the least and largest x and y at which a vehicle may touch a patch, m."""
     if patch.circle is not None:
         x, y, radius = patch.circle
@@ -178,14 +178,15 @@ def _bounds(patch: FrictionPatch, map: RoadMap) -> tuple[float, float, float, fl
     )  # fmt: skip
 
 
-def _samples(patch: FrictionPatch, map: RoadMap) -> NDArray[np.bool_]:
+def _samples(patch: SurfacePatch, map: RoadMap) -> NDArray[np.bool_]:
     """Return which lane samples a stretch of road covers, (N,)."""
     lanes, samples = map.lanes, map.samples
     chosen = lanes.road[samples.lane] == patch.road
     if patch.lane is not None:
         chosen &= lanes.lane_id[samples.lane] == patch.lane
-    covered: NDArray[np.bool_] = chosen & (samples.s_road >= patch.s_from - SPACING)
-    return covered & (samples.s_road <= patch.s_to + SPACING)
+    low, high = patch.stretch
+    covered: NDArray[np.bool_] = chosen & (samples.s_road >= low - SPACING)
+    return covered & (samples.s_road <= high + SPACING)
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,13 +210,8 @@ def in_zone(zone: FrictionZone, s: ActorStates) -> NDArray[np.bool_]:
     return inside
 
 
-def _check(k: int, patch: FrictionPatch, map: RoadMap) -> None:
+def _check(k: int, patch: SurfacePatch, map: RoadMap) -> None:
     where = f"patches[{k}]{f' ({patch.name})' if patch.name else ''}"
-    if patch.mu_ratio is not None:
-        require_range(f"{where}.mu_ratio", patch.mu_ratio, 0.0, 2.0)
-    require_choice(f"{where}.side", patch.side, SIDES)
-    if sum((patch.circle is not None, bool(patch.polygon), patch.road is not None)) != 1:
-        raise ConfigError(f"{where} needs a circle, a polygon or a road")
     if patch.road is None:
         return
     roads = sorted({int(road) for road in map.lanes.road})
@@ -229,7 +225,7 @@ def _check(k: int, patch: FrictionPatch, map: RoadMap) -> None:
         raise ConfigError(
             f"{where}: road {patch.road} has lanes {', '.join(f'{i}' for i in lanes)} and runs from "
             f"{on.min():.1f} to {on.max():.1f} m; the patch asks for lane {patch.lane} from "
-            f"{patch.s_from:g} to {patch.s_to:g} m"
+            f"{patch.stretch[0]:g} to {patch.stretch[1]:g} m"
         )
 
 

@@ -10,7 +10,7 @@ from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.names import path_part
 from skidpad.core.reading import is_file
 from skidpad.core.simulator import BackendChoice, BackendKind
-from skidpad.roads.map_files import bundled_maps
+from skidpad.roads.map_files import bundled_maps, is_made_map
 
 
 def check_backend(choice: BackendChoice) -> BackendChoice:
@@ -31,7 +31,7 @@ def check_backend(choice: BackendChoice) -> BackendChoice:
 
 def map_of(map: str, choice: BackendChoice) -> str:
     """A bundled map or a file as it is; a CARLA server's own map is fetched and kept as a file."""
-    named = map in bundled_maps() or is_file(Path(map)) or Path(map).suffix
+    named = map in bundled_maps() or is_made_map(map) or is_file(Path(map)) or Path(map).suffix
     if choice.backend is BackendKind.EMBEDDED or named:
         return map
     from skidpad.core.jit import user_cache

@@ -38,10 +38,12 @@ def extension_points() -> tuple[Registry[Any], ...]:
     from skidpad.core.sensor_types import SENSORS
     from skidpad.evidence.channels.indicators.catalogue import INDICATORS
     from skidpad.physics.presets import WEATHERS
+    from skidpad.roads.map_files import MAPS
     from skidpad.scenarios.registry import SCENARIO_NAMES
 
+    points = (SENSORS, INDICATORS, WEATHERS, MAPS, SCENARIO_NAMES)
     try:
         from skidpad.fleet.alerting.relay_types import RELAYS
     except ImportError:  # the optional part `fleet` is not installed
-        return (SENSORS, INDICATORS, WEATHERS, SCENARIO_NAMES)
-    return (SENSORS, INDICATORS, WEATHERS, SCENARIO_NAMES, RELAYS)
+        return points
+    return (*points, RELAYS)

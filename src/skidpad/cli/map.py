@@ -16,7 +16,7 @@ maps = typer.Typer(name="map", help="Bundled and own maps.", no_args_is_help=Tru
 
 SPEEDS_KMH = (80.0, 150.0)  # the matrix drives at 80, its limiter ends at 150
 BENDS_SHOWN, IDS_SHOWN = 20, 40
-MAP = typer.Argument(help="Name of a bundled map, or an OpenDRIVE file.")
+MAP = typer.Argument(help="Name of a map (skidpad map list), or an OpenDRIVE file.")
 FILE = typer.Argument(help="An OpenDRIVE file.")
 PNG = typer.Option(None, help="Also write a picture from above.")
 OUT = typer.Option(None, help="Where to write; default: beside it, as .npz.")
@@ -24,13 +24,17 @@ OUT = typer.Option(None, help="Where to write; default: beside it, as .npz.")
 
 @maps.command("list")
 def list_() -> None:
-    """Name the maps that come with Skidpad."""
+    """Name the maps that come with Skidpad, and those that installed packages make."""
     from skidpad.roads.bundled import bundled_maps, load_map
+    from skidpad.roads.map_files import MAPS
 
     for name in bundled_maps():
         map = load_map(name)
         driving = map.arrays.drivable == 1
         typer.echo(f"{name}: {map.lanes.length[driving].sum() / 1000.0:.1f} km of driving lanes")
+    for source in MAPS.foreign_entries():
+        setting = f":SETTING ({source.units})" if source.units else ""
+        typer.echo(f"{source.name}{setting}: {source.title}")
 
 
 @maps.command()

@@ -2,14 +2,47 @@
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 
 from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.names import path_part
 from skidpad.core.reading import is_file
+from skidpad.core.registry import Registry
+from skidpad.core.told import describe_value
 
 FOLDER = Path(__file__).parent / "maps"
 KEPT = "maps"  # in a campaign's folder: maps/<content>/<name>.xodr
+
+
+@dataclass(frozen=True, slots=True)
+class MapSource:
+    """What gives a map by its name: a file of Skidpad, or a package that makes or holds roads.
+
+    Attributes:
+        name: The name of the map, or what stands before the colon in "name:setting".
+        title: A few words for tables and pages.
+        units: What the setting is, with units; empty: the map takes none.
+        factory: Returns the OpenDRIVE text of a setting; the same setting gives the same text.
+    """
+
+    name: str
+    title: str
+    factory: Callable[[str], str]
+    units: str = ""
+
+
+def _own_maps() -> tuple[MapSource, ...]:
+    return tuple(
+        MapSource(file.stem, "Comes with Skidpad", lambda _, file=file: file.read_text("utf-8"))
+        for file in sorted(FOLDER.glob("*.xodr"))
+    )
+
+
+MAPS = Registry("map", "skidpad.maps", MapSource, _own_maps)
 
 
 def bundled_maps() -> list[str]:
@@ -18,18 +51,49 @@ def bundled_maps() -> list[str]:
 
 
 def map_file(map: str | Path) -> Path:
-    """The OpenDRIVE file of a bundled map's name, or of a path."""
+    """The OpenDRIVE file of a map's name, of "name:setting" for a map that is made, or of a path."""
     name = str(map)
     if name in bundled_maps():
         return FOLDER / f"{name}.xodr"
     path = Path(map)
     if is_file(path):
         return path
+    if is_made_map(name):
+        return _write_made_map(name)
     if path.suffix or len(path.parts) > 1:
         raise FileError(f"map {name}: there is no such file")
-    raise ConfigError(
-        f"unknown map {name!r}; choose one of: {', '.join(bundled_maps())}, or a file"
-    )
+    raise ConfigError(f"unknown map {name!r}; choose one of: {', '.join(MAPS.names())}, or a file")
+
+
+def is_made_map(map: str) -> bool:
+    """Tells whether a package makes the map of this name, "name" or "name:setting"."""
+    source = MAPS.sources().get(map.partition(":")[0])
+    return source is not None and source.package != "skidpad"
+
+
+def _write_made_map(map: str) -> Path:
+    """Writes the map that a package makes to the cache; the file's place tells its content."""
+    from skidpad.core.jit import user_cache  # numba comes with it
+
+    name, _, setting = map.partition(":")
+    source = MAPS.get(name)
+    if bool(setting) is not bool(source.units):
+        takes = f"a setting, as {name}:SETTING ({source.units})" if source.units else "no setting"
+        raise ConfigError(f"map {map!r}: {name} takes {takes}")
+    try:
+        text = source.factory(setting).encode()
+    except ConfigError:
+        raise
+    except Exception as error:  # code of a package: anything can happen
+        raise ConfigError(f"map {map!r} cannot be made: {describe_value(error)}") from error
+    part = path_part("-".join(filter(None, (name, setting))))
+    file = user_cache() / "made-maps" / sha256(text).hexdigest()[:16] / f"{part}.xodr"
+    if not file.is_file():
+        file.parent.mkdir(parents=True, exist_ok=True)
+        unfinished = file.with_suffix(f".{os.getpid()}")
+        unfinished.write_bytes(text)
+        unfinished.replace(file)
+    return file
 
 
 def map_name(map: str) -> str:
@@ -43,7 +107,7 @@ def kept_name(file: Path) -> str:
 
 
 def require_map(map: str) -> None:
-    """Raise ConfigError for a name that no bundled map has; what names a file may be moved yet."""
+    """Raise ConfigError for a name that no map has; what names a file may be moved yet."""
     path = Path(map)
-    if not path.suffix and len(path.parts) < 2:
+    if is_made_map(map) or (not path.suffix and len(path.parts) < 2):
         map_file(map)

@@ -10,6 +10,7 @@ from skidpad.core.errors import ConfigError, FileError, NoLaneError
 from skidpad.core.reading import is_file
 from skidpad.recording.staging import FileCriterion
 from skidpad.roads.bundled import bundled_maps, load_map
+from skidpad.roads.map_files import is_made_map, map_file
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.actions.controllers import Activate, Several
 from skidpad.scenarios.catalogs import Catalogs
@@ -269,6 +270,8 @@ def _network(root: Node, maps: Sequence[Path], findings: list[Finding]) -> Netwo
         path = str(found[0])
     elif _bare(name) in bundled_maps():
         path = _bare(name)
+    elif is_made_map(name):
+        path = str(map_file(name))
     else:
         raise logic.error(f"there is no road file {name!r} beside the scenario")
     try:

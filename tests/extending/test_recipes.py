@@ -7,8 +7,10 @@ import re
 import subprocess
 import sys
 from configparser import ConfigParser
+from importlib.util import find_spec
 from pathlib import Path
 
+import polars as pl
 import pytest
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
@@ -19,7 +21,31 @@ ENTRY_POINTS = 'project.entry-points."'
 
 
 def install(package: Path, packages: Path) -> None:
-    """Installs a package of plain modules as pip does, without network and build tools.
+    """Installs a package into a folder by pip, without network.
+
+    The setuptools that Python 3.11 brings along cannot build alone; there it is unpacked instead.
+    """
+    if not has_builder():
+        unpack(package, packages)
+        return
+    options = ("--no-index", "--no-build-isolation", "--no-deps", "--disable-pip-version-check")
+    call(
+        package.parent, "-m", "pip", "install", "-q", *options,
+        "--upgrade", "--target", str(packages), str(package),
+    )  # fmt: skip
+
+
+def has_builder() -> bool:
+    """Tells whether setuptools is there and can build a wheel."""
+    try:
+        import setuptools.command.bdist_wheel  # since setuptools 70.1
+    except ImportError:
+        return find_spec("setuptools") is not None and find_spec("wheel") is not None
+    return True
+
+
+def unpack(package: Path, packages: Path) -> None:
+    """Installs a package of plain modules as pip does.
 
     Modules are copied, and names, version and entry points go into a .dist-info folder.
     """
@@ -87,6 +113,14 @@ def test_a_recipe_works_as_printed_and_its_runs_open_without_it(title: str, tmp_
         story = (tmp_path / "out" / "crowd").rglob("*")
         texts = [p.read_text("utf-8") for p in story if p.suffix in (".csv", ".json", ".jsonl")]
         assert any("slow_all" in text for text in texts)
+    page = tmp_path / "out" / "close" / "report.html"
+    if page.is_file():
+        assert "close following" in page.read_text(encoding="utf-8")
+        rows = pl.read_parquet(page.with_name("results.parquet"))
+        assert rows["close_following_pct"].item() >= 0.0
+        again = "from skidpad.report.matrix import write_report; from pathlib import Path; "
+        call(tmp_path, "-c", again + "write_report(Path('out/close'))")  # without it
+        assert "close following" in page.read_text(encoding="utf-8")
     page = tmp_path / "out" / "monitored" / "report.html"
     if page.is_file():
         assert "ego speed difference" in page.read_text(encoding="utf-8")

@@ -180,7 +180,10 @@ class Campaign(Generic[T, K, M]):
             entries = latest(ledger.entries)
         rows, timing = [(e.key, e.metrics) for e in entries], [e.timing for e in entries]
         places = [e.fingerprint for e in entries]
-        digest = self.recipe.columns.write(out, rows, timing, csv=csv, fingerprints=places)
+        added = [e.added for e in entries]
+        digest = self.recipe.columns.write(
+            out, rows, timing, csv=csv, fingerprints=places, added=added
+        )
         self.recipe.finish(self.tasks, out, runner)
         failed = sum(Outcome(e.key.outcome) in RETRIED for e in entries)
         mixed = len(fingerprints(entries)) > 1
@@ -210,6 +213,7 @@ class Campaign(Generic[T, K, M]):
                 fingerprint=here,
                 attempts=finished.attempts,
                 error=driven.error,
+                added=driven.added,
             )
 
     def _drive_task(self, task: T, finished: Finished) -> Driven[K, M | None]:

@@ -57,7 +57,9 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
     # numba and friends are imported only where they are needed, not in the parent.
     from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.run import run
+    from skidpad.evidence.drive.added import measure_added
     from skidpad.evidence.drive.metrics import run_metrics
+    from skidpad.recording.added_metrics import write_added_metrics
     from skidpad.recording.motion import motion_hash
     from skidpad.roads.bundled import load_map
 
@@ -70,11 +72,12 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
     driven = run(here, backend=backend, folder=folder, sinks=(pace,))
     timing = watch.timing(len(driven.log) * DT, pace.slow_pct)
     digest = write_run(folder, driven)
-    metrics = Metrics()
+    metrics, added = Metrics(), ()
     if len(driven.log):  # a stack may fail before it has answered once
-        metrics = run_metrics(
-            driven.log, load_map(road_file(roads_of(here))), metric_settings(cell)
-        )
+        road = load_map(road_file(roads_of(here)))
+        metrics = run_metrics(driven.log, road, metric_settings(cell))
+        added = measure_added(driven.log, road, metric_settings(cell))
+        write_added_metrics(folder, added)
     return Driven(
         key=run_key(
             cell,
@@ -86,6 +89,7 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
         metrics=metrics,
         timing=timing,
         error=last_line(driven.error),
+        added=added,
     )
 
 

@@ -9,6 +9,7 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from skidpad.campaign.worker import Runner
 from skidpad.core.vocabulary import Outcome
+from skidpad.recording.added_metrics import AddedMetric
 from skidpad.recording.ledger import Entry, K
 from skidpad.recording.results import Columns, Timing
 
@@ -43,6 +44,7 @@ class Driven(Generic[K, M]):
     metrics: M
     timing: Timing
     error: str = ""
+    added: tuple[AddedMetric, ...] = ()  # by installed packages
 
 
 def nothing_else(tasks: Sequence[Any], out: Path, runner: Runner) -> None:

@@ -30,18 +30,19 @@ def extensions(
             units = getattr(entry, "units", "")
             by = "" if source.package == "skidpad" else f"  [package {source.package}]"
             unit = f" ({units})" if units else ""
-            typer.echo(f"  {entry.name:<22}{entry.title}{unit}{by}")
+            typer.echo(f"  {entry.name:<21} {entry.title}{unit}{by}")
 
 
 def extension_points() -> tuple[Registry[Any], ...]:
     """Returns every registry that installed packages can add to, as help and docs show them."""
     from skidpad.core.sensor_types import SENSORS
     from skidpad.evidence.channels.indicators.catalogue import INDICATORS
+    from skidpad.evidence.drive.added import METRICS
     from skidpad.physics.presets import WEATHERS
     from skidpad.roads.map_files import MAPS
     from skidpad.scenarios.registry import SCENARIO_NAMES
 
-    points = (SENSORS, INDICATORS, WEATHERS, MAPS, SCENARIO_NAMES)
+    points = (SENSORS, METRICS, INDICATORS, WEATHERS, MAPS, SCENARIO_NAMES)
     try:
         from skidpad.fleet.alerting.relay_types import RELAYS
     except ImportError:  # the optional part `fleet` is not installed

@@ -21,6 +21,7 @@ from skidpad.evidence.drive.severity import graded_contacts
 from skidpad.evidence.drive.story import tell_story
 from skidpad.physics.grip import friction_ratio
 from skidpad.physics.types import vehicle_types
+from skidpad.recording.added_metrics import read_added_metrics
 from skidpad.recording.fingerprint import comparison_text, fingerprint
 from skidpad.recording.logfiles import driven_on, log_hash, read_log
 from skidpad.recording.matrix import Metrics
@@ -77,6 +78,9 @@ def show(run: Path) -> None:
     table = Table("metric", *columns, "meaning", box=None, pad_edge=False)
     for name in columns["value"]:
         table.add_row(name, *(_text(c[name]) for c in columns.values()), meanings[name])
+    for added in read_added_metrics(run):  # of the whole run
+        rest = [""] * (len(columns) - 1)
+        table.add_row(added.name, _text(added.value), *rest, f"{added.title}, {added.units}")
     console.print(table)
     drive = prepare(log, road_map)
     for crash in find_crashes(drive):

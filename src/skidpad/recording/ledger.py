@@ -22,6 +22,7 @@ from skidpad.core.names import inside
 from skidpad.core.reading import decode_json, read_bytes
 from skidpad.core.told import clean
 from skidpad.core.vocabulary import Outcome
+from skidpad.recording.added_metrics import AddedMetric
 from skidpad.recording.files import output_error, write_bytes
 from skidpad.recording.results import Timing
 
@@ -56,6 +57,7 @@ class Entry(Generic[K, M]):
     fingerprint: str
     attempts: int = 1
     error: str = ""  # one sentence, for agent_error, crashed, timeout
+    added: tuple[AddedMetric, ...] = ()  # by installed packages
 
 
 E = TypeVar("E", bound=Entry[Any, Any])

@@ -15,6 +15,7 @@ from typing import Any, Generic, TypeVar
 import polars as pl
 
 from skidpad.core.errors import FileError
+from skidpad.recording.added_metrics import AddedMetric
 from skidpad.recording.files import (
     content_hash,
     read_parquet,
@@ -65,16 +66,19 @@ class Columns(Generic[K, M]):
         timing: Sequence[Timing] = (),
         csv: bool = False,
         fingerprints: Sequence[str] = (),
+        added: Sequence[Sequence[AddedMetric]] = (),
     ) -> str:
         """Write results.parquet, and timing.parquet with a line for each row; returns the hash.
 
-        fingerprints: of each row, where it was driven.
+        fingerprints: of each row, where it was driven. added: of each row, what packages measured.
         """
-        table = self.table(rows)
-        if fingerprints:
-            places = pl.Series(FINGERPRINT, fingerprints, dtype=pl.String)
-            keys = pl.DataFrame([_plain(self.key, key) for key, _ in rows], schema=schema(self.key))
-            table = table.with_columns(keys.with_columns(places).sort(self.sort)[FINGERPRINT])
+        beside = [pl.Series(FINGERPRINT, fingerprints, dtype=pl.String)] * bool(fingerprints)
+        for name in dict.fromkeys(metric.name for row in added for metric in row):
+            values = [next((m.value for m in row if m.name == name), None) for row in added]
+            beside.append(pl.Series(name, values, dtype=pl.Float64))
+        keys = pl.DataFrame([_plain(self.key, key) for key, _ in rows], schema=schema(self.key))
+        sorted_beside = keys.with_columns(beside).sort(self.sort)
+        table = self.table(rows).with_columns(sorted_beside[series.name] for series in beside)
         names = {name: kind for name, kind in schema(self.key).items() if name in self.sort}
         walls = [
             {name: getattr(key, name) for name in names} | asdict(wall)

@@ -117,9 +117,16 @@ class CampaignView(Generic[E]):
         text = f"{len(gone)} of {count_text(len(self.results), 'run')} did not finish ({names}); "
         return [Text(text + "no denominator counts them.", tone="warning")]
 
+    @cached_property
+    def metrics(self) -> list[Metric]:
+        """All metrics of the rows, those that packages added last."""
+        added = {m.name: m for entry in self.folder.entries for m in entry.added}
+        own = metrics_of(self.columns.metrics)
+        return own + [Metric(m.name, m.units, m.title) for m in added.values()]
+
     def definitions(self) -> Definitions:
         """Returns the definition of every metric."""
-        return Definitions([(m.name, m.unit, m.meaning) for m in metrics_of(self.columns.metrics)])
+        return Definitions([(m.name, m.unit, m.meaning) for m in self.metrics])
 
     def provenance(self) -> list[Block]:
         """Versions, machines, times, and what all runs have in common."""

@@ -338,5 +338,5 @@ def _metrics_table(matrix: Matrix, config: str) -> Table:
         ),
     ]
     note = "Means over seeds; small: 95 % interval, none where all seeds are alike."
-    found = table(columns, metrics_of(Metrics), config_title(config), note, sortable=False)
+    found = table(columns, matrix.metrics, config_title(config), note, sortable=False)
     return replace(found, folded=True)

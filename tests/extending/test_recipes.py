@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from configparser import ConfigParser
+from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -38,7 +39,7 @@ def install(package: Path, packages: Path) -> None:
 def has_builder() -> bool:
     """Tells whether setuptools is there and can build a wheel."""
     try:
-        import setuptools.command.bdist_wheel  # since setuptools 70.1
+        import_module("setuptools.command.bdist_wheel")  # since setuptools 70.1
     except ImportError:
         return find_spec("setuptools") is not None and find_spec("wheel") is not None
     return True

@@ -17,6 +17,7 @@ from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import LeadDefinition, MetricSettings
+from skidpad.recording.added_metrics import AddedMetric
 from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics, RunKey
 from skidpad.roads.bundled import map_name
 from skidpad.stack.configurations import V_CRUISE_KMH, V_LIMITER_KMH
@@ -72,7 +73,8 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
     driven = run(here, backend=backend, folder=folder, sinks=(pace,))
     timing = watch.timing(len(driven.log) * DT, pace.slow_pct)
     digest = write_run(folder, driven)
-    metrics, added = Metrics(), ()
+    metrics = Metrics()
+    added: tuple[AddedMetric, ...] = ()
     if len(driven.log):  # a stack may fail before it has answered once
         road = load_map(road_file(roads_of(here)))
         metrics = run_metrics(driven.log, road, metric_settings(cell))

@@ -34,4 +34,7 @@ def read_added_metrics(folder: Path) -> tuple[AddedMetric, ...]:
     path = folder / METRICS_FILE
     if not path.is_file():
         return ()
-    return decode_json(read_bytes(path, str(path), SIZE_MAX), str(path), tuple[AddedMetric, ...])
+    found: tuple[AddedMetric, ...] = decode_json(
+        read_bytes(path, str(path), SIZE_MAX), str(path), tuple[AddedMetric, ...]
+    )
+    return found

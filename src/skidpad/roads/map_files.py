@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from hashlib import sha256
 from pathlib import Path
 
@@ -35,9 +36,14 @@ class MapSource:
     units: str = ""
 
 
+def _read_own(file: Path, setting: str) -> str:
+    del setting  # there is none
+    return file.read_text("utf-8")
+
+
 def _own_maps() -> tuple[MapSource, ...]:
     return tuple(
-        MapSource(file.stem, "Comes with Skidpad", lambda _, file=file: file.read_text("utf-8"))
+        MapSource(file.stem, "Comes with Skidpad", partial(_read_own, file))
         for file in sorted(FOLDER.glob("*.xodr"))
     )
 

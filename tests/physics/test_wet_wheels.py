@@ -53,7 +53,7 @@ def fleet_on(params, v, *, commands=(0.0, 0.0, 0.0, 0.0, 0.0), t=0.0):
     fleet.place(0, Pose(0.0, 0.0), v)
     while t > 0.0:
         now = float(np.hypot(fleet.states.vx[0], fleet.states.vy[0]))
-        fleet.feel.stiffness[:] = stiffness_at(params, now)
+        fleet.stiffness[:] = stiffness_at(params, now)
         fleet.step(np.array([commands]), np.full((1, 4), mu_at(params, now)))
         t -= 0.01
     return fleet
@@ -136,7 +136,7 @@ def test_drag_grows_with_depth_and_width_and_is_small_behind():
 def test_water_slows_a_coasting_car_by_its_drag():
     fleet, dry = fleet_on(road(), 20.0), fleet_on(road(), 20.0)
     drag = water_drag.py_func(0.002, 0.205, False)
-    fleet.feel.water[:] = [drag, drag, drag * CLEARED, drag * CLEARED]
+    fleet.water[:] = [drag, drag, drag * CLEARED, drag * CLEARED]
     for car in (fleet, dry):
         car.step(np.zeros((1, 5)), np.full((1, 4), 0.6))
     lost = (dry.states.vx[0] - fleet.states.vx[0]) / 0.01

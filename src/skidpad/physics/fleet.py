@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.states import ActorStates
-from skidpad.physics.params import Feel, WheelStates, vehicle_params
+from skidpad.physics.params import FEEL, STIFFNESS, WATER, WheelStates, vehicle_params
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE, VehicleType
 from skidpad.physics.vehicle import step_vehicles
 
@@ -65,8 +65,10 @@ class Fleet:
         self.tire_friction = np.array(
             [[t.tire_friction] * 4 for t in types], dtype=np.float64
         ).reshape(n, 4)
-        self.feel = Feel.dry(n)  # what the tyres felt in the last step (decision L-6)
-        self.mu = self.feel.mu
+        self.feel = np.zeros((n, FEEL))  # what the tyres felt in the last step (decision L-6)
+        self.mu, self.stiffness = self.feel[:, :STIFFNESS], self.feel[:, STIFFNESS:WATER]
+        self.water = self.feel[:, WATER:]
+        self.stiffness[:] = 1.0
         self._flat = np.zeros(n)
 
     def __len__(self) -> int:
@@ -105,7 +107,7 @@ class Fleet:
 
         commands (n, 5): throttle, brake, steer (left positive), handbrake, reverse. mu (n, 4) of a
         tyre with tire_friction 3.5 at FL, FR, RL, RR; each wheel's own scale is applied here, once.
-        Stiffness and drag of water are those of `feel`.
+        `stiffness` and `water` are as they were set.
         grade, bank (n,): rad, uphill and left side up positive. active: None means all present.
         """
         if commands.shape != (len(self), 5) or mu.shape != (len(self), 4):

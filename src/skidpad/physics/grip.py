@@ -303,6 +303,8 @@ def stiffness_at(params: GripParams, v: float) -> float:
     brush's stiffness is 2 c a^2 with half the length a, so it falls with the square of the share
     that `afloat` leaves of the friction.
     """
+    if params.bare_stiffness == 0.0:
+        return params.firm_stiffness
     left = afloat(params, v)
     return params.firm_stiffness + params.bare_stiffness * left * left
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from skidpad.core.constants import G
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorStates
-from skidpad.physics.params import Feel, Floats, VehicleParams, WheelStates
+from skidpad.physics.params import STIFFNESS, WATER, Floats, VehicleParams, WheelStates
 from skidpad.physics.stability import Correction, Model, Motion, correction
 from skidpad.physics.tyre import RELAXATION_RADII, V_SLIP_MIN
 from skidpad.physics.wheel import Contact, Torques, Tyre, turn
@@ -189,14 +189,14 @@ def _stability_correction(
 @inner_kernel
 def _push(
     car: Car, u: float, v: float, r: float, a_x: float, drive: float, asked: Correction,
-    steer: float, omega: Floats, slip_y: Floats, slide: Floats, load: Floats, feel: Feel, h: float,
+    steer: float, omega: Floats, slip_y: Floats, slide: Floats, load: Floats, feel: Floats, h: float,
 ) -> Push:  # fmt: skip
     """All four wheels through h seconds; omega, slip_y and slide (4,) are written."""
-    cd, sd, mu = cos(steer), sin(steer), feel.mu
+    cd, sd = cos(steer), sin(steer)
     speed = sqrt(u * u + v * v)
     engine_drag = car.mass * car.engine_drag * (1.0 - car.throttle) * min(speed / V_CLUTCH, 1.0)
     twist = asked.turn * car.yaw_inertia / car.half_track * car.front.radius  # N m at a wheel
-    low = car.rear.radius * min(mu[2], mu[3])  # N m over load: the rear wheels select low
+    low = car.rear.radius * min(feel[2], feel[3])  # N m over load: the rear wheels select low
     per_load = 2.0 * car.torque_front / max(load[0] + load[1], 1.0)
     force_x, force_y, moment, held = 0.0, 0.0, 0.0, 0.0
     for w in range(4):
@@ -215,7 +215,7 @@ def _push(
             if asked.rear != front:
                 brake = max(brake + (twist if left else -twist), 0.0)
         wheel = turn(
-            Contact(vx, vy, omega[w], slip_y[w], load[w], mu[w], feel.stiffness[w]),
+            Contact(vx, vy, omega[w], slip_y[w], load[w], feel[w], feel[STIFFNESS + w]),
             tyre,
             Torques(
                 share * drive,
@@ -230,7 +230,7 @@ def _push(
             h,
         )
         omega[w], slip_y[w], slide[w] = wheel.omega, wheel.slip_y, wheel.slide
-        f_x, f_y = wheel.f_x - feel.water[w] * abs(vx) * vx, wheel.f_y
+        f_x, f_y = wheel.f_x - feel[WATER + w] * abs(vx) * vx, wheel.f_y
         if front:
             f_x, f_y = f_x * cd - f_y * sd, f_x * sd + f_y * cd
         force_x += f_x
@@ -242,10 +242,10 @@ def _push(
 
 @inner_kernel
 def _advance(
-    i: int, states: ActorStates, wheels: WheelStates, car: Car, feel: Feel, g_x: float,
+    i: int, states: ActorStates, wheels: WheelStates, car: Car, feel: Floats, g_x: float,
     g_y: float, turn_max: float, h: float, steps: int,
 ) -> None:  # fmt: skip
-    """A vehicle through `steps` substeps of h seconds. feel (4,); g_x, g_y: m/s^2 of a slope."""
+    """A vehicle through `steps` substeps of h seconds. feel (12,); g_x, g_y: m/s^2 of a slope."""
     steer_lag, load_lag = 1.0 - exp(-h / STEER_TIME), 1.0 - exp(-h / LOAD_TIME)
     omega, load, a_load = wheels.omega[i], wheels.load[i], wheels.a_load[i]
     body = _body(i, states, car.x_cog)
@@ -258,7 +258,7 @@ def _advance(
         change = (car.steer * steer_share(speed) - steer) * steer_lag
         steer += min(max(change, -turn_max), turn_max)
         _wheel_loads(car, a_load[0], a_load[1], load)
-        asked = _stability_correction(car, u, v, r, steer, feel.mu)
+        asked = _stability_correction(car, u, v, r, steer, feel)
         drive = _drive(car, u, speed, omega) * asked.drive
         push = _push(car, u, v, r, a_x, drive, asked, steer, omega, wheels.slip_y[i],
                      wheels.slide[i], load, feel, h)  # fmt: skip
@@ -318,7 +318,7 @@ def step_vehicles(
     wheels: WheelStates,
     params: VehicleParams,
     commands: Floats,
-    feel: Feel,
+    feel: Floats,
     grade: Floats,
     bank: Floats,
     active: NDArray[np.bool_],
@@ -327,8 +327,8 @@ def step_vehicles(
 ) -> None:
     """All active vehicles through one tick of `steps` substeps of h seconds, in place.
 
-    commands (n, 5): throttle, brake, steer (left positive), handbrake, reverse. feel (n, 4) at FL,
-    FR, RL, RR. grade (n,): slope along the heading, rad, uphill positive. bank (n,): roll of the
+    commands (n, 5): throttle, brake, steer (left positive), handbrake, reverse. feel (n, 12): `params`.
+    grade (n,): slope along the heading, rad, uphill positive. bank (n,): roll of the
     road about the heading, rad, left side up positive.
     """
     for i in range(active.shape[0]):
@@ -336,7 +336,6 @@ def step_vehicles(
             car = _car(i, params, commands[i], grade[i], bank[i])
             g_x, g_y = -G * sin(grade[i]), -G * sin(bank[i])
             turn_max = params.steer_rate[i] * h
-            here = Feel(feel.mu[i], feel.stiffness[i], feel.water[i])
-            _advance(i, states, wheels, car, here, g_x, g_y, turn_max, h, steps)
+            _advance(i, states, wheels, car, feel[i], g_x, g_y, turn_max, h, steps)
             states.pitch[i] = -grade[i] - params.pitch_gradient[i] * wheels.a_load[i, 0]
             states.roll[i] = bank[i] + params.roll_gradient[i] * wheels.a_load[i, 1]

@@ -61,7 +61,7 @@ def felt(road, words):
     if ZONE in words:
         world.zones = [FrictionZone(Pose(300.0, 0.0), (500.0, 50.0, 5.0), TRIGGER)]
     world.feel_grip()
-    return world.on_wheels.feel.mu[0]
+    return world.fleet.mu[0]
 
 
 def by_rule(words):

@@ -15,7 +15,7 @@ from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
 from skidpad.physics.contact import Bodies, ContactLaw, Contacts, resolve_contacts
 from skidpad.physics.grip import grip_of_row, mu_at, stiffness_at, water_drag
-from skidpad.physics.params import Feel, VehicleParams, WheelStates
+from skidpad.physics.params import STIFFNESS, WATER, VehicleParams, WheelStates
 from skidpad.physics.segments import Segments
 from skidpad.physics.types import TIRE_FRICTION_REFERENCE
 from skidpad.physics.vehicle import step_vehicles
@@ -48,7 +48,7 @@ class Wheeled(NamedTuple):
     grips: Floats  # (w, fields of GripParams), of each vehicle's tyres outside of patches
     patch_stiffness: Floats  # (w, 4) slip stiffness over the dry one in patches; below 0: no patch
     patch_film: Floats  # (w, 4) m of water in patches; below 0: no patch
-    feel: Feel  # (w, 4) at the tyres
+    feel: Floats  # (w, 12) at the tyres, see `params`
     active: Flags  # (w,) moved by physics in this step
 
 
@@ -124,11 +124,11 @@ def feel_grip(rows: Rows, w: Wheeled) -> None:
         mu, stiffness = mu_at(grip, v), stiffness_at(grip, v)
         for k in range(4):
             w.road_mu[i, k] = mu * w.patched[i, k]
-            w.feel.mu[i, k] = w.road_mu[i, k] * w.tire_friction[i, k] / TIRE_FRICTION_REFERENCE
+            w.feel[i, k] = w.road_mu[i, k] * w.tire_friction[i, k] / TIRE_FRICTION_REFERENCE
             own, film = w.patch_stiffness[i, k], w.patch_film[i, k]
-            w.feel.stiffness[i, k] = stiffness if own < 0.0 else own
+            w.feel[i, STIFFNESS + k] = stiffness if own < 0.0 else own
             depth = grip.film if film < 0.0 else film
-            w.feel.water[i, k] = water_drag(depth, w.params.tyre_width[i], k >= 2)
+            w.feel[i, WATER + k] = water_drag(depth, w.params.tyre_width[i], k >= 2)
 
 
 @inner_kernel
@@ -144,7 +144,7 @@ def _drive(rows: Rows, moved: Flags, w: Wheeled, now: Now) -> None:
     )  # fmt: skip
     for i in range(len(w.active)):
         for k in range(4):
-            rows.mu[i, k] = w.feel.mu[i, k]
+            rows.mu[i, k] = w.feel[i, k]
         forward, left = rows.held[i, 0], rows.held[i, 1]
         if not isnan(forward):
             c, sn = cos(s.yaw[i]), sin(s.yaw[i])

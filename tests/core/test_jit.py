@@ -108,3 +108,30 @@ def test_nobody_else_may_write_into_the_cache(
         os.umask(before)
     assert folder.is_dir()
     assert jit.kernel_cache().stat().st_mode & 0o777 == 0o700
+
+
+RECORD = """
+from typing import NamedTuple
+import numpy as np
+class {name}(NamedTuple):
+    x: np.ndarray
+"""
+USER = """
+import sys; sys.path.insert(0, {folder!r})
+import numpy as np
+from skidpad.core.jit import hold
+from record import {name}
+assert hold({name}(np.ones(3))) is not None
+"""
+
+
+def test_a_record_that_was_renamed_does_not_break_the_kept_code_of_others(tmp_path: Path) -> None:
+    """`hold` is kept by its own text while the types of its callers change."""
+    for name in ("Before", "After"):
+        (tmp_path / "record.py").write_text(RECORD.format(name=name))
+        text = USER.format(folder=str(tmp_path), name=name)
+        done = subprocess.run(
+            [sys.executable, "-c", text], capture_output=True, text=True, check=False,
+            env=os.environ | {"XDG_CACHE_HOME": str(tmp_path / "cache")},
+        )  # fmt: skip
+        assert done.returncode == 0, done.stderr

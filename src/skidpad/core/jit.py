@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Generic, NoReturn, TypeVar
 
 import numba
+from numba.core.caching import IndexDataCacheFile
 from numba.core.registry import CPUDispatcher
 from numba.experimental import structref
 
@@ -128,7 +129,23 @@ def _compile(function: Callable[..., Any], **flags: bool) -> Any:
     if "NUMBA_CACHE_DIR" not in os.environ:  # numba's own variable: the user's word is final
         file = Path(function.__code__.co_filename).resolve()
         numba.config.CACHE_DIR = _cache_of(file) if file.is_relative_to(PACKAGE) else ""
-    return numba.njit(cache=True, nogil=True, error_model="numpy", **flags)(function)
+    compiled = numba.njit(cache=True, nogil=True, error_model="numpy", **flags)(function)
+    compiled._cache._cache_file.__class__ = ForgivingIndex
+    return compiled
+
+
+class ForgivingIndex(IndexDataCacheFile):  # type: ignore[misc]
+    """An index of machine code whose types may be gone: then it is empty, and written anew.
+
+    Generic kernels such as `hold` are kept by their own text, for records of any file: numba would
+    end with an AttributeError once such a record is renamed.
+    """
+
+    def _load_index(self) -> dict[Any, str]:
+        try:
+            return dict(super()._load_index())
+        except (AttributeError, ImportError):
+            return {}
 
 
 if TYPE_CHECKING:

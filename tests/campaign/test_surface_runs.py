@@ -14,6 +14,7 @@ from skidpad.campaign.run import run
 from skidpad.campaign.surfaces import read_surface
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
+from skidpad.core.inputs import Outside
 from skidpad.core.run import RunSpec, Scenario, run_from_plain
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import VehicleCommand
@@ -118,3 +119,25 @@ def test_a_vehicle_has_tyres_of_its_own():
     mu = backend.truth().mu
     assert mu[0] == pytest.approx(0.077, abs=0.002)
     assert (mu[1] > 0.2).all()
+
+
+def test_a_patch_is_felt_by_the_tyres_of_each_vehicle_and_by_the_weather_of_the_moment():
+    """Ice under two kinds of tyres; then rain takes the road beside a puddle, and not the puddle."""
+    stage = stage_of(structs.replace(SPEC, surface=(SurfacePatch(ice_mm=3.0, road=1),)))
+    backend = EmbeddedBackend()
+    other = replace(stage.setup.actors[0], tyres="studded")
+    backend.reset(replace(stage.setup, actors=(other,)), 1)
+    backend.step(VehicleCommand())
+    mu = backend.truth().mu
+    assert (mu[1] / mu[0]).min() > 1.8
+    stage = stage_of(structs.replace(SPEC, surface=(SurfacePatch(water_mm=2.0, road=1),)))
+    backend.reset(replace(stage.setup, ego=replace(stage.setup.ego, speed=20.0), actors=()), 1)
+    backend.step(VehicleCommand())
+    before = np.array(backend.truth().mu[0])
+    outside = Outside(
+        weather=replace(stage.setup.weather, precipitation=60.0, wetness=100.0),
+        grip=stage.setup.grip, range_model=stage.setup.range_model,
+    )  # fmt: skip
+    backend.change(outside)
+    backend.step(VehicleCommand())
+    assert backend.truth().mu[0] == pytest.approx(before, rel=0.03)

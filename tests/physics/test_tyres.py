@@ -94,6 +94,8 @@ def test_wear_and_kinds_keep_their_order():
     ice = {name: mu_at(physical_params(SHEET, MU_REF, find_tyres(name)), 5.0)
            for name in ("summer", "all_season", "winter", "studded", "winter_4mm")}  # fmt: skip
     assert ice["summer"] < ice["all_season"] < ice["winter"] < ice["studded"]
+    worn = mu_at(physical_params(SHEET, MU_REF, find_tyres("studded_1.6mm")), 5.0)
+    assert worn == pytest.approx(ice["winter"])  # VTI: as a new tyre without studs
     assert ice["winter_4mm"] == ice["summer"]  # VTI: worn European winter tyres on smooth ice
     assert ice["winter"] == pytest.approx(ice_mu(-5.0, wet=False))
     assert ice["studded"] == pytest.approx((30 * MPH) ** 2 / (2 * G * 92 * 0.3048) * 0.71, rel=0.03)

@@ -88,6 +88,22 @@ def test_side_force_over_slip_at_five_films_and_three_speeds():
         assert curves[1:4, 0] == pytest.approx(plain[1:4, 0] * shares, rel=0.08)
 
 
+def test_side_force_on_packed_snow_grows_as_slowly_as_measured():
+    """Fitted: 90 % or more of the maximum by 7 to 10 degrees, SAE 2006-01-1627 (CRREL)."""
+    angles = np.radians(np.arange(1.0, 25.0, 0.1))
+    for on, low, high in ((True, 7.0, 10.0), (False, 1.5, 3.0)):
+        force = np.array([side_force(road(snow=50.0, on=on), 15.0, np.tan(a)) for a in angles])
+        assert low <= np.degrees(angles[force > 0.9 * force.max()][0]) <= high
+
+
+def test_side_force_on_ice_has_a_maximum_and_falls():
+    """The shape of the same measurement on ice."""
+    angles = np.radians(np.arange(0.5, 17.0, 0.25))
+    force = np.array([side_force(road(ice=3.0), 15.0, np.tan(a)) for a in angles])
+    assert 2 < force.argmax() < len(force) - 10
+    assert force[-1] < 0.97 * force.max()
+
+
 def test_snow_and_ice_shear():
     assert stiffness_at(road(snow=50.0), 20.0) == SNOW_STIFFNESS
     assert stiffness_at(road(ice=3.0), 20.0) == ICE_STIFFNESS

@@ -62,9 +62,11 @@ ICE_MU_PER_C = -0.006  # colder ice grips better; our assumption
 ICE_MU_RANGE = (0.05, 0.20)  # wet ice at 0 C, and below -19 C; our assumption
 ICE_TREAD_MM = 4.0  # of tread and less: a tyre is worn on ice; our assumption
 SNOW_COVER_MM = 5.0  # depth that hides the road; our assumption
-# Slip stiffness over that of a dry road. Burckhardt's curves have an initial slope c1 c2 - c3 of 30.2
-# (dry), 18.3 (snow), 15.3 (ice); only those of the dry road were read, so both are assumptions.
-SNOW_STIFFNESS, ICE_STIFFNESS = 0.60, 0.51
+# Slip stiffness over that of a dry road. Packed snow: a fit to SAE 2006-01-1627 (CRREL, abstract): side
+# force reaches 90 % of its maximum at slip angles of 7 to 10 degrees; 0.22 to 0.32 give that range.
+# Ice: Burckhardt's curves have an initial slope c1 c2 - c3 of 30.2 (dry) and 15.3 (ice, not read): an
+# assumption. His 18.3 on snow (not read) would mean 0.60, and 90 % at 4 degrees.
+SNOW_STIFFNESS, ICE_STIFFNESS = 0.26, 0.51
 
 # Displacement drag 0.5 C_D rho w d v^2, as AMC 25.1591 of EASA has it for aeroplane tyres; the page
 # was found, its section on drag and its 0.75 were not read, so both are an assumption.

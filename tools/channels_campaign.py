@@ -2,14 +2,16 @@
 
     python tools/channels_campaign.py --out out/channels --hours 50        # about 1.5 h on two cores
     python tools/channels_campaign.py --out out/channels --hours 50 --publish
+    python tools/channels_campaign.py --only rules --out out/channels --workers 16 --stop-after 540
 
 Parts on seeds of their own, each on every route. `train` and `validate` are driven in the route's own
 weather, by day, by night, in rain and on ice, among natural and among risky drivers; `report` the same
 without ice, which is a part of its own: there the ego, which knows no grip, tailgates. Trees are fitted
 on `train`, their limits chosen on routes that the fold did not see; `validate` is for looking, `report`
 and `ice` are looked at once. Then the arbiter and each channel alone drive the same natural hours,
-for redundancy. What is done is not done again, so a campaign that was stopped goes on; `--only hazards`
-or `--only redundancy` drives one of the two. `--publish` writes docs/results/channels and the tables of
+for redundancy. What is done is not done again, so a campaign that was stopped goes on. At last every rule and every
+variant that was tried is judged on hours of their own (`monitor_drives`), of which only rows of counts stay.
+`--only hazards`, `--only redundancy` or `--only rules` drives one of the three. `--publish` writes docs/results/channels and the tables of
 docs/channels-evaluation.md, and says what was driven at which commit.
 """
 
@@ -27,6 +29,7 @@ from pathlib import Path
 from typing import Any
 
 import channels_tables
+import monitor_drives
 from skidpad.campaign.channels import SEEDS_EACH
 from skidpad.evidence.channels.redundancy import compare_drivers
 from skidpad.recording.channel_drives import read_outcomes
@@ -63,24 +66,35 @@ PARTS = (
     Part("report", 63, 0.4, CONDITIONS),
     Part("ice", 64, 0.35, ICE, "natural"),
 )
-HAZARDS, REDUNDANCY = "hazards", "redundancy"
+HAZARDS, REDUNDANCY, RULES = "hazards", "redundancy", "rules"
 HOURS_EACH = 6.0  # of the arbiter and of each channel alone
 SEED_OF_REDUNDANCY = 65
+UNFINISHED = 3  # exit code: --stop-after came first
 
 
 def main(words: Sequence[str] | None = None) -> int:
     """Everything; the exit code of what failed first."""
     asked = _asked(words)
     asked.out.mkdir(parents=True, exist_ok=True)
-    if asked.only != REDUNDANCY:
+    if asked.only in (None, HAZARDS):
         _hazards(asked, asked.out)
-    if asked.only != HAZARDS:
+    if asked.only in (None, REDUNDANCY):
         for driver in DRIVERS:
             folder = asked.out / REDUNDANCY / driver
             _drive(folder, asked, SEED_OF_REDUNDANCY, HOURS_EACH, drive_by=driver)
+    is_whole = asked.only not in (None, RULES) or _rules(asked)
     if asked.publish:
         publish(asked.out, asked.hours, only=asked.only)
-    return 0
+    return 0 if is_whole else UNFINISHED
+
+
+def _rules(asked: argparse.Namespace) -> bool:
+    """Drive the hours of the rules; returns whether all are driven."""
+    parts = monitor_drives.registered_parts(asked.hours)
+    is_whole = monitor_drives.drive(asked.out / RULES, parts, asked.workers, asked.stop_after)
+    if not is_whole:
+        print("Not all hours are driven; the same command goes on.", flush=True)
+    return is_whole
 
 
 def _hazards(asked: argparse.Namespace, out: Path) -> None:
@@ -100,10 +114,16 @@ def _asked(words: Sequence[str] | None) -> argparse.Namespace:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--out", type=Path, required=True, help="folder of the campaign")
     parser.add_argument(
-        "--hours", type=float, default=50.0, help="simulated hours of the three parts"
+        "--hours",
+        type=float,
+        default=50.0,
+        help="simulated hours: of the parts of `hazards`, and of those of `rules`",
     )
     parser.add_argument(
-        "--only", choices=(HAZARDS, REDUNDANCY), help="drive and publish this alone"
+        "--only", choices=(HAZARDS, REDUNDANCY, RULES), help="drive and publish this alone"
+    )
+    parser.add_argument(
+        "--stop-after", type=float, metavar="S", help="begin no drive of the rules after so many s"
     )
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
     parser.add_argument("--publish", action="store_true", help="write results and page of docs")
@@ -132,15 +152,20 @@ def _skidpad(*words: object) -> None:
 def publish(out: Path, hours: float, results: Path = RESULTS, only: str | None = None) -> None:
     """Copy what the page needs, and write its tables anew."""
     results.mkdir(parents=True, exist_ok=True)
-    if only != REDUNDANCY:
+    if only in (None, HAZARDS):
         for name in JUDGED:
             table = json.loads((out / name / "evaluation.json").read_text(encoding="utf-8"))
             _write(results / f"{name}.json", {"model": table["model"], "strata": _kept(table)})
         seeds = {p.name: p.seed * SEEDS_EACH for p in PARTS}
         _write(results / "run.json", _driven() | {"hours_asked": hours, "first_seed": seeds})
-    if only != HAZARDS:
+    if only in (None, REDUNDANCY):
         about = _driven() | {"first_seed": SEED_OF_REDUNDANCY * SEEDS_EACH}
         _write(results / "redundancy.json", about | {"drivers": _outcomes(out / REDUNDANCY)})
+    if only in (None, RULES):
+        parts = monitor_drives.registered_parts(hours)
+        rows = monitor_drives.read_rows(out / RULES / monitor_drives.ROWS)
+        _write(results / "rules.json", _driven() | monitor_drives.summary(parts, rows))
+        (results / "ways.json").write_text(json.dumps(monitor_drives.ways(parts, rows)) + "\n")
     channels_tables.main([])
 
 

@@ -11,12 +11,10 @@ end early, at a collision.
 
 from __future__ import annotations
 
-import hashlib
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from math import ceil
 from pathlib import Path
 from typing import Any
@@ -25,14 +23,12 @@ import yaml
 from msgspec import structs
 
 import monitor_rules
-import monitor_variants
 from skidpad.campaign.channel_routes import Condition, chosen_routes
 from skidpad.campaign.channels import SEEDS_EACH, SEGMENT, drive_one, segments, warm_up
 from skidpad.campaign.pool import local
 from skidpad.campaign.worker import Job
 from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import Stratum
-from skidpad.evidence.channels.judging.kept import code_hash
 
 ROOT = Path(__file__).resolve().parents[1]
 PLAN = ROOT / "docs" / "results" / "preregistration.yaml"
@@ -73,18 +69,11 @@ class Task:
 
 def registered_parts(hours: float) -> list[Part]:
     """The parts of the registration, which have so many hours together."""
-    parts = [Part(**row) for row in yaml.safe_load(PLAN.read_text(encoding="utf-8"))["monitor"]["parts"]]
+    parts = [
+        Part(**row) for row in yaml.safe_load(PLAN.read_text(encoding="utf-8"))["monitor"]["parts"]
+    ]
     share = hours / sum(part.hours for part in parts)
     return [Part(p.name, p.seed, p.hours * share, p.conditions, p.stratum) for p in parts]
-
-
-@lru_cache(maxsize=1)
-def judging_hash() -> str:
-    """Of all code that judges: rows of other code are not mixed with these."""
-    total = hashlib.sha256(code_hash().encode())
-    for module in (monitor_rules, monitor_variants):
-        total.update(Path(str(module.__file__)).read_bytes())
-    return total.hexdigest()[:16]
 
 
 def drive(out: Path, parts: Sequence[Part], workers: int, stop_after: float | None = None) -> bool:
@@ -118,10 +107,12 @@ def _missing(
     stop_at = time.time() + (1e9 if stop_after is None else stop_after)
     known = {(row["part"], row["number"]) for row in rows}
     paced = sorted(
-        ((number / part.hours, part.name, number, spec)
-        for part in parts
-        if not is_complete(part, rows)
-        for number, spec in enumerate(part.specs())),
+        (
+            (number / part.hours, part.name, number, spec)
+            for part in parts
+            if not is_complete(part, rows)
+            for number, spec in enumerate(part.specs())
+        ),
         key=lambda one: one[:3],
     )
     return [
@@ -146,7 +137,7 @@ def drive_and_judge(task: Task) -> Row | None:
         for end in (".mcap", ".json"):
             path.with_suffix(end).unlink(missing_ok=True)
     return judged | {
-        "part": task.part, "number": task.number, "seed": task.spec.seed, "code": judging_hash(),
+        "part": task.part, "number": task.number, "seed": task.spec.seed, "code": monitor_rules.judging_hash(),
         "route": task.spec.cell, "km": round(driven.metrics.distance_m / 1000.0, 3),
         "collisions": driven.metrics.collisions, "hash": driven.key.log_hash,
         "cpu_drive_s": round(cpu_drive, 2),
@@ -156,7 +147,7 @@ def drive_and_judge(task: Task) -> Row | None:
 
 def _failed_row(task: Task, detail: str) -> Row:
     return {"part": task.part, "number": task.number, "seed": task.spec.seed, "hours": 0.0,
-            "code": judging_hash(), "failed": detail[-500:]}  # fmt: skip
+            "code": monitor_rules.judging_hash(), "failed": detail[-500:]}  # fmt: skip
 
 
 def read_rows(file: Path) -> list[Row]:
@@ -165,7 +156,7 @@ def read_rows(file: Path) -> list[Row]:
         return []
     lines = file.read_text(encoding="utf-8").splitlines()
     rows = [row for line in lines if (row := _row_from(line)) is not None]
-    return [row for row in rows if row["code"] == judging_hash()]
+    return [row for row in rows if row["code"] == monitor_rules.judging_hash()]
 
 
 def _row_from(line: str) -> Row | None:
@@ -207,7 +198,8 @@ def _mark_full(out: Path, part: Part, rows: Sequence[Row]) -> None:
 
 def _say_progress(parts: Sequence[Part], rows: Sequence[Row]) -> None:
     said = ", ".join(
-        f"{p.name} {sum(r['hours'] for r in counted_rows(p, rows)):.2f} of {p.hours:g} h" for p in parts
+        f"{p.name} {sum(r['hours'] for r in counted_rows(p, rows)):.2f} of {p.hours:g} h"
+        for p in parts
     )
     print(said, flush=True)
 

@@ -9,10 +9,11 @@ weather, by day, by night, in rain and on ice, among natural and among risky dri
 without ice, which is a part of its own: there the ego, which knows no grip, tailgates. Trees are fitted
 on `train`, their limits chosen on routes that the fold did not see; `validate` is for looking, `report`
 and `ice` are looked at once. Then the arbiter and each channel alone drive the same natural hours,
-for redundancy. What is done is not done again, so a campaign that was stopped goes on. At last every rule and every
-variant that was tried is judged on hours of their own (`monitor_drives`), of which only rows of counts stay.
-`--only hazards`, `--only redundancy` or `--only rules` drives one of the three. `--publish` writes docs/results/channels and the tables of
-docs/channels-evaluation.md, and says what was driven at which commit.
+for redundancy. At last every rule and every variant that was tried is judged on hours of their own
+(`monitor_drives`), of which only rows of counts stay. What is done is not done again, so a campaign that
+was stopped goes on; `--only hazards`, `--only redundancy` or `--only rules` drives one of the three.
+`--publish` writes docs/results/channels and the tables of docs/channels-evaluation.md, and says what was
+driven at which commit; with `--only rules --stop-after 0` it publishes the rows that are there.
 """
 
 from __future__ import annotations
@@ -164,7 +165,8 @@ def publish(out: Path, hours: float, results: Path = RESULTS, only: str | None =
     if only in (None, RULES):
         parts = monitor_drives.registered_parts(hours)
         rows = monitor_drives.read_rows(out / RULES / monitor_drives.ROWS)
-        _write(results / "rules.json", _driven() | monitor_drives.summary(parts, rows))
+        about = {name: value for name, value in _driven().items() if name != "processors"}
+        _write(results / "rules.json", about | monitor_drives.summary(parts, rows))
         (results / "ways.json").write_text(json.dumps(monitor_drives.ways(parts, rows)) + "\n")
     channels_tables.main([])
 

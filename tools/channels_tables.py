@@ -172,8 +172,36 @@ def rules(results: Path) -> str:
     hours = ", ".join(
         f"{p['hours']:.2f} h {n} ({p['segments']} segments)" for n, p in told["drives"].items()
     )
-    when = f"Driven {told['date']} at commit `{told['commit']}`, seeds from {seeds}: {hours}.\n\n"
-    return when + _table(head, rows)
+    when = f"Driven {told['date']} at commit `{told['commit']}`, seeds from {seeds}: {hours}."
+    return f"{when}{_cost(told)}\n\n{_table(head, rows)}"
+
+
+def _cost(told: dict[str, Any]) -> str:
+    """Processor time of what was driven; nothing where it was not measured."""
+    if "cpu_s_per_hour" not in told:
+        return ""
+    of, failed = told["cpu_s_per_hour"], told["failed"]
+    lost = f" {failed} segments failed and count as not driven." if failed else ""
+    return (
+        f" One driven hour takes {of['driving']:.0f} s of processor time to drive and "
+        f"{of['judging']:.0f} s to judge by all rules.{lost}"
+    )
+
+
+def rarity(results: Path) -> str:
+    """How many true hazards of each kind there were, and how many hours would bring enough of them."""
+    told = _rules_of(results)
+    if told is None:
+        return "Not driven.\n"
+    head = ["drives", "hazard", "true", "per h", f"hours that bring {FEW}"]
+    rows = []
+    for drives, part in told["drives"].items():
+        for hazard in HAZARDS:
+            row = next(of[hazard] for of in part["rules"].values() if hazard in of)
+            true, hours = row["tp"] + row["fn"], part["hours"]
+            need = f"{FEW * hours / true:.0f}" if true else f"more than {hours:.0f}"
+            rows.append([drives, _words(hazard), _count_true(row), f"{true / hours:.2f}", need])
+    return _table(head, rows)
 
 
 def reference(results: Path) -> str:
@@ -244,7 +272,7 @@ def _false_rate(row: dict[str, Any]) -> str:
 
 TABLES: dict[str, Callable[[Path], str]] = {
     "driven": driven, "scores": scores, "missed": missed, "ice": ice, "curves": curves,
-    "redundancy": redundancy, "rules": rules, "reference": reference,
+    "redundancy": redundancy, "rules": rules, "reference": reference, "rarity": rarity,
 }  # fmt: skip
 
 

@@ -27,6 +27,7 @@ from skidpad.campaign.channel_routes import Condition, chosen_routes
 from skidpad.campaign.channels import SEEDS_EACH, SEGMENT, drive_one, segments, warm_up
 from skidpad.campaign.pool import local
 from skidpad.campaign.worker import Job
+from skidpad.core.errors import FileError
 from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import Stratum
 
@@ -103,7 +104,9 @@ def drive(out: Path, parts: Sequence[Part], workers: int, stop_after: float | No
 def _missing(
     out: Path, parts: Sequence[Part], rows: Sequence[Row], stop_after: float | None
 ) -> list[Task]:
-    """Segments without a row, all parts at an equal pace."""
+    """Segments without a row, all parts at an equal pace; none with no time at all."""
+    if stop_after is not None and stop_after <= 0.0:
+        return []
     stop_at = time.time() + (1e9 if stop_after is None else stop_after)
     known = {(row["part"], row["number"]) for row in rows}
     paced = sorted(
@@ -137,8 +140,9 @@ def drive_and_judge(task: Task) -> Row | None:
         for end in (".mcap", ".json"):
             path.with_suffix(end).unlink(missing_ok=True)
     return judged | {
-        "part": task.part, "number": task.number, "seed": task.spec.seed, "code": monitor_rules.judging_hash(),
-        "route": task.spec.cell, "km": round(driven.metrics.distance_m / 1000.0, 3),
+        "part": task.part, "number": task.number, "seed": task.spec.seed,
+        "code": monitor_rules.judging_hash(), "route": task.spec.cell,
+        "km": round(driven.metrics.distance_m / 1000.0, 3),
         "collisions": driven.metrics.collisions, "hash": driven.key.log_hash,
         "cpu_drive_s": round(cpu_drive, 2),
         "cpu_judge_s": round(time.process_time() - begun - cpu_drive, 2),
@@ -210,6 +214,8 @@ def summary(parts: Sequence[Part], rows: Sequence[Row]) -> dict[str, Any]:
     counted = {name: of for name, of in counted.items() if of}
     failed = [r for p in parts for r in counted_rows(p, rows) if "failed" in r]
     hours = sum(r["hours"] for of in counted.values() for r in of)
+    if not hours:
+        raise FileError("no driven segment of the rules has a row of today's code; drive first")
 
     def cost(of: str) -> float:
         return round(sum(r[of] for rows in counted.values() for r in rows) / hours, 1)

@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 
 import monitor_variants
-from monitor_variants import Fused, Integrated, MapVote, Smoothed, Steady
+from monitor_variants import Fused, Integrated, MapVote, Patient, Smoothed, Steady, hold
 from skidpad.campaign.channels import SEEDS_EACH
 from skidpad.core.channels import Cycle
 from skidpad.core.vocabulary import HazardType
@@ -44,11 +44,11 @@ from skidpad.roads.queries import RoadMap
 
 LOCALISATION = HazardType.INCONSISTENT_LOCALISATION
 BEFORE, TRACKED, REFERENCE = "before: a dry road, vote", "tracked", "reference "
-INNOVATION, MAP_VOTE = "innovation over", "map-matched vote over"  # localisation alone
+PLACES = ("innovation", "chi-square", "map-matched")  # begins of names of rules for positions alone
 LIMITS = {LOCALISATION: FACTORS} | dict.fromkeys(TAILS, SPARES)
 LEAP = 1.0  # m, of `tracked`
 LEAPS = (0.8, 0.9, 1.1)  # m, tried
-MAP_LIMITS = (1.2, 1.5)  # m, tried
+CHI2_HIGH, CHI2_END = 33.0, 20.0  # tried: at which a vote begins; at which an alarm ends
 WAY_STEP = 10.0  # m between places of a way that stay
 Found = Mapping[str, Sequence[Span]]  # by rule
 
@@ -63,6 +63,7 @@ def found_gaps(
         "own grip, fusion": Fused(channels),
         "own grip, integrated probability": Integrated(channels),
         "own grip, smoothed, 0.5 s late": Smoothed(channels),
+        "own grip, integrated, hysteresis": Patient(channels),
         "own grip, fusion, integrated, hysteresis": Steady(channels),
         "told the grip": Tracked(channels, SafeDistance.on(grip)),
     }
@@ -79,19 +80,19 @@ def found_places(
     """What each rule finds of inconsistent positions; without a map none asks one."""
     tracked = Tracked(channels)
     t = np.array([cycle.t for cycle in looked])
-    chi2 = np.array([tracked._offset(c.t, c.frames) for c in looked]) > CHI2_LIMIT
+    chi2 = np.array([tracked._offset(c.t, c.frames) for c in looked])
     leaps = np.array([tracked._leap(c.t, c.frames) for c in looked])
-    today = chi2 | (leaps > LEAP)
-    rules = {BEFORE: chi2, TRACKED: today}
-    rules |= {f"{INNOVATION} {leap:g} m": chi2 | (leaps > leap) for leap in LEAPS}
+    leap, apart, lasts = leaps > LEAP, chi2 > CHI2_LIMIT, chi2 > CHI2_END
+    high = leap | (chi2 > CHI2_HIGH)
+    rules: dict[str, Sequence[bool]] = {BEFORE: apart, TRACKED: leap | apart}
+    rules |= {f"innovation over {at:g} m, or vote": (leaps > at) | apart for at in LEAPS}
+    rules |= {"chi-square over 33": high, "chi-square over 33, hysteresis": hold(high, lasts)}
     if map is not None:
         vote = MapVote(channels, map)
-        away = np.array([vote.update(c.t, c.frames) for c in looked])
-        rules |= {
-            f"{MAP_VOTE} {limit:g} m, or tracked": today | (away > limit) for limit in MAP_LIMITS
-        }
+        matched = leap | np.array([vote.update(c.t, c.frames) for c in looked])
+        rules |= {"map-matched vote": matched, "map-matched, hysteresis": hold(matched, lasts)}
     for name, held in rules.items():
-        yield name, list(spans(LOCALISATION, t, held.astype(float), 0.5, 1, begin))
+        yield name, list(spans(LOCALISATION, t, np.array(held, dtype=float), 0.5, 1, begin))
 
 
 def judge(path: Path, with_reference: bool) -> dict[str, Any]:
@@ -151,7 +152,7 @@ def _counts(
     elif name in (BEFORE, TRACKED):
         judged = [*SCORED_HAZARDS]
     else:
-        judged = [LOCALISATION] if name.startswith((INNOVATION, MAP_VOTE)) else [*SIDES]
+        judged = [LOCALISATION] if name.startswith(PLACES) else [*SIDES]
     return {h.value: [rows[h].tp, rows[h].fp, rows[h].fn, *rows[h].weighed] for h in judged}
 
 

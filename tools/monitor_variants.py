@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Sequence
-from math import erf, hypot, nan, sqrt
+from math import erf, hypot, sqrt
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from skidpad.core.channels import ChannelFrame
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.tracked.tracks import COAST, V_LEAST, VEHICLES, Track
-from skidpad.evidence.channels.tracked.vote import Tracked
+from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, SIGMA_PLACE, Tracked
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
 
@@ -101,8 +101,14 @@ class Integrated(Tracked):
         return any(o is not None and self.means[id(o)] < 0.5 for o in others)
 
 
+class Patient(Integrated):
+    """A mean probability over a longer time; an alarm ends at a lower limit than it begins."""
+
+    share, on, off = 0.15, SURE_OF_MEAN, 0.5
+
+
 class Steady(Integrated, Fused):
-    """Fusion, a mean probability over a longer time, begin and end of an alarm at different limits."""
+    """The same with fusion and a vote, and surer: at most one false alarm per hour on the tuning drives."""
 
     share, on, off, vote = 0.15, 0.97, 0.6, True
 
@@ -224,30 +230,42 @@ class MapMatch:
 
 
 class MapVote:
-    """A pair of channels is apart, and the map says which one is beside the lanes."""
+    """Two channels are apart: the map, as the third voter, says how far each one is from where it is.
 
-    beside, apart = 0.8, 1.2  # m
+    The shifts of both channels' worlds against the lanes give the mean of their errors, their positions the
+    difference. Where the map says nothing, two channels apart are enough, as in `tracked`.
+    """
+
+    least = 1.4  # m: an error under this is none, as a shift shows two thirds of an error at most
 
     def __init__(self, channels: Sequence[str], map: RoadMap) -> None:
+        self.tracked = Tracked(channels)
         self.matches = [MapMatch(map) for _ in channels]
 
-    def update(self, t: float, frames: Sequence[ChannelFrame | None]) -> float:
-        """m by which a channel that the map contradicts is away from one that it confirms; NaN: unknown."""
+    def update(self, t: float, frames: Sequence[ChannelFrame | None]) -> bool:
+        """Whether positions are apart and the map does not contradict."""
         for match, frame in zip(self.matches, frames, strict=True):
             match.update(frame)
-        worst = nan
-        for i, one in enumerate(frames):
-            for j, two in enumerate(frames):
-                off, good = self.matches[i].shift, self.matches[j].shift
-                if i == j or one is None or two is None or off is None or good is None:
-                    continue
-                gap = one.ego[:2] - two.ego[:2]
-                length = hypot(*off.tolist())
-                if length < self.beside or length < 2.0 * hypot(*good.tolist()):
-                    continue
-                along = (
-                    float(gap @ off) / length
-                )  # of the offset in the direction that the map names
-                away = hypot(*gap.tolist()) if along > 0.5 * length else 0.0
-                worst = away if worst != worst else max(worst, away)
-        return worst
+        chi2 = self.tracked._offset(t, frames)
+        if not chi2 > CHI2_LIMIT:  # nor is NaN
+            return False
+        pairs = zip(self.tracked.pairs, self.tracked.offsets, strict=True)
+        return any(self._is_confirmed(a, b, window) for (a, b), window in pairs)
+
+    def _is_confirmed(self, a: int, b: int, window: Sequence[tuple[float, float, float]]) -> bool:
+        if not window:
+            return False
+        half = 0.5 * np.mean([row[1:] for row in window], axis=0)
+        one, two = self.matches[a].shift, self.matches[b].shift
+        if one is None or two is None:
+            return bool(4.0 * (half @ half) > 2.0 * CHI2_LIMIT * SIGMA_PLACE**2)
+        mean = 0.5 * (one + two)
+        return max(hypot(*(mean - half)), hypot(*(mean + half))) > self.least
+
+
+def hold(begins: Sequence[bool], lasts: Sequence[bool]) -> list[bool]:
+    """An alarm from where it begins for as long as it lasts."""
+    out: list[bool] = []
+    for begin, last in zip(begins, lasts, strict=True):
+        out.append(bool(begin or (last and out and out[-1])))
+    return out

@@ -11,7 +11,9 @@ import pytest
 from svg_values import curves_of
 
 import channels_tables as tables
+import monitor_drives
 import monitor_rules
+import monitor_variants
 from channel_worlds import Eyes, World, drive
 from skidpad.evidence.channels.judging.curves import Looked
 from skidpad.evidence.channels.tracked.tracks import Track
@@ -88,7 +90,7 @@ def test_every_rule_judges_a_recording_once(tmp_path, capsys, monkeypatch):
     told = json.loads(out.read_text())
     assert told["first_seeds"] == [71000000]
     rules = told["drives"]["risky"]["rules"]
-    for name in (monitor_rules.TODAY, "grip from own signals", "own grip, fusion", "told the grip"):
+    for name in (monitor_rules.BEFORE, monitor_rules.TRACKED, "own grip, fusion", "told the grip"):
         assert (rules[name][TAILGATED]["tp"], rules[name][TAILGATED]["fn"]) == (1, 0), name
     at_truth = told["reference"]["drives"]["risky"]["rules"]["reference 0"][TAILGATED]
     assert (at_truth["tp"], at_truth["fp"], at_truth["fn"]) == (1, 0, 0)
@@ -100,7 +102,7 @@ def test_fused_tracks_weigh_by_their_covariances():
         Track(True, gap, v, (p, p, 0.0), 0.0, (0.0, 0.0))
         for gap, v, p in ((8, 10, 1.0), (12, 14, 3.0))
     )
-    gap, v, p = monitor_rules.fused_state([one, two])
+    gap, v, p = monitor_variants.fused_state([one, two])
     assert (gap, v) == pytest.approx((9.0, 11.0))
     assert p == pytest.approx((0.75, 0.75, 0.0))
 

@@ -100,10 +100,12 @@ fleet-load: $(VENV)/.tested-with
 	$(BIN)/python tools/fleet_load.py --records 20000
 	$(BIN)/python tools/fleet_load.py --records 20000 --kills 20
 
-# the evaluation of the channels, whole, and the tables of its page: about 1.5 h; goes on where it stopped
+# the evaluation of the channels, whole, and the tables of its page: about 3 h on two
+# processors; goes on where it stopped. ONLY=hazards, redundancy or rules: one of its three parts; WORKERS=16: processes
 HOURS ?= 50
 channels: $(VENV)/.tested-with
-	PYTHONPATH=src $(BIN)/python tools/channels_campaign.py --out out/channels --hours $(HOURS) --publish
+	PYTHONPATH=src $(BIN)/python tools/channels_campaign.py --out out/channels --hours $(HOURS) --publish \
+		$(if $(ONLY),--only $(ONLY)) $(if $(WORKERS),--workers $(WORKERS))
 
 # whether the channels monitor's kernels compile for ARM64
 arm64: $(VENV)/.tested-with

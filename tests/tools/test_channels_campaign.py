@@ -42,7 +42,8 @@ def published(driven, tmp_path, monkeypatch):
     page.write_text("By hand.\n<!-- table: missed -->\nold\n<!-- end -->\nBy hand too.\n")
     monkeypatch.setattr(tables, "PAGE", page)
     monkeypatch.setattr(tables, "RESULTS", tmp_path / "results")
-    campaign.publish(driven, 1.0, tmp_path / "results")
+    for part in (campaign.HAZARDS, campaign.REDUNDANCY):
+        campaign.publish(driven, 1.0, tmp_path / "results", part)
     return tmp_path / "results"
 
 
@@ -82,9 +83,13 @@ def test_without_results_a_page_stays_as_it_is(tmp_path):
 
 @pytest.mark.req("C-210")
 def test_parts_share_no_seed_and_are_driven_in_every_condition_and_stratum(monkeypatch, tmp_path):
-    calls = []
+    calls, hours_of_rules = [], []
     monkeypatch.setattr(campaign, "_skidpad", lambda *words: calls.append([*map(str, words)]))
-    assert campaign.main(["--out", str(tmp_path), "--hours", "10", "--workers", "1"]) == 0
+    drive_rules = lambda out, parts, workers, stop: bool(hours_of_rules.extend(parts))  # noqa: E731
+    monkeypatch.setattr(campaign.monitor_drives, "drive", drive_rules)
+    code = campaign.main(["--out", str(tmp_path), "--hours", "10", "--workers", "1"])
+    assert code == campaign.UNFINISHED  # of the rules nothing was driven
+    assert sum(part.hours for part in hours_of_rules) == pytest.approx(10.0)
     drives = [c for c in calls if c[:2] == ["channels", "drive"]]
     seeds = {c[c.index("--seed") + 1] for c in drives}
     assert len(seeds) == 5

@@ -13,7 +13,8 @@ import hashlib
 import json
 import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from functools import lru_cache
+from concurrent.futures import ProcessPoolExecutor
+from functools import lru_cache, partial
 from math import dist
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,19 @@ from typing import Any
 import numpy as np
 
 import monitor_variants
-from monitor_variants import Fused, Integrated, MapVote, Patient, Smoothed, Steady, hold
+from monitor_variants import (
+    MAJORITIES,
+    OFF_CENTRE,
+    Fused,
+    Integrated,
+    MapVote,
+    Patient,
+    Smoothed,
+    Steady,
+    hold,
+    majority,
+    off_centre,
+)
 from skidpad.campaign.channels import SEEDS_EACH
 from skidpad.core.channels import Cycle
 from skidpad.core.vocabulary import HazardType
@@ -72,6 +85,10 @@ def found_gaps(
         rows = [rule.distances(*cycle) for cycle in looked]
         short = {h: np.array([float(row[s] > 0.0) for row in rows]) for h, s in SIDES.items()}
         yield name, [s for h, p in short.items() for s in spans(h, t, p, 0.5, 1, begin)]
+        for length in MAJORITIES if name == TRACKED else ():
+            most = {h: majority(p, length) for h, p in short.items()}
+            found = [s for h, p in most.items() for s in spans(h, t, p, 0.5, 1, begin)]
+            yield f"own grip, majority of {length:g} s", found
 
 
 def found_places(
@@ -90,6 +107,11 @@ def found_places(
     if map is not None:
         vote = MapVote(channels, map)
         matched = leap | np.array([vote.update(c.t, c.frames) for c in looked])
+        off = off_centre(map, looked) > OFF_CENTRE
+        rules |= {
+            "map-matched by the ego, innovation": (leap & off) | apart,
+            "map-matched by the ego, both": (leap | apart) & off,
+        }
         rules |= {"map-matched vote": matched, "map-matched, hysteresis": hold(matched, lasts)}
     for name, held in rules.items():
         yield name, list(spans(LOCALISATION, t, np.array(held, dtype=float), 0.5, 1, begin))
@@ -207,12 +229,19 @@ def _tally(row: Mapping[str, Any], name: str, hazard: str) -> Tally:
     return Tally(tp, fp, fn, row["hours"], (), Weighed(*weighed))
 
 
-def judge_folders(folders: Sequence[Path], with_reference: bool) -> dict[str, Any]:
+def judge_folders(
+    folders: Sequence[Path], with_reference: bool, workers: int = 1
+) -> dict[str, Any]:
     """Seeds and summaries by kind of drives of all complete recordings in the folders."""
     files = sorted(p for folder in folders for p in folder.rglob("*.mcap"))
     paths = [p for p in files if p.with_suffix(".json").is_file()]
     code = judging_hash()
-    rows = [read_or_judge(path, code, with_reference) for path in paths]
+    judge_one = partial(read_or_judge, code=code, with_reference=with_reference)
+    if workers > 1:
+        with ProcessPoolExecutor(workers) as pool:
+            rows = list(pool.map(judge_one, paths))
+    else:
+        rows = [judge_one(path) for path in paths]
     seeds = {int(path.stem.rsplit("-", 1)[1]) // SEEDS_EACH * SEEDS_EACH for path in paths}
     parts = {
         "natural": [r for r in rows if not r["ice"] and not r["risky"]],
@@ -233,10 +262,15 @@ def main(words: Sequence[str] | None = None) -> int:
     parser.add_argument("--out", type=Path, required=True, help="file to write")
     parser.add_argument("--commit", default="unknown", help="of the code that drove")
     parser.add_argument("--date", default="", help="of the drives")
+    parser.add_argument("--workers", type=int, default=1, help="processes that judge")
     asked = parser.parse_args(words)
-    table = {"commit": asked.commit, "date": asked.date, **judge_folders(asked.folders, False)}
+    table = {
+        "commit": asked.commit,
+        "date": asked.date,
+        **judge_folders(asked.folders, False, asked.workers),
+    }
     if asked.reference:
-        table["reference"] = judge_folders(asked.reference, True)
+        table["reference"] = judge_folders(asked.reference, True, asked.workers)
     asked.out.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
     return 0
 

@@ -13,19 +13,25 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import median_filter, uniform_filter1d
 from scipy.spatial import cKDTree
 
 from skidpad.core.channels import ChannelFrame
 from skidpad.evidence.channels.hazards import Signal
+from skidpad.evidence.channels.judging.curves import Looked
 from skidpad.evidence.channels.tracked.tracks import COAST, V_LEAST, VEHICLES, Track
 from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, SIGMA_PLACE, Tracked
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
+from skidpad.stack.channels.channel import CYCLE
 
 Floats = NDArray[np.float64]
 Variances = tuple[float, float, float]  # of gap and speed, and their covariance
 SURE_OF_MEAN = 0.95  # of a probability over the last half second
 LAG = 0.5  # s by which smoothed tracks are late
+MAJORITIES = (1.0, 2.0)  # s of cycles whose majority decides
+OFF_CENTRE, MEAN_S = 0.8, 0.5  # m from the lane's centre by which the map doubts a position; s
+OFF_ROAD = 5.0  # m, of a place that no lane is near
 SIGMA_A = 2.0  # m/s^2, motion noise as of the tracks themselves
 
 
@@ -170,6 +176,24 @@ def smoothed_state(past: Sequence[State], behind: bool) -> tuple[float, float, V
         c = c0 + g00 * g10 * da + (g00 * g11 + g01 * g10) * dc + g01 * g11 * db
         t1, v_ego = t0, v_ego0
     return gap, v, (a, b, c)
+
+
+def majority(short: Floats, length: float) -> Floats:
+    """Whether a gap is short in most of the cycles of `length` s around each one: half of that late."""
+    out: Floats = median_filter(short, size=round(length / CYCLE) | 1, mode="nearest")
+    return out
+
+
+def off_centre(map: RoadMap, looked: Sequence[Looked]) -> Floats:
+    """(T,) m by which the channel that is farthest from a lane's centre lies off it, mean of 0.5 s."""
+    worst = np.zeros(len(looked))
+    for k, cycle in enumerate(looked):
+        for frame in cycle.frames:
+            if frame is not None and np.isfinite(frame.ego[:2]).all():
+                point = map.project(float(frame.ego[0]), float(frame.ego[1]), 0.0)
+                worst[k] = max(worst[k], OFF_ROAD if point is None else abs(point.offset))
+    out: Floats = uniform_filter1d(worst, size=round(MEAN_S / CYCLE), mode="nearest")
+    return out
 
 
 class MapMatch:

@@ -11,7 +11,6 @@ import pytest
 from svg_values import curves_of
 
 import channels_tables as tables
-import monitor_drives
 import monitor_rules
 import monitor_variants
 from channel_worlds import Eyes, World, drive
@@ -110,9 +109,9 @@ def test_fused_tracks_weigh_by_their_covariances():
 def test_smoothing_bridges_a_gap_and_drops_a_flicker():
     """By hand: 11 cycles of 0.1 s decide, so that 3 of them are no gap and 7 with a hole are one."""
     flicker = np.array([0.0] * 20 + [1.0] * 3 + [0.0] * 20)
-    assert not monitor_rules.smoothed(flicker, 1.0).any()
+    assert not monitor_variants.majority(flicker, 1.0).any()
     held = np.array([0.0] * 10 + [1.0] * 7 + [0.0] * 2 + [1.0] * 7 + [0.0] * 10)
-    assert monitor_rules.smoothed(held, 1.0)[15:21].all()
+    assert monitor_variants.majority(held, 1.0)[15:21].all()
 
 
 def test_the_map_doubts_the_channel_that_is_off_its_lane():
@@ -123,6 +122,6 @@ def test_the_map_doubts_the_channel_that_is_off_its_lane():
     left = (lane.x - 0.6 * sin(lane.heading), lane.y + 0.6 * cos(lane.heading))
     places = [left] * 10 + [(lane.x, lane.y)] * 20
     frames = [SimpleNamespace(ego=np.array(place)) for place in places]
-    off = monitor_rules.off_centre(map, [Looked(0.0, [], [frame]) for frame in frames])
+    off = monitor_variants.off_centre(map, [Looked(0.0, [], [frame]) for frame in frames])
     assert off[2:7] == pytest.approx(0.6, abs=0.05)
     assert off[20:] == pytest.approx(0.0, abs=0.05)

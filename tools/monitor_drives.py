@@ -185,7 +185,7 @@ def counted_rows(part: Part, rows: Iterable[Row]) -> list[Row]:
 
 def is_complete(part: Part, rows: Iterable[Row]) -> bool:
     """Returns whether the segments that count reach the part's hours."""
-    return sum(row["hours"] for row in counted_rows(part, rows)) >= part.hours
+    return bool(sum(row["hours"] for row in counted_rows(part, rows)) >= part.hours)
 
 
 def _full(out: Path, part: str) -> Path:
@@ -218,7 +218,7 @@ def summary(parts: Sequence[Part], rows: Sequence[Row]) -> dict[str, Any]:
         raise FileError("no driven segment of the rules has a row of today's code; drive first")
 
     def cost(of: str) -> float:
-        return round(sum(r[of] for rows in counted.values() for r in rows) / hours, 1)
+        return float(round(sum(r[of] for rows in counted.values() for r in rows) / hours, 1))
 
     return {
         "first_seeds": [p.seed * SEEDS_EACH for p in parts],

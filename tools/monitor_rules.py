@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 import monitor_variants
 from monitor_variants import (
@@ -63,6 +64,7 @@ LEAP = 1.0  # m, of `tracked`
 LEAPS = (0.8, 0.9, 1.1)  # m, tried
 CHI2_HIGH, CHI2_END = 33.0, 20.0  # tried: at which a vote begins; at which an alarm ends
 WAY_STEP = 10.0  # m between places of a way that stay
+Held = Sequence[bool] | NDArray[np.bool_]
 Found = Mapping[str, Sequence[Span]]  # by rule
 
 
@@ -101,7 +103,7 @@ def found_places(
     leaps = np.array([tracked._leap(c.t, c.frames) for c in looked])
     leap, apart, lasts = leaps > LEAP, chi2 > CHI2_LIMIT, chi2 > CHI2_END
     high = leap | (chi2 > CHI2_HIGH)
-    rules: dict[str, Sequence[bool]] = {BEFORE: apart, TRACKED: leap | apart}
+    rules: dict[str, Held] = {BEFORE: apart, TRACKED: leap | apart}
     rules |= {f"innovation over {at:g} m, or vote": (leaps > at) | apart for at in LEAPS}
     rules |= {"chi-square over 33": high, "chi-square over 33, hysteresis": hold(high, lasts)}
     if map is not None:

@@ -7,7 +7,7 @@ from 9000000 to 9999999 alone.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from math import erf, hypot, sqrt
 from typing import Any
 
@@ -287,7 +287,7 @@ class MapVote:
         return max(hypot(*(mean - half)), hypot(*(mean + half))) > self.least
 
 
-def hold(begins: Sequence[bool], lasts: Sequence[bool]) -> list[bool]:
+def hold(begins: Iterable[bool], lasts: Iterable[bool]) -> list[bool]:
     """An alarm from where it begins for as long as it lasts."""
     out: list[bool] = []
     for begin, last in zip(begins, lasts, strict=True):

@@ -47,6 +47,16 @@ def test_a_summer_tyre_stops_as_measured():
     assert "mu_ref must be a number between 0.05 and 3, winter or summer" in str(wrong.exception)
 
 
+def test_worn_and_winter_tyres_are_asked_for_by_name():
+    at = {name: float(row(runner.invoke(app, ["friction", "--preset", "rain_60", "--tyres", name]).output,
+                          "rain_60")[8]) for name in ("winter", "winter_4mm", "summer_1.6mm")}  # fmt: skip
+    assert at["winter"] < at["winter_4mm"] < at["summer_1.6mm"]
+    plain = runner.invoke(app, ["friction", "--wetness", "100"]).output
+    assert runner.invoke(app, ["friction", "--wetness", "100", "--tyres", "winter"]).output == plain
+    wrong = runner.invoke(app, ["friction", "--tyres", "slick"])
+    assert "unknown tyres 'slick'; choose one of: all_season" in str(wrong.exception)
+
+
 def test_both_models_stand_beside_each_other():
     result = runner.invoke(app, ["friction", "--wetness", "40", "--deposits", "40"])
     assert result.exit_code == 0

@@ -50,17 +50,22 @@ def friction(
             help="Friction of the dry road: winter (tyres, 0.9), summer (1.05), a number."
         ),
     ] = "winter",
+    tyres: Annotated[
+        str, typer.Option(help="Tyres, such as summer, all_season, studded, winter_4mm.")
+    ] = "winter",
 ) -> None:
     """Say how far to a stop in a weather, and what grip is left in both models.
 
     Example: skidpad friction --preset rain_60
     """
+    from skidpad.core.tyres import find_tyres
     from skidpad.core.vocabulary import GripModel
     from skidpad.core.weather import Weather
     from skidpad.physics.presets import all_presets, find_weather
     from skidpad.stack.settings import parse_assignments
 
     mu: float = parse_assignments([f"mu_ref={mu_ref}"])["mu_ref"]
+    find_tyres(tyres)
     if plot is not None:
         from skidpad.cli.friction_figure import draw
 
@@ -88,7 +93,7 @@ def friction(
         weathers = [weather]
     dry = replace(find_weather("clear-noon"), name="dry")
     models = [GripModel.STATISTICAL, GripModel.PHYSICAL]
-    rows = grip_rows([*weathers, dry], models, mu)
+    rows = grip_rows([*weathers, dry], models, mu, tyres)
     for line in (*_answer(weathers, rows, mu), *_table(weathers, rows)):
         typer.echo(line)
 

@@ -12,7 +12,6 @@ from importlib import resources
 from msgspec import Struct, structs
 
 from skidpad.core.errors import require_choice
-from skidpad.core.reading import decode_yaml
 
 NEW_MM = 8.0
 WORN_MM = 1.6  # the legal limit in Europe, and "worn" in the table of Bosch
@@ -40,6 +39,8 @@ class Tyres(Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
 @cache
 def known_tyres() -> dict[str, Tyres]:
     """All tyres by name, sorted."""
+    from skidpad.core.reading import decode_yaml  # YAML comes with it, which --help does not need
+
     where = resources.files("skidpad.core").joinpath("tyres.yaml")
     kinds = decode_yaml(where.read_bytes(), "tyres.yaml", dict[str, Tyres])
     return {

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, mps_from_kmh
+from skidpad.core.tyres import REFERENCE
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.fleet import Fleet
-from skidpad.physics.grip import MU_REF, GripParams, grip_params, mu_at
+from skidpad.physics.grip import MU_REF, GripParams, Road, mu_at
 from skidpad.physics.types import EGO_TYPE, VehicleType, vehicle_type
 
 SPEEDS_KMH = (50.0, 80.0, 100.0)
@@ -88,7 +89,10 @@ class GripRow:
 
 
 def grip_rows(
-    weathers: Sequence[Weather], models: Sequence[GripModel], mu_ref: float = MU_REF
+    weathers: Sequence[Weather],
+    models: Sequence[GripModel],
+    mu_ref: float = MU_REF,
+    tyres: str = REFERENCE,
 ) -> list[GripRow]:
     """Rows for all weathers and models, weather by weather, from one batch of stops.
 
@@ -98,7 +102,7 @@ def grip_rows(
     for weather in weathers:
         for model in models:
             try:
-                cases.append((weather, model, grip_params(weather, model, mu_ref)))
+                cases.append((weather, model, Road(weather, model, mu_ref, tyres).params()))
             except ConfigError:
                 continue
     v0 = [mps_from_kmh(kmh) for kmh in SPEEDS_KMH]

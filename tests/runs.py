@@ -10,11 +10,11 @@ from msgspec import structs
 from skidpad.campaign.channel_routes import driven_routes
 from skidpad.campaign.grip_cells import template
 from skidpad.core.run import AdasDriver, ChannelCrew, Roads, RunSpec, Scenario
+from skidpad.core.settings import Settings, load_profile
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
 from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import Settings, load_profile
 
 
 def adas_run(number: int = 2, weather: str | Weather = "clear-noon", **changes: Any) -> RunSpec:
@@ -29,8 +29,7 @@ def adas_run(number: int = 2, weather: str | Weather = "clear-noon", **changes: 
         driver=AdasDriver(label=str(number), functions=functions_of(number)),
         course=Roads(vehicles=changes.pop("vehicles", 20)),
         weather=find_weather(weather) if isinstance(weather, str) else weather,
-        profile=profile,
-        settings=settings.as_plain(),
+        settings=settings,
         sensors=SensorLevel.OBJECTS,
     )
     return structs.replace(base, **changes)
@@ -46,6 +45,6 @@ def segment_run(route: str = "route-4", crew: ChannelCrew | None = None, **chang
 def scenario_run(file: str | Path, grip: str = "none", **changes: Any) -> RunSpec:
     """A scenario, by name or file, played on objects in clear weather by configuration 2."""
     course = structs.replace(changes.pop("course", Scenario()), file=str(file))
-    settings = Settings().with_values({"grip": grip}).as_plain()
+    settings = Settings().with_values({"grip": grip})
     base = {"weather": Weather(), "seed": 0, "settings": settings}
     return template(course=course, **{**base, **changes})

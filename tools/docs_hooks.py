@@ -1,4 +1,4 @@
-"""What `mkdocs` is told beside mkdocs.yml: the home page and the reference of commands are generated.
+"""What `mkdocs` is told beside mkdocs.yml: the home page, commands and settings are generated.
 
 The home page is README.md with its links turned round. The reference of commands is what the program
 says of itself, so it cannot be out of date.
@@ -18,7 +18,11 @@ def on_files(files: Any, config: Any) -> Any:
     """Adds the generated pages to the site's files."""
     from mkdocs.structure.files import File
 
-    pages = {"index.md": home_page(), "reference/cli.md": command_reference()}
+    pages = {
+        "index.md": home_page(),
+        "reference/cli.md": command_reference(),
+        "reference/settings.md": settings_reference(),
+    }
     for place, content in pages.items():
         files.append(File.generated(config, place, content=content))
     return files
@@ -48,6 +52,23 @@ def command_reference() -> str:
     context = root.context_class(root, info_name="skidpad")
     for path, command in sorted(_leaves(root, context, ("skidpad",))):
         lines += _command_section(path, command)
+    return "\n".join(lines) + "\n"
+
+
+def settings_reference() -> str:
+    """Returns every setting with its meaning, values and default, as Markdown."""
+    from skidpad.core.setting import setting_fields
+    from skidpad.core.settings import PARTS, load_profile
+
+    recommended = load_profile("recommended").to_plain()
+    lines = ["# Settings", "", "Of `--set name=value`, `settings=` and a profile's file.", ""]
+    for part, kind in PARTS.items():
+        lines += [f"## {part}", "", (kind.__doc__ or "").strip(), ""]
+        lines += ["| setting | meaning | values | recommended | source |", "|---|---|---|---|---|"]
+        for name, one in setting_fields(kind).items():
+            value = "none" if recommended[name] is None else recommended[name]
+            lines += [f"| `{name}` | {one.text} | {one.allowed} | {value} | {one.source} |"]
+        lines += [""]
     return "\n".join(lines) + "\n"
 
 

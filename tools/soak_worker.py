@@ -25,7 +25,6 @@ from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather
 from skidpad.recording.logfiles import log_hash
 from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import load_profile
 
 SEEDS = 10
 LIMIT_S = 900.0  # of a run: the first compiles kernels
@@ -38,8 +37,6 @@ def one_run(seed: int) -> str:
         driver=AdasDriver(label="2", functions=functions_of(2)),
         course=Roads(vehicles=10),
         weather=find_weather("rain-noon"),
-        profile="recommended",
-        settings=load_profile("recommended", None).as_plain(),
         sensors=SensorLevel.OBJECTS,
         duration=5.0,
     )

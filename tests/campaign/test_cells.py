@@ -13,7 +13,6 @@ from skidpad.core.run import Roads, RunSpec
 from skidpad.core.vocabulary import TrafficStart
 from skidpad.core.weather import Weather
 from skidpad.simulation.recovery import Supervisor
-from skidpad.stack.settings import settings_of
 
 RAIN = Weather(name="rain-noon", title="Heavy Rain - Noon", precipitation=100, wetness=100)
 CLEAR = Weather(name="clear-noon", title="Clear Sky - Noon")
@@ -55,8 +54,8 @@ def test_the_command_line_reaches_the_cells():
         40,
         60.0,
     )
-    settings = settings_of(one)
-    assert (settings.grip.value, settings.mu_ref) == ("none", 0.7)
+    world = one.settings.world
+    assert (world.grip.value, world.mu_ref) == ("none", 0.7)
 
 
 @pytest.mark.req("A-201")

@@ -16,6 +16,7 @@ from skidpad.cli.adas_plan import plan
 from skidpad.cli.asked import Climate, Drivers
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Function, ReferenceDriver, Roads, RunSpec
+from skidpad.core.stack_settings import CapScope
 from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
 from skidpad.physics.presets import find_weather
 from skidpad.recording.logfiles import log_hash, read_log
@@ -24,7 +25,6 @@ from skidpad.recording.results import read_results
 from skidpad.report.matrix import write_report
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.control.resume import SpeedCaps
-from skidpad.stack.settings import CapScope
 
 ONE = Climate(weather="clear-noon")
 

@@ -20,6 +20,7 @@ from skidpad.campaign.pool import local
 from skidpad.campaign.worker import Finished, Runner
 from skidpad.core.errors import OutputError
 from skidpad.core.run import AgentDriver, Friction, RunSpec
+from skidpad.core.settings import load_profile
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.presets import preset
 from skidpad.recording.grip import GripEntry, read_series
@@ -27,7 +28,6 @@ from skidpad.recording.ledger import read_ledger
 from skidpad.recording.results import read_results
 from skidpad.report.grip_data import load_grip
 from skidpad.scenarios.variation import CutIn
-from skidpad.stack.settings import Settings
 
 WEATHERS = [preset("icy_0"), preset("icy_30")]
 
@@ -261,7 +261,7 @@ def test_the_spawn_delay_alone_breaks_the_cut_in_and_the_distance_repairs_it(tmp
 
 @pytest.mark.req("B-003")
 def test_the_physical_model_reaches_the_tyres(tmp_path):
-    batch = cells(1, settings=Settings(grip=GripModel.PHYSICAL).as_plain())[2:]
+    batch = cells(1, settings=load_profile("recommended", {"grip": GripModel.PHYSICAL}))[2:]
     run(batch, tmp_path / "out")
     mu = dict(read_results(tmp_path / "out").select("friction", "mu").iter_rows())
     assert mu["original"] == pytest.approx(0.9)

@@ -185,7 +185,7 @@ def stored(folder: Path, plain: dict[str, Any]) -> Path:
 def test_folders_of_the_first_version_are_read(tmp_path: Path) -> None:
     matrix = read_run(stored(tmp_path, MATRIX_1))
     assert (matrix.name, matrix.duration) == ("2_clear-noon-005", 60.0)
-    assert matrix.settings == {"mu_ref": 0.7}
+    assert matrix.settings.world.mu_ref == 0.7
     assert matrix.backend == BackendChoice(
         backend=BackendKind.CARLA, pace=True, without=("light-cache",)
     )
@@ -193,7 +193,7 @@ def test_folders_of_the_first_version_are_read(tmp_path: Path) -> None:
     assert foreign.driver == StackDriver("f.py:A", name="f.py:A")
     grip = read_run(stored(tmp_path, GRIP_1))
     assert grip.name == "ghost_cut_in-unfixed_icy_30_original-000002"
-    assert grip.settings["grip"] == "statistical"
+    assert grip.settings.world.grip.value == "statistical"
     assert isinstance(grip.course, Scenario)
     assert grip.course.parameters["EgoSpeed"] == 0.0
 

@@ -11,6 +11,7 @@ from msgspec import Meta, Struct, structs
 from typer.core import TyperGroup, TyperOption
 from typer.testing import CliRunner
 
+from skidpad.cli.asked import Tuned
 from skidpad.cli.main import app
 from skidpad.cli.spread import describe_parameters, spread_fields
 from skidpad.core.errors import ConfigError
@@ -98,5 +99,6 @@ def test_every_command_that_drives_takes_the_simulator_options(path: str) -> Non
 @pytest.mark.parametrize("path", DRIVING)
 def test_every_command_that_drives_a_run_takes_its_options(path: str) -> None:
     found = options(path, RunSpec)
-    assert {"duration", "sensors", "render", "overlay", "profile"} == set(found)
+    assert {"duration", "sensors", "render", "overlay"} == set(found)
     assert found == options("adas", RunSpec)
+    assert {"profile", "set", "surface"} == set(options(path, Tuned))

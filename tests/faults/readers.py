@@ -84,10 +84,8 @@ def run_files() -> list[bytes]:
 
 
 def read_stored(path: Path) -> object:
-    from skidpad.stack.settings import settings_of
-
     run = read_run(path.parent)
-    return run.name, run.resolved(), settings_of(run)
+    return run.name, run.resolved(), run.settings
 
 
 def records() -> list[bytes]:
@@ -287,8 +285,8 @@ def tell_story(path: Path) -> object:
 
 
 def words(path: Path) -> object:
+    from skidpad.core.settings import parse_assignments
     from skidpad.evidence.compare import parse_rule
-    from skidpad.stack.settings import parse_assignments
 
     kind, _, text = path.read_bytes().decode("utf-8", "replace").partition(" ")
     readers: dict[str, Callable[[str], object]] = {

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from skidpad.core.errors import SkidpadError
+from skidpad.core.settings import Settings
 from skidpad.core.told import LONGEST
 from skidpad.fleet.alerting.keeping import parse_alert
 from skidpad.fleet.batch import drive_of
@@ -15,7 +16,6 @@ from skidpad.live.outcome import LINK, read_outcome
 from skidpad.recording.inputs import decode_inputs
 from skidpad.recording.monitored import SUMMARY, read_summary
 from skidpad.roads.baked import load_baked
-from skidpad.stack.settings import Settings
 
 NAME = "a\nb"
 SCENE = {"map": "town", "ego": {"x": 1.0, "y": 2.0, "heading": 0.5}, "v": 12.5}

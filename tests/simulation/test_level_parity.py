@@ -43,7 +43,7 @@ class Shadow(Sink):
         self.stage = stage_of(structs.replace(spec, sensors=SensorLevel.OBJECTS))
         self.seed = spec.seed
         self.suite: Objects | None = None
-        plain = {"configuration": int(spec.driver.label), "profile": spec.profile}
+        plain = {"configuration": int(spec.driver.label), "profile": spec.settings.profile}
         self.stack = AdasStack(self.stage.setup.specs, self.stage.map, plain)
         self.rows: Reports = []
 

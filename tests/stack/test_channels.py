@@ -12,11 +12,11 @@ from skidpad.roads.lanes import SignalKind
 from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Reason
 from skidpad.stack.channels.channel import Channel
 from skidpad.stack.channels.route import route_path
-from skidpad.stack.channels.settings import CarModel, settings_of
+from skidpad.stack.channels.settings import CarModel, load_channel_settings
 from skidpad.stack.channels.tracking import Tracker
 
 CAR = CarModel(length=3.8, width=1.7, wheelbase=2.5, steer_max=1.2, a_drive=4.0, a_brake=9.0)
-LAV, TFUSE = settings_of("lav_like"), settings_of("tfuse_like")
+LAV, TFUSE = load_channel_settings("lav_like"), load_channel_settings("tfuse_like")
 
 
 def view(t, ego=(0, 0, 0, 0, 0), objects=(), lights=None, late=0.0, label=SemanticClass.CAR):

@@ -30,6 +30,7 @@ from skidpad.campaign.matrix import metric_settings
 from skidpad.campaign.run import run
 from skidpad.core.geometry import Pose
 from skidpad.core.run import RunSpec
+from skidpad.core.settings import NAMES, Settings
 from skidpad.core.setup import DT
 from skidpad.core.specs import LidarSpec
 from skidpad.core.states import ContactEvent, VehicleCommand
@@ -41,7 +42,6 @@ from skidpad.roads.bundled import load_map
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.recovery import Supervisor
 from skidpad.stack.adas import AdasStack
-from skidpad.stack.settings import NAMES, Settings
 
 Outcome = Callable[[Settings], Any]
 
@@ -60,7 +60,7 @@ def driven(*scene: dict[str, Any], configuration: int = 2, map: ArcMap | None = 
     """Commands and reports over hand-drawn frames; `also`: settings that the scene needs."""
 
     def outcome(settings: Settings) -> Any:
-        plain = settings.with_values(also).as_plain()
+        plain = settings.with_values(also).stack.to_plain()
         options = {"configuration": configuration, "set": plain}
         stack = AdasStack(SPECS, map or ArcMap(), options)
         log = []
@@ -190,7 +190,7 @@ def lidar(settings: Settings) -> bytes:
 def recovery(settings: Settings) -> list[Any]:
     """A contact with a car standing 10 m ahead, until the ego drives again."""
     start = figure8().ahead(figure8().place(figure8().ego_start), 300.0)
-    supervisor = Supervisor(figure8(), recovery_settings(settings), DT)
+    supervisor = Supervisor(figure8(), recovery_settings(settings.traffic), DT)
     table = makelog.actor_table(2)
     poses = [start.pose, start.pose.moved(10.0, 0.0)]
     rows = [{"x": p.x, "y": p.y, "z": p.z, "yaw": p.yaw} for p in poses]

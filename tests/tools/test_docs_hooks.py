@@ -9,7 +9,7 @@ import yaml
 from docs_hooks import ROOT, command_reference, home_page, on_page_markdown
 
 DOCS = ROOT / "docs"
-GENERATED = {"index.md", "reference/cli.md"}
+GENERATED = {"index.md", "reference/cli.md", "reference/settings.md"}
 
 
 def pages_in(nav: object) -> list[str]:

@@ -10,7 +10,8 @@ import numpy as np
 from skidpad.campaign.cast import stage_of
 from skidpad.campaign.traffic_asked import TrafficBench
 from skidpad.campaign.traffic_watch import Seen, Watch
-from skidpad.core.run import Plain, Roads, RunSpec
+from skidpad.core.run import Roads, RunSpec
+from skidpad.core.settings import load_profile
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import TrafficStart
 from skidpad.evidence.statistics import Interval, poisson_interval
@@ -64,7 +65,7 @@ def measure(asked: TrafficBench, weather: str) -> TrafficRow:
 def background_world(asked: TrafficBench, weather: str, seed: int) -> World:
     """A world as runs have it, in whose ego's car a driver of the background sits."""
     roads = Roads(map=asked.map, traffic=TrafficStart.RANDOM, vehicles=asked.vehicles - 1)
-    settings: dict[str, Plain] = {"drivers": not asked.careless}
+    settings = load_profile("recommended", {"drivers": not asked.careless})
     spec = RunSpec(course=roads, weather=find_weather(weather), settings=settings)
     world = staged(stage_of(spec).setup, seed)
     assert world.traffic is not None

@@ -29,6 +29,7 @@ from skidpad.core.run import (
     Scenario,
     StackDriver,
 )
+from skidpad.core.settings import NightRain, Relocation, TrafficSettings
 from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
 from skidpad.core.simulator import BackendKind
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand
@@ -44,13 +45,11 @@ from skidpad.scenarios.shipped import NAMES, scenario_file
 from skidpad.sensors.overlay import Lens
 from skidpad.sensors.twelve import twelve_sensors
 from skidpad.simulation.recovery import RecoverySettings, Supervisor
-from skidpad.stack import settings as options
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.agents import load_agent
 from skidpad.stack.channels.settings import CarModel
 from skidpad.stack.interface import Stack
 from skidpad.stack.loading import GuardedStack, import_class, load_stack
-from skidpad.stack.settings import Settings, grip_of, settings_of
 
 CRUISE = "cruise_speed"  # property of a scenario's ego, m/s
 ROUTE_LENGTH = "route_length"  # another one, m
@@ -162,7 +161,7 @@ def stage_of(spec: RunSpec) -> Stage:
 
 
 def _roads(spec: RunSpec, course: Roads) -> Stage:
-    s = settings_of(spec)
+    s = spec.settings.traffic
     file = road_file(course)
     map = load_map(file)
     ego = ActorSetup(name="ego", type=EGO_TYPE, place=start_of(map), driver=Control.SCRIPTED)
@@ -236,23 +235,23 @@ def _load_registered(texts: Sequence[str]) -> dict[str, type[Any]]:
 
 def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
     """What every set-up says: the weather, what it touches, and what is sensed of it."""
-    s = settings_of(spec)
+    world, sensors = spec.settings.world, spec.settings.sensors
     return Setup(
         map=map,
         weather=spec.weather,
-        specs=twelve_sensors(bumper_depth_fov_deg=s.bumper_depth_fov_deg),
+        specs=twelve_sensors(bumper_depth_fov_deg=sensors.bumper_depth_fov_deg),
         ego=ego,
-        grip=grip_of(spec),
-        range_model=s.range,
-        camera_effect=s.camera,
-        rain_hides_night=s.night_rain is options.NightRain.RAIN_ONLY,
-        mu_ref=s.mu_ref,
-        tyres=s.tyres,
-        tyre_stiffness=s.tyre_stiffness,
-        water_drag=s.water_drag,
-        material_base=s.mu_ref if s.lane_material else None,
-        lidar=s.lidar,
-        stability=s.esc,
+        grip=spec.grip,
+        range_model=sensors.range,
+        camera_effect=sensors.camera,
+        rain_hides_night=sensors.night_rain is NightRain.RAIN_ONLY,
+        mu_ref=world.mu_ref,
+        tyres=world.tyres,
+        tyre_stiffness=world.tyre_stiffness,
+        water_drag=world.water_drag,
+        material_base=world.mu_ref if world.lane_material else None,
+        lidar=sensors.lidar,
+        stability=world.esc,
         level=spec.sensors,
         render_all=spec.render is Render.ALL or _foreign_on_carla(spec),
         patches=spec.surface,
@@ -265,9 +264,9 @@ def _foreign_on_carla(spec: RunSpec) -> bool:
     return foreign and spec.backend.backend is BackendKind.CARLA
 
 
-def recovery_settings(s: Settings) -> RecoverySettings:
+def recovery_settings(s: TrafficSettings) -> RecoverySettings:
     """The supervisor's part of the settings (D-076, D-077, D-080)."""
-    if s.relocation is options.Relocation.STANDING:
+    if s.relocation is Relocation.STANDING:
         return RecoverySettings(warm_up=1.5, release_speed=0.0, clearance=s.clearance)
     return RecoverySettings(clearance=s.clearance)
 
@@ -283,7 +282,7 @@ def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> S
     return StackAtWheel(stack, Lens(spec.weather, spec.seed) if spec.overlay else None)
 
 
-def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, Any]]:
+def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, object]]:
     driver = spec.driver
     cruise = {} if stage.cruise_kmh is None else {"cruise_kmh": stage.cruise_kmh}
     match driver:
@@ -307,8 +306,8 @@ def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, An
                 cruise = {"cruise_kmh": driver.cruise_kmh}
             return AdasStack, {
                 "functions": sorted(f.value for f in driver.functions),
-                "profile": spec.profile,
-                "set": settings_of(spec).as_plain(),
+                "profile": spec.settings.profile,
+                "set": spec.settings.stack.to_plain(),
                 **cruise,
             }
     raise ConfigError(f"{driver.label} needs a route to drive")

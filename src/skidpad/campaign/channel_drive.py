@@ -43,7 +43,7 @@ from skidpad.sensors.channel_suite import CYCLE
 from skidpad.simulation.world.traffic.variety import risky_character
 from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Choice, Reason
 from skidpad.stack.channels.channel import Channel
-from skidpad.stack.channels.settings import settings_of
+from skidpad.stack.channels.settings import load_channel_settings
 
 PERIOD = round(CYCLE / DT)  # ticks
 WARM_UP = 3.0  # s before the recording begins: tracks exist then (C-12)
@@ -68,7 +68,7 @@ class Crew:
         self.guide = guide
         names = self.crew.channels
         self.channels = [
-            Channel(name, settings_of(name), segment.car, segment.map, segment.route)
+            Channel(name, load_channel_settings(name), segment.car, segment.map, segment.route)
             for name in names
         ]
         self.arbiter = Arbiter(names, ArbiterSettings(preferred=names[0]))

@@ -38,7 +38,6 @@ from skidpad.core.weather import Weather
 from skidpad.physics.optics import visibility
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.recovery import Action, Supervisor
-from skidpad.stack.settings import grip_of, settings_of
 
 LOW_VISIBILITY = 200.0  # m
 
@@ -88,8 +87,8 @@ class Desk:
     def __init__(self, source: InputSource, spec: RunSpec, dt: float = DT) -> None:
         self.source, self.hands, self.course = source, Hands(dt), spec.course
         self.density = Density(spec.course.vehicles if isinstance(spec.course, Roads) else 0)
-        settings = settings_of(spec)
-        self.outside = Outside(weather=spec.weather, grip=grip_of(spec), range_model=settings.range)
+        range_model = spec.settings.sensors.range
+        self.outside = Outside(weather=spec.weather, grip=spec.grip, range_model=range_model)
         self.manual = False
         self.pedals = Pedals()
         self.functions: frozenset[Function] | None = None  # None: as the stack began

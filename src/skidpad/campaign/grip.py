@@ -40,7 +40,6 @@ from skidpad.recording.grip import (
 from skidpad.recording.logfiles import TICKS, log_hash
 from skidpad.recording.results import Timing, read_results
 from skidpad.scenarios.variation import CutIn
-from skidpad.stack.settings import grip_of, settings_of
 
 if TYPE_CHECKING:
     from skidpad.campaign.run import Run
@@ -82,7 +81,7 @@ def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> Judged:
         driven.outcome,
         triggered=driven.triggered,
         route_length=driven.route_length,
-        ratio=friction_ratio(cell.weather, grip_of(cell)),
+        ratio=friction_ratio(cell.weather, cell.grip),
         off_road=driven.off_road,
     )
     if keep or driven.error:
@@ -117,7 +116,7 @@ def grip_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> Gr
         cutin=scenario_of(cell).variant or CutIn.FIXED.value,
         controller=cell.driver.label,
         sensors=cell.sensors.value,
-        model=settings_of(cell).grip.value,
+        model=cell.settings.world.grip.value,
         overlay=cell.overlay,
         outcome=outcome.value,
         version=__version__,
@@ -138,7 +137,9 @@ def finish(cells: Sequence[RunSpec], out: Path, runner: Runner) -> None:
     for _ in runner(jobs):
         pass
     write_stopping(
-        out, list({c.weather.name: c.weather for c in cells}.values()), settings_of(cells[0]).mu_ref
+        out,
+        list({c.weather.name: c.weather for c in cells}.values()),
+        cells[0].settings.world.mu_ref,
     )
 
 

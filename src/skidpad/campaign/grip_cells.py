@@ -12,11 +12,11 @@ from msgspec import structs
 from skidpad.campaign.cells import FIRST_SEED
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Friction, RunSpec, Scenario
+from skidpad.core.settings import load_profile
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.scenarios.variation import CUT_IN, CutIn, drawn_parameters, drawn_skill
 from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import Settings
 
 DURATION = 120.0  # s, unless the file ends before
 STACK = "stack"  # what results call our own stack
@@ -40,7 +40,7 @@ def template(configuration: int = 2, **changes: Any) -> RunSpec:
         driver=driver,
         course=Scenario(file=CUT_IN),
         duration=DURATION,
-        settings=Settings(grip=GripModel.STATISTICAL).as_plain(),
+        settings=load_profile("recommended", {"grip": GripModel.STATISTICAL}),
         sensors=SensorLevel.OBJECTS,
     )
     return structs.replace(base, **changes)

@@ -13,6 +13,7 @@ from skidpad.campaign.recipe import Driven, Recipe
 from skidpad.campaign.runfolder import Stopwatch, fresh_folder, last_line, write_config, write_run
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
+from skidpad.core.settings import LaneTruth
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome, SensorLevel
 from skidpad.core.weather import Weather
@@ -21,7 +22,6 @@ from skidpad.recording.added_metrics import AddedMetric
 from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics, RunKey
 from skidpad.roads.bundled import map_name
 from skidpad.stack.configurations import V_CRUISE_KMH, V_LIMITER_KMH
-from skidpad.stack.settings import LaneTruth, settings_of
 
 TIMES_OF_DAY = ("sunrise", "noon", "night")
 
@@ -102,7 +102,7 @@ def missing_vehicles(course: Roads, actors: int) -> int:
 
 def metric_settings(cell: RunSpec) -> MetricSettings:
     """The definitions that the cell's profile asks for (D-102, D-103)."""
-    same_road = settings_of(cell).lane_truth is LaneTruth.SAME_ROAD
+    same_road = cell.settings.metrics.lane_truth is LaneTruth.SAME_ROAD
     return MetricSettings(
         lead=LeadDefinition.SAME_ROAD_AND_LANE if same_road else LeadDefinition.AHEAD_ON_LANE
     )
@@ -116,7 +116,7 @@ def run_key(
     vehicles_missing: int | None = None,
 ) -> RunKey:
     """The identifying columns of a cell's row."""
-    settings, driver = settings_of(cell), cell.driver
+    settings, driver = cell.settings, cell.driver
     ours = driver if isinstance(driver, AdasDriver) else None
     return RunKey(
         config=cell.driver.label,
@@ -124,11 +124,11 @@ def run_key(
         precipitation_kind=cell.weather.precipitation_kind,
         time_of_day=time_of_day(cell.weather),
         seed=cell.seed,
-        profile=cell.profile,
+        profile=settings.profile,
         map=map_name(roads_of(cell).map),
         sensors=cell.sensors.value,
-        grip=settings.grip.value,
-        range=settings.range.value,
+        grip=settings.world.grip.value,
+        range=settings.sensors.range.value,
         outcome=outcome.value,
         functions="" if ours is None else named(ours.functions),
         cruise_kmh=None if ours is None else cruise_target(ours),

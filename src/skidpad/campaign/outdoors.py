@@ -22,7 +22,6 @@ from skidpad.scenarios.environment import Environment, Fall, Wetness
 from skidpad.scenarios.player import Player
 from skidpad.scenarios.signals import held_lights
 from skidpad.simulation.backend import Backend
-from skidpad.stack.settings import grip_of, settings_of
 
 NAME = "file"  # of the weather that a file describes
 LATITUDE = radians(45.0)  # of the sun where a file says the time only, at an equinox; assumption
@@ -82,10 +81,12 @@ class FileChanges:
 
     def __init__(self, player: Player, spec: RunSpec) -> None:
         self.player, self.done, self.noticed = player, 0, 0
-        settings = settings_of(spec)
+        settings = spec.settings
         assert isinstance(spec.course, Scenario)
-        self.follows, self.mu_ref = spec.course.weather_of_file, settings.mu_ref
-        self.outside = Outside(weather=spec.weather, grip=grip_of(spec), range_model=settings.range)
+        self.follows, self.mu_ref = spec.course.weather_of_file, settings.world.mu_ref
+        self.outside = Outside(
+            weather=spec.weather, grip=spec.grip, range_model=settings.sensors.range
+        )
 
     @property
     def weather(self) -> Weather:

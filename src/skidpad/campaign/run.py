@@ -29,6 +29,8 @@ from skidpad.core.run import (
     RunSpec,
     StackDriver,
 )
+from skidpad.core.setting import Plain
+from skidpad.core.settings import load_profile
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import ActorTable
 from skidpad.core.told import clean
@@ -46,7 +48,6 @@ from skidpad.simulation.backend import Backend
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.interface import Stack
 from skidpad.stack.loading import load_stack
-from skidpad.stack.settings import load_profile
 
 DESK_ROOM = 12_000  # ticks of a log at first, as nobody knows how long a person drives
 LONGEST_STORY = 20_000  # characters of a traceback
@@ -92,8 +93,8 @@ def drive(
     vehicles: int = 20,
     sensors: str = "pixels",
     profile: str = "recommended",
-    settings: Mapping[str, Any] | None = None,
-    stack_settings: Mapping[str, Any] | None = None,
+    settings: Mapping[str, Plain] | None = None,
+    stack_settings: Mapping[str, object] | None = None,
     out: str | Path | None = None,
     backend: BackendChoice | None = None,
 ) -> Run:
@@ -139,8 +140,7 @@ def drive(
         weather=find_weather(weather) if isinstance(weather, str) else weather,
         seed=seed,
         duration=duration,
-        profile=profile,
-        settings=load_profile(profile, settings).as_plain(),
+        settings=load_profile(profile, settings),
         sensors=SensorLevel(require_choice("sensors", sensors, words[0])),
         backend=BackendChoice() if backend is None else backend,
     )
@@ -326,7 +326,7 @@ def log_of(spec: RunSpec, stage: Stage, desk: Desk | None = None) -> Log:
         "config": spec.driver.label,
         "weather": spec.weather.name,
         "seed": str(spec.seed),
-        "profile": spec.profile,
+        "profile": spec.settings.profile,
         "sensors": spec.sensors.value,
     }
     if spec.backend.backend is BackendKind.CARLA:  # it tells contacts of the ego alone

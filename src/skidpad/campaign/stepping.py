@@ -23,6 +23,7 @@ from skidpad.core.run import (
     StackDriver,
 )
 from skidpad.core.run import Scenario as Course
+from skidpad.core.settings import load_profile
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import GripModel
@@ -30,7 +31,6 @@ from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
 from skidpad.scenarios.scene import State
 from skidpad.stack.loading import load_stack
-from skidpad.stack.settings import load_profile
 
 PLAIN = "clear-noon"  # what a file leaves open of the weather, as in `skidpad play`
 IDEAL = "ideal"
@@ -88,7 +88,7 @@ class Scenario:
             parameters=dict(parameters or {}),
             actors=ActorMode(require_choice("actors", actors, words)),
         )
-        settings = load_profile("recommended", {"grip": GripModel.PHYSICAL.value}).as_plain()
+        settings = load_profile("recommended", {"grip": GripModel.PHYSICAL})
         spec = template(
             course=course,
             seed=seed,

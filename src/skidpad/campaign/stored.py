@@ -17,7 +17,6 @@ from skidpad.core.told import describe_value
 from skidpad.recording.channel_drives import read_record
 from skidpad.scenarios.variation import CutIn
 from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import settings_of
 
 Plain = dict[str, Any]
 
@@ -43,9 +42,7 @@ def read_segment(recording: Path) -> RunSpec:
 def _read_description(plain: Plain, older: Callable[[Plain], Plain], path: Path) -> RunSpec:
     """The run of a description of this version, or of one that `older` turns into it."""
     try:
-        run = run_from_plain(plain if "version" in plain else older(plain), str(path))
-        settings_of(run)
-        return run
+        return run_from_plain(plain if "version" in plain else older(plain), str(path))
     except FileError:
         raise
     except ConfigError as error:

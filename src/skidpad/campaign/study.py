@@ -24,7 +24,6 @@ from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.logfiles import log_hash
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.recovery import Supervisor
-from skidpad.stack.settings import settings_of
 
 KEPT = (
     "fatal_collisions",
@@ -44,7 +43,7 @@ def stage_for(variant: Variant) -> Stage:
     stage = stage_of(variant.run)
     if not variant.recovery:
         return stage
-    values = replace(recovery_settings(settings_of(variant.run)), **variant.recovery)
+    values = replace(recovery_settings(variant.run.settings.traffic), **variant.recovery)
     return replace(stage, supervisor=Supervisor(stage.map, values, stage.setup.dt))
 
 

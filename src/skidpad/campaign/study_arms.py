@@ -10,10 +10,10 @@ from msgspec import structs
 
 from skidpad.campaign.study_stacks import NOISE
 from skidpad.core.run import AdasDriver, RunSpec, StackDriver
+from skidpad.core.settings import load_profile
 from skidpad.core.vocabulary import Clearance, SensorLevel
 from skidpad.physics.presets import find_weather
 from skidpad.stack.configurations import functions_of
-from skidpad.stack.settings import load_profile
 
 TARGETS_KMH = (60.0, 90.0, 120.0, 150.0)
 DROPOUT_SHARES = (0.0, 0.1, 0.2)  # of time in which nothing is sensed
@@ -46,7 +46,7 @@ def base_run(
     return RunSpec(
         driver=AdasDriver(label=str(configuration), functions=functions_of(configuration)),
         weather=find_weather(weather),
-        settings=load_profile("recommended", settings).as_plain(),
+        settings=load_profile("recommended", settings),
         sensors=SensorLevel.OBJECTS,
     )
 
@@ -54,7 +54,7 @@ def base_run(
 def make_changed_run(stack: str, seed: int, configuration: int, **change: Any) -> RunSpec:
     """The same with a changed stack of `study_stacks`; cruise_kmh is an option of the stack."""
     base = base_run(configuration)
-    options = {"configuration": configuration, "profile": base.profile}
+    options = {"configuration": configuration, "profile": base.settings.profile}
     options |= {k: change.pop(k) for k in ("cruise_kmh",) if k in change}
     options["change"] = {**change, "seed": seed}
     driver = StackDriver(f"{STACKS}:{stack}", options, name=str(configuration))
@@ -113,8 +113,7 @@ def preliminary(seeds: Sequence[int]) -> list[Variant]:
             structs.replace(
                 base_run(2),
                 seed=seed,
-                profile=profile,
-                settings=load_profile(profile, same).as_plain(),
+                settings=load_profile(profile, same),
             ),
             {"variant": name},
         )

@@ -32,7 +32,6 @@ from skidpad.recording.grip import GripMetrics
 from skidpad.recording.logfiles import TICKS
 from skidpad.recording.results import read_results
 from skidpad.recording.threshold import THRESHOLD, ThresholdEntry, ThresholdKey
-from skidpad.stack.settings import settings_of
 
 COMMAND = "grip-threshold"
 SITUATION = ("driver", "actors", "start", "deceleration")
@@ -73,7 +72,7 @@ def threshold_key(task: Task, outcome: Outcome, log_hash: str | None = None) -> 
         speed_kmh=kmh_from_mps(task.start.v),
         gap_m=task.start.gap,
         deceleration=task.deceleration,
-        road_mu=settings_of(task.run).mu_ref,
+        road_mu=task.run.settings.world.mu_ref,
         preset=preset_of(task.share),
         seed=task.run.seed,
         outcome=outcome.value,

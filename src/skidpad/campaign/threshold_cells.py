@@ -31,7 +31,6 @@ from skidpad.physics.grip import statistical_ratio
 from skidpad.physics.presets import preset
 from skidpad.scenarios.shipped import find_shipped
 from skidpad.scenarios.variation import drawn_parameters, drawn_skill
-from skidpad.stack.settings import settings_of
 
 LEAD = "lead_slowdown"
 EGO_S = 100.0  # m, where the file puts the ego
@@ -184,8 +183,8 @@ def _run(run: RunSpec, mode: ActorMode, start: Start, braking: float, share: flo
         end_on_collision=True,  # B-094
         actors=mode,
     )
-    mu = share * settings_of(run).mu_ref
-    settings = run.settings | {"mu_ref": mu, "grip": GripModel.NONE.value}
+    mu = share * run.settings.world.mu_ref
+    settings = run.settings.with_values({"mu_ref": mu, "grip": GripModel.NONE})
     return structs.replace(run, course=course, settings=settings)
 
 

@@ -183,10 +183,17 @@ class Climate(Struct, frozen=True):
 
 
 class Tuned(Struct, frozen=True):
-    """Single settings over those of the profile."""
+    """A profile, single settings over it, and what lies on the road."""
 
+    profile: Annotated[
+        str, Meta(description="recommended, thesis_text, thesis_listing or preliminary.")
+    ] = "recommended"
     set: Annotated[
-        tuple[str, ...], Meta(description="Single settings over the profile: name=value.")
+        tuple[str, ...],
+        Meta(
+            description="A setting over the profile: name=value; `skidpad profiles show recommended` "
+            "lists them."
+        ),
     ] = ()
     surface: Annotated[
         Path | None,
@@ -194,15 +201,15 @@ class Tuned(Struct, frozen=True):
     ] = None
 
     def resolve(self, run: RunSpec, **more: str | None) -> RunSpec:
-        """`run` with all its settings written out. more: settings given by name, None: not given."""
+        """Returns `run` with these settings. more: settings given by name, None: not given."""
         from msgspec import structs
 
         from skidpad.campaign.surfaces import read_surface
-        from skidpad.stack.settings import load_profile, parse_assignments
+        from skidpad.core.settings import load_profile, parse_assignments
 
         values = parse_assignments(self.set)
         values |= parse_assignments(f"{k}={v}" for k, v in more.items() if v is not None)
-        settings = load_profile(run.profile, values).as_plain()
+        settings = load_profile(self.profile, values)
         surface = () if self.surface is None else read_surface(self.surface)
         return structs.replace(run, settings=settings, surface=surface)
 

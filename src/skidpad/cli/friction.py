@@ -58,11 +58,11 @@ def friction(
 
     Example: skidpad friction --preset rain_60
     """
+    from skidpad.core.settings import parse_assignments
     from skidpad.core.tyres import find_tyres
     from skidpad.core.vocabulary import GripModel
     from skidpad.core.weather import Weather
     from skidpad.physics.presets import all_presets, find_weather
-    from skidpad.stack.settings import parse_assignments
 
     mu: float = parse_assignments([f"mu_ref={mu_ref}"])["mu_ref"]
     find_tyres(tyres)

@@ -13,7 +13,6 @@ from skidpad.core.weather import Weather
 from skidpad.physics.presets import GRIP, SNOW, find_weather, preset_groups
 from skidpad.scenarios.shipped import NAMES
 from skidpad.scenarios.variation import CutIn
-from skidpad.stack.settings import settings_of
 
 Choice = TypeVar("Choice", Friction, CutIn)
 
@@ -48,7 +47,7 @@ def _vary_run(ask: GripCross, run: RunSpec) -> Cross:
     from skidpad.physics.grip import friction_ratio  # kernels come with it
 
     for weather in climate:
-        friction_ratio(weather, settings_of(run).grip)  # rain with ice, snow: says what is wrong
+        friction_ratio(weather, run.settings.world.grip)  # rain with ice, snow: says what is wrong
     return Cross(
         scenarios=chosen,
         weather=climate,

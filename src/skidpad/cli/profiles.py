@@ -25,7 +25,7 @@ def _default(context: typer.Context) -> None:
 @profiles.command("list")
 def list_profiles() -> None:
     """Name the profiles, with the number of settings that differ from `recommended`."""
-    from skidpad.stack.settings import PROFILES, differences, load_profile
+    from skidpad.core.settings import PROFILES, differences, load_profile
 
     recommended = load_profile("recommended")
     for name in PROFILES:
@@ -51,24 +51,22 @@ def sensors(
 @profiles.command()
 def show(name: str) -> None:
     """Show every setting of a profile with its source."""
-    from dataclasses import fields
     from textwrap import wrap
 
-    from skidpad.stack.settings import Settings, load_profile
+    from skidpad.core.settings import PART_OF, find_setting, load_profile
 
-    plain = load_profile(name).as_plain()
-    for f in fields(Settings):
-        about = f.metadata
-        words = f"{about['source']}, {about['house']}: {about['text']}"
+    for setting, value in load_profile(name).to_plain().items():
+        about = find_setting(setting)
+        words = f"{about.source}, {PART_OF[setting]}: {about.text}"
         for line in wrap(words, WIDTH, initial_indent="# ", subsequent_indent="#   "):
             typer.echo(line)
-        typer.echo(f"{f.name}: {_text(plain[f.name])}")
+        typer.echo(f"{setting}: {_text(value)}")
 
 
 @profiles.command()
 def diff(a: str, b: str) -> None:
     """List the settings in which two profiles differ."""
-    from skidpad.stack.settings import differences, load_profile
+    from skidpad.core.settings import differences, load_profile
 
     rows = differences(load_profile(a), load_profile(b))
     if not rows:

@@ -31,7 +31,6 @@ from skidpad.recording.runlog import RunLog
 from skidpad.report.cards import contact_text, headline, timeline
 from skidpad.report.causes import write_cause
 from skidpad.roads.queries import RoadMap
-from skidpad.stack.settings import grip_of
 
 
 def open_run(run: Path) -> tuple[RunLog, RoadMap]:
@@ -129,7 +128,7 @@ def vehicle_grips(run: Path, log: RunLog) -> list[tuple[str, ...]]:
     spec = read_run(run)
     if spec.backend.backend is not BackendKind.EMBEDDED:
         return []
-    ratio = friction_ratio(spec.weather, grip_of(spec))
+    ratio = friction_ratio(spec.weather, spec.grip)
     types = vehicle_types()
     return [
         (name, type_, f"{own:g}", f"{ratio:.4f}", f"{own * ratio:.4g}", spec.weather.name)

@@ -16,7 +16,6 @@ from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.words import Link, Live, Pace
 from skidpad.core.inputs import Functions
 from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
-from skidpad.stack.settings import settings_of
 
 
 def about(
@@ -78,6 +77,6 @@ def functions_on(spec: RunSpec, desk: Desk) -> list[str] | None:
     if not isinstance(spec.driver, AdasDriver):
         return None
     on = spec.driver.functions if desk.functions is None else desk.functions
-    if desk.functions is None and settings_of(spec).aeb_without_acc and "acc" not in on:
+    if desk.functions is None and spec.settings.stack.aeb_without_acc and "acc" not in on:
         return sorted({*(f.value for f in on), "aeb"})
     return sorted(f.value for f in Functions(tuple(on)).on)

@@ -46,7 +46,6 @@ from skidpad.recording.logfiles import TICKS, read_log
 from skidpad.recording.runlog import RunLog
 from skidpad.simulation.recovery import Action, Moved, Relocate
 from skidpad.stack.control.text import mode_text
-from skidpad.stack.settings import grip_of, settings_of
 
 LEAST_WAY, MOST_WAY = 0.3, 12.0  # m in two ticks, between which a grade can be told
 Floats = NDArray[np.float64]
@@ -218,7 +217,7 @@ def read_folder(folder: Path) -> tuple[RunLog, RunSpec]:
 def seats_of(spec: RunSpec, inputs: tuple[Timed, ...]) -> list[Seat]:
     """How the desk stood from which tick on, in order; the first one is how the run began."""
     functions = tuple(spec.driver.functions) if isinstance(spec.driver, AdasDriver) else None
-    outside = Outside(weather=spec.weather, grip=grip_of(spec), range_model=settings_of(spec).range)
+    outside = Outside(weather=spec.weather, grip=spec.grip, range_model=spec.settings.sensors.range)
     now = Seat(-1, outside, False, "keyboard", functions, None)
     seats = [now]
     for timed in inputs:

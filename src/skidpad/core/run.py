@@ -14,10 +14,12 @@ from msgspec import Meta, Struct
 
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.names import path_part, slug
+from skidpad.core.setting import Plain
+from skidpad.core.settings import Settings, load_profile
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.surface import SurfacePatch
 from skidpad.core.told import on_a_line
-from skidpad.core.vocabulary import SensorLevel, Stratum, TrafficStart
+from skidpad.core.vocabulary import GripModel, SensorLevel, Stratum, TrafficStart
 from skidpad.core.weather import Weather
 
 VERSION = 2  # of config.yaml; folders without the word were written before there was one value
@@ -25,9 +27,6 @@ DURATION = 500.0  # s (A-005)
 DEADLINE_BASE_S, DEADLINE_PER_SIMULATED_S = 180.0, 4.0  # wall time after which a run is killed
 REFERENCE = "reference"  # the reference driver's name in commands and results
 ARBITER = "arbiter"  # the driver of a crew, when it is not one of the channels
-
-Plain = bool | float | str | None
-
 
 PARTED = {"parted": True}  # of an option: its words are parted by commas
 
@@ -267,10 +266,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     duration: Annotated[
         float, Meta(ge=0.05, le=1.0e5, description="Longest simulated time, s.")
     ] = DURATION
-    profile: Annotated[
-        str, Meta(description="recommended, thesis_text, thesis_listing or preliminary.")
-    ] = "recommended"
-    settings: dict[str, Plain] = {}  # of the profile and over it; {}: all as recommended
+    settings: Settings = Settings()  # of world, sensors, traffic, stack and metrics
     sensors: Annotated[
         SensorLevel, Meta(description="pixels: real images; objects: from boxes, much faster.")
     ] = SensorLevel.PIXELS
@@ -315,6 +311,11 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         return f"{self.cell}-{self.seed:0{_DIGITS[type(self.course)]}d}"
 
     @property
+    def grip(self) -> GripModel:
+        """What acts on the tyres: its setting, unless friction stays the original one."""
+        return self.settings.world.grip if self.friction is Friction.REDUCED else GripModel.NONE
+
+    @property
     def foreign_code(self) -> tuple[str, ...]:
         """Returns the foreign code that a drive of this run would execute, in words."""
         driver = self.driver
@@ -340,10 +341,13 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
     def to_plain(self) -> dict[str, Any]:
         """The whole value as plain data, as it stands in config.yaml."""
-        plain: dict[str, Any] = msgspec.to_builtins(self, order="deterministic")
-        if not self.surface:  # so that runs without one are described as before
-            del plain["surface"]
-        return {"version": VERSION, **plain}
+        plain: dict[str, Any] = {"version": VERSION}
+        for name, value in msgspec.to_builtins(self, order="deterministic").items():
+            if name == "settings":  # flat, as in a profile
+                plain |= {"profile": self.settings.profile, name: self.settings.to_plain()}
+            elif name != "surface" or value:  # so that runs without one are described as before
+                plain[name] = value
+        return plain
 
 
 def _pack_on_carla(course: Course, backend: BackendChoice) -> bool:
@@ -361,7 +365,12 @@ def run_from_plain(plain: dict[str, Any], where: str) -> RunSpec:
     version = plain.get("version")
     if version != VERSION:
         raise FileError(f"{where} has version {version!r} of a run's description, not {VERSION}")
+    parts = {k: v for k, v in plain.items() if k not in ("version", "profile")}
     try:
-        return msgspec.convert({k: v for k, v in plain.items() if k != "version"}, RunSpec)
+        values = msgspec.convert(parts.get("settings", {}), dict[str, Plain])
+        settings = load_profile(plain.get("profile", "recommended"), values)
+        return msgspec.convert({**parts, "settings": msgspec.to_builtins(settings)}, RunSpec)
+    except ConfigError as error:
+        raise FileError(f"{where}: {error}") from None
     except msgspec.ValidationError as error:
         raise FileError(f"{where} does not describe a run: {on_a_line(error)}") from error

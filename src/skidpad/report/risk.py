@@ -252,5 +252,6 @@ def _limits(asked: Risk, found: RiskFound) -> str:
         "are independent of each other. Two methods agree when the interval of their ratio contains 1 "
         "and lies within 0.5 to 2, each with a half-width of at most 50 %; the interval of the answer "
         f"holds those of both. Failures in a region that no repetition entered are missed. {noise}"
-        f"{faults}\n\nWeather {run.weather.name}, profile {run.profile}, at most {run.duration:g} s a run."
+        f"{faults}\n\nWeather {run.weather.name}, profile {run.settings.profile}, "
+        f"at most {run.duration:g} s a run."
     )

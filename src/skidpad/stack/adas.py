@@ -11,8 +11,10 @@ from skidpad.core.errors import require_choice, require_range
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.run import Function
+from skidpad.core.settings import load_profile
 from skidpad.core.setup import DT
 from skidpad.core.specs import SensorSpec
+from skidpad.core.stack_settings import Route, StackSettings
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import DetectionStatus, LightState, Supervision, Tier
 from skidpad.roads.queries import RoadMap
@@ -45,7 +47,6 @@ from skidpad.stack.perception.lane_view import (
     LaneView,
 )
 from skidpad.stack.perception.lights import NO_LIGHT, LightReading, LightScan, StopLock
-from skidpad.stack.settings import Route, Settings, load_profile
 
 HELD = VehicleCommand(brake=1.0)  # while the supervisor drives; it overrides this anyway
 KEYS = ("configuration", "functions", "profile", "set", "cruise_kmh", "limiter_kmh", "dt")
@@ -56,7 +57,7 @@ class AdasConfig:
     """What this stack drives with; speeds in km/h as at a cruise control's lever."""
 
     functions: Functions
-    settings: Settings
+    settings: StackSettings
     cruise_kmh: float = V_CRUISE_KMH
     limiter_kmh: float = V_LIMITER_KMH
     dt: float = DT
@@ -75,7 +76,7 @@ class AdasConfig:
         """
         for key in plain:
             require_choice("stack option", key, KEYS)
-        settings = load_profile(plain.get("profile", "recommended"), plain.get("set"))
+        settings = load_profile(plain.get("profile", "recommended"), plain.get("set")).stack
         if "functions" in plain:
             functions = parse_functions(",".join(plain["functions"]))
         else:

@@ -12,6 +12,8 @@ from hypothesis import strategies as st
 from stackfakes import LANE_WIDTH, RED, SPECS, ArcMap, Car, ego_at, frame
 
 from skidpad.core.geometry import Pose
+from skidpad.core.settings import Settings
+from skidpad.core.stack_settings import CapScope, Lookahead, ResumeEnd, StackSettings
 from skidpad.core.vocabulary import Tier
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.configurations import functions_of
@@ -26,7 +28,6 @@ from skidpad.stack.control.steering import (
     steering_of,
 )
 from skidpad.stack.perception.lane_view import FirstBranchRoute, HighwayRoute, LaneTracker
-from skidpad.stack.settings import CapScope, Lookahead, ResumeEnd, Settings
 
 approx = pytest.approx
 
@@ -104,7 +105,7 @@ def test_highway_route_leaves_the_slip_road_and_goes_straight():
 
 @pytest.mark.req("A-150")
 def test_lazy_driver_looks_8_m_ahead_ignores_little_and_halves_the_rest():
-    lazy, map = steering_of(functions_of(1), Settings()), ArcMap()
+    lazy, map = steering_of(functions_of(1), StackSettings()), ArcMap()
     for v_kmh, gain in ((20.0, 1.2), (140.0, 0.4)):
         for offset in (0.05, 0.5, 1.5):
             angle = -atan2(offset, 8.0)
@@ -119,7 +120,7 @@ def test_lazy_driver_looks_8_m_ahead_ignores_little_and_halves_the_rest():
 @pytest.mark.req("A-151")
 def test_lazy_driver_has_settings():
     values = {"lazy_lookahead": 20.0, "lazy_dead_band": 0.0, "lazy_gain": 1.0}
-    lazy = steering_of(functions_of(0), Settings().with_values(values))
+    lazy = steering_of(functions_of(0), Settings().with_values(values).stack)
     assert isinstance(lazy, LazyDriver)
     angle = -atan2(0.5, 20.0)
     expected = angle * 1.2 * (1.0 - 0.3 * abs(angle) / pi)

@@ -10,6 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stackfakes import GREEN, RED, SPECS, ArcMap, Car, ego_at, frame
 
+from skidpad.core.settings import Settings
+from skidpad.core.stack_settings import StackSettings
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import Tier
 from skidpad.stack.adas import AdasConfig, AdasStack
@@ -22,7 +24,6 @@ from skidpad.stack.configurations import (
 from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, Pid
 from skidpad.stack.control.text import LABELS, mode_text
 from skidpad.stack.control.tiers import Hierarchy, Lead, Request, Situation, time_gap, zones
-from skidpad.stack.settings import Settings
 
 approx = pytest.approx
 
@@ -34,7 +35,7 @@ def situation(v_kmh, distance=None, stop=None, confirmed=True, cap=1e9, cruise=1
 
 
 def hierarchy(configuration=4, **settings):
-    return Hierarchy(functions_of(configuration), Settings().with_values(settings), 0.05)
+    return Hierarchy(functions_of(configuration), Settings().with_values(settings).stack, 0.05)
 
 
 def decide(s, configuration=4, **settings):
@@ -189,9 +190,9 @@ def test_hold_behind_a_car_or_at_the_line():
     assert decide(situation(2.0, 5.01, stop=30.0)).tier is Tier.APPROACH
     assert decide(situation(2.0, 4.4, stop=30.0)).tier is Tier.STOPPED_TOO_CLOSE
     # without emergency braking, tiers 1 and 2 are gone and the lead does trigger the hold
-    alone = Hierarchy(frozenset({Function.TLA}), Settings(), 0.05)
+    alone = Hierarchy(frozenset({Function.TLA}), StackSettings(), 0.05)
     assert alone.decide(situation(2.0, 4.49, stop=30.0)).tier is Tier.STOPPED_BEHIND_CAR
-    alone = Hierarchy(frozenset({Function.TLA}), Settings(), 0.05)
+    alone = Hierarchy(frozenset({Function.TLA}), StackSettings(), 0.05)
     assert alone.decide(situation(2.0, 4.51, stop=30.0)).tier is Tier.APPROACH
     # tier 4 acts below 50 m to the line
     assert decide(situation(40.0, 60.0, stop=49.9)).tier is Tier.APPROACH
@@ -230,7 +231,7 @@ def test_approach_behind_a_car_brakes_by_the_excess_speed():
             if r.tier is Tier.APPROACH:
                 assert (r.throttle, r.brake) == approx((0.0, brake))
     # never slower than 1.5 m/s: effective 0.36 m would ask for 1.34 m/s
-    alone = Hierarchy(frozenset({Function.TLA}), Settings(), 0.05)
+    alone = Hierarchy(frozenset({Function.TLA}), StackSettings(), 0.05)
     for v, throttle in ((3.14, 0.2), (3.18, 0.0)):  # sqrt(2 x 2.5 x 2.0) = 3.162
         r = alone.decide(situation(3.6 * v, 30.0, stop=2.0))
         assert (r.tier, r.throttle) == (Tier.APPROACH, throttle)
@@ -396,7 +397,7 @@ def test_emergency_begins_below_0_75_s():
 @pytest.mark.req("A-121")
 def test_approach_is_never_slower_than_1_5_m_s():
     """The floor shows where the hold does not: effective 2 m asks for more, so shorten the hold."""
-    alone = Hierarchy(frozenset({Function.TLA}), Settings(), 0.05)
+    alone = Hierarchy(frozenset({Function.TLA}), StackSettings(), 0.05)
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("skidpad.stack.control.tiers.LEAD_HOLD", 0.1)
         for v, throttle in ((1.45, 0.2), (1.55, 0.0)):

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import pytest
 
+from skidpad.core.stack_settings import StackSettings
 from skidpad.core.vocabulary import Tier
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, Pid
 from skidpad.stack.control.steering import lookahead_distance, steer_command, steering_gain
 from skidpad.stack.control.tiers import Hierarchy, Lead, Situation, time_gap, zones
-from skidpad.stack.settings import Settings
 from skidpad.stack.timing import ticks_to_reach, ticks_within
 
 approx = pytest.approx
@@ -22,7 +22,7 @@ def situation(v_kmh, distance=None, stop=None, confirmed=True, cap=1e9):
 
 
 def decide(s, configuration=4):
-    return Hierarchy(functions_of(configuration), Settings(), 0.05).decide(s)
+    return Hierarchy(functions_of(configuration), StackSettings(), 0.05).decide(s)
 
 
 @pytest.mark.req("A-111", "A-113", "A-114", "A-119", "A-123", "A-130", "A-135", "A-137", "A-138")
@@ -77,7 +77,7 @@ def test_emergency_brake_values_and_configuration_zero():
 
 @pytest.mark.req("A-134", "A-136")
 def test_coasts_twenty_ticks_after_following():
-    h = Hierarchy(functions_of(2), Settings(), 0.05)
+    h = Hierarchy(functions_of(2), StackSettings(), 0.05)
     h.decide(situation(36.0, 25.0))
     tiers = [h.decide(situation(36.0)).tier for _ in range(22)]
     assert tiers == [Tier.COAST] * 20 + [Tier.CRUISE] * 2

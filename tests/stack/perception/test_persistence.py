@@ -9,12 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from stackfakes import SPECS, ArcMap, Car, ego_at, frame
 
+from skidpad.core.stack_settings import RadarCloseCheck
 from skidpad.core.vocabulary import DetectionStatus, Tier
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.perception.fusion import MedianFilter
 from skidpad.stack.perception.persistence import NOTHING_DETECTED, Persistence
 from skidpad.stack.perception.radar import NO_RADAR, RadarReading
-from skidpad.stack.settings import RadarCloseCheck
 
 approx = pytest.approx
 NO, SEEN, HELD, RADAR, SAFE = (

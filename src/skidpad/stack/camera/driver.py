@@ -22,6 +22,7 @@ from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.run import Function
 from skidpad.core.setup import DT
 from skidpad.core.specs import SensorSpec
+from skidpad.core.stack_settings import StackSettings
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.camera.codes import AHEAD, Label, mosaic
@@ -30,7 +31,6 @@ from skidpad.stack.camera.network import seen
 from skidpad.stack.control.bends import bend_speed, slowed
 from skidpad.stack.control.steering import Smoothing, lookahead_distance, steer_command
 from skidpad.stack.control.tiers import Hierarchy, Lead, Situation, time_gap
-from skidpad.stack.settings import load_profile
 
 CRUISE_KMH = 80.0
 SAMPLES = 5  # of which the median counts, as in the published fusion
@@ -56,7 +56,7 @@ class CameraDriver:
             require_choice("camera driver option", key, ("cruise_kmh",))
         self.cruise_kmh = float(settings.get("cruise_kmh", CRUISE_KMH))
         require_range("cruise_kmh", self.cruise_kmh, 1.0, 400.0)
-        self.hierarchy = Hierarchy(FUNCTIONS, load_profile("recommended"), DT)
+        self.hierarchy = Hierarchy(FUNCTIONS, StackSettings(), DT)
         self.smoothing = Smoothing(DT)
         self.gaps: deque[float | None] = deque(maxlen=SAMPLES)
         self.offsets: Floats | None = None

@@ -80,7 +80,7 @@ SETTINGS = {
 }
 
 
-def settings_of(channel: str) -> ChannelSettings:
+def load_channel_settings(channel: str) -> ChannelSettings:
     """The planning settings of a shipped channel."""
     require_choice("channel", channel, tuple(SETTINGS))
     return SETTINGS[channel]

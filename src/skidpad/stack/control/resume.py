@@ -5,8 +5,8 @@ from __future__ import annotations
 from math import inf
 
 from skidpad.core.run import Function
+from skidpad.core.stack_settings import CapScope, ResumeEnd
 from skidpad.stack.configurations import Functions
-from skidpad.stack.settings import CapScope, ResumeEnd
 from skidpad.stack.timing import ticks_to_reach
 
 STOPPED_BELOW_KMH = 5.0  # km/h

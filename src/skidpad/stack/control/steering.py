@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from skidpad.core.geometry import Pose, kmh_from_mps
 from skidpad.core.run import Function
+from skidpad.core.stack_settings import Lookahead, StackSettings
 from skidpad.roads.queries import LanePoint
 from skidpad.stack.configurations import Functions
-from skidpad.stack.settings import Lookahead, Settings
 
 LOOKAHEAD_PER_KMH = 0.4  # m per km/h (A-143)
 LOOKAHEAD_MIN = 12.0  # m (A-143)
@@ -90,7 +90,7 @@ def steer_towards(pose: Pose, v_kmh: float, target: LanePoint | None) -> float:
 Steering = LaneCentring | LazyDriver
 
 
-def steering_of(functions: Functions, settings: Settings) -> Steering:
+def steering_of(functions: Functions, settings: StackSettings) -> Steering:
     """Lane centring if it is switched on, else the lazy driver."""
     if Function.LCA in functions:
         return LaneCentring(settings.lookahead)

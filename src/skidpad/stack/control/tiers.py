@@ -9,11 +9,17 @@ from math import sqrt
 from typing import NamedTuple, Protocol
 
 from skidpad.core.run import Function
+from skidpad.core.stack_settings import (
+    CruiseLaw,
+    Follower,
+    LightBraking,
+    StackSettings,
+    Unconfirmed,
+)
 from skidpad.core.vocabulary import Tier
 from skidpad.stack.configurations import Functions
 from skidpad.stack.control.pid import DISTANCE_GAINS, SPEED_GAINS, Pid
 from skidpad.stack.control.steady import SteadySpeed
-from skidpad.stack.settings import CruiseLaw, Follower, LightBraking, Settings, Unconfirmed
 from skidpad.stack.timing import ticks_to_reach
 
 V_GAP_MIN = 0.1  # m/s, divisor of the time gap (A-110)
@@ -306,7 +312,7 @@ class Cruise:
 class Hierarchy:
     """Tiers 1 to 7 for a set of functions (A-111)."""
 
-    def __init__(self, functions: Functions, settings: Settings, dt: float) -> None:
+    def __init__(self, functions: Functions, settings: StackSettings, dt: float) -> None:
         self.speed_pid = Pid(SPEED_GAINS, dt)
         self.distance_pid = Pid(DISTANCE_GAINS, dt)
         self.lead_at_light = LeadAtLight()
@@ -317,7 +323,7 @@ class Hierarchy:
         self.brakes = bool(functions & {Function.ACC, Function.AEB})  # tiers 1 to 3 (A-140)
         self.rules = self._rules(functions, settings)
 
-    def _rules(self, functions: Functions, settings: Settings) -> tuple[Rule, ...]:
+    def _rules(self, functions: Functions, settings: StackSettings) -> tuple[Rule, ...]:
         """Tiers 1 to 3 come with ACC, or with emergency braking alone (A-140)."""
         unconfirmed = NO_ACTION if settings.unconfirmed is Unconfirmed.CONSUME else None
         following = Following(settings.follower, self.distance_pid)

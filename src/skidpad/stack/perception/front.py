@@ -8,6 +8,13 @@ from typing import NamedTuple
 from skidpad.core.frames import SensorFrame
 from skidpad.core.run import Function
 from skidpad.core.specs import SensorSpec
+from skidpad.core.stack_settings import (
+    RadarCandidates,
+    RadarCorridor,
+    RoofCorridor,
+    StackSettings,
+    Targets,
+)
 from skidpad.core.vocabulary import DetectionStatus
 from skidpad.roads.queries import RoadMap
 from skidpad.stack.configurations import Functions
@@ -32,13 +39,6 @@ from skidpad.stack.perception.radar import (
     LaneMatch,
     Radar,
     RadarReading,
-)
-from skidpad.stack.settings import (
-    RadarCandidates,
-    RadarCorridor,
-    RoofCorridor,
-    Settings,
-    Targets,
 )
 
 ROOF = ("depth_roof", "semantic_roof")
@@ -65,7 +65,7 @@ class Front:
         specs: Sequence[SensorSpec],
         map: RoadMap,
         functions: Functions,
-        settings: Settings,
+        settings: StackSettings,
         dt: float,
     ) -> None:
         self.settings = settings
@@ -138,7 +138,7 @@ class Front:
         return self.verification.confirm(frame, distance, view.yaw_error, view.kappa)
 
 
-def _radar(map: RoadMap, settings: Settings) -> Radar:
+def _radar(map: RoadMap, settings: StackSettings) -> Radar:
     nearest_only = settings.radar_candidates is RadarCandidates.NEAREST
     if settings.radar_corridor is RadarCorridor.PARABOLA:
         return Radar(AnyPoint(), PARABOLA_HALF_WIDTH, nearest_only)

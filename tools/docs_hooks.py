@@ -57,7 +57,7 @@ def command_reference() -> str:
 
 def settings_reference() -> str:
     """Returns every setting with its meaning, values and default, as Markdown."""
-    from skidpad.core.setting import setting_fields
+    from skidpad.core.setting import describe_settings
     from skidpad.core.settings import PARTS, load_profile
 
     recommended = load_profile("recommended").to_plain()
@@ -65,9 +65,9 @@ def settings_reference() -> str:
     for part, kind in PARTS.items():
         lines += [f"## {part}", "", (kind.__doc__ or "").strip(), ""]
         lines += ["| setting | meaning | values | recommended | source |", "|---|---|---|---|---|"]
-        for name, one in setting_fields(kind).items():
+        for name, one in describe_settings(kind).items():
             value = "none" if recommended[name] is None else recommended[name]
-            lines += [f"| `{name}` | {one.text} | {one.allowed} | {value} | {one.source} |"]
+            lines += [f"| `{name}` | {one.text} | {one.range_text} | {value} | {one.source} |"]
         lines += [""]
     return "\n".join(lines) + "\n"
 

@@ -48,9 +48,7 @@ def test_images_labels_and_controls_of_a_drive(tmp_path):
 def test_wrong_input_is_one_sentence(tmp_path):
     with pytest.raises(ConfigError, match="--sensors pixels"):
         export_drive(template(), tmp_path, 2)
-    other = CliRunner().invoke(
-        app, ["export-dataset", "--out", str(tmp_path), "--controller", "ideal"]
-    )
+    other = CliRunner().invoke(app, ["export-dataset", "--out", str(tmp_path), "--stack", "ideal"])
     assert isinstance(other.exception, ConfigError)
     with pytest.raises(ConfigError, match="stack or camera"):
         export_drive(RunSpec(driver=StackDriver("a:b"), course=Roads()), tmp_path, 2)

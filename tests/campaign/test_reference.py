@@ -9,7 +9,7 @@ from runs import scenario_run
 from skidpad import drive
 from skidpad.campaign.cast import driver_of, stage_of
 from skidpad.campaign.cells import cross, matrix_drivers
-from skidpad.cli.asked import Controller, Drivers
+from skidpad.cli.asked import Drivers, EgoStack
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, ReferenceDriver, RunSpec, run_from_plain
 from skidpad.core.weather import Weather
@@ -22,7 +22,7 @@ def test_it_is_named_wherever_a_driver_is_chosen():
     assert [d.label for d in matrix_drivers("reference,4")] == ["reference", "4"]
     assert Drivers(stack="reference").chosen() == [ReferenceDriver()]
     assert Drivers(configs="reference").chosen() == [ReferenceDriver()]
-    assert Controller(controller="reference").chosen() == ReferenceDriver()
+    assert EgoStack(stack="reference").chosen() == ReferenceDriver()
     with pytest.raises(ConfigError, match="0, 1, 2, 3, 4, reference"):
         matrix_drivers("refrence")
     assert all(isinstance(d, AdasDriver) for d in Drivers(cruise="80").chosen())

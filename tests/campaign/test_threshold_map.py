@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from skidpad.campaign.grip_cells import template
 from skidpad.campaign.threshold import SITUATION
 from skidpad.campaign.threshold_cells import PRESETS, default_shares, preset_of
-from skidpad.cli.asked import Controller, GripCross, MapAsked
+from skidpad.cli.asked import EgoStack, GripCross, MapAsked
 from skidpad.cli.main import app
 from skidpad.cli.threshold_plan import plan_map
 from skidpad.core.errors import InputError
@@ -24,9 +24,9 @@ SMALL = (
 )  # fmt: skip
 
 
-def plan(controller=None, cross=None, repeats=20, **asked):
+def plan(ego=None, cross=None, repeats=20, **asked):
     ask = MapAsked(map_of=asked.pop("map_of", "threshold"), **asked)
-    return plan_map(ask, cross or GripCross(), controller or Controller(), template(), repeats)
+    return plan_map(ask, cross or GripCross(), ego or EgoStack(), template(), repeats)
 
 
 def test_every_combination_is_a_run_of_its_own():
@@ -46,7 +46,7 @@ def test_seeds_are_common_to_all_levels_so_that_runs_are_paired():
 
 def test_the_first_seed_is_the_one_asked_for():
     asked = MapAsked(map_of="threshold", drivers="acc", headways="1", decelerations="4")
-    found = plan_map(asked, GripCross(), Controller(), replace(template(), seed=5501), 3)
+    found = plan_map(asked, GripCross(), EgoStack(), replace(template(), seed=5501), 3)
     assert {task.run.seed for task in found} == {5501, 5502, 5503}
 
 
@@ -68,7 +68,7 @@ def test_levels_hold_what_the_weathers_of_the_study_leave():
         ({"levels": "0.5,0.2"}, "--levels needs dry road, 1"),
         ({"levels": "1,nan"}, "--levels takes numbers between 0.06 and 1, got 'nan'"),
         ({"cross": GripCross(weather="icy_30")}, "leave away --scenarios, --weather"),
-        ({"controller": Controller(controller="ideal")}, "--controller"),
+        ({"ego": EgoStack(stack="ideal")}, "--stack"),
     ],
 )
 def test_wrong_input_is_one_sentence(wish, message):

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.grip import recipe
 from skidpad.campaign.grip_cells import template
-from skidpad.cli.asked import Controller, GripCross, Tuned
+from skidpad.cli.asked import EgoStack, GripCross, Tuned
 from skidpad.cli.grip_plan import plan_grip, with_model
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, InputError
@@ -28,7 +28,7 @@ SMALL = (
 def plan(repeats=100, **asked) -> list[RunSpec]:
     """As the command makes it: what is asked of the crossing, of the run, and who drives."""
     run = {n: asked.pop(n) for n in ("sensors", "overlay") if n in asked}
-    driver = Controller(controller=asked.pop("controller", "stack")).chosen()
+    driver = EgoStack(stack=asked.pop("stack", "2")).chosen()
     cross = GripCross(**asked)
     return plan_grip(
         cross, with_model(template(driver=driver, **run), Tuned(), cross.model), repeats
@@ -51,8 +51,8 @@ def test_the_default_is_the_published_campaign():
         ({"scenarios": "ghost"}, "unknown scenario 'ghost'"),
         ({"friction": "half"}, "original, reduced"),
         ({"cutin": "broken"}, "original, unfixed, fixed"),
-        ({"controller": "agent:nowhere.py:A"}, "does not exist"),
-        ({"controller": "no.such:Thing"}, "cannot be imported"),
+        ({"stack": "agent:nowhere.py:A"}, "does not exist"),
+        ({"stack": "no.such:Thing"}, "cannot be imported"),
         ({"overlay": True}, "--sensors pixels"),
     ],
 )

@@ -101,7 +101,7 @@ def test_catalogs_are_passed_over_and_distributions_checked_choice_by_choice(fol
 def test_what_cannot_be_played_is_never_as_expected(folder, tmp_path):
     junit = tmp_path / "junit.xml"
     done = play(
-        folder, "--out", tmp_path / "o", "--duration", 1, "--workers", 1, "--controller", "ideal",
+        folder, "--out", tmp_path / "o", "--duration", 1, "--workers", 1, "--stack", "ideal",
         "--expect", "no-collision", "--junit", junit,
     )  # fmt: skip
     assert done.exit_code == 1, done.output

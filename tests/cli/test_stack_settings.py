@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 import skidpad
 from skidpad.campaign.cast import driver_of, stage_of
 from skidpad.campaign.stored import read_run
-from skidpad.cli.asked import Controller, Drivers, read_stack_settings
+from skidpad.cli.asked import Drivers, EgoStack, read_stack_settings
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import Roads, RunSpec, Scenario, StackDriver
@@ -66,12 +66,12 @@ def test_they_reach_the_driver_of_a_campaign_and_of_a_scenario():
     assert Drivers(stack=WHERE, stack_set=("cruise_kmh=60",)).chosen() == [
         StackDriver(WHERE, given)
     ]
-    chosen = Controller(controller=WHERE, stack_set=("cruise_kmh=60",)).chosen()
+    chosen = EgoStack(stack=WHERE, stack_set=("cruise_kmh=60",)).chosen()
     assert chosen == StackDriver(WHERE, given)
     with pytest.raises(ConfigError, match="--stack-set is for your own stack"):
         Drivers(stack_set=("a=1",)).chosen()
     with pytest.raises(ConfigError, match="--stack-set is for your own stack"):
-        Controller(stack_set=("a=1",)).chosen()
+        EgoStack(stack_set=("a=1",)).chosen()
 
 
 def test_a_scenarios_speed_reaches_a_users_stack_unless_it_is_told_another():
@@ -85,7 +85,7 @@ def test_a_scenarios_speed_reaches_a_users_stack_unless_it_is_told_another():
 
 
 def test_the_command_line_stores_them_with_the_run(tmp_path):
-    words = ["play", str(FOLDER / "lead_slowdown.xosc"), "--controller", WHERE, "--duration", "0.2"]
+    words = ["play", str(FOLDER / "lead_slowdown.xosc"), "--stack", WHERE, "--duration", "0.2"]
     words += ["--out", str(tmp_path / "out"), "--stack-set", "gain=0.5"]
     done = CliRunner().invoke(app, words)
     assert done.exit_code == 1, "0.2 s are too short: void"
@@ -95,8 +95,9 @@ def test_the_command_line_stores_them_with_the_run(tmp_path):
 def test_the_function_and_the_command_have_the_same_defaults():
     taken = inspect.signature(skidpad.drive).parameters
     run, roads = RunSpec(), Roads()
-    for name in ("seed", "duration", "profile"):
+    for name in ("seed", "duration"):
         assert taken[name].default == getattr(run, name), name
+    assert taken["profile"].default == run.settings.profile
     assert taken["sensors"].default == run.sensors.value
     assert taken["map"].default == roads.map
     assert taken["vehicles"].default == roads.vehicles

@@ -13,8 +13,8 @@ import skidpad
 
 PACKAGE = Path(skidpad.__file__).parent
 TOOLS = PACKAGE.parents[1] / "tools"
-LINE = '    slush: float = setting(0.5, "M-1", "depth of slush, m", low=0.0, high=2.0)\n'
-BEFORE = "    esc: bool = setting("
+LINE = '    slush: float = setting_field(0.5, "M-1", "depth of slush, m", low=0.0, high=2.0)\n'
+BEFORE = "    esc: bool = setting_field("
 ASK = """
 from typer.testing import CliRunner
 from skidpad.cli.main import app

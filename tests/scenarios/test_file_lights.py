@@ -42,7 +42,7 @@ def driven(folder: Path, *events: str, end: float) -> RunLog:
         folder, road=TOWN, init=ego + at("other", -1, 5, 0), stories=story(*events), end=end
     )
     done = CliRunner().invoke(
-        app, ["play", str(file), "--out", str(folder / "out"), "--config", "3"]
+        app, ["play", str(file), "--out", str(folder / "out"), "--stack", "3"]
     )
     assert done.exit_code == 0, done.output
     return read_log(folder / "out")

@@ -80,7 +80,7 @@ def file(tmp_path_factory):
 
 def drive(file, controller, *more):
     out = file.parent / controller
-    words = ["play", str(file), "--out", str(out), "--controller", controller, "--weather"]
+    words = ["play", str(file), "--out", str(out), "--stack", controller, "--weather"]
     done = CliRunner().invoke(app, [*words, "rain-noon", *more])
     assert done.exit_code == 0, done.output
     log = read_log(out)
@@ -89,7 +89,7 @@ def drive(file, controller, *more):
 
 
 def test_our_stack_takes_over_when_the_file_says_so_and_brakes_behind_who_cuts_in(file):
-    log, story, target = drive(file, "stack")
+    log, story, target = drive(file, "2")
     handed = next(r for r in story if "HandOver" in r and "startTransition" in r)
     assert 1.0 < float(handed.split(",")[0]) < 1.2
     cut = next(r for r in story if "Change" in r and "startTransition" in r)

@@ -77,7 +77,7 @@ def test_a_car_on_its_tyres_closes_the_gap_within_its_performance(tmp_path):
         init=at("ego", -3, 100) + at("other", -1, 120, 10),
     )  # fmt: skip
     out = tmp_path / "out"
-    arguments = ["play", str(file), "--out", str(out), "--controller", "ideal"]
+    arguments = ["play", str(file), "--out", str(out), "--stack", "ideal"]
     done = CliRunner().invoke(app, [*arguments, "--actors", "physical"])
     assert done.exit_code == 0, done.output
     log = read_log(out)

@@ -28,7 +28,7 @@ from typer.testing import CliRunner
 from skidpad.cli.main import app
 from skidpad.recording.logfiles import read_log
 
-RIDE = ["--controller", "ideal", "--actors", "ideal"]
+RIDE = ["--stack", "ideal", "--actors", "ideal"]
 
 
 def play(*words: object):
@@ -151,7 +151,7 @@ def test_a_folder_has_crash_cards_and_a_verdict_for_each_run(tmp_path):
         a_braking_lead(tmp_path / "in" / name, gap).rename(tmp_path / "in" / name / f"{name}.xosc")
     junit = tmp_path / "junit.xml"
     done = play(
-        tmp_path / "in", "--out", tmp_path / "out", "--workers", 1, "--controller",
+        tmp_path / "in", "--out", tmp_path / "out", "--workers", 1, "--stack",
         "blind:Blind", "--expect", "no-collision", "--junit", junit,
     )  # fmt: skip
     assert done.exit_code == 1, done.output
@@ -169,7 +169,7 @@ def test_a_folder_has_crash_cards_and_a_verdict_for_each_run(tmp_path):
 def test_a_single_run_has_crash_cards_too(tmp_path):
     (tmp_path / "in").mkdir()
     file = a_braking_lead(tmp_path / "in", 12.0)
-    done = play(file, "--out", tmp_path / "out", "--controller", "blind:Blind")
+    done = play(file, "--out", tmp_path / "out", "--stack", "blind:Blind")
     assert done.exit_code == 1, done.output
     assert "skidpad rerun" in done.output
     assert "One crash" in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

@@ -29,10 +29,10 @@ from typer.testing import CliRunner
 from skidpad.cli.main import app
 from skidpad.recording.staging import read_staging
 
-BLIND = ("--controller", "blind:Blind", "--actors", "ideal")
+BLIND = ("--stack", "blind:Blind", "--actors", "ideal")
 NO_HIT = ("--expect", "no-collision")
 LANE_Y = -1.75  # of lane -1 of the straight road
-RIDE = ("--controller", "ideal", "--actors", "ideal")
+RIDE = ("--stack", "ideal", "--actors", "ideal")
 PEDESTRIAN = """<ScenarioObject name="walker"><Pedestrian name="p" mass="80" model="p"
 pedestrianCategory="pedestrian"><BoundingBox><Center x="0" y="0" z="0.9"/><Dimensions width="0.6"
 length="0.6" height="1.8"/></BoundingBox><Properties/></Pedestrian></ScenarioObject>"""

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 from skidpad.cli.main import app
 from skidpad.core.errors import FileError
 
-RIDE = ["--controller", "ideal", "--actors", "ideal"]
+RIDE = ["--stack", "ideal", "--actors", "ideal"]
 ROAD = '<LogicFile filepath="roads/lane.xodr"/>'
 
 

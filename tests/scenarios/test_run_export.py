@@ -72,7 +72,7 @@ def test_a_run_is_played_again_within_1_cm(drives, name):
 def test_the_command_play_moves_the_ego_as_it_was_driven(drives, tmp_path):
     log = read_log(drives / "traffic")
     file = exported(drives / "traffic")
-    words = ["play", str(file), "--controller", "ideal", "--actors", "ideal", "--out"]
+    words = ["play", str(file), "--stack", "ideal", "--actors", "ideal", "--out"]
     done = CliRunner().invoke(app, [*words, str(tmp_path / "again")])
     assert done.exit_code == 0, done.output
     again = read_log(tmp_path / "again")

@@ -15,7 +15,7 @@ from skidpad.search.risk import influence_of
 
 CALL = (
     "ghost_cut_in", "--vary", "GhostS=25:60", "--vary", "GhostSpeed=15:23", "--vary", "MergeDistance=2:8",
-    "--config", "4", "--workers", "1", "--duration", "10", "--repetitions", "2", "--per-level", "50",
+    "--stack", "4", "--workers", "1", "--duration", "10", "--repetitions", "2", "--per-level", "50",
     "--samples", "100",
 )  # fmt: skip
 

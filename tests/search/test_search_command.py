@@ -23,7 +23,7 @@ from skidpad.search.space import apply_values
 
 CALL = (
     "ghost_cut_in", "--vary", "GhostS=25:45", "--vary", "GhostSpeed=17:21", "--vary", "MergeDistance=5:8",
-    "--config", "4", "--budget", "40", "--workers", "1", "--duration", "12",
+    "--stack", "4", "--budget", "40", "--workers", "1", "--duration", "12",
 )  # fmt: skip
 
 

@@ -123,12 +123,17 @@ def seeds(n: int, first: int = FIRST_SEED) -> range:
     return range(first, first + n)
 
 
+def describe_run(driver: DriverSpec, weather: Weather, seed: int, template: RunSpec) -> RunSpec:
+    """Returns the template with this driver in this weather: what commands and `drive` run."""
+    return structs.replace(template, driver=driver, weather=weather, seed=seed)
+
+
 def cross(
     drivers: Sequence[DriverSpec], weather: Sequence[Weather], n: int, template: RunSpec
 ) -> list[RunSpec]:
     """Every driver in every weather with n seeds from the template's on, the rest as there."""
     cells = [
-        structs.replace(template, driver=d, weather=w, seed=s)
+        describe_run(d, w, s, template)
         for s in seeds(n, template.seed)
         for w in weather
         for d in drivers

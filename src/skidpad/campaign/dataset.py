@@ -2,7 +2,7 @@
 
 OUT/<run>/images/<camera>/<tick>.png, OUT/<run>/frames.parquet and config.yaml; OUT/dataset.json says
 what the columns and cameras are. Somebody else's network can be trained on it, and driven with
-`--stack` or `--controller`.
+`--stack`.
 """
 
 from __future__ import annotations

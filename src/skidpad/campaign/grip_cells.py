@@ -10,16 +10,15 @@ from typing import Any
 from msgspec import structs
 
 from skidpad.campaign.cells import FIRST_SEED
+from skidpad.campaign.drivers import STACK, find_driver
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import AdasDriver, Friction, RunSpec, Scenario
+from skidpad.core.run import Friction, RunSpec, Scenario
 from skidpad.core.settings import load_profile
 from skidpad.core.vocabulary import GripModel, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.scenarios.variation import CUT_IN, CutIn, drawn_parameters, drawn_skill
-from skidpad.stack.configurations import functions_of
 
 DURATION = 120.0  # s, unless the file ends before
-STACK = "stack"  # what results call our own stack
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -35,9 +34,8 @@ class Cross:
 
 def template(configuration: int = 2, **changes: Any) -> RunSpec:
     """A run of the catalogue on objects, by our stack; `changes` are fields of it."""
-    driver = AdasDriver(label=STACK, functions=functions_of(configuration))
     base = RunSpec(
-        driver=driver,
+        driver=find_driver(configuration, label=STACK),
         course=Scenario(file=CUT_IN),
         duration=DURATION,
         settings=load_profile("recommended", {"grip": GripModel.STATISTICAL}),

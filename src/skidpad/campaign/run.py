@@ -14,17 +14,16 @@ from numpy.typing import NDArray
 
 from skidpad.campaign.backends import make_backend
 from skidpad.campaign.cast import StackAtWheel, Stage, driver_of, stage_of, with_sensors
+from skidpad.campaign.cells import describe_run
 from skidpad.campaign.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
 from skidpad.campaign.drive import Driver, Moment, Sink, ticks
+from skidpad.campaign.drivers import find_driver
 from skidpad.campaign.outdoors import ChangedBackend, FileChanges
 from skidpad.campaign.readings import ReadingsRecorder
 from skidpad.campaign.snapshots import Snapshots
 from skidpad.core.errors import StackError, require_choice
 from skidpad.core.run import (
-    REFERENCE,
-    AdasDriver,
     DriverSpec,
-    ReferenceDriver,
     Roads,
     RunSpec,
     StackDriver,
@@ -45,9 +44,7 @@ from skidpad.recording.ticks import TickLog
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.player import Played
 from skidpad.simulation.backend import Backend
-from skidpad.stack.configurations import functions_of
 from skidpad.stack.interface import Stack
-from skidpad.stack.loading import load_stack
 
 DESK_ROOM = 12_000  # ticks of a log at first, as nobody knows how long a person drives
 LONGEST_STORY = 20_000  # characters of a traceback
@@ -101,8 +98,8 @@ def drive(
     """Drive a stack on a map with traffic; the defaults are those of `skidpad adas`.
 
     Args:
-        stack: a class with the stack interface, "module:Class", "file.py:Class", or 0 to 4 for a
-            published configuration, or "reference" for the reference driver.
+        stack: a class with the stack interface, or what `--stack` takes: 0 to 4 for a published
+            configuration, "reference", "camera", "module:Class", "FILE.py:Class".
         map: a bundled map's name, or an OpenDRIVE file.
         weather: a preset's name, a weather file (.yaml), or a weather.
         seed: of traffic and noise; the same seed gives the same log.
@@ -130,32 +127,27 @@ def drive(
     """
     driver, kind = _name_driver(stack, dict(stack_settings or {}))
     words = [v.value for v in SensorLevel], [v.value for v in TrafficStart]
-    spec = RunSpec(
-        driver=driver,
+    template = RunSpec(
         course=Roads(
             map=str(map),
             traffic=TrafficStart(require_choice("traffic", traffic, words[1])),
             vehicles=vehicles,
         ),
-        weather=find_weather(weather) if isinstance(weather, str) else weather,
-        seed=seed,
         duration=duration,
         settings=load_profile(profile, settings),
         sensors=SensorLevel(require_choice("sensors", sensors, words[0])),
         backend=BackendChoice() if backend is None else backend,
     )
+    outside = find_weather(weather) if isinstance(weather, str) else weather
+    spec = describe_run(driver, outside, seed, template)
     return run(spec, kind, folder=None if out is None else Path(out))
 
 
 def _name_driver(
     stack: type[Stack] | str | int, options: dict[str, Any]
 ) -> tuple[DriverSpec, type[Stack] | None]:
-    if isinstance(stack, int):
-        return AdasDriver(label=str(stack), functions=functions_of(stack)), None
-    if stack == REFERENCE:
-        return ReferenceDriver(), None
-    if isinstance(stack, str):
-        return StackDriver(stack, options), load_stack(stack)
+    if isinstance(stack, (str, int)):
+        return find_driver(stack, options), None
     return StackDriver(f"{stack.__module__}:{stack.__qualname__}", options), stack
 
 

@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from msgspec import structs
-
 from skidpad.campaign.cast import StackAtWheel, stage_of
 from skidpad.campaign.drive import Script
+from skidpad.campaign.drivers import STACK, find_driver
 from skidpad.campaign.files import runs_of
 from skidpad.campaign.grip_cells import template
 from skidpad.campaign.run import OpenRun, Run
@@ -17,10 +16,7 @@ from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.frames import SensorFrame
 from skidpad.core.run import (
     ActorMode,
-    DriverSpec,
     Friction,
-    Passenger,
-    StackDriver,
 )
 from skidpad.core.run import Scenario as Course
 from skidpad.core.settings import load_profile
@@ -30,10 +26,8 @@ from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import find_weather
 from skidpad.scenarios.scene import State
-from skidpad.stack.loading import load_stack
 
 PLAIN = "clear-noon"  # what a file leaves open of the weather, as in `skidpad play`
-IDEAL = "ideal"
 HOLDS, ENDS = " holds", " ends"  # how the story tells of a condition
 
 
@@ -54,8 +48,8 @@ class Scenario:
 
     Args:
         file: An OpenSCENARIO XML file.
-        stack: Which stack drives the ego: None for ours, "ideal" for the file itself, or a class
-            as "module:Class".
+        stack: Which stack drives the ego, as `--stack`: 0 to 4 (our own), "ideal" for the file
+            itself, a class as "module:Class", ...
         actors: "physical" or "ideal", as `--actors`.
         weather: A preset's name; None for the weather of the file.
         parameters: Values of the file's parameters, by name.
@@ -76,7 +70,7 @@ class Scenario:
         self,
         file: str | Path,
         *,
-        stack: str | None = None,
+        stack: str | int = 2,
         actors: str = "physical",
         weather: str | Weather | None = None,
         parameters: Mapping[str, float | str] | None = None,
@@ -95,9 +89,8 @@ class Scenario:
             duration=duration,
             settings=settings,
             weather=find_weather(PLAIN),
+            driver=find_driver(stack, label=STACK),
         )
-        if stack is not None:
-            spec = structs.replace(spec, driver=_driver(stack))
         outside = find_weather(weather) if isinstance(weather, str) else weather
         (self.spec,) = runs_of(spec, [Path(file)], [outside], [Friction.REDUCED], [seed])
         stage = stage_of(self.spec)
@@ -186,13 +179,6 @@ class Scenario:
             raise ConfigError("a scenario needs at least one step before it is finished")
         self._open.close()
         return self._open.finish()
-
-
-def _driver(stack: str) -> DriverSpec:
-    if stack == IDEAL:
-        return Passenger()
-    load_stack(stack)  # what is not there is said here
-    return StackDriver(stack)
 
 
 class _Wheel:

@@ -11,21 +11,13 @@ from msgspec import Meta, Struct
 
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import (
-    REFERENCE,
-    AdasDriver,
-    AgentDriver,
-    CameraDriver,
     DriverSpec,
     Friction,
-    Passenger,
-    ReferenceDriver,
     RunSpec,
-    StackDriver,
 )
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 
-OURS, IDEAL, CAMERA, AGENT = "stack", "ideal", "camera", "agent:"
 OF_FILE = "file"  # the weather that a scenario describes
 StackSettings = Annotated[
     tuple[str, ...],
@@ -54,24 +46,24 @@ class Drivers(Struct, frozen=True):
     ] = None
     stack: Annotated[
         str | None,
-        Meta(description="Your own stack: module:Class or file.py:Class; or reference."),
+        Meta(
+            description="One driver: module:Class, FILE.py:Class, 0 to 4, reference, camera or "
+            "agent:PATH:CLASS."
+        ),
     ] = None
     stack_set: StackSettings = ()
 
     def chosen(self) -> list[DriverSpec]:
         """The drivers; ConfigError or FileError for what is not there."""
         from skidpad.campaign.cells import cruising, drivers_with, matrix_drivers, published_drivers
-        from skidpad.stack.loading import load_stack
+        from skidpad.campaign.drivers import find_driver
 
         if self.stack is not None:
             if self.configs is not None or self.functions or self.cruise is not None:
                 raise ConfigError("--stack goes with none of --configs, --functions and --cruise")
-            if self.stack == REFERENCE:
-                require_no_settings(self.stack_set, "--stack FILE:CLASS")
-                return [ReferenceDriver()]
-            load_stack(self.stack)  # a stack that is not there is wrong input, no run's outcome
-            return [StackDriver(self.stack, read_stack_settings(self.stack_set))]
-        require_no_settings(self.stack_set, "--stack FILE:CLASS")
+            return [find_driver(self.stack, read_stack_settings(self.stack_set))]
+        if self.stack_set:
+            raise ConfigError("--stack-set is for your own stack: give it with --stack FILE:CLASS")
         chosen = drivers_with(self.functions)
         if self.cruise is not None:
             if self.configs is not None or not chosen:
@@ -82,45 +74,23 @@ class Drivers(Struct, frozen=True):
         return [*chosen]
 
 
-class Controller(Struct, frozen=True):
+class EgoStack(Struct, frozen=True):
     """The driver of the ego in a scenario."""
 
-    controller: Annotated[
+    stack: Annotated[
         str,
         Meta(
-            description="stack, camera, reference, ideal (as the file says), module:Class, "
-            "agent:PATH:CLASS."
+            description="0 to 4 (our stack in a published configuration), reference, camera, ideal "
+            "(as the file says), module:Class, FILE.py:Class, agent:PATH:CLASS."
         ),
-    ] = OURS
-    config: Annotated[int, Meta(ge=0, le=4, description="Configuration of our stack.")] = 2
+    ] = "2"
     stack_set: StackSettings = ()
 
     def chosen(self) -> DriverSpec:
         """The driver; ConfigError or FileError for one that is not there."""
-        from skidpad.stack.configurations import functions_of
-        from skidpad.stack.loading import load_stack
+        from skidpad.campaign.drivers import STACK, find_driver
 
-        ours = self.controller in (OURS, IDEAL, CAMERA, REFERENCE) or self.controller.startswith(
-            AGENT
-        )
-        if ours:
-            require_no_settings(self.stack_set, "--controller FILE:CLASS")
-        if self.controller == OURS:
-            return AdasDriver(label=OURS, functions=functions_of(self.config))
-        if self.controller == IDEAL:
-            return Passenger()
-        if self.controller == CAMERA:
-            return CameraDriver()
-        if self.controller == REFERENCE:
-            return ReferenceDriver()
-        if self.controller.startswith(AGENT):
-            from skidpad.stack.agents import load_agent  # kernels come with it
-
-            where = self.controller.removeprefix(AGENT)
-            load_agent(where)
-            return AgentDriver(where)
-        load_stack(self.controller)
-        return StackDriver(self.controller, read_stack_settings(self.stack_set))
+        return find_driver(self.stack, read_stack_settings(self.stack_set), label=STACK)
 
 
 def read_stack_settings(words: Iterable[str]) -> dict[str, bool | float | str | None]:
@@ -152,12 +122,6 @@ def _plain_value(text: str) -> bool | float | str | None:
         if isfinite(value):
             return value
     return text
-
-
-def require_no_settings(words: tuple[str, ...], option: str) -> None:
-    """Raise ConfigError for settings of a stack where none of the user's drives."""
-    if words:
-        raise ConfigError(f"--stack-set is for your own stack: give it with {option}")
 
 
 class Climate(Struct, frozen=True):

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from msgspec import structs
 
-from skidpad.cli.asked import Controller, Tuned
+from skidpad.cli.asked import EgoStack, Tuned
 from skidpad.cli.spread import spread_fields
 from skidpad.core.run import Roads, RunSpec
 
@@ -17,7 +17,7 @@ COURSES = "road"
 
 @spread_fields(duration=60.0)
 def export_dataset(
-    controller: Controller,
+    ego: EgoStack,
     run: RunSpec,
     roads: Roads,
     tuned: Tuned,
@@ -39,7 +39,7 @@ def export_dataset(
 
     require_choice("--course", course, (COURSES, *NAMES))
     run = structs.replace(tuned.resolve(run), weather=find_weather(weather))
-    run = structs.replace(run, driver=controller.chosen())
+    run = structs.replace(run, driver=ego.chosen())
     from skidpad.campaign.dataset import export_drive, write_card
 
     for seed in range(first_seed, first_seed + seeds):

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from msgspec import structs
 
-from skidpad.cli.asked import MAPS, Controller, GripCross, MapAsked, Tuned
+from skidpad.cli.asked import MAPS, EgoStack, GripCross, MapAsked, Tuned
 from skidpad.cli.campaigns import FirstSeed, How
 from skidpad.cli.spread import spread_fields
 from skidpad.core.errors import require_choice
@@ -35,7 +35,7 @@ def grip(
     how: How,
     cross: GripCross,
     map: MapAsked,
-    controller: Controller,
+    ego: EgoStack,
     run: RunSpec,
     scenario: Scenario,
     tuned: Tuned,
@@ -65,13 +65,13 @@ def grip(
 
         run = tuned.resolve(run)
         repeats = seeds or threshold_plan.REPEATS
-        levels = threshold_plan.plan_map(map, cross, controller, run, repeats)
+        levels = threshold_plan.plan_map(map, cross, ego, run, repeats)
         how(Campaign(threshold.recipe(keep_all), levels, alone=alone), write_threshold_report)
         return
     from skidpad.cli.grip_plan import plan_grip, with_model
 
     run = with_model(run, tuned, cross.model, cross.esc)
-    run = structs.replace(run, driver=controller.chosen(), course=scenario)
+    run = structs.replace(run, driver=ego.chosen(), course=scenario)
     cells = plan_grip(cross, run, seeds or REPEATS)
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.grip import recipe

@@ -56,7 +56,7 @@ OPTIONS = {
     "how": "Campaign",
     "driving": "Campaign",
     "drivers": "Driver",
-    "controller": "Driver",
+    "ego": "Driver",
     "crew": "Driver",
     "climate": "Weather",
     "cross": "Variations",

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from msgspec import structs
 
-from skidpad.cli.asked import OF_FILE, Controller, PlayCross, Tuned
+from skidpad.cli.asked import OF_FILE, EgoStack, PlayCross, Tuned
 from skidpad.cli.campaigns import Drive, Driving, How, Seeds
 from skidpad.cli.expected import Expected, exit_by_verdicts, played_report
 from skidpad.cli.spread import spread_fields
@@ -32,7 +32,7 @@ def play_folder(
     how: How,
     folder: Annotated[Path, typer.Argument(help="Folder with .xosc files, at any depth.")],
     cross: PlayCross,
-    controller: Controller,
+    ego: EgoStack,
     run: RunSpec,
     scenario: Scenario,
     tuned: Tuned,
@@ -40,7 +40,7 @@ def play_folder(
     seeds: Seeds = 1,
 ) -> None:
     """Play every scenario of a folder in every weather, with and without its grip."""
-    template = play_template(cross, controller, run, scenario, tuned, backend)
+    template = play_template(cross, ego, run, scenario, tuned, backend)
     how(_campaign(template, cross, folder, seeds, []), played_report)
 
 
@@ -53,7 +53,7 @@ def play(
         ),
     ],
     cross: PlayCross,
-    controller: Controller,
+    ego: EgoStack,
     run: RunSpec,
     scenario: Scenario,
     tuned: Tuned,
@@ -70,7 +70,7 @@ def play(
     from skidpad.core.errors import ConfigError
 
     file = find_scenario(file)
-    template = play_template(cross, controller, run, scenario, tuned, backend)
+    template = play_template(cross, ego, run, scenario, tuned, backend)
     expected.check()  # what cannot be read is said before anything is driven
     if check:
         _check(file, structs.replace(scenario, parameters=cross.parameters()))
@@ -128,7 +128,7 @@ def find_scenario(file: Path) -> Path:
 
 def play_template(
     cross: PlayCross,
-    controller: Controller,
+    ego: EgoStack,
     run: RunSpec,
     scenario: Scenario,
     tuned: Tuned,
@@ -140,7 +140,7 @@ def play_template(
 
     return structs.replace(
         tuned.resolve(run, grip=cross.frictions()[1]),
-        driver=controller.chosen(),
+        driver=ego.chosen(),
         course=structs.replace(scenario, parameters=cross.parameters()),
         backend=check_backend(backend),
         weather=find_weather(PLAIN),

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 from msgspec import Meta, Struct
 
-from skidpad.cli.asked import Controller, PlayCross, Tuned
+from skidpad.cli.asked import EgoStack, PlayCross, Tuned
 from skidpad.cli.varied import Batches, VariedFile, Vary, scenario_options, vary_scenario
 from skidpad.core.run import RunSpec, Scenario
 
@@ -38,7 +38,7 @@ def risk(
     file: VariedFile,
     encounters: Encounters,
     cross: PlayCross,
-    controller: Controller,
+    ego: EgoStack,
     run: RunSpec,
     scenario: Scenario,
     tuned: Tuned,
@@ -56,7 +56,7 @@ def risk(
 
     exposure = NO_EXPOSURE if encounters.exposure is None else read_exposure(encounters.exposure)
     template, space = vary_scenario(
-        file, encounters.vary, exposure.variables, cross, controller, run, scenario, tuned
+        file, encounters.vary, exposure.variables, cross, ego, run, scenario, tuned
     )
     asked = Risk(
         run=template.to_plain(), space=space, per_hour=exposure.per_hour,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from msgspec import Meta, Struct
 
-from skidpad.cli.asked import Controller, PlayCross, Tuned
+from skidpad.cli.asked import EgoStack, PlayCross, Tuned
 from skidpad.cli.varied import Batches, VariedFile, Vary, scenario_options, vary_scenario
 from skidpad.core.run import RunSpec, Scenario
 
@@ -39,7 +39,7 @@ def search(
     file: VariedFile,
     varied: Varied,
     cross: PlayCross,
-    controller: Controller,
+    ego: EgoStack,
     run: RunSpec,
     scenario: Scenario,
     tuned: Tuned,
@@ -59,7 +59,7 @@ def search(
 
     require_choice("--method", varied.method, tuple(METHODS))
     require_choice("--objective", varied.objective, tuple(OBJECTIVES))
-    template, space = vary_scenario(file, varied.vary, (), cross, controller, run, scenario, tuned)
+    template, space = vary_scenario(file, varied.vary, (), cross, ego, run, scenario, tuned)
     found = Search(
         run=template.to_plain(), space=space, method=varied.method, objective=varied.objective,
         budget=varied.budget, seed=varied.search_seed,

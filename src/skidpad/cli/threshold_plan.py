@@ -16,7 +16,7 @@ from skidpad.campaign.threshold_cells import (
     start_of_text,
     tasks,
 )
-from skidpad.cli.asked import MAPS, OURS, Controller, GripCross, MapAsked
+from skidpad.cli.asked import MAPS, EgoStack, GripCross, MapAsked
 from skidpad.cli.grip_plan import split_words
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import ActorMode, RunSpec
@@ -27,14 +27,14 @@ WEATHER = "rain_0"  # of the study: dry, and every level looks like it
 
 
 def plan_map(
-    ask: MapAsked, cross: GripCross, controller: Controller, run: RunSpec, repeats: int
+    ask: MapAsked, cross: GripCross, ego: EgoStack, run: RunSpec, repeats: int
 ) -> list[Task]:
     """The runs of a map; ConfigError for what cannot be driven."""
     require_choice("--map-of", str(ask.map_of), MAPS)
-    if cross != GripCross() or controller != Controller(controller=OURS):
+    if cross != GripCross() or ego != EgoStack():
         raise ConfigError(
             "--map-of threshold chooses scenario, weather, friction and drivers itself: leave away "
-            "--scenarios, --weather, --friction, --model, --cutin, --four-cells, --controller, --config"
+            "--scenarios, --weather, --friction, --model, --cutin, --four-cells, --stack"
         )
     if run.overlay:
         raise ConfigError("--map-of threshold drives on a clear day: leave --overlay away")

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from rich.progress import Progress
 
     from skidpad.campaign.worker import Runner
-    from skidpad.cli.asked import Controller, PlayCross, Tuned
+    from skidpad.cli.asked import EgoStack, PlayCross, Tuned
     from skidpad.core.space import Space, Variable
 
 VariedFile = Annotated[
@@ -69,7 +69,7 @@ def vary_scenario(
     vary: Sequence[str],
     below: Sequence[Variable],
     cross: PlayCross,
-    controller: Controller,
+    ego: EgoStack,
     run: RunSpec,
     scenario: Scenario,
     tuned: Tuned,
@@ -90,7 +90,7 @@ def vary_scenario(
     names = {v.name for v in given}
     kept = {v.name: v for v in (*of_file, *below) if v.name not in names}
     space = check_space(Space((*kept.values(), *given)))
-    template = _template(file, cross, controller, run, scenario, tuned)
+    template = _template(file, cross, ego, run, scenario, tuned)
     _require_parameters(template, space)
     return template, space
 
@@ -114,7 +114,7 @@ def _read_varied(file: Path) -> tuple[Path, tuple[Variable, ...]]:
 def _template(
     file: Path,
     cross: PlayCross,
-    controller: Controller,
+    ego: EgoStack,
     run: RunSpec,
     scenario: Scenario,
     tuned: Tuned,
@@ -126,7 +126,7 @@ def _template(
         raise ConfigError(
             "a search has one weather and one grip; --vary weather=one|other varies it"
         )
-    template = play_template(cross, controller, run, scenario, tuned, BackendChoice())
+    template = play_template(cross, ego, run, scenario, tuned, BackendChoice())
     (found,) = play_runs(template, cross, [file], seeds=1)
     return found
 

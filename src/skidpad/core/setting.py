@@ -2,7 +2,7 @@
 
     @dataclass(frozen=True, slots=True, kw_only=True)
     class WorldSettings(SettingsPart):
-        mu_ref: float = setting(0.9, "M-1", "friction of a dry road", low=0.05, high=3.0)
+        mu_ref: float = setting_field(0.9, "M-1", "friction of a dry road", low=0.05, high=3.0)
 
 That line is the only place where a setting is declared. Profiles, `--set`, `skidpad profiles`,
 `skidpad.drive`, config.yaml and the page of settings read it from there (`skidpad.core.settings`).
@@ -21,7 +21,7 @@ Plain = bool | float | str | None
 SWITCH = {"on": True, "true": True, "yes": True, "off": False, "false": False, "no": False}
 
 
-def setting(
+def setting_field(
     default: Any,
     source: str,
     text: str,
@@ -62,7 +62,7 @@ class SettingField:
     choices: Callable[[], Iterable[str]] | None
 
     @property
-    def allowed(self) -> str:
+    def range_text(self) -> str:
         """What the setting takes, in words."""
         if self.kind is bool:
             return "on or off"
@@ -97,7 +97,7 @@ class SettingField:
 
     def _read_switch(self, value: object) -> bool:
         if str(value).lower() not in SWITCH:
-            raise ConfigError(f"setting {self.name} must be {self.allowed}, got {value!r}")
+            raise ConfigError(f"setting {self.name} must be {self.range_text}, got {value!r}")
         return SWITCH[str(value).lower()]
 
     def _read_number(self, value: Any) -> float:
@@ -109,7 +109,7 @@ class SettingField:
             return float(value)
         except (TypeError, ValueError):
             raise ConfigError(
-                f"setting {self.name} must be {self.allowed}, got {value!r}"
+                f"setting {self.name} must be {self.range_text}, got {value!r}"
             ) from None
 
 
@@ -119,16 +119,16 @@ class SettingsPart:
     __slots__ = ()
 
     def __post_init__(self) -> None:
-        for name, one in setting_fields(type(self)).items():
+        for name, one in describe_settings(type(self)).items():
             one.require_in_range(getattr(self, name))
 
     def to_plain(self) -> dict[str, Plain]:
         """Returns the values by name, as YAML holds them."""
-        values = ((name, getattr(self, name)) for name in setting_fields(type(self)))
+        values = ((name, getattr(self, name)) for name in describe_settings(type(self)))
         return {name: v.value if isinstance(v, Enum) else v for name, v in values}
 
 
-def setting_fields(part: type[SettingsPart]) -> dict[str, SettingField]:
+def describe_settings(part: type[SettingsPart]) -> dict[str, SettingField]:
     """Returns the settings of a part by name."""
     if part not in _described:
         hints = get_type_hints(part)

@@ -17,7 +17,7 @@ from typing import Any
 import msgspec
 
 from skidpad.core.errors import ConfigError, require_choice
-from skidpad.core.setting import Plain, SettingField, SettingsPart, setting, setting_fields
+from skidpad.core.setting import Plain, SettingField, SettingsPart, describe_settings, setting_field
 from skidpad.core.stack_settings import StackSettings
 from skidpad.core.tyres import REFERENCE, known_tyres
 from skidpad.core.vocabulary import Clearance, GripModel, LidarModel, RangeModel
@@ -60,8 +60,8 @@ class LaneTruth(str, Enum):
 class WorldSettings(SettingsPart):
     """What weather does to tyres and road."""
 
-    grip: GripModel = setting(GripModel.PHYSICAL, "M-1", "weather acts on tyres")
-    mu_ref: float = setting(
+    grip: GripModel = setting_field(GripModel.PHYSICAL, "M-1", "weather acts on tyres")
+    mu_ref: float = setting_field(
         0.9,
         "M-1",
         "friction of a dry road: winter (tyres, 0.9), summer (1.05), a number",
@@ -69,17 +69,17 @@ class WorldSettings(SettingsPart):
         high=3.0,
         words=TYRES,
     )
-    tyres: str = setting(
+    tyres: str = setting_field(
         REFERENCE, "M-1", "tyres of vehicles that have none of their own", choices=known_tyres
     )
-    tyre_stiffness: bool = setting(
+    tyre_stiffness: bool = setting_field(
         False, "M-1, T-11", "slip stiffness falls on water, snow and ice"
     )
-    water_drag: bool = setting(False, "M-1, T-11", "wheels push water aside")
-    lane_material: bool = setting(
+    water_drag: bool = setting_field(False, "M-1, T-11", "wheels push water aside")
+    lane_material: bool = setting_field(
         False, "M-1, T-11", "<material friction> of OpenDRIVE replaces mu_ref on its lane"
     )
-    esc: bool = setting(
+    esc: bool = setting_field(
         True, "M-1, R-5", "stability and traction control, brake-force distribution"
     )
 
@@ -88,15 +88,17 @@ class WorldSettings(SettingsPart):
 class SensorSettings(SettingsPart):
     """What weather does to sensors, and how they are mounted."""
 
-    range: RangeModel = setting(
+    range: RangeModel = setting_field(
         RangeModel.PHYSICAL, "M-1", "weather acts on depth, labels and radar"
     )
-    lidar: LidarModel = setting(
+    lidar: LidarModel = setting_field(
         LidarModel.EXACT, "M-1, T-11", "lost and false returns of lidars in rain, fog, snow"
     )
-    camera: bool = setting(True, "M-4", "weather acts on RGB images")
-    night_rain: NightRain = setting(NightRain.BOTH, "D-094", "camera effects of rain at night")
-    bumper_depth_fov_deg: float = setting(
+    camera: bool = setting_field(True, "M-4", "weather acts on RGB images")
+    night_rain: NightRain = setting_field(
+        NightRain.BOTH, "D-094", "camera effects of rain at night"
+    )
+    bumper_depth_fov_deg: float = setting_field(
         100.0, "D-001", "field of view of the bumper depth camera", low=30.0, high=150.0
     )
 
@@ -105,24 +107,26 @@ class SensorSettings(SettingsPart):
 class TrafficSettings(SettingsPart):
     """Background traffic, and what the supervisor does with an ego that has stopped driving."""
 
-    drivers: bool = setting(True, "M-1, R-5", "background drivers differ and mind grip and sight")
-    initial_limit_kmh: float | None = setting(
+    drivers: bool = setting_field(
+        True, "M-1, R-5", "background drivers differ and mind grip and sight"
+    )
+    initial_limit_kmh: float | None = setting_field(
         None, "M-6", "limit of background drivers up to the first sign", low=5.0, high=250.0
     )
-    traffic_positions: TrafficPositions = setting(
+    traffic_positions: TrafficPositions = setting_field(
         TrafficPositions.LISTING, "D-085, D-086", "published positions of traffic"
     )
-    relocation: Relocation = setting(
+    relocation: Relocation = setting_field(
         Relocation.ROLLING, "D-076, D-077", "what follows a relocation"
     )
-    clearance: Clearance = setting(Clearance.OTHERS, "D-080", "search for a free place")
+    clearance: Clearance = setting_field(Clearance.OTHERS, "D-080", "search for a free place")
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class MetricSettings(SettingsPart):
     """What the metrics take for true."""
 
-    lane_truth: LaneTruth = setting(
+    lane_truth: LaneTruth = setting_field(
         LaneTruth.FOLLOWED, "D-102, D-103", "which vehicle is the true lead"
     )
 
@@ -169,14 +173,14 @@ PARTS: dict[str, type[SettingsPart]] = {
     "stack": StackSettings,
     "metrics": MetricSettings,
 }
-PART_OF = {name: part for part, kind in PARTS.items() for name in setting_fields(kind)}
+PART_OF = {name: part for part, kind in PARTS.items() for name in describe_settings(kind)}
 NAMES = tuple(PART_OF)
 
 
 def find_setting(name: str) -> SettingField:
     """Returns the setting of this name; ConfigError that lists all names for an unknown one."""
     require_choice("setting", name, NAMES)
-    return setting_fields(PARTS[PART_OF[name]])[name]
+    return describe_settings(PARTS[PART_OF[name]])[name]
 
 
 def parse_assignments(assignments: Iterable[str]) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-from skidpad.core.setting import SettingsPart, setting
+from skidpad.core.setting import SettingsPart, setting_field
 
 
 class RoofCorridor(str, Enum):
@@ -103,60 +103,62 @@ class ResumeEnd(str, Enum):
 class StackSettings(SettingsPart):
     """What our own stack does; the defaults are the profile `recommended`."""
 
-    roof_corridor: RoofCorridor = setting(
+    roof_corridor: RoofCorridor = setting_field(
         RoofCorridor.DEPTH_DEPENDENT, "D-015", "width of the roof corridor"
     )
-    bumper_alone: bool = setting(
+    bumper_alone: bool = setting_field(
         True, "D-017", "bumper reading counts at 15 to 30 m when the roof sees nothing"
     )
-    detection_gate: float = setting(
+    detection_gate: float = setting_field(
         60.0, "D-020", "farthest fused distance that is a detection, m", low=1.0, high=80.0
     )
-    safety_persist: bool = setting(
+    safety_persist: bool = setting_field(
         False, "D-023", "hold a lost near lead for up to 5 s while following"
     )
-    radar_close_check: RadarCloseCheck = setting(
+    radar_close_check: RadarCloseCheck = setting_field(
         RadarCloseCheck.BUMPER, "D-025", "what a radar target below 22 m needs"
     )
-    radar_candidates: RadarCandidates = setting(
+    radar_candidates: RadarCandidates = setting_field(
         RadarCandidates.ALL, "D-029", "radar points that are matched with the map"
     )
-    rejected_stays_active: bool = setting(
+    rejected_stays_active: bool = setting_field(
         False, "D-035", "a radar target off the lane still reports RADAR_ACTIVE"
     )
-    aeb_without_acc: bool = setting(False, "D-038", "configuration 0 has emergency braking")
-    targets: Targets = setting(Targets.ROAD_USERS, "D-011, R-5", "what the cameras look for ahead")
-    cruise: CruiseLaw = setting(CruiseLaw.STEADY, "A-135, R-5", "what holds the cruise speed")
-    unconfirmed: Unconfirmed = setting(
+    aeb_without_acc: bool = setting_field(False, "D-038", "configuration 0 has emergency braking")
+    targets: Targets = setting_field(
+        Targets.ROAD_USERS, "D-011, R-5", "what the cameras look for ahead"
+    )
+    cruise: CruiseLaw = setting_field(CruiseLaw.STEADY, "A-135, R-5", "what holds the cruise speed")
+    unconfirmed: Unconfirmed = setting_field(
         Unconfirmed.FALL_THROUGH, "D-044", "tiers 1 and 3 before confirmation"
     )
-    light_braking: LightBraking = setting(
+    light_braking: LightBraking = setting_field(
         LightBraking.SPEED_PID, "D-047", "braking law before a stop line"
     )
-    cap_scope: CapScope = setting(
+    cap_scope: CapScope = setting_field(
         CapScope.GLOBAL, "D-051, D-053", "where limiter and resume cap act"
     )
-    lookahead: Lookahead = setting(Lookahead.DYNAMIC, "D-054", "look-ahead of the LCA")
-    route: Route = setting(Route.HIGHWAY, "D-058", "highway isolation, straightest path")
+    lookahead: Lookahead = setting_field(Lookahead.DYNAMIC, "D-054", "look-ahead of the LCA")
+    route: Route = setting_field(Route.HIGHWAY, "D-058", "highway isolation, straightest path")
     # Options that the sources name but do not use; off unless asked for.
-    radar: bool = setting(True, "A-038", "the radar takes part in detection")
-    radar_corridor: RadarCorridor = setting(
+    radar: bool = setting_field(True, "A-038", "the radar takes part in detection")
+    radar_corridor: RadarCorridor = setting_field(
         RadarCorridor.LANE_MATCH, "A-084", "how the radar tells the ego's lane"
     )
-    consistency_guard: float | None = setting(
+    consistency_guard: float | None = setting_field(
         None, "A-059", "tiers that differ by more, in m: the nearer counts", low=0.0, high=80.0
     )
-    rate_filter: bool = setting(False, "A-062", "distance changes by <= 240 m/s")
-    follower: Follower = setting(Follower.ZONES, "A-108", "what actuates following")
-    hsv_required: bool = setting(False, "A-168", "the camera must confirm a red light")
-    resume_end: ResumeEnd = setting(ResumeEnd.TIME, "A-177", "what ends the resume cap")
-    lazy_lookahead: float = setting(
+    rate_filter: bool = setting_field(False, "A-062", "distance changes by <= 240 m/s")
+    follower: Follower = setting_field(Follower.ZONES, "A-108", "what actuates following")
+    hsv_required: bool = setting_field(False, "A-168", "the camera must confirm a red light")
+    resume_end: ResumeEnd = setting_field(ResumeEnd.TIME, "A-177", "what ends the resume cap")
+    lazy_lookahead: float = setting_field(
         8.0, "A-151", "look-ahead of the lazy driver, m", low=1.0, high=100.0
     )
-    lazy_dead_band: float = setting(
+    lazy_dead_band: float = setting_field(
         0.04, "A-151", "steer that the lazy driver ignores", low=0.0, high=1.0
     )
-    lazy_gain: float = setting(
+    lazy_gain: float = setting_field(
         0.45, "A-151", "share of steer the lazy driver applies", low=0.0, high=2.0
     )
-    steer_smoothing: bool = setting(False, "A-152", "low-pass and rate limit on steer")
+    steer_smoothing: bool = setting_field(False, "A-152", "low-pass and rate limit on steer")

@@ -53,7 +53,7 @@ def run(*words: str) -> str:
 def test_play_moves_the_same_actors_on_both_backends(serve: Serve, tmp_path: Path) -> None:
     """The lead of the file slows down where and when it does in the embedded simulator."""
     file = str(FOLDER / "lead_slowdown.xosc")
-    words = ("play", file, "--duration", "4", "--controller", "ideal", "--actors", "ideal")
+    words = ("play", file, "--duration", "4", "--stack", "ideal", "--actors", "ideal")
     said = skidpad(tmp_path / "carla", serve("--mu-ref", "0.9").port, *words)
     assert "The run was not judged." in said
     run(*words, "--out", str(tmp_path / "here"))

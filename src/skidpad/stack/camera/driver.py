@@ -1,4 +1,4 @@
-"""A driver that sees: `--controller camera`. Three forward cameras and the speedometer, nothing else.
+"""A driver that sees: `--stack camera`. Three forward cameras and the speedometer, nothing else.
 
 The network says where the lane runs and who is in it; controllers of our stack do the rest: lane
 centring by a point ahead, cruise, following and emergency braking by the seven tiers. It reads

@@ -1,0 +1,77 @@
+"""Which stack drives, by name: the same words for `--stack`, `skidpad.drive` and `skidpad.Scenario`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from skidpad.core.errors import ConfigError
+from skidpad.core.run import (
+    REFERENCE,
+    AdasDriver,
+    AgentDriver,
+    CameraDriver,
+    DriverSpec,
+    Passenger,
+    ReferenceDriver,
+    StackDriver,
+)
+from skidpad.stack.configurations import CONFIGURATIONS, functions_of
+from skidpad.stack.loading import load_stack
+
+IDEAL, CAMERA, AGENT = "ideal", "camera", "agent:"
+STACK = "stack"  # what results of scenarios call our own stack
+NUMBERS = {str(number): number for number in CONFIGURATIONS}
+
+
+def find_driver(
+    stack: str | int, options: Mapping[str, object] | None = None, label: str = ""
+) -> DriverSpec:
+    """Returns the driver of this name.
+
+    Args:
+        stack: 0 to 4 for our stack in a published configuration, "reference", "camera", "ideal" for
+            a scenario that moves the ego itself, "agent:PATH:CLASS" for an agent of the CARLA
+            leaderboard, or a stack's class as "module:Class" or "FILE.py:Class".
+        options: what a class is given as its settings.
+        label: what results call our stack; its number by default.
+
+    Raises:
+        ConfigError: the name stands for no driver, or options are given to a driver of ours.
+        FileError: the stack's file is not there.
+    """
+    name = str(stack)
+    ours = _find_ours(name, label)
+    if ours is None:
+        load_stack(name)  # a stack that is not there is wrong input, no run's outcome
+        given: dict[str, Any] = dict(options or {})
+        return StackDriver(name, given)
+    if options:
+        raise ConfigError(
+            f"--stack-set is for your own stack: give it with --stack FILE:CLASS, not {name}"
+        )
+    return ours
+
+
+def _find_ours(name: str, label: str) -> DriverSpec | None:
+    """The driver of this name that is no user's class; None for a class."""
+    if name in NUMBERS:
+        return AdasDriver(label=label or name, functions=functions_of(NUMBERS[name]))
+    if name == REFERENCE:
+        return ReferenceDriver()
+    if name == CAMERA:
+        return CameraDriver()
+    if name == IDEAL:
+        return Passenger()
+    if name.startswith(AGENT):
+        from skidpad.stack.agents import load_agent  # kernels come with it
+
+        where = name.removeprefix(AGENT)
+        load_agent(where)
+        return AgentDriver(where)
+    if ":" not in name:
+        raise ConfigError(
+            f"unknown stack {name!r}; choose one of: {', '.join([*NUMBERS, REFERENCE, CAMERA, IDEAL])}, "
+            "module:Class, FILE.py:Class, agent:PATH:CLASS"
+        )
+    return None

@@ -105,7 +105,7 @@ def test_assignments(text, name, value):
         ("camera=maybe", r"setting camera must be on or off, got 'maybe'"),
         (
             "mu_ref=high",
-            r"setting mu_ref must be a number between 0.05 and 3 or winter or summer, got 'high'",
+            r"setting mu_ref must be a number between 0.05 and 3, winter or summer, got 'high'",
         ),
         ("initial_limit_kmh=x", r"between 5 and 250 or none, got 'x'"),
     ],

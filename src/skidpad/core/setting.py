@@ -70,8 +70,10 @@ class SettingField:
             return ", ".join(self.choices())
         if issubclass(self.kind, Enum):
             return ", ".join(m.value for m in self.kind)
-        numbers = f"a number between {self.low:g} and {self.high:g}"
-        return " or ".join([numbers, *self.words, *["none"] * self.optional])
+        words = f", {' or '.join(self.words)}" if self.words else ""
+        return (
+            f"a number between {self.low:g} and {self.high:g}{words}" + " or none" * self.optional
+        )
 
     def read(self, value: object) -> Any:
         """Returns `value` in the setting's type; text is read as on a command line.

@@ -42,9 +42,8 @@ def setting_field(
         words: names that stand for numbers.
         choices: returns the names of which a text must be one.
     """
-    about = {"source": source, "text": text, "low": low, "high": high, "words": words or {}}
-    about["choices"] = choices
-    return field(default=default, metadata=about)
+    about: dict[str, Any] = {"source": source, "text": text, "low": low, "high": high}
+    return field(default=default, metadata=about | {"words": words or {}, "choices": choices})
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,7 @@ from msgspec import Struct
 from skidpad.core.errors import ConfigError, require_range
 
 FRICTION = (0.01, 1.5)  # times the friction that is there without the patch
-WATER_MM = (0.0, 2.0)  # deepest film for which the friction of wet roads holds (docs/physics.md)
+WATER_MM = (0.0, 10.0)  # for friction, deeper than 2 counts as 2 (docs/physics.md)
 ICE_MM = (0.0, 20.0)
 SNOW_MM = (0.0, 2000.0)
 RADIUS = (0.1, 1000.0)  # m

@@ -52,7 +52,8 @@ V_HALF_WORN, V_HALF_FILM_WORN = 11.7, 1.17  # the same with 1.6 mm of tread, lea
 WORN_DRY = 1.18  # dry friction of a worn tyre over that of a new one: Bosch, 1.0 over 0.85
 FILM_WEDGE = 1.0  # mm, more water than the tread takes at low speed already; fit to Bosch
 V_WEDGE = 19.8  # m/s at which 1 mm beyond that has halved grip once more; fit to Bosch
-FILM_MAX = 2.0  # mm, deepest water of that table; deeper counts as this
+FILM_MAX = 2.0  # mm, deepest water of that table; for friction, deeper counts as this
+DEEPEST = 10.0  # mm, deepest water that a wheel pushes aside
 FLOATING = (
     0.04  # share of wet grip that a fully floating tyre keeps; our assumption (Bosch: 0 to 0.07)
 )
@@ -209,7 +210,7 @@ def physical_params(
         firm_stiffness += snow_cover * SNOW_STIFFNESS
     return GripParams(
         mu_ref * (dry / MU_REF), firm, bare * open_road, DRY_FALL, lift, deep / V_WEDGE**2,
-        firm_stiffness, open_road if stiffness else 0.0, film / 1000.0 if drag else 0.0,
+        firm_stiffness, open_road if stiffness else 0.0, min(surface.film_mm, DEEPEST) / 1000.0 if drag else 0.0,
     )  # fmt: skip
 
 

@@ -5,6 +5,7 @@ from math import hypot
 
 import numpy as np
 import pytest
+from shapely.geometry import Point, Polygon
 
 from skidpad.campaign.surfaces import read_surface
 from skidpad.core.errors import ConfigError
@@ -76,18 +77,46 @@ def test_a_stretch_covers_its_lane_its_side_and_nothing_else():
     assert found.ratio_at(*ahead, Z) == 1.0
 
 
-def test_vehicles_far_from_every_patch_are_not_looked_at(monkeypatch):
-    """The bounds leave out only where nothing is: the same shares with them and without."""
+def test_the_bounds_leave_out_only_where_nothing_is():
     found = patches(SurfacePatch(friction=0.5, circle=(X, Y, 4.0)))
-    found.fit([])
-    low_x, low_y, high_x, high_y = found.bounds[0]
     rng = np.random.default_rng(3)
     for _ in range(300):
         x, y = X + rng.uniform(-40, 40), Y + rng.uniform(-40, 40)
-        inside = low_x <= x <= high_x and low_y <= y <= high_y
-        if found.ratio_at(x, y, Z) < 1.0:
-            assert inside
-            assert hypot(x - X, y - Y) <= 4.0
+        assert (found.ratio_at(x, y, Z) < 1.0) == (hypot(x - X, y - Y) <= 4.0)
+
+
+def covers(patch, x, y, z):
+    """The same in plain words, without a kernel."""
+    if patch.circle is not None:
+        return hypot(x - patch.circle[0], y - patch.circle[1]) <= patch.circle[2]
+    if patch.polygon:
+        return Polygon(patch.polygon).contains(Point(x, y))
+    place = ROAD.project(x, y, z)
+    if place is None or abs(place.offset) > place.width / 2 or place.road != patch.road:
+        return False
+    low, high = patch.stretch
+    on_side = patch.side == "both" or (place.offset > 0) == (patch.side == "left")
+    return on_side and patch.lane in (None, place.lane_id) and low <= ROAD.s_road(place) <= high
+
+
+def test_the_kernel_finds_the_patch_that_plain_words_find():
+    star = ((X, Y - 9), (X + 3, Y), (X + 9, Y + 9), (X, Y + 4), (X - 9, Y + 9), (X - 3, Y))
+    laid = [
+        SurfacePatch(
+            friction=0.9, road=PLACE.road, s=(ROAD.s_road(PLACE) - 6, ROAD.s_road(PLACE) + 8)
+        ),
+        SurfacePatch(friction=0.8, road=PLACE.road, lane=PLACE.lane_id, side="right"),
+        SurfacePatch(friction=0.7, polygon=star),
+        SurfacePatch(friction=0.6, circle=(X + 4, Y - 2, 5.0)),
+    ]
+    found, rng = patches(*laid), np.random.default_rng(5)
+    seen = set()
+    for _ in range(400):
+        x, y = float(X + rng.uniform(-15, 15)), float(Y + rng.uniform(-15, 15))
+        wanted = min((p.friction for p in laid if covers(p, x, y, Z)), default=1.0)
+        assert found.ratio_at(x, y, Z) == wanted, (x, y)
+        seen.add(wanted)
+    assert seen == {0.6, 0.7, 0.8, 0.9, 1.0}
 
 
 @pytest.mark.parametrize(
@@ -98,7 +127,7 @@ def test_vehicles_far_from_every_patch_are_not_looked_at(monkeypatch):
         ("patches: [{water_mm: 1}]", "patches[0]: needs one of circle, polygon and road"),
         ("patches: [{circle: [0, 0, 1]}]", "needs either friction or a depth"),
         ("patches: [{friction: 0.5, ice_mm: 1, road: 1}]", "needs either friction or a depth"),
-        ("patches: [{water_mm: 3, road: 1}]", "water_mm must be between 0 and 2, got 3"),
+        ("patches: [{water_mm: 13, road: 1}]", "water_mm must be between 0 and 10, got 13"),
         ("patches: [{friction: 0, road: 1}]", "friction must be between 0.01 and 1.5, got 0"),
         ("patches: [{friction: 0.5, circle: [0, 0, 1], side: left}]", "go with a road"),
         ("patches: [{friction: 0.5, road: 1, s: [5, 5]}]", "s must run from 0 or more to more"),

@@ -2,20 +2,34 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass, replace
-from math import cos, hypot, sin
+from math import cos, sin
 
 import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
+from skidpad.core.jit import hold
 from skidpad.core.states import ActorStates
 from skidpad.core.surface import SurfacePatch
-from skidpad.physics.grip import GripParams, Road, mu_at, road_surface, stiffness_at
+from skidpad.physics.grip import GripParams, Road, road_surface
 from skidpad.physics.types import VehicleType
-from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.roads.queries import RoadMap
+from skidpad.simulation.world.patch_kernel import (
+    ANY,
+    BOTH,
+    LEFT,
+    NO_PATCH,
+    RIGHT,
+    PatchArrays,
+    WheelPlaces,
+    fill_patches,
+    find_effect,
+)
+
+__all__ = ["NO_PATCH", "FrictionZone", "LaneFrictions", "Patches", "in_zone"]
 
 Floats = NDArray[np.float64]
 # by road and lane: from and to along the road in m, and the share of the friction there
@@ -24,7 +38,6 @@ LaneFrictions = dict[tuple[int, int], list[tuple[float, float, float]]]
 REACH = 12.0  # m from a vehicle's origin to its farthest wheel, and half a lane
 SPACING = 1.0  # m, the largest distance of two lane samples
 LISTED = 20  # roads that a message names
-NO_PATCH = -1.0  # stiffness and film where no patch says them
 
 
 class Patches:
@@ -42,114 +55,105 @@ class Patches:
         Raises:
             ConfigError: a patch lies on no road of the map, or none of its lanes has such a stretch.
         """
-        self.map, self.patches = map, tuple(patches)
-        self.wheels: list[list[tuple[float, float]]] = []
-        self.tyres: list[str] = []
+        self.map, self.patches, self.lanes = map, tuple(patches), lanes or {}
         for k, patch in enumerate(self.patches):
             _check(k, patch, map)
-        self.lanes = lanes or {}
-        everywhere = [(-np.inf, -np.inf, np.inf, np.inf)] if self.lanes else []
-        self.bounds = np.array([*everywhere, *(_bounds(p, map) for p in self.patches)])
+        self._place, self._tyres = np.zeros((0, 4, 2)), list[str]()
         self.lay(road)
 
     def lay(self, road: Road) -> None:
         """The road without patches is this from now on."""
         self.road = road
-        self._outside: dict[str, GripParams] = {}
-        self._covered: dict[str, list[GripParams | None]] = {}
-        self._know(road.tyres)
-
-    def _know(self, tyres: str) -> None:
-        """Work out what these tyres hold outside and inside of every patch."""
-        if tyres not in self._outside:
-            self._outside[tyres] = self.road.params(tyres)
-            self._covered[tyres] = [_surface_grip(p, self.road, tyres) for p in self.patches]
+        self._pack()
 
     def fit(self, types: Sequence[VehicleType]) -> None:
         """These are the vehicles from now on."""
-        self.wheels = [
-            [(x, y) for x in (t.x_front_axle, t.x_rear_axle) for y in (t.track / 2, -t.track / 2)]
-            for t in types
-        ]
-        self.tyres = [t.tyres or self.road.tyres for t in types]
+        self._place = np.array(
+            [
+                [
+                    (x, y)
+                    for x in (t.x_front_axle, t.x_rear_axle)
+                    for y in (t.track / 2, -t.track / 2)
+                ]
+                for t in types
+            ],
+            dtype=np.float64,
+        ).reshape(-1, 4, 2)
+        self._tyres = [t.tyres for t in types]
+        self._pack()
+
+    def _pack(self) -> None:
+        """Everything as the kernels read it: patches, and what every kind of tyre here makes of them."""
+        own = [name or self.road.tyres for name in self._tyres]
+        self.kinds = sorted({self.road.tyres, *own})
+        self._wheels = WheelPlaces(
+            self._place, np.array([self.kinds.index(n) for n in own], np.int64)
+        )
+        self._held = hold(_arrays(self.map, self.patches, self.lanes, self.road, self.kinds))
 
     def fill(self, states: ActorStates, share: Floats, stiffness: Floats, film: Floats) -> None:
         """Set what patches do to the wheels, (w, 4) at FL, FR, RL, RR.
 
         share: of the friction without patches. stiffness: over the dry one. film: of water, m.
         """
-        share[:] = 1.0
-        stiffness[:] = film[:] = NO_PATCH
-        count = len(self.wheels)
-        x, y = states.x[:count, None], states.y[:count, None]
-        low_x, low_y, high_x, high_y = self.bounds.T
-        near = (x >= low_x) & (x <= high_x) & (y >= low_y) & (y <= high_y)
-        for i in np.flatnonzero(near.any(axis=1) & states.present[:count]):
-            c, s = cos(states.yaw[i]), sin(states.yaw[i])
-            v = float(np.hypot(states.vx[i], states.vy[i]))
-            self._know(self.tyres[i])
-            for k, (forward, left) in enumerate(self.wheels[i]):
-                at = (states.x[i] + forward * c - left * s, states.y[i] + forward * s + left * c)
-                found = self.effect_at(at[0], at[1], float(states.z[i]), v, self.tyres[i])
-                share[i, k], stiffness[i, k], film[i, k] = found
+        fill_patches(self.map.held, self._held, self._wheels, states, share, stiffness, film)
 
     def ratio_at(self, x: float, y: float, z: float, v: float = 0.0) -> float:
         """Return the friction at a point of the road at a speed in m/s over that without patches.
 
-        Where patches overlap the slippery one counts.
+        Where patches overlap the slippery one counts. The tyres are those of the run.
         """
-        return self.effect_at(x, y, z, v, self.road.tyres)[0]
-
-    def effect_at(
-        self, x: float, y: float, z: float, v: float, tyres: str
-    ) -> tuple[float, float, float]:
-        """Return share of friction, stiffness and film of the most slippery patch at a point.
-
-        The lane's material multiplies the share, whatever lies on it.
-        """
-        place = self.map.project(float(x), float(y), z)
-        under = [k for k, p in enumerate(self.patches) if self._covers(p, x, y, place)]
-        found = [self._effect(k, v, tyres) for k in under]
-        share, stiffness, film = min(found, default=(1.0, NO_PATCH, NO_PATCH))
-        return share * self._of_lane(place), stiffness, film
-
-    def _of_lane(self, place: LanePoint | None) -> float:
-        """Return the share that the material of the lane under a point makes."""
-        if not self.lanes or place is None or abs(place.offset) > place.width / 2.0:
-            return 1.0
-        s = self.map.s_road(place)
-        stretches = self.lanes.get((place.road, place.lane_id), ())
-        return next((share for low, high, share in stretches if low <= s < high), 1.0)
-
-    def _effect(self, k: int, v: float, tyres: str) -> tuple[float, float, float]:
-        ratio, covered = self.patches[k].friction, self._covered[tyres][k]
-        if covered is None:
-            return (1.0 if ratio is None else ratio), NO_PATCH, NO_PATCH
-        share = float(mu_at(covered, v) / mu_at(self._outside[tyres], v))
-        return share, float(stiffness_at(covered, v)), covered.film
-
-    def _covers(self, patch: SurfacePatch, x: float, y: float, place: LanePoint | None) -> bool:
-        if patch.circle is not None:
-            middle_x, middle_y, radius = patch.circle
-            return hypot(x - middle_x, y - middle_y) <= radius
-        if patch.polygon:
-            return _inside(patch.polygon, x, y)
-        if place is None or place.road != patch.road or patch.lane not in (None, place.lane_id):
-            return False
-        if abs(place.offset) > place.width / 2.0:
-            return False
-        on_side = patch.side == "both" or (place.offset > 0.0) == (patch.side == "left")
-        low, high = patch.stretch
-        return on_side and low <= self.map.s_road(place) <= high
+        kind = self.kinds.index(self.road.tyres)
+        return float(find_effect(self.map.held, self._held, x, y, z, v, kind)[0])
 
 
-def _surface_grip(patch: SurfacePatch, road: Road, tyres: str) -> GripParams | None:
-    """Return the grip on what lies in a patch, at least as deep as the weather's; None: a plain ratio.
+def _arrays(
+    map: RoadMap,
+    patches: Sequence[SurfacePatch],
+    lanes: LaneFrictions,
+    road: Road,
+    kinds: Sequence[str],
+) -> PatchArrays:
+    corners = [np.array(p.polygon, dtype=np.float64).reshape(-1, 2) for p in patches]
+    materials = [lanes.get(key, []) for key in _lane_names(map)]
+    return PatchArrays(
+        bounds=np.array([_bounds(p, map) for p in patches]).reshape(-1, 4),
+        circle=np.array([p.circle or (0.0, 0.0, -1.0) for p in patches]).reshape(-1, 3),
+        corner_start=_starts(corners),
+        corner=np.concatenate([np.zeros((0, 2)), *corners]),
+        stretch=np.array([_stretch_key(p) for p in patches], dtype=np.int64).reshape(-1, 3),
+        s=np.array([p.stretch for p in patches], dtype=np.float64).reshape(-1, 2),
+        ratio=np.array([np.nan if p.friction is None else p.friction for p in patches]),
+        outside=np.array([road.params(kind) for kind in kinds]),
+        covered=np.array(
+            [[_surface_grip(p, road, kind) for p in patches] for kind in kinds], dtype=np.float64
+        ).reshape(len(kinds), len(patches), len(GripParams._fields)),
+        material_start=_starts(materials),
+        material=np.array([m for of in materials for m in of], dtype=np.float64).reshape(-1, 3),
+    )
+
+
+def _lane_names(map: RoadMap) -> list[tuple[int, int]]:
+    return list(zip(map.lanes.road.tolist(), map.lanes.lane_id.tolist(), strict=True))
+
+
+def _starts(parts: Sequence[Sized]) -> NDArray[np.int64]:
+    """Return where each part begins when all stand one behind the other, and where the last one ends."""
+    return np.cumsum([0, *(len(part) for part in parts)], dtype=np.int64)
+
+
+def _stretch_key(patch: SurfacePatch) -> tuple[int, int, int]:
+    if patch.road is None:
+        return ANY, ANY, BOTH
+    side = {"both": BOTH, "left": LEFT, "right": RIGHT}[patch.side]
+    return patch.road, ANY if patch.lane is None else patch.lane, side
+
+
+def _surface_grip(patch: SurfacePatch, road: Road, tyres: str) -> GripParams:
+    """Return the grip on what lies in a patch, at least as deep as the weather's.
 
     Always by the physical model, which alone knows films and snow.
     """
-    if patch.friction is not None:
-        return None
     outside = road_surface(road.weather)
     return road.params(
         tyres,
@@ -227,14 +231,3 @@ def _check(k: int, patch: SurfacePatch, map: RoadMap) -> None:
             f"{on.min():.1f} to {on.max():.1f} m; the patch asks for lane {patch.lane} from "
             f"{patch.stretch[0]:g} to {patch.stretch[1]:g} m"
         )
-
-
-def _inside(polygon: Sequence[tuple[float, float]], x: float, y: float) -> bool:
-    """Even-odd rule."""
-    inside = False
-    x0, y0 = polygon[-1]
-    for x1, y1 in polygon:
-        if (y0 > y) != (y1 > y) and x < x0 + (y - y0) * (x1 - x0) / (y1 - y0):
-            inside = not inside
-        x0, y0 = x1, y1
-    return inside

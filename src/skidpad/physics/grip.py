@@ -210,7 +210,8 @@ def physical_params(
         firm_stiffness += snow_cover * SNOW_STIFFNESS
     return GripParams(
         mu_ref * (dry / MU_REF), firm, bare * open_road, DRY_FALL, lift, deep / V_WEDGE**2,
-        firm_stiffness, open_road if stiffness else 0.0, min(surface.film_mm, DEEPEST) / 1000.0 if drag else 0.0,
+        firm_stiffness, open_road if stiffness else 0.0,
+        min(surface.film_mm, DEEPEST) / 1000.0 if drag else 0.0,
     )  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
 from skidpad.core.inputs import Outside
 from skidpad.core.run import RunSpec, Scenario, run_from_plain
+from skidpad.core.settings import load_profile
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import VehicleCommand
 from skidpad.core.surface import SurfacePatch
@@ -87,7 +88,9 @@ def test_carla_has_no_surfaces():
 
 def coast(*surface, **settings):
     """Roll from 18 m/s for 2 s with hands off: the turn in rad, and the speed that is left."""
-    stage = stage_of(structs.replace(SPEC, surface=surface, settings=settings))
+    stage = stage_of(
+        structs.replace(SPEC, surface=surface, settings=load_profile("recommended", settings))
+    )
     backend = EmbeddedBackend()
     backend.reset(replace(stage.setup, ego=replace(stage.setup.ego, speed=18.0), actors=()), 1)
     start = float(backend.truth().states.yaw[0])
@@ -109,7 +112,9 @@ def test_a_puddle_under_the_left_wheels_pulls_a_coasting_car_to_the_left():
 
 
 def test_a_vehicle_has_tyres_of_its_own():
-    stage = stage_of(structs.replace(SPEC, settings={"tyres": "summer"}))
+    stage = stage_of(
+        structs.replace(SPEC, settings=load_profile("recommended", {"tyres": "summer"}))
+    )
     assert stage.setup.tyres == "summer"
     icy = replace(stage.setup.weather, ice_thickness=30.0, road_temperature_c=-5.0)
     other = replace(stage.setup.actors[0], tyres="studded")

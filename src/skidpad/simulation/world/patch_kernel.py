@@ -136,7 +136,7 @@ def _covers(
     if p.stretch[k, 0] == ANY:
         if p.circle[k, 2] >= 0.0:
             dx, dy = x - p.circle[k, 0], y - p.circle[k, 1]
-            return sqrt(dx * dx + dy * dy) <= p.circle[k, 2]
+            return bool(sqrt(dx * dx + dy * dy) <= p.circle[k, 2])
         return _is_inside(p.corner, p.corner_start[k], p.corner_start[k + 1], x, y)
     if lane < 0 or a.road[lane] != p.stretch[k, 0]:
         return False
@@ -145,7 +145,7 @@ def _covers(
         return False
     if p.stretch[k, 2] != BOTH and (offset > 0.0) != (p.stretch[k, 2] == LEFT):
         return False
-    return p.s[k, 0] <= s_road <= p.s[k, 1]
+    return bool(p.s[k, 0] <= s_road <= p.s[k, 1])
 
 
 @inner_kernel

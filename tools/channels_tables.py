@@ -24,6 +24,12 @@ SLOT = re.compile(r"(<!-- table: (\w+) -->\n).*?(<!-- end -->)", re.DOTALL)
 HAZARDS = ("inconsistent_localisation", "ego_tailgating", "ego_tailgated")
 FEW = 100  # of the effective size
 ON_ICE = "natural (on ice)"
+PRECISION = ROOT / "src" / "skidpad" / "fleet" / "insight" / "precision.yaml"
+TRACKED = {  # names in rules.json of what `tracked` has, the newest first
+    "inconsistent_localisation": ("tracked", "innovation over 1 m, or today's"),
+    "ego_tailgating": ("tracked", "grip from own signals"),
+    "ego_tailgated": ("tracked", "grip from own signals"),
+}
 Rows = list[list[str]]
 
 
@@ -32,12 +38,35 @@ def main(words: list[str] | None = None) -> int:
     words = sys.argv[1:] if words is None else words
     before = PAGE.read_text(encoding="utf-8")
     after = filled(before, RESULTS)
+    known = PRECISION.read_text(encoding="utf-8")
+    measured = with_tracked_precision(known, RESULTS)
     if "--check" in words:
-        return int(before != after)
+        return int(before != after or known != measured)
     PAGE.write_text(after, encoding="utf-8")
+    if measured != known:
+        PRECISION.write_text(measured, encoding="utf-8")
     if (RESULTS / "rules.json").is_file():
         FIGURE.write_text(reference_figure(RESULTS), encoding="utf-8")
     return 0
+
+
+def with_tracked_precision(known: str, results: Path) -> str:
+    """The fleet's table of precisions, its last part `tracked` made of the drives among natural drivers."""
+    told = _rules_of(results)
+    if told is None or "natural" not in told["drives"]:
+        return known
+    rules = told["drives"]["natural"]["rules"]
+    lines = []
+    for hazard, names in TRACKED.items():
+        row = next(rules[name][hazard] for name in names if hazard in rules.get(name, {}))
+        if not row["tp"] + row["fp"]:
+            continue
+        said = f'"true": {row["tp"]}, "false": {row["fp"]}'
+        if row["precision_interval"] is not None:
+            low, high = row["precision_interval"]
+            said += f", low: {low:.3f}, high: {high:.3f}"
+        lines.append(f"  {hazard}: {{{said}}}\n")
+    return known[: known.index("tracked:\n")] + "tracked:\n" + "".join(lines)
 
 
 def filled(page: str, results: Path) -> str:

@@ -1,6 +1,7 @@
 """The three answers of the matrix page, by value: rows in, sentences out."""
 
 import re
+from dataclasses import replace
 
 import pytest
 from test_matrix_report import key
@@ -16,7 +17,7 @@ from skidpad.report.matrix_data import EVENTS, FIRST, WEATHERS, config_list, loa
 from skidpad.report.matrix_figures import collisions, speed_figure
 from skidpad.report.matrix_headline import headline_numbers
 from skidpad.report.matrix_kinds import count, kinds_of
-from skidpad.report.matrix_tables import count_table
+from skidpad.report.matrix_tables import count_table, kinds_table
 
 CLAIMS = [f for f in FINDINGS if not f.study]
 
@@ -229,7 +230,7 @@ def test_the_kinds_of_crashes_add_up_to_all(tmp_path, graded):
     matrix = campaign(tmp_path, clear_cut, 2)
     kinds = kinds_of(graded)
     found = {k.title: n for k in kinds if (n := count(k, matrix.cell("3")))}
-    slow = "contact of 5 to 20 km/h" if graded else "struck from behind"
+    slow = "contact of 5 to 20 km/h" if graded else "struck from behind or touched sideways"
     assert found == {"into a barrier": 24, slow: 4}
     assert sum(count(k, matrix.finished) for k in kinds) == matrix.finished[EVENTS].sum()
 
@@ -247,6 +248,16 @@ def test_a_crash_is_a_serious_contact_or_a_departure_and_no_graze(tmp_path):
     MATRIX.write(tmp_path, [(key("1", "clear-noon", 1), grazed)])
     row = load_matrix(tmp_path).results.row(0, named=True)
     assert (row[EVENTS], row["fatal_collisions"], row[FIRST]) == (1, 3, 9.0)
+
+
+@pytest.mark.parametrize("graded", [True, False])
+def test_rows_that_count_touches_at_the_side_as_struck_from_behind_say_so(tmp_path, graded):
+    run = Metrics(fatal_collisions=3, collisions_vehicle=2, rear_ended=2, distance_km=1.0)
+    row = replace(run, serious_contacts=1) if graded else run
+    MATRIX.write(tmp_path, [(key("1", "clear-noon", 1), row)])
+    titles = [title for title, _ in kinds_table(load_matrix(tmp_path)).columns]
+    assert ("of these struck from behind" in titles) is graded
+    assert ("of these struck from behind or touched sideways" in titles) is not graded
 
 
 def test_results_that_grade_no_contact_say_that_a_crash_is_an_intervention(tmp_path):

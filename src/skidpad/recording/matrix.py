@@ -51,7 +51,10 @@ class Metrics:
     road_departures_first: int | None = metric("of these static, off the road, wrong way", "R-6")
     first_fatal_s: float | None = metric("time to the first fatal one; none: beyond the run", "R-6")
     contacts: int | None = metric("contacts, also those within the cool-down", "A-189")
-    rear_ended: int | None = metric("of the vehicle collisions: struck from behind", "M-8")
+    rear_ended: int | None = metric(
+        "of the vehicle collisions: struck from behind; until the morning of 2026-11-25 also at the side",
+        "M-8",
+    )
     bend_exits: int | None = metric("static or off the road: in a bend without a lead", "M-6")
     stuck_relocations: int | None = metric("relocations of a stuck ego, not fatal", "A-253")
     max_impact_kmh: float | None = metric("largest closing speed at a collision", "A-249")

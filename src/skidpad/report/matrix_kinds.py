@@ -22,10 +22,11 @@ CONTACTS = (
     Kind("contact of 5 to 20 km/h", ("contacts_medium",), (),
          "or slower, with a person or two wheels"),
 )  # fmt: skip
+# Rows without grades are older than 2026-11-25, when a touch at the side still counted as one from behind.
 UNGRADED = (
-    Kind("into or beside a vehicle", ("crashes_vehicle",), ("rear_ended",),
-         "the ego drove into a vehicle, or both touched sideways"),
-    Kind("struck from behind", ("rear_ended",), (), "another vehicle drove into the ego"),
+    Kind("into a vehicle", ("crashes_vehicle",), ("rear_ended",), "the ego drove into a vehicle"),
+    Kind("struck from behind or touched sideways", ("rear_ended",), (),
+         "by another vehicle; rows of this age do not tell the two apart"),
 )  # fmt: skip
 DEPARTURES = (
     Kind("into a barrier", ("collisions_static",), (), "or anything else that stands"),

@@ -55,7 +55,11 @@ MEANS = (
 )  # fmt: skip
 KINDS = (
     ("collisions_vehicle", "vehicles", "recoveries after hitting or being hit by a vehicle"),
-    ("rear_ended", "of these struck from behind", "another vehicle drove into the ego"),
+    (
+        "rear_ended",
+        "of these struck from behind",
+        "another vehicle drove into the ego; until the morning of 2026-11-25 touches at the side counted too",
+    ),
     ("collisions_static", "barriers and posts", "recoveries after hitting anything that stands"),
     ("off_road", "off the road", "left all lanes and was put back"),
     (
@@ -66,6 +70,7 @@ KINDS = (
     ("wrong_way", "wrong-way corrections", ""),
     ("stuck_relocations", "stuck and put back", "no intervention"),
 )
+UNGRADED_TITLES = {"rear_ended": "of these struck from behind or touched sideways"}
 CONTACTS = ("contacts", "contacts", "of the ego, also those within the cool-down of a recovery")
 GRADES = (
     ("contacts_light", "below 5 km/h", "of the contacts with road users, by change of speed"),
@@ -264,7 +269,9 @@ def possible_part(limits: Interval, column: str, least: float) -> Interval:
 
 def kinds_table(matrix: Matrix) -> Table:
     """What put the car back, as counts of each configuration."""
-    return _counts(matrix, KINDS, "What the interventions were: counts, every drive once")
+    titles = {} if matrix.has_grades else UNGRADED_TITLES
+    kinds = [(kind, titles.get(kind, title), words) for kind, title, words in KINDS]
+    return _counts(matrix, kinds, "What the interventions were: counts, every drive once")
 
 
 def grades_table(matrix: Matrix) -> Table:

@@ -8,6 +8,7 @@ from importlib.resources import files
 import msgspec
 
 from skidpad.core.reading import decode_yaml
+from skidpad.core.wording import count_text
 
 
 class Precision(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -29,7 +30,7 @@ class Precision(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         limits = "" if self.low is None or self.high is None else (
             f" [{100.0 * self.low:.0f}, {100.0 * self.high:.0f}]"
         )  # fmt: skip
-        return f"{100.0 * self.share:.0f} %{limits} of {count} alarms"
+        return f"{100.0 * self.share:.0f} %{limits} of {count_text(count, 'alarm')}"
 
 
 def measured_precision(rules: str, hazard: str) -> Precision | None:

@@ -81,7 +81,7 @@ def drive(out: Path, parts: Sequence[Part], workers: int, stop_after: float | No
     """Drive what is missing; returns whether every part has its hours."""
     out.mkdir(parents=True, exist_ok=True)
     file = out / ROWS
-    rows = read_rows(file)
+    rows = read_rows(file, monitor_rules.judging_hash())
     for part in parts:
         _mark_full(out, part, rows)
     tasks = _missing(out, parts, rows, stop_after)
@@ -154,13 +154,14 @@ def _failed_row(task: Task, detail: str) -> Row:
             "code": monitor_rules.judging_hash(), "failed": detail[-500:]}  # fmt: skip
 
 
-def read_rows(file: Path) -> list[Row]:
-    """The rows that today's code made."""
+def read_rows(file: Path, code: str | None = None) -> list[Row]:
+    """The rows that one code made: this one, or that of the newest row."""
     if not file.is_file():
         return []
     lines = file.read_text(encoding="utf-8").splitlines()
     rows = [row for line in lines if (row := _row_from(line)) is not None]
-    return [row for row in rows if row["code"] == monitor_rules.judging_hash()]
+    code = code or (rows[-1]["code"] if rows else "")
+    return [row for row in rows if row["code"] == code]
 
 
 def _row_from(line: str) -> Row | None:
@@ -215,7 +216,7 @@ def summary(parts: Sequence[Part], rows: Sequence[Row]) -> dict[str, Any]:
     failed = [r for p in parts for r in counted_rows(p, rows) if "failed" in r]
     hours = sum(r["hours"] for of in counted.values() for r in of)
     if not hours:
-        raise FileError("no driven segment of the rules has a row of today's code; drive first")
+        raise FileError("no driven segment of the rules has a row; drive first")
 
     def cost(of: str) -> float:
         return float(round(sum(r[of] for rows in counted.values() for r in rows) / hours, 1))

@@ -9,19 +9,17 @@ compares them: they are for looking at. Chromium and the package playwright must
 from __future__ import annotations
 
 import re
+import shutil
 import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from playwright.sync_api import sync_playwright
+from playwright.sync_api import ViewportSize, sync_playwright
 
 from skidpad.cli.fleet_demo import open_recorded
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests"))
-from chromium import CHROMIUM, FLAGS  # noqa: E402  the browser of the tests
-
-WINDOW, PHONE = {"width": 1180, "height": 800}, {"width": 390, "height": 844}
+FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
+WINDOW, PHONE = ViewportSize(width=1180, height=800), ViewportSize(width=390, height=844)
 PAGES = (("work", "/work", WINDOW, False), ("changes", "/changes", WINDOW, False),
          ("dashboard", "/", WINDOW, True), ("phone", "/", PHONE, False))  # fmt: skip
 SETTLE_MS = 3000.0  # until a page has come whole
@@ -34,7 +32,7 @@ def main() -> int:
     with TemporaryDirectory() as folder, open_recorded(Path(folder), 0, said.append) as address:
         link = next(found[0] for line in said if (found := re.search(rf"{address}\S+", line)))
         with sync_playwright() as driver:
-            browser = driver.chromium.launch(executable_path=CHROMIUM, args=FLAGS)
+            browser = driver.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
             context = browser.new_context(viewport=WINDOW)
             page = context.new_page()
             page.goto(link)

@@ -38,9 +38,7 @@ def farthest(air: LidarAir) -> float:
     """Distance in m to which a surface of 0.5 is the strongest return."""
     distance = np.arange(1.0, REACH, 0.1)
     model = lidar_returns.ReturnModel(air._replace(drops=Drops()), REACH)
-    found = model.measure(
-        distance, np.full(len(distance), int(SemanticClass.CAR)), np.random.default_rng(0)
-    )
+    found = model.measure(distance, np.full(len(distance), int(SemanticClass.CAR)), 0)
     return float(distance[np.isfinite(found.distance) & ~found.false].max())
 
 
@@ -63,7 +61,7 @@ def false_share(air: LidarAir, distance: float) -> float:
     """Percent of beams on ground at this distance, inf: none, that return a drop."""
     label = np.full(BEAMS, int(SemanticClass.ROAD))
     model = lidar_returns.ReturnModel(air, REACH)
-    found = model.measure(np.full(BEAMS, distance), label, np.random.default_rng(1))
+    found = model.measure(np.full(BEAMS, distance), label, 1)
     return 100.0 * float(found.false.mean())
 
 

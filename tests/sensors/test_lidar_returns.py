@@ -38,9 +38,7 @@ SPEC = LidarSpec("l", Pose(0.0, 0.0, 2.4), channels=16, range=120.0, rotation_hz
 
 
 def beams(model, n, distance, label=CAR, seed=1):
-    return model.measure(
-        np.full(n, float(distance)), np.full(n, label), np.random.default_rng(seed)
-    )
+    return model.measure(np.full(n, float(distance)), np.full(n, label), seed)
 
 
 def lost(model, distance, label=CAR, n=400):
@@ -50,9 +48,7 @@ def lost(model, distance, label=CAR, n=400):
 def farthest(sight):
     """Distance in m to which a car is met in fog by a lidar of 120 m."""
     distance = np.arange(2.0, 120.0, 0.5)
-    found = ReturnModel(fog(sight), 120.0).measure(
-        distance, np.full(len(distance), CAR), np.random.default_rng(1)
-    )
+    found = ReturnModel(fog(sight), 120.0).measure(distance, np.full(len(distance), CAR), 1)
     return float(distance[np.isfinite(found.distance) & ~found.false].max())
 
 

@@ -11,22 +11,25 @@ from __future__ import annotations
 from math import pi
 
 import numpy as np
+from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import LidarPoints
 from skidpad.core.geometry import Pose
+from skidpad.core.jit import kernel
 from skidpad.core.specs import LidarSpec
 from skidpad.sensors.around import (
     SECTORS,
     STEEPEST_DEG,
     Fan,
     Seen,
-    directions,
     look_around,
     sectors_of,
 )
-from skidpad.sensors.lidar_returns import ReturnModel
+from skidpad.sensors.lidar_returns import BeamAir, ReturnModel, find_returns
 from skidpad.sensors.live_scene import LiveScene
+
+Floats = NDArray[np.float64]
 
 
 class Lidar:
@@ -79,20 +82,42 @@ class Lidar:
     def _through_weather(self, model: ReturnModel, fan: Fan, seen: Seen, tick: int) -> LidarPoints:
         """What is noticed of the beams of a tick; false returns have class 0 and no actor."""
         n = len(fan.column)
-        distance, label = np.full(n, np.inf), np.zeros(n, dtype=np.int64)
-        cosine, instance = np.zeros(n), np.zeros(n, dtype=np.int64)
-        for column, values in (
-            (distance, seen.distance), (label, seen.label), (cosine, seen.cosine),
-            (instance, seen.instance),
-        ):  # fmt: skip
-            column[seen.ray] = values
-        found = model.measure(distance, label, np.random.default_rng([self._key, tick]))
-        label[found.false] = cosine[found.false] = instance[found.false] = 0
-        ray = np.flatnonzero(np.isfinite(found.distance))
-        return LidarPoints(
-            (directions(fan, ray) * found.distance[ray][:, None]).astype(np.float32),
-            np.minimum(found.intensity[ray], 1.0).astype(np.float32),
-            cosine[ray].astype(np.float32),
-            label[ray].astype(np.uint8),
-            instance[ray].astype(np.uint16),
-        )
+        out = LidarPoints(
+            np.empty((n, 3), np.float32), np.empty(n, np.float32), np.empty(n, np.float32),
+            np.empty(n, np.uint8), np.empty(n, np.uint16),
+        )  # fmt: skip
+        aside = np.column_stack([np.cos(fan.azimuth), np.sin(fan.azimuth)])
+        up = np.column_stack([np.cos(fan.elevation), np.sin(fan.elevation)])
+        m = scan_weather(model.air, fan, seen, aside, up, np.uint64(self._key), tick, out)
+        return LidarPoints(*(column[:m] for column in out))
+
+
+@kernel
+def scan_weather(
+    air: BeamAir, fan: Fan, seen: Seen, aside: Floats, up: Floats, key: np.uint64, tick: int,
+    out: LidarPoints,
+) -> int:  # fmt: skip
+    """All beams of a tick into `out`, without those that nothing came back of; their number.
+
+    aside, up: cosine and sine of the fan's azimuths and elevations.
+    """
+    distance, label = np.full(fan.column.size, np.inf), np.zeros(fan.column.size, np.int64)
+    for k in range(seen.ray.size):
+        distance[seen.ray[k]], label[seen.ray[k]] = seen.distance[k], seen.label[k]
+    found, m, k = find_returns(air, distance, label, key, tick), 0, 0
+    for i in range(distance.size):
+        met = distance[i] < np.inf
+        far = found.distance[i]
+        if far < np.inf:
+            column, channel = fan.column[i], fan.channel[i]
+            out.xyz[m, 0] = aside[column, 0] * up[channel, 0] * far
+            out.xyz[m, 1] = aside[column, 1] * up[channel, 0] * far
+            out.xyz[m, 2] = up[channel, 1] * far
+            out.intensity[m] = min(found.intensity[i], 1.0)
+            real = not found.false[i]
+            out.cosine[m] = seen.cosine[k] if real else 0.0
+            out.label[m] = label[i] if real else 0
+            out.instance[m] = seen.instance[k] if real else 0
+            m += 1
+        k += met
+    return m

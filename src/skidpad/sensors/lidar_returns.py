@@ -16,11 +16,15 @@ Valid where drops in a beam are met one by one: 0.5 to 100 mm/h, fog down to 20 
 
 from __future__ import annotations
 
+from math import exp, inf, log1p, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import beta, norm
 
+from skidpad.core.jit import inner_kernel, kernel
+from skidpad.core.splitmix import GOLDEN, scrambled, unit
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.droplets import SMALLEST_MM, Drops
 from skidpad.physics.optics import LidarAir
@@ -51,12 +55,90 @@ GROUND = (
 ON_GROUND, SIGN, OTHER = 0.1, 1.0, 0.5
 
 
+class BeamAir(NamedTuple):
+    """The air of one lidar in one weather, as kernels read it."""
+
+    fog: float  # 1/m
+    fog_start: float  # m
+    falling: float  # 1/m
+    least: float  # power below which nothing is noticed
+    fog_distance: float  # m, and power of fog's answer
+    fog_power: float
+    reflects: Floats  # (256,) by label
+    spread: Floats  # (T,) m, quantiles of the noise of fog's distance
+    normal: Floats  # (T,) of the standard normal distribution
+    drop_share: float  # share of beams with a drop that is noticed
+    mean: Floats  # (P,) number of drops in a beam that are stronger than each power, falling
+    log_power: Floats  # (P,)
+    places: Floats  # (P, R) distribution of the distance of a drop of such power
+    r: Floats  # (R,) m
+
+
 class Returns(NamedTuple):
     """What n beams brought back."""
 
     distance: Floats  # m; inf: nothing was noticed
     intensity: Floats  # what a surface there would have as reflectivity, times the air's loss
     false: NDArray[np.bool_]  # a drop or fog, no surface
+
+
+@inner_kernel
+def _strongest_drop(m: BeamAir, chance: float, second: float) -> tuple[float, float]:
+    """Power and distance of a beam's strongest drop, of a number below `drop_share` and another one.
+
+    The mean number of drops stronger than the strongest is exponential: -log(1 - chance).
+    """
+    number = -log1p(-chance)
+    low, high = 0, m.mean.size - 1  # mean[low] > number >= mean[high]
+    while high - low > 1:
+        middle = (low + high) // 2
+        if m.mean[middle] > number:
+            low = middle
+        else:
+            high = middle
+    part = (m.mean[low] - number) / max(m.mean[low] - m.mean[high], 1e-300)
+    power = exp(m.log_power[low] + min(part, 1.0) * (m.log_power[high] - m.log_power[low]))
+    row = m.places[low]
+    at = min(int(np.searchsorted(row, second)), m.r.size - 1)
+    return power, m.r[at]
+
+
+@kernel
+def find_returns(
+    m: BeamAir, distance: Floats, label: NDArray[np.int64], key: np.uint64, tick: int
+) -> Returns:
+    """What beams bring back; distance: of the surface in the way, inf: none.
+
+    One loop: a call per beam that is handed the air's arrays would cost more than all the rest.
+    """
+    n = distance.size
+    out, strengths, false = np.empty(n), np.empty(n), np.zeros(n, np.bool_)
+    start = scrambled(key + np.uint64(tick) * GOLDEN)  # random bits of a lidar in one tick
+    for i in range(n):
+        bits = scrambled(start + np.uint64(i) * np.uint64(4) * GOLDEN)  # of a beam; steps of GOLDEN
+        power, intensity, found = 0.0, 0.0, distance[i]
+        if found < inf:
+            depth = m.fog * max(found - m.fog_start, 0.0) + m.falling * found
+            intensity = m.reflects[label[i]] * exp(-2.0 * depth)
+            power = intensity / (found * found)
+        chance = unit(scrambled(bits))
+        if chance < m.drop_share:
+            strength, where = _strongest_drop(m, chance, unit(scrambled(bits + GOLDEN)))
+            if strength > power and where < distance[i]:
+                power, found, false[i] = strength, where, True
+                intensity = strength * where * where
+        if m.fog_power >= m.least and m.fog_power > power and distance[i] > m.fog_distance:
+            at = int(unit(scrambled(bits + np.uint64(2) * GOLDEN)) * m.spread.size)
+            power, false[i] = m.fog_power, True
+            found = min(m.fog_distance + m.spread[at], distance[i])
+            intensity = power * found * found
+        if power < m.least:
+            found, intensity, false[i] = inf, 0.0, False
+        elif not false[i]:
+            at = int(unit(scrambled(bits + np.uint64(3) * GOLDEN)) * m.normal.size)
+            found += ACCURACY * sqrt(0.5 * m.least / power) * m.normal[at]
+        out[i], strengths[i] = found, intensity
+    return Returns(out, strengths, false)
 
 
 def reflectivities() -> Floats:
@@ -72,45 +154,21 @@ class ReturnModel:
 
     def __init__(self, air: LidarAir, reach: float) -> None:
         """reach: m at which a white surface is just noticed in clear air."""
-        self.air, self.least = air, WHITE / reach**2
-        self._fog_distance, self._fog_power = fog_response(air, reach)
-        self._drops = DropReturns(air, self.least)
-        self._reflects = reflectivities()
-
-    def optical_depth(self, distance: Floats) -> Floats:
-        """Return the nepers of one way through the air."""
-        through = np.maximum(distance - self.air.fog_start, 0.0)
-        return self.air.fog * through + self.air.falling * distance
+        self.least = WHITE / reach**2
+        fog_distance, fog_power = fog_response(air, reach)
+        drops, quantiles = DropReturns(air, self.least), (np.arange(1024) + 0.5) / 1024
+        self.air = BeamAir(
+            air.fog, air.fog_start, air.falling, self.least, fog_distance, fog_power,
+            reflectivities(), FOG_SPREAD * beta.ppf(quantiles, *FOG_SHAPE), norm.ppf(quantiles),
+            float(-np.expm1(-drops.mean[0])), drops.mean, np.log(drops.powers), drops.places,
+            drops.r,
+        )  # fmt: skip
 
     def measure(
-        self, distance: Floats, label: NDArray[np.int64], rng: np.random.Generator
+        self, distance: Floats, label: NDArray[np.int64], key: int, tick: int = 0
     ) -> Returns:
         """What beams bring back whose surfaces are so far; inf: they meet none."""
-        n, meets = len(distance), np.isfinite(distance)
-        there = np.where(meets, distance, 1.0)
-        intensity = self._reflects[label] * np.exp(-2.0 * self.optical_depth(there))
-        power = np.where(meets, intensity / (there * there), 0.0)
-        found, false = np.where(meets, distance, np.inf), np.zeros(n, dtype=np.bool_)
-        for at, strength, where in (self._fog(distance, rng), self._drops.draw(distance, rng)):
-            wins = strength > power[at]
-            at, strength, where = at[wins], strength[wins], where[wins]
-            power[at], found[at], false[at] = strength, where, True
-            intensity[at] = strength * where * where
-        found[power < self.least] = np.inf
-        kept = np.flatnonzero(np.isfinite(found) & ~false)
-        noise = ACCURACY * np.sqrt(0.5 * self.least / power[kept])
-        found[kept] += noise * rng.standard_normal(len(kept))
-        return Returns(found, intensity, false)
-
-    def _fog(
-        self, distance: Floats, rng: np.random.Generator
-    ) -> tuple[NDArray[np.intp], Floats, Floats]:
-        """Beams that fog answers: which, how strongly, from where."""
-        if self._fog_power < self.least:
-            return np.zeros(0, dtype=np.intp), np.zeros(0), np.zeros(0)
-        at = np.flatnonzero(distance > self._fog_distance)
-        where = self._fog_distance + FOG_SPREAD * rng.beta(*FOG_SHAPE, len(at))
-        return at, np.full(len(at), self._fog_power), np.minimum(where, distance[at])
+        return find_returns(self.air, distance, label, np.uint64(key), tick)
 
 
 def fog_response(air: LidarAir, reach: float) -> tuple[float, float]:
@@ -160,18 +218,3 @@ class DropReturns:
         diameter = self._diameter_for(power)
         density = self.r**2 * diameter * np.exp(-drops.slope * diameter)
         return np.where((power < self.most) & (diameter > SMALLEST_MM), density, 0.0)
-
-    def draw(
-        self, distance: Floats, rng: np.random.Generator
-    ) -> tuple[NDArray[np.intp], Floats, Floats]:
-        """Beams with a drop that is noticed, nearer than their surface: which, its power, its distance."""
-        first = rng.standard_exponential(
-            len(distance)
-        )  # mean of the drops stronger than the strongest
-        at = np.flatnonzero(first < self.mean[0])
-        power = np.exp(np.interp(first[at], self.mean[::-1], np.log(self.powers[::-1])))
-        row = np.searchsorted(self.powers, power, side="right") - 1
-        column = (self.places[row] < rng.random(len(at))[:, None]).sum(axis=1)
-        where = self.r[np.minimum(column, len(self.r) - 1)]
-        near = where < distance[at]
-        return at[near], power[near], where[near]

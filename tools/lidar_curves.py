@@ -26,7 +26,8 @@ from skidpad.physics.optics import CONTRAST_SEEN, LidarAir, rain_extinction
 from skidpad.sensors import lidar_returns
 from skidpad.sensors.lidar_returns import DIVERGENCE, NEAREST, ON_GROUND, OTHER, WHITE
 
-REACH, DISTANCE, BEAMS = 100.0, 30.0, 40_000
+REACH, DISTANCE = 100.0, 30.0
+BEAMS, OURS = 40_000, 1_000_000  # drawn by LISA, and here
 FIELDS = (
     "kind", "amount", "unit", "extinction_here_per_km", "extinction_spectrum_per_km",
     "range_of_0.5_here_m", "range_of_0.5_lisa_m", "range_of_0.5_hahner_m",
@@ -59,9 +60,9 @@ def hahner_range(sight: float) -> float:
 
 def false_share(air: LidarAir, distance: float) -> float:
     """Percent of beams on ground at this distance, inf: none, that return a drop."""
-    label = np.full(BEAMS, int(SemanticClass.ROAD))
+    label = np.full(OURS, int(SemanticClass.ROAD))
     model = lidar_returns.ReturnModel(air, REACH)
-    found = model.measure(np.full(BEAMS, distance), label, 1)
+    found = model.measure(np.full(OURS, distance), label, 1)
     return 100.0 * float(found.false.mean())
 
 

@@ -89,7 +89,7 @@ class Lidar:
         aside = np.column_stack([np.cos(fan.azimuth), np.sin(fan.azimuth)])
         up = np.column_stack([np.cos(fan.elevation), np.sin(fan.elevation)])
         m = scan_weather(model.air, fan, seen, aside, up, np.uint64(self._key), tick, out)
-        return LidarPoints(*(column[:m] for column in out))
+        return LidarPoints._make(column[:m] for column in out)
 
 
 @kernel

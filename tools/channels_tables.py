@@ -47,7 +47,25 @@ def main(words: list[str] | None = None) -> int:
         PRECISION.write_text(measured, encoding="utf-8")
     if (RESULTS / "rules.json").is_file():
         FIGURE.write_text(reference_figure(RESULTS), encoding="utf-8")
+    for name, svg in ways_by_file(RESULTS).items():
+        (RESULTS / name).write_text(svg, encoding="utf-8")
     return 0
+
+
+def ways_by_file(results: Path) -> dict[str, str]:
+    """The figures of the ways driven, by the name of their file; none where no way is known."""
+    from skidpad.report.channels_ways import ways_figures
+
+    if not (results / "ways.json").is_file():
+        return {}
+    drawn = ways_figures(_read(results, "ways"), results)
+    return {f"ways-{k + 1}.svg": svg for k, svg in enumerate(drawn)}
+
+
+def ways(results: Path) -> str:
+    """The same figures on the page."""
+    shown = [f"![Ways driven, by map](results/channels/{name})\n" for name in ways_by_file(results)]
+    return "".join(shown) or "No ways were kept of these drives.\n"
 
 
 def with_tracked_precision(known: str, results: Path) -> str:
@@ -301,7 +319,7 @@ def _false_rate(row: dict[str, Any]) -> str:
 
 TABLES: dict[str, Callable[[Path], str]] = {
     "driven": driven, "scores": scores, "missed": missed, "ice": ice, "curves": curves,
-    "redundancy": redundancy, "rules": rules, "reference": reference, "rarity": rarity,
+    "redundancy": redundancy, "rules": rules, "reference": reference, "rarity": rarity, "ways": ways,
 }  # fmt: skip
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from skidpad.core.channels import Decision
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import LightState
-from skidpad.recording.channel_drives import DriveOutcome, Ending
+from skidpad.recording.channel_drives import WAY_STEP, DriveOutcome, Ending
 from skidpad.roads.lanes import SignalKind
 from skidpad.stack.channels.route import SEARCH, STEP, RoutePath, locate
 from skidpad.stack.channels.settings import CarModel
@@ -35,6 +35,7 @@ class Referee:
         self.distance = self.stood = self.minimal_risk = 0.0
         self.driving: dict[str, float] = {}
         self.hits: list[bool] = []
+        self.way: list[tuple[float, float]] = []
         self._last: dict[tuple[int, str], float] = {}
         self._place: tuple[float, float] | None = None
         self._driver: str | None = None
@@ -47,6 +48,8 @@ class Referee:
         if self._place is not None:
             self.distance += hypot(x - self._place[0], y - self._place[1])
         self._place = (x, y)
+        if not self.way or hypot(x - self.way[-1][0], y - self.way[-1][1]) >= WAY_STEP:
+            self.way.append((round(x, 1), round(y, 1)))
         self.cycles += 1
         if self._driver is not None and decision.driving != self._driver:
             self.switches += 1
@@ -119,6 +122,7 @@ class Referee:
             switches=self.switches,
             minimal_risk_s=self.minimal_risk,
             driving_s=dict(sorted(self.driving.items())),
+            way=tuple(self.way),
         )
 
 

@@ -14,6 +14,8 @@ from skidpad.core.reading import UNUSABLE
 from skidpad.recording.ledger import Entry
 from skidpad.recording.results import Columns
 
+WAY_STEP = 10.0  # m
+
 
 class Ending(str, Enum):
     """Why the drive of a segment ended."""
@@ -65,6 +67,7 @@ class DriveOutcome(DriveMetrics):
     driving_s: dict[str, float]
     content_hash: str = ""
     cpu_s: float = 0.0  # outside every hash
+    way: tuple[tuple[float, float], ...] = ()  # m, places of the ego WAY_STEP apart
 
 
 DRIVES = Columns(DriveKey, DriveMetrics, ("route", "seed", "drive_by"))
@@ -86,7 +89,12 @@ def read_record(path: Path) -> DriveRecord | None:
         return None
 
 
-def read_outcomes(folders: Iterable[Path]) -> list[DriveOutcome]:
+def read_records(folders: Iterable[Path]) -> list[DriveRecord]:
     """All finished segments below the folders, in order of their paths."""
     found = (read_record(p) for folder in folders for p in sorted(folder.rglob("*.json")))
-    return [record.outcome for record in found if record is not None]
+    return [record for record in found if record is not None]
+
+
+def read_outcomes(folders: Iterable[Path]) -> list[DriveOutcome]:
+    """What became of them."""
+    return [record.outcome for record in read_records(folders)]

@@ -23,7 +23,7 @@ COUNTS = {"tracked": {"ego_tailgated": [1, 0, 1, 1.0, 2.0, 2.0]}}
 def row(number, hours=0.25, part="natural", **more):
     return {
         "part": part, "number": number, "hours": hours, "code": monitor_rules.judging_hash(),
-        "counts": COUNTS, "map": "town", "way": [[0.0, 0.4], [9.6, 0.0]], "cpu_drive_s": 20.0,
+        "counts": COUNTS, "map": "town", "way": [[0.0, 0.4], [5.0, 0.0], [9.6, 0.0]], "cpu_drive_s": 20.0,
         "cpu_judge_s": 5.0,
     } | more  # fmt: skip
 

@@ -14,7 +14,7 @@ import channels_tables as tables
 from skidpad.campaign.channel_outcomes import Referee
 from skidpad.core.channels import Decision
 from skidpad.recording.channel_drives import WAY_STEP, DriveOutcome, DriveRecord, read_records
-from skidpad.report.channels_ways import lane_lines, ways_driven
+from skidpad.report.channels_ways import draw_ways, lane_lines
 from skidpad.report.figures import PALETTE
 from skidpad.roads.bundled import load_map
 
@@ -41,7 +41,7 @@ def write(folder, ways):
 
 def test_a_page_draws_the_ways_on_their_maps(tmp_path):
     write(tmp_path, WAYS)
-    (figure,) = ways_driven(tmp_path)
+    (figure,) = draw_ways(tmp_path)
     assert (
         figure.caption == "Where the ego drove. figure8: 1 drive, 4 km, unheard-of: 1 drive, 4 km."
     )
@@ -53,7 +53,7 @@ def test_a_page_draws_the_ways_on_their_maps(tmp_path):
 
 def test_drives_that_kept_no_places_say_so(tmp_path):
     write(tmp_path, {"figure8": [()]})
-    (text,) = ways_driven(tmp_path)
+    (text,) = draw_ways(tmp_path)
     assert text.text.startswith("Not shown")
     assert read_records([tmp_path])[0].outcome.way == ()
 

@@ -96,5 +96,5 @@ def read_records(folders: Iterable[Path]) -> list[DriveRecord]:
 
 
 def read_outcomes(folders: Iterable[Path]) -> list[DriveOutcome]:
-    """What became of them."""
+    """The outcomes of all finished segments below the folders, in order of their paths."""
     return [record.outcome for record in read_records(folders)]

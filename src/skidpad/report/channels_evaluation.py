@@ -20,7 +20,7 @@ from skidpad.report.channels_redundancy import redundancy
 from skidpad.report.channels_routes import route_blocks
 from skidpad.report.channels_scores import FEW, HAZARDS, TRUTHS, Row, headline, ratio_text, short
 from skidpad.report.channels_strata import headline_of_risky, precision_recall, strata
-from skidpad.report.channels_ways import ways_driven
+from skidpad.report.channels_ways import draw_ways
 from skidpad.report.figures import Chart, Curve, curves
 from skidpad.report.page import (
     Answer,
@@ -112,7 +112,7 @@ def evaluation_page(evaluation: Row, folder: Path) -> Page:
             Section("One threshold, both errors", _curve(evaluation)),
             Section("Does redundancy pay", redundancy(folder)),
             Section("How the two truths differ", [scores.agreement(evaluation)]),
-            Section("Ways driven", ways_driven(folder)),
+            Section("Ways driven", draw_ways(folder)),
             Section("Segments", [scores.segments(evaluation)]),
         ],
     )

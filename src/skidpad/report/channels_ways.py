@@ -26,7 +26,7 @@ LANES = {"color": "#c5cdd5", "linewidth": 0.6}
 DRIVEN = {"linewidth": 1.0, "alpha": 0.6}
 
 
-def ways_driven(folder: Path) -> list[Block]:
+def draw_ways(folder: Path) -> list[Block]:
     """A figure of each map with the ways of all drives below the folder."""
     ways: dict[str, list[Way]] = {}
     km: dict[str, float] = {}
@@ -55,11 +55,11 @@ def ways_figures(ways: Mapping[str, Sequence[Way]], folder: Path) -> list[str]:
 
 
 def _chart(name: str, ways: Sequence[Way], folder: Path) -> Chart:
-    x, y = _joined(np.array(way, dtype=np.float64).reshape(-1, 2) for way in ways)
+    x, y = _join_lines(np.array(way, dtype=np.float64).reshape(-1, 2) for way in ways)
     drawn = [Curve("driven", x, y, colour=0, style=DRIVEN)]
     map = _known_map(name, folder)
     if map is not None:
-        drawn.insert(0, Curve("lanes", *_joined(lane_lines(map)), style=LANES))
+        drawn.insert(0, Curve("lanes", *_join_lines(lane_lines(map)), style=LANES))
     return Chart(drawn, "x, m", "y, m", name, equal=True)
 
 
@@ -71,7 +71,7 @@ def lane_lines(map: RoadMap) -> Iterable[Floats]:
         yield np.column_stack([map.samples.x[rows], map.samples.y[rows]])
 
 
-def _joined(lines: Iterable[Floats]) -> tuple[Floats, Floats]:
+def _join_lines(lines: Iterable[Floats]) -> tuple[Floats, Floats]:
     """Lines as one, with a gap between them."""
     gap = np.full((1, 2), np.nan)
     whole = np.concatenate([part for line in lines for part in (line, gap)] or [gap])

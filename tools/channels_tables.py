@@ -26,9 +26,9 @@ FEW = 100  # of the effective size
 ON_ICE = "natural (on ice)"
 PRECISION = ROOT / "src" / "skidpad" / "fleet" / "insight" / "precision.yaml"
 TRACKED = {  # names in rules.json of what `tracked` has, the newest first
-    "inconsistent_localisation": ("tracked", "innovation over 1 m, or today's"),
-    "ego_tailgating": ("tracked", "grip from own signals"),
-    "ego_tailgated": ("tracked", "grip from own signals"),
+    "inconsistent_localisation": ("tracked",),
+    "ego_tailgating": ("tracked",),
+    "ego_tailgated": ("tracked",),
 }
 Rows = list[list[str]]
 

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 
 import monitor_variants
 from monitor_variants import (
-    MAJORITIES,
     OFF_CENTRE,
     Fused,
     Integrated,
@@ -58,6 +57,8 @@ from skidpad.roads.queries import RoadMap
 
 LOCALISATION = HazardType.INCONSISTENT_LOCALISATION
 BEFORE, TRACKED, REFERENCE = "before: a dry road, vote", "tracked", "reference "
+EACH_CYCLE = "own grip, each cycle by itself"
+LONG = 2.0  # s of cycles whose majority decides; `tracked` takes 1 s
 PLACES = ("innovation", "chi-square", "map-matched")  # begins of names of rules for positions alone
 LIMITS = {LOCALISATION: FACTORS} | dict.fromkeys(TAILS, SPARES)
 LEAP = 1.0  # m, of `tracked`
@@ -73,24 +74,25 @@ def found_gaps(
 ) -> Iterator[tuple[str, list[Span]]]:
     """What each rule finds of both tailgating hazards."""
     rules = {
-        BEFORE: Tracked(channels, SafeDistance()),
+        BEFORE: Tracked(channels, SafeDistance(), smoothing=0.0),
         TRACKED: Tracked(channels),
-        "own grip, fusion": Fused(channels),
+        EACH_CYCLE: Tracked(channels, smoothing=0.0),
+        "own grip, fusion": Fused(channels, smoothing=0.0),
         "own grip, integrated probability": Integrated(channels),
-        "own grip, smoothed, 0.5 s late": Smoothed(channels),
+        "own grip, smoothed tracks": Smoothed(channels, smoothing=0.0),
         "own grip, integrated, hysteresis": Patient(channels),
         "own grip, fusion, integrated, hysteresis": Steady(channels),
-        "told the grip": Tracked(channels, SafeDistance.on(grip)),
+        "told the grip": Tracked(channels, SafeDistance.on(grip), smoothing=0.0),
     }
     t = np.array([cycle.t for cycle in looked])
     for name, rule in rules.items():
         rows = [rule.distances(*cycle) for cycle in looked]
         short = {h: np.array([float(row[s] > 0.0) for row in rows]) for h, s in SIDES.items()}
         yield name, [s for h, p in short.items() for s in spans(h, t, p, 0.5, 1, begin)]
-        for length in MAJORITIES if name == TRACKED else ():
-            most = {h: majority(p, length) for h, p in short.items()}
+        if name == EACH_CYCLE:
+            most = {h: majority(p, LONG) for h, p in short.items()}
             found = [s for h, p in most.items() for s in spans(h, t, p, 0.5, 1, begin)]
-            yield f"own grip, majority of {length:g} s", found
+            yield f"own grip, smoothed over {LONG:g} s", found
 
 
 def found_places(

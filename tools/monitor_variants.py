@@ -29,7 +29,6 @@ Floats = NDArray[np.float64]
 Variances = tuple[float, float, float]  # of gap and speed, and their covariance
 SURE_OF_MEAN = 0.95  # of a probability over the last half second
 LAG = 0.5  # s by which smoothed tracks are late
-MAJORITIES = (1.0, 2.0)  # s of cycles whose majority decides
 OFF_CENTRE, MEAN_S = 0.8, 0.5  # m from the lane's centre by which the map doubts a position; s
 OFF_ROAD = 5.0  # m, of a place that no lane is near
 SIGMA_A = 2.0  # m/s^2, motion noise as of the tracks themselves

@@ -16,20 +16,34 @@ from skidpad.evidence.channels.tracked.grip import OwnGrip
 from skidpad.evidence.channels.tracked.odometer import Odometer, greatest_leap
 from skidpad.evidence.channels.tracked.tracks import CONFIRM, SURE, Lookout, Seen, Track, Tracks
 
+SIDES = (Signal.FRONT_DEFICIT, Signal.REAR_DEFICIT)
+CYCLE = 0.1  # s (C-022)
 SAME = 4.0  # m between two channels' reports of one object
 SIGMA_PLACE = 0.27  # m per axis: 0.10 m of jitter and 0.25 m of drift, as docs/channels.md states
 UNLIKELY = 1e-6  # share of cycles with right positions that may look wrong (assumption)
 CHI2_LIMIT = -2.0 * log(UNLIKELY)  # of two degrees of freedom: 27.6
 PLAN_STEP = 0.5  # s
+SMOOTHING = (
+    1.0  # s over which a short gap is the median of its cycles, so that it comes half as late
+)
 
 
 class Tracked:
     """Call `update` once per cycle with usable frames; None: the channel is silent."""
 
     def __init__(
-        self, channels: Sequence[str], safe: SafeDistance | None = None, sure: float = SURE
+        self,
+        channels: Sequence[str],
+        safe: SafeDistance | None = None,
+        sure: float = SURE,
+        smoothing: float = SMOOTHING,
     ) -> None:
-        """safe: None: on the grip that the vehicle itself shows, on a dry road until it does."""
+        """safe: None: on the grip that the vehicle itself shows, on a dry road until it does.
+
+        smoothing: s of cycles of which a short gap is the median; 0: each cycle by itself.
+        """
+        self.smoothing = smoothing
+        self.recent: dict[Signal, deque[tuple[float, float]]] = {side: deque() for side in SIDES}
         self.lookouts = [Lookout() for _ in channels]
         self.tracks = [Tracks(safe or SafeDistance(), sure) for _ in channels]
         self.own_grip = OwnGrip() if safe is None else None
@@ -78,7 +92,20 @@ class Tracked:
                     track.alone = t
                 elif t - track.alone >= CONFIRM - 1e-6:
                     out[Signal.UNSEEN_DEFICIT] = max(out[Signal.UNSEEN_DEFICIT], track.deficit)
-        return out
+        return out | {side: self._smooth(side, t, out[side]) for side in SIDES}
+
+    def _smooth(self, side: Signal, t: float, deficit: float) -> float:
+        """The median of a deficit over the last cycles; before there are enough, missing ones are 0."""
+        if not self.smoothing:
+            return deficit
+        window = self.recent[side]
+        window.append((t, deficit))
+        while t - window[0][0] > self.smoothing + 1e-6:
+            window.popleft()
+        values = sorted(value for _, value in window)
+        short = max(round(self.smoothing / CYCLE) + 1 - len(values), 0)  # cycles that are missing
+        middle = (len(values) + short) // 2 - short
+        return values[middle] if middle >= 0 else 0.0
 
     def _same(self, channel: int, track: Track) -> Track | None:
         """The same object as another channel has it."""

@@ -190,7 +190,7 @@ class DropReturns:
 
     def __init__(self, air: LidarAir, least: float) -> None:
         """least: power below which nothing is noticed."""
-        self.r = np.arange(NEAREST, FARTHEST_DROP, 0.05)
+        self.r = np.arange(NEAREST + 0.025, FARTHEST_DROP, 0.05)  # middles of steps
         depth = air.fog * np.maximum(self.r - air.fog_start, 0.0) + air.falling * self.r
         self.most = (
             air.drops.reflectivity * np.exp(-2.0 * depth) / self.r**2

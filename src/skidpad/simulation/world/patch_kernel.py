@@ -18,7 +18,6 @@ Ints = NDArray[np.int64]
 NO_PATCH = -1.0  # stiffness and film where no patch says them
 ANY = 2**40  # a lane id that means all lanes, a road id that means none
 BOTH, LEFT, RIGHT = range(3)  # halves of a lane
-Effect = tuple[float, float, float]  # share of friction, stiffness, film in m
 
 
 class PatchArrays(NamedTuple):
@@ -49,71 +48,80 @@ def fill_patches(
     map: Held[LaneArrays], patches: Held[PatchArrays], wheels: WheelPlaces, states: ActorStates,
     share: Floats, stiffness: Floats, film: Floats,
 ) -> None:  # fmt: skip
-    """Set what patches do to all wheels, (w, 4) at FL, FR, RL, RR; 1 and NO_PATCH where none is."""
-    p = patches.value
+    """Set what patches do to all wheels, (w, 4) at FL, FR, RL, RR; 1 and NO_PATCH where none is.
+
+    The slippery one of the patches at a wheel counts; the lane's material multiplies its share. One
+    body: inner kernels that are handed so many arrays for every wheel and patch would cost most.
+    """
+    a, p = map.value, patches.value
+    everywhere = len(p.material) > 0
     for i in range(len(wheels.kind)):
         for k in range(4):
             share[i, k], stiffness[i, k], film[i, k] = 1.0, NO_PATCH, NO_PATCH
-        if not (states.present[i] and _is_near(p, states.x[i], states.y[i])):
+        near = everywhere
+        for n in range(len(p.ratio)):
+            near = near or _is_in(p.bounds[n], states.x[i], states.y[i])
+        if not (near and states.present[i]):
             continue
         c, s = cos(states.yaw[i]), sin(states.yaw[i])
         v = sqrt(states.vx[i] * states.vx[i] + states.vy[i] * states.vy[i])
+        kind, z = wheels.kind[i], states.z[i]
         for k in range(4):
             forward, left = wheels.place[i, k, 0], wheels.place[i, k, 1]
             x = states.x[i] + forward * c - left * s
             y = states.y[i] + forward * s + left * c
-            found = _effect(map.value, p, x, y, states.z[i], v, wheels.kind[i])
-            share[i, k], stiffness[i, k], film[i, k] = found
-
-
-@kernel
-def find_effect(
-    map: Held[LaneArrays], patches: Held[PatchArrays], x: float, y: float, z: float, v: float,
-    kind: int,
-) -> Effect:  # fmt: skip
-    """What a wheel with this kind of tyre meets at a point at a speed in m/s."""
-    return _effect(map.value, patches.value, x, y, z, v, kind)
+            lane, offset, s_road, placed, found = -1, 0.0, 0.0, False, False
+            for n in range(len(p.ratio)):
+                if not _is_in(p.bounds[n], x, y):
+                    continue
+                road = p.stretch[n, 0]
+                if road != ANY:
+                    if not placed:
+                        lane, offset, s_road = _place(a, x, y, z)
+                        placed = True
+                    covers = lane >= 0 and _is_on_stretch(
+                        road, p.stretch[n, 1], p.stretch[n, 2], p.s[n, 0], p.s[n, 1],
+                        a.road[lane], a.lane_id[lane], offset, s_road,
+                    )  # fmt: skip
+                elif p.circle[n, 2] >= 0.0:
+                    dx, dy = x - p.circle[n, 0], y - p.circle[n, 1]
+                    covers = sqrt(dx * dx + dy * dy) <= p.circle[n, 2]
+                else:
+                    covers = _is_inside(p.corner, p.corner_start[n], p.corner_start[n + 1], x, y)
+                if not covers:
+                    continue
+                own, own_stiffness, own_film = p.ratio[n], NO_PATCH, NO_PATCH
+                if isnan(own):
+                    covered = _params(p.covered[kind], n)
+                    own = mu_at(covered, v) / mu_at(_params(p.outside, kind), v)
+                    own_stiffness, own_film = stiffness_at(covered, v), covered.film
+                if not found or own < share[i, k]:
+                    share[i, k], stiffness[i, k], film[i, k] = own, own_stiffness, own_film
+                    found = True
+            if everywhere:
+                if not placed:
+                    lane, offset, s_road = _place(a, x, y, z)
+                if lane >= 0:
+                    for n in range(p.material_start[lane], p.material_start[lane + 1]):
+                        if p.material[n, 0] <= s_road < p.material[n, 1]:
+                            share[i, k] *= p.material[n, 2]
 
 
 @inner_kernel
-def _is_near(p: PatchArrays, x: float, y: float) -> bool:
-    if len(p.material) > 0:
-        return True
-    for k in range(len(p.ratio)):
-        b = p.bounds[k]
-        if b[0] <= x <= b[2] and b[1] <= y <= b[3]:
-            return True
-    return False
+def _is_in(bounds: Floats, x: float, y: float) -> bool:
+    return bool(bounds[0] <= x <= bounds[2] and bounds[1] <= y <= bounds[3])
 
 
 @inner_kernel
-def _effect(
-    a: LaneArrays, p: PatchArrays, x: float, y: float, z: float, v: float, kind: int
-) -> Effect:
-    """The slippery one of the patches there; the lane's material multiplies its share."""
-    lane, offset, s_road, placed = -1, 0.0, 0.0, False
-    share, stiffness, film, found = 1.0, NO_PATCH, NO_PATCH, False
-    for k in range(len(p.ratio)):
-        b = p.bounds[k]
-        if not (b[0] <= x <= b[2] and b[1] <= y <= b[3]):
-            continue
-        if p.stretch[k, 0] != ANY and not placed:
-            lane, offset, s_road = _place(a, x, y, z)
-            placed = True
-        if not _covers(a, p, k, x, y, lane, offset, s_road):
-            continue
-        own_share, own_stiffness, own_film = p.ratio[k], NO_PATCH, NO_PATCH
-        if isnan(own_share):
-            covered = _params(p.covered[kind], k)
-            own_share = mu_at(covered, v) / mu_at(_params(p.outside, kind), v)
-            own_stiffness, own_film = stiffness_at(covered, v), covered.film
-        if not found or own_share < share:
-            share, stiffness, film, found = own_share, own_stiffness, own_film, True
-    if len(p.material) > 0:
-        if not placed:
-            lane, offset, s_road = _place(a, x, y, z)
-        share *= _material_share(p, lane, s_road)
-    return share, stiffness, film
+def _is_on_stretch(
+    road: int, lane: int, side: int, low: float, high: float, on_road: int, on_lane: int,
+    offset: float, s_road: float,
+) -> bool:  # fmt: skip
+    if on_road != road or (lane != ANY and lane != on_lane):
+        return False
+    if side != BOTH and (offset > 0.0) != (side == LEFT):
+        return False
+    return low <= s_road <= high
 
 
 @inner_kernel
@@ -129,26 +137,6 @@ def _place(a: LaneArrays, x: float, y: float, z: float) -> tuple[int, float, flo
 
 
 @inner_kernel
-def _covers(
-    a: LaneArrays, p: PatchArrays, k: int, x: float, y: float, lane: int, offset: float,
-    s_road: float,
-) -> bool:  # fmt: skip
-    if p.stretch[k, 0] == ANY:
-        if p.circle[k, 2] >= 0.0:
-            dx, dy = x - p.circle[k, 0], y - p.circle[k, 1]
-            return bool(sqrt(dx * dx + dy * dy) <= p.circle[k, 2])
-        return _is_inside(p.corner, p.corner_start[k], p.corner_start[k + 1], x, y)
-    if lane < 0 or a.road[lane] != p.stretch[k, 0]:
-        return False
-    any_lane = p.stretch[k, 1] == ANY
-    if not any_lane and p.stretch[k, 1] != a.lane_id[lane]:
-        return False
-    if p.stretch[k, 2] != BOTH and (offset > 0.0) != (p.stretch[k, 2] == LEFT):
-        return False
-    return bool(p.s[k, 0] <= s_road <= p.s[k, 1])
-
-
-@inner_kernel
 def _is_inside(corner: Floats, first: int, last: int, x: float, y: float) -> bool:
     """Even-odd rule."""
     inside = False
@@ -159,16 +147,6 @@ def _is_inside(corner: Floats, first: int, last: int, x: float, y: float) -> boo
             inside = not inside
         x0, y0 = x1, y1
     return inside
-
-
-@inner_kernel
-def _material_share(p: PatchArrays, lane: int, s_road: float) -> float:
-    if lane < 0:
-        return 1.0
-    for k in range(p.material_start[lane], p.material_start[lane + 1]):
-        if p.material[k, 0] <= s_road < p.material[k, 1]:
-            return float(p.material[k, 2])
-    return 1.0
 
 
 @inner_kernel

@@ -26,7 +26,6 @@ from skidpad.simulation.world.patch_kernel import (
     PatchArrays,
     WheelPlaces,
     fill_patches,
-    find_effect,
 )
 
 __all__ = ["NO_PATCH", "FrictionZone", "LaneFrictions", "Patches", "in_zone"]
@@ -103,8 +102,13 @@ class Patches:
 
         Where patches overlap the slippery one counts. The tyres are those of the run.
         """
-        kind = self.kinds.index(self.road.tyres)
-        return float(find_effect(self.map.held, self._held, x, y, z, v, kind)[0])
+        states, at = ActorStates.empty(1), np.zeros((1, 4, 2))
+        states.x[0], states.y[0], states.z[0], states.vx[0] = x, y, z, v
+        states.present[0] = True
+        one = WheelPlaces(at, np.array([self.kinds.index(self.road.tyres)], np.int64))
+        share, stiffness, film = (np.zeros((1, 4)) for _ in range(3))
+        fill_patches(self.map.held, self._held, one, states, share, stiffness, film)
+        return float(share[0, 0])
 
 
 def _arrays(

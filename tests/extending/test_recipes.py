@@ -114,6 +114,15 @@ def test_a_recipe_works_as_printed_and_its_runs_open_without_it(title: str, tmp_
         story = (tmp_path / "out" / "crowd").rglob("*")
         texts = [p.read_text("utf-8") for p in story if p.suffix in (".csv", ".json", ".jsonl")]
         assert any("slow_all" in text for text in texts)
+        replayed = "from skidpad.cockpit.replay import Recording; from pathlib import Path; "
+        replayed += "print(Recording(next(Path('out/behind/runs').iterdir())).readings(20))"
+        assert "Radar to the rear, returns" in call(tmp_path, "-c", replayed)
+    page = tmp_path / "out" / "assisted" / "report.html"
+    if page.is_file():
+        assert "Intelligent speed assistance" in page.read_text(encoding="utf-8")
+        rows = pl.read_parquet(page.with_name("results.parquet"))
+        assert rows["max_speed_kmh"].item() < 101.0
+        assert rows["functions"].item() == "acc+lca+isa"
     page = tmp_path / "out" / "close" / "report.html"
     if page.is_file():
         assert "close following" in page.read_text(encoding="utf-8")

@@ -129,7 +129,7 @@ def test_unknown_names_are_errors():
     for call, says in (
         (lambda: load_profile("best"), "unknown profile 'best'; choose one of: recommended"),
         (lambda: functions_of(5), "unknown configuration 5; choose one of: 0, 1, 2, 3, 4"),
-        (lambda: parse_functions("acc,abs"), "unknown function 'abs'; choose one of: aeb, acc"),
+        (lambda: parse_functions("acc,abs"), "unknown function 'abs'; choose one of: acc, lca"),
         (lambda: AdasConfig.from_mapping({"speed": 3}), "unknown stack option 'speed'"),
         (lambda: AdasConfig.from_mapping({"cruise_kmh": 0}), "cruise_kmh must be between 1"),
     ):
@@ -139,8 +139,8 @@ def test_unknown_names_are_errors():
 
 @pytest.mark.req("A-011")
 def test_functions_by_name():
-    assert parse_functions(" acc, lca ") == {Function.ACC, Function.LCA}
-    assert parse_functions("") == frozenset()
+    assert parse_functions(" acc, lca ") == ({Function.ACC, Function.LCA}, ())
+    assert parse_functions("") == (frozenset(), ())
     assert AdasConfig.from_mapping({"functions": ["tla"]}).functions == {Function.TLA}
     assert AdasConfig.from_mapping({}).functions == functions_of(4)
 

@@ -305,7 +305,7 @@ def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, ob
             if driver.cruise_kmh is not None:
                 cruise = {"cruise_kmh": driver.cruise_kmh}
             return AdasStack, {
-                "functions": sorted(f.value for f in driver.functions),
+                "functions": [*sorted(f.value for f in driver.functions), *driver.added],
                 "profile": spec.settings.profile,
                 "set": spec.settings.stack.to_plain(),
                 **cruise,

@@ -55,12 +55,15 @@ def matrix_drivers(text: str) -> list[DriverSpec]:
 def drivers_with(functions: Iterable[str]) -> list[AdasDriver]:
     """`aeb` and `acc,lca` to a driver each, named after its functions."""
     chosen = [parse_functions(names) for names in functions]
-    return [AdasDriver(label=named(found) or "none", functions=found) for found in chosen]
+    return [
+        AdasDriver(label=named(own, added) or "none", functions=own, added=added)
+        for own, added in chosen
+    ]
 
 
-def named(functions: Functions) -> str:
+def named(functions: Functions, added: Iterable[str] = ()) -> str:
     """A set of functions as one word."""
-    return "+".join(sorted(f.value for f in functions))
+    return "+".join([*sorted(f.value for f in functions), *added])
 
 
 def cruising(drivers: Sequence[AdasDriver], text: str) -> list[AdasDriver]:

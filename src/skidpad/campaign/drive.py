@@ -12,7 +12,7 @@ What the sinks keep is the only result. Whatever is said about a drive later is 
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -89,6 +89,9 @@ class Sink:
 
     def begin(self, table: ActorTable) -> None:
         """The run begins, with these actors."""
+
+    def follow_readings(self, latest: Callable[[], list[tuple[str, str]]]) -> None:
+        """Further sensors or functions are recorded; `latest` says what they said last, in words."""
 
     def see(self, moment: Moment) -> None:
         """One moment."""

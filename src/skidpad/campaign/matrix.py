@@ -130,7 +130,7 @@ def run_key(
         grip=settings.world.grip.value,
         range=settings.sensors.range.value,
         outcome=outcome.value,
-        functions="" if ours is None else named(ours.functions),
+        functions="" if ours is None else named(ours.functions, ours.added),
         cruise_kmh=None if ours is None else cruise_target(ours),
         traffic=roads_of(cell).traffic.value,
         version=__version__,

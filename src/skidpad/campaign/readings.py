@@ -1,46 +1,71 @@
-"""Records the numbers of the further sensors that a stack asked for, where their type gives any."""
+"""Records the numbers of the further sensors that a stack asked for, and of added functions."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
 
 from skidpad.campaign.drive import Moment, Sink
 from skidpad.core.sensor_types import SensorType, find_sensor_type
 from skidpad.core.setup import Setup
-from skidpad.recording.readings import RecordedSensor, SensorReadings, tabulate_readings
+from skidpad.recording.readings import (
+    RecordedSensor,
+    SensorReadings,
+    describe_row,
+    tabulate_readings,
+)
+from skidpad.stack.functions import AddedFunctions
 
 
 class ReadingsRecorder(Sink):
     """Reads each recorded sensor once per tick, after the driver has acted."""
 
-    def __init__(self, setup: Setup) -> None:
-        """setup: with the sensors that the stack asked for."""
+    def __init__(self, setup: Setup, stack: object = None) -> None:
+        """setup: with the sensors that the stack asked for. stack: whose functions are recorded."""
+        added = getattr(stack, "added", None)
+        self._added = added if isinstance(added, AddedFunctions) and added.kinds else None
         self._kinds: dict[str, SensorType] = {}
         for spec in setup.specs:
             kind = find_sensor_type(spec) if spec.id in setup.asked else None
             if kind is not None and kind.numbers is not None:
                 self._kinds[spec.id] = kind
+        self._sensors = self._describe_sensors()
         self._rows: list[dict[str, float]] = []
 
     @property
     def is_needed(self) -> bool:
-        """Tells whether any sensor of the run is recorded."""
-        return bool(self._kinds)
+        """Tells whether any sensor or function of the run is recorded."""
+        return bool(self._kinds) or self._added is not None
 
     def see(self, moment: Moment) -> None:
         """Adds the row of one tick."""
         row: dict[str, float] = {"tick": moment.truth.tick}
         for id, kind in self._kinds.items():
             assert kind.numbers is not None
-            for quantity, value in kind.numbers(moment.frame.extra[id]).items():
-                if isfinite(value):
-                    row[f"{id}.{quantity}"] = float(value)
+            row |= _columns(id, kind.numbers(moment.frame.extra[id]))
+        for name, numbers in {} if self._added is None else self._added.numbers().items():
+            row |= _columns(name, numbers)
         self._rows.append(row)
 
     def finish(self) -> SensorReadings:
         """Returns the table of all recorded ticks."""
+        return tabulate_readings(self._sensors, self._rows)
+
+    @property
+    def latest(self) -> list[tuple[str, str]]:
+        """What the newest tick says, as words and a number for people."""
+        return describe_row(self._sensors, self._rows[-1]) if self._rows else []
+
+    def _describe_sensors(self) -> dict[str, RecordedSensor]:
         sensors = {
             id: RecordedSensor(id, kind.name, kind.title, kind.units)
             for id, kind in self._kinds.items()
         }
-        return tabulate_readings(sensors, self._rows)
+        for function in () if self._added is None else self._added.kinds:
+            name, title, units = function.name, function.title, function.units
+            sensors[name] = RecordedSensor(name, "function", title, units)
+        return sensors
+
+
+def _columns(id: str, numbers: Mapping[str, float]) -> dict[str, float]:
+    return {f"{id}.{name}": float(value) for name, value in numbers.items() if isfinite(value)}

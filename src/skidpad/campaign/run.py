@@ -296,10 +296,12 @@ class OpenRun:
                 sink.begin(backend.truth().table)
             self._failed(error)
             return
-        recorder = ReadingsRecorder(setup)
+        recorder = ReadingsRecorder(setup, driver.stack.stack)
         sinks = self.sinks
         if recorder.is_needed:
-            self.recorder, sinks = recorder, (*sinks, recorder)
+            self.recorder, sinks = recorder, (recorder, *sinks)
+            for sink in self.sinks:
+                sink.follow_readings(lambda: recorder.latest)
         frame = backend.reset(setup, self.spec.seed)
         wheel = driver if at_wheel is None else at_wheel(driver)
         failure = yield from ticks(backend, frame, wheel, stage.supervisor, stage.script, sinks)

@@ -38,7 +38,8 @@ class Drivers(Struct, frozen=True):
     functions: Annotated[
         tuple[str, ...],
         Meta(
-            description="A set of aeb,acc,lca,tla,resume,limiter,bend; may be given several times."
+            description="A set of aeb,acc,lca,tla,resume,limiter,bend and functions of packages "
+            "(`skidpad extensions functions`); may be given several times."
         ),
     ] = ()
     cruise: Annotated[

@@ -41,8 +41,9 @@ def extension_points() -> tuple[Registry[Any], ...]:
     from skidpad.physics.presets import WEATHERS
     from skidpad.roads.map_files import MAPS
     from skidpad.scenarios.registry import SCENARIO_NAMES
+    from skidpad.stack.functions import FUNCTIONS
 
-    points = (SENSORS, METRICS, INDICATORS, WEATHERS, MAPS, SCENARIO_NAMES)
+    points = (SENSORS, FUNCTIONS, METRICS, INDICATORS, WEATHERS, MAPS, SCENARIO_NAMES)
     try:
         from skidpad.fleet.alerting.relay_types import RELAYS
     except ImportError:  # the optional part `fleet` is not installed

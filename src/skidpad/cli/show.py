@@ -110,7 +110,7 @@ def show_readings(run: Path) -> None:
     readings = read_readings(run)
     if readings is None:
         return
-    table_console().print("\n[bold]Readings of further sensors[/]")
+    table_console().print("\n[bold]Readings of further sensors and functions[/]")
     shown = Table("sensor", "type", "quantity", "mean", "least", "most", box=None, pad_edge=False)
     for row in summarise_readings(readings):
         values = (_text(v) for v in (row.mean, row.least, row.most))

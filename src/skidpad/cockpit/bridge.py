@@ -179,7 +179,8 @@ class Bridge:
         return Lamps(LAMP_ORDER[(at + 1) % len(LAMP_ORDER)])
 
     def _toggle(self, value: Any) -> Functions:
-        on = {Function(name) for name in self._seat("functions", [])}
+        own = {f.value for f in Function}  # those of packages have no switch
+        on = {Function(name) for name in self._seat("functions", []) if name in own}
         return Functions(tuple(sorted(on ^ {Function(value)}, key=lambda f: f.value)))
 
     def _weather(self, value: Any) -> Sky:

@@ -153,6 +153,11 @@ class ChannelSource:
         del k
         return 0
 
+    def readings(self, k: int) -> list[tuple[str, str]]:
+        """Returns nothing, as a recording of channels holds no further sensors."""
+        del k
+        return []
+
     def curves(self) -> Curves:
         """What is drawn along the time; channels have no tiers."""
         part = every(self.ticks)

@@ -14,7 +14,6 @@ from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.realtime import RealTime
 from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.words import Link, Live, Pace
-from skidpad.core.inputs import Functions
 from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
 
 
@@ -76,7 +75,7 @@ def functions_on(spec: RunSpec, desk: Desk) -> list[str] | None:
     """The functions of our stack that are on; None: another stack drives, which has no switches."""
     if not isinstance(spec.driver, AdasDriver):
         return None
-    on = spec.driver.functions if desk.functions is None else desk.functions
+    on = {f.value for f in (spec.driver.functions if desk.functions is None else desk.functions)}
     if desk.functions is None and spec.settings.stack.aeb_without_acc and "acc" not in on:
-        return sorted({*(f.value for f in on), "aeb"})
-    return sorted(f.value for f in Functions(tuple(on)).on)
+        on.add("aeb")
+    return [*sorted(on), *spec.driver.added]

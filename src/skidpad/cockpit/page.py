@@ -21,6 +21,7 @@ from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.core.weather import RANGES
 from skidpad.physics.presets import all_presets
 from skidpad.sensors.finish.extras import Extra
+from skidpad.stack.functions import FUNCTIONS
 
 STYLE = resources.files("skidpad.cockpit").joinpath("cockpit.css").read_text(encoding="utf-8")
 SYNC = 0.3  # s between two looks at how things really stand
@@ -35,15 +36,6 @@ SLIDERS = {
     "sun_altitude_deg": "sun, deg",
 }
 SHOWN_RANGES = {"snow_depth_mm": (0.0, 100.0)}
-TITLES = {
-    Function.ACC: "ACC (1)",
-    Function.LCA: "lane centring (2)",
-    Function.TLA: "light assist (3)",
-    Function.RESUME: "resume (4)",
-    Function.LIMITER: "limiter (5)",
-    Function.AEB: "emergency braking (6)",
-    Function.BEND: "slow in bends (7)",
-}
 PICTURE = "picture "  # before the name of an addition, as lamps have a switch of their own
 EXTRAS = {
     Extra.SHADOWS: "shadows",
@@ -198,8 +190,9 @@ def extra_switch(panel: Panel, extra: Extra) -> None:
 def drive_controls(panel: Panel) -> None:
     """Functions of our stack, and the headlights."""
     with ui.element("div").classes("switches"):
-        for function, title in TITLES.items():
-            function_switch(panel, function.value, title)
+        own = [kind for kind in FUNCTIONS.entries() if kind.factory is None]
+        for key, kind in enumerate(own, start=1):
+            function_switch(panel, kind.name, f"{kind.title} ({key})")
     lamps = ui.toggle(
         [switch.value for switch in LAMP_ORDER],
         on_change=lambda e: panel.changed("lamps", e.value, "lamps", e.value),

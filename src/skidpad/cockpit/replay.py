@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_right
 from dataclasses import fields
+from functools import cached_property
 from math import isnan
 from pathlib import Path
 from typing import Any
@@ -43,6 +44,7 @@ from skidpad.physics.types import vehicle_types
 from skidpad.recording.events import LightChange, Notice, Relocation
 from skidpad.recording.inputs import read_inputs
 from skidpad.recording.logfiles import TICKS, read_log
+from skidpad.recording.readings import RecordedSensor, describe_row, read_readings
 from skidpad.recording.runlog import RunLog
 from skidpad.simulation.recovery import Action, Moved, Relocate
 from skidpad.stack.control.text import mode_text
@@ -109,6 +111,20 @@ class Recording:
     def collisions(self, k: int) -> int:
         """How many contacts of the ego there were up to moment k."""
         return sum(1 for c in self.log.contacts if c.tick <= self.tick(k))
+
+    @cached_property
+    def _readings(self) -> tuple[dict[str, RecordedSensor], dict[int, dict[str, float]]]:
+        """Further sensors and functions by id, and what they said by tick."""
+        found = read_readings(self.folder)
+        if found is None:
+            return {}, {}
+        rows = {row.pop("tick"): row for row in found.table.to_dicts()}
+        return {sensor.id: sensor for sensor in found.sensors}, rows
+
+    def readings(self, k: int) -> list[tuple[str, str]]:
+        """What further sensors and functions said in moment k, as words and a number for people."""
+        sensors, rows = self._readings
+        return describe_row(sensors, rows.get(self.tick(k), {}))
 
     def seat(self, k: int) -> Seat:
         """How the desk stood in moment k."""

@@ -138,6 +138,7 @@ class Replayer:
             "note": self.note,
             "events": self._events(),
             "collisions": self.source.collisions(self.k),
+            "added": self.source.readings(self.k),
         }
         return Shown(seat.outside, told)
 

@@ -60,12 +60,17 @@ class Screen(Sink):
         self.events: deque[tuple[float, str]] = deque(maxlen=TOLD_EVENTS)
         self._at = 0.0
         self.crash: Pose | None = None  # where the ego's last contact was
+        self.latest: Callable[[], list[tuple[str, str]]] = list  # of further sensors and functions
         self.beside: Beside | None = None  # another run in step with this one
 
     def begin(self, table: ActorTable) -> None:
         """The run begins, with these actors."""
         self.studio = Studio(self.map, table, self.ask().outside, self.seed)
         self.cameras, self.light = self.studio.suite.cameras, LightAhead(self.map)
+
+    def follow_readings(self, latest: Callable[[], list[tuple[str, str]]]) -> None:
+        """What further sensors and functions say is shown beside the pictures."""
+        self.latest = latest
 
     def see(self, moment: Moment) -> None:
         """Show it, or drop it: a page that is slow, or not there, costs nothing."""
@@ -130,5 +135,6 @@ class Screen(Sink):
             "collisions": self.collisions,
             "shown": self.shown,
             "dropped": self.dropped,
+            "added": self.latest(),
             **shown.told,
         }

@@ -96,6 +96,10 @@ class Source(Protocol):
         """How many contacts of the ego there were up to moment k."""
         ...
 
+    def readings(self, k: int) -> list[tuple[str, str]]:
+        """What further sensors and functions said in moment k, as words and a number for people."""
+        ...
+
     def curves(self) -> Curves:
         """What is drawn along the time."""
         ...

@@ -52,6 +52,7 @@ class AdasDriver(Struct, frozen=True, kw_only=True, tag="adas", forbid_unknown_f
     label: str = "2"  # "0" to "4", "acc+lca", or what a scenario calls its controller
     functions: frozenset[Function] = frozenset({Function.ACC, Function.LCA})
     cruise_kmh: float | None = None  # of free cruise; None: the scenario's, else as published
+    added: tuple[str, ...] = ()  # functions of installed packages, in alphabetical order
 
 
 class StackDriver(Struct, frozen=True, tag="stack", forbid_unknown_fields=True):
@@ -347,6 +348,8 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
                 plain |= {"profile": self.settings.profile, name: self.settings.to_plain()}
             elif name != "surface" or value:  # so that runs without one are described as before
                 plain[name] = value
+        if isinstance(self.driver, AdasDriver) and not self.driver.added:  # as before, too
+            del plain["driver"]["added"]
         return plain
 
 

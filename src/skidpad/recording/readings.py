@@ -66,6 +66,18 @@ def tabulate_readings(
     return SensorReadings(tuple(described), pl.DataFrame(columns))
 
 
+def describe_row(
+    sensors: Mapping[str, RecordedSensor], row: Mapping[str, float | None]
+) -> list[tuple[str, str]]:
+    """Returns what a tick's row says, as words and a number for people."""
+    told = []
+    for name, value in row.items():
+        id, _, quantity = name.rpartition(".")
+        if id in sensors and value is not None:
+            told.append((f"{sensors[id].title}, {quantity.replace('_', ' ')}", f"{value:.4g}"))
+    return told
+
+
 def write_readings(folder: Path, readings: SensorReadings) -> None:
     """Writes the readings of a run into its folder."""
     about = msgspec.json.encode(readings.sensors).decode()

@@ -69,7 +69,11 @@ def build_page(matrix: Matrix) -> Page:
         Section("Every crash", crash_sections(matrix, crashes)),
         Section("Beside the published numbers", beside_published(matrix)),
         Section("Pixels against objects", parity_section(parity)),
-        *([Section("Further sensors", read)] if (read := reading_blocks(matrix)) else []),
+        *(
+            [Section("Further sensors and functions", read)]
+            if (read := reading_blocks(matrix))
+            else []
+        ),
         Section("All metrics", matrix_tables.per_weather(matrix)),
         Section("Real time", real_time_blocks(matrix)),
         Section("Definitions", [matrix.definitions()]),

@@ -1,4 +1,4 @@
-"""What the further sensors of a user's stack measured, a row per weather, sensor and quantity."""
+"""What further sensors and functions recorded, a row per weather, sensor and quantity."""
 
 from __future__ import annotations
 
@@ -30,6 +30,8 @@ def reading_blocks(matrix: Matrix) -> list[Block]:
             words = (run["config"], run["weather"], s.sensor.id, s.sensor.title, s.quantity)
             numbers = (Cell("-" if v is None else f"{v:.4g}", v) for v in (s.mean, s.least, s.most))
             rows.append([*(Cell(word) for word in words), *numbers])
-    return [Table(COLUMNS, rows, "Readings of further sensors, first seed of each weather")] * bool(
-        rows
-    )
+    return [
+        Table(
+            COLUMNS, rows, "Readings of further sensors and functions, first seed of each weather"
+        )
+    ] * bool(rows)

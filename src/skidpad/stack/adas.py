@@ -38,6 +38,7 @@ from skidpad.stack.control.tiers import (
     needs_verification,
     time_gap,
 )
+from skidpad.stack.functions import AddedFunctions
 from skidpad.stack.perception.front import Front, Sight
 from skidpad.stack.perception.hsv import LampCamera
 from skidpad.stack.perception.lane_view import (
@@ -57,6 +58,7 @@ class AdasConfig:
     """What this stack drives with; speeds in km/h as at a cruise control's lever."""
 
     functions: Functions
+    added: tuple[str, ...] = ()  # functions of packages
     settings: StackSettings
     cruise_kmh: float = V_CRUISE_KMH
     limiter_kmh: float = V_LIMITER_KMH
@@ -77,14 +79,15 @@ class AdasConfig:
         for key in plain:
             require_choice("stack option", key, KEYS)
         settings = load_profile(plain.get("profile", "recommended"), plain.get("set")).stack
+        added: tuple[str, ...] = ()
         if "functions" in plain:
-            functions = parse_functions(",".join(plain["functions"]))
+            functions, added = parse_functions(",".join(plain["functions"]))
         else:
             functions = functions_of(plain.get("configuration", 4))
         if settings.aeb_without_acc and not functions & {Function.ACC}:
             functions |= {Function.AEB}
         numbers = {k: float(plain[k]) for k in ("cruise_kmh", "limiter_kmh", "dt") if k in plain}
-        return cls(functions=functions, settings=settings, **numbers)
+        return cls(functions=functions, added=added, settings=settings, **numbers)
 
 
 class AdasStack:
@@ -107,6 +110,7 @@ class AdasStack:
         self.smoothing: Smoothing | NoSmoothing = (
             Smoothing(self.config.dt) if options.steer_smoothing else NoSmoothing()
         )
+        self.added = AddedFunctions(self.config.added, map, self.config.dt)
         self.supervision = Supervision.NONE
         self.verified_by = ""
         self.report = StackReport()
@@ -115,7 +119,8 @@ class AdasStack:
     @property
     def mode(self) -> str:
         """The mode of the last tick as text for people (A-139)."""
-        return mode_text(self.report, Function.LCA in self.functions, self.verified_by)
+        own = mode_text(self.report, Function.LCA in self.functions, self.verified_by)
+        return own + self.added.mode
 
     def switch(self, functions: Functions) -> None:
         """Turn functions on and off while driving (A-011); the controllers start afresh."""
@@ -133,6 +138,7 @@ class AdasStack:
         self.hierarchy.reset()
         self.lock.reset()
         self.smoothing.reset()
+        self.added.reset()
         if self.bends is not None:
             self.bends.reset()
 
@@ -159,8 +165,9 @@ class AdasStack:
         self.report = self._report(view, sight, situation, request.tier, light, hsv)
         if supervised:
             return HELD
-        return VehicleCommand(request.throttle, request.brake, self._steer(frame, v, view),
-                              request.handbrake)  # fmt: skip
+        command = VehicleCommand(request.throttle, request.brake, self._steer(frame, v, view),
+                                 request.handbrake)  # fmt: skip
+        return self.added.update(frame, command)
 
     def _follow_supervision(self, phase: Supervision) -> None:
         """The warm-up begins where the ego was put (A-185)."""

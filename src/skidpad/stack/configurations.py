@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from skidpad.core.errors import ConfigError, require_choice
+from skidpad.core.errors import ConfigError
 from skidpad.core.run import Function
+from skidpad.stack.functions import FUNCTIONS
 
 V_CRUISE_KMH = 150.0  # cruise target without a limiter (A-009)
 V_LIMITER_KMH = 80.0  # limiter of configuration 4 (A-178)
@@ -39,8 +40,11 @@ def functions_of(configuration: int) -> Functions:
     return CONFIGURATIONS[configuration]
 
 
-def parse_functions(text: str) -> Functions:
-    """`acc,lca` to functions; an empty text is none of them."""
-    names = [name.strip() for name in text.split(",") if name.strip()]
-    allowed = [function.value for function in Function]
-    return frozenset(Function(require_choice("function", name, allowed)) for name in names)
+def parse_functions(text: str) -> tuple[Functions, tuple[str, ...]]:
+    """Returns the functions of a text like `acc,lca`: those of the stack, and those of packages."""
+    names = {name.strip() for name in text.split(",") if name.strip()}
+    own = {function.value for function in Function}
+    added = tuple(sorted(names - own))
+    for name in added:
+        FUNCTIONS.get(name)
+    return frozenset(Function(name) for name in names & own), added

@@ -19,6 +19,7 @@ import numpy as np
 
 from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.frames import SensorFrame
+from skidpad.core.run import Function
 from skidpad.core.sensor_types import SENSORS, find_sensor_type
 from skidpad.core.specs import PointSensorSpec, SensorSpec
 from skidpad.core.states import StackReport, VehicleCommand
@@ -114,7 +115,7 @@ class GuardedStack:
         settings: Mapping[str, Any],
     ) -> None:
         self.name = kind.__name__
-        self._is_own = kind.__module__ == OWN
+        self._is_own = kind.__module__ == OWN and not _has_added(settings)
         self._tick = -1  # the last one
         self._taken = frozenset(spec.id for spec in specs)
         self._process, self._folder = os.getpid(), _folder()
@@ -198,6 +199,12 @@ class GuardedStack:
             self._folder = _folder()
             if self._folder != home:
                 _enter(home)
+
+
+def _has_added(settings: Mapping[str, Any]) -> bool:
+    """Tells whether functions of packages drive along in our stack."""
+    own = {function.value for function in Function}
+    return not own.issuperset(settings.get("functions", ()))
 
 
 def _sensors_of(stack: Stack) -> tuple[Any, ...]:

@@ -379,9 +379,9 @@ def test_functions_are_switched_while_driving():
     assert steer < 0.0
     stack.switch(functions_of(2))
     assert tick(9)[2] == approx(150 / 3.6)
-    stack.switch(parse_functions("lca"))
+    stack.switch(parse_functions("lca")[0])
     assert tick(10)[0] in (Tier.COAST, Tier.CRUISE)
-    stack.switch(parse_functions(""))
+    stack.switch(parse_functions("")[0])
     assert tick(11)[1] != steer
     stack.switch(functions_of(4))
     assert tick(12)[:2] == (Tier.ACC_CLOSE, approx(steer))

@@ -1,0 +1,90 @@
+"""The driving functions of the stack as entries of a registry, to which installed packages add."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol
+
+from skidpad.core.frames import SensorFrame
+from skidpad.core.registry import Registry
+from skidpad.core.run import Function
+from skidpad.core.states import VehicleCommand
+
+if TYPE_CHECKING:  # kernels come with it
+    from skidpad.roads.queries import RoadMap
+
+
+class DrivingFunction(Protocol):
+    """A function that acts after those of the stack, on what the stack would do.
+
+    Optional: `numbers()` returns numbers of the last tick by "name_unit", which are recorded;
+    `mode` is a text on its present state, for the cockpit.
+    """
+
+    def update(self, frame: SensorFrame, command: VehicleCommand) -> VehicleCommand:
+        """Returns the command of this tick, changed or as it is."""
+        ...
+
+
+@dataclass(frozen=True, slots=True)
+class FunctionType:
+    """A driving function that a configuration of the stack can have.
+
+    Attributes:
+        name: The word of `--functions`.
+        title: A few words for tables and pages.
+        units: What its numbers are, with units.
+        factory: `factory(map, dt)` returns the function of one run; None: the stack has it built in.
+    """
+
+    name: str
+    title: str
+    units: str = ""
+    factory: Callable[[RoadMap, float], DrivingFunction] | None = None
+
+
+def _own_functions() -> tuple[FunctionType, ...]:
+    titles = {
+        Function.ACC: "ACC",
+        Function.LCA: "lane centring",
+        Function.TLA: "light assist",
+        Function.RESUME: "resume",
+        Function.LIMITER: "limiter",
+        Function.AEB: "emergency braking",
+        Function.BEND: "slow in bends",
+    }
+    return tuple(FunctionType(function.value, title) for function, title in titles.items())
+
+
+FUNCTIONS = Registry("function", "skidpad.functions", FunctionType, _own_functions)
+
+
+class AddedFunctions:
+    """The functions of packages in one run, one after the other."""
+
+    def __init__(self, names: Sequence[str], map: RoadMap, dt: float) -> None:
+        self.kinds = tuple(FUNCTIONS.get(name) for name in names)
+        self._make = lambda: [k.factory(map, dt) for k in self.kinds if k.factory is not None]
+        self.reset()
+
+    def reset(self) -> None:
+        """Starts all of them afresh."""
+        self._functions = self._make()
+
+    def update(self, frame: SensorFrame, command: VehicleCommand) -> VehicleCommand:
+        """Returns the command after each function has changed it."""
+        for function in self._functions:
+            command = function.update(frame, command)
+        return command
+
+    @property
+    def mode(self) -> str:
+        """The texts of those that say something."""
+        texts = (getattr(function, "mode", "") for function in self._functions)
+        return "".join(f" [{text}]" for text in texts if text)
+
+    def numbers(self) -> dict[str, Mapping[str, float]]:
+        """Returns the numbers of the last tick, by the name of the function."""
+        pairs = zip(self.kinds, self._functions, strict=True)
+        return {kind.name: f.numbers() for kind, f in pairs if hasattr(f, "numbers")}

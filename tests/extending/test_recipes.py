@@ -14,6 +14,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from skidpad.recording.logfiles import read_log
+
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
 RECIPE = re.compile(r"^## (An? .+?)\n(.*?)(?=^## |\Z)", re.DOTALL | re.MULTILINE)
 BLOCK = re.compile(r"```(\w+)(?: title=\"([\w./-]+)\")?\n(.*?)```", re.DOTALL)
@@ -123,6 +125,11 @@ def test_a_recipe_works_as_printed_and_its_runs_open_without_it(title: str, tmp_
         rows = pl.read_parquet(page.with_name("results.parquet"))
         assert rows["max_speed_kmh"].item() < 101.0
         assert rows["functions"].item() == "acc+lca+isa"
+    late = tmp_path / "out" / "late" / "runs" / "2_rain-noon-001"
+    if late.is_dir():
+        log = read_log(late)
+        asked, done = log.requested.throttle, log.applied.throttle
+        assert list(done[4:24]) == list(asked[:20]) != list(done[1:21])
     page = tmp_path / "out" / "close" / "report.html"
     if page.is_file():
         assert "close following" in page.read_text(encoding="utf-8")

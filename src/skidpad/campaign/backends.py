@@ -6,7 +6,7 @@ import shlex
 from typing import TYPE_CHECKING
 
 from skidpad.core.errors import require_choice
-from skidpad.core.simulator import BackendChoice, BackendKind
+from skidpad.core.simulator import BACKENDS, BackendChoice, BackendKind
 from skidpad.simulation.backend import Backend
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 
@@ -20,7 +20,7 @@ _KEEPERS: dict[BackendChoice, ServerKeeper] = {}  # of this process; a worker li
 
 def keep_server(choice: BackendChoice) -> None:
     """Where the campaign starts its own CARLA server: it is up, and not older than asked for."""
-    if choice.backend is BackendKind.EMBEDDED or not choice.server_command:
+    if choice.backend != BackendKind.CARLA or not choice.server_command:
         return
     if choice not in _KEEPERS:
         from skidpad.simulation.carla.keeper import ServerKeeper
@@ -48,8 +48,18 @@ def carla_options(choice: BackendChoice, watchdog: float | None = None) -> Carla
 
 def make_backend(choice: BackendChoice, watchdog: float | None = None) -> Backend:
     """A fresh backend. watchdog: s without a tick after which this process ends; None: never."""
-    if choice.backend is BackendKind.EMBEDDED:
-        return EmbeddedBackend()
+    made: Backend = BACKENDS.get(choice.backend).make(choice, watchdog)
+    return made
+
+
+def make_embedded(choice: BackendChoice, watchdog: float | None = None) -> Backend:
+    """Returns a fresh embedded simulator, which needs no watchdog."""
+    del choice, watchdog
+    return EmbeddedBackend()
+
+
+def make_carla(choice: BackendChoice, watchdog: float | None = None) -> Backend:
+    """Returns the client of a CARLA server."""
     # The wheel and its threads concern only drives on it.
     from skidpad.simulation.carla.backend import CarlaBackend
 

@@ -261,7 +261,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
 def _foreign_on_carla(spec: RunSpec) -> bool:
     """Tells whether a foreign stack drives on CARLA: which images it reads is unknown before."""
     foreign = isinstance(spec.driver, (StackDriver, AgentDriver))
-    return foreign and spec.backend.backend is BackendKind.CARLA
+    return foreign and spec.backend.backend == BackendKind.CARLA
 
 
 def recovery_settings(s: TrafficSettings) -> RecoverySettings:

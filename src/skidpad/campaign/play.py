@@ -32,7 +32,7 @@ def run_to(spec: RunSpec, out: Path) -> Run:
     On a CARLA server a process of its own drives: the wheel's threads can end theirs.
     """
     task = Task(spec, require_free(out))
-    if spec.backend.backend is BackendKind.EMBEDDED:
+    if spec.backend.backend != BackendKind.CARLA:
         return run_task(task)
     if isinstance(spec.course, Scenario):
         load_scenario(spec.course)  # what is wrong in the file is said here

@@ -323,7 +323,7 @@ def log_of(spec: RunSpec, stage: Stage, desk: Desk | None = None) -> Log:
         "profile": spec.settings.profile,
         "sensors": spec.sensors.value,
     }
-    if spec.backend.backend is BackendKind.CARLA:  # it tells contacts of the ego alone
+    if spec.backend.backend == BackendKind.CARLA:  # it tells contacts of the ego alone
         about["traffic"] = UNSEEN
     dt = stage.setup.dt
     header = LogHeader(map=stage.map.name, map_hash=stage.map.content_hash, dt=dt, about=about)

@@ -9,14 +9,15 @@ from pathlib import Path
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.names import path_part
 from skidpad.core.reading import is_file
-from skidpad.core.simulator import BackendChoice, BackendKind
+from skidpad.core.simulator import BACKENDS, BackendChoice, BackendKind
 from skidpad.roads.map_files import bundled_maps, is_made_map
 
 
 def check_backend(choice: BackendChoice) -> BackendChoice:
     """The choice, if it can be driven on: a CARLA server that runs already must answer now."""
-    if choice.backend is BackendKind.EMBEDDED:
-        return BackendChoice()
+    BACKENDS.get(choice.backend)
+    if choice.backend != BackendKind.CARLA:
+        return BackendChoice(backend=choice.backend)
     if choice.restart_every and not choice.server_command:
         raise ConfigError("--restart-every needs --server-command: only our own server is ours")
     from skidpad.campaign.backends import carla_options
@@ -32,7 +33,7 @@ def check_backend(choice: BackendChoice) -> BackendChoice:
 def map_of(map: str, choice: BackendChoice) -> str:
     """A bundled map or a file as it is; a CARLA server's own map is fetched and kept as a file."""
     named = map in bundled_maps() or is_made_map(map) or is_file(Path(map)) or Path(map).suffix
-    if choice.backend is BackendKind.EMBEDDED or named:
+    if choice.backend != BackendKind.CARLA or named:
         return map
     from skidpad.core.jit import user_cache
 
@@ -63,4 +64,4 @@ def _fetch(choice: BackendChoice, map: str, folder: Path) -> None:
 
 def drives_alone(choice: BackendChoice) -> bool:
     """A CARLA server drives one run at a time."""
-    return choice.backend is BackendKind.CARLA
+    return choice.backend == BackendKind.CARLA

@@ -88,7 +88,7 @@ def drive(
         seed=seed,
         backend=check_backend(backend),
     )
-    if isinstance(spec.course, Roads) and spec.backend.backend is BackendKind.EMBEDDED:
+    if isinstance(spec.course, Roads) and spec.backend.backend != BackendKind.CARLA:
         require_map(spec.course.map)
     from skidpad.cockpit.about import About
     from skidpad.cockpit.driving import about, drive_job
@@ -115,7 +115,7 @@ def require_place(spec: RunSpec) -> None:
 
     if isinstance(spec.course, Scenario):
         load_scenario(spec.course)
-    elif isinstance(spec.course, Roads) and spec.backend.backend is BackendKind.EMBEDDED:
+    elif isinstance(spec.course, Roads) and spec.backend.backend != BackendKind.CARLA:
         load_map(road_file(spec.course))
 
 
@@ -126,7 +126,7 @@ def with_reserve(roads: Roads, backend: BackendChoice, more: int | None) -> Road
         raise ConfigError(
             f"--more must be at most {room} beside {roads.vehicles} vehicles, got {more}"
         )
-    if backend.backend is BackendKind.CARLA:
+    if backend.backend == BackendKind.CARLA:
         if more:
             raise ConfigError(f"--more must be 0 on a CARLA server, got {more}")
         return roads

@@ -36,6 +36,7 @@ def extensions(
 def extension_points() -> tuple[Registry[Any], ...]:
     """Returns every registry that installed packages can add to, as help and docs show them."""
     from skidpad.core.sensor_types import SENSORS
+    from skidpad.core.simulator import BACKENDS
     from skidpad.evidence.channels.indicators.catalogue import INDICATORS
     from skidpad.evidence.drive.added import METRICS
     from skidpad.physics.presets import WEATHERS
@@ -43,7 +44,7 @@ def extension_points() -> tuple[Registry[Any], ...]:
     from skidpad.scenarios.registry import SCENARIO_NAMES
     from skidpad.stack.functions import FUNCTIONS
 
-    points = (SENSORS, FUNCTIONS, METRICS, INDICATORS, WEATHERS, MAPS, SCENARIO_NAMES)
+    points = (SENSORS, FUNCTIONS, METRICS, INDICATORS, WEATHERS, MAPS, SCENARIO_NAMES, BACKENDS)
     try:
         from skidpad.fleet.alerting.relay_types import RELAYS
     except ImportError:  # the optional part `fleet` is not installed

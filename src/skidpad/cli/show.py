@@ -126,7 +126,7 @@ def vehicle_grips(run: Path, log: RunLog) -> list[tuple[str, ...]]:
     if not (run / CONFIG).is_file():
         return []
     spec = read_run(run)
-    if spec.backend.backend is not BackendKind.EMBEDDED:
+    if spec.backend.backend != BackendKind.EMBEDDED:
         return []
     ratio = friction_ratio(spec.weather, spec.grip)
     types = vehicle_types()

@@ -10,11 +10,23 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from difflib import get_close_matches
 from functools import cache, partial
+from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
 from typing import Generic, Protocol, TypeVar
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.told import describe_value
+
+T = TypeVar("T")
+
+
+def load_factory(factory: Callable[..., T] | str) -> Callable[..., T]:
+    """Returns a factory as it is, or imports the one that a text "module:function" names."""
+    if not isinstance(factory, str):
+        return factory
+    module, _, name = factory.partition(":")
+    found: Callable[..., T] = getattr(import_module(module), name)
+    return found
 
 
 class Entry(Protocol):

@@ -288,7 +288,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise ConfigError(
                 "traffic pack and risky drivers are kept together by the embedded simulator alone"
             )
-        if self.surface and self.backend.backend is BackendKind.CARLA:
+        if self.surface and self.backend.backend == BackendKind.CARLA:
             raise ConfigError("--surface needs the embedded simulator")
         if isinstance(self.driver, CameraDriver) and self.sensors is not SensorLevel.PIXELS:
             raise ConfigError("the camera driver sees images: it needs --sensors pixels")
@@ -327,6 +327,8 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             )
         if isinstance(self.course, Scenario):
             found += [f"the class {text!r}" for text in self.course.register]
+        if self.backend.backend not in (BackendKind.EMBEDDED, BackendKind.CARLA):
+            found.append(f"the backend {self.backend.backend!r}")
         if self.backend.server_command:
             found.append(f"the command {self.backend.server_command!r}")
         return tuple(found)
@@ -356,7 +358,7 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 def _pack_on_carla(course: Course, backend: BackendChoice) -> bool:
     packed = isinstance(course, Roads) and course.traffic is TrafficStart.PACK
     risky = isinstance(course, Route) and course.stratum is Stratum.RISKY  # drives as one
-    return (packed or risky) and backend.backend is BackendKind.CARLA
+    return (packed or risky) and backend.backend == BackendKind.CARLA
 
 
 OURS = "skidpad."  # stacks of this package are no foreign code

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from importlib import import_module
 from typing import Any, Protocol
 
 from skidpad.core.channels import ChannelView
 from skidpad.core.frames import CameraImage, GnssFix, ImuReading, LidarPoints
 from skidpad.core.geometry import Pose
-from skidpad.core.registry import Registry
+from skidpad.core.registry import Registry, load_factory
 from skidpad.core.sight import DriverView
 from skidpad.core.specs import (
     GNSS,
@@ -68,11 +67,7 @@ class SensorType:
 
     def make(self, spec: AnySpec, host: object) -> Measure:
         """Returns what measures for this spec in one run."""
-        factory = self.factory
-        if isinstance(factory, str):
-            module, _, name = factory.partition(":")
-            factory = getattr(import_module(module), name)
-        return factory(spec, host)
+        return load_factory(self.factory)(spec, host)
 
     def describes(self, spec: object) -> bool:
         """Tells whether a spec is of this kind."""

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from enum import Enum
+from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Annotated, Any
 
 import msgspec
 from msgspec import Meta, Struct
 
+from skidpad.core.registry import Registry, load_factory
 
-class BackendKind(str, Enum):
-    """Which simulator drives the world."""
+
+class BackendKind:
+    """Names of Skidpad's own simulators."""
 
     EMBEDDED = "embedded"
     CARLA = "carla"
@@ -19,9 +22,13 @@ class BackendKind(str, Enum):
 class BackendChoice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A simulator and, for a CARLA server, where it is and how it is used."""
 
-    backend: Annotated[BackendKind, Meta(description="carla: a CARLA server drives the world.")] = (
-        BackendKind.EMBEDDED
-    )
+    backend: Annotated[
+        str,
+        Meta(
+            description="embedded; carla: a CARLA server drives the world; or that of a package "
+            "(`skidpad extensions backends`)."
+        ),
+    ] = BackendKind.EMBEDDED
     host: Annotated[str, Meta(description="Of the CARLA server.")] = "127.0.0.1"
     port: Annotated[int, Meta(ge=1, le=65535, description="Of the CARLA server.")] = 2000
     pace: Annotated[bool, Meta(description="CARLA: hold runs at real time.")] = False  # A-262
@@ -43,3 +50,35 @@ class BackendChoice(Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 
 
 ADDRESS = ("host", "port", "server_command", "restart_every")
+
+
+@dataclass(frozen=True, slots=True)
+class BackendType:
+    """A simulator that runs can be driven on.
+
+    Attributes:
+        name: The word of `--backend`.
+        title: A few words for tables and pages.
+        factory: `factory(choice, watchdog)` returns a fresh `skidpad.simulation.backend.Backend`;
+            watchdog: s without a tick after which the process ends, None: never. A text
+            "module:function" names one that is imported when it is needed.
+    """
+
+    name: str
+    title: str
+    factory: Callable[[BackendChoice, float | None], Any] | str
+
+    def make(self, choice: BackendChoice, watchdog: float | None = None) -> Any:
+        """Returns a fresh backend, ready to be reset."""
+        return load_factory(self.factory)(choice, watchdog)
+
+
+def _own_backends() -> tuple[BackendType, ...]:
+    at = "skidpad.campaign.backends:"
+    return (
+        BackendType(BackendKind.EMBEDDED, "The simulator of Skidpad", at + "make_embedded"),
+        BackendType(BackendKind.CARLA, "A CARLA server", at + "make_carla"),
+    )
+
+
+BACKENDS = Registry("backend", "skidpad.backends", BackendType, _own_backends)

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from itertools import count
 from typing import Any, Protocol
+from weakref import WeakValueDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,6 +103,8 @@ class AskedSensors:
         self.observers: list[Observe] = []  # that look in every tick, in the order of the specs
         self._scene: LiveScene | None = None  # for the first sensor that casts rays
         self._placed = -1
+        self._serial = next(_SERIALS)
+        _OPEN[self._serial] = self
         self.readers = {s.id: self._reader(s) for s in setup.specs if s.id in setup.asked}
 
     def read(
@@ -118,7 +122,7 @@ class AskedSensors:
         self.tick, self.states, self.images = tick, states, images
         for observe in self.observers:
             observe(tick, states, lights, braking)
-        return Readings(self, tick)
+        return Readings(self._serial, tick, tuple(self.readers))
 
     def scene(self) -> LiveScene:
         """Returns the map's surfaces with all actors where they are now."""
@@ -224,26 +228,39 @@ class MeasuredCycles:
         return self._view
 
 
-class Readings(Mapping[str, Any]):
-    """Readings by sensor id, each made when it is first read."""
+_SERIALS = count()
+_OPEN: WeakValueDictionary[int, AskedSensors] = WeakValueDictionary()  # by serial number
 
-    def __init__(self, sensors: AskedSensors, tick: int) -> None:
-        self._sensors, self._tick = sensors, tick
+
+class Readings(Mapping[str, Any]):
+    """Readings by sensor id, each made when it is first read.
+
+    It holds readings and numbers alone: no attribute of it leads to the sensors or the world.
+    """
+
+    __slots__ = ("_ids", "_ready", "_serial", "_tick")
+
+    def __init__(self, serial: int, tick: int, ids: tuple[str, ...]) -> None:
+        """serial: of the sensors that measure."""
+        self._serial, self._tick, self._ids = serial, tick, ids
         self._ready: dict[str, Any] = {}
 
     def __getitem__(self, id: str) -> Any:
         if id not in self._ready:
-            reader = self._sensors.readers[id]
-            if self._sensors.tick != self._tick:
+            if id not in self._ids:
+                raise KeyError(id)
+            sensors = _OPEN.get(self._serial)
+            if sensors is None or sensors.tick != self._tick:
+                now = "the run was closed" if sensors is None else f"tick {sensors.tick}"
                 raise BackendError(
-                    f"sensor {id} of tick {self._tick} was first read after tick "
-                    f"{self._sensors.tick}; a frame is valid until the next step"
+                    f"sensor {id} of tick {self._tick} was first read after "
+                    f"{now}; a frame is valid until the next step"
                 )
-            self._ready[id] = reader()
+            self._ready[id] = sensors.readers[id]()
         return self._ready[id]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._sensors.readers)
+        return iter(self._ids)
 
     def __len__(self) -> int:
-        return len(self._sensors.readers)
+        return len(self._ids)

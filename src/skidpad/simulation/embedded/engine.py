@@ -106,6 +106,7 @@ class EmbeddedBackend:
         self.sensing.change(outside)
         self._setup = changed
         if self._asked is not None:
+            self._last_asked = self._asked  # which the frame of the moment may still read
             self._asked = self._make_asked()
 
     def _make_asked(self) -> AskedSensors:

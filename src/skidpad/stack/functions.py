@@ -65,12 +65,13 @@ class AddedFunctions:
 
     def __init__(self, names: Sequence[str], map: RoadMap, dt: float) -> None:
         self.kinds = tuple(FUNCTIONS.get(name) for name in names)
-        self._make = lambda: [k.factory(map, dt) for k in self.kinds if k.factory is not None]
+        self._map, self._dt = map, dt
         self.reset()
 
     def reset(self) -> None:
         """Starts all of them afresh."""
-        self._functions = self._make()
+        factories = [kind.factory for kind in self.kinds if kind.factory is not None]
+        self._functions = [factory(self._map, self._dt) for factory in factories]
 
     def update(self, frame: SensorFrame, command: VehicleCommand) -> VehicleCommand:
         """Returns the command after each function has changed it."""

@@ -14,6 +14,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from skidpad.cli.extensions import extension_points
 from skidpad.recording.logfiles import read_log
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
@@ -104,53 +105,91 @@ def follow(text: str, folder: Path, packages: Path) -> list[str]:
     return followed
 
 
+def check_sensor(folder: Path) -> None:
+    """The report, and the cockpit's replay without the package, show the sensor."""
+    assert "Radar to the rear" in (folder / "out/behind/report.html").read_text("utf-8")
+    replayed = "from skidpad.cockpit.replay import Recording; from pathlib import Path; "
+    replayed += "print(Recording(next(Path('out/behind/runs').iterdir())).readings(20))"
+    assert "Radar to the rear, returns" in call(folder, "-c", replayed)
+
+
+def check_function(folder: Path) -> None:
+    """The function held the vehicle to the limit of 100 km/h, and the report shows its numbers."""
+    page = folder / "out/assisted/report.html"
+    assert "Intelligent speed assistance" in page.read_text("utf-8")
+    rows = pl.read_parquet(page.with_name("results.parquet"))
+    assert 90.0 < rows["max_speed_kmh"].item() < 101.0
+    assert rows["functions"].item() == "acc+lca+isa"
+
+
+def check_indicator(folder: Path) -> None:
+    """The page and its data have the indicator, also when it is written again without the package."""
+    page = folder / "out/monitored/report.html"
+    assert "ego speed difference" in page.read_text("utf-8")
+    again = "from skidpad.report.channels import write_drive_report; from pathlib import Path; "
+    call(folder, "-c", again + "write_drive_report(Path('out/monitored'))")
+    assert "ego speed difference" in page.read_text("utf-8")
+    assert "ego_speed_difference" in page.with_name("monitor.json").read_text("utf-8")
+
+
+def check_action(folder: Path) -> None:
+    """The story of the run tells the action."""
+    story = (folder / "out/crowd").rglob("*")
+    texts = [p.read_text("utf-8") for p in story if p.suffix in (".csv", ".json", ".jsonl")]
+    assert any("slow_all" in text for text in texts)
+
+
+def check_metric(folder: Path) -> None:
+    """Rows and report have the metric, also a report that is written again without the package."""
+    page = folder / "out/close/report.html"
+    assert "close following" in page.read_text("utf-8")
+    rows = pl.read_parquet(page.with_name("results.parquet"))
+    assert 0.0 <= rows["close_following_pct"].item() <= 100.0
+    again = "from skidpad.report.matrix import write_report; from pathlib import Path; "
+    call(folder, "-c", again + "write_report(Path('out/close'))")
+    assert "close following" in page.read_text("utf-8")
+
+
+def check_backend(folder: Path) -> None:
+    """What acts is what was asked for three ticks before."""
+    log = read_log(folder / "out/late/runs/2_rain-noon-001")
+    asked, done = log.requested.throttle, log.applied.throttle
+    assert list(done[4:24]) == list(asked[:20]) != list(done[1:21])
+
+
+def check_map(folder: Path) -> None:
+    """The campaign keeps the road that was made."""
+    assert list(folder.glob("out/circle/maps/*/circle-60.xodr"))
+
+
+CHECKS = {
+    "A sensor": check_sensor,
+    "A driving function": check_function,
+    "An indicator": check_indicator,
+    "A scenario action and a condition": check_action,
+    "A metric": check_metric,
+    "A backend": check_backend,
+    "A map": check_map,
+}
+
+
 @pytest.mark.parametrize("title", RECIPES)
 def test_a_recipe_works_as_printed_and_its_runs_open_without_it(title: str, tmp_path: Path) -> None:
     packages = tmp_path / "packages"
     commands = follow(RECIPES[title], tmp_path, packages)
     assert commands
-    page = tmp_path / "out" / "behind" / "report.html"
-    if page.is_file():
-        assert "Radar to the rear" in page.read_text(encoding="utf-8")
-    if "crowd.xosc" in RECIPES[title]:
-        story = (tmp_path / "out" / "crowd").rglob("*")
-        texts = [p.read_text("utf-8") for p in story if p.suffix in (".csv", ".json", ".jsonl")]
-        assert any("slow_all" in text for text in texts)
-        replayed = "from skidpad.cockpit.replay import Recording; from pathlib import Path; "
-        replayed += "print(Recording(next(Path('out/behind/runs').iterdir())).readings(20))"
-        assert "Radar to the rear, returns" in call(tmp_path, "-c", replayed)
-    page = tmp_path / "out" / "assisted" / "report.html"
-    if page.is_file():
-        assert "Intelligent speed assistance" in page.read_text(encoding="utf-8")
-        rows = pl.read_parquet(page.with_name("results.parquet"))
-        assert rows["max_speed_kmh"].item() < 101.0
-        assert rows["functions"].item() == "acc+lca+isa"
-    late = tmp_path / "out" / "late" / "runs" / "2_rain-noon-001"
-    if late.is_dir():
-        log = read_log(late)
-        asked, done = log.requested.throttle, log.applied.throttle
-        assert list(done[4:24]) == list(asked[:20]) != list(done[1:21])
-    page = tmp_path / "out" / "close" / "report.html"
-    if page.is_file():
-        assert "close following" in page.read_text(encoding="utf-8")
-        rows = pl.read_parquet(page.with_name("results.parquet"))
-        assert rows["close_following_pct"].item() >= 0.0
-        again = "from skidpad.report.matrix import write_report; from pathlib import Path; "
-        call(tmp_path, "-c", again + "write_report(Path('out/close'))")  # without it
-        assert "close following" in page.read_text(encoding="utf-8")
-    page = tmp_path / "out" / "monitored" / "report.html"
-    if page.is_file():
-        assert "ego speed difference" in page.read_text(encoding="utf-8")
-        again = "from skidpad.report.channels import write_drive_report; from pathlib import Path; "
-        call(tmp_path, "-c", again + "write_drive_report(Path('out/monitored'))")  # without it
-        assert "ego speed difference" in page.read_text(encoding="utf-8")
-        assert "ego_speed_difference" in (page.parent / "monitor.json").read_text("utf-8")
+    if title in CHECKS:
+        CHECKS[title](tmp_path)
     for command in commands:
-        if command.startswith(
-            ("skidpad show ", "skidpad safety-case ")
-        ):  # with the package removed
+        if command.startswith(("skidpad show ", "skidpad safety-case ")):
             with_it = call(tmp_path, "-m", *command.split(), packages=packages)
-            assert call(tmp_path, "-m", *command.split()) == with_it
+            assert call(tmp_path, "-m", *command.split()) == with_it  # with the package removed
+
+
+def test_every_registry_has_a_recipe() -> None:
+    groups = {registry.group for registry in extension_points()}
+    assert groups == set(re.findall(r'entry-points."([\w.]+)"', PAGE.read_text("utf-8")))
+    assert set(CHECKS) <= set(RECIPES)
 
 
 def test_the_relay_of_the_recipe_takes_alerts(tmp_path: Path) -> None:

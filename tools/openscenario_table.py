@@ -15,15 +15,21 @@ PAGE = ROOT / "docs" / "openscenario.md"
 BEGIN, END = "<!-- coverage: begin -->", "<!-- coverage: end -->"
 
 
-def marked_tests() -> dict[str, str]:
-    """A test for each element that one is marked with."""
+def marked_tests(mark_name: str = "osc") -> dict[str, str]:
+    """A test for each element that one is marked with.
+
+    mark_name: `osc` for tests of what an element does, `osc_noted` for those of a note alone.
+    """
     found: dict[str, str] = {}
     for file in sorted((ROOT / "tests" / "scenarios").glob("test_*.py")):
         for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if not isinstance(node, ast.FunctionDef):
                 continue
             for mark in node.decorator_list:
-                if isinstance(mark, ast.Call) and ast.unparse(mark.func) == "pytest.mark.osc":
+                if (
+                    isinstance(mark, ast.Call)
+                    and ast.unparse(mark.func) == f"pytest.mark.{mark_name}"
+                ):
                     for name in mark.args:
                         found.setdefault(ast.literal_eval(name), f"{file.stem}::{node.name}")
     return found

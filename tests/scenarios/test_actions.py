@@ -183,7 +183,7 @@ vehicleLightType="brakeLights"/></LightType><LightState mode="on"/></LightStateA
 }  # fmt: skip
 
 
-@pytest.mark.osc(
+@pytest.mark.osc_noted(
     "LightStateAction", "AnimationAction", "AppearanceAction",
     "UserDefinedAction", "CustomCommandAction", "SetMonitorAction",
 )  # fmt: skip

@@ -110,6 +110,7 @@ def test_an_action_of_the_file_upon_the_speed_goes_before_the_controller(tmp_pat
     assert found[-1].speed == pytest.approx(4.0, abs=0.05)
 
 
+@pytest.mark.osc("UserDefinedAction", "CustomCommandAction", "UserDefinedValueCondition")
 def test_an_action_and_a_value_of_users_are_reached_by_their_names(tmp_path):
     custom = """<UserDefinedAction><CustomCommandAction type="count">ping</CustomCommandAction>
 </UserDefinedAction>"""

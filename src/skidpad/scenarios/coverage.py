@@ -61,7 +61,6 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         "TrafficSignalStateAction": STATES,
         "UserDefinedValueCondition": NAMED,
         "CustomCommandAction": NAMED,
-        "SetMonitorAction": "is noted, without effect",
         **dict.fromkeys(
             ("TrailerAction", "ConnectTrailerAction", "DisconnectTrailerAction"), TOWED
         ),
@@ -101,7 +100,8 @@ class Coverage:
 
 def without_effect() -> tuple[str, ...]:
     """Actions that are read and noted, and change nothing that this world can show."""
-    return tuple(tag for tag, make in PRIVATE.items() if make.__name__ == "no_effect")
+    silent = (tag for tag, make in PRIVATE.items() if make.__name__ == "no_effect")
+    return (*silent, "AppearanceAction", "SetMonitorAction")
 
 
 def known_elements() -> frozenset[str]:
@@ -128,8 +128,10 @@ def coverage() -> list[Coverage]:
     known, silent = known_elements(), without_effect()
     found = []
     for name in sorted(wanted):
-        remark = "is noted, without effect" if name in silent else PARTIAL.get(name, "")
-        if name not in known:
+        remark = PARTIAL.get(name, "")
+        if name in silent:
+            found.append(Coverage(name, Support.NO, "is read and noted, without effect"))
+        elif name not in known:
             found.append(Coverage(name, Support.NO))
         else:
             found.append(Coverage(name, Support.PARTIAL if remark else Support.YES, remark))

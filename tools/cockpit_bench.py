@@ -24,7 +24,7 @@ from skidpad.cockpit.driving import about, drive_job
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.pictures import Encoder
 from skidpad.cockpit.producer import Producer
-from skidpad.cockpit.replay import Recording
+from skidpad.cockpit.replay import RecordedRun
 from skidpad.cockpit.replaying import Replayer
 from skidpad.cockpit.serving import application
 from skidpad.cockpit.studio import Studio, View, plane
@@ -44,7 +44,7 @@ def spec(weather: str, seconds: float) -> RunSpec:
     return RunSpec(driver=driver, course=Roads(), weather=preset(weather), duration=seconds)
 
 
-def views(recording: Recording, moments: range) -> dict[str, float]:
+def views(recording: RecordedRun, moments: range) -> dict[str, float]:
     """Median CPU milliseconds per view, drawn alone and handed on, and of JPEG for all."""
     table, first = recording.table, recording.seat(moments[0]).outside
     found = {}
@@ -63,7 +63,7 @@ def views(recording: Recording, moments: range) -> dict[str, float]:
     return found
 
 
-def seeks(recording: Recording) -> tuple[float, float]:
+def seeks(recording: RecordedRun) -> tuple[float, float]:
     """Median and longest wall milliseconds from the word to the picture, its JPEG included."""
     feed, link, encoder = Feed(), Link(None), Encoder()
     replayer = Replayer(recording, feed, link)
@@ -117,7 +117,7 @@ def main() -> None:
         for weather in ("clear-noon", "rain-night"):
             run = spec(weather, 20.0)
             drive_at_desk(run, Desk(Recorded([]), run), folder / weather)
-            recording = Recording(folder / weather)
+            recording = RecordedRun(folder / weather)
             cost = views(recording, range(200, 300))
             print(weather, msgspec.json.encode({k: round(v, 2) for k, v in cost.items()}).decode())
             print("seek: median {:.0f} ms, longest {:.0f} ms".format(*seeks(recording)))

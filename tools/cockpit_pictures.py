@@ -22,7 +22,7 @@ from skidpad.campaign.desk import Desk, Recorded
 from skidpad.campaign.desk_run import drive_at_desk
 from skidpad.cockpit.film import stretch_of, write_film
 from skidpad.cockpit.pictures import Picture, colours
-from skidpad.cockpit.replay import Recording
+from skidpad.cockpit.replay import RecordedRun
 from skidpad.cockpit.studio import Studio, View, plane
 from skidpad.core.inputs import Sky, Timed
 from skidpad.core.run import AdasDriver, Roads, RunSpec
@@ -41,7 +41,7 @@ VIEWS = (View.DRIVER, View.FOLLOW)
 SIZE = (320, 240)  # px of one picture in the sheet
 
 
-def picture(recording: Recording, weather: str, view: View, extras: frozenset[Extra]) -> Picture:
+def picture(recording: RecordedRun, weather: str, view: View, extras: frozenset[Extra]) -> Picture:
     """The moment in a weather."""
     outside = replace(recording.seat(TICK).outside, weather=preset(weather))
     studio = Studio(recording.map, recording.table, outside, recording.spec.seed, extras)
@@ -52,7 +52,7 @@ def picture(recording: Recording, weather: str, view: View, extras: frozenset[Ex
     return np.asarray(cv2.resize(shown, SIZE, interpolation=cv2.INTER_AREA), dtype=np.uint8)
 
 
-def driven(folder: Path, first: str, seconds: float, changes: dict[int, str]) -> Recording:
+def driven(folder: Path, first: str, seconds: float, changes: dict[int, str]) -> RecordedRun:
     """A drive that begins in one weather; changes: others by tick."""
     driver = AdasDriver(label="3", functions=functions_of(3))
     run = RunSpec(driver=driver, course=Roads(), weather=preset(first), duration=seconds,
@@ -62,7 +62,7 @@ def driven(folder: Path, first: str, seconds: float, changes: dict[int, str]) ->
         for tick, name in changes.items()
     ]
     drive_at_desk(run, Desk(Recorded(inputs), run), folder)
-    return Recording(folder)
+    return RecordedRun(folder)
 
 
 def main() -> None:

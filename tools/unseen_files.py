@@ -31,7 +31,7 @@ from skidpad.core.errors import SkidpadError  # noqa: E402
 from skidpad.scenarios.document import parse  # noqa: E402
 from skidpad.scenarios.findings import HARMLESS  # noqa: E402
 from skidpad.scenarios.scenario import check  # noqa: E402
-from skidpad.scenarios.stage import Told, played  # noqa: E402
+from skidpad.scenarios.stage import PlayedScenario, played  # noqa: E402
 
 STEP, END = 0.05, 20.0  # s
 MOST = 60  # files of one repository
@@ -114,7 +114,7 @@ def folder_of(file: Path, folders: Iterable[Path]) -> Path:
     return above / file.relative_to(above).parts[0]
 
 
-def play(file: Path, maps: Sequence[Path]) -> tuple[str, Told | None]:
+def play(file: Path, maps: Sequence[Path]) -> tuple[str, PlayedScenario | None]:
     """Returns what became of a file, and its trajectories where it plays."""
     try:
         compiled = check(file, maps=maps)

@@ -35,7 +35,7 @@ from skidpad.physics.manoeuvres import (
     understeer,
 )
 from skidpad.physics.stopping import stops
-from skidpad.physics.types import EGO_TYPE, Drive, VehicleType, traffic_types, vehicle_type
+from skidpad.physics.types import EGO_TYPE, DrivenWheels, VehicleType, traffic_types, vehicle_type
 from skidpad.physics.vehicle import steer_share
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ ORACLE = VehicleType(
     front_share=1.4227 / 2.579,
     wheel_radius=0.344,
     wheel_inertia=1.7,
-    drive=Drive.REAR,
+    drive=DrivenWheels.REAR,
     power=150_000.0,
     force_max=8000.0,
     brake_torque_front=1500.0,

@@ -19,7 +19,7 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, SensorLevel
 from skidpad.physics.presets import find_weather
 from skidpad.simulation.embedded.engine import EmbeddedBackend
-from skidpad.simulation.sensing import Readings, Sensing, sensing_of
+from skidpad.simulation.sensing import CameraRadarReadings, Sensing, sensing_of
 
 
 class OtherNumbers:
@@ -34,7 +34,7 @@ class OtherNumbers:
         states: ActorStates,
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_],
-    ) -> Readings:
+    ) -> CameraRadarReadings:
         mixed = ActorStates(*(column[self.order] for column in states))
         return self.inner.read(tick, mixed, lights, braking[self.order])
 

@@ -10,7 +10,7 @@ from skidpad.campaign.headways import headways_of
 from skidpad.campaign.traffic_asked import TrafficBench
 from skidpad.campaign.traffic_watch import (
     LONG,
-    Seen,
+    TrafficCounts,
     Watch,
     leaders,
     overlaps,
@@ -55,7 +55,7 @@ def test_rectangles_overlap_where_they_do() -> None:
 @pytest.mark.req("A-209")
 def test_every_move_of_random_traffic_is_counted_and_nobody_is_near() -> None:
     """In rain on figure8, where half of all moves came out of a queue."""
-    world, seen, jumps = world_of("figure8", 60, "rain-noon"), Seen(), 0
+    world, seen, jumps = world_of("figure8", 60, "rain-noon"), TrafficCounts(), 0
     watch = Watch(world, seen, "rain-noon", 900_000)
     for _ in range(2400):
         there, x, y = world.states.present.copy(), world.states.x.copy(), world.states.y.copy()
@@ -96,7 +96,7 @@ def test_followers_are_held_up_and_no_longer_close_in(
     wanted: float, own: float, lead: float, counted: bool
 ) -> None:
     """A vehicle 30 m behind a leader, both 4 m long or more, on a motorway."""
-    world, seen = world_of(vehicles=2), Seen()
+    world, seen = world_of(vehicles=2), TrafficCounts()
     watch = Watch(world, seen, "clear-noon", 900_000)
     assert world.traffic is not None
     halves = world.placed["half_length"][:2].copy()
@@ -119,7 +119,7 @@ def test_followers_are_held_up_and_no_longer_close_in(
 
 
 def test_who_stands_long_is_listed_with_the_cause() -> None:
-    world, seen = world_of(vehicles=3), Seen()
+    world, seen = world_of(vehicles=3), TrafficCounts()
     watch = Watch(world, seen, "clear-noon", 1)
     assert world.traffic is not None
     for tick in range(round(LONG / world.dt) + 20):

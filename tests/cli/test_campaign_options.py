@@ -4,7 +4,7 @@ import pytest
 import typer
 from typer.core import TyperOption
 
-from skidpad.cli.campaigns import Drive, Estimate
+from skidpad.cli.campaigns import CampaignOptions, Estimate
 from skidpad.cli.main import app
 from skidpad.core.errors import OutputError
 from toy_campaign import campaign
@@ -33,7 +33,7 @@ def test_every_campaign_takes_the_same_options_and_can_be_estimated(path):
 
 
 def test_the_terminal_shows_cells_as_they_end_and_then_the_report(tmp_path, capsys):
-    how = Drive(out=tmp_path / "out", workers=1)
+    how = CampaignOptions(out=tmp_path / "out", workers=1)
     summary = how(campaign(), lambda folder: f"report of {folder.name}")
     shown = capsys.readouterr()
     assert shown.out == "report of out\n"
@@ -41,7 +41,7 @@ def test_the_terminal_shows_cells_as_they_end_and_then_the_report(tmp_path, caps
     assert summary.runs == 8
     with pytest.raises(OutputError, match="--resume"):
         how(campaign(), str)
-    again = Drive(out=tmp_path / "out", workers=1, resume=True)(campaign(), str)
+    again = CampaignOptions(out=tmp_path / "out", workers=1, resume=True)(campaign(), str)
     assert (again.driven, again.content_hash) == (0, summary.content_hash)
     assert "even: 4 runs, 2 heads" in capsys.readouterr().err
 
@@ -49,7 +49,7 @@ def test_the_terminal_shows_cells_as_they_end_and_then_the_report(tmp_path, caps
 def test_another_campaign_goes_to_the_next_folder(tmp_path, capsys):
     out = tmp_path / "out"
     for n, wanted in ((4, "out"), (5, "out-2"), (5, "out-2")):
-        how = Drive(out=out, workers=1, or_next=True, resume=True)
+        how = CampaignOptions(out=out, workers=1, or_next=True, resume=True)
         assert how(campaign(n), str).folder.name == wanted
 
 

@@ -28,7 +28,7 @@ from skidpad.cockpit.hud import TIERS
 from skidpad.cockpit.marks import marks_of, project
 from skidpad.cockpit.pictures import LIGHTS, Encoder, colours, views_of
 from skidpad.cockpit.producer import Producer
-from skidpad.cockpit.realtime import RealTime
+from skidpad.cockpit.realtime import CockpitPacer
 from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.studio import View, cameras
 from skidpad.cockpit.tabs import ASLEEP_AFTER, RELEASE_AFTER, DeadMan, Tabs
@@ -172,7 +172,7 @@ class Wall:
 def paced(link, took, wall=None):
     """Real time over ticks that take so long each; returns the wall and what was waited."""
     wall, shown = Wall() if wall is None else wall, []
-    time = RealTime(link, shown.append, wall, wall.wait)
+    time = CockpitPacer(link, shown.append, wall, wall.wait)
     time.begin(None)
     try:
         for seconds in took:
@@ -211,7 +211,7 @@ def test_a_pause_shows_the_moment_and_goes_on_by_steps():
     for word in (Pause(True), Show(View.TOP), Step(2)):
         ours.send_bytes(encode(word))
     link.drain()
-    time = RealTime(link, (shown := []).append, (wall := Wall()), wall.wait)
+    time = CockpitPacer(link, (shown := []).append, (wall := Wall()), wall.wait)
     time.see("first")
     time.see("second")
     assert shown == ["first", "second"]

@@ -21,7 +21,7 @@ from skidpad.cli.main import app
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.film import stretch_of, write_film
 from skidpad.cockpit.pictures import colours
-from skidpad.cockpit.replay import Recording, report_of
+from skidpad.cockpit.replay import RecordedRun, report_of
 from skidpad.cockpit.replaying import Replayer
 from skidpad.cockpit.studio import Studio, View, plane
 from skidpad.cockpit.watching import lines, standing
@@ -77,7 +77,7 @@ def driven(tmp_path_factory):
 
 
 def test_a_car_on_a_bridge_is_in_nobodys_way_on_the_time_line(driven):
-    recording = Recording(driven[0])
+    recording = RecordedRun(driven[0])
     log = recording.log
     at = {name: getattr(log.actors, name).copy() for name in ("x", "y", "z", "yaw", "vx", "vy")}
     for name in ("x", "y", "z", "yaw"):
@@ -93,7 +93,7 @@ def test_a_car_on_a_bridge_is_in_nobodys_way_on_the_time_line(driven):
 
 @pytest.mark.parametrize("tick", [-5, 2000])
 def test_a_crash_that_no_moment_shows_is_looked_for_in_the_nearest_one(driven, tick):
-    recording = Recording(driven[0])
+    recording = RecordedRun(driven[0])
     beyond = ContactEvent(tick, 1, "", impulse=1e3, v_closing=2.0, x=0.0, y=0.0)
     recording.log = replace(recording.log, events=(beyond,))
     at = 0 if tick < 0 else -1
@@ -102,7 +102,7 @@ def test_a_crash_that_no_moment_shows_is_looked_for_in_the_nearest_one(driven, t
 
 def test_moments_are_those_that_were_driven(driven):
     folder, moments = driven
-    recording = Recording(folder)
+    recording = RecordedRun(folder)
     assert recording.ticks == len(moments) == 100
     for k in (0, 31, 71, 99, 40):  # in any order
         tick, states, lights, contacts, report, mode = moments[k]
@@ -117,7 +117,7 @@ def test_moments_are_those_that_were_driven(driven):
 
 
 def test_the_desk_stands_as_it_stood(driven):
-    recording = Recording(driven[0])
+    recording = RecordedRun(driven[0])
     seats = {k: recording.seat(k) for k in (0, 9, 10, 29, 30, 49, 50, 54, 55, 69, 70)}
     assert [k for k, s in seats.items() if s.manual] == [30, 49, 50, 54, 55, 69]
     assert seats[9].functions != seats[10].functions == (Function.ACC,)
@@ -130,7 +130,7 @@ def test_the_desk_stands_as_it_stood(driven):
 @pytest.mark.req("A-275")
 def test_pictures_are_drawn_again_from_the_poses(driven):
     folder, moments = driven
-    recording = Recording(folder)
+    recording = RecordedRun(folder)
     studio = Studio(recording.map, recording.table, recording.seat(20).outside, 4)
     nobody = np.zeros(len(recording.table), dtype=np.bool_)
     tick, states, lights, *_ = moments[20]
@@ -146,7 +146,7 @@ def test_pictures_are_drawn_again_from_the_poses(driven):
 
 
 def test_time_goes_where_it_is_told_to(driven):
-    recording, feed, link = Recording(driven[0]), Feed(), Link(None)
+    recording, feed, link = RecordedRun(driven[0]), Feed(), Link(None)
     now = [0.0]
     replayer = Replayer(recording, feed, link, lambda: now[0])
     where = []
@@ -177,7 +177,7 @@ def test_time_goes_where_it_is_told_to(driven):
 
 @pytest.mark.req("A-275")
 def test_a_stretch_becomes_a_film(driven, tmp_path):
-    recording = Recording(driven[0])
+    recording = RecordedRun(driven[0])
     words = ["replay", str(driven[0]), "--from", "1", "--to", "1.5", "--film"]
     done = CliRunner().invoke(app, [*words, str(tmp_path / "a" / "film.mp4"), "--view", "driver"])
     assert done.exit_code == 0, done.output
@@ -198,7 +198,7 @@ def test_a_stretch_becomes_a_film(driven, tmp_path):
 def test_folders_that_hold_no_run_are_one_sentence(driven, tmp_path):
     def refused(folder):
         with pytest.raises(FileError) as caught:
-            Recording(folder)
+            RecordedRun(folder)
         assert "\n" not in str(caught.value)
         return str(caught.value)
 

@@ -19,7 +19,7 @@ from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.indicators import every, least_of, ttc_ahead
 from skidpad.cockpit.opening import open_source
-from skidpad.cockpit.replay import Recording
+from skidpad.cockpit.replay import RecordedRun
 from skidpad.cockpit.replaying import Replayer
 from skidpad.cockpit.source import index_at, timeline
 from skidpad.cockpit.studio import CRASH, View, mount_in, watching
@@ -217,7 +217,7 @@ def hazards(folder, ids=("h0001",)):
 def test_a_hazard_is_replayed_as_the_driving_channel_saw_it(tmp_path):
     folder, worlds = hazards(tmp_path / "found")
     source = open_source(folder)
-    assert isinstance(source, Recording)
+    assert isinstance(source, RecordedRun)
     k = index_at(source, round(1.0 / DT))
     states = source.moment(k).truth.states
     ego = worlds[10].frames[1].ego

@@ -35,11 +35,11 @@ def campaign(n):
 
 def main():
     """Drive or resume it as the command line does."""
-    from skidpad.cli.campaigns import Drive
+    from skidpad.cli.campaigns import CampaignOptions
     from skidpad.cli.main import run_guarded
 
     run_guarded(
-        lambda: Drive(out=Path(sys.argv[1]), workers=2, resume=True)(
+        lambda: CampaignOptions(out=Path(sys.argv[1]), workers=2, resume=True)(
             campaign(int(sys.argv[2])), lambda folder: "done"
         )
     )

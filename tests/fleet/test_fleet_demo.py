@@ -30,14 +30,14 @@ from skidpad.fleet.service import Places, open_fleet
 from skidpad.fleet.store.accounts import add_person
 from skidpad.fleet.store.reading import Wanted, hazard_rows, record_of
 from skidpad.fleet.store.tables import drives, hazards, vehicles
-from skidpad.fleet.updates.payloads import PayloadKind, settings_of_content
+from skidpad.fleet.updates.payloads import PayloadKind, read_payload_content
 from skidpad.fleet.words import Role
 
 
 def test_the_rule_sets_of_the_demo_are_valid_and_differ():
     sets = rule_sets()
     assert len(set(sets.values())) == 3
-    settings = {name: settings_of_content(PayloadKind.RULES, c) for name, c in sets.items()}
+    settings = {name: read_payload_content(PayloadKind.RULES, c) for name, c in sets.items()}
     assert {name: s.profile for name, s in settings.items()} == {
         "published": Profile.AS_PRINTED,
         "tracked": Profile.TRACKED,

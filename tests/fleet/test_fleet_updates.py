@@ -28,7 +28,7 @@ from skidpad.fleet.loop import rollout
 from skidpad.fleet.loop.plan import look
 from skidpad.fleet.updates import signing
 from skidpad.fleet.updates.client import UpdateClient, UpdateRefused
-from skidpad.fleet.updates.payloads import PayloadKind, payload_name, settings_of_content
+from skidpad.fleet.updates.payloads import PayloadKind, payload_name, read_payload_content
 from skidpad.fleet.updates.repository import SIGNED_AT
 from skidpad.fleet.upkeep import Upkeep
 from skidpad.fleet.words import Refused
@@ -97,7 +97,7 @@ def test_a_signed_update_arrives_as_it_was(maker, tmp_path):
     maker.repository.publish(maker.signed(NAME, CONTENT), NAME, CONTENT)
     path = car.client.fetch(NAME)
     assert path.read_bytes() == CONTENT
-    assert settings_of_content(PayloadKind.RULES, CONTENT).rules
+    assert read_payload_content(PayloadKind.RULES, CONTENT).rules
     assert maker.repository.content(NAME) == CONTENT
 
 
@@ -243,8 +243,8 @@ def test_another_makers_root_and_files_open_nothing(maker, tmp_path):
 def test_payloads_are_data_that_the_reader_takes():
     model = Path(model_module.__file__).parent / "models" / "hazards.npz"
     thresholds = Path(catalogue.__file__).with_name("thresholds.yaml").read_bytes()
-    assert settings_of_content(PayloadKind.MODEL, model.read_bytes()).detectors
-    assert settings_of_content(PayloadKind.THRESHOLDS, thresholds).thresholds
+    assert read_payload_content(PayloadKind.MODEL, model.read_bytes()).detectors
+    assert read_payload_content(PayloadKind.THRESHOLDS, thresholds).thresholds
     buffer = io.BytesIO()
     np.savez(buffer, card=np.array([{"a": 1}], dtype=object))  # needs pickle to be read
     bad = [
@@ -255,7 +255,7 @@ def test_payloads_are_data_that_the_reader_takes():
     ]  # fmt: skip
     for kind, content in bad:
         with pytest.raises(Refused):
-            settings_of_content(kind, content)
+            read_payload_content(kind, content)
 
 
 def test_keys_that_sign_never_lie_with_the_data(tmp_path):

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from skidpad.scenarios.scenario import Scenario, compile_scenario
-from skidpad.scenarios.stage import Told, played
+from skidpad.scenarios.stage import PlayedScenario, played
 
 HEAD = """<?xml version='1.0'?>
 <OpenSCENARIO>
@@ -181,6 +181,6 @@ def compiled(folder: Path, **parts: object) -> Scenario:
     return compile_scenario(write(folder, **parts))
 
 
-def told(folder: Path, **parts: object) -> Told:
+def told(folder: Path, **parts: object) -> PlayedScenario:
     """The file played by itself, everything ideal."""
     return played(compiled(folder, **parts), 60.0)

@@ -28,7 +28,7 @@ from skidpad.scenarios.network import network_of
 from skidpad.scenarios.player import Player
 from skidpad.scenarios.routes import random_roads
 from skidpad.scenarios.scenario import check
-from skidpad.scenarios.stage import Stage, played
+from skidpad.scenarios.stage import IdealWorld, played
 
 STOP = private(speed(to(0)))
 LIGHTS = """<RoadNetwork><LogicFile filepath="straight.xodr"/><TrafficSignals>
@@ -200,7 +200,7 @@ def test_what_this_world_cannot_show_is_over_at_once_and_told(tmp_path, tag):
 def driven_by_others(tmp_path, action, end=4.0):
     """The ego's commands by tick, while somebody else may drive it."""
     scenario = compiled(tmp_path, stories=story(event("e", action, time(2.0)), actor="ego"))
-    stage = Stage(scenario)
+    stage = IdealWorld(scenario)
     modes = dict.fromkeys(scenario.entities, ActorMode.IDEAL) | {"ego": None}
     player, moved = Player(scenario, modes=modes), []
     for _ in range(round(end / 0.05)):

@@ -23,7 +23,7 @@ from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.player import Player
-from skidpad.scenarios.stage import Stage
+from skidpad.scenarios.stage import IdealWorld
 from skidpad.simulation.scripted import Motion
 
 V_EGO = 20.0  # m/s, twice what its file says
@@ -93,7 +93,7 @@ def test_the_newer_action_wins_against_a_trajectory_with_times(tmp_path, action,
 def with_a_stack(folder, action, when=LATER, **parts):
     """Played with an ego that drives itself: at V_EGO, from 1 s on on another lane."""
     scenario = compiled(folder, stories=story(event("e", action, when)), end=20.0, **parts)
-    stage, modes = Stage(scenario), dict.fromkeys(scenario.entities, ActorMode.IDEAL)
+    stage, modes = IdealWorld(scenario), dict.fromkeys(scenario.entities, ActorMode.IDEAL)
     player = Player(scenario, modes=modes | {"ego": None})
     begin = scenario.start.entities["ego"].place.pose
     while True:
@@ -191,7 +191,7 @@ def test_a_word_is_not_added_to(tmp_path):
 
 def test_height_is_that_of_the_ground_for_whom_the_file_does_not_place(tmp_path):
     scenario = compiled(tmp_path)
-    stage, player = Stage(scenario), Player(scenario, modes={"ego": None})
+    stage, player = IdealWorld(scenario), Player(scenario, modes={"ego": None})
     player.step(stage.truth())
     stage.step([ActorCommand("ego", place=Pose(102.0, -8.75, 12.0), speed=40.0)])
     player.step(stage.truth())

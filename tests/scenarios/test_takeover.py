@@ -15,7 +15,7 @@ from skidpad.core.run import ActorMode
 from skidpad.recording.logfiles import read_log
 from skidpad.recording.runlog import RunLog
 from skidpad.scenarios.player import Player
-from skidpad.scenarios.stage import Stage
+from skidpad.scenarios.stage import IdealWorld
 
 HIDE = private('<VisibilityAction graphics="true" sensors="{}" traffic="true"/>')
 
@@ -68,7 +68,7 @@ def test_a_brake_is_pressed_until_it_is_given_back(tmp_path, actor, i):
 def test_inputs_are_those_of_a_driver(tmp_path, inputs, worked):
     events = story(event("e", override(inputs), time(0.5)), actor="other")
     scenario = compiled(tmp_path, stories=events, minor=3)
-    player, stage = Player(scenario, modes={"other": ActorMode.PHYSICAL}), Stage(scenario)
+    player, stage = Player(scenario, modes={"other": ActorMode.PHYSICAL}), IdealWorld(scenario)
     for _ in range(15):
         stage.step(player.step(stage.truth()))
     assert player.actors["other"].worked == pytest.approx(worked)
@@ -81,7 +81,7 @@ def test_inputs_are_those_of_a_driver(tmp_path, inputs, worked):
 def test_what_no_vehicle_here_has_is_noted(tmp_path, inputs):
     events = story(event("e", override(inputs), time(0.5)), actor="other")
     scenario = compiled(tmp_path, stories=events, minor=3)
-    player, stage = Player(scenario), Stage(scenario)
+    player, stage = Player(scenario), IdealWorld(scenario)
     for _ in range(15):
         stage.step(player.step(stage.truth()))
     assert any("Override" in notice for notice in player.scene.notices)

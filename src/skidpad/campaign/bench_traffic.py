@@ -9,7 +9,7 @@ import numpy as np
 
 from skidpad.campaign.cast import stage_of
 from skidpad.campaign.traffic_asked import TrafficBench
-from skidpad.campaign.traffic_watch import Seen, Watch
+from skidpad.campaign.traffic_watch import TrafficCounts, Watch
 from skidpad.core.run import Roads, RunSpec
 from skidpad.core.settings import load_profile
 from skidpad.core.setup import DT
@@ -34,7 +34,7 @@ class TrafficRow:
     static: int = 0  # with what stands beside the road
     put_back: int = 0  # stuck or astray
     changes: int = 0  # of lane
-    seen: Seen = field(default_factory=Seen)
+    seen: TrafficCounts = field(default_factory=TrafficCounts)
 
     @property
     def per_100_km(self) -> float:

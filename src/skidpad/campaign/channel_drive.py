@@ -128,7 +128,7 @@ class Crew:
         self.decision = Decision(t, name, choice.reason.value, tuple(scores))
 
 
-class Recording(Sink):
+class ChannelRecorder(Sink):
     """Writes every cycle after the warm-up and tells listeners; it knows when the segment is over."""
 
     def __init__(
@@ -175,7 +175,7 @@ class Recording(Sink):
 class Street:
     """The script of a segment: people walk and ride, until the recording has ended."""
 
-    def __init__(self, crew: Crew, recording: Recording) -> None:
+    def __init__(self, crew: Crew, recording: ChannelRecorder) -> None:
         self.crew, self.recording = crew, recording
 
     @property
@@ -212,7 +212,7 @@ def drive_segment(
             open_listeners(links, crew.crew.channels, path) as listeners,
             ChannelWriter(part, crew.crew.channels) as writer,
         ):
-            recording = Recording(crew, writer, [*listeners, *aboard])
+            recording = ChannelRecorder(crew, writer, [*listeners, *aboard])
             sinks = (recording, RealTime(DT)) if links.live else (recording,)
             specs = crew.sensors()
             asked = frozenset(channel.id for channel in specs)

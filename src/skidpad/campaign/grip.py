@@ -56,7 +56,7 @@ def warm_up() -> None:
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class GripDrive:
     """A drive, and what its log says."""
 
     driven: Run
@@ -65,7 +65,7 @@ class Judged:
     timing: Timing
 
 
-def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> Judged:
+def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> GripDrive:
     """In a worker: drive a run of the catalogue; with `keep`, or when it failed, into its folder."""
     from skidpad.campaign.backends import WATCHDOG, keep_server, make_backend
     from skidpad.campaign.run import run
@@ -89,7 +89,7 @@ def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> Judged:
         write_run(folder, driven)
         write_played(folder, driven)
         keep_road(out, driven.road)
-    return Judged(driven, metrics, log_hash(driven.log), watch.timing())
+    return GripDrive(driven, metrics, log_hash(driven.log), watch.timing())
 
 
 def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey, GripMetrics]:

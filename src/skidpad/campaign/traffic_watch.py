@@ -50,7 +50,7 @@ class Stand:
 
 
 @dataclass(slots=True)
-class Seen:
+class TrafficCounts:
     """What a watch has seen so far, of one world or several."""
 
     overlaps: int = 0  # pairs of vehicles that began to overlap
@@ -93,7 +93,7 @@ class Seen:
 class Watch:
     """Looks at a world after each of its steps."""
 
-    def __init__(self, world: World, seen: Seen, weather: str, seed: int) -> None:
+    def __init__(self, world: World, seen: TrafficCounts, weather: str, seed: int) -> None:
         n = len(world.table)
         self.world, self.seen, self.weather, self.seed = world, seen, weather, seed
         self._touching: set[tuple[int, int]] = set()

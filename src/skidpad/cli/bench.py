@@ -19,7 +19,7 @@ from skidpad.core.setup import DT
 
 if TYPE_CHECKING:
     from skidpad.campaign.bench import Row
-    from skidpad.campaign.traffic_watch import Seen
+    from skidpad.campaign.traffic_watch import TrafficCounts
 
 
 class Subject(str, Enum):
@@ -130,7 +130,7 @@ def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
     return {"unit": "min", "minutes": minutes, "how": how, "target": matrix.TARGET}
 
 
-def _describe_seen(seen: Seen) -> Iterator[str]:
+def _describe_seen(seen: TrafficCounts) -> Iterator[str]:
     """Headways in steady following, and who stood long and for what."""
     from skidpad.campaign.headways import headways_of
     from skidpad.campaign.traffic_watch import LONG

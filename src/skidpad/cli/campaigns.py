@@ -38,7 +38,7 @@ class Driving(Struct, frozen=True, kw_only=True):
     csv: Annotated[bool, Meta(description="Write CSV beside Parquet.")] = False
 
 
-class Drive(Driving, frozen=True, kw_only=True):
+class CampaignOptions(Driving, frozen=True, kw_only=True):
     """Where and how the runs of a campaign are driven."""
 
     out: Annotated[Path, Meta(description="Folder for results and report.")]
@@ -137,7 +137,7 @@ class Estimate(Struct, frozen=True, kw_only=True):
         )
 
 
-How = Drive | Estimate
+How = CampaignOptions | Estimate
 
 
 def next_folder(out: Path, identities: Mapping[str, dict[str, Any]]) -> Path:

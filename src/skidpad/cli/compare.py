@@ -12,7 +12,7 @@ import typer
 if TYPE_CHECKING:
     import polars as pl
 
-    from skidpad.evidence.compare import Change, Judged, Rule
+    from skidpad.evidence.compare import Change, Rule, RuleJudgement
 
 
 class Flaws(str, Enum):
@@ -156,7 +156,7 @@ def _places(results: pl.DataFrame) -> set[str]:
     return set(results[FINGERPRINT])
 
 
-def _against(rule: Rule, judged: list[Judged], undecided: Undecided) -> list[Judged]:
+def _against(rule: Rule, judged: list[RuleJudgement], undecided: Undecided) -> list[RuleJudgement]:
     """The judgements for which a rule fails the gate."""
     from skidpad.evidence.compare import Answer
 
@@ -164,7 +164,7 @@ def _against(rule: Rule, judged: list[Judged], undecided: Undecided) -> list[Jud
     return [j for j in judged if j.rule is rule and j.answer in bad]
 
 
-def _say(rule: Rule, judged: list[Judged], undecided: Undecided) -> None:
+def _say(rule: Rule, judged: list[RuleJudgement], undecided: Undecided) -> None:
     """One line per judgement: to stderr those that fail the gate."""
     against = _against(rule, judged, undecided)
     for j in judged:

@@ -323,7 +323,7 @@ def sign(
 
     with fleet_extra():
         from skidpad.fleet.updates import signing
-        from skidpad.fleet.updates.payloads import PayloadKind, payload_name, settings_of_content
+        from skidpad.fleet.updates.payloads import PayloadKind, payload_name, read_payload_content
     from skidpad.recording.files import write_bytes
 
     known = PayloadKind(require_choice("kind", kind, [k.value for k in PayloadKind]))
@@ -331,7 +331,7 @@ def sign(
         content, current = payload.read_bytes(), list_.read_bytes()
     except OSError as error:
         raise FileError(f"{error.filename}: cannot be read ({error.strerror})") from error
-    settings_of_content(known, content)
+    read_payload_content(known, content)
     name = payload_name(known, content)
     signers = [signing.load_key(path) for path in key]
     write_bytes(out, signing.add_target(current, (name, content), {}, signers, time.time()))

@@ -73,7 +73,7 @@ def drive(job: Job) -> tuple[int, int]:
     from skidpad.campaign.channel_drive import drive_segment
     from skidpad.campaign.channel_routes import driven_routes
     from skidpad.fleet.loop.judging import errors_of
-    from skidpad.fleet.updates.payloads import PayloadKind, settings_of_content
+    from skidpad.fleet.updates.payloads import PayloadKind, read_payload_content
     from skidpad.live.watch import watch
     from skidpad.recording.cycles import cycles
     from skidpad.recording.sources import open_channels
@@ -82,8 +82,8 @@ def drive(job: Job) -> tuple[int, int]:
     recording = job.folder / "drive.mcap"
     spec = structs.replace(driven_routes()[job.route], duration=job.seconds, seed=job.seed)
     drive_segment(spec, recording)
-    active = settings_of_content(PayloadKind.RULES, job.active)
-    before = settings_of_content(PayloadKind.RULES, job.before)
+    active = read_payload_content(PayloadKind.RULES, job.active)
+    before = read_payload_content(PayloadKind.RULES, job.before)
     watch(open_channels(recording, None, truth=False), job.folder, active)
     source = open_channels(recording, None, truth=False)
     new, old = errors_of(list(cycles(source)), source.channels, [active, before])

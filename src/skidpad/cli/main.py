@@ -12,7 +12,7 @@ import typer
 import skidpad
 from skidpad.cli.adas import adas, report, show
 from skidpad.cli.bench import bench
-from skidpad.cli.campaigns import Drive, Estimate
+from skidpad.cli.campaigns import CampaignOptions, Estimate
 from skidpad.cli.carla_launcher import carla_launcher, translate_options
 from skidpad.cli.channels import channels
 from skidpad.cli.channels_drive import drive, outcomes
@@ -74,7 +74,7 @@ estimate = typer.Typer(
     no_args_is_help=True,
 )
 campaign.add_typer(estimate)
-driving, estimating = spread_fields({"how": Drive}), spread_fields({"how": Estimate})
+driving, estimating = spread_fields({"how": CampaignOptions}), spread_fields({"how": Estimate})
 app.command()(driving(adas))
 app.command()(driving(grip))
 channels.command()(driving(drive))

@@ -10,7 +10,7 @@ import typer
 from msgspec import structs
 
 from skidpad.cli.asked import OF_FILE, EgoStack, PlayCross, Tuned
-from skidpad.cli.campaigns import Drive, Driving, How, Seeds
+from skidpad.cli.campaigns import CampaignOptions, Driving, How, Seeds
 from skidpad.cli.expected import Expected, exit_by_verdicts, played_report
 from skidpad.cli.spread import spread_fields
 from skidpad.core.run import RunSpec, Scenario
@@ -81,7 +81,7 @@ def play(
     from skidpad.scenarios.distributions import is_distribution
 
     if file.is_dir() or is_distribution(file):
-        how = Drive(out=out, **structs.asdict(driving))
+        how = CampaignOptions(out=out, **structs.asdict(driving))
         _drive_all(how, template, cross, file, seeds, expected)
         return
     runs = play_runs(template, cross, [file], seeds)
@@ -96,7 +96,12 @@ def play(
 
 
 def _drive_all(
-    how: Drive, template: RunSpec, cross: PlayCross, file: Path, seeds: int, expected: Expected
+    how: CampaignOptions,
+    template: RunSpec,
+    cross: PlayCross,
+    file: Path,
+    seeds: int,
+    expected: Expected,
 ) -> None:
     """Drive the campaign of a folder; its end says what became of its runs."""
     left_out: list[LeftOut] = []

@@ -11,7 +11,7 @@ from skidpad.campaign.desk import Desk
 from skidpad.campaign.desk_run import drive_at_desk
 from skidpad.cockpit import hud
 from skidpad.cockpit.feed import Feed
-from skidpad.cockpit.realtime import RealTime
+from skidpad.cockpit.realtime import CockpitPacer
 from skidpad.cockpit.screen import Screen, Shown
 from skidpad.cockpit.words import Link, Live, Pace
 from skidpad.core.run import AdasDriver, Roads, RunSpec, run_from_plain
@@ -53,7 +53,7 @@ def drive_job(feed_name: str, pipe: Connection, about: dict[str, Any]) -> str:
         return Shown(desk.outside, told)
 
     screen = Screen(feed, link, stage_of(spec).map, shown, spec.seed, spec.surface)
-    time = RealTime(link, screen.show, own_gc=about["own_gc"])
+    time = CockpitPacer(link, screen.show, own_gc=about["own_gc"])
     try:
         driven = drive_at_desk(spec, desk, folder, (screen, time))
     finally:

@@ -16,7 +16,7 @@ from skidpad.recording.hazards import INDEX_FILE, read_index
 from skidpad.recording.indicators import FILE, read_indicators
 
 
-class Judged(NamedTuple):
+class MonitoredRun(NamedTuple):
     """Of one recording; empty where no monitor looked at it."""
 
     hazards: list[tuple[int, int, str]]  # first and last tick, and what it was
@@ -28,7 +28,7 @@ class Judged(NamedTuple):
         return [(first, "hazard", f"hazard: {text}") for first, _, text in self.hazards]
 
 
-def read_judgements(recording: Path, ticks: Sequence[int]) -> Judged:
+def read_judgements(recording: Path, ticks: Sequence[int]) -> MonitoredRun:
     """What the folder NAME.monitor beside a recording with moments at `ticks` says."""
     folder = recording.with_suffix(MONITORED)
     hazards, violated = [], np.zeros(len(ticks), dtype=np.int64)
@@ -44,4 +44,4 @@ def read_judgements(recording: Path, ticks: Sequence[int]) -> Judged:
         np.add.at(violated, at[within], beyond["len"].to_numpy()[within])
     starts = np.arange(len(ticks))[every(len(ticks))]
     most = np.maximum.reduceat(violated, starts).tolist() if violated.any() else []
-    return Judged(sorted(hazards), most)
+    return MonitoredRun(sorted(hazards), most)

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from skidpad.campaign.play import run_to
 from skidpad.cockpit.channel_source import ChannelSource, weather_of
-from skidpad.cockpit.replay import Recording
+from skidpad.cockpit.replay import RecordedRun
 from skidpad.cockpit.source import Source
 from skidpad.core.errors import ConfigError
 from skidpad.core.names import path_part
@@ -24,10 +24,10 @@ REPLAYS, SCENARIOS = "replays", "scenarios"  # folders within that of the hazard
 def open_source(path: Path, hazard: str | None = None) -> Source:
     """What lies at a path. hazard: the id of one, in a folder of hazards."""
     if (path / TEXT_FILE).is_file():
-        return Recording(play_hazard(path, hazard))
+        return RecordedRun(play_hazard(path, hazard))
     if hazard is not None:
         raise ConfigError(f"--id names a hazard, and {path} is no folder of hazards")
-    return ChannelSource(path) if path.suffix == RECORDING else Recording(path)
+    return ChannelSource(path) if path.suffix == RECORDING else RecordedRun(path)
 
 
 def play_hazard(folder: Path, id: str | None) -> Path:

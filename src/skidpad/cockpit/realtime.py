@@ -19,7 +19,7 @@ PATIENCE = 0.05  # s between two looks at the words while it stands
 WINDOW = 20  # ticks over which the real-time factor is measured
 
 
-class RealTime(Sink):
+class CockpitPacer(Sink):
     """Holds a run at so many times real time, pauses it, and lets it go tick by tick."""
 
     def __init__(

@@ -64,7 +64,7 @@ WORDS: dict[str, type[Any]] = {
 }
 
 
-class Recording:
+class RecordedRun:
     """A run's folder, moment by moment in any order."""
 
     def __init__(self, folder: Path) -> None:

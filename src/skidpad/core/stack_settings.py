@@ -78,7 +78,7 @@ class Lookahead(str, Enum):
     FIXED = "fixed"
 
 
-class Route(str, Enum):
+class BranchChoice(str, Enum):
     """D-058: which way lane centring takes."""
 
     HIGHWAY = "highway"
@@ -139,7 +139,9 @@ class StackSettings(SettingsPart):
         CapScope.GLOBAL, "D-051, D-053", "where limiter and resume cap act"
     )
     lookahead: Lookahead = setting_field(Lookahead.DYNAMIC, "D-054", "look-ahead of the LCA")
-    route: Route = setting_field(Route.HIGHWAY, "D-058", "highway isolation, straightest path")
+    route: BranchChoice = setting_field(
+        BranchChoice.HIGHWAY, "D-058", "highway isolation, straightest path"
+    )
     # Options that the sources name but do not use; off unless asked for.
     radar: bool = setting_field(True, "A-038", "the radar takes part in detection")
     radar_corridor: RadarCorridor = setting_field(

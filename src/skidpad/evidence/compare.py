@@ -79,7 +79,7 @@ class Answer(str, Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class RuleJudgement:
     """A rule, judged for one driver."""
 
     rule: Rule
@@ -99,21 +99,23 @@ class Judged:
         return told if self.p is None else f"{told}, adjusted {p_text(self.p)}"
 
 
-def judge_rules(rules: Sequence[Rule], changes: Sequence[Change], *, point: bool) -> list[Judged]:
+def judge_rules(
+    rules: Sequence[Rule], changes: Sequence[Change], *, point: bool
+) -> list[RuleJudgement]:
     """Every rule for every driver; point: by the mean difference alone, without a test."""
     pairs = [(r, c) for r in rules for c in changes if c.column == r.column]
     if point:
         fired = [r.compare(c.comparison.mean, r.limit) for r, c in pairs]
         answers = [Answer.FIRED if f else Answer.PASSED for f in fired]
-        return [Judged(r, c, a, None, 0) for (r, c), a in zip(pairs, answers, strict=True)]
+        return [RuleJudgement(r, c, a, None, 0) for (r, c), a in zip(pairs, answers, strict=True)]
     needed = seeds_to_fire(len(pairs))
     judged = []
     for (rule, change), p in zip(pairs, holm([r.p(c) for r, c in pairs]), strict=True):
         if change.comparison.n < needed:
-            judged.append(Judged(rule, change, Answer.UNDECIDED, None, needed))
+            judged.append(RuleJudgement(rule, change, Answer.UNDECIDED, None, needed))
         else:
             answer = Answer.FIRED if p <= ALPHA else Answer.PASSED
-            judged.append(Judged(rule, change, answer, p, needed))
+            judged.append(RuleJudgement(rule, change, answer, p, needed))
     return judged
 
 

@@ -33,7 +33,7 @@ class PlayVerdict(str, Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Judged:
+class PlayJudgement:
     """A verdict, the criterion in words, and a sentence for each reason."""
 
     verdict: PlayVerdict
@@ -90,7 +90,7 @@ def judge_run(
     rules: Sequence[Expectation],
     of_file: Sequence[Result],
     values: dict[str, float],
-) -> Judged:
+) -> PlayJudgement:
     """Return the verdict on a run that was driven to its end.
 
     rules: of `--expect`. of_file: results of the file's own criteria. values: numbers for rules.
@@ -100,12 +100,12 @@ def judge_run(
     missing = void_reasons(staging, others)
     if failed:
         reasons = tuple(f"{said} ({rule})" for rule, said in failed.items())
-        return Judged(PlayVerdict.FAILED, criterion, reasons, wrong)
+        return PlayJudgement(PlayVerdict.FAILED, criterion, reasons, wrong)
     if not wrong:
-        return Judged(PlayVerdict.NOT_JUDGED, criterion, tuple(missing), wrong)
+        return PlayJudgement(PlayVerdict.NOT_JUDGED, criterion, tuple(missing), wrong)
     if missing:
-        return Judged(PlayVerdict.VOID, criterion, tuple(missing), wrong)
-    return Judged(PlayVerdict.PASSED, criterion, (), wrong)
+        return PlayJudgement(PlayVerdict.VOID, criterion, tuple(missing), wrong)
+    return PlayJudgement(PlayVerdict.PASSED, criterion, (), wrong)
 
 
 def _criterion(

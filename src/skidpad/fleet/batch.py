@@ -70,21 +70,21 @@ class Found:
 Count = Annotated[int, msgspec.Meta(ge=0, le=1_000_000)]
 
 
-class Judged(msgspec.Struct, frozen=True):
+class ErrorCounts(msgspec.Struct, frozen=True):
     """Errors of the monitor in a drive: under the update, and under what the vehicle had before."""
 
     errors: Count
     before: Count
 
 
-class Drive(msgspec.Struct, frozen=True):
+class BatchDrive(msgspec.Struct, frozen=True):
     """What is read of a drive's summary (`evidence.channels.summary.watched`)."""
 
     seconds: float
     cycles: int
     context: dict[str, str]
     release: str = ""
-    judged: Judged | None = None
+    judged: ErrorCounts | None = None
 
 
 class IndicatorRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
@@ -101,7 +101,7 @@ class IndicatorRow(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 _HEADS = msgspec.json.Decoder(Head)
-_DRIVES = msgspec.json.Decoder(Drive)
+_DRIVES = msgspec.json.Decoder(BatchDrive)
 _ROWS = msgspec.json.Decoder(IndicatorRow)
 
 
@@ -173,7 +173,7 @@ def _place(head: Head, text: bytes) -> tuple[float, float]:
     return (x, y) if abs(x) <= NUMBER_MAX and abs(y) <= NUMBER_MAX else (0.0, 0.0)
 
 
-def drive_of(content: bytes) -> Drive:
+def drive_of(content: bytes) -> BatchDrive:
     """What a drive's summary says; Refused when it is none."""
     try:
         drive = _DRIVES.decode(content)
@@ -186,7 +186,7 @@ def drive_of(content: bytes) -> Drive:
     return drive
 
 
-def drive_text(drive: Drive) -> str:
+def drive_text(drive: BatchDrive) -> str:
     """A drive as it is kept: what was understood of its summary; the body holds all of it."""
     return msgspec.json.encode(drive).decode()
 

@@ -19,7 +19,7 @@ TIME_MAX = 1e12  # s, either side of 1970
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class MessageHead:
     """What stands beside the body."""
 
     kind: Kind
@@ -28,7 +28,7 @@ class Told:
     vehicle_time: float | None  # s, as the vehicle believed
 
 
-def check_batch(fleet: Fleet, who: Principal, told: Told, body: bytes) -> Batch:
+def check_batch(fleet: Fleet, who: Principal, told: MessageHead, body: bytes) -> Batch:
     """The batch of a vehicle; Refused when any of it cannot be kept."""
     content = unpack(body, fleet.limits)
     operator, manufacturer = owners_of(fleet, str(who.vehicle))

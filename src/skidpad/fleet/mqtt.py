@@ -19,7 +19,7 @@ from typing import Any
 from skidpad.core.errors import SkidpadError
 from skidpad.fleet.api.guard import Guard
 from skidpad.fleet.broker import ANSWERS, TOPIC, Broker, connect_to, library, properties
-from skidpad.fleet.checking import DRIVE, KEY, TIME_MAX, Told, check_batch
+from skidpad.fleet.checking import DRIVE, KEY, TIME_MAX, MessageHead, check_batch
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.intake import plain
 from skidpad.fleet.words import Action, Kind, Refused
@@ -120,7 +120,7 @@ class BatchListener:
             return 500, {"detail": "the fleet failed; try again"}
 
 
-def _read_properties(topic: str, told: dict[str, str]) -> Told:
+def _read_properties(topic: str, told: dict[str, str]) -> MessageHead:
     """What stands beside the body; Refused (422) when it is not what it must be."""
     kind, key, drive = topic.rpartition("/")[2], told.get("key", ""), told.get("drive", "")
     if kind not in {k.value for k in Kind}:
@@ -133,4 +133,4 @@ def _read_properties(topic: str, told: dict[str, str]) -> Told:
         time = float("nan")
     if time is not None and not -TIME_MAX <= time <= TIME_MAX:
         raise Refused(422, f"time must be a number between {-TIME_MAX:g} and {TIME_MAX:g}")
-    return Told(Kind(kind), key, drive, time)
+    return MessageHead(Kind(kind), key, drive, time)

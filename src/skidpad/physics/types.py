@@ -17,7 +17,7 @@ from skidpad.core.vocabulary import ActorKind
 TIRE_FRICTION_REFERENCE = 3.5  # the blueprints' own tire_friction, at which mu is mu_ref (B-033)
 
 
-class Drive(str, Enum):
+class DrivenWheels(str, Enum):
     """Driven wheels; all-wheel drive splits evenly."""
 
     FRONT = "front"
@@ -43,7 +43,7 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     wheel_inertia: float  # kg m^2, one wheel with its share of the drive line
     tyre_width: float = 0.205  # m, of the tread; usual sizes of such vehicles, an assumption
     tyres: str = ""  # by name, `core.tyres`; empty: those of the run
-    drive: Drive
+    drive: DrivenWheels
     power: float  # W at the wheels
     force_max: float  # N at the wheels, lowest gear
     speed_max: float | None = None  # m/s, beyond which the engine does not drive
@@ -129,13 +129,17 @@ class VehicleType(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_on
     @property
     def drive_share_front(self) -> float:
         """Share of the drive force at the front axle."""
-        return {Drive.FRONT: 1.0, Drive.REAR: 0.0, Drive.ALL: 0.5}[self.drive]
+        return {DrivenWheels.FRONT: 1.0, DrivenWheels.REAR: 0.0, DrivenWheels.ALL: 0.5}[self.drive]
 
     @property
     def weight_driven(self) -> float:
         """Share of the weight at rest on the driven wheels."""
         rear = 1.0 - self.front_share
-        return {Drive.FRONT: self.front_share, Drive.REAR: rear, Drive.ALL: 1.0}[self.drive]
+        return {
+            DrivenWheels.FRONT: self.front_share,
+            DrivenWheels.REAR: rear,
+            DrivenWheels.ALL: 1.0,
+        }[self.drive]
 
 
 EGO_TYPE = "mini_cooper_s"

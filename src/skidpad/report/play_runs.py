@@ -19,7 +19,7 @@ from skidpad.evidence.expectations import Expectation, parse_expectation, run_va
 from skidpad.evidence.pairs import pairs
 from skidpad.evidence.play_verdicts import (
     Counterpart,
-    Judged,
+    PlayJudgement,
     PlayVerdict,
     counterparts,
     judge_run,
@@ -47,7 +47,7 @@ class PlayRun:
     weather: str
     friction: str
     seed: int | None
-    judged: Judged
+    judged: PlayJudgement
     folder: Path | None = None
     duration: float | None = None  # s
     others: tuple[Counterpart, ...] = ()
@@ -92,7 +92,7 @@ def load_played(out: Path) -> Played:
     runs += [
         PlayRun(
             name=left.file, scenario=left.file, weather="", friction="", seed=None,
-            judged=Judged(PlayVerdict.ERROR, "", (f"cannot be played: {left.why}",)),
+            judged=PlayJudgement(PlayVerdict.ERROR, "", (f"cannot be played: {left.why}",)),
         )
         for left in judging.left_out
     ]  # fmt: skip
@@ -115,13 +115,17 @@ def _run(out: Path, folder: Path, rules: Sequence[Expectation], entry: GripEntry
     staging = read_staging(folder)
     if staging is None or not (folder / TICKS).is_file():
         what = (entry.error if entry else "").strip().rpartition("\n")[2]
-        judged = Judged(PlayVerdict.ERROR, "", (what or "the run was not driven to its end",))
+        judged = PlayJudgement(
+            PlayVerdict.ERROR, "", (what or "the run was not driven to its end",)
+        )
         return PlayRun(name=name, judged=judged, metrics=metrics, **words)
     log = read_log(folder)
     found = pairs(log)
     others = tuple(counterparts(log, found, staging))
     if (folder / ERROR).is_file():
-        judged = Judged(PlayVerdict.ERROR, "", ("the stack failed", *_last_line(folder / ERROR)))
+        judged = PlayJudgement(
+            PlayVerdict.ERROR, "", ("the stack failed", *_last_line(folder / ERROR))
+        )
     else:
         judged = judge_run(
             staging, others, rules, _of_file(out, log, staging), run_values(log, found)

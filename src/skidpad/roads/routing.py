@@ -13,7 +13,7 @@ CHANGE_COST = 20.0  # m of detour that a lane change is worth
 
 
 @dataclass(frozen=True, slots=True)
-class Route:
+class LaneRoute:
     """A way over the map."""
 
     lanes: tuple[int, ...]  # indices; each follows or lies beside the one before
@@ -28,7 +28,7 @@ class _Node:
     first: bool
 
 
-def shortest_route(map: RoadMap, start: LanePoint, goal: LanePoint) -> Route | None:
+def shortest_route(map: RoadMap, start: LanePoint, goal: LanePoint) -> LaneRoute | None:
     """The cheapest route by Dijkstra's algorithm; None when the goal cannot be reached.
 
     Lane changes go to neighbours of the same direction and cost as much as CHANGE_COST metres.
@@ -75,7 +75,7 @@ def _steps(map: RoadMap, node: _Node, done: float) -> Iterator[tuple[_Node, floa
 
 def _route(
     map: RoadMap, start: LanePoint, goal: LanePoint, last: _Node, parents: dict[_Node, _Node]
-) -> Route:
+) -> LaneRoute:
     nodes = [last]
     while parents[nodes[-1]] != nodes[-1]:
         nodes.append(parents[nodes[-1]])
@@ -84,4 +84,4 @@ def _route(
     for node, following in pairwise(nodes):
         if following.lane in map.successors(node.lane) and not following.first:
             length += float(map.lanes.length[node.lane]) - _entered_at(map, start, node)
-    return Route(tuple(node.lane for node in nodes), length)
+    return LaneRoute(tuple(node.lane for node in nodes), length)

@@ -18,7 +18,7 @@ ROADS_MAX = 200  # of a way that nobody has planned
 
 
 @dataclass(frozen=True, slots=True)
-class Route:
+class ScenarioRoute:
     """A way over the map: where it begins, and the roads in their order."""
 
     name: str
@@ -30,7 +30,7 @@ class Route:
         return network.ahead(self.start, s, self.roads) or self.start
 
 
-def compile_route(node: Node, ctx: Context) -> Route:
+def compile_route(node: Node, ctx: Context) -> ScenarioRoute:
     """A <Route> or a reference to one; waypoints must not depend on what moves."""
     node = ctx.catalogs.resolved(node, "Route")
     points = []
@@ -43,7 +43,7 @@ def compile_route(node: Node, ctx: Context) -> Route:
         points.append(at.fixed.lane)
     if len(points) < 2:
         raise node.error("needs at least two <Waypoint>s")
-    return Route(node.label(), points[0], roads_through(ctx.network, points))
+    return ScenarioRoute(node.label(), points[0], roads_through(ctx.network, points))
 
 
 def roads_through(network: Network, points: Sequence[LanePoint]) -> tuple[int, ...]:
@@ -81,7 +81,7 @@ def random_roads(
 class OnRoute:
     """So far along a route; lane None: the lane that the route begins on."""
 
-    route: Route
+    route: ScenarioRoute
     s: float
     lane_id: int | None
     offset: float

@@ -48,7 +48,7 @@ class Row:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class PlayedScenario:
     """A scenario played by itself: where everything was, and the player at the end."""
 
     rows: tuple[Row, ...]
@@ -74,7 +74,7 @@ def rows_csv(rows: Iterable[Row]) -> str:
     return text.getvalue()
 
 
-class Stage:
+class IdealWorld:
     """The world: it does as it is told."""
 
     def __init__(self, scenario: Scenario) -> None:
@@ -121,9 +121,9 @@ class Stage:
         return WorldTruth(self.tick, self.table, self.states, self.mu, self.commands, {}, (), ())
 
 
-def played(scenario: Scenario, duration: float, dt: float = DT, seed: int = 0) -> Told:
+def played(scenario: Scenario, duration: float, dt: float = DT, seed: int = 0) -> PlayedScenario:
     """The scenario as its file says, everything ideal, until it ends or for `duration` s."""
-    stage = Stage(scenario)
+    stage = IdealWorld(scenario)
     modes = dict.fromkeys(scenario.entities, ActorMode.IDEAL)
     player = Player(scenario, modes=modes, dt=dt, seed=seed)
     rows: list[Row] = []
@@ -133,10 +133,10 @@ def played(scenario: Scenario, duration: float, dt: float = DT, seed: int = 0) -
         if player.ended:
             break
         stage.step(words)
-    return Told(tuple(rows), player)
+    return PlayedScenario(tuple(rows), player)
 
 
-def _rows(player: Player, stage: Stage) -> list[Row]:
+def _rows(player: Player, stage: IdealWorld) -> list[Row]:
     found = []
     s, t = stage.states, player.scene.t
     for i, (name, actor) in enumerate(player.actors.items()):

@@ -22,7 +22,7 @@ from skidpad.scenarios.storyboard import (
 from skidpad.scenarios.triggers import Watch
 
 
-class Told:
+class StatefulElement:
     """An element with a state, told to the scene when it changes."""
 
     def __init__(self, path: Path) -> None:
@@ -45,7 +45,7 @@ class Told:
         return self.state is State.COMPLETE
 
 
-class ToldEvent(Told):
+class ToldEvent(StatefulElement):
     """An event of a run, with its actions under way."""
 
     def __init__(self, event: Event, group: Group) -> None:
@@ -125,7 +125,7 @@ def _begin_action(action: NamedAction, actors: Iterable[str], scene: Scene) -> I
             yield action.private.begin(scene, scene.actors[name])
 
 
-class ToldParent(Told):
+class ToldParent(StatefulElement):
     """An element that is complete when all its children are."""
 
     def __init__(self, path: Path, children: Sequence[ToldParent | ToldEvent]) -> None:

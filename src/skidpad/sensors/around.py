@@ -30,7 +30,7 @@ class Fan(NamedTuple):
     channel: Ints  # (n,)
 
 
-class Seen(NamedTuple):
+class RayHits(NamedTuple):
     """What m of the rays met, in their order."""
 
     ray: Ints  # (m,) which they are
@@ -47,7 +47,7 @@ def sectors_of(azimuth: Floats) -> Ints:
     return sector
 
 
-def look_around(scene: LiveScene, pose: Pose, fan: Fan, reach: float, hidden: int) -> Seen:
+def look_around(scene: LiveScene, pose: Pose, fan: Fan, reach: float, hidden: int) -> RayHits:
     """The nearest surfaces along rays from `pose`.
 
     reach: m. hidden: row of the actor that no ray meets, or -1.
@@ -69,7 +69,7 @@ def look_around(scene: LiveScene, pose: Pose, fan: Fan, reach: float, hidden: in
     ray = np.flatnonzero(distance <= reach)
     key = hits.key[ray].astype(np.int64)
     direction = directions(fan, ray)
-    return Seen(ray, distance[ray], direction, hits.cosine[ray], key >> 8 & 0xFF, key >> 16)
+    return RayHits(ray, distance[ray], direction, hits.cosine[ray], key >> 8 & 0xFF, key >> 16)
 
 
 def directions(fan: Fan, ray: Ints) -> Floats:

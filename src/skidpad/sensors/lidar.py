@@ -22,7 +22,7 @@ from skidpad.sensors.around import (
     SECTORS,
     STEEPEST_DEG,
     Fan,
-    Seen,
+    RayHits,
     look_around,
     sectors_of,
 )
@@ -79,7 +79,9 @@ class Lidar:
             seen.instance.astype(np.uint16),
         )
 
-    def _through_weather(self, model: ReturnModel, fan: Fan, seen: Seen, tick: int) -> LidarPoints:
+    def _through_weather(
+        self, model: ReturnModel, fan: Fan, seen: RayHits, tick: int
+    ) -> LidarPoints:
         """What is noticed of the beams of a tick; false returns have class 0 and no actor."""
         n = len(fan.column)
         out = LidarPoints(
@@ -94,7 +96,7 @@ class Lidar:
 
 @kernel
 def scan_weather(
-    air: BeamAir, fan: Fan, seen: Seen, aside: Floats, up: Floats, key: np.uint64, tick: int,
+    air: BeamAir, fan: Fan, seen: RayHits, aside: Floats, up: Floats, key: np.uint64, tick: int,
     out: LidarPoints,
 ) -> int:  # fmt: skip
     """All beams of a tick into `out`, without those that nothing came back of; their number.

@@ -21,7 +21,7 @@ NO_IMAGES: Mapping[str, CameraImage] = {}
 NO_SEGMENTS: Mapping[str, Segments] = {}
 
 
-class Readings(NamedTuple):
+class CameraRadarReadings(NamedTuple):
     """One tick of cameras and radar at either level."""
 
     images: Mapping[str, CameraImage]
@@ -38,7 +38,7 @@ class Sensing(Protocol):
         states: ActorStates,
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_],
-    ) -> Readings:
+    ) -> CameraRadarReadings:
         """Readings of this state; valid until the next call (decision X-11)."""
         ...
 
@@ -75,10 +75,10 @@ class Pixels:
         states: ActorStates,
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_],
-    ) -> Readings:
+    ) -> CameraRadarReadings:
         """Images are rendered when first read."""
         seen = self.suite.observe(tick, states, lights, braking)
-        return Readings(seen.images, NO_SEGMENTS, seen.radar)
+        return CameraRadarReadings(seen.images, NO_SEGMENTS, seen.radar)
 
     def change(self, outside: Outside) -> None:
         """Weather and headlights are others from the next reading on."""
@@ -106,10 +106,12 @@ class Objects:
         states: ActorStates,
         lights: Mapping[int, LightState],
         braking: NDArray[np.bool_],
-    ) -> Readings:
+    ) -> CameraRadarReadings:
         """Segments of the depth cameras; lights and lamps play no part at this level."""
         del lights, braking
-        return Readings(NO_IMAGES, self.suite.segments(states), self.suite.radar(tick, states))
+        return CameraRadarReadings(
+            NO_IMAGES, self.suite.segments(states), self.suite.radar(tick, states)
+        )
 
     def change(self, outside: Outside) -> None:
         """Weather and headlights are others from the next reading on."""

@@ -14,7 +14,7 @@ from skidpad.core.run import Function
 from skidpad.core.settings import load_profile
 from skidpad.core.setup import DT
 from skidpad.core.specs import SensorSpec
-from skidpad.core.stack_settings import Route, StackSettings
+from skidpad.core.stack_settings import BranchChoice, StackSettings
 from skidpad.core.states import StackReport, VehicleCommand
 from skidpad.core.vocabulary import DetectionStatus, LightState, Supervision, Tier
 from skidpad.roads.queries import RoadMap
@@ -100,7 +100,7 @@ class AdasStack:
     ) -> None:
         self.config = AdasConfig.from_mapping(settings)
         options = self.config.settings
-        route = HighwayRoute() if options.route is Route.HIGHWAY else FirstBranchRoute()
+        route = HighwayRoute() if options.route is BranchChoice.HIGHWAY else FirstBranchRoute()
         self.tracker = LaneTracker(map, route)
         self.front = Front(specs, map, self.config.functions, options, self.config.dt)
         self.scan = LightScan(map)

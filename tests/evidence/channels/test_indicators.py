@@ -29,7 +29,7 @@ from skidpad.evidence.channels.indicators.catalogue import (
     safety_case,
 )
 from skidpad.evidence.channels.indicators.comfort import Form
-from skidpad.evidence.channels.indicators.layout import Readings
+from skidpad.evidence.channels.indicators.layout import IndicatorReadings
 from skidpad.evidence.channels.indicators.panel import IndicatorPanel
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 
@@ -439,7 +439,7 @@ def panel_of(n, settings=None) -> IndicatorPanel:
     return IndicatorPanel([f"c{i}" for i in range(n)], settings or IndicatorSettings())
 
 
-def run(panel: IndicatorPanel, frames) -> Readings:
+def run(panel: IndicatorPanel, frames) -> IndicatorReadings:
     return panel.update([None if f is None else usable(f) for f in frames])
 
 
@@ -449,7 +449,7 @@ def moving(t, dx=0.0, objects=((20.0, 0.0, 0.0, 8.0, 0.0),), **more):
     return frame(t, (10.0 * t + dx, 0.0, 0.0, 10.0, 0.0), rows, **more)
 
 
-def readings_after(seconds, settings=None, n=2, **more) -> Readings:
+def readings_after(seconds, settings=None, n=2, **more) -> IndicatorReadings:
     panel = panel_of(n, settings)
     for k in range(round(seconds * 10) + 1):
         out = run(panel, [moving(0.1 * k, **more) for _ in range(n)])

@@ -13,7 +13,7 @@ from pathlib import Path
 from tests.scenarios.oracle.cases import CASES
 from tests.scenarios.oracle.roads import ROADS
 
-from skidpad.scenarios.stage import Told
+from skidpad.scenarios.stage import PlayedScenario
 
 HERE = Path(__file__).parent
 OWN, OTHERS = HERE / "references", HERE / "corpus"
@@ -79,7 +79,7 @@ class Deviation:
         return self.since is None
 
 
-def deviations(told: Told, reference: Reference) -> dict[str, Deviation]:
+def deviations(told: PlayedScenario, reference: Reference) -> dict[str, Deviation]:
     """Returns how far each entity is from its reference at equal times; inf where it is not there."""
     ours = {(r.name, round(r.time * 1000.0)): r for r in told.rows}
     found = {}

@@ -10,7 +10,7 @@ import pytest
 
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.options import ServerOptions
-from skidpad.simulation.carla_server.replayer import Recording
+from skidpad.simulation.carla_server.replayer import CarlaRecording
 from skidpad.simulation.carla_server.rpc import CallError
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.streams import StreamHub
@@ -50,7 +50,7 @@ def recorded(tmp_path: Path) -> list[dict[str, tuple[float, float]]]:
     return seen
 
 
-def replay(served: Served, begin: float = 0.0, duration: float = 0.0) -> Recording:
+def replay(served: Served, begin: float = 0.0, duration: float = 0.0) -> CarlaRecording:
     """Begin a replay; what is replayed."""
     source = served.recorder.recording(NAME)
     served.replayer.start(served.episode, source, begin, duration, 0)
@@ -102,7 +102,7 @@ def test_living_actors_play_themselves(recorded, tmp_path: Path) -> None:
     ids = [a.id for a in served.episode.actors]
     source = served.recorder.recording(NAME)
     renamed = dict(zip(source.kinds, sorted(ids)[-3:], strict=True))
-    again = Recording(
+    again = CarlaRecording(
         source.map,
         source.times,
         [{renamed[id]: p for id, p in tick.items()} for tick in source.poses],

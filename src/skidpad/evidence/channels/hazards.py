@@ -20,7 +20,7 @@ from skidpad.core.reading import decode_yaml, read_bytes
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.indicators.comfort import Form
-from skidpad.evidence.channels.indicators.layout import Layout, Readings
+from skidpad.evidence.channels.indicators.layout import IndicatorReadings, Layout
 from skidpad.evidence.channels.risk import RiskMatrix
 
 Floats = NDArray[np.float64]
@@ -238,7 +238,7 @@ class SignalReader:
         self.steadiness = _Steadiness(layout)
 
     def read(
-        self, t: float, readings: Readings, risk: RiskMatrix, driving: int | None
+        self, t: float, readings: IndicatorReadings, risk: RiskMatrix, driving: int | None
     ) -> SignalReadings:
         """The signals at `t`; without a recorded driving channel, that of the highest score."""
         scores = readings[Indicator.SAFETY_SCORE]
@@ -271,7 +271,7 @@ class SignalReader:
         return SignalReadings(values, pair, assumed, driving)
 
 
-def _largest_gap(readings: Readings) -> tuple[float, int | None, bool]:
+def _largest_gap(readings: IndicatorReadings) -> tuple[float, int | None, bool]:
     """OLSS - OCSS of the pair where it is largest by size, that pair, and whether assumed."""
     count = readings[Indicator.OBJECT_COUNT]
     location = readings[Indicator.OBJECT_LOCATION]
@@ -299,7 +299,7 @@ class _Steadiness:
         self.down = False
 
     def update(
-        self, t: float, readings: Readings, values: dict[Signal, float]
+        self, t: float, readings: IndicatorReadings, values: dict[Signal, float]
     ) -> dict[Signal, float]:
         count = _least(readings[Indicator.OBJECT_COUNT])
         row = np.concatenate([[values[Signal.SAFETY_SCORE], count], readings.values[self.steady]])

@@ -34,7 +34,7 @@ from skidpad.evidence.channels.indicators.catalogue import (
     Threshold,
     load_thresholds,
 )
-from skidpad.evidence.channels.indicators.layout import Place, Readings
+from skidpad.evidence.channels.indicators.layout import IndicatorReadings, Place
 from skidpad.evidence.channels.indicators.panel import IndicatorPanel, Lap, no_lap
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.recorder import CycleEvidence, Recorder
@@ -155,7 +155,7 @@ class Monitor:
         return evidence
 
     def _apply_rules(
-        self, cycle: Cycle, readings: Readings, risk: RiskMatrix, signals: SignalReadings
+        self, cycle: Cycle, readings: IndicatorReadings, risk: RiskMatrix, signals: SignalReadings
     ) -> CycleEvidence:
         fired, undecided = [], []
         learned = self._learned_hazards(cycle.t, readings, risk, signals)
@@ -183,7 +183,7 @@ class Monitor:
         return CycleEvidence(cycle, readings, risk, signals, tuple(fired), tuple(undecided))
 
     def _learned_hazards(
-        self, t: float, readings: Readings, risk: RiskMatrix, signals: SignalReadings
+        self, t: float, readings: IndicatorReadings, risk: RiskMatrix, signals: SignalReadings
     ) -> list[HazardType]:
         if self.learned is None:
             return []
@@ -224,7 +224,7 @@ class Monitor:
             if flat:
                 u.shapes[name] += len(flat)
 
-    def _count_violations(self, t: float, readings: Readings) -> None:
+    def _count_violations(self, t: float, readings: IndicatorReadings) -> None:
         self._missing += np.isnan(readings.values)
         beyond = (readings.values < self._low) | (readings.values > self._high)
         self._violated += beyond

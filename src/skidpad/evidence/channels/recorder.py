@@ -12,7 +12,7 @@ import numpy as np
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import Rule, Signal, SignalReadings
-from skidpad.evidence.channels.indicators.layout import Readings
+from skidpad.evidence.channels.indicators.layout import IndicatorReadings
 from skidpad.evidence.channels.risk import RiskMatrix
 from skidpad.evidence.channels.timefilter import SAME_TIME
 from skidpad.recording.hazards import HazardRecord, InvolvedObject
@@ -27,7 +27,7 @@ class CycleEvidence:
     """Everything found in one cycle."""
 
     cycle: Cycle
-    readings: Readings
+    readings: IndicatorReadings
     risk: RiskMatrix
     signals: SignalReadings
     fired: tuple[HazardType, ...]

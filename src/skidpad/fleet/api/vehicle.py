@@ -9,7 +9,7 @@ from fastapi import APIRouter, Depends, Header, Request
 from starlette.concurrency import run_in_threadpool
 
 from skidpad.fleet.api.guard import Needs, fleet_of
-from skidpad.fleet.checking import DRIVE, KEY, TIME_MAX, Told, check_batch
+from skidpad.fleet.checking import DRIVE, KEY, TIME_MAX, MessageHead, check_batch
 from skidpad.fleet.store.intake import plain
 from skidpad.fleet.words import Action, Kind, Limits, Principal, Refused
 
@@ -43,7 +43,7 @@ async def upload(
     fleet = fleet_of(request)
     body = await read_body(request, fleet.limits)
 
-    about = Told(kind, key, drive, vehicle_time)
+    about = MessageHead(kind, key, drive, vehicle_time)
     if len(body) <= INLINE:
         batch = check_batch(fleet, who, about, body)
     else:

@@ -16,7 +16,7 @@ from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.events import add_event
 from skidpad.fleet.store.loop import changes, evaluations
 from skidpad.fleet.store.reading import hazard_row, record_of
-from skidpad.fleet.updates.payloads import PayloadKind, payload_name, settings_of_content
+from skidpad.fleet.updates.payloads import PayloadKind, payload_name, read_payload_content
 from skidpad.fleet.words import Principal, Refused, absent
 
 SCENES_MAX = 200
@@ -37,7 +37,7 @@ def propose(fleet: Fleet, who: Principal, proposal: Proposal) -> str:
     """Keep a change; its id. Refused when the payload is not valid or a scene is not visible."""
     if not 1 <= len(proposal.hazards) <= SCENES_MAX:
         raise Refused(422, f"a change names 1 to {SCENES_MAX} hazards that led to it")
-    settings_of_content(proposal.kind, proposal.content)
+    read_payload_content(proposal.kind, proposal.content)
     with fleet.engine.connect() as connection:
         for hazard in proposal.hazards:
             hazard_row(connection, who, hazard)
@@ -78,7 +78,7 @@ def re_evaluate(
 ) -> list[dict[str, Any]]:
     """Judge the scenes that led to a change again: errors under what was, and under the change."""
     kind, _, content = payload_of(fleet, who, change)
-    settings = [settings_of_content(*before), settings_of_content(kind, content)]
+    settings = [read_payload_content(*before), read_payload_content(kind, content)]
     with fleet.engine.connect() as connection:
         scenes = json.loads(change_row(connection, who, change).hazards)
         known = {row["hazard"] for row in evaluations_of(connection, change)}

@@ -15,7 +15,7 @@ from typing import Any
 from sqlalchemy import Connection, Engine, bindparam, select
 from sqlalchemy.exc import DataError, IntegrityError
 
-from skidpad.fleet.batch import Drive, Found, drive_text, weather_class
+from skidpad.fleet.batch import BatchDrive, Found, drive_text, weather_class
 from skidpad.fleet.blobs import Blobs
 from skidpad.fleet.identity import digest, new_id
 from skidpad.fleet.store.tables import batches, drives, hazards
@@ -46,7 +46,7 @@ class Batch:
     drive: str = ""
     vehicle_time: float | None = None
     found: Sequence[Found] = ()
-    summary: Drive | None = None
+    summary: BatchDrive | None = None
 
 
 @dataclass(frozen=True, slots=True)

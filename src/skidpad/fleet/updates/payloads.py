@@ -52,12 +52,12 @@ def payload_name(kind: PayloadKind, content: bytes) -> str:
     return f"{kind.value}-{digest(content)[:24]}.{SUFFIX[kind]}"
 
 
-def settings_of(kind: PayloadKind, path: Path) -> MonitorSettings:
+def read_payload(kind: PayloadKind, path: Path) -> MonitorSettings:
     """How a monitor judges under the update at `path`; FileError or ConfigError when it is none."""
     return MonitorSettings(**_READERS[kind](path))
 
 
-def settings_of_content(kind: PayloadKind, content: bytes) -> MonitorSettings:
+def read_payload_content(kind: PayloadKind, content: bytes) -> MonitorSettings:
     """As `settings_of`; Refused (422) for anything that the vehicle's reader would not take."""
     if len(content) > PAYLOAD_MAX:
         raise Refused(413, f"an update may have {PAYLOAD_MAX} bytes")
@@ -67,6 +67,6 @@ def settings_of_content(kind: PayloadKind, content: bytes) -> MonitorSettings:
         path = Path(folder) / f"payload.{SUFFIX[kind]}"
         path.write_bytes(content)
         try:
-            return settings_of(kind, path)
+            return read_payload(kind, path)
         except InputError as error:
             raise Refused(422, f"the update is not valid: {on_a_line(error)}") from error

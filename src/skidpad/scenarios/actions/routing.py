@@ -11,7 +11,7 @@ from skidpad.scenarios.document import Node
 from skidpad.scenarios.lines import Line
 from skidpad.scenarios.network import Network
 from skidpad.scenarios.positions import Position, position
-from skidpad.scenarios.routes import Route, compile_route, random_roads, roads_through
+from skidpad.scenarios.routes import ScenarioRoute, compile_route, random_roads, roads_through
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 from skidpad.scenarios.tracking import PacedTrack, TimedTrack
 from skidpad.scenarios.trajectories import Trajectory, compile_trajectory
@@ -38,7 +38,7 @@ def compile_teleport(node: Node, ctx: Context) -> Teleport:
 class AssignRoute:
     """Take certain roads from now on."""
 
-    route: Route
+    route: ScenarioRoute
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """At once; it matters at the next fork."""

@@ -17,7 +17,7 @@ from skidpad.sensors.asked import AskedSensors
 from skidpad.simulation.carla import decode
 from skidpad.simulation.carla.actor_rows import ActorRow
 from skidpad.simulation.carla.pictures import Pictures
-from skidpad.simulation.sensing import Objects, Readings
+from skidpad.simulation.sensing import CameraRadarReadings, Objects
 
 Messages = Mapping[str, Any]  # what the wheel delivered, by sensor id
 
@@ -56,7 +56,7 @@ class Reader:
         states: ActorStates,
         commands: Floats,
         lights: dict[int, LightState],
-    ) -> tuple[Readings, Mapping[str, Any]]:
+    ) -> tuple[CameraRadarReadings, Mapping[str, Any]]:
         """The common sensors' readings, and those that the stack asked for besides."""
         self._messages, braking = messages, commands[:, 1] > 0.0
         if self._objects is not None:
@@ -66,7 +66,7 @@ class Reader:
             if self._radar_id is not None:
                 raw = messages[self._radar_id].raw_data
                 radar = decode.radar_points(raw, self._radar_limit)
-            seen = Readings(self.pictures.of(tick, messages), {}, radar)
+            seen = CameraRadarReadings(self.pictures.of(tick, messages), {}, radar)
         asked = self._asked
         if asked is None:
             return seen, {}

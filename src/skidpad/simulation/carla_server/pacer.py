@@ -16,7 +16,7 @@ when a tick returns before that thread has gone to sleep. Simulators that render
 without this rest we met it about once in 2000 ticks on two busy cores."""
 
 
-class Pacer:
+class ServerPacer:
     """Ticks in real time while no client does."""
 
     def __init__(

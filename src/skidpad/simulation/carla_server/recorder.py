@@ -22,7 +22,7 @@ from skidpad.simulation.carla_server.recorder_text import (
     list_blocked,
     list_collisions,
 )
-from skidpad.simulation.carla_server.replayer import FORMAT, PLAYED, Recording, recording
+from skidpad.simulation.carla_server.replayer import FORMAT, PLAYED, CarlaRecording, recording
 from skidpad.simulation.carla_server.rpc import CallError
 from skidpad.simulation.carla_server.touches import touches
 from skidpad.simulation.carla_server.vehicles import Vehicle, Vehicles
@@ -118,7 +118,7 @@ class Recorder:
         with _explain_failure(name):
             return list_blocked(*self._read_with_start(name), seconds, cm)
 
-    def recording(self, name: str) -> Recording:
+    def recording(self, name: str) -> CarlaRecording:
         """What can be replayed of a file."""
         with _explain_failure(name):
             return recording(name, *self._read(name))

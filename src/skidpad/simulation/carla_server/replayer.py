@@ -27,7 +27,7 @@ BEHIND, ABOVE = 8.0, 4.0  # m, of the spectator from the actor that it follows
 
 
 @dataclass(frozen=True, slots=True)
-class Recording:
+class CarlaRecording:
     """What a file holds, by recorded ids; times in s from its first tick."""
 
     map: str
@@ -68,7 +68,7 @@ def _between(a: Pose, b: Pose, share: float, span: float) -> tuple[Pose, Vector]
     return pose, (dx / span, dy / span, dz / span)
 
 
-def recording(name: str, head: dict[str, Any], ticks: list[list[Any]]) -> Recording:
+def recording(name: str, head: dict[str, Any], ticks: list[list[Any]]) -> CarlaRecording:
     """What a file's lines say; CallError when it is of another format or broken."""
     if head.get("format") != FORMAT or not ticks:
         raise CallError(f"{name} holds no ticks that can be replayed")
@@ -83,7 +83,7 @@ def recording(name: str, head: dict[str, Any], ticks: list[list[Any]]) -> Record
     times = [float(t[1]) - start for t in ticks]
     if any(b <= a for a, b in pairwise(times)):
         raise CallError(f"{name}: times do not grow")
-    return Recording(str(head.get("map")), times, poses, kinds)
+    return CarlaRecording(str(head.get("map")), times, poses, kinds)
 
 
 class Replayer:
@@ -96,7 +96,7 @@ class Replayer:
         self._run: _Run | None = None
 
     def start(
-        self, episode: Episode, source: Recording, begin: float, duration: float, follow: int
+        self, episode: Episode, source: CarlaRecording, begin: float, duration: float, follow: int
     ) -> tuple[float, float]:
         """Begin; the times in s from and to which it replays. A negative begin counts from the end.
 
@@ -148,7 +148,7 @@ class _Run:
     """One replay on one episode."""
 
     episode: Episode
-    source: Recording
+    source: CarlaRecording
     now: float  # s
     end: float
     follow: int

@@ -15,7 +15,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.simulation.carla_server.codec import Decoder, ProtocolError, Request
 from skidpad.simulation.carla_server.methods import TABLES
 from skidpad.simulation.carla_server.options import ServerOptions
-from skidpad.simulation.carla_server.pacer import MANAGER_REST, Pacer
+from skidpad.simulation.carla_server.pacer import MANAGER_REST, ServerPacer
 from skidpad.simulation.carla_server.rpc import Dispatcher
 from skidpad.simulation.carla_server.served import Served
 from skidpad.simulation.carla_server.streams import StreamHub
@@ -142,7 +142,7 @@ class CarlaServer:
         self.hub = StreamHub()
         self.served = Served(options, self.hub)
         self.dispatcher = Dispatcher(self.served, TABLES)
-        self.pacer = Pacer(self.served.tick, self._own_step, lambda: not self._clients)
+        self.pacer = ServerPacer(self.served.tick, self._own_step, lambda: not self._clients)
         self.served.platform_time = self.pacer.measure_elapsed
         self.served.announce = self.hub.announce
         self._clients: set[RpcConnection] = set()

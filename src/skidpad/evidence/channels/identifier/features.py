@@ -16,7 +16,7 @@ from skidpad.evidence.channels.indicators.catalogue import (
     PAIR_INDICATORS,
     Indicator,
 )
-from skidpad.evidence.channels.indicators.layout import Readings
+from skidpad.evidence.channels.indicators.layout import IndicatorReadings
 from skidpad.evidence.channels.risk import RiskMatrix
 
 Floats = NDArray[np.float64]
@@ -54,7 +54,7 @@ TRAINED_ON = tuple(name for name in FEATURE_NAMES if not name.startswith(_NEARLY
 _UPPER = np.array([i in GREATEST for i in PAIR_INDICATORS])
 
 
-def feature_row(readings: Readings, risk: RiskMatrix, signals: SignalReadings) -> Floats:
+def feature_row(readings: IndicatorReadings, risk: RiskMatrix, signals: SignalReadings) -> Floats:
     """One cycle as (len(ROW_NAMES),)."""
     pairs = np.where(_UPPER, _greatest(readings.by_pair()), _least(readings.by_pair()))
     ahead, behind = risk.risk_ahead.reshape(1, -1), risk.risk_behind.reshape(1, -1)

@@ -70,7 +70,7 @@ class Layout:
 
 
 @dataclass(frozen=True, slots=True)
-class Readings:
+class IndicatorReadings:
     """The values of one cycle; `readings[indicator]` is a view of those of its subjects."""
 
     layout: Layout

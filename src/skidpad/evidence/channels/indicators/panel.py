@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from skidpad.evidence.channels.frames import Usable
 from skidpad.evidence.channels.indicators.catalogue import Scope
 from skidpad.evidence.channels.indicators.channel import ChannelIndicators, Values
-from skidpad.evidence.channels.indicators.layout import Layout, Readings
+from skidpad.evidence.channels.indicators.layout import IndicatorReadings, Layout
 from skidpad.evidence.channels.indicators.pair import PairIndicators
 from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 
@@ -42,7 +42,7 @@ class IndicatorPanel:
             (kind, [kind.make() for _ in range(of[kind.scope])]) for kind in self.layout.added
         ]
 
-    def update(self, messages: Sequence[Usable | None], lap: Lap = no_lap) -> Readings:
+    def update(self, messages: Sequence[Usable | None], lap: Lap = no_lap) -> IndicatorReadings:
         """The values of one cycle; `lap(name)` is called when the part `name` is done.
 
         Those of risk (safety score, share of the risk behind) are left open.
@@ -70,7 +70,7 @@ class IndicatorPanel:
             self._store_values(values, p, pair.prediction(similar))
         self._add_foreign(values)
         lap("motion_prediction")
-        return Readings(self.layout, values, tuple(pair.matched for pair in self.pairs))
+        return IndicatorReadings(self.layout, values, tuple(pair.matched for pair in self.pairs))
 
     def _add_foreign(self, row: Floats) -> None:
         """Writes the values of the indicators that packages added."""

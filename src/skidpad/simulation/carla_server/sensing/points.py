@@ -13,7 +13,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import angles_to_carla, vectors_to_carla
 from skidpad.core.randomness import stream_key
 from skidpad.core.specs import RadarSpec
-from skidpad.sensors.around import STEEPEST_DEG, Fan, Seen, look_around
+from skidpad.sensors.around import STEEPEST_DEG, Fan, RayHits, look_around
 from skidpad.sensors.beam import Beam
 from skidpad.sensors.radar import Radar
 from skidpad.simulation.carla_server import wire
@@ -126,7 +126,7 @@ class _Scan:
     """The returns of a tick."""
 
     channel: NDArray[np.int64]
-    seen: Seen
+    seen: RayHits
 
     def places(self, distance: Floats) -> Floats:
         """(n, 3) in the sensor's frame, CARLA's axes."""

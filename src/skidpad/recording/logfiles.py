@@ -92,7 +92,7 @@ def log_hash(log: RunLog) -> str:
 
 
 def _hash(log: RunLog, table: pl.DataFrame) -> str:
-    head = _head(log)
+    head = _describe_log(log)
     header = head.pop("header")
     drive = {**head, "weathers": len(log.weathers), "map": header.map_hash, "dt": header.dt}
     text = msgspec.json.encode(drive, order="deterministic")
@@ -101,7 +101,7 @@ def _hash(log: RunLog, table: pl.DataFrame) -> str:
 
 def write_log(folder: Path, log: RunLog) -> str:
     """Write ticks.parquet and events.jsonl into `folder`, each atomically; returns the hash."""
-    head = msgspec.json.encode(_head(log), order="deterministic")
+    head = msgspec.json.encode(_describe_log(log), order="deterministic")
     table = tick_table(log)
     write_bytes(folder / EVENTS, encode_events(log.events))
     write_parquet(folder / TICKS, table, {KEY: head.decode(), PLACE: fingerprint().short})
@@ -203,7 +203,7 @@ def _series(table: pl.DataFrame, prefix: str, kind: type[S]) -> S:
     return kind(*(numbers[name].to_numpy() for name in names))
 
 
-def _head(log: RunLog) -> dict[str, Any]:
+def _describe_log(log: RunLog) -> dict[str, Any]:
     t = log.table
     return {
         "schema": SCHEMA_VERSION,

@@ -116,9 +116,9 @@ class RoadMap:
 
     def project(self, x: float, y: float, z: float, driving: bool = True) -> LanePoint | None:
         """Nearest (driving) lane centre at about this height; None beyond 20 m."""
-        return self._point(*entries.project(self.held, float(x), float(y), float(z), driving))
+        return self._make_point(*entries.project(self.held, float(x), float(y), float(z), driving))
 
-    def _point(self, lane: int, s: float, offset: float, *place: float) -> LanePoint | None:
+    def _make_point(self, lane: int, s: float, offset: float, *place: float) -> LanePoint | None:
         if lane < 0:
             return None
         x, y, z, heading, curvature, width = place
@@ -141,7 +141,7 @@ class RoadMap:
         heading: what "straight" is measured against; None: the lane's own. None where the road ends.
         """
         measured = nan if heading is None else heading
-        return self._point(
+        return self._make_point(
             *entries.advance(self.held, point.lane, point.s, float(distance), measured)
         )
 

@@ -58,13 +58,13 @@ def _combine_parameters(node: Node) -> list[dict[str, str]]:
         factors.append([{name: value} for value in _values(one.only())])
     for many in node.children("DeterministicMultiParameterDistribution"):
         sets = many.child("ValueSetDistribution").children("ParameterValueSet")
-        factors.append([_set(s) for s in sets])
+        factors.append([_read_parameter_set(s) for s in sets])
     if prod(len(f) for f in factors) > CHOICES_MAX:
         raise node.error(f"makes more than {CHOICES_MAX} choices")
     return [{k: v for part in parts for k, v in part.items()} for parts in product(*factors)]
 
 
-def _set(node: Node) -> dict[str, str]:
+def _read_parameter_set(node: Node) -> dict[str, str]:
     direct = {
         one.plain("parameterRef"): one.text("value") for one in node.children("ParameterAssignment")
     }

@@ -131,9 +131,9 @@ def _levels(piece: Edges, lanes: LaneTable, lane: int, outer: NDArray[np.bool_])
             if is_outer:
                 parts.append(_skirt(piece, at, side))
         if level < LEVELS - 1:  # beyond that a line is a quarter of a pixel wide
-            parts.append(_marking(piece, at, level, 1))
+            parts.append(_paint_edge(piece, at, level, 1))
             if kind in DRIVABLE and lanes.left[lane] < 0:
-                parts.append(_marking(piece, at, level, 0))
+                parts.append(_paint_edge(piece, at, level, 0))
         meshes.append(merge(parts))
     return meshes
 
@@ -145,7 +145,7 @@ def _skirt(piece: Edges, at: NDArray[np.intp], side: int) -> Mesh:
     return ribbon(edge, out, SemanticClass.TERRAIN, Material.EMBANKMENT)
 
 
-def _marking(piece: Edges, at: NDArray[np.intp], level: int, side: int) -> Mesh:
+def _paint_edge(piece: Edges, at: NDArray[np.intp], level: int, side: int) -> Mesh:
     edge = (piece.left, piece.right)[side] + (0.0, 0.0, MARKING_LIFT)
     half = piece.normal * (MARKING_WIDTH / 2.0)
     style = (piece.marking_left, piece.marking_right)[side]

@@ -169,7 +169,7 @@ class Supervisor:
         elif self.phase is Supervision.WARM_UP:
             self._begin(Supervision.NONE, 0.0, self.reason)
 
-    def _place(self, states: ActorStates) -> LanePoint | None:
+    def _find_lane(self, states: ActorStates) -> LanePoint | None:
         x, y, z = float(states.x[0]), float(states.y[0]), float(states.z[0])
         return self.map.project(x, y, z)
 
@@ -177,7 +177,7 @@ class Supervisor:
         """Backwards towards the lane (A-182): by the cross product of the heading and the vector to
         the lane in m, the lane's lateral distance. The published one is CARLA-handed: in ISO 8855
         both it and the steer change sign, so the formula keeps its form."""
-        place = self._place(states)
+        place = self._find_lane(states)
         steer = 0.0
         if place is not None:
             dx, dy = place.x - float(states.x[0]), place.y - float(states.y[0])
@@ -189,7 +189,7 @@ class Supervisor:
     def _realign(self, states: ActorStates) -> Action:
         """Put the ego on the lane (A-183 to A-186, A-198); without a lane, wait (A-192)."""
         assert self.truth is not None
-        nearest = self._place(states)
+        nearest = self._find_lane(states)
         if self.reason is RelocationReason.ROAD_END:
             nearest = self.first
         elif self.reason is RelocationReason.OFF_ROAD and nearest is None:
@@ -210,7 +210,7 @@ class Supervisor:
     def _warm_up(self, states: ActorStates) -> Action:
         if self.left > 0:
             return Action(HELD)
-        place = self._place(states)
+        place = self._find_lane(states)
         yaw = float(states.yaw[0]) if place is None else place.heading
         pose = replace(states.pose(0), yaw=yaw)
         return Action(ROLLING, Relocate(pose, self.settings.release_speed))
@@ -255,7 +255,7 @@ class Supervisor:
     def _astray(self, truth: WorldTruth) -> RelocationReason | None:
         """Why the ego is put back although it touched nothing: wrong way, or off the road."""
         states = truth.states
-        place = self._place(states)
+        place = self._find_lane(states)
         if place is not None:
             self.first, self.last = self.first or place, place
             crossing = self.map.lanes.junction[place.lane] >= 0  # its lanes lead all ways
@@ -304,7 +304,7 @@ class Supervisor:
         """The stack says that it holds, or a vehicle or a red light stands ahead."""
         if report is not None and report.tier in HOLDING:
             return True
-        ego = self._place(truth.states)
+        ego = self._find_lane(truth.states)
         if ego is None:
             return False
         here = replace(

@@ -81,7 +81,7 @@ def set_standing(
     for name, text in (("owner", standing.owner), ("release", standing.release), ("note", note)):
         if len(text) > TEXT_MAX:
             raise Refused(422, f"{name} has at most {TEXT_MAX} characters, got {len(text)}")
-    _add(connection, subject_key(who, subject), standing, (who.id, at), note)
+    _record_standing(connection, subject_key(who, subject), standing, (who.id, at), note)
 
 
 def reopen(
@@ -91,10 +91,10 @@ def reopen(
     for subject, was, driven in recurred:
         again = Standing(State.REOPENED, was.owner, was.release)
         note = f"alarms from drives with {driven}"
-        _add(connection, subject_key(who, subject), again, ("analysis", at), note)
+        _record_standing(connection, subject_key(who, subject), again, ("analysis", at), note)
 
 
-def _add(
+def _record_standing(
     connection: Connection, key: str, standing: Standing, by: tuple[str, float], note: str
 ) -> None:
     detail = {"owner": standing.owner, "release": standing.release, "note": note}

@@ -119,7 +119,7 @@ def compile_override(node: Node, ctx: Context) -> PrivateAction:
     return Override(inputs) if inputs else NoEffect(node.tag)
 
 
-def _share(node: Node) -> float:
+def _read_pedal(node: Node) -> float:
     """A pedal's way, 0 to 1."""
     percent = node.find("BrakePercent")
     return min(max((percent or node).number("value"), 0.0), 1.0)
@@ -140,12 +140,12 @@ def _reverse(node: Node) -> bool:
 # field of a VehicleCommand and how it is read; there is no clutch
 INPUTS: Mapping[str, tuple[str, Callable[[Node], float]]] = MappingProxyType(
     {
-        "Throttle": ("throttle", _share),
-        "Brake": ("brake", _share),
-        "ParkingBrake": ("handbrake", lambda node: _share(node) > 0.0),
+        "Throttle": ("throttle", _read_pedal),
+        "Brake": ("brake", _read_pedal),
+        "ParkingBrake": ("handbrake", lambda node: _read_pedal(node) > 0.0),
         "SteeringWheel": ("steer", _steer),
         "Gear": ("reverse", _reverse),
-        "Clutch": ("", _share),
+        "Clutch": ("", _read_pedal),
     }
 )
 

@@ -48,7 +48,7 @@ class WatchedStack(AdasStack):
     """Our stack with the three cameras beside its own sensors; it does not look at them."""
 
     def sensors(self) -> tuple[SensorSpec, ...]:
-        """The cameras that are written down."""
+        """Returns the cameras whose images are written to the data set."""
         return CAMERAS
 
 

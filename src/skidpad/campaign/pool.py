@@ -63,7 +63,10 @@ def run_jobs(jobs: Iterable[Job], workers: int) -> Iterator[Finished]:
 
 
 def _supervise(crew: list[Worker | None], queue: _Queue) -> Iterator[Finished]:
-    """crew: the workers by place; None where there is none yet, or no more."""
+    """Gives waiting jobs to idle workers, and yields each as it finishes; failed ones may be tried again.
+
+    crew: the workers by place; None where there is none yet, or no more.
+    """
     while True:
         for place, worker in enumerate(crew):
             if (worker is None or worker.job is None) and queue.waiting:

@@ -99,7 +99,7 @@ def finish(driven: Sequence[Task], out: Path, runner: Runner) -> None:
 
 
 def recipe(keep_all: bool = False) -> Recipe[Task, ThresholdKey, GripMetrics]:
-    """keep_all: the whole log of every run."""
+    """Returns what a threshold campaign is made of; keep_all: every run leaves its whole log."""
     return Recipe(
         command=COMMAND,
         columns=THRESHOLD,

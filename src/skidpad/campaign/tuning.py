@@ -113,7 +113,7 @@ class TrialMetrics:
 
 
 def candidates(scenario: str) -> Iterator[Candidate]:
-    """Yields the candidates that were tried."""
+    """Yields the sets of values that are tried for a scenario."""
     if scenario == CUT_IN:
         for cutin in (CutIn.ORIGINAL, CutIn.FIXED):  # without and with the spawn delay
             for v in GHOST_SPEEDS:

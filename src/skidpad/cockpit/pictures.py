@@ -29,7 +29,7 @@ CLOSING, STEADY, LEAD = (82, 133, 255), (235, 235, 235), (127, 206, 79)  # blue,
 
 
 def colours(array: Array) -> Picture:
-    """The plane of a view in colours."""
+    """Returns the image of a view as blue, green and red bytes."""
     if array.dtype == np.uint32:
         rgba = array.view(np.uint8).reshape(*array.shape, 4)
         return np.asarray(cv2.cvtColor(rgba, cv2.COLOR_RGBA2BGR), dtype=np.uint8)

@@ -71,7 +71,7 @@ class Replayer:
                 self.show()
 
     def turn(self) -> None:
-        """Go on as far as words and clock say."""
+        """Goes to the moment that the clock has reached, or that the page asked for."""
         link, last = self.link, self.source.ticks - 1
         if link.seek is not None:
             self._from(index_at(self.source, link.seek))

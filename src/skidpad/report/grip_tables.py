@@ -103,7 +103,7 @@ def paired_test(pair: Pair) -> Cell:
 
 
 def mark(pair: Pair, friction: str) -> str:
-    """Reduced friction stands out where the paired test finds it better or worse."""
+    """Returns the tone of a cell: "good" or "bad" where the paired test finds a difference, else ""."""
     before, after = completion(pair.original).value, completion(pair.reduced).value
     if friction == ORIGINAL or before is None or after is None or not len(pair.common):
         return ""

@@ -47,6 +47,7 @@ def load_map(map: str | Path) -> RoadMap:
 
 @lru_cache(maxsize=8)
 def _load(path: Path, changed: int) -> RoadMap:  # noqa: ARG001  part of the key
+    """Returns the map of a file; `changed`, when the file was written, lets the cache forget an older one."""
     if path.suffix == ".npz":
         return RoadMap(load_baked(path))
     stored = path.with_suffix(".npz")

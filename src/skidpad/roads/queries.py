@@ -119,6 +119,7 @@ class RoadMap:
         return self._make_point(*entries.project(self.held, float(x), float(y), float(z), driving))
 
     def _make_point(self, lane: int, s: float, offset: float, *place: float) -> LanePoint | None:
+        """Returns the point of a kernel's answer; place: x, y, z, heading, curvature, lane's width."""
         if lane < 0:
             return None
         x, y, z, heading, curvature, width = place

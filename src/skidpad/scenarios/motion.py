@@ -122,7 +122,7 @@ class Guide:
         return -left
 
     def demand(self, motion: Motion) -> Demand:
-        """What a driver has to do now."""
+        """Goes on by one step, and returns what a driver has to do in it."""
         self.advance(motion)
         if self.base is None:
             return Demand(self.v, self.a, 0.0, 0.0, 0.0, 0.0)

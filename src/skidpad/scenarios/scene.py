@@ -140,7 +140,7 @@ class Actor:
 
     @property
     def placed_by_file(self) -> bool:
-        """It is exactly where the scenario says."""
+        """Tells whether it is moved exactly as the scenario says, without physics."""
         return self.driven_by_file and (self.driver is None or self.mode is not ActorMode.PHYSICAL)
 
     @property

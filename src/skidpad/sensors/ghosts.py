@@ -25,7 +25,7 @@ class GhostSettings:
     life: float  # s, mean of an exponential distribution
 
     def scaled(self, factor: float) -> GhostSettings:
-        """So many times as often."""
+        """Returns the settings with ghosts `factor` times as often."""
         return replace(self, rate=factor * self.rate)
 
 

@@ -146,6 +146,7 @@ def _skirt(piece: Edges, at: NDArray[np.intp], side: int) -> Mesh:
 
 
 def _paint_edge(piece: Edges, at: NDArray[np.intp], level: int, side: int) -> Mesh:
+    """Returns the paint on one edge of a piece of lane; side: 0 left, 1 right; level: of detail."""
     edge = (piece.left, piece.right)[side] + (0.0, 0.0, MARKING_LIFT)
     half = piece.normal * (MARKING_WIDTH / 2.0)
     style = (piece.marking_left, piece.marking_right)[side]

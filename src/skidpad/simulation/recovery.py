@@ -170,6 +170,7 @@ class Supervisor:
             self._begin(Supervision.NONE, 0.0, self.reason)
 
     def _find_lane(self, states: ActorStates) -> LanePoint | None:
+        """Returns the place on a lane where the ego is; None off all lanes."""
         x, y, z = float(states.x[0]), float(states.y[0]), float(states.z[0])
         return self.map.project(x, y, z)
 

@@ -43,6 +43,7 @@ def _collision(drive: Drive, limit: float) -> str:
 
 
 def _distance(drive: Drive, limit: float) -> str:
+    """Returns why the ego did not drive far enough; "" where it did."""
     way = _way(drive)
     return "" if way >= limit else f"the ego drove {way:.1f} m, {limit:g} m are asked for"
 

@@ -58,7 +58,7 @@ class Dispatcher:
             self.relay(relay)
 
     def escalate(self) -> None:
-        """One level up for what is overdue."""
+        """Raises each alert that nobody took in time by one level."""
         now, up = self.clock(), False
         with self.engine.begin() as connection:
             for alert in alerts_since(connection, now - DAY):

@@ -33,7 +33,7 @@ def open_engine(url: str) -> Engine:
 
 
 def sqlite_url(folder: Path) -> str:
-    """The store of a data folder."""
+    """Returns the address of the SQLite database in a data folder."""
     return f"sqlite:///{(folder / 'fleet.sqlite').absolute()}"
 
 

@@ -120,7 +120,7 @@ def compile_override(node: Node, ctx: Context) -> PrivateAction:
 
 
 def _read_pedal(node: Node) -> float:
-    """A pedal's way, 0 to 1."""
+    """Returns how far an element presses a pedal, 0 to 1."""
     percent = node.find("BrakePercent")
     return min(max((percent or node).number("value"), 0.0), 1.0)
 
@@ -157,7 +157,7 @@ class Visibility:
     sensors: bool
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
-        """From the next step on."""
+        """Sensors see the actor, or do not, from the next step on."""
         del scene
         actor.visible = self.sensors
         return DONE

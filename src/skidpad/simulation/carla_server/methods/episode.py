@@ -88,7 +88,7 @@ def get_episode_settings(served: Served) -> list[Any]:
 
 @TABLE.method("set_episode_settings")
 def set_episode_settings(served: Served, settings: Any) -> int:
-    """From the next tick on; the current frame."""
+    """Sets what holds from the next tick on; returns the number of the current frame."""
     served.apply(parse_settings(settings))
     return served.clock.frame
 

@@ -43,7 +43,7 @@ class Memory:
                     turn = before[0] @ scene.live.actors.rotation[row].T
                     shift = before[1] - turn @ scene.live.actors.position[row]
                     out[mine] = compute_flow(view, self.view, turn, shift, drawn.inverse)[mine]
-        self.view, self.bodies = view, _bodies(scene)
+        self.view, self.bodies = view, _copy_motions(scene)
         return out
 
 
@@ -68,7 +68,7 @@ def optical_flow(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Mes
     return [(camera.head, made.memory.since(scene, view, camera.drawn).tobytes())]
 
 
-def _bodies(scene: Pictured) -> dict[int, tuple[Floats, Floats]]:
+def _copy_motions(scene: Pictured) -> dict[int, tuple[Floats, Floats]]:
     actors = scene.live.actors
     return {
         actor.id: (actors.rotation[row].copy(), actors.position[row].copy())

@@ -51,7 +51,7 @@ def tail_marks(cycles: Sequence[Cycle], spare: float) -> list[Mark]:
     for k, cycle in enumerate(cycles):
         truth = cycle.truth
         if truth is not None and np.hypot(*truth.ego[3:]) > V_EGO_MIN:
-            marks.extend(_tail_marks(k, cycle.t, truth, path, cycle.frames, spare))
+            marks.extend(_mark_tailgating(k, cycle.t, truth, path, cycle.frames, spare))
     return marks
 
 
@@ -74,7 +74,7 @@ class _DrivenPath:
         return shapely.LineString(points), float(self.s[k] - self.s[first])
 
 
-def _tail_marks(
+def _mark_tailgating(
     k: int,
     t: float,
     truth: TruthFrame,

@@ -36,7 +36,7 @@ class AnyEntity:
     condition: EntityCondition
 
     def probe(self) -> Probe:
-        """By the rule `any` or `all`."""
+        """Returns what tells whether the condition holds for any entity, or for all."""
         return self._holds
 
     def holding(self, scene: Scene) -> list[str]:

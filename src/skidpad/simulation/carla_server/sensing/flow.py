@@ -69,6 +69,7 @@ def optical_flow(around: Surroundings, clock: Clock, sensor: Sensor) -> list[Mes
 
 
 def _copy_motions(scene: Pictured) -> dict[int, tuple[Floats, Floats]]:
+    """Returns how each actor is turned and where it is, by id, as the next picture is compared with it."""
     actors = scene.live.actors
     return {
         actor.id: (actors.rotation[row].copy(), actors.position[row].copy())

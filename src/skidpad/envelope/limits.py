@@ -1,0 +1,108 @@
+"""The speeds that sight, a lead, bends and water allow: pure functions, each with its source.
+
+Speeds in m/s, distances in m, decelerations positive in m/s^2. The lowest speed of all wins.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from enum import IntEnum
+from math import inf, sqrt
+
+STRAIGHT = 1e-5  # 1/m, less is no bend
+INCH_MM = 25.4
+MPH = 0.44704  # m/s
+FILM_LEAST, FILM_MOST = 0.2, 2.54  # mm between which `floating_speed` is used; thinner: no floating
+
+
+class Binding(IntEnum):
+    """Which limit is the lowest."""
+
+    NONE = 0  # none is below the speed that a car can drive
+    SIGHT = 1
+    LEAD = 2
+    BEND = 3
+    WATER = 4
+    TABLE = 5  # of a rival of the envelope: a table of speeds, or one fixed speed
+
+
+def sight_speed(distance: float, deceleration: float, delay: float) -> float:
+    """Returns the highest speed from which a car stops within `distance`.
+
+    Solves d = v t + v^2 / (2 a) for v: stopping sight distance, AASHTO, A Policy on Geometric Design
+    of Highways and Streets (2011), equation 3-2, with the delay in the place of the reaction time.
+    """
+    if distance <= 0.0:
+        return 0.0
+    b = deceleration * delay
+    return sqrt(b * b + 2.0 * deceleration * distance) - b
+
+
+def safe_gap(
+    v: float, v_lead: float, deceleration: float, lead_deceleration: float, delay: float
+) -> float:
+    """Returns the gap that keeps a follower out of a lead that brakes at once.
+
+    The longitudinal distance of RSS without acceleration in the response time (Shalev-Shwartz, Shammah
+    and Shashua, On a Formal Model of Safe and Scalable Self-driving Cars, 2017, arXiv 1708.06374, lemma
+    2; IEEE 2846-2022 has the same form).
+    """
+    own = v * delay + v * v / (2.0 * deceleration)
+    return max(own - v_lead * v_lead / (2.0 * lead_deceleration), 0.0)
+
+
+def following_speed(
+    gap: float, v_lead: float, deceleration: float, lead_deceleration: float, delay: float
+) -> float:
+    """Returns the highest speed for which `gap` is a safe one: `safe_gap` solved for v.
+
+    The stops are compared. Where the lead brakes less hard than the follower can, the two may come
+    nearer before both stand, so the lead's deceleration must be its hardest possible one.
+    """
+    lead_way = v_lead * v_lead / (2.0 * lead_deceleration)
+    return sight_speed(max(gap, 0.0) + lead_way, deceleration, delay)
+
+
+def bend_speed(curvature: float, lateral: float) -> float:
+    """Returns the speed at which a bend takes `lateral` m/s^2: v^2 times curvature.
+
+    The point-mass balance of AASHTO's equation 3-7 without superelevation.
+    """
+    return sqrt(lateral / abs(curvature)) if abs(curvature) > STRAIGHT else inf
+
+
+def speed_before_bend(v_bend: float, distance: float, approach: float) -> float:
+    """Returns the speed `distance` before a bend from which `approach` m/s^2 slows to v_bend."""
+    return sqrt(v_bend * v_bend + 2.0 * approach * max(distance, 0.0)) if v_bend < inf else inf
+
+
+def bends_speed(
+    places: Iterable[tuple[float, float]], lateral: float, approach: float, delay: float, v: float
+) -> float:
+    """Returns the speed that all bends of (distance, curvature) allow; v drives on for the delay."""
+    return min(
+        (
+            speed_before_bend(bend_speed(curvature, lateral), distance - v * delay, approach)
+            for distance, curvature in places
+        ),
+        default=inf,
+    )
+
+
+def floating_speed(film_mm: float) -> float:
+    """Returns the speed at which tyres begin to float on so much water; inf on less than 0.2 mm.
+
+    V = 26.04 d^-0.259, in mph and inches, for less than 0.1 inch: Huebner, Reed and Henry, Criteria for
+    Predicting Hydroplaning Potential, Journal of Transportation Engineering 112 (1986), as PAVDRN
+    of NCHRP 1-29 uses it. Fitted to worn and ribbed tyres; deeper water counts as 0.1 inch.
+    """
+    if film_mm < FILM_LEAST:
+        return inf
+    return MPH * 26.04 * (min(film_mm, FILM_MOST) / INCH_MM) ** -0.259
+
+
+def lowest(limits: Mapping[Binding, float], most: float) -> tuple[float, Binding]:
+    """Returns the lowest speed and its name; `most` and NONE where no limit is below it."""
+    binding = min(limits, key=lambda name: limits[name], default=Binding.NONE)
+    v = limits.get(binding, inf)
+    return (v, binding) if v < most else (most, Binding.NONE)

@@ -12,8 +12,10 @@ from skidpad.core.geometry import Pose
 from skidpad.core.registry import Registry, load_factory
 from skidpad.core.sight import DriverView
 from skidpad.core.specs import (
+    AIR_THERMOMETER,
     GNSS,
     IMU,
+    RAIN_SENSOR,
     SPEEDOMETER,
     CameraSpec,
     ChannelSpec,
@@ -77,7 +79,7 @@ class SensorType:
 
 
 def _own_types() -> tuple[SensorType, ...]:
-    at = "skidpad.sensors.asked:"
+    at, outside = "skidpad.sensors.asked:", "skidpad.sensors.outside:"
     point = PointSensorSpec
     return (
         SensorType("camera", "Camera", "pixels", CameraSpec, CameraImage, at + "make_camera"),
@@ -98,6 +100,14 @@ def _own_types() -> tuple[SensorType, ...]:
         SensorType(
             "channel", "All sensors of a channel", "m, m/s, rad", ChannelSpec, ChannelView,
             at + "make_channel",
+        ),
+        SensorType(
+            RAIN_SENSOR, "Rain sensor of the wiper", "stage 0 to 3", point, int,
+            outside + "make_rain_sensor", RAIN_SENSOR,
+        ),
+        SensorType(
+            AIR_THERMOMETER, "Thermometer in the bumper", "deg C", point, float,
+            outside + "make_thermometer", AIR_THERMOMETER,
         ),
     )  # fmt: skip
 

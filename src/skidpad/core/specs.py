@@ -92,14 +92,15 @@ class LidarSpec:
 
 GNSS, IMU, SPEEDOMETER = "gnss", "imu", "speedometer"
 COLLISION, LANE_INVASION = "collision", "lane_invasion"
+RAIN_SENSOR, AIR_THERMOMETER = "rain_sensor", "air_thermometer"
 
 
 @dataclass(frozen=True, slots=True)
 class PointSensorSpec:
-    """GNSS, IMU, speedometer, collision or lane-invasion sensor."""
+    """GNSS, IMU, speedometer, collision or lane-invasion sensor, rain sensor or thermometer."""
 
     id: str
-    kind: str  # one of the five words above
+    kind: str  # one of the words above
     mount: Pose = Pose(0.0, 0.0, 0.0)
 
 

@@ -66,7 +66,7 @@ def following_speed(
 def bend_speed(curvature: float, lateral: float) -> float:
     """Returns the speed at which a bend takes `lateral` m/s^2: v^2 times curvature.
 
-    The point-mass balance of AASHTO's equation 3-7 without superelevation.
+    The balance of a point mass, AASHTO's simplified curve formula, without superelevation.
     """
     return sqrt(lateral / abs(curvature)) if abs(curvature) > STRAIGHT else inf
 
@@ -92,9 +92,9 @@ def bends_speed(
 def floating_speed(film_mm: float) -> float:
     """Returns the speed at which tyres begin to float on so much water; inf on less than 0.2 mm.
 
-    V = 26.04 d^-0.259, in mph and inches, for less than 0.1 inch: Huebner, Reed and Henry, Criteria for
-    Predicting Hydroplaning Potential, Journal of Transportation Engineering 112 (1986), as PAVDRN
-    of NCHRP 1-29 uses it. Fitted to worn and ribbed tyres; deeper water counts as 0.1 inch.
+    V = 26.04 d^-0.259, in mph and inches, for less than 0.1 inch; deeper water counts as 0.1 inch.
+    After Huebner, Reed and Henry, Criteria for Predicting Hydroplaning Potential, Journal of
+    Transportation Engineering 112 (1986), as in PAVDRN of NCHRP 1-29; the paper's text was not found.
     """
     if film_mm < FILM_LEAST:
         return inf

@@ -1,0 +1,249 @@
+"""`govern(stack, settings)`: any stack, kept inside the envelope of its grip and sight.
+
+It lowers acceleration and nothing else: it takes throttle away and adds brake, never steers, and never
+takes away the stack's own braking. It sees the frame that the stack sees, the map, two sensors of its
+own, and the commands that it returned: no weather, no friction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import isfinite
+from typing import Any
+
+from skidpad.core.constants import G
+from skidpad.core.errors import require_range
+from skidpad.core.frames import SensorFrame
+from skidpad.core.setup import DT
+from skidpad.core.specs import (
+    AIR_THERMOMETER,
+    RAIN_SENSOR,
+    PointSensorSpec,
+    RadarSpec,
+    SensorSpec,
+)
+from skidpad.core.states import StackReport, VehicleCommand
+from skidpad.core.vocabulary import Supervision
+from skidpad.envelope.grip import COLD_C, STIFFNESS, Grip, GripEstimator
+from skidpad.envelope.limits import (
+    Binding,
+    bends_speed,
+    floating_speed,
+    following_speed,
+    lowest,
+    sight_speed,
+)
+from skidpad.envelope.sight import Sight, Way, way_ahead
+from skidpad.roads.queries import RoadMap
+from skidpad.stack.interface import Stack
+
+RAIN_ID, AIR_ID = "envelope_rain", "envelope_air"
+SENSORS = (PointSensorSpec(RAIN_ID, RAIN_SENSOR), PointSensorSpec(AIR_ID, AIR_THERMOMETER))
+# mm of water by stage of the rain sensor, as high as to be expected: wet, heavy rain and puddles of the
+# friction table of the Bosch Automotive Handbook (docs/physics.md)
+FILMS = (0.0, 0.2, 1.0, 2.0)
+TABLE_KMH = (80.0, 60.0, 40.0)  # rows of the rival: dry, rain, cold
+V_CREEP = 1.5  # m/s, below it the stack is left alone: it must be able to start
+BRAKE_GAIN = 1.0  # 1/s, from too much speed to deceleration
+SOFT = 1.0  # m/s below the limit, over which throttle is taken away
+CLOSE = 2.0  # m kept behind a standing lead
+LEAD_GRIP, LEAD_BRAKE = (
+    1.2,
+    8.0,
+)  # times the estimate that a lead's tyres may have; m/s^2 it brakes at most
+GripAt = Callable[[float], float]  # grip at a speed in m/s
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class EnvelopeSettings:
+    """How the envelope is set.
+
+    Attributes:
+        share: of the estimated grip that stopping may take.
+        lateral_share: of it that bends may take.
+        delay: s from a need to the deceleration.
+        approach: m/s^2 with which a falling limit is approached.
+        most: m/s, no limit is above it.
+        stiffness: of the tyre that the estimator was designed with.
+        factor: on the estimated grip, for studies.
+        table_kmh: speeds when dry, in rain, in the cold, in the place of the envelope: a rival.
+        oracle: true grip, for studies only.
+    """
+
+    share: float = 0.7
+    lateral_share: float = 0.5
+    delay: float = 0.5
+    approach: float = 2.0
+    most: float = 150.0 / 3.6
+    stiffness: float = STIFFNESS
+    factor: float = 1.0
+    table_kmh: tuple[float, float, float] | None = None
+    oracle: GripAt | None = None
+    dt: float = DT
+
+    def __post_init__(self) -> None:
+        require_range("share", self.share, 0.05, 1.0)
+        require_range("lateral_share", self.lateral_share, 0.05, 1.0)
+        require_range("delay", self.delay, 0.0, 5.0)
+        require_range("approach", self.approach, 0.1, 10.0)
+        require_range("most", self.most, 1.0, 120.0)
+        require_range("stiffness", self.stiffness, 5.0, 60.0)
+        require_range("factor", self.factor, 0.1, 3.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Allowed:
+    """What the envelope said in a tick."""
+
+    speed: float  # m/s
+    binding: Binding
+    grip: Grip
+    reach: float  # m that is seen
+
+    def numbers(self) -> dict[str, float]:
+        """Returns the columns of the recording."""
+        return {
+            "speed_mps": self.speed, "binding": float(self.binding), "grip": self.grip.value,
+            "confidence": self.grip.confidence, "prior": self.grip.prior, "reach_m": self.reach,
+        }  # fmt: skip
+
+
+class Envelope:
+    """The speed that is safe here and now."""
+
+    def __init__(
+        self, specs: Sequence[SensorSpec], map: RoadMap, settings: EnvelopeSettings
+    ) -> None:
+        self.map, self.settings = map, settings
+        radar = next((spec for spec in specs if isinstance(spec, RadarSpec)), None)
+        self.sight = Sight(radar, settings.dt)
+        self.grip = GripEstimator(settings.dt, stiffness=settings.stiffness)
+
+    def reset(self) -> None:
+        """Forgets what was seen and felt at another place."""
+        self.sight.reset()
+        self.grip.reset()
+
+    def update(self, frame: SensorFrame, applied: VehicleCommand) -> Allowed:
+        """Returns what is allowed in this tick; applied: the command before it."""
+        set_to, ego, v = self.settings, frame.ego, max(frame.ego.speed, 0.0)
+        stage, air_c = int(frame.extra[RAIN_ID]), float(frame.extra[AIR_ID])
+        way = way_ahead(self.map, ego.pose)
+        grade = 0.0 if way is None else way.grade
+        grip = self.grip.update(ego, applied, stage, air_c, grade)
+        if set_to.oracle is not None:
+            true = set_to.oracle(v)
+            grip = Grip(true, true, 1.0, grip.prior)
+        elif set_to.factor != 1.0:
+            grip = replace(grip, value=grip.value * set_to.factor)
+        if set_to.table_kmh is not None:
+            row = 2 if air_c < COLD_C else min(stage, 1)
+            limits, reach = {Binding.TABLE: set_to.table_kmh[row] / 3.6}, 0.0
+        else:
+            limits, reach = self._limits(frame, way, grip, stage, v)
+        return Allowed(*lowest(limits, set_to.most), grip, reach)
+
+    def _limits(
+        self, frame: SensorFrame, way: Way | None, grip: Grip, stage: int, v: float
+    ) -> tuple[dict[Binding, float], float]:
+        set_to = self.settings
+        braking = set_to.share * grip.value * G
+        limits = {Binding.WATER: floating_speed(FILMS[stage])}
+        if way is None:  # off every lane: nothing is known of what lies ahead
+            return limits, 0.0
+        lead = self.sight.look(frame.radar, frame.ego.pose, way, v)
+        reach = min(self.sight.reach, self.sight.clear_way(frame.ego.pose, way))
+        limits[Binding.SIGHT] = sight_speed(reach, braking, set_to.delay)
+        limits[Binding.BEND] = bends_speed(
+            zip(way.s.tolist(), way.curvature.tolist(), strict=True),
+            set_to.lateral_share * grip.value * G, min(set_to.approach, braking), set_to.delay, v,
+        )  # fmt: skip
+        if lead is not None:
+            hardest = min(LEAD_GRIP * grip.value * G, LEAD_BRAKE)
+            gap = lead.gap - CLOSE
+            limits[Binding.LEAD] = following_speed(gap, lead.speed, braking, hardest, set_to.delay)
+        return limits, reach
+
+
+def lower(
+    command: VehicleCommand, v: float, allowed: float, approach: float, a_brake: float
+) -> VehicleCommand:
+    """Returns the command with less acceleration where v is near or above the allowed speed."""
+    if v <= max(allowed - SOFT, V_CREEP) or command.reverse:
+        return command
+    share = min(max((allowed - v) / SOFT, 0.0), 1.0)
+    brake = min(BRAKE_GAIN * max(v - allowed, 0.0), approach) / a_brake
+    throttle = command.throttle * share
+    if throttle == command.throttle and brake <= command.brake:
+        return command
+    return replace(command, throttle=throttle, brake=max(command.brake, brake))
+
+
+class GovernedStack:
+    """A stack inside the envelope; to all others it looks like the stack itself."""
+
+    def __init__(
+        self, inner: Stack, specs: Sequence[SensorSpec], map: RoadMap, settings: EnvelopeSettings
+    ) -> None:
+        self.inner, self.settings = inner, settings
+        self.envelope = Envelope(specs, map, settings)
+        self.applied = VehicleCommand()
+        self.supervision = Supervision.NONE
+        self.allowed: Allowed | None = None
+
+    def sensors(self) -> tuple[SensorSpec, ...]:
+        """Returns what the stack asks for, and the two sensors of the envelope."""
+        ask = getattr(self.inner, "sensors", None)
+        return (*(() if ask is None else ask()), *SENSORS)
+
+    @property
+    def report(self) -> StackReport:
+        """What the stack says about its last tick."""
+        return getattr(self.inner, "report", None) or StackReport()
+
+    @property
+    def mode(self) -> str:
+        """The stack's mode in its own words."""
+        return str(getattr(self.inner, "mode", ""))
+
+    def close(self) -> None:
+        """Ends the stack."""
+        close = getattr(self.inner, "close", None)
+        if callable(close):
+            close()
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        """Returns the stack's command, with less acceleration where the envelope asks for it."""
+        if frame.supervision is not self.supervision:
+            self.envelope.reset()
+            self.supervision = frame.supervision
+        driven = frame.supervision is Supervision.NONE
+        self.allowed = self.envelope.update(frame, self.applied if driven else VehicleCommand())
+        tell = getattr(self.inner, "limit_speed", None)
+        if callable(tell):
+            tell(max(self.allowed.speed, V_CREEP))
+        command = self.inner.tick(frame)
+        if driven and isinstance(command, VehicleCommand) and isfinite(frame.ego.speed):
+            braking = self.settings.share * self.allowed.grip.value * G
+            approach = min(self.settings.approach, braking)
+            if self.allowed.binding is Binding.LEAD:  # a lead may brake at any moment
+                approach = braking
+            car = self.envelope.grip.car
+            command = lower(command, frame.ego.speed, self.allowed.speed, approach, car.a_brake)
+        self.applied = command
+        return command
+
+
+def govern(stack: type[Stack], settings: EnvelopeSettings | None = None) -> type[Stack]:
+    """Returns a class like `stack` whose stacks stay inside the envelope."""
+    set_to = settings or EnvelopeSettings()
+
+    class Governed(GovernedStack):
+        def __init__(
+            self, specs: Sequence[SensorSpec], map: RoadMap, settings: Mapping[str, Any]
+        ) -> None:
+            super().__init__(stack(specs, map, settings), specs, map, set_to)
+
+    Governed.__name__ = Governed.__qualname__ = stack.__name__
+    return Governed

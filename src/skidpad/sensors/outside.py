@@ -1,0 +1,42 @@
+"""What a car senses of the air: drops on the windscreen in four stages, and its temperature.
+
+Neither knows the road: no water film, no road temperature, no friction.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import floor
+
+from skidpad.core.randomness import stream
+from skidpad.core.specs import PointSensorSpec
+from skidpad.physics.grip import rain_rate
+from skidpad.sensors.asked import SensorHost
+
+# mm/h above which rain counts as light, moderate, heavy: the glossary of the American Meteorological
+# Society, "rain" (a trace to 2.5, to 7.6, over 7.6)
+STAGES = (0.0, 2.5, 7.6)
+ERROR_C = 2.0  # K, largest error of the thermometer, the same for a whole run
+STEP_C = 0.5  # K, of its display; our assumption
+
+
+def rain_stage(rate_mm_h: float) -> int:
+    """Returns 0 without rain, 1, 2, 3 in light, moderate, heavy rain."""
+    return sum(rate_mm_h > least for least in STAGES)
+
+
+def make_rain_sensor(spec: PointSensorSpec, host: SensorHost) -> Callable[[], int]:
+    """Returns what reads the stage of the wiper."""
+    del spec
+    return lambda: rain_stage(rain_rate(host.setup.weather))
+
+
+def make_thermometer(spec: PointSensorSpec, host: SensorHost) -> Callable[[], float]:
+    """Returns what reads the temperature of the air, with an error of up to 2 K."""
+    error = stream(host.seed, f"{spec.id}/error").uniform(-ERROR_C, ERROR_C)
+
+    def read() -> float:
+        air = host.setup.weather.air_temperature_c + error
+        return STEP_C * floor(air / STEP_C + 0.5)
+
+    return read

@@ -15,8 +15,9 @@ from skidpad.core.weather import RANGES, Weather
 from skidpad.stack.configurations import (
     CONFIGURATIONS,
     CRUISE_RANGE,
+    GOVERNED,
     Functions,
-    functions_of,
+    numbered_driver,
     parse_functions,
 )
 
@@ -31,13 +32,13 @@ def published_drivers(numbers: str) -> list[AdasDriver]:
         return [AdasDriver(label=str(n), functions=f) for n, f in CONFIGURATIONS.items()]
     drivers = []
     for text in numbers.split(","):
-        known = {str(n) for n in CONFIGURATIONS}
+        known = {str(n) for n in (*CONFIGURATIONS, *GOVERNED)}
         if text.strip() not in known:
-            allowed = ", ".join([*map(str, CONFIGURATIONS), REFERENCE])
+            allowed = ", ".join([*map(str, (*CONFIGURATIONS, *GOVERNED)), REFERENCE])
             raise ConfigError(
                 f"unknown configuration {describe_value(text.strip(), 100)}; choose among: {allowed}"
             )
-        drivers.append(AdasDriver(label=text.strip(), functions=functions_of(int(text.strip()))))
+        drivers.append(numbered_driver(int(text.strip())))
     return drivers
 
 

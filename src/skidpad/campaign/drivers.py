@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from msgspec import structs
+
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import (
     REFERENCE,
-    AdasDriver,
     AgentDriver,
     CameraDriver,
     DriverSpec,
@@ -16,12 +17,12 @@ from skidpad.core.run import (
     ReferenceDriver,
     StackDriver,
 )
-from skidpad.stack.configurations import CONFIGURATIONS, functions_of
+from skidpad.stack.configurations import CONFIGURATIONS, GOVERNED, numbered_driver
 from skidpad.stack.loading import load_stack
 
 IDEAL, CAMERA, AGENT = "ideal", "camera", "agent:"
 STACK = "stack"  # what results of scenarios call our own stack
-NUMBERS = {str(number): number for number in CONFIGURATIONS}
+NUMBERS = {str(number): number for number in (*CONFIGURATIONS, *GOVERNED)}
 
 
 def find_driver(
@@ -30,7 +31,8 @@ def find_driver(
     """Returns the driver of this name.
 
     Args:
-        stack: 0 to 4 for our stack in a published configuration, "reference", "camera", "ideal" for
+        stack: 0 to 4 for our stack in a published configuration, 5 and 6 for it with the speed
+            envelope, "reference", "camera", "ideal" for
             a scenario that moves the ego itself, "agent:PATH:CLASS" for an agent of the CARLA
             leaderboard, or a stack's class as "module:Class" or "FILE.py:Class".
         options: what a class is given as its settings.
@@ -56,7 +58,8 @@ def find_driver(
 def _find_ours(name: str, label: str) -> DriverSpec | None:
     """The driver of this name that is no user's class; None for a class."""
     if name in NUMBERS:
-        return AdasDriver(label=label or name, functions=functions_of(NUMBERS[name]))
+        ours = numbered_driver(NUMBERS[name])
+        return structs.replace(ours, label=label or name)
     if name == REFERENCE:
         return ReferenceDriver()
     if name == CAMERA:

@@ -8,6 +8,8 @@ from math import isfinite
 from skidpad.campaign.drive import Moment, Sink
 from skidpad.core.sensor_types import SensorType, find_sensor_type
 from skidpad.core.setup import Setup
+from skidpad.envelope.govern import GovernedStack
+from skidpad.envelope.limits import Binding
 from skidpad.recording.readings import (
     RecordedSensor,
     SensorReadings,
@@ -16,6 +18,9 @@ from skidpad.recording.readings import (
 )
 from skidpad.stack.functions import AddedFunctions
 
+ENVELOPE = "envelope"
+UNITS = "m/s, m; binding: " + ", ".join(f"{b.value} {b.name.lower()}" for b in Binding)
+
 
 class ReadingsRecorder(Sink):
     """Reads each recorded sensor once per tick, after the driver has acted."""
@@ -23,6 +28,7 @@ class ReadingsRecorder(Sink):
     def __init__(self, setup: Setup, stack: object = None) -> None:
         """setup: with the sensors that the stack asked for. stack: whose functions are recorded."""
         added = getattr(stack, "added", None)
+        self._governed = stack if isinstance(stack, GovernedStack) else None
         self._added = added if isinstance(added, AddedFunctions) and added.kinds else None
         self._kinds: dict[str, SensorType] = {}
         for spec in setup.specs:
@@ -35,7 +41,7 @@ class ReadingsRecorder(Sink):
     @property
     def is_needed(self) -> bool:
         """Tells whether any sensor or function of the run is recorded."""
-        return bool(self._kinds) or self._added is not None
+        return bool(self._kinds) or self._added is not None or self._governed is not None
 
     def see(self, moment: Moment) -> None:
         """Adds the row of one tick."""
@@ -45,6 +51,8 @@ class ReadingsRecorder(Sink):
             row |= _columns(id, kind.numbers(moment.frame.extra[id]))
         for name, numbers in {} if self._added is None else self._added.numbers().items():
             row |= _columns(name, numbers)
+        if self._governed is not None and self._governed.allowed is not None:
+            row |= _columns(ENVELOPE, self._governed.allowed.numbers())
         self._rows.append(row)
 
     def finish(self) -> SensorReadings:
@@ -64,6 +72,8 @@ class ReadingsRecorder(Sink):
         for function in () if self._added is None else self._added.kinds:
             name, title, units = function.name, function.title, function.units
             sensors[name] = RecordedSensor(name, "function", title, units)
+        if self._governed is not None:
+            sensors[ENVELOPE] = RecordedSensor(ENVELOPE, "envelope", "Speed envelope", UNITS)
         return sensors
 
 

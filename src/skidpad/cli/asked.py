@@ -31,8 +31,8 @@ class Drivers(Struct, frozen=True):
     configs: Annotated[
         str | None,
         Meta(
-            description="Published configurations and the reference driver, e.g. 0,4,reference; "
-            "default all five and reference."
+            description="Published configurations 0 to 4, the reference driver, and 5 and 6, whose speed "
+            "stays inside the envelope, e.g. 0,4,reference; default 0 to 4 and reference."
         ),
     ] = None
     functions: Annotated[

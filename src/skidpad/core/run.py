@@ -53,6 +53,7 @@ class AdasDriver(Struct, frozen=True, kw_only=True, tag="adas", forbid_unknown_f
     functions: frozenset[Function] = frozenset({Function.ACC, Function.LCA})
     cruise_kmh: float | None = None  # of free cruise; None: the scenario's, else as published
     added: tuple[str, ...] = ()  # functions of installed packages, in alphabetical order
+    envelope: bool = False  # its speed stays inside the envelope: configurations 5 and 6
 
 
 class StackDriver(Struct, frozen=True, tag="stack", forbid_unknown_fields=True):
@@ -256,6 +257,16 @@ class Friction(str, Enum):
     REDUCED = "reduced"  # tyres know it, by the setting `grip`
 
 
+class Govern(str, Enum):
+    """What keeps the driver's speed inside its grip and sight (docs/envelope.md)."""
+
+    NONE = "none"
+    ENVELOPE = "envelope"  # grip and sight from own signals
+    ORACLE = "oracle"  # the same with true grip, for studies
+    TABLE = "table"  # a rival: three speeds by wiper stage and temperature
+    FIXED = "fixed"  # another one: 80 km/h always
+
+
 class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One run. Two equal values give equal recordings."""
 
@@ -275,6 +286,13 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
         Render, Meta(description="needed: images that something reads; all: every image.")
     ] = Render.NEEDED
     overlay: Annotated[bool, Meta(description="Rain drops on the cameras (pixels).")] = False
+    govern: Annotated[
+        Govern,
+        Meta(
+            description="Keep any stack's speed inside its grip and sight: envelope; for studies "
+            "oracle (true grip), table (80, 60, 40 km/h: dry, rain, cold), fixed (80 km/h)."
+        ),
+    ] = Govern.NONE
     backend: BackendChoice = BackendChoice()
     surface: tuple[SurfacePatch, ...] = ()  # what lies on parts of the road
     inputs: str = (
@@ -292,6 +310,11 @@ class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
             raise ConfigError("--surface needs the embedded simulator")
         if isinstance(self.driver, CameraDriver) and self.sensors is not SensorLevel.PIXELS:
             raise ConfigError("the camera driver sees images: it needs --sensors pixels")
+        if self.govern is not Govern.NONE and isinstance(self.driver, (ChannelCrew, Passenger)):
+            raise ConfigError(
+                f"--govern {self.govern.value} keeps a stack's speed, and {self.driver.label} is no "
+                "stack: choose a stack, or --govern none"
+            )
         if isinstance(self.driver, Passenger) and not isinstance(self.course, Scenario):
             raise ConfigError("only a scenario moves the ego itself")
 

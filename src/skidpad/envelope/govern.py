@@ -207,6 +207,12 @@ class GovernedStack:
         """The stack's mode in its own words."""
         return str(getattr(self.inner, "mode", ""))
 
+    def __getattr__(self, name: str) -> Any:
+        """Returns what else the stack has, such as the switches of its functions."""
+        if name == "inner":  # it could not be built
+            raise AttributeError(name)
+        return getattr(self.inner, name)
+
     def close(self) -> None:
         """Ends the stack."""
         close = getattr(self.inner, "close", None)

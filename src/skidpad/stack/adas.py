@@ -113,6 +113,7 @@ class AdasStack:
         self.added = AddedFunctions(self.config.added, map, self.config.dt)
         self.supervision = Supervision.NONE
         self.verified_by = ""
+        self.v_told = inf
         self.report = StackReport()
         self.switch(self.config.functions)
 
@@ -131,6 +132,10 @@ class AdasStack:
         self.caps = SpeedCaps(functions, c.cruise_kmh, c.limiter_kmh, c.settings.cap_scope)
         self.bends = BendSpeed(c.dt) if Function.BEND in functions else None
         self.front.switch(functions)
+
+    def limit_speed(self, v: float) -> None:
+        """Cruises no faster than v m/s until told otherwise: whatever governs this stack says so."""
+        self.v_told = v
 
     def relocated(self) -> None:
         """The ego stands elsewhere: what was seen and summed before no longer counts (A-109)."""
@@ -155,8 +160,10 @@ class AdasStack:
         self.resume.update(stop is not None, kmh_from_mps(v), lane_curvature)
         situation, sight = self._situation(frame, v, view, sight, stop_distance)
         v_bends = self._speed_for_bends(frame, v, view)
-        slower_kmh = min(situation.cruise_kmh, kmh_from_mps(v_bends))
-        situation = situation._replace(cruise_kmh=slower_kmh)
+        told_kmh = kmh_from_mps(self.v_told)
+        slower_kmh = min(situation.cruise_kmh, kmh_from_mps(v_bends), told_kmh)
+        slower_cap_kmh = min(situation.follow_cap_kmh, told_kmh)
+        situation = situation._replace(cruise_kmh=slower_kmh, follow_cap_kmh=slower_cap_kmh)
         supervised = frame.supervision is not Supervision.NONE
         request = Request(Tier.NONE)
         if not supervised:

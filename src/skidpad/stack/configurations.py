@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Function
+from skidpad.core.run import AdasDriver, Function
 from skidpad.stack.functions import FUNCTIONS
 
 V_CRUISE_KMH = 150.0  # cruise target without a limiter (A-009)
@@ -28,6 +28,20 @@ TITLES: dict[int, str] = {
     3: "ACC + LCA + light assist",
     4: "full package, 80 km/h limiter",
 }
+
+
+# ours: their speed stays inside the envelope in place of the fixed limit (docs/envelope.md)
+GOVERNED: dict[int, Functions] = {
+    5: CONFIGURATIONS[3],
+    6: frozenset({Function.ACC, Function.LCA}),
+}
+
+
+def numbered_driver(number: int) -> AdasDriver:
+    """Returns the driver of configuration 0 to 6."""
+    if number in GOVERNED:
+        return AdasDriver(label=str(number), functions=GOVERNED[number], envelope=True)
+    return AdasDriver(label=str(number), functions=functions_of(number))
 
 
 def functions_of(configuration: int) -> Functions:

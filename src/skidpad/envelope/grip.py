@@ -27,6 +27,8 @@ ASK_LEAST = 0.6  # m/s^2 that a car asks for at least
 V_LEAST = 2.0  # m/s, below which slip and engine tell nothing
 BRAKE_USE, DRIVE_USE = 0.97, 0.93  # of the grip that anti-lock and traction control take
 FORCE_LEAST = 0.06  # of the load, less tells nothing about the curve's shape
+SLIPPING = 1.6  # times the slip that the force would need far from the limit
+AY_MOST, STEADY = 0.5, 0.3  # m/s^2 across, and share by which pedals move, in a usable window
 SIGMA_LEAST, SIGMA_SURE = 0.35, 0.75  # shares of full sliding: less tells nothing, more is sure
 TURN_SHORT, TURN_ASK, V_CHARACTERISTIC = 0.6, 1.0, 25.0  # share, m/s^2, m/s of the single-track car
 FADE_LOW, FADE_HIGH = 3000.0, 400.0  # m over which low and high grip are believed; our assumption
@@ -137,13 +139,19 @@ class GripEstimator:
         slip = ((front - v) if drives else v - 0.5 * (front + rear)) / v
         self._limit_along(v, force, asked, along, drives, slip)
         self._limit_across(v, ay, steer, yaw_rate)
-        if along > FORCE_LEAST and slip > 1e-4 and abs(asked) > ASK_LEAST:
+        if along > FORCE_LEAST and slip > 1e-4 and abs(ay) < AY_MOST and self._is_steady():
             grip, sigma = brush_grip(along, slip, self.stiffness)
             sure = min(max((sigma - SIGMA_LEAST) / (SIGMA_SURE - SIGMA_LEAST), 0.0), 1.0)
             if sure > 0.0:
                 self._learn(max(grip, use), 0.3 * sure, v)
         if use > (self.prior if self.shown is None else self.shown):  # at least what it got
             self._learn(use, 1.0, v)
+
+    def _is_steady(self) -> bool:
+        """Tells whether pedals hold still in the window, or slip and force belong to two moments."""
+        asked = [row[5] for row in self.rows]
+        steady = max(asked) - min(asked) < STEADY * max(map(abs, asked))
+        return steady and min(map(abs, asked)) > ASK_LEAST
 
     def _limit_along(
         self, v: float, force: float, asked: float, along: float, drives: bool, slip: float
@@ -152,11 +160,11 @@ class GripEstimator:
         got = force if drives else -force
         missing = abs(asked) - got
         short = abs(asked) > ASK_LEAST and got > 0.0 and got < SHORT * abs(asked)
-        slipping = slip * self.stiffness > along  # else the engine or the brakes give less
-        self.short_ticks = (
-            self.short_ticks + 1 if short and missing > SHORT_LEAST and slipping else 0
-        )
-        if self.short_ticks >= SETTLED and slip * self.stiffness > 1.6 * along:
+        # without slip the engine or the brakes give less, or are on their way
+        slipping = slip * self.stiffness > SLIPPING * along and self._is_steady()
+        is_limit = short and missing > SHORT_LEAST and slipping
+        self.short_ticks = self.short_ticks + 1 if is_limit else 0
+        if self.short_ticks >= SETTLED:
             self._learn(along / (DRIVE_USE if drives else BRAKE_USE), 0.5, v)
 
     def _limit_across(self, v: float, ay: float, steer: float, yaw_rate: float) -> None:

@@ -26,6 +26,7 @@ SHORT, SHORT_LEAST = 0.8, 0.4  # share of the wanted acceleration, and m/s^2, th
 ASK_LEAST = 0.6  # m/s^2 that a car asks for at least
 V_LEAST = 2.0  # m/s, below which slip and engine tell nothing
 BRAKE_USE, DRIVE_USE = 0.97, 0.93  # of the grip that anti-lock and traction control take
+LIMIT_LEAST = 0.04  # of the load; a car that gets less has an engine that drags or rolls
 FORCE_LEAST = 0.06  # of the load, less tells nothing about the curve's shape
 SLIPPING = 1.6  # times the slip that the force would need far from the limit
 AY_MOST, STEADY = 0.5, 0.3  # m/s^2 across, and share by which pedals move, in a usable window
@@ -162,7 +163,7 @@ class GripEstimator:
         short = abs(asked) > ASK_LEAST and got > 0.0 and got < SHORT * abs(asked)
         # without slip the engine or the brakes give less, or are on their way
         slipping = slip * self.stiffness > SLIPPING * along and self._is_steady()
-        is_limit = short and missing > SHORT_LEAST and slipping
+        is_limit = short and missing > SHORT_LEAST and slipping and along > LIMIT_LEAST
         self.short_ticks = self.short_ticks + 1 if is_limit else 0
         if self.short_ticks >= SETTLED:
             self._learn(along / (DRIVE_USE if drives else BRAKE_USE), 0.5, v)

@@ -1,0 +1,178 @@
+"""What the envelope does to a stack: less acceleration, and nothing else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from skidpad.campaign.run import drive
+from skidpad.campaign.run import run as drive_run
+from skidpad.core.errors import ConfigError
+from skidpad.core.run import Govern, Passenger, Roads, RunSpec, Scenario
+from skidpad.core.setup import ActorSetup, Setup
+from skidpad.core.states import VehicleCommand
+from skidpad.core.vocabulary import Outcome, SensorLevel
+from skidpad.core.weather import Weather
+from skidpad.envelope.govern import (
+    SENSORS,
+    V_CREEP,
+    EnvelopeSettings,
+    GovernedStack,
+    govern,
+    lower,
+)
+from skidpad.envelope.limits import Binding
+from skidpad.physics.presets import preset
+from skidpad.sensors.outside import make_rain_sensor, make_thermometer, rain_stage
+
+UNIT = st.floats(0.0, 1.0)
+SPEEDS = st.floats(0.0, 60.0)
+
+
+class Straight:
+    """Full throttle straight on, whatever happens."""
+
+    def __init__(self, specs, map, settings):
+        self.told = []
+
+    def limit_speed(self, v):
+        self.told.append(v)
+
+    def tick(self, frame):
+        return VehicleCommand(throttle=1.0)
+
+
+class Raises(Straight):
+    """Fails in its tenth tick."""
+
+    def tick(self, frame):
+        if frame.tick >= 10:
+            raise ValueError("lost")
+        return super().tick(frame)
+
+
+@given(UNIT, UNIT, st.floats(-1.0, 1.0), SPEEDS, SPEEDS)
+def test_the_envelope_only_lowers_acceleration(throttle, brake, steer, v, allowed):
+    command = VehicleCommand(throttle, brake, steer, handbrake=True)
+    after = lower(command, v, allowed, 2.0, 11.0)
+    assert after.throttle <= throttle
+    assert after.brake >= brake
+    assert (after.steer, after.handbrake, after.reverse) == (steer, True, False)
+
+
+@given(UNIT, SPEEDS)
+def test_below_creep_speed_and_well_below_the_limit_the_stack_is_left_alone(throttle, v):
+    command = VehicleCommand(throttle)
+    assert lower(command, V_CREEP, 0.0, 2.0, 11.0) == command
+    assert lower(command, v, v + 1.5, 2.0, 11.0) == command
+
+
+def test_a_falling_limit_is_approached_with_the_stated_deceleration_at_most():
+    braked = lower(VehicleCommand(1.0), 30.0, 5.0, 2.0, 11.0)
+    assert braked.throttle == 0.0
+    assert braked.brake * 11.0 == pytest.approx(2.0)
+
+
+def governed_run(kind, duration, weather="clear-noon", vehicles=0, **settings):
+    spec = RunSpec(
+        course=Roads(map="straight", vehicles=vehicles), duration=duration,
+        weather=preset(weather), sensors=SensorLevel.OBJECTS,
+    )  # fmt: skip
+    return drive_run(spec, govern(kind, EnvelopeSettings(**settings)))
+
+
+def test_full_throttle_stays_below_the_limit_and_its_name_is_recorded():
+    run = governed_run(Straight, 25.0, table_kmh=(50.0, 40.0, 30.0))
+    v = np.asarray(run.log.ego.speed) * 3.6
+    assert run.outcome is Outcome.COMPLETED
+    assert 48.0 < v.max() < 51.0
+    assert set(run.readings.table["envelope.binding"].to_list()) == {Binding.TABLE}
+
+
+def test_a_stack_of_ours_that_was_held_back_does_not_shoot_forward_when_released():
+    """Its integral does not wind up: on release it accelerates no harder than from the same speed."""
+    from skidpad.stack.adas import AdasStack
+
+    stack = AdasStack
+    limits = []
+
+    class Held(stack):
+        def __init__(self, specs, map, settings):
+            super().__init__(specs, map, {"functions": [], "cruise_kmh": 60.0})
+
+        def tick(self, frame):
+            limits.append(self.v_told)
+            return super().tick(frame)
+
+    held = governed_run(Held, 40.0, table_kmh=(40.0, 40.0, 40.0))
+    v = np.asarray(held.log.ego.speed) * 3.6
+    throttle = np.asarray(held.log.requested.throttle)
+    assert v.max() < 41.5
+    assert throttle[-100:].max() < 0.5  # held by its own cruise, not against full throttle
+    assert min(limits) == pytest.approx(40.0 / 3.6)
+
+
+def test_a_stack_starts_from_rest_behind_a_limit_that_is_zero():
+    command = lower(VehicleCommand(0.6), 0.0, 0.0, 2.0, 11.0)
+    assert command.throttle == 0.6
+
+
+def test_a_stack_that_raises_is_the_outcome_of_its_run():
+    run = governed_run(Raises, 2.0)
+    assert run.outcome is Outcome.AGENT_ERROR
+    assert "lost" in run.error
+
+
+def test_a_governed_stack_looks_like_the_stack():
+    stack = govern(Straight)((), None, {})
+    assert isinstance(stack, GovernedStack)
+    assert type(stack).__name__ == "Straight"
+    assert stack.told == []
+    assert stack.sensors() == SENSORS
+
+
+def test_configuration_5_is_slower_on_ice_than_4_and_runs_without_an_envelope_have_no_column():
+    runs = {
+        n: drive(n, weather="icy_100", sensors="objects", duration=25.0, seed=900_001)
+        for n in (3, 5, 6)
+    }
+    assert runs[3].readings is None
+    v = {n: float(np.max(run.log.ego.speed)) for n, run in runs.items()}
+    assert max(v[5], v[6]) < v[3]
+
+
+def test_only_a_stack_can_be_governed():
+    with pytest.raises(
+        ConfigError, match="--govern envelope keeps a stack's speed, and ideal is no"
+    ):
+        RunSpec(driver=Passenger(), course=Scenario(file="x"), govern=Govern.ENVELOPE)
+
+
+def test_settings_out_of_range_are_told():
+    with pytest.raises(ConfigError, match="share"):
+        EnvelopeSettings(share=2.0)
+
+
+class Host:
+    """A run's weather, for the two sensors of the air."""
+
+    def __init__(self, weather, seed):
+        ego = ActorSetup(name="ego", type="mini_cooper_s", place=None)
+        self.setup = Setup(map="straight", weather=weather, specs=(), ego=ego)
+        self.seed = seed
+
+
+def test_the_rain_sensor_has_four_stages():
+    assert [rain_stage(r) for r in (0.0, 0.5, 5.0, 20.0)] == [0, 1, 2, 3]
+    heavy = Host(Weather(precipitation=100.0), 1)
+    assert make_rain_sensor(SENSORS[0], heavy)() == 3
+
+
+def test_the_thermometer_knows_the_air_within_2_k_and_never_the_road():
+    cold_road = Weather(air_temperature_c=6.0, road_temperature_c=-10.0)
+    warm_road = replace(cold_road, road_temperature_c=30.0)
+    read = [make_thermometer(SENSORS[1], Host(cold_road, seed))() for seed in range(40)]
+    assert read == [make_thermometer(SENSORS[1], Host(warm_road, seed))() for seed in range(40)]
+    assert 3.75 <= min(read) < 5.0 < 7.0 < max(read) <= 8.25

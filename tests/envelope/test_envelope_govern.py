@@ -25,7 +25,7 @@ from skidpad.envelope.govern import (
 )
 from skidpad.envelope.limits import Binding
 from skidpad.physics.presets import preset
-from skidpad.sensors.outside import make_rain_sensor, make_thermometer, rain_stage
+from skidpad.sensors.outside import make_rain_sensor, make_thermometer, wiper_stage
 
 UNIT = st.floats(0.0, 1.0)
 SPEEDS = st.floats(0.0, 60.0)
@@ -165,7 +165,7 @@ class Host:
 
 
 def test_the_rain_sensor_has_four_stages():
-    assert [rain_stage(r) for r in (0.0, 0.5, 5.0, 20.0)] == [0, 1, 2, 3]
+    assert [wiper_stage(r) for r in (0.0, 0.5, 5.0, 20.0)] == [0, 1, 2, 3]
     heavy = Host(Weather(precipitation=100.0), 1)
     assert make_rain_sensor(SENSORS[0], heavy)() == 3
 

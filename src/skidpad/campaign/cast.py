@@ -11,7 +11,7 @@ from typing import Any
 
 from skidpad.campaign.drive import Script, Supervising, Timer, Unsupervised
 from skidpad.campaign.file_drivers import FILE_DRIVERS
-from skidpad.campaign.governing import governed
+from skidpad.campaign.governing import apply_envelope
 from skidpad.campaign.keeping import road_file
 from skidpad.campaign.starts import start_of
 from skidpad.core.errors import ConfigError, FileError, StackError
@@ -278,7 +278,7 @@ def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> S
     # our own stack gives the map's arrays to kernels, which know one type of array
     chosen = kind or found
     map = stage.map if chosen is AdasStack else stage.map.read_only()
-    chosen = governed(chosen, spec, stage)
+    chosen = apply_envelope(chosen, spec, stage)
     common = tuple(spec for spec in stage.setup.specs if spec.id not in stage.setup.asked)
     stack = GuardedStack(chosen, common, map, settings)
     return StackAtWheel(stack, Lens(spec.weather, spec.seed) if spec.overlay else None)

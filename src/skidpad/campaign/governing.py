@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 FIXED_KMH = 80.0
 
 
-def governed(stack: type[Stack], spec: RunSpec, stage: Stage) -> type[Stack]:
+def apply_envelope(stack: type[Stack], spec: RunSpec, stage: Stage) -> type[Stack]:
     """Returns the stack's class with what the run puts around it."""
     found = choose_envelope(spec, stage)
     return stack if found is None else govern(stack, found)

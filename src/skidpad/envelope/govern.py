@@ -214,7 +214,7 @@ class GovernedStack:
         return getattr(self.inner, name)
 
     def close(self) -> None:
-        """Ends the stack."""
+        """Tells the stack that its run is over."""
         close = getattr(self.inner, "close", None)
         if callable(close):
             close()

@@ -114,7 +114,7 @@ class GripEstimator:
         self._fade(v * self.dt)
         front = 0.5 * (ego.wheel_speeds[0] + ego.wheel_speeds[1])
         rear = 0.5 * (ego.wheel_speeds[2] + ego.wheel_speeds[3])
-        asked = self._asked(v, command)
+        asked = self._wanted_acceleration(v, command)
         self.rows.append(
             (v, ego.ax + G * grade, ego.ay, front, rear, asked, command.steer, ego.yaw_rate)
         )
@@ -122,7 +122,7 @@ class GripEstimator:
             self._judge(*(sum(column) / WINDOW for column in zip(*self.rows, strict=True)))
         return self._estimate(v, stage)
 
-    def _asked(self, v: float, command: VehicleCommand) -> float:
+    def _wanted_acceleration(self, v: float, command: VehicleCommand) -> float:
         """m/s^2 that the pedals ask for."""
         if command.brake > 0.0:
             return -command.brake * self.car.a_brake

@@ -79,7 +79,7 @@ class Sight:
     def look(self, points: RadarPoints, pose: Pose, way: Way, v: float) -> Lead | None:
         """Returns the lead of the tick, held for a second without a return."""
         found = self._find(points, pose, way, v)
-        held = self._held(v)
+        held = self._carry_lead(v)
         if found is None:
             self.lead = held
         else:
@@ -107,7 +107,7 @@ class Sight:
         seen = way.s[np.argmax(outside)] if outside.any() else self.radar.range
         return float(min(seen, self.radar.range))
 
-    def _held(self, v: float) -> Lead | None:
+    def _carry_lead(self, v: float) -> Lead | None:
         self.unseen += self.dt
         if self.lead is None or self.unseen > HOLD:
             return None

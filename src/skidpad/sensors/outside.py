@@ -20,7 +20,7 @@ ERROR_C = 2.0  # K, largest error of the thermometer, the same for a whole run
 STEP_C = 0.5  # K, of its display; our assumption
 
 
-def rain_stage(rate_mm_h: float) -> int:
+def wiper_stage(rate_mm_h: float) -> int:
     """Returns 0 without rain, 1, 2, 3 in light, moderate, heavy rain."""
     return sum(rate_mm_h > least for least in STAGES)
 
@@ -28,7 +28,7 @@ def rain_stage(rate_mm_h: float) -> int:
 def make_rain_sensor(spec: PointSensorSpec, host: SensorHost) -> Callable[[], int]:
     """Returns what reads the stage of the wiper."""
     del spec
-    return lambda: rain_stage(rain_rate(host.setup.weather))
+    return lambda: wiper_stage(rain_rate(host.setup.weather))
 
 
 def make_thermometer(spec: PointSensorSpec, host: SensorHost) -> Callable[[], float]:

@@ -278,7 +278,7 @@ def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> S
     # our own stack gives the map's arrays to kernels, which know one type of array
     chosen = kind or found
     map = stage.map if chosen is AdasStack else stage.map.read_only()
-    chosen = apply_envelope(chosen, spec, stage)
+    chosen = apply_envelope(chosen, spec, stage.setup)
     common = tuple(spec for spec in stage.setup.specs if spec.id not in stage.setup.asked)
     stack = GuardedStack(chosen, common, map, settings)
     return StackAtWheel(stack, Lens(spec.weather, spec.seed) if spec.overlay else None)

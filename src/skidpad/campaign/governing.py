@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from skidpad.core.run import AdasDriver, Govern, RunSpec
+from skidpad.core.setup import Setup
 from skidpad.envelope.govern import TABLE_KMH, EnvelopeSettings, govern
 from skidpad.physics.grip import grip_params, mu_at
 from skidpad.stack.interface import Stack
 
-if TYPE_CHECKING:
-    from skidpad.campaign.cast import Stage
-
 FIXED_KMH = 80.0
 
 
-def apply_envelope(stack: type[Stack], spec: RunSpec, stage: Stage) -> type[Stack]:
+def apply_envelope(stack: type[Stack], spec: RunSpec, setup: Setup) -> type[Stack]:
     """Returns the stack's class with what the run puts around it."""
-    found = choose_envelope(spec, stage)
+    found = choose_envelope(spec, setup)
     return stack if found is None else govern(stack, found)
 
 
-def choose_envelope(spec: RunSpec, stage: Stage) -> EnvelopeSettings | None:
+def choose_envelope(spec: RunSpec, setup: Setup) -> EnvelopeSettings | None:
     """Returns the settings of the run's envelope; None: it has none."""
-    dt = stage.setup.dt
+    dt = setup.dt
     own = isinstance(spec.driver, AdasDriver) and spec.driver.envelope
     kind = Govern.ENVELOPE if own and spec.govern is Govern.NONE else spec.govern
     match kind:
@@ -36,5 +32,5 @@ def choose_envelope(spec: RunSpec, stage: Stage) -> EnvelopeSettings | None:
         case Govern.FIXED:
             return EnvelopeSettings(dt=dt, table_kmh=(FIXED_KMH,) * 3)
         case Govern.ORACLE:
-            params = grip_params(stage.setup.weather, stage.setup.grip, stage.setup.mu_ref)
+            params = grip_params(setup.weather, setup.grip, setup.mu_ref)
             return EnvelopeSettings(dt=dt, oracle=lambda v: float(mu_at(params, v)))

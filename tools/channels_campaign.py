@@ -85,7 +85,7 @@ def main(words: Sequence[str] | None = None) -> int:
             _drive(folder, asked, SEED_OF_REDUNDANCY, HOURS_EACH, drive_by=driver)
     is_whole = asked.only not in (None, RULES) or _rules(asked)
     if asked.publish:
-        publish(asked.out, asked.hours, only=asked.only)
+        publish(asked.out, asked.hours, only=asked.only, name=asked.table)
     return 0 if is_whole else UNFINISHED
 
 
@@ -127,6 +127,12 @@ def _asked(words: Sequence[str] | None) -> argparse.Namespace:
         "--stop-after", type=float, metavar="S", help="begin no drive of the rules after so many s"
     )
     parser.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    parser.add_argument(
+        "--table",
+        choices=(RULES, "variants"),
+        default=RULES,
+        help="of the page, for the rules' hours",
+    )
     parser.add_argument("--publish", action="store_true", help="write results and page of docs")
     return parser.parse_args(words)
 
@@ -150,8 +156,10 @@ def _skidpad(*words: object) -> None:
         sys.exit(done.returncode)
 
 
-def publish(out: Path, hours: float, results: Path = RESULTS, only: str | None = None) -> None:
-    """Copy what the page needs, and write its tables anew."""
+def publish(
+    out: Path, hours: float, results: Path = RESULTS, only: str | None = None, name: str = RULES
+) -> None:
+    """Copy what the page needs, and write its tables anew. name: of the table of rules."""
     results.mkdir(parents=True, exist_ok=True)
     if only in (None, HAZARDS):
         for name in JUDGED:
@@ -166,7 +174,7 @@ def publish(out: Path, hours: float, results: Path = RESULTS, only: str | None =
         parts = monitor_drives.registered_parts(hours)
         rows = monitor_drives.read_rows(out / RULES / monitor_drives.ROWS)
         about = {name: value for name, value in _driven().items() if name != "processors"}
-        _write(results / "rules.json", about | monitor_drives.summary(parts, rows))
+        _write(results / f"{name}.json", about | monitor_drives.summary(parts, rows))
         (results / "ways.json").write_text(json.dumps(monitor_drives.ways(parts, rows)) + "\n")
     channels_tables.main([])
 

@@ -202,7 +202,16 @@ def redundancy(results: Path) -> str:
 
 def rules(results: Path) -> str:
     """Today's rules and those that were tried, on the same drives; the judged kinds alone."""
-    told = _rules_of(results)
+    return _rules_table(results, "rules")
+
+
+def variants(results: Path) -> str:
+    """The same on further drives, with variants that came later."""
+    return _rules_table(results, "variants")
+
+
+def _rules_table(results: Path, name: str) -> str:
+    told = _rules_of(results, name)
     if told is None:
         return "Not driven.\n"
     seeds = ", ".join(map(str, told["first_seeds"]))
@@ -302,8 +311,8 @@ def reference_figure(results: Path) -> str:
     return curves(charts, width=11.0, height=3.6)
 
 
-def _rules_of(results: Path) -> Any:
-    return _read(results, "rules") if (results / "rules.json").is_file() else None
+def _rules_of(results: Path, name: str = "rules") -> Any:
+    return _read(results, name) if (results / f"{name}.json").is_file() else None
 
 
 def _count_true(row: dict[str, Any]) -> str:
@@ -319,7 +328,8 @@ def _false_rate(row: dict[str, Any]) -> str:
 
 TABLES: dict[str, Callable[[Path], str]] = {
     "driven": driven, "scores": scores, "missed": missed, "ice": ice, "curves": curves,
-    "redundancy": redundancy, "rules": rules, "reference": reference, "rarity": rarity, "ways": ways,
+    "redundancy": redundancy, "rules": rules, "reference": reference, "rarity": rarity,
+    "ways": ways, "variants": variants,
 }  # fmt: skip
 
 

@@ -125,3 +125,10 @@ def test_the_map_doubts_the_channel_that_is_off_its_lane():
     off = monitor_variants.off_centre(map, [Looked(0.0, [], [frame]) for frame in frames])
     assert off[2:7] == pytest.approx(0.6, abs=0.05)
     assert off[20:] == pytest.approx(0.0, abs=0.05)
+
+
+def test_variants_that_came_later_stand_in_a_table_of_their_own(results):
+    assert tables.variants(results) == "Not driven.\n"
+    (results / "rules.json").rename(results / "variants.json")
+    assert "| risky | ego tailgated | today |" in tables.variants(results)
+    assert tables.rules(results) == "Not driven.\n"

@@ -14,6 +14,7 @@ from skidpad.report.crashes import Cell, Found, crash_sections, found_crashes, w
 from skidpad.report.matrix_answers import answers
 from skidpad.report.matrix_baseline import baseline_text
 from skidpad.report.matrix_data import Matrix, load_matrix
+from skidpad.report.matrix_envelope import envelope_blocks
 from skidpad.report.matrix_factors import factors
 from skidpad.report.matrix_headline import headline_numbers, headline_table
 from skidpad.report.matrix_parity import Parity, load_parity, parity_section
@@ -74,6 +75,7 @@ def build_page(matrix: Matrix) -> Page:
             if (read := reading_blocks(matrix))
             else []
         ),
+        *([Section("Speed envelope", bound)] if (bound := envelope_blocks(matrix)) else []),
         Section("All metrics", matrix_tables.per_weather(matrix)),
         Section("Real time", real_time_blocks(matrix)),
         Section("Definitions", [matrix.definitions()]),

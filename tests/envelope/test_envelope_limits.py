@@ -15,6 +15,8 @@ from skidpad.envelope.limits import (
     sight_speed,
     speed_before_bend,
 )
+from skidpad.physics.grip import GripParams
+from skidpad.physics.stopping import stops
 
 STEP = 1e-3  # s
 GRIPS = [0.08, 0.15, 0.34, 0.6, 0.9]
@@ -85,3 +87,11 @@ def test_the_lowest_limit_wins_and_is_named():
     assert lowest(limits, 50.0) == (20.0, Binding.BEND)
     assert lowest(limits, 10.0) == (10.0, Binding.NONE)
     assert lowest({}, 10.0) == (10.0, Binding.NONE)
+
+
+@pytest.mark.parametrize("mu", [0.1, 0.34, 0.9])
+def test_the_whole_vehicle_model_stops_within_sight_below_the_limit_and_not_above(mu):
+    """Tyres, load transfer, anti-lock brakes and the pedal's delay, on a road of known grip."""
+    limit = sight_speed(60.0, mu * G, 0.1)
+    below, above = stops([GripParams(mu, 1.0, 0.0)] * 2, [0.98 * limit, 1.15 * limit])
+    assert below.distance < 60.0 < above.distance

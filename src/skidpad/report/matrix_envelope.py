@@ -54,7 +54,7 @@ def _quantity(column: str) -> str:
 
 
 def _row(ticks: pl.DataFrame, names: dict[int, str]) -> list[Cell]:
-    shares = [float((ticks["binding"] == number).mean() or 0.0) * 100.0 for number in names]
+    shares = [_number((ticks["binding"] == number).mean()) * 100.0 for number in names]
     speed = _number(ticks["speed_mps"].mean()) * 3.6
     alone = _number((ticks["confidence"] < UNKNOWN).mean()) * 100.0
     grip = _number(ticks["grip"].median())

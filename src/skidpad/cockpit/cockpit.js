@@ -150,7 +150,7 @@ export default {
         ["light", s.light ? `${s.light} at ${s.light_at} m` : "-"], ["weather", seat.weather],
         ["grip", seat.grip || ""], ["stop in", unit(m.stop_m, "m")], ["collisions", h.collisions], ["real time", h.rtf ? `${h.rtf.toFixed(2)} x` : h.kind === "replay" ? `${h.rate} x` : "-"],
         ["pictures", `${this.shownAt.length}/s, ${h.dropped} dropped`], ["drives", seat.manual ? `you, by ${seat.method}` : "the stack"],
-        ["on", seat.functions ? seat.functions.join(" ") || "nothing" : "-"], ...h.added]);
+        ["on", seat.functions ? seat.functions.join(" ") || "nothing" : "-"], ...(h.added || [])]);
       [...r.tiers.children].forEach((li, i) => li.classList.toggle("lit", i === s.tier));
       m.mu.forEach((v, i) => { const w = r[`w${i}`][0], t = r[`m${i}`][0]; t.textContent = v === null ? "" : v.toFixed(2);
         w.style.fill = v === null ? "#555" : `hsl(${Math.max(0, Math.min(1, (v - 0.1) / 0.8)) * 130}, 70%, 48%)`; });

@@ -108,8 +108,8 @@ def follow(text: str, folder: Path, packages: Path) -> list[str]:
 def check_sensor(folder: Path) -> None:
     """The report, and the cockpit's replay without the package, show the sensor."""
     assert "Radar to the rear" in (folder / "out/behind/report.html").read_text("utf-8")
-    replayed = "from skidpad.cockpit.replay import Recording; from pathlib import Path; "
-    replayed += "print(Recording(next(Path('out/behind/runs').iterdir())).readings(20))"
+    replayed = "from skidpad.cockpit.replay import RecordedRun; from pathlib import Path; "
+    replayed += "print(RecordedRun(next(Path('out/behind/runs').iterdir())).readings(20))"
     assert "Radar to the rear, returns" in call(folder, "-c", replayed)
 
 

@@ -35,14 +35,17 @@ class Line:
 
     Headings that the vertices do not name are those of the motion from point to point. A closed
     line goes back to its first point, at a time that nobody says: its times end before that.
+    tangential: the headings of the vertices are those of the line, and say nothing about the entity.
     """
 
-    def __init__(self, vertices: Sequence[Vertex], *, closed: bool = False) -> None:
+    def __init__(
+        self, vertices: Sequence[Vertex], *, closed: bool = False, tangential: bool = False
+    ) -> None:
         points = [*vertices, vertices[0]] if closed else vertices
         self.x = [v.x for v in points]
         self.y = [v.y for v in points]
         self.z = [v.z for v in points]
-        self.named = [v.heading for v in points]
+        self.named, self.tangential = [v.heading for v in points], tangential
         self._nearest: dict[tuple[float, float], float] = {}  # lengths by point, asked in each step
         self.s = [0.0]
         for k in range(1, len(points)):
@@ -70,7 +73,7 @@ class Line:
     def names_heading(self, s: float) -> bool:
         """Returns whether the vertices say how an entity looks at length s."""
         k, _ = self._find(self.s, s)
-        return self.named[k] is not None
+        return self.named[k] is not None and not self.tangential
 
     def at_time(self, t: float) -> Pose:
         """The pose at time t, clamped to the line; linear between points."""

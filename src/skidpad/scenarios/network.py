@@ -45,10 +45,10 @@ class RoadCoordinates:
 
 
 class Network:
-    """One map. `name` is a bundled map's, or a file's path."""
+    """One map. `name` is a bundled map's, or a file's path; stand_in: the file has no road."""
 
-    def __init__(self, map: RoadMap, name: str) -> None:
-        self.map, self.name = map, name
+    def __init__(self, map: RoadMap, name: str, *, stand_in: bool = False) -> None:
+        self.map, self.name, self.stand_in = map, name, stand_in
         self._route_lengths: dict[tuple[int, int], float | None] = {}
 
     @cached_property
@@ -202,6 +202,6 @@ def next_lane_id(lane: int, change: int) -> int:
 
 
 @lru_cache(maxsize=8)
-def network_of(map: RoadMap, name: str) -> Network:
+def network_of(map: RoadMap, name: str, *, stand_in: bool = False) -> Network:
     """The network of a loaded map, made once."""
-    return Network(map, name)
+    return Network(map, name, stand_in=stand_in)

@@ -261,7 +261,7 @@ def _network(root: Node, maps: Sequence[Path], findings: list[Finding]) -> Netwo
     """The road beside the file; a bundled map by its bare name; a straight road where none is named."""
     logic = root.find("RoadNetwork", "LogicFile")
     if logic is None:
-        return network_of(load_map(EMPTY_ROAD), EMPTY_ROAD)
+        return network_of(load_map(EMPTY_ROAD), EMPTY_ROAD, stand_in=True)
     name = logic.text("filepath").replace("\\", "/")
     beside = root.file.parent / name
     elsewhere = [folder / f"{Path(name).stem}.xodr" for folder in maps]
@@ -278,7 +278,7 @@ def _network(root: Node, maps: Sequence[Path], findings: list[Finding]) -> Netwo
         return network_of(load_map(path), path)
     except NoLaneError as error:
         findings.append(logic.finding(f"{error}: a straight road is taken", Kind.NOTE))
-        return network_of(load_map(EMPTY_ROAD), EMPTY_ROAD)
+        return network_of(load_map(EMPTY_ROAD), EMPTY_ROAD, stand_in=True)
     except (FileError, ConfigError) as error:
         raise logic.error(f"the road {name!r} cannot be read: {error}") from None
 

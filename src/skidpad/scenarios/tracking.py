@@ -79,6 +79,7 @@ class PacedTrack:
     timed = False
 
     def __init__(self, line: Line, s: float, t: float, closed: bool, v: float) -> None:
+        s = s if closed else min(s, line.length)
         self.line, self.s, self.t, self.closed, self.v = line, s, t, closed, v
         self.sense = 1.0
         if line.names_heading(s):
@@ -114,7 +115,9 @@ class PacedTrack:
         if self.closed:
             self.s %= self.line.length
             return False
-        return self.s >= self.line.length - 1e-6 or (move < 0.0 and self.s <= 1e-6)
+        if self.sense * v >= 0.0 and self.s >= self.line.length - 1e-6:
+            return True
+        return move < 0.0 and self.s <= 1e-6
 
 
 def course(track: Track, t: float, dt: float) -> float:

@@ -16,6 +16,7 @@ from skidpad.scenarios.network import Place
 from skidpad.scenarios.positions import Fixed, Orientation, Position, orientation, position
 from skidpad.scenarios.scene import Scene
 
+CLOTHOIDS = ("Clothoid", "ClothoidSpline")  # the place of one says how the line begins
 Shape = Callable[[Sequence[Pose]], list[Vertex]]
 ORIGIN = Pose(0.0, 0.0)
 KNOT_MAX, WEIGHT_MAX = 1e9, 1e9  # of splines, so that their sums are numbers
@@ -31,13 +32,15 @@ class Trajectory:
     places: tuple[Position, ...] = ()
     shape: Shape | None = None
     from_here: bool = False  # it begins where the entity is that follows it
+    tangential: bool = False  # its headings are those of the line
 
     def traced(self, scene: Scene, here: Pose = ORIGIN) -> Line:
         """The line as things are now, for an entity that is here."""
         if self.line is not None or self.shape is None:
             return self.line or Line([Vertex(0.0, 0.0, 0.0)])
         poses = [p.place(scene).pose for p in self.places]
-        return Line(self.shape([here, *poses] if self.from_here else poses), closed=self.closed)
+        vertices = self.shape([here, *poses] if self.from_here else poses)
+        return Line(vertices, closed=self.closed, tangential=self.tangential)
 
 
 def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
@@ -58,9 +61,13 @@ def compile_trajectory(node: Node, ctx: Context) -> Trajectory:
     places = tuple(position(n, ctx) for n in nodes)
     fixed = [p.fixed.pose for p in places if isinstance(p, Fixed)]
     from_here = shape.tag == "ClothoidSpline" and not _begins(next(shape.children()))
-    if len(fixed) == len(places) and not from_here:
-        return Trajectory(name, closed, Line(make(fixed), closed=closed))
-    return Trajectory(name, closed, None, places, make, from_here)
+    trajectory = Trajectory(
+        name, closed, None, places, make, from_here, tangential=shape.tag in CLOTHOIDS
+    )
+    if len(fixed) < len(places) or from_here:
+        return trajectory
+    line = Line(make(fixed), closed=closed, tangential=trajectory.tangential)
+    return replace(trajectory, line=line)
 
 
 def _check_times(shape: Node, times: Sequence[float | None]) -> None:

@@ -9,7 +9,7 @@ from skidpad.core.geometry import Pose
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.lines import Line
-from skidpad.scenarios.network import Network
+from skidpad.scenarios.network import Network, Place
 from skidpad.scenarios.positions import Position, position
 from skidpad.scenarios.routes import ScenarioRoute, compile_route, random_roads, roads_through
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
@@ -161,7 +161,7 @@ class Timed:
             v = self.track.at(min(scene.t + scene.dt, self.track.end))[1]
             self.actor.guide.v, self.actor.guide.a = v, 0.0
             return False
-        self.actor.follow_road(scene.network, self.track.v_end)
+        _leave_end(self.actor, scene.network, self.track.v_end)
         return True
 
 
@@ -177,8 +177,16 @@ class Paced:
             return True
         if not self.track.step(scene.t, self.actor.guide.v):
             return False
-        self.actor.follow_road(scene.network, self.actor.guide.v)
+        _leave_end(self.actor, scene.network, self.actor.guide.v)
         return True
+
+
+def _leave_end(actor: Actor, network: Network, v: float) -> None:
+    """Goes on along the lane at speed v; in a file without a road there is none, and it stands."""
+    if network.stand_in:
+        actor.put(network, Place(actor.pose), 0.0)
+    else:
+        actor.follow_road(network, v)
 
 
 def compile_follow(node: Node, ctx: Context) -> FollowTrajectory:

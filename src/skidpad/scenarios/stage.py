@@ -148,5 +148,9 @@ def _rows(player: Player, stage: IdealWorld) -> list[Row]:
         y = float(s.y[k]) - box.forward * sin(yaw) - box.left * cos(yaw)
         vx, vy = float(s.vx[k]), float(s.vy[k])
         v = copysign(hypot(vx, vy), vx * cos(yaw) + vy * sin(yaw))
+        if stage.tick == 0 and actor.track is not None:  # what begins at time 0 is so at time 0
+            pose, first, _ = actor.track.at(t)
+            v = v if actor.track.timed else first
+            x, y, yaw = pose.x, pose.y, pose.yaw
         found.append(Row(t, i, name, x, y, float(s.z[k]), yaw, v))
     return found

@@ -73,7 +73,7 @@ class PacedTrack:
     """A line at the speed that the actor is asked for when its turn comes in a step.
 
     sense: -1 for an actor that looks against the line, else 1. It comes from the headings that the
-    line names, else from the sign of the speed at the begin: rear first along the line.
+    line names, else from the sign of the first speed that is not 0: rear first along the line.
     """
 
     timed = False
@@ -81,11 +81,13 @@ class PacedTrack:
     def __init__(self, line: Line, s: float, t: float, closed: bool, v: float) -> None:
         s = s if closed else min(s, line.length)
         self.line, self.s, self.t, self.closed, self.v = line, s, t, closed, v
-        self.sense = 1.0
-        if line.names_heading(s):
-            self.sense = 1.0 if cos(line.at_length(s).yaw - line.tangent(s)) > -SQUARE else -1.0
-        elif v < 0.0:
-            self.sense = -1.0
+        self.moved, self.sense = False, self._sense_at(s, v)
+
+    def _sense_at(self, s: float, v: float) -> float:
+        if self.line.names_heading(s):
+            against = cos(self.line.at_length(s).yaw - self.line.tangent(s)) <= -SQUARE
+            return -1.0 if against else 1.0
+        return -1.0 if v < 0.0 else 1.0
 
     def at(self, t: float) -> tuple[Pose, float, float]:
         """Pose and speed at time t, for this step's speed; beyond its ends straight on."""
@@ -110,7 +112,10 @@ class PacedTrack:
 
     def step(self, t: float, v: float) -> bool:
         """Go on to time t, from there at v; True at the end of the line, back at its begin likewise."""
+        if not self.moved and self.v * (t - self.t) == 0.0:  # a speed of the same event counts
+            self.sense = self._sense_at(self.s, v)
         move = self.sense * self.v * (t - self.t)
+        self.moved = self.moved or move != 0.0
         self.s, self.t, self.v = self.s + move, t, v
         if self.closed:
             self.s %= self.line.length

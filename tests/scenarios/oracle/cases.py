@@ -38,6 +38,7 @@ from tests.scenarios.oracle.actions import (
     timing,
 )
 from tests.scenarios.oracle.conditions import conditions
+from tests.scenarios.oracle.ends import at_once, backwards, without_road
 from tests.scenarios.oracle.settings import BEGIN, NORTH, SETTINGS, WEST, Case, case, moving, turned
 
 
@@ -226,38 +227,6 @@ def _line() -> str:
 CORNER = ((150.0, -1.75), (180.0, -1.75), (180.0, 12.0))
 
 
-def backwards() -> Iterator[Case]:
-    """Trajectories that an entity follows with a negative speed, from their end or against a corner."""
-    for name, offset, *points in (
-        ("end", 60, (140.0, -1.75, 0.0), (200.0, -1.75, 0.0)),
-        ("bend", 30, (150.0, -8.0, 0.0), (170.0, -1.75, 0.0), (208.0, -1.75, 0.0)),
-        ("turn", 28, (150.0, -1.75, 0.0), (176.0, -1.75, 0.0), (130.0, -5.25, 0.0)),
-        ("climb", 28, (200.0, 40.0, NORTH), (200.0, 0.0, NORTH)),
-    ):
-        x = f'initialDistanceOffset="{offset}"'
-        yield case(f"track_back_{name}", "reverse", trajectory(*points, attributes=x), end=8.0)
-        if name != "end":
-            yield case(f"track_ahead_{name}", "on_foot", trajectory(*points, attributes=x), end=8.0)
-
-
-def without_road() -> Iterator[Case]:
-    """Ends of trajectories in a file without a road."""
-    lines = {
-        "paced": trajectory((0.0, 0.0), (40.0, 3.0)),
-        "timed": trajectory((0.0, 0.0, None, 0.0), (40.0, 30.0, None, 4.0), timing=timing()),
-        "corner": trajectory((0.0, 0.0), (20.0, 0.0), (20.0, 25.0)),
-    }
-    ego = init("ego", teleport(world(0, -20, 0)), speed(to(8)), trajectory((0, -20), (60, -20)))
-    for name, line in lines.items():
-        parts = {
-            "entities": vehicle("ego") + vehicle("other"),
-            "road": "",
-            "init": ego + init("other", teleport(world(0, 0, 0)), speed(to(10)), line),
-            "stories": "",
-        }
-        yield Case(f"track_no_road_{name}", "straight", parts, 8.0)
-
-
 def trajectories() -> Iterator[Case]:
     yield case("track_corner", "straight", trajectory(*CORNER))
     yield case("track_on_foot", "on_foot", trajectory((131.5, -1.75), (135.0, 5.0), (140.0, 5.0)))
@@ -304,6 +273,7 @@ def trajectories() -> Iterator[Case]:
     yield case("track_clothoid", "crossing", shape_of(clothoid))
     yield from backwards()
     yield from without_road()
+    yield from at_once()
     yield case(
         "track_speed",
         "straight",

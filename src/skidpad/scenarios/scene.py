@@ -21,7 +21,7 @@ from skidpad.scenarios.network import Network, Place
 from skidpad.scenarios.tracking import Track, track_demand
 from skidpad.simulation.scripted import ActorDriver, Motion
 
-STANDING = 0.05  # m/s
+STANDING = 0.05, 1e-3  # m/s, of what drives on tyres, and of what is where the file says
 PAST = 0.05  # m beyond the last place of a lane
 TOUCHING = 0.05  # m, bodies that the physics keeps apart are this near
 Path = tuple[str, ...]
@@ -278,7 +278,7 @@ class Actor:
 
         z: of the ground, m, for whom the file does not place.
         """
-        v, before, stood = self.v, self.motion, self.v < STANDING
+        v, before, bound = self.v, self.motion, STANDING[self.placed_by_file]
         self.motion = motion
         dt, self.seen = dt if self.seen else 0.0, True
         box = self.entity.box
@@ -291,7 +291,7 @@ class Actor:
             self.a = (self.v - v) / dt
             self.acceleration = (motion.vx - before.vx) / dt, (motion.vy - before.vy) / dt
         self.travelled += self.v * dt
-        self.stood = self.stood + dt if stood and self.v < STANDING else 0.0
+        self.stood = self.stood + dt if max(v, self.v) < bound else 0.0
         self.at_end = self.at_end + dt if self.guide.at_end else 0.0
 
 

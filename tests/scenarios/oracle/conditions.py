@@ -121,6 +121,9 @@ def conditions() -> Iterator[Case]:
         entity_condition('<StandStillCondition duration="0.975"/>'),
     )
     yield _chain("stands", "straight", slow, again)
+    gently = event("slow", private(speed(to(0), "cubic", 4)), time(BEGIN))
+    for setting in ("straight", "curve", "hill"):
+        yield _chain("stands_gently", setting, gently, again)
     follows = event(
         "again", private(speed(to(12), "linear", 2)), state("event", "slow", "completeState")
     )

@@ -45,7 +45,7 @@ STEP, SAMPLE = 0.05, 0.2  # s, of the players and of what is stored
 OPTIONS = f"--fixed_timestep {STEP} --disable_controllers"
 LEAST_WAY = 5.0  # m that an entity of a corpus moves to be counted
 CORPUS_END = 40.0  # s of a file of others
-NOT_COMPARABLE = {  # by the file's hash: why its motion is nothing to compare; frozen before the count
+NOT_COMPARABLE = {  # by the file's hash: why its motion is nothing to compare
     "5238302359bb20b98c5061f5c501e6829825afed8a79a40e6f18ad3c5640236e": (
         "swarm.xosc of esmini: a TrafficSwarmAction, whose vehicles esmini draws at random"
     ),

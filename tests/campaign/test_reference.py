@@ -23,7 +23,7 @@ def test_it_is_named_wherever_a_driver_is_chosen():
     assert Drivers(stack="reference").chosen() == [ReferenceDriver()]
     assert Drivers(configs="reference").chosen() == [ReferenceDriver()]
     assert EgoStack(stack="reference").chosen() == ReferenceDriver()
-    with pytest.raises(ConfigError, match="0, 1, 2, 3, 4, reference"):
+    with pytest.raises(ConfigError, match="0, 1, 2, 3, 4, 5, 6, reference"):
         matrix_drivers("refrence")
     assert all(isinstance(d, AdasDriver) for d in Drivers(cruise="80").chosen())
 

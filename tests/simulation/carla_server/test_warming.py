@@ -32,7 +32,7 @@ def test_parts_are_compiled_for_the_types_of_a_step(served: Served) -> None:
         world.fleet.wheels,
         world.fleet.params,
         world.rows.commands,
-        world.on_wheels.felt,
+        world.on_wheels.feel,
         world.rows.grade,
         world.rows.bank,
         world.on_wheels.active,

@@ -48,7 +48,7 @@ class Drivers(Struct, frozen=True):
     stack: Annotated[
         str | None,
         Meta(
-            description="One driver: module:Class, FILE.py:Class, 0 to 4, reference, camera or "
+            description="One driver: module:Class, FILE.py:Class, 0 to 6, reference, camera or "
             "agent:PATH:CLASS."
         ),
     ] = None
@@ -81,8 +81,8 @@ class EgoStack(Struct, frozen=True):
     stack: Annotated[
         str,
         Meta(
-            description="0 to 4 (our stack in a published configuration), reference, camera, ideal "
-            "(as the file says), module:Class, FILE.py:Class, agent:PATH:CLASS."
+            description="0 to 6 (our stack in a configuration), reference, camera, ideal (as the "
+            "file says), module:Class, FILE.py:Class, agent:PATH:CLASS."
         ),
     ] = "2"
     stack_set: StackSettings = ()

@@ -8,6 +8,9 @@ from typer.testing import CliRunner
 
 from skidpad.cli.friction_figure import draw_surface, friction_figure
 from skidpad.cli.main import app, main
+from skidpad.core.vocabulary import GripModel
+from skidpad.physics.presets import find_weather
+from skidpad.physics.stopping import grip_rows
 
 runner = CliRunner(env={"COLUMNS": "100"})
 
@@ -55,6 +58,15 @@ def test_worn_and_winter_tyres_are_asked_for_by_name():
     assert runner.invoke(app, ["friction", "--wetness", "100", "--tyres", "winter"]).output == plain
     wrong = runner.invoke(app, ["friction", "--tyres", "slick"])
     assert "unknown tyres 'slick'; choose one of: all_season" in str(wrong.exception)
+
+
+def test_the_ratio_is_a_share_of_the_same_tyres_dry_grip():
+    """Also of a tyre that grips more than the winter tyre when dry: no rain leaves more than all."""
+    weathers = [find_weather("clear-noon"), find_weather("rain_60")]
+    dry, wet = grip_rows(weathers, [GripModel.PHYSICAL], tyres="summer")
+    assert wet.ratio < dry.ratio
+    assert dry.ratio == pytest.approx(1.0, abs=0.1)
+    assert wet.ratio / dry.ratio == pytest.approx(wet.mu / dry.mu)
 
 
 def test_both_models_stand_beside_each_other():

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from skidpad.core.constants import G
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose, mps_from_kmh
-from skidpad.core.tyres import REFERENCE
+from skidpad.core.tyres import REFERENCE, find_tyres
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.fleet import Fleet
@@ -82,7 +82,7 @@ class GripRow:
 
     weather: str
     model: GripModel
-    ratio: float  # at standstill
+    ratio: float  # at standstill, over the dry friction of the same tyres
     mu: float  # at standstill
     mu_80: float  # at 80 km/h
     stops: tuple[Stop, ...]  # from SPEEDS_KMH
@@ -107,10 +107,11 @@ def grip_rows(
                 continue
     v0 = [mps_from_kmh(kmh) for kmh in SPEEDS_KMH]
     each = stops([p for *_, p in cases for _ in v0], v0 * len(cases))
+    dry = mu_ref * find_tyres(tyres).dry / find_tyres(REFERENCE).dry
     rows = []
     for k, (weather, model, params) in enumerate(cases):
         mine = tuple(each[k * len(v0) : (k + 1) * len(v0)])
         mu = float(mu_at(params, 0.0))
         mu_80 = float(mu_at(params, mps_from_kmh(80.0)))
-        rows.append(GripRow(weather.name, model, mu / mu_ref, mu, mu_80, mine))
+        rows.append(GripRow(weather.name, model, mu / dry, mu, mu_80, mine))
     return rows

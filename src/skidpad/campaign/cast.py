@@ -274,7 +274,7 @@ def recovery_settings(s: TrafficSettings) -> RecoverySettings:
 
 def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> StackAtWheel:
     """The stack that drives, built; StackError when it cannot be. kind: its class, if loaded."""
-    found, settings = _class_of(spec, stage)
+    found, settings = _class_of(spec, stage, kind)
     # our own stack gives the map's arrays to kernels, which know one type of array
     chosen = kind or found
     map = stage.map if chosen is AdasStack else stage.map.read_only()
@@ -284,13 +284,16 @@ def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> S
     return StackAtWheel(stack, Lens(spec.weather, spec.seed) if spec.overlay else None)
 
 
-def _class_of(spec: RunSpec, stage: Stage) -> tuple[type[Stack], Mapping[str, object]]:
+def _class_of(
+    spec: RunSpec, stage: Stage, kind: type[Stack] | None
+) -> tuple[type[Stack], Mapping[str, object]]:
+    """The driver's class and its settings. kind: the class, if loaded: a user's file runs once."""
     driver = spec.driver
     cruise = {} if stage.cruise_kmh is None else {"cruise_kmh": stage.cruise_kmh}
     match driver:
         case StackDriver():
             # a copy: whatever it does to them
-            return load_stack(driver.where), {**cruise, **deepcopy(driver.options)}
+            return kind or load_stack(driver.where), {**cruise, **deepcopy(driver.options)}
         case AgentDriver():
             return load_agent(driver.where), {}
         case Passenger():

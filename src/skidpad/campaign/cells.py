@@ -8,6 +8,7 @@ from math import isfinite
 
 from msgspec import structs
 
+from skidpad.campaign.drivers import NUMBERS
 from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.run import REFERENCE, AdasDriver, DriverSpec, ReferenceDriver, RunSpec
 from skidpad.core.told import describe_value
@@ -15,7 +16,6 @@ from skidpad.core.weather import RANGES, Weather
 from skidpad.stack.configurations import (
     CONFIGURATIONS,
     CRUISE_RANGE,
-    GOVERNED,
     Functions,
     numbered_driver,
     parse_functions,
@@ -32,13 +32,12 @@ def published_drivers(numbers: str) -> list[AdasDriver]:
         return [AdasDriver(label=str(n), functions=f) for n, f in CONFIGURATIONS.items()]
     drivers = []
     for text in numbers.split(","):
-        known = {str(n) for n in (*CONFIGURATIONS, *GOVERNED)}
-        if text.strip() not in known:
-            allowed = ", ".join([*map(str, (*CONFIGURATIONS, *GOVERNED)), REFERENCE])
+        if text.strip() not in NUMBERS:
+            allowed = ", ".join([*NUMBERS, REFERENCE])
             raise ConfigError(
                 f"unknown configuration {describe_value(text.strip(), 100)}; choose among: {allowed}"
             )
-        drivers.append(numbered_driver(int(text.strip())))
+        drivers.append(numbered_driver(NUMBERS[text.strip()]))
     return drivers
 
 

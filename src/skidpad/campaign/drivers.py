@@ -25,27 +25,25 @@ STACK = "stack"  # what results of scenarios call our own stack
 NUMBERS = {str(number): number for number in (*CONFIGURATIONS, *GOVERNED)}
 
 
-def find_driver(
+def describe_driver(
     stack: str | int, options: Mapping[str, object] | None = None, label: str = ""
 ) -> DriverSpec:
-    """Returns the driver of this name.
+    """Returns the driver of this name; a user's class is not looked for yet.
 
     Args:
         stack: 0 to 4 for our stack in a published configuration, 5 and 6 for it with the speed
-            envelope, "reference", "camera", "ideal" for
-            a scenario that moves the ego itself, "agent:PATH:CLASS" for an agent of the CARLA
-            leaderboard, or a stack's class as "module:Class" or "FILE.py:Class".
+            envelope, "reference", "camera", "ideal" for a scenario that moves the ego itself,
+            "agent:PATH:CLASS" for an agent of the CARLA leaderboard, or a stack's class as
+            "module:Class" or "FILE.py:Class".
         options: what a class is given as its settings.
         label: what results call our stack; its number by default.
 
     Raises:
         ConfigError: the name stands for no driver, or options are given to a driver of ours.
-        FileError: the stack's file is not there.
     """
     name = str(stack)
-    ours = _find_ours(name, label)
+    ours = _describe_ours(name, label)
     if ours is None:
-        load_stack(name)  # a stack that is not there is wrong input, no run's outcome
         given: dict[str, Any] = dict(options or {})
         return StackDriver(name, given)
     if options:
@@ -55,11 +53,29 @@ def find_driver(
     return ours
 
 
-def _find_ours(name: str, label: str) -> DriverSpec | None:
+def find_driver(
+    stack: str | int, options: Mapping[str, object] | None = None, label: str = ""
+) -> DriverSpec:
+    """As `describe_driver`, and the class is there: a wrong name is wrong input, no run's outcome.
+
+    Raises:
+        ConfigError: also when there is no such class, or it is no stack.
+        FileError: its file is not there.
+    """
+    driver = describe_driver(stack, options, label)
+    if isinstance(driver, StackDriver):
+        load_stack(driver.where)
+    elif isinstance(driver, AgentDriver):
+        from skidpad.stack.agents import load_agent  # kernels come with it
+
+        load_agent(driver.where)
+    return driver
+
+
+def _describe_ours(name: str, label: str) -> DriverSpec | None:
     """The driver of this name that is no user's class; None for a class."""
     if name in NUMBERS:
-        ours = numbered_driver(NUMBERS[name])
-        return structs.replace(ours, label=label or name)
+        return structs.replace(numbered_driver(NUMBERS[name]), label=label or name)
     if name == REFERENCE:
         return ReferenceDriver()
     if name == CAMERA:
@@ -67,11 +83,7 @@ def _find_ours(name: str, label: str) -> DriverSpec | None:
     if name == IDEAL:
         return Passenger()
     if name.startswith(AGENT):
-        from skidpad.stack.agents import load_agent  # kernels come with it
-
-        where = name.removeprefix(AGENT)
-        load_agent(where)
-        return AgentDriver(where)
+        return AgentDriver(name.removeprefix(AGENT))
     if ":" not in name:
         raise ConfigError(
             f"unknown stack {name!r}; choose one of: {', '.join([*NUMBERS, REFERENCE, CAMERA, IDEAL])}, "

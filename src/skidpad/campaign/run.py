@@ -17,7 +17,7 @@ from skidpad.campaign.cast import StackAtWheel, Stage, driver_of, stage_of, with
 from skidpad.campaign.cells import describe_run
 from skidpad.campaign.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
 from skidpad.campaign.drive import Driver, Moment, Sink, ticks
-from skidpad.campaign.drivers import find_driver
+from skidpad.campaign.drivers import describe_driver
 from skidpad.campaign.outdoors import ChangedBackend, FileChanges
 from skidpad.campaign.readings import ReadingsRecorder
 from skidpad.campaign.snapshots import Snapshots
@@ -45,6 +45,7 @@ from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.player import Played
 from skidpad.simulation.backend import Backend
 from skidpad.stack.interface import Stack
+from skidpad.stack.loading import load_stack
 
 DESK_ROOM = 12_000  # ticks of a log at first, as nobody knows how long a person drives
 LONGEST_STORY = 20_000  # characters of a traceback
@@ -147,7 +148,8 @@ def _name_driver(
     stack: type[Stack] | str | int, options: dict[str, Any]
 ) -> tuple[DriverSpec, type[Stack] | None]:
     if isinstance(stack, (str, int)):
-        return find_driver(stack, options), None
+        driver = describe_driver(stack, options)
+        return driver, load_stack(driver.where) if isinstance(driver, StackDriver) else None
     return StackDriver(f"{stack.__module__}:{stack.__qualname__}", options), stack
 
 

@@ -27,6 +27,7 @@ from skidpad.report.page import Card, Event, Image
 from skidpad.report.replay import replay
 from skidpad.roads.queries import RoadMap
 
+Found = tuple[Crash, Drive, RoadMap, Path]  # Path: of the run
 PICTURE_WIDTH = 480  # px
 PICTURE_BYTES = 60_000  # decision M-17
 THUMBNAIL_WIDTH, THUMBNAIL_BYTES = 240, 10_000  # px, bytes

@@ -10,8 +10,7 @@ from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.logfiles import read_log
 from skidpad.recording.motion import motion_hash
 from skidpad.recording.runlog import RunLog
-from skidpad.report.cards import crash_card, severity
-from skidpad.report.crashes import Found
+from skidpad.report.cards import Found, crash_card, severity
 from skidpad.report.page import Cards, Page, Section, write_page
 from skidpad.roads.queries import RoadMap
 

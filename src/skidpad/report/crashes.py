@@ -4,29 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 
 import polars as pl
 
 from skidpad.core.names import slug
 from skidpad.core.wording import count_text
 from skidpad.evidence.contrasts import drive_hash
-from skidpad.evidence.drive.collisions import Crash, find_crashes
-from skidpad.evidence.drive.prepared import Drive, prepare
+from skidpad.evidence.drive.collisions import find_crashes
+from skidpad.evidence.drive.prepared import prepare
 from skidpad.recording.campaigns import snapshot
 from skidpad.recording.logfiles import read_log
-from skidpad.report.cards import crash_card, headline, severity, thumbnail_uri
+from skidpad.report.cards import Found, crash_card, headline, severity, thumbnail_uri
 from skidpad.report.matrix_data import Matrix, config_title, weather_title
 from skidpad.report.page import Block, Cards, Image, Montage, Page, Section, Text, write_page
 from skidpad.roads.bundled import kept_map
-from skidpad.roads.queries import RoadMap
 
 CARDS = "cards"
 INLINE = 3  # per cell
 MONTAGE = 60  # pictures of a configuration
 RUNS_READ = 10  # per cell, those with the hardest impacts
 Cell = tuple[str, str]  # configuration, weather
-Found = tuple[Crash, Drive, RoadMap, Path]  # Path: of the run
 
 
 def found_crashes(matrix: Matrix) -> dict[Cell, list[Found]]:

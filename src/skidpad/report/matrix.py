@@ -10,7 +10,8 @@ from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.statistics import DISPERSION_ASSUMED
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.report import matrix_figures, matrix_tables
-from skidpad.report.crashes import Cell, Found, crash_sections, found_crashes, worst_of_each
+from skidpad.report.cards import Found
+from skidpad.report.crashes import Cell, crash_sections, found_crashes, worst_of_each
 from skidpad.report.matrix_answers import answers
 from skidpad.report.matrix_baseline import baseline_text
 from skidpad.report.matrix_data import Matrix, load_matrix

@@ -9,7 +9,8 @@ import polars as pl
 from skidpad.core.wording import capitalize_first, count_text, list_text
 from skidpad.evidence.statistics import Interval, Rate, p_text, seeds_for_verdict
 from skidpad.evidence.verdicts import Judgement
-from skidpad.report.crashes import Cell, Found
+from skidpad.report.cards import Found
+from skidpad.report.crashes import Cell
 from skidpad.report.figures import (
     POINTS_REACH,
     Series,

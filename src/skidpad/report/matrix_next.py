@@ -8,8 +8,8 @@ import polars as pl
 
 from skidpad.core.wording import capitalize_first, count_text
 from skidpad.evidence.verdicts import Judgement, Verdict
-from skidpad.report.cards import headline, severity
-from skidpad.report.crashes import Cell, Found
+from skidpad.report.cards import Found, headline, severity
+from skidpad.report.crashes import Cell
 from skidpad.report.figures import Series, stacked_bars
 from skidpad.report.matrix_data import BASELINE, EVENT, EVENTS, Matrix, config_list, config_title
 from skidpad.report.matrix_kinds import count, kinds_of

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.recording.logfiles import read_log
-from skidpad.report.crashes import Cell, Found
+from skidpad.report.cards import Found
+from skidpad.report.crashes import Cell
 from skidpad.report.figures import FRAME, Chart, Curve, curves
 from skidpad.report.matrix_answers import MARKERS
 from skidpad.report.matrix_data import Matrix, config_title

@@ -11,8 +11,8 @@ from skidpad.core.wording import count_text
 from skidpad.evidence.encounters import DISTANCE, TIME
 from skidpad.evidence.play_verdicts import Counterpart, PlayVerdict
 from skidpad.recording.logfiles import read_log
+from skidpad.report.cards import Found
 from skidpad.report.crash_page import contact_cards, find_contacts
-from skidpad.report.crashes import Found
 from skidpad.report.page import (
     Answer,
     Answers,

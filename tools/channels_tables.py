@@ -54,7 +54,7 @@ def main(words: list[str] | None = None) -> int:
 
 def ways_by_file(results: Path) -> dict[str, str]:
     """The figures of the ways driven, by the name of their file; none where no way is known."""
-    from skidpad.report.channels_ways import ways_figures
+    from skidpad.report.channels.evaluation.ways import ways_figures
 
     if not (results / "ways.json").is_file():
         return {}
@@ -290,7 +290,7 @@ def reference_curves(told: dict[str, Any]) -> Iterator[tuple[str, str, list[list
 
 def reference_figure(results: Path) -> str:
     """Precision over recall of the reference, one chart per hazard, one line per kind of drives."""
-    from skidpad.report.figures import Chart, Curve, curves
+    from skidpad.report.elements.figures import Chart, Curve, curves
 
     found = list(reference_curves(_rules_of(results) or {"reference": {"drives": {}}}))
     names = list(dict.fromkeys(drives for drives, *_ in found))

@@ -13,8 +13,8 @@ from skidpad.evidence.grip.rain import CELLS, four_cells
 from skidpad.evidence.grip.study import Pair, Share
 from skidpad.evidence.verdicts import judge
 from skidpad.recording.results import read_results
-from skidpad.report.grip_data import PAIRED, load_grip, scenario_title
-from skidpad.report.threshold import load_threshold
+from skidpad.report.grip.data import PAIRED, load_grip, scenario_title
+from skidpad.report.grip.threshold import load_threshold
 
 DELAYS = "delays.parquet"
 

@@ -15,7 +15,7 @@ from skidpad.evidence.statistics import Rate, compare_pairs, event_rate
 from skidpad.evidence.verdicts import Judgement, judge
 from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.matrix import MatrixEntry
-from skidpad.report.matrix_data import Matrix, config_title, rate_by_seed, weather_title
+from skidpad.report.matrix.data import Matrix, config_title, rate_by_seed, weather_title
 
 COUNTS = {
     "crashes_vehicle": "crashes with vehicles",

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from skidpad.evidence.statistics import Interval
 from skidpad.evidence.verdicts import Judgement
-from skidpad.report.verdicts import plain
+from skidpad.report.elements.verdicts import plain
 
 
 def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -22,7 +22,7 @@ from skidpad.physics.presets import find_weather
 from skidpad.recording.logfiles import log_hash, read_log
 from skidpad.recording.motion import motion_hash
 from skidpad.recording.results import read_results
-from skidpad.report.matrix import write_report
+from skidpad.report.matrix.page import write_report
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.control.resume import SpeedCaps
 

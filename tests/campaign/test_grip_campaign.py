@@ -26,7 +26,7 @@ from skidpad.physics.presets import preset
 from skidpad.recording.grip import GripEntry, read_series
 from skidpad.recording.ledger import read_ledger
 from skidpad.recording.results import read_results
-from skidpad.report.grip_data import load_grip
+from skidpad.report.grip.data import load_grip
 from skidpad.scenarios.variation import CutIn
 
 WEATHERS = [preset("icy_0"), preset("icy_30")]

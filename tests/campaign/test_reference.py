@@ -13,7 +13,7 @@ from skidpad.cli.asked import Drivers, EgoStack
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, ReferenceDriver, RunSpec, run_from_plain
 from skidpad.core.weather import Weather
-from skidpad.report.matrix_data import config_title
+from skidpad.report.matrix.data import config_title
 from skidpad.stack.reference.person import person_of
 
 

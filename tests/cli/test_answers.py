@@ -9,7 +9,7 @@ from skidpad.cli.grip import answer_text, next_text
 from skidpad.cli.main import app
 from skidpad.recording.campaigns import CampaignFolder
 from skidpad.recording.matrix import MATRIX, Metrics, RunKey
-from skidpad.report.matrix_data import Matrix
+from skidpad.report.matrix.data import Matrix
 
 
 def rows(*cells):
@@ -72,7 +72,9 @@ def test_adas_ends_with_the_answers_the_page_and_the_run_to_look_at(tmp_path, mo
         Matrix, "names", lambda _, runs: [f"{r['config']}-{r['seed']}" for r in runs.to_dicts()]
     )
     monkeypatch.setattr(CampaignFolder, "log", lambda self, name: self.path / "runs" / name)
-    monkeypatch.setattr("skidpad.report.matrix.write_report", lambda folder: folder / "report.html")
+    monkeypatch.setattr(
+        "skidpad.report.matrix.page.write_report", lambda folder: folder / "report.html"
+    )
     first, sure, *_, page, following = answer(tmp_path).split("\n")
     assert first == "Fewest crashes: in clear sky configuration 1 (ACC) with 0.00 per run."
     assert sure.startswith("2 seeds per cell cannot tell two configurations apart")

@@ -17,7 +17,7 @@ from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, InputError
 from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import SensorLevel
-from skidpad.report.grip import write_grip_report
+from skidpad.report.grip.page import write_grip_report
 from skidpad.scenarios.shipped import FOLDER
 
 SMALL = (

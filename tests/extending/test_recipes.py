@@ -126,7 +126,9 @@ def check_indicator(folder: Path) -> None:
     """The page and its data have the indicator, also when it is written again without the package."""
     page = folder / "out/monitored/report.html"
     assert "ego speed difference" in page.read_text("utf-8")
-    again = "from skidpad.report.channels import write_drive_report; from pathlib import Path; "
+    again = (
+        "from skidpad.report.channels.page import write_drive_report; from pathlib import Path; "
+    )
     call(folder, "-c", again + "write_drive_report(Path('out/monitored'))")
     assert "ego speed difference" in page.read_text("utf-8")
     assert "ego_speed_difference" in page.with_name("monitor.json").read_text("utf-8")
@@ -145,7 +147,7 @@ def check_metric(folder: Path) -> None:
     assert "close following" in page.read_text("utf-8")
     rows = pl.read_parquet(page.with_name("results.parquet"))
     assert 0.0 <= rows["close_following_pct"].item() <= 100.0
-    again = "from skidpad.report.matrix import write_report; from pathlib import Path; "
+    again = "from skidpad.report.matrix.page import write_report; from pathlib import Path; "
     call(folder, "-c", again + "write_report(Path('out/close'))")
     assert "close following" in page.read_text("utf-8")
 

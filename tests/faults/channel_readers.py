@@ -68,7 +68,7 @@ def read_indicators(path: Path) -> object:
 
 def read_page(path: Path) -> object:
     """The page of a monitored drive, whose other files are whole."""
-    from skidpad.report.channels import write_drive_report
+    from skidpad.report.channels.page import write_drive_report
 
     for name, content in watched().items():
         if name != path.name:

@@ -13,7 +13,7 @@ from skidpad.core.run import run_from_plain
 
 def main():
     """The run's description stands on the command line, after the folder."""
-    from skidpad.report.matrix import write_report
+    from skidpad.report.matrix.page import write_report
 
     run = run_from_plain(yaml.safe_load(sys.argv[2]), "here")
     summary = Campaign(RECIPE, [run]).run(Path(sys.argv[1]), here, csv=True)

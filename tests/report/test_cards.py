@@ -24,12 +24,12 @@ from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics, RunKey
 from skidpad.recording.motion import motion_hash
 from skidpad.recording.results import Timing
 from skidpad.recording.runlog import RunLog
-from skidpad.report.cards import contact_text, crash_card, facts, severity, tags, timeline
-from skidpad.report.causes import write_cause
-from skidpad.report.crash_page import contact_cards, find_contacts, write_crashes
-from skidpad.report.crashes import crash_sections, found_crashes, montages, worst_of_each
-from skidpad.report.matrix_data import load_matrix
-from skidpad.report.page import Cards, Montage, Page, Section, render
+from skidpad.report.crashes.cards import contact_text, crash_card, facts, severity, tags, timeline
+from skidpad.report.crashes.causes import write_cause
+from skidpad.report.crashes.page import contact_cards, find_contacts, write_crashes
+from skidpad.report.elements.page import Cards, Montage, Page, Section, render
+from skidpad.report.matrix.crashes import crash_sections, found_crashes, montages, worst_of_each
+from skidpad.report.matrix.data import load_matrix
 from skidpad.roads.bundled import load_map
 
 KMH = 3.6

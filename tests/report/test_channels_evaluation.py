@@ -13,10 +13,10 @@ from skidpad.evidence.channels.judging.reference import NAME as REFERENCE
 from skidpad.evidence.channels.judging.segments import judge
 from skidpad.recording.channel_drives import DriveOutcome, DriveRecord
 from skidpad.recording.cycles import cycles
-from skidpad.report.channels_evaluation import _curve, evaluation_page, write_evaluation_report
-from skidpad.report.channels_redundancy import redundancy
-from skidpad.report.channels_strata import precision_recall
-from skidpad.report.figures import PALETTE
+from skidpad.report.channels.evaluation.page import _curve, evaluation_page, write_evaluation_report
+from skidpad.report.channels.evaluation.redundancy import redundancy
+from skidpad.report.channels.evaluation.strata import precision_recall
+from skidpad.report.elements.figures import PALETTE
 
 EYES = (Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,)))
 

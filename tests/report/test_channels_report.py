@@ -15,12 +15,12 @@ from skidpad.evidence.channels.monitor import MonitorSettings
 from skidpad.evidence.channels.timing import MODULES
 from skidpad.live.watch import Timer, watch
 from skidpad.recording.hazards import read_hazards
-from skidpad.report.channels import drive_page, write_drive_report
-from skidpad.report.channels_data import load_drive
-from skidpad.report.channels_figures import risk, timing
-from skidpad.report.figures import PALETTE
-from skidpad.report.timeline import Mark, Strip, timelines
-from skidpad.report.worlds import UNIT, worlds_replay
+from skidpad.report.channels.data import load_drive
+from skidpad.report.channels.figures import risk, timing
+from skidpad.report.channels.page import drive_page, write_drive_report
+from skidpad.report.channels.worlds import UNIT, worlds_replay
+from skidpad.report.elements.figures import PALETTE
+from skidpad.report.elements.timeline import Mark, Strip, timelines
 
 WORLD = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-11.0, 0, 0, 15.5, 0), (50.0, 3.5, 0, 15, 0)]))
 EYES = (Eyes("lav", 0.03), Eyes("tfuse", 0.03, blind=(0,)))

@@ -2,7 +2,7 @@
 
 import pytest
 
-from skidpad.report.channels_routes import route_blocks
+from skidpad.report.channels.evaluation.routes import route_blocks
 
 LOCATION, COUNT = "ego_location_similarity", "object_count_similarity"
 

@@ -4,7 +4,7 @@ import pytest
 from lxml import etree
 from svg_values import bars, texts
 
-from skidpad.report.figures import (
+from skidpad.report.elements.figures import (
     INK,
     PALETTE,
     Series,

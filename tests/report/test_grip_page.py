@@ -10,11 +10,11 @@ from svg_values import curves_of, texts
 
 from skidpad.evidence.grip.study import METRICS, ORIGINAL, REDUCED, CellSeries, Distance, Pair
 from skidpad.evidence.statistics import Interval
-from skidpad.report.figures import PALETTE
-from skidpad.report.grip_data import scenario_title
-from skidpad.report.grip_figures import across_weathers, both_modes, trajectories
-from skidpad.report.grip_tables import completion_tables, distance_tables
-from skidpad.report.grip_weathers import weather_blocks
+from skidpad.report.elements.figures import PALETTE
+from skidpad.report.grip.data import scenario_title
+from skidpad.report.grip.figures import across_weathers, both_modes, trajectories
+from skidpad.report.grip.tables import completion_tables, distance_tables
+from skidpad.report.grip.weathers import weather_blocks
 from skidpad.report.published import Source, published_rows
 
 N = 20

@@ -9,9 +9,9 @@ from test_page import page
 
 from chromium import CHROMIUM, FLAGS
 from skidpad.evidence.channels.indicators.catalogue import Indicator
-from skidpad.report.channels_routes import route_blocks
-from skidpad.report.matrix import write_report
-from skidpad.report.page import Cell, Page, Section, Table, Text, write_page
+from skidpad.report.channels.evaluation.routes import route_blocks
+from skidpad.report.elements.page import Cell, Page, Section, Table, Text, write_page
+from skidpad.report.matrix.page import write_report
 
 pytestmark = pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
 

@@ -10,14 +10,14 @@ from skidpad.evidence.drive.findings import FINDINGS
 from skidpad.evidence.verdicts import Verdict, judge
 from skidpad.recording.matrix import MATRIX, Metrics
 from skidpad.recording.results import Timing
-from skidpad.report.matrix import write_report
-from skidpad.report.matrix_answers import answers
-from skidpad.report.matrix_baseline import baseline_text
-from skidpad.report.matrix_data import EVENTS, FIRST, WEATHERS, config_list, load_matrix
-from skidpad.report.matrix_figures import collisions, speed_figure
-from skidpad.report.matrix_headline import headline_numbers
-from skidpad.report.matrix_kinds import count, kinds_of
-from skidpad.report.matrix_tables import count_table, kinds_table
+from skidpad.report.matrix.answers import answers
+from skidpad.report.matrix.baseline import baseline_text
+from skidpad.report.matrix.data import EVENTS, FIRST, WEATHERS, config_list, load_matrix
+from skidpad.report.matrix.figures import collisions, speed_figure
+from skidpad.report.matrix.headline import headline_numbers
+from skidpad.report.matrix.kinds import count, kinds_of
+from skidpad.report.matrix.page import write_report
+from skidpad.report.matrix.tables import count_table, kinds_table
 
 CLAIMS = [f for f in FINDINGS if not f.study]
 

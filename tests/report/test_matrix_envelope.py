@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import polars as pl
 
 from skidpad.recording.readings import RecordedSensor, tabulate_readings, write_readings
-from skidpad.report.matrix_envelope import binding_names, envelope_blocks
+from skidpad.report.matrix.envelope import binding_names, envelope_blocks
 
 SENSOR = RecordedSensor("envelope", "envelope", "Speed envelope", "m/s; binding: 0 none, 1 sight")
 RAIN = RecordedSensor("rain", "rain_sensor", "Rain", "stage")

@@ -12,14 +12,14 @@ from test_matrix_report import campaign, key
 from skidpad.evidence.statistics import Interval, mean_limits
 from skidpad.recording.matrix import MATRIX, Metrics
 from skidpad.recording.results import Timing
-from skidpad.report.figures import PALETTE, Series, stacked_bars
-from skidpad.report.matrix import write_report
-from skidpad.report.matrix_answers import answers
-from skidpad.report.matrix_data import WEATHERS, load_matrix
-from skidpad.report.matrix_real_time import real_time_blocks
-from skidpad.report.matrix_sides import side_blocks
-from skidpad.report.matrix_steps import step_blocks, step_differences
-from skidpad.report.matrix_tables import (
+from skidpad.report.elements.figures import PALETTE, Series, stacked_bars
+from skidpad.report.matrix.answers import answers
+from skidpad.report.matrix.comparisons.sides import side_blocks
+from skidpad.report.matrix.comparisons.steps import step_blocks, step_differences
+from skidpad.report.matrix.data import WEATHERS, load_matrix
+from skidpad.report.matrix.page import write_report
+from skidpad.report.matrix.real_time import real_time_blocks
+from skidpad.report.matrix.tables import (
     count_table,
     grades_table,
     kinds_table,

@@ -14,9 +14,9 @@ from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather
 from skidpad.recording.matrix import MATRIX, PIXELS
 from skidpad.recording.results import Timing
-from skidpad.report.matrix import build_page
-from skidpad.report.matrix_data import load_matrix
-from skidpad.report.matrix_parity import load_parity, parity_section
+from skidpad.report.matrix.comparisons.parity import load_parity, parity_section
+from skidpad.report.matrix.data import load_matrix
+from skidpad.report.matrix.page import build_page
 
 
 def row(config, seed, sensors, motion, **values):

@@ -8,10 +8,10 @@ import pytest
 from skidpad.recording.files import write_parquet
 from skidpad.recording.matrix import MATRIX, Metrics, RunKey
 from skidpad.recording.results import Timing
-from skidpad.report.matrix import build_page, write_report
-from skidpad.report.matrix_data import WEATHERS, load_matrix, rate_by_seed, weather_title
-from skidpad.report.matrix_headline import headline_numbers, headline_table
-from skidpad.report.matrix_tables import per_weather
+from skidpad.report.matrix.data import WEATHERS, load_matrix, rate_by_seed, weather_title
+from skidpad.report.matrix.headline import headline_numbers, headline_table
+from skidpad.report.matrix.page import build_page, write_report
+from skidpad.report.matrix.tables import per_weather
 
 RATES = {"0": 3.0, "1": 0.5, "2": 1.0, "3": 1.5, "4": 0.0}
 

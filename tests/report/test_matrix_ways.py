@@ -8,9 +8,9 @@ import pytest
 from svg_values import texts
 from test_matrix_answers import campaign, metrics
 
-from skidpad.report import matrix_ways
-from skidpad.report.figures import PALETTE
-from skidpad.report.matrix_ways import broken_way, way_blocks
+from skidpad.report.elements.figures import PALETTE
+from skidpad.report.matrix import ways as matrix_ways
+from skidpad.report.matrix.ways import broken_way, way_blocks
 from skidpad.roads.bundled import load_map
 
 

@@ -16,7 +16,7 @@ import monitor_variants
 from channel_worlds import Eyes, World, drive
 from skidpad.evidence.channels.judging.curves import Looked
 from skidpad.evidence.channels.tracked.tracks import Track
-from skidpad.report.figures import PALETTE
+from skidpad.report.elements.figures import PALETTE
 from skidpad.roads.bundled import load_map
 
 TAILGATED = "ego_tailgated"

@@ -3,7 +3,7 @@ import re
 
 import pytest
 
-from skidpad.report.page import (
+from skidpad.report.elements.page import (
     Answer,
     Answers,
     Card,
@@ -112,7 +112,7 @@ def test_a_report_is_replaced_only_by_a_complete_one(tmp_path, monkeypatch):
     def broken(_):
         raise OSError("disk full")
 
-    monkeypatch.setattr("skidpad.report.page.render", broken)
+    monkeypatch.setattr("skidpad.report.elements.page.render", broken)
     with pytest.raises(OSError, match="disk full"):
         write_page(page(), path)
     assert path.read_text() == before

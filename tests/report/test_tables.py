@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import pytest
 
 from skidpad.evidence.statistics import Interval
-from skidpad.report.page import Cell
-from skidpad.report.tables import Column, Format, Quantity, number, table
+from skidpad.report.elements.page import Cell
+from skidpad.report.elements.tables import Column, Format, Quantity, number, table
 
 
 @dataclass(frozen=True)

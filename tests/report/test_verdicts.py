@@ -3,7 +3,7 @@ import pytest
 
 from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.verdicts import Judgement, Verdict, judge
-from skidpad.report.verdicts import plain, tally_text
+from skidpad.report.elements.verdicts import plain, tally_text
 
 
 def judged(verdict, seeds=None):

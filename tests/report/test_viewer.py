@@ -9,7 +9,7 @@ from channel_worlds import CAR, Eyes, World, drive, traffic
 from skidpad.cli.main import app
 from skidpad.core.errors import MissingExtra
 from skidpad.recording.channels import ChannelWriter
-from skidpad.report.viewer import outline, require_rerun
+from skidpad.report.channels.viewer import outline, require_rerun
 
 
 @pytest.fixture

@@ -78,9 +78,9 @@ def adas(
 
 def answer(folder: Path) -> str:
     """Write the report of a campaign; returns what it answers, its path, and the next command."""
-    from skidpad.report.matrix import write_report
-    from skidpad.report.matrix_answers import terminal_answer
-    from skidpad.report.matrix_data import load_matrix
+    from skidpad.report.matrix.answers import terminal_answer
+    from skidpad.report.matrix.data import load_matrix
+    from skidpad.report.matrix.page import write_report
 
     page = write_report(folder)
     *lines, last = terminal_answer(load_matrix(folder))
@@ -119,10 +119,10 @@ def report(
 def _reports() -> dict[str, Callable[[Path], object]]:
     from skidpad.cli.channels_drive import totals
     from skidpad.cli.expected import played_report
-    from skidpad.report.grip import write_grip_report
+    from skidpad.report.grip.page import write_grip_report
+    from skidpad.report.grip.threshold import write_threshold_report
     from skidpad.report.risk import write_risk_report
     from skidpad.report.search import write_search_report
-    from skidpad.report.threshold import write_threshold_report
 
     return {
         "adas": answer,
@@ -140,7 +140,7 @@ def _report_run(run: Path) -> str:
     from skidpad.cli.expected import played_report
     from skidpad.cli.show import open_run
     from skidpad.recording.staging import STAGING
-    from skidpad.report.crash_page import write_crashes
+    from skidpad.report.crashes.page import write_crashes
 
     if (run / STAGING).is_file():
         return played_report(run)

@@ -107,7 +107,7 @@ def _write_pages(folder: Path) -> None:
     from skidpad.recording.monitored import SUMMARY
 
     for summary in sorted(folder.glob(f"*/*.monitor/{SUMMARY}")):
-        from skidpad.report.channels import write_drive_report
+        from skidpad.report.channels.page import write_drive_report
 
         write_drive_report(summary.parent)
 

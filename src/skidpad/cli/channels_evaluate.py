@@ -58,7 +58,7 @@ def evaluate(
     varied = None if curve is None else Signal(require_choice("signal", curve, [*Signal]))
     from skidpad.evidence.channels.judging.evaluation import Evaluation, read_labels
     from skidpad.recording.files import write_bytes
-    from skidpad.report.channels_evaluation import write_evaluation_report
+    from skidpad.report.channels.evaluation.page import write_evaluation_report
 
     marked = read_labels(labels) if labels else {}
     if "" in marked and len(paths) > 1:

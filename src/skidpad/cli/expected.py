@@ -11,7 +11,7 @@ from msgspec import Meta, Struct
 
 if TYPE_CHECKING:
     from skidpad.recording.staging import LeftOut
-    from skidpad.report.play_runs import Played
+    from skidpad.report.play.runs import Played
 
 
 class Expected(Struct, frozen=True):
@@ -46,7 +46,7 @@ class Expected(Struct, frozen=True):
 def write_played_page(out: Path) -> tuple[Played, str]:
     """Write the page of a folder that `play` wrote; returns its runs and the text to print."""
     from skidpad.cli.played_table import played_text
-    from skidpad.report.play import write_play_report
+    from skidpad.report.play.page import write_play_report
 
     played, page = write_play_report(out)
     return played, played_text(played, page)

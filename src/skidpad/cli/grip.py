@@ -61,7 +61,7 @@ def grip(
         from skidpad.campaign import threshold
         from skidpad.campaign.campaign import Campaign
         from skidpad.cli import threshold_plan
-        from skidpad.report.threshold import write_threshold_report
+        from skidpad.report.grip.threshold import write_threshold_report
 
         run = tuned.resolve(run)
         repeats = seeds or threshold_plan.REPEATS
@@ -76,7 +76,7 @@ def grip(
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.grip import recipe
     from skidpad.recording.results import read_results
-    from skidpad.report.grip import write_grip_report
+    from skidpad.report.grip.page import write_grip_report
 
     def answer(folder: Path) -> str:
         page, rows = write_grip_report(folder), read_results(folder)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from skidpad.evidence.play_verdicts import PlayVerdict
 
 if TYPE_CHECKING:
-    from skidpad.report.play_runs import PlayRun
+    from skidpad.report.play.runs import PlayRun
 
 TAGS = {
     PlayVerdict.ERROR: "error",

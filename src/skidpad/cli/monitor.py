@@ -114,7 +114,7 @@ def monitor(
     from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
     from skidpad.live.watch import Alarms, Timer, watch_whole
     from skidpad.recording.sources import file_hash
-    from skidpad.report.channels import write_drive_report
+    from skidpad.report.channels.page import write_drive_report
 
     wanted = {name: _rule(name) for name in fail_if or []}
     if junit is not None and not wanted:

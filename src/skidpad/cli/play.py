@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from skidpad.campaign.campaign import Campaign
     from skidpad.recording.grip import GripKey, GripMetrics
     from skidpad.recording.staging import LeftOut
-    from skidpad.report.play_runs import Played
+    from skidpad.report.play.runs import Played
 
 PLAIN = "clear-noon"  # what a file leaves open of the weather
 scenario_options = spread_fields(sensors=SensorLevel.OBJECTS, duration=120.0)

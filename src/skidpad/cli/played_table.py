@@ -8,8 +8,8 @@ from shlex import quote
 
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.evidence.play_verdicts import PlayVerdict
-from skidpad.report.play import answer, criterion, in_order
-from skidpad.report.play_runs import CSV, Played, PlayRun
+from skidpad.report.play.page import answer, criterion, in_order
+from skidpad.report.play.runs import CSV, Played, PlayRun
 
 WIDTHS = (26, 14, 10, 6, 6, 6, 6)  # with a space between columns 80
 HEADS = ("scenario", "weather", "verdict", "gap", "TTC", "decel", "hit")

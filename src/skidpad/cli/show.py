@@ -28,8 +28,8 @@ from skidpad.recording.matrix import Metrics
 from skidpad.recording.readings import read_readings, summarise_readings
 from skidpad.recording.results import definitions_of
 from skidpad.recording.runlog import RunLog
-from skidpad.report.cards import contact_text, headline, timeline
-from skidpad.report.causes import write_cause
+from skidpad.report.crashes.cards import contact_text, headline, timeline
+from skidpad.report.crashes.causes import write_cause
 from skidpad.roads.queries import RoadMap
 
 

@@ -19,7 +19,7 @@ def view(file: Path = FILE, mapping: Path | None = MAPPING, save: Path | None = 
         raise FileError(f"{file}: no such file")
     from skidpad.recording.cycles import cycles
     from skidpad.recording.sources import open_channels
-    from skidpad.report.viewer import log_drive, require_rerun
+    from skidpad.report.channels.viewer import log_drive, require_rerun
 
     require_rerun()
     source = open_channels(file, mapping, truth=False)

@@ -19,8 +19,8 @@ from skidpad.recording.risks import (
     read_risk_found,
 )
 from skidpad.recording.searches import Trial, read_trials
-from skidpad.report.figures import INK, PALETTE, canvas, svg_of
-from skidpad.report.page import (
+from skidpad.report.elements.figures import INK, PALETTE, canvas, svg_of
+from skidpad.report.elements.page import (
     REPORT,
     Answer,
     Answers,

@@ -23,8 +23,8 @@ from skidpad.recording.searches import (
     read_search,
     read_trials,
 )
-from skidpad.report.figures import INK, PALETTE, canvas, svg_of
-from skidpad.report.page import (
+from skidpad.report.elements.figures import INK, PALETTE, canvas, svg_of
+from skidpad.report.elements.page import (
     REPORT,
     Answer,
     Answers,

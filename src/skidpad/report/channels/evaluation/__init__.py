@@ -1,0 +1,1 @@
+"""The report of an evaluation: how well monitors and identifiers find hazards."""

@@ -1,0 +1,1 @@
+"""Crash cards: why a crash happened, what was seen of it, and a replay."""

@@ -1,0 +1,161 @@
+"""What the reports of all campaigns say alike: facts, runs that are missing, definitions, provenance."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any, ClassVar, Generic
+
+import msgspec
+import polars as pl
+
+from skidpad import __version__
+from skidpad.core.wording import count_text
+from skidpad.evidence.contrasts import NOT_RUN
+from skidpad.recording.campaigns import CampaignFolder
+from skidpad.recording.ledger import E
+from skidpad.recording.results import Columns, definitions_of
+from skidpad.report.elements.page import Block, Code, Definitions, Text, words
+
+NAMED = 5  # runs
+CLOCKS = {
+    "wall_s": ("wall time", " s"),
+    "cpu_s": ("processor time", " s"),
+    "rtf": ("real-time factor", ""),
+}
+UNITS = {
+    "_m": "m",
+    "_m2": "m²",
+    "_s": "s",
+    "_kmh": "km/h",
+    "_km": "km",
+    "_pct": "%",
+    "_deg": "deg",
+    "_deg_s": "deg/s",
+}
+ENDINGS = sorted(UNITS, key=len, reverse=True)
+
+
+@dataclass(frozen=True)
+class Metric:
+    """A column of results with title and unit."""
+
+    name: str
+    unit: str
+    meaning: str
+
+    @property
+    def title(self) -> str:
+        """Its name in words, without the unit."""
+        ending = next((end for end in ENDINGS if self.name.endswith(end)), "")
+        return re.sub(r"(\d) (\d)", r"\1.\2", words(self.name.removesuffix(ending)))
+
+    @property
+    def heading(self) -> str:
+        """Title of the metric with its unit."""
+        if self.unit and self.title.endswith(" per 100"):
+            return f"{self.title} {self.unit}"
+        return f"{self.title}, {self.unit}" if self.unit else self.title
+
+
+def metrics_of(rows: type[Any]) -> list[Metric]:
+    """The metrics of a class of rows; units stand in the names (A-252)."""
+    return [
+        Metric(name, unit_of(name), f"{meaning} ({source})")
+        for name, meaning, source in definitions_of(rows)
+    ]
+
+
+def unit_of(name: str) -> str:
+    """Returns the unit that a column's suffix says."""
+    return next((UNITS[end] for end in ENDINGS if name.endswith(end)), "")
+
+
+@dataclass(frozen=True)
+class CampaignView(Generic[E]):
+    """A campaign as a report looks at it; each kind of campaign says what its rows are."""
+
+    columns: ClassVar[Columns[Any, Any]]
+    common: ClassVar[tuple[str, ...]]  # columns that are facts of the whole campaign
+
+    folder: CampaignFolder[E]
+
+    @property
+    def results(self) -> pl.DataFrame:
+        """Results of every run of the campaign."""
+        return self.folder.results
+
+    @cached_property
+    def finished(self) -> pl.DataFrame:
+        """Runs that count in denominators (decision L-7)."""
+        return self.results.filter(~pl.col("outcome").is_in(NOT_RUN))
+
+    @cached_property
+    def _run_names(self) -> dict[tuple[Any, ...], str]:
+        return self.folder.names(*self.columns.sort)
+
+    def names(self, runs: pl.DataFrame) -> list[str | None]:
+        """Names of these runs; None for one that the ledger does not know."""
+        return [self._run_names.get(key) for key in runs.select(self.columns.sort).rows()]
+
+    def values(self, column: str) -> str:
+        """All values of a column, for people."""
+        return ", ".join(sorted(map(str, self.results[column].unique().to_list())))
+
+    def facts(self) -> list[tuple[str, str]]:
+        """What all runs have in common."""
+        return [(column, self.values(column)) for column in self.common]
+
+    def missing(self) -> list[Block]:
+        """A warning that names runs without a result."""
+        gone = self.results.filter(pl.col("outcome").is_in(NOT_RUN))
+        if not len(gone):
+            return []
+        named = gone.select(*self.columns.sort, "outcome").head(NAMED).rows()
+        names = "; ".join(" ".join(str(v) for v in r if not isinstance(v, bool)) for r in named)
+        text = f"{len(gone)} of {count_text(len(self.results), 'run')} did not finish ({names}); "
+        return [Text(text + "no denominator counts them.", tone="warning")]
+
+    @cached_property
+    def metrics(self) -> list[Metric]:
+        """All metrics of the rows, those that packages added last."""
+        added = {m.name: m for entry in self.folder.entries for m in entry.added}
+        own = metrics_of(self.columns.metrics)
+        return own + [Metric(m.name, m.units, m.title) for m in added.values()]
+
+    def definitions(self) -> Definitions:
+        """Returns the definition of every metric."""
+        return Definitions([(m.name, m.unit, m.meaning) for m in self.metrics])
+
+    def provenance(self) -> list[Block]:
+        """Versions, machines, times, and what all runs have in common."""
+        lines = [
+            f"Skidpad {__version__}, results hash {self.columns.hash(self.results)}.",
+            f"Machine fingerprints: {', '.join(self.folder.fingerprints) or 'none'}.",
+            *self._times(),
+        ]
+        text = msgspec.json.format(
+            msgspec.json.encode(self.folder.configuration).decode(), indent=2
+        )
+        title = "Resolved configuration common to all runs"
+        return [Text(" ".join(lines)), Code(title, text)]
+
+    @cached_property
+    def processor_minutes(self) -> float:
+        """Processor time of all runs."""
+        timing = self.folder.timing
+        if "cpu_s" not in timing.columns:
+            return 0.0
+        return float(timing["cpu_s"].drop_nulls().drop_nans().sum()) / 60.0
+
+    def _times(self) -> list[str]:
+        parts = []
+        for column, (name, unit) in CLOCKS.items():
+            if column in self.folder.timing.columns:
+                known = self.folder.timing[column].drop_nulls().drop_nans()
+                known = known.filter(known > 0.0)
+                if len(known):
+                    least, median = known.min(), known.median()
+                    parts.append(f"{name} median {median:.2f}{unit}, least {least:.2f}{unit}")
+        return [f"Per run: {'; '.join(parts)}."] if parts else []

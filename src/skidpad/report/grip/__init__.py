@@ -1,0 +1,1 @@
+"""The reports of the friction campaign and of the threshold map."""

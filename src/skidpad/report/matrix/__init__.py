@@ -1,0 +1,1 @@
+"""The report of the ADAS-in-weather matrix."""

@@ -1,0 +1,308 @@
+"""What a reader of the matrix asks first: which functions, what the weather changes, what comes next."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import polars as pl
+
+from skidpad.core.wording import capitalize_first, count_text, list_text
+from skidpad.evidence.statistics import Interval, Rate, p_text, seeds_for_verdict
+from skidpad.evidence.verdicts import Judgement
+from skidpad.report.crashes.cards import Found
+from skidpad.report.elements.figures import (
+    POINTS_REACH,
+    Series,
+    cut_note,
+    points_with_intervals,
+)
+from skidpad.report.elements.page import Answer, Answers, Figure
+from skidpad.report.matrix.comparisons.contrasts import Contrast, by_configuration, by_weather
+from skidpad.report.matrix.crashes import Cell
+from skidpad.report.matrix.data import (
+    EVENT,
+    EVENTS,
+    REFERENCE,
+    Matrix,
+    WeatherGroup,
+    config_list,
+    config_title,
+    functions_list,
+    rate_by_seed,
+)
+from skidpad.report.matrix.next import look_next
+
+MEANS = (("mean_speed_kmh", "mean speed", "km/h"), ("dropout_pct", "dropout", "%"))
+COLOURS = {"clear sky": 1, "heavy rain": 0}  # of the palette
+MARKERS = "ovsD^P*X"
+
+
+def answers(
+    matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[Found]]
+) -> Answers:
+    """Three questions, each with its picture."""
+    if not len(matrix.finished):
+        return Answers([Answer("What happened?", "No run was finished.")])
+    return Answers([_functions(matrix), _weather(matrix), look_next(matrix, judged, crashes)])
+
+
+def terminal_answer(matrix: Matrix) -> list[str]:
+    """The first two answers as lines, and what to look at next as a command."""
+    if not len(matrix.finished):
+        return ["No run was finished."]
+    functions, weather = _functions(matrix), _weather(matrix)
+    lines = [functions.sentence, *functions.lines, weather.sentence]
+    runs = matrix.finished.filter(pl.col("config").is_in(matrix.comparison_configs))
+    worst = runs.sort(EVENTS, "config", "weather", "seed", descending=[True, *[False] * 3]).head(1)
+    for name in matrix.names(worst):
+        if (
+            name is not None
+            and worst[EVENTS][0]
+            and (folder := matrix.folder.log(name)) is not None
+        ):
+            crashes = count_text(worst[EVENTS][0], EVENT, EVENTS)
+            lines.append(f"Next: skidpad show {folder} tells of the run with {crashes}")
+    return lines
+
+
+# --- which functions
+
+
+def _functions(matrix: Matrix) -> Answer:
+    """The functions with the fewest crashes in each weather, and how sure that is.
+
+    The reference driver is a model of a human and has no functions, so it is told beside them.
+    """
+    differences = by_configuration(matrix, matrix.climates)
+    rates = {g: _rates(matrix, g) for g in matrix.climates}
+    judged = {g: {c: r[c] for c in r if c != REFERENCE} or r for g, r in rates.items()}
+    best = {g: min(r, key=lambda c: r[c].rate) for g, r in judged.items() if r}
+    parts = [_fewest(g, judged[g], judged[g][c].rate) for g, c in best.items()]
+    sentence = f"Fewest {EVENTS}: {'; '.join(parts)}.{_beside_reference(rates, judged)}"
+    least = seeds_for_verdict(len(differences))
+    if len(matrix.comparison_configs) < 2:
+        lines = []
+    elif matrix.seeds < least:
+        lines = [_too_few_seeds(matrix.seeds, least)]
+    else:
+        lines = [_sureness(matrix, g, c, differences, judged[g][c]) for g, c in best.items()]
+    return Answer(
+        "Which functions crash least, in which weather, and how sure is that?",
+        sentence,
+        lines,
+        _rate_figure(matrix, rates),
+    )
+
+
+def _fewest(group: WeatherGroup, rates: dict[str, Rate], least: float) -> str:
+    """All configurations that share the least rate of a group."""
+    found = [c for c, rate in rates.items() if rate.rate == least]
+    return f"in {group.name} {functions_list(found)} with {least:.2f} per run"
+
+
+def _beside_reference(
+    rates: dict[WeatherGroup, dict[str, Rate]], judged: dict[WeatherGroup, dict[str, Rate]]
+) -> str:
+    """A sentence with the rates of the reference driver where functions are judged without it."""
+    told = [
+        f"{r[REFERENCE].rate:.2f} in {g.name}"
+        for g, r in rates.items()
+        if REFERENCE in r and REFERENCE not in judged[g]
+    ]
+    if not told:
+        return ""
+    return f" The reference driver, a model of a careful human, had {list_text(told)}."
+
+
+def _too_few_seeds(seeds: int, least: int) -> str:
+    """Why nothing is said of differences."""
+    return (
+        f"{count_text(seeds, 'seed')} per cell cannot tell two configurations apart: what differs "
+        f"may be chance. It takes at least {least} (`--seeds {least}`)."
+    )
+
+
+def _rates(matrix: Matrix, group: WeatherGroup) -> dict[str, Rate]:
+    found = {c: rate_by_seed(matrix.within(c, group), EVENTS) for c in matrix.comparison_configs}
+    return {c: rate for c, rate in found.items() if rate is not None}
+
+
+def _sureness(
+    matrix: Matrix,
+    group: WeatherGroup,
+    best: str,
+    differences: dict[tuple[WeatherGroup, str, str], Contrast],
+    rate: Rate,
+) -> str:
+    """Which others the best one of a group surely beats, and which it cannot be told from."""
+    others = {
+        (a if b == best else b): c
+        for (g, a, b), c in differences.items()
+        if g == group and best in (a, b)
+    }
+    sure = [c for c, d in others.items() if d.is_sure]
+    same = [c for c, d in others.items() if d.identical]
+    open_ = [c for c in others if c not in sure and c not in same]
+    told = []
+    if sure:
+        largest = max(others[c].p for c in sure)
+        told.append(f"{_in_words(best)} has fewer than {config_list(sure)} ({_at_most(largest)})")
+    if open_:
+        seeds = count_text(matrix.seeds, "seed")
+        told.append(f"{seeds} cannot tell {_in_words(best)} from {config_list(open_)}")
+    if same:
+        told.append(f"{_in_words(best)} drove exactly as {config_list(same)}")
+    if not rate.events:
+        share = 100 * rate.most_runs
+        none = f"no {EVENT} in {count_text(rate.runs, 'seed')}"
+        told.append(f"{none} still allows {EVENTS} in up to {share:.0f} % of seeds (95 %)")
+    return f"{capitalize_first(group.name)}: {'; '.join(told)}."
+
+
+def _at_most(p: float) -> str:
+    return p_text(p) if p < 0.001 else f"p at most {p:.2g}"
+
+
+def _in_words(config: str) -> str:
+    return config_list([config])
+
+
+def weather_series(group: WeatherGroup, k: int, **values: Sequence[float | None]) -> Series:
+    """A series in the colour and with the mark of its weather."""
+    colour = COLOURS.get(group.name, 2 + k)
+    return Series(group.name, colour=colour, marker=MARKERS[k % len(MARKERS)], **values)
+
+
+def _rate_figure(matrix: Matrix, rates: dict[WeatherGroup, dict[str, Rate]]) -> Figure:
+    series = []
+    for k, (group, by_config) in enumerate(rates.items()):
+        found = [by_config.get(c) for c in matrix.comparison_configs]
+        limits = [ends(r.interval if r else None) for r in found]
+        low, high = zip(*limits, strict=True)
+        values = [r.rate if r else None for r in found]
+        series.append(weather_series(group, k, values=values, low=low, high=high))
+    rows = [config_title(c) for c in matrix.comparison_configs]
+    caption = (
+        f"{EVENTS.capitalize()} per run of {matrix.duration:g} s; lines are 95 % intervals. A hollow "
+        f"point has none: fewer than two seeds had a {EVENT}, which is too few for an interval and no "
+        "proof of zero."
+    )
+    caption += cut_note(series, POINTS_REACH)
+    return Figure(points_with_intervals(rows, series, f"{EVENTS} per run"), caption)
+
+
+def ends(interval: Interval | None) -> tuple[float | None, float | None]:
+    """The finite ends of an interval."""
+    if interval is None:
+        return None, None
+    low, high = (None if abs(end) == float("inf") else end for end in interval)
+    return low, high
+
+
+# --- what the weather changes
+
+
+def _weather(matrix: Matrix) -> Answer:
+    """Every climate against the first one, per configuration."""
+    question = "What does the weather change?"
+    first, *rest = matrix.climates
+    if not rest:
+        return Answer(question, f"Only {first.name} was driven.", _times_of_day(matrix))
+    changes = by_weather(matrix)
+    least = seeds_for_verdict(len(changes))
+    told = [_changes(matrix, group, changes) for group in rest]
+    if matrix.seeds < least:
+        told = [_too_few_seeds(matrix.seeds, least).replace("configurations", "weathers")]
+    elif any(not d.is_sure and not d.identical for d in changes.values()):
+        told.append("Where no difference shows, the numbers below may differ by chance.")
+    lines = [_levels(matrix, c) for c in matrix.comparison_configs]
+    return Answer(
+        question,
+        " ".join(told),
+        [*lines, *_meaning(matrix), *_times_of_day(matrix)],
+        _change_figure(matrix, rest, changes) if matrix.seeds > 1 else None,
+    )
+
+
+def _changes(
+    matrix: Matrix, group: WeatherGroup, changes: dict[tuple[str, WeatherGroup], Contrast]
+) -> str:
+    """One sentence: for which configurations a climate surely changes the interventions."""
+    mine = {c: changes[c, group] for c in matrix.comparison_configs if (c, group) in changes}
+    more = [c for c, d in mine.items() if d.is_sure and d.mean > 0.0]
+    fewer = [c for c, d in mine.items() if d.is_sure and d.mean < 0.0]
+    same = [c for c, d in mine.items() if d.identical]
+    open_ = [c for c in mine if c not in (*more, *fewer, *same)]
+    parts = [
+        f"{word} {config_list(configs)}"
+        for word, configs in (
+            (f"more {EVENTS} with", more),
+            (f"fewer {EVENTS} with", fewer),
+            ("the very same drives with", same),
+            (f"no difference that {count_text(matrix.seeds, 'seed')} can show with", open_),
+        )
+        if configs
+    ]
+    base = matrix.climates[0].name
+    return f"{capitalize_first(group.name)} against {base}: {'; '.join(parts)}."
+
+
+def _levels(matrix: Matrix, config: str) -> str:
+    """A configuration in every climate: interventions per run, speed, dropout."""
+    groups = {g: matrix.within(config, g) for g in matrix.climates}
+    rates = {g: rate for g, r in groups.items() if (rate := rate_by_seed(r, EVENTS)) is not None}
+    between = " → " if len(groups) == 2 else ", "
+    if len(rates) == len(groups) == 2:
+        told = between.join(f"{rate.rate:.2f}" for rate in rates.values())
+    else:
+        told = ", ".join(f"{rate.rate:.2f} in {g.name}" for g, rate in rates.items())
+    parts = [f"{EVENTS} per run {told}"]
+    for column, title, unit in MEANS:
+        values = [runs[column].drop_nulls() for runs in groups.values()]
+        if all(len(v) for v in values):
+            parts.append(
+                f"{title} {between.join(f'{float(v.to_numpy().mean()):.1f}' for v in values)} {unit}"
+            )
+    return f"{config_title(config)}: {'; '.join(parts)}."
+
+
+def _meaning(matrix: Matrix) -> list[str]:
+    """What the arrows and the word dropout mean."""
+    told = []
+    if len(matrix.climates) == 2:
+        first, second = matrix.climates
+        told.append(f"Arrows lead from {first.name} to {second.name}.")
+    if matrix.finished["dropout_pct"].count():
+        told.append("Dropout is the time without a target, or with one held from memory.")
+    return [" ".join(told)] if told else []
+
+
+def _times_of_day(matrix: Matrix) -> list[str]:
+    """Weathers that every configuration drove alike."""
+    groups = [g for g in matrix.weather_groups if len(g.weathers) > 1]
+    if not groups:
+        return []
+    names = list_text([f"“{g.title}”" for g in groups])
+    return [f"Within {names} every drive moved alike, seed for seed: one column each."]
+
+
+def _change_figure(
+    matrix: Matrix,
+    groups: Sequence[WeatherGroup],
+    changes: dict[tuple[str, WeatherGroup], Contrast],
+) -> Figure:
+    series = []
+    for k, group in enumerate(groups, start=1):
+        found = [changes.get((c, group)) for c in matrix.comparison_configs]
+        low, high = zip(*(ends(d.interval if d else None) for d in found), strict=True)
+        values = [d.mean if d else None for d in found]
+        series.append(weather_series(group, k, values=values, low=low, high=high))
+    rows = [config_title(c) for c in matrix.comparison_configs]
+    base = matrix.climates[0].name
+    label = f"{EVENTS} per run, minus those in {base}"
+    caption = (
+        f"What each weather adds to the {EVENTS} per run in {base}, paired by seed; to the right of "
+        "the rule is worse. Lines are 95 % intervals of each difference alone; the sentence above is "
+        f"corrected for all {len(changes)}.{cut_note(series, POINTS_REACH)}"
+    )
+    return Figure(points_with_intervals(rows, series, label, origin=0.0), caption)

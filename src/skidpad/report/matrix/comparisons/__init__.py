@@ -1,0 +1,1 @@
+"""What the matrix compares: configurations, steps of automation, factors, levels, published numbers."""

@@ -1,0 +1,126 @@
+"""The published numbers beside ours, apart from everything else, with what differs said first."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import partial
+
+from skidpad.core.wording import list_text
+from skidpad.report.elements.figures import Series, grouped_bars, panel
+from skidpad.report.elements.page import Block, Figure, Text
+from skidpad.report.elements.tables import Column, Format, Quantity, table
+from skidpad.report.matrix.data import (
+    INTERVENTIONS,
+    WEATHERS,
+    Matrix,
+    config_title,
+    published_preliminary,
+    published_value,
+    weather_title,
+)
+
+QUANTITIES = (
+    (INTERVENTIONS, "Collisions per run", "published: total collisions; ours: interventions"),
+    ("dropout_pct", "Dropout, %", "ticks without a target or persisting"),
+    ("mean_error_m", "Mean distance error, m", ""),
+    ("headway_variance_m2", "Variance of the distance error, m²", "published as headway variance"),
+    ("radar_fpr_pct", "Radar false positive rate, %", "after the lane check"),
+    ("radar_fnr_pct", "Radar false negative rate, %", "after the lane check"),
+    ("mean_speed_kmh", "Mean speed, km/h", ""),
+)
+PUBLISHED = {  # column of results: what the published experiment had, in words
+    "profile": (("thesis_text", "thesis_listing"), "the thesis's settings"),
+    "traffic": (("fixed",), "vehicles at fixed places"),
+    "sensors": (("pixels",), "camera images"),
+    "map": (("Town04",), "the map Town04"),
+}
+
+
+def differences(matrix: Matrix) -> list[str]:
+    """In what these runs are not the published experiment; every one has another simulator."""
+    found = []
+    for column, (values, words) in PUBLISHED.items():
+        here = {str(v) for v in matrix.results[column].unique()}
+        if not here <= set(values):
+            found.append(f"{words} (here: {', '.join(sorted(here))})")
+    return found
+
+
+def beside_published(matrix: Matrix) -> list[Block]:
+    """One table per published quantity, ours and theirs in each cell, and the figures with both."""
+    configs = [c for c in matrix.configs if _has_published(matrix, c)]
+    if not configs:
+        return []
+    return [
+        _words(matrix),
+        *(_table(matrix, configs, *quantity) for quantity in QUANTITIES),
+        *_figures(matrix, configs),
+    ]
+
+
+def _has_published(matrix: Matrix, config: str) -> bool:
+    return any(published_value(INTERVENTIONS, config, w) is not None for w in matrix.weathers)
+
+
+def _words(matrix: Matrix) -> Text:
+    """What the reader must know before comparing."""
+    other = differences(matrix)
+    text = (
+        "The published numbers come from one run of 500 s per cell on CARLA; they have no interval. "
+        "Nothing here was tuned to meet them."
+    )
+    if not other:
+        return Text("This is the published experiment on another simulator. " + text)
+    text = f"Not the published experiment: that had {list_text(other)}. {text}"
+    return Text(text + " `make published` drives the published experiment.", tone="warning")
+
+
+def _table(matrix: Matrix, configs: Sequence[str], column: str, caption: str, note: str) -> Block:
+    def of(weather: str, config: str) -> Quantity:
+        runs = matrix.cell(config, weather).drop_nulls(column)
+        return Quantity(
+            value=float(runs[column].mean()) if len(runs) else None,  # type: ignore[arg-type]
+            published=published_value(column, config, weather),
+        )
+
+    columns = [
+        Column[str]("configuration", config_title),
+        *(
+            Column[str](weather_title(w), partial(of, w), w, format=Format(".2f", absent="no run"))
+            for w in matrix.weathers
+            if w in WEATHERS
+        ),
+    ]
+    return table(columns, configs, f"{caption}, ours and published", note)
+
+
+def _figures(matrix: Matrix, configs: Sequence[str]) -> list[Block]:
+    weathers = [w for w in matrix.weathers if w in WEATHERS]
+    groups = [w.replace("-", "\n", 1) for w in weathers]
+    figures: list[Block] = []
+    for column, label, caption in (
+        (INTERVENTIONS, "collisions per run", "Interventions (bars) and published collisions (diamonds)."),
+        ("dropout_pct", "dropout, %", "Dropout (bars) and the published dropout (diamonds)."),
+    ):  # fmt: skip
+        series = [
+            Series(
+                f"configuration {c}",
+                [_mean(matrix, column, c, w) for w in weathers],
+                published=[published_value(column, c, w) for w in weathers],
+            )
+            for c in configs
+        ]
+        figures.append(Figure(grouped_bars(groups, series, label), caption))
+    charts = [
+        (label, Series(label, [before, after])) for label, before, after in published_preliminary()
+    ]
+    caption = (
+        "Published alone: preliminary against final script, means over the eleven clear runs that "
+        "both have. `skidpad study A-278` drives both here."
+    )
+    return [*figures, Figure(panel(["preliminary", "final"], charts), caption)]
+
+
+def _mean(matrix: Matrix, column: str, config: str, weather: str) -> float | None:
+    values = matrix.cell(config, weather)[column].drop_nulls()
+    return float(values.mean()) if len(values) else None  # type: ignore[arg-type]

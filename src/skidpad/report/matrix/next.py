@@ -1,0 +1,107 @@
+"""What should be looked at next: the commonest kind of crash, the hardest one, and the sources' claims."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import polars as pl
+
+from skidpad.core.wording import capitalize_first, count_text
+from skidpad.evidence.verdicts import Judgement, Verdict
+from skidpad.report.crashes.cards import Found, headline, severity
+from skidpad.report.elements.figures import Series, stacked_bars
+from skidpad.report.elements.page import Answer, Figure
+from skidpad.report.elements.verdicts import tally_text, unjudged_text
+from skidpad.report.matrix.crashes import Cell
+from skidpad.report.matrix.data import BASELINE, EVENT, EVENTS, Matrix, config_list, config_title
+from skidpad.report.matrix.kinds import count, kinds_of
+
+FIRST_COLOUR = 2  # of kinds: those before are weathers
+DECIDED = (Verdict.CONTRADICTED, Verdict.SUPPORTED)
+DECIDED_MAX = 3  # claims that the first page names
+QUESTION = "What should be looked at next?"
+
+
+def look_next(
+    matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[Found]]
+) -> Answer:
+    """The commonest kind of intervention, the hardest crash, and what these runs leave open."""
+    runs = {c: matrix.cell(c) for c in matrix.comparison_configs}
+    totals = {c: int(r[EVENTS].sum()) for c, r in runs.items()}
+    worst = max(totals, key=lambda c: totals[c] / max(1, len(runs[c])))
+    if not totals[worst]:
+        sentence = f"No configuration had a {EVENT}: drive harder conditions or more seeds."
+        return Answer(QUESTION, sentence, _claims(matrix, judged))
+    sentence = (
+        f"{_commonest(matrix, sum(totals.values()))} {capitalize_first(config_list([worst]))} had most "
+        f"({totals[worst]} in {count_text(len(runs[worst]), 'drive')}"
+        f"{_next_most(totals, runs, worst)})."
+    )
+    lines = [*_hardest(matrix, crashes), *_claims(matrix, judged)]
+    series = [
+        Series(
+            kind.title,
+            [count(kind, runs[c]) / max(1, len(runs[c])) for c in matrix.comparison_configs],
+            colour=FIRST_COLOUR + k,
+        )
+        for k, kind in enumerate(kinds_of(matrix.has_grades))
+    ]
+    rows = [config_title(c) for c in matrix.comparison_configs]
+    figure = Figure(
+        stacked_bars(rows, series, f"{EVENTS} per run"),
+        f"What the {EVENTS} were, every drive once.",
+    )
+    return Answer(QUESTION, sentence, lines, figure)
+
+
+def _next_most(totals: dict[str, int], runs: dict[str, pl.DataFrame], worst: str) -> str:
+    """The configuration that comes next, so that a reader sees how close it is."""
+    others = [c for c in totals if c != worst and len(runs[c])]
+    if not others:
+        return ""
+    second = max(others, key=lambda c: totals[c] / len(runs[c]))
+    return f"; next {config_list([second])} with {totals[second]} in {len(runs[second])}"
+
+
+def _commonest(matrix: Matrix, total: int) -> str:
+    """The kind that most crashes were of, and the climate in which most of these happened."""
+    compared = [matrix.cell(c) for c in matrix.comparison_configs]
+    kinds = {k: sum(count(k, r) for r in compared) for k in kinds_of(matrix.has_grades)}
+    most = max(kinds, key=lambda kind: kinds[kind])
+    told = f"{kinds[most]} of {count_text(total, EVENT, EVENTS)} were of the kind “{most.title}”"
+    if len(matrix.climates) < 2:
+        return f"{told}."
+    within = {
+        g: sum(count(most, matrix.within(c, g)) for c in matrix.comparison_configs)
+        for g in matrix.climates
+    }
+    where = max(within, key=lambda g: within[g])
+    return f"{told}, {within[where]} of them in {where.name}."
+
+
+def _claims(matrix: Matrix, judged: Sequence[Judgement]) -> list[str]:
+    """What became of the sources' claims; those that were decided are named."""
+    if matrix.seeds == 1:
+        return [unjudged_text(judged)]
+    decided = [j for verdict in DECIDED for j in judged if j.verdict is verdict]
+    named = [
+        f"{j.verdict.value.capitalize()}: “{j.finding.claim.rstrip('.')}” ({j.finding.id})."
+        for j in decided[:DECIDED_MAX]
+    ]
+    return [tally_text(judged), *named]
+
+
+def _hardest(matrix: Matrix, crashes: dict[Cell, list[Found]]) -> list[str]:
+    """The hardest crash of all compared configurations."""
+    found = [(cell, items[0]) for cell, items in crashes.items() if cell[0] != BASELINE and items]
+    if not found:
+        return []
+    (config, weather), (crash, _, _, run) = max(found, key=lambda f: severity(f[1][0]))
+    group = next(g for g in matrix.weather_groups if weather in g.weathers)
+    where = f"{config_list([config])} in {group.name}, run {run.name} at {crash.t:.0f} s"
+    return [f"The hardest crash: {_as_fragment(headline(crash))}, {where}. Its card stands below."]
+
+
+def _as_fragment(headline_text: str) -> str:
+    """A headline within a sentence."""
+    return headline_text[:1].lower() + headline_text[1:]

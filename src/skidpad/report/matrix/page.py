@@ -1,0 +1,147 @@
+"""The report of a matrix campaign: from results.parquet and the run folders to one page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from skidpad.evidence.drive.acceptance import ACCEPTANCE
+from skidpad.evidence.drive.findings import FINDINGS, astray
+from skidpad.evidence.statistics import DISPERSION_ASSUMED
+from skidpad.evidence.verdicts import Judgement, judge
+from skidpad.report.crashes.cards import Found
+from skidpad.report.elements.page import Block, Page, Section, Text, write_report_page
+from skidpad.report.elements.verdicts import unjudged_text, verdict_blocks
+from skidpad.report.matrix import figures as matrix_figures
+from skidpad.report.matrix import tables as matrix_tables
+from skidpad.report.matrix.answers import answers
+from skidpad.report.matrix.baseline import baseline_text
+from skidpad.report.matrix.comparisons.factors import factors
+from skidpad.report.matrix.comparisons.parity import Parity, load_parity, parity_section
+from skidpad.report.matrix.comparisons.published import beside_published
+from skidpad.report.matrix.comparisons.sides import side_blocks
+from skidpad.report.matrix.comparisons.steps import step_blocks
+from skidpad.report.matrix.crashes import Cell, crash_sections, found_crashes, worst_of_each
+from skidpad.report.matrix.data import Matrix, load_matrix
+from skidpad.report.matrix.envelope import envelope_blocks
+from skidpad.report.matrix.headline import headline_numbers, headline_table
+from skidpad.report.matrix.readings import reading_blocks
+from skidpad.report.matrix.real_time import real_time_blocks
+from skidpad.report.matrix.ways import way_blocks
+
+CLAIMS = (*FINDINGS, *ACCEPTANCE)
+GRADED = """A crash is a serious contact or a departure. A contact is serious when it changes the speed of \
+either side by 5 km/h or more; with a pedestrian or a two-wheeler every contact is. A departure leads into a \
+barrier, takes all wheels off every lane for 1 s or the car more than 3 m beyond the edge, or ends facing \
+the wrong way. An intervention puts the car back on its lane; the source counts these as collisions."""
+UNGRADED = """These results are older than the grading of contacts. A crash is every intervention: what puts \
+the car back on its lane after a contact, a departure from the road, or because it faces the wrong way."""
+LEAD = f"""\
+Each row is a set of driving functions, each column a weather. Seeds are common to all cells, so \
+differences between cells are paired. Intervals are 95 %, over seeds, from 8 seeds on. Those of counts hold \
+while the variance of counts is at most {DISPERSION_ASSUMED:g} times their mean. Where fewer than two seeds \
+had an event, the largest share of seeds that have one stands instead: it holds however events clump."""
+
+
+def write_report(folder: Path) -> Path:
+    """Write report.html into a campaign's folder; returns its path."""
+    return write_report_page(build_page(load_matrix(folder)), folder)
+
+
+def build_page(matrix: Matrix) -> Page:
+    """All sections in the order in which a reader asks."""
+    claims = [f for f in CLAIMS if not f.study]
+    judged = judge(claims, [matrix.results] * len(claims), astray(matrix.results))
+    crashes = found_crashes(matrix)
+    parity = load_parity(matrix)
+    sections = [
+        Section("What happened", _first(matrix, judged, crashes)),
+        Section(
+            "Crashes and interventions",
+            matrix_tables.collisions(matrix) + matrix_figures.collisions(matrix),
+        ),
+        Section("Findings of the sources, judged", _verdicts(matrix, judged)),
+        Section(
+            "Lane keeping and perception",
+            matrix_tables.others(matrix) + matrix_figures.others(matrix),
+        ),
+        *([Section("Functions and cruise target", varied)] if (varied := factors(matrix)) else []),
+        Section("One step at a time", step_blocks(matrix)),
+        Section("Two configurations side by side", side_blocks(matrix)),
+        Section("Where it happened", way_blocks(matrix, crashes)),
+        Section("Every crash", crash_sections(matrix, crashes)),
+        Section("Beside the published numbers", beside_published(matrix)),
+        Section("Pixels against objects", parity_section(parity)),
+        *(
+            [Section("Further sensors and functions", read)]
+            if (read := reading_blocks(matrix))
+            else []
+        ),
+        *([Section("Speed envelope", bound)] if (bound := envelope_blocks(matrix)) else []),
+        Section("All metrics", matrix_tables.per_weather(matrix)),
+        Section("Real time", real_time_blocks(matrix)),
+        Section("Definitions", [matrix.definitions()]),
+        Section("Configuration and versions", matrix.provenance()),
+    ]
+    return Page(
+        title="Driver assistance in weather",
+        subtitle=matrix.subtitle,
+        facts=[*matrix.facts(), *_processor_time(matrix, parity)],
+        sections=sections,
+    )
+
+
+def _first(
+    matrix: Matrix, judged: Sequence[Judgement], crashes: dict[Cell, list[Found]]
+) -> list[Block]:
+    """What is read first: answers, headline numbers, the worst crashes, and how to read the rest."""
+    return [
+        *matrix.missing(),
+        answers(matrix, judged, crashes),
+        Text(GRADED if matrix.has_grades else UNGRADED),
+        *baseline_text(matrix),
+        headline_numbers(matrix),
+        headline_table(matrix),
+        matrix_figures.speed_figure(matrix),
+        *worst_of_each(crashes),
+        Text(LEAD),
+        *_alike(matrix),
+    ]
+
+
+def _processor_time(matrix: Matrix, parity: Parity | None) -> list[tuple[str, str]]:
+    """What each part of the campaign took, in processor minutes."""
+    parts = [matrix, *([parity.pixels] if parity else [])]
+    told = [
+        f"{m.values('sensors')} {m.processor_minutes:.1f} min"
+        for m in parts
+        if m.processor_minutes > 0.0
+    ]
+    return [("processor time", ", ".join(told))] if told else []
+
+
+def _alike(matrix: Matrix) -> list[Block]:
+    groups = {tuple(g.weathers) for g in matrix.weather_groups}
+    others = [(c, w) for c, w in matrix.same_weather if tuple(w) not in groups]
+    if not others:
+        return []
+    pairs = "; ".join(f"configuration {c}: {' = '.join(weathers)}" for c, weathers in others)
+    text = f"Drives that moved alike in several weathers ({pairs}) count once in totals."
+    return [Text(text, tone="note")]
+
+
+def _verdicts(matrix: Matrix, judged: Sequence[Judgement]) -> list[Block]:
+    if matrix.seeds == 1:
+        return [Text(unjudged_text(judged))]
+    intro = Text(
+        "Each claim, its test and its margin were written down before results of the matrix were "
+        "seen. One rule is not blind: that a margin comes before significance, so that a difference "
+        "below its margin supports nothing, is shared by all reports and was settled after results "
+        "of the friction campaign had been seen. "
+        "By construction: both sides must be the same drive. Same drives: they happened to be, what "
+        "differs never came into play. A v behind an id: the same claim for crashes with vehicles alone. "
+        "The sources call an intervention a fatal collision, so claims and columns carry that name."
+    )
+    own = ", ".join(f.id for f in CLAIMS if f.study)
+    rest = Text(f"Claims that need runs of their own are judged by `skidpad study`: {own}.")
+    return [intro, *verdict_blocks(judged), rest]

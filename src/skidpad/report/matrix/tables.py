@@ -1,0 +1,349 @@
+"""Tables of the matrix report (A-256, A-258)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import partial
+
+import polars as pl
+
+from skidpad.core.wording import count_text
+from skidpad.evidence.contrasts import per_seed
+from skidpad.evidence.statistics import (
+    ASSUMED,
+    UNITS_FROM,
+    Interval,
+    Rate,
+    mean_limits,
+    no_limits_text,
+    poisson_interval,
+    rate_remark,
+)
+from skidpad.recording.matrix import Metrics
+from skidpad.report.elements.campaign import Metric, metrics_of
+from skidpad.report.elements.page import Block, Cell, Table
+from skidpad.report.elements.tables import Column, Format, Quantity, table
+from skidpad.report.matrix.data import (
+    EVENTS,
+    INTERVENTIONS,
+    Matrix,
+    WeatherGroup,
+    config_title,
+    rate_by_seed,
+)
+
+METRICS = {m.name: m for m in metrics_of(Metrics)}
+NAMES = {  # one name for one quantity, in all tables
+    INTERVENTIONS: "interventions",
+    "road_departures": "departures",
+    "lane_invasions": "solid markings crossed",
+    "ttc_below_1_5_s": "time with a TTC below 1.5 s",
+    "mean_error_m": "mean distance error",
+    "headway_variance_m2": "variance of the distance error",
+    "radar_fpr_pct": "radar false positives",
+    "radar_fnr_pct": "radar false negatives",
+}
+RATE = Format(".2f", absent="no run")
+MEANS = (
+    ("dropout_pct", "Dropout: ticks without a target or persisting, %"),
+    ("headway_variance_m2", "Variance of the distance error, m²"),
+    ("mean_error_m", "Mean distance error, m"),
+    ("radar_fpr_pct", "Radar false positive rate after the lane check, %"),
+    ("radar_fnr_pct", "Radar false negative rate after the lane check, %"),
+    ("mean_speed_kmh", "Mean speed, km/h"),
+)  # fmt: skip
+KINDS = (
+    ("collisions_vehicle", "vehicles", "recoveries after hitting or being hit by a vehicle"),
+    (
+        "rear_ended",
+        "of these struck from behind",
+        "another vehicle drove into the ego; until the morning of 2026-11-25 touches at the side counted too",
+    ),
+    ("collisions_static", "barriers and posts", "recoveries after hitting anything that stands"),
+    ("off_road", "off the road", "left all lanes and was put back"),
+    (
+        "bend_exits",
+        "in a bend without a lead",
+        "of the two before: speed alone was too much for the bend",
+    ),
+    ("wrong_way", "wrong-way corrections", ""),
+    ("stuck_relocations", "stuck and put back", "no intervention"),
+)
+UNGRADED_TITLES = {"rear_ended": "of these struck from behind or touched sideways"}
+CONTACTS = ("contacts", "contacts", "of the ego, also those within the cool-down of a recovery")
+GRADES = (
+    ("contacts_light", "below 5 km/h", "of the contacts with road users, by change of speed"),
+    ("contacts_medium", "5 to 20 km/h", "the same, or slower with a person or two wheels"),
+    ("contacts_heavy", "above 20 km/h", "the same"),
+    ("contacts_vulnerable", "with persons or two wheels", "of these"),
+    ("contacts_static", "with what stands", "barriers, posts"),
+    ("contacts_repeated", "the same one again", "touched once more within 8 s, graded once"),
+)
+COUNTS = frozenset(  # events of which a mean is a rate
+    (
+        *("serious_contacts", "road_departures", INTERVENTIONS, "interventions", "fatal_first"),
+        *("crashes_vehicle", "crashes_vehicle_first", "road_departures_first", "lane_invasions"),
+        *(name for name, *_ in (*KINDS, CONTACTS, *GRADES)),
+    )
+)
+
+GRADES_NOTE = (
+    "Classes are of contacts with road users, by the larger change of speed of the two; persons and two "
+    "wheels are among them and never in the lowest. The three classes, what stands and repeated "
+    "touches add up to all contacts."
+)
+BACKGROUND = (
+    ("traffic_contacts", "contacts", "of two background vehicles, first touch"),
+    ("traffic_contacts_after_ego", "soon after the ego's", "within 20 s of a contact of the ego"),
+    ("traffic_put_back", "put back", "stood without a cause or left the lane for 10 s"),
+    ("traffic_moved", "moved", "far from the ego, and entered anew nearer to it"),
+)
+
+BACKGROUND_NOTE = (
+    "Contacts of two background vehicles with each other. Put back: a vehicle that stood without a "
+    "cause or left the lane for 10 s. Moved: taken from far away and entered anew nearer to the ego, "
+    "which keeps the traffic around it dense."
+)
+
+
+def collisions(matrix: Matrix) -> list[Block]:
+    """Crashes, interventions, and what they were."""
+    return [
+        count_table(matrix, EVENTS, crash_caption(matrix)),
+        *(
+            [count_table(matrix, "serious_contacts", "Serious contacts per run")]
+            if matrix.has_grades
+            else []
+        ),
+        count_table(matrix, "road_departures", "Departures from the road per run"),
+        count_table(matrix, INTERVENTIONS, "Interventions per run (published as collisions)"),
+        count_table(
+            matrix, "fatal_first", "Interventions per run that are the first of their chain"
+        ),
+        kinds_table(matrix),
+        grades_table(matrix),
+        background_table(matrix),
+    ]
+
+
+def crash_caption(matrix: Matrix) -> str:
+    """What a crash is in these results."""
+    if matrix.has_grades:
+        return "Crashes per run: serious contacts and departures"
+    return "Crashes per run: interventions, as these results grade no contact"
+
+
+def others(matrix: Matrix) -> list[Block]:
+    """Lane invasions, dropouts and radar errors."""
+    return [
+        count_table(matrix, "lane_invasions", "Solid markings crossed per run"),
+        *(mean_table(matrix, column, caption) for column, caption in MEANS),
+    ]
+
+
+def by_weather(
+    matrix: Matrix,
+    of: Callable[[WeatherGroup | None, str], Quantity],
+    format: Format,
+    caption: str,
+    note: str,
+) -> Table:
+    """One row per configuration, one column per weather, and one in which each drive counts once.
+
+    Weathers that every configuration drove alike are one column.
+    """
+    columns = [
+        Column[str]("configuration", config_title),
+        *(
+            Column[str](g.title, partial(of, g), ", ".join(g.weathers), format=format)
+            for g in matrix.weather_groups
+        ),
+        Column[str]("all", partial(of, None), "every drive once", format=format),
+    ]
+    return table(columns, matrix.configs, caption, note)
+
+
+def count_table(matrix: Matrix, column: str, caption: str) -> Table:
+    """Events per run with intervals."""
+    rates = {
+        (c, g): rate_by_seed(matrix.within(c, g), column)
+        for c in matrix.configs
+        for g in matrix.weather_groups
+    }
+    top = max(
+        (r.rate for (c, _), r in rates.items() if r and c in matrix.comparison_configs), default=0.0
+    )
+
+    def of(group: WeatherGroup | None, config: str) -> Quantity:
+        if group is None:
+            return rate_quantity(matrix.rate(column, config))
+        shade = top or 1.0 if config in matrix.comparison_configs else None
+        return rate_quantity(rates[config, group], shade)
+
+    note = (
+        f"Per run of {matrix.duration:g} s; small: 95 % interval {ASSUMED}.{few_seeds_note(matrix)}"
+    )
+    return by_weather(matrix, of, RATE, caption, note)
+
+
+def rate_quantity(rate: Rate | None, top: float | None = None) -> Quantity:
+    """Events per run; shaded against the rate `top`."""
+    if rate is None:
+        return Quantity(value=None)
+    return Quantity(
+        value=rate.rate,
+        interval=rate.interval,
+        remark=remark_on(rate),
+        heat=None if top is None else (rate.rate / top) ** 0.5,
+        hint=rate_hint(rate),
+    )
+
+
+def remark_on(rate: Rate) -> str:
+    """What stands beside a rate; of a single seed nothing, the table's note says it once."""
+    return rate_remark(rate, "seed") if rate.runs > 1 else ""
+
+
+def few_seeds_note(matrix: Matrix) -> str:
+    """The sentence that stands once below a table, in place of limits that so few seeds cannot give."""
+    if matrix.seeds >= UNITS_FROM:
+        return ""
+    return f" {no_limits_text(matrix.seeds, 'seed')}."
+
+
+def rate_hint(rate: Rate) -> str:
+    """What a rate rests on."""
+    events, seeds = count_text(rate.events, "event"), count_text(rate.runs, "seed")
+    return f"{events}, {seeds}"
+
+
+def mean_table(matrix: Matrix, column: str, caption: str) -> Table:
+    """Means over seeds with intervals."""
+
+    def of(group: WeatherGroup | None, config: str) -> Quantity:
+        runs = matrix.cell(config) if group is None else matrix.within(config, group)
+        return mean_quantity(runs, column)
+
+    note = f"Mean over seeds; small: 95 % interval over seeds.{few_seeds_note(matrix)}"
+    return by_weather(matrix, of, Format(), caption, note)
+
+
+def metric_quantity(runs: pl.DataFrame, column: str) -> Quantity:
+    """The mean of a metric over seeds; of events their rate, with the interval it has everywhere."""
+    return (
+        rate_quantity(rate_by_seed(runs, column))
+        if column in COUNTS
+        else mean_quantity(runs, column)
+    )
+
+
+def mean_quantity(runs: pl.DataFrame, column: str) -> Quantity:
+    """Mean over seeds, of each the mean of its runs; one seed has no interval."""
+    known = per_seed(runs.drop_nulls(column), pl.col(column).cast(pl.Float64)).to_numpy()
+    limits = mean_limits(known)
+    return Quantity(
+        value=float(known.mean()) if known.size else None,
+        interval=None if limits is None else possible_part(limits, column, float(known.min())),
+        remark=""
+        if limits or not known.size
+        else _without_limits(known.size, runs["seed"].n_unique()),
+        hint=count_text(known.size, "seed") if known.size else "",
+    )
+
+
+def _without_limits(known: int, seeds: int) -> str:
+    """Why a mean has no limits; of so few seeds in all the table's note says it once."""
+    if seeds < UNITS_FROM:
+        return ""
+    return no_limits_text(known, "seed") if known >= UNITS_FROM else f"{known} of {seeds} seeds"
+
+
+def possible_part(limits: Interval, column: str, least: float) -> Interval:
+    """The part of an interval in which the quantity can lie: no metric of a run is negative, and no
+    share above 100 %. least: the least value seen."""
+    low, high = limits
+    most = 100.0 if "_pct" in column else float("inf")
+    return Interval(max(low, min(0.0, least)), min(high, most))
+
+
+def kinds_table(matrix: Matrix) -> Table:
+    """What put the car back, as counts of each configuration."""
+    titles = {} if matrix.has_grades else UNGRADED_TITLES
+    kinds = [(kind, titles.get(kind, title), words) for kind, title, words in KINDS]
+    return _counts(matrix, kinds, "What the interventions were: counts, every drive once")
+
+
+def grades_table(matrix: Matrix) -> Table:
+    """How hard the contacts were."""
+    grades = GRADES if matrix.has_grades else ()
+    note = GRADES_NOTE if grades else ""
+    caption = "What the contacts were: counts, every drive once"
+    return _counts(matrix, (CONTACTS, *grades), caption, note)
+
+
+def _counts(
+    matrix: Matrix, kinds: Sequence[tuple[str, str, str]], caption: str, note: str = ""
+) -> Table:
+    def name(config: str) -> Cell:
+        runs = matrix.cell(config)
+        note = f"{count_text(len(runs), 'run')}, {runs['distance_km'].sum():,.0f} km"
+        return Cell(config_title(config), note=note)
+
+    def count(kind: str, config: str) -> int:
+        return int(matrix.cell(config)[kind].sum())
+
+    columns = [
+        Column("configuration", name),
+        *(Column[str](title, partial(count, kind), words) for kind, title, words in kinds),
+    ]
+    return table(columns, matrix.configs, caption, note)
+
+
+def background_table(matrix: Matrix) -> Table:
+    """How whole the background stayed in each weather, over the compared configurations."""
+
+    def total(column: str, group: WeatherGroup) -> float:
+        return float(sum(matrix.within(c, group)[column].sum() for c in matrix.comparison_configs))
+
+    def rate(group: WeatherGroup) -> Quantity:
+        km, contacts = total("traffic_km", group), int(total("traffic_contacts", group))
+        if km <= 0.0:
+            return Quantity(value=None)
+        return Quantity(
+            value=100.0 * contacts / km, interval=poisson_interval(contacts, km / 100.0)
+        )
+
+    columns = [
+        Column[WeatherGroup]("weather", lambda group: group.title),
+        Column[WeatherGroup]("distance", partial(total, "traffic_km"), "of all of them", "km"),
+        *(
+            Column[WeatherGroup](title, partial(total, column), note, format=Format(".0f"))
+            for column, title, note in BACKGROUND
+        ),
+        Column[WeatherGroup]("per 100 km", rate, "of the contacts, exact 95 % interval"),
+    ]
+    return table(
+        columns, matrix.weather_groups, "Contacts among background vehicles", BACKGROUND_NOTE
+    )
+
+
+def per_weather(matrix: Matrix) -> list[Block]:
+    """Every metric of every cell, one table per configuration (A-256)."""
+    return [_metrics_table(matrix, config) for config in matrix.configs]
+
+
+def _metrics_table(matrix: Matrix, config: str) -> Table:
+    def of(group: WeatherGroup, metric: Metric) -> Quantity:
+        return replace(metric_quantity(matrix.within(config, group), metric.name), remark="")
+
+    columns = [
+        Column[Metric]("metric", lambda m: Cell(m.heading, note=m.meaning)),
+        *(
+            Column[Metric](g.title, partial(of, g), ", ".join(g.weathers))
+            for g in matrix.weather_groups
+        ),
+    ]
+    note = "Means over seeds; small: 95 % interval, none where all seeds are alike."
+    found = table(columns, matrix.metrics, config_title(config), note, sortable=False)
+    return replace(found, folded=True)

@@ -1,0 +1,1 @@
+"""The page of scenarios that were played."""

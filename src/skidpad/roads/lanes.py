@@ -40,6 +40,7 @@ class Marking(IntEnum):
     SOLID_BROKEN = 4
     BROKEN_SOLID = 5
     OTHER = 6
+    CURB = 7  # a kerb stone: no paint; what lies beyond it and is no carriageway lies higher
 
 
 class LaneSamples(NamedTuple):

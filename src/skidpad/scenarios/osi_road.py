@@ -44,6 +44,7 @@ MARKS = {  # LaneBoundary.Classification: type; of two lines the nearer one coun
     Marking.SOLID_BROKEN: "SOLID_LINE",
     Marking.BROKEN_SOLID: "DASHED_LINE",
     Marking.OTHER: "OTHER",
+    Marking.CURB: "CURB",
 }
 SIGNS = {
     SignalKind.STOP: "STOP",

@@ -39,6 +39,8 @@ SURFACE: dict[LaneKind, tuple[SemanticClass, Material]] = {
     LaneKind.MEDIAN: (SemanticClass.TERRAIN, Material.MEDIAN),
     LaneKind.OTHER: (SemanticClass.ROAD, Material.SHOULDER),
 }
+RAISED = (LaneKind.SIDEWALK, LaneKind.MEDIAN, LaneKind.BORDER, LaneKind.OTHER)  # beyond a kerb
+KERB_HEIGHT, KERB_WIDTH = 0.12, 0.15  # m, of a kerb that the file names and gives no size
 DRIVABLE = (LaneKind.DRIVING, LaneKind.RAMP)
 MIN_WIDTH = 0.02  # m; a lane narrower than this over a whole piece is not drawn
 
@@ -123,6 +125,8 @@ def _stations(s: NDArray[np.float64], chord: float) -> NDArray[np.intp]:
 def _levels(piece: Edges, lanes: LaneTable, lane: int, outer: NDArray[np.bool_]) -> list[Mesh]:
     kind = LaneKind(int(lanes.kind[lane]))
     label, material = SURFACE[kind]
+    ground = piece
+    piece, is_raised = _raise_beyond_kerbs(piece, kind)
     meshes = []
     for level, chord in enumerate(CHORDS):
         at = _stations(piece.s, chord)
@@ -130,12 +134,41 @@ def _levels(piece: Edges, lanes: LaneTable, lane: int, outer: NDArray[np.bool_])
         for side, is_outer in enumerate(outer):
             if is_outer:
                 parts.append(_skirt(piece, at, side))
+            if (is_raised or is_outer) and level < LEVELS - 1:
+                parts += _kerb(ground, at, side, is_raised)
         if level < LEVELS - 1:  # beyond that a line is a quarter of a pixel wide
             parts.append(_paint_edge(piece, at, level, 1))
             if kind in DRIVABLE and lanes.left[lane] < 0:
                 parts.append(_paint_edge(piece, at, level, 0))
         meshes.append(merge(parts))
     return meshes
+
+
+def _raise_beyond_kerbs(piece: Edges, kind: LaneKind) -> tuple[Edges, bool]:
+    """Returns the piece as high as the kerbs at its edges, and whether it has any."""
+    kerbs = (piece.marking_left == Marking.CURB) | (piece.marking_right == Marking.CURB)
+    if kind not in RAISED or not kerbs.any():
+        return piece, False
+    lift = np.stack([np.zeros(len(kerbs)), np.zeros(len(kerbs)), KERB_HEIGHT * kerbs], axis=1)
+    return piece._replace(left=piece.left + lift, right=piece.right + lift), True
+
+
+def _kerb(piece: Edges, at: NDArray[np.intp], side: int, inside: bool) -> list[Mesh]:
+    """Returns the stones of a kerb on one edge of a piece, which lies inside or outside the edge."""
+    style = (piece.marking_left, piece.marking_right)[side][at]
+    stretches = np.flatnonzero((style[:-1] == Marking.CURB) & (style[1:] == Marking.CURB))
+    if not len(stretches):
+        return []
+    pairs = np.stack([stretches, stretches + 1], axis=1)
+    foot = (piece.left, piece.right)[side][at]
+    outward = piece.normal[at] * (KERB_WIDTH if side == 0 else -KERB_WIDTH)
+    up = np.array([0.0, 0.0, KERB_HEIGHT + (MARKING_LIFT if inside else 0.0)])
+    behind = foot - outward if inside else foot + outward
+    look = (SemanticClass.SIDEWALK, Material.KERB)
+    faces = [patches(foot + up, foot, pairs, *look), patches(behind + up, foot + up, pairs, *look)]
+    if not inside:
+        faces.append(patches(behind + up, behind, pairs, *look))
+    return faces
 
 
 def _skirt(piece: Edges, at: NDArray[np.intp], side: int) -> Mesh:

@@ -52,7 +52,7 @@ def bake(text: bytes, name: str, file: str = "") -> BakedMap:
         signals=signals._replace(
             **{k: np.round(getattr(signals, k), DIGITS[k]) for k in ("x", "y", "z", "s", "heading")}
         ),
-        roadside=roadside(document, signals),
+        roadside=roadside(document, signals, shapes),
         geo_reference=document.geo_reference,
         ego_start=_ego_start(document),
     )

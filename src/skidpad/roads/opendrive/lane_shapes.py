@@ -54,6 +54,7 @@ MARKINGS = {
     "solid solid": Marking.SOLID_SOLID,
     "solid broken": Marking.SOLID_BROKEN,
     "broken solid": Marking.BROKEN_SOLID,
+    "curb": Marking.CURB,
 }
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import cos, sin
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import SignalTable
 from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
+from skidpad.roads.opendrive.lane_shapes import LaneShape
 from skidpad.roads.opendrive.signals import road_place, signal_heads
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, ParkingSpace, Roadside
 
@@ -54,7 +55,7 @@ LABELS = {
 }
 
 
-def roadside(document: Document, signals: SignalTable) -> Roadside:
+def roadside(document: Document, signals: SignalTable, shapes: Sequence[LaneShape]) -> Roadside:
     """Only what the file says; nothing is made up for files without objects."""
     read = Reader(document.file)
     barriers: list[Barrier] = []
@@ -80,10 +81,11 @@ def roadside(document: Document, signals: SignalTable) -> Roadside:
                 parking.append(_parking(read, road, node))
             elif type_ in LABELS:
                 boxes += _boxes(read, road, node, type_)
+    heads, posts = signal_heads(document, signals, shapes)
     return Roadside(
         tuple(barriers),
-        tuple(boxes),
-        signal_heads(document, signals),
+        (*boxes, *posts),
+        heads,
         tuple(crosswalks),
         tuple(parking),
     )

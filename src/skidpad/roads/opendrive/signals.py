@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.geometry import wrap_angle
+from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import SignalKind, SignalTable
 from skidpad.roads.opendrive.document import Document, Node, Reader, RoadRecord
 from skidpad.roads.opendrive.lane_shapes import LaneKey, LaneShape
 from skidpad.roads.opendrive.links import DRIVABLE
-from skidpad.roads.roadside import SignalHead
+from skidpad.roads.roadside import Box, SignalHead
 
 LIGHTS = {"1000001", "1000007", "1000008", "1000009", "1000010", "1000011"}  # vehicle lights
 KINDS = {
@@ -24,6 +25,15 @@ KINDS = {
 STOP_LINE = "294"  # German catalogue, as all numbers here
 STOP_LINE_REACH = 40.0  # m between a head beyond a crossing and its stop line
 HEAD_SIZE = 1.0  # m, height of a head whose file gives none
+# A light whose lower edge the file puts lower than this is one whose zOffset is the foot of its post.
+LOWEST_HEAD = 1.0  # m above the road (assumption; pedestrians must pass below a head)
+# Lower edges of heads on posts beside and on arms above a road: MUTCD 2009, section 4D.15, asks for
+# at least 8 ft and 15 ft, and 15 ft is 4.6 m.
+ON_POST, ABOVE_ROAD = 2.4, 5.0  # m
+POST_WIDTH = 0.15  # m
+POST_RGB = (120, 120, 125)
+STOREY = 3.0  # m of height between roads one above the other
+BESIDE = 0.2  # m between a post and the lanes, below which it stands on the road
 
 
 class Place(NamedTuple):
@@ -93,24 +103,49 @@ def signal_table(
     )
 
 
-def signal_heads(document: Document, table: SignalTable) -> tuple[SignalHead, ...]:
-    """A head for every light that governs some lane."""
+def signal_heads(
+    document: Document, table: SignalTable, shapes: Sequence[LaneShape]
+) -> tuple[tuple[SignalHead, ...], tuple[Box, ...]]:
+    """Returns a head for every light that governs some lane, and the posts that heads need.
+
+    OpenDRIVE's zOffset is the lower edge of a head. Several editors write the foot of the post
+    instead, so that the head would stand in the ground: such a head is put on a post of its own.
+    """
     read = Reader(document.file)
-    heads = {}
+    heads, posts = {}, []
     for _road, node in _signals(document):
         signal = read.id(node)
         governed = np.flatnonzero((table.id == signal) & (table.kind == SignalKind.LIGHT))
         if len(governed):
             i = governed[0]
-            middle = 0.5 * read.number(node, "height", HEAD_SIZE)
-            heads[signal] = SignalHead(
-                signal,
-                float(table.x[i]),
-                float(table.y[i]),
-                float(table.z[i]) + middle,
-                float(table.heading[i]),
-            )
-    return tuple(heads[k] for k in sorted(heads))
+            x, y, z, heading = (float(v[i]) for v in (table.x, table.y, table.z, table.heading))
+            lower, middle = z, 0.5 * read.number(node, "height", HEAD_SIZE)
+            above = read.number(node, "zOffset", 0.0)
+            if above < LOWEST_HEAD:
+                stands = not _is_on_lane(shapes, x, y, z)
+                lower = round(z - above + (ON_POST if stands else ABOVE_ROAD), 5)
+                if stands and signal not in heads:
+                    posts.append(_post(x, y, min(z, z - above), heading, lower))
+            heads[signal] = SignalHead(signal, x, y, lower + middle, heading)
+    return tuple(heads[k] for k in sorted(heads)), tuple(posts)
+
+
+def _post(x: float, y: float, z: float, heading: float, top: float) -> Box:
+    """Returns the post from z up to `top`."""
+    label, height = int(SemanticClass.POLE), round(top - z, 5)
+    x, y, z, yaw = (round(v, 5) for v in (x, y, z, heading))
+    return Box(label, x, y, z, yaw, POST_WIDTH, POST_WIDTH, height, rgb=POST_RGB)
+
+
+def _is_on_lane(shapes: Sequence[LaneShape], x: float, y: float, z: float) -> bool:
+    """Tells whether a post at this place would stand on a lane that is driven on, or touch it."""
+    for shape in shapes:
+        if shape.kind not in DRIVABLE:
+            continue
+        away = np.hypot(shape.x - x, shape.y - y) - 0.5 * shape.width
+        if ((away < BESIDE) & (np.abs(shape.z - z) < STOREY)).any():
+            return True
+    return False
 
 
 def _order(row: _Row) -> tuple[int, float, int]:

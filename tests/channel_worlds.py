@@ -124,12 +124,12 @@ class Listed:
     rows: list
 
     def __post_init__(self) -> None:
-        from skidpad.recording.channels import Losses
+        from skidpad.recording.channels.mcap_files import Losses
 
         self.losses = Losses()
 
     def messages(self):
-        from skidpad.recording.channels import Message
+        from skidpad.recording.channels.mcap_files import Message
 
         for channel, item in self.rows:
             yield Message(channel, item.t, item)

@@ -21,8 +21,8 @@ from channel_worlds import frame
 from programs import require_program
 from skidpad.core.channels import Cycle
 from skidpad.core.vocabulary import HazardType
-from skidpad.recording.hazard_text import HEADER
-from skidpad.recording.hazards import HazardRecord, InvolvedObject, encode_record
+from skidpad.recording.hazards.records import HazardRecord, InvolvedObject, encode_record
+from skidpad.recording.hazards.text import HEADER
 
 NOW = 1_790_000_000.0
 

@@ -20,8 +20,8 @@ from skidpad.core.states import (
     WorldTruth,
 )
 from skidpad.core.vocabulary import LightState, Supervision
-from skidpad.recording.runlog import LogHeader, RunLog
-from skidpad.recording.ticks import TickLog
+from skidpad.recording.run.log import LogHeader, RunLog
+from skidpad.recording.run.ticks import TickLog
 
 DT = 0.05
 

@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.recipe import Driven, Recipe
-from skidpad.recording.ledger import Entry
-from skidpad.recording.results import Columns, Timing, metric
+from skidpad.recording.campaign.ledger import Entry
+from skidpad.recording.campaign.results import Columns, Timing, metric
 
 SHARES = {"sure": 1.0, "even": 0.5}
 

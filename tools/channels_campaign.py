@@ -33,7 +33,7 @@ import channels_tables
 import monitor_drives
 from skidpad.campaign.channels import SEEDS_EACH
 from skidpad.evidence.channels.redundancy import compare_drivers
-from skidpad.recording.channel_drives import read_outcomes
+from skidpad.recording.channels.drives import read_outcomes
 
 ROOT = Path(__file__).resolve().parents[1]
 RESULTS = ROOT / "docs" / "results" / "channels"

@@ -42,7 +42,7 @@ from skidpad.fleet.identity import digest
 from skidpad.fleet.service import Places, open_fleet, open_store
 from skidpad.fleet.store.accounts import add_vehicle
 from skidpad.fleet.store.tables import batches, hazards
-from skidpad.recording.hazard_text import HEADER
+from skidpad.recording.hazards.text import HEADER
 
 HEAD = {
     "type": "ego_tailgating", "profile": "practical", "forms": "corrected", "t_start": 1.0,

@@ -37,7 +37,7 @@ from skidpad.fleet.store.later import series
 from skidpad.fleet.store.tables import batches, drives, hazards
 from skidpad.fleet.warehouse import DAY, Warehouse
 from skidpad.fleet.words import Principal, Role
-from skidpad.recording.hazard_text import HEADER
+from skidpad.recording.hazards.text import HEADER
 
 P95_MS, SHOWS_S = 300.0, 10.0  # asked of the dashboard
 PAGES = ("/", "/places", "/case", "/changes")

@@ -49,9 +49,9 @@ from skidpad.evidence.channels.matching import Span, Tally, Weighed, score, tall
 from skidpad.evidence.channels.tracked.distance import SafeDistance
 from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, Tracked
 from skidpad.evidence.statistics import event_rate
-from skidpad.recording.channels import McapRecording
-from skidpad.recording.context import context_of
-from skidpad.recording.cycles import cycles
+from skidpad.recording.channels.context import context_of
+from skidpad.recording.channels.cycles import cycles
+from skidpad.recording.channels.mcap_files import McapRecording
 from skidpad.roads.bundled import bundled_maps, load_map
 from skidpad.roads.queries import RoadMap
 

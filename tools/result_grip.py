@@ -12,7 +12,7 @@ from skidpad.evidence.grip.findings import FINDINGS
 from skidpad.evidence.grip.rain import CELLS, four_cells
 from skidpad.evidence.grip.study import Pair, Share
 from skidpad.evidence.verdicts import judge
-from skidpad.recording.results import read_results
+from skidpad.recording.campaign.results import read_results
 from skidpad.report.grip.data import PAIRED, load_grip, scenario_title
 from skidpad.report.grip.threshold import load_threshold
 

@@ -13,8 +13,8 @@ from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.statistics import Rate, compare_pairs, event_rate
 from skidpad.evidence.verdicts import Judgement, judge
-from skidpad.recording.campaigns import CampaignFolder
-from skidpad.recording.matrix import MatrixEntry
+from skidpad.recording.campaign.folder import CampaignFolder
+from skidpad.recording.campaign.matrix import MatrixEntry
 from skidpad.report.matrix.data import Matrix, config_title, rate_by_seed, weather_title
 
 COUNTS = {

@@ -23,7 +23,7 @@ from skidpad.campaign.worker import Job, Worker
 from skidpad.core.run import AdasDriver, Roads, RunSpec
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather
-from skidpad.recording.logfiles import log_hash
+from skidpad.recording.run.log_files import log_hash
 from skidpad.stack.configurations import functions_of
 
 SEEDS = 10

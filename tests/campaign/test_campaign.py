@@ -11,8 +11,8 @@ from skidpad.campaign.recipe import cell_of
 from skidpad.campaign.worker import Finished
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.vocabulary import Outcome
-from skidpad.recording.ledger import CAMPAIGN, read_ledger
-from skidpad.recording.results import read_results
+from skidpad.recording.campaign.ledger import CAMPAIGN, read_ledger
+from skidpad.recording.campaign.results import read_results
 from toy_campaign import RECIPE, Toss
 
 

@@ -19,11 +19,11 @@ from skidpad.campaign.pool import local
 from skidpad.core.channels import ChannelFrame, Decision, TruthFrame
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.run import ChannelCrew
-from skidpad.recording.channel_drives import read_outcomes
-from skidpad.recording.channel_hash import recording_hash
-from skidpad.recording.channels import McapRecording
-from skidpad.recording.ledger import LEDGER
-from skidpad.recording.results import read_results
+from skidpad.recording.campaign.ledger import LEDGER
+from skidpad.recording.campaign.results import read_results
+from skidpad.recording.channels.content_hash import recording_hash
+from skidpad.recording.channels.drives import read_outcomes
+from skidpad.recording.channels.mcap_files import McapRecording
 from skidpad.stack.channels.arbiter import Reason
 
 BOTH = ("lav_like", "tfuse_like")

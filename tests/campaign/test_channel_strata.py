@@ -18,8 +18,8 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.run import run_from_plain
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.vocabulary import Stratum
-from skidpad.recording.channels import McapRecording
-from skidpad.recording.context import context_of
+from skidpad.recording.channels.context import context_of
+from skidpad.recording.channels.mcap_files import McapRecording
 from skidpad.sensors.channel_presets import senses_of
 from skidpad.simulation.world.stage import staged
 from skidpad.simulation.world.traffic.variety import risky_character

@@ -17,8 +17,8 @@ from skidpad.core.inputs import Crowd, Timed
 from skidpad.core.run import Roads
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.vocabulary import SensorLevel, TrafficStart
-from skidpad.recording.inputs import decode_inputs, encode_inputs
-from skidpad.recording.logfiles import log_hash
+from skidpad.recording.run.inputs import decode_inputs, encode_inputs
+from skidpad.recording.run.log_files import log_hash
 
 INPUTS = [Timed(20, Crowd(4)), Timed(60, Crowd(9)), Timed(61, Crowd(12))]
 

@@ -33,8 +33,8 @@ from skidpad.core.vocabulary import GripModel, RangeModel, SensorLevel, Supervis
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import visibility
 from skidpad.physics.presets import preset
-from skidpad.recording.inputs import INPUTS, decode_inputs, encode_inputs, read_inputs
-from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.run.inputs import INPUTS, decode_inputs, encode_inputs, read_inputs
+from skidpad.recording.run.log_files import log_hash, read_log
 
 
 def spec(sensors=SensorLevel.OBJECTS, duration=12.0, **changes):

@@ -24,7 +24,7 @@ from skidpad.core.specs import CameraSpec, LidarSpec, Modality, PointSensorSpec,
 from skidpad.core.states import ContactEvent, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Outcome, RelocationReason, SensorLevel, Supervision, Tier
 from skidpad.evidence.drive.metrics import run_metrics
-from skidpad.recording.logfiles import log_hash
+from skidpad.recording.run.log_files import log_hash
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.embedded.engine import EmbeddedBackend

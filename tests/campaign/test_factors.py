@@ -19,9 +19,9 @@ from skidpad.core.run import AdasDriver, Function, ReferenceDriver, Roads, RunSp
 from skidpad.core.stack_settings import CapScope
 from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
 from skidpad.physics.presets import find_weather
-from skidpad.recording.logfiles import log_hash, read_log
-from skidpad.recording.motion import motion_hash
-from skidpad.recording.results import read_results
+from skidpad.recording.campaign.results import read_results
+from skidpad.recording.run.log_files import log_hash, read_log
+from skidpad.recording.run.motion import motion_hash
 from skidpad.report.matrix.page import write_report
 from skidpad.stack.configurations import functions_of
 from skidpad.stack.control.resume import SpeedCaps

@@ -23,9 +23,9 @@ from skidpad.core.run import AgentDriver, Friction, RunSpec
 from skidpad.core.settings import load_profile
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.presets import preset
-from skidpad.recording.grip import GripEntry, read_series
-from skidpad.recording.ledger import read_ledger
-from skidpad.recording.results import read_results
+from skidpad.recording.campaign.grip import GripEntry, read_series
+from skidpad.recording.campaign.ledger import read_ledger
+from skidpad.recording.campaign.results import read_results
 from skidpad.report.grip.data import load_grip
 from skidpad.scenarios.variation import CutIn
 

@@ -21,8 +21,8 @@ from skidpad.cli.main import app
 from skidpad.core.errors import InputError, OutputError
 from skidpad.core.run import StackDriver
 from skidpad.physics.presets import find_weather
-from skidpad.recording.ledger import LEDGER
-from skidpad.recording.results import read_results
+from skidpad.recording.campaign.ledger import LEDGER
+from skidpad.recording.campaign.results import read_results
 
 ROOT = Path(__file__).resolve().parents[2]
 CALL = [sys.executable, "-m", "skidpad", "adas", "--sensors", "objects", "--duration", "6"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from runs import adas_run
 from skidpad.campaign.run import run
-from skidpad.recording.motion import motion_hash
+from skidpad.recording.run.motion import motion_hash
 
 
 def test_times_of_day_are_one_drive_and_rain_is_another() -> None:

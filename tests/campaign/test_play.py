@@ -12,7 +12,7 @@ from skidpad.core.errors import OutputError
 from skidpad.core.run import ActorMode, AgentDriver, Scenario
 from skidpad.core.vocabulary import GripModel, Outcome, SensorLevel
 from skidpad.core.weather import Weather
-from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.scenarios.shipped import FOLDER
 
 FILE = FOLDER / "lead_slowdown.xosc"

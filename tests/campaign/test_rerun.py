@@ -15,7 +15,7 @@ from skidpad.campaign.stored import read_run
 from skidpad.campaign.views import SIZE, twelve_views
 from skidpad.cli.main import app
 from skidpad.core.vocabulary import SensorLevel
-from skidpad.recording.results import read_results
+from skidpad.recording.campaign.results import read_results
 
 
 def cell(sensors=SensorLevel.OBJECTS, duration=6.0, **changes):

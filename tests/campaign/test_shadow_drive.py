@@ -17,9 +17,9 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Passenger, ReferenceDriver
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.shadow import Foresight
-from skidpad.recording.cycles import cycles
-from skidpad.recording.hazards import HazardRecord
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.channels.cycles import cycles
+from skidpad.recording.hazards.records import HazardRecord
+from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.hazard_export import export_hazard
 from skidpad.scenarios.writer import OscVersion
 from skidpad.stack.configurations import functions_of

@@ -12,7 +12,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand
-from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.run.log_files import log_hash, read_log
 
 
 @pytest.fixture

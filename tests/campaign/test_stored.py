@@ -36,8 +36,8 @@ from skidpad.core.run import (
     run_from_plain,
 )
 from skidpad.core.simulator import BackendChoice, BackendKind
-from skidpad.recording.channel_drives import DriveRecord, read_record
-from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.channels.drives import DriveRecord, read_record
+from skidpad.recording.run.log_files import log_hash, read_log
 
 SERVER = BackendChoice(
     backend=BackendKind.CARLA,

@@ -17,7 +17,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.states import EgoEstimate, StackReport, VehicleCommand
 from skidpad.core.vocabulary import Clearance, Tier
 from skidpad.evidence.verdicts import judge
-from skidpad.recording.logfiles import log_hash
+from skidpad.recording.run.log_files import log_hash
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.twelve import twelve_sensors
 

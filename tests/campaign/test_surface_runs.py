@@ -21,7 +21,7 @@ from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.states import VehicleCommand
 from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import SensorLevel
-from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "puddle.yaml"

@@ -16,7 +16,7 @@ from skidpad.cli.asked import EgoStack, GripCross, MapAsked
 from skidpad.cli.main import app
 from skidpad.cli.threshold_plan import plan_map
 from skidpad.core.errors import InputError
-from skidpad.recording.results import read_results
+from skidpad.recording.campaign.results import read_results
 
 SMALL = (
     "--map-of", "threshold", "--drivers", "acc", "--headways", "0.6,25m", "--decelerations", "8",

@@ -6,7 +6,7 @@ from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells import FIRST_SEED
 from skidpad.campaign.tuning import RECIPE, SEEDS, Candidate, candidates, summary, trials
 from skidpad.campaign.worker import Finished
-from skidpad.recording.results import read_results
+from skidpad.recording.campaign.results import read_results
 from skidpad.scenarios.shipped import NAMES, find_shipped
 from skidpad.scenarios.variation import CUT_IN, CutIn, variant_parameters
 

@@ -7,8 +7,8 @@ from typer.testing import CliRunner
 from skidpad.cli.adas import answer
 from skidpad.cli.grip import answer_text, next_text
 from skidpad.cli.main import app
-from skidpad.recording.campaigns import CampaignFolder
-from skidpad.recording.matrix import MATRIX, Metrics, RunKey
+from skidpad.recording.campaign.folder import CampaignFolder
+from skidpad.recording.campaign.matrix import MATRIX, Metrics, RunKey
 from skidpad.report.matrix.data import Matrix
 
 

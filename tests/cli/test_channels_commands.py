@@ -19,8 +19,8 @@ from skidpad.core.channels import Context
 from skidpad.core.errors import ConfigError
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.timing import time_by_objects, timing_statistics
-from skidpad.recording.channels import ChannelWriter
-from skidpad.recording.hazards import read_hazards
+from skidpad.recording.channels.mcap_files import ChannelWriter
+from skidpad.recording.hazards.records import read_hazards
 
 runner = CliRunner(env={"COLUMNS": "200"})
 WORLD = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-11.0, 0, 0, 15.5, 0), (50.0, 3.5, 0, 15, 0)]))

@@ -10,7 +10,7 @@ import pytest
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
-from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.run.log_files import log_hash, read_log
 from stadium import written
 
 RUNNER = CliRunner()

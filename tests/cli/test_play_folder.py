@@ -9,9 +9,9 @@ from skidpad.cli.asked import PlayCross
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import Friction
-from skidpad.recording.grip import GripEntry
-from skidpad.recording.ledger import read_ledger
-from skidpad.recording.results import read_results
+from skidpad.recording.campaign.grip import GripEntry
+from skidpad.recording.campaign.ledger import read_ledger
+from skidpad.recording.campaign.results import read_results
 from skidpad.scenarios.shipped import FOLDER
 
 

@@ -10,7 +10,7 @@ from skidpad.campaign.play import run_to
 from skidpad.cli.main import app
 from skidpad.cli.show import vehicle_grips
 from skidpad.core.run import Friction
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.run.log_files import read_log
 
 
 @pytest.mark.req("B-068")

@@ -6,8 +6,8 @@ import subprocess
 import sys
 
 from skidpad.cli import folders
-from skidpad.recording.logfiles import TICKS
-from skidpad.recording.results import RESULTS
+from skidpad.recording.campaign.results import RESULTS
+from skidpad.recording.run.log_files import TICKS
 
 TYPOS = """
 adas --weather rain-nigt --out X

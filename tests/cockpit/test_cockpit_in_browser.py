@@ -26,10 +26,10 @@ from skidpad.core.inputs import Functions, Lamps, Method, Pedals, Sky, Timed, Wh
 from skidpad.core.run import Function
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.physics.presets import preset
-from skidpad.recording.campaigns import RUNS, SNAPSHOTS
-from skidpad.recording.inputs import read_inputs
-from skidpad.recording.ledger import LEDGER
-from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.campaign.folder import RUNS, SNAPSHOTS
+from skidpad.recording.campaign.ledger import LEDGER
+from skidpad.recording.run.inputs import read_inputs
+from skidpad.recording.run.log_files import log_hash, read_log
 
 GAMEPAD = """() => { const pad = { connected: true, id: "pad", axes: [0.5, 0, 0, 0],
     buttons: Array.from({ length: 16 }, (_, i) => ({ value: i === 7 ? 0.4 : 0 })) };

@@ -54,7 +54,7 @@ from skidpad.core.specs import Modality
 from skidpad.core.states import StackReport
 from skidpad.core.vocabulary import GripModel, RangeModel, SemanticClass, Tier
 from skidpad.physics.presets import preset
-from skidpad.recording.logfiles import log_hash
+from skidpad.recording.run.log_files import log_hash
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
 from skidpad.sensors.suite import PixelSuite

@@ -42,8 +42,8 @@ from skidpad.core.run import Function
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import GripModel, RangeModel
 from skidpad.physics.presets import preset
-from skidpad.recording.campaigns import RUNS
-from skidpad.recording.logfiles import EVENTS, TICKS
+from skidpad.recording.campaign.folder import RUNS
+from skidpad.recording.run.log_files import EVENTS, TICKS
 
 INPUTS = [
     Timed(10, Functions((Function.ACC,))),

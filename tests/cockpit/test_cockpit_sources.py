@@ -31,9 +31,9 @@ from skidpad.core.inputs import Crowd, Pedals, Timed, Wheel
 from skidpad.core.setup import DT
 from skidpad.core.vocabulary import ActorKind, HazardType, SemanticClass, class_of
 from skidpad.evidence.pairs import Body
-from skidpad.recording.channels import ChannelWriter
-from skidpad.recording.cycles import cycles
-from skidpad.recording.hazards import HazardRecord, HazardWriter
+from skidpad.recording.channels.cycles import cycles
+from skidpad.recording.channels.mcap_files import ChannelWriter
+from skidpad.recording.hazards.records import HazardRecord, HazardWriter
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.view import camera_view
 

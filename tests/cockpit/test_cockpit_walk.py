@@ -7,7 +7,7 @@ from commands import PATIENCE, running
 from skidpad.campaign.stored import read_run
 from skidpad.core.inputs import Sky
 from skidpad.physics.grip import grip_params
-from skidpad.recording.inputs import read_inputs
+from skidpad.recording.run.inputs import read_inputs
 
 STEPS = int(os.environ.get("SKIDPAD_WALK", "1000"))
 WAIT = 1000.0 * PATIENCE  # ms

@@ -20,7 +20,7 @@ from skidpad.evidence.compare import (
     seeds_to_fire,
 )
 from skidpad.evidence.statistics import holm, sign_tests
-from skidpad.recording.matrix import MATRIX, Metrics, RunKey
+from skidpad.recording.campaign.matrix import MATRIX, Metrics, RunKey
 
 
 def rows(extra=0, seeds=range(1, 9), outcome="completed"):

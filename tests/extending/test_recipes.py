@@ -15,7 +15,7 @@ import polars as pl
 import pytest
 
 from skidpad.cli.extensions import extension_points
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.run.log_files import read_log
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
 RECIPE = re.compile(r"^## (An? .+?)\n(.*?)(?=^## |\Z)", re.DOTALL | re.MULTILINE)

@@ -18,7 +18,7 @@ from channel_worlds import Eyes, World, drive
 
 @cache
 def recording() -> bytes:
-    from skidpad.recording.channels import ChannelWriter
+    from skidpad.recording.channels.mcap_files import ChannelWriter
 
     world = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(50.0, 3.5, 0, 15, 0), (-9, 0, 0, 16, 0)]))
     listed = drive(world, (Eyes("left", 0.03), Eyes("right", 0.03)), 0.3)
@@ -61,7 +61,7 @@ def watched() -> dict[str, bytes]:
 
 def read_indicators(path: Path) -> object:
     from skidpad.evidence.channels.case import evidence_lines
-    from skidpad.recording.indicators import read_indicators
+    from skidpad.recording.channels.indicators import read_indicators
 
     return list(evidence_lines(read_indicators(path.parent)))
 
@@ -78,7 +78,7 @@ def read_page(path: Path) -> object:
 
 
 def read_hazards(path: Path) -> object:
-    from skidpad.recording.hazards import read_hazards
+    from skidpad.recording.hazards.records import read_hazards
     from skidpad.scenarios.hazard_export import export_hazard
 
     return [export_hazard(r, path.parent / "scenarios") for r in read_hazards(path.parent)]
@@ -86,7 +86,7 @@ def read_hazards(path: Path) -> object:
 
 def list_hazards(path: Path) -> object:
     from skidpad.cli.hazards import lines
-    from skidpad.recording.hazards import read_index
+    from skidpad.recording.hazards.records import read_index
 
     return list(lines(read_index(path.parent)))
 

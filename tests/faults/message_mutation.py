@@ -11,7 +11,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from mutation import NUMBERS
 
-from skidpad.recording import channels_pb2 as pb
+from skidpad.recording.channels import channels_pb2 as pb
 
 
 @cache

@@ -38,14 +38,14 @@ def asked(read: Any) -> Any:
 
 
 def inputs() -> list[bytes]:
-    from skidpad.recording.inputs import encode_inputs
+    from skidpad.recording.run.inputs import encode_inputs
 
     done = (Timed(1, Wheel(True)), Timed(3, Pedals(0.4, 0.0)), Timed(9, Wheel(False)))
     return [encode_inputs(done)]
 
 
 def read_inputs(path: Path) -> object:
-    from skidpad.recording.inputs import decode_inputs, encode_inputs
+    from skidpad.recording.run.inputs import decode_inputs, encode_inputs
 
     return encode_inputs(decode_inputs(path.read_bytes()))
 

@@ -89,7 +89,7 @@ def read_stored(path: Path) -> object:
 
 
 def records() -> list[bytes]:
-    from skidpad.recording.channel_drives import DriveOutcome, DriveRecord, Ending
+    from skidpad.recording.channels.drives import DriveOutcome, DriveRecord, Ending
 
     outcome = DriveOutcome(
         driven_s=1.0, distance_m=2.0, collisions=0, collisions_struck=0, red_lights_run=0,
@@ -129,7 +129,7 @@ def mappings() -> list[bytes]:
 
 
 def read_mapping(path: Path) -> object:
-    from skidpad.recording.rosbag import load_mapping
+    from skidpad.recording.formats.ros_bag import load_mapping
 
     return load_mapping(path)
 
@@ -160,7 +160,7 @@ def toy_files() -> dict[str, bytes]:
 
 
 def read_identity(path: Path) -> object:
-    from skidpad.recording.ledger import campaign_command, common_configuration
+    from skidpad.recording.campaign.ledger import campaign_command, common_configuration
 
     return campaign_command(path.parent), common_configuration(path.parent)
 
@@ -176,13 +176,13 @@ def ledgers() -> list[bytes]:
 
 
 def read_toy_ledger(path: Path) -> object:
-    from skidpad.recording.ledger import latest, read_ledger
+    from skidpad.recording.campaign.ledger import latest, read_ledger
 
     return latest(read_ledger(path.parent, TOY.entry))
 
 
 def read_toy_results(path: Path) -> object:
-    from skidpad.recording.results import read_results
+    from skidpad.recording.campaign.results import read_results
 
     return read_results(path.parent, TOY.columns)
 
@@ -190,7 +190,7 @@ def read_toy_results(path: Path) -> object:
 @cache
 def run_folder() -> dict[str, bytes]:
     from skidpad.campaign.run import run
-    from skidpad.recording.logfiles import write_log
+    from skidpad.recording.run.log_files import write_log
 
     driven = run(runs.adas_run(duration=0.5, vehicles=1))
     with TemporaryDirectory() as folder:
@@ -203,7 +203,7 @@ def read_drive(path: Path) -> object:
     from skidpad.evidence.drive.collisions import find_crashes
     from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
     from skidpad.evidence.drive.prepared import prepare
-    from skidpad.recording.logfiles import log_hash, read_log
+    from skidpad.recording.run.log_files import log_hash, read_log
     from skidpad.roads.bundled import load_map
 
     for name, content in run_folder().items():

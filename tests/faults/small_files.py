@@ -188,7 +188,7 @@ def events() -> bytes:
     from skidpad.core.geometry import Pose
     from skidpad.core.states import ContactEvent, LaneInvasion, TrafficContact
     from skidpad.core.vocabulary import LightState, RelocationReason
-    from skidpad.recording.events import (
+    from skidpad.recording.run.events import (
         LightChange,
         Notice,
         NoticeSource,
@@ -217,7 +217,7 @@ def short_record(text: bytes) -> bytes:
     """The first record of a file of hazards with its first cycles only."""
     from dataclasses import replace
 
-    from skidpad.recording.hazards import decode_record, encode_record
+    from skidpad.recording.hazards.records import decode_record, encode_record
 
     head, _, rest = text.decode().partition("\n")
     record = decode_record(rest[: rest.index("\nZ\n") + 3])

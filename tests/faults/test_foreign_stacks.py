@@ -18,8 +18,8 @@ from skidpad.campaign.worker import Job
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import StackDriver
 from skidpad.core.vocabulary import Outcome
-from skidpad.recording.ledger import read_ledger
-from skidpad.recording.matrix import MatrixEntry
+from skidpad.recording.campaign.ledger import read_ledger
+from skidpad.recording.campaign.matrix import MatrixEntry
 from skidpad.roads.bundled import load_map
 from skidpad.stack.loading import load_stack
 

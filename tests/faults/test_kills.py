@@ -21,9 +21,9 @@ import runs
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.matrix import RECIPE
 from skidpad.core.errors import OutputError
-from skidpad.recording.campaigns import RUNS
-from skidpad.recording.ledger import LEDGER
-from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.campaign.folder import RUNS
+from skidpad.recording.campaign.ledger import LEDGER
+from skidpad.recording.run.log_files import log_hash, read_log
 from toy_campaign import campaign as toy_campaign
 
 TESTS = Path(__file__).parents[1]

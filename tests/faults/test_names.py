@@ -13,9 +13,9 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.names import LONGEST, inside, path_part, slug
 from skidpad.core.run import Scenario, StackDriver
 from skidpad.core.weather import Weather
-from skidpad.recording.campaigns import RUNS, CampaignFolder
-from skidpad.recording.grip import read_series
-from skidpad.recording.matrix import MatrixEntry
+from skidpad.recording.campaign.folder import RUNS, CampaignFolder
+from skidpad.recording.campaign.grip import read_series
+from skidpad.recording.campaign.matrix import MatrixEntry
 
 BAD = [
     "../../victim",

@@ -13,8 +13,8 @@ from skidpad.core.told import LONGEST
 from skidpad.fleet.alerting.keeping import parse_alert
 from skidpad.fleet.batch import drive_of
 from skidpad.live.outcome import LINK, read_outcome
-from skidpad.recording.inputs import decode_inputs
-from skidpad.recording.monitored import SUMMARY, read_summary
+from skidpad.recording.channels.monitored import SUMMARY, read_summary
+from skidpad.recording.run.inputs import decode_inputs
 from skidpad.roads.baked import load_baked
 
 NAME = "a\nb"

@@ -13,7 +13,7 @@ from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.evidence.channels.monitor import MonitorSettings
 from skidpad.live.watch import watch_whole
-from skidpad.recording.channels import ChannelWriter
+from skidpad.recording.channels.mcap_files import ChannelWriter
 from skidpad.recording.files import write_atomically, write_bytes
 from skidpad.recording.folders import ResultKind, prepare_files, require_kind
 

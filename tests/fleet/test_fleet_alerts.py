@@ -387,7 +387,7 @@ def test_a_simulated_vehicle_obeys(lite, tmp_path):
     """It drives by its channels, raises an alert after 3 s, is slowed down, and stopped after 9 s."""
     from skidpad.campaign.channel_drive import drive_segment
     from skidpad.campaign.channel_routes import driven_routes
-    from skidpad.recording.cycles import cycles
+    from skidpad.recording.channels.cycles import cycles
     from skidpad.recording.sources import open_channels
 
     red, orders, alert = Vehicle(lite), {30: "slow", 90: "stop"}, []

@@ -26,9 +26,9 @@ from skidpad.fleet.store.accounts import principal_of
 from skidpad.fleet.store.tables import drives, hazards
 from skidpad.fleet.uploader import poster, rounds, send, send_all
 from skidpad.fleet.words import Kind
-from skidpad.recording.hazards import HazardWriter
-from skidpad.recording.indicators import Column, IndicatorLog
-from skidpad.recording.monitored import write_summary
+from skidpad.recording.channels.indicators import Column, IndicatorLog
+from skidpad.recording.channels.monitored import write_summary
+from skidpad.recording.hazards.records import HazardWriter
 
 RUN = CliRunner()
 

@@ -25,11 +25,11 @@ from skidpad.live.outcome import read_outcome
 from skidpad.live.settings import Flow, Links, MonitorLinkSettings
 from skidpad.live.watch import watch
 from skidpad.live.wire import WireSource, cycle_mark, end_mark, pack_item
-from skidpad.recording.channel_hash import recording_hash
-from skidpad.recording.channels import McapRecording
-from skidpad.recording.cycles import cycles
-from skidpad.recording.indicators import read_indicators
-from skidpad.recording.monitored import read_summary, read_timing
+from skidpad.recording.channels.content_hash import recording_hash
+from skidpad.recording.channels.cycles import cycles
+from skidpad.recording.channels.indicators import read_indicators
+from skidpad.recording.channels.mcap_files import McapRecording
+from skidpad.recording.channels.monitored import read_summary, read_timing
 
 FOLLOWED = World((0.0, 0.0, 0.0, 15.0, 0.0), np.array([(-30.0, 0.0, 0.0, 16.5, 0.0)]))
 BLIND_BEHIND = (Eyes("lav", 0.02), Eyes("tfuse", 0.02, blind=(0,)))

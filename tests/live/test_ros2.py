@@ -30,9 +30,9 @@ from skidpad.live.ros2.publisher import RosPublisher, mapping_of  # noqa: E402
 from skidpad.live.ros2.types import OBJECTS, ODOMETRY, PATH, Types, dds_name, ros_name  # noqa: E402
 from skidpad.live.settings import Flow, Links  # noqa: E402
 from skidpad.live.watch import watch  # noqa: E402
-from skidpad.recording.channels import McapRecording  # noqa: E402
-from skidpad.recording.indicators import read_indicators  # noqa: E402
-from skidpad.recording.rosbag import Mapping  # noqa: E402
+from skidpad.recording.channels.indicators import read_indicators  # noqa: E402
+from skidpad.recording.channels.mcap_files import McapRecording  # noqa: E402
+from skidpad.recording.formats.ros_bag import Mapping  # noqa: E402
 
 DOMAIN = 1 + os.getpid() % 99  # one per process of the tests; ports below those given at random
 PATIENCE = 900.0  # s; kernels may have to be compiled first
@@ -181,7 +181,7 @@ def test_what_is_not_there_or_of_another_kind_is_one_sentence():
 
 def test_frames_come_back_from_the_wire_as_they_went():
     f = frame(5.2, (1.0, 2.0, 0.3, 4.0, 5.0), [(7.0, 8, 0.9, 1, 2)], ids=[9], classes=[14])
-    from skidpad.recording.rosbag import RosFrames
+    from skidpad.recording.formats.ros_bag import RosFrames
 
     make, frames = Messages(Types()), RosFrames(mapping_of(("a",), 4.5, 1.8))
     assert list(frames.take("/skidpad/a/objects", 5.2, make.objects(f), OBJECTS)) == []

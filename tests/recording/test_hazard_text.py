@@ -14,8 +14,8 @@ from channel_worlds import Eyes, World, drive, frame, traffic
 from skidpad.core.channels import Cycle
 from skidpad.core.errors import FileError
 from skidpad.core.vocabulary import HazardType
-from skidpad.recording.cycles import cycles
-from skidpad.recording.hazards import (
+from skidpad.recording.channels.cycles import cycles
+from skidpad.recording.hazards.records import (
     HazardRecord,
     HazardWriter,
     InvolvedObject,

@@ -9,7 +9,7 @@ import runs
 from skidpad.campaign.run import run
 from skidpad.core.errors import FileError
 from skidpad.recording.files import read_parquet
-from skidpad.recording.logfiles import TICKS, read_log, write_log
+from skidpad.recording.run.log_files import TICKS, read_log, write_log
 
 
 @pytest.fixture(scope="module")

@@ -11,10 +11,10 @@ import pytest
 from makelog import drive
 from skidpad.core.states import ContactEvent, StackReport, TrafficContact
 from skidpad.core.vocabulary import DetectionStatus
-from skidpad.recording.events import Notice, NoticeSource
-from skidpad.recording.logfiles import log_hash
-from skidpad.recording.motion import motion_hash
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.events import Notice, NoticeSource
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import log_hash
+from skidpad.recording.run.motion import motion_hash
 
 TOUCH = ContactEvent(4, 1, "", 900.0, 3.0, 10.0, 0.0)
 

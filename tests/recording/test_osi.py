@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.core.vocabulary import LightState
-from skidpad.recording.logfiles import read_log
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import read_log
 
 pytest.importorskip("osi3", reason="needs the extra osi")
 COLOURS = {2: LightState.RED, 3: LightState.YELLOW, 4: LightState.GREEN}  # Classification.Color

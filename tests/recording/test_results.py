@@ -14,9 +14,8 @@ import pytest
 
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.vocabulary import Outcome
-from skidpad.recording import ledger as ledger_module
-from skidpad.recording.fingerprint import comparison_text, fingerprint
-from skidpad.recording.ledger import (
+from skidpad.recording.campaign import ledger as ledger_module
+from skidpad.recording.campaign.ledger import (
     CAMPAIGN,
     LEDGER,
     Entry,
@@ -30,8 +29,9 @@ from skidpad.recording.ledger import (
     latest,
     read_ledger,
 )
-from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics, RunKey
-from skidpad.recording.results import Timing, definitions_of, read_results
+from skidpad.recording.campaign.matrix import MATRIX, MatrixEntry, Metrics, RunKey
+from skidpad.recording.campaign.results import Timing, definitions_of, read_results
+from skidpad.recording.fingerprint import comparison_text, fingerprint
 
 IDENTITY = {"configs": [0, 1], "seeds": 2}
 
@@ -188,7 +188,7 @@ def test_what_was_appended_survives_kill_9(tmp_path: Path) -> None:
         sys.path.insert(0, {str(Path(__file__).parent)!r})
         from pathlib import Path
         from test_results import IDENTITY, MatrixEntry, entry
-        from skidpad.recording.ledger import Ledger
+        from skidpad.recording.campaign.ledger import Ledger
         ledger = Ledger(Path({str(tmp_path / "out")!r}), MatrixEntry, IDENTITY)
         ledger.append(entry("a"))
         os.kill(os.getpid(), signal.SIGKILL)

@@ -9,8 +9,8 @@ import pytest
 
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.vocabulary import SemanticClass
-from skidpad.recording.cycles import cycles
-from skidpad.recording.rosbag import load_mapping
+from skidpad.recording.channels.cycles import cycles
+from skidpad.recording.formats.ros_bag import load_mapping
 from skidpad.recording.sources import open_channels
 
 rosbag2 = pytest.importorskip("rosbags.rosbag2")

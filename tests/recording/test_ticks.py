@@ -21,10 +21,17 @@ from skidpad.core.vocabulary import (
     Supervision,
     Tier,
 )
-from skidpad.recording.events import LightChange, Notice, NoticeSource, Relocation, decode_events
 from skidpad.recording.files import content_hash, write_atomically
 from skidpad.recording.fingerprint import fingerprint
-from skidpad.recording.logfiles import (
+from skidpad.recording.run.events import (
+    LightChange,
+    Notice,
+    NoticeSource,
+    Relocation,
+    decode_events,
+)
+from skidpad.recording.run.log import LogHeader, ReportSeries, RunLog
+from skidpad.recording.run.log_files import (
     EVENTS,
     TICKS,
     driven_on,
@@ -33,8 +40,7 @@ from skidpad.recording.logfiles import (
     tick_table,
     write_log,
 )
-from skidpad.recording.runlog import LogHeader, ReportSeries, RunLog
-from skidpad.recording.ticks import TickLog
+from skidpad.recording.run.ticks import TickLog
 
 CONTACT = ContactEvent(3, -1, "guardrail", 120.0, 2.5, 1.0, 2.0)
 INVASION = LaneInvasion(5, "solid", 7)

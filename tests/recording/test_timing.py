@@ -5,9 +5,9 @@ import pytest
 
 from skidpad.core.errors import FileError
 from skidpad.evidence.channels.timing import TIMES
-from skidpad.recording.campaigns import CampaignFolder
+from skidpad.recording.campaign.folder import CampaignFolder
+from skidpad.recording.channels.monitored import read_timing, write_timing
 from skidpad.recording.files import write_parquet
-from skidpad.recording.monitored import read_timing, write_timing
 
 CYCLES = pl.DataFrame({name: [0, 1, 2] for name in TIMES}, schema=TIMES)
 

@@ -14,7 +14,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from skidpad.recording.channels import McapRecording
+from skidpad.recording.channels.mcap_files import McapRecording
 
 Columns = dict[str, NDArray[Any]]  # first axis: rows, in the order of time
 STRIDE = 19  # rows between stored values; prime, so that it meets all rows of a cycle

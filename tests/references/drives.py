@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import skidpad
 from skidpad.cli.main import app
-from skidpad.recording.logfiles import write_log
+from skidpad.recording.run.log_files import write_log
 from skidpad.simulation.carla_server.process import ServerProcess
 
 CLIENT = Path(__file__).with_name("carla_client.py")

@@ -18,12 +18,12 @@ from skidpad.evidence.drive.collisions import Crash, CrashKind, Striker, find_cr
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.evidence.drive.severity import Contact
 from skidpad.evidence.drive.story import Arrival, Moment, Sighting, Story
-from skidpad.recording.ledger import Entry, Ledger
-from skidpad.recording.logfiles import write_log
-from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics, RunKey
-from skidpad.recording.motion import motion_hash
-from skidpad.recording.results import Timing
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.campaign.ledger import Entry, Ledger
+from skidpad.recording.campaign.matrix import MATRIX, MatrixEntry, Metrics, RunKey
+from skidpad.recording.campaign.results import Timing
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import write_log
+from skidpad.recording.run.motion import motion_hash
 from skidpad.report.crashes.cards import contact_text, crash_card, facts, severity, tags, timeline
 from skidpad.report.crashes.causes import write_cause
 from skidpad.report.crashes.page import contact_cards, find_contacts, write_crashes

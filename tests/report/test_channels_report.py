@@ -14,7 +14,7 @@ from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.evidence.channels.monitor import MonitorSettings
 from skidpad.evidence.channels.timing import MODULES
 from skidpad.live.watch import Timer, watch
-from skidpad.recording.hazards import read_hazards
+from skidpad.recording.hazards.records import read_hazards
 from skidpad.report.channels.data import load_drive
 from skidpad.report.channels.figures import risk, timing
 from skidpad.report.channels.page import drive_page, write_drive_report

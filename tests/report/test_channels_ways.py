@@ -13,7 +13,7 @@ from svg_values import curves_of
 import channels_tables as tables
 from skidpad.campaign.channel_outcomes import Referee
 from skidpad.core.channels import Decision
-from skidpad.recording.channel_drives import WAY_STEP, DriveOutcome, DriveRecord, read_records
+from skidpad.recording.channels.drives import WAY_STEP, DriveOutcome, DriveRecord, read_records
 from skidpad.report.channels.evaluation.ways import draw_ways, lane_lines
 from skidpad.report.elements.figures import PALETTE
 from skidpad.roads.bundled import load_map

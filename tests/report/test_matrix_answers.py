@@ -8,8 +8,8 @@ from test_matrix_report import key
 
 from skidpad.evidence.drive.findings import FINDINGS
 from skidpad.evidence.verdicts import Verdict, judge
-from skidpad.recording.matrix import MATRIX, Metrics
-from skidpad.recording.results import Timing
+from skidpad.recording.campaign.matrix import MATRIX, Metrics
+from skidpad.recording.campaign.results import Timing
 from skidpad.report.matrix.answers import answers
 from skidpad.report.matrix.baseline import baseline_text
 from skidpad.report.matrix.data import EVENTS, FIRST, WEATHERS, config_list, load_matrix

@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import polars as pl
 
-from skidpad.recording.readings import RecordedSensor, tabulate_readings, write_readings
+from skidpad.recording.run.readings import RecordedSensor, tabulate_readings, write_readings
 from skidpad.report.matrix.envelope import binding_names, envelope_blocks
 
 SENSOR = RecordedSensor("envelope", "envelope", "Speed envelope", "m/s; binding: 0 none, 1 sight")

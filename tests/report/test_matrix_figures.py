@@ -10,8 +10,8 @@ from svg_values import bars, curves_of, frames, marks_of, shapes, texts
 from test_matrix_report import campaign, key
 
 from skidpad.evidence.statistics import Interval, mean_limits
-from skidpad.recording.matrix import MATRIX, Metrics
-from skidpad.recording.results import Timing
+from skidpad.recording.campaign.matrix import MATRIX, Metrics
+from skidpad.recording.campaign.results import Timing
 from skidpad.report.elements.figures import PALETTE, Series, stacked_bars
 from skidpad.report.matrix.answers import answers
 from skidpad.report.matrix.comparisons.sides import side_blocks

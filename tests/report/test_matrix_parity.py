@@ -12,8 +12,8 @@ from skidpad.cli.adas_plan import on_pixels
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather
-from skidpad.recording.matrix import MATRIX, PIXELS
-from skidpad.recording.results import Timing
+from skidpad.recording.campaign.matrix import MATRIX, PIXELS
+from skidpad.recording.campaign.results import Timing
 from skidpad.report.matrix.comparisons.parity import load_parity, parity_section
 from skidpad.report.matrix.data import load_matrix
 from skidpad.report.matrix.page import build_page

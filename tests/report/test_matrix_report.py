@@ -5,9 +5,9 @@ import numpy as np
 import polars as pl
 import pytest
 
+from skidpad.recording.campaign.matrix import MATRIX, Metrics, RunKey
+from skidpad.recording.campaign.results import Timing
 from skidpad.recording.files import write_parquet
-from skidpad.recording.matrix import MATRIX, Metrics, RunKey
-from skidpad.recording.results import Timing
 from skidpad.report.matrix.data import WEATHERS, load_matrix, rate_by_seed, weather_title
 from skidpad.report.matrix.headline import headline_numbers, headline_table
 from skidpad.report.matrix.page import build_page, write_report

@@ -6,8 +6,8 @@ import polars as pl
 import pytest
 
 import skidpad
-from skidpad.recording.matrix import Metrics, RunKey
-from skidpad.recording.results import schema
+from skidpad.recording.campaign.matrix import Metrics, RunKey
+from skidpad.recording.campaign.results import schema
 from skidpad.report.published import Source, published_matrix, read_published
 
 PACKAGE = Path(skidpad.__file__).parent

@@ -7,7 +7,7 @@ import pytest
 
 import makelog
 from skidpad.core.surface import SurfacePatch
-from skidpad.recording.surfaces import read_run_surface
+from skidpad.recording.run.surfaces import read_run_surface
 from skidpad.report.elements.replay import UNIT, replay, replay_run
 from skidpad.roads.bundled import load_map
 from skidpad.roads.surface_outlines import outline_patches

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from channel_worlds import CAR, Eyes, World, drive, traffic
 from skidpad.cli.main import app
 from skidpad.core.errors import MissingExtra
-from skidpad.recording.channels import ChannelWriter
+from skidpad.recording.channels.mcap_files import ChannelWriter
 from skidpad.report.channels.viewer import outline, require_rerun
 
 

@@ -11,8 +11,8 @@ from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.core.vocabulary import LightState
-from skidpad.recording.logfiles import read_log
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import read_log
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import LanePoint
 from skidpad.scenarios.signals import read_signal_state

@@ -14,7 +14,7 @@ from skidpad.core.errors import FileError
 from skidpad.core.weather import Weather
 from skidpad.physics.grip import rain_rate
 from skidpad.physics.optics import sight
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.environment import Environment, Fall, Wetness
 
 

@@ -8,7 +8,7 @@ from tests.scenarios.files import FILE, ROAD, VEHICLE, document
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.run.log_files import read_log
 
 CATALOG = document('<Catalog name="VehicleCatalog">{entries}</Catalog>', minor=1)
 CAR = VEHICLE.format(x=1.4).replace('name="v"', 'name="{name}"')

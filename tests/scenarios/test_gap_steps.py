@@ -21,8 +21,8 @@ from tests.scenarios.files import (
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
-from skidpad.recording.events import NoticeSource
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.run.events import NoticeSource
+from skidpad.recording.run.log_files import read_log
 
 SIDES = ("leadingReferencedEntity", "trailingReferencedEntity")
 

@@ -16,8 +16,13 @@ from channel_worlds import Eyes, World, drive, traffic
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, InputError
 from skidpad.core.vocabulary import HazardType
-from skidpad.recording.cycles import cycles
-from skidpad.recording.hazards import HazardRecord, HazardWriter, decode_record, encode_record
+from skidpad.recording.channels.cycles import cycles
+from skidpad.recording.hazards.records import (
+    HazardRecord,
+    HazardWriter,
+    decode_record,
+    encode_record,
+)
 from skidpad.scenarios.hazard_export import export_hazard
 from skidpad.scenarios.writer import OscVersion
 

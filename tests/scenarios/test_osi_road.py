@@ -12,7 +12,7 @@ import pytest
 pytest.importorskip("osi3", reason="needs the extra osi")
 
 from skidpad.core.errors import ConfigError
-from skidpad.recording.osi_udp import PART, message_parts, read_address, send_osi
+from skidpad.recording.formats.osi_udp import PART, message_parts, read_address, send_osi
 from skidpad.roads.bundled import load_map
 from skidpad.roads.lanes import LaneKind, Marking, SignalKind
 from skidpad.scenarios.osi_road import FIRST_LANE, STEP, Tilt, road_truth

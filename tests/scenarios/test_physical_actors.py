@@ -8,7 +8,7 @@ from tests.scenarios.files import at, write
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.run.log_files import read_log
 
 
 @pytest.mark.parametrize("v", [4.0, 13.33, 30.0])

@@ -26,7 +26,7 @@ from tests.scenarios.files import (
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.run.log_files import read_log
 
 RIDE = ["--stack", "ideal", "--actors", "ideal"]
 

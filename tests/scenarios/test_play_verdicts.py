@@ -27,7 +27,7 @@ from tests.scenarios.files import (
 from typer.testing import CliRunner
 
 from skidpad.cli.main import app
-from skidpad.recording.staging import read_staging
+from skidpad.recording.run.staging import read_staging
 
 BLIND = ("--stack", "blind:Blind", "--actors", "ideal")
 NO_HIT = ("--expect", "no-collision")

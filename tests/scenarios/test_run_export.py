@@ -19,7 +19,7 @@ from runs import adas_run, scenario_run
 from skidpad.campaign.play import run_to
 from skidpad.cli.main import app
 from skidpad.core.run import Passenger, Roads
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.run_export import log_tracks, road_of
 from skidpad.scenarios.scenario import compile_scenario
 from skidpad.scenarios.stage import played

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.core.run import ActorMode
-from skidpad.recording.logfiles import read_log
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import read_log
 from skidpad.scenarios.player import Player
 from skidpad.scenarios.stage import IdealWorld
 

@@ -7,8 +7,8 @@ from typer.testing import CliRunner
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.space import Normal, Uniform, Variable
-from skidpad.recording.risks import RISK_RUNS, SCALES, read_risk, read_risk_found
-from skidpad.recording.searches import Trial, read_trials
+from skidpad.recording.campaign.risks import RISK_RUNS, SCALES, read_risk, read_risk_found
+from skidpad.recording.campaign.searches import Trial, read_trials
 from skidpad.search.exposure import read_exposure
 from skidpad.search.probability import Weighted
 from skidpad.search.risk import influence_of

@@ -8,9 +8,7 @@ from typer.testing import CliRunner
 
 from skidpad.cli.main import app
 from skidpad.core.errors import InputError, OutputError
-from skidpad.recording.files import write_bytes
-from skidpad.recording.logfiles import log_hash, read_log
-from skidpad.recording.searches import (
+from skidpad.recording.campaign.searches import (
     CHOICES,
     TRIALS,
     distinct_failures,
@@ -19,6 +17,8 @@ from skidpad.recording.searches import (
     read_search,
     read_trials,
 )
+from skidpad.recording.files import write_bytes
+from skidpad.recording.run.log_files import log_hash, read_log
 from skidpad.search.space import apply_values
 
 CALL = (
@@ -77,7 +77,7 @@ def test_the_border_lies_between_two_runs_that_were_driven(found):
 
 def test_a_kept_failure_is_the_drive_of_its_trial(found):
     from skidpad.campaign.run import run
-    from skidpad.recording.motion import motion_hash
+    from skidpad.recording.run.motion import motion_hash
 
     out, _ = found
     first = read_findings(out).groups[0].failures[0]

@@ -55,7 +55,7 @@ def test_batches_make_up_the_budget():
 
 
 def test_a_crash_that_the_reference_driver_has_too_is_no_place_to_look():
-    from skidpad.recording.searches import Trial
+    from skidpad.recording.campaign.searches import Trial
     from skidpad.search.loop import _told_margin
 
     hit = Trial(number=0, unit=(0.5,), values={}, margin=-1.0, contact_kmh=30.0, other="lead")
@@ -73,7 +73,7 @@ def test_what_cannot_be_driven_is_no_harmless_neighbour():
     """Halving stops where neither side of the border is known; before, such a run counted as harmless."""
     from skidpad.core.run import RunSpec, Scenario
     from skidpad.core.space import Space, Uniform, Variable
-    from skidpad.recording.searches import Group, Search, Trial
+    from skidpad.recording.campaign.searches import Group, Search, Trial
     from skidpad.search import failures
 
     space = Space((Variable("x", Uniform(0.0, 1.0)),))

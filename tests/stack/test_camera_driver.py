@@ -129,7 +129,7 @@ def test_it_stops_behind_a_lead():
 @pytest.mark.slow
 @pytest.mark.req("X-1", "X-12")
 def test_a_drive_repeats_to_the_byte():
-    from skidpad.recording.logfiles import log_hash
+    from skidpad.recording.run.log_files import log_hash
 
     (cell,) = drives(duration=3.0)
     assert log_hash(run(cell).log) == log_hash(run(cell).log)

@@ -37,7 +37,7 @@ from skidpad.core.states import ContactEvent, VehicleCommand
 from skidpad.core.vocabulary import Control, SemanticClass, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import prepare
-from skidpad.recording.logfiles import log_hash
+from skidpad.recording.run.log_files import log_hash
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.recovery import Supervisor

@@ -19,8 +19,8 @@ sys.path.insert(0, str(ROOT / "tools"))
 import campaigns  # noqa: E402
 import result_tables as tables  # noqa: E402
 from skidpad.cli.main import app  # noqa: E402
-from skidpad.recording.matrix import Metrics, RunKey  # noqa: E402
-from skidpad.recording.results import schema  # noqa: E402
+from skidpad.recording.campaign.matrix import Metrics, RunKey  # noqa: E402
+from skidpad.recording.campaign.results import schema  # noqa: E402
 
 PLAN = tables.plan()
 COMMANDS = {c["name"]: c["command"] for c in PLAN["campaigns"]}

@@ -24,8 +24,7 @@ from skidpad.campaign.worker import Finished, Job, Runner
 from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.statistics import clopper_pearson
-from skidpad.recording.fingerprint import fingerprint
-from skidpad.recording.ledger import (
+from skidpad.recording.campaign.ledger import (
     DAMAGED,
     LEDGER,
     RETRIED,
@@ -35,7 +34,8 @@ from skidpad.recording.ledger import (
     fingerprints,
     latest,
 )
-from skidpad.recording.results import Timing
+from skidpad.recording.campaign.results import Timing
+from skidpad.recording.fingerprint import fingerprint
 
 BATCH = 20  # runs per cell after which a stopping rule looks again (decision G-8)
 PROBES = 12  # runs that an estimate drives, spread over the campaign

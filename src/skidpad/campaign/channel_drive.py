@@ -37,8 +37,8 @@ from skidpad.evidence.channels.risk import safety_scores
 from skidpad.live.links import open_listeners
 from skidpad.live.listener import Listener
 from skidpad.live.settings import Links
-from skidpad.recording.channel_drives import DriveOutcome
-from skidpad.recording.channels import ChannelWriter, Item
+from skidpad.recording.channels.drives import DriveOutcome
+from skidpad.recording.channels.mcap_files import ChannelWriter, Item
 from skidpad.sensors.channel_suite import CYCLE
 from skidpad.simulation.world.traffic.variety import risky_character
 from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Choice, Reason

@@ -9,7 +9,7 @@ import numpy as np
 from skidpad.core.channels import Decision
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import LightState
-from skidpad.recording.channel_drives import WAY_STEP, DriveOutcome, Ending
+from skidpad.recording.channels.drives import WAY_STEP, DriveOutcome, Ending
 from skidpad.roads.lanes import SignalKind
 from skidpad.stack.channels.route import SEARCH, STEP, RoutePath, locate
 from skidpad.stack.channels.settings import CarModel

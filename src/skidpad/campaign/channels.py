@@ -27,14 +27,14 @@ from skidpad.core.errors import require_range
 from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import Outcome
 from skidpad.live.settings import Links
-from skidpad.recording.channel_drives import (
+from skidpad.recording.channels.content_hash import recording_hash
+from skidpad.recording.channels.drives import (
     DRIVES,
     DriveEntry,
     DriveKey,
     DriveMetrics,
     DriveRecord,
 )
-from skidpad.recording.channel_hash import recording_hash
 from skidpad.recording.files import write_bytes
 
 SEGMENT = 600.0  # s (C-12)

@@ -14,7 +14,7 @@ from skidpad.campaign.run import Run, run
 from skidpad.campaign.runfolder import write_config, write_run
 from skidpad.core.run import RunSpec
 from skidpad.recording.files import require_free, write_bytes
-from skidpad.recording.inputs import INPUTS, encode_inputs, inputs_hash
+from skidpad.recording.run.inputs import INPUTS, encode_inputs, inputs_hash
 
 
 def drive_at_desk(spec: RunSpec, desk: Desk, folder: Path, sinks: Sequence[Sink] = ()) -> Run:

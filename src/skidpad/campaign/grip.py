@@ -28,8 +28,8 @@ from skidpad.campaign.runfolder import (
 from skidpad.campaign.worker import Job, Runner
 from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import Outcome
-from skidpad.recording.campaigns import RUNS
-from skidpad.recording.grip import (
+from skidpad.recording.campaign.folder import RUNS
+from skidpad.recording.campaign.grip import (
     GRIP,
     GripEntry,
     GripKey,
@@ -37,8 +37,8 @@ from skidpad.recording.grip import (
     series_path,
     write_series,
 )
-from skidpad.recording.logfiles import TICKS, log_hash
-from skidpad.recording.results import Timing, read_results
+from skidpad.recording.campaign.results import Timing, read_results
+from skidpad.recording.run.log_files import TICKS, log_hash
 from skidpad.scenarios.variation import CutIn
 
 if TYPE_CHECKING:

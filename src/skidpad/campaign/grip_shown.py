@@ -10,8 +10,8 @@ import polars as pl
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.stopping import SPEEDS_KMH, grip_rows
+from skidpad.recording.campaign.grip import STOPPING
 from skidpad.recording.files import write_parquet
-from skidpad.recording.grip import STOPPING
 
 CELL = ("scenario", "cutin", "overlay", "weather", "friction")
 

@@ -18,8 +18,8 @@ from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.prepared import LeadDefinition, MetricSettings
-from skidpad.recording.added_metrics import AddedMetric
-from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics, RunKey
+from skidpad.recording.campaign.added_metrics import AddedMetric
+from skidpad.recording.campaign.matrix import MATRIX, MatrixEntry, Metrics, RunKey
 from skidpad.roads.bundled import map_name
 from skidpad.stack.configurations import V_CRUISE_KMH, V_LIMITER_KMH
 
@@ -60,8 +60,8 @@ def drive_one(out: Path, cell: RunSpec) -> Driven[RunKey, Metrics]:
     from skidpad.campaign.run import run
     from skidpad.evidence.drive.added import measure_added
     from skidpad.evidence.drive.metrics import run_metrics
-    from skidpad.recording.added_metrics import write_added_metrics
-    from skidpad.recording.motion import motion_hash
+    from skidpad.recording.campaign.added_metrics import write_added_metrics
+    from skidpad.recording.run.motion import motion_hash
     from skidpad.roads.bundled import load_map
 
     folder = fresh_folder(out, cell.name)

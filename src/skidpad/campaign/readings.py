@@ -10,7 +10,7 @@ from skidpad.core.sensor_types import SensorType, find_sensor_type
 from skidpad.core.setup import Setup
 from skidpad.envelope.govern import GovernedStack
 from skidpad.envelope.limits import Binding
-from skidpad.recording.readings import (
+from skidpad.recording.run.readings import (
     RecordedSensor,
     SensorReadings,
     describe_row,

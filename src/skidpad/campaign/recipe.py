@@ -9,9 +9,9 @@ from typing import Any, Generic, Protocol, TypeVar
 
 from skidpad.campaign.worker import Runner
 from skidpad.core.vocabulary import Outcome
-from skidpad.recording.added_metrics import AddedMetric
-from skidpad.recording.ledger import Entry, K
-from skidpad.recording.results import Columns, Timing
+from skidpad.recording.campaign.added_metrics import AddedMetric
+from skidpad.recording.campaign.ledger import Entry, K
+from skidpad.recording.campaign.results import Columns, Timing
 
 
 class Task(Protocol):

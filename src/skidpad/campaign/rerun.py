@@ -31,11 +31,11 @@ from skidpad.core.errors import ConfigError, FileError, OutputError
 from skidpad.core.run import RunSpec
 from skidpad.core.setup import DT
 from skidpad.core.states import StackReport
-from skidpad.recording.channel_hash import recording_hash
+from skidpad.recording.channels.content_hash import recording_hash
 from skidpad.recording.files import output_error, write_atomically
-from skidpad.recording.inputs import read_inputs
-from skidpad.recording.logfiles import log_hash, read_log
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.inputs import read_inputs
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import log_hash, read_log
 
 PICTURES = 40  # at most this many PNG files of a stretch when no film is asked for
 

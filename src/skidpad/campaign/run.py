@@ -37,10 +37,10 @@ from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
 from skidpad.core.weather import Weather
 from skidpad.evidence.drive.background import UNSEEN
 from skidpad.physics.presets import find_weather
-from skidpad.recording.events import NoticeSource, Relocation
-from skidpad.recording.readings import SensorReadings
-from skidpad.recording.runlog import LogHeader, RunLog
-from skidpad.recording.ticks import TickLog
+from skidpad.recording.run.events import NoticeSource, Relocation
+from skidpad.recording.run.log import LogHeader, RunLog
+from skidpad.recording.run.readings import SensorReadings
+from skidpad.recording.run.ticks import TickLog
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.player import Played
 from skidpad.simulation.backend import Backend

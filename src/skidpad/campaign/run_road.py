@@ -8,7 +8,7 @@ from skidpad.campaign.cast import load_scenario
 from skidpad.campaign.stored import read_run
 from skidpad.core.errors import FileError, InputError
 from skidpad.core.run import Roads, Scenario
-from skidpad.recording.runlog import LogHeader
+from skidpad.recording.run.log import LogHeader
 from skidpad.roads.bundled import KEPT, bundled_maps, load_map
 from skidpad.roads.queries import RoadMap
 

@@ -13,11 +13,11 @@ import yaml
 
 from skidpad.core.names import inside
 from skidpad.evidence.pairs import Pair, pairs, pairs_of_others
-from skidpad.recording.campaigns import RUNS
+from skidpad.recording.campaign.folder import RUNS
+from skidpad.recording.campaign.results import Timing
 from skidpad.recording.files import output_error, write_bytes
-from skidpad.recording.logfiles import write_log
-from skidpad.recording.readings import write_readings
-from skidpad.recording.results import Timing
+from skidpad.recording.run.log_files import write_log
+from skidpad.recording.run.readings import write_readings
 from skidpad.scenarios.results import write_results
 
 if TYPE_CHECKING:

@@ -26,7 +26,7 @@ from skidpad.evidence.shadow import (
     partings,
     share_apart,
 )
-from skidpad.recording.logfiles import log_hash, read_log
+from skidpad.recording.run.log_files import log_hash, read_log
 
 
 class Shadow(Sink):

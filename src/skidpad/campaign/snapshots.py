@@ -12,7 +12,7 @@ from skidpad.campaign.drive import Moment, Sink
 from skidpad.core.frames import SensorFrame
 from skidpad.core.names import path_part, slug
 from skidpad.core.vocabulary import RelocationReason
-from skidpad.recording.campaigns import SNAPSHOTS
+from skidpad.recording.campaign.folder import SNAPSHOTS
 from skidpad.recording.files import write_atomically
 
 FRONT, TOP = "rgb_front", "rgb_top"

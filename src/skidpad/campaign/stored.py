@@ -14,7 +14,7 @@ from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.reading import UNUSABLE, decode_yaml, read_bytes
 from skidpad.core.run import VERSION, RunSpec, run_from_plain
 from skidpad.core.told import describe_value
-from skidpad.recording.channel_drives import read_record
+from skidpad.recording.channels.drives import read_record
 from skidpad.scenarios.variation import CutIn
 from skidpad.stack.configurations import functions_of
 

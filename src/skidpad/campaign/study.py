@@ -21,7 +21,7 @@ from skidpad.evidence.drive.acceptance import ACCEPTANCE
 from skidpad.evidence.drive.findings import FINDINGS, astray
 from skidpad.evidence.drive.metrics import run_metrics
 from skidpad.evidence.verdicts import Judgement, judge
-from skidpad.recording.logfiles import log_hash
+from skidpad.recording.run.log_files import log_hash
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.recovery import Supervisor
 

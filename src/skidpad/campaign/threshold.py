@@ -27,11 +27,11 @@ from skidpad.campaign.worker import Job, Runner
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.run import ActorMode
 from skidpad.core.vocabulary import Outcome
-from skidpad.recording.campaigns import RUNS
-from skidpad.recording.grip import GripMetrics
-from skidpad.recording.logfiles import TICKS
-from skidpad.recording.results import read_results
-from skidpad.recording.threshold import THRESHOLD, ThresholdEntry, ThresholdKey
+from skidpad.recording.campaign.folder import RUNS
+from skidpad.recording.campaign.grip import GripMetrics
+from skidpad.recording.campaign.results import read_results
+from skidpad.recording.campaign.threshold import THRESHOLD, ThresholdEntry, ThresholdKey
+from skidpad.recording.run.log_files import TICKS
 
 COMMAND = "grip-threshold"
 SITUATION = ("driver", "actors", "start", "deceleration")

@@ -33,8 +33,8 @@ from skidpad.core.setup import DT
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.grip.scores import npc_contact_row
 from skidpad.physics.presets import preset
-from skidpad.recording.ledger import Entry
-from skidpad.recording.results import Columns, metric, read_results
+from skidpad.recording.campaign.ledger import Entry
+from skidpad.recording.campaign.results import Columns, metric, read_results
 from skidpad.scenarios.shipped import NAMES
 from skidpad.scenarios.variation import (
     CUT_IN,

@@ -64,7 +64,7 @@ def adas(
     from skidpad.campaign.keeping import found_again, keep_maps
     from skidpad.campaign.matrix import RECIPE
     from skidpad.cli.adas_plan import on_pixels, plan
-    from skidpad.recording.matrix import PIXELS
+    from skidpad.recording.campaign.matrix import PIXELS
 
     run = structs.replace(run, course=roads, backend=check_backend(backend), seed=first_seed)
     run = found_again(run, how.folder)
@@ -93,11 +93,11 @@ def report(
 ) -> None:
     """Write the report of a campaign again, from what it left behind; of a run, its own page."""
     from skidpad.core.errors import FileError
-    from skidpad.recording.ledger import LEDGER, campaign_command
-    from skidpad.recording.logfiles import TICKS
-    from skidpad.recording.results import RESULTS
-    from skidpad.recording.risks import RISK_FOUND
-    from skidpad.recording.searches import FOUND
+    from skidpad.recording.campaign.ledger import LEDGER, campaign_command
+    from skidpad.recording.campaign.results import RESULTS
+    from skidpad.recording.campaign.risks import RISK_FOUND
+    from skidpad.recording.campaign.searches import FOUND
+    from skidpad.recording.run.log_files import TICKS
 
     if (folder / TICKS).is_file():
         typer.echo(_report_run(folder))
@@ -139,7 +139,7 @@ def _report_run(run: Path) -> str:
     """The page of one run: with its verdict where it plays a scenario, else its crash cards."""
     from skidpad.cli.expected import played_report
     from skidpad.cli.show import open_run
-    from skidpad.recording.staging import STAGING
+    from skidpad.recording.run.staging import STAGING
     from skidpad.report.crashes.page import write_crashes
 
     if (run / STAGING).is_file():

@@ -145,7 +145,7 @@ def next_folder(out: Path, identities: Mapping[str, dict[str, Any]]) -> Path:
 
     identities: of each campaign, by its folder below.
     """
-    from skidpad.recording.ledger import FolderState, folder_state
+    from skidpad.recording.campaign.ledger import FolderState, folder_state
 
     folder, n = out, 1
     while any(

@@ -20,8 +20,8 @@ B = typer.Argument(help="The other one.")
 @channels.command()
 def info(file: Path = FILE, mapping: Path | None = MAPPING) -> None:
     """Say what a recording holds and what is wrong with it."""
-    from skidpad.recording.channels import McapRecording
-    from skidpad.recording.cycles import cycles
+    from skidpad.recording.channels.cycles import cycles
+    from skidpad.recording.channels.mcap_files import McapRecording
     from skidpad.recording.sources import open_channels
 
     source = open_channels(file, mapping)
@@ -58,7 +58,7 @@ def info(file: Path = FILE, mapping: Path | None = MAPPING) -> None:
 def compare(a: Path = A, b: Path = B) -> None:
     """Compare two monitored drives cycle by cycle, B less A."""
     from skidpad.evidence.channels.comparison import compare_drives
-    from skidpad.recording.indicators import read_indicators
+    from skidpad.recording.channels.indicators import read_indicators
 
     for row in compare_drives(read_indicators(a), read_indicators(b)):
         typer.echo(row)

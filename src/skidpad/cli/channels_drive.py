@@ -84,7 +84,7 @@ def totals(folder: Path) -> str:
 
     from skidpad.core.wording import count_text
     from skidpad.live.outcome import LINK
-    from skidpad.recording.results import read_results
+    from skidpad.recording.campaign.results import read_results
 
     _write_pages(folder)
     driven = read_results(folder).drop_nulls("driven_s")
@@ -104,7 +104,7 @@ def totals(folder: Path) -> str:
 
 def _write_pages(folder: Path) -> None:
     """The page of every drive whose monitor came to its end."""
-    from skidpad.recording.monitored import SUMMARY
+    from skidpad.recording.channels.monitored import SUMMARY
 
     for summary in sorted(folder.glob(f"*/*.monitor/{SUMMARY}")):
         from skidpad.report.channels.page import write_drive_report
@@ -116,7 +116,7 @@ def _describe_monitor(folder: Path) -> str:
     """What became of a monitor beside its drive, in one line."""
     from skidpad.evidence.channels.timing import LIVE_TIMES, delay_sentence
     from skidpad.live.outcome import read_outcome
-    from skidpad.recording.monitored import read_timing
+    from skidpad.recording.channels.monitored import read_timing
 
     times = read_timing(folder, LIVE_TIMES)
     delay = "" if times is None else f"; {delay_sentence(times)}"
@@ -126,7 +126,7 @@ def _describe_monitor(folder: Path) -> str:
 def outcomes(folders: list[Path] = FOLDERS) -> None:
     """Compare drivers over the seeds that all have driven: does redundancy pay?"""
     from skidpad.core.errors import FileError
-    from skidpad.recording.channel_drives import read_outcomes
+    from skidpad.recording.channels.drives import read_outcomes
 
     driven = read_outcomes(folders)
     if not driven:

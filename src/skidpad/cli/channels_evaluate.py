@@ -163,9 +163,9 @@ def _judge_task(task: _Task) -> Segment:
 
     from skidpad.evidence.channels.judging.segments import judge
     from skidpad.live.watch import Timer
-    from skidpad.recording.channels import McapRecording
-    from skidpad.recording.context import context_of
-    from skidpad.recording.cycles import cycles
+    from skidpad.recording.channels.context import context_of
+    from skidpad.recording.channels.cycles import cycles
+    from skidpad.recording.channels.mcap_files import McapRecording
 
     source = McapRecording(task.path)
     context = context_of(source)

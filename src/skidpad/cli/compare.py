@@ -112,8 +112,8 @@ class Gate(NamedTuple):
 def _read_rules(texts: list[str]) -> list[Rule]:
     """The rules; one that cannot be read is said before the tests load."""
     from skidpad.evidence.comparisons import parse_comparison
-    from skidpad.recording.matrix import Metrics
-    from skidpad.recording.results import definitions_of
+    from skidpad.recording.campaign.matrix import Metrics
+    from skidpad.recording.campaign.results import definitions_of
 
     columns = [name for name, _, _ in definitions_of(Metrics)]
     read = [(text, parse_comparison("--fail-if", text, columns)) for text in texts]
@@ -125,9 +125,9 @@ def _read_rules(texts: list[str]) -> list[Rule]:
 def _compare(a: Path, b: Path, rules: list[Rule], gate: Gate) -> dict[str, list[str]]:
     """Print what changed and what the rules say of it; returns what fails, by rule."""
     from skidpad.evidence.compare import compare_campaigns, flaws, judge_rules
+    from skidpad.recording.campaign.matrix import MATRIX
+    from skidpad.recording.campaign.results import read_results
     from skidpad.recording.fingerprint import comparison_text
-    from skidpad.recording.matrix import MATRIX
-    from skidpad.recording.results import read_results
 
     wanted = list(dict.fromkeys([*SHOWN, *(r.column for r in rules)]))
     before, after = (read_results(folder, MATRIX) for folder in (a, b))
@@ -149,7 +149,7 @@ def _compare(a: Path, b: Path, rules: list[Rule], gate: Gate) -> dict[str, list[
 
 def _places(results: pl.DataFrame) -> set[str]:
     """Fingerprints of the rows; none where some row has none."""
-    from skidpad.recording.results import FINGERPRINT
+    from skidpad.recording.campaign.results import FINGERPRINT
 
     if FINGERPRINT not in results.columns or results[FINGERPRINT].has_nulls():
         return set()

@@ -10,7 +10,7 @@ import typer
 from msgspec import Meta, Struct
 
 if TYPE_CHECKING:
-    from skidpad.recording.staging import LeftOut
+    from skidpad.recording.run.staging import LeftOut
     from skidpad.report.play.runs import Played
 
 
@@ -32,7 +32,7 @@ class Expected(Struct, frozen=True):
 
     def conclude(self, out: Path, left_out: Sequence[LeftOut] = ()) -> tuple[Played, str]:
         """Judge the runs of a folder, write page, results.csv and JUnit; returns also what to print."""
-        from skidpad.recording.staging import Judging, write_judging
+        from skidpad.recording.run.staging import Judging, write_judging
 
         write_judging(out, Judging(expect=self.expect, left_out=tuple(left_out)))
         played, text = write_played_page(out)

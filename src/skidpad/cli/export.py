@@ -11,8 +11,8 @@ import typer
 from skidpad.cli.hazards import Osc
 
 if TYPE_CHECKING:
-    from skidpad.recording.osi import World
-    from skidpad.recording.runlog import RunLog
+    from skidpad.recording.formats.osi import World
+    from skidpad.recording.run.log import RunLog
     from skidpad.scenarios.environment import Environment
 
 
@@ -38,9 +38,9 @@ def export(
 
     require_run(run)
     from skidpad.campaign.run_road import road_files
-    from skidpad.recording.logfiles import read_log
-    from skidpad.recording.osi import send_run, write_osi
-    from skidpad.recording.osi_udp import read_address
+    from skidpad.recording.formats.osi import send_run, write_osi
+    from skidpad.recording.formats.osi_udp import read_address
+    from skidpad.recording.run.log_files import read_log
     from skidpad.scenarios.run_export import export_run
     from skidpad.scenarios.writer import OscVersion
 
@@ -80,7 +80,7 @@ def _world(run: Path, log: RunLog) -> World:
     from skidpad.core.errors import InputError
     from skidpad.core.geometry import Pose, wrap_angle
     from skidpad.physics.grip import rain_rate
-    from skidpad.recording.osi import World
+    from skidpad.recording.formats.osi import World
     from skidpad.roads.bundled import load_map
     from skidpad.scenarios.osi_road import Tilt, road_truth
     from skidpad.scenarios.run_export import road_of

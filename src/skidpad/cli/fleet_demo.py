@@ -75,7 +75,7 @@ def drive(job: Job) -> tuple[int, int]:
     from skidpad.fleet.loop.judging import errors_of
     from skidpad.fleet.updates.payloads import PayloadKind, read_payload_content
     from skidpad.live.watch import watch
-    from skidpad.recording.cycles import cycles
+    from skidpad.recording.channels.cycles import cycles
     from skidpad.recording.sources import open_channels
 
     job.folder.mkdir(parents=True)

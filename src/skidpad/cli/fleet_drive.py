@@ -24,8 +24,8 @@ from skidpad.live.child import ALARMS
 from skidpad.live.links import MONITORED
 from skidpad.live.outcome import LinkOutcome, read_outcome
 from skidpad.live.settings import Links
-from skidpad.recording.channel_drives import DriveOutcome
-from skidpad.recording.channels import Item
+from skidpad.recording.channels.drives import DriveOutcome
+from skidpad.recording.channels.mcap_files import Item
 
 KEPT = 100  # cycles: 10 s, more than a monitor that is heard may be late
 OBJECTS_MAX = 200

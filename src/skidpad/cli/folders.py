@@ -6,8 +6,8 @@ from pathlib import Path
 
 from skidpad.core.errors import FileError
 
-RESULTS = "results.parquet"  # recording.results.RESULTS, likewise
-TICKS = "ticks.parquet"  # recording.logfiles.TICKS, which loads the library of tables
+RESULTS = "results.parquet"  # recording.campaign.results.RESULTS, likewise
+TICKS = "ticks.parquet"  # recording.run.log_files.TICKS, which loads the library of tables
 
 
 def require_run(path: Path, *others: str) -> None:

@@ -75,7 +75,7 @@ def grip(
     cells = plan_grip(cross, run, seeds or REPEATS)
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.grip import recipe
-    from skidpad.recording.results import read_results
+    from skidpad.recording.campaign.results import read_results
     from skidpad.report.grip.page import write_grip_report
 
     def answer(folder: Path) -> str:

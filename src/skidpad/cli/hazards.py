@@ -31,7 +31,7 @@ WORLD = typer.Option(None, help="Only this channel's world; 1.0: the driving one
 @hazards.command("list")
 def list_(folder: Path = DIR) -> None:
     """One line per hazard."""
-    from skidpad.recording.hazards import read_index
+    from skidpad.recording.hazards.records import read_index
 
     for line in lines(read_index(folder)):
         typer.echo(line)
@@ -54,7 +54,7 @@ def show(folder: Path = DIR, id: list[str] = ID) -> None:
     """Everything that a record says, without its worlds."""
     import json
 
-    from skidpad.recording.hazards import read_index
+    from skidpad.recording.hazards.records import read_index
 
     rows = read_index(folder)
     for row in _choose_ids({row["id"]: row for row in rows}, id):
@@ -69,7 +69,7 @@ def export(
     world: str | None = WORLD,
 ) -> None:
     """Write each hazard as .xosc and .xodr into DIR/scenarios."""
-    from skidpad.recording.hazards import read_hazards
+    from skidpad.recording.hazards.records import read_hazards
 
     chosen = _choose_ids({record.id: record for record in read_hazards(folder)}, id)
     from skidpad.scenarios.hazard_export import export_hazard

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from skidpad.core.vocabulary import HazardType
     from skidpad.evidence.channels.indicators.catalogue import AnyIndicator
     from skidpad.evidence.channels.summary import Watched
-    from skidpad.recording.channels import ChannelSource
+    from skidpad.recording.channels.mcap_files import ChannelSource
 
 
 class Rules(str, Enum):
@@ -153,7 +153,7 @@ def _source(file: Path | None, mapping: Path | None, domain: int, wait: float) -
     if mapping is None:
         raise ConfigError("--listen needs --mapping FILE, which says which topics are what")
     from skidpad.live.ros2.listener import RosTopics
-    from skidpad.recording.rosbag import load_mapping
+    from skidpad.recording.formats.ros_bag import load_mapping
 
     return RosTopics(load_mapping(mapping), domain, patience=wait, silence=wait)
 
@@ -246,7 +246,7 @@ def _gate(counts: dict[str, int], junit: Path | None) -> None:
 def safety_case(folder: Path = DIR) -> None:
     """Print the safety case with what the drive says for and against each claim."""
     from skidpad.evidence.channels.case import evidence_lines
-    from skidpad.recording.indicators import read_indicators
+    from skidpad.recording.channels.indicators import read_indicators
 
     for line in evidence_lines(read_indicators(folder)):
         typer.echo(line)

@@ -19,8 +19,8 @@ from skidpad.core.vocabulary import SensorLevel
 
 if TYPE_CHECKING:
     from skidpad.campaign.campaign import Campaign
-    from skidpad.recording.grip import GripKey, GripMetrics
-    from skidpad.recording.staging import LeftOut
+    from skidpad.recording.campaign.grip import GripKey, GripMetrics
+    from skidpad.recording.run.staging import LeftOut
     from skidpad.report.play.runs import Played
 
 PLAIN = "clear-noon"  # what a file leaves open of the weather
@@ -159,7 +159,7 @@ def _campaign(
     from skidpad.campaign.campaign import Campaign
     from skidpad.campaign.files import RECIPE, scenario_files
     from skidpad.cli.carla_backend import drives_alone
-    from skidpad.recording.staging import LeftOut
+    from skidpad.recording.run.staging import LeftOut
 
     found = scenario_files(folder) if folder.is_dir() else [folder]
     hindrances = {file: _hindrance(file, template) for file in found}

@@ -14,7 +14,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from skidpad.campaign.campaign import BATCH, Campaign
 from skidpad.campaign.recipe import cell_of
 from skidpad.core.wording import count_text
-from skidpad.recording.ledger import Entry
+from skidpad.recording.campaign.ledger import Entry
 
 console = Console(stderr=True)
 

@@ -49,7 +49,7 @@ def risk(
     A crash is a contact above 5 km/h (with a person or a two-wheeler any) or a departure from the road.
     Where the methods disagree or are too uncertain, the answer is "not determined".
     """
-    from skidpad.recording.risks import Risk
+    from skidpad.recording.campaign.risks import Risk
     from skidpad.search.exposure import NO_EXPOSURE, read_exposure
     from skidpad.search.loop import begin_risk
     from skidpad.search.risk import estimate_risk

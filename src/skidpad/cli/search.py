@@ -13,7 +13,7 @@ from skidpad.cli.varied import Batches, VariedFile, Vary, scenario_options, vary
 from skidpad.core.run import RunSpec, Scenario
 
 if TYPE_CHECKING:
-    from skidpad.recording.searches import Search, Trial
+    from skidpad.recording.campaign.searches import Search, Trial
 
 
 class Varied(Struct, frozen=True):
@@ -52,7 +52,7 @@ def search(
     the smallest change that makes it harmless.
     """
     from skidpad.core.errors import require_choice
-    from skidpad.recording.searches import Search
+    from skidpad.recording.campaign.searches import Search
     from skidpad.search.loop import write_search
     from skidpad.search.margin import OBJECTIVES
     from skidpad.search.methods import METHODS

@@ -72,8 +72,8 @@ def channel_lines(recording: Path, channel: str | None) -> list[str]:
     from skidpad.core.errors import require_choice
     from skidpad.evidence.channels.shadow import plans_of
     from skidpad.evidence.shadow import partings, share_apart
-    from skidpad.recording.channels import McapRecording
-    from skidpad.recording.cycles import cycles
+    from skidpad.recording.channels.cycles import cycles
+    from skidpad.recording.channels.mcap_files import McapRecording
 
     source = McapRecording(recording, truth=False)
     if channel is not None:

@@ -21,13 +21,13 @@ from skidpad.evidence.drive.severity import graded_contacts
 from skidpad.evidence.drive.story import tell_story
 from skidpad.physics.grip import friction_ratio
 from skidpad.physics.types import vehicle_types
-from skidpad.recording.added_metrics import read_added_metrics
+from skidpad.recording.campaign.added_metrics import read_added_metrics
+from skidpad.recording.campaign.matrix import Metrics
+from skidpad.recording.campaign.results import definitions_of
 from skidpad.recording.fingerprint import comparison_text, fingerprint
-from skidpad.recording.logfiles import driven_on, log_hash, read_log
-from skidpad.recording.matrix import Metrics
-from skidpad.recording.readings import read_readings, summarise_readings
-from skidpad.recording.results import definitions_of
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import driven_on, log_hash, read_log
+from skidpad.recording.run.readings import read_readings, summarise_readings
 from skidpad.report.crashes.cards import contact_text, headline, timeline
 from skidpad.report.crashes.causes import write_cause
 from skidpad.roads.queries import RoadMap

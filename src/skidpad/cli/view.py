@@ -17,7 +17,7 @@ def view(file: Path = FILE, mapping: Path | None = MAPPING, save: Path | None = 
 
     if not file.exists():
         raise FileError(f"{file}: no such file")
-    from skidpad.recording.cycles import cycles
+    from skidpad.recording.channels.cycles import cycles
     from skidpad.recording.sources import open_channels
     from skidpad.report.channels.viewer import log_drive, require_rerun
 

@@ -45,7 +45,7 @@ from skidpad.core.vocabulary import (
 )
 from skidpad.core.weather import Weather
 from skidpad.evidence.pairs import Body
-from skidpad.recording.channels import McapRecording
+from skidpad.recording.channels.mcap_files import McapRecording
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.recovery import Action

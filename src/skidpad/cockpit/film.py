@@ -20,7 +20,7 @@ from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import Studio, View, plane
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.setup import DT
-from skidpad.recording.surfaces import read_run_surface
+from skidpad.recording.run.surfaces import read_run_surface
 from skidpad.roads.surface_outlines import outline_patches
 from skidpad.simulation.world.world import BRAKING
 

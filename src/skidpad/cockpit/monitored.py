@@ -12,8 +12,8 @@ import polars as pl
 from skidpad.cockpit.indicators import every
 from skidpad.core.setup import DT
 from skidpad.live.links import MONITORED
-from skidpad.recording.hazards import INDEX_FILE, read_index
-from skidpad.recording.indicators import FILE, read_indicators
+from skidpad.recording.channels.indicators import FILE, read_indicators
+from skidpad.recording.hazards.records import INDEX_FILE, read_index
 
 
 class MonitoredRun(NamedTuple):

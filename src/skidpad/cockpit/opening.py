@@ -12,8 +12,8 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.names import path_part
 from skidpad.core.run import ActorMode, Passenger, RunSpec, Scenario
 from skidpad.core.vocabulary import SensorLevel
-from skidpad.recording.hazards import TEXT_FILE, HazardRecord, read_hazards
-from skidpad.recording.logfiles import TICKS
+from skidpad.recording.hazards.records import TEXT_FILE, HazardRecord, read_hazards
+from skidpad.recording.run.log_files import TICKS
 from skidpad.scenarios.hazard_export import export_hazard
 from skidpad.scenarios.writer import OscVersion
 

@@ -41,11 +41,11 @@ from skidpad.core.states import (
 from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Supervision, Tier
 from skidpad.evidence.pairs import body, together
 from skidpad.physics.types import vehicle_types
-from skidpad.recording.events import LightChange, Notice, Relocation
-from skidpad.recording.inputs import read_inputs
-from skidpad.recording.logfiles import TICKS, read_log
-from skidpad.recording.readings import RecordedSensor, describe_row, read_readings
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.events import LightChange, Notice, Relocation
+from skidpad.recording.run.inputs import read_inputs
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import TICKS, read_log
+from skidpad.recording.run.readings import RecordedSensor, describe_row, read_readings
 from skidpad.simulation.recovery import Action, Moved, Relocate
 from skidpad.stack.control.text import mode_text
 

@@ -19,7 +19,7 @@ from skidpad.cockpit.words import Link
 from skidpad.core.errors import OutputError
 from skidpad.core.inputs import Beam
 from skidpad.core.setup import DT
-from skidpad.recording.surfaces import read_run_surface
+from skidpad.recording.run.surfaces import read_run_surface
 
 PATIENCE = 0.02  # s between two looks at the words
 FILMS = "films"  # folder within the run's

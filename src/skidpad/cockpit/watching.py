@@ -21,8 +21,8 @@ from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.statistics import clopper_pearson
 from skidpad.pages.server import Place, Server
 from skidpad.pages.site import nicegui, site
-from skidpad.recording.campaigns import RUNS, last_snapshot
-from skidpad.recording.ledger import CAMPAIGN, LEDGER, latest, read_identity, read_ledger
+from skidpad.recording.campaign.folder import RUNS, last_snapshot
+from skidpad.recording.campaign.ledger import CAMPAIGN, LEDGER, latest, read_identity, read_ledger
 
 WRAPPED = "overflow-wrap: anywhere"  # the name of a folder may be wider than a phone
 GOOD = "without a crash"

@@ -1,7 +1,7 @@
 """What a person at the desk does while a run is driven. An input acts in the tick that it is given.
 
 A run with the same inputs at the same ticks is the same run: they are stored in its folder
-(`recording/inputs.py`) and given again by `skidpad rerun`.
+(`recording/run/inputs.py`) and given again by `skidpad rerun`.
 """
 
 from __future__ import annotations

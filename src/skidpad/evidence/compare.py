@@ -29,8 +29,8 @@ from skidpad.evidence.statistics import (
     p_text,
     sign_tests,
 )
-from skidpad.recording.matrix import Metrics
-from skidpad.recording.results import definitions_of
+from skidpad.recording.campaign.matrix import Metrics
+from skidpad.recording.campaign.results import definitions_of
 
 Floats = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.evidence.pairs import Body, body, following, together
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -9,7 +9,7 @@ from math import inf
 from skidpad.core.wording import count_text
 from skidpad.evidence.comparisons import parse_comparison
 from skidpad.evidence.pairs import Pair, pairs
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 
 NO_COLLISION = "no-collision"
 LEAST = tuple(name for name in Pair._fields if name.startswith("min_"))

@@ -17,7 +17,7 @@ from skidpad.evidence.drive.conflict import (
     least,
     time_to_collision,
 )
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 
 Floats = NDArray[np.float64]
 EGO = 0

@@ -10,8 +10,8 @@ from skidpad.evidence.drive.file_criteria import Result
 from skidpad.evidence.encounters import DISTANCE, TIME, Encounter, encounter
 from skidpad.evidence.expectations import NO_COLLISION, Expectation, parse_expectation
 from skidpad.evidence.pairs import EGO, Pair
-from skidpad.recording.runlog import RunLog
-from skidpad.recording.staging import Staging
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.staging import Staging
 
 NO_CONTACT = "no contact of the ego"
 NOTHING_UNDER_TEST = "none, as the file drives the ego and nothing is under test"

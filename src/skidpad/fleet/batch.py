@@ -1,7 +1,7 @@
 """What a vehicle's batch says, checked before anything of it is kept.
 
 Of a hazard record only the head is read here; its worlds are read when somebody asks for them, by a
-reader that takes nothing on trust (`recording.hazard_text_reader`).
+reader that takes nothing on trust (`recording.hazards.text_reader`).
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
 from skidpad.fleet.identity import digest
 from skidpad.fleet.words import Limits, Refused
-from skidpad.recording.hazard_text import HEADER
+from skidpad.recording.hazards.text import HEADER
 
 Word = msgspec.Meta(max_length=200)
 END = b"\nZ\n"
@@ -34,7 +34,7 @@ class _Object(msgspec.Struct, frozen=True):
 
 
 class Head(msgspec.Struct, frozen=True):
-    """The index row of a record (`recording.hazards.index_row`)."""
+    """The index row of a record (`recording.hazards.records.index_row`)."""
 
     id: str
     type: HazardType

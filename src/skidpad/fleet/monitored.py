@@ -12,9 +12,9 @@ from skidpad.core.errors import FileError
 from skidpad.fleet.identity import digest
 from skidpad.fleet.spool import Spool
 from skidpad.fleet.words import Kind
-from skidpad.recording import indicators, monitored
-from skidpad.recording.hazard_text import HEADER
-from skidpad.recording.hazards import TEXT_FILE
+from skidpad.recording.channels import indicators, monitored
+from skidpad.recording.hazards.records import TEXT_FILE
+from skidpad.recording.hazards.text import HEADER
 
 RECORDS = 100  # of a batch
 BYTES = 4 * 1024 * 1024  # of a batch of hazards before it is packed

@@ -23,7 +23,7 @@ from skidpad.fleet.store.intake import Batch, Intake
 from skidpad.fleet.updates.repository import Repository
 from skidpad.fleet.warehouse import Warehouse
 from skidpad.fleet.words import Limits
-from skidpad.recording.hazards import HazardRecord
+from skidpad.recording.hazards.records import HazardRecord
 
 CAME = "came"  # topic, with a tenant: something new of its vehicles
 Clock = Callable[[], float]  # s since 1970

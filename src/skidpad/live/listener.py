@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Protocol
 
-from skidpad.recording.channels import Item
+from skidpad.recording.channels.mcap_files import Item
 
 
 class Listener(Protocol):

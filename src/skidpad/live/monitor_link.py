@@ -25,7 +25,7 @@ import skidpad
 from skidpad.live.outcome import LinkOutcome, write_outcome
 from skidpad.live.settings import Flow, MonitorLinkSettings
 from skidpad.live.wire import cycle_mark, end_mark, pack_item
-from skidpad.recording.channels import Item
+from skidpad.recording.channels.mcap_files import Item
 
 START_PATIENCE = 600.0  # s: kernels may have to be compiled first
 

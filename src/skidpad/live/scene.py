@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from skidpad.core.channels import ChannelFrame, Decision
 from skidpad.core.errors import ConfigError, MissingExtra
 from skidpad.live.child import ALARMS
-from skidpad.recording.channels import Item
+from skidpad.recording.channels.mcap_files import Item
 
 try:
     import foxglove

@@ -17,19 +17,19 @@ from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
 from skidpad.evidence.channels.recorder import CycleEvidence
 from skidpad.evidence.channels.summary import Watched, columns, summarise_drive
 from skidpad.evidence.channels.timing import MODULES
-from skidpad.recording.channels import ChannelSource, Losses, Message
-from skidpad.recording.cycles import cycles
-from skidpad.recording.folders import ResultKind, prepare_files, require_kind
-from skidpad.recording.hazards import INDEX_FILE, TEXT_FILE, HazardWriter
-from skidpad.recording.indicators import FILE as INDICATORS
-from skidpad.recording.indicators import IndicatorLog
-from skidpad.recording.monitored import (
+from skidpad.recording.channels.cycles import cycles
+from skidpad.recording.channels.indicators import FILE as INDICATORS
+from skidpad.recording.channels.indicators import IndicatorLog
+from skidpad.recording.channels.mcap_files import ChannelSource, Losses, Message
+from skidpad.recording.channels.monitored import (
     SUMMARY,
     TIMING,
     read_summary,
     write_summary,
     write_timing,
 )
+from skidpad.recording.folders import ResultKind, prepare_files, require_kind
+from skidpad.recording.hazards.records import INDEX_FILE, TEXT_FILE, HazardWriter
 
 FILES = (INDICATORS, TEXT_FILE, INDEX_FILE, TIMING, SUMMARY)
 WARM_CYCLES = 20

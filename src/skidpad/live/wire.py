@@ -14,9 +14,9 @@ from google.protobuf.message import DecodeError
 
 from skidpad.core.channels import ChannelFrame, Context, Decision, Due, TruthFrame
 from skidpad.core.errors import FileError
-from skidpad.recording import channel_codec as codec
-from skidpad.recording import channels_pb2 as pb
-from skidpad.recording.channels import Item, Losses, Message
+from skidpad.recording.channels import channels_pb2 as pb
+from skidpad.recording.channels import codec
+from skidpad.recording.channels.mcap_files import Item, Losses, Message
 
 HEAD = struct.Struct("<BhI")
 MARK = struct.Struct("<qdq")

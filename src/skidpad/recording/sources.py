@@ -6,7 +6,7 @@ from hashlib import sha256
 from pathlib import Path
 
 from skidpad.core.errors import FileError
-from skidpad.recording.channels import ChannelSource, McapRecording
+from skidpad.recording.channels.mcap_files import ChannelSource, McapRecording
 
 BLOCK = 2**20  # bytes
 
@@ -14,7 +14,7 @@ BLOCK = 2**20  # bytes
 def open_channels(path: Path, mapping: Path | None = None, truth: bool = True) -> ChannelSource:
     """The recording at `path`; with `mapping` it is read as a ROS 2 bag."""
     if mapping is not None:
-        from skidpad.recording.rosbag import RosRecording
+        from skidpad.recording.formats.ros_bag import RosRecording
 
         return RosRecording(path, mapping)
     if path.is_dir():

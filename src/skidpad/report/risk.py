@@ -7,7 +7,7 @@ from math import ceil, log
 from pathlib import Path
 
 from skidpad.core.wording import count_text
-from skidpad.recording.risks import (
+from skidpad.recording.campaign.risks import (
     RISK_RUNS,
     SCALES,
     Influence,
@@ -18,7 +18,7 @@ from skidpad.recording.risks import (
     read_risk,
     read_risk_found,
 )
-from skidpad.recording.searches import Trial, read_trials
+from skidpad.recording.campaign.searches import Trial, read_trials
 from skidpad.report.elements.figures import INK, PALETTE, canvas, svg_of
 from skidpad.report.elements.page import (
     REPORT,

@@ -11,7 +11,7 @@ from scipy.stats import ks_2samp
 from skidpad.core.run import AdasDriver, DriverSpec
 from skidpad.core.space import Choice, Normal, Variable
 from skidpad.core.wording import count_text
-from skidpad.recording.searches import (
+from skidpad.recording.campaign.searches import (
     Change,
     Findings,
     Group,

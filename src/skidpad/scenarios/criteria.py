@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from skidpad.recording.staging import FileCriterion
+from skidpad.recording.run.staging import FileCriterion
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.findings import Fault
 

@@ -17,7 +17,7 @@ from scenariogeneration import xodr
 
 from skidpad.core.errors import ConfigError, InputError
 from skidpad.core.names import path_part
-from skidpad.recording.hazards import HazardRecord
+from skidpad.recording.hazards.records import HazardRecord
 from skidpad.scenarios.tracks import Track, tracks
 from skidpad.scenarios.writer import OscVersion, Sheet, write_element, write_scenario
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from skidpad.core.geometry import kmh_from_mps, wrap_angle
-from skidpad.recording.osi import library
+from skidpad.recording.formats.osi import library
 from skidpad.roads.lanes import LaneKind, Marking, SignalKind
 from skidpad.roads.queries import RoadMap
 

@@ -11,7 +11,7 @@ from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand, ActorSetup
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Control
-from skidpad.recording.staging import Staging
+from skidpad.recording.run.staging import Staging
 from skidpad.scenarios.entities import TYRES, Box
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Place

@@ -9,8 +9,8 @@ from math import cos, hypot, sin
 from pathlib import Path
 
 from skidpad.recording.files import write_bytes
-from skidpad.recording.runlog import RunLog
-from skidpad.recording.staging import write_staging
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.staging import write_staging
 from skidpad.scenarios.entities import Box
 from skidpad.scenarios.player import Played
 from skidpad.scenarios.scene import Happening

@@ -12,7 +12,7 @@ from skidpad.core.errors import InputError
 from skidpad.core.names import path_part
 from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.recording.files import write_bytes
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 from skidpad.roads.bundled import FOLDER, load_map
 from skidpad.scenarios.environment import Environment
 from skidpad.scenarios.hazard_export import road_under

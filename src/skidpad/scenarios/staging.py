@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 
-from skidpad.recording.staging import StagedEvent, Staging
+from skidpad.recording.run.staging import StagedEvent, Staging
 from skidpad.scenarios.actions.base import NoEffect
 from skidpad.scenarios.conditions.by_entity import Collision
 from skidpad.scenarios.scenario import Scenario

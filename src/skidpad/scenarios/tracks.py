@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame
 from skidpad.core.vocabulary import SemanticClass
-from skidpad.recording.hazards import HazardRecord
+from skidpad.recording.hazards.records import HazardRecord
 
 Floats = NDArray[np.float64]
 V_STANDING = 0.5  # m/s, below it the heading is held

@@ -10,7 +10,7 @@ from skidpad.core.errors import ConfigError
 from skidpad.core.reading import decode_yaml, read_bytes
 from skidpad.core.space import Variable
 from skidpad.core.told import describe_value
-from skidpad.recording.risks import Rate
+from skidpad.recording.campaign.risks import Rate
 from skidpad.search.space import parse_variable
 
 KEYS = ("variables", "per_hour", "per_100km")

@@ -14,8 +14,7 @@ from msgspec import structs
 from skidpad.campaign.play import run_to
 from skidpad.campaign.worker import Runner
 from skidpad.core.space import Space
-from skidpad.recording.files import write_bytes
-from skidpad.recording.searches import (
+from skidpad.recording.campaign.searches import (
     CHOICES,
     FOUND,
     Change,
@@ -26,6 +25,7 @@ from skidpad.recording.searches import (
     distinct_failures,
     failure_folder,
 )
+from skidpad.recording.files import write_bytes
 from skidpad.search.files import write_choices
 from skidpad.search.loop import drive_all
 from skidpad.search.space import apply_values

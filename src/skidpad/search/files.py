@@ -8,8 +8,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from skidpad.core.space import Choice, Law, Normal, Space, Uniform, Variable
+from skidpad.recording.campaign.searches import Trial
 from skidpad.recording.files import write_bytes
-from skidpad.recording.searches import Trial
 from skidpad.scenarios.distributions import scenario_of_choices
 from skidpad.scenarios.document import Node, parse
 from skidpad.scenarios.parameters import inner

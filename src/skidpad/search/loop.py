@@ -17,9 +17,16 @@ from msgspec import Struct, structs
 
 from skidpad.campaign.worker import Job, Runner
 from skidpad.core.errors import FileError, OutputError
+from skidpad.recording.campaign.risks import RISK, RISK_RUNS, Risk, read_risk
+from skidpad.recording.campaign.searches import (
+    SEARCH,
+    TRIALS,
+    Search,
+    Trial,
+    read_search,
+    read_trials,
+)
 from skidpad.recording.files import write_bytes
-from skidpad.recording.risks import RISK, RISK_RUNS, Risk, read_risk
-from skidpad.recording.searches import SEARCH, TRIALS, Search, Trial, read_search, read_trials
 from skidpad.search.margin import NO_CONFLICT
 from skidpad.search.methods import batch_sizes, make_method
 from skidpad.search.trial import Point, drive_point, unit_tuple, with_reference

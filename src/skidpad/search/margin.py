@@ -20,7 +20,7 @@ import numpy as np
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.evidence.drive.severity import LIGHT_BELOW, Contact, graded_contacts
 from skidpad.evidence.pairs import Pair, pairs
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 from skidpad.roads.queries import RoadMap
 
 NO_CONFLICT = 2.0

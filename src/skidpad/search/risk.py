@@ -15,8 +15,7 @@ from scipy.special import ndtr
 
 from skidpad.campaign.worker import Runner
 from skidpad.core.space import Choice, Variable
-from skidpad.recording.files import write_bytes
-from skidpad.recording.risks import (
+from skidpad.recording.campaign.risks import (
     RISK_FOUND,
     RISK_RUNS,
     SCALES,
@@ -25,7 +24,8 @@ from skidpad.recording.risks import (
     Risk,
     RiskFound,
 )
-from skidpad.recording.searches import Trial
+from skidpad.recording.campaign.searches import Trial
+from skidpad.recording.files import write_bytes
 from skidpad.search.loop import StoredTrials, drive_all
 from skidpad.search.probability import (
     Estimate,

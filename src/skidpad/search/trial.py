@@ -15,9 +15,9 @@ from skidpad.core.run import ReferenceDriver, RunSpec
 from skidpad.core.space import Space
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.drive.severity import Contact
-from skidpad.recording.motion import motion_hash
-from skidpad.recording.runlog import RunLog
-from skidpad.recording.searches import FRONT, Trial
+from skidpad.recording.campaign.searches import FRONT, Trial
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.motion import motion_hash
 from skidpad.roads.bundled import load_map
 from skidpad.scenarios.measures import between
 from skidpad.search.margin import NO_CONFLICT, Closeness, closeness

@@ -20,8 +20,8 @@ from skidpad.evidence.channels.indicators.settings import IndicatorSettings
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings, drive_events
 from skidpad.evidence.channels.recorder import WORLD_LIMIT
 from skidpad.evidence.channels.timefilter import TimeFilter
-from skidpad.recording.channels import ChannelWriter, McapRecording
-from skidpad.recording.cycles import cycles
+from skidpad.recording.channels.cycles import cycles
+from skidpad.recording.channels.mcap_files import ChannelWriter, McapRecording
 
 NAN = float("nan")
 FOLLOWER = (-30.0, 0, 0, 16.5, 0)  # 4.8 m and 3.2 s from a collision after 13.8 s

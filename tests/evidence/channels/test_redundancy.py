@@ -3,7 +3,7 @@
 import pytest
 
 from skidpad.evidence.channels.redundancy import compare_drivers, differences
-from skidpad.recording.channel_drives import DriveOutcome
+from skidpad.recording.channels.drives import DriveOutcome
 
 
 def outcome(drive_by: str, seed: int, collisions: int) -> DriveOutcome:

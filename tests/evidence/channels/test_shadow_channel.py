@@ -13,7 +13,7 @@ from skidpad.core.channels import Decision
 from skidpad.core.errors import ConfigError
 from skidpad.evidence.channels.shadow import planned_braking, plans_of
 from skidpad.evidence.shadow import partings, share_apart
-from skidpad.recording.cycles import cycles
+from skidpad.recording.channels.cycles import cycles
 
 TIMES = np.arange(16) * 0.2
 

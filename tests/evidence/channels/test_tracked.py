@@ -19,7 +19,7 @@ from skidpad.evidence.channels.tracked.distance import SafeDistance
 from skidpad.evidence.channels.tracked.grip import OwnGrip, planned_acceleration
 from skidpad.evidence.channels.tracked.tracks import Lookout, Tracks
 from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, Tracked, parting
-from skidpad.recording.cycles import cycles
+from skidpad.recording.channels.cycles import cycles
 
 TAILGATED, TAILGATING = HazardType.EGO_TAILGATED, HazardType.EGO_TAILGATING
 LOCALISATION, UNSEEN = HazardType.INCONSISTENT_LOCALISATION, HazardType.UNSEEN_BY_A_CHANNEL

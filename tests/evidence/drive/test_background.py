@@ -12,8 +12,8 @@ import pytest
 import makelog
 from skidpad.core.states import ContactEvent, TrafficContact
 from skidpad.evidence.drive.background import UNSEEN, background
-from skidpad.recording.events import MovedOn, PutBack
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.events import MovedOn, PutBack
+from skidpad.recording.run.log import RunLog
 
 TICKS = 1000  # 50 s
 

@@ -13,8 +13,8 @@ from makelog import DT, drive, pose
 from skidpad.core.states import ContactEvent, StackReport
 from skidpad.core.vocabulary import RelocationReason, Supervision, Tier
 from skidpad.evidence.drive import manner
-from skidpad.recording.events import Relocation
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.events import Relocation
+from skidpad.recording.run.log import RunLog
 
 
 def tiers(*stretches: tuple[Tier, int], throttle: float = 0.5, far: float = 100.0) -> RunLog:

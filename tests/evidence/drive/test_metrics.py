@@ -23,11 +23,11 @@ from skidpad.evidence.drive.lateral import count_invasions
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import LeadDefinition, MetricSettings, prepare
 from skidpad.evidence.drive.story import tell_story
-from skidpad.recording.events import Relocation
-from skidpad.recording.logfiles import read_log, write_log
-from skidpad.recording.matrix import Metrics
-from skidpad.recording.runlog import RunLog
-from skidpad.recording.ticks import TickLog
+from skidpad.recording.campaign.matrix import Metrics
+from skidpad.recording.run.events import Relocation
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import read_log, write_log
+from skidpad.recording.run.ticks import TickLog
 
 SEEN = StackReport(
     status=DetectionStatus.FUSION_DETECT, tier=Tier.ACC_HOLD, detected=True, distance=30.0

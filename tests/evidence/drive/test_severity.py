@@ -14,9 +14,9 @@ from skidpad.core.vocabulary import ActorKind, RelocationReason, Supervision
 from skidpad.evidence.drive.metrics import run_metrics, weather_metrics
 from skidpad.evidence.drive.prepared import prepare
 from skidpad.evidence.drive.severity import Contact, Measure, Severity, graded_contacts
-from skidpad.recording.events import Relocation
-from skidpad.recording.matrix import Metrics
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.campaign.matrix import Metrics
+from skidpad.recording.run.events import Relocation
+from skidpad.recording.run.log import RunLog
 
 KMH = 3.6
 TICK = 10

@@ -21,8 +21,8 @@ from skidpad.core.vocabulary import (
 from skidpad.evidence.drive.collisions import Crash, CrashKind, find_crashes
 from skidpad.evidence.drive.prepared import Drive, prepare
 from skidpad.evidence.drive.story import Arrival, Story, tell_story
-from skidpad.recording.events import Relocation
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.events import Relocation
+from skidpad.recording.run.log import RunLog
 
 HIT = 100  # tick of the contact
 V, LENGTH = 20.0, 4.0

@@ -16,7 +16,7 @@ from skidpad.evidence.drive.collisions import Crash, find_crashes
 from skidpad.evidence.drive.lateral import count_invasions
 from skidpad.evidence.drive.metrics import run_metrics
 from skidpad.evidence.drive.prepared import prepare
-from skidpad.recording.matrix import Metrics
+from skidpad.recording.campaign.matrix import Metrics
 
 SEEN = StackReport(
     status=DetectionStatus.FUSION_DETECT, tier=Tier.ACC_HOLD, detected=True, distance=10.0

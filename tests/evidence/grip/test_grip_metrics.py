@@ -20,7 +20,7 @@ from skidpad.evidence.grip.scores import (
     route_share,
 )
 from skidpad.evidence.grip.study import METRICS, CellSeries, delays, distances
-from skidpad.recording.grip import COLUMNS
+from skidpad.recording.campaign.grip import COLUMNS
 
 
 def going(x=0.0, y=0.0, v=10.0, yaw=0.0, vy=0.0):

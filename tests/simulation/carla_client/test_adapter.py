@@ -22,7 +22,7 @@ from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.matrix import RECIPE
 from skidpad.campaign.pool import local
 from skidpad.core.simulator import BackendChoice, BackendKind
-from skidpad.recording.matrix import MatrixEntry
+from skidpad.recording.campaign.matrix import MatrixEntry
 from skidpad.simulation.carla_server.process import ServerProcess
 
 pytest.importorskip("carla")
@@ -212,7 +212,7 @@ def test_adas_completes_a_cell_on_carla(serve: Serve, tmp_path: Path) -> None:
     assert results["outcome"].to_list() == ["completed"]
     assert results["samples"].to_list() == [80]
     assert (tmp_path / "out" / "report.html").is_file()
-    from skidpad.recording.logfiles import read_log
+    from skidpad.recording.run.log_files import read_log
 
     log = read_log(next((tmp_path / "out" / "runs").iterdir()))
     assert log.actors.x.shape == (80, 21)

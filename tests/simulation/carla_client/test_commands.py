@@ -14,9 +14,9 @@ import pytest
 
 from carla_programs import environment
 from skidpad.core.channels import ChannelFrame, TruthFrame
-from skidpad.recording.channel_drives import read_outcomes
-from skidpad.recording.channels import McapRecording
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.channels.drives import read_outcomes
+from skidpad.recording.channels.mcap_files import McapRecording
+from skidpad.recording.run.log_files import read_log
 from skidpad.recording.sources import recordings_below
 from skidpad.scenarios.shipped import FOLDER
 from skidpad.simulation.carla_server.process import ServerProcess

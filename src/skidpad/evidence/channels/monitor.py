@@ -42,7 +42,7 @@ from skidpad.evidence.channels.risk import RiskForm, RiskMatrix, risk_matrix
 from skidpad.evidence.channels.timefilter import Event, TimeFilter
 from skidpad.evidence.channels.tracked.distance import GRIPS, SafeDistance
 from skidpad.evidence.channels.tracked.vote import Tracked
-from skidpad.recording.hazards import HazardRecord
+from skidpad.recording.hazards.records import HazardRecord
 
 Floats = NDArray[np.float64]
 

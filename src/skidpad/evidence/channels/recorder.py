@@ -15,7 +15,7 @@ from skidpad.evidence.channels.hazards import Rule, Signal, SignalReadings
 from skidpad.evidence.channels.indicators.layout import IndicatorReadings
 from skidpad.evidence.channels.risk import RiskMatrix
 from skidpad.evidence.channels.timefilter import SAME_TIME
-from skidpad.recording.hazards import HazardRecord, InvolvedObject
+from skidpad.recording.hazards.records import HazardRecord, InvolvedObject
 
 BEFORE = 5.0  # s of world kept before a hazard
 AFTER = 5.0  # s after it

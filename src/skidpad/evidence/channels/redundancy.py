@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from skidpad.core.run import ARBITER
 from skidpad.evidence.statistics import Comparison, Rate, compare_pairs, event_rate
-from skidpad.recording.channel_drives import DriveOutcome
+from skidpad.recording.channels.drives import DriveOutcome
 
 EVENTS = ("collisions", "collisions_struck", "red_lights_run", "stalls")
 Key = tuple[str, int]  # route and seed

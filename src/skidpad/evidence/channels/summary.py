@@ -10,8 +10,8 @@ from skidpad.evidence.channels.indicators.catalogue import Bound
 from skidpad.evidence.channels.indicators.layout import Place
 from skidpad.evidence.channels.monitor import Monitor, drive_events
 from skidpad.evidence.channels.timefilter import Event
-from skidpad.recording.channels import Losses
-from skidpad.recording.indicators import Column
+from skidpad.recording.channels.indicators import Column
+from skidpad.recording.channels.mcap_files import Losses
 
 
 @dataclass(frozen=True, slots=True)

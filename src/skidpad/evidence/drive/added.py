@@ -13,10 +13,10 @@ from skidpad.core.told import describe_value
 from skidpad.evidence.drive.collisions import find_crashes
 from skidpad.evidence.drive.metrics import highway_roads, summarise
 from skidpad.evidence.drive.prepared import Drive, MetricSettings, prepare
-from skidpad.recording.added_metrics import AddedMetric
-from skidpad.recording.matrix import Metrics
-from skidpad.recording.results import definitions_of
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.campaign.added_metrics import AddedMetric
+from skidpad.recording.campaign.matrix import Metrics
+from skidpad.recording.campaign.results import definitions_of
+from skidpad.recording.run.log import RunLog
 from skidpad.roads.queries import RoadMap
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from skidpad.core.vocabulary import ActorKind
 from skidpad.evidence.drive.prepared import Drive, Mask
-from skidpad.recording.matrix import Metrics
+from skidpad.recording.campaign.matrix import Metrics
 
 AFTER_EGO = 20.0  # s after a contact of the ego, in which others may owe theirs to it
 UNSEEN = "unseen"  # `traffic` of a log's header: the backend does not tell contacts of others

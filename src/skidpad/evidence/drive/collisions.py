@@ -12,7 +12,7 @@ from skidpad.core.vocabulary import RelocationReason, Supervision
 from skidpad.evidence.drive.perception import vehicle_present
 from skidpad.evidence.drive.prepared import Drive, Mask
 from skidpad.evidence.drive.severity import Contact, grade
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 
 BEND_RADIUS = 250.0  # m, a lane curved tighter is a bend
 LOOK_BACK = 10.0  # s of history in the chain of causes

@@ -11,7 +11,7 @@ import numpy as np
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.wording import count_text
 from skidpad.evidence.drive.prepared import Drive
-from skidpad.recording.staging import FileCriterion
+from skidpad.recording.run.staging import FileCriterion
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.vocabulary import Supervision, Tier
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 
 Mask = NDArray[np.bool_]
 

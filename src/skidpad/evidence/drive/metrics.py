@@ -27,9 +27,9 @@ from skidpad.evidence.drive.severity import (
     distinct_contacts,
     graded_contacts,
 )
-from skidpad.recording.events import Event
-from skidpad.recording.matrix import Metrics
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.campaign.matrix import Metrics
+from skidpad.recording.run.events import Event
+from skidpad.recording.run.log import RunLog
 from skidpad.roads.queries import RoadMap
 
 KMH = 3.6

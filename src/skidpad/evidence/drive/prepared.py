@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.vocabulary import ActorKind, Supervision
 from skidpad.evidence.drive.lanematch import LaneIndex, LaneMatch
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 from skidpad.roads.queries import RoadMap
 
 Floats = NDArray[np.float64]

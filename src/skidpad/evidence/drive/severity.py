@@ -11,7 +11,7 @@ from skidpad.core.geometry import mps_from_kmh
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import ActorKind
 from skidpad.evidence.drive.prepared import Drive, Floats
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 
 LIGHT_BELOW = mps_from_kmh(5.0)  # m/s, a contact below it is of the lowest class
 HEAVY_ABOVE = mps_from_kmh(20.0)  # m/s, a contact above it is of the highest class

@@ -26,7 +26,7 @@ from skidpad.evidence.drive.collisions import (
 )
 from skidpad.evidence.drive.prepared import LEAD_RANGE, Drive, Floats, Mask
 from skidpad.evidence.drive.severity import Contact, graded_contacts
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 
 EGO = 0
 RIGHT_WITHIN, RIGHT_SHARE = 3.0, 0.2  # m, or this share of the gap: measured and true agree

@@ -20,8 +20,8 @@ from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.lefthanded import mirror_value
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import ActorKind, Outcome
-from skidpad.recording.grip import GripMetrics
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.campaign.grip import GripMetrics
+from skidpad.recording.run.log import RunLog
 
 Floats = NDArray[np.float64]
 

@@ -30,7 +30,7 @@ from skidpad.evidence.statistics import (
     mcnemar,
     mean_limits,
 )
-from skidpad.recording.grip import COLUMNS
+from skidpad.recording.campaign.grip import COLUMNS
 
 Floats = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skidpad.evidence.channels.hazards import Signal
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
-from skidpad.recording.hazards import HazardRecord
+from skidpad.recording.hazards.records import HazardRecord
 
 Floats = NDArray[np.float64]
 POINTS = 20  # of a series; records have 11 s, so one point stands for about half a second

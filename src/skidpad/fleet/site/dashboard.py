@@ -31,7 +31,7 @@ from skidpad.fleet.site.frame import say, table
 from skidpad.fleet.site.work import WORK_NOTE, draw_top
 from skidpad.fleet.store.reading import Wanted, hazard_row, hazard_rows, record_of
 from skidpad.fleet.words import Principal, Refused
-from skidpad.recording.hazards import HazardRecord
+from skidpad.recording.hazards.records import HazardRecord
 
 SHOWN = 6  # trends
 MAPS = 3

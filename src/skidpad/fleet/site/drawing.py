@@ -9,7 +9,7 @@ from math import cos, floor, hypot, isfinite, log10, sin
 
 from skidpad.core.channels import ChannelFrame
 from skidpad.fleet.alerting.keeping import Body
-from skidpad.recording.hazards import HazardRecord
+from skidpad.recording.hazards.records import HazardRecord
 
 Line = Sequence[tuple[float, float]]  # m
 MapLines = Callable[[str], Sequence[Line]]  # roads of a map by its name

@@ -15,7 +15,7 @@ from skidpad.fleet.store.rights import visible
 from skidpad.fleet.store.tables import batches, hazards
 from skidpad.fleet.unpacking import unpack
 from skidpad.fleet.words import Limits, Principal, absent
-from skidpad.recording.hazards import HazardRecord, decode_record
+from skidpad.recording.hazards.records import HazardRecord, decode_record
 
 PAGE = 200  # rows of one answer
 

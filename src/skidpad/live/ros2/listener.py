@@ -10,9 +10,9 @@ from typing import Any
 from skidpad.core.errors import ConfigError, FileError, MissingExtra
 from skidpad.live.ros2.network import like, participant, said_of_type
 from skidpad.live.ros2.types import Types, ros_name
-from skidpad.recording.channels import Losses, Message
-from skidpad.recording.ros_objects import OBJECT_READERS
-from skidpad.recording.rosbag import ODOMETRY, Clock, Mapping, RosFrames, stamp_of
+from skidpad.recording.channels.mcap_files import Losses, Message
+from skidpad.recording.formats.ros_bag import ODOMETRY, Clock, Mapping, RosFrames, stamp_of
+from skidpad.recording.formats.ros_objects import OBJECT_READERS
 
 try:
     from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication

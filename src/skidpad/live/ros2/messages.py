@@ -1,4 +1,4 @@
-"""Channel frames as ROS 2 messages: the inverse of `recording/rosbag.py`."""
+"""Channel frames as ROS 2 messages: the inverse of `recording/formats/ros_bag.py`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame
 from skidpad.live.ros2.types import OBJECTS, ODOMETRY, PATH, Types
-from skidpad.recording.ros_objects import AUTOWARE_CLASSES
+from skidpad.recording.formats.ros_objects import AUTOWARE_CLASSES
 
 Floats = NDArray[np.float64]
 NS = 1_000_000_000

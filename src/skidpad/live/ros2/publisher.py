@@ -17,9 +17,15 @@ from skidpad.live.ros2.messages import Messages
 from skidpad.live.ros2.network import BLOCKING, participant, qos
 from skidpad.live.ros2.types import OBJECTS, ODOMETRY, PATH, Types
 from skidpad.live.settings import Flow
-from skidpad.recording.channels import Item
+from skidpad.recording.channels.mcap_files import Item
 from skidpad.recording.files import write_bytes
-from skidpad.recording.rosbag import ChannelTopics, EgoTopic, Mapping, ObjectTopic, PlanTopic
+from skidpad.recording.formats.ros_bag import (
+    ChannelTopics,
+    EgoTopic,
+    Mapping,
+    ObjectTopic,
+    PlanTopic,
+)
 
 try:
     from cyclonedds.core import DDSException

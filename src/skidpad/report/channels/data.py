@@ -20,9 +20,9 @@ from skidpad.evidence.channels.indicators.catalogue import (
     load_thresholds,
 )
 from skidpad.evidence.channels.timing import TIMES
-from skidpad.recording.hazards import HazardRecord, read_hazards
-from skidpad.recording.indicators import read_indicators
-from skidpad.recording.monitored import SUMMARY, read_summary, read_timing
+from skidpad.recording.channels.indicators import read_indicators
+from skidpad.recording.channels.monitored import SUMMARY, read_summary, read_timing
+from skidpad.recording.hazards.records import HazardRecord, read_hazards
 
 Floats = NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import numpy as np
 from skidpad import __version__
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.indicators.catalogue import Indicator
-from skidpad.recording.hazards import HazardRecord
+from skidpad.recording.hazards.records import HazardRecord
 from skidpad.report.channels import figures, tables
 from skidpad.report.channels.data import MonitoredDrive, load_drive
 from skidpad.report.channels.worlds import worlds_replay

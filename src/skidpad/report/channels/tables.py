@@ -16,7 +16,7 @@ from skidpad.evidence.channels.indicators.catalogue import (
     safety_case,
 )
 from skidpad.evidence.channels.timing import timing_statistics
-from skidpad.recording.hazards import HazardRecord
+from skidpad.recording.hazards.records import HazardRecord
 from skidpad.report.channels.data import MonitoredDrive
 from skidpad.report.elements.page import Block, Cell, Node, Table, Text, Tree, words
 from skidpad.report.elements.tables import Column, Format, Quantity, table

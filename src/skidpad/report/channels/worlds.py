@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame, Cycle
-from skidpad.recording.hazards import HazardRecord
+from skidpad.recording.hazards.records import HazardRecord
 
 UNIT = 0.05  # m
 STRIDE = 2  # cycles between pictures

@@ -14,8 +14,8 @@ from skidpad.evidence.drive.collisions import Crash, CrashKind, Striker
 from skidpad.evidence.drive.prepared import Drive
 from skidpad.evidence.drive.severity import Contact
 from skidpad.evidence.drive.story import Arrival, Sighting, Story, tell_story
-from skidpad.recording.campaigns import snapshot
-from skidpad.recording.surfaces import read_run_surface
+from skidpad.recording.campaign.folder import snapshot
+from skidpad.recording.run.surfaces import read_run_surface
 from skidpad.report.crashes.causes import (
     format_gap,
     format_metres,

@@ -7,9 +7,9 @@ from pathlib import Path
 
 from skidpad.evidence.drive.collisions import contact_crashes
 from skidpad.evidence.drive.prepared import prepare
-from skidpad.recording.logfiles import read_log
-from skidpad.recording.motion import motion_hash
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import read_log
+from skidpad.recording.run.motion import motion_hash
 from skidpad.report.crashes.cards import Found, crash_card, severity
 from skidpad.report.elements.page import Cards, Page, Section, write_page
 from skidpad.roads.queries import RoadMap

@@ -13,9 +13,9 @@ import polars as pl
 from skidpad import __version__
 from skidpad.core.wording import count_text
 from skidpad.evidence.contrasts import NOT_RUN
-from skidpad.recording.campaigns import CampaignFolder
-from skidpad.recording.ledger import E
-from skidpad.recording.results import Columns, definitions_of
+from skidpad.recording.campaign.folder import CampaignFolder
+from skidpad.recording.campaign.ledger import E
+from skidpad.recording.campaign.results import Columns, definitions_of
 from skidpad.report.elements.page import Block, Code, Definitions, Text, words
 
 NAMED = 5  # runs

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.surface import SurfacePatch
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 from skidpad.roads.lanes import LaneKind
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.surface_outlines import outline_patches

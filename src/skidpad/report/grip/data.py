@@ -23,8 +23,8 @@ from skidpad.evidence.grip.study import (
     distances,
     pairs,
 )
-from skidpad.recording.campaigns import CampaignFolder
-from skidpad.recording.grip import GRIP, GripEntry, read_series
+from skidpad.recording.campaign.folder import CampaignFolder
+from skidpad.recording.campaign.grip import GRIP, GripEntry, read_series
 from skidpad.report.elements.campaign import CampaignView
 
 SCENARIOS = {

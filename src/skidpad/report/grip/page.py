@@ -12,9 +12,9 @@ from skidpad.core.wording import count_text
 from skidpad.evidence.grip.findings import FINDINGS
 from skidpad.evidence.grip.study import ORIGINAL, REDUCED, Share, completion, completion_p
 from skidpad.evidence.verdicts import Judgement, judge
-from skidpad.recording.grip import read_stopping
-from skidpad.recording.logfiles import read_log
-from skidpad.recording.surfaces import read_run_surface
+from skidpad.recording.campaign.grip import read_stopping
+from skidpad.recording.run.log_files import read_log
+from skidpad.recording.run.surfaces import read_run_surface
 from skidpad.report.elements.page import (
     Answer,
     Answers,

@@ -14,10 +14,10 @@ from skidpad.core.errors import FileError
 from skidpad.core.wording import count_text
 from skidpad.evidence.grip.threshold import JUDGED, Situation, situations
 from skidpad.evidence.verdicts import Judgement, Verdict
-from skidpad.recording.campaigns import CampaignFolder
-from skidpad.recording.logfiles import read_log
-from skidpad.recording.surfaces import read_run_surface
-from skidpad.recording.threshold import THRESHOLD, ThresholdEntry
+from skidpad.recording.campaign.folder import CampaignFolder
+from skidpad.recording.campaign.threshold import THRESHOLD, ThresholdEntry
+from skidpad.recording.run.log_files import read_log
+from skidpad.recording.run.surfaces import read_run_surface
 from skidpad.report.elements.campaign import CampaignView
 from skidpad.report.elements.page import (
     Answer,

@@ -12,8 +12,8 @@ from skidpad.core.wording import count_text
 from skidpad.evidence.contrasts import drive_hash
 from skidpad.evidence.drive.collisions import find_crashes
 from skidpad.evidence.drive.prepared import prepare
-from skidpad.recording.campaigns import snapshot
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.campaign.folder import snapshot
+from skidpad.recording.run.log_files import read_log
 from skidpad.report.crashes.cards import Found, crash_card, headline, severity, thumbnail_uri
 from skidpad.report.elements.page import (
     Block,

@@ -11,9 +11,9 @@ import polars as pl
 
 from skidpad.core.wording import count_text, list_text
 from skidpad.evidence.statistics import Rate, event_rate
-from skidpad.recording.campaigns import CampaignFolder
-from skidpad.recording.matrix import MATRIX, MatrixEntry, Metrics
-from skidpad.recording.results import schema
+from skidpad.recording.campaign.folder import CampaignFolder
+from skidpad.recording.campaign.matrix import MATRIX, MatrixEntry, Metrics
+from skidpad.recording.campaign.results import schema
 from skidpad.report.elements.campaign import CampaignView
 from skidpad.report.published import Source, published_matrix, read_published
 

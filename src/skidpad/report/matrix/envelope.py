@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import polars as pl
 
-from skidpad.recording.readings import RecordedSensor, read_readings
+from skidpad.recording.run.readings import RecordedSensor, read_readings
 from skidpad.report.elements.page import Block, Cell, Table
 from skidpad.report.matrix.data import Matrix
 

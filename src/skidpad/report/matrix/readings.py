@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from skidpad.recording.readings import read_readings, summarise_readings
+from skidpad.recording.run.readings import read_readings, summarise_readings
 from skidpad.report.elements.page import Block, Cell, Table
 from skidpad.report.matrix.data import Matrix
 

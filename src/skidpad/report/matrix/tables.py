@@ -20,7 +20,7 @@ from skidpad.evidence.statistics import (
     poisson_interval,
     rate_remark,
 )
-from skidpad.recording.matrix import Metrics
+from skidpad.recording.campaign.matrix import Metrics
 from skidpad.report.elements.campaign import Metric, metrics_of
 from skidpad.report.elements.page import Block, Cell, Table
 from skidpad.report.elements.tables import Column, Format, Quantity, table

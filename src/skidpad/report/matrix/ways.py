@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.run.log_files import read_log
 from skidpad.report.crashes.cards import Found
 from skidpad.report.elements.figures import FRAME, Chart, Curve, curves
 from skidpad.report.elements.page import Block, Figure

@@ -13,9 +13,9 @@ from skidpad.core.geometry import kmh_from_mps
 from skidpad.evidence.drive.conflict import time_to_collision
 from skidpad.evidence.pairs import EGO, body, following, together
 from skidpad.evidence.play_verdicts import Counterpart
-from skidpad.recording.logfiles import read_log
-from skidpad.recording.runlog import RunLog
-from skidpad.recording.surfaces import read_run_surface
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import read_log
+from skidpad.recording.run.surfaces import read_run_surface
 from skidpad.report.elements.page import Card, Figure, anchor
 from skidpad.report.elements.replay import replay_run
 from skidpad.report.elements.timeline import Mark, Strip, timelines

@@ -10,7 +10,7 @@ from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.wording import count_text
 from skidpad.evidence.encounters import DISTANCE, TIME
 from skidpad.evidence.play_verdicts import Counterpart, PlayVerdict
-from skidpad.recording.logfiles import read_log
+from skidpad.recording.run.log_files import read_log
 from skidpad.report.crashes.cards import Found
 from skidpad.report.crashes.page import contact_cards, find_contacts
 from skidpad.report.elements.page import (

@@ -24,13 +24,13 @@ from skidpad.evidence.play_verdicts import (
     counterparts,
     judge_run,
 )
-from skidpad.recording.campaigns import RUNS
+from skidpad.recording.campaign.folder import RUNS
+from skidpad.recording.campaign.grip import GripEntry, GripKey
+from skidpad.recording.campaign.ledger import LEDGER, latest, read_ledger
 from skidpad.recording.files import write_csv
-from skidpad.recording.grip import GripEntry, GripKey
-from skidpad.recording.ledger import LEDGER, latest, read_ledger
-from skidpad.recording.logfiles import TICKS, read_log
-from skidpad.recording.runlog import LogHeader, RunLog
-from skidpad.recording.staging import Judging, Staging, read_judging, read_staging
+from skidpad.recording.run.log import LogHeader, RunLog
+from skidpad.recording.run.log_files import TICKS, read_log
+from skidpad.recording.run.staging import Judging, Staging, read_judging, read_staging
 from skidpad.roads.bundled import KEPT, kept_map
 from skidpad.roads.queries import RoadMap
 

@@ -29,7 +29,7 @@ from skidpad.evidence.channels.judging.learned import with_model
 from skidpad.evidence.channels.judging.segments import judge
 from skidpad.evidence.channels.matching import Span
 from skidpad.evidence.channels.monitor import Monitor, MonitorSettings
-from skidpad.recording.cycles import cycles
+from skidpad.recording.channels.cycles import cycles
 
 TAILGATED = HazardType.EGO_TAILGATED
 

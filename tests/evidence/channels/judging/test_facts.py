@@ -14,7 +14,7 @@ from skidpad.evidence.channels.judging.facts import (
     times_of,
 )
 from skidpad.evidence.channels.monitor import Monitor
-from skidpad.recording.cycles import cycles
+from skidpad.recording.channels.cycles import cycles
 
 
 def facts(world, eyes, seconds=12.0, change=None):

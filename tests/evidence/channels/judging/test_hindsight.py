@@ -16,7 +16,7 @@ from skidpad.evidence.channels.judging.reference import (
 )
 from skidpad.evidence.channels.judging.segments import TOLD, judge
 from skidpad.evidence.channels.matching import tally
-from skidpad.recording.cycles import cycles
+from skidpad.recording.channels.cycles import cycles
 
 TAILGATED = HazardType.EGO_TAILGATED
 LOCALISATION = HazardType.INCONSISTENT_LOCALISATION

@@ -26,7 +26,7 @@ from skidpad.evidence.channels.judging.truth import marks
 from skidpad.evidence.channels.judging.weights import Weights, weights_from
 from skidpad.evidence.channels.matching import Span, Weighed, score, tally
 from skidpad.evidence.channels.timefilter import TimeFilter
-from skidpad.recording.cycles import cycles
+from skidpad.recording.channels.cycles import cycles
 
 TAILGATED = HazardType.EGO_TAILGATED
 EYES = (Eyes("a", 0.02), Eyes("b", 0.02, blind=(0,)))

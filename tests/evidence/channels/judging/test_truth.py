@@ -35,7 +35,7 @@ from skidpad.evidence.channels.matching import (
     score,
     tally,
 )
-from skidpad.recording.cycles import cycles
+from skidpad.recording.channels.cycles import cycles
 
 TAILGATED, TAILGATING = HazardType.EGO_TAILGATED, HazardType.EGO_TAILGATING
 LOCALISATION = HazardType.INCONSISTENT_LOCALISATION

@@ -13,7 +13,7 @@ from skidpad.evidence.channels.redundancy import (
     differences,
 )
 from skidpad.evidence.statistics import interval_text, p_text, rate_text
-from skidpad.recording.channel_drives import read_outcomes
+from skidpad.recording.channels.drives import read_outcomes
 from skidpad.report.elements.page import Block, Cell, Text
 from skidpad.report.elements.tables import Column, Format, table
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.errors import SkidpadError
 from skidpad.core.wording import count_text
-from skidpad.recording.channel_drives import read_records
+from skidpad.recording.channels.drives import read_records
 from skidpad.report.elements.figures import Chart, Curve, curves
 from skidpad.report.elements.page import Block, Figure, Text
 from skidpad.roads.bundled import kept_map

@@ -10,8 +10,8 @@ import polars as pl
 
 from skidpad.core.errors import FileError
 from skidpad.core.wording import count_text
-from skidpad.recording.campaigns import CampaignFolder
-from skidpad.recording.matrix import PIXELS, MatrixEntry
+from skidpad.recording.campaign.folder import CampaignFolder
+from skidpad.recording.campaign.matrix import PIXELS, MatrixEntry
 from skidpad.report.elements.figures import POINTS, Chart, Curve, curves
 from skidpad.report.elements.page import Block, Cell, Figure, Text
 from skidpad.report.elements.tables import Column, Format, Quantity, table

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import floor, inf
 
 from skidpad.core.channels import ChannelFrame, Cycle, Decision, Due, TruthFrame
-from skidpad.recording.channels import ChannelSource, Message
+from skidpad.recording.channels.mcap_files import ChannelSource, Message
 
 STEP = 0.1  # s, the cycle of the published stacks (C-022)
 MAX_AGE = 0.15  # s, older messages count as absent (decision C-10)

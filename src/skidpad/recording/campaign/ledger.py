@@ -22,9 +22,9 @@ from skidpad.core.names import inside
 from skidpad.core.reading import decode_json, read_bytes
 from skidpad.core.told import clean
 from skidpad.core.vocabulary import Outcome
-from skidpad.recording.added_metrics import AddedMetric
+from skidpad.recording.campaign.added_metrics import AddedMetric
+from skidpad.recording.campaign.results import Timing
 from skidpad.recording.files import output_error, write_bytes
-from skidpad.recording.results import Timing
 
 LEDGER, CAMPAIGN = "ledger.jsonl", "campaign.json"
 SUM = re.compile(rb',"sum":"([0-9a-f]{8})"}$')

@@ -9,7 +9,7 @@ from msgspec import Struct
 
 from skidpad.core.run import RunSpec, run_from_plain
 from skidpad.core.space import Space
-from skidpad.recording.searches import read_stored
+from skidpad.recording.campaign.searches import read_stored
 
 RISK, RISK_RUNS, RISK_FOUND = "risk.json", "runs.jsonl", "probability.json"
 SCALES = (0.5, 0.9, 1.1, 2.0)  # of the values of an input, to see what hangs on it

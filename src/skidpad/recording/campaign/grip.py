@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from skidpad.core.errors import FileError
 from skidpad.core.names import inside
+from skidpad.recording.campaign.ledger import Entry
+from skidpad.recording.campaign.results import Columns, metric
 from skidpad.recording.files import read_parquet, require_columns, write_parquet
-from skidpad.recording.ledger import Entry
-from skidpad.recording.results import Columns, metric
 
 SERIES, STOPPING = "series", "stopping.parquet"
 

@@ -15,7 +15,7 @@ from typing import Any, Generic, TypeVar
 import polars as pl
 
 from skidpad.core.errors import FileError
-from skidpad.recording.added_metrics import AddedMetric
+from skidpad.recording.campaign.added_metrics import AddedMetric
 from skidpad.recording.files import (
     content_hash,
     read_parquet,

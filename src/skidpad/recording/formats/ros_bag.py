@@ -29,8 +29,8 @@ from skidpad.core.channels import ChannelFrame
 from skidpad.core.errors import ConfigError, FileError, MissingExtra
 from skidpad.core.reading import decode_yaml, read_bytes
 from skidpad.core.told import on_a_line
-from skidpad.recording.channels import Losses, Message
-from skidpad.recording.ros_objects import OBJECT_READERS, RosObjects, empty_objects, yaw_of
+from skidpad.recording.channels.mcap_files import Losses, Message
+from skidpad.recording.formats.ros_objects import OBJECT_READERS, RosObjects, empty_objects, yaw_of
 
 Floats = NDArray[np.float64]
 NS = 1e9

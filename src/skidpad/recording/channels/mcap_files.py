@@ -19,8 +19,8 @@ from mcap.writer import Writer
 
 from skidpad.core.channels import ChannelFrame, Context, Decision, Due, TruthFrame
 from skidpad.core.errors import ConfigError, FileError, OutputError
-from skidpad.recording import channel_codec as codec
-from skidpad.recording import channels_pb2 as pb
+from skidpad.recording.channels import channels_pb2 as pb
+from skidpad.recording.channels import codec
 
 CHANNEL_TOPIC = "/channels/"
 TRUTH_TOPIC = "/truth"

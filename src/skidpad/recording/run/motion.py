@@ -8,8 +8,8 @@ import msgspec
 import numpy as np
 
 from skidpad.core.states import ContactEvent, TrafficContact
-from skidpad.recording.events import encode_events
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.events import encode_events
+from skidpad.recording.run.log import RunLog
 
 POSE = ("x", "y", "z", "yaw")
 TOUCHES = (ContactEvent, TrafficContact)
@@ -20,7 +20,7 @@ def motion_hash(log: RunLog) -> str:
 
     Equal hashes are one drive for totals, intervals and verdicts. What the sensors and the stack
     said is left out, so a lamp that is seen at noon and not at night makes no second drive. The
-    full content hash (`logfiles.log_hash`) stays the promise of reproducibility.
+    full content hash (`log_files.log_hash`) stays the promise of reproducibility.
     """
     kind, size = log.table.kind.tolist(), (log.table.length.tolist(), log.table.width.tolist())
     head = {"map": log.header.map_hash, "dt": log.header.dt, "kind": kind, "size": size}

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame, Context, Decision, TruthFrame
 from skidpad.core.errors import FileError
-from skidpad.recording import channels_pb2 as pb
+from skidpad.recording.channels import channels_pb2 as pb
 
 Floats = NDArray[np.float64]
 POLYGON_LIMIT = 64  # vertices; a shape with more is not a shape but damage

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.vocabulary import SemanticClass
-from skidpad.recording.channel_codec import POLYGON_LIMIT, padded_polygons
+from skidpad.recording.channels.codec import POLYGON_LIMIT, padded_polygons
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

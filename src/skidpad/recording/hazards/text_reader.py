@@ -1,4 +1,4 @@
-"""Reads worlds of channels back from lines of text; see `hazard_text` for the lines."""
+"""Reads worlds of channels back from lines of text; see `text.py` for the lines."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.channels import ChannelFrame, Cycle
 from skidpad.core.errors import FileError
-from skidpad.recording.channel_codec import padded_polygons
-from skidpad.recording.hazard_text import NUMBER_LIMIT, Channel, Numbers, Object, Pose, moved_on
+from skidpad.recording.channels.codec import padded_polygons
+from skidpad.recording.hazards.text import NUMBER_LIMIT, Channel, Numbers, Object, Pose, moved_on
 
 Floats = NDArray[np.float64]
 LINE_LIMIT = 2_000_000  # characters

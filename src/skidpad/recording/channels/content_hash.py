@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from skidpad.recording.channels import McapRecording
+from skidpad.recording.channels.mcap_files import McapRecording
 
 
 def recording_hash(path: Path) -> str:

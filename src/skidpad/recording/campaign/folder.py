@@ -11,10 +11,16 @@ import polars as pl
 
 from skidpad.core.errors import FileError
 from skidpad.core.names import inside
+from skidpad.recording.campaign.ledger import (
+    E,
+    common_configuration,
+    fingerprints,
+    latest,
+    read_ledger,
+)
+from skidpad.recording.campaign.results import TIMING, Timing, read_results, schema
 from skidpad.recording.files import read_parquet, require_columns
-from skidpad.recording.ledger import E, common_configuration, fingerprints, latest, read_ledger
-from skidpad.recording.logfiles import TICKS
-from skidpad.recording.results import TIMING, Timing, read_results, schema
+from skidpad.recording.run.log_files import TICKS
 
 RUNS, SNAPSHOTS = "runs", "snapshots"
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from skidpad.recording.grip import GripMetrics
-from skidpad.recording.ledger import Entry
-from skidpad.recording.results import Columns
+from skidpad.recording.campaign.grip import GripMetrics
+from skidpad.recording.campaign.ledger import Entry
+from skidpad.recording.campaign.results import Columns
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -8,7 +8,7 @@ import numpy as np
 
 from skidpad.core.states import ContactEvent
 from skidpad.core.vocabulary import DetectionStatus, LightSource, LightState, Supervision, Tier
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.run.log import RunLog
 
 WORDS: dict[str, type[IntEnum]] = {  # fields of the stack's report that are numbers of words
     "status": DetectionStatus,

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from skidpad.core.errors import FileError
 from skidpad.core.reading import UNUSABLE, decode_json, read_bytes, unusable
 from skidpad.core.states import ActorTable
-from skidpad.recording.events import Event, decode_events, encode_events
 from skidpad.recording.files import content_hash, read_parquet, write_bytes, write_parquet
 from skidpad.recording.fingerprint import fingerprint
-from skidpad.recording.logchecks import require_sound
-from skidpad.recording.runlog import (
+from skidpad.recording.run.events import Event, decode_events, encode_events
+from skidpad.recording.run.log import (
     ActorSeries,
     CommandSeries,
     EgoSeries,
@@ -25,6 +24,7 @@ from skidpad.recording.runlog import (
     ReportSeries,
     RunLog,
 )
+from skidpad.recording.run.log_checks import require_sound
 
 TICKS, EVENTS = "ticks.parquet", "events.jsonl"
 SCHEMA_VERSION = "1"

@@ -18,8 +18,8 @@ from skidpad.core.errors import ConfigError, InputError, MissingExtra
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.vocabulary import ActorKind, LightState
 from skidpad.recording.files import write_bytes
-from skidpad.recording.osi_udp import send_osi
-from skidpad.recording.runlog import RunLog
+from skidpad.recording.formats.osi_udp import send_osi
+from skidpad.recording.run.log import RunLog
 
 if TYPE_CHECKING:
     from osi3.osi_groundtruth_pb2 import GroundTruth

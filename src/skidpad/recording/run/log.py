@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.states import ActorTable, ContactEvent, LaneInvasion, TrafficContact
-from skidpad.recording.events import (
+from skidpad.recording.run.events import (
     Event,
     LightChange,
     MovedOn,

@@ -17,8 +17,8 @@ from skidpad.core.errors import FileError, OutputError
 from skidpad.core.reading import UNUSABLE, decode_json, read_bytes, unusable
 from skidpad.core.told import on_a_line
 from skidpad.core.vocabulary import HazardType
-from skidpad.recording.hazard_text import HEADER, encode_worlds
-from skidpad.recording.hazard_text_reader import decode_worlds
+from skidpad.recording.hazards.text import HEADER, encode_worlds
+from skidpad.recording.hazards.text_reader import decode_worlds
 
 TEXT_FILE = "hazards.txt"
 INDEX_FILE = "hazards.jsonl"

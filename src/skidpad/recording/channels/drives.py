@@ -11,8 +11,8 @@ from typing import Any
 import msgspec
 
 from skidpad.core.reading import UNUSABLE
-from skidpad.recording.ledger import Entry
-from skidpad.recording.results import Columns
+from skidpad.recording.campaign.ledger import Entry
+from skidpad.recording.campaign.results import Columns
 
 WAY_STEP = 10.0  # m
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from skidpad.core.channels import Context
-from skidpad.recording.channels import ChannelSource
+from skidpad.recording.channels.mcap_files import ChannelSource
 
 
 def context_of(source: ChannelSource) -> dict[str, str]:

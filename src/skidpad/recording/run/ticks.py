@@ -10,7 +10,7 @@ import numpy as np
 from skidpad.core.frames import SensorFrame
 from skidpad.core.states import ActorTable, StackReport, VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState, Supervision
-from skidpad.recording.events import (
+from skidpad.recording.run.events import (
     Event,
     LightChange,
     MovedOn,
@@ -19,7 +19,7 @@ from skidpad.recording.events import (
     PutBack,
     Relocation,
 )
-from skidpad.recording.runlog import (
+from skidpad.recording.run.log import (
     ActorSeries,
     CommandSeries,
     EgoSeries,

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from skidpad.recording.ledger import Entry
-from skidpad.recording.results import Columns, metric
+from skidpad.recording.campaign.ledger import Entry
+from skidpad.recording.campaign.results import Columns, metric
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -1,0 +1,1 @@
+"""What campaigns and searches leave: the ledger, and one typed row per run."""

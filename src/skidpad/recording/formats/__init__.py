@@ -1,0 +1,1 @@
+"""Formats of others: ROS 2 bags and ASAM OSI."""

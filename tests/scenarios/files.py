@@ -91,7 +91,12 @@ def to(v: object) -> str:
     return f'<AbsoluteTargetSpeed value="{v}"/>'
 
 
-def trajectory(*points: tuple[Any, ...], timing: str = "<None/>", attributes: str = "") -> str:
+def trajectory(
+    *points: tuple[Any, ...],
+    timing: str = "<None/>",
+    attributes: str = "",
+    following: str = "position",
+) -> str:
     """A polyline through points x, y, perhaps with heading (None: not said) and time."""
     vertices = ""
     for k, (x, y, *more) in enumerate(points):
@@ -101,7 +106,7 @@ def trajectory(*points: tuple[Any, ...], timing: str = "<None/>", attributes: st
     return f"""<RoutingAction><FollowTrajectoryAction {attributes}><TrajectoryRef>
 <Trajectory name="t" closed="false"><Shape><Polyline>{vertices}</Polyline></Shape></Trajectory>
 </TrajectoryRef><TimeReference>{timing}</TimeReference>
-<TrajectoryFollowingMode followingMode="position"/></FollowTrajectoryAction></RoutingAction>"""
+<TrajectoryFollowingMode followingMode="{following}"/></FollowTrajectoryAction></RoutingAction>"""
 
 
 def synchronize(

@@ -42,7 +42,7 @@ CONTROLLED = (
     "of others than the ego `ACC`, `ReferenceDriver` and registered names, along their lanes"
 )
 TOWED = "without slip at the trailer's axle; masses and forces do not count"
-FOLLOW = "`follow` is read as `position`"
+FOLLOW = "under `follow` walkers and objects are placed"
 PARTIAL: Mapping[str, str] = MappingProxyType(
     {
         **dict.fromkeys(
@@ -50,7 +50,7 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         ),
         "FollowTrajectoryAction": FOLLOW,
         "LaneChangeAction": FOLLOW,
-        "SpeedAction": f"{FOLLOW}; rates of acceleration of `Performance` are not read",
+        "SpeedAction": "`follow` is read as `position`; rates of acceleration of `Performance` are not read",
         "SpeedProfileAction": "limits of jerk act under `follow`, each speed with acceleration 0",
         "LongitudinalDistanceAction": "axes of the world and of trajectories are those of the entity",
         "LateralDistanceAction": (

@@ -10,6 +10,7 @@ from math import inf
 from skidpad.core.told import describe_value
 from skidpad.core.tyres import REFERENCE, known_tyres
 from skidpad.core.vocabulary import ActorKind
+from skidpad.physics.types import vehicle_type
 from skidpad.scenarios.catalogs import Catalogs
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.findings import Fault, Finding, Kind
@@ -51,9 +52,19 @@ class Box:
     left: float = 0.0
 
 
+@dataclass(frozen=True, slots=True)
+class Axles:
+    """Distance of a vehicle's axles, m, and the largest angle of its front wheels, rad."""
+
+    wheelbase: float
+    steering_max: float
+
+
 TRAILERS_MOST = 8  # one behind the other, inside one description; assumption
 SIZES = ("length", "width", "height")
 BICYCLE = Box(1.8, 0.6, 1.7)
+TWO_WHEELS = Axles(1.1, 0.7)  # of a bicycle whose file names none; assumption
+WHEELBASE_MIN, LOCK_MAX = 0.2, 1.5  # m, rad; beyond them a file's axles are as usual
 USUAL = {  # sizes where only the category is known; assumption
     ActorKind.CAR: Box(),
     ActorKind.VAN: Box(5.3, 2.0, 2.2),
@@ -95,6 +106,7 @@ class Entity:
     performance: Performance = Performance()
     properties: Mapping[str, str] = field(default_factory=dict)
     coupling: Coupling = Coupling()
+    axles: Axles | None = None  # None: it cannot steer
 
     @property
     def is_marked_ego(self) -> bool:
@@ -224,7 +236,8 @@ def _vehicle(name: str, node: Node, properties: Mapping[str, str]) -> Entity:
     category = node.text("vehicleCategory")
     box, limits = _box(node, Box()), _performance(node)
     if category in TWO_WHEELED:
-        return Entity(name, Body.VEHICLE, "bicycle", False, box, limits, properties)
+        axles = _axles(node, TWO_WHEELS)
+        return Entity(name, Body.VEHICLE, "bicycle", False, box, limits, properties, axles=axles)
     coupling = _coupling(name, node)
     if category not in WHEELED:
         raise node.unsupported(f"vehicleCategory={category!r} is not supported")
@@ -234,7 +247,22 @@ def _vehicle(name: str, node: Node, properties: Mapping[str, str]) -> Entity:
             f"got {describe_value(properties[TYRES], 100)}"
         )
     type = nearest_type(WHEELED[category], box.length, box.width, box.height)
-    return Entity(name, Body.VEHICLE, type, True, box, limits, properties, coupling)
+    usual = vehicle_type(type)
+    axles = _axles(node, Axles(usual.wheelbase, usual.steer_max))
+    return Entity(name, Body.VEHICLE, type, True, box, limits, properties, coupling, axles)
+
+
+def _axles(node: Node, usual: Axles) -> Axles:
+    """Returns the axles of a vehicle; what is missing or impossible is as usual for its kind."""
+    front, rear = node.find("Axles", "FrontAxle"), node.find("Axles", "RearAxle")
+    if front is None or rear is None:
+        return usual
+    wheelbase = front.number("positionX", 0.0) - rear.number("positionX", 0.0)
+    steering_max = front.number("maxSteering", 0.0)
+    return Axles(
+        wheelbase if wheelbase > WHEELBASE_MIN else usual.wheelbase,
+        steering_max if 0.0 < steering_max < LOCK_MAX else usual.steering_max,
+    )
 
 
 def of_category(node: Node, name: str, category: str) -> Entity:

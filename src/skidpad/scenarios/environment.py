@@ -125,3 +125,16 @@ def _weather(node: Node) -> dict[str, Any]:
         "temperature_c": node.number("temperature") - CELSIUS if node.has("temperature") else None,
         "wind": 0.0 if wind is None else wind.number("speed"),
     }
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """The time of day, s since 1970, as it was set at `since` s; runs: it goes on by itself."""
+
+    moment: float
+    since: float
+    runs: bool
+
+    def now(self, t: float) -> float:
+        """Returns the time of day at t s."""
+        return self.moment + (t - self.since if self.runs else 0.0)

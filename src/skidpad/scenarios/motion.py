@@ -91,7 +91,7 @@ class Guide:
         self.along = 1.0 if abs(look) <= pi / 2.0 else -1.0
         self.turn = look if self.along > 0.0 else wrap_angle(look - pi)
 
-    def advance(self, motion: Motion) -> None:
+    def advance(self, motion: Motion | Pose) -> None:
         """Move the reference point abreast of the actor."""
         if self.base is None:
             return
@@ -120,6 +120,14 @@ class Guide:
             self.along, self.offset_rate = -self.along, -self.offset_rate
         self.base, self.offset = point, left
         return -left
+
+    def preview(self, way: float, offset: float) -> Pose | None:
+        """Returns the place `way` m further along at an offset; None at the end of the road."""
+        if self.base is None:
+            return None
+        sense = self.along if self.v >= 0.0 else -self.along
+        further = self.network.ahead(self.base, sense * way, self.roads)
+        return further and further.pose.moved(left=offset)
 
     def demand(self, motion: Motion) -> Demand:
         """Goes on by one step, and returns what a driver has to do in it."""

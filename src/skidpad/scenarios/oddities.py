@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 
 from skidpad.scenarios.document import Node
+from skidpad.scenarios.entities import LOCK_MAX
 from skidpad.scenarios.findings import Fault, Finding, Kind
 
 V_MAX = 150.0  # m/s, 540 km/h: faster is no road vehicle
@@ -44,12 +45,21 @@ def _dynamics(node: Node) -> str:
     return f"value: a {dimension} of {value:g} is read as a step"
 
 
+def _front_axle(node: Node) -> str:
+    angle = node.number("maxSteering", 0.0)
+    if 0.0 <= angle < LOCK_MAX:
+        return ""
+    what = f"maxSteering: {angle:g} must be between 0 and {LOCK_MAX:g} rad"
+    return f"{what}; that of the usual vehicle is taken"
+
+
 LOOKS: Mapping[str, Callable[[Node], str]] = {
     "AbsoluteTargetSpeed": _speed,
     "AbsoluteSpeed": _speed,
     "SpeedProfileEntry": _speed,
     "Event": _count,
     "ManeuverGroup": _count,
+    "FrontAxle": _front_axle,
     "SpeedActionDynamics": _dynamics,
     "LaneChangeActionDynamics": _dynamics,
 }

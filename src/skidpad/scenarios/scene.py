@@ -14,10 +14,11 @@ from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState
 from skidpad.scenarios.entities import Entity
-from skidpad.scenarios.environment import Environment
+from skidpad.scenarios.environment import Clock, Environment
 from skidpad.scenarios.measures import Point, between, corners, overlap
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Network, Place
+from skidpad.scenarios.steering import LaneSteering
 from skidpad.scenarios.tracking import Track, track_demand
 from skidpad.simulation.scripted import ActorDriver, Motion
 
@@ -101,6 +102,7 @@ class Actor:
     lateral: Running | None = None
     leading: Running | None = None  # the action whose track it is led along
     led_since: float = 0.0  # s
+    lane_steering: LaneSteering | None = None  # it steers to its lane instead of being put there
     present: bool = True
     seen: bool = False  # in a tick before
     handed: bool = True  # somebody else's controller is active, where mode is None
@@ -166,6 +168,7 @@ class Actor:
     def lead(self, action: Running, track: Track, t: float) -> None:
         """An action leads it along a track; what moved it aside is over, with times its speed too."""
         self.leading, self.track, self.led_since, self.lateral = action, track, t, None
+        self.lane_steering = None
         if track.timed:
             self.longitudinal = None
 
@@ -248,16 +251,27 @@ class Actor:
     def _place_command(self, t: float, dt: float) -> ActorCommand:
         if self.track is not None:
             pose, v, _ = self.track.at(t)
-            v = v if self.track.timed else self.guide.v
+            v = v if self.track.timed or self.track.steered else self.guide.v
         else:
-            pose, v = self.guide.ideal(dt), self.guide.v
+            pose, v = self._pose_on_road(dt), self.guide.v
             if self.guide.at_end:
                 v = 0.0
         self.pose = pose
         return ActorCommand(self.name, place=self.centre(pose), speed=v)
 
+    def _pose_on_road(self, dt: float) -> Pose:
+        """Return the pose a step on along the lane, where it is put or steers to."""
+        steering = self.lane_steering
+        if steering is None:
+            return self.guide.ideal(dt)
+        pose = steering.step(self.guide, self.pose, dt)
+        if steering.settled and self.lateral is None:
+            self.lane_steering = None
+        return pose
+
     def put(self, network: Network, place: Place, v: float) -> None:
         """It stands somewhere else from now on."""
+        self.lane_steering = None
         roads = self.guide.roads
         self.guide = Guide(network, place, v)
         self.guide.roads = roads
@@ -300,19 +314,6 @@ class Flow(Protocol):
 
     name: str
     stopped: bool
-
-
-@dataclass(frozen=True, slots=True)
-class Clock:
-    """The time of day, s since 1970, as it was set at `since` s; runs: it goes on by itself."""
-
-    moment: float
-    since: float
-    runs: bool
-
-    def now(self, t: float) -> float:
-        """Returns the time of day at t s."""
-        return self.moment + (t - self.since if self.runs else 0.0)
 
 
 @dataclass

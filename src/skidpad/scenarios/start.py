@@ -157,6 +157,8 @@ class _Starting:
         network = self.ctx.network
         for action in self.wish.actions:
             if isinstance(action, FollowTrajectory):
+                if self.wish.positions and action.is_steered(self.entity):
+                    continue  # it steers there from where it is
                 here = self._so_far = self._so_far or network.place_of(ORIGIN)
                 pose = action.first_pose(self.scene, here.pose, self.v_told)
                 self._so_far = network.place_of(pose)

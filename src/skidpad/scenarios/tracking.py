@@ -17,9 +17,13 @@ SQUARE = 1e-6  # cosine between heading and line that still is not against the l
 
 
 class Track(Protocol):
-    """Where an actor is led, instead of along its lane; timed: at its own times."""
+    """Where an actor is led, instead of along its lane.
+
+    timed: at its own times; steered: as its steering and pedals allow, not exactly there.
+    """
 
     timed: bool
+    steered: bool
 
     def at(self, t: float) -> tuple[Pose, float, float]:
         """Pose, speed and acceleration at scenario time t."""
@@ -37,7 +41,7 @@ class Track(Protocol):
 class TimedTrack:
     """A line by its times: `begin` is the scenario time of line time 0, `scale` stretches it."""
 
-    timed = True
+    timed, steered = True, False
 
     def __init__(self, line: Line, begin: float, scale: float) -> None:
         assert line.t is not None
@@ -76,7 +80,7 @@ class PacedTrack:
     line names, else from the sign of the first speed that is not 0: rear first along the line.
     """
 
-    timed = False
+    timed, steered = False, False
 
     def __init__(self, line: Line, s: float, t: float, closed: bool, v: float) -> None:
         s = s if closed else min(s, line.length)

@@ -53,7 +53,7 @@ class Dimension(Enum):
 
 
 class Following(Enum):
-    """How closely a change is followed; both are read alike, as by esmini."""
+    """How closely a change is followed: by being placed there, or within the limits of a vehicle."""
 
     POSITION = "position"
     FOLLOW = "follow"
@@ -66,6 +66,7 @@ class Dynamics:
     shape: Shape
     dimension: Dimension
     value: float
+    following: Following = Following.POSITION
 
     def span(self, size: float) -> float:
         """Time in s, or distance in m, of a change by `size`; 0 for a step."""
@@ -79,8 +80,9 @@ class Dynamics:
 
 def dynamics(node: Node) -> Dynamics:
     """<...Dynamics> of an action."""
-    node.choice("followingMode", Following, Following.POSITION)
+    following = node.choice("followingMode", Following, Following.POSITION)
     shape = node.choice("dynamicsShape", Shape)
     if shape is Shape.STEP and not node.has("value"):
-        return Dynamics(shape, Dimension.TIME, 0.0)
-    return Dynamics(shape, node.choice("dynamicsDimension", Dimension), node.number("value"))
+        return Dynamics(shape, Dimension.TIME, 0.0, following)
+    dimension = node.choice("dynamicsDimension", Dimension)
+    return Dynamics(shape, dimension, node.number("value"), following)

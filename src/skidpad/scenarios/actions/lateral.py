@@ -7,13 +7,15 @@ from enum import Enum
 from math import cos, inf, sqrt
 
 from skidpad.roads.queries import LanePoint
-from skidpad.scenarios.actions.base import Dimension, Dynamics, dynamics
+from skidpad.scenarios.actions.base import Dimension, Dynamics, Following, dynamics
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
+from skidpad.scenarios.entities import Axles
 from skidpad.scenarios.measures import Axes, between
 from skidpad.scenarios.motion import SHARPEST, SLOW, Guide, Shape, Transition
 from skidpad.scenarios.network import next_lane_id
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
+from skidpad.scenarios.steering import LaneSteering, look_ahead
 
 ASKEW = 0.1  # cosine between a lane and an entity, below which the one is not beside the other
 A_LATERAL = 1.0  # m/s^2, of a change of offset for which the file gives no limit
@@ -56,6 +58,27 @@ class ChangeOfOffset:
         return self.change.over(now)
 
 
+class SteeredChange(ChangeOfOffset):
+    """A sideways motion that a vehicle steers to; it is done when the vehicle is there."""
+
+    def __init__(self, actor: Actor, axles: Axles, change: Transition, *, by_way: bool) -> None:
+        super().__init__(actor, change, by_way=by_way, to_lane=True)
+        self.steering = actor.lane_steering = actor.lane_steering or LaneSteering(axles)
+        self.steering.settled = False
+
+    def step(self, scene: Scene) -> bool:
+        """Demand the offset, and aim at the one further on."""
+        if self.actor.lateral is not self or self.actor.track is not None:
+            return True
+        over, v = super().step(scene), abs(self.actor.guide.v)
+        way = look_ahead(self.steering.axles, v)
+        self.actor.guide.pace = None
+        self.steering.offset, _, _ = self.change.at(
+            self.done + (way if self.by_way else way / max(v, SLOW))
+        )
+        return over and self.steering.settled
+
+
 class OffsetKept(ChangeOfOffset):
     """An offset that is gone to and then kept until another action takes over."""
 
@@ -96,6 +119,10 @@ class LaneChange:
         span = self.dynamics.span(end - guide.offset)
         change = Transition(guide.offset, end, span, self.dynamics.shape)
         by_way = self.dynamics.dimension is Dimension.DISTANCE
+        axles, following = actor.entity.axles, self.dynamics.following
+        if following is Following.FOLLOW and axles is not None and actor.placed_by_file:
+            actor.lateral = SteeredChange(actor, axles, change, by_way=by_way)
+            return actor.lateral
         actor.lateral = ChangeOfOffset(actor, change, by_way=by_way, to_lane=True)
         return actor.lateral
 

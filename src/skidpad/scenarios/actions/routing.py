@@ -6,13 +6,16 @@ from dataclasses import dataclass
 from random import Random
 
 from skidpad.core.geometry import Pose
+from skidpad.scenarios.actions.base import Following
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
+from skidpad.scenarios.entities import Entity
 from skidpad.scenarios.lines import Line
 from skidpad.scenarios.network import Network, Place
 from skidpad.scenarios.positions import Position, position
 from skidpad.scenarios.routes import ScenarioRoute, compile_route, random_roads, roads_through
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
+from skidpad.scenarios.steering import SteeredTrack
 from skidpad.scenarios.tracking import PacedTrack, TimedTrack
 from skidpad.scenarios.trajectories import Trajectory, compile_trajectory
 
@@ -115,6 +118,11 @@ class FollowTrajectory:
     trajectory: Trajectory
     timing: Timing | None
     s_begin: float
+    following: Following = Following.POSITION
+
+    def is_steered(self, entity: Entity) -> bool:
+        """Returns whether the entity steers to the line from where it is; a walker is placed on it."""
+        return self.following is Following.FOLLOW and entity.axles is not None
 
     def first_pose(self, scene: Scene, here: Pose, v: float) -> Pose:
         """Returns where an entity with speed v is led to at the begin of the scenario."""
@@ -136,8 +144,10 @@ class FollowTrajectory:
         """Absolute times count from the begin of the scenario."""
         line = self.trajectory.traced(scene, actor.pose)
         guide = actor.guide
-        led: Paced | Timed
-        if self.timing is None or line.t is None:
+        led: Paced | Timed | Steered
+        if self.is_steered(actor.entity) and actor.placed_by_file:
+            led = self._steer(scene, actor, line)
+        elif self.timing is None or line.t is None:
             closed = self.trajectory.closed
             led = Paced(actor, PacedTrack(line, self.s_begin, scene.t, closed, guide.v))
         else:
@@ -145,6 +155,19 @@ class FollowTrajectory:
             led = Timed(actor, TimedTrack(line, begin, self.timing.scale))
         actor.lead(led, led.track, scene.t)
         return led
+
+    def _steer(self, scene: Scene, actor: Actor, line: Line) -> Steered:
+        entity, closed = actor.entity, self.trajectory.closed
+        assert entity.axles is not None
+        times = None
+        if self.timing is not None and line.t is not None:
+            begin = self._zero(line, self.timing, scene.t)
+            times = TimedTrack(line, begin, self.timing.scale)
+        track = SteeredTrack(
+            line, self.s_begin, actor.pose, actor.v_signed, scene.t, entity.axles, entity.performance,
+            closed=closed, timed=times is not None,
+        )  # fmt: skip
+        return Steered(actor, track, times)
 
 
 class Timed:
@@ -181,6 +204,34 @@ class Paced:
         return True
 
 
+class Steered:
+    """A trajectory that a vehicle steers along, at its own speed or after its times."""
+
+    def __init__(self, actor: Actor, track: SteeredTrack, times: TimedTrack | None) -> None:
+        self.actor, self.track, self.times = actor, track, times
+
+    def step(self, scene: Scene) -> bool:
+        """Until the vehicle has reached the end; it then drives on along its lane."""
+        actor, track = self.actor, self.track
+        if actor.track is not track:
+            return True
+        there = track.move_to(scene.t)
+        v = actor.guide.v if self.times is None else self._pace(self.times, scene.t, scene.dt)
+        track.aim_at(v, scene.dt)
+        if self.times is not None:
+            actor.guide.v, actor.guide.a = track.v, 0.0
+        if there:
+            _leave_end(actor, scene.network, actor.guide.v)
+        return there
+
+    def _pace(self, times: TimedTrack, t: float, dt: float) -> float:
+        """Returns the speed of the coming step that the times of the line ask for."""
+        beyond = max(t - times.end, 0.0) * abs(times.v_end)
+        length = times.line.length_at((t - times.begin) / times.scale) + beyond
+        _, v, _ = times.at(t + 0.5 * dt)
+        return self.track.pace(v, length)
+
+
 def _leave_end(actor: Actor, network: Network, v: float) -> None:
     """Goes on along the lane at speed v; in a file without a road there is none, and it stands."""
     if network.stand_in:
@@ -195,10 +246,14 @@ def compile_follow(node: Node, ctx: Context) -> FollowTrajectory:
     if reference is None:
         reference = node.child("TrajectoryRef").only()
     trajectory = compile_trajectory(reference, ctx)
+    mode = node.find("TrajectoryFollowingMode")
+    following = Following.POSITION
+    if mode is not None:
+        following = mode.choice("followingMode", Following, Following.POSITION)
     timing = (node.find("TimeReference") or node).find("Timing")
     s = node.number("initialDistanceOffset", 0.0)
     if timing is None:
-        return FollowTrajectory(trajectory, None, s)
+        return FollowTrajectory(trajectory, None, s, following)
     domain = timing.text("domainAbsoluteRelative")
     if domain not in ("absolute", "relative"):
         raise timing.error(f"domainAbsoluteRelative must be absolute or relative, got {domain!r}")
@@ -206,4 +261,4 @@ def compile_follow(node: Node, ctx: Context) -> FollowTrajectory:
     if scale <= 0.0:
         raise timing.error(f"scale must be positive, got {scale:g}")
     how = Timing(domain == "relative", scale, timing.number("offset", 0.0))
-    return FollowTrajectory(trajectory, how, s)
+    return FollowTrajectory(trajectory, how, s, following)

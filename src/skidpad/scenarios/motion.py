@@ -127,7 +127,7 @@ class Guide:
             return None
         sense = self.along if self.v >= 0.0 else -self.along
         further = self.network.ahead(self.base, sense * way, self.roads)
-        return further and further.pose.moved(left=offset)
+        return None if further is None else further.pose.moved(left=offset)
 
     def demand(self, motion: Motion) -> Demand:
         """Goes on by one step, and returns what a driver has to do in it."""

@@ -10,11 +10,10 @@ from math import inf
 from skidpad.core.told import describe_value
 from skidpad.core.tyres import REFERENCE, known_tyres
 from skidpad.core.vocabulary import ActorKind
-from skidpad.physics.types import vehicle_type
 from skidpad.scenarios.catalogs import Catalogs
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.findings import Fault, Finding, Kind
-from skidpad.simulation.scripted import nearest_type
+from skidpad.simulation.scripted import nearest_type, steering_geometry
 
 EGO_NAMES = ("ego", "hero", "ego_vehicle")
 WHEELED = {
@@ -247,8 +246,7 @@ def _vehicle(name: str, node: Node, properties: Mapping[str, str]) -> Entity:
             f"got {describe_value(properties[TYRES], 100)}"
         )
     type = nearest_type(WHEELED[category], box.length, box.width, box.height)
-    usual = vehicle_type(type)
-    axles = _axles(node, Axles(usual.wheelbase, usual.steer_max))
+    axles = _axles(node, Axles(*steering_geometry(type)))
     return Entity(name, Body.VEHICLE, type, True, box, limits, properties, coupling, axles)
 
 

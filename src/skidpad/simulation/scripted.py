@@ -104,3 +104,9 @@ def nearest_type(kind: ActorKind, length: float, width: float, height: float) ->
         return hypot(t.length - length, t.width - width, t.height - height)
 
     return min(of_kind, key=lambda k: distance(of_kind[k]))
+
+
+def steering_geometry(kind: str) -> tuple[float, float]:
+    """Returns distance of the axles, m, and largest angle of the front wheels, rad, of a vehicle type."""
+    found = vehicle_type(kind)
+    return found.wheelbase, found.steer_max

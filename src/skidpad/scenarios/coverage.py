@@ -50,9 +50,11 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         ),
         "FollowTrajectoryAction": FOLLOW,
         "LaneChangeAction": FOLLOW,
-        "SpeedAction": "`follow` is read as `position`; rates of acceleration of `Performance` are not read",
+        "SpeedAction": "limits of jerk act under `follow`, not on a target that goes on changing",
         "SpeedProfileAction": "limits of jerk act under `follow`, each speed with acceleration 0",
-        "LongitudinalDistanceAction": "axes of the world and of trajectories are those of the entity",
+        "LongitudinalDistanceAction": (
+            "axes of the world and of trajectories are those of the entity; braking ends at once"
+        ),
         "LateralDistanceAction": (
             "of its limits `maxSpeed` only; axes of the world and of trajectories are those of the lane"
         ),

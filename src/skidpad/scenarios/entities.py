@@ -79,6 +79,8 @@ class Performance:
     v_max: float = inf
     a_max: float = inf
     b_max: float = inf
+    a_rate: float = inf  # m/s^3, upwards, and downwards
+    b_rate: float = inf
 
 
 @dataclass(frozen=True, slots=True)
@@ -296,9 +298,13 @@ def _performance(node: Node) -> Performance:
     found = node.find("Performance")
     if found is None:
         return Performance()
-    most = (found.limit(k, inf) for k in ("maxSpeed", "maxAcceleration", "maxDeceleration"))
-    v, a, b = (m if m > 0.0 else inf for m in most)
-    return Performance(v, a, b)
+    most = (found.limit(name, inf) for name in LIMITS)
+    return Performance(*(m if m > 0.0 else inf for m in most))
+
+
+LIMITS = (
+    "maxSpeed", "maxAcceleration", "maxDeceleration", "maxAccelerationRate", "maxDecelerationRate",
+)  # fmt: skip
 
 
 def _properties(node: Node) -> dict[str, str]:

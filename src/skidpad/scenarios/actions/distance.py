@@ -43,7 +43,11 @@ class Limits:
     def of(self, own: Performance) -> Performance:
         """Together with what the entity can do."""
         return Performance(
-            min(self.v_max, own.v_max), min(self.a_max, own.a_max), min(self.b_max, own.b_max)
+            min(self.v_max, own.v_max),
+            min(self.a_max, own.a_max),
+            min(self.b_max, own.b_max),
+            min(self.a_rate, own.a_rate),
+            min(self.b_rate, own.b_rate),
         )
 
 
@@ -142,7 +146,7 @@ class GapKept:
 
     def _limit_jerk(self, now: float, wanted: float, dt: float) -> float:
         """An acceleration that grows no faster than the file allows; it may end at once, as in esmini."""
-        rates = self.action.limits
+        rates = self.limits
         if wanted < 0.0:
             return max(wanted, now - rates.b_rate * dt)
         return min(wanted, now + rates.a_rate * dt)

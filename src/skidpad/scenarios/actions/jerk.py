@@ -36,6 +36,12 @@ class Piece:
         """Returns speed and acceleration t s after its begin."""
         return self.v + t * (self.a + 0.5 * t * self.jerk), self.a + t * self.jerk
 
+    @property
+    def way(self) -> float:
+        """Returns the way driven in it, m."""
+        t = self.duration
+        return t * (self.v + t * (0.5 * self.a + t * self.jerk / 6.0))
+
 
 def smooth_pieces(
     v: float, end: float, most: float, jerk: Jerk, duration: float | None
@@ -65,6 +71,40 @@ def smooth_pieces(
         peak / fall, reached + sign * peak * held, sign * peak, -sign * fall if fall < inf else 0.0
     )
     yield from (up, hold, down)
+
+
+def settle(v: float, a: float, jerk: Jerk) -> Piece:
+    """Returns the piece that brings an acceleration that is under way to 0 first."""
+    rate = jerk.down if a > 0.0 else jerk.up
+    if a == 0.0 or rate == inf:
+        return Piece(0.0, v, 0.0, 0.0)
+    return Piece(abs(a) / rate, v, a, -copysign(rate, a))
+
+
+def pieces_over(v: float, end: float, most: float, jerk: Jerk, way: float) -> list[Piece]:
+    """Returns a change of speed that takes `way` m, both speeds of one sign.
+
+    It takes a longer way where the limits leave no other choice.
+    """
+
+    def change(duration: float | None) -> tuple[list[Piece], float]:
+        pieces = list(smooth_pieces(v, end, most, jerk, duration))
+        return pieces, abs(sum(piece.way for piece in pieces))
+
+    pieces, least = change(None)
+    if least >= way or abs(end - v) < SLOW:
+        return pieces
+    short = sum(piece.duration for piece in pieces)
+    long = 2.0 * way / abs(v + end)
+    while change(long)[1] < way:
+        short, long = long, 2.0 * long
+    for _ in range(BISECTIONS):
+        middle = 0.5 * (short + long)
+        short, long = (middle, long) if change(middle)[1] < way else (short, middle)
+    return change(long)[0]
+
+
+BISECTIONS = 50
 
 
 class SmoothProfile:

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import pairwise
 from math import copysign, inf
 
 from skidpad.scenarios.actions.base import Dimension, Dynamics, Following, dynamics
-from skidpad.scenarios.actions.jerk import Jerk, Piece, SmoothProfile, smooth_pieces
+from skidpad.scenarios.actions.jerk import (
+    Jerk,
+    Piece,
+    SmoothProfile,
+    pieces_over,
+    settle,
+    smooth_pieces,
+)
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Performance
@@ -57,6 +64,10 @@ class Speed:
         """From the speed demanded so far."""
         v, limits = actor.guide.v, actor.entity.performance
         end = limit_speed(self.target.speed(scene), limits)
+        if self.dynamics.following is Following.FOLLOW:
+            bound = limits.a_max if end > v else limits.b_max
+            if jerk_of(limits).is_limited or (self.dynamics.shape is Shape.STEP and bound < inf):
+                return self._smooth(scene, actor, end, bound)
         if self.dynamics.dimension is Dimension.DISTANCE:
             span = over_distance(v, end, self.dynamics)
         else:
@@ -67,6 +78,47 @@ class Speed:
         going = ChangeOfSpeed(actor, change, scene.t, follow)
         actor.pace_by(going, scene)
         return going
+
+    def _smooth(self, scene: Scene, actor: Actor, end: float, bound: float) -> Running:
+        """Begin the change within the limits of the entity: its acceleration rises, stays and falls."""
+        guide, change, jerk = actor.guide, self.dynamics, jerk_of(actor.entity.performance)
+        first = settle(guide.v, acceleration_under_way(actor), jerk)
+        v, _ = first.at(first.duration)
+        duration: float | None = None
+        most = bound
+        if change.shape is not Shape.STEP and change.dimension is Dimension.RATE and change.value:
+            most = min(bound, abs(change.value))
+        elif change.shape is not Shape.STEP and change.dimension is Dimension.TIME:
+            duration = max(change.value - first.duration, 0.0)
+        pieces = list(smooth_pieces(v, end, most, jerk, duration))
+        if change.shape is not Shape.STEP and change.dimension is Dimension.DISTANCE:
+            way = max(change.value - abs(first.way), 0.0)
+            if v * end >= 0.0:
+                pieces = pieces_over(v, end, most, jerk, way)
+            else:
+                duration = over_distance(v, end, replace(change, value=way))
+                pieces = list(smooth_pieces(v, end, most, jerk, duration))
+        follow = self.target if self.target.continuous else None
+        going = SmoothChange(actor, scene.t, [first, *pieces], end, follow)
+        actor.pace_by(going, scene)
+        return going
+
+
+def acceleration_under_way(actor: Actor) -> float:
+    """Returns the acceleration of a change that is replaced, m/s^2; one that is no step of the file."""
+    limits = actor.entity.performance
+    most = limits.a_max if actor.a > 0.0 else limits.b_max
+    if actor.guide.a or most == inf or abs(actor.a) > most * (1.0 + ROUNDING):
+        return actor.guide.a
+    return actor.a
+
+
+ROUNDING = 1e-6  # of an acceleration that is measured over a step
+
+
+def jerk_of(limits: Performance) -> Jerk:
+    """Returns how fast the acceleration of an entity may change."""
+    return Jerk(limits.a_rate, limits.b_rate)
 
 
 def limit_speed(v: float, limits: Performance) -> float:
@@ -116,6 +168,28 @@ class ChangeOfSpeed:
         return False
 
 
+class SmoothChange(SmoothProfile):
+    """A speed action under way within limits of jerk; follow: a target that is kept to afterwards."""
+
+    def __init__(
+        self, actor: Actor, began: float, pieces: list[Piece], end: float, follow: Target | None
+    ) -> None:
+        super().__init__(actor, began, pieces, end)
+        self.follow = follow
+
+    def step(self, scene: Scene) -> bool:
+        """Demand the speed of the end of this step; afterwards that of the target, within limits."""
+        actor, before = self.actor, self.actor.guide.v
+        over = super().step(scene)
+        if not over or self.follow is None or actor.longitudinal is not self:
+            return over
+        limits = actor.entity.performance
+        wish = limit_speed(self.follow.speed(scene), limits) - before
+        a = min(max(wish / scene.dt, -limits.b_max), limits.a_max)
+        actor.guide.v, actor.guide.a = before + a * scene.dt, a
+        return False
+
+
 def compile_speed(node: Node, ctx: Context) -> Speed:
     """A <SpeedAction>."""
     change = dynamics(node.child("SpeedActionDynamics"))
@@ -138,14 +212,20 @@ class Profile:
     other: str | None
     limits: Performance
     jerk: Jerk = Jerk()
+    following: Following = Following.POSITION
 
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """From the speed demanded so far."""
-        going = self._smooth(scene, actor) if self.jerk.is_limited else self._straight(scene, actor)
+        own = actor.entity.performance if self.following is Following.FOLLOW else Performance()
+        jerk = Jerk(min(self.jerk.up, own.a_rate), min(self.jerk.down, own.b_rate))
+        if jerk.is_limited:
+            going: Running = self._smooth(scene, actor, jerk)
+        else:
+            going = self._straight(scene, actor)
         actor.pace_by(going, scene)
         return going
 
-    def _smooth(self, scene: Scene, actor: Actor) -> Running:
+    def _smooth(self, scene: Scene, actor: Actor, jerk: Jerk) -> Running:
         """Returns the profile with limits of jerk: at each of its speeds the acceleration is 0."""
         base = 0.0 if self.other is None else scene.actors[self.other].v_told
         own, v = actor.entity.performance, actor.guide.v
@@ -153,7 +233,7 @@ class Profile:
         for entry, duration in self.entries:
             end = limit_speed(base + entry, own)
             most = (self.limits.a_max, own.a_max) if end > v else (self.limits.b_max, own.b_max)
-            pieces += smooth_pieces(v, end, min(*most, DEFAULT_CHANGE), self.jerk, duration)
+            pieces += smooth_pieces(v, end, min(*most, DEFAULT_CHANGE), jerk, duration)
             v = end
         return SmoothProfile(actor, scene.t, pieces, v)
 
@@ -218,4 +298,4 @@ def compile_profile(node: Node, ctx: Context) -> Profile:
             rates = (found.limit(k, inf) for k in ("maxAccelerationRate", "maxDecelerationRate"))
             jerk = Jerk(*(rate if rate > 0.0 else inf for rate in rates))
     other = ctx.entity(node) if node.has("entityRef") else None
-    return Profile(tuple(entries), other, limits, jerk)
+    return Profile(tuple(entries), other, limits, jerk, following)

@@ -15,7 +15,6 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import lru_cache, partial
-from math import dist
 from pathlib import Path
 from typing import Any
 
@@ -51,6 +50,7 @@ from skidpad.evidence.channels.tracked.vote import CHI2_LIMIT, Tracked
 from skidpad.evidence.statistics import event_rate
 from skidpad.recording.channels.context import context_of
 from skidpad.recording.channels.cycles import cycles
+from skidpad.recording.channels.drives import extend_way
 from skidpad.recording.channels.mcap_files import McapRecording
 from skidpad.roads.bundled import bundled_maps, load_map
 from skidpad.roads.queries import RoadMap
@@ -64,7 +64,6 @@ LIMITS = {LOCALISATION: FACTORS} | dict.fromkeys(TAILS, SPARES)
 LEAP = 1.0  # m, of `tracked`
 LEAPS = (0.8, 0.9, 1.1)  # m, tried
 CHI2_HIGH, CHI2_END = 33.0, 20.0  # tried: at which a vote begins; at which an alarm ends
-WAY_STEP = 10.0  # m between places of a way that stay
 Held = Sequence[bool] | NDArray[np.bool_]
 Found = Mapping[str, Sequence[Span]]  # by rule
 
@@ -145,16 +144,13 @@ def judge(path: Path, with_reference: bool) -> dict[str, Any]:
             "risky": context.get("stratum") == "risky", "way": thinned_way(rows)}  # fmt: skip
 
 
-def thinned_way(rows: Sequence[Cycle], step: float = WAY_STEP) -> list[list[float]]:
+def thinned_way(rows: Sequence[Cycle]) -> list[tuple[float, float]]:
     """Where the ego truly was: its first place, then one whenever it has moved on by a step, in m."""
-    out: list[list[float]] = []
+    way: list[tuple[float, float]] = []
     for row in rows:
-        if row.truth is None:
-            continue
-        x, y = row.truth.ego[:2].tolist()
-        if not out or dist((x, y), out[-1]) >= step:
-            out.append([round(x, 1), round(y, 1)])
-    return out
+        if row.truth is not None:
+            extend_way(way, *row.truth.ego[:2].tolist())
+    return way
 
 
 def is_of_reference(name: str) -> bool:

@@ -60,10 +60,11 @@ def test_worn_and_winter_tyres_are_asked_for_by_name():
     assert "unknown tyres 'slick'; choose one of: all_season" in str(wrong.exception)
 
 
-def test_the_ratio_is_a_share_of_the_same_tyres_dry_grip():
+@pytest.mark.parametrize("tyres", ["summer", "summer_1.6mm"])
+def test_the_ratio_is_a_share_of_the_same_tyres_dry_grip(tyres):
     """Also of a tyre that grips more than the winter tyre when dry: no rain leaves more than all."""
     weathers = [find_weather("clear-noon"), find_weather("rain_60")]
-    dry, wet = grip_rows(weathers, [GripModel.PHYSICAL], tyres="summer")
+    dry, wet = grip_rows(weathers, [GripModel.PHYSICAL], tyres=tyres)
     assert wet.ratio < dry.ratio
     assert dry.ratio == pytest.approx(1.0, abs=0.1)
     assert wet.ratio / dry.ratio == pytest.approx(wet.mu / dry.mu)

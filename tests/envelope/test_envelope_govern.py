@@ -7,13 +7,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from skidpad.campaign.governing import choose_envelope
 from skidpad.campaign.run import drive
 from skidpad.campaign.run import run as drive_run
 from skidpad.core.errors import ConfigError
-from skidpad.core.run import Govern, Passenger, Roads, RunSpec, Scenario
+from skidpad.core.geometry import Pose
+from skidpad.core.run import Passenger, Roads, RunSpec, Scenario
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import VehicleCommand
-from skidpad.core.vocabulary import Outcome, SensorLevel
+from skidpad.core.vocabulary import Govern, GripModel, Outcome, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.envelope.govern import (
     SENSORS,
@@ -148,6 +150,19 @@ def test_only_a_stack_can_be_governed():
         ConfigError, match="--govern envelope keeps a stack's speed, and ideal is no"
     ):
         RunSpec(driver=Passenger(), course=Scenario(file="x"), govern=Govern.ENVELOPE)
+
+
+def test_the_oracle_knows_the_tyres_of_the_run():
+    ice = Weather(name="ice", ice_thickness=100.0, road_temperature_c=-5.0)
+
+    def grip(tyres):
+        setup = Setup(
+            map="figure8", specs=(), ego=ActorSetup(name="ego", type="tesla", place=Pose(0.0, 0.0)),
+            weather=ice, grip=GripModel.PHYSICAL, tyres=tyres,
+        )  # fmt: skip
+        return choose_envelope(RunSpec(govern=Govern.ORACLE), setup).oracle(10.0)
+
+    assert grip("summer") < grip("winter") < grip("studded")
 
 
 def test_settings_out_of_range_are_told():

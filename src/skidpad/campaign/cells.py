@@ -56,12 +56,12 @@ def drivers_with(functions: Iterable[str]) -> list[AdasDriver]:
     """`aeb` and `acc,lca` to a driver each, named after its functions."""
     chosen = [parse_functions(names) for names in functions]
     return [
-        AdasDriver(label=named(own, added) or "none", functions=own, added=added)
+        AdasDriver(label=join_functions(own, added) or "none", functions=own, added=added)
         for own, added in chosen
     ]
 
 
-def named(functions: Functions, added: Iterable[str] = ()) -> str:
+def join_functions(functions: Functions, added: Iterable[str] = ()) -> str:
     """A set of functions as one word."""
     return "+".join([*sorted(f.value for f in functions), *added])
 

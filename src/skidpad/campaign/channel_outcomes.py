@@ -9,7 +9,7 @@ import numpy as np
 from skidpad.core.channels import Decision
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import LightState
-from skidpad.recording.channels.drives import WAY_STEP, DriveOutcome, Ending
+from skidpad.recording.channels.drives import DriveOutcome, Ending, extend_way
 from skidpad.roads.lanes import SignalKind
 from skidpad.stack.channels.route import SEARCH, STEP, RoutePath, locate
 from skidpad.stack.channels.settings import CarModel
@@ -48,8 +48,7 @@ class Referee:
         if self._place is not None:
             self.distance += hypot(x - self._place[0], y - self._place[1])
         self._place = (x, y)
-        if not self.way or hypot(x - self.way[-1][0], y - self.way[-1][1]) >= WAY_STEP:
-            self.way.append((round(x, 1), round(y, 1)))
+        extend_way(self.way, x, y)
         self.cycles += 1
         if self._driver is not None and decision.driving != self._driver:
             self.switches += 1

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from skidpad.core.run import AdasDriver, Govern, RunSpec
+from skidpad.core.run import AdasDriver, RunSpec
 from skidpad.core.setup import Setup
+from skidpad.core.vocabulary import Govern
 from skidpad.envelope.govern import TABLE_KMH, EnvelopeSettings, govern
-from skidpad.physics.grip import grip_params, mu_at
+from skidpad.physics.grip import mu_at, road_of
 from skidpad.stack.interface import Stack
 
 FIXED_KMH = 80.0
@@ -32,5 +33,5 @@ def choose_envelope(spec: RunSpec, setup: Setup) -> EnvelopeSettings | None:
         case Govern.FIXED:
             return EnvelopeSettings(dt=dt, table_kmh=(FIXED_KMH,) * 3)
         case Govern.ORACLE:
-            params = grip_params(setup.weather, setup.grip, setup.mu_ref)
+            params = road_of(setup).params()
             return EnvelopeSettings(dt=dt, oracle=lambda v: float(mu_at(params, v)))

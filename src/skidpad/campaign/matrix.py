@@ -6,7 +6,7 @@ from math import inf
 from pathlib import Path
 
 from skidpad import __version__
-from skidpad.campaign.cells import named
+from skidpad.campaign.cells import join_functions
 from skidpad.campaign.keeping import road_file, with_kept_map
 from skidpad.campaign.pace import Pace
 from skidpad.campaign.recipe import Driven, Recipe
@@ -130,7 +130,7 @@ def run_key(
         grip=settings.world.grip.value,
         range=settings.sensors.range.value,
         outcome=outcome.value,
-        functions="" if ours is None else named(ours.functions, ours.added),
+        functions="" if ours is None else join_functions(ours.functions, ours.added),
         cruise_kmh=None if ours is None else cruise_target(ours),
         traffic=roads_of(cell).traffic.value,
         version=__version__,

@@ -19,7 +19,7 @@ from skidpad.core.settings import Settings, load_profile
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.surface import SurfacePatch
 from skidpad.core.told import on_a_line
-from skidpad.core.vocabulary import GripModel, SensorLevel, Stratum, TrafficStart
+from skidpad.core.vocabulary import Govern, GripModel, SensorLevel, Stratum, TrafficStart
 from skidpad.core.weather import Weather
 
 VERSION = 2  # of config.yaml; folders without the word were written before there was one value
@@ -257,16 +257,6 @@ class Friction(str, Enum):
     REDUCED = "reduced"  # tyres know it, by the setting `grip`
 
 
-class Govern(str, Enum):
-    """What keeps the driver's speed inside its grip and sight (docs/envelope.md)."""
-
-    NONE = "none"
-    ENVELOPE = "envelope"  # grip and sight from own signals
-    ORACLE = "oracle"  # the same with true grip, for studies
-    TABLE = "table"  # a rival: three speeds by wiper stage and temperature
-    FIXED = "fixed"  # another one: 80 km/h always
-
-
 class RunSpec(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One run. Two equal values give equal recordings."""
 
@@ -393,11 +383,11 @@ def run_from_plain(plain: dict[str, Any], where: str) -> RunSpec:
     version = plain.get("version")
     if version != VERSION:
         raise FileError(f"{where} has version {version!r} of a run's description, not {VERSION}")
-    parts = {k: v for k, v in plain.items() if k not in ("version", "profile")}
+    fields = {k: v for k, v in plain.items() if k not in ("version", "profile", "settings")}
     try:
-        values = msgspec.convert(parts.get("settings", {}), dict[str, Plain])
+        values = msgspec.convert(plain.get("settings", {}), dict[str, Plain])
         settings = load_profile(plain.get("profile", "recommended"), values)
-        return msgspec.convert({**parts, "settings": msgspec.to_builtins(settings)}, RunSpec)
+        return msgspec.structs.replace(msgspec.convert(fields, RunSpec), settings=settings)
     except ConfigError as error:
         raise FileError(f"{where}: {error}") from None
     except msgspec.ValidationError as error:

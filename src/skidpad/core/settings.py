@@ -8,7 +8,7 @@ one syntax. Each settles a place where the sources contradict themselves or leav
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cache
 from importlib.resources import files
@@ -136,11 +136,11 @@ class Settings:
     """All settings of a run; the defaults are the profile `recommended`."""
 
     profile: str = "recommended"  # whose values were filled in first
-    world: WorldSettings = field(default_factory=WorldSettings)
-    sensors: SensorSettings = field(default_factory=SensorSettings)
-    traffic: TrafficSettings = field(default_factory=TrafficSettings)
-    stack: StackSettings = field(default_factory=StackSettings)
-    metrics: MetricSettings = field(default_factory=MetricSettings)
+    world: WorldSettings = WorldSettings()
+    sensors: SensorSettings = SensorSettings()
+    traffic: TrafficSettings = TrafficSettings()
+    stack: StackSettings = StackSettings()
+    metrics: MetricSettings = MetricSettings()
 
     def with_values(self, values: Mapping[str, object]) -> Settings:
         """Returns a copy with some values replaced.

@@ -221,3 +221,13 @@ LABEL_OF_KIND = {
     ActorKind.PEDESTRIAN: SemanticClass.PEDESTRIAN,
     ActorKind.PROP: SemanticClass.DYNAMIC,
 }
+
+
+class Govern(str, Enum):
+    """What keeps the driver's speed inside its grip and sight (docs/envelope.md)."""
+
+    NONE = "none"
+    ENVELOPE = "envelope"  # grip and sight from own signals
+    ORACLE = "oracle"  # the same with true grip, for studies
+    TABLE = "table"  # a rival: three speeds by wiper stage and temperature
+    FIXED = "fixed"  # another one: 80 km/h always

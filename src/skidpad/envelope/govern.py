@@ -48,10 +48,8 @@ V_CREEP = 1.5  # m/s, below it the stack is left alone: it must be able to start
 BRAKE_GAIN = 1.0  # 1/s, from too much speed to deceleration
 SOFT = 1.0  # m/s below the limit, over which throttle is taken away
 CLOSE = 2.0  # m kept behind a standing lead
-LEAD_GRIP, LEAD_BRAKE = (
-    1.2,
-    8.0,
-)  # times the estimate that a lead's tyres may have; m/s^2 it brakes at most
+LEAD_GRIP = 1.2  # times the estimate that a lead's tyres may have
+LEAD_BRAKE = 8.0  # m/s^2 that it brakes at most
 GripAt = Callable[[float], float]  # grip at a speed in m/s
 
 

@@ -72,10 +72,9 @@ SNOW_STIFFNESS, ICE_STIFFNESS = 0.26, 0.51
 # Displacement drag 0.5 C_D rho w d v^2, as AMC 25.1591 of EASA has it for aeroplane tyres; the page
 # was found, its section on drag and its 0.75 were not read, so both are an assumption.
 WATER_DRAG, WATER_DENSITY = 0.75, 1000.0  # -, kg/m^3
-CLEARED = (
-    0.2  # share of the film that a wheel leaves to the one behind it; our assumption. Metz (SAE
-)
-# 2011-01-0986 and tests at Volk Field, abstracts) finds that the clearing is significant
+# Share of the film that a wheel leaves to the one behind it: our assumption. Metz (SAE 2011-01-0986 and
+# tests at Volk Field, abstracts) finds that the clearing is significant.
+CLEARED = 0.2
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,6 +175,11 @@ def ice_mu(road_temperature_c: float, wet: bool) -> float:
     return min(max(ICE_MU + ICE_MU_PER_C * (temperature - ICE_MU_REF_C), low), high)
 
 
+def dry_friction(tyres: Tyres) -> float:
+    """Friction of these tyres on the dry road on which new winter tyres have MU_REF."""
+    return tyres.dry * (1.0 + (WORN_DRY - 1.0) * tyres.wear)
+
+
 def physical_params(
     surface: RoadSurface,
     mu_ref: float = MU_REF,
@@ -197,7 +201,7 @@ def physical_params(
     ice_cover = min(surface.ice_mm / TEXTURE_MM, 1.0)
     snow_cover = min(surface.snow_mm / SNOW_COVER_MM, 1.0)
     open_road = (1.0 - ice_cover) * (1.0 - snow_cover)
-    dry = tyres.dry * (1.0 + (WORN_DRY - 1.0) * tyres.wear)
+    dry = dry_friction(tyres)
     ice, snow = _on_ice(surface, tyres, wet=film > 0.0), _on_snow(tyres)
     firm = ice_cover * (1.0 - snow_cover) * ice / dry + snow_cover * snow / dry
     thin, deep = min(film, FILM_WEDGE), max(film - FILM_WEDGE, 0.0)
@@ -247,8 +251,7 @@ class Road:
         kind = find_tyres(self.tyres if tyres is None else tyres)
         if surface is None and self.model is not GripModel.PHYSICAL:
             ratio = 1.0 if self.model is GripModel.NONE else statistical_ratio(self.weather)
-            dry = kind.dry * (1.0 + (WORN_DRY - 1.0) * kind.wear)
-            return GripParams(self.mu_ref * (dry / MU_REF), ratio, 0.0)
+            return GripParams(self.mu_ref * (dry_friction(kind) / MU_REF), ratio, 0.0)
         return physical_params(
             road_surface(self.weather) if surface is None else surface,
             self.mu_ref, kind, stiffness=self.stiffness, drag=self.drag,

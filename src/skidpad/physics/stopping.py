@@ -15,7 +15,7 @@ from skidpad.core.tyres import REFERENCE, find_tyres
 from skidpad.core.vocabulary import GripModel
 from skidpad.core.weather import Weather
 from skidpad.physics.fleet import Fleet
-from skidpad.physics.grip import MU_REF, GripParams, Road, mu_at
+from skidpad.physics.grip import MU_REF, GripParams, Road, dry_friction, mu_at
 from skidpad.physics.types import EGO_TYPE, VehicleType, vehicle_type
 
 SPEEDS_KMH = (50.0, 80.0, 100.0)
@@ -107,7 +107,7 @@ def grip_rows(
                 continue
     v0 = [mps_from_kmh(kmh) for kmh in SPEEDS_KMH]
     each = stops([p for *_, p in cases for _ in v0], v0 * len(cases))
-    dry = mu_ref * find_tyres(tyres).dry / find_tyres(REFERENCE).dry
+    dry = mu_ref * (dry_friction(find_tyres(tyres)) / MU_REF)
     rows = []
     for k, (weather, model, params) in enumerate(cases):
         mine = tuple(each[k * len(v0) : (k + 1) * len(v0)])

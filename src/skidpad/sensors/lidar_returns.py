@@ -36,15 +36,11 @@ DIVERGENCE = 3e-3  # rad, full angle of the beam (LISA)
 NEAREST = 1.5  # m, of a drop that is noticed (LISA)
 ACCURACY = 0.09  # m, range noise at a power of half the threshold: accuracy / sqrt(2 SNR) (LISA)
 PULSE = 2e-8 * 299_792_458.0  # m, length of a pulse of 20 ns (Hahner et al.)
-MEETS = (
-    0.9,
-    10.0,
-)  # m, from and to which receiver and beam come to overlap: the first value is that
-# of Hahner et al., the second the bound that they name for most sensors (their own value is 1 m)
-FOG_SPREAD, FOG_SHAPE = (
-    10.0,
-    (2.0, 20.0),
-)  # m, of a beta distribution: noise of fog's distance (same)
+# m, from and to which receiver and beam come to overlap: the first value is that of Hahner et al.,
+# the second the bound that they name for most sensors (their own value is 1 m).
+MEETS = (0.9, 10.0)
+FOG_SPREAD = 10.0  # m, of a beta distribution: noise of fog's distance (Hahner et al.)
+FOG_SHAPE = (2.0, 20.0)
 FARTHEST_DROP = 30.0  # m; beyond, a drop returns less than 1e-6 of a white surface at 1 m
 GROUND = (
     SemanticClass.ROAD, SemanticClass.SIDEWALK, SemanticClass.TERRAIN, SemanticClass.ROAD_LINE,

@@ -1,4 +1,4 @@
-"""Relays alerts as they come, tries again what failed, and escalates what nobody took up.
+"""Relays alerts as they come, tries again what failed, and escalates alerts that stay open.
 
 Every relay has a thread of its own, so that one that does not answer delays no other.
 """
@@ -58,7 +58,7 @@ class Dispatcher:
             self.relay(relay)
 
     def escalate(self) -> None:
-        """Raises each alert that nobody took in time by one level."""
+        """Raises each alert that is still open when its time is over by one level."""
         now, up = self.clock(), False
         with self.engine.begin() as connection:
             for alert in alerts_since(connection, now - DAY):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from enum import Enum
+from math import dist
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from skidpad.core.reading import UNUSABLE
 from skidpad.recording.campaign.ledger import Entry
 from skidpad.recording.campaign.results import Columns
 
-WAY_STEP = 10.0  # m
+WAY_STEP = 10.0  # m between two places of a way
 
 
 class Ending(str, Enum):
@@ -68,6 +69,12 @@ class DriveOutcome(DriveMetrics):
     content_hash: str = ""
     cpu_s: float = 0.0  # outside every hash
     way: tuple[tuple[float, float], ...] = ()  # m, places of the ego WAY_STEP apart
+
+
+def extend_way(way: list[tuple[float, float]], x: float, y: float) -> None:
+    """Appends a place in m to a way, unless it is less than WAY_STEP from the last one."""
+    if not way or dist((x, y), way[-1]) >= WAY_STEP:
+        way.append((round(x, 1), round(y, 1)))
 
 
 DRIVES = Columns(DriveKey, DriveMetrics, ("route", "seed", "drive_by"))

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.jit import Held, inner_kernel, kernel
 from skidpad.core.states import ActorStates
-from skidpad.physics.grip import GripParams, mu_at, stiffness_at
+from skidpad.physics.grip import grip_of_row, mu_at, stiffness_at
 from skidpad.roads.kernels import LaneArrays, project_kernel, s_road_kernel, sample_kernel
 
 Floats = NDArray[np.float64]
@@ -92,8 +92,8 @@ def fill_patches(
                     continue
                 own, own_stiffness, own_film = p.ratio[n], NO_PATCH, NO_PATCH
                 if isnan(own):
-                    covered = _params(p.covered[kind], n)
-                    own = mu_at(covered, v) / mu_at(_params(p.outside, kind), v)
+                    covered = grip_of_row(p.covered[kind], n)
+                    own = mu_at(covered, v) / mu_at(grip_of_row(p.outside, kind), v)
                     own_stiffness, own_film = stiffness_at(covered, v), covered.film
                 if not found or own < share[i, k]:
                     share[i, k], stiffness[i, k], film[i, k] = own, own_stiffness, own_film
@@ -138,7 +138,7 @@ def _place(a: LaneArrays, x: float, y: float, z: float) -> tuple[int, float, flo
 
 @inner_kernel
 def _is_inside(corner: Floats, first: int, last: int, x: float, y: float) -> bool:
-    """Even-odd rule."""
+    """Whether a point lies inside a polygon, by the even-odd rule."""
     inside = False
     x0, y0 = corner[last - 1, 0], corner[last - 1, 1]
     for k in range(first, last):
@@ -147,9 +147,3 @@ def _is_inside(corner: Floats, first: int, last: int, x: float, y: float) -> boo
             inside = not inside
         x0, y0 = x1, y1
     return inside
-
-
-@inner_kernel
-def _params(rows: Floats, i: int) -> GripParams:
-    g = rows[i]
-    return GripParams(g[0], g[1], g[2], g[3], g[4], g[5], g[6], g[7], g[8])

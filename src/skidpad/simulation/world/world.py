@@ -210,8 +210,7 @@ class World:
 
     def lay(self, road: Road) -> None:
         """From now on the weather does this to the road, in patches too."""
-        self.grip = road.params()
-        self._road = road
+        self._grip, self._road = road.params(), road
         self._fill_grips()
         if self.patches is not None:
             self.patches.lay(road)

@@ -15,17 +15,16 @@ from skidpad.evidence.channels.tracked.distance import SafeDistance
 from skidpad.evidence.channels.tracked.grip import OwnGrip
 from skidpad.evidence.channels.tracked.odometer import Odometer, greatest_leap
 from skidpad.evidence.channels.tracked.tracks import CONFIRM, SURE, Lookout, Seen, Track, Tracks
+from skidpad.recording.channels.cycles import STEP
 
 SIDES = (Signal.FRONT_DEFICIT, Signal.REAR_DEFICIT)
-CYCLE = 0.1  # s (C-022)
 SAME = 4.0  # m between two channels' reports of one object
 SIGMA_PLACE = 0.27  # m per axis: 0.10 m of jitter and 0.25 m of drift, as docs/channels.md states
 UNLIKELY = 1e-6  # share of cycles with right positions that may look wrong (assumption)
 CHI2_LIMIT = -2.0 * log(UNLIKELY)  # of two degrees of freedom: 27.6
 PLAN_STEP = 0.5  # s
-SMOOTHING = (
-    1.0  # s over which a short gap is the median of its cycles, so that it comes half as late
-)
+# s over which a short gap is the median of its cycles, so that it comes half as late
+SMOOTHING = 1.0
 
 
 class Tracked:
@@ -102,10 +101,11 @@ class Tracked:
         window.append((t, deficit))
         while t - window[0][0] > self.smoothing + 1e-6:
             window.popleft()
-        values = sorted(value for _, value in window)
-        short = max(round(self.smoothing / CYCLE) + 1 - len(values), 0)  # cycles that are missing
-        middle = (len(values) + short) // 2 - short
-        return values[middle] if middle >= 0 else 0.0
+        values = [value for _, value in window]
+        values += [0.0] * (
+            round(self.smoothing / STEP) + 1 - len(values)
+        )  # deficits are never less
+        return sorted(values)[len(values) // 2]
 
     def _same(self, channel: int, track: Track) -> Track | None:
         """The same object as another channel has it."""

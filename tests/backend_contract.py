@@ -26,7 +26,7 @@ from skidpad.core.vocabulary import (
 from skidpad.core.weather import Weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
-from skidpad.sensors.twelve import twelve_sensors
+from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.simulation.backend import Backend
 
 Make = Callable[[], Backend]

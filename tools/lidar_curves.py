@@ -23,8 +23,8 @@ from skidpad.physics.droplets import (
     snow_flakes,
 )
 from skidpad.physics.optics import CONTRAST_SEEN, LidarAir, rain_extinction
-from skidpad.sensors import lidar_returns
-from skidpad.sensors.lidar_returns import DIVERGENCE, NEAREST, ON_GROUND, OTHER, WHITE
+from skidpad.sensors.ranging import lidar_returns
+from skidpad.sensors.ranging.lidar_returns import DIVERGENCE, NEAREST, ON_GROUND, OTHER, WHITE
 
 REACH, DISTANCE = 100.0, 30.0
 BEAMS, OURS = 40_000, 1_000_000  # drawn by LISA, and here

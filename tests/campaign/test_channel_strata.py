@@ -20,7 +20,7 @@ from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.vocabulary import Stratum
 from skidpad.recording.channels.context import context_of
 from skidpad.recording.channels.mcap_files import McapRecording
-from skidpad.sensors.channel_presets import senses_of
+from skidpad.sensors.channels.presets import senses_of
 from skidpad.simulation.world.stage import staged
 from skidpad.simulation.world.traffic.variety import risky_character
 

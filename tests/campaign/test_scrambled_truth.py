@@ -20,7 +20,7 @@ from skidpad.core.specs import EyesSpec, LidarSpec
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import SensorLevel, TrafficStart
 from skidpad.roads.queries import RoadMap
-from skidpad.sensors.asked import AskedSensors
+from skidpad.sensors.requested import AskedSensors
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 from skidpad.simulation.world.world import World
 from skidpad.stack.loading import GuardedStack

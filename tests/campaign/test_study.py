@@ -19,7 +19,7 @@ from skidpad.core.vocabulary import Clearance, Tier
 from skidpad.evidence.verdicts import judge
 from skidpad.recording.run.log_files import log_hash
 from skidpad.roads.bundled import load_map
-from skidpad.sensors.twelve import twelve_sensors
+from skidpad.sensors.published_sensors import twelve_sensors
 
 FIGURE8 = load_map("figure8")
 STUDIES = study_arms.STUDIES

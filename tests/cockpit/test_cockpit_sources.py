@@ -35,7 +35,7 @@ from skidpad.recording.channels.cycles import cycles
 from skidpad.recording.channels.mcap_files import ChannelWriter
 from skidpad.recording.hazards.records import HazardRecord, HazardWriter
 from skidpad.roads.bundled import load_map
-from skidpad.sensors.view import camera_view
+from skidpad.sensors.raster.view import camera_view
 
 MOMENTS = 12
 

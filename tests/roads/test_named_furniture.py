@@ -9,8 +9,8 @@ from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import LaneKind, Marking
 from skidpad.roads.opendrive.bake import bake
 from skidpad.roads.queries import RoadMap
-from skidpad.sensors.materials import Material
-from skidpad.sensors.roadmesh import KERB_HEIGHT, road_pieces
+from skidpad.sensors.scene.materials import Material
+from skidpad.sensors.scene.road_mesh import KERB_HEIGHT, road_pieces
 
 LANE = (
     '<lane id="{id}" type="{type}"><width sOffset="0" a="{width}" b="0" c="0" d="0"/>'

@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from skidpad.sensors.beam import direction
-from skidpad.sensors.boxes import boxes_in_view, placed, walls_in_view
-from skidpad.sensors.object_radar import NEAR
-from skidpad.sensors.objects import (
+from skidpad.sensors.object_level.boxes import boxes_in_view, placed, walls_in_view
+from skidpad.sensors.object_level.object_radar import NEAR
+from skidpad.sensors.object_level.objects import (
     BIN,
     LEVEL_GAP,
     LEVEL_GRADE,
@@ -23,6 +22,7 @@ from skidpad.sensors.objects import (
     STRIP,
     WIDEN,
 )
+from skidpad.sensors.ranging.beam import direction
 
 compiled = njit(error_model="numpy")
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from skidpad.core.vocabulary import SemanticClass
-from skidpad.sensors.materials import Material
-from skidpad.sensors.view import NEAR
+from skidpad.sensors.raster.view import NEAR
+from skidpad.sensors.scene.materials import Material
 
 
 def triangles_of(suite, view, hidden=0):

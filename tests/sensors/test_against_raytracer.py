@@ -7,10 +7,10 @@ from raytracer import pixel_directions, trace
 from skidpad.core.weather import Weather
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.bench import convoy
-from skidpad.sensors.rasteriser import AUTO_LEVEL
+from skidpad.sensors.published_sensors import twelve_sensors
+from skidpad.sensors.raster.rasteriser import AUTO_LEVEL
+from skidpad.sensors.raster.view import camera_view
 from skidpad.sensors.suite import PixelSettings, PixelSuite
-from skidpad.sensors.twelve import twelve_sensors
-from skidpad.sensors.view import camera_view
 
 PLACES = (0.0, 700.0, 1500.0, 2400.0)  # m after the start
 CAMERAS = ("depth_roof", "depth_bumper")

@@ -11,10 +11,10 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind, LightState
 from skidpad.physics.presets import preset
 from skidpad.roads.roadside import Box, Roadside, SignalHead
-from skidpad.sensors.channel_presets import LAV_LIKE, SENSES, TFUSE_LIKE
-from skidpad.sensors.channel_suite import ChannelSuite
-from skidpad.sensors.ghosts import GhostSettings
-from skidpad.sensors.localisation import Localisation
+from skidpad.sensors.channels.ghosts import GhostSettings
+from skidpad.sensors.channels.localisation import Localisation
+from skidpad.sensors.channels.presets import LAV_LIKE, SENSES, TFUSE_LIKE
+from skidpad.sensors.channels.suite import ChannelSuite
 
 NOON = preset("clear-noon")
 CAR = (4.5, 1.9, 1.5)

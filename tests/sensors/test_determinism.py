@@ -15,8 +15,8 @@ from skidpad.core.vocabulary import RangeModel
 from skidpad.physics.presets import preset
 from skidpad.roads.bundled import load_map
 from skidpad.sensors.bench import convoy
+from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
-from skidpad.sensors.twelve import twelve_sensors
 
 IDS = ("depth_roof", "semantic_roof", "depth_bumper", "semantic_bumper", "rgb_front", "rgb_rear")
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from skidpad.core.vocabulary import SemanticClass
-from skidpad.sensors.encodings import (
+from skidpad.sensors.pictures.encodings import (
     cityscapes_colours,
     vehicle_mask,
 )

@@ -15,7 +15,7 @@ from skidpad.core.vocabulary import ActorKind, LightState
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import preset
 from skidpad.roads.roadside import Box, Roadside, SignalHead
-from skidpad.sensors.eyes import LOOMING, Eyes, perceived_velocity, road_look
+from skidpad.sensors.object_level.eyes import LOOMING, Eyes, perceived_velocity, road_look
 
 NOON = preset("clear-noon")
 SIZES = {

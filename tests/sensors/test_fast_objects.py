@@ -9,9 +9,9 @@ import pytest
 from sensors import plain_objects
 from sensors.test_objects import BUMPER, RADAR, ROOF, world
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside
-from skidpad.sensors import objects
-from skidpad.sensors.boxes import Boxes
-from skidpad.sensors.objects import ObjectSuite
+from skidpad.sensors.object_level import objects
+from skidpad.sensors.object_level.boxes import Boxes
+from skidpad.sensors.object_level.objects import ObjectSuite
 
 SLOPE = np.array([0.02, -0.01])
 

@@ -15,9 +15,9 @@ from skidpad.physics.presets import preset
 from skidpad.roads.roadside import Box, SignalHead
 from skidpad.sensors.finish.extras import ALL_EXTRAS, NO_EXTRAS, Extra
 from skidpad.sensors.finish.outline import MOST, spans
-from skidpad.sensors.materials import Material
+from skidpad.sensors.raster.view import camera_view
+from skidpad.sensors.scene.materials import Material
 from skidpad.sensors.suite import PixelSettings, PixelSuite
-from skidpad.sensors.view import camera_view
 
 DRIVER = Pose(0.5, 0.0, 1.4, 0.0, 0.0, 0.0)
 SIGN = Box(SemanticClass.TRAFFIC_SIGN, 130.0, -15.0, 2.0, 0.0, 0.1, 1.5, 1.5, rgb=(200, 200, 210))

@@ -9,7 +9,7 @@ from skidpad.core.geometry import Pose
 from skidpad.core.specs import LidarSpec
 from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.core.weather import Weather
-from skidpad.sensors.lidar import Lidar
+from skidpad.sensors.ranging.lidar import Lidar
 from skidpad.sensors.suite import PixelSuite
 
 SPEC = LidarSpec("l", Pose(0.0, 0.0, 2.4), channels=16, range=60.0, rotation_hz=20.0)

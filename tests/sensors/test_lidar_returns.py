@@ -19,8 +19,8 @@ from skidpad.physics.droplets import (
     snow_flakes,
 )
 from skidpad.physics.optics import LidarAir, extinction, lidar_air, rain_extinction
-from skidpad.sensors.lidar import Lidar
-from skidpad.sensors.lidar_returns import (
+from skidpad.sensors.ranging.lidar import Lidar
+from skidpad.sensors.ranging.lidar_returns import (
     ACCURACY,
     DIVERGENCE,
     NEAREST,

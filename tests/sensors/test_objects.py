@@ -12,9 +12,9 @@ from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.physics.optics import label_range, radar_range
 from skidpad.physics.presets import find_weather
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside
-from skidpad.sensors.beam import beam_of
-from skidpad.sensors.objects import ObjectSuite
-from skidpad.sensors.radar import Radar, aim
+from skidpad.sensors.object_level.objects import ObjectSuite
+from skidpad.sensors.ranging.beam import beam_of
+from skidpad.sensors.ranging.radar import Radar, aim
 
 ROOF = CameraSpec("roof", Modality.DEPTH, 800, 600, 90.0, Pose(1.5, 0.0, 2.4))
 BUMPER = CameraSpec("bumper", Modality.DEPTH, 400, 300, 100.0, Pose(2.3, 0, 0.4, pitch=radians(20)))

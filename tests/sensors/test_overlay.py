@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from skidpad.core.weather import Weather
-from skidpad.sensors.overlay import OPACITY, droplet_layer, overlaid
+from skidpad.sensors.pictures.overlay import OPACITY, droplet_layer, overlaid
 
 RAIN = Weather(precipitation=60.0)
 

@@ -6,8 +6,8 @@ from worlds import World, lanes_along, states_at, table_of
 
 from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.core.weather import Weather
+from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
-from skidpad.sensors.twelve import twelve_sensors
 
 
 def crossing(rise=8.0):

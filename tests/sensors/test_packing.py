@@ -6,12 +6,12 @@ from hypothesis import strategies as st
 
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality
-from skidpad.sensors.blocks import BLOCK, COLUMNS, LANES, gather
-from skidpad.sensors.degradation import CameraNoise, Degradation
-from skidpad.sensors.materials import MATERIALS
-from skidpad.sensors.packing import pack, rounded, unpack
-from skidpad.sensors.shading import behind_lamps
-from skidpad.sensors.view import camera_view
+from skidpad.sensors.pictures.blocks import BLOCK, COLUMNS, LANES, gather
+from skidpad.sensors.pictures.degradation import CameraNoise, Degradation
+from skidpad.sensors.pictures.packing import pack, rounded, unpack
+from skidpad.sensors.pictures.shading import behind_lamps
+from skidpad.sensors.raster.view import camera_view
+from skidpad.sensors.scene.materials import MATERIALS
 
 BYTES = st.tuples(*[st.integers(0, 255)] * 3)
 

@@ -10,8 +10,8 @@ from skidpad.core.specs import CameraSpec, Modality, RadarSpec
 from skidpad.core.vocabulary import ActorKind, SemanticClass
 from skidpad.core.weather import Weather
 from skidpad.roads.roadside import Box
+from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
-from skidpad.sensors.twelve import twelve_sensors
 
 LEVEL = Pose(0.0, 0.0, 1.5)
 DEPTH = CameraSpec("d", Modality.DEPTH, 160, 120, 90.0, LEVEL)

@@ -8,7 +8,7 @@ import pytest
 
 from skidpad.core.lefthanded import pose_from_carla
 from skidpad.core.specs import CameraSpec, RadarSpec
-from skidpad.sensors.twelve import CaptureSize, mounts_outside, twelve_sensors
+from skidpad.sensors.published_sensors import CaptureSize, mounts_outside, twelve_sensors
 
 PUBLISHED = [
     # id, width, height, fov, x, y, z, pitch, yaw: as printed, CARLA axes

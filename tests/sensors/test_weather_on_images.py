@@ -20,17 +20,17 @@ from skidpad.core.vocabulary import (
 from skidpad.core.weather import Weather
 from skidpad.physics.presets import preset
 from skidpad.roads.roadside import SignalHead
-from skidpad.sensors.degradation import (
+from skidpad.sensors.finish.extras import NO_EXTRAS
+from skidpad.sensors.pictures.degradation import (
     CameraNoise,
     Degradation,
     clear_of_weather,
     degradation,
     glass_mask,
 )
-from skidpad.sensors.finish.extras import NO_EXTRAS
-from skidpad.sensors.perception_noise import PerceptionNoise
+from skidpad.sensors.pictures.perception_noise import PerceptionNoise
+from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
-from skidpad.sensors.twelve import twelve_sensors
 
 SIX = ("clear-sunrise", "clear-noon", "clear-night", "rain-sunrise", "rain-noon", "rain-night")
 GREY = 110

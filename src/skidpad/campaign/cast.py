@@ -43,8 +43,8 @@ from skidpad.scenarios import scenario as scenarios
 from skidpad.scenarios.player import Player, setups
 from skidpad.scenarios.registry import Names
 from skidpad.scenarios.shipped import NAMES, scenario_file
-from skidpad.sensors.overlay import Lens
-from skidpad.sensors.twelve import twelve_sensors
+from skidpad.sensors.pictures.overlay import Lens
+from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.simulation.recovery import RecoverySettings, Supervisor
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.agents import load_agent

@@ -39,7 +39,7 @@ from skidpad.live.listener import Listener
 from skidpad.live.settings import Links
 from skidpad.recording.channels.drives import DriveOutcome
 from skidpad.recording.channels.mcap_files import ChannelWriter, Item
-from skidpad.sensors.channel_suite import CYCLE
+from skidpad.sensors.channels.suite import CYCLE
 from skidpad.simulation.world.traffic.variety import risky_character
 from skidpad.stack.channels.arbiter import Arbiter, ArbiterSettings, Choice, Reason
 from skidpad.stack.channels.channel import Channel

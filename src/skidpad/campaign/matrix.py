@@ -43,8 +43,8 @@ def see_all() -> None:
     from skidpad.physics.presets import preset
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.bench import convoy
+    from skidpad.sensors.published_sensors import twelve_sensors
     from skidpad.sensors.suite import PixelSettings, PixelSuite
-    from skidpad.sensors.twelve import twelve_sensors
     from skidpad.stack.perception.hsv import LampCamera
 
     road_map, specs = load_map("figure8"), twelve_sensors()

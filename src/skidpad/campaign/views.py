@@ -13,7 +13,7 @@ from skidpad.campaign.drive import Moment
 from skidpad.core.frames import CameraImage, RadarPoints
 from skidpad.core.states import StackReport
 from skidpad.core.vocabulary import Supervision
-from skidpad.sensors.encodings import cityscapes_colours
+from skidpad.sensors.pictures.encodings import cityscapes_colours
 
 Picture = NDArray[np.uint8]
 

@@ -61,7 +61,7 @@ def drive(
     from skidpad.campaign.channels import recipe_with_links, segments
     from skidpad.campaign.keeping import found_again, keep_maps
     from skidpad.roads.bundled import load_map
-    from skidpad.sensors.channel_presets import senses_of
+    from skidpad.sensors.channels.presets import senses_of
 
     for name in crew.channels:
         senses_of(name)

@@ -10,7 +10,7 @@ import numpy as np
 
 from skidpad.cli.pictures import format_of, write_picture
 from skidpad.core.specs import CameraSpec, RadarSpec
-from skidpad.sensors.twelve import twelve_sensors
+from skidpad.sensors.published_sensors import twelve_sensors
 
 EGO = (4.7, 1.85)  # m, length and width of the drawn car
 CAMERA_REACH = 3.0  # m, how far the drawn field of a camera reaches

@@ -16,8 +16,8 @@ from skidpad.core.states import StackReport
 from skidpad.roads.queries import RoadMap
 from skidpad.roads.roadside import SignalHead
 from skidpad.roads.surface_outlines import PatchOutline
-from skidpad.sensors.twelve import RADAR_ID, twelve_sensors
-from skidpad.sensors.view import camera_view
+from skidpad.sensors.published_sensors import RADAR_ID, twelve_sensors
+from skidpad.sensors.raster.view import camera_view
 from skidpad.stack.perception.lane_view import LaneView
 from skidpad.stack.perception.lights import LightScan
 

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.cockpit.feed import Array, Packet
-from skidpad.sensors.encodings import cityscapes_colours
+from skidpad.sensors.pictures.encodings import cityscapes_colours
 
 Picture = NDArray[np.uint8]  # (H, W, 3) blue, green, red, as OpenCV wants it
 QUALITY = 80  # of JPEG

@@ -23,8 +23,8 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.finish.extras import ALL_EXTRAS, Extra
+from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
-from skidpad.sensors.twelve import twelve_sensors
 
 THINNED = 2  # depth and classes are shown at every second pixel
 LOOKED_AT = 0.8  # m, height of what the crash camera looks at

@@ -51,7 +51,7 @@ class SensorType:
         spec: The class of its specs, a frozen dataclass with `id` and `mount`.
         reading: The class of its readings: plain data and arrays.
         factory: `factory(spec, host)` returns a function that measures when the stack reads it;
-            `host` is a `skidpad.sensors.asked.SensorHost`. A text "module:function" names one
+            `host` is a `skidpad.sensors.requested.SensorHost`. A text "module:function" names one
             that is imported when it is needed.
         word: The `kind` of a PointSensorSpec; empty for all others.
         numbers: Sums a reading up as one number per quantity ("name_unit"), written in each tick
@@ -79,7 +79,7 @@ class SensorType:
 
 
 def _own_types() -> tuple[SensorType, ...]:
-    at, outside = "skidpad.sensors.asked:", "skidpad.sensors.outside:"
+    at, outside = "skidpad.sensors.requested:", "skidpad.sensors.outside:"
     point = PointSensorSpec
     return (
         SensorType("camera", "Camera", "pixels", CameraSpec, CameraImage, at + "make_camera"),

@@ -15,8 +15,8 @@ from skidpad.core.vocabulary import ActorKind, LightState, RangeModel
 from skidpad.physics.presets import preset
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import LanePoint, RoadMap
+from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.sensors.suite import PixelSettings, PixelSuite
-from skidpad.sensors.twelve import twelve_sensors
 
 TICKS = 200
 STEP = 1.5  # m per tick: 30 m/s at 20 Hz

@@ -11,7 +11,7 @@ from math import floor
 from skidpad.core.randomness import stream
 from skidpad.core.specs import PointSensorSpec
 from skidpad.physics.grip import rain_rate
-from skidpad.sensors.asked import SensorHost
+from skidpad.sensors.requested import SensorHost
 
 # mm/h above which rain counts as light, moderate, heavy: the glossary of the American Meteorological
 # Society, "rain" (a trace to 2.5, to 7.6, over 7.6)

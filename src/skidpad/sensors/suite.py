@@ -19,18 +19,18 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, RangeModel
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import depth_range, label_range, radar_range
-from skidpad.sensors.beam import beam_of
-from skidpad.sensors.degradation import CameraNoise, degradation
 from skidpad.sensors.finish.extras import NO_EXTRAS, Extra
 from skidpad.sensors.finish.finish import Finish
-from skidpad.sensors.lighting import lighting
-from skidpad.sensors.live_scene import LiveScene, SceneMap
-from skidpad.sensors.passes import NOTHING, UNLIMITED, Pass, Sight, poison
-from skidpad.sensors.perception_noise import PerceptionNoise
-from skidpad.sensors.radar import Radar
-from skidpad.sensors.rasteriser import AUTO_LEVEL
-from skidpad.sensors.shading import Shading
-from skidpad.sensors.view import View, camera_view
+from skidpad.sensors.pictures.degradation import CameraNoise, degradation
+from skidpad.sensors.pictures.lighting import lighting
+from skidpad.sensors.pictures.perception_noise import PerceptionNoise
+from skidpad.sensors.pictures.shading import Shading
+from skidpad.sensors.ranging.beam import beam_of
+from skidpad.sensors.ranging.radar import Radar
+from skidpad.sensors.raster.live_scene import LiveScene, SceneMap
+from skidpad.sensors.raster.passes import NOTHING, UNLIMITED, Pass, Sight, poison
+from skidpad.sensors.raster.rasteriser import AUTO_LEVEL
+from skidpad.sensors.raster.view import View, camera_view
 
 EGO = 0
 CALM = 0.3  # share of the published camera effect in a calm picture for people; by eye

@@ -14,7 +14,7 @@ from skidpad.core.setup import Setup
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, RangeModel, SensorLevel
 from skidpad.roads.queries import RoadMap
-from skidpad.sensors.objects import ObjectSuite
+from skidpad.sensors.object_level.objects import ObjectSuite
 from skidpad.sensors.suite import PixelSettings, PixelSuite
 
 NO_IMAGES: Mapping[str, CameraImage] = {}

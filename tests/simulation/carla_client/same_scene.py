@@ -18,7 +18,7 @@ from skidpad.core.lefthanded import pose_from_carla, pose_to_carla
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import Control, SensorLevel
-from skidpad.sensors.rays import make_hits, make_rays
+from skidpad.sensors.raster.rays import make_hits, make_rays
 from skidpad.simulation.carla.backend import CarlaBackend
 from skidpad.simulation.carla.options import CarlaOptions
 from skidpad.simulation.embedded.engine import EmbeddedBackend

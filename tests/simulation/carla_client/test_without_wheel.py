@@ -17,7 +17,7 @@ from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.weather import Weather
 from skidpad.roads.bundled import load_map
-from skidpad.sensors.twelve import twelve_sensors
+from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.simulation.carla import decode
 from skidpad.simulation.carla.connection import connect, release
 from skidpad.simulation.carla.events import closing, marking_name

@@ -7,7 +7,7 @@ import pytest
 from test_served import Kept
 
 from skidpad.core.geometry import Pose
-from skidpad.sensors.view import View
+from skidpad.sensors.raster.view import View
 from skidpad.simulation.carla_server.actors import Attachment
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.methods import episode as methods

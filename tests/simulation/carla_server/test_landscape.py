@@ -8,7 +8,7 @@ import pytest
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.bundled import load_map, map_file
-from skidpad.sensors.around import Fan, look_around
+from skidpad.sensors.ranging.around import Fan, look_around
 from skidpad.simulation.carla_server import scenery
 from skidpad.simulation.carla_server.episode import Wanted
 from skidpad.simulation.carla_server.landscape import Landscape, objects, pieces, without

@@ -19,7 +19,7 @@ from skidpad.core.vocabulary import Control, SensorLevel
 from skidpad.core.weather import Weather
 from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.bundled import load_map
-from skidpad.sensors.twelve import twelve_sensors
+from skidpad.sensors.published_sensors import twelve_sensors
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 
 MAP = load_map("figure8")

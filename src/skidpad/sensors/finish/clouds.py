@@ -16,9 +16,9 @@ from scipy import ndimage
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.randomness import stream
 from skidpad.core.weather import Weather
-from skidpad.sensors.lighting import Lighting
-from skidpad.sensors.packing import pack, unpack
-from skidpad.sensors.view import View
+from skidpad.sensors.pictures.lighting import Lighting
+from skidpad.sensors.pictures.packing import pack, unpack
+from skidpad.sensors.raster.view import View
 
 SIZE = 512  # texels of the texture, which repeats
 OCTAVES = ((96.0, 1.0), (40.0, 0.55), (16.0, 0.34), (6.0, 0.17))  # texels of blur, weight

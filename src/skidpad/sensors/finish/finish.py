@@ -26,11 +26,11 @@ from skidpad.sensors.finish.shadows import (
     shade_of,
     standing,
 )
-from skidpad.sensors.lighting import Lighting
-from skidpad.sensors.materials import MATERIALS
-from skidpad.sensors.passes import Pass
-from skidpad.sensors.shading import ROADLIKE
-from skidpad.sensors.view import View
+from skidpad.sensors.pictures.lighting import Lighting
+from skidpad.sensors.pictures.shading import ROADLIKE
+from skidpad.sensors.raster.passes import Pass
+from skidpad.sensors.raster.view import View
+from skidpad.sensors.scene.materials import MATERIALS
 
 STANDING_REACH = 70.0  # m, of shadows of what stands beside the road
 LEAST_WET = 0.1  # of 1, below which a road mirrors no lamp

@@ -7,8 +7,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.sensors.finish.lamps import Sources
-from skidpad.sensors.packing import pack, unpack
-from skidpad.sensors.view import View
+from skidpad.sensors.pictures.packing import pack, unpack
+from skidpad.sensors.raster.view import View
 
 WHITE = np.float32(65025.0)  # a byte's square, of light 1
 FARTHEST = 350.0  # m

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind, LightState
 from skidpad.roads.roadside import SignalHead
-from skidpad.sensors.lighting import Lighting
+from skidpad.sensors.pictures.lighting import Lighting
 
 Floats = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import inner_kernel, kernel
-from skidpad.sensors.view import View
+from skidpad.sensors.raster.view import View
 
 Floats = NDArray[np.float64]
 MOST = 96  # points on screen: 16 corners, and where their 120 edges pass the near plane

@@ -14,10 +14,10 @@ from skidpad.core.geometry import Pose
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.sensors.finish.glow import add_light
-from skidpad.sensors.lighting import Lighting
-from skidpad.sensors.materials import MATERIALS, Material
-from skidpad.sensors.shading import HEADLAMP_X, HEADLAMP_Z, beam_at, beam_of, behind_lamps
-from skidpad.sensors.view import View
+from skidpad.sensors.pictures.lighting import Lighting
+from skidpad.sensors.pictures.shading import HEADLAMP_X, HEADLAMP_Z, beam_at, beam_of, behind_lamps
+from skidpad.sensors.raster.view import View
+from skidpad.sensors.scene.materials import MATERIALS, Material
 
 MARKING_GAIN, SIGN_GAIN, PLATE_GAIN = 0.9, 2.2, 1.6  # of light that comes back, per light there
 SPILL = 0.035  # of the beam's power above the cut-off, by which signs are read at night

@@ -18,10 +18,10 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
 from skidpad.roads.roadside import Box
 from skidpad.sensors.finish.outline import MOST, spans
-from skidpad.sensors.lighting import Lighting
-from skidpad.sensors.materials import MATERIALS, Material
-from skidpad.sensors.packing import pack, unpack
-from skidpad.sensors.view import View
+from skidpad.sensors.pictures.lighting import Lighting
+from skidpad.sensors.pictures.packing import pack, unpack
+from skidpad.sensors.raster.view import View
+from skidpad.sensors.scene.materials import MATERIALS, Material
 
 Floats = NDArray[np.float64]
 

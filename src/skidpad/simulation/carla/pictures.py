@@ -17,7 +17,7 @@ from skidpad.core.setup import Setup
 from skidpad.core.specs import CameraSpec, Modality
 from skidpad.core.vocabulary import RangeModel
 from skidpad.physics.optics import depth_range, label_range
-from skidpad.sensors.degradation import CameraNoise, degradation
+from skidpad.sensors.pictures.degradation import CameraNoise, degradation
 from skidpad.simulation.carla import decode
 
 FEED_WORKERS = 5  # one per display feed

@@ -13,7 +13,7 @@ from skidpad.core.states import ActorStates, ActorTable, Floats
 from skidpad.core.vocabulary import LightState, RangeModel, SensorLevel
 from skidpad.physics.optics import radar_range
 from skidpad.roads.queries import RoadMap
-from skidpad.sensors.asked import AskedSensors
+from skidpad.sensors.requested import AskedSensors
 from skidpad.simulation.carla import decode
 from skidpad.simulation.carla.actor_rows import ActorRow
 from skidpad.simulation.carla.pictures import Pictures

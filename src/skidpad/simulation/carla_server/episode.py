@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from itertools import count
 
 from skidpad.core.geometry import Pose
-from skidpad.sensors.live_scene import scene_of
+from skidpad.sensors.raster.live_scene import scene_of
 from skidpad.simulation.carla_server import filling, shapes
 from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable, Attachment
 from skidpad.simulation.carla_server.bones import Skeleton

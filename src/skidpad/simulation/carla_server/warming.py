@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import is_kept, kernel_cache
-from skidpad.sensors import rays
+from skidpad.sensors.raster import rays
 from skidpad.simulation.carla_server.actors import Attachment
 from skidpad.simulation.carla_server.catalogue import Family
 from skidpad.simulation.carla_server.episode import Wanted

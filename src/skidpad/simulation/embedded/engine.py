@@ -17,7 +17,7 @@ from skidpad.core.setup import ActorCommand, Setup
 from skidpad.core.states import EgoEstimate, VehicleCommand, WorldTruth
 from skidpad.physics.grip import road_of
 from skidpad.roads.queries import RoadMap
-from skidpad.sensors.asked import AskedSensors
+from skidpad.sensors.requested import AskedSensors
 from skidpad.simulation.sensing import sensing_of
 from skidpad.simulation.world.stage import staged
 from skidpad.simulation.world.world import EGO, World

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.sensors.passes import Pass
-from skidpad.sensors.view import View
+from skidpad.sensors.raster.passes import Pass
+from skidpad.sensors.raster.view import View
 from skidpad.simulation.carla_server.actors import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing.images import Camera, make_camera

@@ -14,9 +14,9 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.sensors.blocks import GLOSS, WETTABLE
-from skidpad.sensors.materials import Material
-from skidpad.sensors.view import View
+from skidpad.sensors.pictures.blocks import GLOSS, WETTABLE
+from skidpad.sensors.raster.view import View
+from skidpad.sensors.scene.materials import Material
 from skidpad.simulation.carla_server.actors import Actor
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing import pixels

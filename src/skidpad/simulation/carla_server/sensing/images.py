@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from skidpad.core.depthcode import bgra_from_inverse_depth
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, Modality
-from skidpad.sensors.passes import Pass
-from skidpad.sensors.rasteriser import AUTO_LEVEL
-from skidpad.sensors.view import View, camera_view
+from skidpad.sensors.raster.passes import Pass
+from skidpad.sensors.raster.rasteriser import AUTO_LEVEL
+from skidpad.sensors.raster.view import View, camera_view
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.actors import Actor
 from skidpad.simulation.carla_server.clock import Clock

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.lefthanded import vectors_to_carla
-from skidpad.sensors.view import View
+from skidpad.sensors.raster.view import View
 from skidpad.simulation.carla_server.clock import Clock
 from skidpad.simulation.carla_server.sensing.images import Camera
 from skidpad.simulation.carla_server.sensing.sensor import Message, Sensor

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
-from skidpad.sensors.view import View
+from skidpad.sensors.raster.view import View
 
 RADIUS = 1.0  # m
 STRENGTH = 0.5

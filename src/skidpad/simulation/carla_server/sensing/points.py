@@ -13,9 +13,9 @@ from skidpad.core.geometry import Pose
 from skidpad.core.lefthanded import angles_to_carla, vectors_to_carla
 from skidpad.core.randomness import stream_key
 from skidpad.core.specs import RadarSpec
-from skidpad.sensors.around import STEEPEST_DEG, Fan, RayHits, look_around
-from skidpad.sensors.beam import Beam
-from skidpad.sensors.radar import Radar
+from skidpad.sensors.ranging.around import STEEPEST_DEG, Fan, RayHits, look_around
+from skidpad.sensors.ranging.beam import Beam
+from skidpad.sensors.ranging.radar import Radar
 from skidpad.simulation.carla_server import wire
 from skidpad.simulation.carla_server.actors import Actor
 from skidpad.simulation.carla_server.clock import Clock

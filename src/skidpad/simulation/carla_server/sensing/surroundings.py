@@ -13,9 +13,9 @@ from skidpad.core.states import ActorStates
 from skidpad.core.states import ActorTable as Bodies
 from skidpad.core.weather import Weather
 from skidpad.roads.queries import RoadMap
-from skidpad.sensors.lighting import lighting
-from skidpad.sensors.live_scene import LiveScene
-from skidpad.sensors.shading import Shading
+from skidpad.sensors.pictures.lighting import lighting
+from skidpad.sensors.pictures.shading import Shading
+from skidpad.sensors.raster.live_scene import LiveScene
 from skidpad.simulation.carla_server.actors import SOLID, Actor, ActorTable, Box
 from skidpad.simulation.carla_server.boxes import Boxes
 from skidpad.simulation.carla_server.catalogue import Family

@@ -22,10 +22,10 @@ from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind, LightState, Semant
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import daylight, label_range
 from skidpad.roads.roadside import Roadside
-from skidpad.sensors.boxes import Boxes, posts_of
-from skidpad.sensors.ghosts import Ghosts, GhostSettings
-from skidpad.sensors.localisation import Localisation, LocalisationError, gauss_markov
-from skidpad.sensors.sight import empty_sight, look, sees_point
+from skidpad.sensors.channels.ghosts import Ghosts, GhostSettings
+from skidpad.sensors.channels.localisation import Localisation, LocalisationError, gauss_markov
+from skidpad.sensors.object_level.boxes import Boxes, posts_of
+from skidpad.sensors.object_level.sight import empty_sight, look, sees_point
 
 Floats = NDArray[np.float64]
 
@@ -48,7 +48,7 @@ CONFUSIONS = {  # what a class is taken for
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ChannelSensing:
-    """How one channel perceives. Sources of the shipped values: `channel_presets`."""
+    """How one channel perceives. Sources of the shipped values: `presets.py`."""
 
     half_angle: float  # rad to both sides of straight ahead; pi: all round
     range_vehicle: float  # m

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from skidpad.core.jit import inner_kernel
-from skidpad.sensors.blocks import ONE, ZERO, B, Float32, G, R, U, W
-from skidpad.sensors.lighting import Lighting
+from skidpad.sensors.pictures.blocks import ONE, ZERO, B, Float32, G, R, U, W
+from skidpad.sensors.pictures.lighting import Lighting
 
 _TWO = np.float32(2.0)
 _GLOW_SHARE, _DISC_SHARE = np.float32(0.25), np.float32(3.0)

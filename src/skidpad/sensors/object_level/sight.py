@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import inner_kernel, kernel
-from skidpad.sensors.boxes import Boxes
+from skidpad.sensors.object_level.boxes import Boxes
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

@@ -26,8 +26,8 @@ from skidpad.core.vocabulary import ActorKind, LightState, RangeModel
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import label_range, sight
 from skidpad.roads.roadside import Roadside
-from skidpad.sensors.boxes import Boxes, posts_of
-from skidpad.sensors.sight import ray_box
+from skidpad.sensors.object_level.boxes import Boxes, posts_of
+from skidpad.sensors.object_level.sight import ray_box
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]

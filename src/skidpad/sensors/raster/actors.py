@@ -6,11 +6,11 @@ import numpy as np
 
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import ActorKind
-from skidpad.sensors.bodies import body_mesh
-from skidpad.sensors.mesh import Mesh
-from skidpad.sensors.projection import Floats
-from skidpad.sensors.rasteriser import Actors
-from skidpad.sensors.scene import pixel_key
+from skidpad.sensors.raster.projection import Floats
+from skidpad.sensors.raster.rasteriser import Actors
+from skidpad.sensors.scene.bodies import body_mesh
+from skidpad.sensors.scene.mesh import Mesh
+from skidpad.sensors.scene.static import pixel_key
 
 MAX_ACTORS = 32_766  # the instance has 15 bits of an int32 key
 

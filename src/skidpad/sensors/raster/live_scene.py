@@ -11,13 +11,13 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.roadside import Roadside
-from skidpad.sensors import rasteriser, rays
-from skidpad.sensors.crowd import make_actors, place_actors
-from skidpad.sensors.passes import Pass
-from skidpad.sensors.projection import make_scratch
-from skidpad.sensors.rays import Hits, Rays
-from skidpad.sensors.scene import StaticScene, build_scene
-from skidpad.sensors.view import View
+from skidpad.sensors.raster import rasteriser, rays
+from skidpad.sensors.raster.actors import make_actors, place_actors
+from skidpad.sensors.raster.passes import Pass
+from skidpad.sensors.raster.projection import make_scratch
+from skidpad.sensors.raster.rays import Hits, Rays
+from skidpad.sensors.raster.view import View
+from skidpad.sensors.scene.static import StaticScene, build_scene
 
 MAX_CLIMB = 8.0  # m/s; a faster change of height is a relocation, not motion
 KEPT_SCENES = 4

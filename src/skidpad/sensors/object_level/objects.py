@@ -26,7 +26,7 @@ from skidpad.core.weather import Weather
 from skidpad.physics.optics import label_range
 from skidpad.roads.kernels import LaneArrays
 from skidpad.roads.roadside import Roadside
-from skidpad.sensors.boxes import (
+from skidpad.sensors.object_level.boxes import (
     Boxes,
     Mount,
     Walls,
@@ -36,7 +36,7 @@ from skidpad.sensors.boxes import (
     posts_of,
     walls_of,
 )
-from skidpad.sensors.object_radar import Antenna, antenna_of, cast_radar, road_slope
+from skidpad.sensors.object_level.object_radar import Antenna, antenna_of, cast_radar, road_slope
 
 Floats = NDArray[np.float64]
 

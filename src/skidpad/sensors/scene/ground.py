@@ -15,9 +15,9 @@ from scipy import ndimage
 
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import LaneSamples
-from skidpad.sensors.materials import Material
-from skidpad.sensors.mesh import Mesh, quads
-from skidpad.sensors.roadmesh import CHUNK, LEVELS, ChunkKey
+from skidpad.sensors.scene.materials import Material
+from skidpad.sensors.scene.mesh import Mesh, quads
+from skidpad.sensors.scene.road_mesh import CHUNK, LEVELS, ChunkKey
 
 CELL = 8.0  # m, resolution at which road heights are gathered
 FINE, COARSE = 2, 6  # cells per quad: 16 m, and 48 m where that is flat enough

@@ -10,9 +10,9 @@ from dataclasses import replace
 from math import pi, radians
 
 from skidpad.core.errors import require_choice
-from skidpad.sensors.channel_suite import ChannelSensing
-from skidpad.sensors.ghosts import GhostSettings
-from skidpad.sensors.localisation import LocalisationError
+from skidpad.sensors.channels.ghosts import GhostSettings
+from skidpad.sensors.channels.localisation import LocalisationError
+from skidpad.sensors.channels.suite import ChannelSensing
 
 # Position: lidar detectors reach a mean translation error of about 0.2 m for cars (nuScenes
 # detection benchmark; CenterPoint, Yin et al. 2021), which is 0.15 m per axis; we give a third of

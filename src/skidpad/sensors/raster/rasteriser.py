@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.vocabulary import SemanticClass
-from skidpad.sensors.materials import Material
-from skidpad.sensors.projection import (
+from skidpad.sensors.raster.projection import (
     BEHIND,
     Floats,
     Ints,
@@ -29,8 +28,9 @@ from skidpad.sensors.projection import (
     rotated,
     sphere_visible,
 )
-from skidpad.sensors.scene import Chunks
-from skidpad.sensors.view import View
+from skidpad.sensors.raster.view import View
+from skidpad.sensors.scene.materials import Material
+from skidpad.sensors.scene.static import Chunks
 
 LEVEL_DISTANCE = (60.0, 150.0, 400.0)  # m from the camera to the chunk's sphere
 AUTO_LEVEL = -1

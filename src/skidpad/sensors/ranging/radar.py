@@ -11,12 +11,12 @@ from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
 from skidpad.core.specs import RadarSpec
-from skidpad.sensors.beam import Beam, direction
-from skidpad.sensors.live_scene import LiveScene
-from skidpad.sensors.projection import Floats
-from skidpad.sensors.rasteriser import Actors
-from skidpad.sensors.rays import Hits, Rays, make_hits, make_rays
-from skidpad.sensors.view import View, world_to_camera
+from skidpad.sensors.ranging.beam import Beam, direction
+from skidpad.sensors.raster.live_scene import LiveScene
+from skidpad.sensors.raster.projection import Floats
+from skidpad.sensors.raster.rasteriser import Actors
+from skidpad.sensors.raster.rays import Hits, Rays, make_hits, make_rays
+from skidpad.sensors.raster.view import View, world_to_camera
 
 CELLS = 16  # columns of cells over the horizontal field of view
 MOST_ROWS = 8 * CELLS  # of cells; a narrow and tall field of view has fewer columns

@@ -18,7 +18,7 @@ from skidpad.core.jit import kernel
 from skidpad.core.randomness import stream, stream_key
 from skidpad.core.weather import Weather
 from skidpad.sensors.noise import mixed, uniform
-from skidpad.sensors.packing import pack, rounded, unpack
+from skidpad.sensors.pictures.packing import pack, rounded, unpack
 
 RAIN_SIGMA = 15.0  # grey levels at precipitation 100 (A-222, D-093)
 RAIN_GREY = 0.5  # share of the grey value in rain

@@ -18,7 +18,7 @@ from skidpad.core.frames import LidarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
 from skidpad.core.specs import LidarSpec
-from skidpad.sensors.around import (
+from skidpad.sensors.ranging.around import (
     SECTORS,
     STEEPEST_DEG,
     Fan,
@@ -26,8 +26,8 @@ from skidpad.sensors.around import (
     look_around,
     sectors_of,
 )
-from skidpad.sensors.lidar_returns import BeamAir, ReturnModel, find_returns
-from skidpad.sensors.live_scene import LiveScene
+from skidpad.sensors.ranging.lidar_returns import BeamAir, ReturnModel, find_returns
+from skidpad.sensors.raster.live_scene import LiveScene
 
 Floats = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.jit import kernel
 from skidpad.core.specs import CameraSpec
-from skidpad.sensors.rasteriser import BACKGROUND
-from skidpad.sensors.view import View
+from skidpad.sensors.raster.rasteriser import BACKGROUND
+from skidpad.sensors.raster.view import View
 
 
 class Sight(NamedTuple):

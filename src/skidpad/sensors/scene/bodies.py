@@ -12,8 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from skidpad.core.vocabulary import LABEL_OF_KIND, ActorKind, SemanticClass
-from skidpad.sensors.materials import Material
-from skidpad.sensors.mesh import (
+from skidpad.sensors.scene.materials import Material
+from skidpad.sensors.scene.mesh import (
     Mesh,
     Points,
     box,

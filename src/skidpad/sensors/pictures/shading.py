@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import inner_kernel, kernel
 from skidpad.core.states import ActorTable
-from skidpad.sensors.blocks import (
+from skidpad.sensors.pictures.blocks import (
     BLOCK,
     COLUMNS,
     GLOSS,
@@ -37,10 +37,10 @@ from skidpad.sensors.blocks import (
     gather,
     slopes,
 )
-from skidpad.sensors.lighting import Lighting
-from skidpad.sensors.materials import ACTOR_PAINTED, EMISSIVE, MATERIALS, Material
-from skidpad.sensors.sky import disc, sky
-from skidpad.sensors.view import View
+from skidpad.sensors.pictures.lighting import Lighting
+from skidpad.sensors.pictures.sky import disc, sky
+from skidpad.sensors.raster.view import View
+from skidpad.sensors.scene.materials import ACTOR_PAINTED, EMISSIVE, MATERIALS, Material
 
 ROADLIKE = (Material.ASPHALT, Material.SHOULDER, Material.MARKING, Material.SIDEWALK)
 SNOWY = (Material.GRASS, Material.EMBANKMENT, Material.SHOULDER, Material.SIDEWALK, Material.MEDIAN)

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.lanes import LaneSamples, LaneTable
 from skidpad.roads.roadside import Roadside
-from skidpad.sensors.clusters import Clusters, cluster
-from skidpad.sensors.furniture import cell, furniture_pieces, lamp_mesh
-from skidpad.sensors.ground import ground_pieces
-from skidpad.sensors.materials import MATERIALS, Material, base_palette
-from skidpad.sensors.mesh import Mesh, merge
-from skidpad.sensors.roadmesh import LEVELS, ChunkKey, road_pieces
+from skidpad.sensors.scene.clusters import Clusters, cluster
+from skidpad.sensors.scene.furniture import cell, furniture_pieces, lamp_mesh
+from skidpad.sensors.scene.ground import ground_pieces
+from skidpad.sensors.scene.materials import MATERIALS, Material, base_palette
+from skidpad.sensors.scene.mesh import Mesh, merge
+from skidpad.sensors.scene.road_mesh import LEVELS, ChunkKey, road_pieces
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int32]

@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import inner_kernel, kernel
-from skidpad.sensors.materials import MATERIALS
-from skidpad.sensors.packing import pack
-from skidpad.sensors.view import View
+from skidpad.sensors.pictures.packing import pack
+from skidpad.sensors.raster.view import View
+from skidpad.sensors.scene.materials import MATERIALS
 
 Float32 = NDArray[np.float32]
 

@@ -13,8 +13,7 @@ from skidpad.core.states import ActorStates
 from skidpad.core.weather import Weather
 from skidpad.physics.optics import radar_range
 from skidpad.roads.kernels import LaneArrays, project_kernel, sample_kernel
-from skidpad.sensors.beam import Beam, beam_of, direction
-from skidpad.sensors.boxes import (
+from skidpad.sensors.object_level.boxes import (
     Boxes,
     Mount,
     Walls,
@@ -23,6 +22,7 @@ from skidpad.sensors.boxes import (
     placed,
     walls_in_view,
 )
+from skidpad.sensors.ranging.beam import Beam, beam_of, direction
 
 Floats = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from skidpad.core.geometry import Pose
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside, SignalHead
-from skidpad.sensors.materials import Material
-from skidpad.sensors.mesh import Mesh, Points, box, disc, merge, ribbon
-from skidpad.sensors.roadmesh import CHORDS, CHUNK, LEVELS, MARKING_LIFT, ChunkKey
+from skidpad.sensors.scene.materials import Material
+from skidpad.sensors.scene.mesh import Mesh, Points, box, disc, merge, ribbon
+from skidpad.sensors.scene.road_mesh import CHORDS, CHUNK, LEVELS, MARKING_LIFT, ChunkKey
 
 RAIL_DEPTH = 0.31  # m, height of a W-beam's face, EN 1317 systems
 POST_SPACING = 4.0  # m

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from skidpad.core.geometry import Pose
 from skidpad.core.jit import kernel
-from skidpad.sensors.live_scene import LiveScene
-from skidpad.sensors.rays import Hits, make_hits, make_rays
-from skidpad.sensors.view import View, world_to_camera
+from skidpad.sensors.raster.live_scene import LiveScene
+from skidpad.sensors.raster.rays import Hits, make_hits, make_rays
+from skidpad.sensors.raster.view import View, world_to_camera
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.roads.lanes import LaneKind, LaneSamples, LaneTable, Marking
-from skidpad.sensors.materials import Material
-from skidpad.sensors.mesh import Mesh, Points, merge, patches, ribbon
+from skidpad.sensors.scene.materials import Material
+from skidpad.sensors.scene.mesh import Mesh, Points, merge, patches, ribbon
 
 CHUNK = 48.0  # m
 CHORDS = (2.0, 4.0, 8.0, 24.0)  # m between cross-sections, by level

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from skidpad.core.jit import inner_kernel, kernel
-from skidpad.sensors.projection import (
+from skidpad.sensors.raster.projection import (
     BEHIND,
     Floats,
     Ints,
@@ -25,9 +25,9 @@ from skidpad.sensors.projection import (
     rotated,
     sphere_visible,
 )
-from skidpad.sensors.rasteriser import Actors
-from skidpad.sensors.scene import Chunks
-from skidpad.sensors.view import NEAR, View
+from skidpad.sensors.raster.rasteriser import Actors
+from skidpad.sensors.raster.view import NEAR, View
+from skidpad.sensors.scene.static import Chunks
 
 SPHERE_MARGIN = 1e-3  # m, far more than rounding can move a ray past a bounding sphere
 

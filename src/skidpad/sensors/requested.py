@@ -29,12 +29,12 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LidarModel, LightState, RangeModel
 from skidpad.physics.optics import LidarAir, extinction, lidar_air
 from skidpad.sensors import inertial
-from skidpad.sensors.channel_presets import senses_of
-from skidpad.sensors.channel_suite import CYCLE, ChannelSuite
-from skidpad.sensors.eyes import Eyes
-from skidpad.sensors.lidar import Lidar
-from skidpad.sensors.lidar_returns import ReturnModel
-from skidpad.sensors.live_scene import LiveScene, SceneMap
+from skidpad.sensors.channels.presets import senses_of
+from skidpad.sensors.channels.suite import CYCLE, ChannelSuite
+from skidpad.sensors.object_level.eyes import Eyes
+from skidpad.sensors.ranging.lidar import Lidar
+from skidpad.sensors.ranging.lidar_returns import ReturnModel
+from skidpad.sensors.raster.live_scene import LiveScene, SceneMap
 
 EGO = 0
 Observe = Callable[

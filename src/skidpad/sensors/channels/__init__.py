@@ -1,0 +1,1 @@
+"""What driving channels perceive: their presets, wrong and late objects, ghosts, localisation."""

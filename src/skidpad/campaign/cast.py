@@ -11,6 +11,8 @@ from typing import Any
 
 from skidpad.campaign.drive import Script, Supervising, Timer, Unsupervised
 from skidpad.campaign.file_drivers import FILE_DRIVERS
+from skidpad.campaign.file_stack import NAME as STACK_NAME
+from skidpad.campaign.file_stack import PilotConditions, PilotMaker
 from skidpad.campaign.governing import apply_envelope
 from skidpad.campaign.keeping import road_file
 from skidpad.campaign.starts import start_of
@@ -53,6 +55,7 @@ from skidpad.stack.interface import Stack
 from skidpad.stack.loading import GuardedStack, import_class, load_stack
 
 CRUISE = "cruise_speed"  # property of a scenario's ego, m/s
+NO_CONDITIONS = PilotConditions()
 ROUTE_LENGTH = "route_length"  # another one, m
 
 
@@ -182,7 +185,7 @@ def _roads(spec: RunSpec, course: Roads) -> Stage:
 
 
 def _scenario(spec: RunSpec, course: Scenario) -> Stage:
-    compiled = load_scenario(course)
+    compiled = load_scenario(course, PilotConditions.from_run(spec))
     modes: dict[str, ActorMode | None] = dict.fromkeys(compiled.entities, course.actors)
     modes[compiled.ego] = ActorMode.IDEAL if isinstance(spec.driver, Passenger) else None
     played = Player(
@@ -201,14 +204,22 @@ def _scenario(spec: RunSpec, course: Scenario) -> Stage:
     return Stage(compiled.map, setup, Unsupervised(), played, played)
 
 
-def load_scenario(course: Scenario) -> scenarios.Scenario:
-    """The file of a course, compiled; ScenarioError lists all that keeps it from being played."""
-    checked = check_scenario(course)
+def load_scenario(
+    course: Scenario, conditions: PilotConditions = NO_CONDITIONS
+) -> scenarios.Scenario:
+    """The file of a course, compiled; ScenarioError lists all that keeps it from being played.
+
+    conditions: in what stacks of other actors drive.
+    """
+    checked = check_scenario(course, conditions)
     return checked.playable()
 
 
-def check_scenario(course: Scenario) -> scenarios.Compiled:
+def check_scenario(
+    course: Scenario, conditions: PilotConditions = NO_CONDITIONS
+) -> scenarios.Compiled:
     """The same, with everything that was found."""
+    own = {**FILE_DRIVERS, STACK_NAME: PilotMaker(conditions)}
     file = scenario_file(course.file) if course.file in NAMES else Path(course.file)
     return scenarios.check(
         file,
@@ -217,7 +228,7 @@ def check_scenario(course: Scenario) -> scenarios.Compiled:
         maps=[Path(folder) for folder in course.maps],
         ignore_unsupported=course.ignore_unsupported,
         lenient=course.lenient,
-        names=Names({**FILE_DRIVERS, **_load_registered(course.register)}, strict=course.strict),
+        names=Names({**own, **_load_registered(course.register)}, strict=course.strict),
     )
 
 

@@ -23,6 +23,8 @@ class FollowingDriver:
     and without error; junctions and lights are the file's.
     """
 
+    checks_properties = True
+
     def __init__(self, properties: Mapping[str, str]) -> None:
         self.person = person_of(int(_number(properties, "seed", 0.0)))
         self.v_set = _number(properties, "setSpeed", inf)

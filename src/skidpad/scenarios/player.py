@@ -15,7 +15,7 @@ from skidpad.recording.run.staging import Staging
 from skidpad.scenarios.entities import TYRES, Box
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Place
-from skidpad.scenarios.registry import control
+from skidpad.scenarios.piloting import control
 from skidpad.scenarios.scenario import Scenario
 from skidpad.scenarios.scene import Actor, Happening, Running, Scene
 from skidpad.scenarios.signals import SignalPlan
@@ -142,6 +142,8 @@ class Player:
         """Return what an actor does from t on; a trailer follows the vehicle that tows it."""
         if actor.towed_by is not None and actor.word is None:
             return tow_command(actor, actor.towed_by, self.scene.dt)
+        if actor.piloted is not None and actor.word is None:
+            return ActorCommand(actor.name, command=actor.overridden(actor.piloted))
         return actor.command(t, self.scene.dt)
 
     def _cast(self, truth: WorldTruth) -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.registry import Registry
+from skidpad.core.states import VehicleCommand
 from skidpad.core.told import describe_value
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.findings import Finding, Kind
@@ -31,8 +32,9 @@ def register(name: str, made: Make) -> None:
         name: As files write it: the name of a Controller, the type of a CustomCommandAction, or the
             name of a UserDefinedValueCondition.
         made: A class. A controller is made with its properties (a dict of texts) and has
-            `update(scene, name)`, which returns an acceleration in m/s^2. Others are made without
-            arguments: an action has `act(scene, text)`, a value has `value(scene)`.
+            `update(scene, name)`, which returns an acceleration in m/s^2, or `drive(scene, name)`,
+            which returns a `VehicleCommand`. Others are made without arguments: an action has
+            `act(scene, text)`, a value has `value(scene)`.
     """
     if not name or not callable(made):
         raise ConfigError(f"register needs a name and a class, got {name!r} and {made!r}")
@@ -44,6 +46,8 @@ class Acc:
 
     Properties: setSpeed, m/s (default: the speed at which it is activated); timeGap, s.
     """
+
+    checks_properties = True
 
     def __init__(self, properties: Mapping[str, str]) -> None:
         self.v_set = _number(properties, "setSpeed", -1.0)
@@ -155,10 +159,27 @@ class ControllerOf:
 
 @dataclass(slots=True)
 class ActiveController:
-    """A controller that drives an actor along its lane."""
+    """A controller of an actor: along its lane, or with pedals and steer."""
 
     name: str
     inner: Any
+
+    @property
+    def drives(self) -> bool:
+        """Return whether it says pedals and steer, by a method `drive`."""
+        return hasattr(self.inner, "drive")
+
+    def command(self, scene: Scene, actor: str) -> VehicleCommand:
+        """Return pedals and steer; ConfigError for anything else."""
+        found = call(self.name, self.inner.drive, scene, actor)
+        if not isinstance(found, VehicleCommand) or not all(
+            isfinite(v) for v in (found.throttle, found.brake, found.steer)
+        ):
+            raise ConfigError(
+                f"controller {self.name!r} must return a VehicleCommand of finite numbers from "
+                f"drive, got {describe_value(found, 100)}"
+            )
+        return found
 
     def acceleration(self, scene: Scene, actor: str) -> float:
         """Return what it asks for, m/s^2; ConfigError for what is no number."""
@@ -177,15 +198,11 @@ def controller_of(node: Node, names: Names) -> tuple[ControllerOf | None, Findin
     if made is None:
         return None, names.unknown(node, "controller", name)
     found = node.find("Properties")
-    properties = {} if found is None else found.children("Property")
-    return ControllerOf(name, {p.text("name"): p.text("value") for p in properties}, made), None
-
-
-def control(scene: Scene) -> None:
-    """One step of every active controller; an action of the file upon the speed goes before it."""
-    for actor in scene.actors.values():
-        if actor.controller is None or not actor.present or actor.longitudinal is not None:
-            continue
-        guide = actor.guide
-        v = max(guide.v + actor.controller.acceleration(scene, actor.name) * scene.dt, 0.0)
-        guide.v, guide.a = v, (v - guide.v) / scene.dt
+    rows = () if found is None else found.children("Property")
+    properties = {p.text("name"): p.text("value") for p in rows}
+    if getattr(made, "checks_properties", False):
+        try:
+            made(properties)
+        except ConfigError as error:
+            return None, node.finding(f"controller {name!r}: {error}", Kind.ERROR)
+    return ControllerOf(name, properties, made), None

@@ -15,7 +15,7 @@ from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState
 from skidpad.scenarios.entities import Entity
 from skidpad.scenarios.environment import Clock, Environment
-from skidpad.scenarios.measures import Point, between, corners, overlap
+from skidpad.scenarios.measures import Point, corners, overlap
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Network, Place
 from skidpad.scenarios.steering import LaneSteering
@@ -23,7 +23,6 @@ from skidpad.scenarios.tracking import Track, track_demand
 from skidpad.simulation.scripted import ActorDriver, Motion
 
 STANDING = 0.05, 1e-3  # m/s, of what drives on tyres, and of what is where the file says
-PAST = 0.05  # m beyond the last place of a lane
 TOUCHING = 0.05  # m, bodies that the physics keeps apart are this near
 Path = tuple[str, ...]
 
@@ -75,10 +74,19 @@ DONE = Done()
 
 
 class Controlling(Protocol):
-    """A controller that drives an actor along its lane."""
+    """A controller of an actor: it says an acceleration along the lane, or pedals and steer."""
+
+    @property
+    def drives(self) -> bool:
+        """Tells whether it says pedals and steer."""
+        ...
 
     def acceleration(self, scene: Scene, actor: str) -> float:
-        """What it asks for, m/s^2."""
+        """Return the acceleration that it asks for, m/s^2."""
+        ...
+
+    def command(self, scene: Scene, actor: str) -> VehicleCommand:
+        """Return pedals and steer for the coming step."""
         ...
 
 
@@ -111,6 +119,8 @@ class Actor:
     assigned: Any = None  # a `registry.ControllerOf` that an action has given it
     towed_by: Actor | None = None  # the vehicle whose hitch draws it
     controller: Controlling | None = None  # active, of an actor other than the ego
+    controls: tuple[bool, bool] = (False, False)  # the controller's domains: lateral, longitudinal
+    piloted: VehicleCommand | None = None  # pedals and steer by its controller, in this step
     worked: dict[str, Any] = field(default_factory=dict)  # inputs that the file works, by name
     a: float = 0.0  # m/s^2 of the speed
     acceleration: Point = (0.0, 0.0)  # m/s^2 in the world
@@ -143,7 +153,8 @@ class Actor:
     @property
     def placed_by_file(self) -> bool:
         """Tells whether it is moved exactly as the scenario says, without physics."""
-        return self.driven_by_file and (self.driver is None or self.mode is not ActorMode.PHYSICAL)
+        moved = self.driver is None or self.mode is not ActorMode.PHYSICAL
+        return self.driven_by_file and self.piloted is None and moved
 
     @property
     def v_told(self) -> float:
@@ -184,26 +195,6 @@ class Actor:
             self.track.skip(way)
         else:
             self.guide.leap += way
-
-    def off_road(self, network: Network, t: float) -> float:
-        """How long it has been beside every lane, s; kept by asking in every step."""
-        point = network.map.project(self.pose.x, self.pose.y, self.pose.z, driving=False)
-        if point is not None and abs(point.offset) <= 0.5 * point.width:
-            self.off_since = None
-            return 0.0
-        self.off_since = t if self.off_since is None else self.off_since
-        return t - self.off_since
-
-    def past_road(self, network: Network, t: float) -> float:
-        """How long it has been at the end of a road, s; beside its lane kept by asking in every step."""
-        if self.driven_by_file and self.track is None:
-            return self.at_end
-        lane = network.place_of(self.pose).lane
-        if lane is not None:
-            forward, _ = between(lane.pose, self.pose.x, self.pose.y)
-            past = abs(forward) > PAST and network.map.ahead(lane, forward) is None
-            self.out_since = (t if self.out_since is None else self.out_since) if past else None
-        return 0.0 if self.out_since is None else t - self.out_since
 
     def place(self, network: Network) -> Place:
         """Where it is, with its lane: the one that it keeps to, else the one under it."""
@@ -328,6 +319,7 @@ class Scene:
     signals: dict[str, str] = field(default_factory=dict)  # states that the file has set
     lights: Mapping[int, LightState] = field(default_factory=dict)  # of the road, by signal id
     t: float = 0.0
+    truth: WorldTruth | None = None  # of this tick, for sensors of actors
     states: dict[Path, State] = field(default_factory=dict)
     moves: list[tuple[Path, Move]] = field(default_factory=list)  # all, in their order
     contacts: set[str] = field(default_factory=set)  # names that touch the ego in this tick
@@ -347,7 +339,7 @@ class Scene:
 
     def observe(self, truth: WorldTruth) -> None:
         """Take over positions and velocities of a tick."""
-        self.t, self.lights = truth.tick * self.dt, truth.lights
+        self.t, self.lights, self.truth = truth.tick * self.dt, truth.lights, truth
         s = truth.states
         columns = (s.x.tolist(), s.y.tolist(), s.yaw.tolist(), s.vx.tolist(), s.vy.tolist())
         z = s.z.tolist()

@@ -38,16 +38,28 @@ class Activate:
     def begin(self, scene: Scene, actor: Actor) -> Running:
         """The ego changes hands; others have a controller, where one of a known name is theirs."""
         actor.assigned = self.assigned or actor.assigned
-        if actor.mode is not None and self.longitudinal is not None:
-            found = actor.assigned or self.controllers.get(actor.name)
-            active = found is not None and self.longitudinal
-            actor.controller = found.make() if found is not None and active else None
+        if actor.mode is not None and self.says is not None:
+            self._switch(scene, actor)
         if actor.mode is not None or self.says is None:
             return DONE
         if actor.handed and not self.says:
             actor.follow_road(scene.network, actor.v)
         actor.handed = self.says
         return DONE
+
+    def _switch(self, scene: Scene, actor: Actor) -> None:
+        """Turn domains of a controller of another actor than the ego on and off."""
+        found = actor.assigned or self.controllers.get(actor.name)
+        asked = zip((self.lateral, self.longitudinal), actor.controls, strict=True)
+        lateral, longitudinal = (old if new is None else new for new, old in asked)
+        before, actor.controls = actor.controller, (lateral, longitudinal)
+        if found is None or not (lateral or longitudinal):
+            actor.controller = None
+            if before is not None and before.drives:
+                actor.piloted = None
+                actor.follow_road(scene.network, actor.motion.speed)
+        elif before is None or self.longitudinal:
+            actor.controller = found.make()
 
 
 @dataclass(frozen=True, slots=True)

@@ -14,7 +14,7 @@ from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Body
 from skidpad.scenarios.measures import Axes, between
-from skidpad.scenarios.network import next_lane_id
+from skidpad.scenarios.network import Network, next_lane_id
 from skidpad.scenarios.positions import Position, position
 from skidpad.scenarios.scene import Actor, Scene
 from skidpad.scenarios.tracking import Track, course
@@ -42,9 +42,9 @@ class Reaches:
         """As it is now; before the first tick nothing has lasted."""
         a = scene.actors[actor]
         if self.quantity is Quantity.OFF_ROAD:
-            lasted = a.off_road(scene.network, scene.t)
+            lasted = time_off_road(a, scene.network, scene.t)
         elif self.quantity is Quantity.AT_END:
-            lasted = a.past_road(scene.network, scene.t)
+            lasted = time_past_road(a, scene.network, scene.t)
         else:
             lasted = a.travelled if self.quantity is Quantity.TRAVELLED else a.stood
         least = 0.0 if self.quantity is Quantity.TRAVELLED else SOME
@@ -289,3 +289,30 @@ BY_ENTITY: Mapping[str, Callable[[Node, Context], EntityCondition]] = {
     "RelativeAngleCondition": _angle,
     "RelativeClearanceCondition": _clearance,
 }
+
+
+PAST = 0.05  # m beyond the last place of a lane
+
+
+def time_off_road(actor: Actor, network: Network, t: float) -> float:
+    """Return how long an actor has been beside every lane, s; ask in every step."""
+    pose = actor.pose
+    point = network.map.project(pose.x, pose.y, pose.z, driving=False)
+    if point is not None and abs(point.offset) <= 0.5 * point.width:
+        actor.off_since = None
+        return 0.0
+    actor.off_since = t if actor.off_since is None else actor.off_since
+    return t - actor.off_since
+
+
+def time_past_road(actor: Actor, network: Network, t: float) -> float:
+    """Return how long an actor has been at the end of a road, s; beside its lane ask in every step."""
+    if actor.driven_by_file and actor.track is None:
+        return actor.at_end
+    lane = network.place_of(actor.pose).lane
+    if lane is not None:
+        forward, _ = between(lane.pose, actor.pose.x, actor.pose.y)
+        past = abs(forward) > PAST and network.map.ahead(lane, forward) is None
+        since = t if actor.out_since is None else actor.out_since
+        actor.out_since = since if past else None
+    return 0.0 if actor.out_since is None else t - actor.out_since

@@ -1,0 +1,201 @@
+"""Our own stack at the wheel of an actor of a scenario file: controller `SkidpadStack`.
+
+The actor has sensors of its own: cameras and radar at the object level, mounted as on the ego. The
+stack is given their readings and the actor's own motion, never the truth of other actors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from math import inf, isfinite
+from typing import Any, NamedTuple
+from zlib import crc32
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.errors import ConfigError
+from skidpad.core.frames import SensorFrame
+from skidpad.core.geometry import kmh_from_mps, mps_from_kmh
+from skidpad.core.run import AdasDriver, RunSpec
+from skidpad.core.setup import DT
+from skidpad.core.states import ActorStates, ActorTable, EgoEstimate, VehicleCommand, WorldTruth
+from skidpad.core.told import describe_value
+from skidpad.core.vocabulary import RangeModel
+from skidpad.core.weather import Weather
+from skidpad.envelope.govern import EnvelopeSettings, govern
+from skidpad.scenarios.scene import Scene
+from skidpad.scenarios.traffic import V_UNKNOWN
+from skidpad.sensors.objects import ObjectSuite
+from skidpad.sensors.twelve import twelve_sensors
+from skidpad.stack.adas import AdasStack
+from skidpad.stack.configurations import CRUISE_RANGE, numbered_driver
+from skidpad.stack.interface import Stack
+
+NUMBERS = (1, 6)  # configurations that drive by themselves
+USUAL_NUMBER = 2  # adaptive cruise control and lane centring
+SPEEDS = tuple(mps_from_kmh(v) for v in CRUISE_RANGE)  # m/s
+NAME = "SkidpadStack"
+NO_IMAGES: Mapping[str, Any] = {}
+
+
+@dataclass(frozen=True, slots=True)
+class PilotConditions:
+    """In what the stacks of actors drive: what a run's description says of it."""
+
+    weather: Weather | None = None  # that limits what sensors see; None: it does not
+    seed: int = 0
+    profile: str = "recommended"
+    settings: Mapping[str, Any] = field(default_factory=dict)  # of the stack
+    bumper_depth_fov_deg: float = 100.0
+    dt: float = DT
+
+    @classmethod
+    def from_run(cls, spec: RunSpec) -> PilotConditions:
+        """Returns those of a run."""
+        sensors = spec.settings.sensors
+        return cls(
+            weather=spec.weather if sensors.range is RangeModel.PHYSICAL else None,
+            seed=spec.seed,
+            profile=spec.settings.profile,
+            settings=spec.settings.stack.to_plain(),
+            bumper_depth_fov_deg=sensors.bumper_depth_fov_deg,
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class PilotMaker:
+    """Makes the controller of one actor; its properties are checked as the file is compiled."""
+
+    conditions: PilotConditions = PilotConditions()
+    checks_properties = True
+
+    def __call__(self, properties: Mapping[str, str]) -> StackPilot:
+        """Returns the controller; ConfigError for a property that it does not know."""
+        return StackPilot(properties, self.conditions)
+
+
+class View(NamedTuple):
+    """The world as one actor's sensors need it: its own row first."""
+
+    order: NDArray[np.int64]
+    states: ActorStates
+    suite: ObjectSuite
+
+
+class StackPilot:
+    """Drives an actor by our own stack.
+
+    Properties: configuration, 1 to 6 (default 2); cruiseSpeed, m/s (default: the speed at which it is
+    activated, 50 km/h for an actor that stands).
+    """
+
+    def __init__(self, properties: Mapping[str, str], conditions: PilotConditions) -> None:
+        self.number = int(_read(properties, "configuration", NUMBERS, float(USUAL_NUMBER)))
+        self.v_cruise = _read(properties, "cruiseSpeed", SPEEDS, inf)
+        self.conditions = conditions
+        self._stack: Stack | None = None
+        self._view: View | None = None
+
+    def drive(self, scene: Scene, name: str) -> VehicleCommand:
+        """Returns what the stack does with what the actor's sensors see."""
+        truth, actor = scene.truth, scene.actors[name]
+        if truth is None:
+            return VehicleCommand()
+        if self._view is None:
+            self._view = _view_of(truth.table, actor.row, scene, self.conditions, name)
+            self._stack = self._stack_of(scene, actor.motion.speed)
+        assert self._stack is not None
+        return self._stack.tick(_frame(self._view, truth, scene))
+
+    def _stack_of(self, scene: Scene, v: float) -> Stack:
+        c, driver = self.conditions, numbered_driver(self.number)
+        assert isinstance(driver, AdasDriver)
+        kind = govern(AdasStack, EnvelopeSettings(dt=c.dt)) if driver.envelope else AdasStack
+        v_cruise = self.v_cruise if isfinite(self.v_cruise) else max(v, 0.0) or V_UNKNOWN
+        specs = twelve_sensors(bumper_depth_fov_deg=c.bumper_depth_fov_deg)
+        settings = {
+            "functions": sorted(f.value for f in driver.functions),
+            "profile": c.profile,
+            "set": dict(c.settings),
+            "cruise_kmh": max(kmh_from_mps(v_cruise), CRUISE_RANGE[0]),
+        }
+        return kind(specs, scene.network.map, settings)
+
+
+def _view_of(
+    table: ActorTable, row: int, scene: Scene, conditions: PilotConditions, name: str
+) -> View:
+    n, map = len(table), scene.network.map
+    order = np.array([row, *(i for i in range(n) if i != row)])
+    own = ActorTable(
+        names=tuple(table.names[i] for i in order),
+        types=tuple(table.types[i] for i in order),
+        kind=table.kind[order],
+        length=table.length[order],
+        width=table.width[order],
+        height=table.height[order],
+        rgb=table.rgb[order],
+    )
+    suite = ObjectSuite(
+        map.roadside,
+        own,
+        twelve_sensors(bumper_depth_fov_deg=conditions.bumper_depth_fov_deg),
+        conditions.seed ^ crc32(name.encode()),
+        conditions.dt,
+        weather=conditions.weather,
+        lanes=map.held,
+    )
+    return View(order, ActorStates.empty(n), suite)
+
+
+def _frame(view: View, truth: WorldTruth, scene: Scene) -> SensorFrame:
+    """Returns what the actor's sensors see of a moment."""
+    for own, column in zip(view.states, truth.states, strict=True):
+        np.take(column, view.order, out=own)
+    hidden = {a.row for a in scene.actors.values() if not a.visible}
+    for i, row in enumerate(view.order.tolist()):
+        if row in hidden and i > 0:
+            view.states.present[i] = False
+    s, me = view.states, int(view.order[0])
+    pose = s.pose(0)
+    speed = float(s.vx[0] * np.cos(pose.yaw) + s.vy[0] * np.sin(pose.yaw))
+    return SensorFrame(
+        tick=truth.tick,
+        ego=EgoEstimate(
+            pose=pose,
+            speed=speed,
+            yaw_rate=float(s.yaw_rate[0]),
+            ax=float(s.ax[0]),
+            ay=float(s.ay[0]),
+            wheel_speeds=(speed, speed, speed, speed),
+            gear=-1 if truth.commands[me, REVERSE] else 1,
+        ),
+        images=NO_IMAGES,
+        segments=view.suite.segments(s),
+        radar=view.suite.radar(truth.tick, s),
+        lights=dict(truth.lights),
+    )
+
+
+REVERSE = 4  # column of the commands
+
+
+def _read(
+    properties: Mapping[str, str], name: str, bounds: tuple[float, ...], default: float
+) -> float:
+    """Returns a property that is a number within bounds; ConfigError for anything else."""
+    if name not in properties:
+        return default
+    low, high = bounds
+    try:
+        value = float(properties[name])
+    except ValueError:
+        value = inf
+    whole = bounds is not NUMBERS or value == int(value if isfinite(value) else 0.0)
+    if not (low <= value <= high and whole):
+        kind = "a whole number" if bounds is NUMBERS else "a number"
+        given = describe_value(properties[name], 100)
+        raise ConfigError(f"property {name} must be {kind} from {low:g} to {high:g}, got {given}")
+    return value

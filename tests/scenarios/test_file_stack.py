@@ -120,8 +120,9 @@ def test_given_back_it_goes_on_as_the_file_says(tmp_path):
 
 def test_the_same_file_gives_the_same_run(tmp_path):
     file = file_of(tmp_path, with_controller(NAME, configuration=5), end=2.0)
-    hashes = {states_of(file, "other")[1].finish().content_hash for _ in range(2)}
-    assert len(hashes) == 1
+    one, again = (states_of(file, "other", "ego")[0] for _ in range(2))
+    assert len(one) > 30
+    assert one == again
 
 
 @pytest.mark.parametrize(

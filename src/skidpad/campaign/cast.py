@@ -18,7 +18,7 @@ from skidpad.campaign.keeping import road_file
 from skidpad.campaign.starts import start_of
 from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.frames import SensorFrame
-from skidpad.core.geometry import kmh_from_mps
+from skidpad.core.geometry import Pose, kmh_from_mps
 from skidpad.core.run import (
     ActorMode,
     AdasDriver,
@@ -185,7 +185,7 @@ def _roads(spec: RunSpec, course: Roads) -> Stage:
 
 
 def _scenario(spec: RunSpec, course: Scenario) -> Stage:
-    compiled = load_scenario(course, PilotConditions.from_run(spec))
+    compiled = load_scenario(course, _pilot_conditions(spec))
     modes: dict[str, ActorMode | None] = dict.fromkeys(compiled.entities, course.actors)
     modes[compiled.ego] = ActorMode.IDEAL if isinstance(spec.driver, Passenger) else None
     played = Player(
@@ -202,6 +202,15 @@ def _scenario(spec: RunSpec, course: Scenario) -> Stage:
     if environment is not None and environment.friction_scale is not None:
         setup = replace(setup, mu_ref=setup.mu_ref * environment.friction_scale)
     return Stage(compiled.map, setup, Unsupervised(), played, played)
+
+
+def _pilot_conditions(spec: RunSpec) -> PilotConditions:
+    """Returns what the stacks of other actors drive in: as the ego, at the object level."""
+    nobody = ActorSetup(name="", type=EGO_TYPE, place=Pose(0.0, 0.0))
+    settings = spec.settings
+    return PilotConditions(
+        setup_of(spec, "", nobody), spec.seed, settings.profile, settings.stack.to_plain()
+    )
 
 
 def load_scenario(

@@ -7,7 +7,7 @@ stack is given their readings and the actor's own motion, never the truth of oth
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, isfinite
 from typing import Any, NamedTuple
 from zlib import crc32
@@ -17,16 +17,18 @@ from numpy.typing import NDArray
 
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import SensorFrame
-from skidpad.core.geometry import kmh_from_mps, mps_from_kmh
-from skidpad.core.run import AdasDriver, RunSpec
-from skidpad.core.setup import DT
+from skidpad.core.geometry import Pose, kmh_from_mps, mps_from_kmh
+from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import ActorStates, ActorTable, EgoEstimate, VehicleCommand, WorldTruth
 from skidpad.core.told import describe_value
 from skidpad.core.vocabulary import RangeModel
-from skidpad.core.weather import Weather
 from skidpad.envelope.govern import EnvelopeSettings, govern
+from skidpad.physics.presets import find_weather
+from skidpad.physics.types import EGO_TYPE
+from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.scene import Scene
 from skidpad.scenarios.traffic import V_UNKNOWN
+from skidpad.sensors.asked import AskedSensors
 from skidpad.sensors.objects import ObjectSuite
 from skidpad.sensors.twelve import twelve_sensors
 from skidpad.stack.adas import AdasStack
@@ -37,31 +39,18 @@ NUMBERS = (1, 6)  # configurations that drive by themselves
 USUAL_NUMBER = 2  # adaptive cruise control and lane centring
 SPEEDS = tuple(mps_from_kmh(v) for v in CRUISE_RANGE)  # m/s
 NAME = "SkidpadStack"
+CLEAR = "clear-noon"  # the weather where no run says one
 NO_IMAGES: Mapping[str, Any] = {}
 
 
 @dataclass(frozen=True, slots=True)
 class PilotConditions:
-    """In what the stacks of actors drive: what a run's description says of it."""
+    """In what the stacks of actors drive. setup: of the run, None for a clear noon."""
 
-    weather: Weather | None = None  # that limits what sensors see; None: it does not
+    setup: Setup | None = None
     seed: int = 0
     profile: str = "recommended"
     settings: Mapping[str, Any] = field(default_factory=dict)  # of the stack
-    bumper_depth_fov_deg: float = 100.0
-    dt: float = DT
-
-    @classmethod
-    def from_run(cls, spec: RunSpec) -> PilotConditions:
-        """Returns those of a run."""
-        sensors = spec.settings.sensors
-        return cls(
-            weather=spec.weather if sensors.range is RangeModel.PHYSICAL else None,
-            seed=spec.seed,
-            profile=spec.settings.profile,
-            settings=spec.settings.stack.to_plain(),
-            bumper_depth_fov_deg=sensors.bumper_depth_fov_deg,
-        )
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,6 +71,7 @@ class View(NamedTuple):
     order: NDArray[np.int64]
     states: ActorStates
     suite: ObjectSuite
+    asked: AskedSensors
 
 
 class StackPilot:
@@ -103,31 +93,36 @@ class StackPilot:
         truth, actor = scene.truth, scene.actors[name]
         if truth is None:
             return VehicleCommand()
-        if self._view is None:
-            self._view = _view_of(truth.table, actor.row, scene, self.conditions, name)
-            self._stack = self._stack_of(scene, actor.motion.speed)
-        assert self._stack is not None
+        if self._stack is None or self._view is None:
+            setup = self.conditions.setup or _usual_setup(scene.dt)
+            self._stack = self._make_stack(setup, scene, actor.motion.speed)
+            more = tuple(getattr(self._stack, "sensors", tuple)())
+            asked = frozenset(spec.id for spec in more)
+            setup = replace(setup, specs=(*setup.specs, *more), asked=asked)
+            seed = self.conditions.seed ^ crc32(name.encode())
+            self._view = _make_view(truth.table, actor.row, scene.network.map, setup, seed)
         return self._stack.tick(_frame(self._view, truth, scene))
 
-    def _stack_of(self, scene: Scene, v: float) -> Stack:
+    def _make_stack(self, setup: Setup, scene: Scene, v: float) -> Stack:
         c, driver = self.conditions, numbered_driver(self.number)
-        assert isinstance(driver, AdasDriver)
-        kind = govern(AdasStack, EnvelopeSettings(dt=c.dt)) if driver.envelope else AdasStack
+        kind = govern(AdasStack, EnvelopeSettings(dt=setup.dt)) if driver.envelope else AdasStack
         v_cruise = self.v_cruise if isfinite(self.v_cruise) else max(v, 0.0) or V_UNKNOWN
-        specs = twelve_sensors(bumper_depth_fov_deg=c.bumper_depth_fov_deg)
         settings = {
             "functions": sorted(f.value for f in driver.functions),
             "profile": c.profile,
             "set": dict(c.settings),
             "cruise_kmh": max(kmh_from_mps(v_cruise), CRUISE_RANGE[0]),
         }
-        return kind(specs, scene.network.map, settings)
+        return kind(setup.specs, scene.network.map, settings)
 
 
-def _view_of(
-    table: ActorTable, row: int, scene: Scene, conditions: PilotConditions, name: str
-) -> View:
-    n, map = len(table), scene.network.map
+def _usual_setup(dt: float) -> Setup:
+    ego = ActorSetup(name="", type=EGO_TYPE, place=Pose(0.0, 0.0))
+    return Setup(map="", weather=find_weather(CLEAR), specs=twelve_sensors(), ego=ego, dt=dt)
+
+
+def _make_view(table: ActorTable, row: int, map: RoadMap, setup: Setup, seed: int) -> View:
+    n = len(table)
     order = np.array([row, *(i for i in range(n) if i != row)])
     own = ActorTable(
         names=tuple(table.names[i] for i in order),
@@ -138,16 +133,12 @@ def _view_of(
         height=table.height[order],
         rgb=table.rgb[order],
     )
+    limited = setup.weather if setup.range_model is RangeModel.PHYSICAL else None
     suite = ObjectSuite(
-        map.roadside,
-        own,
-        twelve_sensors(bumper_depth_fov_deg=conditions.bumper_depth_fov_deg),
-        conditions.seed ^ crc32(name.encode()),
-        conditions.dt,
-        weather=conditions.weather,
-        lanes=map.held,
+        map.roadside, own, setup.specs, seed, setup.dt, weather=limited, lanes=map.held
     )
-    return View(order, ActorStates.empty(n), suite)
+    asked = AskedSensors(map, own, setup, seed=seed)
+    return View(order, ActorStates.empty(n), suite, asked)
 
 
 def _frame(view: View, truth: WorldTruth, scene: Scene) -> SensorFrame:
@@ -158,7 +149,7 @@ def _frame(view: View, truth: WorldTruth, scene: Scene) -> SensorFrame:
     for i, row in enumerate(view.order.tolist()):
         if row in hidden and i > 0:
             view.states.present[i] = False
-    s, me = view.states, int(view.order[0])
+    s, me, braking = view.states, int(view.order[0]), truth.commands[view.order, BRAKE] > 0.0
     pose = s.pose(0)
     speed = float(s.vx[0] * np.cos(pose.yaw) + s.vy[0] * np.sin(pose.yaw))
     return SensorFrame(
@@ -176,10 +167,11 @@ def _frame(view: View, truth: WorldTruth, scene: Scene) -> SensorFrame:
         segments=view.suite.segments(s),
         radar=view.suite.radar(truth.tick, s),
         lights=dict(truth.lights),
+        extra=view.asked.read(truth.tick, s, NO_IMAGES, truth.lights, braking),
     )
 
 
-REVERSE = 4  # column of the commands
+BRAKE, REVERSE = 1, 4  # columns of the commands
 
 
 def _read(

@@ -181,13 +181,13 @@ def _read(
     if name not in properties:
         return default
     low, high = bounds
+    whole = bounds is NUMBERS
     try:
         value = float(properties[name])
     except ValueError:
         value = inf
-    whole = bounds is not NUMBERS or value == int(value if isfinite(value) else 0.0)
-    if not (low <= value <= high and whole):
-        kind = "a whole number" if bounds is NUMBERS else "a number"
+    if not low <= value <= high or (whole and value % 1.0):
+        kind = "a whole number" if whole else "a number"
         given = describe_value(properties[name], 100)
         raise ConfigError(f"property {name} must be {kind} from {low:g} to {high:g}, got {given}")
     return value

@@ -38,7 +38,9 @@ STATES = (
     "colours and three lamps such as `on;off;off` are shown; other words are for conditions alone"
 )
 NAMED = "by registered names; others are noted, without effect"
-CONTROLLED = "of others than the ego `ACC`, `ReferenceDriver` along their lanes, `SkidpadStack`, registered names"
+CONTROLLED = (
+    "of others `ACC` and `ReferenceDriver` along their lanes, `SkidpadStack`, registered names"
+)
 TOWED = "without slip at the trailer's axle; masses and forces do not count"
 FOLLOW = "under `follow` walkers and objects are placed"
 PARTIAL: Mapping[str, str] = MappingProxyType(

@@ -30,9 +30,9 @@ def pilot(scene: Scene, actor: Actor, controller: Controlling) -> VehicleCommand
         return None
     asked = controller.command(scene, actor.name)
     lateral, longitudinal = actor.controls
-    led = actor.track is not None
-    steers = lateral and actor.lateral is None and not led
-    paces = longitudinal and actor.longitudinal is None and not (led and actor.track.timed)
+    timed = actor.track is not None and actor.track.timed
+    steers = lateral and actor.lateral is None and actor.track is None
+    paces = longitudinal and actor.longitudinal is None and not timed
     if steers:
         actor.follow_road(scene.network, actor.guide.v)
     if paces:

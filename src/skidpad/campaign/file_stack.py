@@ -28,9 +28,9 @@ from skidpad.physics.types import EGO_TYPE
 from skidpad.roads.queries import RoadMap
 from skidpad.scenarios.scene import Scene
 from skidpad.scenarios.traffic import V_UNKNOWN
-from skidpad.sensors.asked import AskedSensors
-from skidpad.sensors.objects import ObjectSuite
-from skidpad.sensors.twelve import twelve_sensors
+from skidpad.sensors.object_level.objects import ObjectSuite
+from skidpad.sensors.published_sensors import twelve_sensors
+from skidpad.sensors.requested import AskedSensors
 from skidpad.stack.adas import AdasStack
 from skidpad.stack.configurations import CRUISE_RANGE, numbered_driver
 from skidpad.stack.interface import Stack

@@ -7,8 +7,8 @@ from typing import Any
 
 from msgspec import structs
 
-from skidpad.campaign.channel_routes import driven_routes
-from skidpad.campaign.grip_cells import template
+from skidpad.campaign.cells.grip import template
+from skidpad.campaign.channels.routes import driven_routes
 from skidpad.core.run import AdasDriver, ChannelCrew, Roads, RunSpec, Scenario
 from skidpad.core.settings import Settings, load_profile
 from skidpad.core.vocabulary import SensorLevel

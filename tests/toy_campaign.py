@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.recipe import Driven, Recipe
+from skidpad.campaign.recipes.recipe import Driven, Recipe
 from skidpad.recording.campaign.ledger import Entry
 from skidpad.recording.campaign.results import Columns, Timing, metric
 

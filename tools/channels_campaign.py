@@ -31,7 +31,7 @@ from typing import Any
 
 import channels_tables
 import monitor_drives
-from skidpad.campaign.channels import SEEDS_EACH
+from skidpad.campaign.recipes.channels import SEEDS_EACH
 from skidpad.evidence.channels.redundancy import compare_drivers
 from skidpad.recording.channels.drives import read_outcomes
 

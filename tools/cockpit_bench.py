@@ -16,8 +16,8 @@ from tempfile import TemporaryDirectory
 
 import msgspec
 
-from skidpad.campaign.desk import Desk, Recorded
-from skidpad.campaign.desk_run import drive_at_desk
+from skidpad.campaign.runs.desk_run import drive_at_desk
+from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.cockpit.about import About
 from skidpad.cockpit.bridge import Bridge
 from skidpad.cockpit.driving import about, drive_job

@@ -18,8 +18,8 @@ import cv2
 import numpy as np
 from PIL import Image
 
-from skidpad.campaign.desk import Desk, Recorded
-from skidpad.campaign.desk_run import drive_at_desk
+from skidpad.campaign.runs.desk_run import drive_at_desk
+from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.cockpit.film import stretch_of, write_film
 from skidpad.cockpit.pictures import Picture, colours
 from skidpad.cockpit.replay import RecordedRun

@@ -23,10 +23,10 @@ import yaml
 from msgspec import structs
 
 import monitor_rules
-from skidpad.campaign.channel_routes import Condition, chosen_routes
-from skidpad.campaign.channels import SEEDS_EACH, SEGMENT, drive_one, segments, warm_up
-from skidpad.campaign.pool import local
-from skidpad.campaign.worker import Job
+from skidpad.campaign.channels.routes import Condition, chosen_routes
+from skidpad.campaign.recipes.channels import SEEDS_EACH, SEGMENT, drive_one, segments, warm_up
+from skidpad.campaign.workers.pool import local
+from skidpad.campaign.workers.worker import Job
 from skidpad.core.errors import FileError
 from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import Stratum

@@ -34,7 +34,7 @@ from monitor_variants import (
     majority,
     off_centre,
 )
-from skidpad.campaign.channels import SEEDS_EACH
+from skidpad.campaign.recipes.channels import SEEDS_EACH
 from skidpad.core.channels import Cycle
 from skidpad.core.vocabulary import HazardType
 from skidpad.evidence.channels.hazards import SCORED_HAZARDS

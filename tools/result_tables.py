@@ -122,8 +122,8 @@ def driven(folder: Path) -> str:
 
 def study_claims(folder: Path, id: str) -> str:
     """The claims of a study."""
-    from skidpad.campaign.study import BY_ID
-    from skidpad.campaign.study_arms import STUDIES
+    from skidpad.campaign.studies.arms import STUDIES
+    from skidpad.campaign.studies.study import BY_ID
 
     rows = pl.read_csv(folder / "rows.csv", infer_schema_length=None)
     rows = rows.with_columns(pl.col("config", "weather").cast(pl.String))

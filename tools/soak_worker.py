@@ -18,8 +18,8 @@ from msgspec import structs
 
 import dated_lines
 from processes import memory_mb
-from skidpad.campaign.run import run
-from skidpad.campaign.worker import Job, Worker
+from skidpad.campaign.runs.run import run
+from skidpad.campaign.workers.worker import Job, Worker
 from skidpad.core.run import AdasDriver, Roads, RunSpec
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather

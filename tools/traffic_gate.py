@@ -15,8 +15,8 @@ from datetime import datetime, timezone
 from pathlib import Path
 from typing import Any
 
-from skidpad.campaign.bench_traffic import TrafficRow, measure
-from skidpad.campaign.traffic_asked import TrafficBench
+from skidpad.campaign.bench.traffic import TrafficRow, measure
+from skidpad.campaign.bench.traffic_options import TrafficBench
 
 RESULT = Path(__file__).parents[1] / "docs" / "results" / "traffic" / "gate.json"
 WEATHERS = ("clear-noon", "rain-noon", "snow", "icy_30")

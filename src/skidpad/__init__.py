@@ -12,7 +12,7 @@ __all__ = ["Scenario", "__version__", "drive", "register"]
 def __getattr__(name: str) -> Any:
     # Lazy, so that `skidpad --version` does not pay for numba.
     if name == "drive":
-        return import_module("skidpad.campaign.run").drive
+        return import_module("skidpad.campaign.runs.run").drive
     if name == "Scenario":
         return import_module("skidpad.campaign.stepping").Scenario
     if name == "register":

@@ -6,10 +6,12 @@ from pathlib import Path
 
 import pytest
 
-from skidpad.campaign import bench, bench_matrix, bench_scenarios
-from skidpad.campaign.bench import TickCost, bench_run, tick_cost
-from skidpad.campaign.bench_traffic import measure
-from skidpad.campaign.traffic_asked import TrafficBench
+from skidpad.campaign.bench import matrix as bench_matrix
+from skidpad.campaign.bench import scenarios as bench_scenarios
+from skidpad.campaign.bench import tick as bench
+from skidpad.campaign.bench.tick import TickCost, bench_run, tick_cost
+from skidpad.campaign.bench.traffic import measure
+from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.scenarios.scenario import compile_scenario
 from skidpad.scenarios.stage import played

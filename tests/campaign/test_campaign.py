@@ -7,8 +7,8 @@ import msgspec
 import pytest
 
 from skidpad.campaign.campaign import PROBES, Campaign
-from skidpad.campaign.recipe import cell_of
-from skidpad.campaign.worker import Finished
+from skidpad.campaign.recipes.recipe import cell_of
+from skidpad.campaign.workers.worker import Finished
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.vocabulary import Outcome
 from skidpad.recording.campaign.ledger import CAMPAIGN, read_ledger

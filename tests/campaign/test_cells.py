@@ -3,9 +3,9 @@ from msgspec.structs import replace
 
 from runs import adas_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.cast import stage_of
-from skidpad.campaign.cells import cross, published_drivers, sweep
-from skidpad.campaign.matrix import RECIPE
+from skidpad.campaign.cells.matrix import cross, published_drivers, sweep
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.recipes.matrix import RECIPE
 from skidpad.cli.adas_plan import plan
 from skidpad.cli.asked import Climate, Drivers, Tuned
 from skidpad.core.errors import ConfigError

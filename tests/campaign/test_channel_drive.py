@@ -12,10 +12,10 @@ from msgspec.structs import replace
 
 from runs import segment_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.channel_drive import drive_segment
-from skidpad.campaign.channel_routes import chosen_routes, driven_routes
-from skidpad.campaign.channels import RECIPE, segments, warm_up
-from skidpad.campaign.pool import local
+from skidpad.campaign.channels.drive import drive_segment
+from skidpad.campaign.channels.routes import chosen_routes, driven_routes
+from skidpad.campaign.recipes.channels import RECIPE, segments, warm_up
+from skidpad.campaign.workers.pool import local
 from skidpad.core.channels import ChannelFrame, Decision, TruthFrame
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.run import ChannelCrew

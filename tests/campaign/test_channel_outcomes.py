@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from skidpad.campaign.channel_outcomes import STALL_TIME, STUCK_TIME, Referee
+from skidpad.campaign.channels.outcomes import STALL_TIME, STUCK_TIME, Referee
 from skidpad.core.channels import Decision
 from skidpad.stack.channels.route import PathPoints, RoutePath
 from skidpad.stack.channels.settings import CarModel

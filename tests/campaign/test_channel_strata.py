@@ -9,10 +9,10 @@ import pytest
 from msgspec import structs
 
 from runs import segment_run
-from skidpad.campaign.channel_drive import RISKY_JUMPS, Crew, drive_segment
-from skidpad.campaign.channel_routes import CONDITIONS, Condition, chosen_routes, driven_routes
-from skidpad.campaign.channel_world import segment_of
-from skidpad.campaign.channels import segments
+from skidpad.campaign.channels.drive import RISKY_JUMPS, Crew, drive_segment
+from skidpad.campaign.channels.routes import CONDITIONS, Condition, chosen_routes, driven_routes
+from skidpad.campaign.channels.world import segment_of
+from skidpad.campaign.recipes.channels import segments
 from skidpad.core.channels import TruthFrame
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import run_from_plain

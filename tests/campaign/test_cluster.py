@@ -4,10 +4,10 @@ import jobs as work
 import pytest
 
 from runs import adas_run, segment_run
-from skidpad.campaign import channels, matrix
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.cluster import runner_of
-from skidpad.campaign.worker import Finished, Job
+from skidpad.campaign.recipes import channels, matrix
+from skidpad.campaign.workers.cluster import runner_of
+from skidpad.campaign.workers.worker import Finished, Job
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.vocabulary import Outcome
 
@@ -68,7 +68,7 @@ def test_deadlines_and_deaths_are_as_in_the_pool(tmp_path):
 def test_a_wrong_address_is_one_sentence(monkeypatch):
     with pytest.raises(ConfigError, match="local:N"), runner_of("local:none"):
         pass
-    monkeypatch.setattr("skidpad.campaign.cluster.CONNECT_S", 0.5)
+    monkeypatch.setattr("skidpad.campaign.workers.cluster.CONNECT_S", 0.5)
     with (
         pytest.raises(BackendError, match="no scheduler answers"),
         runner_of("tcp://127.0.0.1:9"),

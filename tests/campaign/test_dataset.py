@@ -9,9 +9,9 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
+from skidpad.campaign.cells.grip import template
 from skidpad.campaign.dataset import COLUMNS, export_drive
-from skidpad.campaign.grip_cells import template
-from skidpad.campaign.stored import read_run
+from skidpad.campaign.runs.stored import read_run
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.core.run import Roads, RunSpec, StackDriver

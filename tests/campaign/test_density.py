@@ -6,10 +6,10 @@ from msgspec import structs
 from typer.testing import CliRunner
 
 from runs import adas_run
-from skidpad.campaign.density import FROM_EGO, Density
-from skidpad.campaign.desk import Desk, Recorded
-from skidpad.campaign.desk_run import drive_at_desk
-from skidpad.campaign.run import run
+from skidpad.campaign.runs.desk_run import drive_at_desk
+from skidpad.campaign.runs.run import run
+from skidpad.campaign.takeover.density import FROM_EGO, Density
+from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.cli.cockpit import with_reserve as with_more
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError

@@ -9,11 +9,11 @@ from msgspec import structs
 from typer.testing import CliRunner
 
 from runs import adas_run
-from skidpad.campaign.desk import LOW_VISIBILITY, Desk, Recorded, beam_of
-from skidpad.campaign.desk_run import drive_at_desk
-from skidpad.campaign.hands import HOLD_TO_REVERSE, Hands
-from skidpad.campaign.run import run
-from skidpad.campaign.stored import read_run
+from skidpad.campaign.runs.desk_run import drive_at_desk
+from skidpad.campaign.runs.run import run
+from skidpad.campaign.runs.stored import read_run
+from skidpad.campaign.takeover.desk import LOW_VISIBILITY, Desk, Recorded, beam_of
+from skidpad.campaign.takeover.hands import HOLD_TO_REVERSE, Hands
 from skidpad.cli.main import app
 from skidpad.core.errors import FileError, OutputError
 from skidpad.core.inputs import (

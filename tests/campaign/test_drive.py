@@ -13,8 +13,8 @@ from msgspec.structs import replace
 from PIL import Image
 
 from runs import adas_run
-from skidpad.campaign.run import Run, drive
-from skidpad.campaign.run import run as run_spec
+from skidpad.campaign.runs.run import Run, drive
+from skidpad.campaign.runs.run import run as run_spec
 from skidpad.core.errors import ConfigError
 from skidpad.core.frames import Frame, Segments, SensorFrame
 from skidpad.core.geometry import Pose

@@ -7,7 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from skidpad.campaign import cast, channel_drive, desk, drive, stepping
+from skidpad.campaign import stepping
+from skidpad.campaign.channels import drive as channel_drive
+from skidpad.campaign.driving import loop as drive
+from skidpad.campaign.driving import run_setup as cast
+from skidpad.campaign.takeover import desk
 from skidpad.cockpit import source
 
 DRIVERS = [
@@ -19,7 +23,7 @@ DRIVERS = [
     ),
 ]  # fmt: skip
 SAMPLE = '''
-from skidpad.campaign.drive import Driver
+from skidpad.campaign.driving.loop import Driver
 
 class Asking:
     """A driver that asks for {what}."""

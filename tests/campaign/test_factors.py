@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.cast import stage_of
-from skidpad.campaign.cells import cruising, drivers_with, published_drivers
-from skidpad.campaign.matrix import RECIPE, run_key, warm_up
-from skidpad.campaign.pool import local
-from skidpad.campaign.run import run
+from skidpad.campaign.cells.matrix import cruising, drivers_with, published_drivers
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.recipes.matrix import RECIPE, run_key, warm_up
+from skidpad.campaign.runs.run import run
+from skidpad.campaign.workers.pool import local
 from skidpad.cli.adas_plan import plan
 from skidpad.cli.asked import Climate, Drivers
 from skidpad.core.errors import ConfigError

@@ -12,12 +12,12 @@ import polars as pl
 import pytest
 
 from skidpad.campaign.campaign import Campaign, uncertain_cells
-from skidpad.campaign.cluster import run_on, runner_of
-from skidpad.campaign.grip import recipe, warm_up
-from skidpad.campaign.grip_cells import Cross, cross, seeds, template
-from skidpad.campaign.grip_shown import select_shown_runs
-from skidpad.campaign.pool import local
-from skidpad.campaign.worker import Finished, Runner
+from skidpad.campaign.cells.grip import Cross, cross, seeds, template
+from skidpad.campaign.recipes.grip import recipe, warm_up
+from skidpad.campaign.recipes.grip_shown import select_shown_runs
+from skidpad.campaign.workers.cluster import run_on, runner_of
+from skidpad.campaign.workers.pool import local
+from skidpad.campaign.workers.worker import Finished, Runner
 from skidpad.core.errors import OutputError
 from skidpad.core.run import AgentDriver, Friction, RunSpec
 from skidpad.core.settings import load_profile

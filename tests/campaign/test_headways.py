@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skidpad.campaign.headways import field_sources, judge
+from skidpad.campaign.bench.headways import field_sources, judge
 from skidpad.core.space import Normal
 
 

@@ -14,9 +14,9 @@ from typer.testing import CliRunner
 
 from runs import adas_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.cells import cross, published_drivers
-from skidpad.campaign.matrix import RECIPE, warm_up
-from skidpad.campaign.pool import local
+from skidpad.campaign.cells.matrix import cross, published_drivers
+from skidpad.campaign.recipes.matrix import RECIPE, warm_up
+from skidpad.campaign.workers.pool import local
 from skidpad.cli.main import app
 from skidpad.core.errors import InputError, OutputError
 from skidpad.core.run import StackDriver

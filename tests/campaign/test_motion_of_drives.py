@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from runs import adas_run
-from skidpad.campaign.run import run
+from skidpad.campaign.runs.run import run
 from skidpad.recording.run.motion import motion_hash
 
 

@@ -11,7 +11,7 @@ import pytest
 from numpy.typing import NDArray
 
 from runs import adas_run
-from skidpad.campaign.run import run
+from skidpad.campaign.runs.run import run
 from skidpad.core.frames import Frame
 from skidpad.core.inputs import Outside
 from skidpad.core.setup import Setup

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from runs import scenario_run
-from skidpad.campaign.play import run_to
-from skidpad.campaign.run import run
+from skidpad.campaign.runs.play import run_to
+from skidpad.campaign.runs.run import run
 from skidpad.core.errors import OutputError
 from skidpad.core.run import ActorMode, AgentDriver, Scenario
 from skidpad.core.vocabulary import GripModel, Outcome, SensorLevel

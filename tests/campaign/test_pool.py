@@ -8,8 +8,8 @@ from pathlib import Path
 import jobs as work
 import pytest
 
-from skidpad.campaign.pool import run_jobs
-from skidpad.campaign.worker import Job
+from skidpad.campaign.workers.pool import run_jobs
+from skidpad.campaign.workers.worker import Job
 from skidpad.core.vocabulary import Outcome
 
 
@@ -80,8 +80,8 @@ def test_children_leave_when_their_parent_is_killed(tmp_path, begin):
         f"import sys; sys.path.insert(0, {str(Path(work.__file__).parent)!r})\n"
         "import jobs\n"
         "from functools import partial\n"
-        "from skidpad.campaign.pool import run_jobs, warm\n"
-        "from skidpad.campaign.worker import Job\n"
+        "from skidpad.campaign.workers.pool import run_jobs, warm\n"
+        "from skidpad.campaign.workers.worker import Job\n"
         "if __name__ == '__main__':\n"
         f"    long = jobs.write_pid_and_sleep, {str(pid_file)!r}\n"
         f"    {begin}\n"

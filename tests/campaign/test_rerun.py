@@ -6,13 +6,13 @@ from typer.testing import CliRunner
 
 from runs import adas_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.drive import Sink
-from skidpad.campaign.matrix import RECIPE
-from skidpad.campaign.pace import Pace
-from skidpad.campaign.pool import local
-from skidpad.campaign.run import run
-from skidpad.campaign.stored import read_run
-from skidpad.campaign.views import SIZE, twelve_views
+from skidpad.campaign.driving.loop import Sink
+from skidpad.campaign.driving.pace import Pace
+from skidpad.campaign.recipes.matrix import RECIPE
+from skidpad.campaign.runs.run import run
+from skidpad.campaign.runs.stored import read_run
+from skidpad.campaign.runs.views import SIZE, twelve_views
+from skidpad.campaign.workers.pool import local
 from skidpad.cli.main import app
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.campaign.results import read_results
@@ -81,7 +81,7 @@ def test_wall_times_stand_apart_from_results(campaign):
 @pytest.mark.req("A-246")
 def test_slow_ticks_are_those_below_0_9_of_real_time(monkeypatch):
     clock = iter([0.0, 0.05, 0.105, 0.165])
-    monkeypatch.setattr("skidpad.campaign.pace.perf_counter", lambda: next(clock))
+    monkeypatch.setattr("skidpad.campaign.driving.pace.perf_counter", lambda: next(clock))
     pace = Pace(0.05)
     for _ in range(3):
         pace.see(None)

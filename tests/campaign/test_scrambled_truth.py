@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 
 from runs import segment_run
-from skidpad.campaign.cast import StackAtWheel, stage_of, with_sensors
-from skidpad.campaign.channel_drive import Crew
-from skidpad.campaign.channel_world import segment_of
+from skidpad.campaign.channels.drive import Crew
+from skidpad.campaign.channels.world import segment_of
+from skidpad.campaign.driving.run_setup import StackAtWheel, stage_of, with_sensors
 from skidpad.core.geometry import Pose
 from skidpad.core.run import Roads, RunSpec, StackDriver
 from skidpad.core.specs import EyesSpec, LidarSpec

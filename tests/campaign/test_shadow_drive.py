@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 from channel_worlds import Eyes, World
 from channel_worlds import drive as drive_channels
 from runs import adas_run, scenario_run
-from skidpad.campaign.play import run_to
-from skidpad.campaign.shadow import Shadowed, ride_along
+from skidpad.campaign.runs.play import run_to
+from skidpad.campaign.runs.shadow import Shadowed, ride_along
 from skidpad.cli.main import app
 from skidpad.cli.shadow import lines
 from skidpad.core.errors import ConfigError

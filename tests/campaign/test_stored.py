@@ -14,15 +14,15 @@ from typer.testing import CliRunner
 
 from runs import adas_run, scenario_run, segment_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.channels import RECIPE as CHANNELS
-from skidpad.campaign.grip import recipe as grip_recipe
-from skidpad.campaign.matrix import RECIPE as MATRIX
-from skidpad.campaign.play import run_to
-from skidpad.campaign.run import run
-from skidpad.campaign.stored import read_run, read_segment
-from skidpad.campaign.study_arms import speed_and_dropout
-from skidpad.campaign.tuning import Candidate, tuning_run
-from skidpad.campaign.worker import Finished, Job
+from skidpad.campaign.recipes.channels import RECIPE as CHANNELS
+from skidpad.campaign.recipes.grip import recipe as grip_recipe
+from skidpad.campaign.recipes.matrix import RECIPE as MATRIX
+from skidpad.campaign.runs.play import run_to
+from skidpad.campaign.runs.run import run
+from skidpad.campaign.runs.stored import read_run, read_segment
+from skidpad.campaign.studies.arms import speed_and_dropout
+from skidpad.campaign.studies.tuning import Candidate, tuning_run
+from skidpad.campaign.workers.worker import Finished, Job
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import (

@@ -8,9 +8,10 @@ import pytest
 from msgspec import structs
 from typer.testing import CliRunner
 
-from skidpad.campaign import study_arms, study_stacks
-from skidpad.campaign.run import run
-from skidpad.campaign.study import BY_ID, drive_variant, stage_for
+from skidpad.campaign.runs.run import run
+from skidpad.campaign.studies import arms as study_arms
+from skidpad.campaign.studies import stacks as study_stacks
+from skidpad.campaign.studies.study import BY_ID, drive_variant, stage_for
 from skidpad.cli.main import app
 from skidpad.core.frames import RadarPoints, Segments, SensorFrame
 from skidpad.core.geometry import Pose

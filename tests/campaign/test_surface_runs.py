@@ -9,9 +9,9 @@ import yaml
 from msgspec import structs
 from typer.testing import CliRunner
 
-from skidpad.campaign.cast import stage_of
-from skidpad.campaign.run import run
-from skidpad.campaign.surfaces import read_surface
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.driving.surfaces import read_surface
+from skidpad.campaign.runs.run import run
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
 from skidpad.core.inputs import Outside

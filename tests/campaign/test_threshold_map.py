@@ -9,9 +9,9 @@ import pytest
 from msgspec.structs import replace
 from typer.testing import CliRunner
 
-from skidpad.campaign.grip_cells import template
-from skidpad.campaign.threshold import SITUATION
-from skidpad.campaign.threshold_cells import PRESETS, default_shares, preset_of
+from skidpad.campaign.cells.grip import template
+from skidpad.campaign.cells.threshold import PRESETS, default_shares, preset_of
+from skidpad.campaign.recipes.threshold import SITUATION
 from skidpad.cli.asked import EgoStack, GripCross, MapAsked
 from skidpad.cli.main import app
 from skidpad.cli.threshold_plan import plan_map

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from skidpad.campaign.bench_traffic import background_world
-from skidpad.campaign.headways import headways_of
-from skidpad.campaign.traffic_asked import TrafficBench
-from skidpad.campaign.traffic_watch import (
+from skidpad.campaign.bench.headways import headways_of
+from skidpad.campaign.bench.traffic import background_world
+from skidpad.campaign.bench.traffic_options import TrafficBench
+from skidpad.campaign.bench.traffic_watch import (
     LONG,
     TrafficCounts,
     Watch,

@@ -7,8 +7,8 @@ import json
 import pytest
 from typer.testing import CliRunner
 
-from skidpad.campaign import bench_scenarios
-from skidpad.campaign.bench_scenarios import ScenarioCost
+from skidpad.campaign.bench import scenarios as bench_scenarios
+from skidpad.campaign.bench.scenarios import ScenarioCost
 from skidpad.cli.main import app
 
 RUNNER = CliRunner()

@@ -9,8 +9,8 @@ import pytest
 from typer.testing import CliRunner
 
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.grip import recipe
-from skidpad.campaign.grip_cells import template
+from skidpad.campaign.cells.grip import template
+from skidpad.campaign.recipes.grip import recipe
 from skidpad.cli.asked import EgoStack, GripCross, Tuned
 from skidpad.cli.grip_plan import plan_grip, with_model
 from skidpad.cli.main import app

@@ -6,7 +6,7 @@ import pytest
 from typer.testing import CliRunner
 
 from runs import adas_run
-from skidpad.campaign.play import run_to
+from skidpad.campaign.runs.play import run_to
 from skidpad.cli.main import app
 from skidpad.cli.show import vehicle_grips
 from skidpad.core.run import Friction

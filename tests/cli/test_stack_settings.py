@@ -8,8 +8,8 @@ import pytest
 from typer.testing import CliRunner
 
 import skidpad
-from skidpad.campaign.cast import driver_of, stage_of
-from skidpad.campaign.stored import read_run
+from skidpad.campaign.driving.run_setup import driver_of, stage_of
+from skidpad.campaign.runs.stored import read_run
 from skidpad.cli.asked import Drivers, EgoStack, read_stack_settings
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
@@ -106,7 +106,7 @@ def test_the_function_and_the_command_have_the_same_defaults():
 
 
 def test_every_argument_and_every_field_of_the_result_is_described():
-    from skidpad.campaign.run import Run
+    from skidpad.campaign.runs.run import Run
 
     about = inspect.getdoc(skidpad.drive)
     for section in ("Args:", "Returns:", "Raises:", "Example:"):

@@ -11,15 +11,15 @@ from PIL import Image
 
 from runs import adas_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.cast import stage_of
-from skidpad.campaign.desk import Desk, Recorded
-from skidpad.campaign.desk_run import drive_at_desk
-from skidpad.campaign.drive import Timer
-from skidpad.campaign.matrix import RECIPE
-from skidpad.campaign.pool import local
-from skidpad.campaign.rerun import desk_of, first_ticks
-from skidpad.campaign.run import run
-from skidpad.campaign.stored import read_run
+from skidpad.campaign.driving.loop import Timer
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.recipes.matrix import RECIPE
+from skidpad.campaign.runs.desk_run import drive_at_desk
+from skidpad.campaign.runs.rerun import desk_of, first_ticks
+from skidpad.campaign.runs.run import run
+from skidpad.campaign.runs.stored import read_run
+from skidpad.campaign.takeover.desk import Desk, Recorded
+from skidpad.campaign.workers.pool import local
 from skidpad.cockpit.hud import TIERS
 from skidpad.cockpit.tabs import ASLEEP_AFTER
 from skidpad.core.inputs import Functions, Lamps, Method, Pedals, Sky, Timed, Wheel

@@ -16,9 +16,9 @@ from producers import Recorder, bridge
 from typer.testing import CliRunner
 
 from runs import adas_run
-from skidpad.campaign.desk import Desk, Recorded
-from skidpad.campaign.drive import Sink
-from skidpad.campaign.run import run
+from skidpad.campaign.driving.loop import Sink
+from skidpad.campaign.runs.run import run
+from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.cli.main import app
 from skidpad.cockpit import producer as producer_module
 from skidpad.cockpit import serving

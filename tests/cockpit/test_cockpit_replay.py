@@ -12,11 +12,11 @@ from typer.testing import CliRunner
 
 from runs import adas_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.desk import Desk, Recorded
-from skidpad.campaign.desk_run import drive_at_desk
-from skidpad.campaign.drive import Sink
-from skidpad.campaign.matrix import RECIPE
-from skidpad.campaign.pool import local
+from skidpad.campaign.driving.loop import Sink
+from skidpad.campaign.recipes.matrix import RECIPE
+from skidpad.campaign.runs.desk_run import drive_at_desk
+from skidpad.campaign.takeover.desk import Desk, Recorded
+from skidpad.campaign.workers.pool import local
 from skidpad.cli.main import app
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.film import stretch_of, write_film

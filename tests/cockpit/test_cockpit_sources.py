@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 
 from channel_worlds import CAR, Eyes, World, drive, frame, traffic
 from runs import adas_run, scenario_run
-from skidpad.campaign.desk import Desk, Recorded
-from skidpad.campaign.desk_run import drive_at_desk
+from skidpad.campaign.runs.desk_run import drive_at_desk
+from skidpad.campaign.takeover.desk import Desk, Recorded
 from skidpad.cli.main import app
 from skidpad.cockpit import channel_source
 from skidpad.cockpit.channel_source import ChannelSource

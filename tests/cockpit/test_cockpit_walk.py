@@ -4,7 +4,7 @@ import os
 
 from commands import PATIENCE, running
 
-from skidpad.campaign.stored import read_run
+from skidpad.campaign.runs.stored import read_run
 from skidpad.core.inputs import Sky
 from skidpad.physics.grip import grip_params
 from skidpad.recording.run.inputs import read_inputs

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skidpad.campaign.governing import choose_envelope
-from skidpad.campaign.run import drive
-from skidpad.campaign.run import run as drive_run
+from skidpad.campaign.driving.governing import choose_envelope
+from skidpad.campaign.runs.run import drive
+from skidpad.campaign.runs.run import run as drive_run
 from skidpad.core.errors import ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.run import Passenger, Roads, RunSpec, Scenario

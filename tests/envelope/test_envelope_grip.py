@@ -97,7 +97,7 @@ def test_water_counts_for_more_at_a_higher_speed_than_the_one_of_the_evidence():
 
 @pytest.mark.parametrize(("weather", "low", "high"), [("icy_100", 0.09, 0.15), ("snow", 0.2, 0.45)])
 def test_a_drive_on_a_slippery_road_finds_its_grip(weather, low, high):
-    from skidpad.campaign.run import drive
+    from skidpad.campaign.runs.run import drive
 
     run = drive(5, weather=weather, sensors="objects", duration=25.0, seed=900_001)
     rows = run.readings.table
@@ -110,9 +110,9 @@ def test_what_only_the_truth_knows_of_the_weather_changes_no_limit():
     """Frames of a drive on ice, shown again with the record of weather and friction scrambled."""
     from msgspec import structs
 
-    from skidpad.campaign.cast import driver_of, stage_of
-    from skidpad.campaign.drive import Sink
-    from skidpad.campaign.run import run as drive_run
+    from skidpad.campaign.driving.loop import Sink
+    from skidpad.campaign.driving.run_setup import driver_of, stage_of
+    from skidpad.campaign.runs.run import run as drive_run
     from skidpad.core.run import Roads, RunSpec
     from skidpad.core.vocabulary import SensorLevel
     from skidpad.physics.presets import preset

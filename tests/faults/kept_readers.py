@@ -98,7 +98,7 @@ def read_judged(path: Path) -> object:
 
 @cache
 def drive() -> dict[str, bytes]:
-    from skidpad.campaign.play import run_to
+    from skidpad.campaign.runs.play import run_to
 
     with TemporaryDirectory() as folder:
         out = Path(folder) / "runs" / "a"

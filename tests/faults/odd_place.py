@@ -7,7 +7,7 @@ import yaml
 from readers import here
 
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.matrix import RECIPE
+from skidpad.campaign.recipes.matrix import RECIPE
 from skidpad.core.run import run_from_plain
 
 

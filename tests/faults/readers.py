@@ -22,9 +22,9 @@ from plain_mutation import mutated_json, mutated_yaml
 from table_mutation import mutated_npz, mutated_parquet
 
 import runs
-from skidpad.campaign.cells import published_drivers, sweep
-from skidpad.campaign.stored import read_run, read_segment
-from skidpad.campaign.worker import Finished
+from skidpad.campaign.cells.matrix import published_drivers, sweep
+from skidpad.campaign.runs.stored import read_run, read_segment
+from skidpad.campaign.workers.worker import Finished
 from skidpad.core.weather import Weather
 from toy_campaign import RECIPE as TOY
 from toy_campaign import campaign as toy_campaign
@@ -189,7 +189,7 @@ def read_toy_results(path: Path) -> object:
 
 @cache
 def run_folder() -> dict[str, bytes]:
-    from skidpad.campaign.run import run
+    from skidpad.campaign.runs.run import run
     from skidpad.recording.run.log_files import write_log
 
     driven = run(runs.adas_run(duration=0.5, vehicles=1))
@@ -250,7 +250,7 @@ def beside(path: Path) -> None:
 
 
 def read_scenario(path: Path) -> object:
-    from skidpad.campaign.cast import check_scenario
+    from skidpad.campaign.driving.run_setup import check_scenario
     from skidpad.core.run import Scenario
 
     beside(path)
@@ -258,7 +258,7 @@ def read_scenario(path: Path) -> object:
 
 
 def play_scenario(path: Path) -> object:
-    from skidpad.campaign.run import run
+    from skidpad.campaign.runs.run import run
 
     beside(path)
     with np.errstate(all="ignore"):

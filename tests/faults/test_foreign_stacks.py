@@ -10,11 +10,11 @@ from waiting import waited
 
 import runs
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.cells import cross
-from skidpad.campaign.matrix import RECIPE
-from skidpad.campaign.pool import local, run_jobs
-from skidpad.campaign.run import run
-from skidpad.campaign.worker import Job
+from skidpad.campaign.cells.matrix import cross
+from skidpad.campaign.recipes.matrix import RECIPE
+from skidpad.campaign.runs.run import run
+from skidpad.campaign.workers.pool import local, run_jobs
+from skidpad.campaign.workers.worker import Job
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import StackDriver
 from skidpad.core.vocabulary import Outcome

@@ -19,7 +19,7 @@ from waiting import PATIENCE, waited
 
 import runs
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.matrix import RECIPE
+from skidpad.campaign.recipes.matrix import RECIPE
 from skidpad.core.errors import OutputError
 from skidpad.recording.campaign.folder import RUNS
 from skidpad.recording.campaign.ledger import LEDGER

@@ -12,7 +12,7 @@ from toy_campaign import RECIPE, Toss, campaign, key
 
 def here(jobs):
     """Runs jobs in this process."""
-    from skidpad.campaign.worker import Finished
+    from skidpad.campaign.workers.worker import Finished
 
     for job in jobs:
         yield Finished(job, value=job.work(job.argument))

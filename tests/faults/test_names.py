@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from msgspec import structs
 
 import runs
-from skidpad.campaign.runfolder import fresh_folder
+from skidpad.campaign.runs.folder import fresh_folder
 from skidpad.core.errors import ConfigError
 from skidpad.core.names import LONGEST, inside, path_part, slug
 from skidpad.core.run import Scenario, StackDriver

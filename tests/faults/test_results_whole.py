@@ -8,7 +8,7 @@ import pytest
 from typer.testing import CliRunner
 
 from channel_worlds import Eyes, World, drive
-from skidpad.campaign.rerun import Film
+from skidpad.campaign.runs.rerun import Film
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, OutputError
 from skidpad.evidence.channels.monitor import MonitorSettings

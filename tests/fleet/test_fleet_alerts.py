@@ -385,8 +385,8 @@ def test_a_vehicle_is_slowed_down_and_let_go_until_it_is_stopped(lite):
 @pytest.mark.req("C-175")
 def test_a_simulated_vehicle_obeys(lite, tmp_path):
     """It drives by its channels, raises an alert after 3 s, is slowed down, and stopped after 9 s."""
-    from skidpad.campaign.channel_drive import drive_segment
-    from skidpad.campaign.channel_routes import driven_routes
+    from skidpad.campaign.channels.drive import drive_segment
+    from skidpad.campaign.channels.routes import driven_routes
     from skidpad.recording.channels.cycles import cycles
     from skidpad.recording.sources import open_channels
 

@@ -14,7 +14,7 @@ import pytest
 
 from channel_worlds import Eyes, Listed, World, drive
 from runs import segment_run
-from skidpad.campaign.channel_drive import drive_segment
+from skidpad.campaign.channels.drive import drive_segment
 from skidpad.core.channels import ChannelFrame, Context
 from skidpad.evidence.channels.monitor import MonitorSettings
 from skidpad.evidence.channels.timing import LIVE_TIMES, delay_sentence, late_cycles

@@ -19,7 +19,7 @@ from cyclonedds.core import DDSException  # noqa: E402
 
 from channel_worlds import Eyes, World, drive, frame  # noqa: E402
 from runs import segment_run  # noqa: E402
-from skidpad.campaign.channel_drive import drive_segment  # noqa: E402
+from skidpad.campaign.channels.drive import drive_segment  # noqa: E402
 from skidpad.core.channels import ChannelFrame  # noqa: E402
 from skidpad.core.errors import FileError  # noqa: E402
 from skidpad.evidence.channels.monitor import MonitorSettings  # noqa: E402

@@ -6,7 +6,7 @@ import polars as pl
 import pytest
 
 import runs
-from skidpad.campaign.run import run
+from skidpad.campaign.runs.run import run
 from skidpad.core.errors import FileError
 from skidpad.recording.files import read_parquet
 from skidpad.recording.run.log_files import TICKS, read_log, write_log

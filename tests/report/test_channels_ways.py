@@ -11,7 +11,7 @@ import pytest
 from svg_values import curves_of
 
 import channels_tables as tables
-from skidpad.campaign.channel_outcomes import Referee
+from skidpad.campaign.channels.outcomes import Referee
 from skidpad.core.channels import Decision
 from skidpad.recording.channels.drives import WAY_STEP, DriveOutcome, DriveRecord, read_records
 from skidpad.report.channels.evaluation.ways import draw_ways, lane_lines
@@ -75,7 +75,7 @@ def test_lanes_are_drawn_from_end_to_end():
 
 def test_a_drive_keeps_a_place_every_ten_metres(monkeypatch):
     referee = Referee(SimpleNamespace(points=None, lines=(), length=1e9), None, 0.1)
-    monkeypatch.setattr("skidpad.campaign.channel_outcomes.locate", lambda *_: (0, 0.0))
+    monkeypatch.setattr("skidpad.campaign.channels.outcomes.locate", lambda *_: (0, 0.0))
     monkeypatch.setattr(Referee, "_lines", lambda *_: None)
     for k in range(100):
         at = [np.array([value]) for value in (1.5 * k, 2.0, 15.0, 0.0)]

@@ -7,7 +7,7 @@ from test_matrix_answers import metrics
 from test_matrix_report import key
 
 from runs import adas_run
-from skidpad.campaign.cells import cross, published_drivers
+from skidpad.campaign.cells.matrix import cross, published_drivers
 from skidpad.cli.adas_plan import on_pixels
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import SensorLevel

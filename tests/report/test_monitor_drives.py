@@ -11,7 +11,7 @@ import pytest
 import monitor_drives as drives
 import monitor_rules
 import monitor_variants as variants
-from skidpad.campaign.worker import Finished
+from skidpad.campaign.workers.worker import Finished
 from skidpad.core.errors import FileError
 from skidpad.roads.bundled import load_map
 from skidpad.roads.lanes import LaneKind

@@ -19,8 +19,8 @@ from tests.scenarios.files import (
 )
 from tests.scenarios.test_registered_names import ACTIVATE, with_controller
 
-from skidpad.campaign.cast import load_scenario
-from skidpad.campaign.file_drivers import FollowingDriver
+from skidpad.campaign.driving.file_drivers import FollowingDriver
+from skidpad.campaign.driving.run_setup import load_scenario
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import Scenario
 from skidpad.scenarios.stage import played

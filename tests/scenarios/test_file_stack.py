@@ -23,7 +23,7 @@ from tests.scenarios.files import (
 from tests.scenarios.test_registered_names import with_controller
 
 import skidpad
-from skidpad.campaign.cast import check_scenario
+from skidpad.campaign.driving.run_setup import check_scenario
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import Scenario
 from skidpad.core.states import VehicleCommand

@@ -7,8 +7,8 @@ import pytest
 from tests.scenarios.files import at, event, story, time, write
 from typer.testing import CliRunner
 
-from skidpad.campaign.outdoors import sun_at, weather_of
-from skidpad.campaign.stored import read_run
+from skidpad.campaign.driving.outdoors import sun_at, weather_of
+from skidpad.campaign.runs.stored import read_run
 from skidpad.cli.main import app
 from skidpad.core.errors import FileError
 from skidpad.core.weather import Weather

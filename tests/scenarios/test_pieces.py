@@ -10,7 +10,7 @@ from merging_player import led, merged, place
 from test_hazard_export import a_record
 
 from runs import scenario_run
-from skidpad.campaign.run import run
+from skidpad.campaign.runs.run import run
 from skidpad.core.run import ActorMode, Passenger, Scenario
 from skidpad.core.vocabulary import Outcome, SemanticClass
 from skidpad.scenarios.hazard_export import export_hazard, road_under

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from runs import scenario_run
-from skidpad.campaign.run import run
+from skidpad.campaign.runs.run import run
 from skidpad.core.errors import FileError
 from skidpad.core.run import ActorMode, Passenger, Scenario, StackDriver
 from skidpad.core.vocabulary import Outcome

@@ -25,7 +25,7 @@ from tests.scenarios.files import (
 )
 from typer.testing import CliRunner
 
-from skidpad.campaign.cast import load_scenario
+from skidpad.campaign.driving.run_setup import load_scenario
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import RunSpec, Scenario

@@ -16,7 +16,7 @@ from test_hazard_export import CHECKER
 from typer.testing import CliRunner
 
 from runs import adas_run, scenario_run
-from skidpad.campaign.play import run_to
+from skidpad.campaign.runs.play import run_to
 from skidpad.cli.main import app
 from skidpad.core.run import Passenger, Roads
 from skidpad.recording.run.log_files import read_log

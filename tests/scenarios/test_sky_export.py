@@ -6,7 +6,7 @@ from datetime import datetime
 
 import pytest
 
-from skidpad.campaign.outdoors import environment_of, weather_of
+from skidpad.campaign.driving.outdoors import environment_of, weather_of
 from skidpad.core.vocabulary import SemanticClass
 from skidpad.physics.presets import preset
 from skidpad.scenarios.scenario import check

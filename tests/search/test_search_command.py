@@ -76,7 +76,7 @@ def test_the_border_lies_between_two_runs_that_were_driven(found):
 
 
 def test_a_kept_failure_is_the_drive_of_its_trial(found):
-    from skidpad.campaign.run import run
+    from skidpad.campaign.runs.run import run
     from skidpad.recording.run.motion import motion_hash
 
     out, _ = found

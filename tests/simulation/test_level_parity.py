@@ -10,9 +10,9 @@ import pytest
 from msgspec import structs
 
 from runs import adas_run
-from skidpad.campaign.cast import stage_of
-from skidpad.campaign.drive import Moment, Sink
-from skidpad.campaign.run import run
+from skidpad.campaign.driving.loop import Moment, Sink
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.runs.run import run
 from skidpad.core.run import RunSpec
 from skidpad.core.states import StackReport
 from skidpad.core.vocabulary import DetectionStatus, SensorLevel, Supervision, Tier

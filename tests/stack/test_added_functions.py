@@ -6,8 +6,8 @@ from functools import partial
 import pytest
 
 from runs import template
-from skidpad.campaign.drive import Sink
-from skidpad.campaign.run import run
+from skidpad.campaign.driving.loop import Sink
+from skidpad.campaign.runs.run import run
 from skidpad.core.errors import ConfigError
 from skidpad.core.registry import Source
 from skidpad.core.run import AdasDriver, Function, run_from_plain

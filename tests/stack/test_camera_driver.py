@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from msgspec import structs
 
-from skidpad.campaign.grip_cells import Cross, cross, seeds, template
-from skidpad.campaign.run import run
+from skidpad.campaign.cells.grip import Cross, cross, seeds, template
+from skidpad.campaign.runs.run import run
 from skidpad.core.errors import ConfigError, StackError
 from skidpad.core.frames import CameraImage, RadarPoints, SensorFrame
 from skidpad.core.geometry import Pose

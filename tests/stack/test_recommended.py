@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from runs import adas_run
-from skidpad.campaign.cast import stage_of
+from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.core.setup import ActorSetup
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import Control, SensorLevel

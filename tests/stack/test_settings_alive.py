@@ -25,9 +25,9 @@ from stackfakes import (
 
 import makelog
 from runs import adas_run
-from skidpad.campaign.cast import recovery_settings, stage_of
-from skidpad.campaign.matrix import metric_settings
-from skidpad.campaign.run import run
+from skidpad.campaign.driving.run_setup import recovery_settings, stage_of
+from skidpad.campaign.recipes.matrix import metric_settings
+from skidpad.campaign.runs.run import run
 from skidpad.core.geometry import Pose
 from skidpad.core.run import RunSpec
 from skidpad.core.settings import NAMES, Settings

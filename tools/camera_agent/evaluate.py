@@ -11,8 +11,8 @@ import sys
 
 import numpy as np
 
-from skidpad.campaign.grip_cells import Cross, cross, seeds, template
-from skidpad.campaign.run import Run, run
+from skidpad.campaign.cells.grip import Cross, cross, seeds, template
+from skidpad.campaign.runs.run import Run, run
 from skidpad.core.frames import SensorFrame
 from skidpad.core.run import CameraDriver, Friction, Roads, RunSpec
 from skidpad.core.vocabulary import Outcome, SensorLevel

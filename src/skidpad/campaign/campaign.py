@@ -18,9 +18,9 @@ from typing import Any, Generic
 
 import msgspec
 
-from skidpad.campaign.keeping import keep_files
-from skidpad.campaign.recipe import Driven, M, Recipe, T, Task, cell_of
-from skidpad.campaign.worker import Finished, Job, Runner
+from skidpad.campaign.recipes.recipe import Driven, M, Recipe, T, Task, cell_of
+from skidpad.campaign.user_files import keep_files
+from skidpad.campaign.workers.worker import Finished, Job, Runner
 from skidpad.core.errors import ConfigError, require_range
 from skidpad.core.vocabulary import Outcome
 from skidpad.evidence.statistics import clopper_pearson

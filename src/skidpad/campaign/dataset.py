@@ -15,9 +15,9 @@ import cv2
 import msgspec
 import polars as pl
 
-from skidpad.campaign.drive import Moment, Sink
-from skidpad.campaign.run import Run, run
-from skidpad.campaign.runfolder import write_config
+from skidpad.campaign.driving.loop import Moment, Sink
+from skidpad.campaign.runs.folder import write_config
+from skidpad.campaign.runs.run import Run, run
 from skidpad.campaign.sight_labels import label_of
 from skidpad.core.errors import ConfigError, OutputError, StackError
 from skidpad.core.geometry import Pose
@@ -108,7 +108,7 @@ def export_drive(spec: RunSpec, out: Path, every: int) -> tuple[Run, int]:
         raise ConfigError("export-dataset writes images: it needs --sensors pixels")
     if not isinstance(spec.driver, (AdasDriver, CameraDriver)):
         raise ConfigError("export-dataset drives with stack or camera")
-    from skidpad.campaign.cast import stage_of
+    from skidpad.campaign.driving.run_setup import stage_of
 
     folder = require_free(out / spec.name)
     sink = DatasetSink(folder, stage_of(spec).map, every)

@@ -6,12 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from skidpad.campaign.cast import StackAtWheel, stage_of
-from skidpad.campaign.drive import Script
-from skidpad.campaign.drivers import STACK, find_driver
-from skidpad.campaign.files import runs_of
-from skidpad.campaign.grip_cells import template
-from skidpad.campaign.run import OpenRun, Run
+from skidpad.campaign.cells.grip import template
+from skidpad.campaign.driving.drivers import STACK, find_driver
+from skidpad.campaign.driving.loop import Script
+from skidpad.campaign.driving.run_setup import StackAtWheel, stage_of
+from skidpad.campaign.recipes.files import runs_of
+from skidpad.campaign.runs.run import OpenRun, Run
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.frames import SensorFrame
 from skidpad.core.run import (

@@ -61,8 +61,8 @@ def adas(
     if backend.backend != BackendKind.CARLA:
         require_map(roads.map)
     from skidpad.campaign.campaign import Campaign
-    from skidpad.campaign.keeping import found_again, keep_maps
-    from skidpad.campaign.matrix import RECIPE
+    from skidpad.campaign.recipes.matrix import RECIPE
+    from skidpad.campaign.user_files import found_again, keep_maps
     from skidpad.cli.adas_plan import on_pixels, plan
     from skidpad.recording.campaign.matrix import PIXELS
 

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import typer
 from msgspec import structs
 
-from skidpad.campaign.cast import stage_of
-from skidpad.campaign.cells import cross
-from skidpad.campaign.keeping import road_file
-from skidpad.campaign.matrix import missing_vehicles, roads_of
+from skidpad.campaign.cells.matrix import cross
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.recipes.matrix import missing_vehicles, roads_of
+from skidpad.campaign.user_files import road_file
 from skidpad.cli.carla_backend import map_of
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import DriverSpec, RunSpec

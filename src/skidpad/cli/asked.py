@@ -56,8 +56,13 @@ class Drivers(Struct, frozen=True):
 
     def chosen(self) -> list[DriverSpec]:
         """The drivers; ConfigError or FileError for what is not there."""
-        from skidpad.campaign.cells import cruising, drivers_with, matrix_drivers, published_drivers
-        from skidpad.campaign.drivers import find_driver
+        from skidpad.campaign.cells.matrix import (
+            cruising,
+            drivers_with,
+            matrix_drivers,
+            published_drivers,
+        )
+        from skidpad.campaign.driving.drivers import find_driver
 
         if self.stack is not None:
             if self.configs is not None or self.functions or self.cruise is not None:
@@ -89,7 +94,7 @@ class EgoStack(Struct, frozen=True):
 
     def chosen(self) -> DriverSpec:
         """The driver; ConfigError or FileError for one that is not there."""
-        from skidpad.campaign.drivers import STACK, find_driver
+        from skidpad.campaign.driving.drivers import STACK, find_driver
 
         return find_driver(self.stack, read_stack_settings(self.stack_set), label=STACK)
 
@@ -137,7 +142,7 @@ class Climate(Struct, frozen=True):
 
     def chosen(self) -> list[Weather]:
         """The weathers; `all` is the six published presets."""
-        from skidpad.campaign.cells import sweep
+        from skidpad.campaign.cells.matrix import sweep
         from skidpad.physics.presets import MATRIX, find_weather, preset_groups
 
         if self.weather == "all":
@@ -169,7 +174,7 @@ class Tuned(Struct, frozen=True):
         """Returns `run` with these settings. more: settings given by name, None: not given."""
         from msgspec import structs
 
-        from skidpad.campaign.surfaces import read_surface
+        from skidpad.campaign.driving.surfaces import read_surface
         from skidpad.core.settings import load_profile, parse_assignments
 
         values = parse_assignments(self.set)

@@ -13,13 +13,13 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from skidpad.campaign.traffic_asked import TrafficBench
+from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.cli.spread import spread_fields
 from skidpad.core.setup import DT
 
 if TYPE_CHECKING:
-    from skidpad.campaign.bench import Row
-    from skidpad.campaign.traffic_watch import TrafficCounts
+    from skidpad.campaign.bench.tick import Row
+    from skidpad.campaign.bench.traffic_watch import TrafficCounts
 
 
 class Subject(str, Enum):
@@ -74,7 +74,7 @@ def machine() -> str:
 
 
 def _tick(seconds: float, quiet: bool) -> dict[str, Any]:
-    from skidpad.campaign.bench import tick_costs
+    from skidpad.campaign.bench.tick import tick_costs
 
     rows = []
     if not quiet:
@@ -119,7 +119,7 @@ def _plain(figures: dict[str, float], unit: str, quiet: bool) -> dict[str, Any]:
 
 
 def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
-    from skidpad.campaign import bench_matrix as matrix
+    from skidpad.campaign.bench import matrix
 
     minutes = matrix.driven_minutes() if run else matrix.estimated_minutes(seconds)
     how = "wall time, driven" if run else "estimated from tick costs"
@@ -132,8 +132,8 @@ def _matrix(seconds: float, run: bool, quiet: bool) -> dict[str, Any]:
 
 def _describe_seen(seen: TrafficCounts) -> Iterator[str]:
     """Headways in steady following, and who stood long and for what."""
-    from skidpad.campaign.headways import headways_of
-    from skidpad.campaign.traffic_watch import LONG
+    from skidpad.campaign.bench.headways import headways_of
+    from skidpad.campaign.bench.traffic_watch import LONG
 
     for road, headways in (
         ("from 80 km/h on", seen.fast),
@@ -156,7 +156,7 @@ def _describe_seen(seen: TrafficCounts) -> Iterator[str]:
 
 
 def _scenarios(seconds: float, quiet: bool) -> dict[str, Any]:
-    from skidpad.campaign.bench_scenarios import measure
+    from skidpad.campaign.bench.scenarios import measure
 
     rows = measure(seconds)
     if not quiet:
@@ -167,7 +167,7 @@ def _scenarios(seconds: float, quiet: bool) -> dict[str, Any]:
 
 
 def _traffic(asked: TrafficBench, quiet: bool) -> dict[str, Any]:
-    from skidpad.campaign.bench_traffic import measure
+    from skidpad.campaign.bench.traffic import measure
 
     rows = []
     if not quiet:

@@ -14,7 +14,7 @@ from msgspec import Meta, Struct
 
 if TYPE_CHECKING:
     from skidpad.campaign.campaign import Campaign, Summary
-    from skidpad.campaign.worker import Runner
+    from skidpad.campaign.workers.worker import Runner
 
 Seeds = Annotated[int, typer.Option("--seeds", "--repeats", min=1, help="Runs per cell.")]
 FirstSeed = Annotated[int, typer.Option("--first-seed", min=1, help="Seeds count up from it.")]
@@ -90,8 +90,8 @@ class CampaignOptions(Driving, frozen=True, kw_only=True):
 
     @contextmanager
     def _runner(self, campaign: Campaign[Any, Any, Any]) -> Iterator[Runner]:
-        from skidpad.campaign.cluster import runner_of
-        from skidpad.campaign.pool import local
+        from skidpad.campaign.workers.cluster import runner_of
+        from skidpad.campaign.workers.pool import local
         from skidpad.core.errors import ConfigError
 
         if self.cluster is None:

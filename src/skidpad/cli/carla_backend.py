@@ -20,7 +20,7 @@ def check_backend(choice: BackendChoice) -> BackendChoice:
         return BackendChoice(backend=choice.backend)
     if choice.restart_every and not choice.server_command:
         raise ConfigError("--restart-every needs --server-command: only our own server is ours")
-    from skidpad.campaign.backends import carla_options
+    from skidpad.campaign.driving.backends import carla_options
     from skidpad.simulation.carla.connection import require_server, wheel
 
     options = carla_options(choice)
@@ -51,7 +51,7 @@ def map_of(map: str, choice: BackendChoice) -> str:
 
 
 def _fetch(choice: BackendChoice, map: str, folder: Path) -> None:
-    from skidpad.campaign.backends import carla_options, keep_server
+    from skidpad.campaign.driving.backends import carla_options, keep_server
     from skidpad.simulation.carla.mapping import fetch_map
 
     keep_server(choice)

@@ -44,7 +44,7 @@ def drive(
     ] = True,
 ) -> None:
     """Drive channels over routes on a simulator; one recording per ten minutes."""
-    from skidpad.campaign.channel_routes import Condition, chosen_routes
+    from skidpad.campaign.channels.routes import Condition, chosen_routes
     from skidpad.cli.carla_backend import check_backend, drives_alone
     from skidpad.core.errors import require_choice
     from skidpad.core.vocabulary import Stratum
@@ -57,9 +57,9 @@ def drive(
         mind_weather,
     )
     from skidpad.campaign.campaign import Campaign
-    from skidpad.campaign.channel_world import route_of
-    from skidpad.campaign.channels import recipe_with_links, segments
-    from skidpad.campaign.keeping import found_again, keep_maps
+    from skidpad.campaign.channels.world import route_of
+    from skidpad.campaign.recipes.channels import recipe_with_links, segments
+    from skidpad.campaign.user_files import found_again, keep_maps
     from skidpad.roads.bundled import load_map
     from skidpad.sensors.channels.presets import senses_of
 

@@ -109,8 +109,8 @@ def drive(
 
 def require_place(spec: RunSpec) -> None:
     """Refuse a file or map that cannot be driven, before a page is opened; a server has its own."""
-    from skidpad.campaign.cast import load_scenario
-    from skidpad.campaign.keeping import road_file
+    from skidpad.campaign.driving.run_setup import load_scenario
+    from skidpad.campaign.user_files import road_file
     from skidpad.roads.bundled import load_map
 
     if isinstance(spec.course, Scenario):

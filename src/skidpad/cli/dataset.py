@@ -31,7 +31,7 @@ def export_dataset(
     every: Annotated[int, typer.Option(min=1, help="Ticks of 0.05 s per image.")] = 2,
 ) -> None:
     """Drive, and write images of three cameras, what is ahead by the truth, and controls."""
-    from skidpad.campaign.grip_cells import drawn_course
+    from skidpad.campaign.cells.grip import drawn_course
     from skidpad.core.errors import require_choice
     from skidpad.physics.presets import find_weather
     from skidpad.scenarios.shipped import NAMES

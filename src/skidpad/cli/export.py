@@ -37,7 +37,7 @@ def export(
     from skidpad.cli.folders import require_run
 
     require_run(run)
-    from skidpad.campaign.run_road import road_files
+    from skidpad.campaign.runs.road import road_files
     from skidpad.recording.formats.osi import send_run, write_osi
     from skidpad.recording.formats.osi_udp import read_address
     from skidpad.recording.run.log_files import read_log
@@ -63,8 +63,8 @@ def export(
 
 def _environment(run: Path) -> Environment | None:
     """Weather and road of the run, where its description is there."""
-    from skidpad.campaign.outdoors import environment_of
-    from skidpad.campaign.stored import read_run
+    from skidpad.campaign.driving.outdoors import environment_of
+    from skidpad.campaign.runs.stored import read_run
     from skidpad.core.errors import InputError
 
     try:
@@ -75,8 +75,8 @@ def _environment(run: Path) -> Environment | None:
 
 def _world(run: Path, log: RunLog) -> World:
     """Projection, lights and rain of the run, as far as road and description are there."""
-    from skidpad.campaign.run_road import road_files
-    from skidpad.campaign.stored import read_run
+    from skidpad.campaign.runs.road import road_files
+    from skidpad.campaign.runs.stored import read_run
     from skidpad.core.errors import InputError
     from skidpad.core.geometry import Pose, wrap_angle
     from skidpad.physics.grip import rain_rate

@@ -254,7 +254,7 @@ def drive_one(
     """
     from msgspec import structs
 
-    from skidpad.campaign.channel_routes import driven_routes
+    from skidpad.campaign.channels.routes import driven_routes
     from skidpad.core.errors import require_choice
     from skidpad.recording.files import require_free
 

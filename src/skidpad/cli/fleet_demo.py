@@ -70,8 +70,8 @@ class Job:
 
 def drive(job: Job) -> tuple[int, int]:
     """In a worker: drive, monitor under the active rules, and count errors under both."""
-    from skidpad.campaign.channel_drive import drive_segment
-    from skidpad.campaign.channel_routes import driven_routes
+    from skidpad.campaign.channels.drive import drive_segment
+    from skidpad.campaign.channels.routes import driven_routes
     from skidpad.fleet.loop.judging import errors_of
     from skidpad.fleet.updates.payloads import PayloadKind, read_payload_content
     from skidpad.live.watch import watch

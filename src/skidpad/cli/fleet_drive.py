@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.channel_drive import drive_segment
+from skidpad.campaign.channels.drive import drive_segment
 from skidpad.core.channels import ChannelFrame, Context
 from skidpad.core.run import RunSpec
 from skidpad.fleet.aboard import Aboard

@@ -58,8 +58,8 @@ def grip(
     alone, keep_all = drives_alone(run.backend), keep is Keep.ALL
     if map.map_of is not None:
         require_choice("--map-of", map.map_of, MAPS)
-        from skidpad.campaign import threshold
         from skidpad.campaign.campaign import Campaign
+        from skidpad.campaign.recipes import threshold
         from skidpad.cli import threshold_plan
         from skidpad.report.grip.threshold import write_threshold_report
 
@@ -74,7 +74,7 @@ def grip(
     run = structs.replace(run, driver=ego.chosen(), course=scenario)
     cells = plan_grip(cross, run, seeds or REPEATS)
     from skidpad.campaign.campaign import Campaign
-    from skidpad.campaign.grip import recipe
+    from skidpad.campaign.recipes.grip import recipe
     from skidpad.recording.campaign.results import read_results
     from skidpad.report.grip.page import write_grip_report
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TypeVar
 
-from skidpad.campaign.grip_cells import Cross, cross, seeds
+from skidpad.campaign.cells.grip import Cross, cross, seeds
 from skidpad.cli.asked import GripCross, Tuned
 from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.run import Friction, RunSpec

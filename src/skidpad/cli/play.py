@@ -77,7 +77,7 @@ def play(
         return
     if out is None:
         raise ConfigError("play needs --out DIR for the run, or --check")
-    from skidpad.campaign.play import run_to
+    from skidpad.campaign.runs.play import run_to
     from skidpad.scenarios.distributions import is_distribution
 
     if file.is_dir() or is_distribution(file):
@@ -157,7 +157,7 @@ def _campaign(
 ) -> Campaign[RunSpec, GripKey, GripMetrics]:
     """Of all that can be played; the others are added to `left_out`."""
     from skidpad.campaign.campaign import Campaign
-    from skidpad.campaign.files import RECIPE, scenario_files
+    from skidpad.campaign.recipes.files import RECIPE, scenario_files
     from skidpad.cli.carla_backend import drives_alone
     from skidpad.recording.run.staging import LeftOut
 
@@ -177,7 +177,7 @@ def play_runs(
     below: Path | None = None,
 ) -> list[RunSpec]:
     """Return the runs of files in every weather, grip and seed that is asked for."""
-    from skidpad.campaign.files import runs_of
+    from skidpad.campaign.recipes.files import runs_of
     from skidpad.physics.presets import find_weather
 
     words = [part.strip() for part in cross.weather.split(",")]
@@ -188,9 +188,9 @@ def play_runs(
 
 def _hindrance(file: Path, template: RunSpec) -> str:
     """Return what keeps a file from being played, "" where nothing does; prints it."""
-    from skidpad.campaign.cast import load_scenario
-    from skidpad.campaign.files import courses_of
-    from skidpad.campaign.grip_cells import scenario_of
+    from skidpad.campaign.cells.grip import scenario_of
+    from skidpad.campaign.driving.run_setup import load_scenario
+    from skidpad.campaign.recipes.files import courses_of
     from skidpad.core.errors import InputError
 
     try:
@@ -204,7 +204,7 @@ def _hindrance(file: Path, template: RunSpec) -> str:
 
 def _check(path: Path, course: Scenario) -> None:
     """Say of a file, or of each in a folder, everything that is wrong or unknown in it."""
-    from skidpad.campaign.files import scenario_files
+    from skidpad.campaign.recipes.files import scenario_files
 
     files = scenario_files(path) if path.is_dir() else [path]
     clean = [_is_clean(file, course) for file in files]
@@ -214,8 +214,8 @@ def _check(path: Path, course: Scenario) -> None:
 
 def _is_clean(file: Path, course: Scenario) -> bool:
     """Say everything that is found in a file, and in each choice where it is a distribution."""
-    from skidpad.campaign.cast import check_scenario
-    from skidpad.campaign.files import courses_of
+    from skidpad.campaign.driving.run_setup import check_scenario
+    from skidpad.campaign.recipes.files import courses_of
     from skidpad.core.errors import FileError
 
     try:

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from skidpad.campaign.campaign import BATCH, Campaign
-from skidpad.campaign.recipe import cell_of
+from skidpad.campaign.recipes.recipe import cell_of
 from skidpad.core.wording import count_text
 from skidpad.recording.campaign.ledger import Entry
 

@@ -11,7 +11,7 @@ import typer
 from skidpad.cli.campaigns import FirstSeed
 
 if TYPE_CHECKING:
-    from skidpad.campaign.rerun import Rerun
+    from skidpad.campaign.runs.rerun import Rerun
 
 
 RECORDING = ".mcap"
@@ -36,8 +36,8 @@ def rerun(
 
     is_segment = run.suffix == RECORDING
     require_run(run, RECORDING)
-    from skidpad.campaign import rerun as again
-    from skidpad.campaign.stored import read_run, read_segment
+    from skidpad.campaign.runs import rerun as again
+    from skidpad.campaign.runs.stored import read_run, read_segment
 
     for foreign in (read_segment if is_segment else read_run)(run).foreign_code:
         if not yes:
@@ -81,12 +81,12 @@ def study(
     from rich.console import Console
     from rich.progress import Progress
 
-    from skidpad.campaign import cells
-    from skidpad.campaign.study_arms import STUDIES
+    from skidpad.campaign.cells import matrix as cells
+    from skidpad.campaign.studies.arms import STUDIES
     from skidpad.core.errors import require_choice
 
     require_choice("study", id, tuple(STUDIES))
-    from skidpad.campaign.study import run_study
+    from skidpad.campaign.studies.study import run_study
     from skidpad.recording.files import write_csv
 
     with Progress(console=Console(stderr=True)) as progress:

@@ -10,7 +10,7 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from skidpad.campaign.shadow import Shadowed
+    from skidpad.campaign.runs.shadow import Shadowed
     from skidpad.evidence.shadow import Foresight, Parting
 
 RECORDING = ".mcap"
@@ -46,8 +46,8 @@ def shadow(
         for line in channel_lines(run, driver):
             typer.echo(line)
         return
-    from skidpad.campaign.shadow import ride_along
-    from skidpad.campaign.stored import read_run
+    from skidpad.campaign.runs.shadow import ride_along
+    from skidpad.campaign.runs.stored import read_run
     from skidpad.cli.asked import Drivers
 
     driver = driver or "reference"

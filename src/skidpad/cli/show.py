@@ -7,9 +7,9 @@ from pathlib import Path
 
 from rich.table import Table
 
-from skidpad.campaign.run_road import load_road
-from skidpad.campaign.runfolder import CONFIG
-from skidpad.campaign.stored import read_run
+from skidpad.campaign.runs.folder import CONFIG
+from skidpad.campaign.runs.road import load_road
+from skidpad.campaign.runs.stored import read_run
 from skidpad.cli.tables import table_console
 from skidpad.core.errors import FileError
 from skidpad.core.simulator import BackendKind

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from msgspec import structs
 
-from skidpad.campaign.grip_cells import seeds
-from skidpad.campaign.threshold_cells import (
+from skidpad.campaign.cells.grip import seeds
+from skidpad.campaign.cells.threshold import (
     DECELERATION_RANGE,
     LEVEL_RANGE,
     Levels,

@@ -19,7 +19,7 @@ from skidpad.core.vocabulary import SensorLevel
 if TYPE_CHECKING:
     from rich.progress import Progress
 
-    from skidpad.campaign.worker import Runner
+    from skidpad.campaign.workers.worker import Runner
     from skidpad.cli.asked import EgoStack, PlayCross, Tuned
     from skidpad.core.space import Space, Variable
 
@@ -53,8 +53,8 @@ class Batches(Struct, frozen=True, kw_only=True):
         """Yield what drives batches, and a bar that is shown in a terminal; Ctrl-C says how to go on."""
         from rich.progress import Progress
 
-        from skidpad.campaign import cluster
-        from skidpad.campaign.pool import keep_workers
+        from skidpad.campaign.workers import cluster
+        from skidpad.campaign.workers.pool import keep_workers
         from skidpad.cli.progress import console, interruptible
 
         here = self.cluster is None
@@ -133,8 +133,8 @@ def _template(
 
 def _require_parameters(template: RunSpec, space: Space) -> None:
     """Raise FileError where the file declares no parameter of a name that varies."""
-    from skidpad.campaign.cast import load_scenario
-    from skidpad.campaign.grip_cells import scenario_of
+    from skidpad.campaign.cells.grip import scenario_of
+    from skidpad.campaign.driving.run_setup import load_scenario
     from skidpad.search.space import apply_values
 
     load_scenario(scenario_of(template))

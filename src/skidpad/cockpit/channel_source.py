@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.drive import Moment
-from skidpad.campaign.keeping import with_kept_map
-from skidpad.campaign.stored import read_segment
+from skidpad.campaign.driving.loop import Moment
+from skidpad.campaign.runs.stored import read_segment
+from skidpad.campaign.user_files import with_kept_map
 from skidpad.cockpit.indicators import every, least_of, ttc_ahead
 from skidpad.cockpit.marks import RADAR_MOUNT
 from skidpad.cockpit.monitored import read_judgements

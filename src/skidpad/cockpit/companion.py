@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.drive import Moment
+from skidpad.campaign.driving.loop import Moment
 from skidpad.cockpit import hud
 from skidpad.cockpit.source import Source, index_at
 from skidpad.cockpit.studio import Studio, View, plane

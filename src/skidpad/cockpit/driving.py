@@ -6,9 +6,9 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from skidpad.campaign.cast import stage_of
-from skidpad.campaign.desk import Desk
-from skidpad.campaign.desk_run import drive_at_desk
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.runs.desk_run import drive_at_desk
+from skidpad.campaign.takeover.desk import Desk
 from skidpad.cockpit import hud
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.realtime import CockpitPacer

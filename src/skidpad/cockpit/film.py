@@ -11,7 +11,7 @@ import msgspec
 import numpy as np
 from PIL import Image
 
-from skidpad.campaign.drive import Moment
+from skidpad.campaign.driving.loop import Moment
 from skidpad.cockpit import hud
 from skidpad.cockpit.companion import Companion
 from skidpad.cockpit.marks import LightAhead, marks_of, patch_marks

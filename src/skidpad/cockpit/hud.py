@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.desk import Desk
-from skidpad.campaign.drive import Moment
+from skidpad.campaign.driving.loop import Moment
+from skidpad.campaign.takeover.desk import Desk
 from skidpad.core.constants import G
 from skidpad.core.geometry import kmh_from_mps
 from skidpad.core.inputs import Beam

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.drive import Moment
+from skidpad.campaign.driving.loop import Moment
 from skidpad.core.frames import RadarPoints
 from skidpad.core.geometry import Pose
 from skidpad.core.specs import CameraSpec, RadarSpec

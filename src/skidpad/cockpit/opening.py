@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from skidpad.campaign.play import run_to
+from skidpad.campaign.runs.play import run_to
 from skidpad.cockpit.channel_source import ChannelSource, weather_of
 from skidpad.cockpit.replay import RecordedRun
 from skidpad.cockpit.source import Source

@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable
 from time import perf_counter, sleep
 
-from skidpad.campaign.drive import Moment, Sink
-from skidpad.campaign.pace import SLOW
+from skidpad.campaign.driving.loop import Moment, Sink
+from skidpad.campaign.driving.pace import SLOW
 from skidpad.cockpit.words import Link
 from skidpad.core.setup import DT
 from skidpad.core.states import ActorTable

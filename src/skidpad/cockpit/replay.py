@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.campaign.desk import beam_of
-from skidpad.campaign.drive import Moment
-from skidpad.campaign.run_road import load_road
-from skidpad.campaign.stored import read_run
+from skidpad.campaign.driving.loop import Moment
+from skidpad.campaign.runs.road import load_road
+from skidpad.campaign.runs.stored import read_run
+from skidpad.campaign.takeover.desk import beam_of
 from skidpad.cockpit.indicators import every, least_of, ttc_ahead
 from skidpad.cockpit.source import Curves, Said, Seat, index_at
 from skidpad.core.errors import FileError

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from skidpad.campaign.drive import Moment, Sink
+from skidpad.campaign.driving.loop import Moment, Sink
 from skidpad.cockpit import hud
 from skidpad.cockpit.feed import Feed
 from skidpad.cockpit.marks import LightAhead, Marks, marks_of, patch_marks

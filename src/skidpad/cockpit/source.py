@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol
 
-from skidpad.campaign.drive import Moment
+from skidpad.campaign.driving.loop import Moment
 from skidpad.cockpit.indicators import NEAR
 from skidpad.core.frames import SensorFrame
 from skidpad.core.geometry import Pose

@@ -13,7 +13,7 @@ from typing import Any
 
 import msgspec
 
-from skidpad.campaign.recipe import cell_of
+from skidpad.campaign.recipes.recipe import cell_of
 from skidpad.cockpit.serving import has_screen
 from skidpad.core.errors import FileError, InputError
 from skidpad.core.names import inside

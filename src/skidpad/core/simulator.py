@@ -74,7 +74,7 @@ class BackendType:
 
 
 def _own_backends() -> tuple[BackendType, ...]:
-    at = "skidpad.campaign.backends:"
+    at = "skidpad.campaign.driving.backends:"
     return (
         BackendType(BackendKind.EMBEDDED, "The simulator of Skidpad", at + "make_embedded"),
         BackendType(BackendKind.CARLA, "A CARLA server", at + "make_carla"),

@@ -11,8 +11,8 @@ import msgspec
 import numpy as np
 from msgspec import structs
 
-from skidpad.campaign.play import run_to
-from skidpad.campaign.worker import Runner
+from skidpad.campaign.runs.play import run_to
+from skidpad.campaign.workers.worker import Runner
 from skidpad.core.space import Space
 from skidpad.recording.campaign.searches import (
     CHOICES,

@@ -15,7 +15,7 @@ import msgspec
 import numpy as np
 from msgspec import Struct, structs
 
-from skidpad.campaign.worker import Job, Runner
+from skidpad.campaign.workers.worker import Job, Runner
 from skidpad.core.errors import FileError, OutputError
 from skidpad.recording.campaign.risks import RISK, RISK_RUNS, Risk, read_risk
 from skidpad.recording.campaign.searches import (

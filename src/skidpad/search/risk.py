@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 from scipy.special import ndtr
 
-from skidpad.campaign.worker import Runner
+from skidpad.campaign.workers.worker import Runner
 from skidpad.core.space import Choice, Variable
 from skidpad.recording.campaign.risks import (
     RISK_FOUND,

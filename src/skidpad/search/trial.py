@@ -8,7 +8,7 @@ from math import atan2, pi
 
 from msgspec import structs
 
-from skidpad.campaign.run import Run, run
+from skidpad.campaign.runs.run import Run, run
 from skidpad.core.errors import InputError
 from skidpad.core.geometry import Pose, kmh_from_mps
 from skidpad.core.run import ReferenceDriver, RunSpec

@@ -7,7 +7,7 @@ import pytest
 
 from channel_worlds import Listed, frame
 from runs import segment_run
-from skidpad.campaign.channel_drive import drive_segment
+from skidpad.campaign.channels.drive import drive_segment
 from skidpad.cli.shadow import channel_lines
 from skidpad.core.channels import Decision
 from skidpad.core.errors import ConfigError

@@ -11,7 +11,7 @@ from typing import Any
 from replay import without_road_noise
 
 from runs import adas_run, scenario_run
-from skidpad.campaign.run import run
+from skidpad.campaign.runs.run import run
 from skidpad.core.frames import Frame
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand

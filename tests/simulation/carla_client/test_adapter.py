@@ -19,8 +19,8 @@ from backend_contract import CHECKS
 from carla_programs import HERE, environment
 from runs import adas_run
 from skidpad.campaign.campaign import Campaign
-from skidpad.campaign.matrix import RECIPE
-from skidpad.campaign.pool import local
+from skidpad.campaign.recipes.matrix import RECIPE
+from skidpad.campaign.workers.pool import local
 from skidpad.core.simulator import BackendChoice, BackendKind
 from skidpad.recording.campaign.matrix import MatrixEntry
 from skidpad.simulation.carla_server.process import ServerProcess

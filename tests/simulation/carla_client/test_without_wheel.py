@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from skidpad.campaign.backends import carla_options
-from skidpad.campaign.starts import start_of
+from skidpad.campaign.driving.backends import carla_options
+from skidpad.campaign.driving.starts import start_of
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.core.geometry import Pose
 from skidpad.core.simulator import BackendChoice, BackendKind

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from skidpad.campaign.bench_traffic import measure
-from skidpad.campaign.traffic_asked import TrafficBench
+from skidpad.campaign.bench.traffic import measure
+from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.core.constants import G
 from skidpad.core.setup import ActorSetup, Setup
 from skidpad.core.states import ActorStates

@@ -5,7 +5,7 @@ import pytest
 from msgspec.structs import replace
 
 from runs import segment_run
-from skidpad.campaign.channel_world import segment_of
+from skidpad.campaign.channels.world import segment_of
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.bundled import load_map

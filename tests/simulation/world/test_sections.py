@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from lxml import etree
 
-from skidpad.campaign.bench_traffic import FIRST_SEED, background_world
-from skidpad.campaign.traffic_asked import TrafficBench
+from skidpad.campaign.bench.traffic import FIRST_SEED, background_world
+from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.roads.bundled import load_map
 from skidpad.roads.queries import RoadMap
 from skidpad.simulation.world.traffic.manager import priority_of

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from shapely.geometry import Point, Polygon
 
-from skidpad.campaign.surfaces import read_surface
+from skidpad.campaign.driving.surfaces import read_surface
 from skidpad.core.errors import ConfigError
 from skidpad.core.surface import SurfacePatch
 from skidpad.core.vocabulary import GripModel

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from skidpad.campaign.bench_traffic import background_world
-from skidpad.campaign.traffic_asked import TrafficBench
+from skidpad.campaign.bench.traffic import background_world
+from skidpad.campaign.bench.traffic_options import TrafficBench
 from skidpad.core.vocabulary import LightState
 from skidpad.roads.bundled import load_map
 from skidpad.simulation.world.traffic.spacing import claims, is_crossing_free

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis.strategies import floats
 from stackfakes import SPECS, ArcMap, ego_at, frame
 
-from skidpad.campaign.run import run
+from skidpad.campaign.runs.run import run
 from skidpad.core.run import AdasDriver, Function, Roads, RunSpec
 from skidpad.core.vocabulary import SensorLevel, Tier
 from skidpad.roads.bundled import load_map

@@ -1,0 +1,180 @@
+"""What a tick costs, part by part, in CPU time (decision M-16): the loop with a clock in between.
+
+For `skidpad bench tick`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from functools import wraps
+from time import process_time_ns
+from typing import Any, TypeVar
+
+import cv2
+import numpy as np
+from msgspec import structs
+
+from skidpad.campaign.driving.loop import Moment, Sink, loop
+from skidpad.campaign.driving.run_setup import driver_of, stage_of
+from skidpad.campaign.runs.run import log_of
+from skidpad.core.run import AdasDriver, Render, RunSpec
+from skidpad.core.vocabulary import SensorLevel
+from skidpad.physics.presets import find_weather
+from skidpad.simulation.embedded.engine import EmbeddedBackend
+from skidpad.simulation.sensing import Pixels
+from skidpad.stack.configurations import functions_of
+
+F = TypeVar("F", bound=Callable[..., Any])
+WARM_UP = 2.0  # s simulated before the clock counts: kernels load, caches fill
+MS = 1.0e-6  # per ns
+CONFIGURATIONS = (0, 2, 3, 4)
+WEATHERS = ("clear-noon", "rain-night")
+SECONDS = 60.0  # s simulated per measurement
+# ms per tick (decision M-16); configurations without lights, with lights, and at object level.
+TARGET_PLAIN, TARGET_LIGHTS, TARGET_ALL_IMAGES, TARGET_OBJECTS = 2.6, 3.2, 5.5, 0.35
+COMPILE_SECONDS = 30.0  # s simulated, in which a light comes into range
+LIGHTS_FROM = 3  # configuration from which lamps are looked for
+
+
+@dataclass(frozen=True, slots=True)
+class TickCost:
+    """CPU milliseconds per tick of one drive."""
+
+    mean: float
+    median: float
+    p99: float
+    parts: dict[str, float]  # means: world, sensors, rendering, stack, supervisor, log
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One line of the table of tick costs."""
+
+    configuration: int
+    weather: str
+    sensors: str  # pixels, objects or all images
+    cost: TickCost
+    target: float  # ms, for the mean
+
+
+def bench_run(
+    configuration: int, weather: str, level: SensorLevel, render: Render = Render.NEEDED
+) -> RunSpec:
+    """A run of the matrix as users run it: figure8, 20 vehicles, recommended settings."""
+    return RunSpec(
+        driver=AdasDriver(label=str(configuration), functions=functions_of(configuration)),
+        weather=find_weather(weather),
+        sensors=level,
+        render=render,
+    )
+
+
+def tick_costs(seconds: float = SECONDS) -> Iterator[Row]:
+    """The whole table, line by line as it is measured; each drive is driven once before."""
+    for level in (SensorLevel.PIXELS, SensorLevel.OBJECTS):
+        for configuration in CONFIGURATIONS:
+            for weather in WEATHERS:
+                plain = TARGET_LIGHTS if configuration >= LIGHTS_FROM else TARGET_PLAIN
+                target = plain if level is SensorLevel.PIXELS else TARGET_OBJECTS
+                spec = bench_run(configuration, weather, level)
+                yield Row(configuration, weather, level.value, warm_cost(spec, seconds), target)
+    for weather in WEATHERS:
+        spec = bench_run(2, weather, SensorLevel.PIXELS, render=Render.ALL)
+        yield Row(2, weather, "all images", warm_cost(spec, seconds), TARGET_ALL_IMAGES)
+
+
+def warm_cost(spec: RunSpec, seconds: float) -> TickCost:
+    """The cost of a drive whose kernels are compiled."""
+    tick_cost(spec, seconds=COMPILE_SECONDS)
+    return tick_cost(spec, seconds)
+
+
+class Meter:
+    """Adds up the CPU time of named parts."""
+
+    def __init__(self) -> None:
+        self.total: dict[str, int] = {}
+
+    def timed(self, name: str, function: F) -> F:
+        """`function`, its time added to `name`."""
+
+        @wraps(function)
+        def wrapper(*args: Any, **kwargs: Any) -> Any:
+            begin = process_time_ns()
+            try:
+                return function(*args, **kwargs)
+            finally:
+                self.total[name] = self.total.get(name, 0) + process_time_ns() - begin
+
+        return wrapper  # type: ignore[return-value]
+
+
+class Spans(Sink):
+    """CPU time from moment to moment; after `warm` of them the meter begins anew."""
+
+    def __init__(self, meter: Meter, warm: int) -> None:
+        self.meter, self.warm = meter, warm
+        self.stamps: list[int] = []
+
+    def see(self, moment: Moment) -> None:
+        """Takes the time of one more tick."""
+        del moment
+        if len(self.stamps) == self.warm:
+            self.meter.total.clear()
+        self.stamps.append(process_time_ns())
+
+    @property
+    def spans(self) -> np.ndarray[Any, Any]:
+        """ns per tick after the warm-up."""
+        return np.diff(self.stamps[self.warm :])
+
+
+def tick_cost(spec: RunSpec, seconds: float = 60.0) -> TickCost:
+    """Drive `spec` for some simulated seconds on the embedded simulator and measure."""
+    cv2.setNumThreads(1)  # as in the workers (decision X-10): helpers that wait would count, too
+    meter = Meter()
+    spec = structs.replace(spec, duration=WARM_UP + seconds)
+    stage = stage_of(spec)
+    driver: Any = driver_of(spec, stage)
+    supervisor: Any = stage.supervisor
+    log: Any = log_of(spec, stage)
+    backend = EmbeddedBackend()
+    frame = backend.reset(stage.setup, spec.seed)
+    _instrument(backend, meter)
+    driver.act = meter.timed("stack", driver.act)
+    supervisor.observe = meter.timed("supervisor", supervisor.observe)
+    supervisor.act = meter.timed("supervisor", supervisor.act)
+    log.see = meter.timed("log", log.see)
+    clock = Spans(meter, round(WARM_UP / stage.setup.dt))
+    failure = loop(backend, frame, driver, supervisor, stage.script, (log, clock))
+    backend.close()
+    if failure is not None:
+        raise failure
+    return _summary(clock.spans, meter.total, spec.render is Render.NEEDED)
+
+
+def _instrument(backend: EmbeddedBackend, meter: Meter) -> None:
+    """Clocks around the world's step, the sensors, and images that the stack asks for."""
+    world: Any = backend.world
+    world.step = meter.timed("world", world.step)
+    sensing: Any = backend.sensing
+    sensing.read = meter.timed("sensors", sensing.read)
+    if isinstance(sensing, Pixels):
+        suite: Any = sensing.suite
+        suite.render = meter.timed("rendering", suite.render)
+
+
+def _summary(spans: np.ndarray[Any, Any], total: dict[str, int], lazy: bool) -> TickCost:
+    """lazy: images are rendered when the stack reads them, else when the sensors observe."""
+    parts = {name: ns * MS / len(spans) for name, ns in total.items()}
+    if lazy:
+        parts["stack"] -= parts.get("rendering", 0.0)
+    elif "rendering" in parts:
+        parts["sensors"] -= parts["rendering"]
+    return TickCost(
+        mean=float(spans.mean()) * MS,
+        median=float(np.median(spans)) * MS,
+        p99=float(np.percentile(spans, 99)) * MS,
+        parts=parts,
+    )

@@ -1,0 +1,100 @@
+"""How background drivers get along with each other in a weather: contacts, speed, changes of lane."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from skidpad.campaign.bench.traffic_options import TrafficBench
+from skidpad.campaign.bench.traffic_watch import TrafficCounts, Watch
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.core.run import Roads, RunSpec
+from skidpad.core.settings import load_profile
+from skidpad.core.setup import DT
+from skidpad.core.vocabulary import TrafficStart
+from skidpad.evidence.statistics import Interval, poisson_interval
+from skidpad.physics.presets import find_weather
+from skidpad.simulation.world.stage import staged
+from skidpad.simulation.world.world import EGO, World
+
+DRIVE = 500.0  # s from one seed
+FIRST_SEED = 900_000  # nothing else is driven from here on (decision X-8)
+
+
+@dataclass(slots=True)
+class TrafficRow:
+    """What was seen in one weather; the one in the ego's car is one of the background."""
+
+    weather: str
+    km: float = 0.0
+    hours: float = 0.0  # of all vehicles together
+    contacts: int = 0  # among vehicles
+    static: int = 0  # with what stands beside the road
+    put_back: int = 0  # stuck or astray
+    changes: int = 0  # of lane
+    seen: TrafficCounts = field(default_factory=TrafficCounts)
+
+    @property
+    def per_100_km(self) -> float:
+        """Contacts among vehicles per 100 km."""
+        return 100.0 * self.contacts / self.km
+
+    @property
+    def interval(self) -> Interval:
+        """Of the contacts per 100 km, exact, 95 %."""
+        return poisson_interval(self.contacts, self.km / 100.0)
+
+    @property
+    def mean_speed_kmh(self) -> float:
+        """Of all vehicles over time; at a given density the flow is in proportion."""
+        return self.km / self.hours if self.hours else 0.0
+
+
+def measure(asked: TrafficBench, weather: str) -> TrafficRow:
+    """Drive seed after seed until the vehicles have covered the distance."""
+    row, seed = TrafficRow(weather), FIRST_SEED
+    while row.km < asked.km:
+        world = background_world(asked, weather, seed)
+        _drive(row, world, asked.km, Watch(world, row.seen, weather, seed))
+        seed += 1
+    return row
+
+
+def background_world(asked: TrafficBench, weather: str, seed: int) -> World:
+    """A world as runs have it, in whose ego's car a driver of the background sits."""
+    roads = Roads(map=asked.map, traffic=TrafficStart.RANDOM, vehicles=asked.vehicles - 1)
+    settings = load_profile("recommended", {"drivers": not asked.careless})
+    spec = RunSpec(course=roads, weather=find_weather(weather), settings=settings)
+    world = staged(stage_of(spec).setup, seed)
+    assert world.traffic is not None
+    place = world.placed[EGO]
+    world.traffic.engage(EGO, int(place["lane"]), float(place["s"]))
+    return world
+
+
+def _drive(row: TrafficRow, world: World, km: float, watch: Watch) -> None:
+    assert world.traffic is not None
+    drivers = world.traffic.drivers.state
+    before = drivers["change"].copy()
+    for _ in range(round(DRIVE / DT)):
+        world.step()
+        watch.look()
+        there = world.states.present
+        speed = np.hypot(world.states.vx, world.states.vy)[there]
+        row.km += float(speed.sum()) * DT / 1000.0
+        row.hours += speed.size * DT / 3600.0
+        _count(row, [c.actor for c in world.contacts] + [c.other for c in world.background])
+        row.put_back += len(world.put_back)
+        row.changes += int((drivers["change"] < before).sum())
+        before = drivers["change"].copy()
+        if row.km >= km:
+            break
+    watch.end()
+
+
+def _count(row: TrafficRow, touched: Iterable[int]) -> None:
+    for other in touched:
+        row.contacts += other >= 0
+        row.static += other < 0

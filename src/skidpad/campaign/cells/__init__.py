@@ -1,0 +1,1 @@
+"""Which runs a campaign has: of the matrix, of friction, of the threshold map."""

@@ -1,0 +1,1 @@
+"""Segments of routes that redundant channels drive: their world, the drive, what became of it."""

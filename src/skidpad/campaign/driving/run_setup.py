@@ -1,0 +1,367 @@
+"""From the description of a run to its world and to the actors in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from copy import deepcopy
+from dataclasses import asdict, dataclass, replace
+from math import isfinite, nan
+from pathlib import Path
+from typing import Any
+
+from skidpad.campaign.driving.file_drivers import FILE_DRIVERS
+from skidpad.campaign.driving.governing import apply_envelope
+from skidpad.campaign.driving.loop import Script, Supervising, Timer, Unsupervised
+from skidpad.campaign.driving.starts import start_of
+from skidpad.campaign.file_stack import NAME as STACK_NAME
+from skidpad.campaign.file_stack import PilotConditions, PilotMaker
+from skidpad.campaign.user_files import road_file
+from skidpad.core.errors import ConfigError, FileError, StackError
+from skidpad.core.frames import SensorFrame
+from skidpad.core.geometry import Pose, kmh_from_mps
+from skidpad.core.run import (
+    ActorMode,
+    AdasDriver,
+    AgentDriver,
+    CameraDriver,
+    Passenger,
+    ReferenceDriver,
+    Render,
+    Roads,
+    RunSpec,
+    Scenario,
+    StackDriver,
+)
+from skidpad.core.settings import NightRain, Relocation, TrafficSettings
+from skidpad.core.setup import ActorSetup, Setup, TrafficSetup
+from skidpad.core.simulator import BackendKind
+from skidpad.core.states import ActorTable, StackReport, VehicleCommand
+from skidpad.core.told import describe_value
+from skidpad.core.vocabulary import Control, Outcome
+from skidpad.physics.types import EGO_TYPE, vehicle_type
+from skidpad.roads.bundled import load_map
+from skidpad.roads.queries import RoadMap
+from skidpad.scenarios import scenario as scenarios
+from skidpad.scenarios.player import Player, setups
+from skidpad.scenarios.registry import Names
+from skidpad.scenarios.shipped import NAMES, scenario_file
+from skidpad.sensors.pictures.overlay import Lens
+from skidpad.sensors.published_sensors import twelve_sensors
+from skidpad.simulation.recovery import RecoverySettings, Supervisor
+from skidpad.stack.adas import AdasStack
+from skidpad.stack.agents import load_agent
+from skidpad.stack.channels.settings import CarModel
+from skidpad.stack.interface import Stack
+from skidpad.stack.loading import GuardedStack, import_class, load_stack
+
+CRUISE = "cruise_speed"  # property of a scenario's ego, m/s
+NO_CONDITIONS = PilotConditions()
+ROUTE_LENGTH = "route_length"  # another one, m
+
+
+class StackAtWheel:
+    """A stack that drives: it is given frames, and never the truth."""
+
+    def __init__(self, stack: GuardedStack, lens: Lens | None = None) -> None:
+        """lens: with rain drops on it, before all cameras (B-160)."""
+        self.stack, self.lens = stack, lens
+
+    @property
+    def report(self) -> StackReport:
+        """What the stack says about its last tick."""
+        return self.stack.report
+
+    @property
+    def mode(self) -> str:
+        """Its mode in its own words."""
+        return self.stack.mode
+
+    def begin(self, table: ActorTable) -> None:
+        """Nothing: a stack does not know the cast."""
+
+    def act(self, frame: SensorFrame) -> VehicleCommand:
+        """Returns the stack's answer to the frame."""
+        if self.lens is not None:
+            images, extra = self.lens.seen(frame.images), self.lens.seen(frame.extra)
+            frame = replace(frame, images=images, extra=extra)
+        return self.stack.tick(frame)
+
+
+class Seated:
+    """Drives nothing: the scenario moves the ego."""
+
+    def __init__(self, specs: object, map: object, settings: object) -> None:
+        del specs, map, settings
+
+    def tick(self, frame: SensorFrame) -> VehicleCommand:
+        """Returns a command with no pedal pressed."""
+        del frame
+        return VehicleCommand()
+
+
+@dataclass(frozen=True, slots=True)
+class Stage:
+    """The world of a run, and the actors in it besides the driver."""
+
+    map: RoadMap
+    setup: Setup
+    supervisor: Supervising
+    script: Script
+    player: Player | None = None  # of a scenario
+
+    @property
+    def cruise_kmh(self) -> float | None:
+        """The ego's cruise target where a scenario says it, else its first speed there (G-1)."""
+        if self.player is None:
+            return None
+        played = self.player.scenario
+        first = played.start.entities[played.ego].speed
+        speed = _number_of(played, CRUISE)
+        return max(kmh_from_mps(first if speed is None else speed), 1.0)
+
+    @property
+    def triggered(self) -> bool:
+        """Every event of the scenario has begun; always so without one."""
+        return self.player is None or self.player.triggered
+
+    @property
+    def route_length(self) -> float | None:
+        """m, of the ego's route where the scenario names one."""
+        if self.player is None:
+            return None
+        return _number_of(self.player.scenario, ROUTE_LENGTH)
+
+    @property
+    def outcome(self) -> Outcome:
+        """How a drive ended in which nothing failed (decisions G-2, L-7)."""
+        if self.player is not None and self.player.hit:
+            return Outcome.COLLISION
+        return Outcome.COMPLETED if self.triggered else Outcome.NOT_TRIGGERED
+
+
+def _number_of(played: scenarios.Scenario, name: str) -> float | None:
+    """A property of the ego that is a number; None where it has none of this name."""
+    text = played.ego_entity.properties.get(name)
+    if text is None:
+        return None
+    try:
+        value = float(text)
+    except ValueError:
+        value = nan
+    if not isfinite(value):
+        raise FileError(
+            f"property {name} of the ego must be a number, got {describe_value(text, 100)}"
+        )
+    return value
+
+
+def stage_of(spec: RunSpec) -> Stage:
+    """The stage of a run with roads or a scenario; FileError for a file that cannot be played."""
+    if isinstance(spec.course, Scenario):
+        return _scenario(spec, spec.course)
+    if not isinstance(spec.course, Roads):
+        raise ConfigError("a route is driven by channels")
+    return _roads(spec, spec.course)
+
+
+def _roads(spec: RunSpec, course: Roads) -> Stage:
+    s = spec.settings.traffic
+    file = road_file(course)
+    map = load_map(file)
+    ego = ActorSetup(name="ego", type=EGO_TYPE, place=start_of(map), driver=Control.SCRIPTED)
+    traffic = TrafficSetup(
+        mode=course.traffic,
+        vehicles=course.vehicles,
+        allow_fewer=course.allow_fewer,
+        reserve=course.reserve,
+        variant=s.traffic_positions.value,
+        initial_limit_kmh=s.initial_limit_kmh,
+        slow_in_weather=s.drivers,
+        variety=s.drivers,
+    )
+    setup = replace(setup_of(spec, file, ego), traffic=traffic)
+    supervisor = Supervisor(map, recovery_settings(s), setup.dt)
+    return Stage(map, setup, supervisor, Timer(round(spec.duration / setup.dt)))
+
+
+def _scenario(spec: RunSpec, course: Scenario) -> Stage:
+    compiled = load_scenario(course, _pilot_conditions(spec))
+    modes: dict[str, ActorMode | None] = dict.fromkeys(compiled.entities, course.actors)
+    modes[compiled.ego] = ActorMode.IDEAL if isinstance(spec.driver, Passenger) else None
+    played = Player(
+        compiled,
+        modes=modes,
+        skill=course.skill,
+        duration=spec.duration,
+        end_on_collision=course.end_on_collision,
+        seed=spec.seed,
+    )
+    ego, actors = setups(compiled)
+    setup = replace(setup_of(spec, compiled.map_name, ego), actors=actors)
+    environment = compiled.start.environment
+    if environment is not None and environment.friction_scale is not None:
+        setup = replace(setup, mu_ref=setup.mu_ref * environment.friction_scale)
+    return Stage(compiled.map, setup, Unsupervised(), played, played)
+
+
+def _pilot_conditions(spec: RunSpec) -> PilotConditions:
+    """Returns what the stacks of other actors drive in: as the ego, at the object level."""
+    nobody = ActorSetup(name="", type=EGO_TYPE, place=Pose(0.0, 0.0))
+    settings = spec.settings
+    return PilotConditions(
+        setup_of(spec, "", nobody), spec.seed, settings.profile, settings.stack.to_plain()
+    )
+
+
+def load_scenario(
+    course: Scenario, conditions: PilotConditions = NO_CONDITIONS
+) -> scenarios.Scenario:
+    """The file of a course, compiled; ScenarioError lists all that keeps it from being played.
+
+    conditions: in what stacks of other actors drive.
+    """
+    checked = check_scenario(course, conditions)
+    return checked.playable()
+
+
+def check_scenario(
+    course: Scenario, conditions: PilotConditions = NO_CONDITIONS
+) -> scenarios.Compiled:
+    """The same, with everything that was found."""
+    own = {**FILE_DRIVERS, STACK_NAME: PilotMaker(conditions)}
+    file = scenario_file(course.file) if course.file in NAMES else Path(course.file)
+    return scenarios.check(
+        file,
+        course.parameters,
+        course.ego,
+        maps=[Path(folder) for folder in course.maps],
+        ignore_unsupported=course.ignore_unsupported,
+        lenient=course.lenient,
+        names=Names({**own, **_load_registered(course.register)}, strict=course.strict),
+    )
+
+
+def _load_registered(texts: Sequence[str]) -> dict[str, type[Any]]:
+    """The classes that a user gives names: NAME=module:Class."""
+    found = {}
+    for text in texts:
+        name, equals, where = text.partition("=")
+        if not equals or not name:
+            raise ConfigError(
+                f"--register takes NAME=module:Class, got {describe_value(text, 200)}"
+            )
+        found[name] = import_class(where, "class")
+    return found
+
+
+def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
+    """What every set-up says: the weather, what it touches, and what is sensed of it."""
+    world, sensors = spec.settings.world, spec.settings.sensors
+    return Setup(
+        map=map,
+        weather=spec.weather,
+        specs=twelve_sensors(bumper_depth_fov_deg=sensors.bumper_depth_fov_deg),
+        ego=ego,
+        grip=spec.grip,
+        range_model=sensors.range,
+        camera_effect=sensors.camera,
+        rain_hides_night=sensors.night_rain is NightRain.RAIN_ONLY,
+        mu_ref=world.mu_ref,
+        tyres=world.tyres,
+        tyre_stiffness=world.tyre_stiffness,
+        water_drag=world.water_drag,
+        material_base=world.mu_ref if world.lane_material else None,
+        lidar=sensors.lidar,
+        stability=world.esc,
+        level=spec.sensors,
+        render_all=spec.render is Render.ALL or _foreign_on_carla(spec),
+        patches=spec.surface,
+    )
+
+
+def _foreign_on_carla(spec: RunSpec) -> bool:
+    """Tells whether a foreign stack drives on CARLA: which images it reads is unknown before."""
+    foreign = isinstance(spec.driver, (StackDriver, AgentDriver))
+    return foreign and spec.backend.backend == BackendKind.CARLA
+
+
+def recovery_settings(s: TrafficSettings) -> RecoverySettings:
+    """The supervisor's part of the settings (D-076, D-077, D-080)."""
+    if s.relocation is Relocation.STANDING:
+        return RecoverySettings(warm_up=1.5, release_speed=0.0, clearance=s.clearance)
+    return RecoverySettings(clearance=s.clearance)
+
+
+def driver_of(spec: RunSpec, stage: Stage, kind: type[Stack] | None = None) -> StackAtWheel:
+    """The stack that drives, built; StackError when it cannot be. kind: its class, if loaded."""
+    found, settings = _class_of(spec, stage, kind)
+    # our own stack gives the map's arrays to kernels, which know one type of array
+    chosen = kind or found
+    map = stage.map if chosen is AdasStack else stage.map.read_only()
+    chosen = apply_envelope(chosen, spec, stage.setup)
+    common = tuple(spec for spec in stage.setup.specs if spec.id not in stage.setup.asked)
+    stack = GuardedStack(chosen, common, map, settings)
+    return StackAtWheel(stack, Lens(spec.weather, spec.seed) if spec.overlay else None)
+
+
+def _class_of(
+    spec: RunSpec, stage: Stage, kind: type[Stack] | None
+) -> tuple[type[Stack], Mapping[str, object]]:
+    """The driver's class and its settings. kind: the class, if loaded: a user's file runs once."""
+    driver = spec.driver
+    cruise = {} if stage.cruise_kmh is None else {"cruise_kmh": stage.cruise_kmh}
+    match driver:
+        case StackDriver():
+            # a copy: whatever it does to them
+            return kind or load_stack(driver.where), {**cruise, **deepcopy(driver.options)}
+        case AgentDriver():
+            return load_agent(driver.where), {}
+        case Passenger():
+            return Seated, {}
+        case CameraDriver():
+            from skidpad.stack.camera import driver as camera  # its network is read with it
+
+            return camera.CameraDriver, cruise
+        case ReferenceDriver():
+            from skidpad.stack.reference.driver import ReferenceStack
+
+            return ReferenceStack, {"seed": spec.seed, "car": asdict(ego_model()), **cruise}
+        case AdasDriver():
+            if driver.cruise_kmh is not None:
+                cruise = {"cruise_kmh": driver.cruise_kmh}
+            return AdasStack, {
+                "functions": [*sorted(f.value for f in driver.functions), *driver.added],
+                "profile": spec.settings.profile,
+                "set": spec.settings.stack.to_plain(),
+                **cruise,
+            }
+    raise ConfigError(f"{driver.label} needs a route to drive")
+
+
+def ego_model() -> CarModel:
+    """What a driver knows about the ego."""
+    t = vehicle_type(EGO_TYPE)
+    return CarModel(
+        length=t.length,
+        width=t.width,
+        wheelbase=t.wheelbase,
+        steer_max=t.steer_max,
+        a_drive=t.a_drive,
+        a_brake=t.a_brake,
+    )
+
+
+def with_sensors(setup: Setup, stack: GuardedStack) -> Setup:
+    """The set-up with the further sensors that the stack asks for (L-3).
+
+    A sensor that is there already as another stack asked for it is shared; StackError for a name
+    that stands for another one.
+    """
+    there = {spec.id: spec for spec in setup.specs}
+    wanted = stack.sensors()
+    for spec in wanted:
+        if there.get(spec.id, spec) != spec:
+            raise StackError(f"{stack.name}.sensors(): {spec.id!r} is another sensor already")
+    more = tuple(spec for spec in wanted if spec.id not in there)
+    asked = setup.asked | {spec.id for spec in wanted}
+    return replace(setup, specs=(*setup.specs, *more), asked=asked)

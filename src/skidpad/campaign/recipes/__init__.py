@@ -1,0 +1,1 @@
+"""The kinds of campaigns: what a run is, how it is driven, which row comes back."""

@@ -1,0 +1,158 @@
+"""The recipe of the friction campaign: short scenarios in thousands of paired runs.
+
+Every run leaves its series; whole logs are kept of those that the report shows (decision G-7).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import partial
+from operator import attrgetter
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from skidpad import __version__
+from skidpad.campaign.cells.grip import Cross, cross, scenario_of, template
+from skidpad.campaign.recipes.grip_shown import CELL, select_shown_runs, write_stopping
+from skidpad.campaign.recipes.recipe import Driven, Recipe
+from skidpad.campaign.runs.folder import (
+    Stopwatch,
+    fresh_folder,
+    last_line,
+    write_config,
+    write_played,
+    write_run,
+)
+from skidpad.campaign.user_files import keep_road
+from skidpad.campaign.workers.worker import Job, Runner
+from skidpad.core.run import RunSpec
+from skidpad.core.vocabulary import Outcome
+from skidpad.recording.campaign.folder import RUNS
+from skidpad.recording.campaign.grip import (
+    GRIP,
+    GripEntry,
+    GripKey,
+    GripMetrics,
+    series_path,
+    write_series,
+)
+from skidpad.recording.campaign.results import Timing, read_results
+from skidpad.recording.run.log_files import TICKS, log_hash
+from skidpad.scenarios.variation import CutIn
+
+if TYPE_CHECKING:
+    from skidpad.campaign.runs.run import Run
+
+
+def warm_up() -> None:
+    """Compile every kernel that a run may need."""
+    from skidpad.campaign.runs.run import run
+    from skidpad.physics.presets import preset
+
+    varied = Cross(scenarios=("front_accident", "ghost_cut_in"), weather=(preset("icy_30"),))
+    for cell in cross(template(), varied, range(1)):
+        run(cell)
+
+
+@dataclass(frozen=True, slots=True)
+class GripDrive:
+    """A drive, and what its log says."""
+
+    driven: Run
+    metrics: GripMetrics
+    log_hash: str
+    timing: Timing
+
+
+def drive_and_judge(out: Path, cell: RunSpec, keep: bool = False) -> GripDrive:
+    """In a worker: drive a run of the catalogue; with `keep`, or when it failed, into its folder."""
+    from skidpad.campaign.driving.backends import WATCHDOG, keep_server, make_backend
+    from skidpad.campaign.runs.run import run
+    from skidpad.evidence.grip.scores import grip_metrics
+    from skidpad.physics.grip import friction_ratio
+
+    folder, watch = fresh_folder(out, cell.name), Stopwatch()
+    keep_server(cell.backend)
+    backend = make_backend(cell.backend, WATCHDOG)
+    driven = run(cell, backend=backend, folder=folder if keep else None)
+    metrics = grip_metrics(
+        driven.log,
+        driven.outcome,
+        triggered=driven.triggered,
+        route_length=driven.route_length,
+        ratio=friction_ratio(cell.weather, cell.grip),
+        off_road=driven.off_road,
+    )
+    if keep or driven.error:
+        write_config(folder, cell.to_plain())
+        write_run(folder, driven)
+        write_played(folder, driven)
+        keep_road(out, driven.road)
+    return GripDrive(driven, metrics, log_hash(driven.log), watch.timing())
+
+
+def drive_one(out: Path, cell: RunSpec, *, keep: bool = False) -> Driven[GripKey, GripMetrics]:
+    """In a worker: drive a cell and write its series, with `keep` its log too."""
+    from skidpad.evidence.grip.scores import grip_series
+
+    found = drive_and_judge(out, cell, keep)
+    write_series(series_path(out, cell.cell, cell.seed), grip_series(found.driven.log))
+    return Driven(
+        key=grip_key(cell, found.driven.outcome, found.log_hash),
+        metrics=found.metrics,
+        timing=found.timing,
+        error=last_line(found.driven.error),
+    )
+
+
+def grip_key(cell: RunSpec, outcome: Outcome, log_hash: str | None = None) -> GripKey:
+    """The identifying columns of a cell's row."""
+    return GripKey(
+        scenario=scenario_of(cell).title,
+        weather=cell.weather.name,
+        friction=cell.friction.value,
+        seed=cell.seed,
+        cutin=scenario_of(cell).variant or CutIn.FIXED.value,
+        controller=cell.driver.label,
+        sensors=cell.sensors.value,
+        model=cell.settings.world.grip.value,
+        overlay=cell.overlay,
+        outcome=outcome.value,
+        version=__version__,
+        log_hash=log_hash,
+    )
+
+
+def finish(cells: Sequence[RunSpec], out: Path, runner: Runner) -> None:
+    """Keep the logs of what the report shows (a drive is the same whenever it is driven)."""
+    wanted = set(select_shown_runs(read_results(out)).select(*CELL, "seed").iter_rows())
+    work = partial(drive_one, out, keep=True)
+    jobs = [
+        Job(c.name, work, c, c.deadline_s)
+        for c in cells
+        if attrgetter(*CELL, "seed")(grip_key(c, Outcome.COMPLETED)) in wanted
+        and not (out / RUNS / c.name / TICKS).exists()
+    ]
+    for _ in runner(jobs):
+        pass
+    write_stopping(
+        out,
+        list({c.weather.name: c.weather for c in cells}.values()),
+        cells[0].settings.world.mu_ref,
+    )
+
+
+def recipe(keep_all: bool = False) -> Recipe[RunSpec, GripKey, GripMetrics]:
+    """keep_all: the whole log of every run."""
+    return Recipe(
+        command="grip",
+        columns=GRIP,
+        entry=GripEntry,
+        key=grip_key,
+        drive=partial(drive_one, keep=keep_all),
+        warm_up=warm_up,
+        success=lambda metrics: metrics.completion,
+        success_means="completed",
+        finish=finish,
+    )

@@ -1,0 +1,78 @@
+"""What a kind of campaign is made of: its runs, how one is driven, what row comes back."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Generic, Protocol, TypeVar
+
+from skidpad.campaign.workers.worker import Runner
+from skidpad.core.vocabulary import Outcome
+from skidpad.recording.campaign.added_metrics import AddedMetric
+from skidpad.recording.campaign.ledger import Entry, K
+from skidpad.recording.campaign.results import Columns, Timing
+
+
+class Task(Protocol):
+    """One run of a campaign. Its name is its cell and its number, parted by the last hyphen."""
+
+    @property
+    def name(self) -> str:
+        """Name of the run, unlike that of any other in the campaign."""
+        ...
+
+    @property
+    def deadline_s(self) -> float:
+        """Wall time after which the run counts as hanging."""
+        ...
+
+    def resolved(self) -> dict[str, Any]:
+        """Everything that decides the run, as plain data."""
+        ...
+
+
+T = TypeVar("T", bound=Task)
+M = TypeVar("M")
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Driven(Generic[K, M]):
+    """What a worker says of a run; `error` is the last line of one that the stack made."""
+
+    key: K
+    metrics: M
+    timing: Timing
+    error: str = ""
+    added: tuple[AddedMetric, ...] = ()  # by installed packages
+
+
+def nothing_else(tasks: Sequence[Any], out: Path, runner: Runner) -> None:
+    """A recipe that leaves results and nothing besides."""
+    del tasks, out, runner
+
+
+def no_drive(key: Any) -> None:
+    """A recipe for runs that are never compared in how they moved."""
+    del key
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class Recipe(Generic[T, K, M]):
+    """What a kind of campaign is made of. `drive` and `warm_up` are called in workers."""
+
+    command: str  # that wrote the folder; reports go by it
+    columns: Columns[K, M]
+    entry: type[Entry[K, M]]  # of its ledger
+    key: Callable[[T, Outcome], K]  # of a run that crashed or timed out
+    drive: Callable[[Path, T], Driven[K, M]]  # a run of the campaign in this folder
+    warm_up: Callable[[], None]  # compiles every kernel that a run may need
+    success: Callable[[M], bool | None]  # what a stopping rule counts; None: not a trial
+    success_means: str  # in words, after a number of runs
+    drive_of: Callable[[K], tuple[str, str] | None] = no_drive  # what drove, and how it moved
+    finish: Callable[[Sequence[T], Path, Runner], None] = nothing_else
+
+
+def cell_of(run: str) -> str:
+    """The cell that a run belongs to, by the run's name."""
+    return run.rpartition("-")[0]

@@ -1,0 +1,1 @@
+"""One run with its folder: driven, stored, driven again, shadowed, played."""

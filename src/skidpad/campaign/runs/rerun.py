@@ -1,0 +1,196 @@
+"""Drive a stored run again and look closely at a stretch of it: all views, the tier trace, a film.
+
+The run is deterministic, so the second drive is the first one: the logs are compared by content hash.
+"""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from skidpad.campaign.channels.drive import drive_segment
+from skidpad.campaign.driving.backends import keep_server
+from skidpad.campaign.driving.loop import Moment, Sink, Timer
+from skidpad.campaign.driving.run_setup import stage_of
+from skidpad.campaign.runs.run import run as drive_again
+from skidpad.campaign.runs.stored import read_run, read_segment
+from skidpad.campaign.runs.views import SIZE, twelve_views
+from skidpad.campaign.takeover.desk import Desk, Recorded
+from skidpad.campaign.user_files import with_kept_map
+from skidpad.core.errors import ConfigError, FileError, OutputError
+from skidpad.core.run import RunSpec
+from skidpad.core.setup import DT
+from skidpad.core.states import StackReport
+from skidpad.recording.channels.content_hash import recording_hash
+from skidpad.recording.files import output_error, write_atomically
+from skidpad.recording.run.inputs import read_inputs
+from skidpad.recording.run.log import RunLog
+from skidpad.recording.run.log_files import log_hash, read_log
+
+PICTURES = 40  # at most this many PNG files of a stretch when no film is asked for
+
+
+@dataclass(frozen=True, slots=True)
+class Rerun:
+    """Outcome of driving a stored run again."""
+
+    same: bool  # the stretch up to its end has the same content hash
+    pictures: tuple[Path, ...]
+    film: Path | None
+    trace: tuple[str, ...]  # one line per change of tier or status
+
+
+def rerun(run: Path, begin_s: float, end_s: float, out: Path, film: Path | None = None) -> Rerun:
+    """Drive the run in folder `run` again up to `end_s`, keeping what happens from `begin_s` on."""
+    stored = read_log(run)
+    spec = with_kept_map(read_run(run), run.resolve().parents[1])
+    if not len(stored):
+        raise FileError(f"{run} holds a run that ended before its first tick")
+    last = float(stored.t[-1])
+    if not 0.0 <= begin_s < end_s:
+        raise ConfigError(f"--from {begin_s:g} must be >= 0 and below --to {end_s:g}")
+    if begin_s > last:
+        raise ConfigError(f"--from {begin_s:g} lies after the end of the run at {last:g} s")
+    end_s = min(end_s, last + DT)
+    closely = Closely(begin_s, end_s, out, film)
+    keep_server(spec.backend)
+    try:
+        stage = stage_of(spec)
+        stage = replace(stage, script=Timer(round(end_s / DT), stage.script))
+        again = drive_again(spec, stage=stage, sinks=(closely,), desk=desk_of(run, spec)).log
+        closely.finish()
+    finally:
+        closely.close()
+    n = len(again)
+    same = log_hash(first_ticks(again, n)) == log_hash(first_ticks(stored, n))
+    return Rerun(same, tuple(closely.pictures), film, tuple(closely.trace))
+
+
+def desk_of(run: Path, spec: RunSpec) -> Desk | None:
+    """Returns the desk of a stored run, at which every input is repeated; None: no person took part."""
+    if not spec.inputs:
+        return None
+    return Desk(Recorded(read_inputs(run, spec.inputs)), spec)
+
+
+def same_segment(recording: Path) -> bool:
+    """Drive the segment of a recording of channels again, all of it; the contents are the same."""
+    spec = with_kept_map(read_segment(recording), recording.resolve().parents[1])
+    with TemporaryDirectory() as folder:
+        again = Path(folder) / "again.mcap"
+        drive_segment(spec, again)
+        return recording_hash(again) == recording_hash(recording)
+
+
+def first_ticks(log: RunLog, n: int) -> RunLog:
+    """The first n ticks of a log."""
+
+    def cut(series: Any) -> Any:
+        return type(series)._make(a[:n] for a in series)
+
+    last = int(log.tick[n - 1])
+    return replace(
+        log,
+        tick=log.tick[:n],
+        actors=cut(log.actors),
+        present=log.present[:n],
+        mu=log.mu[:n],
+        ego=cut(log.ego),
+        applied=cut(log.applied),
+        requested=cut(log.requested),
+        report=cut(log.report),
+        supervision=log.supervision[:n],
+        weather=log.weather[:n],
+        weathers=log.weathers[: int(log.weather[:n].max()) + 1],
+        events=tuple(e for e in log.events if e.tick <= last),
+    )
+
+
+class Closely(Sink):
+    """Watches a stretch: pictures or a film of all views, and the trace of tiers."""
+
+    def __init__(self, begin_s: float, end_s: float, out: Path, film: Path | None) -> None:
+        self.begin_s, self.out = begin_s, out
+        self.every = max(1, round((end_s - begin_s) / DT / PICTURES))
+        self.pictures: list[Path] = []
+        self.trace: list[str] = []
+        self._before: tuple[Any, Any] | None = None
+        self._film = None if film is None else Film(film)
+
+    def see(self, moment: Moment) -> None:
+        """Keep this moment if it lies in the stretch."""
+        t = moment.frame.tick * DT
+        if t < self.begin_s - 1e-9:
+            return
+        self._trace(t, moment.report, moment.driver.mode)
+        if self._film is not None:
+            self._film.write(np.ascontiguousarray(twelve_views(moment, DT)[..., ::-1]))
+        elif moment.frame.tick % self.every == 0:
+            path = self.out / f"{t:07.2f}s.png"
+            picture = Image.fromarray(twelve_views(moment, DT))
+            write_atomically(path, partial(picture.save, format="PNG"))
+            self.pictures.append(path)
+
+    def _trace(self, t: float, report: StackReport, mode: str) -> None:
+        if (report.tier, report.status) == self._before:
+            return
+        self._before = (report.tier, report.status)
+        tier = report.tier.name if report.tier is not None else "-"
+        status = report.status.name if report.status is not None else "-"
+        distance = f", {report.distance:.1f} m" if report.distance is not None else ""
+        self.trace.append(f"{t:7.2f} s  {mode or tier:<36} {status}{distance}")
+
+    def finish(self) -> None:
+        """The stretch is over: put the film in place."""
+        if self._film is not None:
+            self._film.finish()
+
+    def close(self) -> None:
+        """Leave nothing of a film that was not finished."""
+        if self._film is not None:
+            self._film.close()
+
+
+class Film:
+    """A film at 20 pictures per second, in place when it is finished; OutputError if it cannot be."""
+
+    def __init__(self, path: Path) -> None:
+        if path.suffix != ".mp4":
+            raise ConfigError(f"--video takes a file that ends in .mp4, got {path}")
+        self.path, self.part = path, path.with_name(f".{path.stem}.{os.getpid()}.part.mp4")
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            raise output_error(path, error) from error
+        code = cv2.VideoWriter.fourcc(*"mp4v")
+        self._writer = cv2.VideoWriter(str(self.part), code, 1.0 / DT, (SIZE[1], SIZE[0]))
+        if not self._writer.isOpened():
+            raise OutputError(f"cannot write the film {path}")
+
+    def write(self, picture: NDArray[np.uint8]) -> None:
+        """One more picture (H, W, 3), blue first."""
+        self._writer.write(picture)
+
+    def finish(self) -> None:
+        """Put it in place."""
+        self._writer.release()
+        try:
+            os.replace(self.part, self.path)
+        except OSError as error:
+            raise output_error(self.path, error) from error
+
+    def close(self) -> None:
+        """Remove what is not in place."""
+        self._writer.release()
+        with suppress(OSError):
+            self.part.unlink(missing_ok=True)

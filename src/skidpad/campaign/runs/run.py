@@ -1,0 +1,355 @@
+"""Drive one run and keep its log: in memory, or with everything else that it leaves in a folder."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.campaign.cells.matrix import describe_run
+from skidpad.campaign.driving.backends import make_backend
+from skidpad.campaign.driving.drivers import describe_driver
+from skidpad.campaign.driving.loop import Driver, Moment, Sink, ticks
+from skidpad.campaign.driving.outdoors import ChangedBackend, FileChanges
+from skidpad.campaign.driving.readings import ReadingsRecorder
+from skidpad.campaign.driving.run_setup import (
+    StackAtWheel,
+    Stage,
+    driver_of,
+    stage_of,
+    with_sensors,
+)
+from skidpad.campaign.driving.snapshots import Snapshots
+from skidpad.campaign.takeover.desk import Desk, DeskBackend, DeskDriver, DeskScript, DeskSupervisor
+from skidpad.core.errors import StackError, require_choice
+from skidpad.core.run import (
+    DriverSpec,
+    Roads,
+    RunSpec,
+    StackDriver,
+)
+from skidpad.core.setting import Plain
+from skidpad.core.settings import load_profile
+from skidpad.core.simulator import BackendChoice, BackendKind
+from skidpad.core.states import ActorTable
+from skidpad.core.told import clean
+from skidpad.core.vocabulary import Outcome, SensorLevel, TrafficStart
+from skidpad.core.weather import Weather
+from skidpad.evidence.drive.background import UNSEEN
+from skidpad.physics.presets import find_weather
+from skidpad.recording.run.events import NoticeSource, Relocation
+from skidpad.recording.run.log import LogHeader, RunLog
+from skidpad.recording.run.readings import SensorReadings
+from skidpad.recording.run.ticks import TickLog
+from skidpad.roads.queries import RoadMap
+from skidpad.scenarios.player import Played
+from skidpad.simulation.backend import Backend
+from skidpad.stack.interface import Stack
+from skidpad.stack.loading import load_stack
+
+DESK_ROOM = 12_000  # ticks of a log at first, as nobody knows how long a person drives
+LONGEST_STORY = 20_000  # characters of a traceback
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """What a drive leaves behind.
+
+    Attributes:
+        log: every actor, sensor value, command and contact, tick by tick.
+        outcome: how it ended: completed, collision, agent_error, ...
+        error: the traceback of a stack that failed; empty otherwise.
+        snapshots: pictures of collisions, where a folder was given and the sensors are pixels.
+        triggered: every event of the scenario has begun; always true without a scenario.
+        route_length: of the ego's route, m, where a scenario names one.
+        off_road: (T,) for every tick, whether the ego has all wheels off every lane.
+        road: the map's name, or its file.
+        played: the story of a scenario, where one was played.
+        readings: numbers of the further sensors that the stack asked for, where they give any.
+    """
+
+    log: RunLog
+    outcome: Outcome
+    error: str = ""
+    snapshots: tuple[Path, ...] = ()
+    triggered: bool = True
+    route_length: float | None = None
+    off_road: NDArray[np.bool_] | None = None
+    road: str = ""
+    played: Played | None = None
+    readings: SensorReadings | None = None
+
+
+def drive(
+    stack: type[Stack] | str | int,
+    *,
+    map: str | Path = "figure8",
+    weather: str | Weather = "clear-noon",
+    seed: int = 1,
+    duration: float = 500.0,
+    traffic: str = "fixed",
+    vehicles: int = 20,
+    sensors: str = "pixels",
+    profile: str = "recommended",
+    settings: Mapping[str, Plain] | None = None,
+    stack_settings: Mapping[str, object] | None = None,
+    out: str | Path | None = None,
+    backend: BackendChoice | None = None,
+) -> Run:
+    """Drive a stack on a map with traffic; the defaults are those of `skidpad adas`.
+
+    Args:
+        stack: a class with the stack interface, or what `--stack` takes: 0 to 4 for a published
+            configuration, "reference", "camera", "module:Class", "FILE.py:Class".
+        map: a bundled map's name, or an OpenDRIVE file.
+        weather: a preset's name, a weather file (.yaml), or a weather.
+        seed: of traffic and noise; the same seed gives the same log.
+        duration: simulated seconds. 500 s take minutes with pixels, and seconds with objects.
+        traffic: "fixed", "random" or "pack": where background vehicles begin and stay.
+        vehicles: how many there are, 0 to 80.
+        sensors: "pixels" for real images, or "objects", which is much faster.
+        profile: "recommended", "thesis_text", "thesis_listing" or "preliminary".
+        settings: single settings over the profile, as `--set`; `skidpad profiles` lists them.
+        stack_settings: what your own class is given as its settings, as `--stack-set`.
+        out: a folder for pictures of collisions; None keeps everything in memory.
+        backend: the simulator; None is the embedded one.
+
+    Returns:
+        The log, how the drive ended, and what it left behind. A stack that fails is an outcome.
+
+    Raises:
+        ConfigError: a value is out of its range, or is no name that exists.
+        FileError: a map, weather or stack file is not there, or cannot be read.
+
+    Example:
+        >>> run = drive("examples/follow_lane.py:FollowLane", weather="rain-night",
+        ...             duration=60, sensors="objects", stack_settings={"cruise_kmh": 60})
+        >>> run.outcome.value, len(run.log.contacts)
+    """
+    driver, kind = _name_driver(stack, dict(stack_settings or {}))
+    words = [v.value for v in SensorLevel], [v.value for v in TrafficStart]
+    template = RunSpec(
+        course=Roads(
+            map=str(map),
+            traffic=TrafficStart(require_choice("traffic", traffic, words[1])),
+            vehicles=vehicles,
+        ),
+        duration=duration,
+        settings=load_profile(profile, settings),
+        sensors=SensorLevel(require_choice("sensors", sensors, words[0])),
+        backend=BackendChoice() if backend is None else backend,
+    )
+    outside = find_weather(weather) if isinstance(weather, str) else weather
+    spec = describe_run(driver, outside, seed, template)
+    return run(spec, kind, folder=None if out is None else Path(out))
+
+
+def _name_driver(
+    stack: type[Stack] | str | int, options: dict[str, Any]
+) -> tuple[DriverSpec, type[Stack] | None]:
+    if isinstance(stack, (str, int)):
+        driver = describe_driver(stack, options)
+        return driver, load_stack(driver.where) if isinstance(driver, StackDriver) else None
+    return StackDriver(f"{stack.__module__}:{stack.__qualname__}", options), stack
+
+
+class Log(Sink):
+    """The tick log of a run as a sink. changes: of a file that may change the weather."""
+
+    changes: FileChanges | None = None
+
+    def __init__(self, header: LogHeader, weather: str, ticks: int) -> None:
+        self.header, self.weather, self.ticks = header, weather, ticks
+
+    def begin(self, table: ActorTable) -> None:
+        """Make room."""
+        self.log = TickLog(table, self.header, self.weather, self.ticks)
+
+    def see(self, moment: Moment) -> None:
+        """Write down the moment, and what supervisor and world did besides driving (A-194)."""
+        frame, truth, action = moment.frame, moment.truth, moment.action
+        if self.changes is not None and self.changes.done:
+            self.log.set_weather(self.changes.weather.name)
+        self.log.append(truth, frame, moment.command, moment.report, frame.supervision)
+        for text in truth.notices:
+            self.log.notice(truth.tick, NoticeSource.TRAFFIC, text)
+        for text in () if self.changes is None else self.changes.new_notices():
+            self.log.notice(truth.tick, NoticeSource.SCENARIO, text)
+        if action.notice:
+            self.log.notice(truth.tick, NoticeSource.SUPERVISOR, action.notice)
+        if action.relocate is not None and action.relocate.moved is not None:
+            m = action.relocate.moved
+            self.log.relocated(Relocation(truth.tick, m.reason, m.shift, m.old, m.new))
+
+
+class DeskLog(Log):
+    """A log whose weather a person may change."""
+
+    def __init__(self, header: LogHeader, weather: str, ticks: int, desk: Desk) -> None:
+        super().__init__(header, weather, ticks)
+        self.desk = desk
+
+    def see(self, moment: Moment) -> None:
+        """Write down the moment; the weather is another one from the next one on."""
+        super().see(moment)
+        if self.desk.changed:
+            self.log.set_weather(self.desk.outside.weather.name)
+
+
+def run(
+    spec: RunSpec,
+    kind: type[Stack] | None = None,
+    *,
+    stage: Stage | None = None,
+    backend: Backend | None = None,
+    folder: Path | None = None,
+    sinks: Sequence[Sink] = (),
+    desk: Desk | None = None,
+) -> Run:
+    """Drive a run on roads or in a scenario; a stack that fails is an outcome.
+
+    kind: the stack's class, if it is loaded. stage: the run's own by default. backend: by default a
+    fresh one of the run's choice. folder: where snapshots of collisions go. sinks: who else looks on.
+    desk: where a person sits, or sat.
+    """
+    opened = OpenRun(
+        spec, kind, stage=stage, backend=backend, folder=folder, sinks=sinks, desk=desk
+    )
+    try:
+        while opened.step() is not None:
+            pass
+    finally:
+        opened.close()
+    return opened.finish()
+
+
+class OpenRun:
+    """A run on its way: the one loop, stopped after each tick.
+
+    at_wheel: what stands between the driver and the loop, as a desk does.
+    """
+
+    def __init__(
+        self,
+        spec: RunSpec,
+        kind: type[Stack] | None = None,
+        *,
+        stage: Stage | None = None,
+        backend: Backend | None = None,
+        folder: Path | None = None,
+        sinks: Sequence[Sink] = (),
+        desk: Desk | None = None,
+        at_wheel: Callable[[StackAtWheel], Driver] | None = None,
+    ) -> None:
+        stage = stage_of(spec) if stage is None else stage
+        backend = make_backend(spec.backend) if backend is None else backend
+        changes = None if stage.player is None else FileChanges(stage.player, spec)
+        if changes is not None:
+            backend = ChangedBackend(backend, changes.news, changes.hands)
+        if desk is not None:
+            backend = DeskBackend(backend, desk)
+            script = DeskScript(stage.script, desk)
+            stage = replace(stage, supervisor=DeskSupervisor(stage.supervisor, desk), script=script)
+        self.spec, self.stage, self.backend = spec, stage, backend
+        self.log = log_of(spec, stage, desk)
+        self.log.changes = changes
+        self.snapshots = Snapshots(folder, spec.driver.label, spec.weather.name, stage.setup.dt)
+        self.sinks = (self.log, self.snapshots, *sinks)
+        self.recorder: ReadingsRecorder | None = None
+        self.failure: StackError | None = None
+        if desk is not None:
+            at_wheel = partial(DeskDriver, desk=desk)
+        self._ticks = self._drive(kind, at_wheel)
+
+    def step(self) -> Moment | None:
+        """Go on by one tick; None when the run is over."""
+        return next(self._ticks, None)
+
+    def close(self) -> None:
+        """Release the backend."""
+        self.backend.close()
+
+    def finish(self) -> Run:
+        """Returns what the run leaves, over or not."""
+        stage, finished = self.stage, self.log.log.finish()
+        return Run(
+            finished,
+            stage.outcome if self.failure is None else Outcome.AGENT_ERROR,
+            "" if self.failure is None else story(self.failure),
+            tuple(self.snapshots.paths),
+            stage.triggered,
+            stage.route_length,
+            off_road(finished, stage.map),
+            str(stage.setup.map),
+            None if stage.player is None else stage.player.played,
+            None if self.recorder is None else self.recorder.finish(),
+        )
+
+    def _drive(
+        self, kind: type[Stack] | None, at_wheel: Callable[[StackAtWheel], Driver] | None
+    ) -> Iterator[Moment]:
+        stage, backend = self.stage, self.backend
+        try:
+            driver = driver_of(self.spec, stage, kind)
+            setup = with_sensors(stage.setup, driver.stack)
+        except StackError as error:  # it could not even be built
+            backend.reset(stage.setup, self.spec.seed)
+            for sink in self.sinks:
+                sink.begin(backend.truth().table)
+            self._failed(error)
+            return
+        recorder = ReadingsRecorder(setup, driver.stack.stack)
+        sinks = self.sinks
+        if recorder.is_needed:
+            self.recorder, sinks = recorder, (recorder, *sinks)
+            for sink in self.sinks:
+                sink.follow_readings(lambda: recorder.latest)
+        frame = backend.reset(setup, self.spec.seed)
+        wheel = driver if at_wheel is None else at_wheel(driver)
+        failure = yield from ticks(backend, frame, wheel, stage.supervisor, stage.script, sinks)
+        driver.stack.close()
+        if failure is not None:
+            self._failed(failure)
+
+    def _failed(self, failure: StackError) -> None:
+        self.failure = failure
+        self.log.log.notice(self.backend.truth().tick, NoticeSource.STACK, str(failure))
+
+
+def log_of(spec: RunSpec, stage: Stage, desk: Desk | None = None) -> Log:
+    """An empty log with what holds for the whole run."""
+    about = {
+        "config": spec.driver.label,
+        "weather": spec.weather.name,
+        "seed": str(spec.seed),
+        "profile": spec.settings.profile,
+        "sensors": spec.sensors.value,
+    }
+    if spec.backend.backend == BackendKind.CARLA:  # it tells contacts of the ego alone
+        about["traffic"] = UNSEEN
+    dt = stage.setup.dt
+    header = LogHeader(map=stage.map.name, map_hash=stage.map.content_hash, dt=dt, about=about)
+    room = round(spec.duration / dt) + 1
+    if desk is None:
+        return Log(header, spec.weather.name, room)
+    return DeskLog(header, spec.weather.name, min(room, DESK_ROOM), desk)
+
+
+def off_road(log: RunLog, map: RoadMap) -> NDArray[np.bool_]:
+    """(T,) whether the ego has all wheels off every lane (decision R-6)."""
+    a, table = log.actors, log.table
+    size = float(table.length[0]), float(table.width[0])
+    return map.edge.off(a.x[:, 0], a.y[:, 0], a.z[:, 0], a.yaw[:, 0], *size)
+
+
+def story(error: StackError) -> str:
+    """The traceback of a stack that failed."""
+    cause = error.__cause__ or error
+    told = clean("".join(traceback.format_exception(cause)), LONGEST_STORY)
+    return f"{told}\n{error}"

@@ -1,0 +1,1 @@
+"""Small experiments of their own, and the tuning of scenarios."""

@@ -1,0 +1,1 @@
+"""A person beside the driver: takes over, switches functions, changes weather and traffic."""

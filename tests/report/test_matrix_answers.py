@@ -85,14 +85,26 @@ def test_the_first_answer_names_the_safest_functions_in_each_weather_and_how_sur
     clear, rain = first.lines
     # twelve comparisons of ten seeds, the two signs of each equally extreme: 12 * 2 / 2^10
     assert clear == (
-        "Clear sky: configuration 1 has fewer than configurations 3 and 4 (p at most 0.023); "
-        "10 seeds cannot tell configuration 1 from configuration 2; "
-        "no crash in 10 seeds still allows crashes in up to 26 % of seeds (95 %)."
+        "Clear sky, configuration 1: it has surely fewer crashes than configurations 3 and 4 "
+        "(p at most 0.023); its difference from configuration 2 may be chance; "
+        "none of its 10 seeds had a crash, so at most 26 % of all seeds do (95 % confidence)."
     )
     assert rain == (
-        "Heavy rain: configuration 1 has fewer than configurations 2 to 4 (p at most 0.023); "
-        "no crash in 10 seeds still allows crashes in up to 26 % of seeds (95 %)."
+        "Heavy rain, configuration 1: it has surely fewer crashes than configurations 2 to 4 "
+        "(p at most 0.023); "
+        "none of its 10 seeds had a crash, so at most 26 % of all seeds do (95 % confidence)."
     )
+
+
+@pytest.mark.req("R-7")
+def test_where_chance_may_explain_every_difference_the_first_sentence_says_so(tmp_path):
+    """Before any configuration is named as the one with fewest crashes."""
+    first = told(campaign(tmp_path, lambda config, kind: metrics(barriers=2)))[0]
+    assert first.sentence.startswith(
+        "10 seeds are too few to rank the configurations: every difference between two of them may be "
+        "chance. Fewest crashes: in clear sky configuration 1 (ACC), "
+    )
+    assert list(first.lines) == []
 
 
 @pytest.mark.req("R-7", "T-5")
@@ -110,7 +122,7 @@ def test_the_first_answer_is_about_functions_and_the_reference_driver_stands_bes
         "The reference driver, a model of a careful human, had 0.00 in clear sky and 0.00 in heavy "
         "rain."
     )
-    assert first.lines[0].startswith("Clear sky: configuration 3 has fewer than configuration 4 ")
+    assert first.lines[0].startswith("Clear sky, configuration 3: it has surely fewer crashes ")
 
 
 @pytest.mark.req("R-7")
@@ -118,8 +130,8 @@ def test_the_second_answer_says_what_rain_changes_for_each_configuration(tmp_pat
     second = told(campaign(tmp_path, clear_cut))[1]
     assert second.sentence == (
         "Heavy rain against clear sky: more crashes with configurations 2 and 4; "
-        "no difference that 10 seeds can show with configurations 1 and 3. "
-        "Where no difference shows, the numbers below may differ by chance."
+        "no change of crashes that 10 seeds can show with configurations 1 and 3. "
+        "Where no difference shows, the crash rates below may differ by chance."
     )
     assert second.lines[3] == (
         "4 · + 80 km/h limiter: crashes per run 2.00 → 5.00; "
@@ -127,18 +139,18 @@ def test_the_second_answer_says_what_rain_changes_for_each_configuration(tmp_pat
     )
     assert second.lines[4] == (
         "Arrows lead from clear sky to heavy rain. "
-        "Dropout is the time without a target, or with one held from memory."
+        "Dropout is the share of time without a current measurement of the car ahead."
     )
     assert second.lines[5] == (
-        "Within “Clear Sky: sunrise, noon and night” and “Heavy Rain: sunrise, noon and night” "
-        "every drive moved alike, seed for seed: one column each."
+        "In “Clear Sky: sunrise, noon and night” and “Heavy Rain: sunrise, noon and night” "
+        "each seed gave the same drive, so these count once and share a column."
     )
 
 
 def test_the_third_answer_names_the_commonest_kind_of_the_worst_configuration(tmp_path):
     third = told(campaign(tmp_path, clear_cut))[2]
     assert third.sentence == (
-        "190 of 250 crashes were of the kind “into a barrier”, 110 of them in heavy rain. "
+        "190 of 250 crashes were of the kind “into a barrier”: 110 in heavy rain, 80 in other weather. "
         "Configuration 3 had most (140 in 20 drives; next configuration 4 with 70 in 20)."
     )
     assert third.lines[0].startswith(f"Of the sources' {len(CLAIMS)} claims: ")
@@ -146,7 +158,7 @@ def test_the_third_answer_names_the_commonest_kind_of_the_worst_configuration(tm
     named = [j for j in decided if j.verdict is Verdict.CONTRADICTED][:3]
     assert named
     assert list(third.lines[1 : 1 + len(named)]) == [
-        f"Contradicted: “{j.finding.claim.rstrip('.')}” ({j.finding.id})." for j in named
+        f"Contradicted: claim {j.finding.id}, “{j.finding.claim.rstrip('.')}”." for j in named
     ]
 
 
@@ -204,8 +216,10 @@ def test_weathers_that_every_configuration_drove_alike_are_one_column_and_count_
 
 def test_the_subtitle_says_how_many_weathers_differ_and_what_the_sensors_are(tmp_path):
     matrix = campaign(tmp_path, clear_cut, 6)
-    assert matrix.subtitle.startswith(
-        "5 configurations in 6 weathers (2 that differ), 6 seeds of each"
+    assert matrix.subtitle.startswith("Configurations 0 to 4 in 6 weathers, 6 seeds of each, on ")
+    assert matrix.subtitle.endswith(
+        "Weathers that gave the same drives count once (Clear Sky: sunrise, noon and night; "
+        "Heavy Rain: sunrise, noon and night)."
     )
     assert re.search(r"sensors (on|from) ", matrix.subtitle)
 

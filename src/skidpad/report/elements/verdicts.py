@@ -11,6 +11,8 @@ from skidpad.evidence.verdicts import Judgement
 from skidpad.evidence.verdicts import Verdict as Outcome
 from skidpad.report.elements.page import Verdict
 
+TALLIED = {Outcome.BY_CONSTRUCTION: "not measured, as both sides are the same drive"}
+
 
 def verdict_blocks(judged: Iterable[Judgement]) -> list[Verdict]:
     """One block per finding: claim, verdict, a plain sentence, numbers, and how it was judged."""
@@ -56,7 +58,7 @@ def plain(j: Judgement) -> str:
 def tally_text(judged: Sequence[Judgement]) -> str:
     """How many claims were judged how."""
     counts = Counter(j.verdict for j in judged)
-    told = ", ".join(f"{counts[v]} {v.value}" for v in Outcome if counts[v])
+    told = ", ".join(f"{counts[v]} {TALLIED.get(v, v.value)}" for v in Outcome if counts[v])
     if len(judged) == 1:
         return f"The source's one claim is {told.removeprefix('1 ')}."
     return f"Of the sources' {len(judged)} claims: {told}."

@@ -85,7 +85,13 @@ def _functions(matrix: Matrix) -> Answer:
     elif matrix.seeds < least:
         lines = [_too_few_seeds(matrix.seeds, least)]
     else:
-        lines = [_sureness(matrix, g, c, differences, judged[g][c]) for g, c in best.items()]
+        if not any(d.is_sure for d in differences.values()):
+            sentence = (
+                f"{count_text(matrix.seeds, 'seed')} are too few to rank the configurations: every "
+                f"difference between two of them may be chance. {sentence}"
+            )
+        told = [_sureness(g, c, differences, judged[g][c]) for g, c in best.items()]
+        lines = [line for line in told if line]
     return Answer(
         "Which functions crash least, in which weather, and how sure is that?",
         sentence,
@@ -128,13 +134,15 @@ def _rates(matrix: Matrix, group: WeatherGroup) -> dict[str, Rate]:
 
 
 def _sureness(
-    matrix: Matrix,
     group: WeatherGroup,
     best: str,
     differences: dict[tuple[WeatherGroup, str, str], Contrast],
     rate: Rate,
 ) -> str:
-    """Which others the best one of a group surely beats, and which it cannot be told from."""
+    """Which others the best one of a group surely beats, and which it may beat by chance.
+
+    Where chance may explain every difference, a sentence before says so.
+    """
     others = {
         (a if b == best else b): c
         for (g, a, b), c in differences.items()
@@ -146,25 +154,24 @@ def _sureness(
     told = []
     if sure:
         largest = max(others[c].p for c in sure)
-        told.append(f"{_in_words(best)} has fewer than {config_list(sure)} ({_at_most(largest)})")
-    if open_:
-        seeds = count_text(matrix.seeds, "seed")
-        told.append(f"{seeds} cannot tell {_in_words(best)} from {config_list(open_)}")
+        told.append(f"it has surely fewer {EVENTS} than {config_list(sure)} ({_at_most(largest)})")
+    if open_ and any(d.is_sure for d in differences.values()):
+        told.append(f"its difference from {config_list(open_)} may be chance")
     if same:
-        told.append(f"{_in_words(best)} drove exactly as {config_list(same)}")
+        told.append(f"it drove exactly as {config_list(same)}")
     if not rate.events:
         share = 100 * rate.most_runs
-        none = f"no {EVENT} in {count_text(rate.runs, 'seed')}"
-        told.append(f"{none} still allows {EVENTS} in up to {share:.0f} % of seeds (95 %)")
-    return f"{capitalize_first(group.name)}: {'; '.join(told)}."
+        told.append(
+            f"none of its {count_text(rate.runs, 'seed')} had a {EVENT}, so at most {share:.0f} % "
+            "of all seeds do (95 % confidence)"
+        )
+    return (
+        f"{capitalize_first(group.name)}, {config_list([best])}: {'; '.join(told)}." if told else ""
+    )
 
 
 def _at_most(p: float) -> str:
     return p_text(p) if p < 0.001 else f"p at most {p:.2g}"
-
-
-def _in_words(config: str) -> str:
-    return config_list([config])
 
 
 def weather_series(group: WeatherGroup, k: int, **values: Sequence[float | None]) -> Series:
@@ -184,8 +191,7 @@ def _rate_figure(matrix: Matrix, rates: dict[WeatherGroup, dict[str, Rate]]) -> 
     rows = [config_title(c) for c in matrix.comparison_configs]
     caption = (
         f"{EVENTS.capitalize()} per run of {matrix.duration:g} s; lines are 95 % intervals. A hollow "
-        f"point has none: fewer than two seeds had a {EVENT}, which is too few for an interval and no "
-        "proof of zero."
+        f"point has no interval, as at most one seed had a {EVENT}; the true rate may be higher."
     )
     caption += cut_note(series, POINTS_REACH)
     return Figure(points_with_intervals(rows, series, f"{EVENTS} per run"), caption)
@@ -214,7 +220,7 @@ def _weather(matrix: Matrix) -> Answer:
     if matrix.seeds < least:
         told = [_too_few_seeds(matrix.seeds, least).replace("configurations", "weathers")]
     elif any(not d.is_sure and not d.identical for d in changes.values()):
-        told.append("Where no difference shows, the numbers below may differ by chance.")
+        told.append("Where no difference shows, the crash rates below may differ by chance.")
     lines = [_levels(matrix, c) for c in matrix.comparison_configs]
     return Answer(
         question,
@@ -239,7 +245,7 @@ def _changes(
             (f"more {EVENTS} with", more),
             (f"fewer {EVENTS} with", fewer),
             ("the very same drives with", same),
-            (f"no difference that {count_text(matrix.seeds, 'seed')} can show with", open_),
+            (f"no change of {EVENTS} that {count_text(matrix.seeds, 'seed')} can show with", open_),
         )
         if configs
     ]
@@ -273,7 +279,7 @@ def _meaning(matrix: Matrix) -> list[str]:
         first, second = matrix.climates
         told.append(f"Arrows lead from {first.name} to {second.name}.")
     if matrix.finished["dropout_pct"].count():
-        told.append("Dropout is the time without a target, or with one held from memory.")
+        told.append("Dropout is the share of time without a current measurement of the car ahead.")
     return [" ".join(told)] if told else []
 
 
@@ -283,7 +289,7 @@ def _times_of_day(matrix: Matrix) -> list[str]:
     if not groups:
         return []
     names = list_text([f"“{g.title}”" for g in groups])
-    return [f"Within {names} every drive moved alike, seed for seed: one column each."]
+    return [f"In {names} each seed gave the same drive, so these count once and share a column."]
 
 
 def _change_figure(

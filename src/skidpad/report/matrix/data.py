@@ -9,7 +9,7 @@ from pathlib import Path
 
 import polars as pl
 
-from skidpad.core.wording import count_text, list_text
+from skidpad.core.wording import capitalize_first, count_text, list_text
 from skidpad.evidence.statistics import Rate, event_rate
 from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.matrix import MATRIX, MatrixEntry, Metrics
@@ -268,12 +268,15 @@ class Matrix(CampaignView[MatrixEntry]):
             SENSOR_LEVELS.get(level, f"sensors as {level}")
             for level in sorted(self.results["sensors"].unique().to_list())
         )
-        alike = len(self.weather_groups)
-        apart = f" ({alike} that differ)" if 1 < alike < len(self.weathers) else ""
+        groups = self.weather_groups
+        alike = ""
+        if 1 < len(groups) < len(self.weathers):
+            names = "; ".join(g.title for g in groups if len(g.weathers) > 1)
+            alike = f" Weathers that gave the same drives count once ({names})."
         return (
-            f"{count_text(len(self.configs), 'configuration')} in "
-            f"{count_text(len(self.weathers), 'weather')}{apart}, "
-            f"{count_text(self.seeds, 'seed')} of each, on {self.values('map')}, {levels}."
+            f"{capitalize_first(config_list(self.configs))} in "
+            f"{count_text(len(self.weathers), 'weather')}, {count_text(self.seeds, 'seed')} of each, "
+            f"on {self.values('map')}, {levels}.{alike}"
         )
 
 

@@ -53,7 +53,7 @@ def headline_numbers(matrix: Matrix) -> Numbers:
         [
             Number(f"{hits:,}", contacts, per_100_km(hits)),
             Number(f"{left:,}", "departures from the road", per_100_km(left)),
-            Number(f"{put_back:,}", "interventions", _chains(put_back, first)),
+            Number(f"{put_back:,}", "interventions", _meaning(put_back, first)),
             Number(
                 f"{len(t):,}",
                 "different drives",
@@ -64,12 +64,11 @@ def headline_numbers(matrix: Matrix) -> Numbers:
     )
 
 
-def _chains(put_back: int, first: int) -> str:
-    """How many interventions followed on another one."""
+def _meaning(put_back: int, first: int) -> str:
+    """What an intervention is, and how many followed on another one."""
     followed = put_back - first
-    if not put_back:
-        return ""
-    return f"{followed:,} of them soon after another" if followed else "none soon after another"
+    again = f", {followed:,} of them soon after another time" if followed else ""
+    return f"times the car was put back, after light contacts, too{again}"
 
 
 def headline_table(matrix: Matrix) -> Table:

@@ -38,20 +38,28 @@ def look_next(
         f"{_next_most(totals, runs, worst)})."
     )
     lines = [*_hardest(matrix, crashes), *_claims(matrix, judged)]
+    return Answer(QUESTION, sentence, lines, _kinds_figure(matrix))
+
+
+def _kinds_figure(matrix: Matrix) -> Figure:
+    """Kinds of crashes per run, a bar for every configuration in every climate."""
+    cells = {
+        f"{config_title(c)}, {g.name}": matrix.within(c, g)
+        for c in matrix.comparison_configs
+        for g in matrix.climates
+    }
     series = [
         Series(
             kind.title,
-            [count(kind, runs[c]) / max(1, len(runs[c])) for c in matrix.comparison_configs],
+            [count(kind, runs) / max(1, len(runs)) for runs in cells.values()],
             colour=FIRST_COLOUR + k,
         )
         for k, kind in enumerate(kinds_of(matrix.has_grades))
     ]
-    rows = [config_title(c) for c in matrix.comparison_configs]
-    figure = Figure(
-        stacked_bars(rows, series, f"{EVENTS} per run"),
-        f"What the {EVENTS} were, every drive once.",
+    return Figure(
+        stacked_bars(list(cells), series, f"{EVENTS} per run"),
+        f"What the {EVENTS} were, by configuration and weather.",
     )
-    return Answer(QUESTION, sentence, lines, figure)
 
 
 def _next_most(totals: dict[str, int], runs: dict[str, pl.DataFrame], worst: str) -> str:
@@ -68,15 +76,18 @@ def _commonest(matrix: Matrix, total: int) -> str:
     compared = [matrix.cell(c) for c in matrix.comparison_configs]
     kinds = {k: sum(count(k, r) for r in compared) for k in kinds_of(matrix.has_grades)}
     most = max(kinds, key=lambda kind: kinds[kind])
-    told = f"{kinds[most]} of {count_text(total, EVENT, EVENTS)} were of the kind “{most.title}”"
+    kind = f"of the kind “{most.title}”"
     if len(matrix.climates) < 2:
-        return f"{told}."
+        return f"{kinds[most]} of {count_text(total, EVENT, EVENTS)} were {kind}."
     within = {
         g: sum(count(most, matrix.within(c, g)) for c in matrix.comparison_configs)
         for g in matrix.climates
     }
     where = max(within, key=lambda g: within[g])
-    return f"{told}, {within[where]} of them in {where.name}."
+    return (
+        f"{kinds[most]} of {count_text(total, EVENT, EVENTS)} were {kind}: {within[where]} in "
+        f"{where.name}, {kinds[most] - within[where]} in other weather."
+    )
 
 
 def _claims(matrix: Matrix, judged: Sequence[Judgement]) -> list[str]:
@@ -85,7 +96,7 @@ def _claims(matrix: Matrix, judged: Sequence[Judgement]) -> list[str]:
         return [unjudged_text(judged)]
     decided = [j for verdict in DECIDED for j in judged if j.verdict is verdict]
     named = [
-        f"{j.verdict.value.capitalize()}: “{j.finding.claim.rstrip('.')}” ({j.finding.id})."
+        f"{j.verdict.value.capitalize()}: claim {j.finding.id}, “{j.finding.claim.rstrip('.')}”."
         for j in decided[:DECIDED_MAX]
     ]
     return [tally_text(judged), *named]

@@ -113,7 +113,7 @@ def _processor_time(matrix: Matrix, parity: Parity | None) -> list[tuple[str, st
     """What each part of the campaign took, in processor minutes."""
     parts = [matrix, *([parity.pixels] if parity else [])]
     told = [
-        f"{m.values('sensors')} {m.processor_minutes:.1f} min"
+        f"{m.processor_minutes:.1f} min on {m.values('sensors')}"
         for m in parts
         if m.processor_minutes > 0.0
     ]

@@ -67,8 +67,8 @@ def headline_numbers(matrix: Matrix) -> Numbers:
 def _meaning(put_back: int, first: int) -> str:
     """What an intervention is, and how many followed on another one."""
     followed = put_back - first
-    again = f", {followed:,} of them soon after another time" if followed else ""
-    return f"times the car was put back, after light contacts, too{again}"
+    again = f"; {followed:,} soon after another one" if followed else ""
+    return f"the car was put back, after light contacts, too{again}"
 
 
 def headline_table(matrix: Matrix) -> Table:

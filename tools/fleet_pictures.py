@@ -16,7 +16,7 @@ from tempfile import TemporaryDirectory
 
 from playwright.sync_api import ViewportSize, sync_playwright
 
-from skidpad.cli.fleet_demo import open_recorded
+from skidpad.cli.fleet.demo import open_recorded
 
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
 WINDOW, PHONE = ViewportSize(width=1180, height=800), ViewportSize(width=390, height=844)

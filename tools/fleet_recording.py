@@ -19,7 +19,7 @@ import tempfile
 from datetime import datetime, timezone
 from pathlib import Path
 
-from skidpad.cli.fleet_demo import SEED
+from skidpad.cli.fleet.demo import SEED
 from skidpad.fleet.recorded import ARCHIVE, PROVENANCE
 
 MOST = 1_500_000  # bytes of the archive

@@ -6,8 +6,8 @@ from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells.matrix import cross, published_drivers, sweep
 from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.recipes.matrix import RECIPE
-from skidpad.cli.adas_plan import plan
-from skidpad.cli.asked import Climate, Drivers, Tuned
+from skidpad.cli.campaigns.adas_plan import plan
+from skidpad.cli.options.asked import Climate, Drivers, Tuned
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import Roads, RunSpec
 from skidpad.core.vocabulary import TrafficStart

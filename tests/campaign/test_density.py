@@ -10,8 +10,8 @@ from skidpad.campaign.runs.desk_run import drive_at_desk
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.takeover.density import FROM_EGO, Density
 from skidpad.campaign.takeover.desk import Desk, Recorded
-from skidpad.cli.cockpit import with_reserve as with_more
 from skidpad.cli.main import app
+from skidpad.cli.runs.cockpit import with_reserve as with_more
 from skidpad.core.errors import ConfigError
 from skidpad.core.inputs import Crowd, Timed
 from skidpad.core.run import Roads

@@ -12,8 +12,8 @@ from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.campaign.recipes.matrix import RECIPE, run_key, warm_up
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.workers.pool import local
-from skidpad.cli.adas_plan import plan
-from skidpad.cli.asked import Climate, Drivers
+from skidpad.cli.campaigns.adas_plan import plan
+from skidpad.cli.options.asked import Climate, Drivers
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Function, ReferenceDriver, Roads, RunSpec
 from skidpad.core.stack_settings import CapScope

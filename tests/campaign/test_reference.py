@@ -9,7 +9,7 @@ from runs import scenario_run
 from skidpad import drive
 from skidpad.campaign.cells.matrix import cross, matrix_drivers
 from skidpad.campaign.driving.run_setup import driver_of, stage_of
-from skidpad.cli.asked import Drivers, EgoStack
+from skidpad.cli.options.asked import Drivers, EgoStack
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, ReferenceDriver, RunSpec, run_from_plain
 from skidpad.core.weather import Weather

@@ -12,7 +12,7 @@ from runs import adas_run, scenario_run
 from skidpad.campaign.runs.play import run_to
 from skidpad.campaign.runs.shadow import Shadowed, ride_along
 from skidpad.cli.main import app
-from skidpad.cli.shadow import lines
+from skidpad.cli.runs.shadow import lines
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import AdasDriver, Passenger, ReferenceDriver
 from skidpad.core.vocabulary import HazardType

@@ -12,9 +12,9 @@ from typer.testing import CliRunner
 from skidpad.campaign.cells.grip import template
 from skidpad.campaign.cells.threshold import PRESETS, default_shares, preset_of
 from skidpad.campaign.recipes.threshold import SITUATION
-from skidpad.cli.asked import EgoStack, GripCross, MapAsked
+from skidpad.cli.campaigns.threshold_plan import plan_map
 from skidpad.cli.main import app
-from skidpad.cli.threshold_plan import plan_map
+from skidpad.cli.options.asked import EgoStack, GripCross, MapAsked
 from skidpad.core.errors import InputError
 from skidpad.recording.campaign.results import read_results
 

@@ -4,8 +4,8 @@ import polars as pl
 import pytest
 from typer.testing import CliRunner
 
-from skidpad.cli.adas import answer
-from skidpad.cli.grip import answer_text, next_text
+from skidpad.cli.campaigns.adas import answer
+from skidpad.cli.campaigns.grip import answer_text, next_text
 from skidpad.cli.main import app
 from skidpad.recording.campaign.folder import CampaignFolder
 from skidpad.recording.campaign.matrix import MATRIX, Metrics, RunKey

@@ -4,8 +4,8 @@ import pytest
 import typer
 from typer.core import TyperOption
 
-from skidpad.cli.campaigns import CampaignOptions, Estimate
 from skidpad.cli.main import app
+from skidpad.cli.options.campaigns import CampaignOptions, Estimate
 from skidpad.core.errors import OutputError
 from toy_campaign import campaign
 

@@ -6,7 +6,7 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
-from skidpad.cli.friction_figure import draw_surface, friction_figure
+from skidpad.cli.lookup.friction_figure import draw_surface, friction_figure
 from skidpad.cli.main import app, main
 from skidpad.core.vocabulary import GripModel
 from skidpad.physics.presets import find_weather

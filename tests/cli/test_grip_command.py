@@ -11,9 +11,9 @@ from typer.testing import CliRunner
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells.grip import template
 from skidpad.campaign.recipes.grip import recipe
-from skidpad.cli.asked import EgoStack, GripCross, Tuned
-from skidpad.cli.grip_plan import plan_grip, with_model
+from skidpad.cli.campaigns.grip_plan import plan_grip, with_model
 from skidpad.cli.main import app
+from skidpad.cli.options.asked import EgoStack, GripCross, Tuned
 from skidpad.core.errors import ConfigError, InputError
 from skidpad.core.run import RunSpec
 from skidpad.core.vocabulary import SensorLevel

@@ -7,8 +7,8 @@ import typer
 from typer.core import TyperOption
 from typer.testing import CliRunner
 
-from skidpad.cli.help_panels import COMMANDS
 from skidpad.cli.main import app
+from skidpad.cli.options.help_panels import COMMANDS
 
 ROOT = typer.main.get_command(app)
 SHOWN = {name: command for name, command in ROOT.commands.items() if not command.hidden}

@@ -5,8 +5,8 @@ from lxml import etree
 from tests.scenarios.files import document
 from typer.testing import CliRunner
 
-from skidpad.cli.asked import PlayCross
 from skidpad.cli.main import app
+from skidpad.cli.options.asked import PlayCross
 from skidpad.core.errors import ConfigError, FileError
 from skidpad.core.run import Friction
 from skidpad.recording.campaign.grip import GripEntry

@@ -8,8 +8,8 @@ import pytest
 from PIL import Image
 from typer.testing import CliRunner
 
+from skidpad.cli.lookup.sensors import CAMERA_REACH, draw_layout, sensor_rows
 from skidpad.cli.main import app
-from skidpad.cli.sensors import CAMERA_REACH, draw_layout, sensor_rows
 
 runner = CliRunner(env={"COLUMNS": "80"})
 

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 from runs import adas_run
 from skidpad.campaign.runs.play import run_to
 from skidpad.cli.main import app
-from skidpad.cli.show import vehicle_grips
+from skidpad.cli.runs.show import vehicle_grips
 from skidpad.core.run import Friction
 from skidpad.recording.run.log_files import read_log
 

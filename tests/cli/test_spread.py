@@ -11,9 +11,9 @@ from msgspec import Meta, Struct, structs
 from typer.core import TyperGroup, TyperOption
 from typer.testing import CliRunner
 
-from skidpad.cli.asked import Tuned
 from skidpad.cli.main import app
-from skidpad.cli.spread import describe_parameters, spread_fields
+from skidpad.cli.options.asked import Tuned
+from skidpad.cli.options.spread import describe_parameters, spread_fields
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import PARTED, RunSpec
 from skidpad.core.simulator import BackendChoice

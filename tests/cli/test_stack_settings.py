@@ -10,8 +10,8 @@ from typer.testing import CliRunner
 import skidpad
 from skidpad.campaign.driving.run_setup import driver_of, stage_of
 from skidpad.campaign.runs.stored import read_run
-from skidpad.cli.asked import Drivers, EgoStack, read_stack_settings
 from skidpad.cli.main import app
+from skidpad.cli.options.asked import Drivers, EgoStack, read_stack_settings
 from skidpad.core.errors import ConfigError
 from skidpad.core.run import Roads, RunSpec, Scenario, StackDriver
 from skidpad.core.states import VehicleCommand

@@ -5,7 +5,7 @@ from __future__ import annotations
 import subprocess
 import sys
 
-from skidpad.cli import folders
+from skidpad.cli.options import folders
 from skidpad.recording.campaign.results import RESULTS
 from skidpad.recording.run.log_files import TICKS
 

@@ -57,7 +57,7 @@ def test_a_new_setting_appears_in_help_files_python_and_docs(tmp_path: Path) -> 
 
 RUN_PATH = ("core/run.py", "core/settings.py", "campaign/runs/run.py", "campaign/driving/run_setup.py",
             "campaign/recipes/matrix.py", "campaign/cells/matrix.py", "campaign/stepping.py",
-            "cli/asked.py")  # fmt: skip
+            "cli/options/asked.py")  # fmt: skip
 
 
 def test_settings_are_typed_on_the_way_from_a_command_to_a_run() -> None:

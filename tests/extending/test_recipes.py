@@ -14,7 +14,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from skidpad.cli.extensions import extension_points
+from skidpad.cli.lookup.extensions import extension_points
 from skidpad.recording.run.log_files import read_log
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "extending.md"
@@ -198,7 +198,7 @@ def test_the_relay_of_the_recipe_takes_alerts(tmp_path: Path) -> None:
     pytest.importorskip("httpx")
     follow(RECIPES["An alert relay"], tmp_path, tmp_path / "packages")
     use = """
-from skidpad.cli.fleet_links import relays
+from skidpad.cli.fleet.links import relays
 from skidpad.core.errors import ConfigError
 from skidpad.fleet.service import Places
 from pathlib import Path

@@ -85,7 +85,7 @@ def read_hazards(path: Path) -> object:
 
 
 def list_hazards(path: Path) -> object:
-    from skidpad.cli.hazards import lines
+    from skidpad.cli.channels.hazards import lines
     from skidpad.recording.hazards.records import read_index
 
     return list(lines(read_index(path.parent)))

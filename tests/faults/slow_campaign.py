@@ -35,8 +35,8 @@ def campaign(n):
 
 def main():
     """Drive or resume it as the command line does."""
-    from skidpad.cli.campaigns import CampaignOptions
     from skidpad.cli.main import run_guarded
+    from skidpad.cli.options.campaigns import CampaignOptions
 
     run_guarded(
         lambda: CampaignOptions(out=Path(sys.argv[1]), workers=2, resume=True)(

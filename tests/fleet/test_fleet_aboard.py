@@ -145,7 +145,7 @@ def test_what_is_no_key_is_told_in_one_sentence(lite, tmp_path):
 
 def test_the_monitors_alarms_become_alerts_with_the_scene_of_their_moment(tmp_path):
     """Half a line is no alarm; of two poses the one of the alarm's time is shown."""
-    from skidpad.cli.fleet_drive import Watch
+    from skidpad.cli.fleet.drive import Watch
 
     raised = []
 
@@ -188,7 +188,7 @@ def test_the_monitors_alarms_become_alerts_with_the_scene_of_their_moment(tmp_pa
 @pytest.mark.req("C-175", "C-190")
 def test_a_vehicle_of_the_command_alerts_and_is_stopped_by_a_teleoperator(tmp_path):
     """The service, the vehicle with its monitor, and the teleoperator are processes of their own."""
-    from skidpad.cli.fleet_demo import serving
+    from skidpad.cli.fleet.demo import serving
     from skidpad.cli.main import app
     from skidpad.core.channels import ChannelFrame, Decision
     from skidpad.recording.sources import open_channels

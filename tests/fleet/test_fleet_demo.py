@@ -8,7 +8,7 @@ import sys
 import pytest
 from sqlalchemy import func, select
 
-from skidpad.cli.fleet_demo import (
+from skidpad.cli.fleet.demo import (
     MAKER,
     PLAN,
     SEED,

@@ -12,7 +12,7 @@ from fleet_world import make_world, mosquitto, record, text_of
 from programs import require_program
 
 pytest.importorskip("aiomqtt", reason="aiomqtt, for mosquitto, is not installed")
-from skidpad.cli.fleet_links import broker_of
+from skidpad.cli.fleet.links import broker_of
 from skidpad.core.errors import BackendError, ConfigError
 from skidpad.fleet.broker import ANSWERS, TOPIC, Broker, connect_to, request_properties
 from skidpad.fleet.mqtt import BatchListener

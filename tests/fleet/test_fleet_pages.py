@@ -19,7 +19,7 @@ from test_fleet_upload import served
 
 from chromium import CHROMIUM, FLAGS
 from fleet_world import make_world, packed, record
-from skidpad.cli.fleet_links import map_lines, open_maps
+from skidpad.cli.fleet.links import map_lines, open_maps
 from skidpad.core.errors import FileError, InputError
 from skidpad.fleet.alerting.keeping import What
 from skidpad.fleet.alerting.orders import Order

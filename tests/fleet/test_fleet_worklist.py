@@ -8,7 +8,7 @@ import json
 import pytest
 
 from fleet_world import packed, record, replace
-from skidpad.cli.fleet_links import open_maps, place_finder
+from skidpad.cli.fleet.links import open_maps, place_finder
 from skidpad.core.vocabulary import HazardType
 from skidpad.fleet.insight.worklist import rank_work
 from skidpad.fleet.patterns import analysis

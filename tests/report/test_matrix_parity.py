@@ -8,7 +8,7 @@ from test_matrix_report import key
 
 from runs import adas_run
 from skidpad.campaign.cells.matrix import cross, published_drivers
-from skidpad.cli.adas_plan import on_pixels
+from skidpad.cli.campaigns.adas_plan import on_pixels
 from skidpad.core.errors import ConfigError
 from skidpad.core.vocabulary import SensorLevel
 from skidpad.physics.presets import find_weather

@@ -156,7 +156,7 @@ def test_the_terminal_shows_a_table_of_80_columns_the_answer_and_the_next_comman
 
 
 def test_a_name_that_is_too_long_keeps_its_ends():
-    from skidpad.cli.played_table import _fit
+    from skidpad.cli.scenarios.played_table import _fit
 
     assert _fit("a" * 20 + "b" * 20, 12) == "aaaaa..bbbbb"
     assert _fit("short", 8) == "short   "

@@ -8,7 +8,7 @@ from contextlib import suppress
 
 import typer
 
-from skidpad.cli.spread import spread_fields
+from skidpad.cli.options.spread import spread_fields
 from skidpad.core.errors import MissingExtra, require_choice
 from skidpad.simulation.carla_server.options import ServerOptions
 

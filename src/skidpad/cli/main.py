@@ -10,34 +10,34 @@ from typing import NoReturn
 import typer
 
 import skidpad
-from skidpad.cli.adas import adas, report, show
-from skidpad.cli.bench import bench
-from skidpad.cli.campaigns import CampaignOptions, Estimate
+from skidpad.cli.campaigns.adas import adas, report, show
+from skidpad.cli.campaigns.grip import grip
 from skidpad.cli.carla_launcher import carla_launcher, translate_options
-from skidpad.cli.channels import channels
-from skidpad.cli.channels_drive import drive, outcomes
-from skidpad.cli.channels_evaluate import evaluate, train
-from skidpad.cli.cockpit import drive as cockpit_drive
-from skidpad.cli.cockpit import replay, watch
-from skidpad.cli.compare import compare
-from skidpad.cli.dataset import export_dataset
-from skidpad.cli.export import export
-from skidpad.cli.extensions import extensions
-from skidpad.cli.fleet import fleet
-from skidpad.cli.friction import friction
-from skidpad.cli.grip import grip
-from skidpad.cli.hazards import hazards
-from skidpad.cli.help_panels import arrange_help
-from skidpad.cli.map import maps
-from skidpad.cli.monitor import monitor, safety_case
-from skidpad.cli.play import play, play_folder
-from skidpad.cli.profiles import profiles
-from skidpad.cli.rerun import rerun, study
-from skidpad.cli.risk import risk
-from skidpad.cli.search import search
-from skidpad.cli.shadow import shadow
-from skidpad.cli.spread import spread_fields
-from skidpad.cli.view import view
+from skidpad.cli.channels.channels import channels
+from skidpad.cli.channels.drive import drive, outcomes
+from skidpad.cli.channels.evaluate import evaluate, train
+from skidpad.cli.channels.hazards import hazards
+from skidpad.cli.channels.monitor import monitor, safety_case
+from skidpad.cli.channels.view import view
+from skidpad.cli.fleet.fleet import fleet
+from skidpad.cli.lookup.bench import bench
+from skidpad.cli.lookup.extensions import extensions
+from skidpad.cli.lookup.friction import friction
+from skidpad.cli.lookup.map import maps
+from skidpad.cli.lookup.profiles import profiles
+from skidpad.cli.options.campaigns import CampaignOptions, Estimate
+from skidpad.cli.options.help_panels import arrange_help
+from skidpad.cli.options.spread import spread_fields
+from skidpad.cli.runs.cockpit import drive as cockpit_drive
+from skidpad.cli.runs.cockpit import replay, watch
+from skidpad.cli.runs.compare import compare
+from skidpad.cli.runs.dataset import export_dataset
+from skidpad.cli.runs.export import export
+from skidpad.cli.runs.rerun import rerun, study
+from skidpad.cli.runs.shadow import shadow
+from skidpad.cli.scenarios.play import play, play_folder
+from skidpad.cli.scenarios.risk import risk
+from skidpad.cli.scenarios.search import search
 from skidpad.core.errors import InputError, SkidpadError
 from skidpad.core.told import clean
 
@@ -114,7 +114,7 @@ app.command()(carla_launcher)
 @app.command()
 def doctor() -> None:
     """Say what is installed, and what each missing part would give."""
-    from skidpad.cli.doctor import doctor as show
+    from skidpad.cli.lookup.doctor import doctor as show
 
     show()
 

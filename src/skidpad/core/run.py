@@ -1,7 +1,7 @@
 """One run as a value: what drives, where, in which weather, on which simulator, from which seed.
 
 `config.yaml` in a run's folder is this value, and driving it again gives the same run. A field with
-a description is an option of every command that drives (`skidpad.cli.spread`).
+a description is an option of every command that drives (`skidpad.cli.options.spread`).
 """
 
 from __future__ import annotations

@@ -8,7 +8,7 @@ import pytest
 from channel_worlds import Listed, frame
 from runs import segment_run
 from skidpad.campaign.channels.drive import drive_segment
-from skidpad.cli.shadow import channel_lines
+from skidpad.cli.runs.shadow import channel_lines
 from skidpad.core.channels import Decision
 from skidpad.core.errors import ConfigError
 from skidpad.evidence.channels.shadow import planned_braking, plans_of

@@ -1,0 +1,1 @@
+"""The campaigns: `adas`, `grip` and its threshold map."""

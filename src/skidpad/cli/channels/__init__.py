@@ -1,0 +1,1 @@
+"""Driving channels: driven, evaluated, monitored, and what a monitor found."""

@@ -1,0 +1,166 @@
+"""`skidpad map`: what maps there are, what is on them, and baking."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+if TYPE_CHECKING:
+    from skidpad.roads.queries import RoadMap
+    from skidpad.roads.summary import MapSummary
+
+maps = typer.Typer(name="map", help="Bundled and own maps.", no_args_is_help=True)
+
+SPEEDS_KMH = (80.0, 150.0)  # the matrix drives at 80, its limiter ends at 150
+BENDS_SHOWN, IDS_SHOWN = 20, 40
+MAP = typer.Argument(help="Name of a map (skidpad map list), or an OpenDRIVE file.")
+FILE = typer.Argument(help="An OpenDRIVE file.")
+PNG = typer.Option(None, help="Also write a picture from above.")
+OUT = typer.Option(None, help="Where to write; default: beside it, as .npz.")
+
+
+@maps.command("list")
+def list_() -> None:
+    """Name the maps that come with Skidpad, and those that installed packages make."""
+    from skidpad.roads.bundled import bundled_maps, load_map
+    from skidpad.roads.map_files import MAPS
+
+    for name in bundled_maps():
+        map = load_map(name)
+        driving = map.arrays.drivable == 1
+        typer.echo(f"{name}: {map.lanes.length[driving].sum() / 1000.0:.1f} km of driving lanes")
+    for source in MAPS.foreign_entries():
+        setting = f":SETTING ({source.units})" if source.units else ""
+        typer.echo(f"{source.name}{setting}: {source.title}")
+
+
+@maps.command()
+def info(
+    map: str = MAP,
+    png: Path | None = PNG,
+) -> None:
+    """Print roads, lanes, signals, limits, and the grip that bends ask for."""
+    from skidpad.cli.output.pictures import format_of, write_picture
+    from skidpad.roads.map_files import map_file
+
+    map_file(map)
+    if png is not None:
+        format_of(png)  # before work
+    from skidpad.roads.bundled import load_map
+    from skidpad.roads.summary import summarise
+
+    loaded = load_map(map)
+    summary = summarise(loaded)
+    for line in _facts(loaded, summary):
+        typer.echo(line)
+    labels = _road_labels(map)
+    typer.echo(_ids(labels))
+    for line in _bends(summary):
+        typer.echo(line)
+    if summary.dead_ends:
+        typer.echo(_dead_ends(summary, labels))
+    if png is not None:
+        from skidpad.roads.plan_view import draw
+
+        write_picture(png, partial(draw, loaded))
+        typer.echo(f"picture: {png}")
+
+
+@maps.command()
+def bake(
+    file: Path = FILE,
+    out: Path | None = OUT,
+) -> None:
+    """Turn an OpenDRIVE file into a baked map, which loads in milliseconds."""
+    from skidpad.recording.files import write_atomically
+    from skidpad.roads.bundled import bake_file
+
+    baked = bake_file(file)
+    target = out or file.with_suffix(".npz")
+    write_atomically(target, baked.save)
+    typer.echo(f"{target}: {len(baked.samples.x)} samples, content hash {baked.content_hash()}")
+
+
+def _road_labels(map: str) -> dict[int, str]:
+    """Returns the ids of the roads as the file writes them, by our numbers; none of a baked map."""
+    from skidpad.roads.bundled import map_file
+    from skidpad.roads.opendrive.document import parse
+
+    file = map_file(map)
+    if file.suffix == ".npz":
+        return {}
+    roads = parse(file.read_bytes(), str(file)).roads
+    return {number: road.label for number, road in roads.items()}
+
+
+def _ids(labels: dict[int, str]) -> str:
+    """Returns the line that names the roads."""
+    if not labels:
+        return "road ids: not in a baked map; see the OpenDRIVE file"
+    more = f" and {len(labels) - IDS_SHOWN} more" if len(labels) > IDS_SHOWN else ""
+    return f"road ids: {', '.join(list(labels.values())[:IDS_SHOWN])}{more}"
+
+
+def _dead_ends(summary: MapSummary, labels: dict[int, str]) -> str:
+    """Returns the warning of driving lanes that lead nowhere."""
+    found = summary.dead_ends
+    ends = ", ".join(f"road {labels.get(road, road)} lane {lane}" for road, lane in found[:10])
+    lanes = "1 driving lane leads" if len(found) == 1 else f"{len(found)} driving lanes lead"
+    return f"warning: {lanes} nowhere: {ends}"
+
+
+def _count(number: int, noun: str) -> str:
+    """Returns a number of things, one of them in the singular."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
+def _facts(map: RoadMap, summary: MapSummary) -> list[str]:
+    lengths = ", ".join(
+        f"{kind.name.lower()} {length / 1000.0:.2f} km"
+        for kind, length in summary.lane_length.items()
+    )
+    signals = ", ".join(
+        f"{count} {kind.name.lower().replace('_', ' ')}" for kind, count in summary.signals.items()
+    )
+    limits = ", ".join(f"{limit * 3.6:.0f}" for limit in summary.limits)
+    side = map.roadside
+    return [
+        f"map {map.name}",
+        f"content hash {map.content_hash}",
+        ", ".join(
+            (
+                _count(summary.roads, "road"),
+                _count(summary.lanes, "lane"),
+                _count(summary.junctions, "junction"),
+            )
+        ),
+        f"lanes: {lengths}",
+        f"signals: {signals or 'none'}",
+        f"limits in km/h: {limits or 'none given'}",
+        f"steepest grade: {100.0 * summary.steepest:.1f} %",
+        (
+            f"roadside: {len(side.barriers)} barriers, {len(side.boxes)} boxes, "
+            f"{len(side.heads)} light heads, {len(side.crosswalks)} crosswalks"
+        ),
+    ]
+
+
+def _bends(summary: MapSummary) -> list[str]:
+    if not summary.bends:
+        return ["no bend tighter than R 300 outside junctions"]
+    grips = "".join(f"  grip at {v:.0f} km/h" for v in SPEEDS_KMH)
+    lines = [f"{'road':>6} {'s from':>8} {'s to':>8} {'R':>7} {'limit':>6}{grips}"]
+    for bend in summary.bends[:BENDS_SHOWN]:
+        limit = "-" if bend.limit is None else f"{bend.limit * 3.6:.0f}"
+        needs = "".join(
+            f"{bend.grip(v / 3.6):>{len(f'  grip at {v:.0f} km/h')}.2f}" for v in SPEEDS_KMH
+        )
+        lines.append(
+            f"{bend.road:>6} {bend.s_from:>8.1f} {bend.s_to:>8.1f} {bend.radius:>7.1f} {limit:>6}{needs}"
+        )
+    if len(summary.bends) > BENDS_SHOWN:
+        lines.append(f"and {len(summary.bends) - BENDS_SHOWN} wider bends")
+    return lines

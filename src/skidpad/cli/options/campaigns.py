@@ -1,0 +1,157 @@
+"""The options that every campaign takes, and what they do."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from msgspec import Meta, Struct
+
+if TYPE_CHECKING:
+    from skidpad.campaign.campaign import Campaign, Summary
+    from skidpad.campaign.workers.worker import Runner
+
+Seeds = Annotated[int, typer.Option("--seeds", "--repeats", min=1, help="Runs per cell.")]
+FirstSeed = Annotated[int, typer.Option("--first-seed", min=1, help="Seeds count up from it.")]
+Workers = Annotated[int, Meta(ge=1, description="Processes; default: one per core.")]
+CORES = os.cpu_count() or 1
+
+
+class Driving(Struct, frozen=True, kw_only=True):
+    """How a campaign is driven."""
+
+    workers: Workers = CORES
+    cluster: Annotated[str | None, Meta(description="Dask scheduler's address, or local:N.")] = None
+    until_halfwidth: Annotated[
+        float | None,
+        Meta(description="Stop a cell once its share of good runs is known to +- this share."),
+    ] = None
+    resume: Annotated[bool, Meta(description="Finish a campaign.")] = False
+    or_next: Annotated[
+        bool, Meta(description="If OUT holds another campaign, use OUT-2, OUT-3, ...")
+    ] = False
+    csv: Annotated[bool, Meta(description="Write CSV beside Parquet.")] = False
+
+
+class CampaignOptions(Driving, frozen=True, kw_only=True):
+    """Where and how the runs of a campaign are driven."""
+
+    out: Annotated[Path, Meta(description="Folder for results and report.")]
+
+    @property
+    def folder(self) -> Path | None:
+        """Where an earlier part of the campaign may lie."""
+        return self.out
+
+    def __call__(
+        self,
+        campaign: Campaign[Any, Any, Any],
+        report: Callable[[Path], object],
+        parts: Mapping[str, Campaign[Any, Any, Any]] = MappingProxyType({}),
+    ) -> Summary:
+        """Drive it under a progress bar and print what `report` says of its folder.
+
+        parts: further campaigns by the folder below its own, driven after it.
+        """
+        from dataclasses import replace
+
+        campaign = replace(campaign, until_halfwidth=self.until_halfwidth)
+        identities = {".": campaign.identity()} | {n: c.identity() for n, c in parts.items()}
+        out = next_folder(self.out, identities) if self.or_next else self.out
+        summary = self._run(campaign, out, out)
+        if parts:
+            report(out)
+        for name, part in parts.items():
+            self._run(part, out / name, out)
+        typer.echo(report(out))
+        return summary
+
+    def _run(self, campaign: Campaign[Any, Any, Any], folder: Path, out: Path) -> Summary:
+        """Drive one campaign into its folder; `out` is what the user asked for."""
+        from skidpad.cli.output.progress import Shown, console, interruptible
+
+        with self._runner(campaign) as runner, Shown(campaign) as shown, interruptible(out):
+            summary = campaign.run(
+                folder,
+                runner,
+                resume=self.resume,
+                csv=self.csv,
+                on_run=shown.ended,
+                on_total=shown.planned_runs,
+            )
+        for warning in summary.warnings():
+            console.print(f"[yellow]{warning}[/]")
+        return summary
+
+    @contextmanager
+    def _runner(self, campaign: Campaign[Any, Any, Any]) -> Iterator[Runner]:
+        from skidpad.campaign.workers.cluster import runner_of
+        from skidpad.campaign.workers.pool import local
+        from skidpad.core.errors import ConfigError
+
+        if self.cluster is None:
+            yield local(1 if campaign.alone else self.workers, campaign.recipe.warm_up)
+            return
+        if campaign.alone:
+            raise ConfigError("--cluster needs --backend embedded: a CARLA server drives one run")
+        with runner_of(self.cluster, campaign.recipe.warm_up) as runner:
+            yield runner
+
+
+class Estimate(Struct, frozen=True, kw_only=True):
+    """How long a campaign would take, instead of driving it."""
+
+    workers: Workers = CORES
+
+    @property
+    def folder(self) -> Path | None:
+        """Nowhere."""
+        return None
+
+    def __call__(
+        self,
+        campaign: Campaign[Any, Any, Any],
+        report: Callable[[Path], object],
+        parts: Mapping[str, Campaign[Any, Any, Any]] = MappingProxyType({}),
+    ) -> None:
+        """Drive a few of its runs and print one sentence, and one for each part."""
+        del report
+        self._print(campaign, "")
+        for name, part in parts.items():
+            self._print(part, f"{name}: ")
+
+    def _print(self, campaign: Campaign[Any, Any, Any], name: str) -> None:
+        from skidpad.core.wording import count_text
+
+        found, workers = campaign.estimate(), 1 if campaign.alone else self.workers
+        typer.echo(
+            f"{name}{'at most ' * campaign.distinct}{count_text(found.runs, 'run')} at "
+            f"{found.cpu_s:.2f} s each (measured on {found.probes}) "
+            f"on {count_text(workers, 'worker')}: about {found.minutes(workers):.1f} min, without "
+            "compilation on first use"
+        )
+
+
+How = CampaignOptions | Estimate
+
+
+def next_folder(out: Path, identities: Mapping[str, dict[str, Any]]) -> Path:
+    """`out`, or the first of out-2, out-3, ... that is empty or holds these campaigns (M-18).
+
+    identities: of each campaign, by its folder below.
+    """
+    from skidpad.recording.campaign.ledger import FolderState, folder_state
+
+    folder, n = out, 1
+    while any(
+        folder_state(folder / name, identity) is FolderState.OTHER
+        for name, identity in identities.items()
+    ):
+        n += 1
+        folder = out.with_name(f"{out.name}-{n}")
+    return folder

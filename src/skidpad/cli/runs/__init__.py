@@ -1,0 +1,1 @@
+"""Single runs and stored results: shown, compared, driven again, exported, watched in the cockpit."""

@@ -1,0 +1,216 @@
+"""`skidpad drive`, `replay` and `watch`: the cockpit in a browser (extra `cockpit`)."""
+
+from __future__ import annotations
+
+from enum import Enum
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from msgspec import Meta, Struct, structs
+
+from skidpad.cli.options.asked import Drivers, Tuned
+from skidpad.cli.options.spread import spread_fields
+from skidpad.core.errors import ConfigError, FileError
+from skidpad.core.run import Roads, RunSpec, Scenario
+from skidpad.core.setup import VEHICLES_MAX
+from skidpad.core.simulator import BackendChoice, BackendKind
+
+if TYPE_CHECKING:
+    from skidpad.pages.server import Place
+
+
+RESERVE = 20  # vehicles to call in, where nothing else is said
+
+
+class Pages(Struct, frozen=True, kw_only=True):
+    """Where the page is served."""
+
+    page_port: Annotated[int, Meta(ge=0, le=65535, description="Of the page; 0: any free one.")] = 0
+    page_host: Annotated[
+        str, Meta(description="Address of the page; others than 127.0.0.1 let others in.")
+    ] = "127.0.0.1"
+    no_browser: Annotated[bool, Meta(description="Print the address, open nothing.")] = False
+
+
+class OnClose(str, Enum):
+    """Values that the option --on-close takes."""
+
+    GO_ON = "go-on"
+    PAUSE = "pause"
+
+
+@spread_fields(duration=3600.0)
+def drive(
+    drivers: Drivers,
+    run: RunSpec,
+    roads: Roads,
+    tuned: Tuned,
+    backend: BackendChoice,
+    pages: Pages,
+    weather: Annotated[str, typer.Option(help="A preset or a YAML file.")] = "clear-noon",
+    seed: Annotated[int, typer.Option(help="Of traffic and noise.")] = 1,
+    scenario: Annotated[
+        str,
+        typer.Option(help="An OpenSCENARIO file, or a name of the catalogue, instead of roads."),
+    ] = "",
+    more: Annotated[
+        int | None,
+        typer.Option(
+            min=0, max=VEHICLES_MAX, help="Vehicles that can be called in; default: up to 20."
+        ),
+    ] = None,
+    rate: Annotated[float, typer.Option(help="Times real time; 0: as fast as it can.")] = 1.0,
+    paused: Annotated[bool, typer.Option("--paused", help="Begin standing.")] = False,
+    gc_in_pause: Annotated[
+        bool, typer.Option(help="Collect garbage between ticks only, not at any moment.")
+    ] = True,
+    on_close: Annotated[
+        OnClose, typer.Option(help="What the drive does when the page is closed.")
+    ] = OnClose.GO_ON,
+    out: Annotated[
+        Path | None, typer.Option(help="Folder of the run; default: out/drives/<name>, numbered.")
+    ] = None,
+) -> None:
+    """Drive in a browser: watch the stack, take over, change weather and grip; keeps a run."""
+    from skidpad.cli.options.carla_backend import check_backend
+    from skidpad.physics.presets import find_weather
+    from skidpad.roads.map_files import require_map
+
+    chosen = drivers.chosen() if drivers != Drivers() else Drivers(configs="3").chosen()
+    if len(chosen) != 1:
+        raise ConfigError(f"one driver at a time, got {len(chosen)}")
+    spec = structs.replace(
+        tuned.resolve(run),
+        driver=chosen[0],
+        course=Scenario(file=scenario) if scenario else with_reserve(roads, backend, more),
+        weather=find_weather(weather),
+        seed=seed,
+        backend=check_backend(backend),
+    )
+    if isinstance(spec.course, Roads) and spec.backend.backend != BackendKind.CARLA:
+        require_map(spec.course.map)
+    from skidpad.cockpit.about import About
+    from skidpad.cockpit.driving import about, drive_job
+    from skidpad.cockpit.producer import Producer
+    from skidpad.cockpit.serving import serve
+    from skidpad.recording.files import require_free
+    from skidpad.simulation.carla.options import Optimisation
+
+    require_place(spec)
+    folder = next_free(Path("out/drives") / spec.name) if out is None else require_free(out)
+    own_gc = gc_in_pause and Optimisation.GC_IN_PAUSE.value not in backend.without
+    producer = Producer(drive_job, about(spec, folder, rate, paused, own_gc))
+    course = spec.course
+    most = course.vehicles + course.reserve if isinstance(course, Roads) else 0
+    shown = About("drive", vehicles=most, pauses=on_close is OnClose.PAUSE)
+    typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
+
+
+def require_place(spec: RunSpec) -> None:
+    """Refuse a file or map that cannot be driven, before a page is opened; a server has its own."""
+    from skidpad.campaign.driving.run_setup import load_scenario
+    from skidpad.campaign.user_files import road_file
+    from skidpad.roads.bundled import load_map
+
+    if isinstance(spec.course, Scenario):
+        load_scenario(spec.course)
+    elif isinstance(spec.course, Roads) and spec.backend.backend != BackendKind.CARLA:
+        load_map(road_file(spec.course))
+
+
+def with_reserve(roads: Roads, backend: BackendChoice, more: int | None) -> Roads:
+    """The course with vehicles to call in; a CARLA server is asked for none."""
+    room = VEHICLES_MAX - roads.vehicles
+    if more is not None and more > room:
+        raise ConfigError(
+            f"--more must be at most {room} beside {roads.vehicles} vehicles, got {more}"
+        )
+    if backend.backend == BackendKind.CARLA:
+        if more:
+            raise ConfigError(f"--more must be 0 on a CARLA server, got {more}")
+        return roads
+    return structs.replace(roads, reserve=min(room, RESERVE) if more is None else more)
+
+
+@spread_fields()
+def replay(
+    run: Annotated[
+        Path,
+        typer.Argument(
+            help="A run's folder, a recording of channels (.mcap), or a monitor's folder."
+        ),
+    ],
+    pages: Pages,
+    beside: Annotated[
+        Path | None, typer.Option(help="Another run, shown beside it in step.")
+    ] = None,
+    hazard: Annotated[
+        str | None, typer.Option("--id", help="Which hazard of a monitor's folder.")
+    ] = None,
+    film: Annotated[
+        Path | None, typer.Option(help="Write a film (.mp4 or .webp) instead of a page.")
+    ] = None,
+    begin: Annotated[float, typer.Option("--from", help="s, of the film.")] = 0.0,
+    end: Annotated[float, typer.Option("--to", help="s, of the film.")] = 10.0,
+    view: Annotated[
+        str, typer.Option(help="driver, follow, top or crash, and every small view.")
+    ] = "follow",
+) -> None:
+    """Scrub through a run in a browser: its pictures are drawn again from what was logged."""
+    from skidpad.cli.options.folders import require_run
+
+    for folder in filter(None, (run, beside)):
+        require_run(folder, ".mcap", "hazards.txt")
+    from skidpad.cockpit.about import About
+    from skidpad.cockpit.film import stretch_of, write_film
+    from skidpad.cockpit.opening import open_source
+    from skidpad.cockpit.producer import Producer
+    from skidpad.cockpit.replaying import replay_job
+    from skidpad.cockpit.serving import serve
+    from skidpad.cockpit.source import timeline
+    from skidpad.cockpit.studio import View
+    from skidpad.core.errors import require_choice
+
+    source = open_source(run, hazard)
+    other = None if beside is None else open_source(beside)
+    if film is not None:
+        seen = View(require_choice("--view", view, [v.value for v in View]))
+        typer.echo(write_film(source, stretch_of(source, begin, end), seen, film, other))
+        return
+    what = {"path": str(run), "hazard": hazard, "beside": None if beside is None else str(beside)}
+    producer = Producer(replay_job, what)
+    shown = About("replay", timeline(source))
+    typer.echo(serve(producer, shown, place_of(pages), typer.echo, not pages.no_browser))
+
+
+@spread_fields()
+def watch(
+    folder: Annotated[Path, typer.Argument(help="A campaign's folder, running or finished.")],
+    pages: Pages,
+    once: Annotated[bool, typer.Option("--once", help="Print how it stands and end.")] = False,
+) -> None:
+    """Watch a campaign while it runs: progress, results so far with intervals, the last crash."""
+    if not folder.is_dir():
+        raise FileError(f"{folder} is not the folder of a campaign")
+    from skidpad.cockpit.watching import lines, serve_watch, standing
+
+    if once:
+        typer.echo("\n".join(lines(standing(folder))))
+        return
+    serve_watch(folder, place_of(pages), typer.echo, browser=not pages.no_browser)
+
+
+def place_of(pages: Pages) -> Place:
+    """Returns host and port at which the pages are served."""
+    from skidpad.pages.server import Place
+
+    return Place(host=pages.page_host, port=pages.page_port)
+
+
+def next_free(folder: Path) -> Path:
+    """`folder`, or the first of folder-2, folder-3, ... where nothing is yet."""
+    from itertools import count
+
+    names = (folder if n == 1 else folder.with_name(f"{folder.name}-{n}") for n in count(1))
+    return next(path for path in names if not path.exists())

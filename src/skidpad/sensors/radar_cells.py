@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from skidpad.core.jit import inner_kernel
+from skidpad.core.splitmix import GOLDEN
 from skidpad.sensors.noise import uniform
 
 Floats = NDArray[np.float64]
 Ints = NDArray[np.int64]
 
-SLOTS = 1 << 14  # of the table; fewer than half may be taken
+BITS = 14
+SLOTS = 1 << BITS  # of the table; fewer than half may be taken
 MOST = SLOTS // 2
 RANGES, SPEEDS = 1 << 11, 1 << 12  # numbers of bins that a cell's number has room for
 GUARD, TRAIN = 2, 8  # cells on each side of the tested one: left out, averaged
@@ -78,16 +80,19 @@ def snr_for(detected: float, false_alarms: float) -> float:
 
 
 @inner_kernel
-def cell_number(grid: Grid, distance: int, speed: int, beam: int) -> int:
+def cell_number(distance: int, speed: int, beam: int) -> int:
     """The number of a cell; range runs fastest."""
     return (beam * SPEEDS + speed + SPEEDS // 2) * RANGES + distance
 
 
 @inner_kernel
-def find_slot(cells: Cells, number: int) -> int:
-    """The slot of a cell, or the free one where it would go."""
-    at = (number * 2654435761) & (SLOTS - 1)
-    while cells.number[at] != EMPTY and cells.number[at] != number:
+def find_slot(numbers: Ints, number: int) -> int:
+    """The slot of a cell, or the free one where it would go.
+
+    Functions that are called for each cell take the arrays they need: to hand all on costs more.
+    """
+    at = np.int64((np.uint64(number) * GOLDEN) >> np.uint64(64 - BITS))
+    while numbers[at] != EMPTY and numbers[at] != number:
         at = (at + 1) & (SLOTS - 1)
     return int(at)
 
@@ -130,8 +135,8 @@ def add_echo(
                 value = row * hann(r - at[0])
                 if value * value < WEAK:
                     continue
-                number = cell_number(grid, r, v, b)
-                slot = find_slot(cells, number)
+                number = cell_number(r, v, b)
+                slot = find_slot(cells.number, number)
                 if cells.number[slot] == EMPTY:
                     if cells.count[0] == MOST:
                         continue
@@ -155,28 +160,42 @@ def normal_pair(key: np.uint64, tick: int, index: int) -> tuple[float, float]:
 
 
 @inner_kernel
-def power_at(cells: Cells, number: int) -> float:
+def power_at(numbers: Ints, powers: Floats, number: int) -> float:
     """Power of a cell that was reached, else 0."""
-    slot = find_slot(cells, number)
-    return float(cells.power[slot]) if cells.number[slot] == number else 0.0
+    slot = find_slot(numbers, number)
+    return float(powers[slot]) if numbers[slot] == number else 0.0
 
 
 @inner_kernel
-def is_peak(cells: Cells, grid: Grid, slot: int) -> bool:
+def is_peak(numbers: Ints, powers: Floats, slot: int) -> bool:
     """Whether no neighbour of a cell is stronger."""
-    number, power = cells.number[slot], cells.power[slot]
+    number, power = numbers[slot], powers[slot]
+    for step in (
+        1,
+        RANGES,
+        SPEEDS * RANGES,
+    ):  # beside it first: that is where it mostly is stronger
+        above = power_at(numbers, powers, number + step)
+        if above > power or power_at(numbers, powers, number - step) > power:
+            return False
     for db in range(-1, 2):
         for dv in range(-1, 2):
             for dr in range(-1, 2):
                 other = number + (db * SPEEDS + dv) * RANGES + dr
-                if other != number and power_at(cells, other) > power:
+                if abs(db) + abs(dv) + abs(dr) > 1 and power_at(numbers, powers, other) > power:
                     return False
     return True
 
 
 @inner_kernel
 def noise_mean(
-    cells: Cells, grid: Grid, number: int, clutter: float, key: np.uint64, tick: int
+    numbers: Ints,
+    powers: Floats,
+    ranges: int,
+    number: int,
+    clutter: float,
+    key: np.uint64,
+    tick: int,
 ) -> float:
     """Mean power of the cells beside one in range; those that no echo reached hold noise and clutter.
 
@@ -188,8 +207,8 @@ def noise_mean(
         for k in range(GUARD + 1, GUARD + TRAIN + 1):
             r = distance + side * k
             power = 0.0
-            if 0 < r < grid.ranges:
-                power = power_at(cells, number + side * k)
+            if 0 < r < ranges:
+                power = power_at(numbers, powers, number + side * k)
             if power > 0.0:
                 total += power
             else:
@@ -202,9 +221,9 @@ def noise_mean(
 
 
 @inner_kernel
-def centre(cells: Cells, number: int, step: int) -> float:
+def centre(numbers: Ints, powers: Floats, number: int, step: int) -> float:
     """Offset in bins of the middle of power over a cell and its two neighbours in one direction."""
-    low, mid, high = (
-        power_at(cells, number - step), power_at(cells, number), power_at(cells, number + step),
+    low, high = (
+        power_at(numbers, powers, number - step), power_at(numbers, powers, number + step),
     )  # fmt: skip
-    return (high - low) / max(low + mid + high, 1e-300)
+    return (high - low) / max(low + power_at(numbers, powers, number) + high, 1e-300)

@@ -1,0 +1,256 @@
+"""What returns a radar's wave: sides of actors and points beside the road, each with its section."""
+
+from __future__ import annotations
+
+from math import exp, log, pi, sqrt
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from skidpad.core.jit import inner_kernel
+from skidpad.core.states import ActorStates
+from skidpad.sensors.boxes import Walls, walls_in_view
+from skidpad.sensors.noise import uniform
+from skidpad.sensors.radar_cells import Cells, add_echo, normal_pair
+from skidpad.sensors.radar_setup import BEAM_STEP, DB, RadarSetup
+from skidpad.sensors.radar_targets import LOBES, Sites, Targets
+
+Floats = NDArray[np.float64]
+
+NEAR = 1.0  # m, nearest echo
+
+
+class RadarWorld(NamedTuple):
+    """What does not change about the world of a radar."""
+
+    length: Floats  # (n,) m, of the actors
+    width: Floats
+    height: Floats
+    targets: Targets
+    sites: Sites
+    walls: Walls
+
+
+class Screens(NamedTuple):
+    """Boxes that may hide others, seen from the antenna; arrays (n,)."""
+
+    row: NDArray[np.int64]
+    cos: Floats
+    sin: Floats
+    x: Floats  # m, antenna from the box's middle, in the box's axes
+    y: Floats
+
+
+class Sensor(NamedTuple):
+    """Where the antenna is in this tick, and how it moves."""
+
+    origin: Floats
+    rotation: Floats
+    vx: float
+    vy: float
+    wet: float  # nepers of the wet radome
+
+
+class Echo(NamedTuple):
+    """A point that returns."""
+
+    distance: float
+    azimuth: float
+    elevation: float
+    rate: float
+    snr: float  # before the target's own fluctuation
+
+
+@inner_kernel
+def find_screens(
+    radar: RadarSetup, world: RadarWorld, states: ActorStates, origin: Floats
+) -> Screens:
+    """The boxes in reach."""
+    n = 0
+    row = np.empty(states.x.size, np.int64)
+    for i in range(1, states.x.size):
+        if states.present[i]:
+            d = np.hypot(states.x[i] - origin[0], states.y[i] - origin[1])
+            if d - world.length[i] < radar.reach:
+                row[n] = i
+                n += 1
+    table = np.empty((4, n))
+    for k in range(n):
+        i = row[k]
+        c, s = np.cos(states.yaw[i]), np.sin(states.yaw[i])
+        dx, dy = origin[0] - states.x[i], origin[1] - states.y[i]
+        table[0, k], table[1, k] = c, s
+        table[2, k], table[3, k] = c * dx + s * dy, -s * dx + c * dy
+    return Screens(row[:n], table[0], table[1], table[2], table[3])
+
+
+@inner_kernel
+def _is_hidden(
+    world: RadarWorld,
+    states: ActorStates,
+    origin: Floats,
+    screens: Screens,
+    own: int,
+    way: tuple[float, float, float],
+) -> bool:
+    """Whether a box lies between antenna and a point that is `way` m off; own: a row not counted."""
+    for k in range(screens.row.size):
+        i = screens.row[k]
+        if i == own:
+            continue
+        c, s = screens.cos[k], screens.sin[k]
+        o = (screens.x[k], screens.y[k], origin[2] - states.z[i] - world.height[i] / 2.0)
+        d = (c * way[0] + s * way[1], -s * way[0] + c * way[1], way[2])
+        half = (world.length[i] / 2.0, world.width[i] / 2.0, world.height[i] / 2.0)
+        enter, leave = 0.0, 1.0
+        for axis in range(3):
+            if d[axis] == 0.0:
+                if abs(o[axis]) > half[axis]:
+                    leave = -1.0
+                continue
+            t0, t1 = (-half[axis] - o[axis]) / d[axis], (half[axis] - o[axis]) / d[axis]
+            enter, leave = max(enter, min(t0, t1)), min(leave, max(t0, t1))
+        if enter < leave:
+            return True
+    return False
+
+
+@inner_kernel
+def _is_behind_wall(
+    walls: Walls, chosen: NDArray[np.int64], origin: Floats, way: tuple[float, float, float]
+) -> bool:
+    """Whether a wall crosses the way from the antenna to a point that is `way` m off."""
+    for w in chosen:
+        ex, ey = walls.x1[w] - walls.x0[w], walls.y1[w] - walls.y0[w]
+        det = ex * way[1] - ey * way[0]
+        if det == 0.0:
+            continue
+        px, py = walls.x0[w] - origin[0], walls.y0[w] - origin[1]
+        t, f = (ex * py - ey * px) / det, (way[0] * py - way[1] * px) / det
+        if 0.0 < t < 1.0 and 0.0 <= f <= 1.0:
+            foot = walls.z0[w] + f * (walls.z1[w] - walls.z0[w])
+            if 0.0 <= origin[2] + t * way[2] - foot <= walls.height[w]:
+                return True
+    return False
+
+
+@inner_kernel
+def _echo(
+    radar: RadarSetup, sensor: Sensor, way: tuple[float, float, float], vx: float, vy: float
+) -> Echo:
+    """What a point of 1 m^2 that moves so returns; SNR 0: it is not met."""
+    distance = sqrt(way[0] * way[0] + way[1] * way[1] + way[2] * way[2])
+    r = sensor.rotation
+    fx = r[0, 0] * way[0] + r[1, 0] * way[1] + r[2, 0] * way[2]
+    fy = r[0, 1] * way[0] + r[1, 1] * way[1] + r[2, 1] * way[2]
+    fz = r[0, 2] * way[0] + r[1, 2] * way[1] + r[2, 2] * way[2]
+    if distance < NEAR or distance > radar.reach or fx <= 0.0:
+        return Echo(distance, 0.0, 0.0, 0.0, 0.0)
+    azimuth, elevation = np.arctan2(fy, fx), np.arctan2(fz, np.hypot(fx, fy))
+    if abs(azimuth) > 0.5 * radar.wide + BEAM_STEP:
+        return Echo(distance, azimuth, elevation, 0.0, 0.0)
+    off = (azimuth / radar.wide) ** 2 + (elevation / radar.high) ** 2
+    lost = 8.0 * log(2.0) * off + radar.air.loss * distance + sensor.wet
+    rate = ((vx - sensor.vx) * way[0] + (vy - sensor.vy) * way[1]) / distance
+    return Echo(distance, azimuth, elevation, rate, radar.factor / distance**4 * exp(-lost))
+
+
+@inner_kernel
+def _deposit(
+    radar: RadarSetup, cells: Cells, echo: Echo, section: float, tick: int, index: int
+) -> None:
+    """Add the echo of a point of this section to its cells."""
+    grid = radar.grid
+    at = (
+        echo.distance / grid.range_step,
+        echo.rate / grid.speed_step,
+        echo.azimuth / grid.beam_step + 0.5 * (grid.beams - 1),
+    )
+    phase = 2.0 * pi * uniform(radar.key, tick, 4 * index + 3)
+    add_echo(cells, grid, at, echo.snr * section, phase, echo.elevation)
+
+
+@inner_kernel
+def lobe_section(side: int, azimuth: float, zenith: float) -> float:
+    """Radar cross section in m^2 of a side of a vehicle; both angles in deg, azimuth from its front."""
+    turn = abs((azimuth - LOBES[side, 0] + 180.0) % 360.0 - 180.0)
+    most = LOBES[side, 5]
+    across = min(12.0 * (turn / LOBES[side, 1]) ** 2, most)
+    rise = min(12.0 * ((zenith - LOBES[side, 2]) / LOBES[side, 3]) ** 2, most)
+    return float(10.0 ** (0.1 * (LOBES[side, 4] - min(across + rise, most))))
+
+
+@inner_kernel
+def _spread(radar: RadarSetup, tick: int, index: int, db: float) -> float:
+    """A factor with mean 1 whose logarithm has this standard deviation in dB."""
+    z, _ = normal_pair(radar.key, tick, 2 * index)
+    return exp(DB * (db * z - 0.5 * DB * db * db))
+
+
+@inner_kernel
+def add_actors(
+    radar: RadarSetup,
+    world: RadarWorld,
+    cells: Cells,
+    states: ActorStates,
+    sensor: Sensor,
+    screens: Screens,
+    tick: int,
+) -> None:
+    """Echoes of the sides of actors that face the antenna and are not hidden."""
+    origin, targets = sensor.origin, world.targets
+    edge = np.tan(0.5 * radar.wide)
+    yaw = np.arctan2(sensor.rotation[1, 0], sensor.rotation[0, 0])
+    rails = walls_in_view(origin, yaw, edge, world.walls, radar.reach)
+    for k in range(screens.row.size):
+        i = screens.row[k]
+        c, s = screens.cos[k], screens.sin[k]
+        for side in range(4):
+            nx, ny = (1.0, 0.0, -1.0, 0.0)[side], (0.0, 1.0, 0.0, -1.0)[side]
+            half = world.length[i] / 2.0 if side % 2 == 0 else world.width[i] / 2.0
+            ax, ay = screens.x[k] - half * nx, screens.y[k] - half * ny  # antenna from the side
+            if ax * nx + ay * ny <= 0.0:
+                continue
+            px, py = half * (c * nx - s * ny), half * (s * nx + c * ny)
+            x, y = states.x[i] + px - origin[0], states.y[i] + py - origin[1]
+            way = (x, y, states.z[i] + targets.rise[i] - origin[2])
+            rate = states.yaw_rate[i]
+            echo = _echo(radar, sensor, way, states.vx[i] - rate * py, states.vy[i] + rate * px)
+            if echo.snr == 0.0:
+                continue
+            if _is_hidden(world, states, origin, screens, i, way):
+                continue
+            if _is_behind_wall(world.walls, rails, origin, way):
+                continue
+            section = targets.area[i, side]
+            if targets.lobed[i]:
+                zenith = 90.0 + np.degrees(np.arctan2(way[2], np.hypot(x, y)))
+                section *= lobe_section(side, np.degrees(np.arctan2(ay, ax)), zenith)
+            index = 4 * i + side
+            section *= _spread(radar, tick, index, targets.spread[i])
+            _deposit(radar, cells, echo, section, tick, index)
+
+
+@inner_kernel
+def add_sites(
+    radar: RadarSetup,
+    world: RadarWorld,
+    cells: Cells,
+    states: ActorStates,
+    sensor: Sensor,
+    screens: Screens,
+    tick: int,
+) -> None:
+    """Echoes of what stands beside the road."""
+    sites, origin = world.sites, sensor.origin
+    for j in range(sites.x.size):
+        x, y = sites.x[j] - origin[0], sites.y[j] - origin[1]
+        if abs(x) + abs(y) > 1.5 * radar.reach or x * sites.nx[j] + y * sites.ny[j] > 0.0:
+            continue
+        way = (x, y, sites.z[j] - origin[2])
+        echo = _echo(radar, sensor, way, 0.0, 0.0)
+        if echo.snr * sites.section[j] < 1.0:
+            continue
+        if not _is_hidden(world, states, origin, screens, 0, way):
+            _deposit(radar, cells, echo, sites.section[j], tick, 4 * states.x.size + j)

@@ -20,7 +20,13 @@ from skidpad.core.errors import ConfigError, require_choice
 from skidpad.core.setting import Plain, SettingField, SettingsPart, describe_settings, setting_field
 from skidpad.core.stack_settings import StackSettings
 from skidpad.core.tyres import REFERENCE, known_tyres
-from skidpad.core.vocabulary import Clearance, GripModel, LidarModel, RangeModel
+from skidpad.core.vocabulary import (
+    Clearance,
+    GripModel,
+    LidarModel,
+    RadarModel,
+    RangeModel,
+)
 
 PROFILES = ("recommended", "thesis_text", "thesis_listing", "preliminary")
 # mu_ref by the tyre whose measured stop from 99.8 km/h on a dry road it gives (What Car?, n11594:
@@ -93,6 +99,9 @@ class SensorSettings(SettingsPart):
     )
     lidar: LidarModel = setting_field(
         LidarModel.EXACT, "M-1, T-11", "lost and false returns of lidars in rain, fog, snow"
+    )
+    radar_model: RadarModel = setting_field(
+        RadarModel.GEOMETRIC, "M-1, T-11", "echoes of the radar: noise, clutter, rain, wet radome"
     )
     camera: bool = setting_field(True, "M-4", "weather acts on RGB images")
     night_rain: NightRain = setting_field(

@@ -14,6 +14,7 @@ from skidpad.core.vocabulary import (
     Control,
     GripModel,
     LidarModel,
+    RadarModel,
     RangeModel,
     SensorLevel,
     Stratum,
@@ -90,6 +91,7 @@ class Setup:
     # mu_ref that <material friction> of the map replaces; None: it is not read (embedded backend)
     material_base: float | None = None
     lidar: LidarModel = LidarModel.EXACT  # of the lidars that a stack asks for (embedded backend)
+    radar_model: RadarModel = RadarModel.GEOMETRIC  # of the common radar (embedded backend)
     stability: bool = False  # all vehicles have stability and traction control (embedded backend)
     level: SensorLevel = SensorLevel.PIXELS
     asked: frozenset[str] = frozenset()  # ids among specs whose readings go to `frame.extra` (L-3)

@@ -203,6 +203,13 @@ class LidarModel(str, Enum):
     PHYSICAL = "physical"
 
 
+class RadarModel(str, Enum):
+    """What a radar returns: `geometric` what its rays meet, `physical` what stands out of its noise."""
+
+    GEOMETRIC = "geometric"
+    PHYSICAL = "physical"
+
+
 class SensorLevel(str, Enum):
     """Real images and radar points, or geometric detection from boxes (decision M-3)."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import NamedTuple, Protocol
 
 import numpy as np
@@ -11,10 +12,12 @@ from numpy.typing import NDArray
 from skidpad.core.frames import CameraImage, RadarPoints, Segments
 from skidpad.core.inputs import Outside
 from skidpad.core.setup import Setup
+from skidpad.core.specs import RadarSpec
 from skidpad.core.states import ActorStates, ActorTable
-from skidpad.core.vocabulary import LightState, RangeModel, SensorLevel
+from skidpad.core.vocabulary import LightState, RadarModel, RangeModel, SensorLevel
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.object_level.objects import ObjectSuite
+from skidpad.sensors.physical_radar import PhysicalRadar
 from skidpad.sensors.suite import PixelSettings, PixelSuite
 
 NO_IMAGES: Mapping[str, CameraImage] = {}
@@ -119,10 +122,49 @@ class Objects:
         self.suite.see_through(outside.weather if physical else None, outside.beam)
 
 
+class WithPhysicalRadar:
+    """A suite whose radar is replaced by the first one of the set-up with noise and clutter."""
+
+    def __init__(
+        self,
+        suite: Sensing,
+        spec: RadarSpec,
+        map: RoadMap,
+        table: ActorTable,
+        setup: Setup,
+        seed: int,
+    ) -> None:
+        weather = setup.weather if setup.range_model is RangeModel.PHYSICAL else None
+        self.suite = suite
+        self.radar = PhysicalRadar(spec, map.roadside, table, seed, weather)
+
+    def read(
+        self,
+        tick: int,
+        states: ActorStates,
+        lights: Mapping[int, LightState],
+        braking: NDArray[np.bool_],
+    ) -> CameraRadarReadings:
+        """Readings of the suite with the radar's detections."""
+        seen = self.suite.read(tick, states, lights, braking)
+        return seen._replace(radar=self.radar.measure(tick, states))
+
+    def change(self, outside: Outside) -> None:
+        """Weather and headlights are others from the next reading on."""
+        self.suite.change(outside)
+        physical = outside.range_model is RangeModel.PHYSICAL
+        self.radar.change(outside.weather if physical else None)
+
+
 def sensing_of(
     map: RoadMap, table: ActorTable, setup: Setup, seed: int, poison: bool = False
 ) -> Sensing:
     """The suite at the level of the set-up."""
+    radars = [spec for spec in setup.specs if isinstance(spec, RadarSpec)]
+    if radars and setup.radar_model is RadarModel.PHYSICAL:
+        others = tuple(spec for spec in setup.specs if not isinstance(spec, RadarSpec))
+        suite = sensing_of(map, table, replace(setup, specs=others), seed, poison)
+        return WithPhysicalRadar(suite, radars[0], map, table, setup, seed)
     if setup.level is SensorLevel.OBJECTS:
         return Objects(map, table, setup, seed)
     return Pixels(map, table, setup, seed, poison)

@@ -272,6 +272,7 @@ def setup_of(spec: RunSpec, map: str, ego: ActorSetup) -> Setup:
         water_drag=world.water_drag,
         material_base=world.mu_ref if world.lane_material else None,
         lidar=sensors.lidar,
+        radar_model=sensors.radar_model,
         stability=world.esc,
         level=spec.sensors,
         render_all=spec.render is Render.ALL or _foreign_on_carla(spec),

@@ -220,6 +220,7 @@ OTHERS: dict[str, Scenario] = {
     "tyre_stiffness": Scenario(True, short_drive("rain-noon")),
     "water_drag": Scenario(True, short_drive("rain-noon")),
     "lidar": Scenario("physical", lidar),
+    "radar_model": Scenario("physical", short_drive("clear-noon")),
     "lane_material": Scenario(True, lane_friction),
     "esc": Scenario(False, short_drive("icy_30")),
     "camera": Scenario(False, lambda s: pictures(s, "rain-noon", "rgb_front")),

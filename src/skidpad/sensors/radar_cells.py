@@ -99,7 +99,7 @@ def find_slot(numbers: Ints, number: int) -> int:
 
 @inner_kernel
 def clear(cells: Cells) -> None:
-    """Forget what was reached."""
+    """Forget the cells that were reached before."""
     for k in range(cells.count[0]):
         slot = cells.taken[k]
         cells.number[slot] = EMPTY

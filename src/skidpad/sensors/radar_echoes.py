@@ -53,7 +53,7 @@ class Sensor(NamedTuple):
 
 
 class Echo(NamedTuple):
-    """A point that returns."""
+    """One point that returns a wave to the antenna."""
 
     distance: float
     azimuth: float
@@ -66,7 +66,7 @@ class Echo(NamedTuple):
 def find_screens(
     radar: RadarSetup, world: RadarWorld, states: ActorStates, origin: Floats
 ) -> Screens:
-    """The boxes in reach."""
+    """The boxes of actors within reach of the antenna."""
     n = 0
     row = np.empty(states.x.size, np.int64)
     for i in range(1, states.x.size):
@@ -182,7 +182,7 @@ def lobe_section(side: int, azimuth: float, zenith: float) -> float:
 
 
 @inner_kernel
-def _spread(radar: RadarSetup, tick: int, index: int, db: float) -> float:
+def _draw_spread(radar: RadarSetup, tick: int, index: int, db: float) -> float:
     """A factor with mean 1 whose logarithm has this standard deviation in dB."""
     z, _ = normal_pair(radar.key, tick, 2 * index)
     return exp(DB * (db * z - 0.5 * DB * db * db))
@@ -228,7 +228,7 @@ def add_actors(
                 zenith = 90.0 + np.degrees(np.arctan2(way[2], np.hypot(x, y)))
                 section *= lobe_section(side, np.degrees(np.arctan2(ay, ax)), zenith)
             index = 4 * i + side
-            section *= _spread(radar, tick, index, targets.spread[i])
+            section *= _draw_spread(radar, tick, index, targets.spread[i])
             _deposit(radar, cells, echo, section, tick, index)
 
 

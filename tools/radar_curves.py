@@ -20,7 +20,7 @@ from skidpad.core.weather import Weather
 from skidpad.physics.optics import RADAR_GHZ, rain_attenuation_db_km
 from skidpad.physics.radio import radome_film, rain_scatter, wet_radome_db
 from skidpad.roads.roadside import Roadside
-from skidpad.sensors.physical_radar import PhysicalRadar
+from skidpad.sensors.physical_radar.radar import PhysicalRadar
 
 SPEC = RadarSpec("radar", Pose(0.0, 0.0, 1.0))
 TICKS, STEP, SPEED = 100, 5.0, 27.8  # m, m/s: 100 km/h

@@ -25,11 +25,17 @@ from skidpad.physics.radio import (
     wet_radome_db,
 )
 from skidpad.roads.roadside import Barrier, BarrierKind, Box, Roadside
-from skidpad.sensors import radar_setup
-from skidpad.sensors.physical_radar import PhysicalRadar
-from skidpad.sensors.radar_cells import AVERAGED, cfar_threshold, make_cells, noise_mean, snr_for
-from skidpad.sensors.radar_echoes import lobe_section
-from skidpad.sensors.radar_targets import BACK, FRONT, LEFT
+from skidpad.sensors.physical_radar import setup as radar_setup
+from skidpad.sensors.physical_radar.cells import (
+    AVERAGED,
+    cfar_threshold,
+    make_cells,
+    noise_mean,
+    snr_for,
+)
+from skidpad.sensors.physical_radar.echoes import lobe_section
+from skidpad.sensors.physical_radar.radar import PhysicalRadar
+from skidpad.sensors.physical_radar.targets import BACK, FRONT, LEFT
 from skidpad.simulation.embedded.engine import EmbeddedBackend
 
 HEAVY = Weather(precipitation=50.0)  # 25 mm/h

@@ -17,7 +17,7 @@ from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.vocabulary import LightState, RadarModel, RangeModel, SensorLevel
 from skidpad.roads.queries import RoadMap
 from skidpad.sensors.object_level.objects import ObjectSuite
-from skidpad.sensors.physical_radar import PhysicalRadar
+from skidpad.sensors.physical_radar.radar import PhysicalRadar
 from skidpad.sensors.suite import PixelSettings, PixelSuite
 
 NO_IMAGES: Mapping[str, CameraImage] = {}

@@ -14,9 +14,9 @@ from skidpad.core.specs import RadarSpec
 from skidpad.core.states import ActorStates, ActorTable
 from skidpad.core.weather import Weather
 from skidpad.roads.roadside import Roadside
-from skidpad.sensors.boxes import placed, walls_of
 from skidpad.sensors.noise import uniform
-from skidpad.sensors.radar_cells import (
+from skidpad.sensors.object_level.boxes import placed, walls_of
+from skidpad.sensors.physical_radar.cells import (
     RANGES,
     SLACK,
     SPEEDS,
@@ -28,8 +28,14 @@ from skidpad.sensors.radar_cells import (
     noise_mean,
     normal_pair,
 )
-from skidpad.sensors.radar_echoes import RadarWorld, Sensor, add_actors, add_sites, find_screens
-from skidpad.sensors.radar_setup import (
+from skidpad.sensors.physical_radar.echoes import (
+    RadarWorld,
+    Sensor,
+    add_actors,
+    add_sites,
+    find_screens,
+)
+from skidpad.sensors.physical_radar.setup import (
     FASTEST,
     MAX_SPEED,
     RAIN_SPREAD,
@@ -38,7 +44,7 @@ from skidpad.sensors.radar_setup import (
     RadarSetup,
     setup_of,
 )
-from skidpad.sensors.radar_targets import sites_of, targets_of
+from skidpad.sensors.physical_radar.targets import sites_of, targets_of
 
 MOST_FOUND = 512
 

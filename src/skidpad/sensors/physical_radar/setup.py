@@ -21,8 +21,8 @@ from skidpad.core.weather import Weather
 from skidpad.physics.grip import rain_rate
 from skidpad.physics.optics import RADAR_GHZ, rain_attenuation_db_km
 from skidpad.physics.radio import rain_scatter, wet_radome_db
-from skidpad.sensors.boxes import Mount, mount_of
-from skidpad.sensors.radar_cells import RANGES, Grid, cfar_threshold, snr_for
+from skidpad.sensors.object_level.boxes import Mount, mount_of
+from skidpad.sensors.physical_radar.cells import RANGES, Grid, cfar_threshold, snr_for
 
 Floats = NDArray[np.float64]
 

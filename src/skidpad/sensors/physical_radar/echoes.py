@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from skidpad.core.jit import inner_kernel
 from skidpad.core.states import ActorStates
-from skidpad.sensors.boxes import Walls, walls_in_view
 from skidpad.sensors.noise import uniform
-from skidpad.sensors.radar_cells import Cells, add_echo, normal_pair
-from skidpad.sensors.radar_setup import BEAM_STEP, DB, RadarSetup
-from skidpad.sensors.radar_targets import LOBES, Sites, Targets
+from skidpad.sensors.object_level.boxes import Walls, walls_in_view
+from skidpad.sensors.physical_radar.cells import Cells, add_echo, normal_pair
+from skidpad.sensors.physical_radar.setup import BEAM_STEP, DB, RadarSetup
+from skidpad.sensors.physical_radar.targets import LOBES, Sites, Targets
 
 Floats = NDArray[np.float64]
 

@@ -254,7 +254,6 @@ def test_both_levels_and_the_switch():
     assert frames["objects"] != frames["no weather"]
 
 
-@pytest.mark.req("NF-1")
 def test_a_tick_costs_at_most_twice_one_with_the_geometric_radar():
     backends = {m: measured(model=m)[0] for m in RadarModel}
     best = dict.fromkeys(RadarModel, np.inf)

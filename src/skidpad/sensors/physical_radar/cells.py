@@ -42,7 +42,7 @@ class Cells(NamedTuple):
     weight: Floats  # (SLOTS,) sum of the echoes' powers
     rise: Floats  # (SLOTS,) sum of power times elevation, rad
     taken: Ints  # (MOST,) slots in use
-    count: Ints  # (1,) how many
+    reached: Ints  # (1,) how many
 
 
 class Grid(NamedTuple):
@@ -100,10 +100,10 @@ def find_slot(numbers: Ints, number: int) -> int:
 @inner_kernel
 def clear(cells: Cells) -> None:
     """Forget the cells that were reached before."""
-    for k in range(cells.count[0]):
+    for k in range(cells.reached[0]):
         slot = cells.taken[k]
         cells.number[slot] = EMPTY
-    cells.count[0] = 0
+    cells.reached[0] = 0
 
 
 @inner_kernel
@@ -138,11 +138,11 @@ def add_echo(
                 number = cell_number(r, v, b)
                 slot = find_slot(cells.number, number)
                 if cells.number[slot] == EMPTY:
-                    if cells.count[0] == MOST:
+                    if cells.reached[0] == MOST:
                         continue
                     cells.number[slot] = number
-                    cells.taken[cells.count[0]] = slot
-                    cells.count[0] += 1
+                    cells.taken[cells.reached[0]] = slot
+                    cells.reached[0] += 1
                     cells.re[slot] = cells.im[slot] = 0.0
                     cells.weight[slot] = cells.rise[slot] = 0.0
                 cells.re[slot] += value * c

@@ -136,7 +136,7 @@ def _bins(number: int) -> tuple[int, int, int]:
 def _add_noise(radar: RadarSetup, cells: Cells, sensor: Sensor, tick: int) -> None:
     """Noise and clutter of the cells that an echo reached."""
     key = radar.key + np.uint64(1)
-    for k in range(cells.count[0]):
+    for k in range(cells.reached[0]):
         slot = cells.taken[k]
         distance, speed, beam = _bins(cells.number[slot])
         z, w = normal_pair(key, tick, cells.number[slot])
@@ -153,7 +153,7 @@ def _select(
     grid, n = radar.grid, 0
     numbers, powers = cells.number, cells.power
     key = radar.key + np.uint64(2)
-    for k in range(cells.count[0]):
+    for k in range(cells.reached[0]):
         slot = cells.taken[k]
         power, number = cells.power[slot], cells.number[slot]
         if n == MOST_FOUND or power < SLACK * grid.threshold or not is_peak(numbers, powers, slot):

@@ -43,7 +43,7 @@ def farthest(kind: ActorKind, size: tuple[float, float, float], yaw: float, weat
     """Distance in m to which a target is found in half of the ticks; it moves with the ego."""
     table = ActorTable(
         ("ego", "target"), ("car", "car"), np.array([ActorKind.CAR, kind], dtype=np.uint8),
-np.array([4.5, size[0]]), np.array([1.8, size[1]]), np.array([1.5, size[2]]),
+        np.array([4.5, size[0]]), np.array([1.8, size[1]]), np.array([1.5, size[2]]),
         np.zeros((2, 3), dtype=np.uint8),
     )  # fmt: skip
     states = ActorStates.empty(2)

@@ -12,7 +12,7 @@ import pytest
 
 from runs import adas_run
 from sensors.test_objects import RADAR, world
-from skidpad.campaign.cast import stage_of
+from skidpad.campaign.driving.run_setup import stage_of
 from skidpad.core.states import VehicleCommand
 from skidpad.core.vocabulary import ActorKind, RadarModel, RangeModel, SensorLevel
 from skidpad.core.weather import Weather

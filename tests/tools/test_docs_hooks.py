@@ -6,10 +6,21 @@ from pathlib import Path
 
 import yaml
 
+from docs_catalogue import sensor_page, vehicle_page, weather_page
 from docs_hooks import ROOT, command_reference, home_page, on_page_markdown
+from skidpad.core.sensor_types import SENSORS
+from skidpad.physics.presets import preset_groups
+from skidpad.physics.types import vehicle_types
 
 DOCS = ROOT / "docs"
-GENERATED = {"index.md", "reference/cli.md", "reference/settings.md"}
+GENERATED = {
+    "index.md", "reference/cli.md", "reference/settings.md", "reference/weathers.md",
+    "reference/vehicles.md", "reference/sensors.md",
+}  # fmt: skip
+
+
+def own_presets() -> list[str]:
+    return [name for members in preset_groups().values() for name in members]
 
 
 def pages_in(nav: object) -> list[str]:
@@ -44,3 +55,32 @@ def test_links_of_the_home_page_lead_to_pages() -> None:
     inside = [t for t in targets if t and not t.startswith("http")]
     assert inside
     assert all(Path(DOCS, t).exists() for t in inside)
+
+
+def section(page: str, name: str) -> str:
+    """Text between the heading of an item and the next heading."""
+    return page.split(f"# {name}\n")[1].split("\n#")[0]
+
+
+def test_every_weather_vehicle_tyre_and_sensor_has_its_section() -> None:
+    weathers, vehicles, sensors = weather_page(), vehicle_page(), sensor_page()
+    for name in own_presets():
+        assert "| friction at 0, 80 km/h | " in section(weathers, name)
+    for name, kind in vehicle_types().items():
+        assert f"| mass with driver | {kind.mass:.0f} kg |" in section(vehicles, name)
+    for name in ("winter", "summer", "studded", "all_season"):
+        assert f"| `{name}` | " in section(vehicles, "Tyres")
+    for one in SENSORS.entries():
+        assert f"specs.{one.spec.__name__}(" in section(sensors, one.name)
+    assert "| `rgb_rear` | rgb | -2, 0, 2.4 | 0, 180 |" in sensors
+    assert "| `semantic_bumper` | semantic | 2.3, 0, 0.4 | -20, 0 |" in sensors
+
+
+def test_numbers_of_a_weather_are_those_of_the_models() -> None:
+    pages = weather_page()
+    ice = section(pages, "icy_100")
+    assert "| ice, snow on the road | 20.0, 0.0 mm |" in ice
+    assert "| rain | 50.0 mm/h |" in section(pages, "rain-noon")
+    distance = float(ice.split("| braking from 80 km/h | ")[1].split(" m")[0])
+    dry = float(section(pages, "clear-noon").split("| braking from 80 km/h | ")[1].split(" m")[0])
+    assert distance > 5.0 * dry

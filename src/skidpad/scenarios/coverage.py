@@ -56,7 +56,7 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
             "axes of the world and of trajectories are those of the entity; braking ends at once"
         ),
         "LateralDistanceAction": (
-            "of its limits `maxSpeed` only; axes of the world and of trajectories are those of the lane"
+            "no limits of braking; axes of the world and of trajectories are those of the lane"
         ),
         "VisibilityAction": "for sensors; pictures for people and other traffic go by none",
         "EnvironmentAction": "falling snow counts by its sight, wind not at all",

@@ -85,6 +85,7 @@ class Guide:
         self.leap = 0.0  # m along the way that this step puts it further, without a speed
         self.offset = 0.0 if point is None else point.offset
         self.offset_rate = self.offset_bend = 0.0
+        self.adds_offset = False  # the motion aside comes on top of the way along the lane
         self.roads: tuple[int, ...] = ()
         self.at_end = False
         look = 0.0 if point is None else wrap_angle(pose.yaw - point.heading)
@@ -154,9 +155,13 @@ class Guide:
         leap, aside, self.leap, self.aside = self.leap, self.aside, 0.0, 0.0
         way = v * dt
         if self.base is None:
+            if self.at_end:
+                self.v = 0.0
+                return self.free
             self.free = self.free.moved(forward=way + leap)
             return self.free
-        sideways = min(abs(self.offset_rate) * dt + abs(aside), abs(way))
+        drift = 0.0 if self.adds_offset else abs(self.offset_rate) * dt
+        sideways = min(drift + abs(aside), abs(way))
         forward = sqrt(way * way - sideways * sideways)
         squeezed = max(1.0 - self.base.curvature * self.offset, SQUEEZED)
         distance = self.along * ((forward if way >= 0.0 else -forward) + leap) / squeezed
@@ -194,7 +199,8 @@ class Guide:
         pose = self.base.pose.moved(left=self.offset)
         turn = self.turn
         if self.offset_rate and abs(self.v) > SLOW:
-            forward = sqrt(max(self.v**2 - self.offset_rate**2, 0.0))
+            drift = 0.0 if self.adds_offset else self.offset_rate
+            forward = sqrt(max(self.v**2 - drift**2, 0.0))
             lean = min(max(atan2(self.offset_rate, forward), -STEEPEST_TURN), STEEPEST_TURN)
             turn = self.along * (lean if self.v > 0.0 else -lean)
         yaw = pose.yaw + turn if self.along > 0.0 else pose.yaw + pi + turn

@@ -18,6 +18,7 @@ from skidpad.roads.routing import shortest_route
 
 ON_LANE = 1.0  # m beyond a lane's edge that still is on it
 SLOPE_STEP = 0.5  # m to either side, over which a slope is taken
+ABREAST, ABREAST_STEPS = 1e-3, 6  # m ahead that still is abreast, and tries to get there
 END_SLACK = 0.5  # m beyond the end of a road that still is its end
 
 
@@ -153,9 +154,14 @@ class Network:
 
     def abreast(self, point: LanePoint, x: float, y: float) -> tuple[LanePoint, float]:
         """The place of a point's lane that is abreast of (x, y), and how far left of it that is."""
-        dx, dy = x - point.x, y - point.y
-        forward = dx * cos(point.heading) + dy * sin(point.heading)
-        near = self.map.ahead(point, forward) or point
+        near = point
+        for _ in range(ABREAST_STEPS):
+            dx, dy = x - near.x, y - near.y
+            forward = dx * cos(near.heading) + dy * sin(near.heading)
+            further = self.map.ahead(near, forward) if abs(forward) > ABREAST else None
+            if further is None:
+                break
+            near = further
         dx, dy = x - near.x, y - near.y
         return near, dy * cos(near.heading) - dx * sin(near.heading)
 

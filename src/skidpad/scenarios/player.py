@@ -12,6 +12,7 @@ from skidpad.core.setup import DT, ActorCommand, ActorSetup
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Control
 from skidpad.recording.run.staging import Staging
+from skidpad.scenarios.actions.routing import go_on_after_track
 from skidpad.scenarios.entities import TYRES, Box
 from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Place
@@ -123,6 +124,8 @@ class Player:
         if first:
             self._cast(truth)
         self.scene.observe(truth)
+        for actor in self.actors.values():
+            go_on_after_track(actor, self.scenario.network)
         if first:
             self._begin()
         self.hit = self.hit or bool(truth.contacts)

@@ -109,6 +109,7 @@ class Actor:
     longitudinal: Running | None = None  # the newest action of its kind replaces the one before
     lateral: Running | None = None
     leading: Running | None = None  # the action whose track it is led along
+    v_after_track: float | None = None  # m/s, once this step has reached the end of the track
     led_since: float = 0.0  # s
     lane_steering: LaneSteering | None = None  # it steers to its lane instead of being put there
     present: bool = True
@@ -178,6 +179,7 @@ class Actor:
 
     def lead(self, action: Running, track: Track, t: float) -> None:
         """An action leads it along a track; what moved it aside is over, with times its speed too."""
+        self.v_after_track = None
         self.leading, self.track, self.led_since, self.lateral = action, track, t, None
         self.lane_steering = None
         if track.timed:

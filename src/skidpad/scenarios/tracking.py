@@ -94,7 +94,10 @@ class PacedTrack:
         return -1.0 if v < 0.0 else 1.0
 
     def at(self, t: float) -> tuple[Pose, float, float]:
-        """Pose and speed at time t, for this step's speed; beyond its ends straight on."""
+        """Pose and speed at time t, for this step's speed; straight on from its end, not before its begin.
+
+        Both as in esmini.
+        """
         v = self.v
         s = self.s + self.sense * v * (t - self.t)
         if self.closed:
@@ -102,7 +105,7 @@ class PacedTrack:
         pose = self.line.at_length(s)
         if self.sense < 0.0 and not self.line.names_heading(s):
             pose = replace(pose, yaw=wrap_angle(pose.yaw + pi))
-        beyond = s - min(max(s, 0.0), self.line.length)
+        beyond = max(s - self.line.length, 0.0)
         return (pose.moved(forward=self.sense * beyond) if beyond else pose), v, 0.0
 
     def way_to(self, place: Pose, t: float) -> float:
@@ -114,8 +117,8 @@ class PacedTrack:
         """Be `way` m further along the line."""
         self.s += way
 
-    def step(self, t: float, v: float) -> bool:
-        """Go on to time t, from there at v; True at the end of the line, back at its begin likewise."""
+    def step(self, t: float, v: float, dt: float) -> bool:
+        """Go on to time t, from there at v; True if the next step reaches an end, back at its begin too."""
         if not self.moved and self.v * (t - self.t) == 0.0:  # a speed of the same event counts
             self.sense = self._sense_at(self.s, v)
         move = self.sense * self.v * (t - self.t)
@@ -124,9 +127,10 @@ class PacedTrack:
         if self.closed:
             self.s %= self.line.length
             return False
-        if self.sense * v >= 0.0 and self.s >= self.line.length - 1e-6:
-            return True
-        return move < 0.0 and self.s <= 1e-6
+        move = self.sense * v * dt
+        if move > 0.0:
+            return self.s + move > self.line.length - NEAR
+        return move < 0.0 and self.s + move < NEAR
 
 
 def course(track: Track, t: float, dt: float) -> float:

@@ -65,10 +65,13 @@ maxLateralAcc="{a}" dynamicsShape="{shape}"/><LaneOffsetTarget>{target}</LaneOff
 </LaneOffsetAction>""")
 
 
-def beside(distance: float, side: str, free: bool = False, axes: str = "entity") -> str:
+def beside(
+    distance: float, side: str, free: bool = False, axes: str = "entity", limits: str = ""
+) -> str:
+    bounds = f"><DynamicConstraints {limits}/></LateralDistanceAction>" if limits else "/>"
     return lateral(f"""<LateralDistanceAction entityRef="ego" distance="{distance}"
 freespace="{str(free).lower()}" continuous="true" coordinateSystem="{axes}"
-displacement="{side}ToReferencedEntity"/>""")
+displacement="{side}ToReferencedEntity"{bounds}""")
 
 
 def relative(value: float, kind: str = "delta", continuous: bool = False) -> str:

@@ -40,6 +40,7 @@ from tests.scenarios.oracle.actions import (
 from tests.scenarios.oracle.conditions import conditions
 from tests.scenarios.oracle.ends import at_once, backwards, without_road
 from tests.scenarios.oracle.settings import BEGIN, NORTH, SETTINGS, WEST, Case, case, moving, turned
+from tests.scenarios.oracle.sideways import sideways
 
 
 def ego_does(action: str, t: float = 2.975) -> str:
@@ -355,6 +356,7 @@ CASES: dict[str, Case] = {
         lines_on_roads,
         begins,
         conditions,
+        sideways,
     )
     for c in part()
 }

@@ -1,23 +1,19 @@
-"""Sideways: to another lane, to an offset in the lane, to a distance from another entity."""
+"""Sideways: to another lane, to an offset in the lane."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from enum import Enum
-from math import cos, inf, sqrt
+from math import cos, sqrt
 
-from skidpad.roads.queries import LanePoint
 from skidpad.scenarios.actions.base import Dimension, Dynamics, Following, dynamics
 from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Axles
-from skidpad.scenarios.measures import Axes, between
 from skidpad.scenarios.motion import SHARPEST, SLOW, Guide, Shape, Transition
 from skidpad.scenarios.network import next_lane_id
 from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 from skidpad.scenarios.steering import LaneSteering, look_ahead
 
-ASKEW = 0.1  # cosine between a lane and an entity, below which the one is not beside the other
 A_LATERAL = 1.0  # m/s^2, of a change of offset for which the file gives no limit
 
 
@@ -45,6 +41,7 @@ class ChangeOfOffset:
         if v < SLOW and not self.change.over(self.done):
             guide.offset_rate = guide.offset_bend = 0.0
             return False
+        guide.adds_offset = not self.to_lane
         if self.to_lane:
             guide.pace = guide.v
         _, slope, _ = self.change.at(self.done)
@@ -191,17 +188,16 @@ class LaneOffset:
         return actor.lateral
 
     def target(self, scene: Scene, actor: Actor) -> float:
-        """Offset left of the lane as it runs, m; the file's counts left of increasing s."""
+        """Offset left of the lane as it runs, m; the file's counts left of increasing s, or of the other."""
         base = actor.guide.base
         if base is None:
             return actor.guide.offset
-        forward = scene.network.forward(base)
-        value = self.value if forward else -self.value
         if self.other is None:
-            return value
+            return self.value if scene.network.forward(base) else -self.value
         other = scene.actors[self.other]
-        _, left = scene.network.abreast(base, other.pose.x, other.pose.y)
-        return left + value
+        near, left = scene.network.abreast(base, other.pose.x, other.pose.y)
+        along = 1.0 if cos(near.heading - other.pose.yaw) >= 0.0 else -1.0
+        return left + along * self.value
 
 
 def compile_lane_offset(node: Node, ctx: Context) -> LaneOffset:
@@ -217,92 +213,3 @@ def compile_lane_offset(node: Node, ctx: Context) -> LaneOffset:
     shape = found.choice("dynamicsShape", Shape)
     continuous = node.flag("continuous", default=False)
     return LaneOffset(shape, min(a_max, 1e6), target.number("value"), other, continuous)
-
-
-class Side(Enum):
-    """Of the entity that a distance is kept to."""
-
-    ANY = "any"
-    LEFT = "leftToReferencedEntity"
-    RIGHT = "rightToReferencedEntity"
-
-
-@dataclass(frozen=True, slots=True)
-class LateralDistance:
-    """Keep a sideways distance to another entity.
-
-    straight: from the line through it in its own direction, else along the own lane.
-    """
-
-    other: str
-    distance: float
-    free: bool
-    continuous: bool
-    side: Side
-    straight: bool
-    v_max: float
-
-    def begin(self, scene: Scene, actor: Actor) -> Running:
-        """From now on."""
-        actor.leave_track(scene.network)
-        _, left = scene.between(self.other, actor.name)
-        to_left = left >= 0.0 if self.side is Side.ANY else self.side is Side.LEFT
-        actor.lateral = DistanceKept(self, actor, 1.0 if to_left else -1.0)
-        return actor.lateral
-
-
-class DistanceKept:
-    """A sideways distance being kept."""
-
-    def __init__(self, action: LateralDistance, actor: Actor, sign: float) -> None:
-        self.action, self.actor, self.sign = action, actor, sign
-
-    def step(self, scene: Scene) -> bool:
-        """Move the offset towards it as fast as is allowed."""
-        actor, guide, action = self.actor, self.actor.guide, self.action
-        if actor.lateral is not self or guide.base is None:
-            return True
-        end = self._end(scene, guide.base)
-        if action.v_max == inf and actor.placed_by_file:
-            guide.aside = (
-                end - guide.offset if action.straight else 0.0
-            )  # as esmini: part of its way
-            guide.offset, guide.offset_rate = end, 0.0
-            return not action.continuous
-        most = min(action.v_max, abs(guide.v)) * scene.dt
-        move = min(max(end - guide.offset, -most), most)
-        guide.offset += move
-        there = not action.continuous and abs(end - guide.offset) < 1e-3
-        guide.offset_rate = 0.0 if there else move / scene.dt
-        return there
-
-    def _end(self, scene: Scene, base: LanePoint) -> float:
-        """The offset at which the distance is kept, m; the sides are those of the other entity."""
-        action, here = self.action, self.actor.guide.offset
-        other = scene.actors[action.other]
-        size = action.distance
-        if action.free:
-            size += 0.5 * (self.actor.entity.box.width + other.entity.box.width)
-        near, left = scene.network.abreast(base, other.pose.x, other.pose.y)
-        if not action.straight:
-            along = 1.0 if cos(near.heading - other.pose.yaw) >= 0.0 else -1.0
-            return left + self.sign * along * size
-        at = base.pose.moved(left=here)
-        _, now = between(other.pose, at.x, at.y)
-        c = cos(base.heading - other.pose.yaw)
-        return here if abs(c) < ASKEW else here + (self.sign * size - now) / c
-
-
-def compile_lateral_distance(node: Node, ctx: Context) -> LateralDistance:
-    """A <LateralDistanceAction>."""
-    found = node.find("DynamicConstraints")
-    axes = node.choice("coordinateSystem", Axes, Axes.ENTITY)
-    return LateralDistance(
-        ctx.entity(node),
-        node.number("distance", 0.0),
-        node.flag("freespace", default=False),
-        node.flag("continuous", default=False),
-        node.choice("displacement", Side, Side.ANY),
-        axes is Axes.ENTITY,
-        inf if found is None else found.limit("maxSpeed", inf),
-    )

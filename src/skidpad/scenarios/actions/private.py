@@ -6,12 +6,9 @@ from collections.abc import Callable, Mapping
 
 from skidpad.scenarios.actions import controllers
 from skidpad.scenarios.actions.base import PrivateAction
+from skidpad.scenarios.actions.beside import compile_lateral_distance
 from skidpad.scenarios.actions.distance import compile_gap
-from skidpad.scenarios.actions.lateral import (
-    compile_lane_change,
-    compile_lane_offset,
-    compile_lateral_distance,
-)
+from skidpad.scenarios.actions.lateral import compile_lane_change, compile_lane_offset
 from skidpad.scenarios.actions.meeting import compile_synchronize
 from skidpad.scenarios.actions.routing import (
     compile_acquire,

@@ -11,6 +11,7 @@ from skidpad.scenarios.context import Context
 from skidpad.scenarios.document import Node
 from skidpad.scenarios.entities import Entity
 from skidpad.scenarios.lines import Line
+from skidpad.scenarios.motion import Guide
 from skidpad.scenarios.network import Network, Place
 from skidpad.scenarios.positions import Position, position
 from skidpad.scenarios.routes import ScenarioRoute, compile_route, random_roads, roads_through
@@ -18,6 +19,8 @@ from skidpad.scenarios.scene import DONE, Actor, Running, Scene
 from skidpad.scenarios.steering import SteeredTrack
 from skidpad.scenarios.tracking import PacedTrack, TimedTrack
 from skidpad.scenarios.trajectories import Trajectory, compile_trajectory
+
+SLACK = 1e-6  # s before the last point that is there
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,6 +157,8 @@ class FollowTrajectory:
             begin = self._zero(line, self.timing, scene.t)
             led = Timed(actor, TimedTrack(line, begin, self.timing.scale))
         actor.lead(led, led.track, scene.t)
+        if actor.placed_by_file:  # what others in this step see
+            actor.pose = led.track.at(scene.t)[0]
         return led
 
     def _steer(self, scene: Scene, actor: Actor, line: Line) -> Steered:
@@ -177,14 +182,15 @@ class Timed:
         self.actor, self.track = actor, track
 
     def step(self, scene: Scene) -> bool:
-        """Until the last point; the entity then drives on along its lane."""
+        """Until the step that reaches the last point; the entity then drives on along its lane."""
         if self.actor.track is not self.track:
             return True
-        if scene.t < self.track.end - 1e-9:
-            v = self.track.at(min(scene.t + scene.dt, self.track.end))[1]
-            self.actor.guide.v, self.actor.guide.a = v, 0.0
+        next_t = scene.t + scene.dt
+        if next_t <= self.track.end + SLACK:
+            self.actor.guide.v, self.actor.guide.a = self.track.at(next_t)[1], 0.0
+        if next_t < self.track.end - SLACK:
             return False
-        _leave_end(self.actor, scene.network, self.track.v_end)
+        self.actor.v_after_track = self.track.v_end
         return True
 
 
@@ -195,12 +201,12 @@ class Paced:
         self.actor, self.track = actor, track
 
     def step(self, scene: Scene) -> bool:
-        """Until its end; the entity then drives on along its lane."""
+        """Until the step that reaches its end; the entity then drives on along its lane."""
         if self.actor.track is not self.track:
             return True
-        if not self.track.step(scene.t, self.actor.guide.v):
+        if not self.track.step(scene.t, self.actor.guide.v, scene.dt):
             return False
-        _leave_end(self.actor, scene.network, self.actor.guide.v)
+        self.actor.v_after_track = self.actor.guide.v
         return True
 
 
@@ -221,7 +227,8 @@ class Steered:
         if self.times is not None:
             actor.guide.v, actor.guide.a = track.v, 0.0
         if there:
-            _leave_end(actor, scene.network, actor.guide.v)
+            actor.v_after_track = actor.guide.v
+            go_on_after_track(actor, scene.network)
         return there
 
     def _pace(self, times: TimedTrack, t: float, dt: float) -> float:
@@ -232,12 +239,15 @@ class Steered:
         return self.track.pace(v, length)
 
 
-def _leave_end(actor: Actor, network: Network, v: float) -> None:
-    """Goes on along the lane at speed v; in a file without a road there is none, and it stands."""
+def go_on_after_track(actor: Actor, network: Network) -> None:
+    """Follow the lane, where a track has ended; in a file without a road there is none: stand."""
+    v, actor.v_after_track = actor.v_after_track, None
+    if v is None or actor.track is None:
+        return
+    actor.follow_road(network, v)
     if network.stand_in:
-        actor.put(network, Place(actor.pose), 0.0)
-    else:
-        actor.follow_road(network, v)
+        actor.guide = Guide(network, Place(actor.pose), v)
+        actor.guide.at_end = True
 
 
 def compile_follow(node: Node, ctx: Context) -> FollowTrajectory:

@@ -152,7 +152,7 @@ class Approach:
     and the allowed acceleration make, as in esmini. It is its own `Track`.
     """
 
-    timed = False
+    timed = steered = False
 
     def __init__(self, action: LateralDistance, actor: Actor, sign: float, t: float) -> None:
         self.action, self.actor, self.sign = action, actor, sign

@@ -168,9 +168,9 @@ def test_a_value_of_the_users_never_holds_and_the_check_says_so(tmp_path):
 
 
 WITHOUT_EFFECT = {
-    "LightStateAction": private("""<AppearanceAction><LightStateAction><LightType><VehicleLight
-vehicleLightType="brakeLights"/></LightType><LightState mode="on"/></LightStateAction>
-</AppearanceAction>"""),
+    "LightStateAction": private("""<AppearanceAction><LightStateAction><LightType>
+<UserDefinedLight userDefinedLightType="disco"/></LightType><LightState mode="on"/>
+</LightStateAction></AppearanceAction>"""),
     "AnimationAction": private("""<AppearanceAction><AnimationAction><AnimationType>
 <ComponentAnimation><VehicleComponent vehicleComponentType="hood"/></ComponentAnimation>
 </AnimationType></AnimationAction></AppearanceAction>"""),
@@ -184,8 +184,7 @@ vehicleLightType="brakeLights"/></LightType><LightState mode="on"/></LightStateA
 
 
 @pytest.mark.osc_noted(
-    "LightStateAction", "AnimationAction", "AppearanceAction",
-    "UserDefinedAction", "CustomCommandAction", "SetMonitorAction",
+    "AnimationAction", "UserDefinedAction", "CustomCommandAction", "SetMonitorAction",
 )  # fmt: skip
 @pytest.mark.parametrize("tag", WITHOUT_EFFECT)
 def test_what_this_world_cannot_show_is_over_at_once_and_told(tmp_path, tag):

@@ -14,7 +14,7 @@ def test_the_page_says_what_the_code_knows():
 def test_an_element_that_is_noted_alone_is_not_supported():
     support = {row.element: row.support for row in coverage()}
     only_noted = set(marked_tests("osc_noted")) - set(marked_tests())
-    assert {"AppearanceAction", "LightStateAction", "AnimationAction"} <= only_noted
+    assert {"AnimationAction", "SetMonitorAction"} <= only_noted
     assert {support[element] for element in only_noted} == {Support.NO}
 
 

@@ -115,3 +115,5 @@ class Outside:
     # traffic lights that a person has taken over, by OpenDRIVE id, and what they show
     lights: tuple[tuple[int, LightState], ...] = ()
     unseen: frozenset[str] = frozenset()  # actors that no sensor sees (embedded backend)
+    # actors whose brake lamps something else than the brake works, and whether they shine (embedded)
+    brake_lamps: tuple[tuple[str, bool], ...] = ()

@@ -58,6 +58,10 @@ PARTIAL: Mapping[str, str] = MappingProxyType(
         "LateralDistanceAction": (
             "no limits of braking; axes of the world and of trajectories are those of the lane"
         ),
+        "AppearanceAction": "lights; animations are noted, without effect",
+        "LightStateAction": (
+            "brake lamps and the ego's beams are drawn, all are exported as OSI; no colours, no fading"
+        ),
         "VisibilityAction": "for sensors; pictures for people and other traffic go by none",
         "EnvironmentAction": "falling snow counts by its sight, wind not at all",
         "TrafficSignalStateAction": STATES,
@@ -103,7 +107,7 @@ class Coverage:
 def without_effect() -> tuple[str, ...]:
     """Actions that are read and noted, and change nothing that this world can show."""
     silent = (tag for tag, make in PRIVATE.items() if make.__name__ == "no_effect")
-    return (*silent, "AppearanceAction", "SetMonitorAction")
+    return (*silent, "SetMonitorAction")
 
 
 def known_elements() -> frozenset[str]:

@@ -11,6 +11,7 @@ from skidpad.core.run import ActorMode
 from skidpad.core.setup import DT, ActorCommand, ActorSetup
 from skidpad.core.states import WorldTruth
 from skidpad.core.vocabulary import Control
+from skidpad.recording.run.lamps import LampChange
 from skidpad.recording.run.staging import Staging
 from skidpad.scenarios.actions.routing import go_on_after_track
 from skidpad.scenarios.entities import TYRES, Box
@@ -45,6 +46,7 @@ class Played:
     story: tuple[Happening, ...]
     boxes: Mapping[str, Box]
     staging: Staging
+    lamps: tuple[LampChange, ...] = ()
 
 
 def setups(scenario: Scenario) -> tuple[ActorSetup, tuple[ActorSetup, ...]]:
@@ -116,7 +118,8 @@ class Player:
         boxes = {name: entity.box for name, entity in self.scenario.entities.items()}
         story = tuple(self.scene.story)
         driven_by_file = self.modes.get(self.scenario.ego, ActorMode.PHYSICAL) is not None
-        return Played(story, boxes, staging_of(self.scenario, story, driven_by_file))
+        staging = staging_of(self.scenario, story, driven_by_file)
+        return Played(story, boxes, staging, tuple(self.scene.lamps))
 
     def step(self, truth: WorldTruth) -> Sequence[ActorCommand]:
         """Look at the moment, go on with the story, say what actors do until the next."""

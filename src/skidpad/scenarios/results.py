@@ -9,6 +9,7 @@ from math import cos, hypot, sin
 from pathlib import Path
 
 from skidpad.recording.files import write_bytes
+from skidpad.recording.run.lamps import write_lamps
 from skidpad.recording.run.log import RunLog
 from skidpad.recording.run.staging import write_staging
 from skidpad.scenarios.entities import Box
@@ -22,6 +23,7 @@ TRAJECTORIES, STORY = "trajectories.csv", "storyboard.csv"
 def write_results(folder: Path, log: RunLog, played: Played) -> None:
     """Writes staging, story and trajectories of a run."""
     write_staging(folder, played.staging)
+    write_lamps(folder, played.lamps)
     rows = rows_csv(log_rows(log, played.boxes))
     write_bytes(folder / TRAJECTORIES, rows.encode())
     write_bytes(folder / STORY, story_csv(played.story).encode())

@@ -13,6 +13,7 @@ from skidpad.core.run import ActorMode
 from skidpad.core.setup import ActorCommand
 from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.vocabulary import LightState
+from skidpad.recording.run.lamps import LampChange
 from skidpad.scenarios.entities import Entity
 from skidpad.scenarios.environment import Clock, Environment
 from skidpad.scenarios.measures import Point, corners, overlap
@@ -330,6 +331,7 @@ class Scene:
     environments: list[Environment] = field(default_factory=list)  # of events, in their order
     clock: Clock | None = None  # time of day, where the file has said one
     story: list[Happening] = field(default_factory=list)
+    lamps: list[LampChange] = field(default_factory=list)  # that the file switches, in their order
     seed: int = 0  # of what is drawn
     flows: list[Flow] = field(default_factory=list)  # of traffic actions
     cruising: dict[str, float] = field(default_factory=dict)  # m/s that traffic's vehicles want

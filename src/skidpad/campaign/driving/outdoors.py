@@ -18,6 +18,7 @@ from skidpad.core.states import VehicleCommand, WorldTruth
 from skidpad.core.weather import RANGES, Weather
 from skidpad.physics.grip import RAIN_FULL
 from skidpad.physics.optics import V_CLEAR, V_FOG
+from skidpad.scenarios.actions.lights import beam_of_ego, lit_brake_lamps
 from skidpad.scenarios.environment import Environment, Fall, Wetness
 from skidpad.scenarios.player import Player
 from skidpad.scenarios.signals import held_lights
@@ -98,6 +99,8 @@ class FileChanges:
         scene = self.player.scene
         unseen = frozenset(actor.name for actor in scene.actors.values() if not actor.visible)
         now = replace(self.outside, lights=held_lights(scene), unseen=unseen)
+        if scene.lamps:
+            now = replace(now, brake_lamps=lit_brake_lamps(scene), beam=beam_of_ego(scene))
         for environment in scene.environments[self.done :]:
             self.done += 1
             if self.follows:

@@ -10,11 +10,11 @@ from pathlib import Path
 from typing import Any
 
 from skidpad.campaign.driving.file_drivers import FILE_DRIVERS
+from skidpad.campaign.driving.file_stack import NAME as STACK_NAME
+from skidpad.campaign.driving.file_stack import PilotConditions, PilotMaker
 from skidpad.campaign.driving.governing import apply_envelope
 from skidpad.campaign.driving.loop import Script, Supervising, Timer, Unsupervised
 from skidpad.campaign.driving.starts import start_of
-from skidpad.campaign.file_stack import NAME as STACK_NAME
-from skidpad.campaign.file_stack import PilotConditions, PilotMaker
 from skidpad.campaign.user_files import road_file
 from skidpad.core.errors import ConfigError, FileError, StackError
 from skidpad.core.frames import SensorFrame

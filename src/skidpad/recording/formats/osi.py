@@ -18,7 +18,9 @@ from skidpad.core.errors import ConfigError, InputError, MissingExtra
 from skidpad.core.geometry import Pose, wrap_angle
 from skidpad.core.vocabulary import ActorKind, LightState
 from skidpad.recording.files import write_bytes
+from skidpad.recording.formats.osi_lamps import write_lamps_of
 from skidpad.recording.formats.osi_udp import send_osi
+from skidpad.recording.run.lamps import LampChange
 from skidpad.recording.run.log import RunLog
 
 if TYPE_CHECKING:
@@ -59,6 +61,7 @@ class World:
     rain_mm_h: float | None = None
     road: GroundTruth | None = None  # lanes, boundaries and signs, for the first message
     tilt: Tilting | None = None
+    lamps: tuple[LampChange, ...] = ()  # of vehicles, that a scenario file has switched
 
 
 class Tilting(Protocol):
@@ -104,7 +107,9 @@ def moments(log: RunLog, world: World) -> Iterator[GroundTruth]:
             truth.MergeFrom(world.road)
         for i in range(len(log.table)):
             if log.present[k, i]:
-                _write_actor(truth.moving_object.add(), log, k, i, world.tilt)
+                moving = truth.moving_object.add()
+                _write_actor(moving, log, k, i, world.tilt)
+                write_lamps_of(moving, log, k, i, world.lamps)
         for signal, state in lamps.at(int(log.tick[k])).items():
             if signal in world.heads:
                 _light(truth, signal, state, world.heads[signal])

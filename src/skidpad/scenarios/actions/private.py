@@ -9,6 +9,7 @@ from skidpad.scenarios.actions.base import PrivateAction
 from skidpad.scenarios.actions.beside import compile_lateral_distance
 from skidpad.scenarios.actions.distance import compile_gap
 from skidpad.scenarios.actions.lateral import compile_lane_change, compile_lane_offset
+from skidpad.scenarios.actions.lights import compile_light_state
 from skidpad.scenarios.actions.meeting import compile_synchronize
 from skidpad.scenarios.actions.routing import (
     compile_acquire,
@@ -41,7 +42,7 @@ PRIVATE: Mapping[str, Compile] = {
     "ControllerAction": controllers.compile_controller,
     **controllers.TABLE,  # where they stood before 1.1, and may stand since
     "VisibilityAction": controllers.compile_visibility,
-    "LightStateAction": controllers.no_effect,
+    "LightStateAction": compile_light_state,
     "AnimationAction": controllers.no_effect,
     "TrailerAction": compile_trailer,
 }

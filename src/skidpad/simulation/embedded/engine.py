@@ -52,6 +52,7 @@ class EmbeddedBackend:
         self._world, self._noise = staged(setup, seed), setup.localisation_noise
         self._setup, self._seed = setup, seed
         self._unseen = np.zeros(len(self.world.table), dtype=np.bool_)
+        self._brake_lamps: list[tuple[int, bool]] = []
         self._localisation = stream(seed, "ego", "localisation")
         self.sensing = sensing_of(self.map, self.world.table, setup, seed, self.poison)
         self._asked = self._make_asked() if setup.asked else None
@@ -103,6 +104,7 @@ class EmbeddedBackend:
         self.world.lights.hold(outside.lights)
         names = self.world.table.names
         self._unseen = np.array([name in outside.unseen for name in names], dtype=np.bool_)
+        self._brake_lamps = [(names.index(name), lit) for name, lit in outside.brake_lamps]
         self.sensing.change(outside)
         self._setup = changed
         if self._asked is not None:
@@ -122,6 +124,8 @@ class EmbeddedBackend:
         if self._unseen.any():
             states = states._replace(present=states.present & ~self._unseen)
         lights, braking = w.lights.by_id, w.braking()
+        for row, lit in self._brake_lamps:
+            braking[row] = lit
         seen = self.sensing.read(w.tick, states, lights, braking)
         extra = {} if asked is None else asked.read(w.tick, states, seen.images, lights, braking)
         return SensorFrame(

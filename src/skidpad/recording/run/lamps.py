@@ -1,0 +1,102 @@
+"""Lamps that a scenario file switches: one row per change, and what is lit at a time (`lamps.csv`)."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+
+from skidpad.core.errors import FileError
+from skidpad.recording.files import write_bytes
+
+FILE = "lamps.csv"
+COLUMNS = ("time", "entity", "lamp", "mode", "on", "off")
+FLASH = 0.5  # s on, and off, where a file does not say it; the standard's default
+ROUNDING = 1e-9  # s
+
+
+class Lamp(str, Enum):
+    """A lamp of a vehicle, by the words of OpenSCENARIO XML 1.3 (`VehicleLightType`)."""
+
+    DAYTIME = "daytimeRunningLights"
+    LOW_BEAM = "lowBeam"
+    HIGH_BEAM = "highBeam"
+    FOG = "fogLights"
+    FOG_FRONT = "fogLightsFront"
+    FOG_REAR = "fogLightsRear"
+    BRAKE = "brakeLights"
+    WARNING = "warningLights"
+    LEFT = "indicatorLeft"
+    RIGHT = "indicatorRight"
+    REVERSING = "reversingLights"
+    PLATE = "licensePlateIllumination"
+    SPECIAL = "specialPurposeLights"
+
+
+class LampMode(str, Enum):
+    """What a lamp is switched to."""
+
+    ON = "on"
+    OFF = "off"
+    FLASHING = "flashing"
+
+
+@dataclass(frozen=True, slots=True)
+class LampChange:
+    """A lamp is switched at time t, s; on, off: s of flashing."""
+
+    t: float
+    entity: str
+    lamp: Lamp
+    mode: LampMode
+    on: float = FLASH
+    off: float = FLASH
+
+    def is_lit(self, t: float) -> bool:
+        """Returns whether it shines at time t."""
+        if self.mode is LampMode.FLASHING:
+            return (t - self.t + ROUNDING) % (self.on + self.off) < self.on
+        return self.mode is LampMode.ON
+
+
+def newest(changes: Iterable[LampChange], t: float) -> Mapping[tuple[str, Lamp], LampChange]:
+    """Returns the last change of each lamp up to time t, by entity and lamp."""
+    return {(c.entity, c.lamp): c for c in changes if c.t <= t + ROUNDING}
+
+
+def write_lamps(folder: Path, changes: Sequence[LampChange]) -> None:
+    """Writes the changes of a run that has any."""
+    if not changes:
+        return
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for c in changes:
+        writer.writerow(
+            (f"{c.t:.3f}", c.entity, c.lamp.value, c.mode.value, f"{c.on:g}", f"{c.off:g}")
+        )
+    write_bytes(folder / FILE, text.getvalue().encode())
+
+
+def read_lamps(folder: Path) -> tuple[LampChange, ...]:
+    """Returns the changes of a run's folder; none where the file of the run switches no lamp."""
+    file = folder / FILE
+    if not file.is_file():
+        return ()
+    try:
+        with file.open(encoding="utf-8", newline="") as lines:
+            return tuple(_change(row) for row in csv.DictReader(lines))
+    except (KeyError, TypeError, ValueError) as error:
+        raise FileError(f"{file}: not as this version writes it: {error}") from None
+
+
+def _change(row: Mapping[str, str]) -> LampChange:
+    on, off = float(row["on"]), float(row["off"])
+    if not on + off > 0.0:
+        raise ValueError(f"on and off must be positive, got {on:g} and {off:g}")
+    return LampChange(
+        float(row["time"]), row["entity"], Lamp(row["lamp"]), LampMode(row["mode"]), on, off
+    )

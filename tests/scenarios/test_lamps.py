@@ -29,6 +29,8 @@ from skidpad.cli.main import app
 from skidpad.core.errors import FileError
 from skidpad.core.inputs import Beam
 from skidpad.core.run import Passenger
+from skidpad.core.states import VehicleCommand
+from skidpad.core.vocabulary import SensorLevel
 from skidpad.recording.run.lamps import FILE, Lamp, LampChange, LampMode, read_lamps, write_lamps
 from skidpad.scenarios.actions.lights import beam_of_ego
 from skidpad.scenarios.findings import ScenarioError
@@ -44,34 +46,26 @@ def lamp(name: str, mode: str = "on", **more: object) -> str:
 
 def seen_by_ego(file: Path, ticks: int) -> list[np.ndarray]:
     """Front pictures of the ego by tick, everything as the file says."""
-    spec = scenario_run(str(file), driver=Passenger())
+    spec = scenario_run(str(file), driver=Passenger(), sensors=SensorLevel.PIXELS)
     stage = stage_of(spec)
     assert stage.player is not None
     backend, changes = EmbeddedBackend(), FileChanges(stage.player, spec)
     frame = backend.reset(stage.setup, 1)
     pictures = []
     for _ in range(ticks):
-        (camera,) = [id for id in frame.images if id == "front_rgb"] or [
-            next(id for id in frame.images if frame.images[id].rgb is not None)
-        ]
+        camera = next(id for id in frame.images if frame.images[id].rgb is not None)
         pictures.append(frame.images[camera].rgb.copy())
         words = stage.player.step(backend.truth())
         news = changes.news()
         if news is not None:
             backend.change(news)
-        frame = backend.step(stage.player.actors["ego"].overridden(frame_command()), words)
+        frame = backend.step(VehicleCommand(brake=1.0), words)
     return pictures
-
-
-def frame_command():
-    from skidpad.core.states import VehicleCommand
-
-    return VehicleCommand(brake=1.0)
 
 
 @pytest.mark.osc("LightStateAction", "AppearanceAction")
 def test_brake_lamps_are_drawn_as_the_file_switches_them(tmp_path):
-    """The car ahead coasts at a constant speed of 0; its lamps go on at 0.1 s and off at 0.2 s."""
+    """The car ahead stands; its lamps go on at 0.1 s and off at 0.2 s."""
     begins = init("ego", teleport(on_lane(-1, 100)), speed(to(0)))
     begins += init("other", teleport(on_lane(-1, 110)), speed(to(0)))
     events = (

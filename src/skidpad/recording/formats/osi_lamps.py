@@ -48,9 +48,9 @@ def _write_switched(state: Any, found: Mapping[Lamp, LampChange], t: float) -> N
             state.brake_light_state = _brake(state, lit)
     switched = [lamp for lamp in INDICATORS if lamp in found]
     if switched:
-        lit = [lamp for lamp in switched if found[lamp].is_lit(t)]
-        both = {Lamp.LEFT, Lamp.RIGHT} <= set(lit)
-        word = "WARNING" if both else INDICATORS[lit[0]] if lit else "OFF"
+        shine = [lamp for lamp in switched if found[lamp].is_lit(t)]
+        both = {Lamp.LEFT, Lamp.RIGHT} <= set(shine)
+        word = "WARNING" if both else INDICATORS[shine[0]] if shine else "OFF"
         state.indicator_state = state.IndicatorState.Value(f"INDICATOR_STATE_{word}")
 
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import ast
 from pathlib import Path
 
-from skidpad.scenarios.coverage import Support, coverage
+from openscenario_coverage import Support, coverage
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "openscenario.md"

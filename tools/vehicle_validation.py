@@ -13,13 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from skidpad.core.constants import G
-from skidpad.core.errors import MissingExtra
-from skidpad.core.geometry import Pose, kmh_from_mps, mps_from_kmh
-from skidpad.physics.avoidance import ENDS, Lanes, attempts, highest, through
-from skidpad.physics.fleet import Fleet
-from skidpad.physics.grip import GripParams
-from skidpad.physics.manoeuvres import (
+from avoidance import ENDS, Lanes, attempts, highest, through
+from manoeuvres import (
     DWELL,
     DWELL_FREQUENCY,
     DWELL_SPEED,
@@ -34,6 +29,11 @@ from skidpad.physics.manoeuvres import (
     time_to_speed,
     understeer,
 )
+from skidpad.core.constants import G
+from skidpad.core.errors import MissingExtra
+from skidpad.core.geometry import Pose, kmh_from_mps, mps_from_kmh
+from skidpad.physics.fleet import Fleet
+from skidpad.physics.grip import GripParams
 from skidpad.physics.stopping import stops
 from skidpad.physics.types import EGO_TYPE, DrivenWheels, VehicleType, traffic_types, vehicle_type
 from skidpad.physics.vehicle import steer_share

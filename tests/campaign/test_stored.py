@@ -13,6 +13,7 @@ from msgspec.structs import replace
 from typer.testing import CliRunner
 
 from runs import adas_run, scenario_run, segment_run
+from scenario_tuning import Candidate, tuning_run
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.recipes.channels import RECIPE as CHANNELS
 from skidpad.campaign.recipes.grip import recipe as grip_recipe
@@ -21,7 +22,6 @@ from skidpad.campaign.runs.play import run_to
 from skidpad.campaign.runs.run import run
 from skidpad.campaign.runs.stored import read_run, read_segment
 from skidpad.campaign.studies.arms import speed_and_dropout
-from skidpad.campaign.studies.tuning import Candidate, tuning_run
 from skidpad.campaign.workers.worker import Finished, Job
 from skidpad.cli.main import app
 from skidpad.core.errors import ConfigError, FileError

@@ -2,9 +2,9 @@
 
 import pytest
 
+from scenario_tuning import RECIPE, SEEDS, Candidate, candidates, summary, trials
 from skidpad.campaign.campaign import Campaign
 from skidpad.campaign.cells.matrix import FIRST_SEED
-from skidpad.campaign.studies.tuning import RECIPE, SEEDS, Candidate, candidates, summary, trials
 from skidpad.campaign.workers.worker import Finished
 from skidpad.recording.campaign.results import read_results
 from skidpad.scenarios.shipped import NAMES, find_shipped

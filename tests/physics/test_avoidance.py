@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from skidpad.physics.avoidance import ENDS, Lanes, attempts, highest, through
-from skidpad.physics.manoeuvres import Trace
+from avoidance import ENDS, Lanes, attempts, highest, through
+from manoeuvres import Trace
 from skidpad.physics.types import EGO_TYPE, vehicle_type
 
 EGO = vehicle_type(EGO_TYPE)

@@ -7,8 +7,7 @@ from math import degrees
 import numpy as np
 import pytest
 
-from skidpad.core.constants import G
-from skidpad.physics.manoeuvres import (
+from manoeuvres import (
     Bench,
     lateral_limit,
     pedals_in_turn,
@@ -16,8 +15,9 @@ from skidpad.physics.manoeuvres import (
     time_to_speed,
     understeer,
 )
-from skidpad.physics.split import split_stop
+from skidpad.core.constants import G
 from skidpad.physics.types import EGO_TYPE, VehicleType, traffic_types, vehicle_type
+from split_friction import split_stop
 
 EGO = vehicle_type(EGO_TYPE)
 CARS = [vehicle_type(name) for name in traffic_types()]

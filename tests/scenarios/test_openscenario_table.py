@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from openscenario_coverage import Support, coverage
 from openscenario_table import PAGE, marked_tests, page
-from skidpad.scenarios.coverage import Support, coverage
 
 
 def test_the_page_says_what_the_code_knows():

@@ -2,8 +2,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from carla_coverage import rewritten
 from skidpad.simulation.carla_server.catalogue import Family, load_catalogue
-from skidpad.simulation.carla_server.coverage import rewritten
 from skidpad.simulation.carla_server.effects import Remarks, load_acting
 from skidpad.simulation.carla_server.sensing.producers import PRODUCERS
 
@@ -12,7 +12,7 @@ PAGE = Path(__file__).parents[3] / "docs" / "carla.md"
 
 def test_the_page_shows_what_is_registered() -> None:
     text = PAGE.read_text(encoding="utf-8")
-    assert rewritten(text) == text, "run python -m skidpad.simulation.carla_server.coverage FILE"
+    assert rewritten(text) == text, "run python tools/carla_coverage.py FILE"
 
 
 def test_every_acting_attribute_exists() -> None:

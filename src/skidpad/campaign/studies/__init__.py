@@ -1,1 +1,1 @@
-"""Small experiments of their own, and the tuning of scenarios."""
+"""Small experiments of their own, for findings that the matrix cannot decide."""

@@ -1,6 +1,6 @@
 """The coverage table of `docs/carla.md`, made from what is registered.
 
-`python -m skidpad.simulation.carla_server.coverage FILE` rewrites the part between its marks.
+`python tools/carla_coverage.py FILE` rewrites the part between its marks.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Choose the scenarios' values in the open: candidates, tuning seeds, a criterion (decision X-8).
 
-`python -m skidpad.campaign.studies.tuning [scenario ...]` drives every candidate on dry road with original
+`python tools/scenario_tuning.py [scenario ...]` drives every candidate on dry road with original
 friction, as a campaign, and prints one row each. No weather and no reduced friction enters; what the
 rows were used for stands in docs/grip.md.
 """

@@ -13,8 +13,8 @@ from itertools import product
 import numpy as np
 from numpy.typing import NDArray
 
+from manoeuvres import MU, TICK, Bench, Trace
 from skidpad.core.geometry import mps_from_kmh
-from skidpad.physics.manoeuvres import MU, TICK, Bench, Trace
 from skidpad.physics.types import VehicleType
 
 Floats = NDArray[np.float64]

@@ -33,8 +33,7 @@ from skidpad.fleet.identity import new_id
 from skidpad.fleet.patterns.series import POINTS, SIGNALS, VERSION, to_plain
 from skidpad.fleet.service import Places, open_store
 from skidpad.fleet.store.accounts import add_person, add_vehicle
-from skidpad.fleet.store.later import series
-from skidpad.fleet.store.tables import batches, drives, hazards
+from skidpad.fleet.store.tables import batches, drives, hazards, series
 from skidpad.fleet.warehouse import DAY, Warehouse
 from skidpad.fleet.words import Principal, Role
 from skidpad.recording.hazards.text import HEADER

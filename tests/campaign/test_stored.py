@@ -6,7 +6,6 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-import msgspec
 import pytest
 import yaml
 from msgspec.structs import replace
@@ -36,7 +35,6 @@ from skidpad.core.run import (
     run_from_plain,
 )
 from skidpad.core.simulator import BackendChoice, BackendKind
-from skidpad.recording.channels.drives import DriveRecord, read_record
 from skidpad.recording.run.log_files import log_hash, read_log
 
 SERVER = BackendChoice(
@@ -123,58 +121,6 @@ def test_a_segment_of_channels_is_driven_again(tmp_path: Path) -> None:
     recording = tmp_path / "route-4" / f"{spec.name}.mcap"
     assert read_segment(recording) == spec
     assert "the same drive" in again(recording)
-    record = read_record(recording.with_suffix(".json"))
-    assert record is not None
-    route = msgspec.to_builtins(spec.course)
-    del route["type"]
-    first = {  # as the first version wrote it
-        "route": {**route, "weather": msgspec.to_builtins(spec.weather)},
-        "channels": ["lav_like", "tfuse_like"],
-        "seed": 1,
-        "duration": 1.0,
-        "drive_by": "arbiter",
-        "noise": 1.0,
-    }
-    older = msgspec.json.encode(DriveRecord(first, record.outcome))
-    recording.with_suffix(".json").write_bytes(older)
-    assert read_segment(recording) == spec
-
-
-MATRIX_1 = {
-    "driver": "2",
-    "functions": ["acc", "lca"],
-    "stack": None,
-    "options": {},
-    "weather": {"name": "clear-noon", "title": "Clear Sky - Noon"},
-    "seed": 5,
-    "profile": "recommended",
-    "settings": {"mu_ref": 0.7},
-    "map": "figure8",
-    "duration": 60.0,
-    "traffic": "random",
-    "vehicles": 7,
-    "allow_fewer": False,
-    "sensors": "pixels",
-    "render": "all",
-    "backend": {"kind": "carla", "pace": True, "without": ["light-cache"]},
-}
-GRIP_1 = {
-    "scenario": "ghost_cut_in",
-    "weather": {"name": "icy_30", "ice_thickness": 30.0},
-    "friction": "original",
-    "seed": 2,
-    "cutin": "unfixed",
-    "model": "statistical",
-    "mu_ref": 0.9,
-    "controller": "stack",
-    "config": 2,
-    "profile": "recommended",
-    "settings": {"grip": "physical", "mu_ref": 0.9},
-    "level": "objects",
-    "actors": "physical",
-    "overlay": False,
-    "backend": {"kind": "embedded", "pace": False, "without": []},
-}
 
 
 def stored(folder: Path, plain: dict[str, Any]) -> Path:
@@ -182,28 +128,12 @@ def stored(folder: Path, plain: dict[str, Any]) -> Path:
     return folder
 
 
-def test_folders_of_the_first_version_are_read(tmp_path: Path) -> None:
-    matrix = read_run(stored(tmp_path, MATRIX_1))
-    assert (matrix.name, matrix.duration) == ("2_clear-noon-005", 60.0)
-    assert matrix.settings.world.mu_ref == 0.7
-    assert matrix.backend == BackendChoice(
-        backend=BackendKind.CARLA, pace=True, without=("light-cache",)
-    )
-    foreign = read_run(stored(tmp_path, MATRIX_1 | {"driver": "f.py:A", "stack": "f.py:A"}))
-    assert foreign.driver == StackDriver("f.py:A", name="f.py:A")
-    grip = read_run(stored(tmp_path, GRIP_1))
-    assert grip.name == "ghost_cut_in-unfixed_icy_30_original-000002"
-    assert grip.settings.world.grip.value == "statistical"
-    assert isinstance(grip.course, Scenario)
-    assert grip.course.parameters["EgoSpeed"] == 0.0
-
-
 @pytest.mark.parametrize(
     ("plain", "told"),
     [
-        ({"file": "lead_slowdown.xosc", "seed": 1}, "play the file again"),
         ({"version": 99}, "version 99"),
-        ({"driver": "2"}, "does not describe a run"),
+        ({"driver": "2"}, "version None of a run's description, not 2"),
+        ({"version": 2, "seed": "x"}, "does not describe a run"),
         ({"version": 2, "weather": {"wetness": 400.0}}, "wetness must be between 0 and 100"),
         ({"version": 2, "colour": "red"}, "colour"),
     ],

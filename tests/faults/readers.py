@@ -166,7 +166,7 @@ def read_identity(path: Path) -> object:
 
 
 def identities() -> list[bytes]:
-    return [toy_files()["campaign.json"], b'{"cells": [{"a": 1}], "command": "adas"}']
+    return [toy_files()["campaign.json"], b'{"common": {"a": 1}, "command": "adas"}']
 
 
 def ledgers() -> list[bytes]:

@@ -20,7 +20,7 @@ from skidpad.fleet.store.accounts import end_credentials, principal_of
 from skidpad.fleet.store.engine import migrate, open_engine
 from skidpad.fleet.store.events import events_of
 from skidpad.fleet.store.intake import Batch
-from skidpad.fleet.store.tables import batches, drives, hazards, metadata
+from skidpad.fleet.store.tables import batches, hazards, metadata
 from skidpad.fleet.words import Kind, Limits, Refused
 
 
@@ -84,19 +84,6 @@ def test_migration_makes_the_tables_that_the_code_knows(world):
     for table in metadata.tables.values():
         columns = {c["name"]: c["nullable"] for c in there.get_columns(table.name)}
         assert columns == {c.name: c.nullable for c in table.columns}
-
-
-def test_a_store_of_an_older_version_gets_the_indexes_that_counting_asks_for(world):
-    engine = world.fleet.engine
-    counted = [i for table in (hazards, drives) for i in table.indexes if "counted" in str(i.name)]
-    assert len(counted) == 4
-    with engine.begin() as connection:
-        for index in counted:
-            index.drop(connection)
-        connection.execute(text("UPDATE alembic_version SET version_num = '0003'"))
-    migrate(engine)
-    there = {i["name"] for name in ("hazards", "drives") for i in inspect(engine).get_indexes(name)}
-    assert {index.name for index in counted} <= there
 
 
 def test_an_ended_credential_opens_nothing(world):

@@ -11,9 +11,8 @@ from skidpad.fleet.loop.rollout import look_at, under_way
 from skidpad.fleet.patterns.analysis import SERVICE, analyse, own
 from skidpad.fleet.rounds import Rounds
 from skidpad.fleet.service import Fleet
-from skidpad.fleet.store.later import analyses
 from skidpad.fleet.store.rights import visible
-from skidpad.fleet.store.tables import hazards, vehicles
+from skidpad.fleet.store.tables import analyses, hazards, vehicles
 from skidpad.fleet.words import Principal, Refused, Role
 
 LOOK_S = 5.0  # between two rounds: what came shows within 10 s

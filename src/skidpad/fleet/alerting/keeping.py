@@ -14,8 +14,8 @@ from sqlalchemy import Connection, select
 from skidpad.core.told import on_a_line
 from skidpad.fleet.identity import digest, new_id
 from skidpad.fleet.store.events import Event, add_event, events_of
-from skidpad.fleet.store.later import alerts
 from skidpad.fleet.store.rights import visible
+from skidpad.fleet.store.tables import alerts
 from skidpad.fleet.words import Principal, Refused, absent
 
 ESCALATE_AFTER_S = 30.0  # without an acknowledgement; assumption

@@ -23,8 +23,8 @@ from skidpad.core.told import on_a_line
 from skidpad.fleet.alerting.keeping import alert_of
 from skidpad.fleet.identity import new_id
 from skidpad.fleet.store.events import add_event, events_of
-from skidpad.fleet.store.later import deliveries, orders
 from skidpad.fleet.store.rights import visible
+from skidpad.fleet.store.tables import deliveries, orders
 from skidpad.fleet.words import Principal, Refused, absent
 from skidpad.recording.files import write_bytes
 

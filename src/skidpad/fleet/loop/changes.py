@@ -14,8 +14,8 @@ from skidpad.fleet.loop.judging import errors_of
 from skidpad.fleet.patterns.analysis import cluster_row
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.events import add_event
-from skidpad.fleet.store.loop import changes, evaluations
 from skidpad.fleet.store.reading import hazard_row, record_of
+from skidpad.fleet.store.tables import changes, evaluations
 from skidpad.fleet.updates.payloads import PayloadKind, payload_name, read_payload_content
 from skidpad.fleet.words import Principal, Refused, absent
 

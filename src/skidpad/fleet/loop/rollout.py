@@ -15,8 +15,7 @@ from skidpad.fleet.loop.changes import change_row, evaluations_of, payload_of
 from skidpad.fleet.loop.plan import Decision, Finding, Plan, choose_vehicles, look
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.store.events import Event, add_event, events_of
-from skidpad.fleet.store.loop import changes, looks, releases
-from skidpad.fleet.store.tables import drives, events, vehicles
+from skidpad.fleet.store.tables import changes, drives, events, looks, releases, vehicles
 from skidpad.fleet.words import Principal, Refused, absent
 
 SUBJECT = "release"

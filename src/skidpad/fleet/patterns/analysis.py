@@ -26,10 +26,9 @@ from skidpad.fleet.patterns.recurrence import keep_subjects, name_subjects, read
 from skidpad.fleet.patterns.series import VERSION, from_plain, series_of, to_plain
 from skidpad.fleet.service import CAME, Fleet
 from skidpad.fleet.store.events import add_event
-from skidpad.fleet.store.later import analyses, clusters, series
 from skidpad.fleet.store.reading import record_of
 from skidpad.fleet.store.rights import visible
-from skidpad.fleet.store.tables import hazards
+from skidpad.fleet.store.tables import analyses, clusters, hazards, series
 from skidpad.fleet.words import Principal, absent
 
 HAZARDS_MAX = 20_000  # newest hazards that one analysis looks at

@@ -12,7 +12,7 @@ from itertools import islice
 
 from sqlalchemy import Connection, select
 
-from skidpad.fleet.store.later import analyses, recurrences
+from skidpad.fleet.store.tables import analyses, recurrences
 from skidpad.fleet.words import Principal
 
 CHUNK = 500  # ids of one query

@@ -16,7 +16,7 @@ from skidpad.fleet.insight.trends import trends
 from skidpad.fleet.loop.rollout import Rollout, rollouts
 from skidpad.fleet.service import Fleet
 from skidpad.fleet.site.frame import table
-from skidpad.fleet.store.loop import changes
+from skidpad.fleet.store.tables import changes
 from skidpad.fleet.words import Principal
 
 ROWS = 200  # of the export that its page shows, newest first

@@ -85,7 +85,6 @@ batches = Table(
     Index("batches_by_kind", "kind", "at"),
 )
 OWNERS = ("operator", "manufacturer")
-OWNED = (*OWNERS, "vehicle")  # columns that row rights are told by
 
 
 def _owner_columns() -> list[Column[str]]:
@@ -146,4 +145,127 @@ events = Table(
     _time(),
     Index("events_by_subject", "subject", "number"),
 )
-FACTS = (tenants, vehicles, principals, credentials, batches, hazards, drives, events)
+# --- analyses, alerts and orders
+series = Table(  # what was computed of a record; computing it again gives the same
+    "series",
+    metadata,
+    Column("digest", DIGEST, primary_key=True),
+    Column("version", Integer, primary_key=True),
+    Column("content", Text, nullable=False),  # JSON
+    _time(),
+)
+analyses = Table(
+    "analyses",
+    metadata,
+    _id(),
+    _to("tenant", "tenants"),
+    Column("actor", NAME, nullable=False),
+    Column("settings", Text, nullable=False),  # JSON
+    Column("hazards", Integer, nullable=False),  # looked at
+    _time(),
+    Column("role", NAME, nullable=True),  # whose rights it used
+)
+clusters = Table(
+    "clusters",
+    metadata,
+    _id(),
+    _to("tenant", "tenants"),
+    _to("analysis", "analyses"),
+    _to("representative", "hazards"),
+    Column("rank", Integer, nullable=False),
+    Column("content", Text, nullable=False),  # JSON
+    Index("clusters_by_analysis", "analysis", "rank"),
+)
+recurrences = (
+    Table(  # which recurring hazard a hazard belongs to; the newest analysis that says so counts
+        "recurrences",
+        metadata,
+        Column("analysis", ID, ForeignKey("analyses.id"), primary_key=True),
+        Column("hazard", ID, ForeignKey("hazards.id"), primary_key=True),
+        Column("subject", ID, nullable=False),
+        _time(),
+        Index("recurrences_by_hazard", "hazard", "at"),
+    )
+)
+alerts = Table(
+    "alerts",
+    metadata,
+    _id(),
+    *_owner_columns(),
+    Column("key", NAME, nullable=False),
+    Column("digest", DIGEST, nullable=False),
+    Column("kind", NAME, nullable=False),
+    Column("text", Text, nullable=False),
+    Column("scene", Text, nullable=False),  # JSON: what the vehicle shows
+    Column("vehicle_time", Double, nullable=True),
+    _time(),
+    UniqueConstraint("vehicle", "key"),
+    Index("alerts_by_operator", "operator", "at"),
+)
+orders = Table(
+    "orders",
+    metadata,
+    _id(),
+    *_owner_columns(),
+    _to("alert", "alerts", null=True),
+    Column("what", NAME, nullable=False),
+    Column("actor", NAME, nullable=False),
+    _time("expires"),
+    _time(),
+    Column("key", NAME, nullable=True),  # of the request
+    Index("orders_by_vehicle", "vehicle", "at"),
+    Index("orders_once", "alert", "actor", "key", unique=True),
+)
+deliveries = Table(  # an order is handed out once, whoever asks at the same time
+    "deliveries",
+    metadata,
+    Column("order", ID, ForeignKey("orders.id"), primary_key=True),
+    Column("challenge", NAME, nullable=False),
+    _time(),
+)
+# --- the loop: changes, their releases, and what a change does to the scenes behind it
+changes = Table(
+    "changes",
+    metadata,
+    _id(),
+    _to("tenant", "tenants"),
+    _to("cluster", "clusters", null=True),
+    Column("kind", NAME, nullable=False),
+    Column("name", NAME, nullable=False),  # of the payload among updates
+    Column("payload", DIGEST, nullable=False),  # blob
+    Column("hazards", Text, nullable=False),  # JSON: ids of the scenes that led to it
+    Column("reason", Text, nullable=False),
+    Column("actor", NAME, nullable=False),
+    _time(),
+)
+releases = Table(
+    "releases",
+    metadata,
+    _id(),
+    _to("tenant", "tenants"),
+    _to("change", "changes"),
+    Column("plan", Text, nullable=False),  # JSON, fixed here
+    Column("before", NAME, nullable=False),  # name of the payload that it takes the place of, ""
+    Column("actor", NAME, nullable=False),
+    _time(),
+    Index("releases_by_tenant", "tenant", "at"),
+)
+evaluations = Table(
+    "evaluations",
+    metadata,
+    _id(),
+    _to("change", "changes"),
+    _to("hazard", "hazards"),
+    Column("errors_before", Integer, nullable=False),
+    Column("errors_after", Integer, nullable=False),
+    Column("found_after", Integer, nullable=False),  # whether its kind is still found in the scene
+    _time(),
+    UniqueConstraint("change", "hazard"),
+)
+looks = Table(  # at a release: each number once, whoever looks at the same time
+    "looks",
+    metadata,
+    Column("release", ID, ForeignKey("releases.id"), primary_key=True),
+    Column("number", Integer, primary_key=True),
+    _time(),
+)

@@ -28,7 +28,6 @@ from skidpad.recording.files import output_error, write_bytes
 
 LEDGER, CAMPAIGN = "ledger.jsonl", "campaign.json"
 SUM = re.compile(rb',"sum":"([0-9a-f]{8})"}$')
-IDENTITY_MAX = 256 * 1024**2  # bytes: version 0.1 wrote every run
 DAMAGED = "ledger.damaged"  # lines that were set aside
 RETRIED = frozenset({Outcome.CRASHED, Outcome.TIMEOUT})  # by resume (decision L-7)
 
@@ -265,9 +264,7 @@ def read_identity(folder: Path) -> dict[str, Any]:
     path = folder / CAMPAIGN
     if not path.is_file():
         return {}
-    identity: dict[str, Any] = decode_json(
-        read_bytes(path, "campaign", IDENTITY_MAX), str(path), dict[str, Any]
-    )
+    identity: dict[str, Any] = decode_json(read_bytes(path, "campaign"), str(path), dict[str, Any])
     return identity
 
 
@@ -278,11 +275,7 @@ def campaign_command(folder: Path) -> str:
 
 def common_configuration(folder: Path) -> dict[str, Any]:
     """What all runs of a campaign have in common."""
-    identity = read_identity(folder)
-    common = identity.get("common", {})
-    if "cells" in identity:  # written by version 0.1: a template, or every cell in full
-        common = identity.get("template") or (identity["cells"] or [{}])
-        common = common[0] if isinstance(common, list) else common
+    common = read_identity(folder).get("common", {})
     if not isinstance(common, dict):
         raise FileError(f"{folder / CAMPAIGN} does not describe a campaign")
     return dict(common)

@@ -1,22 +1,21 @@
-"""Changes, releases, evaluations."""
+"""All tables of the first version. Later versions add steps; this one then names its tables."""
 
 from __future__ import annotations
 
 from alembic import op
 
 from skidpad.fleet.store.appendonly import statements
-from skidpad.fleet.store.loop import LOOP
 from skidpad.fleet.store.tables import metadata
 
-revision = "0003"
-down_revision = "0002"
+revision = "0001"
+down_revision = None
 
 
 def upgrade() -> None:
     """Make the tables and protect them."""
     bind = op.get_bind()
-    metadata.create_all(bind, tables=list(LOOP))
-    for statement in statements(bind.dialect.name, [table.name for table in LOOP]):
+    metadata.create_all(bind)
+    for statement in statements(bind.dialect.name, metadata.tables):
         op.execute(statement)
 
 

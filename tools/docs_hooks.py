@@ -11,7 +11,10 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[1]
-OUTSIDE = {"SECURITY.md": "reliability.md", "../SECURITY.md": "reliability.md"}
+OUTSIDE = {
+    "SECURITY.md": "reliability.md", "../SECURITY.md": "reliability.md",
+    "CONTRIBUTING.md": "extending.md", "CITATION.cff": "comparison.md",
+}  # fmt: skip
 
 
 def on_files(files: Any, config: Any) -> Any:
@@ -22,6 +25,7 @@ def on_files(files: Any, config: Any) -> Any:
         "index.md": home_page(),
         "reference/cli.md": command_reference(),
         "reference/settings.md": settings_reference(),
+        "llms.txt": page_list(config.nav),
     }
     for place, content in pages.items():
         files.append(File.generated(config, place, content=content))
@@ -33,6 +37,22 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
     for target, page in OUTSIDE.items():
         markdown = markdown.replace(f"]({target})", f"]({page})")
     return markdown
+
+
+def page_list(nav: list[dict[str, Any]]) -> str:
+    """Returns all pages by subject, for language models that read the site (llmstxt.org)."""
+    lines = ["# Skidpad", "", "> A proving ground for driving automation in bad weather.", ""]
+    for part in nav:
+        for subject, pages in part.items():
+            entries = pages if isinstance(pages, list) else [{subject: pages}]
+            lines += [f"## {subject}", ""]
+            lines += [
+                f"- [{title}]({place.removesuffix('.md')}.html)"
+                for entry in entries
+                for title, place in entry.items()
+            ]
+            lines += [""]
+    return "\n".join(lines)
 
 
 def home_page() -> str:

@@ -6,8 +6,9 @@ from pathlib import Path
 
 import yaml
 
+import skidpad
 from docs_catalogue import sensor_page, vehicle_page, weather_page
-from docs_hooks import ROOT, command_reference, home_page, on_page_markdown
+from docs_hooks import ROOT, command_reference, home_page, on_page_markdown, page_list
 from skidpad.core.sensor_types import SENSORS
 from skidpad.physics.presets import preset_groups
 from skidpad.physics.types import vehicle_types
@@ -84,3 +85,16 @@ def test_numbers_of_a_weather_are_those_of_the_models() -> None:
     distance = float(ice.split("| braking from 80 km/h | ")[1].split(" m")[0])
     dry = float(section(pages, "clear-noon").split("| braking from 80 km/h | ")[1].split(" m")[0])
     assert distance > 5.0 * dry
+
+
+def test_the_list_for_language_models_has_every_page() -> None:
+    config = yaml.safe_load((ROOT / "mkdocs.yml").read_text(encoding="utf-8"))
+    text = page_list(config["nav"])
+    for page in pages_in(config["nav"]):
+        assert f"]({page.removesuffix('.md')}.html)" in text
+
+
+def test_the_citation_names_version_and_licence_of_the_package() -> None:
+    cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
+    assert cited["version"] == skidpad.__version__
+    assert f'license = "{cited["license"]}"' in (ROOT / "pyproject.toml").read_text("utf-8")

@@ -134,7 +134,7 @@ class Guide:
         """Goes on by one step, and returns what a driver has to do in it."""
         self.advance(motion)
         if self.base is None:
-            return Demand(self.v, self.a, 0.0, 0.0, 0.0, 0.0)
+            return Demand(self.v, self.a, 0.0, 0.0, 0.0, 0.0, reverse=self.v < 0.0)
         heading = self.base.heading if self.along > 0.0 else self.base.heading + pi
         c, s = cos(heading), sin(heading)
         dx, dy = motion.x - self.base.x, motion.y - self.base.y
@@ -147,6 +147,7 @@ class Guide:
             error=left - self.along * self.offset,
             error_rate=drift - self.along * self.offset_rate,
             a_lateral=self.along * self.offset_bend,
+            reverse=self.v < 0.0,
         )
 
     def ideal(self, dt: float) -> Pose:

@@ -154,4 +154,7 @@ def track_demand(
     drift = motion.vy * c - motion.vx * s
     turn = wrap_angle(after.yaw - pose.yaw)
     curvature = turn / max(abs(v) * dt, 0.05)
-    return Demand(v + behind, a, curvature, dy * c - dx * s, drift, 0.0)
+    if v < 0.0:  # the box's centre swings out beside the way of the reference point
+        curvature = -curvature
+        drift -= ((place.x - pose.x) * c + (place.y - pose.y) * s) * turn / dt
+    return Demand(v + behind, a, curvature, dy * c - dx * s, drift, 0.0, reverse=v < 0.0)

@@ -6,7 +6,7 @@ succeeds. On every backend, as it only sees poses and velocities.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import atan, cos, hypot, sin
 
 from skidpad.core.constants import G
@@ -23,6 +23,7 @@ A_LATERAL_MAX = 7.0  # m/s^2, the most that a driver steers for
 SPEED_GAIN = 1.2  # 1/s
 V_STANDING = 0.3  # m/s
 HOLD_BRAKE = 0.6
+LOOK_BACK, LOOK_BACK_TIME = 5.0, 1.5  # m at least, and s, over which a reversing driver corrects
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +36,7 @@ class Demand:
     error: float  # m, the actor lies left of where it should be
     error_rate: float  # m/s
     a_lateral: float  # m/s^2 of the demanded sideways motion
+    reverse: bool = False  # the actor shall go backwards
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,8 +72,23 @@ class ActorDriver:
 
     def command(self, motion: Motion, demand: Demand) -> VehicleCommand:
         """Pedals and steer for the coming step."""
+        if demand.reverse and motion.speed < V_STANDING:
+            return self._backwards(motion, demand)
         throttle, brake = self._pedals(motion.speed, demand)
         return VehicleCommand(throttle=throttle, brake=brake, steer=self._steer(motion, demand))
+
+    def _backwards(self, motion: Motion, d: Demand) -> VehicleCommand:
+        """Pedals as forwards, seen the other way round; the steering brings the rear axle to the path.
+
+        Over the way driven the offset obeys e'' = -2 (e + L e') / L^2, as in pure pursuit.
+        """
+        v, look = abs(motion.speed), max(LOOK_BACK, LOOK_BACK_TIME * abs(motion.speed))
+        throttle, brake = self._pedals(-motion.speed, replace(d, v=-d.v, a=-d.a))
+        slope = d.error_rate / max(v, V_STANDING)
+        kappa = d.curvature - 2.0 * (d.error + look * slope) / (look * look)
+        angle = atan(self.type.wheelbase * kappa)
+        steer = min(max(angle / (self.type.steer_max * steer_share(v)), -1.0), 1.0)
+        return VehicleCommand(throttle=throttle, brake=brake, steer=float(steer), reverse=True)
 
     def _steer(self, motion: Motion, d: Demand) -> float:
         v = max(motion.speed, V_LATERAL_MIN)

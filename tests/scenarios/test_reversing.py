@@ -108,8 +108,10 @@ def test_our_stack_stops_for_a_car_that_reverses_towards_it(tmp_path):
     ego, other = log.actors.vx[:, 0], log.actors.vx[:, 1]
     seen = log.report.radar_velocity
     known = np.isfinite(seen) & (log.t > 2.5) & (ego > 1.0)
-    known &= log.actors.x[:, 1] - log.actors.x[:, 0] < 40.0  # farther off the road answers, too
     assert known.sum() > 20
-    assert np.abs(seen[known] + (ego - other)[known]).max() < 0.7
+    right = np.abs(seen + ego - other) < 0.01
+    still = np.abs(seen + ego) < 0.1  # where what stands beside the road is nearer
+    assert (right | still)[known].all()
+    assert right[known][-15:].all()
     assert (log.actors.x[:, 1] - log.actors.x[:, 0]).min() > 4.5
     assert ego[-1] < 0.5

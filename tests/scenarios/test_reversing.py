@@ -96,10 +96,10 @@ def test_without_a_word_of_reverse_nothing_changes():
 
 
 def test_our_stack_stops_for_a_car_that_reverses_towards_it(tmp_path):
-    """Closing at the sum of both speeds: the radar says so, and the ego brakes to a stand."""
+    """Closing at the sum of both speeds: the radar says so, and the ego stands before it is reached."""
     begins = init("ego", teleport(on_lane(-1, 100)), speed(to(12)))
     begins += init("other", teleport(on_lane(-1, 220)), speed(to(-2), "linear", 2))
-    stop = event("stop", private(speed(to(0), "linear", 2)), time(11.0))
+    stop = event("stop", private(speed(to(0), "linear", 2)), time(9.5))
     file = write(tmp_path, init=begins, stories=story(stop), end=14.0)
     scenario = skidpad.Scenario(file, stack=2, actors="physical")
     while scenario.step():

@@ -13,7 +13,7 @@ from typing import Any
 ROOT = Path(__file__).resolve().parents[1]
 OUTSIDE = {
     "SECURITY.md": "reliability.md", "../SECURITY.md": "reliability.md",
-    "CONTRIBUTING.md": "extending.md", "CITATION.cff": "comparison.md",
+    "CONTRIBUTING.md": "contributing.md", "CITATION.cff": "contributing.md",
 }  # fmt: skip
 
 
@@ -23,6 +23,7 @@ def on_files(files: Any, config: Any) -> Any:
 
     pages = {
         "index.md": home_page(),
+        "contributing.md": contributing_page(),
         "reference/cli.md": command_reference(),
         "reference/settings.md": settings_reference(),
         "llms.txt": page_list(config.nav),
@@ -57,7 +58,17 @@ def page_list(nav: list[dict[str, Any]]) -> str:
 
 def home_page() -> str:
     """Returns README.md with links as seen from docs/."""
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    return _seen_from_docs("README.md")
+
+
+def contributing_page() -> str:
+    """Returns CONTRIBUTING.md and how to cite."""
+    cited = (ROOT / "CITATION.cff").read_text(encoding="utf-8")
+    return f"{_seen_from_docs('CONTRIBUTING.md')}\n## How to cite\n\n```yaml\n{cited}```\n"
+
+
+def _seen_from_docs(name: str) -> str:
+    text = (ROOT / name).read_text(encoding="utf-8")
     return re.sub(r"\]\(docs/", "](", text)
 
 
